@@ -1,0 +1,5 @@
+"""Robots by name."""
+
+from wbc.robot.loading import load
+
+__all__ = ["load"]

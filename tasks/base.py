@@ -1,0 +1,230 @@
+"""The two contracts: what a task and a constraint declare, and what is derived from it.
+
+A :class:`Task` states an error e(q, inputs) and is served by the rows
+
+    (de/dq) v + de/dt = -gain e                                     [unit of e per second]
+
+in the least-squares sense. A :class:`Constraint` states margins h(q, inputs) >= 0, rows
+lower <= A v <= upper, or simple bounds on v. A margin becomes
+
+    (dh/dq) v + dh/dt >= -rate h,      rate dt in (0, 1].
+
+Items are frozen declarations. Run-time values (targets, gains, masks) are :class:`Input`
+declarations; their values live in the controller. Jacobians, time derivatives, C code, tests and
+tables are derived from the expressions.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
+
+import casadi as ca
+import numpy as np
+
+from wbc import validation
+from wbc.symbolic.kinematics import Pose
+from wbc.symbolic.tracer import Tracer
+
+if TYPE_CHECKING:
+    from wbc.robot import Robot
+
+Kind = Literal["vector", "pose", "configuration", "tangent"]
+
+
+@dataclass(frozen=True, eq=False)
+class Input:
+    """A run-time value of an item.
+
+    Attributes:
+        name: how the user spells it, ``controller["hand"].target``.
+        kind: ``vector`` of ``size`` numbers; ``pose`` (12 numbers in the buffer: rotation by columns,
+            then position; ``pin.SE3`` at the user's border); ``configuration`` (nq numbers on the manifold);
+            ``tangent`` (nv numbers).
+        unit: SI unit, for tables and error messages.
+        size: numbers of a ``vector``; 0 means one scalar.
+        default: initial value as the user would write it. None: the value *at the configuration of the
+            first step* (:meth:`Item.initial`), so that a fresh controller stays where it is.
+        rate: name of the input that holds this one's time derivative: same size for a vector, a twist
+            (linear; angular, 6, in the axes the pose is given in) for a pose, nv for a configuration.
+        low, high: valid range of each number.
+    """
+
+    name: str
+    kind: Kind = "vector"
+    unit: str = ""
+    size: int = 0
+    default: Any = None
+    rate: str | None = None
+    low: float = -np.inf
+    high: float = np.inf
+
+
+@dataclass(frozen=True)
+class Row:
+    """One row of an item: ``label`` within the item ("x", "panda_joint4") and the unit of its error or margin."""
+
+    label: str
+    unit: str
+
+
+class Order(IntEnum):
+    """Order of sacrifice when rows cannot all hold: a higher number gives way first."""
+
+    ACTUATOR = 0
+    POSITION = 1
+    HOLD = 2
+    MARGIN = 3
+    SOFT = 4
+
+
+#: What an item's expressions receive: SX vectors, SX scalars, or :class:`Pose` for a pose input.
+Values = Mapping[str, Any]
+
+_registry: dict[str, type[Item]] = {}
+
+
+@dataclass(frozen=True)
+class Item:
+    """Common ground of tasks and constraints."""
+
+    #: Abstract classes stay out of the registry
+    abstract: ClassVar[bool] = True
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        super().__init_subclass__(**options)
+        if "abstract" not in cls.__dict__:
+            cls.abstract = False
+        if not cls.abstract:
+            _registry[cls.__name__] = cls
+
+    def validate(self, robot: Robot) -> None:
+        """Check the declaration against a robot; called by ``stack.add``.
+
+        Raises:
+            WbcError: an unknown frame or joint, a wrong shape, a value out of range.
+        """
+
+    def inputs(self, robot: Robot) -> tuple[Input, ...]:
+        """Run-time inputs, besides those that every item has (see :class:`Task`, :class:`Constraint`)."""
+        return ()
+
+    def rows(self, robot: Robot) -> tuple[Row, ...]:
+        """Labels and units of the rows, in the order of the expression."""
+        raise TypeError(f"{type(self).__name__} declares no rows")
+
+    def initial(self, robot: Robot, q: np.ndarray) -> dict[str, Any]:
+        """Values at configuration ``q`` of the inputs whose default is None."""
+        return {}
+
+    def declaration(self) -> dict[str, Any]:
+        """Everything that decides the compiled code, as plain data; part of the cache key."""
+        return {"class": f"{type(self).__module__}.{type(self).__qualname__}"} | {
+            f.name: _plain(getattr(self, f.name)) for f in dataclasses.fields(self)
+        }
+
+
+@dataclass(frozen=True)
+class Task(Item):
+    """A wish: e(q, inputs) -> 0, weighted against the other wishes of its level.
+
+    Every task has the run-time inputs ``gain`` [1/s], ``weight``, ``enabled`` and ``mask`` (one number
+    >= 0 a row, multiplies the row's weight).
+    """
+
+    abstract: ClassVar[bool] = True
+
+    #: Default gain [1/s]: e decays like exp(-gain t) where nothing hinders it
+    default_gain: ClassVar[float] = 2.0
+
+    def error(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
+        """e(q, inputs), one entry a row, in the rows' units."""
+        raise TypeError(f"{type(self).__name__} declares no error")
+
+    def jacobian(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX | None:
+        """None: the Jacobian is derived from :meth:`error`. A task on the velocity itself (damping)
+        returns the matrix of its rows here."""
+        return None
+
+    def row_factor(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX | None:
+        """None, or one smooth factor in [0, 1] a row by which the row's weight is multiplied: a task that
+        fades where its error is singular."""
+        return None
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Constraint rows lower <= A v <= upper; equal bounds make an equality. ``A`` is rows x nv."""
+
+    matrix: ca.SX
+    lower: ca.SX
+    upper: ca.SX
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """Simple bounds lower <= v <= upper, nv entries each; +-inf where there is none."""
+
+    lower: ca.SX
+    upper: ca.SX
+
+
+@dataclass(frozen=True)
+class Constraint(Item):
+    """What must hold. A subclass implements exactly one of :meth:`margins`, :meth:`velocity_rows`, :meth:`bounds`.
+
+    Every constraint has the run-time inputs ``enabled`` and ``mask`` (0 or 1 a row); one with margins
+    also ``rate`` [1/s].
+    """
+
+    abstract: ClassVar[bool] = True
+    order: ClassVar[Order] = Order.MARGIN
+
+    #: Default rate [1/s] of margins: h decays no faster than exp(-rate t)
+    default_rate: ClassVar[float] = 20.0
+
+    def margins(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX | None:
+        """h(q, inputs) >= 0, one entry a row, or None."""
+        return None
+
+    def velocity_rows(self, robot: Robot, kin: Tracer, inputs: Values, dt: ca.SX) -> Rows | None:
+        """lower <= A v <= upper, or None."""
+        return None
+
+    def bounds(self, robot: Robot, kin: Tracer, inputs: Values, dt: ca.SX) -> Bounds | None:
+        """Simple bounds on v, or None; ``kin.v`` is the velocity that accelerations are counted from."""
+        return None
+
+
+def registry() -> dict[str, type[Item]]:
+    """Every concrete task and constraint class by name, the user's own included."""
+    return dict(_registry)
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Item):
+        return value.declaration()
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        return {"class": type(value).__qualname__} | {
+            f.name: _plain(getattr(value, f.name)) for f in dataclasses.fields(value)
+        }
+    if isinstance(value, (list, tuple)):
+        return [_plain(v) for v in value]
+    if isinstance(value, Mapping):
+        return {str(k): _plain(v) for k, v in value.items()}
+    if isinstance(value, np.ndarray):
+        return [float(v).hex() for v in value.ravel()] + list(value.shape)
+    if isinstance(value, np.generic):
+        return value.item()
+    if hasattr(value, "homogeneous"):
+        return _plain(np.asarray(value.homogeneous))
+    if isinstance(value, (str, int, bool, type(None))):
+        return value
+    if isinstance(value, float):
+        return value.hex()
+    if isinstance(value, ca.Function):
+        return value.serialize()
+    raise validation.ShapeError("declaration", value, "only plain data, arrays, poses and CasADi functions")

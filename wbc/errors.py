@@ -1,0 +1,101 @@
+"""The error hierarchy: every error that this package raises on purpose is a :class:`WbcError`.
+
+An error names the *field* that was wrong, the *value* that was given and, where the choice is
+from a list, the valid *choices* with the nearest one first. Raising leaves every object as it was.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+from typing import Any
+
+
+class WbcError(Exception):
+    """Root of all errors of this package.
+
+    Attributes:
+        field: what was wrong, as the caller spells it (``"q"``, ``"hand.target"``).
+        value: the value that was given.
+        choices: the valid values, nearest first; empty where there is no list to choose from.
+    """
+
+    def __init__(self, field: str, value: Any, reason: str, choices: Iterable[str] = ()) -> None:
+        self.field = field
+        self.value = value
+        self.choices = tuple(choices)
+        text = f"{field}: {reason} (got {_short(value)})"
+        if self.choices:
+            shown = ", ".join(self.choices[:8])
+            more = f", ... {len(self.choices) - 8} more" if len(self.choices) > 8 else ""
+            text += f"; valid: {shown}{more}"
+        super().__init__(text)
+
+
+class UnknownNameError(WbcError):
+    """A frame, joint, item, robot, solver or option name that does not exist."""
+
+    def __init__(self, field: str, value: Any, choices: Iterable[str]) -> None:
+        ranked = nearest(str(value), choices)
+        hint = f"unknown name, did you mean {ranked[0]!r}?" if ranked else "unknown name"
+        super().__init__(field, value, hint, ranked)
+
+
+class DuplicateNameError(WbcError):
+    """A name that is taken already."""
+
+
+class ShapeError(WbcError):
+    """An array of the wrong shape or an object of the wrong type."""
+
+
+class NotFiniteError(WbcError):
+    """NaN or infinity where a finite number is needed."""
+
+
+class RangeError(WbcError):
+    """A number outside its valid range (negative weight, dt <= 0, rate * dt > 1)."""
+
+
+class BoundsError(WbcError):
+    """Lower bounds above upper bounds."""
+
+
+class RotationError(WbcError):
+    """A quaternion that is not of unit length, or a matrix that is not a rotation."""
+
+
+class RobotFileError(WbcError):
+    """A robot description that cannot be read or parsed."""
+
+
+class UnsupportedJointError(WbcError):
+    """A joint type that the symbolic kinematics do not cover."""
+
+
+class LevelError(WbcError):
+    """A level that this version does not implement; it is never turned into a weight."""
+
+
+class SolverError(WbcError):
+    """A solver that is missing or that failed outside of a tick."""
+
+
+class CompileError(WbcError):
+    """The C compiler was asked for and could not build the tick."""
+
+
+def nearest(name: str, choices: Iterable[str]) -> tuple[str, ...]:
+    """All choices, the most similar to ``name`` first."""
+    lowered = name.lower()
+
+    def distance(choice: str) -> tuple[float, str]:
+        ratio = difflib.SequenceMatcher(None, lowered, choice.lower()).ratio()
+        return (-ratio, choice)
+
+    return tuple(sorted(set(choices), key=distance))
+
+
+def _short(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= 120 else text[:117] + "..."

@@ -1,0 +1,231 @@
+"""The robot: a ``pin.Model`` with limits, named frames, link shapes and couplings. Immutable."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from wbc import validation
+from wbc.errors import DuplicateNameError, RotationError, ShapeError, UnknownNameError
+from wbc.robot.limits import Limits
+from wbc.shapes import PlacedShape
+from wbc.symbolic.kinematics import WORLD
+from wbc.validation import Array
+
+BASES = ("fixed", "floating", "planar", "differential")
+
+
+@dataclass(frozen=True)
+class Coupling:
+    """A mimic joint: v[follower] = ratio * v[leader], and q likewise plus ``offset``. Indices into v."""
+
+    follower: int
+    leader: int
+    ratio: float
+    offset: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Robot:
+    """A robot model and what the description says about it.
+
+    Attributes:
+        name: short name, as ``wbc.robots.load`` takes it.
+        model: the Pinocchio model. Not to be changed; added frames are in it.
+        limits: see :class:`Limits`.
+        base: ``fixed``, ``floating`` (free flyer), ``planar`` (x, y, yaw) or ``differential`` (planar,
+            no sideways velocity).
+        neutral: a configuration within the position limits, used where one is needed [nq].
+        shapes: link frame name -> collision shapes fixed to it.
+        couplings: mimic joints that are kept as degrees of freedom.
+        frames: role -> frame name ("tip", "shoulder", "elbow", "wrist", ...), where the table knows them.
+        notes: where limits come from, one sentence a key ("acceleration", "shapes", ...).
+    """
+
+    name: str
+    model: pin.Model
+    limits: Limits
+    base: str = "fixed"
+    neutral: Array = field(default_factory=lambda: np.zeros(0))
+    shapes: Mapping[str, tuple[PlacedShape, ...]] = field(default_factory=dict)
+    couplings: tuple[Coupling, ...] = ()
+    frames: Mapping[str, str] = field(default_factory=dict)
+    notes: Mapping[str, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        validation.one_of("robot.base", self.base, BASES)
+        if self.limits.velocity.shape != (self.nv,):
+            raise ShapeError("robot.limits", self.limits.velocity, f"expected {self.nv} entries each")
+        neutral = self.neutral if np.size(self.neutral) else pin.neutral(self.model)
+        object.__setattr__(self, "neutral", self.configuration("robot.neutral", neutral))
+
+    @property
+    def nq(self) -> int:
+        """Numbers in a configuration."""
+        return int(self.model.nq)
+
+    @property
+    def nv(self) -> int:
+        """Degrees of freedom (numbers in a velocity)."""
+        return int(self.model.nv)
+
+    @cached_property
+    def frame_names(self) -> tuple[str, ...]:
+        """Names of all frames, ``"world"`` first."""
+        seen = dict.fromkeys([WORLD] + [str(f.name) for f in self.model.frames])
+        return tuple(seen)
+
+    @cached_property
+    def joint_names(self) -> tuple[str, ...]:
+        """Names of the moving joints, the base joint included."""
+        return tuple(str(n) for n in list(self.model.names)[1:])
+
+    @cached_property
+    def dof_names(self) -> tuple[str, ...]:
+        """One label a degree of freedom: the joint's name, with a suffix where a joint has several."""
+        suffixes = {6: ("x", "y", "z", "rx", "ry", "rz"), 3: ("x", "y", "yaw")}
+        out: list[str] = []
+        for j in range(1, self.model.njoints):
+            name, nv = str(self.model.names[j]), int(self.model.nvs[j])
+            if nv == 1:
+                out.append(name)
+                continue
+            labels = suffixes.get(nv, tuple(str(i) for i in range(nv)))
+            if "Spherical" in self.model.joints[j].shortname():
+                labels = ("rx", "ry", "rz")
+            out += [f"{name}.{label}" for label in labels]
+        return tuple(out)
+
+    @cached_property
+    def dof_units(self) -> tuple[str, ...]:
+        """``"rad"`` or ``"m"`` for each degree of freedom."""
+        units: list[str] = []
+        data = self.model.createData()
+        pin.computeJointJacobians(self.model, data, self.neutral)
+        for j in range(1, self.model.njoints):
+            jacobian = pin.getJointJacobian(self.model, data, j, pin.LOCAL)
+            start, nv = int(self.model.idx_vs[j]), int(self.model.nvs[j])
+            for column in jacobian[:, start : start + nv].T:
+                units.append("rad" if np.abs(column[3:]).max() > 1e-9 else "m")
+        return tuple(units)
+
+    @cached_property
+    def position_index(self) -> Array:
+        """Per degree of freedom, the index in q of the coordinate that it is the rate of, or -1."""
+        out = np.full(self.nv, -1, dtype=int)
+        for j in range(1, self.model.njoints):
+            nq, nv = int(self.model.nqs[j]), int(self.model.nvs[j])
+            if nq == nv:
+                for k in range(nv):
+                    out[int(self.model.idx_vs[j]) + k] = int(self.model.idx_qs[j]) + k
+        return out
+
+    @cached_property
+    def characteristic_length(self) -> float:
+        """The length [m] that ties metres to radians: the longest chain of joint placements from the root.
+
+        A metre of error costs as much as 1 / length radians. It scales with the robot, so a model in
+        millimetres gets the same answers. 1 for a robot whose joints all share one origin.
+        """
+        reach = np.zeros(self.model.njoints)
+        for j in range(1, self.model.njoints):
+            parent = int(self.model.parents[j])
+            step = float(np.linalg.norm(self.model.jointPlacements[j].translation)) if parent > 0 else 0.0
+            reach[j] = reach[parent] + step
+        longest = float(reach.max()) if len(reach) else 0.0
+        return longest if longest > 0.0 else 1.0
+
+    def check_frame(self, field_name: str, frame: Any) -> str:
+        """The frame's name, or an :class:`UnknownNameError` that lists the nearest ones."""
+        return validation.one_of(field_name, frame, self.frame_names)
+
+    def dofs(self, joint: str, field_name: str = "joint") -> slice:
+        """Where the velocities of a joint stand in v.
+
+        Raises:
+            UnknownNameError: no such joint.
+        """
+        validation.one_of(field_name, joint, self.joint_names)
+        j = int(self.model.getJointId(joint))
+        start = int(self.model.idx_vs[j])
+        return slice(start, start + int(self.model.nvs[j]))
+
+    def configuration(self, field_name: str, q: Any) -> Array:
+        """A checked float64 copy of a configuration; quaternions and unit circles must have unit length.
+
+        Raises:
+            ShapeError, NotFiniteError, RotationError.
+        """
+        out = validation.real_array(field_name, q, (self.nq,))
+        if not pin.isNormalized(self.model, out, validation.ROTATION_TOLERANCE):
+            raise RotationError(field_name, q, "a quaternion or (cos, sin) pair is not of unit length")
+        return out
+
+    def with_frame(self, name: str, parent: str, placement: Any = None) -> Robot:
+        """A copy with one more frame, fixed to ``parent`` at ``placement`` (default: identity).
+
+        Raises:
+            DuplicateNameError, UnknownNameError, RotationError.
+        """
+        if name in self.frame_names:
+            raise DuplicateNameError("frame", name, "a frame of this name exists")
+        self.check_frame("parent", parent)
+        local = validation.pose("placement", placement) if placement is not None else pin.SE3.Identity()
+        model = pin.Model(self.model)
+        if parent == WORLD:
+            model.addFrame(pin.Frame(name, 0, 0, local, pin.FrameType.OP_FRAME))
+        else:
+            above = model.frames[model.getFrameId(parent)]
+            model.addFrame(
+                pin.Frame(name, above.parentJoint, model.getFrameId(parent), above.placement * local,
+                          pin.FrameType.OP_FRAME))
+        return replace(self, model=model)
+
+    def with_limits(self, **changes: Any) -> Robot:
+        """A copy with overridden limits, see :meth:`Limits.override`."""
+        return replace(self, limits=self.limits.override(**changes))
+
+    def with_shapes(self, shapes: Mapping[str, Sequence[PlacedShape]]) -> Robot:
+        """A copy with other link shapes.
+
+        Raises:
+            UnknownNameError: a link frame that does not exist.
+        """
+        for frame in shapes:
+            self.check_frame("shapes", frame)
+        return replace(self, shapes={k: tuple(v) for k, v in shapes.items()})
+
+    @cached_property
+    def fingerprint(self) -> str:
+        """Hash of everything about the model that compiled code depends on."""
+        h = hashlib.sha256()
+        m = self.model
+        for j in range(1, m.njoints):
+            h.update(f"{m.names[j]} {m.parents[j]} {m.joints[j].shortname()}\n".encode())
+            joint = m.joints[j].extract()
+            if hasattr(joint, "axis"):
+                h.update(np.asarray(joint.axis).tobytes())
+            if hasattr(joint, "jointPlacements"):
+                for part, place in zip(joint.joints, joint.jointPlacements, strict=True):
+                    axis = getattr(part.extract(), "axis", None)
+                    h.update(part.shortname().encode() + place.homogeneous.tobytes())
+                    h.update(b"" if axis is None else np.asarray(axis).tobytes())
+            h.update(m.jointPlacements[j].homogeneous.tobytes())
+            h.update(m.inertias[j].toDynamicParameters().tobytes())
+        for f in m.frames:
+            h.update(f"{f.name} {f.parentJoint}\n".encode() + f.placement.homogeneous.tobytes())
+        for array in (self.limits.position_lower, self.limits.position_upper, self.limits.velocity,
+                      self.limits.acceleration, self.limits.effort, self.neutral):
+            h.update(np.ascontiguousarray(array).tobytes())
+        h.update(repr((self.base, self.couplings)).encode())
+        for frame, shapes in sorted(self.shapes.items()):
+            for s in shapes:
+                h.update(f"{frame} {s.shape} {s.excess!r}".encode() + s.placement.homogeneous.tobytes())
+        return h.hexdigest()
+

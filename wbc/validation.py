@@ -1,0 +1,100 @@
+"""Checks at the border: every value that a user hands in passes through one of these.
+
+Each function returns a fresh float64 copy (or a float) and raises a typed error that names
+the field; nothing is changed when it raises.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from wbc.errors import NotFiniteError, RangeError, RotationError, ShapeError, UnknownNameError
+
+Array = NDArray[np.float64]
+
+#: How far a rotation may be from orthonormal (Frobenius norm of R'R - I) or a quaternion from unit length.
+ROTATION_TOLERANCE = 1e-6
+
+
+def real_array(field: str, value: Any, shape: tuple[int, ...] | None = None, *, finite: bool = True) -> Array:
+    """A float64 copy of ``value`` with the given shape; int, float32, lists and tuples are welcome."""
+    try:
+        raw = np.asarray(value)
+        if raw.dtype.kind not in "iufb":
+            raise TypeError(raw.dtype)
+        out = np.array(raw, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise ShapeError(field, value, "expected real numbers") from error
+    if shape is not None and out.shape != shape:
+        raise ShapeError(field, value, f"expected shape {shape}, not {out.shape}")
+    if finite and not np.isfinite(out).all():
+        raise NotFiniteError(field, value, "expected finite numbers")
+    return out
+
+
+def scalar(
+    field: str,
+    value: Any,
+    *,
+    low: float = -np.inf,
+    high: float = np.inf,
+    open_low: bool = False,
+    unit: str = "",
+) -> float:
+    """A finite float within [low, high], or (low, high] with ``open_low``."""
+    number = float(real_array(field, value, ()))
+    bad = number <= low if open_low else number < low
+    if bad or number > high:
+        left = "(" if open_low else "["
+        raise RangeError(field, value, f"expected a value in {left}{low:g}, {high:g}] {unit}".rstrip())
+    return number
+
+
+def flag(field: str, value: Any) -> bool:
+    """A bool; 0 and 1 are accepted, other values are not."""
+    if isinstance(value, (bool, np.bool_)) or (isinstance(value, (int, np.integer)) and int(value) in (0, 1)):
+        return bool(value)
+    raise ShapeError(field, value, "expected True or False")
+
+
+def one_of(field: str, value: Any, choices: Iterable[str]) -> str:
+    """A name out of ``choices``."""
+    names = tuple(choices)
+    if not isinstance(value, str) or value not in names:
+        raise UnknownNameError(field, value, names)
+    return value
+
+
+def rotation(field: str, value: Any) -> Array:
+    """A 3x3 rotation matrix, from a matrix or from a unit quaternion (x, y, z, w)."""
+    raw = real_array(field, value)
+    if raw.shape == (4,):
+        norm = float(np.linalg.norm(raw))
+        if abs(norm - 1.0) > ROTATION_TOLERANCE:
+            raise RotationError(field, value, f"quaternion x, y, z, w of norm {norm:.9g}, expected 1")
+        return np.asarray(pin.Quaternion(raw / norm).matrix(), dtype=np.float64)
+    if raw.shape != (3, 3):
+        raise ShapeError(field, value, f"expected a 3x3 rotation or a quaternion (x, y, z, w), not shape {raw.shape}")
+    off = float(np.linalg.norm(raw.T @ raw - np.eye(3)))
+    if off > ROTATION_TOLERANCE or np.linalg.det(raw) < 0.0:
+        raise RotationError(field, value, f"not a rotation matrix (|R'R - 1| = {off:.3g}, det = {np.linalg.det(raw):.3g})")
+    return raw
+
+
+def pose(field: str, value: Any) -> pin.SE3:
+    """A pose, from ``pin.SE3``, a 4x4 homogeneous matrix or seven numbers (position, quaternion x, y, z, w)."""
+    if isinstance(value, pin.SE3):
+        return pin.SE3(rotation(field, value.rotation), real_array(field, value.translation, (3,)))
+    raw = real_array(field, value)
+    if raw.shape == (7,):
+        return pin.SE3(rotation(field, raw[3:]), raw[:3])
+    if raw.shape == (4, 4):
+        if not np.array_equal(raw[3], (0.0, 0.0, 0.0, 1.0)):
+            raise RotationError(field, value, "last row of a homogeneous matrix must be 0, 0, 0, 1")
+        return pin.SE3(rotation(field, raw[:3, :3]), raw[:3, 3])
+    raise ShapeError(field, value, "expected a pin.SE3, a 4x4 matrix or (position, quaternion x, y, z, w)")
