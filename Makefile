@@ -1,0 +1,77 @@
+# The only commands needed on a machine with Python 3.11 (or newer), pip and gcc: `make demo`, `make test`.
+
+PYTHON ?= $(shell command -v python3.11 || command -v python3 || echo python3)
+VENV ?= .venv
+PEERS_VENV ?= .venv-peers
+# Extra arguments for pytest, e.g. make test PYTEST_ARGS="-k panda"
+PYTEST_ARGS ?=
+# Processes of pytest; "auto" is one a core
+PYTEST_JOBS ?= auto
+
+BIN := $(VENV)/bin
+READY := $(VENV)/.ready
+PEERS_READY := $(PEERS_VENV)/.ready
+TYPES := build/types
+SOURCES := wbc tasks robots tests bench examples
+
+.DEFAULT_GOAL := help
+.PHONY: help setup demo test lint format types bench lock clean
+
+help:  ## list the targets
+	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 10
+
+setup: $(READY)  ## create .venv with the pinned packages and this one
+
+demo: $(READY)  ## the main job: a Panda follows a timed path round an obstacle
+	$(BIN)/python -m examples.demo
+
+test: $(READY)  ## all tests
+	$(BIN)/python -m pytest -n $(PYTEST_JOBS) $(PYTEST_ARGS)
+
+lint: $(READY)  ## ruff: rules and format
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+
+format: $(READY)  ## apply ruff's fixes and format
+	$(BIN)/ruff check --fix-only .
+	$(BIN)/ruff format .
+
+# tasks/ and robots/ install as wbc.tasks and wbc.robots; mypy gets the same picture as a tree of links.
+types: $(READY)  ## mypy --strict on the package
+	@rm -rf $(TYPES) && mkdir -p $(TYPES)/wbc
+	@ln -s $(CURDIR)/wbc/* $(CURDIR)/tasks $(CURDIR)/robots $(TYPES)/wbc/
+	cd $(TYPES) && $(abspath $(BIN))/mypy --config-file $(CURDIR)/pyproject.toml \
+		--cache-dir $(CURDIR)/.mypy_cache --strict -p wbc
+
+bench: $(READY) $(PEERS_READY)  ## compare with pink, mink and placo on the same problems
+	$(BIN)/python -m bench --peers-python $(PEERS_VENV)/bin/python
+
+lock: $(READY)  ## write the versions in .venv to requirements/lock.txt
+	$(BIN)/python requirements/freeze.py > requirements/lock.txt.new
+	mv requirements/lock.txt.new requirements/lock.txt
+
+clean:  ## remove environments, builds and caches
+	rm -rf $(VENV) $(PEERS_VENV) build dist runs *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
+
+# An environment is ready when everything in it is installed; a change of the pins makes it again in place.
+$(READY): requirements/lock.txt pyproject.toml
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' \
+		|| { echo "Python 3.11 or newer is needed; say which: make PYTHON=/path/to/python3.11"; exit 1; }
+	$(call make_venv,$(VENV))
+	$(BIN)/python -m pip install --quiet --requirement requirements/lock.txt
+	$(BIN)/python -m pip install --quiet --no-deps --no-build-isolation --editable .
+	@touch $@
+
+$(PEERS_READY): requirements/peers.txt
+	$(call make_venv,$(PEERS_VENV))
+	$(PEERS_VENV)/bin/python -m pip install --quiet --requirement requirements/peers.txt
+	@touch $@
+
+# Debian splits ensurepip off from Python; then pip is brought in by the pip outside.
+define make_venv
+	@test -x $(1)/bin/python && $(1)/bin/python -m pip --version > /dev/null 2>&1 \
+		|| { echo "creating $(1) with $(PYTHON)"; rm -rf $(1); $(PYTHON) -m venv $(1) 2> /dev/null; } \
+		|| { rm -rf $(1) && $(PYTHON) -m venv --without-pip $(1) \
+			&& $(PYTHON) -m pip --python $(1)/bin/python install --quiet pip; }
+endef
