@@ -24,6 +24,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import casadi as ca
 import numpy as np
+from numpy.typing import NDArray
 
 from wbc import validation
 from wbc.symbolic.kinematics import Pose
@@ -32,7 +33,10 @@ from wbc.symbolic.tracer import Tracer
 if TYPE_CHECKING:
     from wbc.robot import Robot
 
-Kind = Literal["vector", "pose", "configuration", "tangent"]
+Kind = Literal["vector", "pose", "rotation", "configuration", "tangent"]
+
+#: What an item contributes: task rows, margin rows, plain rows on v, or simple bounds on v.
+Form = Literal["task", "margins", "rows", "bounds"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,14 +46,16 @@ class Input:
     Attributes:
         name: how the user spells it, ``controller["hand"].target``.
         kind: ``vector`` of ``size`` numbers; ``pose`` (12 numbers in the buffer: rotation by columns,
-            then position; ``pin.SE3`` at the user's border); ``configuration`` (nq numbers on the manifold);
-            ``tangent`` (nv numbers).
+            then position; ``pin.SE3`` at the user's border); ``rotation`` (9 numbers by columns; a 3x3 matrix or a
+            quaternion x, y, z, w at the border); ``configuration`` (nq numbers on the manifold); ``tangent``
+            (nv numbers).
         unit: SI unit, for tables and error messages.
         size: numbers of a ``vector``; 0 means one scalar.
         default: initial value as the user would write it. None: the value *at the configuration of the
             first step* (:meth:`Item.initial`), so that a fresh controller stays where it is.
         rate: name of the input that holds this one's time derivative: same size for a vector, a twist
-            (linear; angular, 6, in the axes the pose is given in) for a pose, nv for a configuration.
+            (linear; angular, 6, in the axes the pose is given in) for a pose, an angular velocity (3) for a
+            rotation, nv numbers for a configuration.
         low, high: valid range of each number.
     """
 
@@ -116,7 +122,11 @@ class Item:
         """Labels and units of the rows, in the order of the expression."""
         raise TypeError(f"{type(self).__name__} declares no rows")
 
-    def initial(self, robot: Robot, q: np.ndarray) -> dict[str, Any]:
+    def row_weights(self, robot: Robot) -> NDArray[np.float64]:
+        """Declared weight of each row, multiplied with the item's weight and the run-time mask."""
+        return np.ones(len(self.rows(robot)))
+
+    def initial(self, robot: Robot, q: NDArray[np.float64]) -> dict[str, Any]:
         """Values at configuration ``q`` of the inputs whose default is None."""
         return {}
 
@@ -185,6 +195,19 @@ class Constraint(Item):
 
     #: Default rate [1/s] of margins: h decays no faster than exp(-rate t)
     default_rate: ClassVar[float] = 20.0
+
+    @property
+    def form(self) -> Form:
+        """Which of the three a subclass implements."""
+        mine = [
+            name
+            for name in ("margins", "velocity_rows", "bounds")
+            if getattr(type(self), name) is not getattr(Constraint, name)
+        ]
+        if len(mine) != 1:
+            raise TypeError(f"{type(self).__name__} must implement exactly one of margins, velocity_rows, bounds")
+        forms: dict[str, Form] = {"margins": "margins", "velocity_rows": "rows", "bounds": "bounds"}
+        return forms[mine[0]]
 
     def margins(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX | None:
         """h(q, inputs) >= 0, one entry a row, or None."""

@@ -1,0 +1,143 @@
+"""The stack as declared: a robot, a time step, and named items with levels and weights."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import Any
+
+from wbc import validation
+from wbc.errors import DuplicateNameError, LevelError, RangeError, ShapeError, UnknownNameError
+from wbc.robot import Robot
+from wbc.tasks.base import Constraint, Item, Task
+
+#: Default cost of velocity against a task row of weight 1, per (rad/s)^2: keeps the optimum unique.
+#: It biases a posture task of weight w by the fraction damping / w.
+DAMPING = 1e-8
+
+#: The time step may vary from tick to tick within these factors of the declared one.
+DT_FACTORS = (0.25, 2.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Entry:
+    """One item of a stack, with the name, level and weight it was added with."""
+
+    item: Item
+    name: str
+    level: int
+    weight: float
+
+    @property
+    def is_task(self) -> bool:
+        """Task (True) or constraint (False)."""
+        return isinstance(self.item, Task)
+
+
+class Declaration:
+    """Items on a robot. See :class:`wbc.Stack`, which adds ``compile``."""
+
+    def __init__(self, robot: Robot, dt: float, *, damping: float = DAMPING, length: float | None = None) -> None:
+        if not isinstance(robot, Robot):
+            raise ShapeError("robot", robot, "expected a wbc Robot, see wbc.robots.load")
+        self._robot = robot
+        self._dt = validation.scalar("dt", dt, low=0.0, open_low=True, unit="s")
+        self._damping = validation.scalar("damping", damping, low=1e-12, high=1.0)
+        chosen = robot.characteristic_length if length is None else length
+        self._length = validation.scalar("length", chosen, low=0.0, open_low=True, unit="m")
+        self._entries: dict[str, Entry] = {}
+
+    @property
+    def robot(self) -> Robot:
+        """The robot."""
+        return self._robot
+
+    @property
+    def dt(self) -> float:
+        """Declared time step [s]."""
+        return self._dt
+
+    @property
+    def dt_range(self) -> tuple[float, float]:
+        """Shortest and longest time step that ``step`` accepts [s]."""
+        return (DT_FACTORS[0] * self._dt, DT_FACTORS[1] * self._dt)
+
+    @property
+    def damping(self) -> float:
+        """Cost of velocity that keeps the optimum unique, see :data:`DAMPING`."""
+        return self._damping
+
+    @property
+    def length(self) -> float:
+        """Characteristic length [m]: a row in metres is divided by it."""
+        return self._length
+
+    @property
+    def entries(self) -> tuple[Entry, ...]:
+        """Items in the order they were added."""
+        return tuple(self._entries.values())
+
+    @property
+    def tasks(self) -> tuple[Entry, ...]:
+        """Tasks in order."""
+        return tuple(e for e in self._entries.values() if e.is_task)
+
+    @property
+    def constraints(self) -> tuple[Entry, ...]:
+        """Constraints in order."""
+        return tuple(e for e in self._entries.values() if not e.is_task)
+
+    def add(self, item: Item, name: str | None = None, level: int = 0, weight: float = 1.0) -> Declaration:
+        """Add an item; returns the stack, so that calls chain.
+
+        Args:
+            item: a task or constraint.
+            name: how rows, errors and ``controller[name]`` call it; default: the class name in snake case.
+            level: only 0 in this version.
+            weight: of a task against the others, >= 0; the cost of a row is weight * (rate error / scale)^2
+                with scale = characteristic length for rows in metres, else 1.
+
+        Raises:
+            DuplicateNameError, LevelError, RangeError, ShapeError, UnknownNameError: bad input; the stack is unchanged.
+        """
+        if not isinstance(item, (Task, Constraint)):
+            raise ShapeError("item", item, "expected a task or a constraint instance")
+        chosen = _snake(type(item).__name__) if name is None else name
+        if not isinstance(chosen, str) or not chosen:
+            raise ShapeError("name", name, "expected a non-empty string")
+        if chosen in self._entries:
+            raise DuplicateNameError("name", chosen, "an item of this name is in the stack; give another with name=")
+        if isinstance(level, bool) or not isinstance(level, int):
+            raise ShapeError("level", level, "expected an integer")
+        if level != 0:
+            raise LevelError("level", level, "strict levels are not implemented; a level is never turned into a weight", ("0",))
+        number = validation.scalar("weight", weight, low=0.0)
+        if isinstance(item, Constraint) and number != 1.0:
+            raise RangeError("weight", weight, "a constraint is hard and has no weight")
+        item.validate(self._robot)
+        self._entries[chosen] = Entry(item, chosen, level, number)
+        return self
+
+    def __getitem__(self, name: str) -> Entry:
+        if name not in self._entries:
+            raise UnknownNameError("item", name, self._entries)
+        return self._entries[name]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._entries
+
+    def __len__(self) -> int:
+        return len(self._entries)
+
+    def key_data(self) -> dict[str, Any]:
+        """Plain data that the compiled code is a function of. Weights are run-time values and not in it."""
+        return {
+            "robot": self._robot.fingerprint,
+            "length": self._length.hex(),
+            "damping": self._damping.hex(),
+            "items": [[e.name, e.item.declaration()] for e in self.entries],
+        }
+
+
+def _snake(name: str) -> str:
+    return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", name).lower()

@@ -1,0 +1,124 @@
+"""Where everything stands in the flat buffers, known from the declaration alone (no expression is built)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from wbc.errors import ShapeError
+from wbc.stack.declaration import Declaration, Entry
+from wbc.tasks.base import Constraint, Form, Input, Row
+
+#: Numbers that an input of each kind takes in the buffer; configuration and tangent depend on the robot.
+_SIZES = {"pose": 12, "rotation": 9}
+
+
+@dataclass(frozen=True, eq=False)
+class Slot:
+    """An input and its place in the parameter buffer."""
+
+    input: Input
+    start: int
+    size: int
+
+    @property
+    def slice(self) -> slice:
+        """Place in the parameter buffer."""
+        return slice(self.start, self.start + self.size)
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """An item's rows and inputs.
+
+    ``start`` counts within the rows of the same form: task rows, general constraint rows, or, for
+    bounds, blocks of nv. ``margin_start`` counts margin rows only (-1: none).
+    """
+
+    entry: Entry
+    form: Form
+    rows: tuple[Row, ...]
+    start: int
+    margin_start: int
+    slots: dict[str, Slot]
+
+    @property
+    def slice(self) -> slice:
+        """Rows of the block within its form."""
+        return slice(self.start, self.start + len(self.rows))
+
+    @property
+    def margins(self) -> slice:
+        """Margin rows of the block."""
+        return slice(self.margin_start, self.margin_start + len(self.rows))
+
+
+class Layout:
+    """Blocks in stack order and the sizes of all buffers."""
+
+    def __init__(self, stack: Declaration) -> None:
+        robot = stack.robot
+        self.nq, self.nv = robot.nq, robot.nv
+        self.parameters = 0
+        self.task_rows = self.general_rows = self.bound_blocks = self.margin_rows = 0
+        self.blocks: dict[str, Block] = {}
+        for entry in (*stack.tasks, *stack.constraints):
+            self._add(stack, entry)
+
+    def _add(self, stack: Declaration, entry: Entry) -> None:
+        robot, item = stack.robot, entry.item
+        rows = item.rows(robot)
+        labels = [r.label for r in rows]
+        if len(set(labels)) != len(labels):
+            raise ShapeError(f"{entry.name}.rows", labels, "row labels repeat")
+        slots: dict[str, Slot] = {}
+        declared = list(item.inputs(robot))
+        form: Form = "task"
+        if isinstance(item, Constraint):
+            form = item.form
+            if form == "margins":
+                declared.append(Input("rate", unit="1/s", default=item.default_rate, low=0.0))
+        elif not any(i.name == "gain" for i in declared):
+            default = getattr(item, "gain", None)
+            declared.append(Input("gain", unit="1/s", default=item.default_gain if default is None else default, low=0.0))
+        for declared_input in declared:
+            if declared_input.name in slots:
+                raise ShapeError(f"{entry.name}.inputs", declared_input.name, "an input of this name is declared twice")
+            size = self._size(declared_input)
+            slots[declared_input.name] = Slot(declared_input, self.parameters, size)
+            self.parameters += size
+        margin = -1
+        if form == "task":
+            start, self.task_rows = self.task_rows, self.task_rows + len(rows)
+        elif form == "bounds":
+            start, self.bound_blocks = self.bound_blocks, self.bound_blocks + 1
+        else:
+            start, self.general_rows = self.general_rows, self.general_rows + len(rows)
+            if form == "margins":
+                margin, self.margin_rows = self.margin_rows, self.margin_rows + len(rows)
+        self.blocks[entry.name] = Block(entry, form, rows, start, margin, slots)
+
+    def _size(self, declared: Input) -> int:
+        if declared.kind == "configuration":
+            return self.nq
+        if declared.kind == "tangent":
+            return self.nv
+        return _SIZES.get(declared.kind, max(1, declared.size))
+
+    def of_form(self, *forms: Form) -> list[Block]:
+        """Blocks of the given forms, in row order."""
+        return [b for b in self.blocks.values() if b.form in forms]
+
+    def row_scales(self, stack: Declaration) -> np.ndarray:
+        """Scale of each task row: the characteristic length for rows in metres, 1 for others."""
+        scales = np.ones(self.task_rows)
+        for block in self.of_form("task"):
+            for k, row in enumerate(block.rows):
+                if row.unit.split("/")[0] == "m":
+                    scales[block.start + k] = stack.length
+        return scales
+
+    def dof_scales(self, stack: Declaration) -> np.ndarray:
+        """Scale of each degree of freedom: the characteristic length for metres, 1 for radians."""
+        return np.array([stack.length if u == "m" else 1.0 for u in stack.robot.dof_units])
