@@ -82,7 +82,9 @@ def rotation(field: str, value: Any) -> Array:
         raise ShapeError(field, value, f"expected a 3x3 rotation or a quaternion (x, y, z, w), not shape {raw.shape}")
     off = float(np.linalg.norm(raw.T @ raw - np.eye(3)))
     if off > ROTATION_TOLERANCE or np.linalg.det(raw) < 0.0:
-        raise RotationError(field, value, f"not a rotation matrix (|R'R - 1| = {off:.3g}, det = {np.linalg.det(raw):.3g})")
+        raise RotationError(
+            field, value, f"not a rotation matrix (|R'R - 1| = {off:.3g}, det = {np.linalg.det(raw):.3g})"
+        )
     return raw
 
 

@@ -12,7 +12,7 @@ import numpy as np
 import pinocchio as pin
 
 from wbc import validation
-from wbc.errors import DuplicateNameError, RotationError, ShapeError, UnknownNameError
+from wbc.errors import DuplicateNameError, RotationError, ShapeError
 from wbc.robot.limits import Limits
 from wbc.shapes import PlacedShape
 from wbc.symbolic.kinematics import WORLD
@@ -183,8 +183,10 @@ class Robot:
         else:
             above = model.frames[model.getFrameId(parent)]
             model.addFrame(
-                pin.Frame(name, above.parentJoint, model.getFrameId(parent), above.placement * local,
-                          pin.FrameType.OP_FRAME))
+                pin.Frame(
+                    name, above.parentJoint, model.getFrameId(parent), above.placement * local, pin.FrameType.OP_FRAME
+                )
+            )
         return replace(self, model=model)
 
     def with_limits(self, **changes: Any) -> Robot:
@@ -220,12 +222,17 @@ class Robot:
             h.update(m.inertias[j].toDynamicParameters().tobytes())
         for f in m.frames:
             h.update(f"{f.name} {f.parentJoint}\n".encode() + f.placement.homogeneous.tobytes())
-        for array in (self.limits.position_lower, self.limits.position_upper, self.limits.velocity,
-                      self.limits.acceleration, self.limits.effort, self.neutral):
+        for array in (
+            self.limits.position_lower,
+            self.limits.position_upper,
+            self.limits.velocity,
+            self.limits.acceleration,
+            self.limits.effort,
+            self.neutral,
+        ):
             h.update(np.ascontiguousarray(array).tobytes())
         h.update(repr((self.base, self.couplings)).encode())
         for frame, shapes in sorted(self.shapes.items()):
             for s in shapes:
                 h.update(f"{frame} {s.shape} {s.excess!r}".encode() + s.placement.homogeneous.tobytes())
         return h.hexdigest()
-

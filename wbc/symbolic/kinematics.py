@@ -179,7 +179,7 @@ class Kinematics:
 
     @cached_property
     def center_of_mass(self) -> ca.SX:
-        """Centre of mass in the world [m], as Pinocchio: bodies welded to the world do not count; the world's origin for no mass."""
+        """Centre of mass in the world [m], as Pinocchio's: bodies welded to the world do not count; 0 for no mass."""
         mass, moment = self._subtrees[0]
         return moment / mass if mass > 0.0 else ca.SX.zeros(3)
 
