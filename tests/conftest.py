@@ -1,0 +1,25 @@
+"""Settings of the whole test suite: deterministic examples, headless plots, native code cached in the repository."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from hypothesis import HealthCheck, settings
+
+os.environ.setdefault("MPLBACKEND", "Agg")
+# One thread a process: pytest-xdist already fills the cores, and sums keep their order.
+for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ.setdefault(variable, "1")
+# Compiled ticks of the tests stay out of the user's cache, and survive from run to run.
+os.environ.setdefault("XDG_CACHE_HOME", str(Path(__file__).parents[1] / "build" / "test-cache"))
+
+settings.register_profile(
+    "wbc",
+    derandomize=True,
+    deadline=None,
+    database=None,
+    print_blob=False,
+    suppress_health_check=[HealthCheck.too_slow],
+)
+settings.load_profile("wbc")

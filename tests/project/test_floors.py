@@ -1,0 +1,105 @@
+"""Imports of the package only point down the floors."""
+
+from __future__ import annotations
+
+import ast
+from pathlib import Path
+
+import pytest
+
+from tests.project.layout import ROOT, module_name, relative, sources
+
+#: Floor of each part of the package, from the ground up. qpsolvers know nothing of robots: see ONLY.
+FLOORS = {
+    "wbc.errors": 0,
+    "wbc.validation": 0,
+    "wbc.shapes": 0,
+    "wbc.symbolic": 1,
+    "wbc.robot": 2,
+    "wbc.robots": 2,
+    "wbc.tasks": 3,
+    "wbc.stack": 4,
+    "wbc.qp": 5,
+    "wbc.controller": 6,
+    "wbc.cli": 9,
+}
+#: Parts that may import only the listed floors, whatever stands below them
+ONLY = {"wbc.qp": {0}}
+#: The package's own __init__ collects names from every floor
+ROOF = "wbc"
+PACKAGE_FILES = sources("wbc", "tasks", "robots")
+
+
+def part_of(module: str) -> str:
+    """The part of the package that a module belongs to."""
+    parts = module.split(".")
+    return ".".join(parts[:2])
+
+
+def imported(path: Path) -> list[tuple[int, str]]:
+    """(line, module) of every import of this package that runs; those for type checking only are left out."""
+    tree = ast.parse(path.read_text())
+    idle = {
+        id(inner)
+        for node in ast.walk(tree)
+        if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.dump(node.test)
+        for statement in node.body
+        for inner in ast.walk(statement)
+    }
+    found: list[tuple[int, str]] = []
+    for node in ast.walk(tree):
+        if id(node) in idle:
+            continue
+        if isinstance(node, ast.Import):
+            found += [(node.lineno, a.name) for a in node.names if a.name.split(".")[0] == "wbc"]
+        elif isinstance(node, ast.ImportFrom) and node.level == 0 and (node.module or "").split(".")[0] == "wbc":
+            module = node.module or ""
+            found += [(node.lineno, f"{module}.{a.name}" if module == "wbc" else module) for a in node.names]
+    return found
+
+
+def faults(path: Path) -> list[str]:
+    """Imports of a file that point up, or to a part that has no floor."""
+    module = module_name(path)
+    if module == ROOF:
+        return []
+    here = part_of(module)
+    if here not in FLOORS:
+        return [f"{relative(path)}: {here} has no floor"]
+    out = []
+    for line, target in imported(path):
+        there = part_of(target)
+        if there == here or target == "wbc.__version__":
+            continue
+        floor = FLOORS.get(there)
+        if floor is None or floor > FLOORS[here] or (here in ONLY and floor not in ONLY[here]):
+            out.append(f"{relative(path)}:{line}: {here} imports {there}")
+    return out
+
+
+@pytest.mark.parametrize("path", PACKAGE_FILES, ids=relative)
+def test_imports_point_down(path: Path) -> None:
+    assert faults(path) == []
+
+
+def test_the_rule_finds_an_import_that_points_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("tests.project.layout.ROOT", tmp_path)
+    bad = tmp_path / "wbc" / "symbolic" / "bad.py"
+    bad.parent.mkdir(parents=True)
+    bad.write_text("import wbc.errors\n\n\ndef f():\n    from wbc import controller\n    return controller\n")
+    assert faults(bad) == ["wbc/symbolic/bad.py:5: wbc.symbolic imports wbc.controller"]
+    solver = tmp_path / "wbc" / "qp" / "bad.py"
+    solver.parent.mkdir(parents=True)
+    solver.write_text("from wbc.robot import Robot\nfrom wbc.errors import WbcError\n")
+    assert faults(solver) == ["wbc/qp/bad.py:1: wbc.qp imports wbc.robot"]
+
+
+def test_relative_imports_are_not_used() -> None:
+    relative_imports = [
+        f"{relative(path)}:{node.lineno}"
+        for path in PACKAGE_FILES
+        for node in ast.walk(ast.parse(path.read_text()))
+        if isinstance(node, ast.ImportFrom) and node.level > 0
+    ]
+    assert relative_imports == []
+    assert (ROOT / "wbc").is_dir()

@@ -1,0 +1,35 @@
+"""Importing the package is quick, because what only some users need is imported when it is used."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+
+import pytest
+
+HEAVY = ("matplotlib", "typer", "rich", "scipy", "pyarrow", "toppra", "ruckig", "osqp")
+
+
+def run(code: str) -> str:
+    """Standard output of a fresh interpreter, outside the repository's folder."""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd="/")
+    return done.stdout
+
+
+@pytest.mark.parametrize("module", ["wbc", "wbc.tasks", "wbc.robots"])
+def test_import_leaves_heavy_packages_alone(module: str) -> None:
+    loaded = set(json.loads(run(f"import json, sys, {module}; print(json.dumps([m for m in sys.modules]))")))
+    assert module in loaded
+    assert not loaded & set(HEAVY)
+
+
+def test_import_takes_less_than_a_second() -> None:
+    code = "import time; t = time.process_time(); import wbc, wbc.tasks, wbc.robots; print(time.process_time() - t)"
+    # CPU time of the best of three: other processes of a test run must not decide
+    assert min(float(run(code)) for _ in range(3)) < 1.0
+
+
+def test_version_is_that_of_the_distribution() -> None:
+    code = "import wbc, importlib.metadata as m; print(wbc.__version__ == m.version('wbc'))"
+    assert run(code).strip() == "True"
