@@ -1,0 +1,108 @@
+"""A certificate: how far an answer can be from the true minimiser, whatever solver gave it.
+
+Derivation (docs/solvers.md has it in full). Let xh = x - delta meet the active rows S exactly and violate
+no other row, and let lam have the right signs on S and vanish elsewhere. Then xh minimises the same
+problem with g - s in place of g, s = H xh + g + C' lam. For two minimisers over one convex set,
+(xh - x*)' H (xh - x*) <= (xh - x*)' s, hence with H = R'R
+
+    |R (xh - x*)| <= |R^-T s|      and      |x_j - x*_j| <= |delta_j| + |row_j R^-1| |R^-T s|.
+
+No singular value of the rows and no guess of the true active set enters.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from wbc.qp.factor import ROUNDOFF, WIDE_ROUNDOFF, ActiveRows, Factor, sides
+from wbc.qp.problem import QP, Solution
+from wbc.validation import Array
+
+_CORRECTIONS = 4
+
+
+@dataclass(frozen=True, slots=True)
+class Certificate:
+    """Residuals of an answer and a bound on its error.
+
+    Attributes:
+        stationarity: largest entry of |H x + g + [1; A]' lam|.
+        violation: largest violation of a bound, in the units of its row.
+        complementarity: largest |lam_i| times the distance of row i from the bound that lam_i names.
+        error_bound: bound on the largest |x_j - x*_j| (rad/s, m/s for joint velocities); inf if none can
+            be stated: H is not positive definite, or x is too far from a feasible point of its active set.
+    """
+
+    stationarity: float
+    violation: float
+    complementarity: float
+    error_bound: float
+
+
+def certify(qp: QP, solution: Solution) -> Certificate:
+    """The certificate of ``solution.x`` and ``solution.multipliers``; the flag is not read.
+
+    x* is the minimiser of the problem whose bounds are the given ones up to the rounding of one
+    evaluation, 4 u (|b_i| + |C_i| |x|) with u = 2^-53.
+    """
+    x, lam = solution.x, solution.multipliers
+    stationarity = np.abs(qp.H @ x + qp.g + lam[: qp.n] + qp.A.T @ lam[qp.n :])
+    at = qp.rows_at(x)
+    named = np.where(lam > 0.0, qp.upper, np.where(lam < 0.0, qp.lower, at))
+    with np.errstate(invalid="ignore"):
+        product = np.abs(lam) * np.abs(named - at)
+    return Certificate(
+        float(stationarity.max(initial=0.0)),
+        float(qp.violation(x).max(initial=0.0)),
+        float(product.max(initial=0.0)),
+        error_bound(qp, solution),
+    )
+
+
+def error_bound(qp: QP, solution: Solution) -> float:
+    """The bound on max |x_j - x*_j|, or inf."""
+    factor = Factor(qp)
+    if not factor.definite:
+        return np.inf
+    gamma = (qp.n + 2) * ROUNDOFF
+    # relative error of |R .| and |R^-1 .| through the rounding of the factorisation itself
+    loss = gamma * float(np.linalg.norm(factor.R)) ** 2 * float(np.linalg.norm(factor.inverse)) ** 2
+    if loss > 0.1:
+        return np.inf
+    x, lam = solution.x, solution.multipliers
+    side = sides(qp, factor, solution)
+    right = (side == 2) | (lam * side > 0.0)
+    clean = np.where((side != 0) & right, lam, 0.0)
+    size = np.concatenate((np.abs(x), np.abs(qp.A) @ np.abs(x)))
+
+    exact = x.astype(np.longdouble)
+    bound = np.where(side == -1, qp.lower, np.where(side == 0, 0.0, qp.upper))
+    rows = ActiveRows(factor, side, clean)
+    for _ in range(_CORRECTIONS):
+        residual = (bound - factor.rows_at(exact))[rows.index].astype(np.float64)
+        dy, _ = rows.solve(np.zeros(qp.n), residual)
+        exact = exact + factor.inverse @ dy
+    at = factor.rows_at(exact)
+    room = 4.0 * ROUNDOFF * (np.where(side == 0, 0.0, np.abs(bound)) + size)
+    low, high = at - qp.lower, qp.upper - at
+    off = np.abs(np.where(side == 0, 0.0, bound - at))
+    if bool((np.minimum(low, high) < -room).any()) or bool((off > room)[clean != 0.0].any()):
+        return np.inf
+
+    force = factor.stationarity(qp, exact, clean).astype(np.float64)
+    rounding = WIDE_ROUNDOFF * (qp.n + qp.m + 3) * _magnitudes(qp, x, clean)
+    left = off[rows.index].astype(np.float64) + WIDE_ROUNDOFF * (qp.n + 2) * size[rows.index]
+    rest = float(np.linalg.norm(left)) * rows.inverse_norm()
+    step = np.linalg.norm(factor.inverse.T @ force) + np.linalg.norm(np.abs(factor.inverse).T @ rounding) + rest
+    reach = np.sqrt(np.einsum("ij,ij->i", factor.inverse, factor.inverse))
+    total = np.abs(exact - x).astype(np.float64) + reach * float(step) * (1.0 + 2.0 * loss) / (1.0 - loss)
+    return float(total.max(initial=0.0))
+
+
+def _magnitudes(qp: QP, x: Array, lam: Array) -> Array:
+    """|H| |x| + |g| + [1; |A|]' |lam|, the size of the terms whose sum is the stationarity."""
+    absolute = np.abs(lam)
+    out: Array = np.abs(qp.H) @ np.abs(x) + np.abs(qp.g) + absolute[: qp.n] + np.abs(qp.A).T @ absolute[qp.n :]
+    return out
