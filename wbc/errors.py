@@ -73,6 +73,10 @@ class UnsupportedJointError(WbcError):
     """A joint type that the symbolic kinematics do not cover."""
 
 
+class MissingShapeError(WbcError):
+    """A link without collision shapes where some are needed."""
+
+
 class LevelError(WbcError):
     """A level that this version does not implement; it is never turned into a weight."""
 

@@ -1,0 +1,71 @@
+"""Joints that must stand still."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
+
+import casadi as ca
+from wbc.tasks._selection import dof_rows, joint_dofs, selection
+from wbc.tasks.base import Bounds, Constraint, Order, Row, Values
+from wbc.tasks.braking import clip
+
+from wbc import validation
+from wbc.symbolic.tracer import Tracer
+
+if TYPE_CHECKING:
+    from wbc.robot import Robot
+
+
+@dataclass(frozen=True)
+class Fixed(Constraint):
+    """v_i = 0 for every degree of freedom i of the named joints, as bounds lower = upper [rad/s or m/s].
+
+    A joint that still moves is brought to rest at its acceleration limit A:
+
+        v_i = v0_i - clip(v0_i, -A dt, A dt)
+
+    with v0 the velocity that accelerations are counted from, which is 0 from the first tick on for a joint at rest.
+
+    Attributes:
+        joints: names of the joints, one or several; a base joint fixes the whole base.
+        acceleration: bring moving joints to rest at ``robot.limits.acceleration``; False: at once.
+
+    It fixes velocities, not positions: a joint that was moved by something else is not brought back (see ``Posture``).
+    A joint outside its position limits returns if a ``JointLimits`` of the stack asks for it, which comes first in the
+    order of sacrifice. A joint that never moves costs less as a locked joint of the robot.
+    """
+
+    order: ClassVar[Order] = Order.HOLD
+
+    joints: tuple[str, ...]
+    acceleration: bool = True
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "joints", selection("Fixed.joints", self.joints))
+        object.__setattr__(self, "acceleration", validation.flag("Fixed.acceleration", self.acceleration))
+
+    def validate(self, robot: Robot) -> None:
+        """Check the joint names.
+
+        Raises:
+            UnknownNameError: an unknown joint.
+        """
+        joint_dofs(robot, "Fixed.joints", self.joints)
+
+    def rows(self, robot: Robot) -> tuple[Row, ...]:
+        """One row a degree of freedom of the robot, fixed or not."""
+        return dof_rows(robot)
+
+    def bounds(self, robot: Robot, kin: Tracer, inputs: Values, dt: ca.SX) -> Bounds:
+        """See the class."""
+        lower, upper = -ca.SX.inf(robot.nv), ca.SX.inf(robot.nv)
+        for i in joint_dofs(robot, "Fixed.joints", self.joints):
+            limit = float(robot.limits.acceleration[i]) if self.acceleration else math.inf
+            rest = ca.SX(0)
+            if math.isfinite(limit):
+                # As JointLimits writes its acceleration ends, so that both give the same number to the last bit
+                rest = clip(rest, kin.v[i] - limit * dt, kin.v[i] + limit * dt)
+            lower[i] = upper[i] = rest
+        return Bounds(lower, upper)

@@ -1,0 +1,125 @@
+"""A box limit on the velocity of a frame."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import casadi as ca
+import numpy as np
+from wbc.tasks.base import Constraint, Input, Order, Row, Rows, Values
+from wbc.tasks.frames import require_motion
+
+from wbc import validation
+from wbc.errors import NotFiniteError, RangeError, ShapeError
+from wbc.symbolic.kinematics import WORLD
+from wbc.symbolic.tracer import Tracer
+
+if TYPE_CHECKING:
+    from wbc.robot import Robot
+
+Triple = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class FrameVelocityLimit(Constraint):
+    """-limit <= C' J v <= limit for each limited axis of a frame's velocity at its origin.
+
+        linear   C' (J_lin v)   [m/s]      three rows, the axes of the frame ``axes``
+        angular  C' (J_ang v)   [rad/s]    three rows
+
+    C is the rotation of ``axes`` in the world. With ``relative_to`` = r the velocity is that seen from the moving
+    frame r: J_lin - J_lin,r - w_r x (p - p_r) in place of J_lin, and J_ang - J_ang,r in place of J_ang.
+
+    Attributes:
+        frame: name of the frame.
+        linear, angular: initial values of the inputs: one number for all three axes, three numbers, or None for no
+            limit. inf in place of a number: this axis has no limit and no row.
+        axes: name of the frame whose axes the rows are in; ``"world"`` by default.
+        relative_to: name of the frame that the velocity is relative to; ``"world"`` by default.
+
+    Inputs: ``linear`` [m/s] and ``angular`` [rad/s], >= 0, one number a row.
+
+    It is a box, so the speed along a diagonal may be sqrt(3) times the limit: divide by sqrt(3) to bound the
+    norm. It limits one point; other points of the body may be faster. It cannot slow a frame down faster than
+    ``JointLimits`` lets the joints brake, so a limit that drops suddenly may be broken for some ticks.
+    """
+
+    order: ClassVar[Order] = Order.MARGIN
+
+    frame: str
+    linear: float | Triple | None = None
+    angular: float | Triple | None = None
+    axes: str = WORLD
+    relative_to: str = WORLD
+
+    def __post_init__(self) -> None:
+        for name in ("linear", "angular"):
+            object.__setattr__(self, name, _box(f"FrameVelocityLimit.{name}", getattr(self, name)))
+        if not self._limits():
+            raise ShapeError("FrameVelocityLimit", (self.linear, self.angular), "expected a limit, linear or angular")
+
+    def _limits(self) -> list[tuple[str, int, float]]:
+        """(input, axis, initial limit) of each row."""
+        return [
+            (name, axis, limit)
+            for name, box in (("linear", self.linear), ("angular", self.angular))
+            if isinstance(box, tuple)
+            for axis, limit in enumerate(box)
+            if limit < np.inf
+        ]
+
+    def validate(self, robot: Robot) -> None:
+        """Check the frames.
+
+        Raises:
+            UnknownNameError: no such frame.
+            RangeError: a frame that cannot move relative to ``relative_to``.
+        """
+        for name in ("frame", "axes", "relative_to"):
+            robot.check_frame(f"FrameVelocityLimit.{name}", getattr(self, name))
+        require_motion(robot, "FrameVelocityLimit.frame", self.frame, self.relative_to)
+
+    def inputs(self, robot: Robot) -> tuple[Input, ...]:
+        """``linear`` and ``angular``, as far as limited."""
+        out = []
+        for name, unit in (("linear", "m/s"), ("angular", "rad/s")):
+            values = [limit for input_name, _, limit in self._limits() if input_name == name]
+            if values:
+                out.append(Input(name, unit=unit, size=len(values), default=values, low=0.0))
+        return tuple(out)
+
+    def rows(self, robot: Robot) -> tuple[Row, ...]:
+        """x, y, z in m/s and rx, ry, rz in rad/s, as far as limited."""
+        labels = {"linear": ("x", "y", "z"), "angular": ("rx", "ry", "rz")}
+        units = {"linear": "m/s", "angular": "rad/s"}
+        return tuple(Row(labels[name][axis], units[name]) for name, axis, _ in self._limits())
+
+    def velocity_rows(self, robot: Robot, kin: Tracer, inputs: Values, dt: ca.SX) -> Rows:
+        """See the class."""
+        jacobian = kin.kinematics.jacobian(self.frame)
+        if self.relative_to != WORLD:
+            base = kin.kinematics.jacobian(self.relative_to)
+            arm = kin.position(self.frame) - kin.position(self.relative_to)
+            carried = ca.vertcat(base[:3, :] - ca.skew(arm) @ base[3:, :], base[3:, :])
+            jacobian = jacobian - carried
+        turn = kin.rotation(self.axes).T
+        parts = {"linear": turn @ jacobian[:3, :], "angular": turn @ jacobian[3:, :]}
+        matrix = ca.vertcat(*[parts[name][axis, :] for name, axis, _ in self._limits()])
+        limit = ca.vertcat(*[inputs[declared.name] for declared in self.inputs(robot)])
+        return Rows(matrix, -limit, limit)
+
+
+def _box(field: str, value: Any) -> Triple | None:
+    """Three limits out of None, one number or three."""
+    if value is None:
+        return None
+    numbers = validation.real_array(field, value, finite=False)
+    if numbers.shape not in ((), (3,)):
+        raise ShapeError(field, value, "expected one number or three")
+    if np.isnan(numbers).any():
+        raise NotFiniteError(field, value, "NaN is no limit; use inf for none")
+    if (numbers < 0).any():
+        raise RangeError(field, value, "expected limits >= 0")
+    x, y, z = (float(n) for n in np.broadcast_to(numbers, 3))
+    return (x, y, z)

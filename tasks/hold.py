@@ -1,0 +1,95 @@
+"""A frame that must not move: a hand on a hold, a foot on the ground."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+from wbc.tasks.base import Constraint, Input, Order, Row, Rows, Values
+from wbc.tasks.frames import frame_pose, require_motion
+
+from wbc import validation
+from wbc.symbolic import rotations as rot
+from wbc.symbolic.tracer import Tracer
+
+if TYPE_CHECKING:
+    from wbc.robot import Robot
+
+KINDS = ("pose", "position", "orientation")
+
+
+@dataclass(frozen=True)
+class Hold(Constraint):
+    """J v = -gain e, an equality: the frame stays at its target, and drift decays like exp(-gain t).
+
+        position     J = J_lin (3 x nv), e = p - p_target                             [m/s]
+        orientation  J = J_ang (3 x nv), e = log3(R R_target'), |e| <= pi             [rad/s]
+        pose         both, in this order (6 x nv)
+
+    in world axes at the frame's origin. For the rotation, J_ang v = -gain e turns R R_target' about its own axis,
+    so de/dt = -gain e exactly although J_ang is not de/dq.
+
+    Attributes:
+        frame: name of the frame.
+        kind: ``"pose"``, ``"position"`` (the frame may turn about its origin) or ``"orientation"``.
+        gain: initial value of the input [1/s].
+
+    Inputs: ``target`` (pose in the world; default: the pose at the first step) and ``gain`` [1/s], which should stay
+    below 1/dt.
+
+    It cannot hold what the robot cannot do: six rows on an arm with fewer free joints, or in a singular pose, are
+    dependent, and with drift left they may contradict. A frame that moves when it becomes held cannot stop faster than
+    ``JointLimits`` lets it; actuator and position limits come first. It holds velocities and a geometric place,
+    not contact forces.
+    """
+
+    order: ClassVar[Order] = Order.HOLD
+
+    frame: str
+    kind: Literal["pose", "position", "orientation"] = "pose"
+    gain: float = 10.0
+
+    def __post_init__(self) -> None:
+        validation.one_of("Hold.kind", self.kind, KINDS)
+        object.__setattr__(self, "gain", validation.scalar("Hold.gain", self.gain, low=0.0, unit="1/s"))
+
+    def validate(self, robot: Robot) -> None:
+        """Check the frame.
+
+        Raises:
+            UnknownNameError: no such frame.
+            RangeError: a frame that no joint moves.
+        """
+        robot.check_frame("Hold.frame", self.frame)
+        require_motion(robot, "Hold.frame", self.frame)
+
+    def inputs(self, robot: Robot) -> tuple[Input, ...]:
+        """``target`` and ``gain``."""
+        return (Input("target", "pose", unit="m, rad"), Input("gain", unit="1/s", default=self.gain, low=0.0))
+
+    def initial(self, robot: Robot, q: NDArray[np.float64]) -> dict[str, Any]:
+        """The frame's pose at ``q``."""
+        return {"target": frame_pose(robot, self.frame, q)}
+
+    def rows(self, robot: Robot) -> tuple[Row, ...]:
+        """x, y, z and rx, ry, rz, as far as held."""
+        position = tuple(Row(axis, "m/s") for axis in ("x", "y", "z"))
+        orientation = tuple(Row(axis, "rad/s") for axis in ("rx", "ry", "rz"))
+        return {"pose": position + orientation, "position": position, "orientation": orientation}[self.kind]
+
+    def velocity_rows(self, robot: Robot, kin: Tracer, inputs: Values, dt: ca.SX) -> Rows:
+        """See the class."""
+        pose, target = kin.pose(self.frame), inputs["target"]
+        jacobian = kin.kinematics.jacobian(self.frame)
+        drift, matrix = [], []
+        if self.kind != "orientation":
+            drift.append(pose.position - target.position)
+            matrix.append(jacobian[:3, :])
+        if self.kind != "position":
+            drift.append(rot.log3(pose.rotation @ target.rotation.T))
+            matrix.append(jacobian[3:, :])
+        wanted = -inputs["gain"] * ca.vertcat(*drift)
+        return Rows(ca.vertcat(*matrix), wanted, wanted)

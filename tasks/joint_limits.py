@@ -1,0 +1,176 @@
+"""Limits of joint position, velocity and acceleration as bounds on v that never contradict each other."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
+
+import casadi as ca
+import numpy as np
+from wbc.tasks._selection import dof_rows, joint_dofs, selection
+from wbc.tasks.base import Bounds, Constraint, Input, Order, Row, Values
+from wbc.tasks.braking import braking_bound, clip
+
+from wbc import validation
+from wbc.errors import RangeError
+from wbc.symbolic.tracer import Tracer
+
+if TYPE_CHECKING:
+    from wbc.robot import Robot
+
+
+@dataclass(frozen=True)
+class JointLimits(Constraint):
+    """lower <= v <= upper from position, velocity and acceleration limits, one interval a degree of freedom:
+
+        actuator  [-s V, s V] cut with [v0 - A dt, v0 + A dt]
+        position  -b(q - q_lower - margin) <= v <= b(q_upper - margin - q)
+
+    b(d) is the braking bound (:func:`wbc.tasks.braking.braking_bound`) at distance d >= 0 and
+    b(d) = -min(return_rate |d|, b(|d|)) outside; v0 is the velocity that accelerations are counted from; V and A
+    are ``robot.limits.velocity`` and ``.acceleration``; s is ``velocity_scale``. Units rad/s, m/s for sliding joints.
+
+    The interval is never empty. Where the actuator limits exclude each other (v0 above s V by more than A dt) it is
+    the acceleration end nearest to [-s V, s V]; where the position bound asks for more than the actuators can do,
+    it is the actuator end nearest to it. From a viable state (v0 allowed last tick, limits unchanged) neither happens
+    and the position limit is not passed, whatever is commanded and however dt varies (at or above ``shortest_dt``
+    where that is given). From outside the joint brakes at A, then returns at ``return_rate`` times the violation
+    at least, and the violation does not grow again.
+
+    Attributes:
+        position, velocity, acceleration: which limits to keep. Without ``acceleration`` the joint may stop at once,
+            b(d) = d / dt.
+        margin: distance kept from both position limits [rad or m].
+        joints: names of the joints to limit; None: all.
+        shortest_dt: promise that no tick is shorter [s]; None: none. The longer it is, the faster a joint may approach
+            its limit, by up to A shortest_dt / 2; with ``shortest_dt`` = dt constant the bound is the exact one.
+        return_rate: initial value of the input [1/s].
+
+    Inputs: ``velocity_scale`` in [0, 1] and ``return_rate`` >= 0 [1/s].
+
+    It cannot keep the limit when v0 is not the velocity that the joint has, when the robot starts too fast too
+    close to a limit, or when the description gives no acceleration limit and the real joint has one.
+    Degrees of freedom whose rate is not that of one coordinate (floating bases, ball joints, unbounded joints)
+    have no position limit. Torque limits are no concern of it.
+    """
+
+    order: ClassVar[Order] = Order.ACTUATOR
+
+    position: bool = True
+    velocity: bool = True
+    acceleration: bool = True
+    margin: float = 0.0
+    joints: tuple[str, ...] | None = None
+    shortest_dt: float | None = None
+    return_rate: float = 5.0
+
+    def __post_init__(self) -> None:
+        for name in ("position", "velocity", "acceleration"):
+            object.__setattr__(self, name, validation.flag(f"JointLimits.{name}", getattr(self, name)))
+        for name, unit in (("margin", "rad or m"), ("return_rate", "1/s")):
+            number = validation.scalar(f"JointLimits.{name}", getattr(self, name), low=0.0, unit=unit)
+            object.__setattr__(self, name, number)
+        if self.shortest_dt is not None:
+            number = validation.scalar("JointLimits.shortest_dt", self.shortest_dt, low=0.0, open_low=True, unit="s")
+            object.__setattr__(self, "shortest_dt", number)
+        if self.joints is not None:
+            object.__setattr__(self, "joints", selection("JointLimits.joints", self.joints))
+
+    def validate(self, robot: Robot) -> None:
+        """Check joint names, and that the margin leaves something of every range.
+
+        Raises:
+            UnknownNameError: an unknown joint.
+            RangeError: a margin above half of a joint's range.
+        """
+        for i in joint_dofs(robot, "JointLimits.joints", self.joints):
+            width = robot.limits.position_upper[i] - robot.limits.position_lower[i]
+            if self.position and robot.position_index[i] >= 0 and 2 * self.margin > width:
+                reason = f"above half of the range {width:g} {robot.dof_units[i]} of {robot.dof_names[i]!r}"
+                raise RangeError("JointLimits.margin", self.margin, reason)
+
+    def inputs(self, robot: Robot) -> tuple[Input, ...]:
+        """``velocity_scale`` and ``return_rate``."""
+        return (
+            Input("velocity_scale", default=1.0, low=0.0, high=1.0),
+            Input("return_rate", unit="1/s", default=self.return_rate, low=0.0),
+        )
+
+    def rows(self, robot: Robot) -> tuple[Row, ...]:
+        """One row a degree of freedom of the robot, limited or not."""
+        return dof_rows(robot)
+
+    def bounds(self, robot: Robot, kin: Tracer, inputs: Values, dt: ca.SX) -> Bounds:
+        """See the class."""
+        limits, count = robot.limits, robot.nv
+        lower, upper = -ca.SX.inf(count), ca.SX.inf(count)
+        for i in joint_dofs(robot, "JointLimits.joints", self.joints):
+            k = int(robot.position_index[i])
+            here = self.position and k >= 0
+            lower[i], upper[i] = allowed_interval(
+                kin.q[k] if here else ca.SX(0),
+                kin.v[i],
+                dt,
+                position=(
+                    float(limits.position_lower[i]) + self.margin if here else -np.inf,
+                    float(limits.position_upper[i]) - self.margin if here else np.inf,
+                ),
+                velocity=float(limits.velocity[i]) if self.velocity else np.inf,
+                acceleration=float(limits.acceleration[i]) if self.acceleration else np.inf,
+                velocity_scale=inputs["velocity_scale"],
+                return_rate=inputs["return_rate"],
+                shortest_dt=self.shortest_dt,
+            )
+        return Bounds(lower, upper)
+
+
+def allowed_interval(
+    q: ca.SX,
+    v: ca.SX,
+    dt: ca.SX,
+    *,
+    position: tuple[float, float],
+    velocity: float,
+    acceleration: float,
+    velocity_scale: ca.SX,
+    return_rate: ca.SX,
+    shortest_dt: float | None = None,
+) -> tuple[ca.SX, ca.SX]:
+    """The interval of :class:`JointLimits` for one coordinate, lower <= upper always.
+
+    Limits are numbers, infinite where there is none, and cost no operation there.
+    """
+    low, high = -ca.SX.inf(1), ca.SX.inf(1)
+    bounded = math.isfinite(velocity) or math.isfinite(acceleration)
+    if math.isfinite(velocity):
+        high = velocity_scale * velocity
+        low = -high
+    if math.isfinite(acceleration):
+        step = acceleration * dt
+        # Clipping both ends gives the intersection, or where it is empty the acceleration end nearest to it
+        low, high = (
+            clip(end, v - step, v + step) if math.isfinite(velocity) else v + s * step
+            for end, s in ((low, -1), (high, 1))
+        )
+    lower, upper = low, high
+    if math.isfinite(position[1]):
+        upper = _approach(position[1] - q, acceleration, dt, return_rate, shortest_dt)
+        upper = clip(upper, low, high) if bounded else upper
+    if math.isfinite(position[0]):
+        lower = -_approach(q - position[0], acceleration, dt, return_rate, shortest_dt)
+        lower = clip(lower, low, high) if bounded else lower
+        if math.isfinite(position[1]):
+            # Equal in exact arithmetic at worst (a range of width 0 seen from outside)
+            lower = ca.fmin(lower, upper)
+    return lower, upper
+
+
+def _approach(distance: ca.SX, acceleration: float, dt: ca.SX, return_rate: ca.SX, shortest_dt: float | None) -> ca.SX:
+    """Largest velocity towards a limit ``distance`` away; negative outside (distance < 0): the slowest return.
+
+    The return is no faster than a speed from which the joint stops on the limit, so that it never conflicts with
+    the opposite limit, however narrow the range.
+    """
+    speed = braking_bound(ca.fabs(distance), acceleration, dt, shortest_dt)
+    return ca.if_else(distance < 0, ca.fmax(return_rate * distance, -speed), speed)
