@@ -1,5 +1,43 @@
 """Tasks and constraints: declarative objects, one idea a file (floor 3)."""
 
-from wbc.tasks.base import Bounds, Constraint, Input, Item, Order, Row, Rows, Task, Values, registry
+from wbc.tasks.base import Bounds, Constraint, Form, Input, Item, Order, Row, Rows, Task, Values, registry
+from wbc.tasks.center_of_mass import CenterOfMass
+from wbc.tasks.damping import Damping
+from wbc.tasks.elbow import Elbow
+from wbc.tasks.end_effector import EndEffector
+from wbc.tasks.expression import Expression
+from wbc.tasks.fixed import Fixed
+from wbc.tasks.frame_velocity_limit import FrameVelocityLimit
+from wbc.tasks.hold import Hold
+from wbc.tasks.joint_limits import JointLimits
+from wbc.tasks.obstacle import Obstacle
+from wbc.tasks.pitch_plane import PitchPlane
+from wbc.tasks.pitch_plane_limit import PitchPlaneLimit
+from wbc.tasks.posture import Posture
 
-__all__ = ["Bounds", "Constraint", "Input", "Item", "Order", "Row", "Rows", "Task", "Values", "registry"]
+__all__ = [
+    "Bounds",
+    "CenterOfMass",
+    "Constraint",
+    "Damping",
+    "Elbow",
+    "EndEffector",
+    "Expression",
+    "Fixed",
+    "Form",
+    "FrameVelocityLimit",
+    "Hold",
+    "Input",
+    "Item",
+    "JointLimits",
+    "Obstacle",
+    "Order",
+    "PitchPlane",
+    "PitchPlaneLimit",
+    "Posture",
+    "Row",
+    "Rows",
+    "Task",
+    "Values",
+    "registry",
+]

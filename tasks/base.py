@@ -27,7 +27,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wbc import validation
-from wbc.symbolic.kinematics import Pose
 from wbc.symbolic.tracer import Tracer
 
 if TYPE_CHECKING:
@@ -87,7 +86,8 @@ class Order(IntEnum):
     SOFT = 4
 
 
-#: What an item's expressions receive: SX vectors, SX scalars, or :class:`Pose` for a pose input.
+#: What an item's expressions receive: an SX scalar or vector, a 3x3 SX for a rotation, a
+#: :class:`wbc.symbolic.kinematics.Pose` for a pose.
 Values = Mapping[str, Any]
 
 _registry: dict[str, type[Item]] = {}
@@ -130,10 +130,10 @@ class Item:
         """Values at configuration ``q`` of the inputs whose default is None."""
         return {}
 
-    def declaration(self) -> dict[str, Any]:
-        """Everything that decides the compiled code, as plain data; part of the cache key."""
+    def declaration(self, robot: Robot) -> dict[str, Any]:
+        """Everything that decides the compiled code besides the robot, as plain data; part of the cache key."""
         return {"class": f"{type(self).__module__}.{type(self).__qualname__}"} | {
-            f.name: _plain(getattr(self, f.name)) for f in dataclasses.fields(self)
+            f.name: _plain(getattr(self, f.name), robot) for f in dataclasses.fields(self)
         }
 
 
@@ -150,18 +150,23 @@ class Task(Item):
     #: Default gain [1/s]: e decays like exp(-gain t) where nothing hinders it
     default_gain: ClassVar[float] = 2.0
 
+    #: First value of the input ``gain`` [1/s] where the class's default is not wanted
+    gain: float | None = dataclasses.field(default=None, kw_only=True)
+
     def error(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
         """e(q, inputs), one entry a row, in the rows' units."""
         raise TypeError(f"{type(self).__name__} declares no error")
 
     def jacobian(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX | None:
         """None: the Jacobian is derived from :meth:`error`. A task on the velocity itself (damping)
-        returns the matrix of its rows here."""
+        returns the matrix of its rows here.
+        """
         return None
 
     def row_factor(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX | None:
         """None, or one smooth factor in [0, 1] a row by which the row's weight is multiplied: a task that
-        fades where its error is singular."""
+        fades where its error is singular.
+        """
         return None
 
 
@@ -227,23 +232,23 @@ def registry() -> dict[str, type[Item]]:
     return dict(_registry)
 
 
-def _plain(value: Any) -> Any:
+def _plain(value: Any, robot: Robot) -> Any:
     if isinstance(value, Item):
-        return value.declaration()
+        return value.declaration(robot)
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         return {"class": type(value).__qualname__} | {
-            f.name: _plain(getattr(value, f.name)) for f in dataclasses.fields(value)
+            f.name: _plain(getattr(value, f.name), robot) for f in dataclasses.fields(value)
         }
     if isinstance(value, (list, tuple)):
-        return [_plain(v) for v in value]
+        return [_plain(v, robot) for v in value]
     if isinstance(value, Mapping):
-        return {str(k): _plain(v) for k, v in value.items()}
+        return {str(k): _plain(v, robot) for k, v in value.items()}
     if isinstance(value, np.ndarray):
         return [float(v).hex() for v in value.ravel()] + list(value.shape)
     if isinstance(value, np.generic):
         return value.item()
     if hasattr(value, "homogeneous"):
-        return _plain(np.asarray(value.homogeneous))
+        return _plain(np.asarray(value.homogeneous), robot)
     if isinstance(value, (str, int, bool, type(None))):
         return value
     if isinstance(value, float):

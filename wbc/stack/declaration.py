@@ -110,7 +110,9 @@ class Declaration:
         if isinstance(level, bool) or not isinstance(level, int):
             raise ShapeError("level", level, "expected an integer")
         if level != 0:
-            raise LevelError("level", level, "strict levels are not implemented; a level is never turned into a weight", ("0",))
+            raise LevelError(
+                "level", level, "strict levels are not implemented; a level is never turned into a weight", ("0",)
+            )
         number = validation.scalar("weight", weight, low=0.0)
         if isinstance(item, Constraint) and number != 1.0:
             raise RangeError("weight", weight, "a constraint is hard and has no weight")
@@ -135,7 +137,7 @@ class Declaration:
             "robot": self._robot.fingerprint,
             "length": self._length.hex(),
             "damping": self._damping.hex(),
-            "items": [[e.name, e.item.declaration()] for e in self.entries],
+            "items": [[e.name, e.item.declaration(self._robot)] for e in self.entries],
         }
 
 

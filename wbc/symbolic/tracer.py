@@ -19,16 +19,23 @@ import casadi as ca
 import numpy as np
 
 from wbc.errors import UnknownNameError
+from wbc.symbolic import rotations as rot
 from wbc.symbolic.kinematics import WORLD, Kinematics, Pose
 
 
 @dataclass
 class _Symbol:
-    """A placeholder ``symbol``, the expression it stands for, and its rate map (rows x nv)."""
+    """A placeholder ``symbol`` and the ``value`` it stands for; its rate is ``motion @ jacobian @ v``.
+
+    The rate is kept as two factors because ``(partial @ motion) @ jacobian`` is much smaller than
+    ``partial @ (motion @ jacobian)``. ``inner``: value and motion are in other placeholders.
+    """
 
     symbol: ca.SX
     value: ca.SX
-    rate: ca.SX
+    motion: ca.SX
+    jacobian: ca.SX
+    inner: bool = False
 
 
 @dataclass
@@ -65,9 +72,9 @@ class Tracer:
         else:
             rotation, position = ca.SX.sym(f"R_{frame}", 3, 3), ca.SX.sym(f"p_{frame}", 3)
             jacobian = self.kinematics.jacobian(frame)
-            self._symbols.append(_Symbol(position, actual.position, jacobian[:3, :]))
-            spin = rotation_rate(rotation) @ jacobian[3:, :]
-            self._symbols.append(_Symbol(ca.vec(rotation), ca.vec(actual.rotation), spin))
+            self._symbols.append(_Symbol(position, actual.position, _eye(), jacobian[:3, :]))
+            spin = rotation_rate(rotation)
+            self._symbols.append(_Symbol(ca.vec(rotation), ca.vec(actual.rotation), spin, jacobian[3:, :]))
             known = Pose(rotation, position)
         self._poses[frame] = known
         return known
@@ -86,8 +93,39 @@ class Tracer:
         if self._com is None:
             self._com = ca.SX.sym("com", 3)
             jacobian = self.kinematics.center_of_mass_jacobian
-            self._symbols.append(_Symbol(self._com, self.kinematics.center_of_mass, jacobian))
+            self._symbols.append(_Symbol(self._com, self.kinematics.center_of_mass, _eye(), jacobian))
         return self._com
+
+    def rotation_error(self, frame: str, base: str, target: ca.SX) -> ca.SX:
+        """phi = log3(R_b' R R_t'): how far ``frame``, seen from ``base``, is turned past ``target`` [rad].
+
+        A rotation vector in the axes of ``base``, |phi| <= pi. Its derivative is the closed form
+        dphi = Jl^-1(phi) R_b' (w - w_b) - Jr^-1(phi) w_t (see :func:`rotations.left_jacobian_inverse`), about a third of
+        what differentiating the logarithm's branches costs.
+
+        Args:
+            target: 3x3 rotation R_t of the target in ``base``; may depend on inputs and on q.
+
+        Raises:
+            UnknownNameError: no such frame.
+        """
+        relative = self.rotation(frame) if base == WORLD else self.rotation(base).T @ self.rotation(frame)
+        phi, spin = ca.SX.sym(f"phi_{frame}_{base}", 3), self.kinematics.jacobian(frame)[3:, :]
+        motion = rot.left_jacobian_inverse(phi)
+        if base != WORLD:
+            motion = motion @ self.rotation(base).T
+            spin = spin - self.kinematics.jacobian(base)[3:, :]
+        self._symbols.append(_Symbol(phi, rot.log3(relative @ target.T), motion, spin, inner=True))
+        if not ca.symvar(target):
+            return phi
+        # ``here`` is the target held still, so ``turn`` is zero and only its derivative counts
+        here = ca.SX.sym("R_here", 3, 3)
+        self._symbols.append(
+            _Symbol(ca.vec(here), ca.vec(target), ca.SX(9, 0), ca.SX(0, self.kinematics.nv), inner=True)
+        )
+        change = (target - here) @ here.T
+        turn = 0.5 * ca.vertcat(change[2, 1] - change[1, 2], change[0, 2] - change[2, 0], change[1, 0] - change[0, 1])
+        return phi - rot.left_jacobian_inverse(-phi) @ turn
 
     def joint(self, name: str) -> ca.SX:
         """Coordinate of a one-dof joint [rad or m]; for an unbounded joint its angle in (-pi, pi].
@@ -107,17 +145,25 @@ class Tracer:
         total = ca.jacobian(expression, self.q) @ self.kinematics.tangent_map
         for known in self._symbols:
             partial = ca.jacobian(expression, known.symbol)
-            if partial.nnz():
-                total = total + partial @ known.rate
+            if partial.nnz() and known.motion.nnz():
+                total = total + ca.sparsify(partial @ known.motion) @ known.jacobian
         return self.expand(ca.sparsify(total))
 
     def expand(self, expression: ca.SX) -> ca.SX:
         """The expression with every placeholder replaced by the kinematics that it stands for."""
-        if not self._symbols:
+        inner = [s for s in self._symbols if s.inner]
+        if inner:
+            _, (expression,) = ca.substitute_inplace([s.symbol for s in inner], [s.value for s in inner], [expression])
+        outer = [s for s in self._symbols if not s.inner]
+        if not outer:
             return expression
-        symbols = ca.vertcat(*[s.symbol for s in self._symbols])
-        values = ca.vertcat(*[s.value for s in self._symbols])
-        return ca.substitute(expression, symbols, values)
+        # A chain of coordinate axes has structural zeros that its placeholders have not
+        values = ca.densify(ca.vertcat(*[s.value for s in outer]))
+        return ca.substitute(expression, ca.vertcat(*[s.symbol for s in outer]), values)
+
+
+def _eye() -> ca.SX:
+    return ca.SX(ca.DM.eye(3))
 
 
 def rotation_rate(rotation: ca.SX) -> ca.SX:

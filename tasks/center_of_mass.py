@@ -1,0 +1,85 @@
+"""The centre of mass follows a position."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import casadi as ca
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from wbc.errors import RangeError
+from wbc.symbolic.kinematics import WORLD
+from wbc.symbolic.tracer import Tracer
+from wbc.tasks.base import Input, Row, Task, Values
+from wbc.tasks.frames import checked_weights, into_axes, point_rows, resolve_axes, weights_of_rows
+
+if TYPE_CHECKING:
+    from wbc.robot import Robot
+
+
+@dataclass(frozen=True)
+class CenterOfMass(Task):
+    """The centre of mass c of the whole robot follows a position in the world:
+
+        e = R_a' (c - target),   c = sum_i m_i c_i / sum_i m_i             [m]
+
+    The rows are components along the axes of a frame a. Links welded to the world have no part in c.
+
+    Inputs:
+        target: 3 numbers in the world [m]. Default: where the centre of mass is at the first step.
+        feedforward: velocity of the target in the world [m/s]. Default 0.
+
+    Example:
+        >>> CenterOfMass(weights=(1, 1, 0))                  # balance: the height is free
+
+    What it cannot do: it is no balance criterion: it knows no support polygon, no contact force and no
+    momentum. Masses come from the robot's description; a payload that is not in it is not seen.
+
+    Attributes:
+        axes: frame a along whose axes rows and weights are counted: ``"world"`` or a frame's name.
+        weights: three numbers >= 0, None: 1 each.
+
+    Raises:
+        UnknownNameError, ShapeError, NotFiniteError, RangeError: on construction or in :meth:`validate`; a
+            robot without mass is a RangeError.
+    """
+
+    axes: str = WORLD
+    weights: tuple[float, ...] | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "weights", checked_weights("CenterOfMass.weights", self.weights, 3))
+
+    def validate(self, robot: Robot) -> None:
+        """Check axes and that the robot has mass, see :meth:`Item.validate`."""
+        resolve_axes(robot, "CenterOfMass.axes", self.axes, None)
+        mass = sum(float(inertia.mass) for inertia in list(robot.model.inertias)[1:])
+        if mass <= 0.0:
+            raise RangeError("CenterOfMass", mass, f"the moving links of {robot.name!r} have no mass [kg]")
+
+    def inputs(self, robot: Robot) -> tuple[Input, ...]:
+        """``target`` and ``feedforward``, see the class."""
+        return (
+            Input("target", unit="m", size=3, rate="feedforward"),
+            Input("feedforward", unit="m/s", size=3, default=np.zeros(3)),
+        )
+
+    def rows(self, robot: Robot) -> tuple[Row, ...]:
+        """x, y, z [m]."""
+        return point_rows()
+
+    def row_weights(self, robot: Robot) -> NDArray[np.float64]:
+        """The declared weights."""
+        return weights_of_rows(self.weights, 3)
+
+    def initial(self, robot: Robot, q: NDArray[np.float64]) -> dict[str, Any]:
+        """The target where the centre of mass is at ``q``."""
+        return {"target": np.array(pin.centerOfMass(robot.model, robot.model.createData(), q))}
+
+    def error(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
+        """The formula of the class."""
+        axes = resolve_axes(robot, "CenterOfMass.axes", self.axes, None)
+        return into_axes(kin, kin.center_of_mass() - inputs["target"], axes)

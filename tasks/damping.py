@@ -1,0 +1,67 @@
+"""Velocities stay small."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from wbc.symbolic.tracer import Tracer
+from wbc.tasks.base import Row, Task, Values
+from wbc.tasks.frames import checked_weights, weights_of_rows
+
+if TYPE_CHECKING:
+    from wbc.robot import Robot
+
+
+@dataclass(frozen=True)
+class Damping(Task):
+    """Every velocity is wished to be zero, with a weight of its own:
+
+        v_i = 0                             [rad/s or m/s, as each degree of freedom]
+
+    There is no error to correct: e is zero, its rows are those of the identity, and ``gain`` has no effect.
+
+    Inputs:
+        none of its own.
+
+    Example:
+        >>> Damping(weights=(1, 1, 1, 1, 1, 1, 100))     # spare the last joint of seven
+
+    What it cannot do: it does not bring the robot back anywhere (use Posture), it does not smooth the command
+    (acceleration limits do), and it slows the other tasks of its level by about its weight over theirs.
+
+    Attributes:
+        weights: one number >= 0 a degree of freedom, the base's included, in the order of v; None: 1 each.
+
+    Raises:
+        ShapeError, NotFiniteError, RangeError: on construction or in :meth:`validate`.
+    """
+
+    weights: tuple[float, ...] | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "weights", checked_weights("Damping.weights", self.weights))
+
+    def validate(self, robot: Robot) -> None:
+        """Check the number of weights, see :meth:`Item.validate`."""
+        checked_weights("Damping.weights", self.weights, robot.nv)
+
+    def rows(self, robot: Robot) -> tuple[Row, ...]:
+        """One row a degree of freedom; the unit is that of its integral, as for every task."""
+        return tuple(Row(n, u) for n, u in zip(robot.dof_names, robot.dof_units, strict=True))
+
+    def row_weights(self, robot: Robot) -> NDArray[np.float64]:
+        """The declared weights."""
+        return weights_of_rows(self.weights, robot.nv)
+
+    def error(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
+        """Zero: there is nothing to correct."""
+        return ca.SX.zeros(robot.nv)
+
+    def jacobian(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
+        """The identity."""
+        return ca.SX(ca.DM.eye(robot.nv))

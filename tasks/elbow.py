@@ -1,0 +1,101 @@
+"""A point of an intermediate body follows a position."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from wbc import validation
+from wbc.symbolic import rotations as rot
+from wbc.symbolic.kinematics import WORLD
+from wbc.symbolic.tracer import Tracer
+from wbc.tasks.base import Input, Row, Task, Values
+from wbc.tasks.frames import (
+    checked_weights,
+    frame_pose,
+    into_axes,
+    point_rows,
+    require_motion,
+    resolve_axes,
+    weights_of_rows,
+)
+
+if TYPE_CHECKING:
+    from wbc.robot import Robot
+
+
+@dataclass(frozen=True)
+class Elbow(Task):
+    """A point fixed in a frame (R, p) of any body follows a position in the world:
+
+        e = R_a' (p + R offset - target)                                   [m]
+
+    The rows are components along the axes of a frame a.
+
+    Inputs:
+        target: 3 numbers in the world [m]. Default: where the point is at the first step.
+        feedforward: velocity of the target in the world [m/s]. Default 0.
+
+    Example:
+        >>> Elbow("panda_link4", offset=(0, 0, 0.05), weights=(0, 0, 1))   # only the height of the elbow
+
+    What it cannot do: it commands a point, not the swivel of the arm: with a hand task above it only the part of e that
+    is tangent to the elbow's circle can be served (use PitchPlane for the angle).
+
+    Attributes:
+        frame: frame of the body.
+        offset: the point in that frame [m].
+        axes: frame a along whose axes rows and weights are counted: ``"world"``, ``"frame"`` (its own) or a name.
+        weights: three numbers >= 0, None: 1 each.
+
+    Raises:
+        UnknownNameError, ShapeError, NotFiniteError, RangeError: on construction or in :meth:`validate`.
+    """
+
+    frame: str
+    offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    axes: str = WORLD
+    weights: tuple[float, ...] | None = None
+
+    def __post_init__(self) -> None:
+        offset = validation.real_array("Elbow.offset", self.offset, (3,))
+        object.__setattr__(self, "offset", tuple(float(x) for x in offset))
+        object.__setattr__(self, "weights", checked_weights("Elbow.weights", self.weights, 3))
+
+    def validate(self, robot: Robot) -> None:
+        """Check frame and axes, see :meth:`Item.validate`."""
+        robot.check_frame("Elbow.frame", self.frame)
+        require_motion(robot, "Elbow.frame", self.frame)
+        resolve_axes(robot, "Elbow.axes", self.axes, self.frame)
+
+    def inputs(self, robot: Robot) -> tuple[Input, ...]:
+        """``target`` and ``feedforward``, see the class."""
+        return (
+            Input("target", unit="m", size=3, rate="feedforward"),
+            Input("feedforward", unit="m/s", size=3, default=np.zeros(3)),
+        )
+
+    def rows(self, robot: Robot) -> tuple[Row, ...]:
+        """x, y, z [m]."""
+        return point_rows()
+
+    def row_weights(self, robot: Robot) -> NDArray[np.float64]:
+        """The declared weights."""
+        return weights_of_rows(self.weights, 3)
+
+    def initial(self, robot: Robot, q: NDArray[np.float64]) -> dict[str, Any]:
+        """The target where the point is at ``q``."""
+        return {"target": frame_pose(robot, self.frame, q).act(np.array(self.offset))}
+
+    def error(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
+        """The formula of the class."""
+        axes = resolve_axes(robot, "Elbow.axes", self.axes, self.frame)
+        if axes != self.frame:
+            point = kin.pose(self.frame).point(rot.constant(self.offset))
+            return into_axes(kin, point - inputs["target"], axes)
+        # R' (p + R offset - target) without turning the offset forth and back
+        return rot.constant(self.offset) - kin.pose(self.frame).inverse_point(inputs["target"])

@@ -1,0 +1,198 @@
+"""The user's own task: any expression of the kinematics, in three lines."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from wbc.errors import NotFiniteError, ShapeError, UnknownNameError, WbcError
+from wbc.symbolic.kinematics import Kinematics
+from wbc.symbolic.tracer import Tracer
+from wbc.tasks import inputs as run_time
+from wbc.tasks.base import Input, Row, Task, Values
+from wbc.tasks.frames import checked_weights, weights_of_rows
+
+if TYPE_CHECKING:
+    from wbc.robot import Robot
+
+
+@dataclass(frozen=True, init=False)
+class Expression(Task):
+    """Whatever the user writes is to become zero:
+
+        e = function(kin, p)                                  [units]
+
+    ``kin`` is the :class:`wbc.symbolic.Tracer` (poses, positions and rotations of frames, centre of mass, joint
+    coordinates, q); ``p`` holds the declared inputs by name: SX scalars and vectors, 3x3 rotations, poses. The result is
+    a CasADi SX scalar or column, or a list of them; the number of rows is found by running the function. The Jacobian
+    is exact, by differentiation along the tangent space, and so is the feed-forward of an input with a ``rate``.
+
+    Inputs:
+        those declared. Each needs a default: nothing else can tell where the function starts from.
+
+    Example:
+        >>> height = Expression(
+        ...     lambda kin, p: kin.position("panda_hand")[2] - p["height"],
+        ...     units="m", inputs=(Input("height", unit="m", default=0.4),))
+
+    What it cannot do: the error may not depend on the velocity. Python branches run once, when the function is traced:
+    use ``casadi.if_else`` for a choice that depends on q or on inputs. It is no better than its formula: where that has
+    no derivative (a norm at zero) the row has none.
+
+    Attributes:
+        function: called as ``function(kin, p)`` each time the task is built; it must give the same each time.
+        units: unit of each row, or one for all; rows in ``m`` are divided by the characteristic length.
+        declared: the run-time inputs, ``inputs=`` of the constructor.
+        labels: name of each row; None: "value" for one row, else "0", "1", ...
+        weights: one number >= 0 a row, None: 1 each.
+
+    Raises:
+        WbcError: the function raised. UnknownNameError: a frame, joint or input that does not exist.
+        ShapeError: the result is no SX column, has symbols of its own, or does not depend on q.
+        NotFiniteError: the result or its Jacobian is not finite at the robot's neutral configuration.
+    """
+
+    function: Callable[[Tracer, Values], Any]
+    units: tuple[str, ...] | str
+    declared: tuple[Input, ...]
+    labels: tuple[str, ...] | None
+    weights: tuple[float, ...] | None
+
+    def __init__(
+        self,
+        function: Callable[[Tracer, Values], Any],
+        *,
+        units: str | Iterable[str],
+        inputs: Iterable[Input] = (),
+        labels: Iterable[str] | None = None,
+        weights: Iterable[float] | None = None,
+        gain: float | None = None,
+    ) -> None:
+        if not callable(function):
+            raise ShapeError("Expression.function", function, "expected a function of (kin, p)")
+        object.__setattr__(self, "function", function)
+        object.__setattr__(self, "units", units if isinstance(units, str) else _strings("units", units))
+        object.__setattr__(self, "declared", tuple(inputs) if isinstance(inputs, Iterable) else (inputs,))
+        object.__setattr__(self, "labels", None if labels is None else _strings("labels", labels))
+        object.__setattr__(self, "weights", checked_weights("Expression.weights", weights))
+        object.__setattr__(self, "gain", gain)
+
+    def validate(self, robot: Robot) -> None:
+        """Trace the function and evaluate it at the robot's neutral configuration, see the class."""
+        run_time.check(robot, "Expression.inputs", self.declared)
+        for d in self.declared:
+            if d.default is None:
+                raise ShapeError(f"Expression.inputs.{d.name}", None, "an input of an Expression needs a default")
+        trace = self._trace(robot)
+        self._check_counts(trace.error.numel())
+        jacobian = trace.tracer.jacobian(trace.error)
+        if jacobian.nnz() == 0:
+            raise ShapeError("Expression.function", trace.error, "the result does not depend on the configuration")
+        outputs = [trace.tracer.expand(trace.error), jacobian]
+        function = ca.Function("check", [trace.tracer.q, trace.symbols.vector], outputs)
+        values = [run_time.flat(robot, d.name, d, d.default) for d in self.declared]
+        error, matrix = function(robot.neutral, np.concatenate([np.zeros(0), *values]))
+        if not np.isfinite(np.array(error)).all():
+            raise NotFiniteError("Expression.function", np.ravel(error), "the error at the neutral configuration")
+        if not np.isfinite(np.array(matrix)).all():
+            rows = np.flatnonzero(~np.isfinite(np.array(matrix)).all(axis=1)).tolist()
+            reason = "no derivative at the neutral configuration, rows listed"
+            raise NotFiniteError("Expression.function", rows, reason)
+
+    def inputs(self, robot: Robot) -> tuple[Input, ...]:
+        """The declared inputs."""
+        return self.declared
+
+    def rows(self, robot: Robot) -> tuple[Row, ...]:
+        """One row an entry of the result."""
+        count = self._trace(robot).error.numel()
+        self._check_counts(count)
+        units = (self.units,) * count if isinstance(self.units, str) else self.units
+        default = ("value",) if count == 1 else tuple(str(k) for k in range(count))
+        return tuple(Row(label, unit) for label, unit in zip(self.labels or default, units, strict=True))
+
+    def row_weights(self, robot: Robot) -> NDArray[np.float64]:
+        """The declared weights."""
+        return weights_of_rows(self.weights, self._trace(robot).error.numel())
+
+    def error(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
+        """The user's function, its result checked and made a column."""
+        given = _Named({d.name: inputs[d.name] for d in self.declared})
+        try:
+            result = self.function(kin, given)
+        except WbcError:
+            raise
+        except Exception as error:
+            reason = f"the function raised {type(error).__name__}: {error}"
+            raise WbcError("Expression.function", self.function, reason) from error
+        return _column(result)
+
+    def declaration(self, robot: Robot) -> dict[str, Any]:
+        """What the function computes (not its source): a digest of the traced expression, with the inputs' layout."""
+        trace = self._trace(robot)
+        outputs = [trace.tracer.expand(trace.error)]
+        traced = ca.Function("expression", [trace.tracer.q, trace.symbols.vector], outputs)
+        return {
+            "class": f"{type(self).__module__}.{type(self).__qualname__}",
+            "rows": [[row.label, row.unit] for row in self.rows(robot)],
+            "weights": [w.hex() for w in self.row_weights(robot).tolist()],
+            "inputs": [[d.name, d.kind, run_time.size(robot, d), d.rate] for d in self.declared],
+            "function": hashlib.sha256(traced.serialize().encode()).hexdigest(),
+        }
+
+    def _trace(self, robot: Robot) -> _Trace:
+        tracer = Tracer(Kinematics(robot.model))
+        symbols = run_time.symbols(robot, self.declared)
+        error = self.error(robot, tracer, symbols.values)
+        known = {s.element_hash() for s in ca.symvar(ca.vertcat(tracer.q, symbols.vector))}
+        if any(s.element_hash() == v.element_hash() for s in ca.symvar(error) for v in ca.symvar(tracer.v)):
+            raise ShapeError("Expression.function", "kin.v", "an error is a function of the configuration, not of v")
+        stray = [s.name() for s in ca.symvar(tracer.expand(error)) if s.element_hash() not in known]
+        if stray:
+            raise ShapeError("Expression.function", stray, "the result has symbols that are not inputs")
+        return _Trace(tracer, symbols, error)
+
+    def _check_counts(self, count: int) -> None:
+        if not isinstance(self.units, str) and len(self.units) != count:
+            raise ShapeError("Expression.units", self.units, f"the function gives {count} rows")
+        if self.labels is not None and len(self.labels) != count:
+            raise ShapeError("Expression.labels", self.labels, f"the function gives {count} rows")
+        checked_weights("Expression.weights", self.weights, count)
+
+
+@dataclass(frozen=True, eq=False)
+class _Trace:
+    tracer: Tracer
+    symbols: run_time.Symbols
+    error: ca.SX
+
+
+class _Named(dict[str, Any]):
+    """Inputs by name; a wrong name is answered with the right ones."""
+
+    def __missing__(self, name: str) -> Any:
+        raise UnknownNameError("Expression input", name, self)
+
+
+def _strings(field: str, value: Any) -> tuple[str, ...]:
+    items = tuple(value) if isinstance(value, Iterable) else (value,)
+    if not all(isinstance(item, str) for item in items):
+        raise ShapeError(f"Expression.{field}", value, "expected strings")
+    return items
+
+
+def _column(result: Any) -> ca.SX:
+    parts = list(result) if isinstance(result, (list, tuple)) else [result]
+    if not parts or not all(isinstance(part, (ca.SX, int, float)) for part in parts):
+        raise ShapeError("Expression.function", result, "expected a CasADi SX column, or a list of SX scalars")
+    columns = [ca.SX(part) for part in parts]
+    if any(c.shape[1] != 1 or c.shape[0] == 0 for c in columns):
+        shapes = [c.shape for c in columns]
+        raise ShapeError("Expression.function", shapes, "expected a column, not a row, a matrix or nothing")
+    return ca.densify(ca.vertcat(*columns))

@@ -1,0 +1,88 @@
+"""What tasks on frames share: axes by name, a point's error in chosen axes, a frame's pose at a configuration."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import casadi as ca
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from wbc import validation
+from wbc.errors import RangeError, ShapeError
+from wbc.symbolic.kinematics import WORLD
+from wbc.symbolic.tracer import Tracer
+from wbc.tasks.base import Row
+
+if TYPE_CHECKING:
+    from wbc.robot import Robot
+
+#: Axes that turn with the task's own frame.
+OWN = "frame"
+#: Axes that the target is given in.
+REFERENCE = "reference"
+
+
+def resolve_axes(robot: Robot, field: str, axes: Any, frame: str | None, reference: str = WORLD) -> str:
+    """The frame whose axes are meant: ``"frame"`` is the task's own, ``"reference"`` the target's, else a frame's name.
+
+    Raises:
+        UnknownNameError: none of these.
+    """
+    words = {REFERENCE: reference} if frame is None else {OWN: frame, REFERENCE: reference}
+    if isinstance(axes, str) and axes in words:
+        return words[axes]
+    return validation.one_of(field, axes, (*words, *robot.frame_names))
+
+
+def require_motion(robot: Robot, field: str, frame: str, reference: str = WORLD) -> None:
+    """Refuse a frame that no joint moves against the reference.
+
+    Raises:
+        RangeError: both are fixed to the same body.
+    """
+    if _joint(robot, frame) == _joint(robot, reference):
+        raise RangeError(field, frame, f"no joint moves this frame against {reference!r}")
+
+
+def _joint(robot: Robot, frame: str) -> int:
+    return 0 if frame == WORLD else int(robot.model.frames[robot.model.getFrameId(frame)].parentJoint)
+
+
+def into_axes(kin: Tracer, vector: ca.SX, axes: str) -> ca.SX:
+    """R_a' vector: the components along the axes of a frame of a vector given in world axes."""
+    return vector if axes == WORLD else kin.rotation(axes).T @ vector
+
+
+def frame_pose(robot: Robot, frame: str, q: NDArray[np.float64]) -> pin.SE3:
+    """Pose of a named frame in the world at a configuration, by Pinocchio."""
+    if frame == WORLD:
+        return pin.SE3.Identity()
+    data = robot.model.createData()
+    pin.forwardKinematics(robot.model, data, q)
+    return pin.updateFramePlacement(robot.model, data, robot.model.getFrameId(frame)).copy()
+
+
+def point_rows() -> tuple[Row, ...]:
+    """Rows x, y, z in metres."""
+    return tuple(Row(label, "m") for label in "xyz")
+
+
+def checked_weights(field: str, weights: Any, count: int | None = None) -> tuple[float, ...] | None:
+    """Weights >= 0, one a row, as a tuple; None stays None (all 1).
+
+    Raises:
+        ShapeError: not one number a row. NotFiniteError, RangeError: NaN, infinite or negative.
+    """
+    if weights is None:
+        return None
+    array = validation.real_array(field, weights)
+    if array.ndim != 1 or (count is not None and array.shape != (count,)):
+        raise ShapeError(field, weights, f"expected {'one number a row' if count is None else f'{count} numbers'}")
+    return tuple(validation.scalar(f"{field}[{i}]", w, low=0.0) for i, w in enumerate(array))
+
+
+def weights_of_rows(weights: tuple[float, ...] | None, count: int) -> NDArray[np.float64]:
+    """Declared weights as an array; ones for None."""
+    return np.ones(count) if weights is None else np.array(weights, dtype=np.float64)

@@ -1,0 +1,113 @@
+"""Run-time values of one item as flat numbers and as the symbols that its expressions receive."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, get_args
+
+import casadi as ca
+import numpy as np
+
+from wbc import validation
+from wbc.errors import BoundsError, DuplicateNameError, RangeError, ShapeError
+from wbc.symbolic.kinematics import Pose
+from wbc.tasks.base import Input, Kind
+from wbc.validation import Array
+
+if TYPE_CHECKING:
+    from wbc.robot import Robot
+
+#: Inputs that every item has, or may have, without declaring them.
+RESERVED = ("gain", "weight", "enabled", "mask", "rate")
+
+
+def size(robot: Robot, declared: Input) -> int:
+    """How many numbers the input takes in a buffer."""
+    fixed = {"pose": 12, "rotation": 9, "configuration": robot.nq, "tangent": robot.nv}
+    return fixed.get(declared.kind, max(1, declared.size))
+
+
+def rate_size(robot: Robot, declared: Input) -> int:
+    """How many numbers the input's time derivative has."""
+    fixed = {"pose": 6, "rotation": 3, "configuration": robot.nv}
+    return fixed.get(declared.kind, size(robot, declared))
+
+
+def flat(robot: Robot, field: str, declared: Input, value: Any) -> Array:
+    """A value as the user writes it, checked, as the numbers of the buffer.
+
+    Raises:
+        ShapeError, NotFiniteError, RotationError, RangeError: it is no value of this input.
+    """
+    if declared.kind == "pose":
+        pose = validation.pose(field, value)
+        return np.concatenate([np.ravel(pose.rotation, order="F"), pose.translation])
+    if declared.kind == "rotation":
+        return np.ravel(validation.rotation(field, value), order="F")
+    if declared.kind == "configuration":
+        return robot.configuration(field, value)
+    shape = () if declared.kind == "vector" and declared.size == 0 else (size(robot, declared),)
+    numbers = np.atleast_1d(validation.real_array(field, value, shape))
+    for number in numbers:
+        validation.scalar(field, number, low=declared.low, high=declared.high, unit=declared.unit)
+    return numbers
+
+
+@dataclass(frozen=True, eq=False)
+class Symbols:
+    """Symbols of some inputs: ``flat`` in buffer order, and ``values`` as an item's expressions receive them."""
+
+    flat: dict[str, ca.SX]
+    values: dict[str, ca.SX | Pose]
+
+    @property
+    def vector(self) -> ca.SX:
+        """All numbers, input after input."""
+        return ca.vertcat(ca.SX(0, 1), *self.flat.values())
+
+
+def symbols(robot: Robot, declared: Sequence[Input]) -> Symbols:
+    """Fresh symbols for the inputs."""
+    numbers = {d.name: ca.SX.sym(d.name, size(robot, d)) for d in declared}
+    values: dict[str, ca.SX | Pose] = {}
+    for d in declared:
+        part = numbers[d.name]
+        if d.kind == "pose":
+            values[d.name] = Pose(ca.reshape(part[:9], 3, 3), part[9:])
+        else:
+            values[d.name] = ca.reshape(part, 3, 3) if d.kind == "rotation" else part
+    return Symbols(numbers, values)
+
+
+def check(robot: Robot, field: str, declared: Sequence[Input]) -> None:
+    """Check the declarations of a user's own inputs.
+
+    Raises:
+        ShapeError, DuplicateNameError, UnknownNameError, RangeError, BoundsError: named by input.
+    """
+    names = [d.name for d in declared if isinstance(d, Input)]
+    for d in declared:
+        if not isinstance(d, Input):
+            raise ShapeError(field, d, "expected an Input")
+        if not isinstance(d.name, str) or not d.name.isidentifier():
+            raise ShapeError(field, d.name, "the name of an input must be a Python identifier")
+        if d.name in RESERVED:
+            raise DuplicateNameError(field, d.name, "every item has an input of this name")
+        if names.count(d.name) > 1:
+            raise DuplicateNameError(field, d.name, "two inputs of this name")
+        where = f"{field}.{d.name}"
+        validation.one_of(f"{where}.kind", d.kind, get_args(Kind))
+        if isinstance(d.size, bool) or not isinstance(d.size, int) or d.size < 0:
+            raise RangeError(f"{where}.size", d.size, "expected an integer >= 0")
+        if not d.low <= d.high:
+            raise BoundsError(f"{where}.low", d.low, f"above high = {d.high!r}, or NaN")
+        if d.default is not None:
+            flat(robot, f"{where}.default", d, d.default)
+        if d.rate is not None:
+            validation.one_of(f"{where}.rate", d.rate, names)
+            other = declared[names.index(d.rate)]
+            found, wanted = size(robot, other), rate_size(robot, d)
+            if found != wanted or other.kind not in ("vector", "tangent"):
+                reason = f"the rate of {d.name!r} has {wanted} numbers, the {other.kind} {d.rate!r} has {found}"
+                raise ShapeError(f"{where}.rate", d.rate, reason)

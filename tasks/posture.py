@@ -1,0 +1,111 @@
+"""Joints stay near a configuration."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from wbc import validation
+from wbc.errors import DuplicateNameError, ShapeError
+from wbc.symbolic.tracer import Tracer
+from wbc.tasks.base import Input, Row, Task, Values
+from wbc.tasks.frames import checked_weights, weights_of_rows
+
+if TYPE_CHECKING:
+    from wbc.robot import Robot
+
+STARTS = ("first", "neutral")
+
+
+@dataclass(frozen=True)
+class Posture(Task):
+    """The chosen joints follow a configuration, on the manifold:
+
+        e = S (q (-) target)              [rad or m, as each degree of freedom]
+
+    where target (+) e = q along the shortest way and S picks the degrees of freedom of the chosen joints. For a
+    revolute or prismatic joint that is q - target; for an unbounded joint the angle in (-pi, pi]; for a
+    floating base the logarithm of the relative pose (linear; angular, in base axes).
+
+    Inputs:
+        target: a configuration, nq numbers (also where only some joints are chosen; the others are not read).
+            Default: see ``start``.
+        feedforward: velocity of the target in its tangent space, nv numbers [rad/s, m/s]. Default 0.
+
+    Example:
+        >>> Posture(joints=("panda_joint1", "panda_joint3"), weights=(1.0, 0.2))
+
+    What it cannot do: an unbounded joint, or the rotation of a base, half a turn from the target has two equally
+    short ways, and noise may choose the other. It knows nothing of limits: a target outside them is aimed at.
+
+    Attributes:
+        joints: names of joints, in the order of the rows; None: every joint but a moving base.
+        weights: one number >= 0 a row, None: 1 each.
+        start: the target until one is set: ``"first"``, the configuration of the first step, or ``"neutral"``, the
+            robot's own.
+
+    Raises:
+        UnknownNameError, DuplicateNameError, ShapeError, NotFiniteError, RangeError: on construction or in
+            :meth:`validate`.
+    """
+
+    joints: tuple[str, ...] | None = None
+    weights: tuple[float, ...] | None = None
+    start: Literal["first", "neutral"] = "first"
+
+    def __post_init__(self) -> None:
+        validation.one_of("Posture.start", self.start, STARTS)
+        if self.joints is not None:
+            if isinstance(self.joints, str) or not isinstance(self.joints, Iterable):
+                raise ShapeError("Posture.joints", self.joints, "expected a list of joint names")
+            object.__setattr__(self, "joints", tuple(self.joints))
+        object.__setattr__(self, "weights", checked_weights("Posture.weights", self.weights))
+
+    def validate(self, robot: Robot) -> None:
+        """Check joints and the number of weights, see :meth:`Item.validate`."""
+        names = self._names(robot)
+        for name in names:
+            robot.dofs(name, "Posture.joints")
+        if len(set(names)) != len(names):
+            raise DuplicateNameError("Posture.joints", names, "a joint is named twice")
+        count = len(self._dofs(robot))
+        if count == 0:
+            raise ShapeError("Posture.joints", names, "no joint is left to hold")
+        checked_weights("Posture.weights", self.weights, count)
+
+    def inputs(self, robot: Robot) -> tuple[Input, ...]:
+        """``target`` and ``feedforward``, see the class."""
+        default = robot.neutral.copy() if self.start == "neutral" else None
+        return (
+            Input("target", "configuration", unit="rad, m", default=default, rate="feedforward"),
+            Input("feedforward", "tangent", unit="rad/s, m/s", default=np.zeros(robot.nv)),
+        )
+
+    def rows(self, robot: Robot) -> tuple[Row, ...]:
+        """One row a degree of freedom of the chosen joints."""
+        return tuple(Row(robot.dof_names[k], robot.dof_units[k]) for k in self._dofs(robot))
+
+    def row_weights(self, robot: Robot) -> NDArray[np.float64]:
+        """The declared weights."""
+        return weights_of_rows(self.weights, len(self._dofs(robot)))
+
+    def initial(self, robot: Robot, q: NDArray[np.float64]) -> dict[str, Any]:
+        """The configuration ``q``."""
+        return {"target": np.array(q, dtype=np.float64)}
+
+    def error(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
+        """The formula of the class."""
+        return kin.kinematics.difference(inputs["target"], kin.q)[self._dofs(robot)]
+
+    def _names(self, robot: Robot) -> tuple[str, ...]:
+        if self.joints is not None:
+            return self.joints
+        return robot.joint_names if robot.base == "fixed" else robot.joint_names[1:]
+
+    def _dofs(self, robot: Robot) -> list[int]:
+        return [k for name in self._names(robot) for k in range(*robot.dofs(name).indices(robot.nv))]
