@@ -1,0 +1,72 @@
+"""PitchPlaneLimit: the angle of an arm's plane stays between two bounds."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import casadi as ca
+
+from wbc import validation
+from wbc.errors import BoundsError, RangeError
+from wbc.robot import Robot
+from wbc.symbolic.tracer import Tracer
+from wbc.tasks._plane import PlaneItem
+from wbc.tasks.base import Constraint, Row, Values
+
+
+@dataclass(frozen=True)
+class PitchPlaneLimit(PlaneItem, Constraint):
+    """Keep the plane of shoulder, elbow and wrist within lower <= psi <= upper on the circle. Two rows.
+
+    psi is the angle of :class:`wbc.tasks.PitchPlane`: of three points, or of the plane perpendicular to ``axis``
+    (with ``PlaneReference()`` if no ``reference`` is given, because a limit needs an angle). With the middle
+    m = (lower + upper) / 2, the half range c = (upper - lower) / 2 and the fading factor f of PitchPlane, the
+    margins [rad] are
+
+        h = (c + f wrap(psi - m),  c - f wrap(psi - m)) >= 0.
+
+    Where f = 1 that is psi - lower and upper - psi, the short way round. Towards a singular set f falls
+    smoothly to 0 and both margins to the constant c, whose derivative is zero: the limit is switched off there by
+    margins that stay differentiable, so v = 0 keeps meeting the rows of any state that meets h >= 0. An arm that
+    turned its plane beyond a bound inside the faded zone cannot leave the zone until the plane is back.
+
+    It cannot: guard the plane inside the faded zones; count turns; tell the way back where psi is opposite to the
+    middle (there the two rows swap roles, and the plane may go on to the other side); promise a gap 2 pi -
+    (upper - lower) smaller than the plane's turn in one tick.
+
+    Attributes:
+        lower, upper: bounds of psi [rad], lower < upper < lower + 2 pi; (3, 4) is a range that contains pi.
+        others: as in :class:`wbc.tasks.PitchPlane`.
+
+    Raises:
+        BoundsError: lower >= upper.
+        RangeError: a range of a full turn or more.
+        UnknownNameError, ShapeError, NotFiniteError: a bad field.
+    """
+
+    lower: float = field(kw_only=True)
+    upper: float = field(kw_only=True)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        lower = validation.scalar("lower", self.lower, unit="rad")
+        upper = validation.scalar("upper", self.upper, unit="rad")
+        if lower >= upper:
+            raise BoundsError("lower", lower, f"expected a value below upper = {upper:g} rad")
+        if upper - lower >= 2 * math.pi:
+            raise RangeError("upper", upper, f"expected less than a full turn above lower = {lower:g} rad")
+        object.__setattr__(self, "lower", lower)
+        object.__setattr__(self, "upper", upper)
+
+    def rows(self, robot: Robot) -> tuple[Row, ...]:
+        return (Row("lower", "rad"), Row("upper", "rad"))
+
+    def margins(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
+        half = (self.upper - self.lower) / 2
+        off = self._fading(kin, with_reference=True) * self._turned(kin, ca.SX(self.lower + half))
+        return ca.vertcat(half + off, half - off)
+
+    def row_factor(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
+        factor = self._fading(kin, with_reference=True)
+        return ca.vertcat(factor, factor)
