@@ -7,6 +7,7 @@ which is the referee in the tests.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -14,8 +15,9 @@ import casadi as ca
 import pinocchio as pin
 
 from wbc.errors import UnknownNameError
+from wbc.symbolic import kernels
 from wbc.symbolic import rotations as rot
-from wbc.symbolic.joints import SymbolicJoint, symbolic_joint
+from wbc.symbolic.joints import SymbolicJoint, mimic_joint, symbolic_joint
 
 WORLD = "world"
 
@@ -41,7 +43,7 @@ class Pose:
 
     def times(self, other: Pose) -> Pose:
         """Composition of poses."""
-        return Pose(self.rotation @ other.rotation, self.point(other.position))
+        return Pose(*kernels.compose()(self.rotation, self.position, other.rotation, other.position))
 
     def inverse(self) -> Pose:
         """Inverse pose."""
@@ -54,50 +56,82 @@ class Kinematics:
     def __init__(self, model: pin.Model) -> None:
         self.model = model
         self.nq, self.nv = int(model.nq), int(model.nv)
+        self.njoints = int(model.njoints)
         self.q = ca.SX.sym("q", self.nq)
         self.v = ca.SX.sym("v", self.nv)
-        names = list(model.names)
-        self.joints: list[SymbolicJoint | None] = [None]
-        self.joints += [symbolic_joint(model.joints[j], names[j]) for j in range(1, model.njoints)]
+        self.parents = [int(p) for p in model.parents]
+        self._fill_joints()
         self._poses: dict[int, Pose] = {0: Pose(ca.SX(ca.DM.eye(3)), ca.SX(3, 1))}
+        self._local: dict[int, Pose] = {}
+        self._subspaces: dict[int, tuple[ca.SX, ca.SX]] = {}
+        self._chains: dict[int, tuple[ca.SX, ca.SX, ca.SX]] = {}
         self._columns: dict[int, tuple[ca.SX, ca.SX]] = {}
         self._frames: dict[str, tuple[int, Pose]] = {}
         self._jacobians: dict[tuple[str, str], ca.SX] = {}
 
+    def _fill_joints(self) -> None:
+        """The joints' maps and where each reads q and v; a mimic joint reads its leader's and owns none."""
+        model = self.model
+        followers = {int(f): int(k) for f, k in zip(model.mimicking_joints, model.mimicked_joints, strict=True)}
+        self.joints: list[SymbolicJoint | None] = [None]
+        self.followers = frozenset(followers)
+        for j in range(1, self.njoints):
+            name, leader = str(model.names[j]), followers.get(j)
+            own = symbolic_joint(model.joints[followers.get(j, j)], name)
+            self.joints.append(own if leader is None else mimic_joint(model.joints[j], own, name))
+        iq, iv = [int(i) for i in model.idx_qs], [int(i) for i in model.idx_vs]
+        self._q_slices = [slice(i, i + (j.nq if j else 0)) for i, j in zip(iq, self.joints, strict=True)]
+        self._v_slices = [slice(i, i + (j.nv if j else 0)) for i, j in zip(iv, self.joints, strict=True)]
+
     def joint_q(self, joint: int) -> ca.SX:
-        """Coordinates of joint number ``joint``."""
-        start = int(self.model.idx_qs[joint])
-        return self.q[start : start + int(self.model.nqs[joint])]
+        """Coordinates of joint number ``joint``; of its leader for a mimic joint."""
+        return self.q[self._q_slices[joint]]
 
     def joint_columns(self, joint: int) -> slice:
-        """Where the velocities of joint number ``joint`` stand in v."""
-        start = int(self.model.idx_vs[joint])
-        return slice(start, start + int(self.model.nvs[joint]))
+        """Where the velocities of joint number ``joint`` stand in v; those of its leader for a mimic joint."""
+        return self._v_slices[joint]
+
+    def symbolic(self, joint: int) -> SymbolicJoint:
+        """The maps of joint number ``joint`` (1 to njoints - 1)."""
+        maps = self.joints[joint]
+        assert maps is not None
+        return maps
+
+    def local_pose(self, joint: int) -> Pose:
+        """Pose of the child side of a joint in the child side of its parent joint (Pinocchio's liMi)."""
+        known = self._local.get(joint)
+        if known is None:
+            fixed = self.model.jointPlacements[joint]
+            rotation, position = self.symbolic(joint).placement(self.joint_q(joint))
+            base = Pose(rot.constant(fixed.rotation), rot.constant(fixed.translation))
+            known = base.times(Pose(rotation, position))
+            self._local[joint] = known
+        return known
 
     def joint_pose(self, joint: int) -> Pose:
         """Pose of the child side of a joint in the world (Pinocchio's oMi)."""
         known = self._poses.get(joint)
-        if known is not None:
-            return known
-        parent = self.joint_pose(int(self.model.parents[joint]))
-        fixed = self.model.jointPlacements[joint]
-        base = parent.times(Pose(rot.constant(fixed.rotation), rot.constant(fixed.translation)))
-        symbolic = self.joints[joint]
-        assert symbolic is not None
-        rotation, position = symbolic.placement(self.joint_q(joint))
-        pose = base.times(Pose(rotation, position))
-        self._poses[joint] = pose
-        return pose
+        if known is None:
+            known = self.joint_pose(self.parents[joint]).times(self.local_pose(joint))
+            self._poses[joint] = known
+        return known
+
+    def joint_subspace(self, joint: int) -> tuple[ca.SX, ca.SX]:
+        """(linear 3 x nv_j, angular 3 x nv_j), child axes, of the joint's own motion: S(q)."""
+        known = self._subspaces.get(joint)
+        if known is None:
+            subspace = ca.sparsify(self.symbolic(joint).subspace(self.joint_q(joint)))
+            known = (subspace[:3, :], subspace[3:, :])
+            self._subspaces[joint] = known
+        return known
 
     def joint_twist(self, joint: int) -> tuple[ca.SX, ca.SX]:
         """(linear 3 x nv_j at the joint's origin, angular 3 x nv_j), world axes, of the joint's own motion."""
         known = self._columns.get(joint)
         if known is None:
-            symbolic = self.joints[joint]
-            assert symbolic is not None
-            subspace = ca.sparsify(symbolic.subspace(self.joint_q(joint)))
+            linear, angular = self.joint_subspace(joint)
             rotation = self.joint_pose(joint).rotation
-            known = (ca.sparsify(rotation @ subspace[:3, :]), ca.sparsify(rotation @ subspace[3:, :]))
+            known = (rotation @ linear, rotation @ angular)
             self._columns[joint] = known
         return known
 
@@ -106,7 +140,7 @@ class Kinematics:
         out = []
         while joint > 0:
             out.append(joint)
-            joint = int(self.model.parents[joint])
+            joint = self.parents[joint]
         return out[::-1]
 
     def frame(self, name: str) -> tuple[int, Pose]:
@@ -151,31 +185,64 @@ class Kinematics:
 
     def point_jacobian(self, joint: int, point: ca.SX) -> ca.SX:
         """6 x nv Jacobian, world axes, of the point of body ``joint`` that is at ``point`` now."""
-        out = ca.SX(6, self.nv)
+        chain = self._chain(joint)
+        if chain is None:
+            return ca.SX(6, self.nv)
+        origins, linear, angular = chain
+        moved = kernels.point_columns(origins.shape[1])(point, origins, linear, angular)
+        both = ca.vertcat(moved, angular)
+        blocks, start = [], 0
         for k in self.support(joint):
-            linear, angular = self.joint_twist(k)
-            arm = point - self.joint_pose(k).position
-            columns = self.joint_columns(k)
-            if angular.nnz():
-                linear = linear - rot.skew(arm) @ angular
-            out[:3, columns] = linear
-            out[3:, columns] = angular
-        return ca.sparsify(out)
+            width = self._width(k)
+            blocks.append((k, both[:, start : start + width]))
+            start += width
+        return self.columns(6, blocks)
+
+    def _width(self, joint: int) -> int:
+        return self.symbolic(joint).nv
+
+    def _chain(self, joint: int) -> tuple[ca.SX, ca.SX, ca.SX] | None:
+        """(origins, linear, angular), 3 x n each, world axes: the motion columns of every joint that moves a body."""
+        known = self._chains.get(joint)
+        if known is None and joint > 0:
+            linear, angular = self.joint_twist(joint)
+            own = (ca.repmat(self.joint_pose(joint).position, 1, self._width(joint)), linear, angular)
+            above = self._chain(self.parents[joint])
+            known = own if above is None else tuple(ca.horzcat(*pair) for pair in zip(above, own, strict=True))
+            self._chains[joint] = known
+        return known
+
+    def columns(self, rows: int, blocks: Iterable[tuple[int, ca.SX]]) -> ca.SX:
+        """A rows x nv matrix from (joint, rows x nv_j) blocks; a mimic joint's block adds to its leader's."""
+        placed: dict[int, ca.SX] = {}
+        for joint, block in blocks:
+            start = self._v_slices[joint].start
+            placed[start] = placed[start] + block if start in placed else block
+        parts, end = [], 0
+        for start in sorted(placed):
+            parts += [ca.SX(rows, start - end), placed[start]]
+            end = start + placed[start].shape[1]
+        return ca.sparsify(ca.horzcat(*parts, ca.SX(rows, self.nv - end)))
 
     @cached_property
     def _subtrees(self) -> list[tuple[float, ca.SX]]:
         """Per joint: mass of its subtree and the first moment of that mass, in the world."""
-        masses = [0.0] * self.model.njoints
+        masses = [0.0] * self.njoints
         moments = [ca.SX(3, 1) for _ in masses]
-        for j in range(self.model.njoints - 1, 0, -1):
+        for j in range(self.njoints - 1, 0, -1):
             inertia = self.model.inertias[j]
             if inertia.mass > 0.0:
                 masses[j] += float(inertia.mass)
                 moments[j] = moments[j] + inertia.mass * self.joint_pose(j).point(rot.constant(inertia.lever))
-            parent = int(self.model.parents[j])
+            parent = self.parents[j]
             masses[parent] += masses[j]
             moments[parent] = moments[parent] + moments[j]
         return list(zip(masses, moments, strict=True))
+
+    @property
+    def mass(self) -> float:
+        """Mass of all moving bodies [kg]."""
+        return self._subtrees[0][0]
 
     @cached_property
     def center_of_mass(self) -> ca.SX:
@@ -187,15 +254,14 @@ class Kinematics:
     def center_of_mass_jacobian(self) -> ca.SX:
         """3 x nv Jacobian of :attr:`center_of_mass`: per joint, twist of the subtree's mass over all mass."""
         total = self._subtrees[0][0]
-        out = ca.SX(3, self.nv)
-        for j in range(1, self.model.njoints):
+        blocks = []
+        for j in range(1, self.njoints):
             mass, moment = self._subtrees[j]
-            if mass <= 0.0:
-                continue
-            linear, angular = self.joint_twist(j)
-            arm = moment - mass * self.joint_pose(j).position
-            out[:, self.joint_columns(j)] = (mass * linear - rot.skew(arm) @ angular) / total
-        return ca.sparsify(out)
+            if mass > 0.0:
+                linear, angular = self.joint_twist(j)
+                arm = (moment - mass * self.joint_pose(j).position) / total
+                blocks.append((j, (mass / total) * linear - rot.skew(arm) @ angular))
+        return self.columns(3, blocks)
 
     @cached_property
     def tangent_map(self) -> ca.SX:
@@ -213,17 +279,21 @@ class Kinematics:
 
     def difference(self, q0: ca.SX, q1: ca.SX) -> ca.SX:
         """v with q0 (+) v = q1, the shortest."""
-        out = []
-        for k, symbolic, a, _ in self._split(q0, self.v):
-            start = int(self.model.idx_qs[k])
-            out.append(symbolic.difference(a, q1[start : start + symbolic.nq]))
-        return ca.vertcat(*out)
+        return ca.vertcat(*[j.difference(a, q1[self._q_slices[k]]) for k, j, a, _ in self._split(q0, self.v)])
 
     def _split(self, q: ca.SX, v: ca.SX) -> list[tuple[int, SymbolicJoint, ca.SX, ca.SX]]:
-        out = []
-        for k in range(1, self.model.njoints):
-            symbolic = self.joints[k]
-            assert symbolic is not None
-            start = int(self.model.idx_qs[k])
-            out.append((k, symbolic, q[start : start + symbolic.nq], v[self.joint_columns(k)]))
-        return out
+        """(joint, maps, coordinates, velocities) of every joint that owns coordinates, in the order of q."""
+        own = [k for k in range(1, self.njoints) if k not in self.followers]
+        own.sort(key=lambda k: self._q_slices[k].start)
+        return [(k, self.symbolic(k), q[self._q_slices[k]], v[self._v_slices[k]]) for k in own]
+
+    def derivative(self, expression: ca.SX) -> ca.SX:
+        """d f(q (+) dv) / d dv at dv = 0, rows x nv: df/dq T(q), exact on quaternions and unit circles.
+
+        v and the other symbols in the expression are held.
+        """
+        return ca.sparsify(ca.jacobian(expression, self.q) @ self.tangent_map)
+
+    def directional(self, expression: ca.SX, direction: ca.SX) -> ca.SX:
+        """d f(q (+) t d) / dt at t = 0 for a direction d (nv): one sweep where :meth:`derivative` takes nv."""
+        return ca.jtimes(expression, self.q, self.tangent_map @ direction)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
@@ -10,12 +12,19 @@ from numpy.typing import ArrayLike
 #: a quarter turn written in floating point leaves 6e-17, which would cost an operation each.
 SNAP = 1e-14
 
+_EYE = np.eye(3)
+
 
 def constant(matrix: ArrayLike) -> ca.SX:
     """A constant as a sparse SX, with rounding dust removed (see :data:`SNAP`)."""
     array = np.array(matrix, dtype=float)
     for special in (0.0, 1.0, -1.0):
         array[np.abs(array - special) < SNAP] = special
+    rows, columns = array.shape if array.ndim == 2 else (array.size, 1)
+    if not array.any():
+        return ca.SX(rows, columns)
+    if array.shape == (3, 3) and np.array_equal(array, _EYE):
+        return ca.SX.eye(3)
     return ca.SX(ca.sparsify(ca.DM(array)))
 
 
@@ -25,19 +34,19 @@ def skew(w: ca.SX) -> ca.SX:
 
 
 def from_axis_angle(axis: ArrayLike, cos: ca.SX, sin: ca.SX) -> ca.SX:
-    """R = 1 + sin(t) [a]x + (1 - cos(t)) [a]x^2 for a constant unit axis (Rodrigues)."""
-    a = np.array(axis, dtype=float)
+    """R = aa' + cos(t) (1 - aa') + sin(t) [a]x for a constant unit axis a (Rodrigues)."""
+    return _axis_angle(tuple(np.array(axis, dtype=float).tolist()))(cos, sin)
+
+
+@lru_cache(maxsize=256)
+def _axis_angle(axis: tuple[float, float, float]) -> ca.Function:
+    """(cos, sin) -> R, kept because one call costs less than the six matrix operations."""
+    a = np.array(axis)
+    cos, sin = ca.SX.sym("cos"), ca.SX.sym("sin")
     hat = np.array([[0.0, -a[2], a[1]], [a[2], 0.0, -a[0]], [-a[1], a[0], 0.0]])
-    out = ca.SX(3, 3)
-    square = hat @ hat
-    for i in range(3):
-        for j in range(3):
-            # aa' + cos (1 - aa') + sin [a]x, entry by entry, so that a coordinate axis leaves no dead terms
-            outer = square[i, j] + (1.0 if i == j else 0.0)
-            entry = _times(outer, ca.SX(1)) + _times((1.0 if i == j else 0.0) - outer, cos) + _times(hat[i, j], sin)
-            if not entry.is_zero():
-                out[i, j] = entry
-    return out
+    outer = np.outer(a, a)
+    turn = constant(outer) + constant(_EYE - outer) * cos + constant(hat) * sin
+    return ca.Function("axis_angle", [cos, sin], [turn])
 
 
 def from_quaternion(quat: ca.SX) -> ca.SX:
@@ -55,56 +64,60 @@ def to_quaternion(rotation: ca.SX) -> ca.SX:
 
     Every branch is guarded, so the three that are not taken stay finite in value and derivative.
     """
+    chosen = _any_quaternion(rotation)
+    return chosen * _sign_of_scalar(chosen)
+
+
+def _sign_of_scalar(quat: ca.SX) -> ca.SX:
+    """The sign that keeps |angle| <= pi; a zero w counts as positive."""
+    return ca.if_else(quat[3] < 0, -1, 1)
+
+
+def _any_quaternion(rotation: ca.SX) -> ca.SX:
+    """One of the two unit quaternions of a rotation: the one with its largest entry positive."""
     r = rotation
     trace = r[0, 0] + r[1, 1] + r[2, 2]
-    candidates = (
-        (trace, 3),
-        (r[0, 0], 0),
-        (r[1, 1], 1),
-        (r[2, 2], 2),
-    )
-    quats = []
-    for _, which in candidates:
-        if which == 3:
-            square = 1 + trace
-            raw = (r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1])
-        else:
-            i, j, k = which, (which + 1) % 3, (which + 2) % 3
-            square = 1 + r[i, i] - r[j, j] - r[k, k]
-        t = ca.sqrt(ca.fmax(square, 1e-2))
+    t = ca.sqrt(ca.fmax(1 + trace, 1e-2))
+    half = 0.5 / t
+    skewed = ca.vertcat(r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1])
+    chosen, best = ca.vertcat(skewed * half, 0.5 * t), trace
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        # The pivot 4 quat[i]^2 is at least 1 where this branch is taken
+        t = ca.sqrt(ca.fmax(1 + r[i, i] - r[j, j] - r[k, k], 1e-2))
         half = 0.5 / t
-        if which == 3:
-            quats.append(ca.vertcat(raw[0] * half, raw[1] * half, raw[2] * half, 0.5 * t))
-        else:
-            entries: list[ca.SX] = [ca.SX(0)] * 4
-            entries[i] = 0.5 * t
-            entries[j] = (r[j, i] + r[i, j]) * half
-            entries[k] = (r[k, i] + r[i, k]) * half
-            entries[3] = (r[k, j] - r[j, k]) * half
-            quats.append(ca.vertcat(*entries))
-    chosen, best = quats[0], candidates[0][0]
-    for (value, _), quat in zip(candidates[1:], quats[1:], strict=True):
-        chosen = ca.if_else(value > best, quat, chosen)
-        best = ca.fmax(value, best)
-    # Flipping by the sign of w keeps |angle| <= pi; a zero w counts as positive
-    return chosen * ca.if_else(chosen[3] < 0, -1, 1)
+        entries: list[ca.SX] = [ca.SX(0)] * 4
+        entries[i] = 0.5 * t
+        entries[j] = (r[j, i] + r[i, j]) * half
+        entries[k] = (r[k, i] + r[i, k]) * half
+        entries[3] = skewed[i] * half
+        chosen = ca.if_else(r[i, i] > best, ca.vertcat(*entries), chosen)
+        best = ca.fmax(r[i, i], best)
+    return chosen
 
 
 def log3(rotation: ca.SX) -> ca.SX:
     """Rotation vector theta * axis of ``rotation``, |theta| <= pi, exact near 0 and near pi.
 
-    Through the quaternion (x, y, z, w): log = 2 atan2(s, w) / s * (x, y, z) with s = |(x, y, z)|;
-    below s^2 = 1e-6 the factor is its series 2/w (1 - s^2 / (3 w^2) + s^4 / (5 w^4)). Discontinuous at
-    theta = pi, as the logarithm is.
+    See :func:`log_quaternion`; discontinuous at theta = pi, as the logarithm is.
     """
-    quat = to_quaternion(rotation)
-    vec, w = quat[:3], quat[3]
+    return log_quaternion(_any_quaternion(rotation))
+
+
+def log_quaternion(quat: ca.SX) -> ca.SX:
+    """Rotation vector of a unit quaternion (x, y, z, w), |theta| <= pi; q and -q give the same.
+
+    log = 2 atan2(s, w) / s * (x, y, z) with s = |(x, y, z)| and the sign of q that makes w >= 0; below
+    s^2 = 1e-6 the factor is its series 2/w (1 - s^2 / (3 w^2) + s^4 / (5 w^4)).
+    """
+    sign = _sign_of_scalar(quat)
+    vec, w = quat[:3], sign * quat[3]
     square = ca.dot(vec, vec)
     small = square < 1e-6
     safe = ca.sqrt(ca.if_else(small, 1.0, square))
     ratio = square / ca.if_else(small, w * w, 1.0)
     series = 2 / ca.if_else(small, w, 1.0) * (1 - ratio / 3 + ratio * ratio / 5)
-    return ca.if_else(small, series, 2 * ca.atan2(safe, w) / safe) * vec
+    return sign * ca.if_else(small, series, 2 * ca.atan2(safe, w) / safe) * vec
 
 
 def exp3(vector: ca.SX) -> ca.SX:
@@ -123,11 +136,29 @@ def quaternion_product(a: ca.SX, b: ca.SX) -> ca.SX:
     return ca.vertcat(aw * bv + bw * av + ca.cross(av, bv), aw * bw - ca.dot(av, bv))
 
 
-def _times(factor: float, value: ca.SX) -> ca.SX:
-    if abs(factor) < SNAP:
-        return ca.SX(0)
-    if abs(factor - 1.0) < SNAP:
-        return value
-    if abs(factor + 1.0) < SNAP:
-        return -value
-    return factor * value
+def quaternion_conjugate(quat: ca.SX) -> ca.SX:
+    """The inverse of a unit quaternion (x, y, z, w)."""
+    return ca.vertcat(-quat[:3], quat[3])
+
+
+def left_jacobian(w: ca.SX) -> ca.SX:
+    """V(w) of the SE(3) exponential: 1 + (1 - cos t)/t^2 [w]x + (t - sin t)/t^3 [w]x^2, series below t^2 = 1e-4."""
+    square = ca.dot(w, w)
+    small = square < 1e-4
+    t = ca.sqrt(ca.if_else(small, 1.0, square))
+    a = ca.if_else(small, 0.5 - square / 24 + square**2 / 720, (1 - ca.cos(t)) / t**2)
+    b = ca.if_else(small, 1 / 6 - square / 120 + square**2 / 5040, (t - ca.sin(t)) / t**3)
+    hat = skew(w)
+    return ca.SX(ca.DM.eye(3)) + a * hat + b * (hat @ hat)
+
+
+def left_jacobian_inverse(w: ca.SX) -> ca.SX:
+    """Inverse of :func:`left_jacobian`, finite up to |w| = pi."""
+    square = ca.dot(w, w)
+    small = square < 1e-4
+    t = ca.sqrt(ca.if_else(small, 1.0, square))
+    half = t / 2
+    exact = (1 - half * ca.cos(half) / ca.sin(half)) / t**2
+    c = ca.if_else(small, 1 / 12 + square / 720 + square**2 / 30240, exact)
+    hat = skew(w)
+    return ca.SX(ca.DM.eye(3)) - 0.5 * hat + c * (hat @ hat)

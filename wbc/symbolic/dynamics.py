@@ -1,0 +1,182 @@
+"""Rigid-body dynamics as expressions: inverse dynamics, gravity, mass matrix, kinetic energy.
+
+    M(q) dv/dt + b(q, v) + g(q) = tau
+
+Recursive algorithms in body axes (Featherstone 2008, chapters 5 and 6; Luh, Walker, Paul 1980). Inertias are
+kept as mass m, first moment h = int r dm and second moment Sigma = int r r' dm about the body's origin: zeros and
+symmetries of the description stay zeros in the expression. ``model.armature`` adds to the diagonal of M, as in
+Pinocchio; friction and damping of the description are not part of these maps, nor of Pinocchio's.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import casadi as ca
+import numpy as np
+
+from wbc.symbolic import kernels
+from wbc.symbolic import rotations as rot
+from wbc.symbolic.kinematics import Kinematics
+from wbc.symbolic.velocity import AccelerationField, Motion
+
+_ZERO = ca.SX(3, 1)
+
+
+class Bodies:
+    """Constant inertias of a model's bodies, per joint: (mass, first moment, second moment) in joint axes."""
+
+    def __init__(self, kinematics: Kinematics) -> None:
+        self.kinematics = kinematics
+        inertias = [kinematics.model.inertias[j] for j in range(kinematics.njoints)]
+        self.masses = [float(i.mass) for i in inertias]
+        self.moments: list[tuple[ca.SX, ca.SX]] = []
+        for inertia in inertias:
+            lever = np.array(inertia.lever)
+            about_center = np.array(inertia.inertia)
+            second = 0.5 * np.trace(about_center) * np.eye(3) - about_center + inertia.mass * np.outer(lever, lever)
+            self.moments.append((rot.constant(inertia.mass * lever), rot.constant(second)))
+
+    @cached_property
+    def composite(self) -> tuple[list[float], list[tuple[ca.SX, ca.SX]]]:
+        """(mass, (first moment, second moment)) of every joint's subtree, in that joint's axes."""
+        kin = self.kinematics
+        masses, moments = list(self.masses), list(self.moments)
+        for j in range(kin.njoints - 1, 0, -1):
+            parent = kin.parents[j]
+            if parent > 0:
+                pose = kin.local_pose(j)
+                moments[parent] = kernels.inertia_to_parent()(
+                    pose.rotation, pose.position, masses[j], *moments[j], *moments[parent]
+                )
+                masses[parent] += masses[j]
+        return masses, moments
+
+    def column_forces(self, joint: int) -> tuple[ca.SX, ca.SX]:
+        """(force, moment), 3 x nv_j each, body axes: momentum of the subtree for unit velocities of the joint."""
+        masses, moments = self.composite
+        first, second = moments[joint]
+        linear, angular = self.kinematics.joint_subspace(joint)
+        inertia = ca.trace(second) * ca.SX(ca.DM.eye(3)) - second
+        hat = rot.skew(first)
+        return masses[joint] * linear - hat @ angular, inertia @ angular + hat @ linear
+
+
+class Dynamics:
+    """Dynamics of one :class:`Kinematics` in its q and v and a joint acceleration symbol ``a`` (nv).
+
+    Each property is built on first use. ``motion`` may be shared with whoever asks for frame velocities.
+    """
+
+    def __init__(self, kinematics: Kinematics, motion: Motion | None = None) -> None:
+        self.kinematics = kinematics
+        self.motion = motion if motion is not None else Motion(kinematics)
+        self.bodies = Bodies(kinematics)
+        self.a = ca.SX.sym("a", kinematics.nv)
+        self._up = ca.SX(-rot.constant(np.array(kinematics.model.gravity.linear)))
+        self._armature = np.array(kinematics.model.armature, dtype=float)
+
+    @cached_property
+    def inverse_dynamics(self) -> ca.SX:
+        """tau = M a + b + g, nv numbers [N m or N], as ``pin.rnea(model, data, q, v, a)``."""
+        field = AccelerationField(self.motion, self.a, self._up)
+        return self._torques(field) + ca.SX(ca.DM(self._armature)) * self.a
+
+    @cached_property
+    def nonlinear_effects(self) -> ca.SX:
+        """b(q, v) + g(q), nv numbers, as ``pin.nonLinearEffects``."""
+        return self._torques(AccelerationField(self.motion, None, self._up, self.motion.drift))
+
+    @cached_property
+    def gravity(self) -> ca.SX:
+        """g(q), nv numbers, as ``pin.computeGeneralizedGravity``: minus the transposed CoM Jacobian times m gravity."""
+        kin = self.kinematics
+        mass = kin.mass
+        return mass * (kin.center_of_mass_jacobian.T @ self._up) if mass > 0.0 else ca.SX.zeros(kin.nv)
+
+    def _torques(self, field: AccelerationField) -> ca.SX:
+        """Joint torques that make the bodies accelerate as ``field`` says."""
+        kin = self.kinematics
+        wrenches = self.wrenches(field)
+        blocks = []
+        for j in range(1, kin.njoints):
+            linear, angular = kin.joint_subspace(j)
+            force, moment = wrenches[j]
+            blocks.append((j, force.T @ linear + moment.T @ angular))
+        return ca.densify(kin.columns(1, blocks).T)
+
+    def wrenches(self, field: AccelerationField) -> list[tuple[ca.SX, ca.SX]]:
+        """Per joint (force, moment) that its subtree needs, body axes; entry 0 is their sum in the world."""
+        kin = self.kinematics
+        out = [(_ZERO, _ZERO)]
+        for j in range(1, kin.njoints):
+            if self.bodies.masses[j] == 0.0 and not any(m.nnz() for m in self.bodies.moments[j]):
+                out.append((_ZERO, _ZERO))
+                continue
+            omega, linear = field.angular(j)[1], field.linear(j)
+            out.append(kernels.body_wrench()(self.bodies.masses[j], *self.bodies.moments[j], omega, linear))
+        return sum_to_root(kin, out)
+
+    @cached_property
+    def mass_matrix(self) -> ca.SX:
+        """M(q), nv x nv, symmetric, zero where no subtree couples, as ``pin.crba``; armature included."""
+        kin = self.kinematics
+        waiting: list[list[tuple[list[int], ca.SX, ca.SX]]] = [[] for _ in range(kin.njoints)]
+        matrix = ca.SX(ca.diag(ca.sparsify(ca.DM(self._armature))))
+        for j in range(kin.njoints - 1, 0, -1):
+            columns = kin.joint_columns(j)
+            own = list(range(columns.start, columns.stop))
+            linear, angular = kin.joint_subspace(j)
+            force, moment = self.bodies.column_forces(j)
+            matrix += _placed(kin.nv, own, own, _symmetric(linear.T @ force + angular.T @ moment))
+            if waiting[j]:
+                dofs = [d for part in waiting[j] for d in part[0]]
+                forces, moments = (ca.horzcat(*[part[i] for part in waiting[j]]) for i in (1, 2))
+                block = _placed(kin.nv, own, dofs, linear.T @ forces + angular.T @ moments)
+                matrix += block + block.T
+                own, force, moment = own + dofs, ca.horzcat(force, forces), ca.horzcat(moment, moments)
+            parent = kin.parents[j]
+            if parent > 0:
+                pose = kin.local_pose(j)
+                step = kernels.columns_to_parent(len(own))
+                waiting[parent].append((own, *step(pose.rotation, pose.position, force, moment)))
+        return ca.sparsify(matrix)
+
+    @cached_property
+    def kinetic_energy(self) -> ca.SX:
+        """1/2 v' M v [J], body by body, armature included, as ``pin.computeKineticEnergy``."""
+        kin = self.kinematics
+        total = 0.5 * ca.dot(ca.SX(ca.DM(self._armature)), kin.v * kin.v)
+        for j in range(1, kin.njoints):
+            w, v = self.motion.body(j)
+            linear, angular = kernels.body_momentum()(self.bodies.masses[j], *self.bodies.moments[j], w, v)
+            total += 0.5 * (ca.dot(v, linear) + ca.dot(w, angular))
+        return total
+
+    @cached_property
+    def inverse_dynamics_derivatives(self) -> tuple[ca.SX, ca.SX]:
+        """(d tau/dq on the tangent space, d tau/dv), nv x nv each, as ``pin.computeRNEADerivatives``.
+
+        d tau/da is :attr:`mass_matrix`.
+        """
+        tau = self.inverse_dynamics
+        return self.kinematics.derivative(tau), ca.jacobian(tau, self.kinematics.v)
+
+
+def sum_to_root(kinematics: Kinematics, own: list[tuple[ca.SX, ca.SX]]) -> list[tuple[ca.SX, ca.SX]]:
+    """Each body's wrench (or momentum) plus those of its subtree, body axes; entry 0 in the world, at its origin."""
+    total = list(own)
+    for j in range(kinematics.njoints - 1, 0, -1):
+        pose, parent = kinematics.local_pose(j), kinematics.parents[j]
+        total[parent] = kernels.wrench_to_parent()(pose.rotation, pose.position, *total[j], *total[parent])
+    return total
+
+
+def _symmetric(block: ca.SX) -> ca.SX:
+    return block if block.shape[0] == 1 else ca.triu2symm(ca.triu(block))
+
+
+def _placed(size: int, rows: list[int], columns: list[int], block: ca.SX) -> ca.SX:
+    out = ca.SX(size, size)
+    out[rows, columns] = block
+    return out
