@@ -11,7 +11,7 @@ import pytest
 
 from tests.project.layout import ROOT, module_name, pyproject, sources
 
-DATA = {".toml", ".urdf", ".xml", ".c", ".h"}
+DATA = {".toml", ".urdf", ".srdf", ".xml", ".c", ".h"}
 
 
 @pytest.fixture(scope="module")
