@@ -67,7 +67,7 @@ def _verify(qp: QP, side: NDArray[np.int8], rows: ActiveRows, at: Any, lam: Any)
     for i in rows.dependent:
         bound = qp.lower[i] if side[i] == -1 else qp.upper[i]
         off = abs(at[i] - Decimal(float(bound)))
-        if off > Decimal(1e-14) * (1 + abs(Decimal(float(bound)))):
+        if off > Decimal("1e-14") * (1 + abs(Decimal(float(bound)))):
             if side[i] == 2:
                 raise SolverError("qp", int(i), "an equality row contradicts the others")
             return int(i), 0

@@ -1,0 +1,107 @@
+"""Solvers behind ``casadi.conic``: qpoases, and others that are experimental.
+
+One solver object is kept and called through its buffers. CasADi reports the verdict in the buffer's
+statistics; an answer that the plugin does not call a success is never passed on.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from wbc.errors import SolverError, UnknownNameError
+from wbc.qp.backend import Backend, answer, refusal
+from wbc.qp.problem import QP, Solution
+from wbc.qp.quiet import quiet_stdout
+from wbc.validation import Array
+
+#: Plugins and their options. All but qpoases are experimental: docs/solvers.md lists their measured errors.
+PLUGINS: dict[str, dict[str, Any]] = {
+    "qpoases": {"printLevel": "none"},
+    "proxqp": {"proxqp": {"eps_abs": 1e-10, "eps_rel": 0.0, "max_iter": 10000}},
+    "piqp": {"piqp": {"eps_abs": 1e-12, "eps_rel": 1e-13, "max_iter": 250}},
+    "qrqp": {"print_iter": False, "print_header": False, "print_info": False},
+    "ipqp": {"print_iter": False, "print_header": False, "print_info": False},
+    "highs": {"highs": {"output_flag": False}},
+    "superscs": {"superscs": {"verbose": 0, "eps": 1e-9}},
+    "fatrop": {"fatrop": {"print_level": 0}},
+    "hpipm": {},
+}
+EXPERIMENTAL = tuple(name for name in PLUGINS if name != "qpoases")
+
+_INFEASIBLE = ("infeasible", "Infeasible", "INFEASIBLE")
+
+
+class Conic(Backend):
+    """A kept ``casadi.conic`` object with dense patterns.
+
+    Raises:
+        UnknownNameError: a plugin that is not in :data:`PLUGINS`.
+        SolverError: the plugin is not in this CasADi, or cannot take problems of this form.
+    """
+
+    def __init__(self, n: int, m: int, plugin: str) -> None:
+        super().__init__(n, m)
+        if plugin not in PLUGINS:
+            raise UnknownNameError("plugin", plugin, PLUGINS)
+        if not ca.has_conic(plugin):
+            raise SolverError("plugin", plugin, "this CasADi has no such plugin")
+        self.name = plugin
+        patterns = {"h": ca.Sparsity.dense(n, n), "a": ca.Sparsity.dense(m, n)}
+        try:
+            with quiet_stdout():
+                self._function = ca.conic("qp", plugin, patterns, {**PLUGINS[plugin], "error_on_fail": False})
+        except RuntimeError as error:
+            raise SolverError("plugin", plugin, str(error).strip().splitlines()[-1]) from error
+        # FunctionBuffer keeps addresses, not references: these dictionaries keep the arrays alive
+        self._in = {name: np.zeros(max(1, self._function.nnz_in(name))) for name in self._function.name_in()}
+        self._out = {name: np.zeros(max(1, self._function.nnz_out(name))) for name in self._function.name_out()}
+        self.reset()
+
+    def reset(self) -> None:
+        """Take a fresh memory object of the solver."""
+        with quiet_stdout():  # qpOASES prints a banner whenever a solver object is made
+            self._buffer, self._call = self._function.buffer()
+        for i, name in enumerate(self._function.name_in()):
+            self._buffer.set_arg(i, memoryview(self._in[name]))
+        for i, name in enumerate(self._function.name_out()):
+            self._buffer.set_res(i, memoryview(self._out[name]))
+        for name in ("x0", "lam_x0", "lam_a0"):
+            self._in[name][:] = 0.0
+
+    def _solve(self, qp: QP, warm: bool) -> Solution:
+        if not warm:
+            self.reset()
+        n, m = self.n, self.m
+        self._in["h"][:] = qp.H.ravel()
+        self._in["g"][:] = qp.g
+        self._in["lbx"][:], self._in["ubx"][:] = qp.lower[:n], qp.upper[:n]
+        if m:
+            self._in["a"][:] = qp.A.ravel(order="F")
+            self._in["lba"][:], self._in["uba"][:] = qp.lower[n:], qp.upper[n:]
+        for out in self._out.values():
+            out[:] = np.nan
+        self._call()
+        stats = self._buffer.stats()
+        iterations = max(0, int(stats.get("iter_count", 0)))
+        if not stats.get("success", False):
+            self.reset()
+            said = f"{stats.get('return_status', '')} {stats.get('unified_return_status', '')}"
+            verdict = any(word in said for word in _INFEASIBLE)
+            return refusal(qp, "infeasible" if verdict else "failed", iterations)
+        multipliers = np.concatenate((self._out["lam_x"][:n], self._out["lam_a"][:m]))
+        solution = answer(qp, self._out["x"].copy(), multipliers, iterations)
+        self._remember(solution)
+        return solution
+
+    def _remember(self, solution: Solution) -> None:
+        if not solution.solved:
+            self.reset()
+            return
+        multipliers: Array = solution.multipliers
+        self._in["x0"][:] = solution.x
+        self._in["lam_x0"][:] = multipliers[: self.n]
+        if self.m:
+            self._in["lam_a0"][:] = multipliers[self.n :]

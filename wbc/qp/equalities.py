@@ -1,0 +1,180 @@
+"""Equality rows made independent, and then orthonormal, before a solver sees them.
+
+An active-set solver works with the rows seen through the factor of H. There, rows of a well-posed
+problem can be nearly parallel: with a posture weight of 1e-8, DAQP called 32 of 40 feasible problems
+infeasible whose equality rows were 1e-2 (relative) away from dependence. Two exact changes cure it:
+
+    rows      A_E x = b            ->  Q x = d           Q orthonormal, the same affine set
+    Hessian   H, g                 ->  H + rho Q'Q, g - rho Q'd      (a constant on that set)
+
+The set and the minimiser are unchanged; the multipliers of the given rows follow by one triangular solve.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wbc.qp.problem import QP, Solution
+from wbc.validation import Array
+
+Index = NDArray[np.intp]
+
+#: A row whose part outside the span of the kept rows is below this share of its length is dropped.
+THRESHOLD = 1e-7
+
+#: A later row is preferred as pivot only if it is longer by this share: near-ties go to the lower index.
+_TIE = 1e-6
+
+#: Room for the right side of a dropped row [unit of the row per second]
+_ROOM = 1e-9
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Equalities:
+    """Independent equality rows of a QP. Indices count general rows, 0 to m - 1.
+
+    Attributes:
+        kept: indices of the k independent rows, in pivot order.
+        dropped: indices of the rows that depend on them.
+        inconsistency: for each dropped row, |A_i x - b_i| at the nearest-to-zero point of the kept rows, in
+            the row's own units.
+        consistent: for each dropped row, whether that is within rounding and threshold.
+        basis: orthonormal rows Q over the free variables, zero at fixed ones [k, n].
+        target: d with Q x = d on the kept rows (x counted without the fixed variables) [k].
+        triangle: lower triangular T, A_kept (free columns) = T Q [k, k].
+    """
+
+    kept: Index
+    dropped: Index
+    inconsistency: Array
+    consistent: NDArray[np.bool_]
+    basis: Array
+    target: Array
+    triangle: Array
+
+    @property
+    def all_consistent(self) -> bool:
+        """True if every dropped row holds where the kept rows hold."""
+        return bool(self.consistent.all())
+
+
+def independent(qp: QP, threshold: float = THRESHOLD, order: NDArray[np.int_] | None = None) -> Equalities:
+    """Pivoted modified Gram-Schmidt on the normalised equality rows of ``qp``.
+
+    Variables with lower == upper are constants: their columns move to the right side first. Then, class by
+    class of ``order`` (low numbers first; one class if None), the row with the longest remainder is
+    taken next, near-ties (1e-6) by lowest index, and every remaining row is orthogonalised against it twice.
+    Rows whose remainder is at most ``threshold`` of their length are dropped. A dropped row is
+    consistent if its right side is met within 1e-9 + threshold |A_i| |x|, x the nearest-to-zero point
+    of the kept rows: the threshold hides no more than that.
+    """
+    n = qp.n
+    fixed = qp.lower[:n] == qp.upper[:n]
+    constant = np.where(fixed, qp.lower[:n], 0.0)
+    rows = np.flatnonzero(qp.lower[n:] == qp.upper[n:])
+    free = np.where(fixed, 0.0, qp.A[rows])
+    right = qp.lower[n + rows] - qp.A[rows] @ constant
+    length = np.sqrt(np.einsum("ij,ij->i", free, free))
+    # a remainder of at most rounding of the whole row is no direction at all
+    whole = np.sqrt(np.einsum("ij,ij->i", qp.A[rows], qp.A[rows]))
+    usable = length > 1e-14 * whole
+    rest = np.where(usable[:, None], free / np.where(usable, length, 1.0)[:, None], 0.0)
+    priority = np.zeros(rows.size, dtype=np.int_) if order is None else np.asarray(order)[rows]
+
+    basis = np.zeros((min(rows.size, n), n))
+    coordinates = np.zeros((rows.size, basis.shape[0]))
+    chosen: list[int] = []
+    for level in np.unique(priority):
+        candidates = [i for i in range(rows.size) if priority[i] == level and usable[i]]
+        while candidates and len(chosen) < basis.shape[0]:
+            pivot, size = _longest(rest, candidates)
+            if size <= threshold:
+                break
+            k = len(chosen)
+            basis[k] = rest[pivot] / size
+            coordinates[pivot, k] = size
+            candidates.remove(pivot)
+            chosen.append(pivot)
+            _remove_direction(rest, coordinates, basis[k], k, chosen)
+    coordinates *= length[:, None]
+    return _finish(rows, free, right, basis[: len(chosen)], coordinates[:, : len(chosen)], chosen, threshold)
+
+
+def _longest(rest: Array, candidates: list[int]) -> tuple[int, float]:
+    best, size = -1, 0.0
+    for i in candidates:
+        length = float(np.sqrt(rest[i] @ rest[i]))
+        if best < 0 or length > (1.0 + _TIE) * size:
+            best, size = i, length
+    return best, size
+
+
+def _remove_direction(rest: Array, coordinates: Array, direction: Array, k: int, chosen: list[int]) -> None:
+    """Take the direction out of all rows that are not chosen, twice, so that rounding leaves nothing behind."""
+    others = np.ones(rest.shape[0], dtype=np.bool_)
+    others[chosen] = False
+    for _ in range(2):
+        along = rest[others] @ direction
+        rest[others] -= np.outer(along, direction)
+        coordinates[others, k] += along
+
+
+def _finish(
+    rows: Index, free: Array, right: Array, basis: Array, coordinates: Array, chosen: list[int], threshold: float
+) -> Equalities:
+    kept = np.array(chosen, dtype=np.intp)
+    left = np.setdiff1d(np.arange(rows.size), kept)
+    triangle = np.ascontiguousarray(coordinates[kept])
+    target = np.zeros(kept.size)
+    for k in range(kept.size):
+        target[k] = (right[kept[k]] - triangle[k, :k] @ target[:k]) / triangle[k, k]
+    point = target @ basis
+    inconsistency = np.abs(free[left] @ point - right[left])
+    lengths = np.sqrt(np.einsum("ij,ij->i", free[left], free[left]))
+    room = _ROOM + threshold * lengths * float(np.linalg.norm(point))
+    return Equalities(rows[kept], rows[left], inconsistency, inconsistency <= room, basis, target, triangle)
+
+
+def orthonormal(qp: QP, equalities: Equalities) -> QP:
+    """The same problem for a solver: kept rows replaced by Q x = d, dropped rows set free, H strengthened.
+
+    rho is the largest diagonal entry of H, so that H keeps its scale.
+    """
+    if equalities.kept.size + equalities.dropped.size == 0:
+        return qp
+    n = qp.n
+    out = qp.copy()
+    Q, d = equalities.basis, equalities.target
+    rho = float(np.max(np.diagonal(qp.H), initial=0.0))
+    out.H += rho * (Q.T @ Q)
+    out.g -= rho * (d @ Q)
+    out.A[equalities.kept] = Q
+    out.lower[n + equalities.kept] = out.upper[n + equalities.kept] = d
+    out.A[equalities.dropped] = 0.0
+    out.lower[n + equalities.dropped], out.upper[n + equalities.dropped] = -np.inf, np.inf
+    return out
+
+
+def restore(qp: QP, equalities: Equalities, solution: Solution) -> Solution:
+    """The solution of :func:`orthonormal` in terms of the rows of ``qp``; dropped rows get multiplier zero."""
+    if equalities.kept.size + equalities.dropped.size == 0 or not solution.solved:
+        return solution
+    n = qp.n
+    # where the rows hold only to rounding, the strengthened Hessian has carried part of the force
+    rho = float(np.max(np.diagonal(qp.H), initial=0.0))
+    gap = equalities.basis @ solution.x - equalities.target
+    forces = solution.multipliers[n + equalities.kept] + rho * gap
+    lam = solution.multipliers.copy()
+    back = np.zeros(forces.size)
+    for k in range(forces.size - 1, -1, -1):
+        below = equalities.triangle[k + 1 :, k] @ back[k + 1 :]
+        back[k] = (forces[k] - below) / equalities.triangle[k, k]
+    lam[n + equalities.kept] = back
+    lam[n + equalities.dropped] = 0.0
+    fixed = np.flatnonzero(qp.lower[:n] == qp.upper[:n])
+    if fixed.size:  # the basis has zeros in fixed columns: their multipliers take up the rest
+        lam[fixed] = -(qp.H[fixed] @ solution.x + qp.g[fixed] + qp.A[:, fixed].T @ lam[n:])
+    return Solution(solution.x, lam, solution.flag, solution.iterations)

@@ -1,0 +1,177 @@
+"""What gives way when the rows cannot all hold: a declared order of sacrifice.
+
+Every general row has a class; class by class, low numbers first, the least violation is found
+
+    minimise 1/2 |s|^2    over v within its simple bounds, rows of lower classes as frozen before,
+                          lower <= A_i v + unit_i s_i <= upper for the rows of this class,
+
+and frozen: a row with s_i != 0 becomes the equality A_i v = (bound - unit_i s_i), because the least s is
+unique. Last, the original objective is minimised over what is left. Simple bounds never give way.
+
+The least-violation problem has no unique v; it is solved by a proximal sequence
+(1/2 eps |v - v_previous|^2 added), which converges to the least s and keeps the solver's H positive definite.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wbc import validation
+from wbc.errors import BoundsError
+from wbc.qp.backend import Backend
+from wbc.qp.daqp import Daqp
+from wbc.qp.prepared import Prepared
+from wbc.qp.problem import QP, Solution
+from wbc.validation import Array
+
+#: Weight of the proximal term, steps at most, and the change of s at which the sequence ends
+PROXIMAL = 1e-6
+STEPS = 30
+SETTLED = 1e-12
+
+#: Violations up to this (per unit of the row) count as none; rows of finished classes get this much room
+ROOM = 1e-9
+
+#: Rows and bounds whose multiplier exceeds this share of the largest one stay active in the later classes
+_PUSHING = 1e-6
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Relaxed:
+    """Answer of :class:`Relaxation`.
+
+    Attributes:
+        x: finite and within the simple bounds, whatever happens [n].
+        multipliers: of the last problem, whose relaxed rows are equalities [n + m]; zeros if ``failed``.
+        flag: ``solved``: all rows hold, x is the plain minimiser; ``relaxed``: some rows gave way as
+            declared, x minimises the objective over the rest; ``failed``: a solver gave no verdict, x is
+            the point of least violation found last.
+        slack: violation of each row at x, in the row's units, >= 0 [m].
+        relaxed: rows whose slack exceeds the numerical room [m].
+        iterations: of all solver calls together.
+    """
+
+    x: Array
+    multipliers: Array
+    flag: str
+    slack: Array
+    relaxed: NDArray[np.bool_]
+    iterations: int
+
+
+class Relaxation:
+    """The cascade, with kept solvers, for problems with ``n`` variables and ``m`` general rows."""
+
+    def __init__(self, n: int, m: int, solver: Backend | None = None) -> None:
+        """``solver`` solves the problems in v (default: DAQP behind prepared equalities)."""
+        self.n, self.m = n, m
+        self._final = solver if solver is not None else Prepared(Daqp(n, m))
+        self._stage = Prepared(Daqp(n + m, m))
+
+    def solve(self, qp: QP, order: NDArray[np.int_], unit: Array | None = None) -> Relaxed:
+        """Solve ``qp`` with its rows, or with as few as must give way in the declared order.
+
+        Args:
+            order: class of each general row; rows of a higher class give way first [m].
+            unit: size of a violation that counts as 1, per row, in the row's units; default: the norm of
+                the row, so that slacks are compared as joint motion [m].
+
+        Raises:
+            ShapeError: ``order`` or ``unit`` of the wrong length.
+            BoundsError: a simple bound or a row whose lower value is above its upper one.
+        """
+        order = validation.real_array("order", order, (self.m,)).astype(np.int_)
+        crossed = np.flatnonzero(qp.lower > qp.upper)
+        if crossed.size:
+            i = int(crossed[0])
+            raise BoundsError(f"lower[{i}]", float(qp.lower[i]), f"above upper {qp.upper[i]:g}")
+        plain = self._final.solve(qp)
+        if plain.solved:
+            return self._answer(qp, plain.x, plain.multipliers, "solved", plain.iterations, np.ones(self.m))
+        scale = np.linalg.norm(qp.A, axis=1) if unit is None else validation.real_array("unit", unit, (self.m,))
+        scale = np.where(scale > 0.0, scale, 1.0)
+        return self._cascade(qp, order, scale, plain.iterations)
+
+    def _cascade(self, qp: QP, order: NDArray[np.int_], unit: Array, iterations: int) -> Relaxed:
+        n = self.n
+        work = QP(qp.H, qp.g, qp.lower.copy(), qp.upper.copy(), qp.A / unit[:, None])
+        with np.errstate(invalid="ignore"):
+            work.lower[n:] /= unit
+            work.upper[n:] /= unit
+        ends = work.lower[n:].copy(), work.upper[n:].copy()
+        work.lower[n:], work.upper[n:] = -np.inf, np.inf
+        v = np.clip(0.0, qp.lower[:n], qp.upper[:n])
+        for level in np.unique(order):
+            rows = np.flatnonzero(order == level)
+            work.lower[n + rows], work.upper[n + rows] = ends[0][rows], ends[1][rows]
+            stage = self._least_violation(work, rows, v)
+            if stage is None:
+                # no verdict: the rows of this class stay free, later ones are still tried
+                work.lower[n + rows], work.upper[n + rows] = -np.inf, np.inf
+                continue
+            v = np.clip(stage.x[:n], qp.lower[:n], qp.upper[:n])
+            iterations += stage.iterations
+            self._freeze(work, rows, stage)
+        last = self._final.solve(work, warm=False)
+        iterations += last.iterations
+        flag = "relaxed" if last.solved else "failed"
+        multipliers = last.multipliers.copy()
+        multipliers[n:] /= unit
+        return self._answer(qp, last.x if last.solved else v, multipliers, flag, iterations, unit)
+
+    def _least_violation(self, work: QP, rows: NDArray[np.intp], v: Array) -> Solution | None:
+        """(v, s) of the least |s| for ``rows``; the other rows of ``work`` are hard."""
+        n, m = self.n, self.m
+        free = np.full(m, np.inf)
+        H = np.diag(np.concatenate((np.full(n, PROXIMAL), np.ones(m))))
+        A = np.hstack((work.A, np.zeros((m, m))))
+        A[rows, n + rows] = 1.0
+        lower = np.concatenate((work.lower[:n], -free, work.lower[n:]))
+        upper = np.concatenate((work.upper[:n], free, work.upper[n:]))
+        problem = QP(H, np.zeros(n + m), lower, upper, A)
+        best: Solution | None = None
+        iterations = 0
+        for _ in range(STEPS):
+            problem.g[:n] = -PROXIMAL * v
+            stage = self._stage.solve(problem, warm=best is not None)
+            iterations += stage.iterations
+            if not stage.solved:
+                break
+            change = np.inf if best is None else float(np.abs(stage.x[n:] - best.x[n:]).max(initial=0.0))
+            best, v = stage, stage.x[:n]
+            if change <= SETTLED:
+                break
+        return None if best is None else Solution(best.x, best.multipliers, "solved", iterations)
+
+    def _freeze(self, work: QP, rows: NDArray[np.intp], stage: Solution) -> None:
+        """Write the least violation of a class into the bounds of its rows, and hold what pushes against it."""
+        n, m = self.n, self.m
+        s = np.zeros(m)
+        s[rows] = stage.x[n + rows]
+        given = rows[np.abs(s[rows]) > ROOM]
+        equal = rows[work.lower[n + rows] == work.upper[n + rows]]
+        value = work.A @ stage.x[:n]
+        pushing = np.abs(stage.multipliers) > _PUSHING * np.abs(s).max(initial=0.0)
+        others = np.setdiff1d(rows, np.union1d(given, equal))
+        work.lower[n + others] -= ROOM
+        work.upper[n + others] += ROOM
+        held = np.union1d(given, equal)
+        if given.size:
+            fixed = np.flatnonzero(pushing[:n])
+            at = np.where(stage.multipliers[fixed] > 0.0, work.upper[fixed], work.lower[fixed])
+            work.lower[fixed] = work.upper[fixed] = at
+            held = np.union1d(held, np.setdiff1d(np.flatnonzero(pushing[n + m :]), rows))
+        work.lower[n + held] = work.upper[n + held] = value[held]
+
+    def _answer(self, qp: QP, x: Array, multipliers: Array, flag: str, iterations: int, unit: Array) -> Relaxed:
+        x = np.clip(x, qp.lower[: self.n], qp.upper[: self.n])
+        slack = qp.violation(x)[self.n :]
+        return Relaxed(x, multipliers, flag, slack, slack > 10.0 * ROOM * unit, iterations)
+
+
+def relax(qp: QP, order: NDArray[np.int_], unit: Array | None = None) -> Relaxed:
+    """:meth:`Relaxation.solve` with fresh solvers."""
+    return Relaxation(qp.n, qp.m).solve(qp, order, unit)
