@@ -1,5 +1,7 @@
-"""Robots by name."""
+"""Robots by name, from files, from models and from Denavit-Hartenberg rows."""
 
-from wbc.robot.loading import load
+from wbc.robot.dh import DHRow
+from wbc.robot.geometry import fit_shapes
+from wbc.robots.catalogue import from_dh, load, names, table
 
-__all__ = ["load"]
+__all__ = ["DHRow", "fit_shapes", "from_dh", "load", "names", "table"]

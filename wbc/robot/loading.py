@@ -1,41 +1,106 @@
-"""Loading robots (first slice: three URDFs by name)."""
+"""Loading robots from files, models and Denavit-Hartenberg rows; names are looked up one floor above."""
 
 from __future__ import annotations
 
+import os
 import pathlib
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
 
-import numpy as np
 import pinocchio as pin
 
-from wbc.robot.limits import Limits
+from wbc import validation
+from wbc.errors import RobotFileError, ShapeError, UnknownNameError
+from wbc.robot.assembly import assemble, override_limits
+from wbc.robot.description import Description, with_base
+from wbc.robot.dh import DHRow, read_dh
+from wbc.robot.files import example_data_folder, read_xml
+from wbc.robot.geometry import description_shapes, fit_shapes
+from wbc.robot.mjcf import read_mjcf
+from wbc.robot.recipe import Recipe
 from wbc.robot.robot import Robot
+from wbc.robot.srdf import read_states
+from wbc.robot.urdf import read_urdf
 
-_TABLE = {
-    "panda": ("panda_description/urdf/panda.urdf", "fixed", ("panda_finger_joint1", "panda_finger_joint2")),
-    "ur5": ("ur_description/urdf/ur5_robot.urdf", "fixed", ()),
-    "talos": ("talos_data/robots/talos_reduced.urdf", "floating", ()),
-}
+SHAPES = ("auto", "description", "fit", "none")
 
 
-def load(name: str) -> Robot:
-    """A robot by name."""
-    file, base, locked = _TABLE[name]
-    folder = pathlib.Path(pin.__file__).parents[4] / "share/example-robot-data/robots"
-    args = (pin.JointModelFreeFlyer(),) if base == "floating" else ()
-    model = pin.buildModelFromUrdf(str(folder / file), *args)
-    if locked:
-        model = pin.buildReducedModel(model, [model.getJointId(n) for n in locked], pin.neutral(model))
-    nv = model.nv
-    lower, upper = np.full(nv, -np.inf), np.full(nv, np.inf)
-    for j in range(1, model.njoints):
-        if model.nqs[j] == model.nvs[j]:
-            iv, iq, n = model.idx_vs[j], model.idx_qs[j], model.nvs[j]
-            lower[iv : iv + n] = model.lowerPositionLimit[iq : iq + n]
-            upper[iv : iv + n] = model.upperPositionLimit[iq : iq + n]
-    velocity = np.array(model.upperVelocityLimit)
-    effort = np.array(model.upperEffortLimit)
-    velocity[velocity == 0] = np.inf
-    if base == "floating":
-        velocity[:6], effort[:6] = np.inf, np.inf
-    return Robot(name, model, Limits(lower, upper, velocity, np.full(nv, np.inf), effort), base,
-                 neutral=pin.neutral(model))
+def read(source: Any, base: str | None, recipe: Recipe) -> Description:
+    """The description in a URDF or MJCF file, a ``pin.Model``, or a sequence of :class:`DHRow`.
+
+    Raises:
+        RobotFileError: a file that is missing, unreadable or neither; ShapeError: something else altogether.
+    """
+    if isinstance(source, pin.Model):
+        model, kind = with_base(pin.Model(source), base)
+        return Description(model, kind)
+    if isinstance(source, (str, os.PathLike)):
+        path = pathlib.Path(source)
+        _, tree = read_xml(path)
+        if tree.tag == "robot":
+            return read_urdf(path, base, recipe.mimic_leaders)
+        if tree.tag == "mujoco":
+            return read_mjcf(path, base)
+        raise RobotFileError("robot", str(path), f"neither URDF nor MJCF: the root element is <{tree.tag}>")
+    if isinstance(source, Sequence) and source and all(isinstance(row, DHRow) for row in source):
+        return read_dh(source, base)
+    raise ShapeError("robot", source, "expected a name, a path, a pin.Model or a sequence of DHRow")
+
+
+def build(
+    source: Any,
+    recipe: Recipe,
+    base: str | None = None,
+    shapes: str = "auto",
+    package_dirs: Iterable[Any] = (),
+    limits: Mapping[str, Any] | None = None,
+) -> Robot:
+    """The robot of a source, made as the recipe says.
+
+    Raises:
+        WbcError: see ``wbc.robots.load``.
+    """
+    validation.one_of("shapes", shapes, SHAPES)
+    description = read(source, base, recipe)
+    return finish(description, recipe, shapes, package_dirs, limits or {})
+
+
+def finish(
+    description: Description, recipe: Recipe, shapes: str, package_dirs: Iterable[Any], limits: Mapping[str, Any]
+) -> Robot:
+    """The robot of a description: states, joints, limits, shapes."""
+    states = dict(description.states)
+    if recipe.srdf:
+        states |= read_states(example_data_folder() / recipe.srdf)
+    if not recipe.state and "home" in states:
+        recipe = replace(recipe, state="home")
+    robot = override_limits(assemble(description, recipe, states), limits)
+    if shapes == "none" or not (robot.source or recipe.shapes):
+        return robot
+    if shapes == "fit":
+        return fit_shapes(robot, package_dirs=package_dirs)
+    if shapes == "auto" and recipe.shapes:
+        return _table_shapes(robot, recipe)
+    return description_shapes(robot, package_dirs)
+
+
+def _table_shapes(robot: Robot, recipe: Recipe) -> Robot:
+    """The spheres and capsules that the table holds, checked against the robot's frames."""
+    shapes: dict[str, list[Any]] = {}
+    for shape in recipe.shapes:
+        shapes.setdefault(shape.link, []).append(shape.placed())
+    largest = max(shape.excess for shape in recipe.shapes)
+    note = f"{len(recipe.shapes)} shapes on {len(shapes)} links from the table, largest excess {largest:.4g} m"
+    return replace(robot.with_shapes(shapes), notes={**robot.notes, "shapes": note})
+
+
+def looks_like_path(text: str) -> bool:
+    """Whether a string that is no known robot name is meant as a path."""
+    path = pathlib.Path(text)
+    return path.suffix.lower() in (".urdf", ".xml", ".mjcf", ".xacro", ".sdf") or len(path.parts) > 1 or path.exists()
+
+
+def unknown(name: str, names: Iterable[str]) -> UnknownNameError:
+    """The error for a robot name that the table does not have."""
+    return UnknownNameError("robot", name, names)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import Any
 
@@ -12,7 +12,7 @@ import numpy as np
 import pinocchio as pin
 
 from wbc import validation
-from wbc.errors import DuplicateNameError, RotationError, ShapeError
+from wbc.errors import DuplicateNameError, RangeError, RotationError, ShapeError
 from wbc.robot.limits import Limits
 from wbc.shapes import PlacedShape
 from wbc.symbolic.kinematics import WORLD
@@ -46,6 +46,9 @@ class Robot:
         couplings: mimic joints that are kept as degrees of freedom.
         frames: role -> frame name ("tip", "shoulder", "elbow", "wrist", ...), where the table knows them.
         notes: where limits come from, one sentence a key ("acceleration", "shapes", ...).
+        locked_dofs: degrees of freedom that the robot cannot drive, whose velocity must stay 0 (the sideways
+            velocity of a differential-drive base). Indices into v.
+        source: the file that the model was read from; "" for a model made in memory.
     """
 
     name: str
@@ -57,11 +60,17 @@ class Robot:
     couplings: tuple[Coupling, ...] = ()
     frames: Mapping[str, str] = field(default_factory=dict)
     notes: Mapping[str, str] = field(default_factory=dict)
+    locked_dofs: tuple[int, ...] = ()
+    source: str = ""
 
     def __post_init__(self) -> None:
         validation.one_of("robot.base", self.base, BASES)
         if self.limits.velocity.shape != (self.nv,):
             raise ShapeError("robot.limits", self.limits.velocity, f"expected {self.nv} entries each")
+        self._check_position_limits()
+        for dof in self.locked_dofs:
+            if not 0 <= dof < self.nv:
+                raise RangeError("robot.locked_dofs", dof, f"expected an index into v, 0 to {self.nv - 1}")
         neutral = self.neutral if np.size(self.neutral) else pin.neutral(self.model)
         object.__setattr__(self, "neutral", self.configuration("robot.neutral", neutral))
 
@@ -74,6 +83,11 @@ class Robot:
     def nv(self) -> int:
         """Degrees of freedom (numbers in a velocity)."""
         return int(self.model.nv)
+
+    @property
+    def base_nv(self) -> int:
+        """Degrees of freedom of the base, which come first in v: 0, 3 or 6."""
+        return {"fixed": 0, "floating": 6}.get(self.base, 3)
 
     @cached_property
     def frame_names(self) -> tuple[str, ...]:
@@ -190,8 +204,56 @@ class Robot:
         return replace(self, model=model)
 
     def with_limits(self, **changes: Any) -> Robot:
-        """A copy with overridden limits, see :meth:`Limits.override`."""
-        return replace(self, limits=self.limits.override(**changes))
+        """A copy with overridden limits.
+
+        Args:
+            changes: field of :class:`Limits` -> an array of nv numbers; a mapping from joint or degree-of-freedom
+                name to a number (or one number a degree of freedom of that joint); or one number for every
+                degree of freedom except the base's and, for positions, except those without a coordinate.
+
+        Raises:
+            UnknownNameError: no such limit, joint or degree of freedom.
+            ShapeError, NotFiniteError, RangeError, BoundsError: a bad value; a finite position limit where q has no
+                coordinate to limit (base, unbounded and ball joints).
+        """
+        arrays = {}
+        for name, change in changes.items():
+            validation.one_of("limit", name, [f.name for f in fields(Limits)])
+            arrays[name] = self._spread(name, change)
+        return replace(self, limits=replace(self.limits, **arrays))
+
+    def _spread(self, limit: str, change: Any) -> Array:
+        """One limit array of nv numbers out of what a user may write for it."""
+        out = np.array(getattr(self.limits, limit))
+        label = f"limits.{limit}"
+        if isinstance(change, Mapping):
+            for key, value in change.items():
+                validation.one_of(label, key, (*self.joint_names, *self.dof_names))
+                where = self.dofs(key) if key in self.joint_names else slice(*self._dof_range(key))
+                width = where.stop - where.start
+                shape = () if np.ndim(value) == 0 else (width,)
+                out[where] = validation.real_array(f"{label}[{key!r}]", value, shape, finite=False)
+            return out
+        if np.ndim(change) == 0:
+            number = validation.real_array(label, change, (), finite=False)
+            chosen = np.arange(self.nv) >= self.base_nv
+            if limit.startswith("position"):
+                chosen &= self.position_index >= 0
+            out[chosen] = number
+            return out
+        return validation.real_array(label, change, (self.nv,), finite=False)
+
+    def _dof_range(self, name: str) -> tuple[int, int]:
+        index = self.dof_names.index(name)
+        return index, index + 1
+
+    def _check_position_limits(self) -> None:
+        free = self.position_index < 0
+        for name in ("position_lower", "position_upper"):
+            limited = np.isfinite(getattr(self.limits, name)) & free
+            if limited.any():
+                dof = self.dof_names[int(np.argmax(limited))]
+                raise RangeError(f"limits.{name}", dof, "this degree of freedom has no single coordinate to limit")
 
     def with_shapes(self, shapes: Mapping[str, Sequence[PlacedShape]]) -> Robot:
         """A copy with other link shapes.
@@ -231,7 +293,7 @@ class Robot:
             self.neutral,
         ):
             h.update(np.ascontiguousarray(array).tobytes())
-        h.update(repr((self.base, self.couplings)).encode())
+        h.update(repr((self.base, self.couplings, self.locked_dofs)).encode())
         for frame, shapes in sorted(self.shapes.items()):
             for s in shapes:
                 h.update(f"{frame} {s.shape} {s.excess!r}".encode() + s.placement.homogeneous.tobytes())

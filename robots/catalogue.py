@@ -1,0 +1,136 @@
+"""The table of robots, and ``load``."""
+
+from __future__ import annotations
+
+import functools
+import os
+import pathlib
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import pinocchio as pin
+
+from wbc import validation
+from wbc.robot.dh import DHRow, read_dh
+from wbc.robot.files import example_data_folder
+from wbc.robot.loading import build, finish, looks_like_path, unknown
+from wbc.robot.recipe import Recipe, lock_mapping
+from wbc.robot.robot import Robot
+from wbc.robot.table import read_table
+
+
+@functools.cache
+def _by_name() -> dict[str, Recipe]:
+    return read_table(pathlib.Path(__file__).parent)
+
+
+def table() -> tuple[Recipe, ...]:
+    """Every robot of the table, those that cannot be loaded included (their ``problem`` says why), by name."""
+    return tuple(recipe for _, recipe in sorted(_by_name().items()))
+
+
+def names() -> tuple[str, ...]:
+    """Names of the robots that load."""
+    return tuple(recipe.name for recipe in table() if not recipe.problem)
+
+
+def load(
+    robot: str | os.PathLike[str] | pin.Model | Sequence[DHRow],
+    *,
+    base: str | None = None,
+    lock: Any = None,
+    name: str | None = None,
+    neutral: Mapping[str, float] | None = None,
+    shapes: str = "auto",
+    package_dirs: Iterable[str | os.PathLike[str]] = (),
+    position_lower: Any = None,
+    position_upper: Any = None,
+    velocity: Any = None,
+    acceleration: Any = None,
+    effort: Any = None,
+) -> Robot:
+    """A robot from the table, a file, a model, or a chain of Denavit-Hartenberg rows.
+
+    Args:
+        robot: a name of the table (:func:`names`), a path of a URDF or MJCF file, a ``pin.Model``, or DH rows.
+        base: ``fixed``, ``floating`` (free flyer: q has position and quaternion x, y, z, w), ``planar`` (x, y,
+            cos, sin; any direction) or ``differential`` (planar, sideways velocity must stay 0, see
+            ``Robot.locked_dofs``). Default: the table's, or the one that the model or MJCF file brings, or fixed.
+        lock: joints to lock: a name, names, patterns (``"finger_*"``), or a mapping from those to a value
+            [rad or m] (None: where the neutral configuration has it). Replaces the table's list; ``()`` locks none.
+            Locking one end of a mimic pair locks both.
+        name: of the robot; default: the table's, the file's stem, or the model's.
+        neutral: joint -> value [rad or m], on top of the table's neutral configuration.
+        shapes: ``auto`` (the table's spheres and capsules, else ``description``), ``description`` (primitives of
+            the file; meshes are skipped and named in the notes), ``fit`` (also a capsule around every mesh, about
+            0.3 s a mesh), ``none``.
+        package_dirs: folders to look for ``package://NAME/...`` meshes in, besides those above the file.
+        position_lower, position_upper [rad or m], velocity [rad/s or m/s], acceleration [rad/s^2 or m/s^2],
+            effort [N m or N]: limits that replace the description's; one number for all joints but the base, nv
+            numbers, or a mapping from joint (or degree of freedom) to a number; infinite for none.
+
+    Raises:
+        UnknownNameError: no such robot (nearest names first), base, joint or frame.
+        RobotFileError: a file that is missing, a directory, unreadable, refused by the parser, or neither URDF
+            nor MJCF; a base that contradicts the description.
+        UnsupportedJointError: a joint that moves and that the symbolic kinematics do not cover.
+        ShapeError, NotFiniteError, RangeError, BoundsError: a bad limit, lock or neutral value.
+
+    Cannot do: SDF and xacro files; closed kinematic chains (a URDF is a tree); loop closures of MJCF (said in
+    ``notes["mimic"]``).
+    """
+    recipe, source = _find(robot)
+    changes: dict[str, Any] = {}
+    if lock is not None:
+        changes["lock"] = lock_mapping(lock)
+    if neutral is not None:
+        changes["neutral"] = {**recipe.neutral, **neutral}
+    if name is not None:
+        changes["name"] = name
+    wanted = recipe.base if base is None and recipe.file else base
+    limits = {
+        "position_lower": position_lower,
+        "position_upper": position_upper,
+        "velocity": velocity,
+        "acceleration": acceleration,
+        "effort": effort,
+    }
+    return build(source, replace(recipe, **changes), wanted, shapes, package_dirs, limits)
+
+
+def from_dh(
+    rows: Sequence[DHRow], *, base: str | None = None, tool: Any = None, name: str = "dh", **limits: Any
+) -> Robot:
+    """A serial chain from Denavit-Hartenberg rows.
+
+    Args:
+        rows: one a joint, from the base; see :class:`DHRow`.
+        base: as in :func:`load`; default fixed.
+        tool: pose of the frame ``tip`` in the last row's frame (a ``pin.SE3``, 4x4 matrix, or position and
+            quaternion x, y, z, w); default: the same.
+        name: of the robot.
+        limits: as in :func:`load`, on top of the rows' own.
+
+    Returns:
+        A robot with the frames ``link0`` (base), ``link1`` ... (the rows' frames) and ``tip``. It has no masses.
+
+    Raises:
+        ShapeError, DuplicateNameError, UnknownNameError, RangeError, BoundsError.
+    """
+    for key in limits:
+        validation.one_of("limit", key, ("position_lower", "position_upper", "velocity", "acceleration", "effort"))
+    return finish(read_dh(rows, base, tool), Recipe(name, frames={"tip": "tip"}), "none", (), limits)
+
+
+def _find(robot: Any) -> tuple[Recipe, Any]:
+    """(recipe, what to read): the table's row for a name, an empty recipe otherwise."""
+    if isinstance(robot, str):
+        recipe = _by_name().get(robot)
+        if recipe is not None:
+            return recipe, example_data_folder() / recipe.file
+        if not looks_like_path(robot):
+            raise unknown(robot, _by_name())
+    if isinstance(robot, (str, os.PathLike)):
+        return Recipe(pathlib.Path(robot).stem), robot
+    return Recipe(str(robot.name) if isinstance(robot, pin.Model) else "dh"), robot

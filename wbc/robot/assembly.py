@@ -1,0 +1,283 @@
+"""From a description to a :class:`~wbc.robot.Robot`: neutral configuration, couplings, locked joints, limits."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from wbc import validation
+from wbc.errors import RangeError, ShapeError
+from wbc.robot.description import Description, Mimic, finite_or_unlimited
+from wbc.robot.limits import Limits
+from wbc.robot.recipe import Recipe, expand
+from wbc.robot.robot import Coupling, Robot
+from wbc.symbolic.joints import symbolic_joint
+from wbc.validation import Array
+
+_NO_ACCELERATION = "none known: unlimited"
+
+
+def assemble(description: Description, recipe: Recipe, states: Mapping[str, Mapping[str, Array]]) -> Robot:
+    """The robot of a description, made as the recipe says; ``states`` are named configurations to choose from.
+
+    Raises:
+        UnknownNameError: a joint, frame or state of the recipe that the description does not have.
+        UnsupportedJointError: a joint that moves and that the symbolic kinematics do not cover.
+        RangeError: two ends of a mimic pair locked at values that contradict each other.
+    """
+    notes = dict(description.notes)
+    model = description.model
+    mimics = resolve_mimics(description.mimics, model)
+    q, remarks = neutral_configuration(model, mimics, recipe, states)
+    if remarks:
+        notes["neutral"] = remarks
+    driven = _moving(model)[0 if description.base == "fixed" else 1 :]
+    locked = _locked(model, mimics, expand("lock", recipe.lock, driven), q)
+    if locked:
+        shown = (f"{name} at {' '.join(f'{x:.6g}' for x in value)}" for name, value in locked.items())
+        notes["lock"] = "locked: " + ", ".join(shown)
+        q = with_values(model, q, locked)
+        reduced = pin.buildReducedModel(model, [model.getJointId(name) for name in locked], q)
+        q = _kept(model, reduced, q)
+        model = reduced
+    for j in range(1, model.njoints):
+        symbolic_joint(model.joints[j], str(model.names[j]))
+    couplings = tuple(
+        Coupling(
+            int(model.idx_vs[model.getJointId(m.follower)]),
+            int(model.idx_vs[model.getJointId(m.leader)]),
+            m.ratio,
+            m.offset,
+        )
+        for m in mimics
+        if m.follower not in locked
+    )
+    limits = read_limits(model, description.base, notes)
+    locked_dofs = (1,) if description.base == "differential" else ()
+    if locked_dofs:
+        notes["base"] = "differential drive: the sideways velocity of the base (index 1 of v) must stay 0"
+    robot = Robot(
+        recipe.name,
+        model,
+        limits,
+        description.base,
+        q,
+        couplings=couplings,
+        frames=recipe.frames,
+        notes=notes,
+        locked_dofs=locked_dofs,
+        source=description.source,
+    )
+    for role, frame in recipe.frames.items():
+        robot.check_frame(f"frames.{role}", frame)
+    return _with_accelerations(robot, {**description.acceleration, **recipe.acceleration}, recipe.source)
+
+
+def _moving(model: pin.Model) -> list[str]:
+    return [str(name) for name in list(model.names)[1:]]
+
+
+def _with_accelerations(robot: Robot, values: Mapping[str, float], source: str) -> Robot:
+    known = {name: value for name, value in values.items() if name in robot.joint_names}
+    note = _NO_ACCELERATION
+    if known:
+        note = source or "given with the description"
+        if len(known) < len(robot.joint_names):
+            note += "; none known for the other joints: unlimited"
+        robot = robot.with_limits(acceleration=known)
+    return replace(robot, notes={**robot.notes, "acceleration": note})
+
+
+def resolve_mimics(mimics: tuple[Mimic, ...], model: pin.Model) -> tuple[Mimic, ...]:
+    """Mimics between joints that move, chains replaced by their first leader.
+
+    Raises:
+        RangeError: joints that follow each other in a circle, or a mimic of a joint with several numbers.
+    """
+    by_follower = {m.follower: m for m in mimics if model.existJointName(m.follower)}
+    out = []
+    for mimic in by_follower.values():
+        leader, ratio, offset = mimic.leader, mimic.ratio, mimic.offset
+        for _ in by_follower:
+            above = by_follower.get(leader)
+            if above is None:
+                break
+            leader, ratio, offset = above.leader, ratio * above.ratio, ratio * above.offset + offset
+        if leader in by_follower:
+            raise RangeError("mimic", mimic.follower, "these joints follow each other in a circle")
+        if not model.existJointName(leader):
+            continue
+        for name in (mimic.follower, leader):
+            if model.nqs[model.getJointId(name)] != 1:
+                raise RangeError("mimic", name, "only joints with one coordinate can be coupled")
+        out.append(Mimic(mimic.follower, leader, ratio, offset))
+    return tuple(out)
+
+
+def neutral_configuration(
+    model: pin.Model, mimics: tuple[Mimic, ...], recipe: Recipe, states: Mapping[str, Mapping[str, Array]]
+) -> tuple[Array, str]:
+    """(q, what had to be changed): the recipe's state and numbers on top of ``pin.neutral``, then put within limits.
+
+    A joint whose value is outside its limits gets the nearest limit if somebody asked for that value, and
+    the middle of its range if it is merely zero.
+    """
+    values: dict[str, Array] = {}
+    if recipe.state:
+        validation.one_of("state", recipe.state, tuple(states))
+        values |= {k: v for k, v in states[recipe.state].items() if _fits(model, k, v)}
+    for name, number in recipe.neutral.items():
+        validation.one_of("neutral", name, _moving(model))
+        values[name] = validation.real_array(f"neutral[{name!r}]", number).reshape(-1)
+    q = with_values(model, pin.neutral(model), values)
+    lower, upper = _ranges(model, mimics)
+    moved = []
+    for j in range(1, model.njoints):
+        if model.nqs[j] != model.nvs[j]:
+            continue
+        name = str(model.names[j])
+        for i in range(model.idx_qs[j], model.idx_qs[j] + model.nqs[j]):
+            low, high = lower[i], upper[i]
+            if low <= q[i] <= high:
+                continue
+            middle = name not in values and np.isfinite(low) and np.isfinite(high)
+            q[i] = (low + high) / 2 if middle else np.clip(q[i], low, high)
+            moved.append(name)
+    for mimic in mimics:
+        follower, leader = (int(model.idx_qs[model.getJointId(n)]) for n in (mimic.follower, mimic.leader))
+        q[follower] = np.clip(
+            mimic.ratio * q[leader] + mimic.offset,
+            model.lowerPositionLimit[follower],
+            model.upperPositionLimit[follower],
+        )
+    where = f"state {recipe.state!r}" if recipe.state else "zero"
+    return q, f"{where}; put within limits: {', '.join(dict.fromkeys(moved))}" if moved else where
+
+
+def _fits(model: pin.Model, name: str, values: Array) -> bool:
+    """Whether a joint of this name moves in the model and takes that many numbers."""
+    if not model.existJointName(name):
+        return False
+    j = model.getJointId(name)
+    return len(values) == model.nqs[j] or (len(values) == 1 and (model.nqs[j], model.nvs[j]) == (2, 1))
+
+
+def _ranges(model: pin.Model, mimics: tuple[Mimic, ...]) -> tuple[Array, Array]:
+    """Position limits by coordinate; a leader's are cut so that its followers stay within theirs, where that can be."""
+    lower, upper = finite_or_unlimited(model.lowerPositionLimit), finite_or_unlimited(model.upperPositionLimit)
+    for mimic in mimics:
+        follower, leader = (int(model.idx_qs[model.getJointId(n)]) for n in (mimic.follower, mimic.leader))
+        if mimic.ratio == 0.0:
+            continue
+        ends = sorted((bound[follower] - mimic.offset) / mimic.ratio for bound in (lower, upper))
+        low, high = max(lower[leader], ends[0]), min(upper[leader], ends[1])
+        if low <= high:
+            lower[leader], upper[leader] = low, high
+    return lower, upper
+
+
+def with_values(model: pin.Model, q: Array, values: Mapping[str, Array]) -> Array:
+    """A copy of q with the coordinates of some joints replaced; an angle goes to an unbounded joint as (cos, sin).
+
+    Raises:
+        ShapeError: a joint given another number of values than it has coordinates.
+    """
+    out = np.array(q)
+    for name, value in values.items():
+        j = model.getJointId(name)
+        nq, start = int(model.nqs[j]), int(model.idx_qs[j])
+        if len(value) == 1 and (nq, int(model.nvs[j])) == (2, 1):
+            value = np.array([np.cos(value[0]), np.sin(value[0])])
+        if len(value) != nq:
+            raise ShapeError(f"neutral[{name!r}]", value, f"expected {nq} numbers")
+        out[start : start + nq] = value
+    return np.asarray(pin.normalize(model, out), dtype=np.float64)
+
+
+def _locked(
+    model: pin.Model, mimics: tuple[Mimic, ...], lock: Mapping[str, float | None], q: Array
+) -> dict[str, Array]:
+    """Joint name -> where it is locked; locking one end of a mimic pair locks the other where the coupling puts it.
+
+    Raises:
+        ShapeError: a value for a joint with several degrees of freedom, which can only be locked as it is.
+        RangeError: two ends of a mimic pair at values that contradict each other.
+    """
+    values: dict[str, Array] = {}
+    for name, value in lock.items():
+        if value is not None and model.nvs[model.getJointId(name)] != 1:
+            raise ShapeError(f"lock[{name!r}]", value, "a joint with several degrees of freedom is locked as it is")
+        values[name] = _coordinates(model, name, q) if value is None else np.array([value])
+    for mimic in mimics:
+        if mimic.follower in values and mimic.leader not in values and mimic.ratio != 0.0:
+            given = lock[mimic.follower]
+            at_rest = _coordinates(model, mimic.leader, q)
+            values[mimic.leader] = at_rest if given is None else np.array([(given - mimic.offset) / mimic.ratio])
+    for mimic in mimics:
+        if mimic.leader not in values:
+            continue
+        coupled = mimic.ratio * values[mimic.leader] + mimic.offset
+        given = lock.get(mimic.follower)
+        if given is not None and abs(given - coupled[0]) > 1e-9:
+            reason = f"it follows {mimic.leader}, which puts it at {coupled[0]:.9g}"
+            raise RangeError(f"lock[{mimic.follower!r}]", given, reason)
+        values[mimic.follower] = coupled
+    return values
+
+
+def _coordinates(model: pin.Model, name: str, q: Array) -> Array:
+    j = model.getJointId(name)
+    return np.array(q[model.idx_qs[j] : model.idx_qs[j] + model.nqs[j]])
+
+
+def _kept(model: pin.Model, reduced: pin.Model, q: Array) -> Array:
+    """The part of q that belongs to the joints of the reduced model."""
+    parts = []
+    for j in range(1, reduced.njoints):
+        k = model.getJointId(str(reduced.names[j]))
+        parts.append(q[model.idx_qs[k] : model.idx_qs[k] + model.nqs[k]])
+    return np.concatenate([np.zeros(0), *parts])
+
+
+def read_limits(model: pin.Model, base: str, notes: dict[str, str]) -> Limits:
+    """Limits of a model; none for the base, and what is 0 in velocity or effort is taken as not given.
+
+    Raises:
+        BoundsError, RangeError, NotFiniteError: the description has a lower limit above the upper one, a
+            negative limit or NaN.
+    """
+    nv = int(model.nv)
+    lower, upper = np.full(nv, -np.inf), np.full(nv, np.inf)
+    for j in range(1, model.njoints):
+        n = int(model.nvs[j])
+        if model.nqs[j] == n:
+            to, start = int(model.idx_vs[j]), int(model.idx_qs[j])
+            lower[to : to + n] = model.lowerPositionLimit[start : start + n]
+            upper[to : to + n] = model.upperPositionLimit[start : start + n]
+    velocity, effort = finite_or_unlimited(model.upperVelocityLimit), finite_or_unlimited(model.upperEffortLimit)
+    base_nv = {"fixed": 0, "floating": 6}.get(base, 3)
+    velocity[:base_nv] = effort[:base_nv] = np.inf
+    names = [str(model.names[j]) for j in range(1, model.njoints) for _ in range(int(model.nvs[j]))]
+    for key, array in (("velocity", velocity), ("effort", effort)):
+        absent = [name for name, value in zip(names, array, strict=True) if value == 0.0]
+        array[array == 0.0] = np.inf
+        if absent:
+            notes[key] = f"not given for {', '.join(dict.fromkeys(absent))}: unlimited"
+    return Limits(finite_or_unlimited(lower), finite_or_unlimited(upper), velocity, np.full(nv, np.inf), effort)
+
+
+def override_limits(robot: Robot, changes: Mapping[str, Any]) -> Robot:
+    """A copy with the limits that are not None replaced, said in the notes."""
+    given = {key: value for key, value in changes.items() if value is not None}
+    if not given:
+        return robot
+    changed = robot.with_limits(**given)
+    notes = dict(changed.notes)
+    for key in given:
+        words = key.split("_")[0]
+        notes[words] = f"{key} given by the caller" if words == "position" else "given by the caller"
+    return replace(changed, notes=notes)
