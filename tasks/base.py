@@ -26,7 +26,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from wbc import validation
+from wbc.errors import ShapeError
 from wbc.symbolic.tracer import Tracer
 
 if TYPE_CHECKING:
@@ -255,4 +255,4 @@ def _plain(value: Any, robot: Robot) -> Any:
         return value.hex()
     if isinstance(value, ca.Function):
         return value.serialize()
-    raise validation.ShapeError("declaration", value, "only plain data, arrays, poses and CasADi functions")
+    raise ShapeError("declaration", value, "only plain data, arrays, poses and CasADi functions")

@@ -29,9 +29,10 @@ class Expression(Task):
         e = function(kin, p)                                  [units]
 
     ``kin`` is the :class:`wbc.symbolic.Tracer` (poses, positions and rotations of frames, centre of mass, joint
-    coordinates, q); ``p`` holds the declared inputs by name: SX scalars and vectors, 3x3 rotations, poses. The result is
-    a CasADi SX scalar or column, or a list of them; the number of rows is found by running the function. The Jacobian
-    is exact, by differentiation along the tangent space, and so is the feed-forward of an input with a ``rate``.
+    coordinates, q); ``p`` holds the declared inputs by name: SX scalars and vectors, 3x3 rotations, poses. The
+    result is a CasADi SX scalar or column, or a list of them; the number of rows is found by running the function. The
+    Jacobian is exact, by differentiation along the tangent space, and so is the feed-forward of an input with a
+    ``rate``.
 
     Inputs:
         those declared. Each needs a default: nothing else can tell where the function starts from.

@@ -60,10 +60,11 @@ class Posture(Task):
 
     def __post_init__(self) -> None:
         validation.one_of("Posture.start", self.start, STARTS)
-        if self.joints is not None:
-            if isinstance(self.joints, str) or not isinstance(self.joints, Iterable):
-                raise ShapeError("Posture.joints", self.joints, "expected a list of joint names")
-            object.__setattr__(self, "joints", tuple(self.joints))
+        joints: Any = self.joints
+        if joints is not None:
+            if isinstance(joints, str) or not isinstance(joints, Iterable):
+                raise ShapeError("Posture.joints", joints, "expected a list of joint names")
+            object.__setattr__(self, "joints", tuple(joints))
         object.__setattr__(self, "weights", checked_weights("Posture.weights", self.weights))
 
     def validate(self, robot: Robot) -> None:

@@ -100,8 +100,8 @@ class Tracer:
         """phi = log3(R_b' R R_t'): how far ``frame``, seen from ``base``, is turned past ``target`` [rad].
 
         A rotation vector in the axes of ``base``, |phi| <= pi. Its derivative is the closed form
-        dphi = Jl^-1(phi) R_b' (w - w_b) - Jr^-1(phi) w_t (see :func:`rotations.left_jacobian_inverse`), about a third of
-        what differentiating the logarithm's branches costs.
+        dphi = Jl^-1(phi) R_b' (w - w_b) - Jr^-1(phi) w_t with Jl^-1 of :func:`rotations.left_jacobian_inverse`
+        and Jr^-1(phi) = Jl^-1(-phi), less than half of what differentiating the logarithm's branches costs.
 
         Args:
             target: 3x3 rotation R_t of the target in ``base``; may depend on inputs and on q.
