@@ -1,0 +1,146 @@
+"""C source of one stack's tick: the generated rows, the tables, and the hand-written cycle in ``native/``."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from importlib import resources
+
+import casadi as ca
+import numpy as np
+
+from wbc.stack.declaration import Declaration
+from wbc.stack.layout import Layout
+from wbc.stack.program import Program, sparsity_rows
+from wbc.tasks.base import Constraint, Order
+
+
+def sources(stack: Declaration, layout: Layout, program: Program) -> dict[str, str]:
+    """File name -> text of everything that makes the tick of a stack."""
+    native = resources.files("wbc.stack") / "native"
+    return {
+        "rows.c": _casadi_source(program),
+        "stack.h": _header(stack, layout, program),
+        "tick.h": (native / "tick.h").read_text(),
+        "tick.c": (native / "tick.c").read_text(),
+    }
+
+
+def _casadi_source(program: Program) -> str:
+    generator = ca.CodeGenerator("rows.c", {"with_header": False})
+    generator.add(program.rows)
+    if program.ahead is not None:
+        generator.add(program.ahead)
+    return str(generator.dump())
+
+
+def _header(stack: Declaration, layout: Layout, program: Program) -> str:
+    jt, at = program.rows.sparsity_out("jt"), program.rows.sparsity_out("at")
+    j_start, j_col = sparsity_rows(jt)
+    a_start, a_col = sparsity_rows(at)
+    general = layout.of_form("margins", "rows")
+    orders = [int(_order(b.entry.item)) for b in general for _ in b.rows]
+    scales = [stack.length if r.unit.split("/")[0] == "m" else 1.0 for b in general for r in b.rows]
+    bounds = layout.of_form("bounds")
+    sequence = sorted(range(len(bounds)), key=lambda k: _order(bounds[k].entry.item))
+    dofs = layout.dof_scales(stack)
+    units = unit_groups(stack)
+    functions = [program.rows] + ([program.ahead] if program.ahead is not None else [])
+    soft_rows = len(orders)
+    lines = [
+        "/* Sizes and tables of one stack; generated */",
+        "#include <stddef.h>",
+        *(
+            f"#define {name} {value}"
+            for name, value in {
+                "NQ": layout.nq,
+                "NV": layout.nv,
+                "NP": layout.parameters,
+                "MT": layout.task_rows,
+                "MC": layout.general_rows,
+                "NB": layout.bound_blocks,
+                "MH": layout.margin_rows,
+                "NNZJ": jt.nnz(),
+                "NNZA": at.nnz(),
+                "UNITS": len(units),
+                "LAST_ORDER": max(orders, default=0),
+                "ACTIVE_MAX": layout.nv + soft_rows + 1,
+                "WORK_W": max(f.sz_w() for f in functions),
+                "WORK_IW": max(f.sz_iw() for f in functions),
+            }.items()
+        ),
+        _table("int", "j_start", j_start),
+        _table("int", "j_col", j_col),
+        _table("int", "a_start", a_start),
+        _table("int", "a_col", a_col),
+        _table("int", "row_order", orders),
+        _table("int", "bound_sequence", sequence),
+        _table("int", "unit_start", [u[0] for u in units]),
+        _table("int", "unit_size", [u[1] for u in units]),
+        _table("double", "row_scale", scales),
+        _table("double", "dof_scale", dofs),
+        _table("double", "damping", stack.damping / dofs**2),
+        *_blocks(j_start, j_col),
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def unit_groups(stack: Declaration) -> list[tuple[int, int]]:
+    """(start, size) of the coordinates in q that must have unit length: quaternions and (cos, sin) pairs."""
+    model = stack.robot.model
+    groups: list[tuple[int, int]] = []
+
+    def visit(joint: object, start: int) -> None:
+        kind = joint.shortname().removeprefix("JointModel")  # type: ignore[attr-defined]
+        if kind.startswith(("RUB", "RevoluteUnbounded")):
+            groups.append((start, 2))
+        elif kind == "FreeFlyer":
+            groups.append((start + 3, 4))
+        elif kind == "Planar":
+            groups.append((start + 2, 2))
+        elif kind == "Spherical":
+            groups.append((start, 4))
+        elif kind == "Composite":
+            for part in joint.extract().joints:  # type: ignore[attr-defined]
+                visit(part, start)
+                start += int(part.nq)
+
+    for j in range(1, model.njoints):
+        visit(model.joints[j], int(model.idx_qs[j]))
+    return groups
+
+
+def _order(item: object) -> Order:
+    assert isinstance(item, Constraint)
+    return item.order
+
+
+def _table(kind: str, name: str, values: Iterable[float]) -> str:
+    """A static table; an unused last entry keeps it from being empty."""
+    texts = [str(int(v)) if kind == "int" else float(v).hex() for v in values]
+    return f"static const {kind} {name}[] = {{{', '.join([*texts, '0'])}}};"
+
+
+def _blocks(start: np.ndarray, col: np.ndarray) -> list[str]:
+    """BLOCKS: statements that add the task rows to H and g, rows of equal columns together.
+    DIAGONALS: statements that add the rows of one entry to the diagonal in ``y``."""
+    build: list[str] = []
+    diagonals: list[str] = []
+    row, rows = 0, len(start) - 1
+    while row < rows:
+        columns = tuple(col[start[row] : start[row + 1]])
+        end = row + 1
+        if len(columns) == 1:
+            while end < rows and start[end + 1] - start[end] == 1:
+                end += 1
+            build.append(f"diagonal(t, {row}, {end - row}, {start[row]});")
+            entry = "t->jt[e] * t->jt[e]"
+            weight = f"t->weight[{row} + e - {start[row]}] * t->report.factor[{row} + e - {start[row]}]"
+            diagonals.append(
+                f"for (int e = {start[row]}; e < {start[end]}; e++) t->y[j_col[e]] += {weight} * {entry};")
+        else:
+            while end < rows and tuple(col[start[end] : start[end + 1]]) == columns:
+                end += 1
+            if columns:
+                build.append(f"block(t, {row}, {end - row}, {start[row]}, {len(columns)});")
+        row = end
+    return [f"#define BLOCKS {' '.join(build)}", f"#define DIAGONALS {' '.join(diagonals)}"]

@@ -1,0 +1,78 @@
+/* One control cycle: rows from CasADi, QP, solution, certificate. No allocation, no global state.
+ *
+ * The sizes and tables that this file uses are in "stack.h", which is generated for one stack:
+ *   NQ NV NP    configuration, velocity, parameters
+ *   MT MC NB MH task rows, general constraint rows, bound blocks, margin rows (arrays have at least one entry)
+ *   NNZJ NNZA   structural non-zeros of task rows and of general rows
+ *   j_start j_col a_start a_col   their positions, row by row
+ *   damping     cost of each velocity
+ *   row_order   class of each general row in the order of sacrifice
+ *   row_scale   its unit: the characteristic length for rows in metres
+ */
+#ifndef WBC_TICK_H
+#define WBC_TICK_H
+
+#include "stack.h"
+#include "daqp/api.h"
+
+#define M_ALL (NV + MC)
+#define WIDE ((NV + 7) / 8 * 8)
+#define PACKED (NV * (NV + 1) / 2)
+#define WBC_INF 1e30
+
+/* Flags of a tick. Negative: the inputs were refused and nothing was changed. */
+#define WBC_SOLVED 0
+#define WBC_RELAXED 1
+#define WBC_BRAKED 2
+#define WBC_BAD_Q (-1)
+#define WBC_BAD_UNIT (-2)
+#define WBC_BAD_V (-3)
+#define WBC_BAD_INPUT (-4)
+
+/* What a tick reports, in this order, before the row-wise outputs. */
+typedef struct {
+    double v[NV];         /* the command */
+    double flag;          /* one of the flags above */
+    double iterations;    /* of the active-set solver, all solves of the tick together */
+    double stationarity;  /* largest entry of |H v + g + A' lambda|, per dof */
+    double violation;     /* largest violation of a row or bound that was not relaxed, row units */
+    double complementarity; /* largest |lambda (A v - b)| */
+    double error_bound;   /* bound on the largest |v - v*| */
+    double error[MT + 1];     /* e of the task rows */
+    double factor[MT + 1];    /* fading factor of the task rows */
+    double margin[MH + 1];    /* h of the margin rows */
+    double ahead[MH + 1];     /* h at q (+) v dt */
+    double lambda[M_ALL + 1]; /* multipliers of bounds, then of general rows; > 0 at the upper side */
+    double slack[MC + 1];     /* by how much a general row was relaxed, row units */
+} wbc_report;
+
+typedef struct {
+    /* inputs, written by the caller */
+    double q[NQ + 1], v_last[NV + 1], p[NP + 1], dt;
+    double weight[MT + 1];       /* weight of each task row, scale included */
+    double enabled[MC + 1];      /* 1 or 0 for each general row */
+    double bound_enabled[NB * NV + 1];
+    wbc_report report;
+    /* the QP */
+    double H[NV * WIDE], g[WIDE], A[MC * NV + 1], low[M_ALL], high[M_ALL];
+    /* outputs of the generated rows */
+    double wish[MT + 1], jt[NNZJ + 1], at[NNZA + 1], bound_low[NB * NV + 1], bound_high[NB * NV + 1];
+    /* factorisation */
+    double R[NV * WIDE], inverse[NV * WIDE], inverse_diagonal[NV], y[WIDE];
+    double scratch[WIDE], product[WIDE];
+    double free_low[MC + 1], free_high[MC + 1]; /* sides of general rows before relaxation */
+    double work_w[WORK_W + 1];
+    long long work_iw[WORK_IW + 1];
+    int warm;                    /* the sense array holds the active set of the last tick */
+    int factored;                /* R inverse and M of the last tick are in the workspace */
+    /* DAQP workspace on our own memory */
+    DAQPWorkspace daqp;
+    DAQPProblem problem;
+    DAQPSettings settings;
+    double Rinv[PACKED], M[MC * NV + 1], dupper[M_ALL], dlower[M_ALL], ldp_v[WIDE], scaling[M_ALL];
+    double x[WIDE], xold[NV], lam[ACTIVE_MAX], lam_star[ACTIVE_MAX], u[NV];
+    double L[ACTIVE_MAX * (ACTIVE_MAX + 1) / 2], D[ACTIVE_MAX], xldl[ACTIVE_MAX], zldl[ACTIVE_MAX];
+    int WS[ACTIVE_MAX], sense[M_ALL], keep[M_ALL];
+} wbc_tick;
+
+#endif

@@ -1,0 +1,222 @@
+"""From declared items to one CasADi function: task rows, constraint rows and bounds at (q, v, inputs, dt).
+
+Outputs of ``rows(q, v, p, dt)`` (MT task rows, MC general rows, NB bound blocks, MH margins):
+
+    error   MT       e of every task row
+    wish    MT       -gain e - de/dt, the rate that the row asks for
+    factor  MT       fading factor in [0, 1]
+    jt      nv x MT  sparse, de/dq transposed: the columns are the rows of J
+    at      nv x MC  sparse, general constraint rows transposed
+    low     MC       lower side of general rows
+    high    MC       upper side
+    margin  MH       h of every margin row
+    bound_low, bound_high   nv x NB
+
+The tick forms H = sum w (factor J)'J + damping and g from these, so that the compiled expression stays
+small and the levels of later versions have their rows. ``ahead(q, v, p, dt)`` is h(q (+) v dt) with moving
+inputs advanced by their rates.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+
+from wbc.errors import ShapeError
+from wbc.stack.declaration import Declaration
+from wbc.stack.layout import Block, Layout, Slot
+from wbc.symbolic import rotations as rot
+from wbc.symbolic.kinematics import Kinematics, Pose
+from wbc.symbolic.tracer import Tracer, rotation_rate
+from wbc.tasks.base import Constraint, Rows, Task
+
+ROWS_OUTPUTS = ("error", "wish", "factor", "jt", "at", "low", "high", "margin", "bound_low", "bound_high")
+
+
+@dataclass(frozen=True, eq=False)
+class Program:
+    """The compiled-to-be functions of a stack; ``ahead`` is None where there are no margins."""
+
+    rows: ca.Function
+    ahead: ca.Function | None
+
+
+class _Builder:
+    def __init__(self, stack: Declaration, layout: Layout) -> None:
+        self.stack, self.layout = stack, layout
+        self.kinematics = Kinematics(stack.robot.model)
+        self.p = ca.SX.sym("p", layout.parameters)
+        self.dt = ca.SX.sym("dt")
+
+    def value(self, slot: Slot, source: ca.SX) -> ca.SX | Pose:
+        """What the item's expression receives for an input."""
+        part = source[slot.slice]
+        if slot.input.kind == "pose":
+            return Pose(ca.reshape(part[:9], 3, 3), part[9:])
+        if slot.input.kind == "rotation":
+            return ca.reshape(part, 3, 3)
+        return part
+
+    def values(self, block: Block, source: ca.SX) -> dict[str, ca.SX | Pose]:
+        return {name: self.value(slot, source) for name, slot in block.slots.items()}
+
+    def rate(self, block: Block, slot: Slot) -> ca.SX | None:
+        """Time derivative of an input's numbers, or None for one that stands still."""
+        if slot.input.rate is None:
+            return None
+        speed = self.p[block.slots[slot.input.rate].slice]
+        part = self.p[slot.slice]
+        if slot.input.kind == "pose":
+            return ca.vertcat(rotation_rate(ca.reshape(part[:9], 3, 3)) @ speed[3:], speed[:3])
+        if slot.input.kind == "rotation":
+            return rotation_rate(ca.reshape(part, 3, 3)) @ speed
+        if slot.input.kind == "configuration":
+            return self.kinematics.tangent_map_at(part) @ speed
+        return speed
+
+    def drift(self, block: Block, expression: ca.SX) -> ca.SX:
+        """Partial time derivative of an item's expression through its moving inputs."""
+        total = ca.SX(expression.numel(), 1)
+        for slot in block.slots.values():
+            speed = self.rate(block, slot)
+            if speed is not None:
+                total = total + ca.jacobian(expression, self.p[slot.slice]) @ speed
+        return ca.sparsify(total)
+
+    def advanced(self, block: Block) -> ca.SX:
+        """The parameter vector with this block's moving inputs dt later."""
+        out = ca.SX(self.p)
+        for slot in block.slots.values():
+            if slot.input.rate is None:
+                continue
+            speed = self.p[block.slots[slot.input.rate].slice]
+            part = self.p[slot.slice]
+            if slot.input.kind in ("pose", "rotation"):
+                angular = speed[3:] if slot.input.kind == "pose" else speed
+                turn = rot.from_quaternion(rot.exp3(angular * self.dt)) @ ca.reshape(part[:9], 3, 3)
+                moved = ca.vec(turn)
+                if slot.input.kind == "pose":
+                    moved = ca.vertcat(moved, part[9:] + speed[:3] * self.dt)
+            elif slot.input.kind == "configuration":
+                moved = self.kinematics.integrate(part, speed * self.dt)
+            else:
+                moved = part + speed * self.dt
+            out[slot.slice] = moved
+        return out
+
+    def column(self, block: Block, what: str, expression: ca.SX) -> ca.SX:
+        """The expression as a dense column of the declared number of rows."""
+        expression = ca.SX(expression)
+        if expression.shape[1] != 1 or expression.shape[0] != len(block.rows):
+            where = f"{block.entry.name}.{what}"
+            raise ShapeError(where, expression.shape, f"expected a column of {len(block.rows)} rows, as rows() declares")
+        return ca.densify(expression)
+
+    def task(self, block: Block) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
+        """error, wish, factor, J of a task."""
+        item = block.entry.item
+        assert isinstance(item, Task)
+        robot, tracer, inputs = self.stack.robot, Tracer(self.kinematics), self.values(block, self.p)
+        error = self.column(block, "error", item.error(robot, tracer, inputs))
+        own = item.jacobian(robot, tracer, inputs)
+        jacobian = tracer.jacobian(error) if own is None else tracer.expand(ca.SX(own))
+        gain = self.p[block.slots["gain"].slice]
+        wish = tracer.expand(-gain * error - self.drift(block, error))
+        fade = item.row_factor(robot, tracer, inputs)
+        factor = ca.SX.ones(len(block.rows)) if fade is None else self.column(block, "row_factor", fade)
+        return tracer.expand(error), wish, tracer.expand(factor), jacobian
+
+    def general(self, block: Block) -> tuple[Rows, ca.SX | None]:
+        """Rows of a constraint, and its margins."""
+        item = block.entry.item
+        assert isinstance(item, Constraint)
+        robot, tracer, inputs = self.stack.robot, Tracer(self.kinematics), self.values(block, self.p)
+        count = len(block.rows)
+        if block.form == "rows":
+            rows = item.velocity_rows(robot, tracer, inputs, self.dt)
+            assert rows is not None
+            low, high = self.column(block, "lower", rows.lower), self.column(block, "upper", rows.upper)
+            return Rows(tracer.expand(ca.SX(rows.matrix)), tracer.expand(low), tracer.expand(high)), None
+        margins = item.margins(robot, tracer, inputs)
+        assert margins is not None
+        margin = self.column(block, "margins", margins)
+        rate = self.p[block.slots["rate"].slice]
+        low = tracer.expand(-rate * margin - self.drift(block, margin))
+        return Rows(tracer.jacobian(margin), low, ca.SX.inf(count)), tracer.expand(margin)
+
+    def ahead(self, block: Block) -> ca.SX:
+        """h(q (+) v dt) of a margin block."""
+        item = block.entry.item
+        assert isinstance(item, Constraint)
+        tracer = Tracer(self.kinematics)
+        margins = item.margins(self.stack.robot, tracer, self.values(block, self.p))
+        assert margins is not None
+        here = ca.Function("h", [self.kinematics.q, self.p], [ca.densify(tracer.expand(margins))])
+        later = self.kinematics.integrate(self.kinematics.q, self.kinematics.v * self.dt)
+        return here(later, self.advanced(block))
+
+
+def build(stack: Declaration, layout: Layout) -> Program:
+    """Build the functions of a stack.
+
+    Raises:
+        ShapeError: an item's expression has another number of rows than it declares, or free symbols.
+    """
+    b = _Builder(stack, layout)
+    nv = layout.nv
+    tasks = [b.task(block) for block in layout.of_form("task")]
+    general = [b.general(block) for block in layout.of_form("margins", "rows")]
+    bounds = []
+    for block in layout.of_form("bounds"):
+        item = block.entry.item
+        assert isinstance(item, Constraint)
+        tracer = Tracer(b.kinematics)
+        got = item.bounds(stack.robot, tracer, b.values(block, b.p), b.dt)
+        assert got is not None
+        bounds.append((b.column(block, "lower", got.lower), b.column(block, "upper", got.upper)))
+    empty = ca.SX(0, 1)
+    outputs = [
+        ca.vertcat(empty, *[t[0] for t in tasks]),
+        ca.vertcat(empty, *[t[1] for t in tasks]),
+        ca.vertcat(empty, *[t[2] for t in tasks]),
+        ca.horzcat(ca.SX(nv, 0), *[_shared_pattern(t[3].T) for t in tasks]),
+        ca.horzcat(ca.SX(nv, 0), *[r.matrix.T for r, _ in general]),
+        ca.vertcat(empty, *[ca.densify(r.lower) for r, _ in general]),
+        ca.vertcat(empty, *[ca.densify(r.upper) for r, _ in general]),
+        ca.vertcat(empty, *[h for _, h in general if h is not None]),
+        ca.horzcat(ca.SX(nv, 0), *[low for low, _ in bounds]),
+        ca.horzcat(ca.SX(nv, 0), *[high for _, high in bounds]),
+    ]
+    outputs = [o if k in (3, 4) else ca.densify(o) for k, o in enumerate(outputs)]
+    inputs = [b.kinematics.q, b.kinematics.v, b.p, b.dt]
+    rows = _function("rows", inputs, outputs, list(ROWS_OUTPUTS))
+    ahead = None
+    if layout.margin_rows:
+        later = ca.vertcat(*[b.ahead(block) for block in layout.of_form("margins")])
+        ahead = _function("ahead", inputs, [ca.densify(later)], ["ahead"])
+    return Program(rows, ahead)
+
+
+def _shared_pattern(transposed: ca.SX) -> ca.SX:
+    """Give all rows of a task the same columns, if that at most doubles the entries: they are then one dense block."""
+    rows = transposed.shape[1]
+    columns = sorted(set(transposed.sparsity().row()))
+    if rows < 2 or len(columns) * rows > 2 * transposed.nnz():
+        return transposed
+    return ca.project(transposed, ca.Sparsity.rowcol(columns, list(range(rows)), transposed.shape[0], rows))
+
+
+def _function(name: str, inputs: list[ca.SX], outputs: list[ca.SX], labels: list[str]) -> ca.Function:
+    free = ca.symvar(ca.veccat(*outputs))
+    known = {s.__hash__() for s in ca.symvar(ca.veccat(*inputs))}
+    stray = [s.name() for s in free if s.__hash__() not in known]
+    if stray:
+        raise ShapeError(f"stack.{name}", stray, "an item's expression contains symbols that are not its inputs")
+    return ca.Function(name, inputs, ca.cse(outputs), ["q", "v", "p", "dt"], labels)
+
+
+def sparsity_rows(transposed: ca.Sparsity) -> tuple[np.ndarray, np.ndarray]:
+    """(starts, columns) of the rows of J from the sparsity of its transpose (compressed columns)."""
+    return np.array(transposed.colind(), dtype=np.int64), np.array(transposed.row(), dtype=np.int64)

@@ -1,0 +1,95 @@
+"""The C compiler and the static DAQP library that the casadi wheel ships."""
+
+from __future__ import annotations
+
+import functools
+import logging
+import os
+import pathlib
+import shutil
+import subprocess
+import tempfile
+
+import casadi as ca
+
+from wbc.errors import CompileError
+
+log = logging.getLogger("wbc")
+
+#: Flags of the generated rows: straight-line code, on which higher levels cost minutes and gain nothing
+ROWS_FLAGS = ("-O1",)
+#: Flags of the hand-written cycle: its loops have constant bounds and are worth unrolling
+TICK_FLAGS = ("-O3",)
+#: No fast-math and no contraction, so that the compiled tick is the arithmetic that was written
+COMMON_FLAGS = ("-std=gnu99", "-fPIC", "-march=native", "-ffp-contract=off", "-fno-math-errno", "-fvisibility=hidden",
+                "-DCASADI_SYMBOL_EXPORT=", "-w")
+
+
+@functools.cache
+def compiler() -> str | None:
+    """Path of the C compiler, or None: ``WBC_CC`` if set (empty: none), else gcc or cc on the PATH."""
+    chosen = os.environ.get("WBC_CC")
+    if chosen is not None:
+        return shutil.which(chosen) if chosen else None
+    return shutil.which("gcc") or shutil.which("cc")
+
+
+@functools.cache
+def available() -> bool:
+    """A compiler and DAQP's library and headers are there. Says once in the log if not."""
+    missing = []
+    if compiler() is None:
+        missing.append("no C compiler")
+    if not (library().exists() and (headers() / "daqp" / "api.h").exists()):
+        missing.append("the casadi package has no static daqp library")
+    if missing:
+        log.warning("%s: ticks run on the CasADi virtual machine, some 10 times slower", " and ".join(missing))
+    return not missing
+
+
+def headers() -> pathlib.Path:
+    """Include folder of the casadi wheel."""
+    return pathlib.Path(ca.__file__).parent / "include"
+
+
+def library() -> pathlib.Path:
+    """Static DAQP library of the casadi wheel."""
+    return pathlib.Path(ca.__file__).parent / "libdaqpstat.a"
+
+
+@functools.cache
+def identity() -> str:
+    """Compiler version, target processor and flags: part of the cache key."""
+    cc = compiler()
+    if cc is None:
+        return "none"
+    version = subprocess.run([cc, "--version"], capture_output=True, text=True, check=False).stdout.splitlines()[:1]
+    target = subprocess.run(
+        [cc, "-march=native", "-Q", "--help=target"], capture_output=True, text=True, check=False).stdout
+    return "\n".join([*version, target, *ROWS_FLAGS, *TICK_FLAGS, *COMMON_FLAGS])
+
+
+def compile_tick(files: dict[str, str], output: pathlib.Path) -> None:
+    """Compile the files of :func:`wbc.stack.codegen.sources` to a shared library at ``output``.
+
+    Raises:
+        CompileError: the compiler failed; its first lines are in the message.
+    """
+    cc = compiler()
+    if cc is None:
+        raise CompileError("compiler", None, "no C compiler found; install gcc or use backend='vm'")
+    with tempfile.TemporaryDirectory(prefix="wbc-") as folder:
+        place = pathlib.Path(folder)
+        for name, text in files.items():
+            (place / name).write_text(text)
+        include = (f"-I{headers()}",)
+        _run([cc, *COMMON_FLAGS, *ROWS_FLAGS, "-c", "rows.c", "-o", "rows.o"], place)
+        _run([cc, *COMMON_FLAGS, *TICK_FLAGS, *include, "-c", "tick.c", "-o", "tick.o"], place)
+        _run([cc, "-shared", "-Wl,--exclude-libs,ALL", "-Wl,-Bsymbolic", "rows.o", "tick.o", str(library()), "-lm",
+              "-o", str(output)], place)
+
+
+def _run(command: list[str], folder: pathlib.Path) -> None:
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    if done.returncode != 0:
+        raise CompileError("compiler", command[0], "failed: " + " / ".join(done.stderr.splitlines()[:4]))
