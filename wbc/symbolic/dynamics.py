@@ -177,6 +177,12 @@ def _symmetric(block: ca.SX) -> ca.SX:
 
 
 def _placed(size: int, rows: list[int], columns: list[int], block: ca.SX) -> ca.SX:
+    """A size x size matrix with ``block`` at rows x columns; columns named twice (a mimic joint and its leader) add."""
+    unique = list(dict.fromkeys(columns))
+    if len(unique) < len(columns):
+        gather = np.zeros((len(columns), len(unique)))
+        gather[np.arange(len(columns)), [unique.index(c) for c in columns]] = 1.0
+        block = block @ rot.constant(gather)
     out = ca.SX(size, size)
-    out[rows, columns] = block
+    out[rows, unique] = block
     return out

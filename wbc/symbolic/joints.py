@@ -17,7 +17,8 @@ __all__ = ["SUPPORTED", "SymbolicJoint", "mimic_joint", "symbolic_joint"]
 
 _MAKERS: dict[str, Callable[[Any], SymbolicJoint]] = {
     "RevoluteUnaligned": lambda j: maps.revolute(np.array(j.axis)),
-    "RevoluteUnboundedUnaligned": lambda j: maps.unbounded(np.array(j.axis)),
+    # Python sees no axis on this type, so it is read from the motion that Pinocchio computes
+    "RevoluteUnboundedUnaligned": lambda j: maps.unbounded(_at(j, np.array([1.0, 0.0]))[0][3:]),
     "PrismaticUnaligned": lambda j: maps.prismatic(np.array(j.axis)),
     "HelicalUnaligned": lambda j: maps.helical(np.array(j.axis), float(j.pitch)),
     "Universal": lambda j: maps.universal(np.array(j.axis1), np.array(j.axis2)),
@@ -64,17 +65,27 @@ def mimic_joint(joint: Any, leader: SymbolicJoint, name: str = "joint") -> Symbo
     ``placement`` and ``subspace`` take the leader's q; ``nq`` and ``nv`` are the leader's, and the manifold maps are
     the leader's. For an unbounded leader q is its angle in (-pi, pi], so an uneven scaling jumps once a turn.
 
-    The type of the joint that follows is not visible from Python, so it is recovered from the constant motion axis
-    that Pinocchio computes for it: shift, turn, or both (helical).
+    The type of the follower is not visible from Python, so it is recovered from the motion that Pinocchio computes
+    for it: a shift or a turn. A helical follower is refused; Pinocchio 4.1 drops its pitch from the motion.
 
     Raises:
-        UnsupportedJointError: the scaling is 0 (then the motion axis, hence the type, cannot be recovered).
+        UnsupportedJointError: the scaling is 0 (then the follower's axis cannot be recovered), or it is helical.
     """
     inner = joint.extract()
     scaling, offset = float(inner.scaling), float(inner.offset)
     if scaling == 0.0:
         raise UnsupportedJointError(f"joint {name!r}", scaling, "a mimic joint of scaling 0 is a fixed joint")
-    follower = _follower(joint, leader.nq, scaling)
+    start = np.zeros(leader.nq)
+    if leader.nq == 2:
+        start[0] = 1.0
+    twist, _ = _at(joint, start)
+    turned = _at(joint, np.array([1.0]) if leader.nq == 1 else np.array([np.cos(1.0), np.sin(1.0)]))[1]
+    if not twist[3:].any():
+        follower = maps.prismatic(twist[:3] / scaling)
+    elif twist[:3].any() or np.abs(turned).max() > rot.SNAP:
+        raise UnsupportedJointError(f"joint {name!r}", "helical follower", "a mimic joint follows by a turn or a shift")
+    else:
+        follower = maps.revolute(twist[3:] / scaling)
 
     def angle(q: ca.SX) -> ca.SX:
         coordinate = q if leader.nq == 1 else ca.atan2(q[1], q[0])
@@ -86,18 +97,14 @@ def mimic_joint(joint: Any, leader: SymbolicJoint, name: str = "joint") -> Symbo
     def subspace(q: ca.SX) -> ca.SX:
         return scaling * follower.subspace(q)
 
-    return SymbolicJoint(leader.nq, leader.nv, placement, subspace, leader.tangent, leader.integrate, leader.difference)
+    return SymbolicJoint(
+        leader.nq, leader.nv, placement, subspace, leader.tangent, leader.integrate, leader.difference
+    )
 
 
-def _follower(joint: Any, leader_nq: int, scaling: float) -> SymbolicJoint:
+def _at(joint: Any, coordinates: Any) -> tuple[Any, Any]:
+    """(motion axis, 6 numbers; position) that Pinocchio computes for a one-dof joint at its coordinates."""
     data = joint.createData()
-    q = np.zeros(joint.idx_q + leader_nq)
-    if leader_nq == 2:
-        q[joint.idx_q] = 1.0
+    q = np.concatenate([np.zeros(joint.idx_q), coordinates])
     joint.calc(data, q)
-    twist = np.asarray(data.S, dtype=float).reshape(6) / scaling
-    linear, angular = twist[:3], twist[3:]
-    if not angular.any():
-        return maps.prismatic(linear)
-    pitch = float(linear @ angular)
-    return maps.helical(angular, pitch) if pitch else maps.revolute(angular)
+    return np.asarray(data.S, dtype=float).reshape(6), np.array(data.M.translation)
