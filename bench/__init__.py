@@ -1,0 +1,1 @@
+"""The benchmark: this package and its peers on the same problems (``make bench``)."""

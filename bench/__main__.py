@@ -1,0 +1,67 @@
+"""``python -m bench``: prepare the problems, measure, print, write results.json and results.md."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+from rich.console import Console
+
+from bench import report
+from bench.harness import Plan, machine, measure, measure_startup
+from bench.pool import ROOT
+from bench.prepare import prepare
+
+OWN = ("wbc", "casadi", "pin", "numpy", "daqp")
+PEERS = ("pin-pink", "mink", "mujoco", "placo", "qpsolvers", "daqp", "quadprog", "pin", "numpy")
+
+
+def main() -> None:
+    """Parse the arguments and run."""
+    parser = argparse.ArgumentParser(prog="bench", description=__doc__)
+    parser.add_argument("--peers-python", help="interpreter with the peers; without it they are left out")
+    parser.add_argument("--rounds", type=int, help="rounds a problem")
+    parser.add_argument("--problems", nargs="+", default=["panda", "ur5", "talos"], help="which problems")
+    parser.add_argument("--work", type=Path, default=ROOT / "build" / "bench", help="folder for the problems")
+    parser.add_argument("--output", type=Path, default=ROOT / "bench", help="folder for results.json and results.md")
+    chosen = parser.parse_args()
+    # Not resolved: a virtual environment's interpreter is a link
+    peers = str(Path(chosen.peers_python).absolute()) if chosen.peers_python else None
+    plan = Plan(sys.executable, peers, chosen.work, chosen.rounds, chosen.problems)
+    console, progress = Console(), Console(stderr=True)
+    about = machine()
+    prepare(plan.folder)
+    with progress.status("") as status:
+        results = {
+            "machine": about,
+            "versions": versions(plan),
+            "startup": measure_startup(plan, status.update),
+            "problems": {name: measure(plan, name, status.update) for name in plan.names},
+        }
+    chosen.output.mkdir(parents=True, exist_ok=True)
+    (chosen.output / "results.json").write_text(json.dumps(results, indent=1) + "\n")
+    (chosen.output / "results.md").write_text(report.markdown(results))
+    report.show(results, console)
+
+
+def versions(plan: Plan) -> dict[str, str]:
+    """Versions in both environments."""
+    out = _versions(plan.python, OWN)
+    if plan.peers_python is not None:
+        found = _versions(plan.peers_python, PEERS)
+        out |= {name if name not in out else f"peers' {name}": version for name, version in found.items()}
+    return out
+
+
+def _versions(python: str, names: tuple[str, ...]) -> dict[str, str]:
+    code = "import importlib.metadata as m, json, sys; print(json.dumps({n: m.version(n) for n in sys.argv[1:]}))"
+    done = subprocess.run([python, "-c", code, *names], capture_output=True, text=True, check=True, cwd=ROOT.anchor)
+    found: dict[str, str] = json.loads(done.stdout)
+    return found
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,87 @@
+"""What a worker asks of each package. A contender keeps its own state; the worker hands over targets and time."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from time import perf_counter_ns
+
+import numpy as np
+
+from bench.problems import Array, Case
+
+
+class Contender(ABC):
+    """One package on one problem, used as its documentation shows.
+
+    All contenders get the same description, targets, weights, limits and tick. Errors are corrected within one
+    tick (gain 1/dt), which is the default of pink and mink and the only choice of placo.
+    """
+
+    def __init__(self, case: Case) -> None:
+        """Build the tasks and limits; the state is that of :meth:`reset`."""
+        self.case = case
+        self.problem = case.problem
+        #: Durations of what was done once [s], by name
+        self.facts: dict[str, float] = {}
+
+    @abstractmethod
+    def reset(self) -> None:
+        """Back to the first configuration."""
+
+    @abstractmethod
+    def aim(self, tick: int) -> None:
+        """Hand over the targets of a tick."""
+
+    @abstractmethod
+    def call(self) -> None:
+        """The call that a user makes each tick; the state moves on by one tick."""
+
+    @abstractmethod
+    def state(self) -> Array:
+        """The configuration: base position and quaternion (x, y, z, w) if floating, joints in the problem's order."""
+
+    @abstractmethod
+    def phases(self) -> dict[str, float]:
+        """One tick as :meth:`call`, its duration split by phase [ns]."""
+
+    def bare(self) -> Callable[[], object] | None:
+        """The native call inside :meth:`call` at the present state, or None where there is no such thing."""
+        return None
+
+    def settle(self) -> None:  # noqa: B027 (most packages move their own state)
+        """What is left to do after the timed call, such as moving a state that the package does not keep."""
+
+    def reference_error(self) -> float | None:
+        """Largest difference [rad/s or m/s] between the package's answer to the QP of this tick and an exact
+        solution of the same QP; None where the package does not show its QP.
+        """
+        return None
+
+
+def stopwatch(phases: dict[str, float], name: str, start: int) -> int:
+    """Book the time since ``start`` under a name; returns the time now [ns]."""
+    now = perf_counter_ns()
+    phases[name] = float(now - start)
+    return now
+
+
+def exact_solution(hessian: Array, linear: Array, rows: Array, upper: Array) -> Array:
+    """Minimise 1/2 x'Hx + g'x subject to rows x <= upper by quadprog, then solve its active set once more.
+
+    The second solve is the KKT system of the rows that quadprog found active, refined once, so that the
+    reference is not limited by quadprog's own rounding.
+    """
+    import quadprog
+
+    finite = np.isfinite(upper)
+    rows, upper = rows[finite], upper[finite]
+    out = quadprog.solve_qp(hessian, -linear, -rows.T.copy(), -upper)
+    active = np.sort(out[5][out[5] > 0]) - 1
+    active = active[out[4][active] > 0]
+    n, m = len(linear), len(active)
+    kkt = np.block([[hessian, rows[active].T], [rows[active], np.zeros((m, m))]])
+    right = np.concatenate([-linear, upper[active]])
+    solution = np.linalg.lstsq(kkt, right, rcond=None)[0]
+    solution += np.linalg.lstsq(kkt, right - kkt @ solution, rcond=None)[0]
+    return np.asarray(solution[:n])

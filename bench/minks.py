@@ -1,0 +1,120 @@
+"""mink with DAQP, on a MuJoCo model made from the same URDF."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from time import perf_counter_ns
+
+import mink
+import mujoco
+import numpy as np
+import qpsolvers
+
+from bench.contender import Contender, exact_solution, stopwatch
+from bench.descriptions import mujoco_urdf
+from bench.problems import Array, Case
+
+#: Spheres farther apart than this give no row [m]; at the rate of the problems such a row never binds
+DETECTION = 0.15
+
+
+class Mink(Contender):
+    """``mink.solve_ik`` and ``Configuration.integrate_inplace``; obstacles by its collision limit."""
+
+    def __init__(self, case: Case) -> None:
+        """Compile the model and build the tasks."""
+        super().__init__(case)
+        problem = self.problem
+        text = case.urdf.read_text()
+        spec = mujoco.MjSpec.from_string(mujoco_urdf(text))
+        if problem.floating:
+            spec.worldbody.first_body().add_freejoint()
+        self.model = spec.compile()
+        self.q0 = np.array(self.model.qpos0)
+        self.slots = [int(self.model.joint(name).qposadr[0]) for name in problem.joints]
+        if problem.floating:
+            self.q0[:3], self.q0[3:7] = case.q0[:3], case.q0[[6, 3, 4, 5]]
+        self.q0[self.slots] = case.q0[-len(self.slots) :]
+        self.frames = [
+            mink.FrameTask(f, "body", position_cost=1.0 / problem.length, orientation_cost=1.0) for f in problem.frames
+        ]
+        posture = mink.PostureTask(self.model, cost=float(np.sqrt(problem.posture_weight)))
+        posture.set_target(self.q0)
+        self.com = mink.ComTask(cost=1.0 / problem.length) if problem.com else None
+        self.tasks = [*self.frames, posture] + ([self.com] if self.com else [])
+        self.limits = [
+            mink.ConfigurationLimit(self.model, gain=1.0),
+            mink.VelocityLimit(self.model, velocity_limits(text, problem.joints)),
+        ]
+        if problem.obstacles:
+            self.limits.append(self._collisions())
+        self.reset()
+
+    def _collisions(self) -> mink.CollisionAvoidanceLimit:
+        obstacles = [f"obstacle{k}_sphere" for k in range(len(self.problem.obstacles))]
+        links = [f"{link}_sphere" for link in self.problem.spheres]
+        # mink bounds the displacement of a tick by gain * distance / dt, so a rate costs two factors of dt
+        return mink.CollisionAvoidanceLimit(
+            self.model,
+            [(links, obstacles)],
+            gain=self.problem.rate * self.problem.dt**2,
+            minimum_distance_from_collisions=self.problem.margin,
+            collision_detection_distance=DETECTION,
+        )
+
+    def reset(self) -> None:
+        self.configuration = mink.Configuration(self.model, q=self.q0)
+
+    def aim(self, tick: int) -> None:
+        for task, pose in zip(self.frames, self.case.poses[tick], strict=True):
+            task.set_target(mink.SE3.from_matrix(pose))
+        if self.com:
+            self.com.set_target(self.case.com[tick])
+
+    def call(self) -> None:
+        velocity = mink.solve_ik(
+            self.configuration,
+            self.tasks,
+            self.problem.dt,
+            solver="daqp",
+            damping=self.problem.damping,
+            limits=self.limits,
+        )
+        self.configuration.integrate_inplace(velocity, self.problem.dt)
+
+    def state(self) -> Array:
+        q = np.array(self.configuration.q)
+        base = [q[:3], q[[4, 5, 6, 3]]] if self.problem.floating else []
+        return np.concatenate([*base, q[self.slots]])
+
+    def _build(self) -> qpsolvers.Problem:
+        return mink.build_ik(
+            self.configuration, self.tasks, self.problem.dt, damping=self.problem.damping, limits=self.limits
+        )
+
+    def phases(self) -> dict[str, float]:
+        spent: dict[str, float] = {}
+        clock = perf_counter_ns()
+        problem = self._build()
+        clock = stopwatch(spent, "assemble", clock)
+        solution = qpsolvers.solve_problem(problem, solver="daqp")
+        clock = stopwatch(spent, "solve", clock)
+        self.configuration.integrate_inplace(solution.x / self.problem.dt, self.problem.dt)
+        stopwatch(spent, "integrate", clock)
+        return spent
+
+    def reference_error(self) -> float | None:
+        problem = self._build()
+        exact = exact_solution(problem.P, problem.q, problem.G, problem.h)
+        found = qpsolvers.solve_problem(problem, solver="daqp").x
+        return float(np.abs(found - exact).max() / self.problem.dt)
+
+
+def velocity_limits(urdf: str, joints: list[str]) -> dict[str, float]:
+    """Velocity limits [rad/s] as the URDF states them; MuJoCo drops them."""
+    limits = {}
+    for joint in ET.fromstring(urdf).iter("joint"):
+        limit = joint.find("limit")
+        if joint.get("name") in joints and limit is not None:
+            limits[str(joint.get("name"))] = float(limit.get("velocity", "inf"))
+    return limits

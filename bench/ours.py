@@ -1,0 +1,96 @@
+"""This package on a problem, as its README shows it."""
+
+from __future__ import annotations
+
+import functools
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+import wbc
+from bench.contender import Contender
+from bench.problems import Array, Case
+from bench.reference import Referee
+
+
+class Ours(Contender):
+    """``controller.step(q)``; the velocity is integrated by whoever called it."""
+
+    def __init__(self, case: Case, expression: bool = False) -> None:
+        """Declare and compile the stack, with one more task of the user's own if ``expression``."""
+        super().__init__(case)
+        problem = self.problem
+        shapes = {
+            link: [wbc.shapes.PlacedShape(wbc.shapes.Sphere(radius), pin.SE3(np.eye(3), np.array(center)))]
+            for link, (center, radius) in problem.spheres.items()
+        }
+        self.robot = wbc.robots.load(problem.robot).with_shapes(shapes)
+        assert list(self.robot.joint_names)[-len(problem.joints) :] == problem.joints
+        stack = wbc.Stack(self.robot, problem.dt, damping=problem.damping)
+        for frame in problem.frames:
+            stack.add(wbc.tasks.EndEffector(frame), name=frame)
+        if problem.com:
+            stack.add(wbc.tasks.CenterOfMass(), name="com")
+        stack.add(wbc.tasks.Posture(), name="posture", weight=problem.posture_weight)
+        if expression:
+            stack.add(height_over_reach(problem.frames[0]), name="expression", weight=1e-6)
+        stack.add(wbc.tasks.JointLimits(acceleration=False))
+        for k, (place, radius) in enumerate(problem.obstacles):
+            pose = pin.SE3(np.eye(3), np.array(place))
+            stack.add(wbc.tasks.Obstacle(wbc.shapes.Sphere(radius), pose=pose, margin=problem.margin), name=f"ball{k}")
+        self.tasks = [e.name for e in stack.tasks]
+        self.controller = stack.compile()
+        self.controller.reset(self.case.q0)
+        for name in self.tasks:
+            self.controller[name].gain = 1.0 / problem.dt
+        self.controller["posture"].target = self.case.q0
+        for k in range(len(problem.obstacles)):
+            self.controller[f"ball{k}"].rate = problem.rate
+        self.targets = [self.controller[f] for f in problem.frames]
+        self.com = self.controller["com"] if problem.com else None
+        self.referee = Referee(case)
+        self.reset()
+
+    def reset(self) -> None:
+        self.q = np.array(self.case.q0)
+        self.controller.reset(self.q)
+        self.tick = 0
+
+    def aim(self, tick: int) -> None:
+        self.tick = tick
+        for target, pose in zip(self.targets, self.case.poses[tick], strict=True):
+            target.target = pin.SE3(pose)
+        if self.com is not None:
+            self.com.target = self.case.com[tick]
+
+    def call(self) -> None:
+        self.step = self.controller.step(self.q)
+
+    def settle(self) -> None:
+        if self.problem.floating:
+            self.q = pin.integrate(self.robot.model, self.q, self.step.v * self.problem.dt)
+        else:
+            self.q = self.q + self.step.v * self.problem.dt
+
+    def state(self) -> Array:
+        return self.q
+
+    def phases(self) -> dict[str, float]:
+        return {}
+
+    def reference_error(self) -> float | None:
+        exact = self.referee.velocity(self.q, self.tick)
+        found = self.controller.step(self.q).v
+        return float(np.abs(found - exact).max())
+
+
+def height_over_reach(frame: str) -> Any:
+    """A user's own task in three lines: the frame's height is half its horizontal distance from the base."""
+    return wbc.tasks.Expression(
+        lambda kin, p: kin.position(frame)[2] ** 2 - 0.25 * (kin.position(frame)[0] ** 2 + kin.position(frame)[1] ** 2),
+        units="m",
+    )
+
+
+with_expression = functools.partial(Ours, expression=True)

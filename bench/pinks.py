@@ -1,0 +1,113 @@
+"""pink, with the QP solver that is asked for."""
+
+from __future__ import annotations
+
+import functools
+from time import perf_counter_ns
+
+import numpy as np
+import pink
+import pinocchio as pin
+import qpsolvers
+
+from bench.contender import Contender, exact_solution, stopwatch
+from bench.problems import Array, Case
+
+
+class Pink(Contender):
+    """``pink.solve_ik`` and ``Configuration.integrate_inplace``; obstacles by its collision barrier."""
+
+    def __init__(self, case: Case, solver: str) -> None:
+        """Build the tasks; ``solver`` is a name that qpsolvers knows."""
+        super().__init__(case)
+        self.solver = solver
+        problem = self.problem
+        root = (pin.JointModelFreeFlyer(),) if problem.floating else ()
+        self.model = pin.buildModelFromUrdf(str(case.urdf), *root)
+        expected = (["root_joint"] if problem.floating else []) + problem.joints
+        assert list(self.model.names)[1:] == expected, list(self.model.names)
+        self.frames = [
+            pink.FrameTask(f, position_cost=1.0 / problem.length, orientation_cost=1.0) for f in problem.frames
+        ]
+        posture = pink.PostureTask(cost=np.sqrt(problem.posture_weight))
+        posture.set_target(case.q0)
+        self.com = pink.tasks.ComTask(cost=1.0 / problem.length) if problem.com else None
+        self.tasks = [*self.frames, posture] + ([self.com] if self.com else [])
+        self.limits = [
+            pink.limits.ConfigurationLimit(self.model, config_limit_gain=1.0),
+            pink.limits.VelocityLimit(self.model),
+        ]
+        self.barriers = [self._barrier()] if problem.obstacles else []
+        self.reset()
+
+    def _barrier(self) -> pink.barriers.SelfCollisionBarrier:
+        geometry = pin.buildGeomFromUrdf(self.model, str(self.case.urdf), pin.GeometryType.COLLISION)
+        names = [g.name for g in geometry.geometryObjects]
+        obstacles = [k for k, n in enumerate(names) if n.startswith("obstacle")]
+        for a in range(len(names)):
+            for b in obstacles:
+                if a not in obstacles:
+                    geometry.addCollisionPair(pin.CollisionPair(a, b))
+        self.geometry = geometry
+        pairs = len(geometry.collisionPairs)
+        return pink.barriers.SelfCollisionBarrier(
+            pairs, gain=self.problem.rate, safe_displacement_gain=0.0, d_min=self.problem.margin
+        )
+
+    def reset(self) -> None:
+        collision = {}
+        if self.problem.obstacles:
+            collision = {"collision_model": self.geometry, "collision_data": pin.GeometryData(self.geometry)}
+        self.configuration = pink.Configuration(self.model, self.model.createData(), self.case.q0, **collision)
+
+    def aim(self, tick: int) -> None:
+        for task, pose in zip(self.frames, self.case.poses[tick], strict=True):
+            task.set_target(pin.SE3(pose))
+        if self.com:
+            self.com.set_target(self.case.com[tick])
+
+    def call(self) -> None:
+        velocity = pink.solve_ik(
+            self.configuration,
+            self.tasks,
+            self.problem.dt,
+            solver=self.solver,
+            damping=self.problem.damping,
+            limits=self.limits,
+            barriers=self.barriers,
+        )
+        self.configuration.integrate_inplace(velocity, self.problem.dt)
+
+    def state(self) -> Array:
+        return np.array(self.configuration.q)
+
+    def _build(self) -> qpsolvers.Problem:
+        return pink.build_ik(
+            self.configuration,
+            self.tasks,
+            self.problem.dt,
+            damping=self.problem.damping,
+            limits=self.limits,
+            barriers=self.barriers,
+        )
+
+    def phases(self) -> dict[str, float]:
+        spent: dict[str, float] = {}
+        clock = perf_counter_ns()
+        problem = self._build()
+        clock = stopwatch(spent, "assemble", clock)
+        solution = qpsolvers.solve_problem(problem, solver=self.solver)
+        clock = stopwatch(spent, "solve", clock)
+        self.configuration.integrate_inplace(solution.x / self.problem.dt, self.problem.dt)
+        stopwatch(spent, "integrate", clock)
+        return spent
+
+    def reference_error(self) -> float | None:
+        problem = self._build()
+        exact = exact_solution(problem.P, problem.q, problem.G, problem.h)
+        found = qpsolvers.solve_problem(problem, solver=self.solver).x
+        return float(np.abs(found - exact).max() / self.problem.dt)
+
+
+with_daqp = functools.partial(Pink, solver="daqp")
+with_quadprog = functools.partial(Pink, solver="quadprog")

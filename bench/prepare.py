@@ -1,0 +1,136 @@
+"""Writes the problems: descriptions and targets of a Panda, a UR5 among obstacles and a Talos.
+
+Each path is a closed figure that starts away from the robot's first pose, so that velocity limits bind at the
+beginning, and rests at its end, so that the errors that remain can be compared.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+
+from bench.descriptions import Sphere, write_urdf
+from bench.problems import Array, Problem, save
+from wbc.robot import Robot
+from wbc.robots import load
+
+#: Ticks of one pass, and how many of them the targets rest at the end
+TICKS, REST = 400, 60
+
+DESCRIPTIONS = Path(pin.__file__).parents[4] / "share" / "example-robot-data" / "robots"
+
+
+def prepare(folder: Path) -> list[Path]:
+    """Write all problems below ``folder``; returns their folders."""
+    return [panda(folder / "panda"), ur5(folder / "ur5"), talos(folder / "talos")]
+
+
+def panda(folder: Path) -> Path:
+    """A hand on a circle, with posture, position and velocity limits."""
+    write_urdf(
+        DESCRIPTIONS / "panda_description/urdf/panda.urdf",
+        folder / "robot.urdf",
+        locked=("panda_finger_joint1", "panda_finger_joint2"),
+    )
+    robot = load("panda")
+    q0 = np.array([0.0, -0.4, 0.0, -2.2, 0.0, 1.9, 0.8])
+    (home,) = placements(robot, q0, ["panda_hand"])
+    poses = np.stack([[circle(home, s, radius=0.12, tilt=0.3, offset=(0.0, 0.1, 0.05))] for s in phases()])
+    problem = Problem(
+        "panda", "Panda: pose of the hand, posture, position and velocity limits", robot="panda",
+        joints=joint_names(robot), frames=["panda_hand"], q0=q0.tolist(), length=robot.characteristic_length,
+    )  # fmt: skip
+    save(folder, problem, poses, np.zeros((TICKS, 3)))
+    return folder
+
+
+def ur5(folder: Path) -> Path:
+    """A tool on a circle among three spheres that the arm must pass at a distance."""
+    spheres: dict[str, Sphere] = {
+        "upper_arm_link": ((0.0, 0.0, 0.25), 0.08),
+        "forearm_link": ((0.0, 0.0, 0.2), 0.07),
+        "wrist_1_link": ((0.0, 0.0, 0.0), 0.06),
+        "wrist_3_link": ((0.0, 0.08, 0.0), 0.05),
+    }
+    robot = load("ur5")
+    q0 = np.array([0.0, -1.2, 1.9, -2.27, -1.57, 0.0])
+    (home,) = placements(robot, q0, ["tool0"])
+    poses = np.stack([[circle(home, s, radius=0.12, tilt=0.2, offset=(0.0, 0.05, 0.03))] for s in phases()])
+    obstacles: list[Sphere] = [
+        (tuple(home.translation + np.array(offset)), radius)
+        for offset, radius in (((0.05, -0.21, 0.03), 0.05), ((-0.14, 0.24, 0.05), 0.06), ((-0.05, 0.0, -0.24), 0.08))
+    ]
+    write_urdf(
+        DESCRIPTIONS / "ur_description/urdf/ur5_robot.urdf", folder / "robot.urdf", spheres=spheres, obstacles=obstacles
+    )
+    problem = Problem(
+        "ur5", "UR5: pose of the tool, posture, limits, 4 link spheres against 3 obstacles", robot="ur5",
+        joints=joint_names(robot), frames=["tool0"], q0=q0.tolist(), length=robot.characteristic_length,
+        spheres=spheres, obstacles=obstacles,
+    )  # fmt: skip
+    save(folder, problem, poses, np.zeros((TICKS, 3)))
+    return folder
+
+
+def talos(folder: Path) -> Path:
+    """Feet at rest, hands on circles, the centre of mass to and fro; floating base, posture and limits."""
+    write_urdf(DESCRIPTIONS / "talos_data/robots/talos_reduced.urdf", folder / "robot.urdf")
+    robot = load("talos")
+    names = joint_names(robot)
+    sitting = {
+        "arm_left_1": 0.25847, "arm_left_2": 0.173046, "arm_left_4": -0.525366, "arm_right_1": -0.25847,
+        "arm_right_2": -0.173046, "arm_right_4": -0.525366, "leg_left_3": -0.411354, "leg_left_4": 0.859395,
+        "leg_left_5": -0.448041, "leg_right_3": -0.411354, "leg_right_4": 0.859395, "leg_right_5": -0.448041,
+    }  # fmt: skip
+    joints = [sitting.get(name.removesuffix("_joint"), 0.0) for name in names]
+    lower, upper = robot.limits.position_lower[6:], robot.limits.position_upper[6:]
+    q0 = np.concatenate([[0.0, 0.0, 1.01927, 0.0, 0.0, 0.0, 1.0], np.clip(joints, lower + 0.02, upper - 0.02)])
+    feet = ["left_sole_link", "right_sole_link"]
+    hands = ["wrist_left_ft_link", "wrist_right_ft_link"]
+    homes = placements(robot, q0, feet + hands)
+    offsets = ((0.05, 0.02, 0.05), (0.05, -0.02, 0.05))
+    poses = np.stack(
+        [
+            [p.homogeneous for p in homes[:2]]
+            + [circle(p, s, radius=0.05, tilt=0.15, offset=o) for p, o in zip(homes[2:], offsets, strict=True)]
+            for s in phases()
+        ]
+    )
+    start = np.array(pin.centerOfMass(robot.model, robot.model.createData(), q0))
+    com = np.stack([start + np.array([0.0, 0.02 * np.sin(2 * np.pi * s), -0.02]) for s in phases()])
+    problem = Problem(
+        "talos", "Talos: 4 poses, centre of mass, posture, limits, floating base", robot="talos", joints=names,
+        frames=feet + hands, q0=q0.tolist(), length=robot.characteristic_length, floating=True, com=True,
+        posture_weight=1e-4,
+    )  # fmt: skip
+    save(folder, problem, poses, com)
+    return folder
+
+
+def phases() -> Array:
+    """Where on its closed figure the target is at each tick: from 0 to 1, smooth at the end, then at rest."""
+    moving = np.linspace(0.0, 1.0, TICKS - REST)
+    return np.concatenate([np.sin(0.5 * np.pi * moving), np.ones(REST)])
+
+
+def circle(home: pin.SE3, s: float, *, radius: float, tilt: float, offset: Sequence[float]) -> Array:
+    """A pose on a circle in the y-z plane, whose orientation nods by ``tilt`` [rad]; s = 1 closes it."""
+    angle = 2 * np.pi * s
+    position = home.translation + offset + radius * np.array([0.0, np.cos(angle) - 1.0, np.sin(angle)])
+    rotation = home.rotation @ pin.exp3(tilt * np.sin(angle) * np.array([1.0, 0.0, 0.0]))
+    return np.array(pin.SE3(rotation, position).homogeneous)
+
+
+def placements(robot: Robot, q: Array, frames: Sequence[str]) -> list[pin.SE3]:
+    """Poses of frames in the world."""
+    data = robot.model.createData()
+    pin.framesForwardKinematics(robot.model, data, q)
+    return [pin.SE3(data.oMf[robot.model.getFrameId(f)]) for f in frames]
+
+
+def joint_names(robot: Robot) -> list[str]:
+    """The one-dof joints in Pinocchio's order."""
+    return [str(robot.model.names[j]) for j in range(1, robot.model.njoints) if int(robot.model.nvs[j]) == 1]

@@ -1,0 +1,155 @@
+"""The results as tables: in the terminal, and as Markdown for the README."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+from bench.goals import Goal, goals
+
+#: Contender that ratios are taken to
+OURS = "wbc"
+
+CALLS = """\
+The call is `controller.step(q)` for wbc, `solve_ik` and `integrate_inplace` for pink and mink, `update_kinematics` \
+and `solve(True)` for placo. The three peers move their own state within the call, because their kinematics are \
+computed there; wbc computes them in `step` and leaves the state to its caller."""
+
+TERMS = """\
+All get the same description, targets, weights and limits, and correct an error within one tick. Obstacles: a barrier \
+for each pair in pink, the collision limit in mink, self-collision with links fixed in the world in placo, whose \
+constraint has no rate."""
+
+ERRORS = """\
+End error and clearance are of the path that each one took, by Pinocchio. Solver error: largest difference between \
+the velocity returned and an exact solution of the same QP, for wbc an independent build of it by Pinocchio and numpy; \
+placo does not show its QP."""
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """A table: a title, columns and rows of text."""
+
+    title: str
+    columns: tuple[str, ...]
+    rows: list[tuple[str, ...]]
+
+    def rich(self) -> Table:
+        """For the terminal."""
+        table = Table(title=self.title, title_justify="left")
+        for k, column in enumerate(self.columns):
+            table.add_column(column, justify="left" if k == 0 else "right")
+        for row in self.rows:
+            table.add_row(*row)
+        return table
+
+    def markdown(self) -> str:
+        """For a page."""
+        lines = [f"**{self.title}**", "", _line(self.columns), _line(["---"] + ["---:"] * (len(self.columns) - 1))]
+        return "\n".join(lines + [_line(row) for row in self.rows])
+
+
+def sheets(results: dict[str, Any]) -> list[Sheet]:
+    """All tables of a run."""
+    out = []
+    for problem in results["problems"].values():
+        out += [ticks(problem), phases(problem)]
+    return [*out, startup(results["startup"]), goal_sheet(goals(results))]
+
+
+def ticks(problem: dict[str, Any]) -> Sheet:
+    """Durations of the user's call, and what it achieved."""
+    ours = problem["contenders"][OURS]["durations"]["call"]["median"]
+    rows = []
+    for name, measured in problem["contenders"].items():
+        durations, found = measured["durations"], measured["tracking"]
+        call = durations["call"]
+        rows.append((
+            name, *(_us(call[key]) for key in ("median", "p99", "p99.9", "max")),
+            "1" if name == OURS else f"{call['median'] / ours:.2f}", _us(durations["aim"]["median"]),
+            _scaled(found["position"], 1e3, ".3f"), _scaled(found["rotation"], 1e3, ".3f"),
+            _scaled(found["clearance"], 1e3, ".2f"), _scaled(found["solver_error"], 1.0, ".0e"),
+        ))  # fmt: skip
+        if "native" in durations:
+            native = durations["native"]
+            figures = [_us(native[key]) for key in ("median", "p99", "p99.9", "max")]
+            rows.append((f"{name}, native call alone", *figures, f"{native['median'] / ours:.2f}", *[""] * 5))
+    columns = (
+        "one tick [us]", "median", "p99", "p99.9", "max", "x wbc", "set targets", "end error [mm]", "[mrad]",
+        "least clearance [mm]", "solver error [rad/s]",
+    )  # fmt: skip
+    return Sheet(f"{problem['title']} ({problem['ticks']} ticks each)", columns, rows)
+
+
+def phases(problem: dict[str, Any]) -> Sheet:
+    """Medians of the phases of a tick, in the order in which they come."""
+    rows = [
+        (name, "  ".join(f"{phase} {_us(value)}" for phase, value in measured["phases"].items()) or "-")
+        for name, measured in problem["contenders"].items()
+    ]
+    return Sheet("Phases of a tick, medians [us]", ("", "phases"), rows)
+
+
+def startup(measured: dict[str, Any]) -> Sheet:
+    """Import, compilation, memory."""
+    rows = [(f"import {package}", f"{seconds:.3f} s") for package, seconds in measured["import"].items()]
+    for name, spent in measured["compile"].items():
+        rows.append((f"{name}: stack.compile(), empty cache", f"{spent['first']:.2f} s"))
+        rows.append((f"{name}: stack.compile(), cached", f"{spent['cached']:.3f} s"))
+    rows += [(f"memory of a Panda process, {n}", f"{peak / 1e6:.0f} MB") for n, peak in measured["memory"].items()]
+    return Sheet("Before the first tick", ("", "measured"), rows)
+
+
+def goal_sheet(found: Iterable[Goal]) -> Sheet:
+    """Goals beside what was measured."""
+    rows = [
+        (goal.text, f"{goal.value:.3g} {goal.unit}".strip(), f"{goal.limit:.3g} {goal.unit}".strip(),
+         "yes" if goal.met else "no")
+        for goal in found
+    ]  # fmt: skip
+    return Sheet("Goals", ("", "measured", "at most", "met"), rows)
+
+
+def notes(results: dict[str, Any]) -> list[str]:
+    """What the reader must know to read the tables."""
+    about, versions = results["machine"], results["versions"]
+    listed = ", ".join(f"{name} {version}" for name, version in versions.items())
+    return [
+        f"{about['processor']}, Python {about['python']}; {about['cores']}; load {about['load']}.",
+        f"Garbage collector {about['garbage collector']}; {about['threads']}.",
+        listed + ".",
+        CALLS,
+        TERMS,
+        ERRORS,
+    ]
+
+
+def show(results: dict[str, Any], console: Console) -> None:
+    """Print everything."""
+    for sheet in sheets(results):
+        console.print(sheet.rich())
+        console.print()
+    for note in notes(results):
+        console.print(note, markup=False, highlight=False)
+
+
+def markdown(results: dict[str, Any]) -> str:
+    """Everything as one page."""
+    parts = [sheet.markdown() for sheet in sheets(results)]
+    return "\n\n".join([*parts, *notes(results)]) + "\n"
+
+
+def _line(cells: Iterable[str]) -> str:
+    return "| " + " | ".join(cells) + " |"
+
+
+def _us(value: float) -> str:
+    return f"{value:.0f}" if value >= 100 else f"{value:.1f}" if value >= 10 else f"{value:.2f}"
+
+
+def _scaled(value: float | None, factor: float, style: str) -> str:
+    return "-" if value is None else format(value * factor, style)

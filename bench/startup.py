@@ -1,0 +1,50 @@
+"""What a process costs before its first tick: import, compilation, memory. Each in a fresh process."""
+
+from __future__ import annotations
+
+import os
+import statistics
+import subprocess
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+
+from bench.pool import ROOT, Worker
+
+#: Package -> what a user imports
+IMPORTS = {"wbc": "wbc", "pink": "pink", "mink": "mink", "placo": "placo"}
+REPEATS = 3
+
+
+def import_seconds(python: str, module: str) -> float:
+    """Wall time of ``import module`` in a fresh interpreter, the median of three [s]."""
+    code = f"import time; t = time.perf_counter(); import {module}; print(time.perf_counter() - t)"
+    runs = [
+        subprocess.run([python, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT.anchor)
+        for _ in range(REPEATS)
+    ]
+    return statistics.median(float(run.stdout) for run in runs)
+
+
+def peak_memory(python: str, contender: str, folder: Path, core: int | None, ticks: int) -> int:
+    """Peak resident memory of a process that runs one problem for ``ticks`` ticks [bytes]."""
+    with Worker(python, contender, folder, core) as worker:
+        worker.ask("time", ticks=ticks)
+        return int(worker.ask("memory")["peak"])
+
+
+def compile_seconds(python: str, contender: str, folder: Path) -> dict[str, float]:
+    """``stack.compile()`` with an empty cache, and in a second process with the cache filled [s]."""
+    with tempfile.TemporaryDirectory(prefix="wbc-bench-") as cache:
+        environment: Mapping[str, str] = {"XDG_CACHE_HOME": cache}
+        out = {}
+        for kind in ("first", "cached"):
+            with Worker(python, contender, folder, None, environment) as worker:
+                out[kind] = float(worker.ready["facts"]["compile"])
+        return out
+
+
+def settings() -> dict[str, str]:
+    """Environment variables that change how fast numeric code runs, as the workers see them."""
+    names = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "PYTHONOPTIMIZE", "PYTHONMALLOC")
+    return {name: os.environ.get(name, "not set") for name in names}

@@ -1,0 +1,152 @@
+"""A process with one package on one problem: reads one JSON command a line, writes one JSON answer a line.
+
+    {"do": "time", "ticks": 400}    ->  {"aim": [ns, ...], "call": [ns, ...], "settle": [ns, ...]}
+    {"do": "phases", "ticks": 100}  ->  {"assemble": [ns, ...], ...}
+    {"do": "path"}                  ->  {"states": [[...], ...]}        one pass along the path
+    {"do": "accuracy"}              ->  {"error": largest difference to the exact solution, or null}
+    {"do": "memory"}                ->  {"peak": bytes}
+
+Every command starts from the first configuration. Run as ``python -m bench.worker CONTENDER FOLDER [CORE]``.
+"""
+
+from __future__ import annotations
+
+import importlib
+import json
+import os
+import sys
+from pathlib import Path
+from time import perf_counter, perf_counter_ns
+from typing import Any
+
+from bench.contender import Contender
+from bench.problems import Case, load
+
+#: Contender -> module and the callable that builds it
+CONTENDERS = {
+    "wbc": ("bench.ours", "Ours"),
+    "wbc+expression": ("bench.ours", "with_expression"),
+    "pink + daqp": ("bench.pinks", "with_daqp"),
+    "pink + quadprog": ("bench.pinks", "with_quadprog"),
+    "mink + daqp": ("bench.minks", "Mink"),
+    "placo": ("bench.placos", "Placo"),
+}
+#: Every how many ticks the answer is compared with an exact solution
+ACCURACY_STRIDE = 10
+
+
+def build(name: str, case: Case) -> Contender:
+    """The contender of that name, on a problem."""
+    module, attribute = CONTENDERS[name]
+    contender: Contender = getattr(importlib.import_module(module), attribute)(case)
+    return contender
+
+
+def time_calls(contender: Contender, ticks: int) -> dict[str, Any]:
+    """Durations of ``ticks`` ticks along the path [ns]."""
+    contender.reset()
+    aim, call, settle, native = [0] * ticks, [0] * ticks, [0] * ticks, [0] * ticks
+    bare = contender.bare()
+    for k in range(ticks):
+        t0 = perf_counter_ns()
+        contender.aim(k)
+        t1 = perf_counter_ns()
+        contender.call()
+        t2 = perf_counter_ns()
+        contender.settle()
+        t3 = perf_counter_ns()
+        aim[k], call[k], settle[k] = t1 - t0, t2 - t1, t3 - t2
+    out = {"aim": aim, "call": call, "settle": settle}
+    if bare is None:
+        return out
+    contender.reset()
+    for k in range(ticks):
+        contender.aim(k)
+        contender.call()
+        t0 = perf_counter_ns()
+        bare()
+        native[k] = perf_counter_ns() - t0
+        contender.settle()
+    return out | {"native": native}
+
+
+def time_phases(contender: Contender, ticks: int) -> dict[str, Any]:
+    """Durations of each phase along the path [ns]."""
+    contender.reset()
+    out: dict[str, list[float]] = {}
+    for k in range(ticks):
+        contender.aim(k)
+        for phase, spent in contender.phases().items():
+            out.setdefault(phase, []).append(spent)
+    return out
+
+
+def walk(contender: Contender) -> dict[str, Any]:
+    """The configuration after every tick of one pass."""
+    contender.reset()
+    states = []
+    for k in range(contender.case.ticks):
+        contender.aim(k)
+        contender.call()
+        contender.settle()
+        states.append(contender.state().tolist())
+    return {"states": states}
+
+
+def accuracy(contender: Contender) -> dict[str, Any]:
+    """Largest difference to an exact solution of the same QP along the path; null if the QP is not shown."""
+    contender.reset()
+    worst: float | None = None
+    for k in range(contender.case.ticks):
+        contender.aim(k)
+        if k % ACCURACY_STRIDE == 0:
+            error = contender.reference_error()
+            worst = error if worst is None or error is None else max(worst, error)
+        contender.call()
+        contender.settle()
+    return {"error": worst}
+
+
+def peak_memory() -> dict[str, Any]:
+    """Peak resident memory of this process [bytes].
+
+    From /proc: ``ru_maxrss`` would also count the parent's memory, which a child has until it executes.
+    """
+    for line in Path("/proc/self/status").read_text().splitlines():
+        if line.startswith("VmHWM:"):
+            return {"peak": int(line.split()[1]) * 1024}
+    raise OSError("no VmHWM in /proc/self/status")
+
+
+def serve(contender: Contender) -> None:
+    """Answer commands until standard input ends."""
+    for line in sys.stdin:
+        command = json.loads(line)
+        answers = {
+            "time": lambda c: time_calls(contender, c["ticks"]),
+            "phases": lambda c: time_phases(contender, c["ticks"]),
+            "path": lambda c: walk(contender),
+            "accuracy": lambda c: accuracy(contender),
+            "memory": lambda c: peak_memory(),
+        }
+        print(json.dumps(answers[command["do"]](command)), flush=True)
+
+
+def main() -> None:
+    """Build, say how long that took, then serve."""
+    name, folder, *core = sys.argv[1:]
+    if core:
+        os.sched_setaffinity(0, {int(core[0])})
+    # Packages print to standard output at will; the protocol keeps a copy of it to itself.
+    protocol = os.dup(1)
+    os.dup2(2, 1)
+    sys.stdout = os.fdopen(protocol, "w")
+    start = perf_counter()
+    contender = build(name, load(Path(folder)))
+    facts = {"build": perf_counter() - start} | contender.facts
+    print(json.dumps({"ready": name, "facts": facts}), flush=True)
+    serve(contender)
+
+
+if __name__ == "__main__":
+    main()
