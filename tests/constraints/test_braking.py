@@ -1,0 +1,140 @@
+"""The braking bound alone: the largest speed that stops in time, at constant and at varying tick lengths."""
+
+from __future__ import annotations
+
+import casadi as ca
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from wbc.tasks.braking import braking_bound
+
+positive = {"allow_nan": False, "allow_infinity": False}
+accelerations = st.floats(0.1, 1e4, **positive)
+ticks = st.floats(1e-4, 0.1, **positive)
+#: Distance in units of a dt^2: from one tick of braking to thousands
+distances = st.floats(1e-6, 1e6, **positive)
+
+
+_d, _a, _dt, _s = (ca.SX.sym(name) for name in ("d", "a", "dt", "s"))
+ANY = ca.Function("any", [_d, _a, _dt], [braking_bound(_d, _a, _dt)])
+LEAST = ca.Function("least", [_d, _a, _dt, _s], [braking_bound(_d, _a, _dt, _s)])
+
+
+def bound(d: float, a: float, dt: float, shortest: float | None = None) -> float:
+    if a in (0.0, np.inf):
+        return float(ca.evalf(braking_bound(ca.SX(d), a, ca.SX(dt), shortest)))
+    return float(ANY(d, a, dt) if shortest is None else LEAST(d, a, dt, shortest))
+
+
+def stopping_distance(v: float, a: float, lengths: np.ndarray) -> float:
+    """Travel of a command v held for the first tick and braked at a over the others."""
+    speeds = v - a * np.concatenate([[0.0], np.cumsum(lengths[1:])])
+    assert speeds[-1] <= 0.0, "not enough ticks to stop"
+    return float(np.maximum(speeds, 0.0) @ lengths)
+
+
+def enough(v: float, a: float, dt: float) -> int:
+    return int(v / (a * dt)) + 3
+
+
+@given(a=accelerations, dt=ticks, x=distances)
+def test_constant_ticks_exact_largest_speed(a: float, dt: float, x: float) -> None:
+    d = x * a * dt**2
+    v = bound(d, a, dt, shortest=dt)
+    lengths = np.full(enough(1.001 * v, a, dt), dt)
+    assert stopping_distance(v, a, lengths) <= d * (1 + 1e-12)
+    assert stopping_distance(v * (1 + 1e-6), a, lengths) > d
+
+
+@given(a=accelerations, dt=ticks, x=distances)
+def test_constant_ticks_closed_form_with_n(a: float, dt: float, x: float) -> None:
+    d = x * a * dt**2
+    n = max(1, np.ceil((np.sqrt(1 + 8 * d / (a * dt**2)) - 1) / 2))
+    assert bound(d, a, dt, shortest=dt) == pytest.approx(d / (n * dt) + (n - 1) * a * dt / 2, rel=1e-12)
+
+
+@pytest.mark.parametrize("ticks_to_stop", [1, 2, 3, 10, 1000, 10**6])
+@pytest.mark.parametrize("nudge", [-1, 0, 1])
+def test_rounding_where_the_number_of_ticks_changes_costs_nothing(ticks_to_stop: int, nudge: int) -> None:
+    """At d = a dt^2 n (n + 1) / 2 both numbers of ticks give n a dt, so a wrong ceil is harmless."""
+    a, dt, n = 7.0, 0.003, ticks_to_stop
+    d = a * dt**2 * n * (n + 1) / 2
+    for _ in range(abs(nudge)):
+        d = np.nextafter(d, nudge * np.inf)
+    assert bound(d, a, dt, shortest=dt) == pytest.approx(n * a * dt, rel=1e-14)
+
+
+@given(a=accelerations, dt=ticks, x=st.floats(1e-3, 1e4), seed=st.integers(0, 2**32 - 1))
+def test_any_ticks_stop_in_time(a: float, dt: float, x: float, seed: int) -> None:
+    d = x * a * dt**2
+    v = bound(d, a, dt)
+    later = dt * np.random.default_rng(seed).uniform(0.01, 8.0, 100 * enough(v, a, dt))
+    assert stopping_distance(v, a, np.concatenate([[dt], later])) <= d * (1 + 1e-12)
+
+
+@pytest.mark.parametrize("x", [0.01, 1.0, 30.0])
+def test_any_ticks_is_the_largest_speed_for_all_tick_lengths(x: float) -> None:
+    a, dt = 3.0, 0.01
+    d = x * a * dt**2
+    v = bound(d, a, dt) * (1 + 1e-3)
+    fine = np.concatenate([[dt], np.full(int(v / (a * dt * 1e-4)) + 2, dt * 1e-4)])
+    assert stopping_distance(v, a, fine) > d
+
+
+@given(
+    a=accelerations, shortest=st.floats(1e-4, 0.02), ratio=st.floats(1.0, 8.0), x=st.floats(1e-2, 1e4),
+    seed=st.integers(0, 2**32 - 1),
+)  # fmt: skip
+def test_ticks_of_a_least_length_stop_in_time(a: float, shortest: float, ratio: float, x: float, seed: int) -> None:
+    dt = ratio * shortest
+    d = x * a * shortest**2
+    v = bound(d, a, dt, shortest)
+    assert v >= bound(d, a, dt) * (1 - 1e-12), "a promise may only help"
+    rng = np.random.default_rng(seed)
+    count = enough(v, a, shortest)
+    for later in (np.full(count, shortest), shortest * rng.uniform(1.0, 8.0, count), np.full(count, dt)):
+        assert stopping_distance(v, a, np.concatenate([[dt], later])) <= d * (1 + 1e-12)
+    worst = np.concatenate([[dt], np.full(count + 3, shortest)])
+    assert stopping_distance(v * (1 + 1e-6), a, worst) > d
+
+
+@given(a=accelerations, dt=ticks, x=distances, shortest=st.sampled_from([None, 1e-4, 0.01]))
+def test_bound_grows_with_the_distance(a: float, dt: float, x: float, shortest: float | None) -> None:
+    d = x * a * dt**2
+    assert 0.0 < bound(d, a, dt, shortest) <= bound(d * (1 + 1e-9), a, dt, shortest)
+
+
+@pytest.mark.parametrize("shortest", [None, 0.005])
+def test_ends_of_the_range(shortest: float | None) -> None:
+    assert bound(0.0, 10.0, 0.005, shortest) == 0.0
+    assert bound(0.0, 0.0, 0.005, shortest) == 0.0
+    assert bound(1.0, 0.0, 0.005, shortest) == 0.0
+    assert bound(0.01, np.inf, 0.005, shortest) == 2.0
+    assert bound(1e300, 1e-300, 0.005, shortest) < np.inf
+    assert bound(1e-9, 10.0, 0.005, shortest) == pytest.approx(2e-7, rel=1e-4)
+
+
+def run_to_the_limit(largest_speed: object, a: float, dt: float, start: float) -> tuple[int, float]:
+    """Full speed at a limit ``start`` away: ticks whose bounds cross, and how far the limit is passed."""
+    d, v, crossed, passed = start, 0.0, 0, 0.0
+    for _ in range(2000):
+        upper = largest_speed(d)
+        crossed += upper < v - a * dt - 1e-12
+        v = max(min(v + a * dt, upper), v - a * dt)
+        d -= v * dt
+        passed = max(passed, -d)
+    return crossed, passed
+
+
+def test_textbook_bound_contradicts_itself_and_ours_does_not() -> None:
+    """sqrt(2 a d) is right in continuous time only: at a = 10, dt = 5 ms it runs into the limit."""
+    a, dt = 10.0, 0.005
+    crossed, passed = run_to_the_limit(lambda d: np.sqrt(2 * a * max(d, 0.0)), a, dt, start=0.5)
+    assert crossed > 40
+    assert 4e-3 < passed < 6e-3
+    for shortest in (None, dt):
+        ours = run_to_the_limit(lambda d, s=shortest: bound(max(d, 0.0), a, dt, s), a, dt, start=0.5)
+        assert ours[0] == 0
+        assert ours[1] < 1e-15
