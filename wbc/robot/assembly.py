@@ -12,6 +12,7 @@ import pinocchio as pin
 from wbc import validation
 from wbc.errors import RangeError, ShapeError
 from wbc.robot.description import Description, Mimic, finite_or_unlimited
+from wbc.robot.frames import make_frames_unique, restore_joint_names
 from wbc.robot.limits import Limits
 from wbc.robot.recipe import Recipe, expand
 from wbc.robot.robot import Coupling, Robot
@@ -37,13 +38,14 @@ def assemble(description: Description, recipe: Recipe, states: Mapping[str, Mapp
         notes["neutral"] = remarks
     driven = _moving(model)[0 if description.base == "fixed" else 1 :]
     locked = _locked(model, mimics, expand("lock", recipe.lock, driven), q)
+    model, q, renamed = _reduced(model, with_values(model, q, locked), list(locked))
     if locked:
         shown = (f"{name} at {' '.join(f'{x:.6g}' for x in value)}" for name, value in locked.items())
         notes["lock"] = "locked: " + ", ".join(shown)
-        q = with_values(model, q, locked)
-        reduced = pin.buildReducedModel(model, [model.getJointId(name) for name in locked], q)
-        q = _kept(model, reduced, q)
-        model = reduced
+    if renamed:
+        notes["frames"] = "joints' frames that share a link's name: " + ", ".join(
+            f"{old} is now {new}" for old, new in renamed.items()
+        )
     for j in range(1, model.njoints):
         symbolic_joint(model.joints[j], str(model.names[j]))
     couplings = tuple(
@@ -155,6 +157,8 @@ def neutral_configuration(
             model.upperPositionLimit[follower],
         )
     where = f"state {recipe.state!r}" if recipe.state else "zero"
+    if recipe.neutral:
+        where += f" with given values of {', '.join(recipe.neutral)}"
     return q, f"{where}; put within limits: {', '.join(dict.fromkeys(moved))}" if moved else where
 
 
@@ -234,13 +238,19 @@ def _coordinates(model: pin.Model, name: str, q: Array) -> Array:
     return np.array(q[model.idx_qs[j] : model.idx_qs[j] + model.nqs[j]])
 
 
-def _kept(model: pin.Model, reduced: pin.Model, q: Array) -> Array:
-    """The part of q that belongs to the joints of the reduced model."""
+def _reduced(model: pin.Model, q: Array, locked: list[str]) -> tuple[pin.Model, Array, dict[str, str]]:
+    """(model without the locked joints, its part of q, frames renamed to make their names unique)."""
+    start = {str(model.names[j]): int(model.idx_qs[j]) for j in range(1, model.njoints)}
+    indices = [model.getJointId(name) for name in locked]
+    whole = pin.Model(model)
+    renamed = make_frames_unique(whole)
+    reduced = pin.buildReducedModel(whole, indices, q) if locked else whole
+    restore_joint_names(reduced, renamed)
     parts = []
     for j in range(1, reduced.njoints):
-        k = model.getJointId(str(reduced.names[j]))
-        parts.append(q[model.idx_qs[k] : model.idx_qs[k] + model.nqs[k]])
-    return np.concatenate([np.zeros(0), *parts])
+        first = start[str(reduced.names[j])]
+        parts.append(q[first : first + int(reduced.nqs[j])])
+    return reduced, np.concatenate([np.zeros(0), *parts]), renamed
 
 
 def read_limits(model: pin.Model, base: str, notes: dict[str, str]) -> Limits:

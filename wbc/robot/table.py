@@ -67,7 +67,7 @@ def read_row(where: str, name: str, row: Any) -> Recipe:
         label = f"{where} {key}"
         if key not in known:
             raise UnknownNameError(where, key, known)
-        reader = _READERS.get(key, _text)
+        reader: Callable[[str, Any], Any] = _READERS.get(key, _text)
         values[key] = reader(label, value)
     recipe = Recipe(name, **values)
     if not recipe.file:
