@@ -119,5 +119,5 @@ def fade(squared: ca.SX, width: float) -> ca.SX:
 
 
 def half_line_fade(line: ca.SX, reference: PlaneReference, width: float) -> ca.SX:
-    """:func:`fade` of the chord |p + u| between the unit vector ``line`` and the singular half-line; ``width`` in rad."""
+    """:func:`fade` of the chord |p + u| from the unit vector ``line`` to the singular half-line; ``width`` in rad."""
     return fade(square(line + rot.constant(reference.pole)), 2 * math.sin(width / 2))

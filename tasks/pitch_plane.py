@@ -89,7 +89,7 @@ class PitchPlane(PlaneItem, Task):
 
     def error(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
         if self.commands_rate:
-            return -inputs["target"]
+            return ca.SX(-inputs["target"])
         return self._turned(kin, inputs["target"])
 
     def jacobian(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX | None:

@@ -19,9 +19,10 @@ Link = tuple[Sequence[float], Sequence[float]]
 SSRMS_OFFSETS = {"boom": 7.11, "z6": -0.7026, "y3": -1.0442, "y5": -0.5692, "x7": 1.3589}
 
 
-def add_chain(model: pin.Model, links: Sequence[Link], prefix: str = "", parent: int = 0,
-              placement: pin.SE3 | None = None) -> int:
-    """Append revolute joints ``<prefix>1`` ... with frames ``<prefix>F1`` ... and ``<prefix>tip``; returns the last joint."""
+def add_chain(
+    model: pin.Model, links: Sequence[Link], prefix: str = "", parent: int = 0, placement: pin.SE3 | None = None
+) -> int:
+    """Append revolute joints ``<prefix>joint1`` ..., frames ``<prefix>F1`` ... and ``<prefix>tip``; the last joint."""
     here = placement if placement is not None else pin.SE3.Identity()
     for k, (axis, offset) in enumerate(links, start=1):
         joint = pin.JointModelRevoluteUnaligned(np.array(axis, dtype=float))
@@ -52,15 +53,30 @@ def four_links(upper: float = 1.0, fore: float = 0.8) -> list[Link]:
 
 def ssrms_links(boom: float, z6: float, y3: float, y5: float, x7: float) -> list[Link]:
     """Space Station arm: roll, yaw, pitch, elbow pitch, pitch, yaw, roll with lateral offsets."""
-    return [(X, (0, 0, 0)), (MINUS_Z, (0, 0, -z6)), (Y, (boom, y3, 0)), (Y, (boom, 0, 0)), (Y, (0, y5, 0)),
-            (MINUS_Z, (0, 0, z6)), (X, (x7, 0, 0))]
+    return [
+        (X, (0, 0, 0)),
+        (MINUS_Z, (0, 0, -z6)),
+        (Y, (boom, y3, 0)),
+        (Y, (boom, 0, 0)),
+        (Y, (0, y5, 0)),
+        (MINUS_Z, (0, 0, z6)),
+        (X, (x7, 0, 0)),
+    ]
 
 
-def spdm_links(boom: float = 1.0, d2: float = 0.2, z12: float = 0.15, z15: float = -0.15, z16: float = -0.15,
-               x17: float = 0.3) -> list[Link]:
+def spdm_links(
+    boom: float = 1.0, d2: float = 0.2, z12: float = 0.15, z15: float = -0.15, z16: float = -0.15, x17: float = 0.3
+) -> list[Link]:
     """One arm of the dexterous manipulator: pitch about z, wrist offset ``d2`` along x."""
-    return [(X, (0, 0, 0)), (Y, (0, 0, z12)), (Z, (boom, 0, 0)), (Z, (boom, 0, 0)), (Z, (d2, 0, z15)),
-            (Y, (0, 0, z16)), (X, (x17, 0, 0))]
+    return [
+        (X, (0, 0, 0)),
+        (Y, (0, 0, z12)),
+        (Z, (boom, 0, 0)),
+        (Z, (boom, 0, 0)),
+        (Z, (d2, 0, z15)),
+        (Y, (0, 0, z16)),
+        (X, (x17, 0, 0)),
+    ]
 
 
 def four_joint_arm(upper: float = 1.0, fore: float = 0.8) -> Robot:
@@ -80,5 +96,15 @@ def spdm_arm() -> Robot:
 
 def spherical_seven(upper: float = 0.42, fore: float = 0.4) -> Robot:
     """Spherical shoulder z y z, elbow y, spherical wrist z y z, no offsets; shoulder F1, elbow F4, wrist F5."""
-    return arm("spherical", [(Z, (0, 0, 0)), (Y, (0, 0, 0)), (Z, (0, 0, upper)), (Y, (0, 0, fore)), (Z, (0, 0, 0)),
-                             (Y, (0, 0, 0)), (Z, (0, 0, 0.126))])
+    return arm(
+        "spherical",
+        [
+            (Z, (0, 0, 0)),
+            (Y, (0, 0, 0)),
+            (Z, (0, 0, upper)),
+            (Y, (0, 0, fore)),
+            (Z, (0, 0, 0)),
+            (Y, (0, 0, 0)),
+            (Z, (0, 0, 0.126)),
+        ],
+    )

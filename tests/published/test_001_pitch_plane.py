@@ -166,8 +166,13 @@ def test_plane_rate_of_an_elbow_command() -> None:
 
 @pytest.mark.parametrize(
     ("q2", "with_alpha", "with_beta"),
-    [(0, 0.424124, 0), (0.5, 0.421499, 0.390733), (1.2, 0.261023, 0.414274), (1.5, 0.050729, 0.414638),
-     (HALF, 0, 0.414650)],
+    [
+        (0, 0.424124, 0),
+        (0.5, 0.421499, 0.390733),
+        (1.2, 0.261023, 0.414274),
+        (1.5, 0.050729, 0.414638),
+        (HALF, 0, 0.414650),
+    ],
 )
 def test_four_joint_conditioning(q2: float, with_alpha: float, with_beta: float) -> None:
     arm, q = four(), np.array([0.3, q2, -0.7, 1.1])
@@ -226,7 +231,9 @@ def ssrms_det(q: np.ndarray, boom: float, d: float) -> float:
 
 def test_ssrms_instance() -> None:
     arm = ssrms()
-    np.testing.assert_allclose(arm.place("tip", STATE).translation, [9.964186073, -4.401697152, -3.134509474], atol=1e-8)
+    np.testing.assert_allclose(
+        arm.place("tip", STATE).translation, [9.964186073, -4.401697152, -3.134509474], atol=1e-8
+    )
     np.testing.assert_allclose(arm.place("F4", STATE).translation, [5.340432612, -4.455087714, 2.925406042], atol=1e-8)
     assert arm.det(STATE) == pytest.approx(393.600601349982, rel=1e-12)
 
@@ -261,10 +268,16 @@ def test_ssrms_row_is_the_rate_about_the_common_normal() -> None:
 @pytest.mark.parametrize(
     ("twist", "rate", "expected"),
     [
-        ((0, 0, 0, 0, 0, 0), 0.01, (0.01085322, 0.000535521, -0.005913812, 0.000851588, 0.002359217, 0.009760005,
-                                    -0.002698056)),
-        ((0.02, 0, 0, 0, 0, 0.005), 0.0, (0.000074111, -0.000680329, 0.002826383, -0.005746076, 0.007088329,
-                                          -0.000061946, -0.005023596)),
+        (
+            (0, 0, 0, 0, 0, 0),
+            0.01,
+            (0.01085322, 0.000535521, -0.005913812, 0.000851588, 0.002359217, 0.009760005, -0.002698056),
+        ),
+        (
+            (0.02, 0, 0, 0, 0, 0.005),
+            0.0,
+            (0.000074111, -0.000680329, 0.002826383, -0.005746076, 0.007088329, -0.000061946, -0.005023596),
+        ),
     ],
 )
 def test_ssrms_motions(twist: tuple[float, ...], rate: float, expected: tuple[float, ...]) -> None:
