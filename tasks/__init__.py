@@ -1,5 +1,6 @@
 """Tasks and constraints: declarative objects, one idea a file (floor 3)."""
 
+from wbc.tasks._stereographic import PlaneReference
 from wbc.tasks.base import Bounds, Constraint, Form, Input, Item, Order, Row, Rows, Task, Values, registry
 from wbc.tasks.center_of_mass import CenterOfMass
 from wbc.tasks.damping import Damping
@@ -34,6 +35,7 @@ __all__ = [
     "Order",
     "PitchPlane",
     "PitchPlaneLimit",
+    "PlaneReference",
     "Posture",
     "Row",
     "Rows",
