@@ -45,6 +45,7 @@ ROBOTS: dict[str, Callable[[], Robot]] = {
     "spherical": models.spherical_seven,
     "equal": equal_arm,
     "unequal": unequal_arm,
+    "four": models.four_joint_arm,
     "ssrms": models.ssrms,
     "talos": lambda: wbc.robots.load("talos"),
 }
@@ -339,6 +340,15 @@ def test_axis_and_points_agree_where_the_arm_is_planar() -> None:
         assert abs(np.sin(off)) < 1e-11
 
 
+def test_axis_form_points_to_the_elbow() -> None:
+    """Arm without offsets: the two angles are equal for a positive elbow angle, opposite for a negative one."""
+    points = PitchPlane("F3", "F4", "tip")
+    axis = replace(points, axis="joint3", reference=PlaneReference())
+    for q in clear("four", points, 20, seed=18):
+        off = wrap(evaluate("four", axis, q)[0][0] - evaluate("four", points, q)[0][0])
+        assert abs(off) == pytest.approx(0.0 if q[3] > 0 else np.pi, abs=1e-11)
+
+
 @pytest.mark.parametrize(
     ("name", "item"),
     [
@@ -583,7 +593,7 @@ def test_margin_derivative_includes_the_fading(case: str) -> None:
 
 
 def push(
-    name: str, item: PitchPlaneLimit, dt: float, seconds: float = 1.2, count: int = 20
+    name: str, item: PitchPlaneLimit, dt: float, seconds: float = 0.8, count: int = 20
 ) -> tuple[np.ndarray, float]:
     """Constant commands against the margin rows from admissible starts: last states and the lowest margin."""
     model, rate = robot(name).model, 20.0
