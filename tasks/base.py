@@ -198,6 +198,9 @@ class Constraint(Item):
     abstract: ClassVar[bool] = True
     order: ClassVar[Order] = Order.MARGIN
 
+    #: Rows are equalities (lower == upper)
+    equality: ClassVar[bool] = False
+
     #: Default rate [1/s] of margins: h decays no faster than exp(-rate t)
     default_rate: ClassVar[float] = 20.0
 

@@ -1,7 +1,28 @@
-"""Whole-body control from declarative tasks."""
+"""Whole-body control: declarative tasks, stacked into one QP, compiled to one native tick.
 
-from wbc.errors import WbcError
+robot = wbc.robots.load("panda")
+stack = wbc.Stack(robot, dt=0.005)
+stack.add(wbc.tasks.EndEffector("panda_hand_tcp"), name="hand")
+stack.add(wbc.tasks.JointLimits())
+controller = stack.compile()
+step = controller.step(robot.neutral)
+"""
 
 __version__ = "0.1.0"
 
-__all__ = ["WbcError", "__version__"]
+from wbc import robots, shapes, tasks
+from wbc.controller import Certificate, Controller, Stack, Status, Step
+from wbc.errors import WbcError
+
+__all__ = [
+    "Certificate",
+    "Controller",
+    "Stack",
+    "Status",
+    "Step",
+    "WbcError",
+    "__version__",
+    "robots",
+    "shapes",
+    "tasks",
+]

@@ -1,1 +1,1 @@
-
+"""From declared items to compiled code (floor 4)."""

@@ -37,11 +37,7 @@ def _header(stack: Declaration, layout: Layout, program: Program) -> str:
     jt, at = program.rows.sparsity_out("jt"), program.rows.sparsity_out("at")
     j_start, j_col = sparsity_rows(jt)
     a_start, a_col = sparsity_rows(at)
-    general = layout.of_form("margins", "rows")
-    orders = [int(_order(b.entry.item)) for b in general for _ in b.rows]
-    scales = [stack.length if r.unit.split("/")[0] == "m" else 1.0 for b in general for r in b.rows]
-    bounds = layout.of_form("bounds")
-    sequence = sorted(range(len(bounds)), key=lambda k: _order(bounds[k].entry.item))
+    orders, scales, sequence = row_orders(layout), row_units(stack, layout), bound_sequence(layout)
     dofs = layout.dof_scales(stack)
     units = unit_groups(stack)
     functions = [program.rows] + ([program.ahead] if program.ahead is not None else [])
@@ -109,6 +105,23 @@ def unit_groups(stack: Declaration) -> list[tuple[int, int]]:
     return groups
 
 
+def row_orders(layout: Layout) -> list[int]:
+    """Class of each general row in the order of sacrifice."""
+    return [int(_order(b.entry.item)) for b in layout.of_form("margins", "rows") for _ in b.rows]
+
+
+def row_units(stack: Declaration, layout: Layout) -> list[float]:
+    """Size of a violation that counts as one, per general row: the characteristic length for metres."""
+    rows = [r for b in layout.of_form("margins", "rows") for r in b.rows]
+    return [stack.length if r.unit.split("/")[0] == "m" else 1.0 for r in rows]
+
+
+def bound_sequence(layout: Layout) -> list[int]:
+    """Bound blocks in the order of sacrifice, then of the stack."""
+    bounds = layout.of_form("bounds")
+    return sorted(range(len(bounds)), key=lambda k: _order(bounds[k].entry.item))
+
+
 def _order(item: object) -> Order:
     assert isinstance(item, Constraint)
     return item.order
@@ -135,8 +148,7 @@ def _blocks(start: np.ndarray, col: np.ndarray) -> list[str]:
             build.append(f"diagonal(t, {row}, {end - row}, {start[row]});")
             entry = "t->jt[e] * t->jt[e]"
             weight = f"t->weight[{row} + e - {start[row]}] * t->report.factor[{row} + e - {start[row]}]"
-            diagonals.append(
-                f"for (int e = {start[row]}; e < {start[end]}; e++) t->y[j_col[e]] += {weight} * {entry};")
+            diagonals.append(f"for (int e = {start[row]}; e < {start[end]}; e++) t->y[j_col[e]] += {weight} * {entry};")
         else:
             while end < rows and tuple(col[start[end] : start[end + 1]]) == columns:
                 end += 1

@@ -8,10 +8,8 @@ import numpy as np
 
 from wbc.errors import ShapeError
 from wbc.stack.declaration import Declaration, Entry
+from wbc.tasks import inputs
 from wbc.tasks.base import Constraint, Form, Input, Row
-
-#: Numbers that an input of each kind takes in the buffer; configuration and tangent depend on the robot.
-_SIZES = {"pose": 12, "rotation": 9}
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,11 +79,13 @@ class Layout:
                 declared.append(Input("rate", unit="1/s", default=item.default_rate, low=0.0))
         elif not any(i.name == "gain" for i in declared):
             default = getattr(item, "gain", None)
-            declared.append(Input("gain", unit="1/s", default=item.default_gain if default is None else default, low=0.0))
+            declared.append(
+                Input("gain", unit="1/s", default=item.default_gain if default is None else default, low=0.0)
+            )
         for declared_input in declared:
             if declared_input.name in slots:
                 raise ShapeError(f"{entry.name}.inputs", declared_input.name, "an input of this name is declared twice")
-            size = self._size(declared_input)
+            size = inputs.size(robot, declared_input)
             slots[declared_input.name] = Slot(declared_input, self.parameters, size)
             self.parameters += size
         margin = -1
@@ -98,13 +98,6 @@ class Layout:
             if form == "margins":
                 margin, self.margin_rows = self.margin_rows, self.margin_rows + len(rows)
         self.blocks[entry.name] = Block(entry, form, rows, start, margin, slots)
-
-    def _size(self, declared: Input) -> int:
-        if declared.kind == "configuration":
-            return self.nq
-        if declared.kind == "tangent":
-            return self.nv
-        return _SIZES.get(declared.kind, max(1, declared.size))
 
     def of_form(self, *forms: Form) -> list[Block]:
         """Blocks of the given forms, in row order."""

@@ -111,7 +111,9 @@ class _Builder:
         expression = ca.SX(expression)
         if expression.shape[1] != 1 or expression.shape[0] != len(block.rows):
             where = f"{block.entry.name}.{what}"
-            raise ShapeError(where, expression.shape, f"expected a column of {len(block.rows)} rows, as rows() declares")
+            raise ShapeError(
+                where, expression.shape, f"expected a column of {len(block.rows)} rows, as rows() declares"
+            )
         return ca.densify(expression)
 
     def task(self, block: Block) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:

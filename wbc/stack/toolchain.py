@@ -21,8 +21,16 @@ ROWS_FLAGS = ("-O1",)
 #: Flags of the hand-written cycle: its loops have constant bounds and are worth unrolling
 TICK_FLAGS = ("-O3",)
 #: No fast-math and no contraction, so that the compiled tick is the arithmetic that was written
-COMMON_FLAGS = ("-std=gnu99", "-fPIC", "-march=native", "-ffp-contract=off", "-fno-math-errno", "-fvisibility=hidden",
-                "-DCASADI_SYMBOL_EXPORT=", "-w")
+COMMON_FLAGS = (
+    "-std=gnu99",
+    "-fPIC",
+    "-march=native",
+    "-ffp-contract=off",
+    "-fno-math-errno",
+    "-fvisibility=hidden",
+    "-DCASADI_SYMBOL_EXPORT=",
+    "-w",
+)
 
 
 @functools.cache
@@ -65,7 +73,8 @@ def identity() -> str:
         return "none"
     version = subprocess.run([cc, "--version"], capture_output=True, text=True, check=False).stdout.splitlines()[:1]
     target = subprocess.run(
-        [cc, "-march=native", "-Q", "--help=target"], capture_output=True, text=True, check=False).stdout
+        [cc, "-march=native", "-Q", "--help=target"], capture_output=True, text=True, check=False
+    ).stdout
     return "\n".join([*version, target, *ROWS_FLAGS, *TICK_FLAGS, *COMMON_FLAGS])
 
 
@@ -85,8 +94,21 @@ def compile_tick(files: dict[str, str], output: pathlib.Path) -> None:
         include = (f"-I{headers()}",)
         _run([cc, *COMMON_FLAGS, *ROWS_FLAGS, "-c", "rows.c", "-o", "rows.o"], place)
         _run([cc, *COMMON_FLAGS, *TICK_FLAGS, *include, "-c", "tick.c", "-o", "tick.o"], place)
-        _run([cc, "-shared", "-Wl,--exclude-libs,ALL", "-Wl,-Bsymbolic", "rows.o", "tick.o", str(library()), "-lm",
-              "-o", str(output)], place)
+        _run(
+            [
+                cc,
+                "-shared",
+                "-Wl,--exclude-libs,ALL",
+                "-Wl,-Bsymbolic",
+                "rows.o",
+                "tick.o",
+                str(library()),
+                "-lm",
+                "-o",
+                str(output),
+            ],
+            place,
+        )
 
 
 def _run(command: list[str], folder: pathlib.Path) -> None:

@@ -61,6 +61,7 @@ static void form_bounds(wbc_tick *t) {
     for (int i = 0; i < NV; i++) {
         t->low[i] = -WBC_INF;
         t->high[i] = WBC_INF;
+        t->report.owner_low[i] = t->report.owner_high[i] = -1.0;
     }
     /* In the order of sacrifice; a later block is clipped into what the earlier ones left */
     for (int k = 0; k < NB; k++) {
@@ -70,6 +71,8 @@ static void form_bounds(wbc_tick *t) {
             const double low = t->low[i], high = t->high[i];
             t->low[i] = clamp(t->bound_low[b * NV + i], low, high);
             t->high[i] = clamp(t->bound_high[b * NV + i], low, high);
+            if (t->low[i] > low) t->report.owner_low[i] = b;
+            if (t->high[i] < high) t->report.owner_high[i] = b;
         }
     }
 }
@@ -111,9 +114,33 @@ INLINE double dot(const double *x, const double *y, int from) {
     return ((part[0] + part[4]) + (part[1] + part[5])) + ((part[2] + part[6]) + (part[3] + part[7]));
 }
 
-/* H = R'R, upper triangle of H only, with the inverse of its diagonal; 0 where H is not positive definite */
+/* Equality rows a'v = b enter the Hessian as well, H + rho a a' / |a|^2 and g - rho b a / |a|^2: a constant where they
+ * hold, so the optimum is the same, but seen through R they are then as independent as they are in v. */
+static void strengthen(wbc_tick *t) {
+    double rho = 0.0;
+    for (int i = 0; i < NV; i++)
+        if (t->H[i * WIDE + i] > rho) rho = t->H[i * WIDE + i];
+    for (int k = 0; k < MC; k++) {
+        t->strength[k] = 0.0;
+        if (t->low[NV + k] != t->high[NV + k]) continue;
+        double square = 0.0;
+        for (int e = a_start[k]; e < a_start[k + 1]; e++) square += t->at[e] * t->at[e];
+        if (square <= DEAD) continue;
+        t->strength[k] = rho / square;
+        for (int e = a_start[k]; e < a_start[k + 1]; e++) {
+            const double f = t->strength[k] * t->at[e];
+            t->y[a_col[e]] += f * t->low[NV + k];
+            for (int c = e; c < a_start[k + 1]; c++) t->R[a_col[e] * WIDE + a_col[c]] += f * t->at[c];
+        }
+    }
+}
+
+/* H = R'R, upper triangle of H only, with the inverse of its diagonal; 0 where H is not positive definite.
+ * Leaves -g in y. */
 static int factor(wbc_tick *t) {
     memcpy(t->R, t->H, sizeof t->R);
+    for (int i = 0; i < WIDE; i++) t->y[i] = -t->g[i];
+    if (MC > 0) strengthen(t);
     for (int i = 0; i < NV; i++) {
         double *row = t->R + i * WIDE;
         const double pivot = row[i];
@@ -272,7 +299,6 @@ static int within_bounds(const wbc_tick *t) {
 
 /* The optimum without rows; 1 if it respects all of them and is therefore the answer */
 static int unconstrained(wbc_tick *t) {
-    for (int i = 0; i < WIDE; i++) t->y[i] = -t->g[i];
     solve_transposed(t, t->y);
     solve_upper(t, t->y, t->x);
     t->daqp.n_active = 0;
@@ -344,6 +370,9 @@ static int relax_class(wbc_tick *t, int order) {
 static int relaxed(wbc_tick *t) {
     for (int order = 1; order <= LAST_ORDER; order++)
         if (!relax_class(t, order)) return -1;
+    /* The sides have moved, and with them what the equality rows contribute */
+    if (!factor(t)) return -1;
+    solve_transposed(t, t->y);
     return constrained(t);
 }
 
@@ -473,8 +502,12 @@ EXPORT void wbc_tick_certify(wbc_tick *t) {
     out->violation = 0.0;
     for (int a = 0; a < work->n_active; a++) {
         const int i = work->WS[a];
-        const double lambda = work->lam_star[a];
-        double value = 0.0;
+        double lambda = work->lam_star[a], value = 0.0;
+        if (i >= NV && t->strength[i - NV] > 0.0) {
+            double gap = -t->low[i];
+            for (int e = a_start[i - NV]; e < a_start[i - NV + 1]; e++) gap += t->at[e] * v[a_col[e]];
+            lambda += t->strength[i - NV] * gap;
+        }
         out->lambda[i] = lambda;
         if (i < NV) {
             residual[i] += lambda;
@@ -512,7 +545,7 @@ EXPORT void wbc_tick_certify(wbc_tick *t) {
     if (out->error_bound > QUICK_BOUND) out->error_bound = sharp_bound(t, size);
 }
 
-static void look_ahead(wbc_tick *t) {
+EXPORT void wbc_tick_look_ahead(wbc_tick *t) {
 #if MH > 0
     const double *arg[4] = {t->q, t->report.v, t->p, &t->dt};
     double *res[1] = {t->report.ahead};
@@ -524,7 +557,7 @@ static void look_ahead(wbc_tick *t) {
 
 /* ---------------------------------------------------------------- entry points */
 
-static int check(const wbc_tick *t) {
+static int refused(const wbc_tick *t) {
     for (int i = 0; i < NQ; i++)
         if (!isfinite(t->q[i])) return WBC_BAD_Q;
     for (int k = 0; k < UNITS; k++) {
@@ -532,18 +565,27 @@ static int check(const wbc_tick *t) {
         for (int i = unit_start[k]; i < unit_start[k] + unit_size[k]; i++) square += t->q[i] * t->q[i];
         if (fabs(square - 1.0) > 2e-6) return WBC_BAD_UNIT;
     }
-    for (int i = 0; i < NV; i++)
-        if (!isfinite(t->v_last[i])) return WBC_BAD_V;
+    if (t->use_v != 0.0)
+        for (int i = 0; i < NV; i++)
+            if (!isfinite(t->v_in[i])) return WBC_BAD_V;
     return 0;
 }
 
+/* Refuse bad inputs, or take over a measured velocity */
+EXPORT int wbc_tick_check(wbc_tick *t) {
+    const int bad = refused(t);
+    if (!bad && t->use_v != 0.0) memcpy(t->v_last, t->v_in, sizeof t->v_in);
+    t->use_v = 0.0;
+    return bad;
+}
+
 EXPORT int wbc_tick_step(wbc_tick *t) {
-    const int bad = check(t);
+    const int bad = wbc_tick_check(t);
     if (bad) return bad;
     wbc_tick_assemble(t);
     const int flag = wbc_tick_solve(t);
     wbc_tick_certify(t);
-    look_ahead(t);
+    wbc_tick_look_ahead(t);
     memcpy(t->v_last, t->report.v, NV * sizeof(double));
     return flag;
 }
@@ -552,11 +594,11 @@ EXPORT long long wbc_tick_size(void) { return (long long)sizeof(wbc_tick); }
 
 #define OFFSET(field) (long long)offsetof(wbc_tick, field)
 
-/* Where the caller finds q, v_last, p, dt, weight, enabled, bound_enabled, report, H, g, A, low, high, jt, wish */
+/* Where the caller finds q, v_last, v_in, use_v, p, dt, weight, enabled, bound_enabled, report, H, g, A, low, high */
 EXPORT void wbc_tick_layout(long long *out) {
-    const long long offsets[] = {OFFSET(q), OFFSET(v_last), OFFSET(p), OFFSET(dt), OFFSET(weight), OFFSET(enabled),
-                                 OFFSET(bound_enabled), OFFSET(report), OFFSET(H), OFFSET(g), OFFSET(A), OFFSET(low),
-                                 OFFSET(high), OFFSET(jt), OFFSET(wish)};
+    const long long offsets[] = {OFFSET(q), OFFSET(v_last), OFFSET(v_in), OFFSET(use_v), OFFSET(p), OFFSET(dt),
+                                 OFFSET(weight), OFFSET(enabled), OFFSET(bound_enabled), OFFSET(report), OFFSET(H),
+                                 OFFSET(g), OFFSET(A), OFFSET(low), OFFSET(high)};
     memcpy(out, offsets, sizeof offsets);
 }
 

@@ -27,7 +27,6 @@
 #define WBC_BAD_Q (-1)
 #define WBC_BAD_UNIT (-2)
 #define WBC_BAD_V (-3)
-#define WBC_BAD_INPUT (-4)
 
 /* What a tick reports, in this order, before the row-wise outputs. */
 typedef struct {
@@ -44,11 +43,14 @@ typedef struct {
     double ahead[MH + 1];     /* h at q (+) v dt */
     double lambda[M_ALL + 1]; /* multipliers of bounds, then of general rows; > 0 at the upper side */
     double slack[MC + 1];     /* by how much a general row was relaxed, row units */
+    double owner_low[NV];     /* bound block that sets each lower bound, -1 for none */
+    double owner_high[NV];
 } wbc_report;
 
 typedef struct {
     /* inputs, written by the caller */
-    double q[NQ + 1], v_last[NV + 1], p[NP + 1], dt;
+    double q[NQ + 1], v_last[NV], p[NP + 1], dt;
+    double v_in[NV], use_v;      /* a measured velocity, taken in place of the last command where use_v is not 0 */
     double weight[MT + 1];       /* weight of each task row, scale included */
     double enabled[MC + 1];      /* 1 or 0 for each general row */
     double bound_enabled[NB * NV + 1];
@@ -60,6 +62,7 @@ typedef struct {
     /* factorisation */
     double R[NV * WIDE], inverse[NV * WIDE], inverse_diagonal[NV], y[WIDE];
     double scratch[WIDE], product[WIDE];
+    double strength[MC + 1];                    /* what equality rows add to the Hessian, per a a' */
     double free_low[MC + 1], free_high[MC + 1]; /* sides of general rows before relaxation */
     double work_w[WORK_W + 1];
     long long work_iw[WORK_IW + 1];

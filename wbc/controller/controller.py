@@ -1,0 +1,201 @@
+"""The controller: validates, writes flat buffers, makes one call, wraps the report."""
+
+from __future__ import annotations
+
+import functools
+from typing import Any
+
+import numpy as np
+
+from wbc import validation
+from wbc.controller.handle import Handle
+from wbc.controller.native import NativeTick
+from wbc.controller.report import BAD_V
+from wbc.controller.solved import SolvedTick
+from wbc.controller.step import Context, Step
+from wbc.controller.table import describe
+from wbc.controller.vm import VmAssembly
+from wbc.errors import SolverError, UnknownNameError
+from wbc.qp.problem import QP
+from wbc.stack.artifact import Artifact
+from wbc.stack.declaration import Declaration
+from wbc.stack.layout import Slot
+from wbc.validation import Array
+
+_FLOAT = np.dtype(np.float64)
+
+
+class Controller:
+    """A compiled stack with its run-time values. Made by :meth:`wbc.Stack.compile`.
+
+    Each controller has its own memory; one controller must not be stepped from two threads at once.
+
+    Attributes:
+        stack: the declaration that it was compiled from.
+        solver: name of the QP solver.
+        backend: ``native`` or ``vm``.
+        cached: the compiled stack was found in the cache.
+    """
+
+    def __init__(self, stack: Declaration, artifact: Artifact, solver: str) -> None:
+        layout = artifact.layout
+        self.stack, self.solver, self.cached = stack, solver, artifact.cached
+        self.backend = "native" if artifact.library is not None else "vm"
+        self.layout = layout
+        self._context = Context(stack, layout)
+        self.row_costs: Array = 1.0 / layout.row_scales(stack) ** 2
+        self.tick: NativeTick | SolvedTick
+        if artifact.library is not None:
+            native = NativeTick(artifact.library, layout)
+            self.tick = native if solver == "daqp" else SolvedTick(native, stack, layout, solver)
+        elif artifact.program is not None:
+            self.tick = SolvedTick(VmAssembly(artifact.program, stack, layout), stack, layout, solver)
+        else:
+            raise SolverError("artifact", artifact, "has neither a library nor a program")
+        if isinstance(self.tick, NativeTick):
+            self._call = functools.partial(self.tick.step_function, self.tick.pointer)
+        else:
+            self._call = self.tick.step
+        self._q, self._report, self._shape = self.tick.q, self.tick.report, (layout.nq,)
+        self._waiting: dict[str, list[Slot]] = {}
+        self._handles = {name: Handle(self, block) for name, block in layout.blocks.items()}
+        self._set_dt(stack.dt)
+        self._dt_is_declared = True
+        for name, handle in self._handles.items():
+            handle.apply()
+            for slot in layout.blocks[name].slots.values():
+                self._set_default(name, slot)
+
+    def step(self, q: Any, v: Any = None, dt: Any = None) -> Step:
+        """One control cycle: the command v for the next dt seconds.
+
+            minimise   sum over task rows of w (J v + gain e + de/dt)^2 + damping |v|^2
+            subject to the constraints' rows and bounds
+
+        Args:
+            q: configuration [nq]; any real array or sequence.
+            v: measured velocity [nv] that acceleration bounds are counted from; default: the last command
+                (zero after a reset).
+            dt: time until the next command [s], within ``stack.dt_range``; default: the declared one.
+
+        Raises:
+            ShapeError, NotFiniteError, RotationError, RangeError: bad input; the controller is unchanged.
+        """
+        if dt is not None or not self._dt_is_declared or v is not None or self._waiting:
+            self._prepare(q, v, dt)
+        if type(q) is np.ndarray and q.dtype is _FLOAT and q.shape == self._shape:
+            self._q[:] = q
+        else:
+            self._q[:] = validation.real_array("q", q, self._shape)
+        if self._call() < 0:
+            self._refuse(q, v)
+        return Step(self._report.tobytes(), self._context)
+
+    def reset(self, q: Any = None, v: Any = None) -> None:
+        """Start anew: the last command becomes ``v`` (default zero) and the solver forgets its active set.
+
+        With ``q``, inputs that are taken from the first configuration and that nobody has set since (held
+        poses, default targets) are taken from ``q``; without it, from the next step.
+
+        Raises:
+            ShapeError, NotFiniteError, RotationError: bad input; the controller is unchanged.
+        """
+        robot = self.stack.robot
+        configuration = None if q is None else robot.configuration("q", q)
+        velocity = np.zeros(robot.nv) if v is None else validation.real_array("v", v, (robot.nv,))
+        self.tick.v_last[:] = velocity
+        self.tick.reset()
+        self._waiting = {name: list(slots) for name, slots in self._first.items() if slots}
+        if configuration is not None:
+            self._initialise(configuration)
+
+    def __getitem__(self, name: str) -> Handle:
+        handle = self._handles.get(name)
+        if handle is None:
+            raise UnknownNameError("item", name, self._handles)
+        return handle
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._handles
+
+    def qp(self) -> QP:
+        """The QP at the buffers' present values (after a step: that of the step, acceleration bounds about its v)."""
+        return self.tick.qp()
+
+    @property
+    def last_command(self) -> Array:
+        """Velocity that the next step counts accelerations from, a copy."""
+        return self.tick.v_last.copy()
+
+    def __str__(self) -> str:
+        return describe(self)
+
+    # What handles need; not for users
+
+    def write(self, slot: Slot, numbers: Array) -> None:
+        """Write validated numbers of an input; it no longer follows the first configuration."""
+        self.tick.p[slot.slice] = numbers
+        for table in (self._waiting, self._first):
+            for name in list(table):
+                table[name] = [s for s in table[name] if s is not slot]
+                if not table[name]:
+                    del table[name]
+
+    def fill_defaults(self, field: str) -> None:
+        """Values that wait for the first configuration cannot be read before it."""
+        item, _, name = field.partition(".")
+        if any(s.input.name == name for s in self._waiting.get(item, ())):
+            raise SolverError(field, None, "is taken from the first configuration; call step(q) or reset(q) first")
+
+    # The first configuration
+
+    @functools.cached_property
+    def _first(self) -> dict[str, list[Slot]]:
+        return {}
+
+    def _set_default(self, name: str, slot: Slot) -> None:
+        value = slot.input.default
+        if value is None:
+            self._waiting.setdefault(name, []).append(slot)
+            self._first.setdefault(name, []).append(slot)
+            return
+        if slot.input.name == "rate":
+            value = min(float(value), 1.0 / self.stack.dt_range[1])
+        self.tick.p[slot.slice] = self._handles[name].checked(slot.input.name, value)
+
+    def _initialise(self, q: Array) -> None:
+        values: list[tuple[Slot, Array]] = []
+        for name, slots in self._waiting.items():
+            initial = self.stack[name].item.initial(self.stack.robot, q)
+            for slot in slots:
+                if slot.input.name not in initial:
+                    raise SolverError(f"{name}.{slot.input.name}", None, "has no default value; set it before step")
+                values.append((slot, self._handles[name].checked(slot.input.name, initial[slot.input.name])))
+        for slot, numbers in values:
+            self.tick.p[slot.slice] = numbers
+        self._waiting = {}
+
+    # Off the fast path
+
+    def _prepare(self, q: Any, v: Any, dt: Any) -> None:
+        low, high = self.stack.dt_range
+        step = self.stack.dt if dt is None else validation.scalar("dt", dt, low=low, high=high, unit="s")
+        velocity = None if v is None else validation.real_array("v", v, (self.stack.robot.nv,))
+        if self._waiting:
+            self._initialise(self.stack.robot.configuration("q", q))
+        elif velocity is not None or dt is not None:
+            validation.real_array("q", q, self._shape)
+        self._set_dt(step)
+        self._dt_is_declared = dt is None
+        if velocity is not None:
+            self.tick.v_in[:] = velocity
+            self.tick.use_v[0] = 1.0
+
+    def _set_dt(self, dt: float) -> None:
+        self.tick.dt[0] = dt
+
+    def _refuse(self, q: Any, v: Any) -> None:
+        """Say what was wrong with inputs that the tick refused."""
+        self.stack.robot.configuration("q", q)
+        validation.real_array("v", v, (self.stack.robot.nv,))
+        raise SolverError("step", BAD_V, "the tick refused its inputs")

@@ -1,0 +1,137 @@
+"""Run-time values of one item: ``controller["hand"].target = pose``."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pinocchio as pin
+
+from wbc import validation
+from wbc.errors import RangeError, UnknownNameError
+from wbc.stack.layout import Block, Slot
+from wbc.tasks import inputs
+from wbc.validation import Array
+
+if TYPE_CHECKING:
+    from wbc.controller.controller import Controller
+
+
+class UnknownValueError(UnknownNameError, AttributeError):
+    """An item has no run-time value of that name."""
+
+
+class Handle:
+    """Run-time values of one item as attributes; reading gives copies, writing validates.
+
+    Besides the item's own inputs: ``enabled``, ``mask`` (one number >= 0 a row of a task, 0 or 1 a row of a
+    constraint), for tasks ``weight`` and ``gain``, for margins ``rate`` [1/s].
+    """
+
+    __slots__ = ("_block", "_controller", "_enabled", "_mask", "_row_weights", "_weight")
+
+    def __init__(self, controller: Controller, block: Block) -> None:
+        put = super().__setattr__
+        put("_controller", controller)
+        put("_block", block)
+        put("_enabled", True)
+        put("_weight", block.entry.weight)
+        put("_mask", np.ones(len(block.rows)))
+        put("_row_weights", np.asarray(block.entry.item.row_weights(controller.stack.robot), dtype=np.float64))
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of all run-time values."""
+        own = ("weight",) if self._block.form == "task" else ()
+        return (*self._block.slots, *own, "enabled", "mask")
+
+    def __dir__(self) -> list[str]:
+        return [*self.names, "names"]
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("__"):
+            raise AttributeError(name)
+        if name == "enabled":
+            return self._enabled
+        if name == "mask":
+            return self._mask.copy()
+        if name == "weight" and self._block.form == "task":
+            return self._weight
+        slot = self._slot(name)
+        self._controller.fill_defaults(self._field(name))
+        return _as_written(slot, self._controller.tick.p[slot.slice])
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        field = self._field(name)
+        if name == "enabled":
+            super().__setattr__("_enabled", validation.flag(field, value))
+        elif name == "mask":
+            super().__setattr__("_mask", self._checked_mask(field, value))
+        elif name == "weight" and self._block.form == "task":
+            super().__setattr__("_weight", validation.scalar(field, value, low=0.0))
+        else:
+            self._controller.write(self._slot(name), self.checked(name, value))
+            return
+        self.apply()
+
+    def checked(self, name: str, value: Any) -> Array:
+        """The numbers of an input's value, validated.
+
+        Raises:
+            WbcError: not a value of this input.
+        """
+        slot, field = self._slot(name), self._field(name)
+        numbers = inputs.flat(self._controller.stack.robot, field, slot.input, value)
+        longest = self._controller.stack.dt_range[1]
+        if name == "rate" and self._block.form == "margins" and not 0.0 < numbers[0] * longest <= 1.0:
+            reason = (
+                f"rate * dt must be in (0, 1] for every dt up to {longest:g} s, so rate in (0, {1 / longest:g}] 1/s"
+            )
+            raise RangeError(field, value, reason)
+        return numbers
+
+    def apply(self) -> None:
+        """Write weights or row switches to the buffers."""
+        tick, block, form = self._controller.tick, self._block, self._block.form
+        on = self._mask * float(self._enabled)
+        if form == "task":
+            tick.weight[block.slice] = self._weight * on * self._row_weights * self._controller.row_costs[block.slice]
+        elif form == "bounds":
+            nv = self._controller.stack.robot.nv
+            tick.bound_enabled[block.start * nv : (block.start + 1) * nv] = on
+        else:
+            tick.enabled[block.slice] = on
+
+    def _checked_mask(self, field: str, value: Any) -> Array:
+        raw = validation.real_array(field, value)
+        count = len(self._block.rows)
+        mask = np.full(count, float(raw)) if raw.shape == () else validation.real_array(field, raw, (count,))
+        for number in mask:
+            validation.scalar(field, number, low=0.0, high=np.inf if self._block.form == "task" else 1.0)
+        if self._block.form != "task" and not np.isin(mask, (0.0, 1.0)).all():
+            raise RangeError(field, value, "a constraint's row is on (1) or off (0)")
+        return mask
+
+    def _slot(self, name: str) -> Slot:
+        slot = self._block.slots.get(name)
+        if slot is None:
+            raise UnknownValueError(self._field(name), name, self.names)
+        return slot
+
+    def _field(self, name: str) -> str:
+        return f"{self._block.entry.name}.{name}"
+
+    def __repr__(self) -> str:
+        return f"<{type(self._block.entry.item).__name__} {self._block.entry.name!r}: {', '.join(self.names)}>"
+
+
+def _as_written(slot: Slot, numbers: Array) -> Any:
+    """An input's numbers as the user writes them."""
+    kind = slot.input.kind
+    if kind == "pose":
+        return pin.SE3(numbers[:9].reshape(3, 3, order="F").copy(), numbers[9:].copy())
+    if kind == "rotation":
+        return numbers.reshape(3, 3, order="F").copy()
+    if kind == "vector" and slot.input.size == 0:
+        return float(numbers[0])
+    return numbers.copy()

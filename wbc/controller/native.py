@@ -1,0 +1,112 @@
+"""The native tick: one library, one block of memory, one call."""
+
+from __future__ import annotations
+
+import ctypes
+import pathlib
+
+import numpy as np
+
+from wbc.controller.report import INFINITE, ReportLayout
+from wbc.errors import CompileError
+from wbc.qp.problem import QP
+from wbc.stack.layout import Layout
+from wbc.validation import Array
+
+_FIELDS = (
+    "q",
+    "v_last",
+    "v_in",
+    "use_v",
+    "p",
+    "dt",
+    "weight",
+    "enabled",
+    "bound_enabled",
+    "report",
+    "H",
+    "g",
+    "A",
+    "low",
+    "high",
+)
+
+
+class NativeTick:
+    """Memory of one controller and the functions of its library; see :class:`wbc.controller.tick.Tick`.
+
+    The report's size in memory is checked against the layout, so that a library of another layout is refused.
+    """
+
+    def __init__(self, library: pathlib.Path, layout: Layout) -> None:
+        # Not CDLL: releasing the interpreter lock costs more than it can give a call of a few microseconds
+        self._library = ctypes.PyDLL(str(library))
+        self._library.wbc_tick_size.restype = ctypes.c_longlong
+        size = int(self._library.wbc_tick_size())
+        raw = np.zeros(size // 8 + 8)
+        shift = (-raw.ctypes.data % 64) // 8
+        self._memory = raw[shift : shift + size // 8]
+        self.pointer = ctypes.c_void_p(self._memory.ctypes.data)
+        offsets = (ctypes.c_longlong * len(_FIELDS))()
+        self._library.wbc_tick_layout(offsets)
+        places = dict(zip(_FIELDS, (int(o) // 8 for o in offsets), strict=True))
+        report = ReportLayout(layout)
+        if places["H"] - places["report"] != report.size:
+            raise CompileError("library", str(library), "was built for another layout")
+        nv, rows = layout.nv, layout.general_rows
+        self._layout = layout
+        self._wide = (nv + 7) // 8 * 8
+
+        def view(name: str, count: int) -> Array:
+            return self._memory[places[name] : places[name] + count]
+
+        self._library.wbc_tick_init(self.pointer)
+        self.q = view("q", layout.nq)
+        self.v_last, self.v_in = view("v_last", nv), view("v_in", nv)
+        self.use_v = view("use_v", 1)
+        self.p = view("p", layout.parameters)
+        self.dt = view("dt", 1)
+        self.weight = view("weight", layout.task_rows)
+        self.enabled = view("enabled", rows)
+        self.bound_enabled = view("bound_enabled", layout.bound_blocks * nv)
+        self.report = view("report", report.size)
+        self._H = view("H", nv * self._wide).reshape(nv, self._wide)
+        self._g = view("g", nv)
+        self._A = view("A", rows * nv).reshape(rows, nv)
+        self._low, self._high = view("low", nv + rows), view("high", nv + rows)
+        self.step_function = self._library.wbc_tick_step
+
+    def step(self) -> int:
+        return int(self.step_function(self.pointer))
+
+    def reset(self) -> None:
+        self._library.wbc_tick_reset(self.pointer)
+
+    def assemble(self) -> None:
+        """Rows and QP only."""
+        self._library.wbc_tick_assemble(self.pointer)
+
+    def solve(self) -> int:
+        """Active-set solution of the assembled QP only."""
+        return int(self._library.wbc_tick_solve(self.pointer))
+
+    def certify(self) -> None:
+        """Certificate of the solved QP only."""
+        self._library.wbc_tick_certify(self.pointer)
+
+    def look_ahead(self) -> None:
+        """Margins after the step only."""
+        self._library.wbc_tick_look_ahead(self.pointer)
+
+    def check(self) -> int:
+        """Only refuse bad inputs, and take over a measured velocity."""
+        return int(self._library.wbc_tick_check(self.pointer))
+
+    def qp(self) -> QP:
+        self.assemble()
+        nv = self._layout.nv
+        upper = np.triu(self._H[:, :nv])
+        H = upper + np.triu(upper, 1).T
+        low, high = self._low.copy(), self._high.copy()
+        low[low <= -INFINITE], high[high >= INFINITE] = -np.inf, np.inf
+        return QP(H, self._g.copy(), low, high, self._A.copy())

@@ -1,0 +1,43 @@
+"""The stack as users know it: a declaration that compiles."""
+
+from __future__ import annotations
+
+from wbc import validation
+from wbc.controller.controller import Controller
+from wbc.qp.solvers import available_solvers
+from wbc.stack.artifact import compile_stack
+from wbc.stack.declaration import Declaration
+
+
+class Stack(Declaration):
+    """Tasks and constraints on a robot.
+
+        stack = wbc.Stack(robot, dt=0.005)
+        stack.add(wbc.tasks.EndEffector("panda_hand_tcp"), name="hand")
+        stack.add(wbc.tasks.JointLimits())
+        controller = stack.compile()
+
+    Args:
+        robot: from :func:`wbc.robots.load`.
+        dt: time between commands [s], > 0. ``step`` accepts ``dt_range``, a quarter to twice of it.
+        damping: cost of velocity against a task row of weight 1, keeps the optimum unique (1e-12 to 1).
+        length: characteristic length [m] that ties metres to radians; default: the robot's.
+
+    Raises:
+        ShapeError, RangeError, NotFiniteError: bad arguments.
+    """
+
+    def compile(self, solver: str = "daqp", backend: str = "auto") -> Controller:
+        """A controller with its own memory; compiled code comes from the cache where it can.
+
+        Args:
+            solver: ``daqp`` (native where gcc is), ``osqp``, ``qpoases``, or an experimental one.
+            backend: ``native``, ``vm``, or ``auto``: native where gcc is, else the CasADi virtual machine.
+
+        Raises:
+            UnknownNameError: unknown solver or backend. CompileError: native without gcc, or gcc failed.
+        """
+        from wbc import __version__
+
+        validation.one_of("solver", solver, available_solvers(experimental=True))
+        return Controller(self, compile_stack(self, backend, __version__), solver)

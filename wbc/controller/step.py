@@ -1,0 +1,215 @@
+"""What a tick returns: the command, and on demand everything that is known about it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import Enum
+from functools import cached_property
+
+import numpy as np
+
+from wbc.controller.report import INFINITE, ReportLayout
+from wbc.stack.declaration import Declaration
+from wbc.stack.layout import Block, Layout
+from wbc.validation import Array
+
+
+class Status(str, Enum):
+    """How a tick ended."""
+
+    #: Every constraint row holds, v is the optimum
+    SOLVED = "solved"
+    #: Rows could not all hold: some gave way in the declared order, see :attr:`Step.relaxed`
+    RELAXED = "relaxed"
+    #: No optimum was found: v brings every joint to rest as fast as its bounds allow
+    BRAKED = "braked"
+
+    def __str__(self) -> str:
+        return self.value
+
+
+@dataclass(frozen=True)
+class Binding:
+    """A row that pushes: ``item`` and ``row`` names, ``side`` (lower, upper, equal), its multiplier."""
+
+    item: str
+    row: str
+    side: str
+    multiplier: float
+
+    def __str__(self) -> str:
+        return f"{self.item}/{self.row} {self.side}"
+
+
+@dataclass(frozen=True)
+class Slack:
+    """A row that gave way: by how much, in its unit per second (rows) or 1/s times its unit (margins)."""
+
+    item: str
+    row: str
+    amount: float
+    unit: str
+
+    def __str__(self) -> str:
+        return f"{self.item}/{self.row} by {self.amount:.3g} {self.unit}"
+
+
+@dataclass(frozen=True, eq=False)
+class Residual:
+    """Error of a task: ``values`` row by row, with ``units`` and ``labels``."""
+
+    values: Array
+    units: tuple[str, ...]
+    labels: tuple[str, ...]
+
+    def norm(self, unit: str) -> float:
+        """Euclidean norm of the rows in ``unit``."""
+        return float(np.linalg.norm([v for v, u in zip(self.values, self.units, strict=True) if u == unit]))
+
+    def __str__(self) -> str:
+        return ", ".join(f"{self.norm(u):.3g} {u}".rstrip() for u in dict.fromkeys(self.units))
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """How good the answer is, computed within the tick.
+
+    Attributes:
+        stationarity: largest entry of |H v + g + A' lambda| (cost per rad/s).
+        violation: largest violation of a row that was not relaxed, in its unit per second.
+        complementarity: largest |lambda (A v - b)|.
+        error_bound: bound on the largest |v - v*| [rad/s, m/s]; inf for a braked tick.
+    """
+
+    stationarity: float
+    violation: float
+    complementarity: float
+    error_bound: float
+
+
+class Context:
+    """What all steps of a controller share: names and places."""
+
+    def __init__(self, stack: Declaration, layout: Layout) -> None:
+        self.stack, self.layout = stack, layout
+        self.report = ReportLayout(layout)
+
+    @cached_property
+    def general(self) -> list[tuple[Block, int]]:
+        """(block, row within it) of every general row."""
+        return [(b, k) for b in self.layout.of_form("margins", "rows") for k in range(len(b.rows))]
+
+    @cached_property
+    def bounds(self) -> list[Block]:
+        """Bound blocks by number."""
+        return self.layout.of_form("bounds")
+
+
+class Step:
+    """Result of one tick. Immutable; everything but ``v`` and ``status`` is worked out when asked for."""
+
+    __slots__ = ("_context", "_data")
+
+    def __init__(self, data: bytes, context: Context) -> None:
+        self._data = data
+        self._context = context
+
+    def _part(self, name: str) -> Array:
+        where = self._context.report[name]
+        return np.frombuffer(self._data, dtype=np.float64, count=where.stop - where.start, offset=8 * where.start)
+
+    def _number(self, name: str) -> float:
+        return float(self._part(name)[0])
+
+    @property
+    def v(self) -> Array:
+        """The command: velocities [rad/s, m/s], nv, read-only."""
+        return np.frombuffer(self._data, dtype=np.float64, count=self._context.layout.nv)
+
+    @property
+    def status(self) -> Status:
+        """How the tick ended."""
+        return (Status.SOLVED, Status.RELAXED, Status.BRAKED)[int(self._number("flag"))]
+
+    @property
+    def iterations(self) -> int:
+        """Iterations of the QP solver; 0 where no row binds."""
+        return int(self._number("iterations"))
+
+    @property
+    def certificate(self) -> Certificate:
+        """Residuals and the error bound of v."""
+        names = ("stationarity", "violation", "complementarity", "error_bound")
+        values = [self._number(n) for n in names]
+        values[3] = np.inf if values[3] >= INFINITE else values[3]
+        return Certificate(*values)
+
+    @property
+    def residuals(self) -> Mapping[str, Residual]:
+        """Error of every task before the step, by name, with units."""
+        error = self._part("error")
+        return {
+            b.entry.name: Residual(error[b.slice], tuple(r.unit for r in b.rows), tuple(r.label for r in b.rows))
+            for b in self._context.layout.of_form("task")
+        }
+
+    @property
+    def faded(self) -> tuple[str, ...]:
+        """Tasks of which a row is faded because its error is near singular."""
+        factor = self._part("factor")
+        return tuple(b.entry.name for b in self._context.layout.of_form("task") if (factor[b.slice] < 1.0).any())
+
+    @property
+    def margins(self) -> Mapping[str, Array]:
+        """Margins h of every margin constraint before the step, by name."""
+        return self._by_margin("margin")
+
+    @property
+    def margins_ahead(self) -> Mapping[str, Array]:
+        """Margins h(q (+) v dt) after the step, with moving obstacles moved on: part of the certificate."""
+        return self._by_margin("ahead")
+
+    def _by_margin(self, part: str) -> Mapping[str, Array]:
+        values = self._part(part)
+        return {b.entry.name: values[b.margins] for b in self._context.layout.of_form("margins")}
+
+    @property
+    def binding(self) -> tuple[Binding, ...]:
+        """Rows and bounds that push against the optimum."""
+        context, nv = self._context, self._context.layout.nv
+        multipliers = self._part("multipliers")
+        low, high = self._part("owner_low"), self._part("owner_high")
+        out = []
+        for i in np.flatnonzero(multipliers):
+            value = float(multipliers[i])
+            side = "upper" if value > 0 else "lower"
+            if i < nv:
+                owner = int((high if value > 0 else low)[i])
+                name = context.bounds[owner].entry.name if owner >= 0 else "bounds"
+                out.append(Binding(name, context.stack.robot.dof_names[i], side, value))
+            else:
+                block, row = context.general[i - nv]
+                side = "equal" if block.entry.item.equality else side
+                out.append(Binding(block.entry.name, block.rows[row].label, side, value))
+        return tuple(out)
+
+    @property
+    def relaxed(self) -> tuple[Slack, ...]:
+        """Rows that gave way because not all could hold."""
+        slack = self._part("slack")
+        out = []
+        for i in np.flatnonzero(slack):
+            block, row = self._context.general[i]
+            out.append(Slack(block.entry.name, block.rows[row].label, float(slack[i]), f"{block.rows[row].unit}/s"))
+        return tuple(out)
+
+    def __repr__(self) -> str:
+        text = f"Step({self.status}, |v| = {np.linalg.norm(self.v):.4g}"
+        for name, residual in self.residuals.items():
+            text += f", {name} {residual}"
+        if self.binding:
+            text += ", binding: " + ", ".join(str(b) for b in self.binding)
+        if self.relaxed:
+            text += ", relaxed: " + ", ".join(str(s) for s in self.relaxed)
+        return text + ")"

@@ -1,0 +1,50 @@
+"""``print(controller)``: every item with level, weight, gain, rows and units."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from wbc.stack.layout import Block
+
+if TYPE_CHECKING:
+    from wbc.controller.controller import Controller
+
+_HEAD = ("item", "kind", "level", "weight", "gain or rate", "rows", "unit", "on")
+
+
+def describe(controller: Controller) -> str:
+    """The table as text."""
+    stack = controller.stack
+    layout = controller.layout
+    robot = stack.robot
+    lines = [_row(controller, block) for block in layout.blocks.values()]
+    widths = [max(len(r[k]) for r in [_HEAD, *lines]) for k in range(len(_HEAD))]
+    text = [
+        f"{robot.name}: {robot.nv} degrees of freedom, dt {stack.dt:g} s "
+        f"({stack.dt_range[0]:g} to {stack.dt_range[1]:g}), solver {controller.solver} ({controller.backend}), "
+        f"characteristic length {stack.length:.3g} m, damping {stack.damping:g}"
+    ]
+    for r in [_HEAD, tuple("-" * w for w in widths), *lines]:
+        text.append("  ".join(c.ljust(w) for c, w in zip(r, widths, strict=True)).rstrip())
+    return "\n".join(text)
+
+
+def _row(controller: Controller, block: Block) -> tuple[str, ...]:
+    handle = controller[block.entry.name]
+    speed = "gain" if block.form == "task" else "rate"
+    rate = f"{getattr(handle, speed):g} 1/s" if speed in block.slots else "-"
+    weight = f"{handle.weight:g}" if block.form == "task" else "hard"
+    units = ", ".join(dict.fromkeys(r.unit or "1" for r in block.rows))
+    mask = handle.mask
+    rows = f"{len(block.rows)}" if mask.all() else f"{int((mask > 0).sum())} of {len(block.rows)}"
+    kind = type(block.entry.item).__name__
+    return (
+        block.entry.name,
+        kind,
+        str(block.entry.level),
+        weight,
+        rate,
+        rows,
+        units,
+        "yes" if handle.enabled else "no",
+    )

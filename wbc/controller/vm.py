@@ -1,0 +1,116 @@
+"""Rows on CasADi's virtual machine, assembled by numpy: the same QP without a compiler."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from wbc.controller.report import BAD_Q, BAD_UNIT, BAD_V, ReportLayout
+from wbc.qp.problem import QP
+from wbc.stack.codegen import bound_sequence, unit_groups
+from wbc.stack.declaration import Declaration
+from wbc.stack.layout import Layout
+from wbc.stack.program import ROWS_OUTPUTS, Program
+from wbc.validation import Array
+
+
+class _Call:
+    """A CasADi function bound once to flat arrays (kept alive here, as the buffer interface requires)."""
+
+    def __init__(self, function: object, arguments: list[Array], results: list[Array]) -> None:
+        self._keep = (function, arguments, results)
+        self._buffer, self.run = function.buffer()  # type: ignore[attr-defined]
+        for i, array in enumerate(arguments):
+            self._buffer.set_arg(i, memoryview(array))
+        for i, array in enumerate(results):
+            self._buffer.set_res(i, memoryview(array))
+
+
+def _room(count: int) -> Array:
+    """At least one number: the buffer interface takes no empty array."""
+    return np.zeros(max(1, count))
+
+
+class VmAssembly:
+    """Buffers of a controller and the QP at their values; mirrors the first half of ``native/tick.c``."""
+
+    def __init__(self, program: Program, stack: Declaration, layout: Layout) -> None:
+        nv, rows, tasks = layout.nv, layout.general_rows, layout.task_rows
+        self._layout = layout
+        self._q, self._v, self._p = _room(layout.nq), _room(nv), _room(layout.parameters)
+        self.q, self.v_last, self.p = self._q[: layout.nq], self._v[:nv], self._p[: layout.parameters]
+        self.v_in, self.use_v, self.dt = np.zeros(nv), np.zeros(1), np.zeros(1)
+        self.weight, self.enabled = np.ones(tasks), np.ones(rows)
+        self.bound_enabled = np.ones(layout.bound_blocks * nv)
+        self.places = ReportLayout(layout)
+        self.report = np.zeros(self.places.size)
+        function = program.rows
+        self._out = {n: _room(function.nnz_out(i)) for i, n in enumerate(ROWS_OUTPUTS)}
+        arguments = [self._q, self._v, self._p, self.dt]
+        self._rows = _Call(function, arguments, list(self._out.values()))
+        self._ahead = None
+        self._later, self._command = _room(layout.margin_rows), _room(nv)
+        if program.ahead is not None:
+            self._ahead = _Call(program.ahead, [self._q, self._command, self._p, self.dt], [self._later])
+        jt, at = function.sparsity_out("jt"), function.sparsity_out("at")
+        self._j_index = (np.repeat(np.arange(tasks), np.diff(jt.colind())), np.array(jt.row(), dtype=np.intp))
+        self._a_index = (np.repeat(np.arange(rows), np.diff(at.colind())), np.array(at.row(), dtype=np.intp))
+        self._J, self._A = np.zeros((tasks, nv)), np.zeros((rows, nv))
+        self._damping = stack.damping / layout.dof_scales(stack) ** 2
+        self._sequence = bound_sequence(layout)
+        self._units = unit_groups(stack)
+
+    def check(self) -> int:
+        """Refuse bad inputs, or take over a measured velocity; 0 or a negative flag."""
+        bad = 0
+        if not np.isfinite(self.q).all():
+            bad = BAD_Q
+        elif any(abs(self.q[s : s + n] @ self.q[s : s + n] - 1.0) > 2e-6 for s, n in self._units):
+            bad = BAD_UNIT
+        elif self.use_v[0] and not np.isfinite(self.v_in).all():
+            bad = BAD_V
+        if not bad and self.use_v[0]:
+            self.v_last[:] = self.v_in
+        self.use_v[0] = 0.0
+        return bad
+
+    def qp(self) -> QP:
+        """The QP at the present values; also writes errors, factors and margins to the report."""
+        layout, out, places = self._layout, self._out, self.places
+        self._rows.run()
+        for name, size in (("error", layout.task_rows), ("factor", layout.task_rows), ("margin", layout.margin_rows)):
+            self.report[places[name]] = out[name][:size]
+        self._J[self._j_index] = out["jt"][: len(self._j_index[0])]
+        self._A[self._a_index] = out["at"][: len(self._a_index[0])]
+        weighted = (self.weight * out["factor"][: layout.task_rows])[:, None] * self._J
+        H = self._J.T @ weighted
+        H = 0.5 * (H + H.T)
+        H[np.diag_indices(layout.nv)] += self._damping
+        g = -weighted.T @ out["wish"][: layout.task_rows]
+        low, high = self._bounds()
+        on = self.enabled != 0.0
+        low_rows = np.where(on, out["low"][: layout.general_rows], -np.inf)
+        high_rows = np.where(on, out["high"][: layout.general_rows], np.inf)
+        return QP(H, g, np.concatenate((low, low_rows)), np.concatenate((high, high_rows)), self._A.copy())
+
+    def _bounds(self) -> tuple[Array, Array]:
+        """Bound blocks in the order of sacrifice, a later one clipped into what the earlier ones left."""
+        nv = self._layout.nv
+        low, high = np.full(nv, -np.inf), np.full(nv, np.inf)
+        owner_low, owner_high = (self.report[self.places[n]] for n in ("owner_low", "owner_high"))
+        owner_low[:] = owner_high[:] = -1.0
+        for b in self._sequence:
+            part = slice(b * nv, (b + 1) * nv)
+            on = self.bound_enabled[part] != 0.0
+            new_low = np.where(on, np.clip(self._out["bound_low"][part], low, high), low)
+            new_high = np.where(on, np.clip(self._out["bound_high"][part], low, high), high)
+            owner_low[new_low > low] = b
+            owner_high[new_high < high] = b
+            low, high = new_low, new_high
+        return low, high
+
+    def look_ahead(self) -> None:
+        """Margins at q (+) v dt, into the report."""
+        if self._ahead is not None:
+            self._command[:] = self.report[self.places["v"]]
+            self._ahead.run()
+            self.report[self.places["ahead"]] = self._later[: self._layout.margin_rows]
