@@ -45,7 +45,7 @@ def certify(qp: QP, solution: Solution) -> Certificate:
     """The certificate of ``solution.x`` and ``solution.multipliers``; the flag is not read.
 
     x* is the minimiser of the problem whose bounds are the given ones up to the rounding of one
-    evaluation, 4 u (|b_i| + |C_i| |x|) with u = 2^-53.
+    evaluation, 4 u (|b_i| + |C_i|_1 |x|_inf) with u = 2^-53.
     """
     x, lam = solution.x, solution.multipliers
     stationarity = np.abs(qp.H @ x + qp.g + lam[: qp.n] + qp.A.T @ lam[qp.n :])
@@ -75,7 +75,7 @@ def error_bound(qp: QP, solution: Solution) -> float:
     side = sides(qp, factor, solution)
     right = (side == 2) | (lam * side > 0.0)
     clean = np.where((side != 0) & right, lam, 0.0)
-    size = np.concatenate((np.abs(x), np.abs(qp.A) @ np.abs(x)))
+    size = np.concatenate((np.ones(qp.n), np.abs(qp.A).sum(axis=1))) * np.abs(x).max(initial=0.0)
 
     exact = x.astype(np.longdouble)
     bound = np.where(side == -1, qp.lower, np.where(side == 0, 0.0, qp.upper))

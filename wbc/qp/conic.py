@@ -6,7 +6,7 @@ statistics; an answer that the plugin does not call a success is never passed on
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, cast
 
 import casadi as ca
 import numpy as np
@@ -31,7 +31,7 @@ PLUGINS: dict[str, dict[str, Any]] = {
 }
 EXPERIMENTAL = tuple(name for name in PLUGINS if name != "qpoases")
 
-_INFEASIBLE = ("infeasible", "Infeasible", "INFEASIBLE")
+_INFEASIBLE = ("infeasib", "Infeasib", "INFEASIB")
 
 
 class Conic(Backend):
@@ -49,7 +49,8 @@ class Conic(Backend):
         if not ca.has_conic(plugin):
             raise SolverError("plugin", plugin, "this CasADi has no such plugin")
         self.name = plugin
-        patterns = {"h": ca.Sparsity.dense(n, n), "a": ca.Sparsity.dense(m, n)}
+        # without any row the qpOASES plugin ignored the bounds of one variable: one free row of zeros stands in
+        patterns = {"h": ca.Sparsity.dense(n, n), "a": ca.Sparsity.dense(max(m, 1), n)}
         try:
             with quiet_stdout():
                 self._function = ca.conic("qp", plugin, patterns, {**PLUGINS[plugin], "error_on_fail": False})
@@ -58,6 +59,7 @@ class Conic(Backend):
         # FunctionBuffer keeps addresses, not references: these dictionaries keep the arrays alive
         self._in = {name: np.zeros(max(1, self._function.nnz_in(name))) for name in self._function.name_in()}
         self._out = {name: np.zeros(max(1, self._function.nnz_out(name))) for name in self._function.name_out()}
+        self._in["lba"][:], self._in["uba"][:] = -np.inf, np.inf
         self.reset()
 
     def reset(self) -> None:
@@ -65,15 +67,25 @@ class Conic(Backend):
         with quiet_stdout():  # qpOASES prints a banner whenever a solver object is made
             self._buffer, self._call = self._function.buffer()
         for i, name in enumerate(self._function.name_in()):
-            self._buffer.set_arg(i, memoryview(self._in[name]))
+            self._buffer.set_arg(i, memoryview(cast("Any", self._in[name])))
         for i, name in enumerate(self._function.name_out()):
-            self._buffer.set_res(i, memoryview(self._out[name]))
+            self._buffer.set_res(i, memoryview(cast("Any", self._out[name])))
         for name in ("x0", "lam_x0", "lam_a0"):
             self._in[name][:] = 0.0
+        self._fresh = True
 
     def _solve(self, qp: QP, warm: bool) -> Solution:
-        if not warm:
-            self.reset()
+        self._load(qp)
+        solution = None
+        if warm and not self._fresh:
+            solution = self._attempt(qp)
+        if solution is None or not solution.solved:  # a refusal must not come from a bad start
+            if not self._fresh:
+                self.reset()
+            solution = self._attempt(qp)
+        return solution
+
+    def _load(self, qp: QP) -> None:
         n, m = self.n, self.m
         self._in["h"][:] = qp.H.ravel()
         self._in["g"][:] = qp.g
@@ -81,8 +93,12 @@ class Conic(Backend):
         if m:
             self._in["a"][:] = qp.A.ravel(order="F")
             self._in["lba"][:], self._in["uba"][:] = qp.lower[n:], qp.upper[n:]
+
+    def _attempt(self, qp: QP) -> Solution:
+        n, m = self.n, self.m
         for out in self._out.values():
             out[:] = np.nan
+        self._fresh = False
         self._call()
         stats = self._buffer.stats()
         iterations = max(0, int(stats.get("iter_count", 0)))

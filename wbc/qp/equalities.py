@@ -25,7 +25,7 @@ Index = NDArray[np.intp]
 #: A row whose part outside the span of the kept rows is below this share of its length is dropped.
 THRESHOLD = 1e-7
 
-#: A later row is preferred as pivot only if it is longer by this share: near-ties go to the lower index.
+#: Rows whose remainder is within this share of the longest are equally good pivots: the lowest index is taken.
 _TIE = 1e-6
 
 #: Room for the right side of a dropped row [unit of the row per second]
@@ -66,7 +66,7 @@ def independent(qp: QP, threshold: float = THRESHOLD, order: NDArray[np.int_] | 
 
     Variables with lower == upper are constants: their columns move to the right side first. Then, class by
     class of ``order`` (low numbers first; one class if None), the row with the longest remainder is
-    taken next, near-ties (1e-6) by lowest index, and every remaining row is orthogonalised against it twice.
+    taken next, near-ties (within 1e-6) by lowest index, and every remaining row is orthogonalised against it twice.
     Rows whose remainder is at most ``threshold`` of their length are dropped. A dropped row is
     consistent if its right side is met within 1e-9 + threshold |A_i| |x|, x the nearest-to-zero point
     of the kept rows: the threshold hides no more than that.
@@ -88,38 +88,24 @@ def independent(qp: QP, threshold: float = THRESHOLD, order: NDArray[np.int_] | 
     coordinates = np.zeros((rows.size, basis.shape[0]))
     chosen: list[int] = []
     for level in np.unique(priority):
-        candidates = [i for i in range(rows.size) if priority[i] == level and usable[i]]
-        while candidates and len(chosen) < basis.shape[0]:
-            pivot, size = _longest(rest, candidates)
-            if size <= threshold:
+        open_rows = (priority == level) & usable
+        while len(chosen) < basis.shape[0]:
+            sizes = np.where(open_rows, np.sqrt(np.einsum("ij,ij->i", rest, rest)), 0.0)
+            pivot = int(np.argmax(sizes >= (1.0 - _TIE) * sizes.max(initial=0.0)))
+            if sizes[pivot] <= threshold:
                 break
             k = len(chosen)
-            basis[k] = rest[pivot] / size
-            coordinates[pivot, k] = size
-            candidates.remove(pivot)
+            basis[k] = rest[pivot] / sizes[pivot]
+            coordinates[pivot, k] = sizes[pivot]
+            rest[pivot], open_rows[pivot] = 0.0, False
             chosen.append(pivot)
-            _remove_direction(rest, coordinates, basis[k], k, chosen)
+            # twice, so that rounding leaves nothing of the direction behind
+            for _ in range(2):
+                along = rest @ basis[k]
+                rest -= along[:, None] * basis[k]
+                coordinates[:, k] += along
     coordinates *= length[:, None]
     return _finish(rows, free, right, basis[: len(chosen)], coordinates[:, : len(chosen)], chosen, threshold)
-
-
-def _longest(rest: Array, candidates: list[int]) -> tuple[int, float]:
-    best, size = -1, 0.0
-    for i in candidates:
-        length = float(np.sqrt(rest[i] @ rest[i]))
-        if best < 0 or length > (1.0 + _TIE) * size:
-            best, size = i, length
-    return best, size
-
-
-def _remove_direction(rest: Array, coordinates: Array, direction: Array, k: int, chosen: list[int]) -> None:
-    """Take the direction out of all rows that are not chosen, twice, so that rounding leaves nothing behind."""
-    others = np.ones(rest.shape[0], dtype=np.bool_)
-    others[chosen] = False
-    for _ in range(2):
-        along = rest[others] @ direction
-        rest[others] -= np.outer(along, direction)
-        coordinates[others, k] += along
 
 
 def _finish(

@@ -84,15 +84,15 @@ class Relaxation:
             BoundsError: a simple bound or a row whose lower value is above its upper one.
         """
         order = validation.real_array("order", order, (self.m,)).astype(np.int_)
+        scale = np.linalg.norm(qp.A, axis=1) if unit is None else validation.real_array("unit", unit, (self.m,))
+        scale = np.where(scale > 0.0, scale, 1.0)
         crossed = np.flatnonzero(qp.lower > qp.upper)
         if crossed.size:
             i = int(crossed[0])
             raise BoundsError(f"lower[{i}]", float(qp.lower[i]), f"above upper {qp.upper[i]:g}")
         plain = self._final.solve(qp)
         if plain.solved:
-            return self._answer(qp, plain.x, plain.multipliers, "solved", plain.iterations, np.ones(self.m))
-        scale = np.linalg.norm(qp.A, axis=1) if unit is None else validation.real_array("unit", unit, (self.m,))
-        scale = np.where(scale > 0.0, scale, 1.0)
+            return self._answer(qp, plain.x, plain.multipliers, "solved", plain.iterations, scale)
         return self._cascade(qp, order, scale, plain.iterations)
 
     def _cascade(self, qp: QP, order: NDArray[np.int_], unit: Array, iterations: int) -> Relaxed:

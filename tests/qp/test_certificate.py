@@ -1,0 +1,85 @@
+"""The certificate's bound holds for every answer, and is small for the answers of the supported solvers."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from wbc.qp import QP, Solution, certify, make_solver
+from wbc.qp.reference import reference
+from wbc.qp.samples import SIZES, WEIGHTS, whole_body
+
+COUNT = {7: 120, 12: 40, 25: 10, 38: 4, 40: 4}
+
+
+def disturbed(rng: np.random.Generator, answer: Solution) -> list[Solution]:
+    """The answer, and answers with noise on the point, on the multipliers, and on both."""
+    out = [answer]
+    for size in (1e-14, 1e-11, 1e-8, 1e-5):
+        x = answer.x + size * rng.normal(size=answer.x.size)
+        lam = answer.multipliers * (1.0 + size * rng.normal(size=answer.multipliers.size))
+        out += [
+            Solution(x, answer.multipliers, "solved"),
+            Solution(answer.x, lam, "solved"),
+            Solution(x, lam, "solved"),
+        ]
+    return out
+
+
+@pytest.mark.parametrize("weight", WEIGHTS)
+@pytest.mark.parametrize("shape", SIZES, ids=str)
+def test_bound_is_never_exceeded(shape, weight):
+    rng = np.random.default_rng([shape[0], shape[3], int(1e6 * weight)])
+    solver = make_solver("daqp", shape[0], shape[2] + shape[3])
+    stated = 0
+    for _ in range(COUNT[shape[0]]):
+        qp = whole_body(rng, *shape, weight, reach=float(10.0 ** rng.uniform(-1, 1)))
+        answer = solver.solve(qp)
+        assert answer.solved
+        exact = reference(qp, answer)
+        assert certify(qp, answer).error_bound < 1e-6
+        for candidate in disturbed(rng, answer)[:: 1 if shape[0] < 20 else 3]:
+            bound = certify(qp, candidate).error_bound
+            assert np.abs(candidate.x - exact.x).max() <= bound
+            stated += np.isfinite(bound)
+    assert stated > 3 * COUNT[shape[0]]
+
+
+def test_bound_is_within_a_factor_of_the_error_where_the_worst_direction_is_hit():
+    # one weak direction, error put along it: the bound must not be a loose constant
+    qp = QP.checked(np.diag([1.0, 1.0, 1e-6]), [-0.1, 0.2, -1e-7], [-1.0] * 3, [1.0] * 3)
+    x = np.array([0.1, -0.2, 0.1 + 1e-5])
+    bound = certify(qp, Solution(x, np.zeros(3), "solved")).error_bound
+    assert 1e-5 <= bound <= 1.001e-5
+
+
+def test_duplicate_active_rows_have_a_finite_bound():
+    H, g = np.diag([1.0, 2.0, 1e-4]), np.array([-1.0, -1.0, 1e-5])
+    A = np.array([[1.0, 0.0, 0.0], [3.0, 0.0, 0.0], [1.0 / 3.0, 0.0, 0.0]])
+    bound = 0.1
+    qp = QP.checked(H, g, [-1.0] * 3 + [-np.inf] * 3, [bound, 1.0, 1.0, bound, 3 * bound, bound / 3.0], A)
+    answer = make_solver("daqp", 3, 3).solve(qp)
+    assert answer.solved
+    assert np.abs(answer.x - [0.1, 0.5, -0.1]).max() <= certify(qp, answer).error_bound < 1e-9
+
+
+def test_bound_at_zero_that_is_touched_only_to_rounding_has_a_certificate():
+    qp = QP.checked(np.eye(2), [1.0, -0.5], [0.0, -1.0], [1.0, 1.0])
+    for x0 in (-1e-30, 1e-30, 0.0):
+        answer = Solution(np.array([x0, 0.5]), np.array([-1.0, 0.0]), "solved")
+        assert certify(qp, answer).error_bound < 1e-15
+
+
+def test_no_bound_is_stated_where_none_can_be_had():
+    qp = QP.checked(np.diag([1.0, 0.0]), [0.0, 0.0], [-1.0, -1.0], [1.0, 1.0])
+    assert certify(qp, Solution(np.zeros(2), np.zeros(2), "solved")).error_bound == np.inf
+    qp = QP.checked(np.eye(2), [0.0, 0.0], [-1.0, -1.0, 2.0, 3.0], [1.0, 1.0, 2.0, 3.0], [[1.0, 1.0], [1.0, 1.0]])
+    assert certify(qp, Solution(np.ones(2), np.zeros(4), "solved")).error_bound == np.inf
+
+
+def test_residuals_are_those_of_the_definition():
+    qp = QP.checked(np.eye(2), [-1.0, 0.0], [-1.0, -1.0, 0.5], [0.25, 1.0, 0.5], [[0.0, 2.0]])
+    found = certify(qp, Solution(np.array([0.5, 0.25]), np.array([0.75, 0.0, -0.25]), "solved"))
+    assert found.stationarity == pytest.approx(0.25)
+    assert found.violation == pytest.approx(0.25)
+    assert found.complementarity == pytest.approx(0.75 * 0.25)
