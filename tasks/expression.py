@@ -98,11 +98,12 @@ class Expression(Task):
         outputs = [trace.tracer.expand(trace.error), jacobian]
         function = ca.Function("check", [trace.tracer.q, trace.symbols.vector], outputs)
         values = [run_time.flat(robot, d.name, d, d.default) for d in self.declared]
-        error, matrix = function(robot.neutral, np.concatenate([np.zeros(0), *values]))
-        if not np.isfinite(np.array(error)).all():
-            raise NotFiniteError("Expression.function", np.ravel(error), "the error at the neutral configuration")
-        if not np.isfinite(np.array(matrix)).all():
-            rows = np.flatnonzero(~np.isfinite(np.array(matrix)).all(axis=1)).tolist()
+        outcome = function(robot.neutral, np.concatenate([np.zeros(0), *values]))
+        error, matrix = (np.array(part.full()) for part in outcome)
+        if not np.isfinite(error).all():
+            raise NotFiniteError("Expression.function", error.ravel(), "the error at the neutral configuration")
+        if not np.isfinite(matrix).all():
+            rows = np.flatnonzero(~np.isfinite(matrix).all(axis=1)).tolist()
             reason = "no derivative at the neutral configuration, rows listed"
             raise NotFiniteError("Expression.function", rows, reason)
 
@@ -112,15 +113,11 @@ class Expression(Task):
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
         """One row an entry of the result."""
-        count = self._trace(robot).error.numel()
-        self._check_counts(count)
-        units = (self.units,) * count if isinstance(self.units, str) else self.units
-        default = ("value",) if count == 1 else tuple(str(k) for k in range(count))
-        return tuple(Row(label, unit) for label, unit in zip(self.labels or default, units, strict=True))
+        return self._rows(self._trace(robot))
 
     def row_weights(self, robot: Robot) -> NDArray[np.float64]:
         """The declared weights."""
-        return weights_of_rows(self.weights, self._trace(robot).error.numel())
+        return weights_of_rows(self.weights, self._trace(robot).error.numel() if self.weights is None else 0)
 
     def error(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
         """The user's function, its result checked and made a column."""
@@ -135,28 +132,39 @@ class Expression(Task):
         return _column(result)
 
     def declaration(self, robot: Robot) -> dict[str, Any]:
-        """What the function computes (not its source): a digest of the traced expression, with the inputs' layout."""
+        """What the function computes (not its source): a digest of the traced formula, with the inputs' layout."""
         trace = self._trace(robot)
-        outputs = [trace.tracer.expand(trace.error)]
-        traced = ca.Function("expression", [trace.tracer.q, trace.symbols.vector], outputs)
+        formula, known = trace.tracer.formula(trace.error)
+        arguments = [*known.values(), trace.symbols.vector]
+        traced = ca.Function("expression", arguments, [formula])
         return {
             "class": f"{type(self).__module__}.{type(self).__qualname__}",
-            "rows": [[row.label, row.unit] for row in self.rows(robot)],
-            "weights": [w.hex() for w in self.row_weights(robot).tolist()],
+            "rows": [[row.label, row.unit] for row in self._rows(trace)],
+            "weights": None if self.weights is None else [w.hex() for w in self.weights],
             "inputs": [[d.name, d.kind, run_time.size(robot, d), d.rate] for d in self.declared],
+            "symbols": list(known),
             "function": hashlib.sha256(traced.serialize().encode()).hexdigest(),
         }
+
+    def _rows(self, trace: _Trace) -> tuple[Row, ...]:
+        count = trace.error.numel()
+        self._check_counts(count)
+        units = (self.units,) * count if isinstance(self.units, str) else self.units
+        default = ("value",) if count == 1 else tuple(str(k) for k in range(count))
+        return tuple(Row(label, unit) for label, unit in zip(self.labels or default, units, strict=True))
 
     def _trace(self, robot: Robot) -> _Trace:
         tracer = Tracer(Kinematics(robot.model))
         symbols = run_time.symbols(robot, self.declared)
         error = self.error(robot, tracer, symbols.values)
-        known = {s.element_hash() for s in ca.symvar(ca.vertcat(tracer.q, symbols.vector))}
-        if any(s.element_hash() == v.element_hash() for s in ca.symvar(error) for v in ca.symvar(tracer.v)):
+        formula, known = tracer.formula(error)
+        free = {s.element_hash(): s.name() for s in ca.symvar(formula)}
+        if any(s.element_hash() in free for s in ca.symvar(tracer.v)):
             raise ShapeError("Expression.function", "kin.v", "an error is a function of the configuration, not of v")
-        stray = [s.name() for s in ca.symvar(tracer.expand(error)) if s.element_hash() not in known]
-        if stray:
-            raise ShapeError("Expression.function", stray, "the result has symbols that are not inputs")
+        for s in ca.symvar(ca.vertcat(*known.values(), symbols.vector)):
+            free.pop(s.element_hash(), None)
+        if free:
+            raise ShapeError("Expression.function", list(free.values()), "the result has symbols that are not inputs")
         return _Trace(tracer, symbols, error)
 
     def _check_counts(self, count: int) -> None:

@@ -13,6 +13,7 @@ moving obstacle) go through the same expression and give its partial derivative 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import casadi as ca
@@ -28,13 +29,15 @@ class _Symbol:
     """A placeholder ``symbol`` and the ``value`` it stands for; its rate is ``motion @ jacobian @ v``.
 
     The rate is kept as two factors because ``(partial @ motion) @ jacobian`` is much smaller than
-    ``partial @ (motion @ jacobian)``. ``inner``: value and motion are in other placeholders.
+    ``partial @ (motion @ jacobian)``. Kinematics are built when they are needed, so that an item can be traced
+    (to count its rows, to make its cache key) without them. ``inner``: value and motion are in other placeholders.
     """
 
+    name: str
     symbol: ca.SX
-    value: ca.SX
+    value: Callable[[], ca.SX]
     motion: ca.SX
-    jacobian: ca.SX
+    jacobian: Callable[[], ca.SX]
     inner: bool = False
 
 
@@ -66,16 +69,28 @@ class Tracer:
         known = self._poses.get(frame)
         if known is not None:
             return known
-        actual = self.kinematics.pose(frame)
+        kinematics = self.kinematics
+        kinematics.frame(frame)
         if frame == WORLD:
-            known = actual
+            known = kinematics.pose(frame)
         else:
-            rotation, position = ca.SX.sym(f"R_{frame}", 3, 3), ca.SX.sym(f"p_{frame}", 3)
-            jacobian = self.kinematics.jacobian(frame)
-            self._symbols.append(_Symbol(position, actual.position, _eye(), jacobian[:3, :]))
-            spin = rotation_rate(rotation)
-            self._symbols.append(_Symbol(ca.vec(rotation), ca.vec(actual.rotation), spin, jacobian[3:, :]))
-            known = Pose(rotation, position)
+            known = Pose(ca.SX.sym(f"R_{frame}", 3, 3), ca.SX.sym(f"p_{frame}", 3))
+            self._symbols += [
+                _Symbol(
+                    f"position {frame}",
+                    known.position,
+                    lambda: kinematics.pose(frame).position,
+                    _eye(),
+                    lambda: kinematics.jacobian(frame)[:3, :],
+                ),
+                _Symbol(
+                    f"rotation {frame}",
+                    ca.vec(known.rotation),
+                    lambda: ca.vec(kinematics.pose(frame).rotation),
+                    rotation_rate(known.rotation),
+                    lambda: kinematics.jacobian(frame)[3:, :],
+                ),
+            ]
         self._poses[frame] = known
         return known
 
@@ -91,9 +106,16 @@ class Tracer:
     def center_of_mass(self) -> ca.SX:
         """Centre of mass in the world [m], as a placeholder."""
         if self._com is None:
-            self._com = ca.SX.sym("com", 3)
-            jacobian = self.kinematics.center_of_mass_jacobian
-            self._symbols.append(_Symbol(self._com, self.kinematics.center_of_mass, _eye(), jacobian))
+            self._com, kinematics = ca.SX.sym("com", 3), self.kinematics
+            self._symbols.append(
+                _Symbol(
+                    "centre of mass",
+                    self._com,
+                    lambda: kinematics.center_of_mass,
+                    _eye(),
+                    lambda: kinematics.center_of_mass_jacobian,
+                )
+            )
         return self._com
 
     def rotation_error(self, frame: str, base: str, target: ca.SX) -> ca.SX:
@@ -109,19 +131,32 @@ class Tracer:
         Raises:
             UnknownNameError: no such frame.
         """
-        relative = self.rotation(frame) if base == WORLD else self.rotation(base).T @ self.rotation(frame)
-        phi, spin = ca.SX.sym(f"phi_{frame}_{base}", 3), self.kinematics.jacobian(frame)[3:, :]
+        relative, kinematics = self.rotation(frame), self.kinematics
+        phi = ca.SX.sym(f"phi_{frame}_{base}", 3)
         motion = rot.left_jacobian_inverse(phi)
         if base != WORLD:
+            relative = self.rotation(base).T @ relative
             motion = motion @ self.rotation(base).T
-            spin = spin - self.kinematics.jacobian(base)[3:, :]
-        self._symbols.append(_Symbol(phi, rot.log3(relative @ target.T), motion, spin, inner=True))
+
+        def spin() -> ca.SX:
+            own = kinematics.jacobian(frame)[3:, :]
+            return own if base == WORLD else own - kinematics.jacobian(base)[3:, :]
+
+        value = rot.log3(relative @ target.T)
+        self._symbols.append(_Symbol(f"turn {frame} {base}", phi, lambda: value, motion, spin, inner=True))
         if not ca.symvar(target):
             return phi
         # ``here`` is the target held still, so ``turn`` is zero and only its derivative counts
-        here = ca.SX.sym("R_here", 3, 3)
+        here, nv = ca.SX.sym("R_here", 3, 3), kinematics.nv
         self._symbols.append(
-            _Symbol(ca.vec(here), ca.vec(target), ca.SX(9, 0), ca.SX(0, self.kinematics.nv), inner=True)
+            _Symbol(
+                "target held still",
+                ca.vec(here),
+                lambda: ca.vec(target),
+                ca.SX(9, 0),
+                lambda: ca.SX(0, nv),
+                inner=True,
+            )
         )
         change = (target - here) @ here.T
         turn = 0.5 * ca.vertcat(change[2, 1] - change[1, 2], change[0, 2] - change[2, 0], change[1, 0] - change[0, 1])
@@ -146,20 +181,33 @@ class Tracer:
         for known in self._symbols:
             partial = ca.jacobian(expression, known.symbol)
             if partial.nnz() and known.motion.nnz():
-                total = total + ca.sparsify(partial @ known.motion) @ known.jacobian
+                total = total + ca.sparsify(partial @ known.motion) @ known.jacobian()
         return self.expand(ca.sparsify(total))
 
     def expand(self, expression: ca.SX) -> ca.SX:
         """The expression with every placeholder replaced by the kinematics that it stands for."""
-        inner = [s for s in self._symbols if s.inner]
-        if inner:
-            _, (expression,) = ca.substitute_inplace([s.symbol for s in inner], [s.value for s in inner], [expression])
+        expression = self._without_inner(expression)
         outer = [s for s in self._symbols if not s.inner]
         if not outer:
             return expression
         # A chain of coordinate axes has structural zeros that its placeholders have not
-        values = ca.densify(ca.vertcat(*[s.value for s in outer]))
+        values = ca.densify(ca.vertcat(*[s.value() for s in outer]))
         return ca.substitute(expression, ca.vertcat(*[s.symbol for s in outer]), values)
+
+    def formula(self, expression: ca.SX) -> tuple[ca.SX, dict[str, ca.SX]]:
+        """The expression before the robot's kinematics are put in, and its symbols by what they stand for.
+
+        It has as many operations as the user wrote, so it is cheap to compare and to hash.
+        """
+        symbols = {"q": self.q} | {s.name: s.symbol for s in self._symbols if not s.inner}
+        return self._without_inner(expression), symbols
+
+    def _without_inner(self, expression: ca.SX) -> ca.SX:
+        inner = [s for s in self._symbols if s.inner]
+        if not inner:
+            return expression
+        _, (out,) = ca.substitute_inplace([s.symbol for s in inner], [s.value() for s in inner], [expression])
+        return out
 
 
 def _eye() -> ca.SX:
