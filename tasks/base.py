@@ -223,7 +223,8 @@ class Constraint(Item):
 
     def row_factor(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX | None:
         """None, or one factor in [0, 1] a margin row, 1 where the margin has its plain meaning: a limit that fades
-        where its quantity is singular. :meth:`margins` contains the factor already; it is for reports only."""
+        where its quantity is singular. :meth:`margins` contains the factor already; it is for reports only.
+        """
         return None
 
     def velocity_rows(self, robot: Robot, kin: Tracer, inputs: Values, dt: ca.SX) -> Rows | None:
