@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
-from wbc.tasks.base import Constraint, Input, Order, Row, Rows, Values
-from wbc.tasks.frames import frame_pose, require_motion
 
 from wbc import validation
 from wbc.symbolic import rotations as rot
 from wbc.symbolic.tracer import Tracer
+from wbc.tasks.base import Constraint, Input, Order, Row, Rows, Values
+from wbc.tasks.frames import frame_pose, require_motion
 
 if TYPE_CHECKING:
     from wbc.robot import Robot
@@ -47,6 +47,7 @@ class Hold(Constraint):
     """
 
     order: ClassVar[Order] = Order.HOLD
+    equality: ClassVar[bool] = True
 
     frame: str
     kind: Literal["pose", "position", "orientation"] = "pose"

@@ -201,7 +201,9 @@ class Step:
         out = []
         for i in np.flatnonzero(slack):
             block, row = self._context.general[i]
-            out.append(Slack(block.entry.name, block.rows[row].label, float(slack[i]), f"{block.rows[row].unit}/s"))
+            unit = block.rows[row].unit
+            per_second = unit if unit.endswith("/s") else f"{unit or '1'}/s"
+            out.append(Slack(block.entry.name, block.rows[row].label, float(slack[i]), per_second))
         return tuple(out)
 
     def __repr__(self) -> str:

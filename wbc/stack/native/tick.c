@@ -12,7 +12,7 @@ int ahead(const double **arg, double **res, long long *iw, double *w, int mem);
 
 #define EPS 1.1102230246251565e-16
 /* Two rows whose normals differ by an angle below sqrt(DEPENDENT) count as one */
-#define DEPENDENT 1e-9
+#define DEPENDENT 1e-10
 /* A general row whose image under R^-1 is shorter than this cannot be moved by v */
 #define DEAD 1e-20
 /* Price of slack against velocity in the relaxation: slack exceeds its minimum by this fraction at most */
@@ -135,23 +135,60 @@ static void strengthen(wbc_tick *t) {
     }
 }
 
+/* Eight rows of R from the rows above them. `from` is a constant after unrolling: the row stays in registers. */
+INLINE int factor_group(wbc_tick *t, const int from) {
+    const int to = from + 8 < NV ? from + 8 : NV;
+    int ok = 1;
+    for (int k = from; k < to; k++) {
+        double row[WIDE];
+        for (int j = from; j < WIDE; j++) row[j] = t->R[k * WIDE + j];
+        for (int i = 0; i < k; i++) {
+            const double *above = t->R + i * WIDE, f = above[k];
+            for (int j = from; j < WIDE; j++) row[j] -= f * above[j];
+        }
+        const double pivot = row[k];
+        ok &= pivot > 0.0;
+        const double scale = t->inverse_diagonal[k] = 1.0 / sqrt(pivot);
+        for (int j = from; j < WIDE; j++) t->R[k * WIDE + j] = row[j] * scale;
+        for (int j = from; j < k; j++) t->R[k * WIDE + j] = 0.0;
+    }
+    return ok;
+}
+
+/* Eight rows of R^-1 from the rows below them */
+INLINE void invert_group(wbc_tick *t, const int from) {
+    const int to = from + 8 < NV ? from + 8 : NV;
+    for (int i = to - 1; i >= from; i--) {
+        const double *source = t->R + i * WIDE;
+        const double first = t->inverse_diagonal[i];
+        double row[WIDE] = {0};
+        for (int k = i + 1; k < to; k++) {
+            const double *below = t->inverse + k * WIDE;
+            for (int j = from; j < WIDE; j++) row[j] += source[k] * below[j];
+        }
+#pragma GCC unroll 64
+        for (int later = from + 8; later < NV; later += 8)
+            for (int k = later; k < (later + 8 < NV ? later + 8 : NV); k++) {
+                const double *below = t->inverse + k * WIDE;
+                for (int j = later; j < WIDE; j++) row[j] += source[k] * below[j];
+            }
+        double *out = t->inverse + i * WIDE;
+        for (int j = 0; j < from; j++) out[j] = 0.0;
+        for (int j = from; j < WIDE; j++) out[j] = -first * row[j];
+        out[i] = first;
+    }
+}
+
 /* H = R'R, upper triangle of H only, with the inverse of its diagonal; 0 where H is not positive definite.
  * Leaves -g in y. */
 static int factor(wbc_tick *t) {
     memcpy(t->R, t->H, sizeof t->R);
     for (int i = 0; i < WIDE; i++) t->y[i] = -t->g[i];
     if (MC > 0) strengthen(t);
-    for (int i = 0; i < NV; i++) {
-        double *row = t->R + i * WIDE;
-        const double pivot = row[i];
-        if (!(pivot > 0.0)) return 0;
-        const double scale = t->inverse_diagonal[i] = 1.0 / sqrt(pivot);
-        for (int j = i & ~7; j < i; j++) row[j] = 0.0;
-        for (int b = i / 8; b < WIDE / 8; b++)
-            for (int k = 0; k < 8; k++) row[8 * b + k] *= scale;
-        for (int k = i + 1; k < NV; k++) axpy(t->R + k * WIDE, row, -row[k], k);
-    }
-    return 1;
+    int ok = 1;
+#pragma GCC unroll 64
+    for (int group = 0; group < WIDE / 8; group++) ok &= factor_group(t, 8 * group);
+    return ok;
 }
 
 /* y = R^-T y, in place */
@@ -174,13 +211,10 @@ static void solve_upper(const wbc_tick *t, const double *y, double *x) {
 /* R^-1 by rows: full rows in `inverse`; packed for DAQP and divided by their lengths, which go to `scaling` as
  * 1/length, in Rinv */
 static void invert(wbc_tick *t) {
-    for (int i = NV - 1; i >= 0; i--) {
-        double *row = t->inverse + i * WIDE;
-        const double *source = t->R + i * WIDE;
-        const double first = t->inverse_diagonal[i];
-        for (int j = 0; j < WIDE; j++) row[j] = 0.0;
-        for (int k = i + 1; k < NV; k++) axpy(row, t->inverse + k * WIDE, -source[k] * first, k);
-        row[i] = first;
+#pragma GCC unroll 64
+    for (int group = WIDE / 8 - 1; group >= 0; group--) invert_group(t, 8 * group);
+    for (int i = 0; i < NV; i++) {
+        const double *row = t->inverse + i * WIDE;
         const double scale = t->scaling[i] = 1.0 / sqrt(dot(row, row, i));
         double *packed = t->Rinv + PACK(i);
         for (int j = i; j < NV; j++) packed[j] = row[j] * scale;
@@ -269,9 +303,12 @@ static int active_set(wbc_tick *t, int warm, int checked) {
         const int i = NV + k;
         if (row_order[k] >= checked || (!dependent && t->scaling[i] != 0.0)) continue;
         if (t->sense[i] & ACTIVE) continue;
-        double sum = 0.0;
-        for (int e = a_start[k]; e < a_start[k + 1]; e++) sum += t->at[e] * t->x[a_col[e]];
-        const double room = TOLERANCE * row_scale[k];
+        double sum = 0.0, square = 0.0;
+        for (int e = a_start[k]; e < a_start[k + 1]; e++) {
+            sum += t->at[e] * t->x[a_col[e]];
+            square += t->at[e] * t->at[e];
+        }
+        const double room = TOLERANCE * (row_scale[k] + 100.0 * sqrt(square * dot(t->x, t->x, 0)));
         if (sum < t->low[i] - room || sum > t->high[i] + room) return EXIT_INFEASIBLE;
     }
     return flag;
@@ -319,6 +356,32 @@ static int constrained(wbc_tick *t) {
     return flag;
 }
 
+/* Move the sides of the rows of a class so that x meets them. Where any row of the class gives way, its equalities
+ * are frozen at what they have: those that hold but for rounding would otherwise contradict the others. */
+static void widen(wbc_tick *t, int order) {
+    double value[MC + 1];
+    int given = 0;
+    for (int k = 0; k < MC; k++) {
+        if (row_order[k] != order) continue;
+        double sum = 0.0;
+        for (int e = a_start[k]; e < a_start[k + 1]; e++) sum += t->at[e] * t->x[a_col[e]];
+        const double room = TOLERANCE * row_scale[k];
+        value[k] = sum;
+        given |= sum < t->low[NV + k] - room || sum > t->high[NV + k] + room;
+    }
+    for (int k = 0; given && k < MC; k++) {
+        if (row_order[k] != order) continue;
+        const double room = TOLERANCE * row_scale[k];
+        double *low = t->low + NV + k, *high = t->high + NV + k;
+        if (*low == *high) {
+            *low = *high = value[k];
+        } else {
+            if (value[k] < *low + room) *low = value[k] - room;
+            if (value[k] > *high - room) *high = value[k] + room;
+        }
+    }
+}
+
 /* Least sum of squared slack of the rows of one class, with the classes before it as they stand:
  * min |v / s|^2 / 2 + sum (slack / scale)^2 / (2 rho). Widens the rows of the class to what was found. */
 static int relax_class(wbc_tick *t, int order) {
@@ -354,16 +417,8 @@ static int relax_class(wbc_tick *t, int order) {
     t->factored = 0;
     if (!found) return 1;
     if (flag < 0) return 0;
-    for (int k = 0; k < MC; k++) {
-        if (row_order[k] != order) continue;
-        const int i = NV + k;
-        double sum = 0.0;
-        for (int e = a_start[k]; e < a_start[k + 1]; e++) sum += t->at[e] * t->x[a_col[e]];
-        const double room = TOLERANCE * row_scale[k];
-        if (sum < t->low[i] - 0.1 * room) t->low[i] = sum - room;
-        if (sum > t->high[i] + 0.1 * room) t->high[i] = sum + room;
-        if (t->low[i] > t->high[i]) t->low[i] = t->high[i] = sum;
-    }
+    for (int i = 0; i < NV; i++) t->x[i] = clamp(t->x[i], t->low[i], t->high[i]);
+    widen(t, order);
     return 1;
 }
 
@@ -418,7 +473,7 @@ EXPORT int wbc_tick_solve(wbc_tick *t) {
     for (int k = 0; k < MC; k++) {
         const double below = t->free_low[k] - t->low[NV + k], above = t->high[NV + k] - t->free_high[k];
         const double slack = below > above ? below : above;
-        t->report.slack[k] = slack > 0.0 ? slack : 0.0;
+        t->report.slack[k] = slack > 2.0 * TOLERANCE * row_scale[k] ? slack : 0.0;
     }
     t->report.flag = flag;
     return flag;
