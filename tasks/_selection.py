@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
-from wbc.tasks.base import Row
-
 from wbc.errors import DuplicateNameError, ShapeError
+from wbc.tasks.base import Row
 
 if TYPE_CHECKING:
     from wbc.robot import Robot

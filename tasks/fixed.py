@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
 import casadi as ca
-from wbc.tasks._selection import dof_rows, joint_dofs, selection
-from wbc.tasks.base import Bounds, Constraint, Order, Row, Values
-from wbc.tasks.braking import clip
 
 from wbc import validation
 from wbc.symbolic.tracer import Tracer
+from wbc.tasks._selection import dof_rows, joint_dofs, selection
+from wbc.tasks.base import Bounds, Constraint, Order, Row, Values
+from wbc.tasks.braking import clip
 
 if TYPE_CHECKING:
     from wbc.robot import Robot

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import casadi as ca
 import numpy as np
-from wbc.tasks.base import Constraint, Input, Order, Row, Rows, Values
-from wbc.tasks.frames import require_motion
 
 from wbc import validation
 from wbc.errors import NotFiniteError, RangeError, ShapeError
 from wbc.symbolic.kinematics import WORLD
 from wbc.symbolic.tracer import Tracer
+from wbc.tasks.base import Constraint, Input, Order, Row, Rows, Values
+from wbc.tasks.frames import require_motion
 
 if TYPE_CHECKING:
     from wbc.robot import Robot

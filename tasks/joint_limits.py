@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, ClassVar
 
 import casadi as ca
 import numpy as np
-from wbc.tasks._selection import dof_rows, joint_dofs, selection
-from wbc.tasks.base import Bounds, Constraint, Input, Order, Row, Values
-from wbc.tasks.braking import braking_bound, clip
 
 from wbc import validation
 from wbc.errors import RangeError
 from wbc.symbolic.tracer import Tracer
+from wbc.tasks._selection import dof_rows, joint_dofs, selection
+from wbc.tasks.base import Bounds, Constraint, Input, Order, Row, Values
+from wbc.tasks.braking import braking_bound, clip
 
 if TYPE_CHECKING:
     from wbc.robot import Robot

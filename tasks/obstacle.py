@@ -7,8 +7,6 @@ from typing import TYPE_CHECKING, ClassVar
 
 import casadi as ca
 import pinocchio as pin
-from wbc.tasks._selection import selection
-from wbc.tasks.base import Constraint, Input, Order, Row, Values
 
 from wbc import validation
 from wbc.errors import MissingShapeError, RangeError, ShapeError, nearest
@@ -16,6 +14,8 @@ from wbc.shapes import Capsule, HalfSpace, PlacedShape, Sphere
 from wbc.symbolic import rotations as rot
 from wbc.symbolic.kinematics import WORLD, Pose
 from wbc.symbolic.tracer import Tracer
+from wbc.tasks._selection import selection
+from wbc.tasks.base import Constraint, Input, Order, Row, Values
 
 if TYPE_CHECKING:
     from wbc.robot import Robot

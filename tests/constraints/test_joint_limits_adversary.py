@@ -63,7 +63,7 @@ CHUNK = 1000
 
 
 class Adversary:
-    """Wishes a * lower + b * upper + c per tick and joint: outwards, to and fro, noise, creeping along a limit, any speed."""
+    """Wishes a * lower + b * upper + c: outwards, to and fro, noise, creeping along a limit, any speed."""
 
     def __init__(self, rng: np.random.Generator, n: int) -> None:
         self.rng, self.n = rng, n

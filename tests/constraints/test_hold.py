@@ -1,0 +1,85 @@
+"""Hold: rows against Pinocchio's Jacobian and logarithm, the default target, the kinds, bad declarations."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from tests.constraints.evaluation import probe, random_configuration
+from tests.constraints.items import tip
+from tests.constraints.robots import NAMES, robot
+from wbc.errors import RangeError, UnknownNameError
+from wbc.tasks.base import Order
+from wbc.tasks.hold import Hold
+
+ROWS = {"pose": slice(0, 6), "position": slice(0, 3), "orientation": slice(3, 6)}
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("kind", ROWS)
+def test_rows_against_pinocchio(name: str, kind: str) -> None:
+    bot, rng = robot(name), np.random.default_rng(21)
+    frame = tip(bot)
+    hold = probe(Hold(frame, kind), bot)
+    data, number = bot.model.createData(), bot.model.getFrameId(frame)
+    for _ in range(20):
+        q, gain = random_configuration(bot, rng), rng.uniform(0.0, 20.0)
+        target = pin.SE3(pin.exp3(rng.uniform(-1.5, 1.5, 3)), rng.uniform(-1, 1, 3))
+        jacobian = pin.computeFrameJacobian(bot.model, data, q, number, pin.LOCAL_WORLD_ALIGNED)
+        pin.framesForwardKinematics(bot.model, data, q)
+        here = data.oMf[number]
+        drift = np.concatenate([here.translation - target.translation, pin.log3(here.rotation @ target.rotation.T)])
+        matrix, lower, upper = hold(q, target=target, gain=gain)
+        assert matrix == pytest.approx(jacobian[ROWS[kind]], abs=1e-10)
+        assert lower == pytest.approx(-gain * drift[ROWS[kind]], abs=1e-9)
+        assert (lower == upper).all()
+
+
+def test_default_target_is_the_pose_of_the_first_step() -> None:
+    bot = robot("talos")
+    item, q = Hold(tip(bot)), random_configuration(bot, np.random.default_rng(22))
+    assert [i.default for i in item.inputs(bot) if i.name == "target"] == [None]
+    _, lower, upper = probe(item, bot)(q, **item.initial(bot, q))
+    assert lower == pytest.approx(np.zeros(6), abs=1e-12)
+    assert (lower == upper).all()
+
+
+@pytest.mark.parametrize("angle", [1e-9, 1e-3, 1.0, np.pi - 1e-6])
+def test_velocity_that_meets_the_rows_shrinks_the_drift_exponentially(angle: float) -> None:
+    """J_ang v = -gain e although J_ang is not de/dq: the error keeps its axis, up to near half a turn."""
+    bot, gain = robot("panda"), 2.0
+    frame, q = "panda_hand", np.array([0.0, -0.5, 0.0, -2.0, 0.3, 1.6, 0.7])
+    data, number = bot.model.createData(), bot.model.getFrameId(frame)
+    pin.framesForwardKinematics(bot.model, data, q)
+    here = data.oMf[number].copy()
+    axis = np.array([0.6, 0.0, 0.8])
+    target = pin.SE3(pin.exp3(-angle * axis) @ here.rotation, here.translation + np.array([0.01, -0.02, 0.03]))
+    matrix, lower, _ = probe(Hold(frame), bot)(q, target=target, gain=gain)
+    v = np.linalg.lstsq(matrix, lower, rcond=None)[0]
+    step = 1e-5
+    pin.framesForwardKinematics(bot.model, data, pin.integrate(bot.model, q, v * step))
+    later = pin.log3(data.oMf[number].rotation @ target.rotation.T)
+    assert (later - angle * axis) / step == pytest.approx(-gain * angle * axis, abs=2e-4)
+
+
+def test_rows_and_order() -> None:
+    bot = robot("panda")
+    assert [r.label for r in Hold("panda_hand").rows(bot)] == ["x", "y", "z", "rx", "ry", "rz"]
+    assert [r.unit for r in Hold("panda_hand").rows(bot)] == ["m/s"] * 3 + ["rad/s"] * 3
+    assert [r.unit for r in Hold("panda_hand", "position").rows(bot)] == ["m/s"] * 3
+    assert [r.unit for r in Hold("panda_hand", "orientation").rows(bot)] == ["rad/s"] * 3
+    assert Hold.order == Order.HOLD
+
+
+def test_bad_declarations() -> None:
+    bot = robot("panda")
+    with pytest.raises(UnknownNameError, match=r"Hold\.kind"):
+        Hold("panda_hand", "positions")  # type: ignore[arg-type]
+    with pytest.raises(RangeError, match=r"Hold\.gain"):
+        Hold("panda_hand", gain=-1.0)
+    with pytest.raises(UnknownNameError, match="did you mean 'panda_hand'"):
+        Hold("panda_hnd").validate(bot)
+    for still in ("world", "panda_link0"):
+        with pytest.raises(RangeError, match="no joint moves"):
+            Hold(still).validate(bot)
