@@ -20,7 +20,7 @@ from wbc.validation import Array
 #: Plugins and their options. All but qpoases are experimental: docs/solvers.md lists their measured errors.
 PLUGINS: dict[str, dict[str, Any]] = {
     "qpoases": {"printLevel": "none"},
-    "proxqp": {"proxqp": {"eps_abs": 1e-10, "eps_rel": 0.0, "max_iter": 10000}},
+    "proxqp": {"proxqp": {"eps_abs": 1e-9, "eps_rel": 0.0, "max_iter": 200}},
     "piqp": {"piqp": {"eps_abs": 1e-12, "eps_rel": 1e-13, "max_iter": 250}},
     "qrqp": {"print_iter": False, "print_header": False, "print_info": False},
     "ipqp": {"print_iter": False, "print_header": False, "print_info": False},
@@ -65,7 +65,8 @@ class Conic(Backend):
     def reset(self) -> None:
         """Take a fresh memory object of the solver."""
         with quiet_stdout():  # qpOASES prints a banner whenever a solver object is made
-            self._buffer, self._call = self._function.buffer()
+            buffer: tuple[Any, Any] = self._function.buffer()
+        self._buffer, self._call = buffer
         for i, name in enumerate(self._function.name_in()):
             self._buffer.set_arg(i, memoryview(cast("Any", self._in[name])))
         for i, name in enumerate(self._function.name_out()):
