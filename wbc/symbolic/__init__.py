@@ -1,6 +1,9 @@
 """Symbolic kinematics and dynamics from a ``pin.Model`` (floor 1: imports nothing above it)."""
 
+from wbc.symbolic.centroidal import Centroidal
+from wbc.symbolic.dynamics import Dynamics
 from wbc.symbolic.kinematics import WORLD, Kinematics, Pose
 from wbc.symbolic.tracer import Tracer
+from wbc.symbolic.velocity import Motion
 
-__all__ = ["WORLD", "Kinematics", "Pose", "Tracer"]
+__all__ = ["WORLD", "Centroidal", "Dynamics", "Kinematics", "Motion", "Pose", "Tracer"]

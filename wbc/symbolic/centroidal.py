@@ -13,7 +13,6 @@ from functools import cached_property
 import casadi as ca
 
 from wbc.symbolic import kernels
-from wbc.symbolic import rotations as rot
 from wbc.symbolic.dynamics import Dynamics, sum_to_root
 
 
@@ -41,9 +40,9 @@ class Centroidal:
         for j in range(1, kin.njoints):
             pose = kin.joint_pose(j)
             force, moment = self.dynamics.bodies.column_forces(j)
-            linear = pose.rotation @ force
+            step = kernels.columns_to_parent(force.shape[1])
             arm = pose.position - kin.center_of_mass
-            blocks.append((j, ca.vertcat(linear, pose.rotation @ moment + rot.skew(arm) @ linear)))
+            blocks.append((j, ca.vertcat(*step(pose.rotation, arm, force, moment))))
         return kin.columns(6, blocks)
 
     @cached_property

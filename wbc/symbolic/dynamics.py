@@ -55,11 +55,8 @@ class Bodies:
     def column_forces(self, joint: int) -> tuple[ca.SX, ca.SX]:
         """(force, moment), 3 x nv_j each, body axes: momentum of the subtree for unit velocities of the joint."""
         masses, moments = self.composite
-        first, second = moments[joint]
         linear, angular = self.kinematics.joint_subspace(joint)
-        inertia = ca.trace(second) * ca.SX(ca.DM.eye(3)) - second
-        hat = rot.skew(first)
-        return masses[joint] * linear - hat @ angular, inertia @ angular + hat @ linear
+        return kernels.column_momentum(linear.shape[1])(masses[joint], *moments[joint], linear, angular)
 
 
 class Dynamics:
@@ -101,8 +98,8 @@ class Dynamics:
         blocks = []
         for j in range(1, kin.njoints):
             linear, angular = kin.joint_subspace(j)
-            force, moment = wrenches[j]
-            blocks.append((j, force.T @ linear + moment.T @ angular))
+            effort = kernels.joint_effort(linear.shape[1], 1)
+            blocks.append((j, effort(linear, angular, *wrenches[j]).T))
         return ca.densify(kin.columns(1, blocks).T)
 
     def wrenches(self, field: AccelerationField) -> list[tuple[ca.SX, ca.SX]]:
@@ -121,26 +118,30 @@ class Dynamics:
     def mass_matrix(self) -> ca.SX:
         """M(q), nv x nv, symmetric, zero where no subtree couples, as ``pin.crba``; armature included."""
         kin = self.kinematics
+        # Every joint has columns of its own here; those of a mimic joint are added to its leader's at the end
+        ends = np.cumsum([0] + [kin.symbolic(j).nv for j in range(1, kin.njoints)])
         waiting: list[list[tuple[list[int], ca.SX, ca.SX]]] = [[] for _ in range(kin.njoints)]
-        matrix = ca.SX(ca.diag(ca.sparsify(ca.DM(self._armature))))
+        rows, columns, values = [], [], []
         for j in range(kin.njoints - 1, 0, -1):
-            columns = kin.joint_columns(j)
-            own = list(range(columns.start, columns.stop))
             linear, angular = kin.joint_subspace(j)
-            force, moment = self.bodies.column_forces(j)
-            matrix += _placed(kin.nv, own, own, _symmetric(linear.T @ force + angular.T @ moment))
-            if waiting[j]:
-                dofs = [d for part in waiting[j] for d in part[0]]
-                forces, moments = (ca.horzcat(*[part[i] for part in waiting[j]]) for i in (1, 2))
-                block = _placed(kin.nv, own, dofs, linear.T @ forces + angular.T @ moments)
-                matrix += block + block.T
-                own, force, moment = own + dofs, ca.horzcat(force, forces), ca.horzcat(moment, moments)
-            parent = kin.parents[j]
-            if parent > 0:
-                pose = kin.local_pose(j)
-                step = kernels.columns_to_parent(len(own))
-                waiting[parent].append((own, *step(pose.rotation, pose.position, force, moment)))
-        return ca.sparsify(matrix)
+            dofs = list(range(ends[j - 1], ends[j]))
+            parts = [(dofs, *self.bodies.column_forces(j)), *waiting[j]]
+            every = [d for part in parts for d in part[0]]
+            force, moment = ca.horzcat(*[part[1] for part in parts]), ca.horzcat(*[part[2] for part in parts])
+            values.append(ca.vec(kernels.joint_effort(len(dofs), len(every))(linear, angular, force, moment)))
+            rows += dofs * len(every)
+            columns += [d for d in every for _ in dofs]
+            if kin.parents[j] > 0:
+                pose, step = kin.local_pose(j), kernels.columns_to_parent(len(every))
+                waiting[kin.parents[j]].append((every, *step(pose.rotation, pose.position, force, moment)))
+        size = int(ends[-1])
+        matrix = ca.triu2symm(ca.triu(ca.SX.triplet(rows, columns, ca.vertcat(*values), size, size)))
+        if kin.followers:
+            gather = np.zeros((size, kin.nv))
+            for j in range(1, kin.njoints):
+                gather[ends[j - 1] : ends[j], kin.joint_columns(j)] = np.eye(kin.symbolic(j).nv)
+            matrix = rot.constant(gather.T) @ matrix @ rot.constant(gather)
+        return ca.sparsify(matrix + ca.SX(ca.diag(ca.sparsify(ca.DM(self._armature)))))
 
     @cached_property
     def kinetic_energy(self) -> ca.SX:
@@ -170,19 +171,3 @@ def sum_to_root(kinematics: Kinematics, own: list[tuple[ca.SX, ca.SX]]) -> list[
         pose, parent = kinematics.local_pose(j), kinematics.parents[j]
         total[parent] = kernels.wrench_to_parent()(pose.rotation, pose.position, *total[j], *total[parent])
     return total
-
-
-def _symmetric(block: ca.SX) -> ca.SX:
-    return block if block.shape[0] == 1 else ca.triu2symm(ca.triu(block))
-
-
-def _placed(size: int, rows: list[int], columns: list[int], block: ca.SX) -> ca.SX:
-    """A size x size matrix with ``block`` at rows x columns; columns named twice (a mimic joint and its leader) add."""
-    unique = list(dict.fromkeys(columns))
-    if len(unique) < len(columns):
-        gather = np.zeros((len(columns), len(unique)))
-        gather[np.arange(len(columns)), [unique.index(c) for c in columns]] = 1.0
-        block = block @ rot.constant(gather)
-    out = ca.SX(size, size)
-    out[rows, unique] = block
-    return out

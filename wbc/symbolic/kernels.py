@@ -115,6 +115,32 @@ def inertia_to_parent() -> ca.Function:
 
 
 @cache
+def joint_velocity(columns: int) -> ca.Function:
+    """(V, W, v) -> W v, V v: angular and linear velocity of a joint with motion columns V (linear) and W (angular)."""
+    (linear, angular), v = _inputs(("V", 3, columns), ("W", 3, columns)), ca.SX.sym("v", columns)
+    return ca.Function("joint_velocity", [linear, angular, v], [angular @ v, linear @ v])
+
+
+@cache
+def joint_effort(columns: int, wrenches: int) -> ca.Function:
+    """(V, W, F, N) -> V'F + W'N, columns x wrenches: what wrenches (force, moment) ask of a joint."""
+    linear, angular = _inputs(("V", 3, columns), ("W", 3, columns))
+    force, moment = _inputs(("F", 3, wrenches), ("N", 3, wrenches))
+    return ca.Function("joint_effort", [linear, angular, force, moment], [linear.T @ force + angular.T @ moment])
+
+
+@cache
+def column_momentum(columns: int) -> ca.Function:
+    """(m, h, Sigma, V, W) -> m V - [h]x W, I W + [h]x V with I = tr(Sigma) 1 - Sigma: momentum per joint velocity."""
+    m, h, sigma, linear, angular = _inputs(
+        ("m", 1, 1), ("h", 3, 1), ("Sigma", 3, 3), ("V", 3, columns), ("W", 3, columns)
+    )
+    inertia, hat = ca.trace(sigma) * ca.DM.eye(3) - sigma, ca.skew(h)
+    outputs = [m * linear - hat @ angular, inertia @ angular + hat @ linear]
+    return ca.Function("column_momentum", [m, h, sigma, linear, angular], outputs)
+
+
+@cache
 def columns_to_parent(columns: int) -> ca.Function:
     """(R, p, F, N) -> R F, R N + [p]x R F for 3 x columns matrices of forces and moments."""
     (r, f, n), (p,) = _inputs(("R", 3, 3), ("F", 3, columns), ("N", 3, columns)), _vectors("p")

@@ -50,6 +50,28 @@ class Pose:
         return Pose(self.rotation.T, -(self.rotation.T @ self.position))
 
 
+#: Which frame a name means where a description gives it to several, first come first served.
+_FRAME_TYPES = (
+    pin.FrameType.BODY,
+    pin.FrameType.JOINT,
+    pin.FrameType.FIXED_JOINT,
+    pin.FrameType.OP_FRAME,
+    pin.FrameType.SENSOR,
+)
+
+
+def frame_index(model: pin.Model, name: str) -> int:
+    """Number of a named frame; of a link and a joint of one name, the link (ANYmal C names both ``LF_HAA``).
+
+    Raises:
+        UnknownNameError: no frame of that name.
+    """
+    for kind in _FRAME_TYPES:
+        if model.existFrame(name, kind):
+            return int(model.getFrameId(name, kind))
+    raise UnknownNameError("frame", name, [f.name for f in model.frames])
+
+
 class Kinematics:
     """Expressions of one model in one configuration symbol ``q`` (nq) and velocity symbol ``v`` (nv)."""
 
@@ -153,12 +175,10 @@ class Kinematics:
         if known is None:
             if name == WORLD:
                 known = (0, self._poses[0])
-            elif self.model.existFrame(name):
-                frame = self.model.frames[self.model.getFrameId(name)]
+            else:
+                frame = self.model.frames[frame_index(self.model, name)]
                 place = frame.placement
                 known = (int(frame.parentJoint), Pose(rot.constant(place.rotation), rot.constant(place.translation)))
-            else:
-                raise UnknownNameError("frame", name, [f.name for f in self.model.frames])
             self._frames[name] = known
         return known
 

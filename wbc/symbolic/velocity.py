@@ -58,9 +58,9 @@ class AccelerationField:
             rate = kin.symbolic(joint).bias(kin.joint_q(joint), kin.v[columns])
             angular, linear = _pair(rate)
             if self._given is not None:
-                s_linear, s_angular = kin.joint_subspace(joint)
-                angular = angular + s_angular @ self._given[columns]
-                linear = linear + s_linear @ self._given[columns]
+                step = kernels.joint_velocity(columns.stop - columns.start)
+                turn, slide = step(*kin.joint_subspace(joint), self._given[columns])
+                angular, linear = angular + turn, linear + slide
             known = self._rates[joint] = (angular, linear)
         return known
 
@@ -115,9 +115,10 @@ class Motion:
         """(angular, linear) velocity of the joint's child side against its parent side, child axes: S v."""
         known = self._joint.get(joint)
         if known is None:
-            linear, angular = self.kinematics.joint_subspace(joint)
-            v = self.kinematics.v[self.kinematics.joint_columns(joint)]
-            known = self._joint[joint] = (angular @ v, linear @ v)
+            columns = self.kinematics.joint_columns(joint)
+            step = kernels.joint_velocity(columns.stop - columns.start)
+            known = step(*self.kinematics.joint_subspace(joint), self.kinematics.v[columns])
+            self._joint[joint] = known
         return known
 
     def body(self, joint: int) -> tuple[ca.SX, ca.SX]:

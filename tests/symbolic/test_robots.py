@@ -1,0 +1,41 @@
+"""Every robot of example-robot-data against Pinocchio, on its own base, floating, and some planar.
+
+Norm: max |ours - Pinocchio's| / max(1, max |Pinocchio's|) of each quantity, 1e-10; one random state a case.
+"""
+
+from __future__ import annotations
+
+import pytest
+
+from tests.symbolic.referee import FILES, Comparison, load
+
+PLANAR = (
+    "double_pendulum_description/urdf/double_pendulum_continuous.urdf",
+    "kinova_description/robots/kinova.urdf",
+    "tiago_description/robots/tiago_no_hand.urdf",
+    "pr2_description/urdf/pr2.urdf",
+    "panda_description/urdf/panda.urdf",
+)
+CASES = [(file, base) for base in ("fixed", "floating") for file in FILES] + [(file, "planar") for file in PLANAR]
+
+#: Up to this many degrees of freedom the derivatives of inverse dynamics are compared whole, above it along one
+#: random direction, which checks every entry with probability 1 at a fraction of the time.
+WHOLE_DERIVATIVES = 9
+
+
+def test_the_wheel_has_the_robots_that_the_table_was_made_for() -> None:
+    assert len(FILES) == 68
+
+
+@pytest.mark.parametrize(("file", "base"), CASES, ids=[f"{base}-{file}" for file, base in CASES])
+def test_agrees_with_pinocchio(file: str, base: str) -> None:
+    model = load(file, base)
+    comparison = Comparison(model)
+    comparison.poses()
+    if model.nv > 0:
+        comparison.frame_motion()
+        comparison.center()
+        comparison.forces()
+        comparison.torque_derivatives(full=model.nv <= WHOLE_DERIVATIVES)
+        comparison.manifold()
+    comparison.check()
