@@ -1,6 +1,6 @@
 """Each constraint in a loop on three robots from 100 random starts, judged by Pinocchio and Coal.
 
-A loop of 40 ticks follows a wish that the constraint must oppose: min |v - wish|^2 under the constraint's rows.
+A loop of 30 ticks follows a wish that the constraint must oppose: min |v - wish|^2 under the constraint's rows.
 Every check is run once more with a mutated formula, which it must notice.
 """
 
@@ -32,7 +32,7 @@ from wbc.tasks.joint_limits import JointLimits
 from wbc.tasks.obstacle import Obstacle
 
 ROBOTS = ("panda", "ur5", "talos")
-STARTS, TICKS, DT, RATE = 100, 40, 0.004, 20.0
+STARTS, TICKS, DT, RATE = 100, 30, 0.005, 20.0
 
 
 def nearest_allowed(wish: np.ndarray, matrix: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
