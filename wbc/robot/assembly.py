@@ -47,7 +47,8 @@ def assemble(description: Description, recipe: Recipe, states: Mapping[str, Mapp
             f"{old} is now {new}" for old, new in renamed.items()
         )
     for j in range(1, model.njoints):
-        symbolic_joint(model.joints[j], str(model.names[j]))
+        if "Mimic" not in model.joints[j].shortname():  # a joint without coordinates of its own
+            symbolic_joint(model.joints[j], str(model.names[j]))
     couplings = tuple(
         Coupling(
             int(model.idx_vs[model.getJointId(m.follower)]),

@@ -15,6 +15,9 @@ from collections.abc import Iterator
 
 from wbc.errors import RobotFileError
 
+#: What the C++ parsers' exceptions become in Python.
+PARSER_ERRORS = (ValueError, RuntimeError, IndexError, OverflowError)
+
 _DATA_WHEEL = "example-robot-data"
 _stderr_lock = threading.Lock()
 

@@ -9,6 +9,8 @@ The *excess* of a shape A around a convex body B is the Hausdorff distance of th
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from scipy.optimize import minimize
 from scipy.spatial import ConvexHull, QhullError
@@ -49,14 +51,11 @@ def fit_capsule(points: Array) -> PlacedShape:
         return segment_shape(middle, middle, 0.0, 0.0)
     scaled = (corners - middle) / size
     best = min((_least_volume(scaled, *start) for start in _starts(scaled)), key=_volume)
-    a, b = middle + size * best[:3], middle + size * best[3:6]
-    if np.linalg.norm(b - a) < 1e-6 * size:
-        a = b = (a + b) / 2
-    # what the shape's own rounding (rotation from a to b) moves is covered by measuring on the shape itself
-    shape = segment_shape(a, b, 0.0, 0.0)
-    ends = shape.ends()
-    radius = float(distance_to_segment(cloud, *ends).max()) * (1 + 1e-12)
-    return segment_shape(a, b, radius, excess(corners, *ends, radius))
+    ends = _shortest(scaled, best)
+    # the rotation from z to the axis rounds the ends, so the radius is measured from where the shape has them
+    line = segment_shape(middle + size * ends[0], middle + size * ends[1], 0.0, 0.0)
+    radius = float(distance_to_segment(cloud, *line.ends()).max()) * (1 + 1e-12)
+    return replace(line, shape=replace(line.shape, radius=radius), excess=excess(corners, *line.ends(), radius))
 
 
 def hull_vertices(points: Array) -> Array:
@@ -150,6 +149,25 @@ def _starts(points: Array) -> list[tuple[Array, Array]]:
     middle = (points.min(axis=0) + points.max(axis=0)) / 2
     out.append((middle - 0.01 * axes[-1], middle + 0.01 * axes[-1]))
     return out
+
+
+def _shortest(points: Array, capsule: Array) -> tuple[Array, Array]:
+    """Ends of the shortest segment on a capsule's axis that keeps all points within its radius.
+
+    The point at t on the axis, d off it, allows ends a <= t + s and b >= t - s with s = sqrt(r^2 - d^2).
+    """
+    origin, span, radius = capsule[:3], capsule[3:6] - capsule[:3], float(capsule[6])
+    length = float(np.linalg.norm(span))
+    if length < 1e-9:
+        return origin, origin
+    axis = span / length
+    t = (points - origin) @ axis
+    off = np.linalg.norm(points - origin - t[:, None] * axis, axis=1)
+    s = np.sqrt(np.maximum(radius**2 - off**2, 0.0))
+    first, last = float((t + s).min()), float((t - s).max())
+    if last - first < 1e-6:
+        first = last = (first + last) / 2
+    return origin + first * axis, origin + last * axis
 
 
 def _volume(x: Array) -> float:

@@ -15,7 +15,8 @@ import pinocchio as pin
 from wbc import validation
 from wbc.errors import RobotFileError, ShapeError
 from wbc.robot import fitting
-from wbc.robot.files import captured_stderr, read_xml
+from wbc.robot.files import PARSER_ERRORS, captured_stderr, read_xml
+from wbc.robot.mjcf import read_mjcf_geometry
 from wbc.robot.robot import Robot
 from wbc.shapes import Capsule, PlacedShape, Sphere
 from wbc.validation import Array
@@ -94,7 +95,7 @@ def mesh_vertices(path: pathlib.Path, scale: Array) -> Array:
     try:
         with captured_stderr() as noise:
             vertices = np.array(coal.MeshLoader().load(str(path), scale).vertices(), dtype=np.float64)
-    except (ValueError, RuntimeError) as error:
+    except PARSER_ERRORS as error:
         raise RobotFileError("mesh", str(path), noise.reason or " ".join(str(error).split())) from error
     if vertices.ndim != 2 or len(vertices) == 0 or not np.isfinite(vertices).all():
         raise RobotFileError("mesh", str(path), "no finite vertices in it")
@@ -130,10 +131,7 @@ def _bodies(robot: Robot, package_dirs: Iterable[Any]) -> list[Body]:
     path = pathlib.Path(robot.source)
     _, tree = read_xml(path)
     if tree.tag == "mujoco":
-        with captured_stderr():
-            model = pin.buildModelFromMJCF(str(path))
-            geometry = pin.buildGeomFromMJCF(model, str(path), pin.GeometryType.COLLISION)
-        return _geometry_bodies(model, geometry)
+        return _geometry_bodies(*read_mjcf_geometry(path))
     folders = [pathlib.Path(folder) for folder in package_dirs]
     return [
         _urdf_body(str(link.get("name")), collision, path, folders)
@@ -255,4 +253,4 @@ def _capsule(radius: float, half: float, placement: pin.SE3, gap: float) -> Plac
 
 def _axis_to_z(axis: int) -> pin.SE3:
     """A rotation whose z axis is the given axis."""
-    return pin.SE3(np.roll(np.eye(3), axis - 2, axis=1) if axis != 2 else np.eye(3), np.zeros(3))
+    return pin.SE3(np.roll(np.eye(3), 2 - axis, axis=1), np.zeros(3))

@@ -11,7 +11,7 @@ import pinocchio as pin
 
 from wbc.errors import RobotFileError
 from wbc.robot.description import Description, Mimic, root_joint
-from wbc.robot.files import captured_stderr, read_xml
+from wbc.robot.files import PARSER_ERRORS, captured_stderr, read_xml
 
 
 def read_urdf(
@@ -35,7 +35,7 @@ def read_urdf(
     try:
         with captured_stderr() as noise:
             model = pin.buildModelFromUrdf(str(path), *(() if joint is None else (joint,)))
-    except (ValueError, RuntimeError) as error:
+    except PARSER_ERRORS as error:
         reason = noise.reason or " ".join(str(error).split())
         raise RobotFileError("robot", str(path), f"the URDF parser refused it: {reason}") from error
     notes = {"parser": noise.reason} if noise.reason else {}

@@ -1,0 +1,126 @@
+"""Mimic joints become couplings or are reduced; locked joints leave the model."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import wbc.robots
+from tests.robots.files import DATA, example, joints
+from wbc.errors import NotFiniteError, RangeError, ShapeError, UnknownNameError
+
+RECIPES = {recipe.name: recipe for recipe in wbc.robots.table() if not recipe.problem}
+WITH_MIMICS = [
+    name for name, r in RECIPES.items() if any(j.find("mimic") is not None for j in joints(example(r.file)).values())
+]
+
+
+def test_thirteen_files_have_mimic_joints() -> None:
+    assert len(WITH_MIMICS) == 13
+
+
+@pytest.mark.parametrize("name", WITH_MIMICS)
+def test_couplings_are_those_of_the_file(name: str) -> None:
+    robot = wbc.robots.load(name, lock=(), shapes="none")
+    leaders = RECIPES[name].mimic_leaders
+    wanted = {}
+    for joint, element in joints(example(RECIPES[name].file)).items():
+        mimic = element.find("mimic")
+        leader = leaders.get(joint, mimic.get("joint")) if mimic is not None else None
+        if leader in robot.joint_names and joint in robot.joint_names:
+            wanted[joint] = (leader, float(mimic.get("multiplier", "1")), float(mimic.get("offset", "0")))
+    found = {robot.dof_names[c.follower]: (robot.dof_names[c.leader], c.ratio, c.offset) for c in robot.couplings}
+    assert found == wanted
+    index = robot.position_index
+    for c in robot.couplings:
+        at = c.ratio * robot.neutral[index[c.leader]] + c.offset
+        assert robot.neutral[index[c.follower]] == pytest.approx(at, abs=1e-12)
+
+
+@pytest.mark.parametrize("name", [n for n in WITH_MIMICS if RECIPES[n].lock])
+def test_table_locks_reduce_both_ends(name: str) -> None:
+    robot, whole = wbc.robots.load(name, shapes="none"), wbc.robots.load(name, lock=(), shapes="none")
+    assert robot.couplings == ()
+    assert whole.nv - robot.nv >= 2
+    assert set(robot.joint_names) < set(whole.joint_names)
+
+
+def test_misspelt_leader_chain_and_lost_follower() -> None:
+    robot = wbc.robots.load(DATA / "misspelt.urdf")
+    names = robot.dof_names
+    found = {names[c.follower]: (names[c.leader], c.ratio, c.offset) for c in robot.couplings}
+    assert found["follow"] == ("lead", -0.5, 0.25)
+    assert found["chain"] == ("lead", -1.0, pytest.approx(0.6))
+    assert "lost (of nobody)" in robot.notes["mimic"]
+    assert np.isinf(robot.limits.position_upper[robot.dofs("lost")]).all()
+    assert "lost" in robot.notes["position"]
+    assert np.isinf(robot.limits.velocity[robot.dofs("follow")]).all()
+    assert "follow" in robot.notes["velocity"]
+
+
+def test_locking_one_end_of_a_pair_locks_the_other() -> None:
+    robot = wbc.robots.load(DATA / "misspelt.urdf", lock={"follow": 0.5})
+    assert robot.joint_names == ("lost",)
+    data = robot.model.createData()
+    pin.framesForwardKinematics(robot.model, data, robot.neutral)
+    one = data.oMf[robot.model.getFrameId("one")].rotation
+    np.testing.assert_allclose(one, pin.utils.rotate("z", -0.5), atol=1e-12)
+
+
+@pytest.mark.parametrize("value", [0.7, None])
+def test_locked_joint_leaves_the_chain_where_it_is(value: float | None) -> None:
+    whole = wbc.robots.load("panda", shapes="none")
+    robot = wbc.robots.load("panda", lock={"panda_finger_joint*": None, "panda_joint3": value}, shapes="none")
+    assert robot.nv == 6
+    assert "panda_joint3" not in robot.joint_names
+    q = whole.neutral.copy()
+    q[2] = q[2] if value is None else value
+    np.testing.assert_array_equal(robot.neutral, np.delete(q, 2))
+    for field in ("position_lower", "velocity", "acceleration", "effort"):
+        np.testing.assert_array_equal(getattr(robot.limits, field), np.delete(getattr(whole.limits, field), 2))
+    poses = []
+    for r, at in ((whole, q), (robot, np.delete(q, 2))):
+        data = r.model.createData()
+        pin.framesForwardKinematics(r.model, data, at)
+        poses.append(data.oMf[r.model.getFrameId("panda_hand_tcp")].homogeneous)
+    np.testing.assert_allclose(poses[1], poses[0], atol=1e-12)
+
+
+def test_locking_an_unbounded_joint_takes_an_angle() -> None:
+    whole = wbc.robots.load("kinova", shapes="none")
+    robot = wbc.robots.load("kinova", lock={"j2s6s200_joint_4": 0.3}, shapes="none")
+    assert (robot.nq, robot.nv) == (whole.nq - 2, whole.nv - 1)
+    q = whole.neutral.copy()
+    q[4:6] = np.cos(0.3), np.sin(0.3)
+    data = whole.model.createData()
+    pin.framesForwardKinematics(whole.model, data, q)
+    mine = robot.model.createData()
+    pin.framesForwardKinematics(robot.model, mine, robot.neutral)
+    tip = robot.frames["tip"]
+    np.testing.assert_allclose(
+        mine.oMf[robot.model.getFrameId(tip)].homogeneous, data.oMf[whole.model.getFrameId(tip)].homogeneous, atol=1e-12
+    )
+
+
+def test_bad_locks() -> None:
+    with pytest.raises(UnknownNameError) as caught:
+        wbc.robots.load("panda", lock=["panda_joint33"])
+    assert caught.value.choices[0] in ("panda_joint3", "panda_finger_joint1", "panda_joint1")
+    with pytest.raises(UnknownNameError):
+        wbc.robots.load("panda", lock=["wheel_*"])
+    with pytest.raises(UnknownNameError):
+        wbc.robots.load("talos", lock=["root_joint"])
+    with pytest.raises(ShapeError):
+        wbc.robots.load("panda", lock=3)
+    with pytest.raises(NotFiniteError):
+        wbc.robots.load("panda", lock={"panda_joint3": float("nan")})
+    with pytest.raises(RangeError, match="follows panda_finger_joint1"):
+        wbc.robots.load("panda", lock={"panda_finger_joint1": 0.01, "panda_finger_joint2": 0.02})
+    with pytest.raises(ShapeError, match="several degrees of freedom"):
+        wbc.robots.load(DATA / "crawler.xml", lock={"ball": 0.1})
+
+
+def test_a_ball_joint_is_locked_as_it_is() -> None:
+    whole, robot = wbc.robots.load(DATA / "crawler.xml"), wbc.robots.load(DATA / "crawler.xml", lock="ball")
+    assert (robot.nq, robot.nv) == (whole.nq - 4, whole.nv - 3)

@@ -1,0 +1,184 @@
+"""MJCF files: a crawler with a free, hinge, slide and ball joint and two hinges in one body."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import wbc.robots
+from tests.robots.files import DATA
+from wbc.errors import RobotFileError
+from wbc.shapes import Capsule, Sphere
+
+CRAWLER = DATA / "crawler.xml"
+INF = math.inf
+
+#: Positions and first rows of the rotations of the bodies at Q, computed once with MuJoCo 4.0.0
+Q = np.array([0.1, 0.2, 0.9, 0.1, 0.2, 0.3, math.sqrt(0.86), 0.3, 0.1, 0.0, 0.6, 0.0, 0.8, 0.2, 0.3])
+MUJOCO = {
+    "trunk": ((0.1, 0.2, 0.9), (0.74, -0.51642, 0.43094)),
+    "imu": ((0.143094, 0.193453, 0.99), (0.74, -0.51642, 0.43094)),
+    "upper": ((0.248, 0.319283, 0.837811), (0.5796, -0.51642, 0.63038)),
+    "slider": ((0.121924, 0.296542, 0.684229), (0.5796, -0.51642, 0.63038)),
+    "palm": ((0.058885, 0.285172, 0.607437), (-0.44288, -0.51642, 0.73292)),
+    "two": ((-0.011056, 0.225483, 0.644936), (-0.66569, -0.36051, 0.65336)),
+}
+
+
+def write(folder: Path, body: str, head: str = "") -> Path:
+    """A model with one body."""
+    path = folder / "model.xml"
+    path.write_text(f'<mujoco>{head}<worldbody><body name="b">{body}<geom size="0.1"/></body></worldbody></mujoco>')
+    return path
+
+
+def test_structure_and_floating_base() -> None:
+    robot = wbc.robots.load(CRAWLER)
+    assert (robot.name, robot.base, robot.nq, robot.nv) == ("crawler", "floating", 15, 13)
+    assert robot.joint_names == ("base", "hinge", "slide", "ball", "Composite_h1")
+    np.testing.assert_allclose(robot.neutral, [0, 0, 1, 0, 0, 0, 1, 0.1, 0.05, 0, 0, 0, 1, 0.1, 0.1])
+    assert "home" in robot.notes["neutral"]
+
+
+def test_ranges_of_the_file_in_radians_and_metres() -> None:
+    limits = wbc.robots.load(CRAWLER).limits
+    lower = [-INF] * 6 + [-math.pi / 2, -0.1] + [-INF] * 3 + [-math.pi / 6, -INF]
+    upper = [INF] * 6 + [math.pi / 4, 0.2] + [INF] * 3 + [math.pi / 6, INF]
+    np.testing.assert_allclose(limits.position_lower, lower, atol=1e-12)
+    np.testing.assert_allclose(limits.position_upper, upper, atol=1e-12)
+    assert limits.effort[6] == 5.0
+    assert np.isinf(limits.velocity).all()
+
+
+def test_poses_against_mujoco() -> None:
+    robot = wbc.robots.load(CRAWLER)
+    data = robot.model.createData()
+    pin.framesForwardKinematics(robot.model, data, Q)
+    for name, (position, row) in MUJOCO.items():
+        pose = data.oMf[robot.model.getFrameId(name)]
+        np.testing.assert_allclose(pose.translation, position, atol=1e-6)
+        np.testing.assert_allclose(pose.rotation[0], row, atol=1e-5)
+
+
+def test_shapes_of_the_file() -> None:
+    robot = wbc.robots.load(CRAWLER)
+    assert set(robot.shapes) == {"trunk", "upper", "slider", "palm", "two"}
+    upper, slider, two = (robot.shapes[name][0] for name in ("upper", "slider", "two"))
+    assert slider.shape == Sphere(0.05)
+    assert isinstance(upper.shape, Capsule)
+    assert (upper.shape.radius, upper.shape.length) == pytest.approx((0.04, 0.3))
+    np.testing.assert_allclose(sorted(end[2] for end in upper.ends()), [-0.3, 0.0], atol=1e-12)
+    assert (upper.excess, slider.excess) == (0.0, 0.0)
+    assert isinstance(two.shape, Capsule)
+    assert (two.shape.radius, two.shape.length) == pytest.approx((0.03, 0.14))
+    assert 0.01 < two.excess < 0.02
+    np.testing.assert_allclose(two.placement.translation, 0.0, atol=1e-12)
+    assert "universe" in robot.notes["shapes"]
+
+
+def test_fixed_base_stands_where_the_file_draws_it() -> None:
+    robot = wbc.robots.load(CRAWLER, base="fixed")
+    assert (robot.base, robot.nv) == ("fixed", 7)
+    data = robot.model.createData()
+    pin.framesForwardKinematics(robot.model, data, robot.neutral)
+    np.testing.assert_allclose(data.oMf[robot.model.getFrameId("trunk")].translation, [0, 0, 1], atol=1e-12)
+
+
+@pytest.mark.parametrize("angle", ["degree", "radian"])
+def test_defaults_limited_and_ref(tmp_path: Path, angle: str) -> None:
+    head = (
+        f'<compiler angle="{angle}"/><default><default class="s"><joint type="slide" range="-.1 .2"/></default>'
+        '<default class="h"><joint range="-9 4.5"/></default></default>'
+    )
+    body = (
+        '<joint name="a" class="s" axis="1 0 0"/><joint name="b" class="h" axis="0 1 0"/>'
+        '<joint name="c" class="h" limited="false" axis="1 0 0"/>'
+        '<joint name="d" class="s" ref="0.1" range="0 0.5" axis="0 0 1"/>'
+    )
+    robot = wbc.robots.load(write(tmp_path, body, head))
+    unit = math.pi / 180 if angle == "degree" else 1.0
+    np.testing.assert_allclose(robot.limits.position_lower, [-0.1, -9 * unit, -INF, -0.1], atol=1e-12)
+    np.testing.assert_allclose(robot.limits.position_upper, [0.2, 4.5 * unit, INF, 0.4], atol=1e-12)
+    assert "ref for d" in robot.notes["position"]
+    np.testing.assert_array_equal(robot.neutral, np.zeros(4))
+
+
+def test_joint_classes_by_childclass_include_and_autolimits(tmp_path: Path) -> None:
+    (tmp_path / "classes.xml").write_text(
+        '<mujoco><default><default class="s"><joint type="slide" range="1 2"/></default></default></mujoco>'
+    )
+    path = tmp_path / "outer.xml"
+    path.write_text(
+        '<mujoco><include file="classes.xml"/><compiler autolimits="false"/><worldbody>'
+        '<body childclass="s"><joint name="free" axis="1 0 0"/><geom type="sphere" size="0.1"/>'
+        '<body><joint name="held" limited="true" axis="0 1 0"/><geom type="sphere" size="0.1"/></body>'
+        "</body></worldbody></mujoco>"
+    )
+    robot = wbc.robots.load(path)
+    np.testing.assert_array_equal(robot.limits.position_lower, [-INF, 1.0])
+    np.testing.assert_array_equal(robot.neutral, [0.0, 1.5])
+
+
+def test_joint_equalities_become_couplings(tmp_path: Path) -> None:
+    path = tmp_path / "pair.xml"
+    path.write_text(
+        '<mujoco><worldbody><body><joint name="a" axis="1 0 0"/><geom type="sphere" size=".1"/>'
+        '<body pos="1 0 0"><joint name="b" axis="1 0 0"/><geom type="sphere" size=".1"/></body></body></worldbody>'
+        '<equality><joint joint1="b" joint2="a" polycoef="0.1 -2 0 0 0"/>'
+        '<joint name="curve" joint1="b" joint2="a" polycoef="0 1 1 0 0"/></equality></mujoco>'
+    )
+    robot = wbc.robots.load(path)
+    (coupling,) = robot.couplings
+    assert (robot.dof_names[coupling.follower], robot.dof_names[coupling.leader]) == ("b", "a")
+    assert (coupling.ratio, coupling.offset) == (-2.0, 0.1)
+    assert "curve" in robot.notes["mimic"]
+
+
+def test_several_root_bodies_and_bodies_without_names(tmp_path: Path) -> None:
+    arm = '<body pos="{x} 0 0"><joint name="{n}" axis="0 0 1"/><geom type="sphere" size=".1"/>{inner}</body>'
+    inner = '<body name="tip" pos="0.5 0 0"><geom type="sphere" size=".05"/></body>'
+    path = tmp_path / "two.xml"
+    bodies = arm.format(x=1, n="a", inner=inner) + arm.format(x=2, n="b", inner="")
+    path.write_text(f"<mujoco><worldbody>{bodies}</worldbody></mujoco>")
+    robot = wbc.robots.load(path)
+    assert robot.joint_names == ("a", "b")
+    assert (robot.base, len(robot.shapes)) == ("fixed", 3)
+    data = robot.model.createData()
+    pin.framesForwardKinematics(robot.model, data, np.array([math.pi / 2, 0.0]))
+    np.testing.assert_allclose(data.oMf[robot.model.getFrameId("tip")].translation, [1, 0.5, 0], atol=1e-12)
+    np.testing.assert_allclose(data.oMi[2].translation, [2, 0, 0], atol=1e-12)
+
+
+def test_meshes_are_found_from_the_files_own_folder(tmp_path: Path) -> None:
+    (tmp_path / "meshes").mkdir()
+    corners = np.array([[0, 0, 0], [0.4, 0, 0], [0, 0.1, 0], [0, 0, 0.1]])
+    lines = [f"v {x} {y} {z}" for x, y, z in corners] + ["f 1 2 3", "f 1 2 4", "f 1 3 4", "f 2 3 4"]
+    (tmp_path / "meshes" / "wedge.obj").write_text("\n".join(lines))
+    path = tmp_path / "mesh.xml"
+    path.write_text(
+        '<mujoco><compiler meshdir="meshes"/><asset><mesh name="wedge" file="wedge.obj"/></asset><worldbody>'
+        '<body name="b"><joint name="j"/><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>'
+        '<geom type="mesh" mesh="wedge"/></body></worldbody></mujoco>'
+    )
+    (shape,) = wbc.robots.load(path, shapes="fit").shapes["b"]
+    a, b = shape.ends()
+    t = np.clip((corners - a) @ (b - a) / ((b - a) @ (b - a)), 0, 1)
+    assert (np.linalg.norm(corners - a - t[:, None] * (b - a), axis=1) <= shape.shape.radius + 1e-9).all()
+
+
+def test_refused_files(tmp_path: Path) -> None:
+    with pytest.raises(RobotFileError, match="MJCF parser refused"):
+        wbc.robots.load(write(tmp_path, '<joint type="spherical"/>'))
+    with pytest.raises(RobotFileError, match="<frame> is not supported"):
+        wbc.robots.load(write(tmp_path, '<frame pos="1 0 0"><body/></frame>'))
+    broken = tmp_path / "loop.xml"
+    broken.write_text('<mujoco><include file="loop.xml"/></mujoco>')
+    with pytest.raises(RobotFileError, match="include"):
+        wbc.robots.load(broken)
+    broken.write_text('<mujoco><include file="missing.xml"/></mujoco>')
+    with pytest.raises(RobotFileError, match="no such file"):
+        wbc.robots.load(broken)

@@ -1,0 +1,90 @@
+"""What is no robot description is refused with a typed error that says why, and with nothing on stderr."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import wbc.robots
+from wbc.errors import BoundsError, RobotFileError, ShapeError, UnknownNameError, UnsupportedJointError, WbcError
+
+LINKS = '<link name="a"/><link name="b"/>'
+JOINT = '<joint name="j" type="revolute"><parent link="a"/><child link="{child}"/>{limit}</joint>'
+BAD_URDFS = {
+    "no_name": (f"<robot>{LINKS}</robot>", "No name given"),
+    "no_links": ('<robot name="r"/>', "link"),
+    "no_limit": (f'<robot name="r">{LINKS}{JOINT.format(child="b", limit="")}</robot>', "limit"),
+    "lost_child": (f'<robot name="r">{LINKS}{JOINT.format(child="c", limit="")}</robot>', "parser refused"),
+    "not_xml": ('<robot name="r">', "not well-formed"),
+    "empty": ("", "not well-formed"),
+    "html": ("<html><body/></html>", "neither URDF nor MJCF"),
+    "two_roots": ('<robot name="r"><link name="a"/><link name="b"/></robot>', "root"),
+}
+
+
+@pytest.mark.parametrize("name", BAD_URDFS)
+def test_broken_descriptions(tmp_path: Path, name: str, capfd: pytest.CaptureFixture[str]) -> None:
+    text, reason = BAD_URDFS[name]
+    path = tmp_path / "bad.urdf"
+    path.write_text(text)
+    with pytest.raises(RobotFileError, match=reason) as caught:
+        wbc.robots.load(path)
+    assert caught.value.value == str(path)
+    assert caught.value.field == "robot"
+    assert capfd.readouterr() == ("", "")
+
+
+def test_missing_directory_and_binary(tmp_path: Path) -> None:
+    with pytest.raises(RobotFileError, match="no such file"):
+        wbc.robots.load(str(tmp_path / "nothing.urdf"))
+    with pytest.raises(RobotFileError, match="no such file"):
+        wbc.robots.load("nothing.urdf")
+    with pytest.raises(RobotFileError, match="directory"):
+        wbc.robots.load(tmp_path)
+    (tmp_path / "noise.urdf").write_bytes(bytes(range(128, 256)))
+    with pytest.raises(RobotFileError, match="cannot be read"):
+        wbc.robots.load(tmp_path / "noise.urdf")
+
+
+def test_limits_upside_down(tmp_path: Path) -> None:
+    limit = '<limit lower="1" upper="-1" velocity="1" effort="1"/>'
+    path = tmp_path / "bounds.urdf"
+    path.write_text(f'<robot name="r">{LINKS}{JOINT.format(child="b", limit=limit)}</robot>')
+    with pytest.raises(BoundsError, match="position_lower"):
+        wbc.robots.load(path)
+
+
+def test_unknown_names_list_the_nearest() -> None:
+    with pytest.raises(UnknownNameError, match="did you mean 'panda'") as caught:
+        wbc.robots.load("pandaa")
+    assert caught.value.choices[0] == "panda"
+    assert set(caught.value.choices) == {recipe.name for recipe in wbc.robots.table()}
+    with pytest.raises(UnknownNameError, match="did you mean 'fit'"):
+        wbc.robots.load("panda", shapes="fitt")
+
+
+@pytest.mark.parametrize("what", [3, None, 2.5, [], {"a": 1}, np.zeros(3)])
+def test_things_that_are_no_robot(what: object) -> None:
+    with pytest.raises(ShapeError, match="expected a name, a path"):
+        wbc.robots.load(what)
+
+
+def test_unsupported_joint_is_refused_unless_locked() -> None:
+    model = pin.Model()
+    first = model.addJoint(0, pin.JointModelEllipsoid(1.0, 2.0, 3.0), pin.SE3.Identity(), "egg")
+    model.addJointFrame(first)
+    second = model.addJoint(first, pin.JointModelRX(), pin.SE3.Identity(), "turn")
+    model.addJointFrame(second)
+    with pytest.raises(UnsupportedJointError, match="egg"):
+        wbc.robots.load(model)
+    assert wbc.robots.load(model, lock="egg").joint_names == ("turn",)
+
+
+def test_every_error_is_a_wbc_error_and_the_next_load_works() -> None:
+    for bad in ("pandaa", "no/such.urdf", 3, [1]):
+        with pytest.raises(WbcError):
+            wbc.robots.load(bad)
+    assert wbc.robots.load("panda").nv == 7

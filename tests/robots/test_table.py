@@ -1,0 +1,125 @@
+"""Every row of the table: loads (or says why not), with limits, neutral configuration and frames that hold."""
+
+from __future__ import annotations
+
+import functools
+import math
+import time
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import wbc.robots
+from tests.robots.files import example, joints
+from wbc.errors import RobotFileError
+from wbc.robot import Recipe, Robot
+from wbc.robot.files import example_data_folder
+
+TABLE = {recipe.name: recipe for recipe in wbc.robots.table()}
+LOADABLE = [name for name, recipe in TABLE.items() if not recipe.problem]
+
+
+@functools.cache
+def bare(name: str) -> Robot:
+    """A robot without shapes, loaded once."""
+    return wbc.robots.load(name, shapes="none")
+
+
+def test_every_urdf_of_the_wheel_has_one_row() -> None:
+    files = sorted(str(p.relative_to(example_data_folder())) for p in example_data_folder().rglob("*.urdf"))
+    rows = sorted(recipe.file for recipe in TABLE.values() if recipe.file.endswith(".urdf"))
+    assert rows == files
+    assert len(files) == 69
+
+
+def test_every_folder_of_the_wheel_has_a_row() -> None:
+    folders = {p.name for p in example_data_folder().iterdir() if p.is_dir()}
+    assert {recipe.file.split("/")[0] for recipe in TABLE.values()} == folders
+    assert len(folders) == 39
+
+
+@pytest.mark.parametrize("name", [name for name, recipe in TABLE.items() if recipe.problem])
+def test_rows_with_a_problem_are_listed_and_refused(name: str) -> None:
+    assert name not in wbc.robots.names()
+    with pytest.raises(RobotFileError) as caught:
+        wbc.robots.load(name)
+    reason = {"ur3_xacro": "No name given for the robot", "cassie": "<sdf>"}[name]
+    assert reason in str(caught.value)
+
+
+@pytest.mark.parametrize("name", LOADABLE)
+def test_robot_loads_as_its_row_says(name: str) -> None:
+    recipe: Recipe = TABLE[name]
+    robot = wbc.robots.load(name)
+    assert (robot.name, robot.base) == (name, recipe.base)
+    assert robot.source == str(example(recipe.file))
+    assert robot.notes["acceleration"]
+    assert len(set(robot.frame_names)) == len({str(f.name) for f in robot.model.frames} | {"world"})
+    assert len({str(f.name) for f in robot.model.frames}) == robot.model.nframes
+    data = robot.model.createData()
+    pin.framesForwardKinematics(robot.model, data, robot.neutral)
+    for frame in robot.frames.values():
+        assert np.isfinite(data.oMf[robot.model.getFrameId(frame)].homogeneous).all()
+
+
+@pytest.mark.parametrize("name", LOADABLE)
+def test_limits_are_those_of_the_file(name: str) -> None:
+    robot = bare(name)
+    elements = joints(example(TABLE[name].file))
+    limits = robot.limits
+    assert (limits.position_lower <= limits.position_upper).all()
+    for joint in robot.joint_names[1 if robot.base_nv else 0 :]:
+        element, dof = elements[joint], robot.dofs(joint)
+        limit = element.find("limit")
+        bounded = element.get("type") != "continuous" and limit is not None
+        given = bounded and (limit.get("lower") is not None or limit.get("upper") is not None)
+        wanted = (float(limit.get("lower", "0")), float(limit.get("upper", "0"))) if given else (-math.inf, math.inf)
+        assert (limits.position_lower[dof][0], limits.position_upper[dof][0]) == pytest.approx(wanted)
+        for key in ("velocity", "effort"):
+            number = float(limit.get(key, "0")) if limit is not None else 0.0
+            assert getattr(limits, key)[dof][0] == pytest.approx(number if number else math.inf)
+            assert number or joint in robot.notes[key]
+
+
+@pytest.mark.parametrize("name", LOADABLE)
+def test_base_is_unlimited_and_neutral_is_within_limits(name: str) -> None:
+    robot = bare(name)
+    for array in (robot.limits.position_upper, -robot.limits.position_lower, robot.limits.velocity):
+        assert np.isinf(array[: robot.base_nv]).all()
+    assert pin.isNormalized(robot.model, robot.neutral)
+    for dof in np.flatnonzero(robot.position_index >= 0):
+        q = robot.neutral[robot.position_index[dof]]
+        assert robot.limits.position_lower[dof] <= q <= robot.limits.position_upper[dof], robot.dof_names[dof]
+
+
+@pytest.mark.parametrize("name", [n for n in LOADABLE if not TABLE[n].acceleration])
+def test_unknown_accelerations_are_unlimited_and_said_so(name: str) -> None:
+    robot = bare(name)
+    assert np.isinf(robot.limits.acceleration).all()
+    assert robot.notes["acceleration"] == "none known: unlimited"
+
+
+def test_published_accelerations() -> None:
+    panda = wbc.robots.load("panda", shapes="none")
+    np.testing.assert_array_equal(panda.limits.acceleration, [15, 7.5, 10, 12.5, 15, 20, 20])
+    assert "Franka" in panda.notes["acceleration"]
+    np.testing.assert_array_equal(wbc.robots.load("xarm7").limits.acceleration, np.full(7, 20.0))
+
+
+def test_neutral_configurations_come_from_the_srdf() -> None:
+    panda = wbc.robots.load("panda")
+    np.testing.assert_array_equal(panda.neutral, [0, -0.785398, 0, -2.35619, 0, 1.5707, 0.785398])
+    talos = wbc.robots.load("talos")
+    assert talos.neutral[2] == 1.01927
+    assert talos.neutral[talos.model.joints[talos.model.getJointId("leg_left_4_joint")].idx_q] == 0.85838
+
+
+def test_loading_is_fast() -> None:
+    wbc.robots.load("panda")
+    spans = []
+    for _ in range(5):
+        start = time.perf_counter()
+        wbc.robots.load("panda")
+        spans.append(time.perf_counter() - start)
+    assert min(spans) < 0.3
