@@ -1,8 +1,8 @@
 """Equality rows made independent, and then orthonormal, before a solver sees them.
 
 An active-set solver works with the rows seen through the factor of H. There, rows of a well-posed
-problem can be nearly parallel: with a posture weight of 1e-8, DAQP called 32 of 40 feasible problems
-infeasible whose equality rows were 1e-2 (relative) away from dependence. Two exact changes cure it:
+problem can be nearly parallel: with a posture weight of 1e-8, DAQP called 40 of 40 feasible problems
+infeasible whose equality rows were 1e-3 (relative) away from dependence. Two exact changes cure it:
 
     rows      A_E x = b            ->  Q x = d           Q orthonormal, the same affine set
     Hessian   H, g                 ->  H + rho Q'Q, g - rho Q'd      (a constant on that set)

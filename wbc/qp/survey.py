@@ -111,7 +111,7 @@ def survey(names: Sequence[str], count: int = 2, timeout: float = 300.0) -> list
 def table(findings: Sequence[Finding]) -> str:
     """The findings as a Markdown table."""
     lines = [
-        "| solver | solved | largest error | median error | largest bound | off > 1e-6 | infeasible refused | median us |",
+        "| solver | solved | largest error | median error | largest bound | > 1e-6 | infeasible refused | median µs |",
         "|---|---|---|---|---|---|---|---|",
     ]
     for f in findings:
