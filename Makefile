@@ -59,13 +59,13 @@ $(READY): requirements/lock.txt pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' \
 		|| { echo "Python 3.11 or newer is needed; say which: make PYTHON=/path/to/python3.11"; exit 1; }
 	$(call make_venv,$(VENV))
-	$(BIN)/python -m pip install --quiet --requirement requirements/lock.txt
+	$(BIN)/python -m pip install --quiet --no-deps --requirement requirements/lock.txt
 	$(BIN)/python -m pip install --quiet --no-deps --no-build-isolation --editable .
 	@touch $@
 
 $(PEERS_READY): requirements/peers.txt
 	$(call make_venv,$(PEERS_VENV))
-	$(PEERS_VENV)/bin/python -m pip install --quiet --requirement requirements/peers.txt
+	$(PEERS_VENV)/bin/python -m pip install --quiet --no-deps --requirement requirements/peers.txt
 	@touch $@
 
 # Debian splits ensurepip off from Python; then pip is brought in by the pip outside.
