@@ -97,9 +97,7 @@ def mimic_joint(joint: Any, leader: SymbolicJoint, name: str = "joint") -> Symbo
     def subspace(q: ca.SX) -> ca.SX:
         return scaling * follower.subspace(q)
 
-    return SymbolicJoint(
-        leader.nq, leader.nv, placement, subspace, leader.tangent, leader.integrate, leader.difference
-    )
+    return SymbolicJoint(leader.nq, leader.nv, placement, subspace, leader.tangent, leader.integrate, leader.difference)
 
 
 def _at(joint: Any, coordinates: Any) -> tuple[Any, Any]:

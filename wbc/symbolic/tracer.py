@@ -206,7 +206,9 @@ class Tracer:
         inner = [s for s in self._symbols if s.inner]
         if not inner:
             return expression
-        _, (out,) = ca.substitute_inplace([s.symbol for s in inner], [s.value() for s in inner], [expression])
+        _, (out,) = ca.substitute_inplace(
+            [s.symbol for s in inner], [ca.densify(s.value()) for s in inner], [expression]
+        )
         return out
 
 
