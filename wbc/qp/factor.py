@@ -8,11 +8,11 @@ where H has weights of 1 beside weights of 1e-6.
 
 from __future__ import annotations
 
+import functools
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg.lapack import dpotrf, dtrtri, dtrtrs
 
 from wbc.qp.problem import QP, Solution
 from wbc.validation import Array
@@ -40,12 +40,12 @@ class Factor:
     """
 
     def __init__(self, qp: QP) -> None:
-        factor, info = dpotrf(qp.H, lower=0, clean=1)
+        factor, info = _lapack().dpotrf(qp.H, lower=0, clean=1)
         self.definite = info == 0 and bool(np.isfinite(factor).all())
         if not self.definite:
             return
         self.R: Array = factor
-        self.inverse: Array = dtrtri(factor, lower=0)[0]
+        self.inverse: Array = _lapack().dtrtri(factor, lower=0)[0]
         self.rows: Array = np.vstack((self.inverse, qp.A @ self.inverse))
         self.norms: Array = np.sqrt(np.einsum("ij,ij->i", self.rows, self.rows))
         self.wide_H: Wide = qp.H.astype(np.longdouble)
@@ -113,14 +113,22 @@ class ActiveRows:
         """(dy, mu) with dy + M_S' mu = force and M_S dy = offset: one step of the active-set KKT system."""
         if self.index.size == 0:
             return force, np.zeros(0)
-        along = dtrtrs(self.T, offset, lower=0, trans=1)[0]
+        along = _lapack().dtrtrs(self.T, offset, lower=0, trans=1)[0]
         inside = self.Q.T @ force
         dy = force + self.Q @ (along - inside)
-        mu = dtrtrs(self.T, inside - along, lower=0)[0]
+        mu = _lapack().dtrtrs(self.T, inside - along, lower=0)[0]
         return dy, mu
 
     def inverse_norm(self) -> float:
         """Frobenius norm of T^-1, at least 1 / (smallest singular value of M_S)."""
         if self.index.size == 0:
             return 0.0
-        return float(np.linalg.norm(dtrtri(self.T, lower=0)[0]))
+        return float(np.linalg.norm(_lapack().dtrtri(self.T, lower=0)[0]))
+
+
+@functools.cache
+def _lapack() -> Any:
+    """LAPACK of scipy, imported at first use: the compiled tick does without it."""
+    from scipy.linalg import lapack
+
+    return lapack

@@ -12,8 +12,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from scipy.optimize import minimize
-from scipy.spatial import ConvexHull, QhullError
 
 from wbc import validation
 from wbc.errors import ShapeError
@@ -60,6 +58,9 @@ def fit_capsule(points: Array) -> PlacedShape:
 
 def hull_vertices(points: Array) -> Array:
     """The vertices of the convex hull; all distinct points where they are flat or too few for a hull."""
+    # Imported here: most processes fit no shapes, and scipy takes longer to import than all the rest
+    from scipy.spatial import ConvexHull, QhullError
+
     distinct = np.unique(points, axis=0)
     if len(distinct) < 5:
         return distinct
@@ -176,6 +177,7 @@ def _volume(x: Array) -> float:
 
 def _least_volume(points: Array, a: Array, b: Array) -> Array:
     """(a, b, radius), a local minimum of the volume with radius >= distance of every point to the segment."""
+    from scipy.optimize import minimize
 
     def slack(x: Array) -> Array:
         return np.asarray(x[6] - distance_to_segment(points, x[:3], x[3:6]))
