@@ -11,6 +11,7 @@ from wbc.tasks.fixed import Fixed
 from wbc.tasks.frame_velocity_limit import FrameVelocityLimit
 from wbc.tasks.hold import Hold
 from wbc.tasks.joint_limits import JointLimits
+from wbc.tasks.mechanism import Mechanism
 from wbc.tasks.obstacle import Obstacle
 from wbc.tasks.pitch_plane import PitchPlane
 from wbc.tasks.pitch_plane_limit import PitchPlaneLimit
@@ -31,6 +32,7 @@ __all__ = [
     "Input",
     "Item",
     "JointLimits",
+    "Mechanism",
     "Obstacle",
     "Order",
     "PitchPlane",

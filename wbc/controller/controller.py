@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -52,10 +53,9 @@ class Controller:
             self.tick = SolvedTick(VmAssembly(artifact.program, stack, layout), stack, layout, solver)
         else:
             raise SolverError("artifact", artifact, "has neither a library nor a program")
+        self._call: Callable[[], int] = self.tick.step
         if isinstance(self.tick, NativeTick):
             self._call = functools.partial(self.tick.step_function, self.tick.pointer)
-        else:
-            self._call = self.tick.step
         self._q, self._report, self._shape = self.tick.q, self.tick.report, (layout.nq,)
         self._waiting: dict[str, list[Slot]] = {}
         self._handles = {name: Handle(self, block) for name, block in layout.blocks.items()}
@@ -134,7 +134,7 @@ class Controller:
 
     def write(self, slot: Slot, numbers: Array) -> None:
         """Write validated numbers of an input; it no longer follows the first configuration."""
-        self.tick.p[slot.slice] = numbers
+        self.tick.p[slot.span] = numbers
         for table in (self._waiting, self._first):
             for name in list(table):
                 table[name] = [s for s in table[name] if s is not slot]
@@ -161,7 +161,7 @@ class Controller:
             return
         if slot.input.name == "rate":
             value = min(float(value), 1.0 / self.stack.dt_range[1])
-        self.tick.p[slot.slice] = self._handles[name].checked(slot.input.name, value)
+        self.tick.p[slot.span] = self._handles[name].checked(slot.input.name, value)
 
     def _initialise(self, q: Array) -> None:
         values: list[tuple[Slot, Array]] = []
@@ -172,7 +172,7 @@ class Controller:
                     raise SolverError(f"{name}.{slot.input.name}", None, "has no default value; set it before step")
                 values.append((slot, self._handles[name].checked(slot.input.name, initial[slot.input.name])))
         for slot, numbers in values:
-            self.tick.p[slot.slice] = numbers
+            self.tick.p[slot.span] = numbers
         self._waiting = {}
 
     # Off the fast path

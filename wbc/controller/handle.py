@@ -59,7 +59,7 @@ class Handle:
             return self._weight
         slot = self._slot(name)
         self._controller.fill_defaults(self._field(name))
-        return _as_written(slot, self._controller.tick.p[slot.slice])
+        return _as_written(slot, self._controller.tick.p[slot.span])
 
     def __setattr__(self, name: str, value: Any) -> None:
         field = self._field(name)
@@ -95,12 +95,12 @@ class Handle:
         tick, block, form = self._controller.tick, self._block, self._block.form
         on = self._mask * float(self._enabled)
         if form == "task":
-            tick.weight[block.slice] = self._weight * on * self._row_weights * self._controller.row_costs[block.slice]
+            tick.weight[block.span] = self._weight * on * self._row_weights * self._controller.row_costs[block.span]
         elif form == "bounds":
             nv = self._controller.stack.robot.nv
             tick.bound_enabled[block.start * nv : (block.start + 1) * nv] = on
         else:
-            tick.enabled[block.slice] = on
+            tick.enabled[block.span] = on
 
     def _checked_mask(self, field: str, value: Any) -> Array:
         raw = validation.real_array(field, value)
@@ -113,7 +113,7 @@ class Handle:
         return mask
 
     def _slot(self, name: str) -> Slot:
-        slot = self._block.slots.get(name)
+        slot: Slot | None = self._block.slots.get(name)
         if slot is None:
             raise UnknownValueError(self._field(name), name, self.names)
         return slot

@@ -31,13 +31,14 @@ class ReportLayout:
             "error": layout.task_rows + 1,
             "factor": layout.task_rows + 1,
             "margin": layout.margin_rows + 1,
+            "margin_factor": layout.margin_rows + 1,
             "ahead": layout.margin_rows + 1,
             "multipliers": nv + rows + 1,
             "slack": rows + 1,
             "owner_low": nv,
             "owner_high": nv,
         }
-        padding = {"error": 1, "factor": 1, "margin": 1, "ahead": 1, "multipliers": 1, "slack": 1}
+        padding = {"error": 1, "factor": 1, "margin": 1, "margin_factor": 1, "ahead": 1, "multipliers": 1, "slack": 1}
         self.slices: dict[str, slice] = {}
         start = 0
         for name, size in sizes.items():
@@ -51,4 +52,4 @@ class ReportLayout:
     @cached_property
     def flag(self) -> int:
         """Index of the flag."""
-        return self.slices["flag"].start
+        return int(self.slices["flag"].start)

@@ -150,15 +150,17 @@ class Step:
         """Error of every task before the step, by name, with units."""
         error = self._part("error")
         return {
-            b.entry.name: Residual(error[b.slice], tuple(r.unit for r in b.rows), tuple(r.label for r in b.rows))
+            b.entry.name: Residual(error[b.span], tuple(r.unit for r in b.rows), tuple(r.label for r in b.rows))
             for b in self._context.layout.of_form("task")
         }
 
     @property
     def faded(self) -> tuple[str, ...]:
-        """Tasks of which a row is faded because its error is near singular."""
-        factor = self._part("factor")
-        return tuple(b.entry.name for b in self._context.layout.of_form("task") if (factor[b.slice] < 1.0).any())
+        """Items of which a row is faded because its error or margin is near singular."""
+        layout, task, margin = self._context.layout, self._part("factor"), self._part("margin_factor")
+        parts = [(b, task[b.span]) for b in layout.of_form("task")]
+        parts += [(b, margin[b.margins]) for b in layout.of_form("margins")]
+        return tuple(b.entry.name for b, factor in parts if (factor < 1.0).any())
 
     @property
     def margins(self) -> Mapping[str, Array]:
@@ -190,7 +192,7 @@ class Step:
                 out.append(Binding(name, context.stack.robot.dof_names[i], side, value))
             else:
                 block, row = context.general[i - nv]
-                side = "equal" if block.entry.item.equality else side
+                side = "equal" if getattr(block.entry.item, "equality", False) else side
                 out.append(Binding(block.entry.name, block.rows[row].label, side, value))
         return tuple(out)
 

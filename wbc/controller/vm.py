@@ -20,9 +20,9 @@ class _Call:
         self._keep = (function, arguments, results)
         self._buffer, self.run = function.buffer()  # type: ignore[attr-defined]
         for i, array in enumerate(arguments):
-            self._buffer.set_arg(i, memoryview(array))
+            self._buffer.set_arg(i, memoryview(array.data))
         for i, array in enumerate(results):
-            self._buffer.set_res(i, memoryview(array))
+            self._buffer.set_res(i, memoryview(array.data))
 
 
 def _room(count: int) -> Array:
@@ -77,7 +77,12 @@ class VmAssembly:
         """The QP at the present values; also writes errors, factors and margins to the report."""
         layout, out, places = self._layout, self._out, self.places
         self._rows.run()
-        for name, size in (("error", layout.task_rows), ("factor", layout.task_rows), ("margin", layout.margin_rows)):
+        for name, size in (
+            ("error", layout.task_rows),
+            ("factor", layout.task_rows),
+            ("margin", layout.margin_rows),
+            ("margin_factor", layout.margin_rows),
+        ):
             self.report[places[name]] = out[name][:size]
         self._J[self._j_index] = out["jt"][: len(self._j_index[0])]
         self._A[self._a_index] = out["at"][: len(self._a_index[0])]

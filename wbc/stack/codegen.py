@@ -135,7 +135,8 @@ def _table(kind: str, name: str, values: Iterable[float]) -> str:
 
 def _blocks(start: np.ndarray, col: np.ndarray) -> list[str]:
     """BLOCKS: statements that add the task rows to H and g, rows of equal columns together.
-    DIAGONALS: statements that add the rows of one entry to the diagonal in ``y``."""
+    DIAGONALS: statements that add the rows of one entry to the diagonal in ``y``.
+    """
     build: list[str] = []
     diagonals: list[str] = []
     row, rows = 0, len(start) - 1

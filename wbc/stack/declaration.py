@@ -10,6 +10,7 @@ from wbc import validation
 from wbc.errors import DuplicateNameError, LevelError, RangeError, ShapeError, UnknownNameError
 from wbc.robot import Robot
 from wbc.tasks.base import Constraint, Item, Task
+from wbc.tasks.mechanism import Mechanism
 
 #: Default cost of velocity against a task row of weight 1, per (rad/s)^2: keeps the optimum unique.
 #: It biases a posture task of weight w by the fraction damping / w.
@@ -46,6 +47,8 @@ class Declaration:
         chosen = robot.characteristic_length if length is None else length
         self._length = validation.scalar("length", chosen, low=0.0, open_low=True, unit="m")
         self._entries: dict[str, Entry] = {}
+        if robot.couplings or robot.locked_dofs:
+            self.add(Mechanism())
 
     @property
     def robot(self) -> Robot:

@@ -9,7 +9,7 @@ import numpy as np
 from wbc.errors import ShapeError
 from wbc.stack.declaration import Declaration, Entry
 from wbc.tasks import inputs
-from wbc.tasks.base import Constraint, Form, Input, Row
+from wbc.tasks.base import Constraint, Form, Input, Row, Task
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,7 +21,7 @@ class Slot:
     size: int
 
     @property
-    def slice(self) -> slice:
+    def span(self) -> slice:
         """Place in the parameter buffer."""
         return slice(self.start, self.start + self.size)
 
@@ -42,7 +42,7 @@ class Block:
     slots: dict[str, Slot]
 
     @property
-    def slice(self) -> slice:
+    def span(self) -> slice:
         """Rows of the block within its form."""
         return slice(self.start, self.start + len(self.rows))
 
@@ -77,11 +77,9 @@ class Layout:
             form = item.form
             if form == "margins":
                 declared.append(Input("rate", unit="1/s", default=item.default_rate, low=0.0))
-        elif not any(i.name == "gain" for i in declared):
-            default = getattr(item, "gain", None)
-            declared.append(
-                Input("gain", unit="1/s", default=item.default_gain if default is None else default, low=0.0)
-            )
+        elif isinstance(item, Task) and not any(i.name == "gain" for i in declared):
+            default = item.default_gain if item.gain is None else item.gain
+            declared.append(Input("gain", unit="1/s", default=default, low=0.0))
         for declared_input in declared:
             if declared_input.name in slots:
                 raise ShapeError(f"{entry.name}.inputs", declared_input.name, "an input of this name is declared twice")

@@ -10,6 +10,7 @@ Outputs of ``rows(q, v, p, dt)`` (MT task rows, MC general rows, NB bound blocks
     low     MC       lower side of general rows
     high    MC       upper side
     margin  MH       h of every margin row
+    margin_factor  MH  factor in [0, 1] by which a margin row is faded
     bound_low, bound_high   nv x NB
 
 The tick forms H = sum w (factor J)'J + damping and g from these, so that the compiled expression stays
@@ -32,7 +33,19 @@ from wbc.symbolic.kinematics import Kinematics, Pose
 from wbc.symbolic.tracer import Tracer, rotation_rate
 from wbc.tasks.base import Constraint, Rows, Task
 
-ROWS_OUTPUTS = ("error", "wish", "factor", "jt", "at", "low", "high", "margin", "bound_low", "bound_high")
+ROWS_OUTPUTS = (
+    "error",
+    "wish",
+    "factor",
+    "jt",
+    "at",
+    "low",
+    "high",
+    "margin",
+    "bound_low",
+    "bound_high",
+    "margin_factor",
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +65,7 @@ class _Builder:
 
     def value(self, slot: Slot, source: ca.SX) -> ca.SX | Pose:
         """What the item's expression receives for an input."""
-        part = source[slot.slice]
+        part = source[slot.span]
         if slot.input.kind == "pose":
             return Pose(ca.reshape(part[:9], 3, 3), part[9:])
         if slot.input.kind == "rotation":
@@ -66,8 +79,8 @@ class _Builder:
         """Time derivative of an input's numbers, or None for one that stands still."""
         if slot.input.rate is None:
             return None
-        speed = self.p[block.slots[slot.input.rate].slice]
-        part = self.p[slot.slice]
+        speed = self.p[block.slots[slot.input.rate].span]
+        part = self.p[slot.span]
         if slot.input.kind == "pose":
             return ca.vertcat(rotation_rate(ca.reshape(part[:9], 3, 3)) @ speed[3:], speed[:3])
         if slot.input.kind == "rotation":
@@ -82,7 +95,7 @@ class _Builder:
         for slot in block.slots.values():
             speed = self.rate(block, slot)
             if speed is not None:
-                total = total + ca.jacobian(expression, self.p[slot.slice]) @ speed
+                total = total + ca.jacobian(expression, self.p[slot.span]) @ speed
         return ca.sparsify(total)
 
     def advanced(self, block: Block) -> ca.SX:
@@ -91,8 +104,8 @@ class _Builder:
         for slot in block.slots.values():
             if slot.input.rate is None:
                 continue
-            speed = self.p[block.slots[slot.input.rate].slice]
-            part = self.p[slot.slice]
+            speed = self.p[block.slots[slot.input.rate].span]
+            part = self.p[slot.span]
             if slot.input.kind in ("pose", "rotation"):
                 angular = speed[3:] if slot.input.kind == "pose" else speed
                 turn = rot.from_quaternion(rot.exp3(angular * self.dt)) @ ca.reshape(part[:9], 3, 3)
@@ -103,7 +116,7 @@ class _Builder:
                 moved = self.kinematics.integrate(part, speed * self.dt)
             else:
                 moved = part + speed * self.dt
-            out[slot.slice] = moved
+            out[slot.span] = moved
         return out
 
     def column(self, block: Block, what: str, expression: ca.SX) -> ca.SX:
@@ -124,14 +137,14 @@ class _Builder:
         error = self.column(block, "error", item.error(robot, tracer, inputs))
         own = item.jacobian(robot, tracer, inputs)
         jacobian = tracer.jacobian(error) if own is None else tracer.expand(ca.SX(own))
-        gain = self.p[block.slots["gain"].slice]
+        gain = self.p[block.slots["gain"].span]
         wish = tracer.expand(-gain * error - self.drift(block, error))
         fade = item.row_factor(robot, tracer, inputs)
         factor = ca.SX.ones(len(block.rows)) if fade is None else self.column(block, "row_factor", fade)
         return tracer.expand(error), wish, tracer.expand(factor), jacobian
 
-    def general(self, block: Block) -> tuple[Rows, ca.SX | None]:
-        """Rows of a constraint, and its margins."""
+    def general(self, block: Block) -> tuple[Rows, ca.SX | None, ca.SX | None]:
+        """Rows of a constraint, its margins and their factors."""
         item = block.entry.item
         assert isinstance(item, Constraint)
         robot, tracer, inputs = self.stack.robot, Tracer(self.kinematics), self.values(block, self.p)
@@ -140,13 +153,16 @@ class _Builder:
             rows = item.velocity_rows(robot, tracer, inputs, self.dt)
             assert rows is not None
             low, high = self.column(block, "lower", rows.lower), self.column(block, "upper", rows.upper)
-            return Rows(tracer.expand(ca.SX(rows.matrix)), tracer.expand(low), tracer.expand(high)), None
+            return Rows(tracer.expand(ca.SX(rows.matrix)), tracer.expand(low), tracer.expand(high)), None, None
         margins = item.margins(robot, tracer, inputs)
         assert margins is not None
         margin = self.column(block, "margins", margins)
-        rate = self.p[block.slots["rate"].slice]
+        rate = self.p[block.slots["rate"].span]
         low = tracer.expand(-rate * margin - self.drift(block, margin))
-        return Rows(tracer.jacobian(margin), low, ca.SX.inf(count)), tracer.expand(margin)
+        fade = item.row_factor(robot, tracer, inputs)
+        factor = ca.SX.ones(count) if fade is None else self.column(block, "row_factor", fade)
+        rows = Rows(tracer.jacobian(margin), low, ca.SX.inf(count))
+        return rows, tracer.expand(margin), tracer.expand(factor)
 
     def ahead(self, block: Block) -> ca.SX:
         """h(q (+) v dt) of a margin block."""
@@ -184,12 +200,13 @@ def build(stack: Declaration, layout: Layout) -> Program:
         ca.vertcat(empty, *[t[1] for t in tasks]),
         ca.vertcat(empty, *[t[2] for t in tasks]),
         ca.horzcat(ca.SX(nv, 0), *[_shared_pattern(t[3].T) for t in tasks]),
-        ca.horzcat(ca.SX(nv, 0), *[r.matrix.T for r, _ in general]),
-        ca.vertcat(empty, *[ca.densify(r.lower) for r, _ in general]),
-        ca.vertcat(empty, *[ca.densify(r.upper) for r, _ in general]),
-        ca.vertcat(empty, *[h for _, h in general if h is not None]),
+        ca.horzcat(ca.SX(nv, 0), *[r.matrix.T for r, _, _ in general]),
+        ca.vertcat(empty, *[ca.densify(r.lower) for r, _, _ in general]),
+        ca.vertcat(empty, *[ca.densify(r.upper) for r, _, _ in general]),
+        ca.vertcat(empty, *[h for _, h, _ in general if h is not None]),
         ca.horzcat(ca.SX(nv, 0), *[low for low, _ in bounds]),
         ca.horzcat(ca.SX(nv, 0), *[high for _, high in bounds]),
+        ca.vertcat(empty, *[f for _, _, f in general if f is not None]),
     ]
     outputs = [o if k in (3, 4) else ca.densify(o) for k, o in enumerate(outputs)]
     inputs = [b.kinematics.q, b.kinematics.v, b.p, b.dt]

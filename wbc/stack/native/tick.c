@@ -79,8 +79,8 @@ static void form_bounds(wbc_tick *t) {
 
 EXPORT void wbc_tick_assemble(wbc_tick *t) {
     const double *arg[4] = {t->q, t->v_last, t->p, &t->dt};
-    double *res[10] = {t->report.error, t->wish, t->report.factor, t->jt, t->at, t->free_low,
-                       t->free_high, t->report.margin, t->bound_low, t->bound_high};
+    double *res[11] = {t->report.error, t->wish, t->report.factor, t->jt, t->at, t->free_low,
+                       t->free_high, t->report.margin, t->bound_low, t->bound_high, t->report.margin_factor};
     rows(arg, res, t->work_iw, t->work_w, 0);
     memset(t->H, 0, sizeof t->H);
     memset(t->g, 0, sizeof t->g);

@@ -40,6 +40,7 @@ typedef struct {
     double error[MT + 1];     /* e of the task rows */
     double factor[MT + 1];    /* fading factor of the task rows */
     double margin[MH + 1];    /* h of the margin rows */
+    double margin_factor[MH + 1]; /* fading factor of the margin rows */
     double ahead[MH + 1];     /* h at q (+) v dt */
     double lambda[M_ALL + 1]; /* multipliers of bounds, then of general rows; > 0 at the upper side */
     double slack[MC + 1];     /* by how much a general row was relaxed, row units */
