@@ -42,7 +42,8 @@ class Centroidal:
             force, moment = self.dynamics.bodies.column_forces(j)
             step = kernels.columns_to_parent(force.shape[1])
             arm = pose.position - kin.center_of_mass
-            blocks.append((j, ca.vertcat(*step(pose.rotation, arm, force, moment))))
+            linear, angular = step(pose.rotation, arm, force, moment)
+            blocks.append((j, ca.vertcat(linear, angular)))
         return kin.columns(6, blocks)
 
     @cached_property

@@ -56,7 +56,9 @@ class Bodies:
         """(force, moment), 3 x nv_j each, body axes: momentum of the subtree for unit velocities of the joint."""
         masses, moments = self.composite
         linear, angular = self.kinematics.joint_subspace(joint)
-        return kernels.column_momentum(linear.shape[1])(masses[joint], *moments[joint], linear, angular)
+        step = kernels.column_momentum(linear.shape[1])
+        force, moment = step(masses[joint], *moments[joint], linear, angular)
+        return force, moment
 
 
 class Dynamics:

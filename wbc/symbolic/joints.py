@@ -28,11 +28,19 @@ _MAKERS: dict[str, Callable[[Any], SymbolicJoint]] = {
     "SphericalZYX": lambda j: maps.spherical_zyx(),
     "Translation": lambda j: maps.translation(),
 }
+
+
+def _along(name: str, axis: maps.Vector) -> dict[str, Callable[[Any], SymbolicJoint]]:
+    return {
+        f"R{name}": lambda _: maps.revolute(axis),
+        f"RUB{name}": lambda _: maps.unbounded(axis),
+        f"P{name}": lambda _: maps.prismatic(axis),
+        f"H{name}": lambda joint: maps.helical(axis, float(joint.pitch)),
+    }
+
+
 for _name, _axis in AXES.items():
-    _MAKERS[f"R{_name}"] = lambda j, axis=_axis: maps.revolute(axis)
-    _MAKERS[f"RUB{_name}"] = lambda j, axis=_axis: maps.unbounded(axis)
-    _MAKERS[f"P{_name}"] = lambda j, axis=_axis: maps.prismatic(axis)
-    _MAKERS[f"H{_name}"] = lambda j, axis=_axis: maps.helical(axis, float(j.pitch))
+    _MAKERS |= _along(_name, _axis)
 
 #: Pinocchio joint types that have a symbolic model, without the prefix ``JointModel``.
 SUPPORTED = (*_MAKERS, "Composite", "Mimic")

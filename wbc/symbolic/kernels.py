@@ -9,9 +9,14 @@ Vectors are in the axes of the body that they belong to. R (3x3) and p (3) are t
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache
+from typing import Any
 
 import casadi as ca
+
+#: A CasADi function: expressions in, one expression or a tuple of them out.
+Step = Callable[..., Any]
 
 
 def _inputs(*shapes: tuple[str, int, int]) -> list[ca.SX]:
@@ -28,14 +33,14 @@ def _mirrored(matrix: ca.SX) -> ca.SX:
 
 
 @cache
-def compose() -> ca.Function:
+def compose() -> Step:
     """(R0, p0, R1, p1) -> R0 R1, p0 + R0 p1."""
     (r0, r1), (p0, p1) = _inputs(("R0", 3, 3), ("R1", 3, 3)), _vectors("p0 p1")
     return ca.Function("compose", [r0, p0, r1, p1], [r0 @ r1, p0 + r0 @ p1])
 
 
 @cache
-def velocity_step() -> ca.Function:
+def velocity_step() -> Step:
     """(R, p, w, v, s, u) -> w' = R'w + s, v' = R'(v + w x p) + u.
 
     w, v: parent's angular and linear velocity; s, u: the joint's own, in child axes.
@@ -45,7 +50,7 @@ def velocity_step() -> ca.Function:
 
 
 @cache
-def spin_step() -> ca.Function:
+def spin_step() -> Step:
     """(R, alpha, w', s, sd) -> alpha' = R'alpha + sd + w' x s, Omega' = [alpha']x + [w']x [w']x.
 
     alpha: parent's angular acceleration; w': the child's angular velocity; s, sd: the joint's own angular
@@ -58,7 +63,7 @@ def spin_step() -> ca.Function:
 
 
 @cache
-def acceleration_step() -> ca.Function:
+def acceleration_step() -> Step:
     """(R, p, Omega, a, w', s, u, ud) -> a' = R'(a + Omega p) + ud + 2 w' x u - s x u.
 
     a, Omega: the parent's. Accelerations are those of the body's origin (classical, not spatial).
@@ -69,7 +74,7 @@ def acceleration_step() -> ca.Function:
 
 
 @cache
-def body_wrench() -> ca.Function:
+def body_wrench() -> Step:
     """(m, h, Sigma, Omega, a) -> force m a + Omega h, moment h x a + [int r x (Omega r) dm] about the origin.
 
     h: first moment of mass; Sigma = int r r' dm. The moment's second part is the axial vector of Omega Sigma.
@@ -81,7 +86,7 @@ def body_wrench() -> ca.Function:
 
 
 @cache
-def body_momentum() -> ca.Function:
+def body_momentum() -> Step:
     """(m, h, Sigma, w, v) -> m v + w x h, I w + h x v about the origin, with I = tr(Sigma) 1 - Sigma."""
     (m, sigma), (h, w, v) = _inputs(("m", 1, 1), ("Sigma", 3, 3)), _vectors("h w v")
     inertia = ca.trace(sigma) * ca.DM.eye(3) - sigma
@@ -90,7 +95,7 @@ def body_momentum() -> ca.Function:
 
 
 @cache
-def wrench_to_parent() -> ca.Function:
+def wrench_to_parent() -> Step:
     """(R, p, f, n, F, N) -> F + R f, N + R n + p x (R f): a child's wrench added to its parent's."""
     (r,), (p, f, n, total_f, total_n) = _inputs(("R", 3, 3)), _vectors("p f n F N")
     force = r @ f
@@ -99,7 +104,7 @@ def wrench_to_parent() -> ca.Function:
 
 
 @cache
-def inertia_to_parent() -> ca.Function:
+def inertia_to_parent() -> Step:
     """(R, p, m, h, Sigma, H, SIGMA) -> first and second moments of a parent with a child's added.
 
     H + R h + m p,  SIGMA + R Sigma R' + g p' + p g' with g = R h + m p / 2.
@@ -115,14 +120,14 @@ def inertia_to_parent() -> ca.Function:
 
 
 @cache
-def joint_velocity(columns: int) -> ca.Function:
+def joint_velocity(columns: int) -> Step:
     """(V, W, v) -> W v, V v: angular and linear velocity of a joint with motion columns V (linear) and W (angular)."""
     (linear, angular), v = _inputs(("V", 3, columns), ("W", 3, columns)), ca.SX.sym("v", columns)
     return ca.Function("joint_velocity", [linear, angular, v], [angular @ v, linear @ v])
 
 
 @cache
-def joint_effort(columns: int, wrenches: int) -> ca.Function:
+def joint_effort(columns: int, wrenches: int) -> Step:
     """(V, W, F, N) -> V'F + W'N, columns x wrenches: what wrenches (force, moment) ask of a joint."""
     linear, angular = _inputs(("V", 3, columns), ("W", 3, columns))
     force, moment = _inputs(("F", 3, wrenches), ("N", 3, wrenches))
@@ -130,7 +135,7 @@ def joint_effort(columns: int, wrenches: int) -> ca.Function:
 
 
 @cache
-def column_momentum(columns: int) -> ca.Function:
+def column_momentum(columns: int) -> Step:
     """(m, h, Sigma, V, W) -> m V - [h]x W, I W + [h]x V with I = tr(Sigma) 1 - Sigma: momentum per joint velocity."""
     m, h, sigma, linear, angular = _inputs(
         ("m", 1, 1), ("h", 3, 1), ("Sigma", 3, 3), ("V", 3, columns), ("W", 3, columns)
@@ -141,7 +146,7 @@ def column_momentum(columns: int) -> ca.Function:
 
 
 @cache
-def columns_to_parent(columns: int) -> ca.Function:
+def columns_to_parent(columns: int) -> Step:
     """(R, p, F, N) -> R F, R N + [p]x R F for 3 x columns matrices of forces and moments."""
     (r, f, n), (p,) = _inputs(("R", 3, 3), ("F", 3, columns), ("N", 3, columns)), _vectors("p")
     force = r @ f
@@ -149,7 +154,7 @@ def columns_to_parent(columns: int) -> ca.Function:
 
 
 @cache
-def point_columns(columns: int) -> ca.Function:
+def point_columns(columns: int) -> Step:
     """(x, P, V, W) -> V - [x - p_k]x W column by column: linear velocity at x of twists given at the points P."""
     point, (origins, linear, angular) = ca.SX.sym("x", 3), _inputs(*[(n, 3, columns) for n in "PVW"])
     arms = ca.repmat(point, 1, columns) - origins

@@ -228,7 +228,10 @@ class Kinematics:
             linear, angular = self.joint_twist(joint)
             own = (ca.repmat(self.joint_pose(joint).position, 1, self._width(joint)), linear, angular)
             above = self._chain(self.parents[joint])
-            known = own if above is None else tuple(ca.horzcat(*pair) for pair in zip(above, own, strict=True))
+            if above is None:
+                known = own
+            else:
+                known = (ca.horzcat(above[0], own[0]), ca.horzcat(above[1], own[1]), ca.horzcat(above[2], own[2]))
             self._chains[joint] = known
         return known
 
