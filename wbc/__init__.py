@@ -10,7 +10,9 @@ step = controller.step(robot.neutral)
 
 __version__ = "0.1.0"
 
-from wbc import robots, shapes, tasks
+from wbc import robots as robots
+from wbc import shapes as shapes
+from wbc import tasks as tasks
 from wbc.controller import Certificate, Controller, Stack, Status, Step
 from wbc.errors import WbcError
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from enum import Enum
+from enum import StrEnum
 from functools import cached_property
 
 import numpy as np
@@ -15,7 +15,7 @@ from wbc.stack.layout import Block, Layout
 from wbc.validation import Array
 
 
-class Status(str, Enum):
+class Status(StrEnum):
     """How a tick ended."""
 
     #: Every constraint row holds, v is the optimum
@@ -24,9 +24,6 @@ class Status(str, Enum):
     RELAXED = "relaxed"
     #: No optimum was found: v brings every joint to rest as fast as its bounds allow
     BRAKED = "braked"
-
-    def __str__(self) -> str:
-        return self.value
 
 
 @dataclass(frozen=True)

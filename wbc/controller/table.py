@@ -19,11 +19,12 @@ def describe(controller: Controller) -> str:
     robot = stack.robot
     lines = [_row(controller, block) for block in layout.blocks.values()]
     widths = [max(len(r[k]) for r in [_HEAD, *lines]) for k in range(len(_HEAD))]
-    text = [
+    head = (
         f"{robot.name}: {robot.nv} degrees of freedom, dt {stack.dt:g} s "
         f"({stack.dt_range[0]:g} to {stack.dt_range[1]:g}), solver {controller.solver} ({controller.backend}), "
         f"characteristic length {stack.length:.3g} m, damping {stack.damping:g}"
-    ]
+    )
+    text = [head]
     for r in [_HEAD, tuple("-" * w for w in widths), *lines]:
         text.append("  ".join(c.ljust(w) for c, w in zip(r, widths, strict=True)).rstrip())
     return "\n".join(text)

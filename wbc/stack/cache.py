@@ -18,11 +18,11 @@ import shutil
 import stat
 import tempfile
 from collections.abc import Callable
+from importlib import metadata
 from typing import Any
 
 import casadi
 import numpy as np
-import pinocchio
 import platformdirs
 
 log = logging.getLogger("wbc")
@@ -40,7 +40,7 @@ def key(data: Any, version: str, toolchain: str) -> str:
     """Hash of everything that the build is a function of."""
     own = {p.name: p.read_text() for p in sorted((pathlib.Path(__file__).parent / "native").iterdir())}
     text = json.dumps(
-        [data, version, toolchain, casadi.__version__, pinocchio.__version__, np.__version__, own], sort_keys=True
+        [data, version, toolchain, casadi.__version__, metadata.version("pin"), np.__version__, own], sort_keys=True
     )
     return hashlib.sha256(text.encode()).hexdigest()[:32]
 
