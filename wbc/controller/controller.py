@@ -23,6 +23,7 @@ from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Slot
 from wbc.validation import Array
 
+_Array = np.ndarray
 _FLOAT = np.dtype(np.float64)
 
 
@@ -61,6 +62,8 @@ class Controller:
         self._handles = {name: Handle(self, block) for name, block in layout.blocks.items()}
         self._set_dt(stack.dt)
         self._dt_is_declared = True
+        #: the next step has more to do than to copy q: defaults to take from it, or dt to set back
+        self._slow = True
         for name, handle in self._handles.items():
             handle.apply()
             for slot in layout.blocks[name].slots.values():
@@ -81,9 +84,9 @@ class Controller:
         Raises:
             ShapeError, NotFiniteError, RotationError, RangeError: bad input; the controller is unchanged.
         """
-        if dt is not None or not self._dt_is_declared or v is not None or self._waiting:
+        if v is not None or dt is not None or self._slow:
             self._prepare(q, v, dt)
-        if type(q) is np.ndarray and q.dtype is _FLOAT and q.shape == self._shape:
+        if type(q) is _Array and q.dtype is _FLOAT and q.shape == self._shape:
             self._q[:] = q
         else:
             self._q[:] = validation.real_array("q", q, self._shape)
@@ -106,6 +109,7 @@ class Controller:
         self.tick.v_last[:] = velocity
         self.tick.reset()
         self._waiting = {name: list(slots) for name, slots in self._first.items() if slots}
+        self._slow = True
         if configuration is not None:
             self._initialise(configuration)
 
@@ -187,6 +191,7 @@ class Controller:
             validation.real_array("q", q, self._shape)
         self._set_dt(step)
         self._dt_is_declared = dt is None
+        self._slow = dt is not None
         if velocity is not None:
             self.tick.v_in[:] = velocity
             self.tick.use_v[0] = 1.0

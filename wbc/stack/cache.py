@@ -21,7 +21,6 @@ from collections.abc import Callable
 from importlib import metadata
 from typing import Any
 
-import casadi
 import numpy as np
 import platformdirs
 
@@ -39,9 +38,8 @@ def root() -> pathlib.Path:
 def key(data: Any, version: str, toolchain: str) -> str:
     """Hash of everything that the build is a function of."""
     own = {p.name: p.read_text() for p in sorted((pathlib.Path(__file__).parent / "native").iterdir())}
-    text = json.dumps(
-        [data, version, toolchain, casadi.__version__, metadata.version("pin"), np.__version__, own], sort_keys=True
-    )
+    versions = [metadata.version("casadi"), metadata.version("pin"), np.__version__, version, toolchain]
+    text = json.dumps([data, versions, own], sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()[:32]
 
 
