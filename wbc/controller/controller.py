@@ -57,11 +57,11 @@ class Controller:
         self._call: Callable[[], int] = self.tick.step
         if isinstance(self.tick, NativeTick):
             self._call = functools.partial(self.tick.step_function, self.tick.pointer)
-        self._q, self._report, self._shape = self.tick.q, self.tick.report, (layout.nq,)
+        self._q, self._v_in, self._use_v, self._report = self.tick.q, self.tick.v_in, self.tick.use_v, self.tick.report
+        self._q_shape, self._v_shape = (layout.nq,), (layout.nv,)
         self._waiting: dict[str, list[Slot]] = {}
         self._handles = {name: Handle(self, block) for name, block in layout.blocks.items()}
-        self._set_dt(stack.dt)
-        self._dt_is_declared = True
+        self.tick.dt[0] = stack.dt
         #: the next step has more to do than to copy q: defaults to take from it, or dt to set back
         self._slow = True
         for name, handle in self._handles.items():
@@ -84,12 +84,17 @@ class Controller:
         Raises:
             ShapeError, NotFiniteError, RotationError, RangeError: bad input; the controller is unchanged.
         """
-        if v is not None or dt is not None or self._slow:
+        if dt is not None or self._slow:
             self._prepare(q, v, dt)
-        if type(q) is _Array and q.dtype is _FLOAT and q.shape == self._shape:
+        if type(q) is _Array and q.dtype is _FLOAT and q.shape == self._q_shape:
             self._q[:] = q
         else:
-            self._q[:] = validation.real_array("q", q, self._shape)
+            self._q[:] = validation.real_array("q", q, self._q_shape)
+        if v is not None:
+            if not (type(v) is _Array and v.dtype is _FLOAT and v.shape == self._v_shape):
+                v = validation.real_array("v", v, self._v_shape)
+            self._v_in[:] = v
+            self._use_v[0] = 1.0
         if self._call() < 0:
             self._refuse(q, v)
         return Step(self._report.tobytes(), self._context)
@@ -182,22 +187,16 @@ class Controller:
     # Off the fast path
 
     def _prepare(self, q: Any, v: Any, dt: Any) -> None:
+        """Another dt than the last, or the first configuration. Everything is checked before anything is changed."""
         low, high = self.stack.dt_range
         step = self.stack.dt if dt is None else validation.scalar("dt", dt, low=low, high=high, unit="s")
-        velocity = None if v is None else validation.real_array("v", v, (self.stack.robot.nv,))
+        configuration = self.stack.robot.configuration("q", q)
+        if v is not None:
+            validation.real_array("v", v, self._v_shape)
         if self._waiting:
-            self._initialise(self.stack.robot.configuration("q", q))
-        elif velocity is not None or dt is not None:
-            validation.real_array("q", q, self._shape)
-        self._set_dt(step)
-        self._dt_is_declared = dt is None
+            self._initialise(configuration)
+        self.tick.dt[0] = step
         self._slow = dt is not None
-        if velocity is not None:
-            self.tick.v_in[:] = velocity
-            self.tick.use_v[0] = 1.0
-
-    def _set_dt(self, dt: float) -> None:
-        self.tick.dt[0] = dt
 
     def _refuse(self, q: Any, v: Any) -> None:
         """Say what was wrong with inputs that the tick refused."""
