@@ -77,11 +77,20 @@ static void form_bounds(wbc_tick *t) {
     }
 }
 
+static int any_nan(const double *x, int count) {
+    int found = 0;
+    for (int i = 0; i < count; i++) found |= x[i] != x[i];
+    return found;
+}
+
 EXPORT void wbc_tick_assemble(wbc_tick *t) {
     const double *arg[4] = {t->q, t->v_last, t->p, &t->dt};
     double *res[11] = {t->report.error, t->wish, t->report.factor, t->jt, t->at, t->free_low,
                        t->free_high, t->report.margin, t->bound_low, t->bound_high, t->report.margin_factor};
     rows(arg, res, t->work_iw, t->work_w, 0);
+    /* Comparisons with NaN are false, so a row of NaN would pass as satisfied: such a tick brakes */
+    t->broken = any_nan(t->jt, NNZJ) | any_nan(t->wish, MT) | any_nan(t->at, NNZA) | any_nan(t->free_low, MC) |
+                any_nan(t->free_high, MC) | any_nan(t->bound_low, NB * NV) | any_nan(t->bound_high, NB * NV);
     memset(t->H, 0, sizeof t->H);
     memset(t->g, 0, sizeof t->g);
     for (int i = 0; i < NV; i++) t->H[i * WIDE + i] = damping[i];
@@ -445,7 +454,7 @@ EXPORT int wbc_tick_solve(wbc_tick *t) {
     int flag = WBC_SOLVED;
     t->report.iterations = 0.0;
     t->factored = 0;
-    if (!factor(t)) {
+    if (t->broken || !factor(t)) {
         brake(t);
         flag = WBC_BRAKED;
     } else if (unconstrained(t)) {
@@ -470,11 +479,15 @@ EXPORT int wbc_tick_solve(wbc_tick *t) {
         flag = WBC_BRAKED;
     }
     for (int i = 0; i < NV; i++) t->report.v[i] = clamp(t->x[i], t->low[i], t->high[i]);
+    int gave_way = 0;
     for (int k = 0; k < MC; k++) {
         const double below = t->free_low[k] - t->low[NV + k], above = t->high[NV + k] - t->free_high[k];
         const double slack = below > above ? below : above;
         t->report.slack[k] = slack > 2.0 * TOLERANCE * row_scale[k] ? slack : 0.0;
+        gave_way |= t->report.slack[k] > 0.0;
     }
+    /* Rows that contradict each other by rounding only */
+    if (flag == WBC_RELAXED && !gave_way) flag = WBC_SOLVED;
     t->report.flag = flag;
     return flag;
 }
