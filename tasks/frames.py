@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from wbc import validation
 from wbc.errors import RangeError, ShapeError
-from wbc.symbolic.kinematics import WORLD
+from wbc.symbolic.kinematics import WORLD, frame_index
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks.base import Row
 
@@ -47,7 +47,7 @@ def require_motion(robot: Robot, field: str, frame: str, reference: str = WORLD)
 
 
 def _joint(robot: Robot, frame: str) -> int:
-    return 0 if frame == WORLD else int(robot.model.frames[robot.model.getFrameId(frame)].parentJoint)
+    return 0 if frame == WORLD else int(robot.model.frames[frame_index(robot.model, frame)].parentJoint)
 
 
 def into_axes(kin: Tracer, vector: ca.SX, axes: str) -> ca.SX:
@@ -61,7 +61,7 @@ def frame_pose(robot: Robot, frame: str, q: NDArray[np.float64]) -> pin.SE3:
         return pin.SE3.Identity()
     data = robot.model.createData()
     pin.forwardKinematics(robot.model, data, q)
-    return pin.updateFramePlacement(robot.model, data, robot.model.getFrameId(frame)).copy()
+    return pin.updateFramePlacement(robot.model, data, frame_index(robot.model, frame)).copy()
 
 
 def point_rows() -> tuple[Row, ...]:

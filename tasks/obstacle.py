@@ -12,7 +12,7 @@ from wbc import validation
 from wbc.errors import MissingShapeError, RangeError, ShapeError, nearest
 from wbc.shapes import Capsule, HalfSpace, PlacedShape, Sphere
 from wbc.symbolic import rotations as rot
-from wbc.symbolic.kinematics import WORLD, Pose
+from wbc.symbolic.kinematics import WORLD, Pose, frame_index
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks._selection import selection
 from wbc.tasks.base import Constraint, Input, Order, Row, Values
@@ -170,4 +170,4 @@ def _length(placed: PlacedShape) -> float:
 
 def _moves(robot: Robot, link: str) -> bool:
     """Whether any joint moves a frame of the model in the world."""
-    return link != WORLD and int(robot.model.frames[robot.model.getFrameId(link)].parentJoint) > 0
+    return link != WORLD and int(robot.model.frames[frame_index(robot.model, link)].parentJoint) > 0

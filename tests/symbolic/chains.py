@@ -52,11 +52,11 @@ def composite(*parts: pin.JointModel, seed: int = 3) -> pin.JointModelComposite:
     return out
 
 
-def unaligned_unbounded() -> pin.Model:
-    """A continuous joint about a slanted axis: only a description makes this type in Python."""
+def unaligned_unbounded(direction: Sequence[float] = tuple(SLANTED)) -> pin.Model:
+    """Continuous joints about a slanted axis: only a description makes this type in Python."""
     moments = '<inertia ixx="1" iyy="2" izz="2.5" ixy=".1" ixz="0" iyz="0"/>'
     link = f'<inertial><origin xyz=".1 .2 .3"/><mass value="2"/>{moments}</inertial>'
-    axis = " ".join(str(c) for c in SLANTED)
+    axis = " ".join(str(float(c)) for c in direction)
     joints = "".join(
         f'<joint name="j{k}" type="continuous"><parent link="l{k}"/><child link="l{k + 1}"/>'
         f'<axis xyz="{axis}"/><origin xyz=".4 -.2 .3" rpy=".3 .2 .1"/></joint>'

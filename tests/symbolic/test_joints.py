@@ -10,6 +10,7 @@ import pytest
 from tests.symbolic.chains import KINDS, SLANTED, VARYING, chain, unaligned_unbounded
 from tests.symbolic.referee import DESCRIPTIONS, REFERENCES, TOLERANCE, Comparison, distance, load, random_state
 from wbc.errors import UnknownNameError, UnsupportedJointError
+from wbc.robot import Limits, Robot
 from wbc.symbolic import Centroidal, Dynamics, Kinematics, Motion
 from wbc.symbolic.kinematics import frame_index
 
@@ -204,3 +205,20 @@ def test_a_model_without_mass() -> None:
         dynamics.mass_matrix,
     ):
         assert expression.is_zero()
+
+
+@pytest.mark.parametrize("change", ["pitch", "armature", "gravity", "axis"])
+def test_the_fingerprint_of_a_robot_sees_everything_that_the_expressions_use(change: str) -> None:
+    def robot(value: float) -> Robot:
+        model = chain([pin.JointModelHX(value if change == "pitch" else 0.3)])
+        if change == "armature":
+            model.armature = np.full(model.nv, value)
+        if change == "gravity":
+            model.gravity.linear = np.array([0.0, 0.0, -value])
+        if change == "axis":
+            model = unaligned_unbounded((0.0, np.cos(value), np.sin(value)))
+        none = np.full(model.nv, np.inf)
+        return Robot("chain", model, Limits(-none, none, none, none, none))
+
+    assert robot(0.5).fingerprint == robot(0.5).fingerprint
+    assert robot(0.5).fingerprint != robot(0.5000001).fingerprint

@@ -15,7 +15,7 @@ from wbc import validation
 from wbc.errors import DuplicateNameError, RangeError, RotationError, ShapeError
 from wbc.robot.limits import Limits
 from wbc.shapes import PlacedShape
-from wbc.symbolic.kinematics import WORLD
+from wbc.symbolic.kinematics import WORLD, frame_index
 from wbc.validation import Array
 
 BASES = ("fixed", "floating", "planar", "differential")
@@ -195,12 +195,10 @@ class Robot:
         if parent == WORLD:
             model.addFrame(pin.Frame(name, 0, 0, local, pin.FrameType.OP_FRAME))
         else:
-            above = model.frames[model.getFrameId(parent)]
-            model.addFrame(
-                pin.Frame(
-                    name, above.parentJoint, model.getFrameId(parent), above.placement * local, pin.FrameType.OP_FRAME
-                )
-            )
+            index = frame_index(model, parent)
+            above = model.frames[index]
+            kind = pin.FrameType.OP_FRAME
+            model.addFrame(pin.Frame(name, above.parentJoint, index, above.placement * local, kind))
         return replace(self, model=model)
 
     def with_limits(self, **changes: Any) -> Robot:
@@ -269,21 +267,8 @@ class Robot:
     def fingerprint(self) -> str:
         """Hash of everything about the model that compiled code depends on."""
         h = hashlib.sha256()
-        m = self.model
-        for j in range(1, m.njoints):
-            h.update(f"{m.names[j]} {m.parents[j]} {m.joints[j].shortname()}\n".encode())
-            joint = m.joints[j].extract()
-            if hasattr(joint, "axis"):
-                h.update(np.asarray(joint.axis).tobytes())
-            if hasattr(joint, "jointPlacements"):
-                for part, place in zip(joint.joints, joint.jointPlacements, strict=True):
-                    axis = getattr(part.extract(), "axis", None)
-                    h.update(part.shortname().encode() + place.homogeneous.tobytes())
-                    h.update(b"" if axis is None else np.asarray(axis).tobytes())
-            h.update(m.jointPlacements[j].homogeneous.tobytes())
-            h.update(m.inertias[j].toDynamicParameters().tobytes())
-        for f in m.frames:
-            h.update(f"{f.name} {f.parentJoint}\n".encode() + f.placement.homogeneous.tobytes())
+        # Pinocchio's own text holds what Python cannot reach: axes of some joint types, pitches, mimic ratios, armature
+        h.update(self.model.saveToString().encode())
         for array in (
             self.limits.position_lower,
             self.limits.position_upper,
