@@ -41,8 +41,8 @@ def flat(robot: Robot, field: str, declared: Input, value: Any) -> Array:
         ShapeError, NotFiniteError, RotationError, RangeError: it is no value of this input.
     """
     if declared.kind == "pose":
-        pose = validation.pose(field, value)
-        return np.concatenate([np.ravel(pose.rotation, order="F"), pose.translation])
+        # The columns of the upper three rows are those of the rotation, then the position
+        return np.ravel(validation.pose(field, value).homogeneous[:3], order="F")
     if declared.kind == "rotation":
         return np.ravel(validation.rotation(field, value), order="F")
     if declared.kind == "configuration":

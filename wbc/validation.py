@@ -6,6 +6,7 @@ the field; nothing is changed when it raises.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from typing import Any
 
@@ -80,8 +81,8 @@ def rotation(field: str, value: Any) -> Array:
         return np.asarray(pin.Quaternion(raw / norm).matrix(), dtype=np.float64)
     if raw.shape != (3, 3):
         raise ShapeError(field, value, f"expected a 3x3 rotation or a quaternion (x, y, z, w), not shape {raw.shape}")
-    off = float(np.linalg.norm(raw.T @ raw - np.eye(3)))
-    if off > ROTATION_TOLERANCE or np.linalg.det(raw) < 0.0:
+    if not _is_rotation(raw):
+        off = float(np.linalg.norm(raw.T @ raw - np.eye(3)))
         raise RotationError(
             field, value, f"not a rotation matrix (|R'R - 1| = {off:.3g}, det = {np.linalg.det(raw):.3g})"
         )
@@ -91,6 +92,8 @@ def rotation(field: str, value: Any) -> Array:
 def pose(field: str, value: Any) -> pin.SE3:
     """A pose, from ``pin.SE3``, a 4x4 homogeneous matrix or seven numbers (position, quaternion x, y, z, w)."""
     if isinstance(value, pin.SE3):
+        if _is_rotation(value.rotation) and all(map(math.isfinite, value.translation.tolist())):
+            return pin.SE3(value)
         return pin.SE3(rotation(field, value.rotation), real_array(field, value.translation, (3,)))
     raw = real_array(field, value)
     if raw.shape == (7,):
@@ -100,3 +103,16 @@ def pose(field: str, value: Any) -> pin.SE3:
             raise RotationError(field, value, "last row of a homogeneous matrix must be 0, 0, 0, 1")
         return pin.SE3(rotation(field, raw[:3, :3]), raw[:3, 3])
     raise ShapeError(field, value, "expected a pin.SE3, a 4x4 matrix or (position, quaternion x, y, z, w)")
+
+
+def _is_rotation(matrix: Array) -> bool:
+    """Whether |R'R - I| <= ROTATION_TOLERANCE and det R > 0; False for NaN.
+
+    In plain floats: targets are set every tick, and nine numbers are too few for numpy to be quick.
+    """
+    a, b, c, d, e, f, g, h, i = matrix.ravel().tolist()
+    diagonal = (a * a + d * d + g * g - 1.0, b * b + e * e + h * h - 1.0, c * c + f * f + i * i - 1.0)
+    mixed = (a * b + d * e + g * h, a * c + d * f + g * i, b * c + e * f + h * i)
+    off = math.hypot(*diagonal, *mixed, *mixed)
+    determinant = a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)
+    return off <= ROTATION_TOLERANCE and determinant > 0.0
