@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
 from time import perf_counter_ns
 
 import numpy as np
@@ -45,8 +44,8 @@ class Contender(ABC):
     def phases(self) -> dict[str, float]:
         """One tick as :meth:`call`, its duration split by phase [ns]."""
 
-    def bare(self) -> Callable[[], object] | None:
-        """The native call inside :meth:`call` at the present state, or None where there is no such thing."""
+    def native(self) -> int | None:
+        """As :meth:`call`, through the native function alone; its duration [ns], None where there is no such thing."""
         return None
 
     def settle(self) -> None:  # noqa: B027 (most packages move their own state)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+from time import perf_counter, perf_counter_ns
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ import wbc
 from bench.contender import Contender
 from bench.problems import Array, Case
 from bench.reference import Referee
+from wbc.controller.native import NativeTick
 
 
 class Ours(Contender):
@@ -20,6 +22,7 @@ class Ours(Contender):
     def __init__(self, case: Case, expression: bool = False) -> None:
         """Declare and compile the stack, with one more task of the user's own if ``expression``."""
         super().__init__(case)
+        self.expression = expression
         problem = self.problem
         shapes = {
             link: [wbc.shapes.PlacedShape(wbc.shapes.Sphere(radius), pin.SE3(np.eye(3), np.array(center)))]
@@ -40,7 +43,9 @@ class Ours(Contender):
             pose = pin.SE3(np.eye(3), np.array(place))
             stack.add(wbc.tasks.Obstacle(wbc.shapes.Sphere(radius), pose=pose, margin=problem.margin), name=f"ball{k}")
         self.tasks = [e.name for e in stack.tasks]
+        start = perf_counter()
         self.controller = stack.compile()
+        self.facts["compile"] = perf_counter() - start
         self.controller.reset(self.case.q0)
         for name in self.tasks:
             self.controller[name].gain = 1.0 / problem.dt
@@ -65,21 +70,53 @@ class Ours(Contender):
             self.com.target = self.case.com[tick]
 
     def call(self) -> None:
-        self.step = self.controller.step(self.q)
+        self.velocity = self.controller.step(self.q).v
+
+    def native(self) -> int | None:
+        tick = self.controller.tick
+        if not isinstance(tick, NativeTick):
+            return None
+        tick.q[:] = self.q
+        start = perf_counter_ns()
+        tick.step_function(tick.pointer)
+        return perf_counter_ns() - start
 
     def settle(self) -> None:
+        # The last command is the velocity of the step, also after a native call that made no Step
+        velocity = self.controller.last_command
         if self.problem.floating:
-            self.q = pin.integrate(self.robot.model, self.q, self.step.v * self.problem.dt)
+            self.q = pin.integrate(self.robot.model, self.q, velocity * self.problem.dt)
         else:
-            self.q = self.q + self.step.v * self.problem.dt
+            self.q = self.q + velocity * self.problem.dt
 
     def state(self) -> Array:
         return self.q
 
     def phases(self) -> dict[str, float]:
-        return {}
+        tick = self.controller.tick
+        start = perf_counter_ns()
+        self.call()
+        whole = perf_counter_ns() - start
+        spent: dict[str, float] = {}
+        if isinstance(tick, NativeTick):
+            library = tick._library
+            for name in ("check", "assemble", "solve", "certify", "look_ahead"):
+                function = getattr(library, f"wbc_tick_{name}")
+                start = perf_counter_ns()
+                function(tick.pointer)
+                spent[name] = float(perf_counter_ns() - start)
+            start = perf_counter_ns()
+            library.wbc_tick_size()
+            crossing = float(perf_counter_ns() - start)
+            # A call from Python costs about as much as a phase; it is taken off each and counted once, as Python's
+            spent = {name: max(0.0, value - crossing) for name, value in spent.items()}
+        spent["python"] = whole - sum(spent.values())
+        self.settle()
+        return spent
 
     def reference_error(self) -> float | None:
+        if self.expression:
+            return None
         exact = self.referee.velocity(self.q, self.tick)
         found = self.controller.step(self.q).v
         return float(np.abs(found - exact).max())

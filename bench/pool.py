@@ -13,6 +13,11 @@ from typing import IO, Any
 ROOT = Path(__file__).parents[1]
 
 
+def user_environment() -> dict[str, str]:
+    """The environment, without what would keep Python from using compiled bytecode as it does for users."""
+    return {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
+
+
 class WorkerError(RuntimeError):
     """A worker that died; the message holds the end of what it wrote to standard error."""
 
@@ -34,7 +39,7 @@ class Worker:
             stderr=self._log,
             text=True,
             cwd=ROOT,
-            env={**os.environ, "PYTHONPATH": str(ROOT), **(environment or {})},
+            env={**user_environment(), "PYTHONPATH": str(ROOT), **(environment or {})},
         )
         self.ready = self._read()
 

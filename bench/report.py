@@ -15,7 +15,7 @@ from bench.goals import Goal, goals
 OURS = "wbc"
 
 CALLS = """\
-The call is `controller.step(q)` for wbc, `solve_ik` and `integrate_inplace` for pink and mink, `update_kinematics` \
+The call is `controller.step(q).v` for wbc, `solve_ik` and `integrate_inplace` for pink and mink, `update_kinematics` \
 and `solve(True)` for placo. The three peers move their own state within the call, because their kinematics are \
 computed there; wbc computes them in `step` and leaves the state to its caller."""
 

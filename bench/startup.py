@@ -9,7 +9,7 @@ import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 
-from bench.pool import ROOT, Worker
+from bench.pool import ROOT, Worker, user_environment
 
 #: Package -> what a user imports
 IMPORTS = {"wbc": "wbc", "pink": "pink", "mink": "mink", "placo": "placo"}
@@ -17,13 +17,10 @@ REPEATS = 3
 
 
 def import_seconds(python: str, module: str) -> float:
-    """Wall time of ``import module`` in a fresh interpreter, the median of three [s]."""
+    """Wall time of ``import module`` in a fresh interpreter, files cached, the median of three [s]."""
     code = f"import time; t = time.perf_counter(); import {module}; print(time.perf_counter() - t)"
-    runs = [
-        subprocess.run([python, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT.anchor)
-        for _ in range(REPEATS)
-    ]
-    return statistics.median(float(run.stdout) for run in runs)
+    _output(python, code)
+    return statistics.median(float(_output(python, code)) for _ in range(REPEATS))
 
 
 def peak_memory(python: str, contender: str, folder: Path, core: int | None, ticks: int) -> int:
@@ -48,3 +45,11 @@ def settings() -> dict[str, str]:
     """Environment variables that change how fast numeric code runs, as the workers see them."""
     names = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "PYTHONOPTIMIZE", "PYTHONMALLOC")
     return {name: os.environ.get(name, "not set") for name in names}
+
+
+def _output(python: str, code: str) -> str:
+    """What a fresh interpreter prints, started outside the repository."""
+    command = [python, "-c", code]
+    return subprocess.run(
+        command, capture_output=True, text=True, check=True, cwd=ROOT.anchor, env=user_environment()
+    ).stdout

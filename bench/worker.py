@@ -45,8 +45,8 @@ def build(name: str, case: Case) -> Contender:
 def time_calls(contender: Contender, ticks: int) -> dict[str, Any]:
     """Durations of ``ticks`` ticks along the path [ns]."""
     contender.reset()
-    aim, call, settle, native = [0] * ticks, [0] * ticks, [0] * ticks, [0] * ticks
-    bare = contender.bare()
+    out: dict[str, list[int]] = {"aim": [0] * ticks, "call": [0] * ticks, "settle": [0] * ticks}
+    aim, call, settle = out.values()
     for k in range(ticks):
         t0 = perf_counter_ns()
         contender.aim(k)
@@ -56,18 +56,22 @@ def time_calls(contender: Contender, ticks: int) -> dict[str, Any]:
         contender.settle()
         t3 = perf_counter_ns()
         aim[k], call[k], settle[k] = t1 - t0, t2 - t1, t3 - t2
-    out = {"aim": aim, "call": call, "settle": settle}
-    if bare is None:
-        return out
     contender.reset()
+    contender.aim(0)
+    if contender.native() is not None:
+        out["native"] = time_native(contender, ticks)
+    return out
+
+
+def time_native(contender: Contender, ticks: int) -> list[int]:
+    """Durations of the native function alone along the same path [ns]."""
+    contender.reset()
+    out = []
     for k in range(ticks):
         contender.aim(k)
-        contender.call()
-        t0 = perf_counter_ns()
-        bare()
-        native[k] = perf_counter_ns() - t0
+        out.append(contender.native() or 0)
         contender.settle()
-    return out | {"native": native}
+    return out
 
 
 def time_phases(contender: Contender, ticks: int) -> dict[str, Any]:
