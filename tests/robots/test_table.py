@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import math
 import time
+import xml.etree.ElementTree as ElementTree
 
 import numpy as np
 import pinocchio as pin
@@ -107,12 +108,23 @@ def test_published_accelerations() -> None:
     np.testing.assert_array_equal(wbc.robots.load("xarm7").limits.acceleration, np.full(7, 20.0))
 
 
-def test_neutral_configurations_come_from_the_srdf() -> None:
-    panda = wbc.robots.load("panda")
-    np.testing.assert_array_equal(panda.neutral, [0, -0.785398, 0, -2.35619, 0, 1.5707, 0.785398])
-    talos = wbc.robots.load("talos")
-    assert talos.neutral[2] == 1.01927
-    assert talos.neutral[talos.model.joints[talos.model.getJointId("leg_left_4_joint")].idx_q] == 0.85838
+@pytest.mark.parametrize("name", [n for n in LOADABLE if TABLE[n].srdf])
+def test_neutral_configuration_is_the_srdf_state(name: str) -> None:
+    robot = bare(name)
+    tree = ElementTree.parse(example(TABLE[name].srdf))
+    (state,) = (g for g in tree.getroot().findall("group_state") if g.get("name") == TABLE[name].state)
+    followers = {robot.dof_names[c.follower] for c in robot.couplings}
+    compared = 0
+    for element in state.findall("joint"):
+        joint, values = str(element.get("name")), [float(x) for x in element.get("value", "").split()]
+        index = robot.position_index[robot.dofs(joint)] if joint in robot.joint_names else []
+        put_elsewhere = joint in robot.notes["neutral"] or joint in followers
+        if len(values) == 1 and len(index) == 1 and index[0] >= 0 and not put_elsewhere:
+            assert robot.neutral[index[0]] == values[0]
+            compared += 1
+        elif joint == "root_joint" and robot.base == "floating" and len(values) == 7:
+            np.testing.assert_allclose(robot.neutral[:7], values, atol=1e-5)
+    assert compared >= 2
 
 
 def test_loading_is_fast() -> None:

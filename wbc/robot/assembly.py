@@ -130,9 +130,12 @@ def neutral_configuration(
     the middle of its range if it is merely zero.
     """
     values: dict[str, Array] = {}
+    where = "zero"
     if recipe.state:
         validation.one_of("state", recipe.state, tuple(states))
-        values |= {k: v for k, v in states[recipe.state].items() if _fits(model, k, v)}
+        state = states[recipe.state]
+        values |= {k: v for k, v in state.items() if _fits(model, k, v)}
+        where = f"state {recipe.state!r} ({len(values)} of its {len(state)} joints are here)"
     for name, number in recipe.neutral.items():
         validation.one_of("neutral", name, _moving(model))
         values[name] = validation.real_array(f"neutral[{name!r}]", number).reshape(-1)
@@ -157,7 +160,6 @@ def neutral_configuration(
             model.lowerPositionLimit[follower],
             model.upperPositionLimit[follower],
         )
-    where = f"state {recipe.state!r}" if recipe.state else "zero"
     if recipe.neutral:
         where += f" with given values of {', '.join(recipe.neutral)}"
     return q, f"{where}; put within limits: {', '.join(dict.fromkeys(moved))}" if moved else where
