@@ -222,3 +222,12 @@ def test_the_fingerprint_of_a_robot_sees_everything_that_the_expressions_use(cha
 
     assert robot(0.5).fingerprint == robot(0.5).fingerprint
     assert robot(0.5).fingerprint != robot(0.5000001).fingerprint
+
+
+def test_world_is_the_fixed_root_even_if_a_floating_robot_has_a_link_of_that_name() -> None:
+    model = load("ur_description/urdf/ur5_robot.urdf", "floating")
+    assert model.existFrame("world")
+    kin = Kinematics(model)
+    assert kin.pose("world").position.is_zero()
+    assert kin.pose("world").rotation.is_eye()
+    assert kin.jacobian("world").nnz() == 0
