@@ -1,0 +1,23 @@
+"""One robot follows one timed path: paths, the loop over ticks, the log and its plots (what ``wbc track`` runs)."""
+
+from wbc.track.log import Log, load, save
+from wbc.track.path import Path, Sample, SplinePath
+from wbc.track.path_file import read_path
+from wbc.track.presets import PRESETS, preset
+from wbc.track.run import track
+from wbc.track.setup import Moving, Plan
+
+__all__ = [
+    "PRESETS",
+    "Log",
+    "Moving",
+    "Path",
+    "Plan",
+    "Sample",
+    "SplinePath",
+    "load",
+    "preset",
+    "read_path",
+    "save",
+    "track",
+]

@@ -1,0 +1,169 @@
+"""Timed Cartesian paths: a pose and its exact twist at every time.
+
+A path starts and ends at rest: velocity and acceleration are zero at both ends, so that a robot that stands
+still can follow it from the first tick.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+import pinocchio as pin
+
+from wbc import validation
+from wbc.errors import RangeError, ShapeError
+from wbc.validation import Array
+
+#: Consecutive orientations may be at most this far apart [rad]; beyond it, the way round is ambiguous.
+LARGEST_TURN = math.radians(170.0)
+
+#: The spline of quaternions may not come nearer to zero than this, where its direction is badly defined.
+SHORTEST_QUATERNION = 0.2
+
+
+@dataclass(frozen=True, eq=False)
+class Sample:
+    """A path at one time.
+
+    Attributes:
+        pose: in the world.
+        twist: linear [m/s] and angular [rad/s] velocity in world axes, of the pose's origin, 6.
+    """
+
+    pose: pin.SE3
+    twist: Array
+
+
+class Path(Protocol):
+    """What can be followed."""
+
+    @property
+    def duration(self) -> float:
+        """Length in time [s]; ``sample`` holds still outside [0, duration]."""
+
+    def sample(self, t: float) -> Sample:
+        """Pose and twist at time t [s]."""
+
+
+class SplinePath:
+    """A C4 path through poses at given times.
+
+    Position: the quintic spline p(t) through the points. Orientation: the quintic spline s(t) in R^4 through the
+    quaternions (signs chosen so that neighbours are nearest), projected to the unit sphere:
+
+        Q = s / |s|,    omega = 2 vec(dQ/dt Q^-1),    dQ/dt = (1 - Q Q') ds/dt / |s|.
+
+    At both ends the first and second derivatives of both splines are zero, hence velocity and acceleration. Two
+    poses give the minimum-jerk polynomial and a turn about one axis.
+
+    Args:
+        times: strictly increasing, n >= 2 [s]; counted from the first.
+        poses: n poses in the world (``pin.SE3``, 4x4, or position and quaternion x, y, z, w).
+
+    Raises:
+        ShapeError, NotFiniteError, RotationError: bad times or poses.
+        RangeError: times do not increase, or neighbouring orientations are more than 170 degrees apart.
+
+    Cannot do: keep corners or straight pieces between points (a spline bows and may overshoot); respect limits.
+    """
+
+    def __init__(self, times: Any, poses: Sequence[Any]) -> None:
+        from scipy.interpolate import make_interp_spline
+
+        stamps = validation.real_array("path.times", times)
+        if stamps.ndim != 1 or len(stamps) < 2 or len(stamps) != len(poses):
+            raise ShapeError("path.times", times, f"expected at least two times, one for each of {len(poses)} poses")
+        if (np.diff(stamps) <= 0.0).any():
+            k = int(np.argmax(np.diff(stamps) <= 0.0)) + 1
+            raise RangeError(f"path.times[{k}]", float(stamps[k]), f"expected a time after {stamps[k - 1]:g} s")
+        placed = [validation.pose(f"path.poses[{k}]", pose) for k, pose in enumerate(poses)]
+        points = np.array([pose.translation for pose in placed])
+        quaternions = _continuous(np.array([pin.Quaternion(pose.rotation).coeffs() for pose in placed]))
+        self.times = stamps - stamps[0]
+        self.points = points
+        ends = [(1, np.zeros(7)), (2, np.zeros(7))]
+        values = np.hstack([points, quaternions])
+        self._spline = make_interp_spline(self.times, values, k=5, bc_type=(ends, ends))
+        self._rate = self._spline.derivative()
+        self._check_quaternions()
+
+    @property
+    def duration(self) -> float:
+        """Time of the last pose [s]."""
+        return float(self.times[-1])
+
+    def sample(self, t: float) -> Sample:
+        """Pose and twist at time t [s]; at rest outside [0, duration]."""
+        inside = min(max(float(t), 0.0), self.duration)
+        value = self._spline(inside)
+        rate = self._rate(inside) if inside == t else np.zeros(7)
+        size = float(np.linalg.norm(value[3:]))
+        unit = value[3:] / size
+        turning = (rate[3:] - unit * float(unit @ rate[3:])) / size
+        pose = pin.SE3(pin.Quaternion(unit).matrix(), value[:3])
+        return Sample(pose, np.concatenate([rate[:3], _angular_velocity(unit, turning)]))
+
+    def _check_quaternions(self) -> None:
+        grid = np.linspace(0.0, self.duration, 50 * len(self.times))
+        sizes = np.linalg.norm(self._spline(grid)[:, 3:], axis=1)
+        if sizes.min() < SHORTEST_QUATERNION:
+            at = float(grid[int(np.argmin(sizes))])
+            raise RangeError("path.poses", f"t = {at:.3g} s", "orientations change too unevenly here; add poses")
+
+
+class Approach:
+    """First a path from a pose to the start of another path, then that path. Both are at rest where they meet."""
+
+    def __init__(self, start: pin.SE3, path: Path, duration: float) -> None:
+        self._way = SplinePath([0.0, duration], [start, path.sample(0.0).pose])
+        self._path = path
+
+    @property
+    def duration(self) -> float:
+        """Duration of both [s]."""
+        return self._way.duration + self._path.duration
+
+    def sample(self, t: float) -> Sample:
+        """Pose and twist at time t [s]."""
+        return self._way.sample(t) if t < self._way.duration else self._path.sample(t - self._way.duration)
+
+
+def smooth_step(t: float, duration: float) -> tuple[float, float]:
+    """x = 10 s^3 - 15 s^4 + 6 s^5 with s = t / duration cut to [0, 1], and dx/dt [1/s]."""
+    s = min(max(t / duration, 0.0), 1.0)
+    return s**3 * (10.0 + s * (6.0 * s - 15.0)), 30.0 * (s * (1.0 - s)) ** 2 / duration
+
+
+def _continuous(quaternions: Array) -> Array:
+    """Signs such that neighbours are nearest.
+
+    Raises:
+        RangeError: neighbours further apart than LARGEST_TURN.
+    """
+    out = quaternions.copy()
+    for k in range(1, len(out)):
+        product = float(out[k] @ out[k - 1])
+        if product < 0.0:
+            out[k] = -out[k]
+        angle = 2.0 * math.acos(min(abs(product), 1.0))
+        if angle > LARGEST_TURN:
+            shown = f"{math.degrees(angle):.1f} deg"
+            raise RangeError(f"path.poses[{k}]", shown, "too far from the orientation before it; add a pose between")
+    return out
+
+
+def _angular_velocity(unit: Array, rate: Array) -> Array:
+    """2 vec(dQ/dt Q^-1) of a unit quaternion x, y, z, w, in world axes."""
+    x, y, z, w = unit.tolist()
+    a, b, c, d = rate.tolist()
+    return np.array(
+        [
+            2.0 * (w * a - d * x - b * z + c * y),
+            2.0 * (w * b - d * y - c * x + a * z),
+            2.0 * (w * c - d * z - a * y + b * x),
+        ]
+    )

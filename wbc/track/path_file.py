@@ -1,0 +1,124 @@
+"""Reading a timed path from a CSV, JSON or TOML file of waypoints.
+
+CSV: a header ``t,x,y,z,qx,qy,qz,qw`` (any order; lines that start with # are skipped), one waypoint a line.
+JSON and TOML: a table with ``waypoints``, a list of tables ``{t, position = [x, y, z], quaternion = [x, y, z, w]}``
+(JSON may also be that list alone). t in s, position in m in the world, unit quaternions.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import pathlib
+import tomllib
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from wbc import validation
+from wbc.errors import NotFiniteError, RotationError, ShapeError, UnknownNameError, WbcError, nearest
+from wbc.track.path import SplinePath
+
+COLUMNS = ("t", "x", "y", "z", "qx", "qy", "qz", "qw")
+KEYS = {"t": 1, "position": 3, "quaternion": 4}
+SUFFIXES = (".csv", ".json", ".toml")
+
+
+class PathFileError(WbcError):
+    """A path file that is missing, unreadable or badly formed."""
+
+
+def read_path(file: str | os.PathLike[str]) -> SplinePath:
+    """The path through the waypoints of a file; its first waypoint is at time 0, whatever ``t`` it has.
+
+    Raises:
+        PathFileError: missing, a directory, not text, not CSV, JSON or TOML, or fewer than two waypoints.
+        UnknownNameError: a column or key that does not belong there.
+        ShapeError, NotFiniteError, RotationError: a value that is no number, is not finite, or is no unit quaternion;
+            the waypoint is named.
+        RangeError: times that do not increase, or orientations too far apart (see :class:`SplinePath`).
+    """
+    path = pathlib.Path(file)
+    if path.suffix.lower() not in SUFFIXES:
+        raise PathFileError("path", str(path), "unknown kind of file", SUFFIXES)
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        reason = "there is no such file" if isinstance(error, FileNotFoundError) else f"cannot be read: {error}"
+        raise PathFileError("path", str(path), reason) from error
+    table = _from_csv(path, text) if path.suffix.lower() == ".csv" else _from_tables(path, text)
+    if len(table) < 2:
+        raise PathFileError("path", str(path), f"expected at least two waypoints, found {len(table)}")
+    for label, numbers in table:
+        if not np.isfinite(numbers).all():
+            raise NotFiniteError(f"{path.name} {label}", numbers, "expected finite numbers")
+        size = float(np.linalg.norm(numbers[4:]))
+        if abs(size - 1.0) > 1e-3:
+            raise RotationError(f"{path.name} {label}", numbers[4:], f"quaternion of norm {size:.6g}, expected 1")
+    values = np.array([numbers for _, numbers in table])
+    # Files are written with few digits: what is a unit quaternion to 1e-3 becomes one
+    values[:, 4:] /= np.linalg.norm(values[:, 4:], axis=1, keepdims=True)
+    return SplinePath(values[:, 0], list(values[:, 1:]))
+
+
+def _from_csv(path: pathlib.Path, text: str) -> list[tuple[str, np.ndarray]]:
+    """(label, eight numbers in the order of COLUMNS) of each line."""
+    lines = [(n, line) for n, line in enumerate(text.splitlines(), 1) if line.strip() and not line.startswith("#")]
+    rows = [(n, next(csv.reader([line]))) for n, line in lines]
+    if not rows:
+        raise PathFileError("path", str(path), "the file is empty")
+    header = [name.strip() for name in rows[0][1]]
+    for name in header:
+        if name not in COLUMNS:
+            raise UnknownNameError(f"{path.name} column", name, COLUMNS)
+    missing = [name for name in COLUMNS if name not in header]
+    if missing:
+        raise ShapeError(f"{path.name} columns", header, f"missing {', '.join(missing)}", nearest(missing[0], COLUMNS))
+    if len(set(header)) != len(header):
+        raise ShapeError(f"{path.name} columns", header, "a column is there twice")
+    order = [header.index(name) for name in COLUMNS]
+    out = []
+    for number, cells in rows[1:]:
+        if len(cells) != len(header):
+            raise ShapeError(f"{path.name} line {number}", cells, f"expected {len(header)} values")
+        out.append((f"line {number}", _numbers(f"{path.name} line {number}", [cells[k] for k in order])))
+    return out
+
+
+def _from_tables(path: pathlib.Path, text: str) -> list[tuple[str, np.ndarray]]:
+    """(label, eight numbers) of each table in a JSON or TOML file."""
+    try:
+        data: Any = json.loads(text) if path.suffix.lower() == ".json" else tomllib.loads(text)
+    except ValueError as error:
+        raise PathFileError("path", str(path), f"not well formed: {error}") from error
+    if isinstance(data, Mapping):
+        for key in data:
+            if key != "waypoints":
+                raise UnknownNameError(f"{path.name} key", key, ("waypoints",))
+        data = data.get("waypoints", [])
+    if not isinstance(data, list):
+        raise ShapeError(f"{path.name} waypoints", data, "expected a list of tables")
+    out = []
+    for k, waypoint in enumerate(data):
+        label = f"waypoint {k}"
+        if not isinstance(waypoint, Mapping):
+            raise ShapeError(f"{path.name} {label}", waypoint, f"expected a table of {', '.join(KEYS)}")
+        for key in waypoint:
+            validation.one_of(f"{path.name} {label} key", key, KEYS)
+        parts = []
+        for key, count in KEYS.items():
+            if key not in waypoint:
+                raise ShapeError(f"{path.name} {label}", waypoint, f"missing {key}", nearest(key, KEYS))
+            value = waypoint[key] if count > 1 else [waypoint[key]]
+            parts.append(validation.real_array(f"{path.name} {label}.{key}", value, (count,), finite=False))
+        out.append((label, np.concatenate(parts)))
+    return out
+
+
+def _numbers(label: str, cells: list[str]) -> np.ndarray:
+    try:
+        return np.array([float(cell) for cell in cells])
+    except ValueError as error:
+        raise ShapeError(label, cells, f"expected numbers: {error}") from error

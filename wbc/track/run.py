@@ -1,0 +1,144 @@
+"""The loop over ticks: command, record, integrate.
+
+The robot of a run is its kinematic model: the command v of each tick is held for dt and integrated on the
+manifold, q <- q (+) v dt (``pin.integrate``), open loop. So the log shows what the controller commands, without the
+tracking error, delay and noise of a real robot's joint servos; ``controller.step`` takes measured q and v as well.
+
+The target of tick k is the path's pose at t_k, the feed-forward its twist at the middle of the interval,
+t_k + dt/2, which is what v is held for.
+"""
+
+from __future__ import annotations
+
+import importlib.metadata
+import math
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from wbc.controller import Controller
+from wbc.track.clearance import clearances, least_mesh_clearance
+from wbc.track.log import Log
+from wbc.track.recorder import Recorder
+from wbc.track.setup import Plan
+
+VERSIONS = ("wbc", "casadi", "pin", "daqp", "osqp", "numpy")
+
+
+def track(
+    plan: Plan,
+    progress: Callable[[int], None] | None = None,
+    stop: Callable[[], bool] | None = None,
+    compiled: Callable[[Controller], None] | None = None,
+) -> Log:
+    """Do a run and return its log.
+
+    Args:
+        plan: what to do.
+        progress: called with the number of finished ticks after each.
+        stop: asked before each tick; True ends the run there, with a log of what was done.
+        compiled: called once when the controller is ready.
+
+    Raises:
+        WbcError: the stack does not fit the robot, or it does not compile.
+    """
+    began = time.perf_counter()
+    controller = plan.stack().compile(solver=plan.solver, backend=plan.backend)
+    compile_time = time.perf_counter() - began
+    if compiled is not None:
+        compiled(controller)
+    recorder = Recorder(plan, controller)
+    _loop(plan, controller, recorder, progress, stop)
+    columns, units = recorder.columns()
+    robot, obstacles, t = plan.robot, plan.obstacles, recorder.times
+    gaps = clearances(robot, recorder.q, obstacles, t)
+    for name, values in gaps.items():
+        columns[f"clearance.{name}"], units[f"clearance.{name}"] = values, "m"
+    meta = _meta(plan, controller, recorder, compile_time)
+    nearest = least_mesh_clearance(robot, recorder.q, obstacles, t, gaps)
+    if nearest is not None:
+        meta["mesh_clearance"] = dict(zip(("least", "link", "t"), nearest, strict=True))
+    return Log(columns, units, meta)
+
+
+def _loop(
+    plan: Plan,
+    controller: Controller,
+    recorder: Recorder,
+    progress: Callable[[int], None] | None,
+    stop: Callable[[], bool] | None,
+) -> None:
+    model, dt, duration = plan.robot.model, plan.dt, plan.path.duration
+    q = plan.start.copy()
+    controller.reset(q)
+    rest = float(controller["plane"].target) if plan.plane is not None else 0.0
+    clock = time.perf_counter_ns
+    for k in range(plan.ticks):
+        if stop is not None and stop():
+            break
+        t = k * dt
+        target, middle = plan.path.sample(t).pose, plan.path.sample(t + dt / 2).twist
+        controller["hand"].target = target
+        controller["hand"].feedforward = middle
+        angle = math.nan
+        if plan.plane is not None:
+            angle = rest + plan.plane.at(t, duration)[0]
+            controller["plane"].target = angle
+            controller["plane"].feedforward = plan.plane.at(t + dt / 2, duration)[1]
+        for name, obstacle in plan.obstacles.items():
+            if obstacle.velocity.any():
+                controller[name].pose = obstacle.at(t)
+                controller[name].velocity = np.concatenate([obstacle.velocity, np.zeros(3)])
+        start = clock()
+        step = controller.step(q)
+        recorder.add(t, q, target, angle, step, (clock() - start) * 1e-9)
+        q = pin.integrate(model, q, step.v * dt)
+        if progress is not None:
+            progress(k + 1)
+
+
+def _meta(plan: Plan, controller: Controller, recorder: Recorder, compile_time: float) -> dict[str, Any]:
+    robot, limits = plan.robot, plan.robot.limits
+    arrays = {
+        "position_lower": limits.position_lower,
+        "position_upper": limits.position_upper,
+        "velocity": limits.velocity,
+        "acceleration": limits.acceleration,
+    }
+    return {
+        "robot": robot.name,
+        "source": robot.source,
+        "frame": plan.frame,
+        "path": plan.label,
+        "duration": plan.path.duration,
+        "ticks": recorder.count,
+        "planned": plan.ticks,
+        "interrupted": recorder.count < plan.ticks,
+        "dt": plan.dt,
+        "integration": "q <- q (+) v dt, open loop",
+        "solver": controller.solver,
+        "backend": controller.backend,
+        "cached": controller.cached,
+        "compile_time": compile_time,
+        "stack": str(controller),
+        "margin": plan.margin,
+        "plane": None if plan.plane is None else {"amplitude": plan.plane.amplitude, "cycles": plan.plane.cycles},
+        "holds": list(plan.holds),
+        "obstacles": {
+            name: {
+                "shape": repr(o.shape),
+                "radius": getattr(o.shape, "radius", None),
+                "pose": np.asarray(o.pose.homogeneous).tolist(),
+                "velocity": o.velocity.tolist(),
+            }
+            for name, o in plan.obstacles.items()
+        },
+        "dofs": list(robot.dof_names),
+        "dof_units": list(robot.dof_units),
+        "position_index": [int(i) for i in robot.position_index],
+        "limits": {name: [None if math.isinf(x) else float(x) for x in array] for name, array in arrays.items()},
+        "versions": {name: importlib.metadata.version(name) for name in VERSIONS},
+    }

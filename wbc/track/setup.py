@@ -1,0 +1,135 @@
+"""What is to be done: robot, path, obstacles and commands, and the stack that does it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+import pinocchio as pin
+
+from wbc import shapes, tasks, validation
+from wbc.controller import Stack
+from wbc.errors import WbcError
+from wbc.robot import Robot
+from wbc.track.path import Path, smooth_step
+from wbc.validation import Array
+
+#: Angle 0 of the elbow plane is "elbow up" for an arm that reaches forward: the plane is vertical, the elbow above.
+REFERENCE = tasks.PlaneReference(pole=(1.0, 0.0, 0.0), direction=(0.0, 0.0, 1.0))
+
+#: Weights of the tasks: the plane costs far less than the hand and the posture far less than the plane, so that
+#: what cannot all be had is lost in that order.
+WEIGHTS = {"hand": 1.0, "plane": 1e-4, "posture": 1e-6}
+
+
+@dataclass(frozen=True, eq=False)
+class Moving:
+    """An obstacle: a sphere or half-space, at a place at t = 0, with a constant linear velocity [m/s]."""
+
+    shape: shapes.Sphere | shapes.HalfSpace
+    pose: pin.SE3
+    velocity: Array = field(default_factory=lambda: np.zeros(3))
+
+    def at(self, t: float) -> pin.SE3:
+        """Pose at time t [s]."""
+        return pin.SE3(self.pose.rotation, self.pose.translation + t * self.velocity)
+
+
+@dataclass(frozen=True)
+class Swing:
+    """A commanded angle of the elbow plane:
+
+        psi(t) = psi_0 + amplitude w(t) sin(2 pi cycles t / T),    w the quintic step, up and down in T / 8,
+
+    psi_0 being the angle at the start. Amplitude 0 holds it.
+    """
+
+    amplitude: float = 0.5
+    cycles: float = 2.0
+
+    def at(self, t: float, duration: float) -> tuple[float, float]:
+        """psi - psi_0 [rad] and its rate [rad/s]."""
+        ramp = duration / 8.0
+        up, up_rate = smooth_step(t, ramp)
+        down, down_rate = smooth_step(duration - t, ramp)
+        speed = 2.0 * math.pi * self.cycles / duration
+        sine, cosine = math.sin(speed * t), math.cos(speed * t)
+        window, rate = up * down, up_rate * down - up * down_rate
+        return self.amplitude * window * sine, self.amplitude * (rate * sine + window * speed * cosine)
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """A run before it is done.
+
+    Attributes:
+        robot: the robot.
+        frame: the frame that follows the path.
+        path: where to.
+        label: name of the path, for titles and the log.
+        start: first configuration; the robot is at rest there.
+        dt: time between commands [s].
+        obstacles: name -> obstacle; every link with shapes keeps clear of it by ``margin`` [m].
+        margin: see ``obstacles``.
+        plane: command of the elbow plane, or None for none.
+        holds: frames that must not move (the feet of a humanoid).
+        gain: of the hand [1/s].
+        solver, backend: see :meth:`wbc.Stack.compile`.
+    """
+
+    robot: Robot
+    frame: str
+    path: Path
+    label: str
+    start: Array
+    dt: float = 0.005
+    obstacles: dict[str, Moving] = field(default_factory=dict)
+    margin: float = 0.02
+    plane: Swing | None = None
+    holds: tuple[str, ...] = ()
+    gain: float = 10.0
+    solver: str = "daqp"
+    backend: str = "auto"
+
+    def __post_init__(self) -> None:
+        self.robot.check_frame("frame", self.frame)
+        validation.scalar("dt", self.dt, low=0.0, open_low=True, unit="s")
+        object.__setattr__(self, "start", self.robot.configuration("start", self.start))
+
+    @property
+    def ticks(self) -> int:
+        """Commands in the whole run."""
+        return max(1, math.ceil(self.path.duration / self.dt - 1e-9))
+
+    def stack(self) -> Stack:
+        """The stack of the run.
+
+        Raises:
+            WbcError: something does not fit the robot (no link shapes, no frames of an elbow plane).
+        """
+        robot = self.robot
+        stack = Stack(robot, dt=self.dt)
+        stack.add(tasks.EndEffector(self.frame, gain=self.gain), name="hand", weight=WEIGHTS["hand"])
+        if self.plane is not None:
+            stack.add(plane_task(robot), name="plane", weight=WEIGHTS["plane"])
+        stack.add(tasks.Posture(), name="posture", weight=WEIGHTS["posture"])
+        stack.add(tasks.JointLimits(), name="limits")
+        for frame in self.holds:
+            stack.add(tasks.Hold(frame), name=f"hold {frame}")
+        for name, obstacle in self.obstacles.items():
+            stack.add(tasks.Obstacle(obstacle.shape, margin=self.margin, pose=obstacle.pose), name=name)
+        return stack
+
+
+def plane_task(robot: Robot) -> tasks.PitchPlane:
+    """The elbow plane of a robot whose table knows shoulder, elbow and wrist.
+
+    Raises:
+        WbcError: it does not know them.
+    """
+    roles = [robot.frames.get(role) for role in ("shoulder", "elbow", "wrist")]
+    if None in roles:
+        raise WbcError("plane", robot.name, "the table knows no shoulder, elbow and wrist of this robot", ("off",))
+    shoulder, elbow, wrist = (str(role) for role in roles)
+    return tasks.PitchPlane(shoulder, elbow, wrist, reference=REFERENCE, gain=5.0)
