@@ -63,8 +63,8 @@ def load(
         name: of the robot; default: the table's, the file's stem, or the model's.
         neutral: joint -> value [rad or m], on top of the table's neutral configuration.
         shapes: ``auto`` (the table's spheres and capsules, else ``description``), ``description`` (primitives of
-            the file; meshes are skipped and named in the notes), ``fit`` (also a capsule around every mesh, about
-            0.3 s a mesh), ``none``.
+            the file; meshes are skipped and named in the notes), ``fit`` (also a capsule around every mesh; about
+            0.2 s for one of some hundred vertices), ``none``.
         package_dirs: folders to look for ``package://NAME/...`` meshes in, besides those above the file.
         position_lower, position_upper [rad or m], velocity [rad/s or m/s], acceleration [rad/s^2 or m/s^2],
             effort [N m or N]: limits that replace the description's; one number for all joints but the base, nv

@@ -124,3 +124,11 @@ def test_bad_locks() -> None:
 def test_a_ball_joint_is_locked_as_it_is() -> None:
     whole, robot = wbc.robots.load(DATA / "crawler.xml"), wbc.robots.load(DATA / "crawler.xml", lock="ball")
     assert (robot.nq, robot.nv) == (whole.nq - 4, whole.nv - 3)
+
+
+def test_a_model_with_pinocchios_own_mimic_joint_has_one_degree_of_freedom_less() -> None:
+    source = str(example(RECIPES["panda"].file))
+    robot = wbc.robots.load(pin.buildModelFromUrdf(source, True))
+    assert (robot.nq, robot.nv, robot.couplings) == (8, 8, ())
+    assert robot.dof_names[-1] == "panda_finger_joint1"
+    assert wbc.robots.load(robot.model, lock="panda_joint3").nv == 7
