@@ -41,16 +41,16 @@ def flat(robot: Robot, field: str, declared: Input, value: Any) -> Array:
         ShapeError, NotFiniteError, RotationError, RangeError: it is no value of this input.
     """
     if declared.kind == "pose":
-        # The columns of the upper three rows are those of the rotation, then the position
-        return np.ravel(validation.pose(field, value).homogeneous[:3], order="F")
+        return validation.pose_numbers(field, value)
     if declared.kind == "rotation":
         return np.ravel(validation.rotation(field, value), order="F")
     if declared.kind == "configuration":
         return robot.configuration(field, value)
     shape = () if declared.kind == "vector" and declared.size == 0 else (size(robot, declared),)
     numbers = np.atleast_1d(validation.real_array(field, value, shape))
-    for number in numbers:
-        validation.scalar(field, number, low=declared.low, high=declared.high, unit=declared.unit)
+    if declared.low > -np.inf or declared.high < np.inf:
+        for number in numbers:
+            validation.scalar(field, number, low=declared.low, high=declared.high, unit=declared.unit)
     return numbers
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -26,23 +28,27 @@ PLACE = np.array([1.0, -2.0, 3.0])
 def test_every_spelling_of_a_pose_is_the_same_pose(value: object) -> None:
     pose = validation.pose("target", value)
     np.testing.assert_allclose(pose.homogeneous, pin.SE3(TURN, PLACE).homogeneous, atol=1e-15)
+    numbers = validation.pose_numbers("target", value)
+    np.testing.assert_allclose(numbers, [*TURN[:, 0], *TURN[:, 1], *TURN[:, 2], *PLACE], atol=1e-15)
 
 
 def test_a_pose_is_a_copy() -> None:
     given = pin.SE3(TURN, PLACE)
-    pose = validation.pose("target", given)
+    pose, numbers = validation.pose("target", given), validation.pose_numbers("target", given)
     given.translation = np.zeros(3)
     np.testing.assert_array_equal(pose.translation, PLACE)
+    np.testing.assert_array_equal(numbers[9:], PLACE)
 
 
+@pytest.mark.parametrize("check", [validation.pose, validation.pose_numbers])
 @pytest.mark.parametrize("number", [np.nan, np.inf, -np.inf])
-def test_numbers_that_are_not_finite_are_refused(number: float) -> None:
+def test_numbers_that_are_not_finite_are_refused(number: float, check: Callable[[str, object], object]) -> None:
     with pytest.raises(NotFiniteError, match="target"):
-        validation.pose("target", pin.SE3(TURN, np.array([0.0, number, 0.0])))
+        check("target", pin.SE3(TURN, np.array([0.0, number, 0.0])))
     broken = TURN.copy()
     broken[1, 2] = number
     with pytest.raises(NotFiniteError, match="target"):
-        validation.pose("target", pin.SE3(broken, PLACE))
+        check("target", pin.SE3(broken, PLACE))
     with pytest.raises(NotFiniteError, match="target"):
         validation.rotation("target", broken)
 
@@ -55,8 +61,9 @@ def test_numbers_that_are_not_finite_are_refused(number: float) -> None:
 def test_matrices_that_are_no_rotations_are_refused(matrix: np.ndarray) -> None:
     with pytest.raises(RotationError, match="target"):
         validation.rotation("target", matrix)
-    with pytest.raises(RotationError, match="target"):
-        validation.pose("target", pin.SE3(matrix, PLACE))
+    for check in (validation.pose, validation.pose_numbers):
+        with pytest.raises(RotationError, match="target"):
+            check("target", pin.SE3(matrix, PLACE))
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -68,8 +75,11 @@ def test_the_tolerance_is_the_frobenius_norm(seed: int) -> None:
     push /= np.linalg.norm(rotation.T @ push + push.T @ rotation)
     inside, outside = (rotation + factor * validation.ROTATION_TOLERANCE * push for factor in (0.99, 1.01))
     np.testing.assert_array_equal(validation.rotation("target", inside), inside)
+    np.testing.assert_array_equal(validation.pose_numbers("target", pin.SE3(inside, PLACE))[:3], inside[:, 0])
     with pytest.raises(RotationError):
         validation.rotation("target", outside)
+    with pytest.raises(RotationError):
+        validation.pose_numbers("target", pin.SE3(outside, PLACE))
 
 
 @pytest.mark.parametrize("value", [np.eye(2), np.zeros(5), "identity", None, [[1.0, 2.0], [3.0]]])

@@ -92,8 +92,6 @@ def rotation(field: str, value: Any) -> Array:
 def pose(field: str, value: Any) -> pin.SE3:
     """A pose, from ``pin.SE3``, a 4x4 homogeneous matrix or seven numbers (position, quaternion x, y, z, w)."""
     if isinstance(value, pin.SE3):
-        if _is_rotation(value.rotation) and all(map(math.isfinite, value.translation.tolist())):
-            return pin.SE3(value)
         return pin.SE3(rotation(field, value.rotation), real_array(field, value.translation, (3,)))
     raw = real_array(field, value)
     if raw.shape == (7,):
@@ -103,6 +101,16 @@ def pose(field: str, value: Any) -> pin.SE3:
             raise RotationError(field, value, "last row of a homogeneous matrix must be 0, 0, 0, 1")
         return pin.SE3(rotation(field, raw[:3, :3]), raw[:3, 3])
     raise ShapeError(field, value, "expected a pin.SE3, a 4x4 matrix or (position, quaternion x, y, z, w)")
+
+
+def pose_numbers(field: str, value: Any) -> Array:
+    """A pose as 12 numbers, rotation by columns, then position; from whatever :func:`pose` takes."""
+    if isinstance(value, pin.SE3):
+        # The columns of the upper three rows are those of the rotation, then the position
+        numbers: Array = np.ravel(value.homogeneous[:3], order="F")
+        if _is_rotation(numbers[:9]) and all(map(math.isfinite, numbers[9:].tolist())):
+            return numbers
+    return np.ravel(pose(field, value).homogeneous[:3], order="F")
 
 
 def _is_rotation(matrix: Array) -> bool:
