@@ -62,6 +62,8 @@ class Controller:
         self._waiting: dict[str, list[Slot]] = {}
         self._handles = {name: Handle(self, block) for name, block in layout.blocks.items()}
         self.tick.dt[0] = stack.dt
+        self.tick.q[:] = stack.robot.neutral
+        self.tick.check()
         #: the next step has more to do than to copy q: defaults to take from it, or dt to set back
         self._slow = True
         for name, handle in self._handles.items():
@@ -86,15 +88,14 @@ class Controller:
         """
         if dt is not None or self._slow:
             self._prepare(q, v, dt)
-        if type(q) is _Array and q.dtype is _FLOAT and q.shape == self._q_shape:
-            self._q[:] = q
-        else:
-            self._q[:] = validation.real_array("q", q, self._q_shape)
+        if not (type(q) is _Array and q.dtype is _FLOAT and q.shape == self._q_shape):
+            q = validation.real_array("q", q, self._q_shape)
         if v is not None:
             if not (type(v) is _Array and v.dtype is _FLOAT and v.shape == self._v_shape):
                 v = validation.real_array("v", v, self._v_shape)
             self._v_in[:] = v
             self._use_v[0] = 1.0
+        self._q[:] = q
         if self._call() < 0:
             self._refuse(q, v)
         return Step(self._report.tobytes(), self._context)
@@ -111,12 +112,14 @@ class Controller:
         robot = self.stack.robot
         configuration = None if q is None else robot.configuration("q", q)
         velocity = np.zeros(robot.nv) if v is None else validation.real_array("v", v, (robot.nv,))
+        waiting = {name: list(slots) for name, slots in self._first.items()}
+        if configuration is not None:
+            self._initialise(waiting, configuration)
+            waiting = {}
+        self._waiting = waiting
         self.tick.v_last[:] = velocity
         self.tick.reset()
-        self._waiting = {name: list(slots) for name, slots in self._first.items() if slots}
         self._slow = True
-        if configuration is not None:
-            self._initialise(configuration)
 
     def __getitem__(self, name: str) -> Handle:
         handle = self._handles.get(name)
@@ -128,7 +131,14 @@ class Controller:
         return name in self._handles
 
     def qp(self) -> QP:
-        """The QP at the buffers' present values (after a step: that of the step, acceleration bounds about its v)."""
+        """The QP at the buffers' present values: at the configuration of the last step (before it: the neutral one),
+        with acceleration bounds about the last command.
+
+        Raises:
+            SolverError: run-time values still wait for the first configuration.
+        """
+        if self._waiting:
+            raise SolverError("qp", None, "needs the first configuration; call step(q) or reset(q) first")
         return self.tick.qp()
 
     @property
@@ -150,10 +160,9 @@ class Controller:
                 if not table[name]:
                     del table[name]
 
-    def fill_defaults(self, field: str) -> None:
+    def require_value(self, slot: Slot, field: str) -> None:
         """Values that wait for the first configuration cannot be read before it."""
-        item, _, name = field.partition(".")
-        if any(s.input.name == name for s in self._waiting.get(item, ())):
+        if any(s is slot for slots in self._waiting.values() for s in slots):
             raise SolverError(field, None, "is taken from the first configuration; call step(q) or reset(q) first")
 
     # The first configuration
@@ -172,9 +181,9 @@ class Controller:
             value = min(float(value), 1.0 / self.stack.dt_range[1])
         self.tick.p[slot.span] = self._handles[name].checked(slot.input.name, value)
 
-    def _initialise(self, q: Array) -> None:
+    def _initialise(self, waiting: dict[str, list[Slot]], q: Array) -> None:
         values: list[tuple[Slot, Array]] = []
-        for name, slots in self._waiting.items():
+        for name, slots in waiting.items():
             initial = self.stack[name].item.initial(self.stack.robot, q)
             for slot in slots:
                 if slot.input.name not in initial:
@@ -182,7 +191,6 @@ class Controller:
                 values.append((slot, self._handles[name].checked(slot.input.name, initial[slot.input.name])))
         for slot, numbers in values:
             self.tick.p[slot.span] = numbers
-        self._waiting = {}
 
     # Off the fast path
 
@@ -194,7 +202,8 @@ class Controller:
         if v is not None:
             validation.real_array("v", v, self._v_shape)
         if self._waiting:
-            self._initialise(configuration)
+            self._initialise(self._waiting, configuration)
+            self._waiting = {}
         self.tick.dt[0] = step
         self._slow = dt is not None
 

@@ -58,7 +58,7 @@ class Handle:
         if name == "weight" and self._block.form == "task":
             return self._weight
         slot = self._slot(name)
-        self._controller.fill_defaults(self._field(name))
+        self._controller.require_value(slot, self._field(name))
         return _as_written(slot, self._controller.tick.p[slot.span])
 
     def __setattr__(self, name: str, value: Any) -> None:

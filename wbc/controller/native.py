@@ -29,6 +29,7 @@ _FIELDS = (
     "A",
     "low",
     "high",
+    "unusable",
 )
 
 
@@ -74,6 +75,7 @@ class NativeTick:
         self._g = view("g", nv)
         self._A = view("A", rows * nv).reshape(rows, nv)
         self._low, self._high = view("low", nv + rows), view("high", nv + rows)
+        self._unusable = view("unusable", 1)
         self.step_function = self._library.wbc_tick_step
 
     def step(self) -> int:
@@ -101,6 +103,11 @@ class NativeTick:
     def check(self) -> int:
         """Only refuse bad inputs, and take over a measured velocity."""
         return int(self._library.wbc_tick_check(self.pointer))
+
+    @property
+    def usable(self) -> bool:
+        """Numbers of the last assembly are finite and every simple bound leaves an interval."""
+        return bool(self._unusable[0] == 0.0)
 
     def qp(self) -> QP:
         self.assemble()

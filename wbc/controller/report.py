@@ -14,6 +14,10 @@ BAD_Q, BAD_UNIT, BAD_V = -1, -2, -3
 #: Stand-in for infinity in bounds and in the error bound of a tick without a certificate
 INFINITE = 1e30
 
+#: Violations up to this, in row units, are rounding; squared lengths of quaternions may be off by the other
+#: (both as in ``native/tick.c``)
+TOLERANCE, UNIT_TOLERANCE = 1e-9, 2.00001e-6
+
 
 class ReportLayout:
     """Slices of the report of one layout."""

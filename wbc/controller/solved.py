@@ -6,15 +6,18 @@ from typing import Protocol
 
 import numpy as np
 
-from wbc.controller.report import BRAKED, INFINITE, RELAXED, SOLVED, ReportLayout
-from wbc.qp.certificate import certify
+from wbc.controller.report import BRAKED, INFINITE, RELAXED, SOLVED, TOLERANCE, ReportLayout
+from wbc.qp.certificate import Certificate, certify
 from wbc.qp.problem import QP, Solution
-from wbc.qp.relax import Relaxation
+from wbc.qp.relax import Relaxation, Relaxed
 from wbc.qp.solvers import make_solver
 from wbc.stack.codegen import row_orders, row_units
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Layout
 from wbc.validation import Array
+
+#: Of a tick that brakes
+_NONE = Certificate(INFINITE, INFINITE, INFINITE, INFINITE)
 
 
 class Assembly(Protocol):
@@ -33,6 +36,10 @@ class Assembly(Protocol):
 
     def check(self) -> int:
         """0, or the flag of refused inputs."""
+
+    @property
+    def usable(self) -> bool:
+        """Numbers of the last QP are finite and every simple bound leaves an interval."""
 
     def qp(self) -> QP:
         """The QP."""
@@ -69,6 +76,9 @@ class SolvedTick:
     def reset(self) -> None:
         self._solver.reset()
 
+    def check(self) -> int:
+        return self._assembly.check()
+
     def qp(self) -> QP:
         return self._assembly.qp()
 
@@ -77,31 +87,40 @@ class SolvedTick:
         if refused:
             return refused
         qp = self._assembly.qp()
-        answer = self._relaxation.solve(qp, self._orders, self._units)
-        flag = {"solved": SOLVED, "relaxed": RELAXED}.get(answer.flag, BRAKED)
-        n, places, report = self._nv, self._places, self.report
-        v = answer.x
-        if flag == BRAKED:
-            with np.errstate(invalid="ignore"):
-                v = np.clip(0.0, qp.lower[:n], qp.upper[:n])
-            v = np.where(np.isfinite(v), v, 0.0)
-        multipliers = answer.multipliers if flag != BRAKED else np.zeros(qp.lower.size)
-        final = qp
-        if flag == RELAXED:
-            final = qp.copy()
-            final.lower[n:] -= answer.slack
-            final.upper[n:] += answer.slack
-        certificate = certify(final, Solution(v, multipliers, "solved"))
-        bound = certificate.error_bound if flag != BRAKED and np.isfinite(certificate.error_bound) else INFINITE
+        flag, v, answer = self._answer(qp)
+        places, report = self._places, self.report
+        certificate, multipliers, slack = _NONE, np.zeros(qp.lower.size), np.zeros(self._units.size)
+        if answer is not None:
+            multipliers, slack = answer.multipliers, qp.violation(v)[self._nv :]
+            certificate = certify(QP(qp.H, qp.g, answer.lower, answer.upper, qp.A), Solution(v, multipliers, "solved"))
+        for name in ("stationarity", "violation", "complementarity", "error_bound"):
+            report[places[name]] = min(getattr(certificate, name), INFINITE)
         report[places["v"]] = v
         report[places["flag"]] = flag
-        report[places["iterations"]] = answer.iterations
-        report[places["stationarity"]] = certificate.stationarity
-        report[places["violation"]] = certificate.violation
-        report[places["complementarity"]] = certificate.complementarity
-        report[places["error_bound"]] = bound
+        report[places["iterations"]] = answer.iterations if answer is not None else 0
         report[places["multipliers"]] = multipliers
-        report[places["slack"]] = np.where(answer.relaxed, answer.slack, 0.0)
+        report[places["slack"]] = np.where(slack > 2.0 * TOLERANCE * self._units, slack, 0.0)
         self._assembly.look_ahead()
         self.v_last[:] = v
         return flag
+
+    def _answer(self, qp: QP) -> tuple[int, Array, Relaxed | None]:
+        """Flag, command and, unless the tick brakes, what the solver answered."""
+        n = self._nv
+        if self._assembly.usable:
+            sides, crossed = self._uncrossed(qp)
+            answer = self._relaxation.solve(sides, self._orders, self._units)
+            if answer.flag != "failed":
+                return RELAXED if crossed or answer.flag == "relaxed" else SOLVED, answer.x, answer
+        return BRAKED, np.clip(0.0, qp.lower[:n], qp.upper[:n]), None
+
+    def _uncrossed(self, qp: QP) -> tuple[QP, bool]:
+        """Rows whose sides have crossed are met half-way; True if any gives way by more than rounding."""
+        n = self._nv
+        gap = qp.lower[n:] - qp.upper[n:]
+        if not (gap > 0.0).any():
+            return qp, False
+        out = qp.copy()
+        middle = 0.5 * (qp.lower[n:] + qp.upper[n:])
+        out.lower[n:], out.upper[n:] = np.where(gap > 0, middle, qp.lower[n:]), np.where(gap > 0, middle, qp.upper[n:])
+        return out, bool((gap > 4.0 * TOLERANCE * self._units).any())

@@ -70,13 +70,13 @@ class Residual:
 
 @dataclass(frozen=True)
 class Certificate:
-    """How good the answer is, computed within the tick.
+    """How good the answer is, computed within the tick; all inf for a braked tick.
 
     Attributes:
         stationarity: largest entry of |H v + g + A' lambda| (cost per rad/s).
         violation: largest violation of a row that was not relaxed, in its unit per second.
         complementarity: largest |lambda (A v - b)|.
-        error_bound: bound on the largest |v - v*| [rad/s, m/s]; inf for a braked tick.
+        error_bound: bound on the largest |v - v*| [rad/s, m/s].
     """
 
     stationarity: float
@@ -139,8 +139,7 @@ class Step:
         """Residuals and the error bound of v."""
         names = ("stationarity", "violation", "complementarity", "error_bound")
         values = [self._number(n) for n in names]
-        values[3] = np.inf if values[3] >= INFINITE else values[3]
-        return Certificate(*values)
+        return Certificate(*(np.inf if value >= INFINITE else value for value in values))
 
     @property
     def residuals(self) -> Mapping[str, Residual]:

@@ -22,6 +22,9 @@ class Tick(Protocol):
     bound_enabled: Array
     report: Array
 
+    def check(self) -> int:
+        """Take q and a measured velocity over, or put the last good q back; negative for refused inputs."""
+
     def step(self) -> int:
         """Run one cycle; the flag, negative for refused inputs."""
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from wbc.controller.report import BAD_Q, BAD_UNIT, BAD_V, ReportLayout
+from wbc.controller.report import BAD_Q, BAD_UNIT, BAD_V, INFINITE, TOLERANCE, UNIT_TOLERANCE, ReportLayout
 from wbc.qp.problem import QP
 from wbc.stack.codegen import bound_sequence, unit_groups
 from wbc.stack.declaration import Declaration
@@ -58,44 +58,69 @@ class VmAssembly:
         self._damping = stack.damping / layout.dof_scales(stack) ** 2
         self._sequence = bound_sequence(layout)
         self._units = unit_groups(stack)
+        self._dof_scales = layout.dof_scales(stack)
+        self._q_good = self.q.copy()
+        self.usable = True
 
     def check(self) -> int:
         """Refuse bad inputs, or take over a measured velocity; 0 or a negative flag."""
         bad = 0
         if not np.isfinite(self.q).all():
             bad = BAD_Q
-        elif any(abs(self.q[s : s + n] @ self.q[s : s + n] - 1.0) > 2e-6 for s, n in self._units):
+        elif any(abs(self.q[s : s + n] @ self.q[s : s + n] - 1.0) > UNIT_TOLERANCE for s, n in self._units):
             bad = BAD_UNIT
         elif self.use_v[0] and not np.isfinite(self.v_in).all():
             bad = BAD_V
         if not bad and self.use_v[0]:
             self.v_last[:] = self.v_in
         self.use_v[0] = 0.0
+        if bad:
+            self.q[:] = self._q_good
+        else:
+            self._q_good[:] = self.q
         return bad
 
     def qp(self) -> QP:
         """The QP at the present values; also writes errors, factors and margins to the report."""
-        layout, out, places = self._layout, self._out, self.places
+        layout, out = self._layout, self._out
         self._rows.run()
-        for name, size in (
-            ("error", layout.task_rows),
-            ("factor", layout.task_rows),
-            ("margin", layout.margin_rows),
-            ("margin_factor", layout.margin_rows),
-        ):
-            self.report[places[name]] = out[name][:size]
+        self._report_rows()
         self._J[self._j_index] = out["jt"][: len(self._j_index[0])]
         self._A[self._a_index] = out["at"][: len(self._a_index[0])]
-        weighted = (self.weight * out["factor"][: layout.task_rows])[:, None] * self._J
-        H = self._J.T @ weighted
+        factor, wish = out["factor"][: layout.task_rows].copy(), out["wish"][: layout.task_rows].copy()
+        J = self._J.copy()
+        self.usable = self._drop_idle_rows(J, wish, factor)
+        self.report[self.places["factor"]] = factor
+        weighted = (self.weight * factor)[:, None] * J
+        H = J.T @ weighted
         H = 0.5 * (H + H.T)
         H[np.diag_indices(layout.nv)] += self._damping
-        g = -weighted.T @ out["wish"][: layout.task_rows]
+        g = -weighted.T @ wish
         low, high = self._bounds()
         on = self.enabled != 0.0
+        A = np.where(on[:, None], self._A, 0.0)
         low_rows = np.where(on, out["low"][: layout.general_rows], -np.inf)
         high_rows = np.where(on, out["high"][: layout.general_rows], np.inf)
-        return QP(H, g, np.concatenate((low, low_rows)), np.concatenate((high, high_rows)), self._A.copy())
+        self.usable &= bool(np.isfinite(A).all() and (low_rows < INFINITE).all() and (high_rows > -INFINITE).all())
+        low_rows[low_rows <= -INFINITE], high_rows[high_rows >= INFINITE] = -np.inf, np.inf
+        return QP(H, g, np.concatenate((low, low_rows)), np.concatenate((high, high_rows)), A)
+
+    def _report_rows(self) -> None:
+        """Errors and margins into the report; no output is NaN."""
+        layout, places = self._layout, self.places
+        for name, size, instead in (
+            ("error", layout.task_rows, np.inf),
+            ("margin", layout.margin_rows, -np.inf),
+            ("margin_factor", layout.margin_rows, 0.0),
+        ):
+            values = self._out[name][:size]
+            self.report[places[name]] = np.where(np.isnan(values), instead, values)
+
+    def _drop_idle_rows(self, J: Array, wish: Array, factor: Array) -> bool:
+        """Task rows without weight leave the problem, whatever their numbers are. False: others are not finite."""
+        bad = ~(np.isfinite(J).all(axis=1) & np.isfinite(wish) & np.isfinite(factor))
+        J[bad], wish[bad], factor[bad] = 0.0, 0.0, 0.0
+        return not bool((bad & (self.weight != 0.0)).any())
 
     def _bounds(self) -> tuple[Array, Array]:
         """Bound blocks in the order of sacrifice, a later one clipped into what the earlier ones left."""
@@ -105,9 +130,17 @@ class VmAssembly:
         owner_low[:] = owner_high[:] = -1.0
         for b in self._sequence:
             part = slice(b * nv, (b + 1) * nv)
+            first, last = self._out["bound_low"][part], self._out["bound_high"][part]
+            with np.errstate(invalid="ignore"):
+                rounding = (first > last) & (first - last <= TOLERANCE * self._dof_scales)
+                middle = 0.5 * (first + last)
+            first, last = np.where(rounding, middle, first), np.where(rounding, middle, last)
             on = self.bound_enabled[part] != 0.0
-            new_low = np.where(on, np.clip(self._out["bound_low"][part], low, high), low)
-            new_high = np.where(on, np.clip(self._out["bound_high"][part], low, high), high)
+            interval = (first <= last) & (first < INFINITE) & (last > -INFINITE)
+            self.usable &= bool((interval | ~on).all())
+            on &= interval
+            new_low = np.where(on, np.clip(first, low, high), low)
+            new_high = np.where(on, np.clip(last, low, high), high)
             owner_low[new_low > low] = b
             owner_high[new_high < high] = b
             low, high = new_low, new_high
@@ -118,4 +151,5 @@ class VmAssembly:
         if self._ahead is not None:
             self._command[:] = self.report[self.places["v"]]
             self._ahead.run()
-            self.report[self.places["ahead"]] = self._later[: self._layout.margin_rows]
+            later = self._later[: self._layout.margin_rows]
+            self.report[self.places["ahead"]] = np.where(np.isnan(later), -np.inf, later)

@@ -51,6 +51,8 @@ class Relaxed:
             the point of least violation found last.
         slack: violation of each row at x, in the row's units, >= 0 [m].
         relaxed: rows whose slack exceeds the numerical room [m].
+        lower, upper: the bounds that x minimises the objective over, the given ones but for what gave way and
+            what was held for it [n + m].
         iterations: of all solver calls together.
     """
 
@@ -59,6 +61,8 @@ class Relaxed:
     flag: str
     slack: Array
     relaxed: NDArray[np.bool_]
+    lower: Array
+    upper: Array
     iterations: int
 
 
@@ -92,7 +96,7 @@ class Relaxation:
             raise BoundsError(f"lower[{i}]", float(qp.lower[i]), f"above upper {qp.upper[i]:g}")
         plain = self._final.solve(qp)
         if plain.solved:
-            return self._answer(qp, plain.x, plain.multipliers, "solved", plain.iterations, scale)
+            return self._answer(qp, plain, "solved", plain.iterations, scale, (qp.lower, qp.upper))
         return self._cascade(qp, order, scale, plain.iterations)
 
     def _cascade(self, qp: QP, order: NDArray[np.int_], unit: Array, iterations: int) -> Relaxed:
@@ -118,9 +122,9 @@ class Relaxation:
         last = self._final.solve(work, warm=False)
         iterations += last.iterations
         flag = "relaxed" if last.solved else "failed"
-        multipliers = last.multipliers.copy()
-        multipliers[n:] /= unit
-        return self._answer(qp, last.x if last.solved else v, multipliers, flag, iterations, unit)
+        size = np.concatenate((np.ones(n), unit))
+        final = Solution(last.x if last.solved else v, last.multipliers / size, last.flag)
+        return self._answer(qp, final, flag, iterations, unit, (work.lower * size, work.upper * size))
 
     def _least_violation(self, work: QP, rows: NDArray[np.intp], v: Array) -> Solution | None:
         """(v, s) of the least |s| for ``rows``; the other rows of ``work`` are hard."""
@@ -166,10 +170,12 @@ class Relaxation:
             held = np.union1d(held, np.setdiff1d(np.flatnonzero(pushing[n + m :]), rows))
         work.lower[n + held] = work.upper[n + held] = value[held]
 
-    def _answer(self, qp: QP, x: Array, multipliers: Array, flag: str, iterations: int, unit: Array) -> Relaxed:
-        x = np.clip(x, qp.lower[: self.n], qp.upper[: self.n])
+    def _answer(
+        self, qp: QP, last: Solution, flag: str, iterations: int, unit: Array, ends: tuple[Array, Array]
+    ) -> Relaxed:
+        x = np.clip(last.x, qp.lower[: self.n], qp.upper[: self.n])
         slack = qp.violation(x)[self.n :]
-        return Relaxed(x, multipliers, flag, slack, slack > 10.0 * ROOM * unit, iterations)
+        return Relaxed(x, last.multipliers, flag, slack, slack > 10.0 * ROOM * unit, *ends, iterations)
 
 
 def relax(qp: QP, order: NDArray[np.int_], unit: Array | None = None) -> Relaxed:

@@ -1,5 +1,6 @@
 #include "tick.h"
 
+#include <float.h>
 #include <math.h>
 #include <string.h>
 
@@ -19,6 +20,8 @@ int ahead(const double **arg, double **res, long long *iw, double *w, int mem);
 #define RHO 1e-8
 /* The cheap error bound is good enough up to here [rad/s] */
 #define QUICK_BOUND 1e-8
+/* Squared length of a quaternion or of a (cos, sin) pair minus 1: its length may be off by 1e-6 */
+#define UNIT_TOLERANCE 2.00001e-6
 /* Violations up to this, in row units, are rounding */
 #define TOLERANCE 1e-9
 
@@ -57,6 +60,27 @@ INLINE void diagonal(wbc_tick *t, int row, int count, int first) {
     }
 }
 
+/* 1 if no entry is NaN or infinite */
+INLINE int all_finite(const double *x, int count) {
+    int bad = 0;
+    for (int i = 0; i < count; i++) bad |= !(fabs(x[i]) <= DBL_MAX);
+    return !bad;
+}
+
+/* Task rows without weight leave the problem, whatever their numbers are. 0 where others are not finite. */
+static int usable_tasks(wbc_tick *t) {
+    int ok = 1;
+    for (int k = 0; k < MT; k++) {
+        const int first = j_start[k], count = j_start[k + 1] - first;
+        const int fine = all_finite(t->jt + first, count) && all_finite(t->wish + k, 1) && all_finite(t->report.factor + k, 1);
+        if (fine) continue;
+        ok &= t->weight[k] == 0.0;
+        memset(t->jt + first, 0, count * sizeof(double));
+        t->wish[k] = t->report.factor[k] = 0.0;
+    }
+    return ok;
+}
+
 static void form_bounds(wbc_tick *t) {
     for (int i = 0; i < NV; i++) {
         t->low[i] = -WBC_INF;
@@ -69,8 +93,15 @@ static void form_bounds(wbc_tick *t) {
         for (int i = 0; i < NV; i++) {
             if (t->bound_enabled[b * NV + i] == 0.0) continue;
             const double low = t->low[i], high = t->high[i];
-            t->low[i] = clamp(t->bound_low[b * NV + i], low, high);
-            t->high[i] = clamp(t->bound_high[b * NV + i], low, high);
+            double from = t->bound_low[b * NV + i], to = t->bound_high[b * NV + i];
+            if (from > to && from - to <= TOLERANCE * dof_scale[i]) from = to = 0.5 * (from + to);
+            /* No interval, or NaN: what the other blocks leave stands, and the tick brakes */
+            if (!(from <= to && from < WBC_INF && to > -WBC_INF)) {
+                t->unusable = 1.0;
+                continue;
+            }
+            t->low[i] = clamp(from, low, high);
+            t->high[i] = clamp(to, low, high);
             if (t->low[i] > low) t->report.owner_low[i] = b;
             if (t->high[i] < high) t->report.owner_high[i] = b;
         }
@@ -93,13 +124,24 @@ EXPORT void wbc_tick_assemble(wbc_tick *t) {
                 any_nan(t->free_high, MC) | any_nan(t->bound_low, NB * NV) | any_nan(t->bound_high, NB * NV);
     memset(t->H, 0, sizeof t->H);
     memset(t->g, 0, sizeof t->g);
+    t->unusable = 0.0;
+    if (!(all_finite(t->jt, NNZJ) && all_finite(t->wish, MT) && all_finite(t->report.factor, MT)))
+        t->unusable = !usable_tasks(t);
     for (int i = 0; i < NV; i++) t->H[i * WIDE + i] = damping[i];
     BLOCKS
     form_bounds(t);
     for (int k = 0; k < MC; k++) {
-        const int on = t->enabled[k] != 0.0;
-        t->free_low[k] = on && t->free_low[k] > -WBC_INF ? t->free_low[k] : -WBC_INF;
-        t->free_high[k] = on && t->free_high[k] < WBC_INF ? t->free_high[k] : WBC_INF;
+        double *row = t->at + a_start[k];
+        const int on = t->enabled[k] != 0.0, count = a_start[k + 1] - a_start[k];
+        if (!on) {
+            memset(row, 0, count * sizeof(double));
+            t->free_low[k] = -WBC_INF;
+            t->free_high[k] = WBC_INF;
+        } else if (!(all_finite(row, count) && t->free_low[k] < WBC_INF && t->free_high[k] > -WBC_INF)) {
+            t->unusable = 1.0;
+        }
+        if (t->free_low[k] < -WBC_INF) t->free_low[k] = -WBC_INF;
+        if (t->free_high[k] > WBC_INF) t->free_high[k] = WBC_INF;
         t->low[NV + k] = t->free_low[k];
         t->high[NV + k] = t->free_high[k];
         t->report.slack[k] = 0.0;
@@ -494,6 +536,12 @@ EXPORT int wbc_tick_solve(wbc_tick *t) {
 
 /* ---------------------------------------------------------------- certificate */
 
+/* No output is NaN: an error without a value is reported as inf, a margin as -inf */
+static void replace_nan(double *x, int count, double by) {
+    for (int i = 0; i < count; i++)
+        if (x[i] != x[i]) x[i] = by;
+}
+
 /* Length of the correction, in the metric of H, that the residual of the active rows asks for */
 static double active_residual(wbc_tick *t) {
     DAQPWorkspace *work = &t->daqp;
@@ -544,6 +592,14 @@ EXPORT void wbc_tick_certify(wbc_tick *t) {
     double *residual = t->scratch, *size = t->product, v[WIDE] = {0};
     memcpy(v, out->v, sizeof out->v);
     for (int i = 0; i < M_ALL; i++) out->lambda[i] = 0.0;
+    replace_nan(out->error, MT, HUGE_VAL);
+    replace_nan(out->factor, MT, 0.0);
+    replace_nan(out->margin, MH, -HUGE_VAL);
+    replace_nan(out->margin_factor, MH, 0.0);
+    if (out->flag == WBC_BRAKED) {
+        out->stationarity = out->violation = out->complementarity = out->error_bound = WBC_INF;
+        return;
+    }
     for (int i = 0; i < WIDE; i++) {
         residual[i] = t->g[i];
         size[i] = fabs(t->g[i]);
@@ -605,10 +661,6 @@ EXPORT void wbc_tick_certify(wbc_tick *t) {
         /* residual of the exact sum: what was computed plus the rounding of its terms */
         size[i] = fabs(residual[i]) + (NV + work->n_active + 4) * EPS * size[i];
     }
-    if (out->flag == WBC_BRAKED) {
-        out->error_bound = WBC_INF;
-        return;
-    }
     out->error_bound = t->factored ? WBC_INF : quick_bound(t, size);
     if (out->error_bound > QUICK_BOUND) out->error_bound = sharp_bound(t, size);
 }
@@ -618,6 +670,7 @@ EXPORT void wbc_tick_look_ahead(wbc_tick *t) {
     const double *arg[4] = {t->q, t->report.v, t->p, &t->dt};
     double *res[1] = {t->report.ahead};
     ahead(arg, res, t->work_iw, t->work_w, 0);
+    replace_nan(t->report.ahead, MH, -HUGE_VAL);
 #else
     (void)t;
 #endif
@@ -631,7 +684,7 @@ static int refused(const wbc_tick *t) {
     for (int k = 0; k < UNITS; k++) {
         double square = 0.0;
         for (int i = unit_start[k]; i < unit_start[k] + unit_size[k]; i++) square += t->q[i] * t->q[i];
-        if (fabs(square - 1.0) > 2e-6) return WBC_BAD_UNIT;
+        if (fabs(square - 1.0) > UNIT_TOLERANCE) return WBC_BAD_UNIT;
     }
     if (t->use_v != 0.0)
         for (int i = 0; i < NV; i++)
@@ -644,6 +697,7 @@ EXPORT int wbc_tick_check(wbc_tick *t) {
     const int bad = refused(t);
     if (!bad && t->use_v != 0.0) memcpy(t->v_last, t->v_in, sizeof t->v_in);
     t->use_v = 0.0;
+    memcpy(bad ? t->q : t->q_good, bad ? t->q_good : t->q, NQ * sizeof(double));
     return bad;
 }
 
@@ -662,11 +716,12 @@ EXPORT long long wbc_tick_size(void) { return (long long)sizeof(wbc_tick); }
 
 #define OFFSET(field) (long long)offsetof(wbc_tick, field)
 
-/* Where the caller finds q, v_last, v_in, use_v, p, dt, weight, enabled, bound_enabled, report, H, g, A, low, high */
+/* Where the caller finds q, v_last, v_in, use_v, p, dt, weight, enabled, bound_enabled, report, H, g, A, low, high,
+ * unusable */
 EXPORT void wbc_tick_layout(long long *out) {
     const long long offsets[] = {OFFSET(q), OFFSET(v_last), OFFSET(v_in), OFFSET(use_v), OFFSET(p), OFFSET(dt),
                                  OFFSET(weight), OFFSET(enabled), OFFSET(bound_enabled), OFFSET(report), OFFSET(H),
-                                 OFFSET(g), OFFSET(A), OFFSET(low), OFFSET(high)};
+                                 OFFSET(g), OFFSET(A), OFFSET(low), OFFSET(high), OFFSET(unusable)};
     memcpy(out, offsets, sizeof offsets);
 }
 

@@ -58,6 +58,8 @@ typedef struct {
     wbc_report report;
     /* the QP */
     double H[NV * WIDE], g[WIDE], A[MC * NV + 1], low[M_ALL], high[M_ALL];
+    double unusable;             /* not 0: numbers that are not finite, or bounds without an interval */
+    double q_good[NQ + 1];       /* q of the last tick that was not refused, put back by one that is */
     /* outputs of the generated rows */
     double wish[MT + 1], jt[NNZJ + 1], at[NNZA + 1], bound_low[NB * NV + 1], bound_high[NB * NV + 1];
     /* factorisation */

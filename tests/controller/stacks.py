@@ -1,0 +1,171 @@
+"""Stacks of these tests: every shipped item on four robots, and random states and run-time values for them."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+import wbc
+from tests.constraints.robots import robot as limited_robot
+from tests.tasks.robots import FRAMES, random_configuration
+from wbc.controller import Controller, Stack
+from wbc.robot import Robot
+from wbc.shapes import HalfSpace, Sphere
+from wbc.tasks import (
+    CenterOfMass,
+    Damping,
+    Elbow,
+    EndEffector,
+    Fixed,
+    FrameVelocityLimit,
+    Hold,
+    JointLimits,
+    Obstacle,
+    Posture,
+)
+from wbc.tasks import inputs as run_time
+
+DT = 0.005
+NAMES = ("panda", "ur5", "kinova", "talos")
+
+#: Names of the items of :func:`everything` that are tasks
+TASKS = ("hand", "hand_in_base", "hand_place", "hand_turn", "elbow", "com", "posture", "damping")
+
+
+@cache
+def robot(name: str) -> Robot:
+    """A robot with acceleration limits and a sphere and a capsule on four of its links."""
+    return limited_robot(name)
+
+
+def everything(name: str) -> Stack:
+    """Every shipped task and constraint at once: for the QP itself, which need not be feasible."""
+    bot, f = robot(name), FRAMES[name]
+    link = next(iter(bot.shapes))
+    stack = Stack(bot, DT)
+    stack.add(EndEffector(f.tip), name="hand")
+    stack.add(EndEffector(f.tip, relative_to=f.base, axes="frame", weights=(1, 2, 3, 4, 5, 0)), name="hand_in_base")
+    stack.add(EndEffector(f.tip, kind="position", relative_to=f.base, axes=f.middle), name="hand_place")
+    stack.add(EndEffector(f.tip, kind="orientation", axes=f.base), name="hand_turn", weight=0.3)
+    stack.add(Elbow(f.middle, offset=(0.1, -0.2, 0.05), axes=f.tip), name="elbow")
+    stack.add(CenterOfMass(), name="com")
+    stack.add(Posture(joints=(bot.joint_names[-1], bot.joint_names[0], bot.joint_names[2])), name="posture")
+    stack.add(Damping(weights=range(1, bot.nv + 1)), name="damping", weight=1e-3)
+    stack.add(Hold(f.middle), name="hold")
+    stack.add(Hold(f.tip, kind="orientation"), name="hold_turn")
+    stack.add(FrameVelocityLimit(f.tip, linear=0.5, angular=1.0, axes=f.tip, relative_to=f.base), name="speed")
+    stack.add(Obstacle(Sphere(0.1), margin=0.02), name="ball")
+    stack.add(Obstacle(HalfSpace(), links=link), name="floor")
+    stack.add(JointLimits(margin=1e-3), name="limits")
+    stack.add(Fixed(bot.joint_names[1:3]), name="fixed")
+    return stack
+
+
+def arm(name: str = "panda", posture: float = 1e-3, obstacle: bool = True) -> Stack:
+    """A hand, a posture, joint limits and a ball: the usual stack."""
+    stack = Stack(robot(name), DT)
+    stack.add(EndEffector(FRAMES[name].tip), name="hand")
+    stack.add(Posture(), name="posture", weight=posture)
+    stack.add(JointLimits(), name="limits")
+    if obstacle:
+        stack.add(Obstacle(Sphere(0.05)), name="ball")
+    return stack
+
+
+def conflicts() -> Stack:
+    """A Panda with what can contradict: two holds, a ball, a speed limit, joint limits, a fixed joint."""
+    bot, f = robot("panda"), FRAMES["panda"]
+    stack = Stack(bot, DT)
+    stack.add(EndEffector(f.tip), name="hand")
+    stack.add(Posture(), name="posture", weight=1e-3)
+    stack.add(JointLimits(), name="limits")
+    stack.add(Hold(f.tip, kind="position"), name="hold")
+    stack.add(Hold(f.middle, kind="position"), name="hold_elbow")
+    stack.add(Obstacle(Sphere(0.05), links=("panda_link5", "panda_link7")), name="ball")
+    stack.add(FrameVelocityLimit(f.tip, linear=0.3), name="speed")
+    return stack
+
+
+def humanoid() -> Stack:
+    """Talos: feet held, hands and centre of mass commanded, posture, joint limits."""
+    bot = robot("talos")
+    stack = Stack(bot, DT)
+    stack.add(Hold("left_sole_link"), name="left_foot")
+    stack.add(Hold("right_sole_link"), name="right_foot")
+    stack.add(EndEffector("gripper_left_base_link"), name="left_hand")
+    stack.add(EndEffector("gripper_right_base_link", kind="position"), name="right_hand")
+    stack.add(CenterOfMass(), name="com")
+    stack.add(Posture(), name="posture", weight=1e-3)
+    stack.add(JointLimits(), name="limits")
+    return stack
+
+
+def sample(bot: Robot, declared: Any, rng: np.random.Generator) -> Any:
+    """A value of an input: places within a metre, rates of order 1, any rotation."""
+    if declared.kind == "pose":
+        return pin.SE3(pin.exp3(rng.uniform(-2.0, 2.0, 3)), rng.uniform(-0.8, 0.8, 3))
+    if declared.kind == "rotation":
+        return pin.exp3(rng.uniform(-2.0, 2.0, 3))
+    if declared.kind == "configuration":
+        return random_configuration(bot, rng)
+    size = run_time.size(bot, declared)
+    if np.isfinite(declared.high):
+        numbers = rng.uniform(declared.low, declared.high, size)
+    elif declared.low >= 0.0:
+        numbers = rng.uniform(0.05, 1.5, size)
+    else:
+        numbers = rng.uniform(-0.8, 0.8, size)
+    return float(numbers[0]) if declared.size == 0 and declared.kind == "vector" else numbers
+
+
+def randomise(controller: Controller, rng: np.random.Generator) -> dict[str, dict[str, Any]]:
+    """Write a random value to every input, weight, mask and switch; what was written, by item."""
+    written: dict[str, dict[str, Any]] = {}
+    for name, block in controller.layout.blocks.items():
+        values = {slot.input.name: sample(controller.stack.robot, slot.input, rng) for slot in block.slots.values()}
+        rows = len(block.rows)
+        if block.form == "task":
+            values |= {"weight": float(10.0 ** rng.uniform(-4, 1)), "mask": rng.uniform(0.0, 2.0, rows)}
+        else:
+            values["mask"] = (rng.random(rows) < 0.8).astype(float)
+        values["enabled"] = bool(rng.random() < 0.85)
+        for key, value in values.items():
+            setattr(controller[name], key, value)
+        written[name] = values
+    return written
+
+
+def near_limits(bot: Robot, rng: np.random.Generator, share: float = 0.4) -> np.ndarray:
+    """A random configuration with some joints close to a position limit, on either side of it."""
+    q = random_configuration(bot, rng)
+    for i, k in enumerate(bot.position_index):
+        ends = [e for e in (bot.limits.position_lower[i], bot.limits.position_upper[i]) if np.isfinite(e)]
+        if k >= 0 and ends and rng.random() < share:
+            q[k] = rng.choice(ends) + rng.normal(0.0, 0.03)
+    return q
+
+
+def inside(bot: Robot, rng: np.random.Generator, share: float = 0.6) -> np.ndarray:
+    """A configuration within ``share`` of every joint's range; a base near the origin."""
+    q = pin.integrate(bot.model, bot.neutral, 0.2 * rng.uniform(-1.0, 1.0, bot.nv))
+    for i, k in enumerate(bot.position_index):
+        low, high = bot.limits.position_lower[i], bot.limits.position_upper[i]
+        if k >= 0 and np.isfinite(low) and np.isfinite(high):
+            q[k] = (low + high) / 2 + share * (high - low) / 2 * rng.uniform(-1.0, 1.0)
+    return q
+
+
+@cache
+def _declared(builder: str, *args: Any) -> Stack:
+    return {"everything": everything, "arm": arm, "conflicts": conflicts, "humanoid": humanoid}[builder](*args)
+
+
+def controller(builder: str, *args: Any, backend: str = "vm", solver: str = "daqp") -> Controller:
+    """A fresh controller of one of the stacks above."""
+    return _declared(builder, *args).compile(solver=solver, backend=backend)
+
+
+__all__ = ["DT", "FRAMES", "NAMES", "controller", "random_configuration", "wbc"]

@@ -1,0 +1,44 @@
+"""The whole QP (H, g, A, bounds, errors, margins) against an independent numpy and Pinocchio build."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.controller.referee import Referee
+from tests.controller.stacks import DT, NAMES, controller, everything, near_limits, randomise
+
+STATES = 12
+
+
+def check(name: str, backend: str, states: int, solver: str = "daqp") -> float:
+    """Largest relative difference over random states, targets, rates, weights, masks and switches."""
+    tick, rng, worst = controller("everything", name, backend=backend, solver=solver), np.random.default_rng(11), 0.0
+    bot = tick.stack.robot
+    for _ in range(states):
+        q, v, dt = near_limits(bot, rng), rng.normal(0.0, 1.0, bot.nv), DT * rng.uniform(0.25, 2.0)
+        written = randomise(tick, rng)
+        step = tick.step(q, v, dt)
+        # the step has moved the last command on: the QP of the step is the one about v
+        tick.tick.v_last[:] = v
+        found = tick.qp()
+        wanted = Referee(everything(name), q, v, dt).qp(written)
+        errors = np.concatenate([r.values for r in step.residuals.values()])
+        margins = np.concatenate(list(step.margins.values()))
+        for a, b in zip((found.H, found.g, found.A, found.lower, found.upper, errors, margins), wanted, strict=True):
+            assert a.shape == b.shape
+            assert (np.isinf(a) == np.isinf(b)).all()
+            assert (np.sign(a[np.isinf(a)]) == np.sign(b[np.isinf(b)])).all()
+            finite = np.isfinite(b)
+            scale = max(1.0, float(np.abs(b[finite]).max(initial=0.0)))
+            worst = max(worst, float(np.abs(a[finite] - b[finite]).max(initial=0.0)) / scale)
+    return worst
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_whole_qp_on_the_virtual_machine(name: str) -> None:
+    assert check(name, "vm", STATES) < 1e-9
+
+
+def test_whole_qp_compiled() -> None:
+    assert check("panda", "native", STATES) < 1e-9
