@@ -32,6 +32,8 @@ def main() -> None:
     peers = str(Path(chosen.peers_python).absolute()) if chosen.peers_python else None
     plan = Plan(sys.executable, peers, chosen.work, chosen.rounds, chosen.problems)
     console, progress = Console(), Console(stderr=True)
+    if not console.is_terminal:
+        console = Console(width=100)
     about = machine()
     prepare(plan.folder)
     with progress.status("") as status:

@@ -13,11 +13,13 @@ from bench.goals import Goal, goals
 
 #: Contender that ratios are taken to
 OURS = "wbc"
+TAILS = ("median", "p99", "p99.9", "max")
 
 CALLS = """\
 The call is `controller.step(q).v` for wbc, `solve_ik` and `integrate_inplace` for pink and mink, `update_kinematics` \
 and `solve(True)` for placo. The three peers move their own state within the call, because their kinematics are \
-computed there; wbc computes them in `step` and leaves the state to its caller."""
+computed there; wbc computes them in `step` and leaves the state to its caller. The whole cycle is targets, call and, \
+for wbc, the integration of the velocity."""
 
 TERMS = """\
 All get the same description, targets, weights and limits, and correct an error within one tick. Obstacles: a barrier \
@@ -57,32 +59,36 @@ def sheets(results: dict[str, Any]) -> list[Sheet]:
     """All tables of a run."""
     out = []
     for problem in results["problems"].values():
-        out += [ticks(problem), phases(problem)]
+        out += [ticks(problem), answers(problem), phases(problem)]
     return [*out, startup(results["startup"]), goal_sheet(goals(results))]
 
 
 def ticks(problem: dict[str, Any]) -> Sheet:
-    """Durations of the user's call, and what it achieved."""
+    """Durations of the user's call."""
     ours = problem["contenders"][OURS]["durations"]["call"]["median"]
     rows = []
     for name, measured in problem["contenders"].items():
-        durations, found = measured["durations"], measured["tracking"]
-        call = durations["call"]
+        durations = measured["durations"]
+        ratio = "1" if name == OURS else f"{durations['call']['median'] / ours:.2f}"
+        around = [_us(durations[part]["median"]) for part in ("aim", "cycle")]
+        rows.append((name, *_tails(durations["call"]), ratio, *around))
+        if "native" in durations:
+            rows.append(("  native call alone", *_tails(durations["native"]), "", "", ""))
+    columns = ("one tick [us]", *TAILS, "x wbc", "set targets", "whole cycle")
+    return Sheet(f"{problem['title']} ({problem['ticks']} ticks each)", columns, rows)
+
+
+def answers(problem: dict[str, Any]) -> Sheet:
+    """What the calls achieved."""
+    rows = []
+    for name, measured in problem["contenders"].items():
+        found = measured["tracking"]
         rows.append((
-            name, *(_us(call[key]) for key in ("median", "p99", "p99.9", "max")),
-            "1" if name == OURS else f"{call['median'] / ours:.2f}", _us(durations["aim"]["median"]),
-            _scaled(found["position"], 1e3, ".3f"), _scaled(found["rotation"], 1e3, ".3f"),
+            name, _scaled(found["position"], 1e3, ".3f"), _scaled(found["rotation"], 1e3, ".3f"),
             _scaled(found["clearance"], 1e3, ".2f"), _scaled(found["solver_error"], 1.0, ".0e"),
         ))  # fmt: skip
-        if "native" in durations:
-            native = durations["native"]
-            figures = [_us(native[key]) for key in ("median", "p99", "p99.9", "max")]
-            rows.append((f"{name}, native call alone", *figures, f"{native['median'] / ours:.2f}", *[""] * 5))
-    columns = (
-        "one tick [us]", "median", "p99", "p99.9", "max", "x wbc", "set targets", "end error [mm]", "[mrad]",
-        "least clearance [mm]", "solver error [rad/s]",
-    )  # fmt: skip
-    return Sheet(f"{problem['title']} ({problem['ticks']} ticks each)", columns, rows)
+    columns = ("", "end error [mm]", "[mrad]", "least clearance [mm]", "solver error [rad/s]")
+    return Sheet("The same job", columns, rows)
 
 
 def phases(problem: dict[str, Any]) -> Sheet:
@@ -98,8 +104,9 @@ def startup(measured: dict[str, Any]) -> Sheet:
     """Import, compilation, memory."""
     rows = [(f"import {package}", f"{seconds:.3f} s") for package, seconds in measured["import"].items()]
     for name, spent in measured["compile"].items():
-        rows.append((f"{name}: stack.compile(), empty cache", f"{spent['first']:.2f} s"))
-        rows.append((f"{name}: stack.compile(), cached", f"{spent['cached']:.3f} s"))
+        for kind, label in (("first", "empty cache"), ("cached", "cached")):
+            text = f"{spent[kind]:.3g} s ({spent[f'{kind} cpu']:.3g} s of processor time)"
+            rows.append((f"{name}: stack.compile(), {label}", text))
     rows += [(f"memory of a Panda process, {n}", f"{peak / 1e6:.0f} MB") for n, peak in measured["memory"].items()]
     return Sheet("Before the first tick", ("", "measured"), rows)
 
@@ -149,6 +156,10 @@ def _line(cells: Iterable[str]) -> str:
 
 def _us(value: float) -> str:
     return f"{value:.0f}" if value >= 100 else f"{value:.1f}" if value >= 10 else f"{value:.2f}"
+
+
+def _tails(durations: dict[str, float]) -> list[str]:
+    return [_us(durations[tail]) for tail in TAILS]
 
 
 def _scaled(value: float | None, factor: float, style: str) -> str:

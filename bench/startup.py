@@ -31,13 +31,14 @@ def peak_memory(python: str, contender: str, folder: Path, core: int | None, tic
 
 
 def compile_seconds(python: str, contender: str, folder: Path) -> dict[str, float]:
-    """``stack.compile()`` with an empty cache, and in a second process with the cache filled [s]."""
+    """Wall and processor time of ``stack.compile()`` with an empty cache, then, in a second process, a full one [s]."""
     with tempfile.TemporaryDirectory(prefix="wbc-bench-") as cache:
         environment: Mapping[str, str] = {"XDG_CACHE_HOME": cache}
         out = {}
         for kind in ("first", "cached"):
             with Worker(python, contender, folder, None, environment) as worker:
                 out[kind] = float(worker.ready["facts"]["compile"])
+                out[f"{kind} cpu"] = float(worker.ready["facts"]["compile cpu"])
         return out
 
 

@@ -1,6 +1,6 @@
 """A process with one package on one problem: reads one JSON command a line, writes one JSON answer a line.
 
-    {"do": "time", "ticks": 400}    ->  {"aim": [ns, ...], "call": [ns, ...], "settle": [ns, ...]}
+    {"do": "time", "ticks": 400}    ->  {"call": [ns, ...], "cycle": [ns, ...], ...}
     {"do": "phases", "ticks": 100}  ->  {"assemble": [ns, ...], ...}
     {"do": "path"}                  ->  {"states": [[...], ...]}        one pass along the path
     {"do": "accuracy"}              ->  {"error": largest difference to the exact solution, or null}
@@ -45,8 +45,8 @@ def build(name: str, case: Case) -> Contender:
 def time_calls(contender: Contender, ticks: int) -> dict[str, Any]:
     """Durations of ``ticks`` ticks along the path [ns]."""
     contender.reset()
-    out: dict[str, list[int]] = {"aim": [0] * ticks, "call": [0] * ticks, "settle": [0] * ticks}
-    aim, call, settle = out.values()
+    out: dict[str, list[int]] = {name: [0] * ticks for name in ("aim", "call", "settle", "cycle")}
+    aim, call, settle, cycle = out.values()
     for k in range(ticks):
         t0 = perf_counter_ns()
         contender.aim(k)
@@ -55,7 +55,7 @@ def time_calls(contender: Contender, ticks: int) -> dict[str, Any]:
         t2 = perf_counter_ns()
         contender.settle()
         t3 = perf_counter_ns()
-        aim[k], call[k], settle[k] = t1 - t0, t2 - t1, t3 - t2
+        aim[k], call[k], settle[k], cycle[k] = t1 - t0, t2 - t1, t3 - t2, t3 - t0
     contender.reset()
     contender.aim(0)
     if contender.native() is not None:

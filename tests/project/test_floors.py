@@ -9,7 +9,7 @@ import pytest
 
 from tests.project.layout import ROOT, module_name, relative, sources
 
-#: Floor of each part of the package, from the ground up. qpsolvers know nothing of robots: see ONLY.
+#: Floor of each part of the package, from the ground up. Solvers know nothing of robots: see ONLY.
 FLOORS = {
     "wbc.errors": 0,
     "wbc.validation": 0,

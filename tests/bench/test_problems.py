@@ -1,0 +1,110 @@
+"""The benchmark's problems: shared descriptions are the robots, and answers are those of an independent QP."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import wbc
+from bench import prepare, worker
+from bench.contender import exact_solution
+from bench.ours import Ours
+from bench.problems import Case, load
+from bench.reference import Referee
+
+MAKERS = {"panda": prepare.panda, "ur5": prepare.ur5, "talos": prepare.talos}
+
+
+@pytest.fixture(scope="module", params=MAKERS)
+def case(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Case:
+    """Each problem, written and read back."""
+    return load(MAKERS[request.param](tmp_path_factory.mktemp("bench") / request.param))
+
+
+@pytest.fixture(scope="module")
+def ours(case: Case) -> Ours:
+    """This package on it."""
+    return Ours(case)
+
+
+def test_shared_description_is_the_robot(case: Case) -> None:
+    robot = wbc.robots.load(case.problem.robot)
+    model = Referee(case).model
+    rng = np.random.default_rng(1)
+    data, other = robot.model.createData(), model.createData()
+    for _ in range(5):
+        q = pin.integrate(model, case.q0, rng.normal(size=model.nv))
+        pin.framesForwardKinematics(robot.model, data, q)
+        pin.framesForwardKinematics(model, other, q)
+        for frame in case.problem.frames:
+            found, wanted = other.oMf[model.getFrameId(frame)], data.oMf[robot.model.getFrameId(frame)]
+            np.testing.assert_allclose(found.homogeneous, wanted.homogeneous, atol=1e-12)
+        if case.problem.com:
+            np.testing.assert_allclose(
+                pin.centerOfMass(model, other, q), pin.centerOfMass(robot.model, data, q), atol=1e-9
+            )
+    joints = slice(6 if case.problem.floating else 0, None)
+    np.testing.assert_array_equal(model.upperVelocityLimit[joints], robot.limits.velocity[joints])
+
+
+def test_paths_make_limits_bind_and_come_to_rest(case: Case) -> None:
+    referee = Referee(case)
+    first = referee.velocity(case.q0, 0)
+    speed = referee.model.upperVelocityLimit[referee.first_joint :]
+    assert np.any(np.abs(first[referee.first_joint :]) > speed * (1 - 1e-9))
+    np.testing.assert_array_equal(case.poses[-1], case.poses[-prepare.REST])
+
+
+def test_answers_are_those_of_an_independent_build_of_the_qp(ours: Ours) -> None:
+    error = worker.accuracy(ours)["error"]
+    assert error is not None
+    assert error < 1e-6
+
+
+def test_path_is_followed_clear_of_obstacles(ours: Ours) -> None:
+    case, referee = ours.case, Referee(ours.case)
+    states = worker.walk(ours)["states"]
+    position, rotation = referee.errors(np.array(states[-1]), case.ticks - 1)
+    assert position < 3e-3
+    assert rotation < 1e-3
+    if case.problem.obstacles:
+        least = []
+        for state in states:
+            referee.update(np.array(state))
+            least.append(referee.clearances()[0].min())
+        # The margin is kept, and reached: the obstacles are in the way
+        assert min(least) > case.problem.margin - 1e-5
+        assert min(least) < case.problem.margin + 1e-3
+
+
+def test_workers_time_every_tick(ours: Ours) -> None:
+    times = worker.time_calls(ours, 20)
+    assert {"aim", "call", "settle", "cycle"} <= set(times)
+    assert all(len(values) == 20 and min(values) > 0 for values in times.values())
+    phases = worker.time_phases(ours, 20)
+    assert "python" in phases
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_exact_solution_satisfies_the_optimality_conditions(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    n, m = 6, 8
+    root = rng.normal(size=(n, n))
+    hessian, linear = root @ root.T + 0.1 * np.eye(n), rng.normal(size=n)
+    rows, upper = rng.normal(size=(m, n)), np.append(rng.uniform(0.0, 0.3, size=m - 1), np.inf)
+    x = exact_solution(hessian, linear, rows, upper)
+    slack = upper - rows @ x
+    assert slack.min() > -1e-10
+    active = slack < 1e-10
+    multipliers = np.linalg.lstsq(rows[active].T, -(hessian @ x + linear), rcond=None)[0]
+    np.testing.assert_allclose(rows[active].T @ multipliers, -(hessian @ x + linear), atol=1e-10)
+    assert np.all(multipliers >= -1e-10)
+
+
+def test_problem_folder_is_complete(case: Case) -> None:
+    folder = case.urdf.parent
+    assert {p.name for p in Path(folder).iterdir()} >= {"problem.json", "targets.npz", "robot.urdf"}
+    assert case.poses.shape == (prepare.TICKS, len(case.problem.frames), 4, 4)
