@@ -81,7 +81,7 @@ def rotation(field: str, value: Any) -> Array:
         return np.asarray(pin.Quaternion(raw / norm).matrix(), dtype=np.float64)
     if raw.shape != (3, 3):
         raise ShapeError(field, value, f"expected a 3x3 rotation or a quaternion (x, y, z, w), not shape {raw.shape}")
-    if not _is_rotation(raw):
+    if not _is_rotation(raw.ravel().tolist()):
         off = float(np.linalg.norm(raw.T @ raw - np.eye(3)))
         raise RotationError(
             field, value, f"not a rotation matrix (|R'R - 1| = {off:.3g}, det = {np.linalg.det(raw):.3g})"
@@ -108,19 +108,20 @@ def pose_numbers(field: str, value: Any) -> Array:
     if isinstance(value, pin.SE3):
         # The columns of the upper three rows are those of the rotation, then the position
         numbers: Array = np.ravel(value.homogeneous[:3], order="F")
-        if _is_rotation(numbers[:9]) and all(map(math.isfinite, numbers[9:].tolist())):
+        *nine, x, y, z = numbers.tolist()
+        if _is_rotation(nine) and math.isfinite(x) and math.isfinite(y) and math.isfinite(z):
             return numbers
     return np.ravel(pose(field, value).homogeneous[:3], order="F")
 
 
-def _is_rotation(matrix: Array) -> bool:
-    """Whether |R'R - I| <= ROTATION_TOLERANCE and det R > 0; False for NaN.
+def _is_rotation(numbers: list[float]) -> bool:
+    """Whether |R'R - I| <= ROTATION_TOLERANCE and det R > 0, for R by rows or by columns; False for NaN.
 
     In plain floats: targets are set every tick, and nine numbers are too few for numpy to be quick.
     """
-    a, b, c, d, e, f, g, h, i = matrix.ravel().tolist()
-    diagonal = (a * a + d * d + g * g - 1.0, b * b + e * e + h * h - 1.0, c * c + f * f + i * i - 1.0)
-    mixed = (a * b + d * e + g * h, a * c + d * f + g * i, b * c + e * f + h * i)
-    off = math.hypot(*diagonal, *mixed, *mixed)
+    a, b, c, d, e, f, g, h, i = numbers
+    xx, yy, zz = a * a + b * b + c * c - 1.0, d * d + e * e + f * f - 1.0, g * g + h * h + i * i - 1.0
+    xy, xz, yz = a * d + b * e + c * f, a * g + b * h + c * i, d * g + e * h + f * i
+    square = xx * xx + yy * yy + zz * zz + 2.0 * (xy * xy + xz * xz + yz * yz)
     determinant = a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)
-    return off <= ROTATION_TOLERANCE and determinant > 0.0
+    return square <= ROTATION_TOLERANCE**2 and determinant > 0.0
