@@ -57,7 +57,9 @@ class Controller:
         self._call: Callable[[], int] = self.tick.step
         if isinstance(self.tick, NativeTick):
             self._call = functools.partial(self.tick.step_function, self.tick.pointer)
-        self._q, self._v_in, self._use_v, self._report = self.tick.q, self.tick.v_in, self.tick.use_v, self.tick.report
+        self._q, self._v_in, self._use_v = self.tick.q, self.tick.v_in, self.tick.use_v
+        # of all ways to copy some hundred numbers into something immutable, the fastest
+        self._snapshot = self.tick.report.data.cast("B").tobytes
         self._q_shape, self._v_shape = (layout.nq,), (layout.nv,)
         self._waiting: dict[str, list[Slot]] = {}
         self._handles = {name: Handle(self, block) for name, block in layout.blocks.items()}
@@ -98,7 +100,7 @@ class Controller:
         self._q[:] = q
         if self._call() < 0:
             self._refuse(q, v)
-        return Step(self._report.tobytes(), self._context)
+        return Step(self._snapshot(), self._context)
 
     def reset(self, q: Any = None, v: Any = None) -> None:
         """Start anew: the last command becomes ``v`` (default zero) and the solver forgets its active set.

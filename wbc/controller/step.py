@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
@@ -91,6 +92,7 @@ class Context:
     def __init__(self, stack: Declaration, layout: Layout) -> None:
         self.stack, self.layout = stack, layout
         self.report = ReportLayout(layout)
+        self.flag_offset = 8 * self.report.flag
 
     @cached_property
     def general(self) -> list[tuple[Block, int]]:
@@ -101,6 +103,10 @@ class Context:
     def bounds(self) -> list[Block]:
         """Bound blocks by number."""
         return self.layout.of_form("bounds")
+
+
+_STATUSES = (Status.SOLVED, Status.RELAXED, Status.BRAKED)
+_DOUBLE = struct.Struct("d").unpack_from
 
 
 class Step:
@@ -117,7 +123,7 @@ class Step:
         return np.frombuffer(self._data, dtype=np.float64, count=where.stop - where.start, offset=8 * where.start)
 
     def _number(self, name: str) -> float:
-        return float(self._part(name)[0])
+        return float(_DOUBLE(self._data, 8 * self._context.report[name].start)[0])
 
     @property
     def v(self) -> Array:
@@ -127,7 +133,7 @@ class Step:
     @property
     def status(self) -> Status:
         """How the tick ended."""
-        return (Status.SOLVED, Status.RELAXED, Status.BRAKED)[int(self._number("flag"))]
+        return _STATUSES[int(_DOUBLE(self._data, self._context.flag_offset)[0])]
 
     @property
     def iterations(self) -> int:
