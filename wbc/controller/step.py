@@ -91,6 +91,7 @@ class Context:
 
     def __init__(self, stack: Declaration, layout: Layout) -> None:
         self.stack, self.layout = stack, layout
+        self.nv = layout.nv
         self.report = ReportLayout(layout)
         self.flag_offset = 8 * self.report.flag
 
@@ -106,6 +107,7 @@ class Context:
 
 
 _STATUSES = (Status.SOLVED, Status.RELAXED, Status.BRAKED)
+_FLOAT = np.dtype(np.float64)
 _DOUBLE = struct.Struct("d").unpack_from
 
 
@@ -128,7 +130,7 @@ class Step:
     @property
     def v(self) -> Array:
         """The command: velocities [rad/s, m/s], nv, read-only."""
-        return np.frombuffer(self._data, dtype=np.float64, count=self._context.layout.nv)
+        return np.frombuffer(self._data, _FLOAT, self._context.nv)
 
     @property
     def status(self) -> Status:
