@@ -1,1 +1,11 @@
-"""Command line."""
+"""The command line ``wbc``."""
+
+from __future__ import annotations
+
+
+def main() -> None:
+    """Entry point of the command ``wbc``."""
+    # Imported here, so that importing the package for its documentation costs nothing
+    from wbc.cli.app import app
+
+    app()

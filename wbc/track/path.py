@@ -85,6 +85,7 @@ class SplinePath:
         quaternions = _continuous(np.array([pin.Quaternion(pose.rotation).coeffs() for pose in placed]))
         self.times = stamps - stamps[0]
         self.points = points
+        self._quaternions = quaternions
         ends = [(1, np.zeros(7)), (2, np.zeros(7))]
         values = np.hstack([points, quaternions])
         self._spline = make_interp_spline(self.times, values, k=5, bc_type=(ends, ends))
@@ -106,6 +107,11 @@ class SplinePath:
         turning = (rate[3:] - unit * float(unit @ rate[3:])) / size
         pose = pin.SE3(pin.Quaternion(unit).matrix(), value[:3])
         return Sample(pose, np.concatenate([rate[:3], _angular_velocity(unit, turning)]))
+
+    def stretched(self, duration: float) -> SplinePath:
+        """The same poses in another time [s], > 0."""
+        poses = [pin.SE3(pin.Quaternion(q).matrix(), p) for p, q in zip(self.points, self._quaternions, strict=True)]
+        return SplinePath(self.times * (duration / self.duration), poses)
 
     def _check_quaternions(self) -> None:
         grid = np.linspace(0.0, self.duration, 50 * len(self.times))

@@ -1,0 +1,24 @@
+"""Where the commands write: results to standard output, progress and errors to standard error."""
+
+from __future__ import annotations
+
+from rich.console import Console
+from rich.text import Text
+
+from wbc.errors import WbcError
+
+
+def out() -> Console:
+    """For results. Made when needed, so that redirected streams are honoured."""
+    return Console(highlight=False)
+
+
+def err() -> Console:
+    """For progress and errors."""
+    return Console(stderr=True, highlight=False)
+
+
+def complain(error: WbcError) -> None:
+    """An error as one line."""
+    line = Text.assemble(("error: ", "bold red"), " ".join(str(error).split()))
+    err().print(line, soft_wrap=True)

@@ -1,0 +1,61 @@
+"""``wbc demo``: the main job."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import pinocchio as pin
+import typer
+
+from wbc import robots, shapes
+from wbc.cli.session import Output, perform
+from wbc.track.presets import preset
+from wbc.track.setup import Moving, Plan, Swing
+
+#: The hand points down at (0.48, 0.42, 0.30) m, the elbow is up
+START = (1.0579, 0.3132, -0.38, -1.7484, 0.1283, 2.0373, 1.4223)
+#: Beside the arm, where the elbow swings
+LAMP = (0.25, -0.32, 0.62)
+
+
+def plan(duration: float = 12.0, rate: float = 200.0, solver: str = "daqp", backend: str = "auto") -> Plan:
+    """A Panda's hand goes round a ball of 0.12 m and back, while its elbow plane is commanded to swing by
+    0.5 rad; a second ball of 0.10 m hangs where the elbow would have to go.
+    """
+    robot = robots.load("panda")
+    tip = robot.frames["tip"]
+    start = np.array(START)
+    data = robot.model.createData()
+    pin.framesForwardKinematics(robot.model, data, start)
+    found = preset("around-obstacle", data.oMf[robot.model.getFrameId(tip)], duration, 0.12)
+    ball, center = found.obstacles[0]
+    return Plan(
+        robot,
+        tip,
+        found.path,
+        "around-obstacle",
+        start,
+        dt=1.0 / rate,
+        obstacles={
+            "ball": Moving(ball, pin.SE3(np.eye(3), center)),
+            "lamp": Moving(shapes.Sphere(0.10), pin.SE3(np.eye(3), np.array(LAMP))),
+        },
+        plane=Swing(0.5),
+        solver=solver,
+        backend=backend,
+    )
+
+
+def demo(
+    output: Annotated[Path, typer.Option(help="Run folder; written over.")] = Path("runs/demo"),
+    duration: Annotated[float, typer.Option(help="Seconds.")] = 12.0,
+    rate: Annotated[float, typer.Option(help="Ticks a second [Hz].")] = 200.0,
+    solver: Annotated[str, typer.Option(help="QP solver.")] = "daqp",
+    backend: Annotated[str, typer.Option(help="auto, native or vm.")] = "auto",
+    log: Annotated[str, typer.Option(help="parquet or npz.")] = "parquet",
+    plots: Annotated[bool, typer.Option(help="Draw the plots and the picture.")] = True,
+) -> None:
+    """Do the main job: a Panda follows a timed path round an obstacle with its elbow plane commanded."""
+    perform(plan(duration, rate, solver, backend), Output(output, True, log, plots))

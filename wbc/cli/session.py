@@ -1,0 +1,160 @@
+"""Doing a plan at the terminal: progress, Ctrl-C, the run folder and the printed summary."""
+
+from __future__ import annotations
+
+import contextlib
+import datetime
+import signal
+import threading
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import typer
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+from wbc import validation
+from wbc.cli.console import err, out
+from wbc.errors import WbcError
+from wbc.track.log import FORMATS, Log, save
+from wbc.track.picture import save_picture
+from wbc.track.plots import save_plots
+from wbc.track.run import track
+from wbc.track.setup import Plan
+from wbc.track.summary import Figure, save_summary, summarise
+
+INTERRUPTED = 130
+#: Ticks between two moves of the progress bar, so that the bar costs nothing
+STRIDE = 25
+
+
+class OutputError(WbcError):
+    """A run folder that cannot be written, or that has a run already."""
+
+
+@dataclass(frozen=True)
+class Output:
+    """What to write: ``folder`` (None: a new one under runs/), whether over a run that is there, and which files."""
+
+    folder: Path | None = None
+    force: bool = False
+    log: str = "parquet"
+    plots: bool = True
+
+
+class Stopper:
+    """Ctrl-C as a question that the loop asks between two ticks, so that no tick is cut in half."""
+
+    def __init__(self) -> None:
+        self.asked = False
+
+    def __call__(self) -> bool:
+        """Whether to stop."""
+        return self.asked
+
+    @contextlib.contextmanager
+    def listening(self) -> Iterator[None]:
+        """Within it the first Ctrl-C asks to stop, and the second interrupts at once."""
+        if threading.current_thread() is not threading.main_thread():
+            yield
+            return
+
+        def asked(number: int, frame: Any) -> None:
+            if self.asked:
+                raise KeyboardInterrupt
+            self.asked = True
+
+        before = signal.signal(signal.SIGINT, asked)
+        try:
+            yield
+        finally:
+            signal.signal(signal.SIGINT, before)
+
+
+def perform(plan: Plan, output: Output) -> None:
+    """Do a plan, write its folder and print its summary; exit code 130 if Ctrl-C ended it early.
+
+    Raises:
+        WbcError: bad input; nothing is written then but an empty folder.
+    """
+    validation.one_of("log", output.log, FORMATS)
+    folder = prepare(plan, output)
+    stopper = Stopper()
+    bar = Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("{task.percentage:3.0f} %"),
+        TimeElapsedColumn(),
+        console=err(),
+        transient=True,
+        refresh_per_second=5,
+    )
+    with bar:
+        stage = bar.add_task("compiling", total=None)
+        log = _tracked(plan, bar, stage, stopper)
+        with stopper.listening():
+            figures = summarise(log)
+            files = [save(log, folder, output.log), save_summary(figures, folder)]
+            if output.plots:
+                files += _drawn(plan, log, folder, bar, stage)
+    report(plan, log, figures, folder, files)
+    if log.meta["interrupted"]:
+        raise typer.Exit(INTERRUPTED)
+
+
+def _tracked(plan: Plan, bar: Progress, stage: Any, stopper: Stopper) -> Log:
+    with contextlib.ExitStack() as stack:
+
+        def compiled(controller: object) -> None:
+            # From here on there is a log to write; a Ctrl-C while compiling ends the command at once
+            stack.enter_context(stopper.listening())
+            bar.update(stage, description=f"{plan.robot.name}: {plan.label}", total=plan.ticks)
+
+        def progress(ticks: int) -> None:
+            if ticks % STRIDE == 0 or ticks == plan.ticks:
+                bar.update(stage, completed=ticks)
+
+        return track(plan, progress, stopper, compiled)
+
+
+def _drawn(plan: Plan, log: Log, folder: Path, bar: Progress, stage: Any) -> list[Path]:
+    bar.update(stage, description="plots", total=None)
+    files = save_plots(log, folder, lambda name: bar.update(stage, description=f"plots: {name}"))
+    bar.update(stage, description="picture")
+    picture = save_picture(log, plan.robot, folder / "overview.png")
+    return files if picture is None else [*files, picture]
+
+
+def prepare(plan: Plan, output: Output) -> Path:
+    """The run folder, made.
+
+    Raises:
+        OutputError: it has a run and ``force`` is off, or it cannot be made.
+    """
+    stamp = datetime.datetime.now().strftime("%Y%m%d-%H%M%S")
+    folder = output.folder or Path("runs") / f"{plan.robot.name}-{plan.label}-{stamp}"
+    logs = [folder / f"log.{kind}" for kind in FORMATS]
+    if any(log.exists() for log in logs) and not output.force:
+        raise OutputError("output", str(folder), "there is a run in this folder; choose another, or use --force")
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for log in logs:
+            log.unlink(missing_ok=True)
+    except OSError as error:
+        raise OutputError("output", str(folder), f"cannot be written: {error.strerror}") from error
+    return folder
+
+
+def report(plan: Plan, log: Log, figures: list[Figure], folder: Path, files: list[Path]) -> None:
+    """Print the summary."""
+    console = out()
+    title = f"{plan.robot.name} follows {plan.label} with {plan.frame}"
+    table = Table(title=title, title_justify="left", title_style="bold", show_header=False, box=None, pad_edge=False)
+    table.add_column(style="cyan", no_wrap=True)
+    table.add_column()
+    for figure in figures:
+        table.add_row(figure.label, figure.text)
+    console.print(table)
+    console.print(f"[bold]{folder}[/bold]: {', '.join(file.name for file in files)}", soft_wrap=True)

@@ -1,0 +1,191 @@
+"""``wbc track``: one robot, one path, one folder of results."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import pinocchio as pin
+import typer
+
+from wbc import robots, shapes, validation
+from wbc.cli.session import Output, perform
+from wbc.errors import ShapeError, UnknownNameError, WbcError
+from wbc.robot import Robot
+from wbc.track.path import Approach
+from wbc.track.path import Path as TimedPath
+from wbc.track.path_file import SUFFIXES, read_path
+from wbc.track.presets import PRESETS, preset
+from wbc.track.setup import Moving, Plan, Swing
+from wbc.validation import Array
+
+PLANES = ("auto", "off", "hold", "swing")
+_SCENE, _CONTROL, _OUTPUT = "What it does", "How it is controlled", "What it writes"
+
+
+def track(
+    robot: Annotated[str, typer.Argument(help="A name of `wbc robots`, or a URDF or MJCF file.")] = "panda",
+    path: Annotated[
+        str,
+        typer.Option(
+            help=f"Preset ({', '.join(PRESETS)}) or a CSV, JSON or TOML file of waypoints.", rich_help_panel=_SCENE
+        ),
+    ] = "circle",
+    frame: Annotated[
+        str | None, typer.Option(help="Frame that follows the path. Default: the robot's tip.", rich_help_panel=_SCENE)
+    ] = None,
+    duration: Annotated[
+        float | None,
+        typer.Option(help="Seconds. Default: 6, or the file's own; a file is stretched.", rich_help_panel=_SCENE),
+    ] = None,
+    size: Annotated[
+        float | None, typer.Option(help="Size of a preset [m], see the documentation.", rich_help_panel=_SCENE)
+    ] = None,
+    sphere: Annotated[
+        list[str] | None,
+        typer.Option(help="Obstacle X,Y,Z,RADIUS[,VX,VY,VZ] in m and m/s; may be repeated.", rich_help_panel=_SCENE),
+    ] = None,
+    floor: Annotated[
+        float | None, typer.Option(help="Height of a floor that links stay above [m].", rich_help_panel=_SCENE)
+    ] = None,
+    start: Annotated[
+        str | None,
+        typer.Option(help="First configuration, numbers with commas. Default: neutral.", rich_help_panel=_SCENE),
+    ] = None,
+    plane: Annotated[
+        str,
+        typer.Option(help="Elbow plane: off, hold, swing; auto holds it where known.", rich_help_panel=_SCENE),
+    ] = "auto",
+    swing: Annotated[float, typer.Option(help="Amplitude of --plane swing [rad].", rich_help_panel=_SCENE)] = 0.5,
+    hold: Annotated[
+        list[str] | None,
+        typer.Option(help="Frame that must not move; default: feet of a floating robot.", rich_help_panel=_SCENE),
+    ] = None,
+    rate: Annotated[float, typer.Option(help="Ticks a second [Hz].", rich_help_panel=_CONTROL)] = 200.0,
+    solver: Annotated[str, typer.Option(help="QP solver.", rich_help_panel=_CONTROL)] = "daqp",
+    backend: Annotated[str, typer.Option(help="auto, native or vm.", rich_help_panel=_CONTROL)] = "auto",
+    gain: Annotated[float, typer.Option(help="Gain of the hand [1/s].", rich_help_panel=_CONTROL)] = 10.0,
+    margin: Annotated[float, typer.Option(help="Distance kept from obstacles [m].", rich_help_panel=_CONTROL)] = 0.02,
+    output: Annotated[
+        Path | None,
+        typer.Option(help="Run folder. Default: runs/ROBOT-PATH-TIME.", rich_help_panel=_OUTPUT),
+    ] = None,
+    force: Annotated[bool, typer.Option(help="Write into a folder that has a run.", rich_help_panel=_OUTPUT)] = False,
+    log: Annotated[str, typer.Option(help="parquet or npz.", rich_help_panel=_OUTPUT)] = "parquet",
+    plots: Annotated[bool, typer.Option(help="Draw the plots and the picture.", rich_help_panel=_OUTPUT)] = True,
+) -> None:
+    """Follow a timed Cartesian path, and leave a log, plots and a summary.
+
+    Ctrl-C ends the run early; what was done until then is written all the same.
+    """
+    machine = robots.load(robot)
+    frequency = validation.scalar("rate", rate, low=0.0, open_low=True, unit="Hz")
+    tip = tip_frame(machine, frame)
+    first = machine.neutral if start is None else configuration(machine, start)
+    way, obstacles, label = scene(machine, tip, first, path, duration, size)
+    obstacles |= {f"sphere{k}": parse_sphere(text) for k, text in enumerate(sphere or (), 1)}
+    if floor is not None:
+        height = validation.scalar("floor", floor, unit="m")
+        obstacles["floor"] = Moving(shapes.HalfSpace(), pin.SE3(np.eye(3), np.array([0.0, 0.0, height])))
+    plan = Plan(
+        machine,
+        tip,
+        way,
+        label,
+        first,
+        dt=1.0 / frequency,
+        obstacles=obstacles,
+        margin=margin,
+        plane=plane_command(machine, plane, swing),
+        holds=tuple(hold) if hold else feet(machine),
+        gain=gain,
+        solver=solver,
+        backend=backend,
+    )
+    perform(plan, Output(output, force, log, plots))
+
+
+def tip_frame(robot: Robot, frame: str | None) -> str:
+    """The frame to move.
+
+    Raises:
+        UnknownNameError: no such frame. WbcError: none given, and the table knows no tip of this robot.
+    """
+    if frame is not None:
+        return robot.check_frame("frame", frame)
+    for role in ("tip", "right_hand", "left_hand"):
+        if role in robot.frames:
+            return robot.frames[role]
+    raise WbcError("frame", None, f"the table knows no tip of {robot.name}; choose with --frame", robot.frame_names[1:])
+
+
+def configuration(robot: Robot, text: str) -> Array:
+    """A configuration from numbers with commas."""
+    return robot.configuration("start", _numbers("start", text))
+
+
+def scene(
+    robot: Robot, tip: str, q: Array, path: str, duration: float | None, size: float | None
+) -> tuple[TimedPath, dict[str, Moving], str]:
+    """(path, obstacles that belong to it, label). A file's path begins with an approach to its first waypoint.
+
+    Raises:
+        UnknownNameError: neither a preset nor a path file. WbcError: a bad file or number.
+    """
+    data = robot.model.createData()
+    pin.framesForwardKinematics(robot.model, data, q)
+    here = data.oMf[robot.model.getFrameId(tip)].copy()
+    if path in PRESETS:
+        found = preset(path, here, 6.0 if duration is None else duration, size)
+        parts = enumerate(found.obstacles)
+        return found.path, {f"ball{k or ''}": Moving(s, pin.SE3(np.eye(3), p)) for k, (s, p) in parts}, path
+    if not path.lower().endswith(SUFFIXES) and "/" not in path:
+        raise UnknownNameError("path", path, PRESETS)
+    if size is not None:
+        raise WbcError("size", size, "belongs to a preset, not to a path file", PRESETS)
+    way = read_path(path)
+    if duration is not None:
+        way = way.stretched(validation.scalar("duration", duration, low=0.0, open_low=True, unit="s"))
+    first = way.sample(0.0).pose
+    away = pin.log6(here.actInv(first))
+    label = Path(path).stem
+    if float(np.abs(away.vector).max()) < 1e-9:
+        return way, {}, label
+    # Half a second, or as long as 0.25 m/s and 1 rad/s need
+    time = max(0.5, float(np.linalg.norm(away.linear)) / 0.25, float(np.linalg.norm(away.angular)))
+    return Approach(here, way, time), {}, label
+
+
+def parse_sphere(text: str) -> Moving:
+    """An obstacle from X,Y,Z,RADIUS[,VX,VY,VZ]."""
+    numbers = _numbers("sphere", text)
+    if len(numbers) not in (4, 7):
+        raise ShapeError("sphere", text, "expected X,Y,Z,RADIUS or X,Y,Z,RADIUS,VX,VY,VZ")
+    velocity = numbers[4:] if len(numbers) == 7 else np.zeros(3)
+    return Moving(shapes.Sphere(float(numbers[3])), pin.SE3(np.eye(3), numbers[:3]), velocity)
+
+
+def plane_command(robot: Robot, plane: str, swing: float) -> Swing | None:
+    """The command of the elbow plane that an option means."""
+    validation.one_of("plane", plane, PLANES)
+    known = all(role in robot.frames for role in ("shoulder", "elbow", "wrist"))
+    if plane == "off" or (plane == "auto" and not known):
+        return None
+    amplitude = validation.scalar("swing", swing, low=-math.pi, high=math.pi, unit="rad")
+    return Swing(amplitude if plane == "swing" else 0.0)
+
+
+def feet(robot: Robot) -> tuple[str, ...]:
+    """Frames that a floating robot stands on, as far as the table knows them."""
+    if robot.base != "floating":
+        return ()
+    return tuple(frame for role, frame in robot.frames.items() if role.endswith("foot"))
+
+
+def _numbers(field: str, text: str) -> Array:
+    try:
+        return validation.real_array(field, [float(part) for part in text.split(",")])
+    except ValueError as error:
+        raise ShapeError(field, text, "expected numbers with commas between them") from error

@@ -1,0 +1,214 @@
+"""Plots of a run, from its log alone."""
+
+from __future__ import annotations
+
+import math
+import pathlib
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from wbc.track import style
+from wbc.track.log import Log
+from wbc.track.summary import position_errors, rotation_angles
+from wbc.validation import Array
+
+
+def save_plots(log: Log, folder: pathlib.Path, progress: Callable[[str], None] | None = None) -> list[pathlib.Path]:
+    """Write the plots that the log has data for; returns the files. An empty log gives none.
+
+    joints, velocities, accelerations (with their limits), errors, plane (commanded and reached), clearance (by link,
+    computed with Coal), tick_time.
+    """
+    if len(log) == 0:
+        return []
+    plots: dict[str, Callable[[Any, Log], Any]] = {
+        "joints": lambda plt, log: _dofs(plt, log, "q", "Joint positions", ("position_lower", "position_upper")),
+        "velocities": lambda plt, log: _dofs(plt, log, "v", "Joint velocities", ("velocity",)),
+        "accelerations": lambda plt, log: _dofs(plt, log, "a", "Joint accelerations", ("acceleration",)),
+        "errors": _errors,
+        "tick_time": _tick_time,
+    }
+    if "plane.command" in log:
+        plots["plane"] = _plane
+    if log.group("clearance"):
+        plots["clearance"] = _clearance
+    files = []
+    with style.pyplot() as plt:
+        for name, draw in plots.items():
+            figure = draw(plt, log)
+            files.append(folder / f"{name}.png")
+            figure.savefig(files[-1])
+            plt.close(figure)
+            if progress is not None:
+                progress(name)
+    return files
+
+
+def _dofs(plt: Any, log: Log, group: str, title: str, limits: tuple[str, ...]) -> Any:
+    """A panel for each degree of freedom that has a curve, forbidden ranges shaded."""
+    curves = {name: values for name, values in log.group(group).items() if name in log.meta["dofs"]}
+    columns = 2 if len(curves) <= 8 else 4
+    rows = math.ceil(len(curves) / columns)
+    size = (4.6 * columns, 1.45 * rows + 0.9) if columns == 2 else (3.4 * columns, 1.35 * rows + 0.9)
+    figure, axes = plt.subplots(rows, columns, figsize=size, sharex=True, layout="constrained", squeeze=False)
+    for panel, (name, values) in zip(axes.flat, curves.items(), strict=False):
+        index = log.meta["dofs"].index(name)
+        low, high = _range(log, limits, index)
+        panel.plot(log["t"], values, color=style.BLUE)
+        _shade(panel, values, low, high)
+        panel.set_title(name, fontsize=10)
+        panel.set_ylabel(log.units[f"{group}.{name}"])
+    for panel in axes.flat[len(curves) :]:
+        panel.set_visible(False)
+    for panel in axes.flat[max(0, len(curves) - columns) : len(curves)]:
+        panel.xaxis.set_tick_params(labelbottom=True)
+    figure.supxlabel("time [s]", fontsize=11, color=style.INK)
+    shaded = "" if all(x is None for name in limits for x in log.meta["limits"][name]) else ", limits in red"
+    figure.suptitle(f"{title}{shaded}", x=0.01, ha="left", fontweight="bold", fontsize=13)
+    return figure
+
+
+def _range(log: Log, limits: tuple[str, ...], index: int) -> tuple[float, float]:
+    values = [log.meta["limits"][name][index] for name in limits]
+    if len(values) == 2:
+        return (
+            -math.inf if values[0] is None else float(values[0]),
+            math.inf if values[1] is None else float(values[1]),
+        )
+    return (-math.inf, math.inf) if values[0] is None else (-float(values[0]), float(values[0]))
+
+
+def _shade(panel: Any, values: Array, low: float, high: float) -> None:
+    """Show the limits where they are within twice the curve's span, and say where they are if they are not."""
+    bottom, top = float(values.min()), float(values.max())
+    pad = 0.12 * max(top - bottom, 1e-3)
+    if all(math.isfinite(x) for x in (low, high)):
+        bottom, top = min(bottom, low), max(top, high)
+        pad = 0.06 * (top - bottom)
+    panel.set_ylim(bottom - pad, top + pad)
+    for edge, end in ((low, bottom - pad), (high, top + pad)):
+        if math.isfinite(edge):
+            panel.axhspan(*sorted((edge, end)), color=style.RED, alpha=0.12, lw=0)
+            panel.axhline(edge, color=style.RED, lw=1.0)
+
+
+def _errors(plt: Any, log: Log) -> Any:
+    """Position and rotation error of the frame, and of the elbow plane where there is one."""
+    curves = [
+        ("position error [mm]", 1e3 * position_errors(log), style.BLUE),
+        ("rotation error [deg]", np.degrees(rotation_angles(log)), style.PURPLE),
+    ]
+    if "plane.command" in log:
+        curves.append(("elbow plane error [deg]", np.degrees(log["error.plane.plane"]), style.ORANGE))
+    figure, axes = plt.subplots(
+        len(curves), 1, figsize=(9.2, 1.9 * len(curves) + 0.8), sharex=True, layout="constrained"
+    )
+    for panel, (label, values, colour) in zip(axes, curves, strict=True):
+        panel.plot(log["t"], values, color=colour)
+        panel.set_ylabel(label)
+        panel.margins(x=0.01)
+        if values.min() >= 0.0:
+            panel.set_ylim(bottom=0.0)
+        _mark(panel, log)
+    axes[-1].set_xlabel("time [s]")
+    title = f"Task errors of {log.meta['frame']}"
+    figure.suptitle(title, x=0.01, ha="left", fontweight="bold", fontsize=13)
+    _mark_legend(axes[0], log)
+    return figure
+
+
+def _plane(plt: Any, log: Log) -> Any:
+    """Angle of the elbow plane, commanded and reached."""
+    figure, panel = plt.subplots(figsize=(9.2, 3.6), layout="constrained")
+    _mark(panel, log)
+    angle = np.degrees(np.unwrap(log["plane.angle"]))
+    panel.plot(log["t"], np.degrees(log["plane.command"]), color=style.GREY, ls=(0, (4, 2)), label="commanded")
+    panel.plot(log["t"], angle, color=style.ORANGE, lw=2.2, label="reached")
+    panel.set_xlabel("time [s]")
+    panel.set_ylabel("angle [deg]")
+    panel.margins(x=0.01)
+    panel.set_title("Angle of the elbow plane, 0 = elbow up", fontsize=13)
+    _mark_legend(panel, log)
+    return figure
+
+
+def _clearance(plt: Any, log: Log) -> Any:
+    """Distance of each link's shapes to the nearest obstacle."""
+    curves = log.group("clearance")
+    nearest = sorted(curves, key=lambda link: float(curves[link].min()))[:7]
+    margin = 1e3 * log.meta["margin"]
+    figure, panel = plt.subplots(figsize=(9.2, 4.0), layout="constrained")
+    for link in [name for name in curves if name in nearest]:
+        panel.plot(log["t"], 1e3 * curves[link], label=link)
+    top = 6.0 * max(margin, 20.0) + 1e3 * max(0.0, float(curves[nearest[0]].min()))
+    panel.set_ylim(min(0.0, 1.1e3 * float(curves[nearest[0]].min())), top)
+    if margin > 0.0:
+        panel.axhspan(panel.get_ylim()[0], margin, color=style.RED, alpha=0.12, lw=0)
+        panel.axhline(margin, color=style.RED, lw=1.0)
+        panel.annotate("margin", (log["t"][0], margin), (4, -4), textcoords="offset points", va="top", color=style.RED)
+    panel.set_xlabel("time [s]")
+    panel.set_ylabel("distance to the nearest obstacle [mm]")
+    panel.margins(x=0.01)
+    panel.set_title("Clearance of the links' shapes, computed with Coal", fontsize=13)
+    panel.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    return figure
+
+
+def _tick_time(plt: Any, log: Log) -> Any:
+    """Histogram of the time that controller.step took."""
+    micro = 1e6 * log["tick"]
+    edges = np.geomspace(max(0.8 * micro.min(), 1e-2), 1.25 * micro.max(), 70)
+    figure, panel = plt.subplots(figsize=(9.2, 3.4), layout="constrained")
+    panel.hist(micro, bins=edges, color=style.TEAL, alpha=0.85)
+    panel.set_xscale("log")
+    panel.set_yscale("log")
+    for name, value, colour in (
+        ("median", float(np.median(micro)), style.INK),
+        ("p99", float(np.quantile(micro, 0.99)), style.RED),
+    ):
+        panel.axvline(value, color=colour, lw=1.4)
+        panel.annotate(
+            f"{name} {value:.1f} us",
+            (value, 1.0),
+            (4, -2),
+            ("data", "axes fraction"),
+            "offset points",
+            va="top",
+            color=colour,
+        )
+    panel.set_xlabel("time of controller.step [us]")
+    panel.set_ylabel("ticks")
+    title = f"Tick time, {len(micro)} ticks, {log.meta['solver']} ({log.meta['backend']})"
+    panel.set_title(title, fontsize=13)
+    return figure
+
+
+def _mark(panel: Any, log: Log) -> None:
+    """Shade the ticks at which an obstacle binds."""
+    flags = _obstacle_binds(log)
+    if flags.any():
+        t, dt = log["t"], log.meta["dt"]
+        edges = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(int), [0]])))
+        for start, end in zip(edges[::2], edges[1::2], strict=True):
+            panel.axvspan(t[start], t[end - 1] + dt, color=style.RED, alpha=0.10, lw=0)
+
+
+def _mark_legend(panel: Any, log: Log) -> None:
+    handles, labels = panel.get_legend_handles_labels()
+    if _obstacle_binds(log).any():
+        from matplotlib.patches import Patch
+
+        handles.append(Patch(color=style.RED, alpha=0.15))
+        labels.append("an obstacle binds")
+    if handles:
+        panel.legend(handles, labels, loc="upper right", ncols=len(labels), bbox_to_anchor=(1.0, 1.16))
+
+
+def _obstacle_binds(log: Log) -> Array:
+    out = np.zeros(len(log), dtype=bool)
+    for name, flags in log.group("binding").items():
+        if name.split("/")[0] in log.meta["obstacles"]:
+            out |= flags
+    return out

@@ -1,0 +1,311 @@
+"""A small renderer for still pictures: triangles, depth buffer, one light with shadows, a floor.
+
+It exists because a plotting library sorts whole surfaces by their distance, which draws an arm through itself. Plain
+numpy, a few seconds a picture; it is no viewer.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from wbc.validation import Array
+
+#: Triangles with a longer edge than this on the screen are split before they are drawn [pixels]
+LARGEST_EDGE = 14.0
+#: Side of the square shadow map [pixels]
+SHADOW_MAP = 1500
+#: Looks at the shadow map for each pixel
+LOOKS = 10
+LIGHT = np.array([0.35, -0.45, 0.82]) / np.linalg.norm([0.35, -0.45, 0.82])
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """Triangles in the world, m x 3 x 3 [m], of one colour (r, g, b in 0..1)."""
+
+    triangles: Array
+    colour: tuple[float, float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Camera:
+    """A pinhole camera.
+
+    Attributes:
+        eye, target: where it is and what is in the middle of the picture [m]; z is up.
+        view: vertical angle of view [rad].
+        width, height: of the picture [pixels].
+    """
+
+    eye: Array
+    target: Array
+    view: float
+    width: int
+    height: int
+
+    @property
+    def axes(self) -> Array:
+        """Rows: right, up and backward, in the world."""
+        back = (self.eye - self.target) / np.linalg.norm(self.eye - self.target)
+        right = np.cross([0.0, 0.0, 1.0], back)
+        right /= np.linalg.norm(right)
+        return np.array([right, np.cross(back, right), back])
+
+    @property
+    def focal(self) -> float:
+        """Focal length [pixels]."""
+        return float(self.height / (2.0 * math.tan(self.view / 2.0)))
+
+    def project(self, points: Array) -> Array:
+        """(column, row, distance along the view) of points, n x 3."""
+        local = (np.asarray(points) - self.eye) @ self.axes.T
+        depth = -local[..., 2]
+        scale = self.focal / np.maximum(depth, 1e-6)
+        x = self.width / 2.0 + scale * local[..., 0]
+        y = self.height / 2.0 - scale * local[..., 1]
+        return np.stack([x, y, depth], axis=-1)
+
+    def rays(self, mask: Array | None = None) -> Array:
+        """Directions through the pixels' middles, of depth 1: height x width x 3, or n x 3 for those of a mask."""
+        x = (np.arange(self.width) + 0.5 - self.width / 2.0) / self.focal
+        y = (self.height / 2.0 - np.arange(self.height) - 0.5) / self.focal
+        if mask is None:
+            local = np.stack(np.broadcast_arrays(x[None, :], y[:, None], -1.0), axis=-1)
+        else:
+            rows, columns = np.nonzero(mask)
+            local = np.stack([x[columns], y[rows], np.full(len(rows), -1.0)], axis=-1)
+        return np.asarray(local @ self.axes)
+
+
+@dataclass(frozen=True, eq=False)
+class Layer:
+    """What is visible at each pixel of one set of meshes: depth (inf: nothing), normal and colour."""
+
+    depth: Array
+    normal: Array
+    colour: Array
+
+
+def draw(meshes: Sequence[Mesh], camera: Camera) -> Layer:
+    """The nearest surfaces."""
+    size = camera.width * camera.height
+    depth = np.full(size, np.inf)
+    owner = np.full(size, -1, dtype=np.int64)
+    normals, colours, start = [], [], 0
+    for mesh in meshes:
+        # The pieces of a split triangle share its plane, so they have its normal
+        screen, parent = _split(camera.project(mesh.triangles))
+        ahead = (screen[..., 2] > 0.05).all(axis=1)
+        screen, parent = screen[ahead], parent[ahead]
+        edges = mesh.triangles[:, 1:] - mesh.triangles[:, :1]
+        normal = np.cross(edges[:, 0], edges[:, 1])
+        normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-30)
+        _fill(screen, parent + start, depth, owner, camera.width, camera.height)
+        normals.append(normal)
+        colours.append(np.broadcast_to(mesh.colour, (len(normal), 3)))
+        start += len(mesh.triangles)
+    normals.append(np.zeros((1, 3)))
+    colours.append(np.zeros((1, 3)))
+    shape = (camera.height, camera.width)
+    return Layer(
+        depth.reshape(shape), np.vstack(normals)[owner].reshape(*shape, 3), np.vstack(colours)[owner].reshape(*shape, 3)
+    )
+
+
+class Shadows:
+    """Depth of the scene as seen from the light (parallel rays)."""
+
+    def __init__(self, meshes: Sequence[Mesh]) -> None:
+        side = np.cross([0.0, 0.0, 1.0], LIGHT)
+        side /= np.linalg.norm(side)
+        self._axes = np.array([side, np.cross(LIGHT, side), -LIGHT])
+        every = np.concatenate([m.triangles for m in meshes]) @ self._axes.T
+        low, high = every[..., :2].reshape(-1, 2).min(axis=0), every[..., :2].reshape(-1, 2).max(axis=0)
+        self._origin, self._scale = low - 0.02, (SHADOW_MAP - 1) / float((high - low).max() + 0.04)
+        screen = every.copy()
+        screen[..., :2] = (screen[..., :2] - self._origin) * self._scale
+        depth = np.full(SHADOW_MAP**2, np.inf)
+        pieces, parent = _split(screen)
+        _fill(pieces, parent, depth, np.full(SHADOW_MAP**2, -1, dtype=np.int64), SHADOW_MAP, SHADOW_MAP)
+        self._depth = depth.reshape(SHADOW_MAP, SHADOW_MAP)
+
+    def lit(self, points: Array, softness: float) -> Array:
+        """Part of the light that reaches points [..., 3], 0 to 1; ``softness`` is the blur of edges [m]."""
+        local = points @ self._axes.T
+        place = (local[:, :2] - self._origin) * self._scale
+        reach = max(1.0, softness * self._scale)
+        # Each pixel looks in directions of its own, so that few looks leave grain, which is averaged away, not bands
+        turn = 2.0 * math.pi * ((0.7548776662 * np.arange(len(points))) % 1.0)
+        total = np.zeros(len(points))
+        for k in range(LOOKS):
+            away = reach * math.sqrt((k + 0.5) / LOOKS)
+            angle = turn + 2.399963 * k
+            column = np.clip((place[:, 0] + away * np.cos(angle)).astype(np.int64), 0, SHADOW_MAP - 1)
+            row = np.clip((place[:, 1] + away * np.sin(angle)).astype(np.int64), 0, SHADOW_MAP - 1)
+            total += local[:, 2] < self._depth[row, column] + 0.012
+        return np.asarray(total / LOOKS)
+
+
+def shade(layer: Layer, camera: Camera, shadows: Shadows) -> tuple[Array, Array]:
+    """(mask of the pixels where something is seen, their colours): sky light, the light with shadows, a highlight."""
+    seen = np.isfinite(layer.depth)
+    rays = camera.rays(seen)
+    points = camera.eye + rays * layer.depth[seen][:, None]
+    view = -rays / np.linalg.norm(rays, axis=1, keepdims=True)
+    normal = layer.normal[seen]
+    normal = np.where(np.sum(normal * view, axis=1, keepdims=True) < 0.0, -normal, normal)
+    lambert = np.clip(normal @ LIGHT, 0.0, 1.0)
+    lit = shadows.lit(points + 0.006 * normal, 0.006)
+    half = LIGHT + view
+    half /= np.linalg.norm(half, axis=1, keepdims=True)
+    shine = np.clip(np.sum(normal * half, axis=1), 0.0, 1.0) ** 40
+    light = 0.43 + 0.13 * normal[:, 2] + 0.52 * lambert * lit
+    return seen, np.clip(layer.colour[seen] * light[:, None] + (0.16 * shine * lit)[:, None], 0.0, 1.0)
+
+
+def floor(camera: Camera, shadows: Shadows, height: float, center: Array, radius: float) -> tuple[Array, Array]:
+    """(colour, depth) of a pale floor at z = ``height`` with a grid of 0.25 m, fading into white at ``radius``."""
+    every = camera.rays()
+    with np.errstate(divide="ignore"):
+        depth = (height - camera.eye[2]) / every[..., 2]
+    depth = np.where((depth > 0.0) & np.isfinite(depth), depth, np.inf)
+    colour = np.ones((*depth.shape, 3))
+    reach = np.hypot(*(camera.eye[:2] - center[:2])) + 1.25 * radius
+    close = depth < 1.5 * reach
+    spot = camera.eye + every[close] * depth[close][:, None]
+    near = np.clip(1.25 - np.linalg.norm(spot[:, :2] - center[:2], axis=1) / radius, 0.0, 1.0)
+    near = near * near * (3.0 - 2.0 * near)
+    lit = np.ones(len(spot))
+    lit[near > 0] = shadows.lit(spot[near > 0], 0.03)
+    width = np.maximum(depth[close] / camera.focal, 1e-9)
+    lines = np.zeros(len(spot))
+    for axis in (0, 1):
+        off = np.abs((spot[:, axis] / 0.25 + 0.5) % 1.0 - 0.5) * 0.25
+        lines = np.maximum(lines, np.clip(1.8 - off / width, 0.0, 1.0))
+    tone = (0.95 - 0.05 * lines) * (0.68 + 0.32 * lit)
+    colour[close] = 1.0 - near[:, None] * (1.0 - tone[:, None] * np.array([0.98, 0.988, 1.0]))
+    return colour, depth
+
+
+def occlusion(depth: Array, width: float) -> Array:
+    """Darkening next to what stands in front, 0 to 1: the depth buffer against its own blur (Luft et al. 2006)."""
+    from scipy.ndimage import gaussian_filter
+
+    blurred = gaussian_filter(depth, width)
+    return np.asarray(np.clip((depth - blurred) * 1.2, 0.0, 0.14))
+
+
+def reduced(image: Array, factor: int) -> Array:
+    """Means over blocks of factor x factor pixels."""
+    h, w = image.shape[0] // factor, image.shape[1] // factor
+    blocks = image[: h * factor, : w * factor].reshape(h, factor, w, factor, -1)
+    return np.asarray(blocks.mean(axis=(1, 3)))
+
+
+def sphere(center: Array, radius: float, colour: tuple[float, float, float]) -> Mesh:
+    """A sphere of 64 x 32 faces."""
+    polar, angles = np.linspace(0.0, math.pi, 97), np.array(_angles(192))
+    around = np.stack([np.cos(angles), np.sin(angles), np.zeros(192)], axis=1)
+    rings = np.sin(polar)[:, None, None] * around + np.cos(polar)[:, None, None] * np.array([0.0, 0.0, 1.0])
+    return Mesh(_quads(center + radius * rings), colour)
+
+
+def tube(points: Array, radius: float, colour: tuple[float, float, float]) -> Mesh:
+    """A tube along a polyline, n x 3."""
+    run = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+    count = int(run[-1] / max(radius, 1e-6)) + 1
+    if count < 2:
+        return Mesh(np.zeros((0, 3, 3)), colour)
+    # At equal distances along the way: where the robot is slow, recorded points are too close for a direction
+    stations = np.linspace(0.0, run[-1], count)
+    line = np.column_stack([np.interp(stations, run, points[:, k]) for k in range(3)])
+    along = np.gradient(line, axis=0)
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    # Any direction that no piece of the line is parallel to
+    side = np.cross(along, [0.31, 0.17, 0.93])
+    side /= np.maximum(np.linalg.norm(side, axis=1, keepdims=True), 1e-9)
+    other = np.cross(along, side)
+    angles = np.array(_angles(12))
+    rings = line[:, None] + radius * (
+        np.cos(angles)[:, None] * side[:, None] + np.sin(angles)[:, None] * other[:, None]
+    )
+    return Mesh(_quads(rings), colour)
+
+
+def _angles(count: int) -> list[float]:
+    return [2.0 * math.pi * k / count for k in range(count)]
+
+
+def _quads(rings: Array) -> Array:
+    """Triangles between neighbouring rings of points, n x m x 3."""
+    a, b = rings[:-1], rings[1:]
+    c, d = np.roll(a, -1, axis=1), np.roll(b, -1, axis=1)
+    return np.concatenate(
+        [np.stack([a, b, d], axis=2).reshape(-1, 3, 3), np.stack([a, d, c], axis=2).reshape(-1, 3, 3)]
+    )
+
+
+def _split(screen: Array) -> tuple[Array, Array]:
+    """Triangles on the screen split at their longest edges until all are short, and the triangle each came from.
+
+    Splitting on the screen keeps depth linear there; with edges this short, the error against true perspective is
+    far below the size of a pixel.
+    """
+    done, parents = [], []
+    parent = np.arange(len(screen))
+    while len(screen):
+        edges = np.linalg.norm(screen[:, [1, 2, 0], :2] - screen[:, :, :2], axis=2)
+        small = edges.max(axis=1) <= LARGEST_EDGE
+        done.append(screen[small])
+        parents.append(parent[small])
+        screen, parent, longest = screen[~small], parent[~small], edges[~small].argmax(axis=1)
+        rows = np.arange(len(screen))
+        a, b, c = (screen[rows, (longest + k) % 3] for k in range(3))
+        middle = (a + b) / 2
+        screen = np.concatenate([np.stack([a, middle, c], axis=1), np.stack([middle, b, c], axis=1)])
+        parent = np.concatenate([parent, parent])
+    return np.concatenate(done or [np.zeros((0, 3, 3))]), np.concatenate(parents or [np.zeros(0, dtype=np.int64)])
+
+
+def _fill(screen: Array, names: Array, depth: Array, owner: Array, width: int, height: int) -> None:
+    """Write nearest depth and owner of each pixel whose middle lies in a triangle."""
+    low = np.floor(screen[..., :2].min(axis=1) - 0.5).astype(np.int64) + 1
+    high = np.floor(screen[..., :2].max(axis=1) - 0.5).astype(np.int64)
+    span = (high - low).max(axis=1) + 1 if len(screen) else np.zeros(0, dtype=np.int64)
+    on = (span > 0) & (high >= 0).all(axis=1) & (low[:, 0] < width) & (low[:, 1] < height)
+    for size in (1, 2, 3, 4, 6, 8, 11, int(LARGEST_EDGE) + 2):
+        chosen = np.flatnonzero(on & (span <= size))
+        on[chosen] = False
+        for part in np.array_split(chosen, max(1, len(chosen) * size * size // 2_000_000 + 1)):
+            if len(part):
+                _fill_group(screen[part], names[part], low[part], size, depth, owner, width, height)
+
+
+def _fill_group(
+    screen: Array, names: Array, low: Array, size: int, depth: Array, owner: Array, width: int, height: int
+) -> None:
+    a, b, c = screen[:, 0], screen[:, 1], screen[:, 2]
+    steps = np.arange(size)
+    x = (low[:, 0, None] + steps)[:, None, :]
+    y = (low[:, 1, None] + steps)[:, :, None]
+    area = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
+    area = np.where(np.abs(area) < 1e-12, np.nan, area)[:, None, None]
+    px, py = x + 0.5, y + 0.5
+
+    def share(p: Array, r: Array) -> Array:
+        along = (r[:, 0] - p[:, 0])[:, None, None] * (py - p[:, 1, None, None])
+        across = (r[:, 1] - p[:, 1])[:, None, None] * (px - p[:, 0, None, None])
+        return np.asarray((along - across) / area)
+
+    wa, wb, wc = share(b, c), share(c, a), share(a, b)
+    inside = (wa >= -1e-9) & (wb >= -1e-9) & (wc >= -1e-9) & (x >= 0) & (x < width) & (y >= 0) & (y < height)
+    z = wa * a[:, 2, None, None] + wb * b[:, 2, None, None] + wc * c[:, 2, None, None]
+    where = np.broadcast_to(y * width + x, z.shape)[inside]
+    values = z[inside]
+    np.minimum.at(depth, where, values)
+    nearest = values <= depth[where]
+    owner[where[nearest]] = np.broadcast_to(names[:, None, None], z.shape)[inside][nearest]
