@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -61,7 +61,9 @@ class Controller:
         # of all ways to copy some hundred numbers into something immutable, the fastest
         self._snapshot = self.tick.report.data.cast("B").tobytes
         self._q_shape, self._v_shape = (layout.nq,), (layout.nv,)
-        self._waiting: dict[str, list[Slot]] = {}
+        #: inputs that follow the first configuration, with their items, and those of them that it still has to fill
+        self._first: dict[Slot, str] = {}
+        self._waiting: dict[Slot, str] = {}
         self._handles = {name: Handle(self, block) for name, block in layout.blocks.items()}
         self.tick.dt[0] = stack.dt
         self.tick.q[:] = stack.robot.neutral
@@ -114,11 +116,9 @@ class Controller:
         robot = self.stack.robot
         configuration = None if q is None else robot.configuration("q", q)
         velocity = np.zeros(robot.nv) if v is None else validation.real_array("v", v, (robot.nv,))
-        waiting = {name: list(slots) for name, slots in self._first.items()}
         if configuration is not None:
-            self._initialise(waiting, configuration)
-            waiting = {}
-        self._waiting = waiting
+            self._initialise(self._first, configuration)
+        self._waiting = {} if configuration is not None else dict(self._first)
         self.tick.v_last[:] = velocity
         self.tick.reset()
         self._slow = True
@@ -156,41 +156,34 @@ class Controller:
     def write(self, slot: Slot, numbers: Array) -> None:
         """Write validated numbers of an input; it no longer follows the first configuration."""
         self.tick.p[slot.span] = numbers
-        for table in (self._waiting, self._first):
-            for name in list(table):
-                table[name] = [s for s in table[name] if s is not slot]
-                if not table[name]:
-                    del table[name]
+        if slot in self._first:
+            del self._first[slot]
+            self._waiting.pop(slot, None)
 
     def require_value(self, slot: Slot, field: str) -> None:
         """Values that wait for the first configuration cannot be read before it."""
-        if any(s is slot for slots in self._waiting.values() for s in slots):
+        if slot in self._waiting:
             raise SolverError(field, None, "is taken from the first configuration; call step(q) or reset(q) first")
 
     # The first configuration
 
-    @functools.cached_property
-    def _first(self) -> dict[str, list[Slot]]:
-        return {}
-
     def _set_default(self, name: str, slot: Slot) -> None:
         value = slot.input.default
         if value is None:
-            self._waiting.setdefault(name, []).append(slot)
-            self._first.setdefault(name, []).append(slot)
+            self._waiting[slot] = self._first[slot] = name
             return
         if slot.input.name == "rate":
             value = min(float(value), 1.0 / self.stack.dt_range[1])
         self.tick.p[slot.span] = self._handles[name].checked(slot.input.name, value)
 
-    def _initialise(self, waiting: dict[str, list[Slot]], q: Array) -> None:
+    def _initialise(self, slots: Mapping[Slot, str], q: Array) -> None:
         values: list[tuple[Slot, Array]] = []
-        for name, slots in waiting.items():
-            initial = self.stack[name].item.initial(self.stack.robot, q)
-            for slot in slots:
-                if slot.input.name not in initial:
-                    raise SolverError(f"{name}.{slot.input.name}", None, "has no default value; set it before step")
-                values.append((slot, self._handles[name].checked(slot.input.name, initial[slot.input.name])))
+        initial = {name: self.stack[name].item.initial(self.stack.robot, q) for name in set(slots.values())}
+        for slot, name in slots.items():
+            wanted = slot.input.name
+            if wanted not in initial[name]:
+                raise SolverError(f"{name}.{wanted}", None, "has no default value; set it before step")
+            values.append((slot, self._handles[name].checked(wanted, initial[name][wanted])))
         for slot, numbers in values:
             self.tick.p[slot.span] = numbers
 

@@ -28,16 +28,30 @@ class Handle:
     constraint), for tasks ``weight`` and ``gain``, for margins ``rate`` [1/s].
     """
 
-    __slots__ = ("_block", "_controller", "_enabled", "_mask", "_row_weights", "_weight")
+    __slots__ = (
+        "_block",
+        "_controller",
+        "_enabled",
+        "_fields",
+        "_mask",
+        "_rate",
+        "_robot",
+        "_row_weights",
+        "_weight",
+    )
 
     def __init__(self, controller: Controller, block: Block) -> None:
         put = super().__setattr__
         put("_controller", controller)
         put("_block", block)
+        put("_robot", controller.stack.robot)
+        # the one input with a limit that the item does not know: rate dt <= 1
+        put("_rate", block.slots.get("rate") if block.form == "margins" else None)
+        put("_fields", {name: f"{block.entry.name}.{name}" for name in block.slots})
         put("_enabled", True)
         put("_weight", block.entry.weight)
         put("_mask", np.ones(len(block.rows)))
-        put("_row_weights", np.asarray(block.entry.item.row_weights(controller.stack.robot), dtype=np.float64))
+        put("_row_weights", np.asarray(block.entry.item.row_weights(self._robot), dtype=np.float64))
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -62,6 +76,10 @@ class Handle:
         return _as_written(slot, self._controller.tick.p[slot.span])
 
     def __setattr__(self, name: str, value: Any) -> None:
+        slot = self._block.slots.get(name)
+        if slot is not None:
+            self._controller.write(slot, self._checked(slot, value))
+            return
         field = self._field(name)
         if name == "enabled":
             super().__setattr__("_enabled", validation.flag(field, value))
@@ -70,8 +88,7 @@ class Handle:
         elif name == "weight" and self._block.form == "task":
             super().__setattr__("_weight", validation.scalar(field, value, low=0.0))
         else:
-            self._controller.write(self._slot(name), self.checked(name, value))
-            return
+            raise UnknownValueError(field, name, self.names)
         self.apply()
 
     def checked(self, name: str, value: Any) -> Array:
@@ -80,10 +97,15 @@ class Handle:
         Raises:
             WbcError: not a value of this input.
         """
-        slot, field = self._slot(name), self._field(name)
-        numbers = inputs.flat(self._controller.stack.robot, field, slot.input, value)
+        return self._checked(self._slot(name), value)
+
+    def _checked(self, slot: Slot, value: Any) -> Array:
+        field = self._fields[slot.input.name]
+        numbers = inputs.flat(self._robot, field, slot.input, value)
+        if slot is not self._rate:
+            return numbers
         longest = self._controller.stack.dt_range[1]
-        if name == "rate" and self._block.form == "margins" and not 0.0 < numbers[0] * longest <= 1.0:
+        if not 0.0 < numbers[0] * longest <= 1.0:
             reason = (
                 f"rate * dt must be in (0, 1] for every dt up to {longest:g} s, so rate in (0, {1 / longest:g}] 1/s"
             )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -20,7 +21,7 @@ class Slot:
     start: int
     size: int
 
-    @property
+    @cached_property
     def span(self) -> slice:
         """Place in the parameter buffer."""
         return slice(self.start, self.start + self.size)
