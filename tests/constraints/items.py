@@ -16,6 +16,7 @@ from wbc.tasks.fixed import Fixed
 from wbc.tasks.frame_velocity_limit import FrameVelocityLimit
 from wbc.tasks.hold import Hold
 from wbc.tasks.joint_limits import JointLimits
+from wbc.tasks.mechanism import Mechanism
 from wbc.tasks.obstacle import Obstacle
 
 #: An item and the run-time values that differ from its defaults
@@ -77,6 +78,10 @@ def _fixed(robot: Robot) -> list[Declared]:
     return [(Fixed(robot.joint_names[-1]), {}), (Fixed(robot.joint_names[:2], acceleration=False), {})]
 
 
+def _mechanism(robot: Robot) -> list[Declared]:
+    return [(Mechanism(), {"gain": 3.0})]
+
+
 #: Class name -> declarations on a robot. Obstacles need ``shaped(robot)``.
 FACTORIES: dict[str, Callable[[Robot], list[Declared]]] = {
     "JointLimits": _joint_limits,
@@ -84,4 +89,5 @@ FACTORIES: dict[str, Callable[[Robot], list[Declared]]] = {
     "FrameVelocityLimit": _frame_velocity_limit,
     "Hold": _hold,
     "Fixed": _fixed,
+    "Mechanism": _mechanism,
 }

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
@@ -10,7 +10,7 @@ import pinocchio as pin
 
 import wbc.robots
 from tests.constraints.robots import with_test_shapes
-from wbc.robot import Robot
+from wbc.robot import Coupling, Robot
 
 #: Fixed arms, one with unbounded joints, and a humanoid with a floating base
 NAMES = ("panda", "ur5", "kinova", "talos")
@@ -53,8 +53,9 @@ FRAMES = {
 
 @cache
 def robot(name: str) -> Robot:
-    """A robot with collision shapes on a few links."""
-    return with_test_shapes(wbc.robots.load(name))
+    """A robot with collision shapes on a few links, a coupling of its last two joints, and an undriven direction."""
+    plain = with_test_shapes(wbc.robots.load(name))
+    return replace(plain, couplings=(Coupling(plain.nv - 1, plain.nv - 2, 0.5, 0.1),), locked_dofs=(1,))
 
 
 def random_configuration(robot: Robot, rng: np.random.Generator) -> np.ndarray:

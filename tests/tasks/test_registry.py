@@ -17,7 +17,7 @@ from tests.tasks.evaluate import Numbers, later, numbers, sample, slope
 from tests.tasks.items import FACTORIES
 from tests.tasks.robots import NAMES, placement, random_configuration, robot, velocity
 from wbc.robot import Robot
-from wbc.tasks import Damping, FrameVelocityLimit, Hold, Item, PitchPlane, Task, registry
+from wbc.tasks import Damping, FrameVelocityLimit, Hold, Item, Mechanism, PitchPlane, Task, registry
 
 STATES = 3
 DIRECTIONS = 4
@@ -75,6 +75,11 @@ def hold(item: Hold, robot: Robot, q: np.ndarray, v: np.ndarray) -> np.ndarray:
     return {"pose": twist, "position": twist[:3], "orientation": twist[3:]}[item.kind]
 
 
+def mechanism(item: Mechanism, robot: Robot, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+    mimics = [v[c.follower] - c.ratio * v[c.leader] for c in robot.couplings]
+    return np.array(mimics + [v[i] for i in robot.locked_dofs])
+
+
 def plane_rate(item: PitchPlane, robot: Robot, q: np.ndarray, v: np.ndarray) -> np.ndarray:
     """Angular velocity of the body that carries the axis, along the line between the offset pitch axes."""
     model, data = robot.model, robot.model.createData()
@@ -95,7 +100,7 @@ def pin_jacobians(model: pin.Model, q: np.ndarray) -> pin.Data:
 
 
 #: What the rows times v are, where they are not the derivative of a value.
-RATES = {Damping: damping, FrameVelocityLimit: frame_velocity, Hold: hold, PitchPlane: plane_rate}
+RATES = {Damping: damping, FrameVelocityLimit: frame_velocity, Hold: hold, Mechanism: mechanism, PitchPlane: plane_rate}
 
 
 def test_every_shipped_class_has_a_factory_and_is_exported() -> None:
