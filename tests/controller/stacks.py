@@ -84,7 +84,7 @@ def conflicts() -> Stack:
     stack.add(JointLimits(), name="limits")
     stack.add(Hold(f.tip, kind="position"), name="hold")
     stack.add(Hold(f.middle, kind="position"), name="hold_elbow")
-    stack.add(Obstacle(Sphere(0.05), links=("panda_link5", "panda_link7")), name="ball")
+    stack.add(Obstacle(Sphere(0.05), links=("panda_link5", "panda_link8")), name="ball")
     stack.add(FrameVelocityLimit(f.tip, linear=0.3), name="speed")
     return stack
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from wbc.controller.report import BRAKED, INFINITE, RELAXED, SOLVED, TOLERANCE, ReportLayout
 from wbc.qp.certificate import Certificate, certify
@@ -88,10 +89,15 @@ class SolvedTick:
             return refused
         qp = self._assembly.qp()
         flag, v, answer = self._answer(qp)
+        slack = qp.violation(v)[self._nv :] if flag == RELAXED else np.zeros(self._units.size)
+        slack = np.where(slack > 2.0 * TOLERANCE * self._units, slack, 0.0)
+        if flag == RELAXED and not slack.any():
+            flag = SOLVED  # the rows contradict each other by rounding only
         places, report = self._places, self.report
-        certificate, multipliers, slack = _NONE, np.zeros(qp.lower.size), np.zeros(self._units.size)
+        certificate, multipliers = _NONE, np.zeros(qp.lower.size)
         if answer is not None:
-            multipliers, slack = answer.multipliers, qp.violation(v)[self._nv :]
+            multipliers = answer.multipliers
+            self._name_frozen_bounds(qp, answer)
             certificate = certify(QP(qp.H, qp.g, answer.lower, answer.upper, qp.A), Solution(v, multipliers, "solved"))
         for name in ("stationarity", "violation", "complementarity", "error_bound"):
             report[places[name]] = min(getattr(certificate, name), INFINITE)
@@ -99,28 +105,38 @@ class SolvedTick:
         report[places["flag"]] = flag
         report[places["iterations"]] = answer.iterations if answer is not None else 0
         report[places["multipliers"]] = multipliers
-        report[places["slack"]] = np.where(slack > 2.0 * TOLERANCE * self._units, slack, 0.0)
+        report[places["slack"]] = slack
         self._assembly.look_ahead()
         self.v_last[:] = v
         return flag
+
+    def _name_frozen_bounds(self, qp: QP, answer: Relaxed) -> None:
+        """Of a bound that a relaxation holds, the other side is not what binds, whatever sign its multiplier has."""
+        n = self._nv
+        frozen = (answer.lower[:n] == answer.upper[:n]) & (qp.lower[:n] != qp.upper[:n])
+        at_lower = answer.lower[:n] == qp.lower[:n]
+        self.report[self._places["owner_high"]][frozen & at_lower] = -1.0
+        self.report[self._places["owner_low"]][frozen & ~at_lower] = -1.0
 
     def _answer(self, qp: QP) -> tuple[int, Array, Relaxed | None]:
         """Flag, command and, unless the tick brakes, what the solver answered."""
         n = self._nv
         if self._assembly.usable:
             sides, crossed = self._uncrossed(qp)
+            if crossed[self._orders == 0].any():
+                return BRAKED, np.clip(0.0, qp.lower[:n], qp.upper[:n]), None
             answer = self._relaxation.solve(sides, self._orders, self._units)
             if answer.flag != "failed":
-                return RELAXED if crossed or answer.flag == "relaxed" else SOLVED, answer.x, answer
+                return RELAXED if crossed.any() or answer.flag == "relaxed" else SOLVED, answer.x, answer
         return BRAKED, np.clip(0.0, qp.lower[:n], qp.upper[:n]), None
 
-    def _uncrossed(self, qp: QP) -> tuple[QP, bool]:
-        """Rows whose sides have crossed are met half-way; True if any gives way by more than rounding."""
+    def _uncrossed(self, qp: QP) -> tuple[QP, NDArray[np.bool_]]:
+        """Rows whose sides have crossed are met half-way; and which of them give way by more than rounding."""
         n = self._nv
         gap = qp.lower[n:] - qp.upper[n:]
         if not (gap > 0.0).any():
-            return qp, False
+            return qp, np.zeros(gap.size, dtype=np.bool_)
         out = qp.copy()
         middle = 0.5 * (qp.lower[n:] + qp.upper[n:])
         out.lower[n:], out.upper[n:] = np.where(gap > 0, middle, qp.lower[n:]), np.where(gap > 0, middle, qp.upper[n:])
-        return out, bool((gap > 4.0 * TOLERANCE * self._units).any())
+        return out, gap > 4.0 * TOLERANCE * self._units

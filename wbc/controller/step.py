@@ -191,11 +191,14 @@ class Step:
             value = float(multipliers[i])
             side = "upper" if value > 0 else "lower"
             if i < nv:
-                owner = int((high if value > 0 else low)[i])
+                if (high if value > 0 else low)[i] < 0.0:
+                    side = "lower" if value > 0 else "upper"  # held by a relaxation, see the order of sacrifice
+                owner = int((high if side == "upper" else low)[i])
                 name = context.bounds[owner].entry.name if owner >= 0 else "bounds"
                 out.append(Binding(name, context.stack.robot.dof_names[i], side, value))
             else:
                 block, row = context.general[i - nv]
+                side = "lower" if block.form == "margins" else side
                 side = "equal" if getattr(block.entry.item, "equality", False) else side
                 out.append(Binding(block.entry.name, block.rows[row].label, side, value))
         return tuple(out)

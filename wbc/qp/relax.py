@@ -6,7 +6,7 @@ Every general row has a class; class by class, low numbers first, the least viol
                           lower <= A_i v + unit_i s_i <= upper for the rows of this class,
 
 and frozen: a row with s_i != 0 becomes the equality A_i v = (bound - unit_i s_i), because the least s is
-unique. Last, the original objective is minimised over what is left. Simple bounds never give way.
+unique. Last, the original objective is minimised over what is left. Simple bounds and rows of class 0 never give way.
 
 The least-violation problem has no unique v; it is solved by a proximal sequence
 (1/2 eps |v - v_previous|^2 added), which converges to the least s and keeps the solver's H positive definite.
@@ -79,7 +79,7 @@ class Relaxation:
         """Solve ``qp`` with its rows, or with as few as must give way in the declared order.
 
         Args:
-            order: class of each general row; rows of a higher class give way first [m].
+            order: class of each general row; rows of a higher class give way first, those of class 0 never [m].
             unit: size of a violation that counts as 1, per row, in the row's units; default: the norm of
                 the row, so that slacks are compared as joint motion [m].
 
@@ -106,9 +106,10 @@ class Relaxation:
             work.lower[n:] /= unit
             work.upper[n:] /= unit
         ends = work.lower[n:].copy(), work.upper[n:].copy()
-        work.lower[n:], work.upper[n:] = -np.inf, np.inf
+        hard = order == 0
+        work.lower[n:], work.upper[n:] = np.where(hard, ends[0], -np.inf), np.where(hard, ends[1], np.inf)
         v = np.clip(0.0, qp.lower[:n], qp.upper[:n])
-        for level in np.unique(order):
+        for level in np.unique(order[~hard]):
             rows = np.flatnonzero(order == level)
             work.lower[n + rows], work.upper[n + rows] = ends[0][rows], ends[1][rows]
             stage = self._least_violation(work, rows, v)
@@ -123,7 +124,9 @@ class Relaxation:
         iterations += last.iterations
         flag = "relaxed" if last.solved else "failed"
         size = np.concatenate((np.ones(n), unit))
-        final = Solution(last.x if last.solved else v, last.multipliers / size, last.flag)
+        x = np.clip(last.x if last.solved else v, work.lower[:n], work.upper[:n])
+        final = Solution(x, last.multipliers / size, last.flag)
+        self._meet(work, x)
         return self._answer(qp, final, flag, iterations, unit, (work.lower * size, work.upper * size))
 
     def _least_violation(self, work: QP, rows: NDArray[np.intp], v: Array) -> Solution | None:
@@ -169,6 +172,15 @@ class Relaxation:
             work.lower[fixed] = work.upper[fixed] = at
             held = np.union1d(held, np.setdiff1d(np.flatnonzero(pushing[n + m :]), rows))
         work.lower[n + held] = work.upper[n + held] = value[held]
+
+    def _meet(self, work: QP, x: Array) -> None:
+        """Move the sides that x misses by rounding to x: of dependent equalities, one set of digits holds them all."""
+        n, value = self.n, work.A @ x
+        low, high = work.lower[n:], work.upper[n:]
+        close = (value >= low - 10.0 * ROOM) & (value <= high + 10.0 * ROOM)
+        equal = close & (low == high)
+        low[close] = np.where(equal, value, np.minimum(low, value))[close]
+        high[close] = np.where(equal, value, np.maximum(high, value))[close]
 
     def _answer(
         self, qp: QP, last: Solution, flag: str, iterations: int, unit: Array, ends: tuple[Array, Array]

@@ -14,10 +14,19 @@ int ahead(const double **arg, double **res, long long *iw, double *w, int mem);
 #define EPS 1.1102230246251565e-16
 /* Two rows whose normals differ by an angle below sqrt(DEPENDENT) count as one */
 #define DEPENDENT 1e-10
+/* How far rows that were left out as dependent may be off, per |row| |v|: at first, and in a relaxation, where the
+ * sides are those of a solution already and only the angle counts */
+#define TIGHT 1e-7
+#define LOOSE 2e-5
 /* A general row whose image under R^-1 is shorter than this cannot be moved by v */
 #define DEAD 1e-20
-/* Price of slack against velocity in the relaxation: slack exceeds its minimum by this fraction at most */
-#define RHO 1e-8
+/* Weight of the proximal term |v - base|^2 against slack^2 in the relaxation */
+#define RHO 1e-6
+/* Proximal steps of a relaxation at most, and the change of a row at which they end */
+#define PROXIMAL_STEPS 12
+#define SETTLED 1e-11
+/* Multipliers above this share of the largest one of the class that gives way are not rounding */
+#define PUSHING 1e-6
 /* The cheap error bound is good enough up to here [rad/s] */
 #define QUICK_BOUND 1e-8
 /* Squared length of a quaternion or of a (cos, sin) pair minus 1: its length may be off by 1e-6 */
@@ -108,22 +117,14 @@ static void form_bounds(wbc_tick *t) {
     }
 }
 
-static int any_nan(const double *x, int count) {
-    int found = 0;
-    for (int i = 0; i < count; i++) found |= x[i] != x[i];
-    return found;
-}
-
 EXPORT void wbc_tick_assemble(wbc_tick *t) {
     const double *arg[4] = {t->q, t->v_last, t->p, &t->dt};
     double *res[11] = {t->report.error, t->wish, t->report.factor, t->jt, t->at, t->free_low,
                        t->free_high, t->report.margin, t->bound_low, t->bound_high, t->report.margin_factor};
     rows(arg, res, t->work_iw, t->work_w, 0);
-    /* Comparisons with NaN are false, so a row of NaN would pass as satisfied: such a tick brakes */
-    t->broken = any_nan(t->jt, NNZJ) | any_nan(t->wish, MT) | any_nan(t->at, NNZA) | any_nan(t->free_low, MC) |
-                any_nan(t->free_high, MC) | any_nan(t->bound_low, NB * NV) | any_nan(t->bound_high, NB * NV);
     memset(t->H, 0, sizeof t->H);
     memset(t->g, 0, sizeof t->g);
+    /* Comparisons with NaN are false, so a row of NaN would pass as satisfied: such a tick brakes */
     t->unusable = 0.0;
     if (!(all_finite(t->jt, NNZJ) && all_finite(t->wish, MT) && all_finite(t->report.factor, MT)))
         t->unusable = !usable_tasks(t);
@@ -329,8 +330,9 @@ static int activate(wbc_tick *t, int i, int lower) {
 }
 
 /* Solve with the factorisation at hand. `warm`: start from the active set in `keep`. Rows of classes from
- * `checked` on may be violated where the solver cannot move them. DAQP's exit flag. */
-static int active_set(wbc_tick *t, int warm, int checked) {
+ * `checked` on may be violated where the solver cannot move them, rows that depend on others by `angle` |row| |v|.
+ * `base`: the point that v is counted from, or NULL. DAQP's exit flag. */
+static int active_set(wbc_tick *t, int warm, int checked, double angle, const double *base) {
     DAQPWorkspace *work = &t->daqp;
     int dependent = 0;
     reset_daqp_workspace(work);
@@ -349,6 +351,7 @@ static int active_set(wbc_tick *t, int warm, int checked) {
     t->report.iterations += work->iterations;
     if (flag < 0) return flag;
     ldp2qp_solution(work);
+    for (int i = 0; base && i < NV; i++) t->x[i] += base[i];
     /* Rows that the solver did not look at: dependent equalities and rows that v cannot move */
     for (int k = 0; k < MC; k++) {
         const int i = NV + k;
@@ -359,7 +362,7 @@ static int active_set(wbc_tick *t, int warm, int checked) {
             sum += t->at[e] * t->x[a_col[e]];
             square += t->at[e] * t->at[e];
         }
-        const double room = TOLERANCE * (row_scale[k] + 100.0 * sqrt(square * dot(t->x, t->x, 0)));
+        const double room = TOLERANCE * row_scale[k] + angle * sqrt(square * dot(t->x, t->x, 0));
         if (sum < t->low[i] - room || sum > t->high[i] + room) return EXIT_INFEASIBLE;
     }
     return flag;
@@ -393,7 +396,7 @@ static int unconstrained(wbc_tick *t) {
     return within_bounds(t);
 }
 
-static int constrained(wbc_tick *t) {
+static int constrained(wbc_tick *t, double angle) {
     if (!t->factored) {
         invert(t);
         image(t);
@@ -402,88 +405,150 @@ static int constrained(wbc_tick *t) {
     }
     shift(t);
     for (int i = 0; i < M_ALL; i++) t->sense[i] = 0;
-    int flag = active_set(t, t->warm, LAST_ORDER + 1);
-    if (flag < 0 && t->warm) flag = active_set(t, 0, LAST_ORDER + 1);
+    int flag = active_set(t, t->warm, LAST_ORDER + 1, angle, NULL);
+    if (flag < 0 && t->warm) flag = active_set(t, 0, LAST_ORDER + 1, angle, NULL);
     return flag;
 }
 
-/* Move the sides of the rows of a class so that x meets them. Where any row of the class gives way, its equalities
- * are frozen at what they have: those that hold but for rounding would otherwise contradict the others. */
-static void widen(wbc_tick *t, int order) {
-    double value[MC + 1];
+static double row_at(const wbc_tick *t, int k, const double *v) {
+    double sum = 0.0;
+    for (int e = a_start[k]; e < a_start[k + 1]; e++) sum += t->at[e] * v[a_col[e]];
+    return sum;
+}
+
+/* Whether a row of a class misses its sides at x by more than rounding */
+static int gives_way(const wbc_tick *t, int k) {
+    const double value = row_at(t, k, t->x), room = TOLERANCE * row_scale[k];
+    return value < t->low[NV + k] - room || value > t->high[NV + k] + room;
+}
+
+/* A class has found its least violation at x. Where a row gave way, it and what pushed against it become equalities
+ * that meet at x: all least violations lie there, and what is left to move has no boundary within rounding. Rows of
+ * the class that hold get room. */
+static void freeze(wbc_tick *t, int order, const char *pushing) {
     int given = 0;
-    for (int k = 0; k < MC; k++) {
-        if (row_order[k] != order) continue;
-        double sum = 0.0;
-        for (int e = a_start[k]; e < a_start[k + 1]; e++) sum += t->at[e] * t->x[a_col[e]];
-        const double room = TOLERANCE * row_scale[k];
-        value[k] = sum;
-        given |= sum < t->low[NV + k] - room || sum > t->high[NV + k] + room;
-    }
-    for (int k = 0; given && k < MC; k++) {
-        if (row_order[k] != order) continue;
-        const double room = TOLERANCE * row_scale[k];
-        double *low = t->low + NV + k, *high = t->high + NV + k;
-        if (*low == *high) {
-            *low = *high = value[k];
+    for (int k = 0; k < MC; k++) given |= row_order[k] == order && gives_way(t, k);
+    for (int i = 0; given && i < NV; i++) {
+        if (!pushing[i] || t->low[i] == t->high[i]) continue;
+        /* The other side is not what binds here, whatever sign the last multiplier takes */
+        if (pushing[i] == LOWER) {
+            t->high[i] = t->low[i];
+            t->report.owner_high[i] = -1.0;
         } else {
-            if (value[k] < *low + room) *low = value[k] - room;
-            if (value[k] > *high - room) *high = value[k] + room;
+            t->low[i] = t->high[i];
+            t->report.owner_low[i] = -1.0;
+        }
+        t->x[i] = t->low[i];
+    }
+    for (int k = 0; k < MC; k++) {
+        double *low = t->low + NV + k, *high = t->high + NV + k;
+        const int equal = *low == *high, own = row_order[k] == order;
+        if (given && row_order[k] <= order && (equal || (own ? gives_way(t, k) : pushing[NV + k]))) {
+            *low = *high = row_at(t, k, t->x);
+        } else if (own && !equal) {
+            *low -= TOLERANCE * row_scale[k];
+            *high += TOLERANCE * row_scale[k];
         }
     }
 }
 
-/* Least sum of squared slack of the rows of one class, with the classes before it as they stand:
- * min |v / s|^2 / 2 + sum (slack / scale)^2 / (2 rho). Widens the rows of the class to what was found. */
-static int relax_class(wbc_tick *t, int order) {
-    DAQPWorkspace *work = &t->daqp;
+/* Rows of class `order` and before it as DAQP takes them, in v / dof_scale and per row_scale */
+static int class_rows(wbc_tick *t, int order) {
     int found = 0;
-    work->Rinv = NULL;
-    work->RinvD = (double *)dof_scale;
-    work->v = NULL;
-    for (int i = 0; i < NV; i++) {
-        t->scaling[i] = 1.0 / dof_scale[i];
-        t->dupper[i] = t->high[i] * t->scaling[i];
-        t->dlower[i] = t->low[i] * t->scaling[i];
-        t->sense[i] = 0;
-    }
+    for (int i = 0; i < NV; i++) t->scaling[i] = 1.0 / dof_scale[i];
     for (int k = 0; k < MC; k++) {
-        const int i = NV + k;
         double *row = t->M + k * NV, square = 0.0;
         for (int j = 0; j < NV; j++) row[j] = 0.0;
         for (int e = a_start[k]; e < a_start[k + 1]; e++) row[a_col[e]] = t->at[e] * dof_scale[a_col[e]] / row_scale[k];
         for (int j = 0; j < NV; j++) square += row[j] * row[j];
         const double scale = square > DEAD && row_order[k] <= order ? 1.0 / sqrt(square) : 0.0;
         for (int j = 0; j < NV; j++) row[j] *= scale;
-        t->scaling[i] = scale;
-        t->dupper[i] = t->high[i] / row_scale[k] * scale;
-        t->dlower[i] = t->low[i] / row_scale[k] * scale;
-        t->sense[i] = row_order[k] == order ? SOFT : 0;
+        t->scaling[NV + k] = scale;
         found |= row_order[k] == order;
     }
-    int flag = found ? active_set(t, 0, order) : 1;
+    return found;
+}
+
+/* One proximal step: min |(v - base) / dof_scale|^2 / 2 + sum (slack / row_scale)^2 / (2 rho) */
+static int least_slack(wbc_tick *t, int order, const double *base, int warm) {
+    for (int i = 0; i < NV; i++) {
+        t->dupper[i] = (t->high[i] - base[i]) * t->scaling[i];
+        t->dlower[i] = (t->low[i] - base[i]) * t->scaling[i];
+        t->sense[i] = 0;
+    }
+    for (int k = 0; k < MC; k++) {
+        const double scale = t->scaling[NV + k] / row_scale[k], value = row_at(t, k, base);
+        t->dupper[NV + k] = (t->high[NV + k] - value) * scale;
+        t->dlower[NV + k] = (t->low[NV + k] - value) * scale;
+        t->sense[NV + k] = row_order[k] == order ? SOFT : 0;
+    }
+    if (!(warm && active_set(t, 1, order, LOOSE, base) >= 0) && active_set(t, 0, order, LOOSE, base) < 0) return 0;
+    memcpy(t->keep, t->sense, sizeof t->keep);
+    for (int i = 0; i < NV; i++) t->x[i] = clamp(t->x[i], t->low[i], t->high[i]);
+    return 1;
+}
+
+/* Which active rows and bounds hold the slack of the class up: their multipliers are not small against its own */
+static void find_pushing(const wbc_tick *t, int order, char *pushing) {
+    const DAQPWorkspace *work = &t->daqp;
+    double largest = 0.0;
+    for (int i = 0; i < M_ALL; i++) pushing[i] = 0;
+    for (int a = 0; a < work->n_active; a++) {
+        const int i = work->WS[a];
+        const double force = fabs(work->lam_star[a]) / t->scaling[i];
+        if (i >= NV && row_order[i - NV] == order && force > largest) largest = force;
+    }
+    for (int a = 0; a < work->n_active; a++) {
+        const int i = work->WS[a];
+        if (fabs(work->lam_star[a]) / t->scaling[i] > PUSHING * largest)
+            pushing[i] = t->sense[i] & LOWER ? LOWER : ACTIVE;
+    }
+}
+
+/* The least sum of squared slack of one class, with the bounds and the classes before it as they stand; then they are
+ * frozen there. The proximal steps take the share of |v| out of the multipliers. */
+static int relax_class(wbc_tick *t, int order) {
+    DAQPWorkspace *work = &t->daqp;
+    double base[WIDE] = {0};
+    char pushing[M_ALL];
+    int found = 0;
+    t->factored = 0;
+    if (!class_rows(t, order)) return 1;
+    work->Rinv = NULL;
+    work->RinvD = (double *)dof_scale;
+    work->v = NULL;
+    for (int step = 0; step < PROXIMAL_STEPS && least_slack(t, order, base, step > 0); step++) {
+        double moved = 0.0;
+        for (int k = 0; k < MC; k++)
+            if (row_order[k] == order) moved = fmax(moved, fabs(row_at(t, k, t->x) - row_at(t, k, base)) / row_scale[k]);
+        memcpy(base, t->x, sizeof base);
+        find_pushing(t, order, pushing);
+        found = 1;
+        if (moved <= SETTLED) break;
+    }
     work->Rinv = t->Rinv;
     work->RinvD = NULL;
     work->v = t->ldp_v;
-    t->factored = 0;
-    if (!found) return 1;
-    if (flag < 0) return 0;
-    for (int i = 0; i < NV; i++) t->x[i] = clamp(t->x[i], t->low[i], t->high[i]);
-    widen(t, order);
+    if (!found) return 0;
+    memcpy(t->x, base, sizeof base);
+    freeze(t, order, pushing);
     return 1;
 }
 
 static int relaxed(wbc_tick *t) {
+    t->warm = 0;
     for (int order = 1; order <= LAST_ORDER; order++)
         if (!relax_class(t, order)) return -1;
     /* The sides have moved, and with them what the equality rows contribute */
     if (!factor(t)) return -1;
     solve_transposed(t, t->y);
-    return constrained(t);
+    return constrained(t, LOOSE);
 }
 
 /* Come to rest as fast as the bounds let each joint */
 static void brake(wbc_tick *t) {
+    /* A relaxation may have moved the sides */
+    form_bounds(t);
     for (int i = 0; i < NV; i++) {
         const double low = t->low[i], high = t->high[i];
         t->x[i] = low <= high ? clamp(0.0, low, high) : 0.0;
@@ -496,13 +561,13 @@ EXPORT int wbc_tick_solve(wbc_tick *t) {
     int flag = WBC_SOLVED;
     t->report.iterations = 0.0;
     t->factored = 0;
-    if (t->broken || !factor(t)) {
+    if (t->unusable != 0.0 || !factor(t)) {
         brake(t);
         flag = WBC_BRAKED;
     } else if (unconstrained(t)) {
         t->warm = 0;
     } else {
-        int exit_flag = constrained(t);
+        int exit_flag = constrained(t, TIGHT);
         if (exit_flag < 0 && MC > 0) {
             flag = WBC_RELAXED;
             exit_flag = relaxed(t);
@@ -522,9 +587,9 @@ EXPORT int wbc_tick_solve(wbc_tick *t) {
     }
     for (int i = 0; i < NV; i++) t->report.v[i] = clamp(t->x[i], t->low[i], t->high[i]);
     int gave_way = 0;
-    for (int k = 0; k < MC; k++) {
-        const double below = t->free_low[k] - t->low[NV + k], above = t->high[NV + k] - t->free_high[k];
-        const double slack = below > above ? below : above;
+    for (int k = 0; flag == WBC_RELAXED && k < MC; k++) {
+        const double value = row_at(t, k, t->report.v);
+        const double slack = fmax(t->free_low[k] - value, value - t->free_high[k]);
         t->report.slack[k] = slack > 2.0 * TOLERANCE * row_scale[k] ? slack : 0.0;
         gave_way |= t->report.slack[k] > 0.0;
     }

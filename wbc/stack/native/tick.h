@@ -69,7 +69,6 @@ typedef struct {
     double free_low[MC + 1], free_high[MC + 1]; /* sides of general rows before relaxation */
     double work_w[WORK_W + 1];
     long long work_iw[WORK_IW + 1];
-    int broken;                  /* a row or bound is NaN */
     int warm;                    /* the sense array holds the active set of the last tick */
     int factored;                /* R inverse and M of the last tick are in the workspace */
     /* DAQP workspace on our own memory */
