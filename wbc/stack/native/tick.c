@@ -29,6 +29,8 @@ int ahead(const double **arg, double **res, long long *iw, double *w, int mem);
 #define PUSHING 1e-6
 /* The cheap error bound is good enough up to here [rad/s] */
 #define QUICK_BOUND 1e-8
+/* Above this [rad/s] the solution is refined once more */
+#define GOOD_BOUND 1e-7
 /* Squared length of a quaternion or of a (cos, sin) pair minus 1: its length may be off by 1e-6 */
 #define UNIT_TOLERANCE 2.00001e-6
 /* Violations up to this, in row units, are rounding */
@@ -557,6 +559,15 @@ static void brake(wbc_tick *t) {
     t->warm = 0;
 }
 
+/* x as the command: within its bounds, and exactly on those that are active */
+static void command(wbc_tick *t) {
+    for (int i = 0; i < NV; i++) t->report.v[i] = clamp(t->x[i], t->low[i], t->high[i]);
+    for (int a = 0; a < t->daqp.n_active; a++) {
+        const int i = t->daqp.WS[a];
+        if (i < NV) t->report.v[i] = t->sense[i] & LOWER ? t->low[i] : t->high[i];
+    }
+}
+
 EXPORT int wbc_tick_solve(wbc_tick *t) {
     int flag = WBC_SOLVED;
     t->report.iterations = 0.0;
@@ -585,7 +596,7 @@ EXPORT int wbc_tick_solve(wbc_tick *t) {
         brake(t);
         flag = WBC_BRAKED;
     }
-    for (int i = 0; i < NV; i++) t->report.v[i] = clamp(t->x[i], t->low[i], t->high[i]);
+    command(t);
     int gave_way = 0;
     for (int k = 0; flag == WBC_RELAXED && k < MC; k++) {
         const double value = row_at(t, k, t->report.v);
@@ -651,20 +662,8 @@ static double sharp_bound(wbc_tick *t, const double *size) {
     return longest * (sqrt(dot(image_of_size, image_of_size, 0)) + active_residual(t));
 }
 
-EXPORT void wbc_tick_certify(wbc_tick *t) {
-    wbc_report *out = &t->report;
-    DAQPWorkspace *work = &t->daqp;
-    double *residual = t->scratch, *size = t->product, v[WIDE] = {0};
-    memcpy(v, out->v, sizeof out->v);
-    for (int i = 0; i < M_ALL; i++) out->lambda[i] = 0.0;
-    replace_nan(out->error, MT, HUGE_VAL);
-    replace_nan(out->factor, MT, 0.0);
-    replace_nan(out->margin, MH, -HUGE_VAL);
-    replace_nan(out->margin_factor, MH, 0.0);
-    if (out->flag == WBC_BRAKED) {
-        out->stationarity = out->violation = out->complementarity = out->error_bound = WBC_INF;
-        return;
-    }
+/* residual = H v + g, and the size of the terms that were added up */
+static void gradient(const wbc_tick *t, const double *v, double *residual, double *size) {
     for (int i = 0; i < WIDE; i++) {
         residual[i] = t->g[i];
         size[i] = fabs(t->g[i]);
@@ -687,35 +686,51 @@ EXPORT void wbc_tick_certify(wbc_tick *t) {
             size[i] += bulk[k];
         }
     }
+}
+
+/* Add the forces of the active rows, set the multipliers and the complementarity */
+static void add_forces(wbc_tick *t, const double *v, double *residual, double *size) {
+    wbc_report *out = &t->report;
+    const DAQPWorkspace *work = &t->daqp;
+    for (int i = 0; i < M_ALL; i++) out->lambda[i] = 0.0;
     out->complementarity = 0.0;
-    out->violation = 0.0;
     for (int a = 0; a < work->n_active; a++) {
-        const int i = work->WS[a];
-        double lambda = work->lam_star[a], value = 0.0;
-        if (i >= NV && t->strength[i - NV] > 0.0) {
-            double gap = -t->low[i];
-            for (int e = a_start[i - NV]; e < a_start[i - NV + 1]; e++) gap += t->at[e] * v[a_col[e]];
-            lambda += t->strength[i - NV] * gap;
-        }
+        const int i = work->WS[a], k = i - NV;
+        if (i < NV) continue;
+        const double value = row_at(t, k, v);
+        double lambda = work->lam_star[a];
+        if (t->strength[k] > 0.0) lambda += t->strength[k] * (value - t->low[i]);
         out->lambda[i] = lambda;
-        if (i < NV) {
-            residual[i] += lambda;
-            size[i] += fabs(lambda);
-            value = v[i];
-        } else {
-            for (int e = a_start[i - NV]; e < a_start[i - NV + 1]; e++) {
-                const double part = t->at[e] * lambda;
-                residual[a_col[e]] += part;
-                size[a_col[e]] += fabs(part);
-                value += t->at[e] * v[a_col[e]];
-            }
+        for (int e = a_start[k]; e < a_start[k + 1]; e++) {
+            const double part = t->at[e] * lambda;
+            residual[a_col[e]] += part;
+            size[a_col[e]] += fabs(part);
         }
         const double gap = fabs(lambda * (value - (t->sense[i] & LOWER ? t->low[i] : t->high[i])));
         if (gap > out->complementarity) out->complementarity = gap;
     }
+    /* Any multiplier of the right sign certifies: that of an active bound is what the other forces leave, which takes
+     * their rounding too */
+    for (int a = 0; a < work->n_active; a++) {
+        const int i = work->WS[a];
+        if (i >= NV) continue;
+        const double lambda = -residual[i], rounding = (NV + work->n_active + 4) * EPS * size[i];
+        if (t->low[i] != t->high[i] && (t->sense[i] & LOWER ? -lambda : lambda) <= rounding) continue;
+        out->lambda[i] = lambda;
+        residual[i] = size[i] = 0.0;
+    }
+}
+
+/* Residuals and the error bound of v; leaves the residual of the stationarity in `scratch` */
+static void examine(wbc_tick *t) {
+    wbc_report *out = &t->report;
+    double *residual = t->scratch, *size = t->product, v[WIDE] = {0};
+    memcpy(v, out->v, sizeof out->v);
+    gradient(t, v, residual, size);
+    add_forces(t, v, residual, size);
+    out->violation = 0.0;
     for (int k = 0; k < MC; k++) {
-        double value = 0.0;
-        for (int e = a_start[k]; e < a_start[k + 1]; e++) value += t->at[e] * v[a_col[e]];
+        const double value = row_at(t, k, v);
         const double below = t->low[NV + k] - value, above = value - t->high[NV + k];
         if (below > out->violation) out->violation = below;
         if (above > out->violation) out->violation = above;
@@ -724,10 +739,58 @@ EXPORT void wbc_tick_certify(wbc_tick *t) {
     for (int i = 0; i < NV; i++) {
         if (fabs(residual[i]) > out->stationarity) out->stationarity = fabs(residual[i]);
         /* residual of the exact sum: what was computed plus the rounding of its terms */
-        size[i] = fabs(residual[i]) + (NV + work->n_active + 4) * EPS * size[i];
+        size[i] = fabs(residual[i]) + (NV + t->daqp.n_active + 4) * EPS * size[i];
     }
     out->error_bound = t->factored ? WBC_INF : quick_bound(t, size);
     if (out->error_bound > QUICK_BOUND) out->error_bound = sharp_bound(t, size);
+}
+
+/* One Newton step on the active set, with y = R v:   dy + M' mu = -R^-T residual,   M dy = side - M y.
+ * Needs what `constrained` leaves: R^-1, M, and the factors of M M'. */
+static void refine(wbc_tick *t) {
+    DAQPWorkspace *work = &t->daqp;
+    double dy[WIDE] = {0}, mu[ACTIVE_MAX];
+    for (int i = 0; i < NV; i++) axpy(dy, t->inverse + i * WIDE, -t->scratch[i], i);
+    for (int a = 0, at = 0; a < work->n_active; a++) {
+        const int i = work->WS[a];
+        double value = i < NV ? t->report.v[i] : row_at(t, i - NV, t->report.v);
+        double r = (value - (t->sense[i] & LOWER ? t->low[i] : t->high[i])) * t->scaling[i];
+        if (i < NV) r += t->scaling[i] * dot(t->inverse + i * WIDE, dy, i);
+        for (int j = 0; i >= NV && j < NV; j++) r += t->M[(i - NV) * NV + j] * dy[j];
+        for (int b = 0; b < a; b++) r -= work->L[at++] * mu[b];
+        at++;
+        mu[a] = r;
+    }
+    for (int a = work->n_active - 1; a >= 0; a--) {
+        mu[a] /= work->D[a];
+        for (int b = a + 1; b < work->n_active; b++) mu[a] -= work->L[b * (b + 1) / 2 + a] * mu[b];
+    }
+    for (int a = 0; a < work->n_active; a++) {
+        const int i = work->WS[a];
+        if (i < NV) axpy(dy, t->inverse + i * WIDE, -mu[a] * t->scaling[i], i);
+        for (int j = 0; i >= NV && j < NV; j++) dy[j] -= mu[a] * t->M[(i - NV) * NV + j];
+        work->lam_star[a] += mu[a] * t->scaling[i];
+    }
+    for (int i = 0; i < NV; i++) t->x[i] = t->report.v[i] + dot(t->inverse + i * WIDE, dy, i);
+    command(t);
+}
+
+EXPORT void wbc_tick_certify(wbc_tick *t) {
+    wbc_report *out = &t->report;
+    replace_nan(out->error, MT, HUGE_VAL);
+    replace_nan(out->factor, MT, 0.0);
+    replace_nan(out->margin, MH, -HUGE_VAL);
+    replace_nan(out->margin_factor, MH, 0.0);
+    if (out->flag == WBC_BRAKED) {
+        for (int i = 0; i < M_ALL; i++) out->lambda[i] = 0.0;
+        out->stationarity = out->violation = out->complementarity = out->error_bound = WBC_INF;
+        return;
+    }
+    examine(t);
+    if (out->error_bound > GOOD_BOUND && t->factored) {
+        refine(t);
+        examine(t);
+    }
 }
 
 EXPORT void wbc_tick_look_ahead(wbc_tick *t) {
