@@ -168,12 +168,18 @@ INLINE double dot(const double *x, const double *y, int from) {
     return ((part[0] + part[4]) + (part[1] + part[5])) + ((part[2] + part[6]) + (part[3] + part[7]));
 }
 
-/* Equality rows a'v = b enter the Hessian as well, H + rho a a' / |a|^2 and g - rho b a / |a|^2: a constant where they
- * hold, so the optimum is the same, but seen through R they are then as independent as they are in v. */
+/* Equality rows a'v = b, fixed variables among them, enter the Hessian as well, H + rho a a' / |a|^2 and
+ * g - rho b a / |a|^2: a constant where they hold, so the optimum is the same, but seen through R they are then as
+ * independent as they are in v. */
 static void strengthen(wbc_tick *t) {
     double rho = 0.0;
     for (int i = 0; i < NV; i++)
         if (t->H[i * WIDE + i] > rho) rho = t->H[i * WIDE + i];
+    for (int i = 0; i < NV; i++) {
+        if (t->low[i] != t->high[i]) continue;
+        t->R[i * WIDE + i] += rho;
+        t->y[i] += rho * t->low[i];
+    }
     for (int k = 0; k < MC; k++) {
         t->strength[k] = 0.0;
         if (t->low[NV + k] != t->high[NV + k]) continue;
@@ -238,7 +244,7 @@ INLINE void invert_group(wbc_tick *t, const int from) {
 static int factor(wbc_tick *t) {
     memcpy(t->R, t->H, sizeof t->R);
     for (int i = 0; i < WIDE; i++) t->y[i] = -t->g[i];
-    if (MC > 0) strengthen(t);
+    strengthen(t);
     int ok = 1;
 #pragma GCC unroll 64
     for (int group = 0; group < WIDE / 8; group++) ok &= factor_group(t, 8 * group);
