@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from rich.console import Console
@@ -148,6 +149,40 @@ def markdown(results: dict[str, Any]) -> str:
     """Everything as one page."""
     parts = [sheet.markdown() for sheet in sheets(results)]
     return "\n\n".join([*parts, *notes(results)]) + "\n"
+
+
+def readme(results: dict[str, Any]) -> str:
+    """The README's table: medians of the user's call, and of the whole cycle, on every problem."""
+    problems: dict[str, Any] = results["problems"]
+    names = list(
+        dict.fromkeys(name for p in problems.values() for name in p["contenders"] if "+expression" not in name)
+    )
+    lines = [_line(["one tick / with new targets [us], medians", *(p["title"] for p in problems.values())])]
+    lines.append(_line(["---", *("---:" for _ in problems)]))
+    for name in names:
+        cells = []
+        for problem in problems.values():
+            found = problem["contenders"].get(name)
+            parts = [_us(found["durations"][part]["median"]) for part in ("call", "cycle")] if found else ["-"]
+            cells.append(" / ".join(parts))
+        lines.append(_line([name, *cells]))
+    about = results["machine"]
+    lines += [
+        "",
+        f"{about['processor']}, Python {about['python']}, {about['cores']}. All reach the same pose to the same error.",
+    ]
+    lines.append(
+        "What each call contains, percentiles, phases, compile times and goals: [bench/results.md](bench/results.md)."
+    )
+    return "\n".join(lines)
+
+
+def update_readme(path: Path, results: dict[str, Any]) -> None:
+    """Put the table between the marks in the README."""
+    head, mark, rest = path.read_text().partition("<!-- bench -->")
+    _, end, tail = rest.partition("<!-- /bench -->")
+    if mark and end:
+        path.write_text(f"{head}{mark}\n\n{readme(results)}\n\n{end}{tail}")
 
 
 def _line(cells: Iterable[str]) -> str:
