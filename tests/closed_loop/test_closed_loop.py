@@ -1,0 +1,41 @@
+"""Every task and constraint in its loop, on three robots, from 100 random starts."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import pytest
+
+from tests.closed_loop import cases
+from tests.closed_loop.loop import Loop
+from tests.closed_loop.machines import CONSTRAINT_ROBOTS, TASK_ROBOTS
+from tests.closed_loop.mechanism import ROBOTS as COUPLED
+from tests.closed_loop.mechanism import build, mechanism
+from wbc.tasks import Mechanism, registry
+
+
+def test_every_shipped_class_has_a_case() -> None:
+    shipped = {cls for cls in registry().values() if cls.__module__.startswith("wbc.tasks")}
+    assert shipped == {case.cls for case in (cases.TASKS | cases.CONSTRAINTS).values()} | {Mechanism}
+
+
+@pytest.mark.parametrize("name", TASK_ROBOTS)
+@pytest.mark.parametrize("case", cases.TASKS)
+def test_task(case: str, name: str) -> None:
+    cases.TASKS[case].check(cases.task_loop(name))
+
+
+@pytest.mark.parametrize("name", CONSTRAINT_ROBOTS)
+@pytest.mark.parametrize("case", cases.CONSTRAINTS)
+def test_constraint(case: str, name: str) -> None:
+    cases.CONSTRAINTS[case].check(cases.constraint_loop(name))
+
+
+@cache
+def coupled_loop(name: str) -> Loop:
+    return build(name)
+
+
+@pytest.mark.parametrize("name", COUPLED)
+def test_mechanism(name: str) -> None:
+    mechanism(coupled_loop(name))
