@@ -294,7 +294,8 @@ def joint_limits(loop: Loop, name: str = "limits", seed: int = 15) -> Figures:
     for _ in range(STARTS):
         q, far = anywhere(loop.robot, rng), np.where(at < 0, 0.0, rng.choice([-30.0, 30.0], model.nv))
         # Anywhere in the outer thirds of the ranges, so that slow joints reach an end, too
-        q[at[held]] = (low + high) / 2 + np.where(rng.random(held.size) < 0.5, -half, half) * rng.uniform(1 / 3, 1, held.size)
+        side = np.where(rng.random(held.size) < 0.5, -half, half)
+        q[at[held]] = (low + high) / 2 + side * rng.uniform(1 / 3, 1, held.size)
         ends = [pin.integrate(model, loop.robot.neutral, s * far) for s in (1.0, -1.0)]
 
         def aim(k: int, _: Array, ends: list[Array] = ends) -> None:
