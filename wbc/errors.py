@@ -31,6 +31,10 @@ class WbcError(Exception):
             text += f"; valid: {shown}{more}"
         super().__init__(text)
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        # Exceptions are rebuilt from their text alone, which no constructor here takes: they must cross processes
+        return _rebuilt, (type(self), self.args, self.__dict__)
+
 
 class UnknownNameError(WbcError):
     """A frame, joint, item, robot, solver or option name that does not exist."""
@@ -103,3 +107,9 @@ def nearest(name: str, choices: Iterable[str]) -> tuple[str, ...]:
 def _short(value: Any) -> str:
     text = repr(value)
     return text if len(text) <= 120 else text[:117] + "..."
+
+
+def _rebuilt(kind: type[WbcError], arguments: tuple[Any, ...], attributes: dict[str, Any]) -> WbcError:
+    error = kind.__new__(kind, *arguments)
+    error.__dict__.update(attributes)
+    return error

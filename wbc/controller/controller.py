@@ -124,10 +124,10 @@ class Controller:
         self._slow = True
 
     def __getitem__(self, name: str) -> Handle:
-        handle = self._handles.get(name)
-        if handle is None:
-            raise UnknownNameError("item", name, self._handles)
-        return handle
+        try:
+            return self._handles[name]
+        except (KeyError, TypeError):
+            raise UnknownNameError("item", name, self._handles) from None
 
     def __contains__(self, name: object) -> bool:
         return name in self._handles

@@ -128,10 +128,11 @@ class Handle:
         raw = validation.real_array(field, value)
         count = len(self._block.rows)
         mask = np.full(count, float(raw)) if raw.shape == () else validation.real_array(field, raw, (count,))
-        for number in mask:
-            validation.scalar(field, number, low=0.0, high=np.inf if self._block.form == "task" else 1.0)
-        if self._block.form != "task" and not np.isin(mask, (0.0, 1.0)).all():
-            raise RangeError(field, value, "a constraint's row is on (1) or off (0)")
+        for k, number in enumerate(mask.tolist()):
+            where = f"{field}[{k}]"
+            validation.scalar(where, number, low=0.0)
+            if self._block.form != "task" and number not in (0.0, 1.0):
+                raise RangeError(where, number, "a constraint's row is on (1) or off (0)")
         return mask
 
     def _slot(self, name: str) -> Slot:

@@ -124,9 +124,10 @@ class Declaration:
         return self
 
     def __getitem__(self, name: str) -> Entry:
-        if name not in self._entries:
-            raise UnknownNameError("item", name, self._entries)
-        return self._entries[name]
+        try:
+            return self._entries[name]
+        except (KeyError, TypeError):
+            raise UnknownNameError("item", name, self._entries) from None
 
     def __contains__(self, name: object) -> bool:
         return name in self._entries
