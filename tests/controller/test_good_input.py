@@ -1,0 +1,141 @@
+"""What is welcome as input, and what must be said before the first tick."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from tests.controller.stacks import DT, inside, robot
+from tests.controller.twins import BACKENDS, POSE, make, next_ticks, state
+from wbc import Stack
+from wbc.errors import SolverError
+from wbc.robot import Robot
+from wbc.symbolic.tracer import Tracer
+from wbc.tasks import Input, Posture
+from wbc.tasks.base import Row, Task, Values
+
+KINDS: dict[str, Callable[[np.ndarray], Any]] = {
+    "float32": lambda x: x.astype(np.float32),
+    "list": lambda x: x.tolist(),
+    "tuple": lambda x: tuple(x.tolist()),
+    "list of numpy scalars": list,
+    "every second": lambda x: np.repeat(x, 2)[::2],
+    "reversed": lambda x: x[::-1].copy()[::-1],
+    "column of a matrix": lambda x: np.column_stack([x, x])[:, 0],
+    "big-endian": lambda x: x.astype(">f8"),
+    "read-only": lambda x: np.frombuffer(x.tobytes()),
+    "subclass": lambda x: x.view(type("Sub", (np.ndarray,), {})),
+}
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+@pytest.mark.parametrize("kind", KINDS)
+def test_any_kind_of_real_numbers_is_the_same_answer(kind: str, backend: str) -> None:
+    controller, twin, spell = make("panda", backend), make("panda", backend), KINDS[kind]
+    rng = np.random.default_rng(5)
+    for arguments in ("q", "qv", "qvd", "q"):
+        # numbers that float32 holds exactly
+        q, v = (x.astype(np.float32).astype(float) for x in (inside(robot("panda"), rng), rng.uniform(-0.1, 0.1, 7)))
+        q_given, v_given = q.copy(), v.copy()
+        dt = (np.float32(0.0078125), 0.0078125) if "d" in arguments else (None, None)
+        one = controller.step(spell(q), spell(v) if "v" in arguments else None, dt[0])
+        other = twin.step(q, v if "v" in arguments else None, dt[1])
+        assert one._data == other._data
+        assert np.array_equal(q, q_given)
+        assert np.array_equal(v, v_given)
+    controller.reset(spell(q), spell(v))
+    twin.reset(q, v)
+    controller["posture"].target, twin["posture"].target = spell(q), q
+    controller["hand"].mask, twin["hand"].mask = spell(np.arange(6.0)), np.arange(6.0)
+    assert controller.step(spell(q))._data == twin.step(q)._data
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+@pytest.mark.parametrize("kind", [int, np.int8, np.int32, np.uint16, np.int64, bool])
+def test_whole_numbers_are_welcome(kind: type, backend: str) -> None:
+    controller, twin = make("panda", backend), make("panda", backend)
+    q = np.array([0, 1, 0, 1, 0, 1, 1]) - (np.array([0, 0, 0, 2, 0, 0, 0]) if np.dtype(kind).kind == "i" else 0)
+    assert controller.step(q.astype(kind), np.ones(7, kind))._data == twin.step(q.astype(float), np.ones(7))._data
+    place = np.array([1, 0, 1])
+    controller["place"].target, twin["place"].target = place.astype(kind), place.astype(float)
+    controller["hand"].weight, twin["hand"].weight = kind(1), 1.0
+    controller["hand"].enabled, twin["hand"].enabled = 0, False
+    controller["limits"].mask, twin["limits"].mask = np.ones(7, kind), np.ones(7)
+    assert controller.step(q.astype(kind).tolist())._data == twin.step(q.astype(float))._data
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_what_was_given_is_copied(backend: str) -> None:
+    """Changing an array or a pose afterwards changes nothing, and what is read is a copy."""
+    controller, twin = make("panda", backend), make("panda", backend)
+    q = inside(robot("panda"), np.random.default_rng(6))
+    for one in (controller, twin):
+        one.step(q)
+    pose, posture, place = POSE.copy(), q.copy(), np.array([0.3, 0.2, 0.5])
+    for one in (controller, twin):
+        one["hand"].target, one["posture"].target, one["place"].target = pose, posture, place
+    pose.translation, posture[:], place[:] = np.zeros(3), 0.0, 0.0
+    read = controller["hand"].target
+    read.translation = np.ones(3)
+    for item, key in (("posture", "target"), ("place", "target"), ("turn", "target"), ("hand", "mask")):
+        value = getattr(controller[item], key)
+        value[:] = 7.0
+    controller.last_command[:] = 3.0
+    assert np.array_equal(controller["hand"].target.homogeneous, POSE.homogeneous)
+    assert controller.step(q)._data == twin.step(q)._data
+
+
+# --- before the first configuration -----------------------------------------------------------------
+
+
+@pytest.mark.parametrize("item", ["hand", "place", "turn", "plane", "posture"])
+def test_a_value_that_waits_for_the_first_configuration_cannot_be_read(item: str) -> None:
+    controller, twin = make("panda", "native"), make("panda", "native")
+    before = state(controller)
+    for read in (lambda: controller[item].target, controller.qp):
+        with pytest.raises(SolverError, match="first configuration") as caught:
+            read()
+        assert caught.value.field in (f"{item}.target", "qp")
+        assert caught.value.value is None
+    assert state(controller) == before
+    assert next_ticks(controller) == next_ticks(twin)
+    assert np.isfinite(np.ravel(getattr(controller[item].target, "homogeneous", controller[item].target))).all()
+    assert np.isfinite(controller.qp().H).all()
+
+
+@dataclass(frozen=True)
+class Undecided(Task):
+    """A joint follows a target that has no default and that no configuration gives."""
+
+    abstract: ClassVar[bool] = True
+
+    def inputs(self, robot: Robot) -> tuple[Input, ...]:
+        return (Input("target", unit="rad"),)
+
+    def rows(self, robot: Robot) -> tuple[Row, ...]:
+        return (Row("joint", "rad"),)
+
+    def error(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
+        return kin.q[0] - inputs["target"]
+
+
+def test_step_before_a_target_without_default() -> None:
+    declared = Stack(robot("panda"), DT).add(Posture(), name="posture").add(Undecided(), name="joint")
+    controller, twin = declared.compile(backend="vm"), declared.compile(backend="vm")
+    before, q = state(controller), robot("panda").neutral
+    for call in (lambda: controller.step(q), lambda: controller.step(q, np.ones(7), DT), lambda: controller.reset(q)):
+        with pytest.raises(SolverError, match="no default value; set it before step") as caught:
+            call()
+        assert caught.value.field == "joint.target"
+        assert state(controller) == before
+    with pytest.raises(SolverError, match="first configuration"):
+        _ = controller["posture"].target
+    for one in (controller, twin):
+        one["joint"].target = 0.5
+    assert controller.step(q)._data == twin.step(q)._data
+    assert controller.step(q).v[0] * np.sign(0.5 - q[0]) > 0.0
