@@ -23,7 +23,7 @@ help:  ## list the targets
 setup: $(READY)  ## create .venv with the pinned packages and this one
 
 demo: $(READY)  ## the main job: a Panda follows a timed path round an obstacle
-	$(BIN)/python -m examples.demo
+	$(BIN)/wbc demo
 
 test: $(READY)  ## all tests
 	$(BIN)/python -m pytest -n $(PYTEST_JOBS) $(PYTEST_ARGS)

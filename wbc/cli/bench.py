@@ -8,8 +8,10 @@ import sys
 
 import typer
 
-import wbc
 from wbc.errors import WbcError
+
+#: The repository, if the package is installed from one
+ROOT = pathlib.Path(__file__).resolve().parents[2]
 
 
 class BenchError(WbcError):
@@ -21,9 +23,8 @@ def bench(context: typer.Context) -> None:
 
     Arguments after the command go to the benchmark: wbc bench --problems panda --rounds 2
     """
-    root = pathlib.Path(wbc.__file__).resolve().parents[1]
-    if not (root / "bench" / "__main__.py").is_file():
+    if not (ROOT / "bench" / "__main__.py").is_file():
         reason = "the benchmark is not installed with the package; run it from a clone of the repository"
-        raise BenchError("bench", str(root / "bench"), reason)
-    done = subprocess.run([sys.executable, "-m", "bench", *context.args], cwd=root, check=False)
+        raise BenchError("bench", str(ROOT / "bench"), reason)
+    done = subprocess.run([sys.executable, "-m", "bench", *context.args], cwd=ROOT, check=False)
     raise typer.Exit(done.returncode)

@@ -10,6 +10,7 @@ import pinocchio as pin
 import typer
 
 from wbc import robots, shapes
+from wbc.cli import options
 from wbc.cli.session import Output, perform
 from wbc.track.presets import preset
 from wbc.track.setup import Moving, Plan, Swing
@@ -49,13 +50,13 @@ def plan(duration: float = 12.0, rate: float = 200.0, solver: str = "daqp", back
 
 
 def demo(
-    output: Annotated[Path, typer.Option(help="Run folder; written over.")] = Path("runs/demo"),
+    output: options.RunFolder = Path("runs/demo"),
     duration: Annotated[float, typer.Option(help="Seconds.")] = 12.0,
-    rate: Annotated[float, typer.Option(help="Ticks a second [Hz].")] = 200.0,
-    solver: Annotated[str, typer.Option(help="QP solver.")] = "daqp",
-    backend: Annotated[str, typer.Option(help="auto, native or vm.")] = "auto",
-    log: Annotated[str, typer.Option(help="parquet or npz.")] = "parquet",
-    plots: Annotated[bool, typer.Option(help="Draw the plots and the picture.")] = True,
+    rate: options.Rate = 200.0,
+    solver: options.Solver = "daqp",
+    backend: options.Backend = "auto",
+    log: options.LogFormat = "parquet",
+    plots: options.Plots = True,
 ) -> None:
     """Do the main job: a Panda follows a timed path round an obstacle with its elbow plane commanded."""
     perform(plan(duration, rate, solver, backend), Output(output, True, log, plots))

@@ -6,6 +6,7 @@ import math
 from typing import Annotated
 
 import typer
+from rich.markup import escape
 from rich.table import Table
 
 from wbc import robots
@@ -27,7 +28,7 @@ def table(
     for recipe in robots.table():
         if match.lower() not in recipe.name.lower() or (recipe.problem and not all_):
             continue
-        about = f"[red]does not load: {recipe.problem}[/red]" if recipe.problem else recipe.about
+        about = f"[red]does not load: {escape(recipe.problem)}[/red]" if recipe.problem else escape(recipe.about)
         rows.add_row(recipe.name, recipe.base, recipe.frames.get("tip", "-"), about)
         count += 1
     if count == 0:
@@ -51,7 +52,7 @@ def show(
         f"characteristic length {robot.characteristic_length:.3g} m"
     )
     if robot.source:
-        console.print(f"read from {robot.source}", soft_wrap=True)
+        console.print(f"read from {escape(robot.source)}", soft_wrap=True)
     console.print(_joints(robot))
     if robot.couplings:
         names = robot.dof_names
@@ -63,7 +64,7 @@ def show(
         counts = [f"{link} {len(group)}" for link, group in robot.shapes.items()]
         console.print("[bold]shapes[/bold]   " + ", ".join(counts))
     for key, note in robot.notes.items():
-        console.print(f"[bold]{key}[/bold]: {note}", soft_wrap=True)
+        console.print(f"[bold]{key}[/bold]: {escape(note)}", soft_wrap=True)
     if frames:
         console.print(f"[bold]frames[/bold]   {', '.join(robot.frame_names)}")
 

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import typer
+from rich.markup import escape
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
@@ -81,14 +82,15 @@ def perform(plan: Plan, output: Output) -> None:
     """
     validation.one_of("log", output.log, FORMATS)
     folder = prepare(plan, output)
-    stopper = Stopper()
+    stopper, console = Stopper(), err()
     bar = Progress(
         TextColumn("{task.description}"),
         BarColumn(),
         TextColumn("{task.percentage:3.0f} %"),
         TimeElapsedColumn(),
-        console=err(),
+        console=console,
         transient=True,
+        disable=not console.is_terminal,
         refresh_per_second=5,
     )
     with bar:
@@ -155,6 +157,6 @@ def report(plan: Plan, log: Log, figures: list[Figure], folder: Path, files: lis
     table.add_column(style="cyan", no_wrap=True)
     table.add_column()
     for figure in figures:
-        table.add_row(figure.label, figure.text)
+        table.add_row(figure.label, escape(figure.text))
     console.print(table)
-    console.print(f"[bold]{folder}[/bold]: {', '.join(file.name for file in files)}", soft_wrap=True)
+    console.print(f"[bold]{escape(str(folder))}[/bold]: {', '.join(file.name for file in files)}", soft_wrap=True)

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Annotated
 
 import numpy as np
 import pinocchio as pin
-import typer
 
 from wbc import robots, shapes, validation
+from wbc.cli import options
 from wbc.cli.session import Output, perform
 from wbc.errors import ShapeError, UnknownNameError, WbcError
 from wbc.robot import Robot
@@ -22,59 +21,29 @@ from wbc.track.setup import Moving, Plan, Swing
 from wbc.validation import Array
 
 PLANES = ("auto", "off", "hold", "swing")
-_SCENE, _CONTROL, _OUTPUT = "What it does", "How it is controlled", "What it writes"
 
 
 def track(
-    robot: Annotated[str, typer.Argument(help="A name of `wbc robots`, or a URDF or MJCF file.")] = "panda",
-    path: Annotated[
-        str,
-        typer.Option(
-            help=f"Preset ({', '.join(PRESETS)}) or a CSV, JSON or TOML file of waypoints.", rich_help_panel=_SCENE
-        ),
-    ] = "circle",
-    frame: Annotated[
-        str | None, typer.Option(help="Frame that follows the path. Default: the robot's tip.", rich_help_panel=_SCENE)
-    ] = None,
-    duration: Annotated[
-        float | None,
-        typer.Option(help="Seconds. Default: 6, or the file's own; a file is stretched.", rich_help_panel=_SCENE),
-    ] = None,
-    size: Annotated[
-        float | None, typer.Option(help="Size of a preset [m], see the documentation.", rich_help_panel=_SCENE)
-    ] = None,
-    sphere: Annotated[
-        list[str] | None,
-        typer.Option(help="Obstacle X,Y,Z,RADIUS[,VX,VY,VZ] in m and m/s; may be repeated.", rich_help_panel=_SCENE),
-    ] = None,
-    floor: Annotated[
-        float | None, typer.Option(help="Height of a floor that links stay above [m].", rich_help_panel=_SCENE)
-    ] = None,
-    start: Annotated[
-        str | None,
-        typer.Option(help="First configuration, numbers with commas. Default: neutral.", rich_help_panel=_SCENE),
-    ] = None,
-    plane: Annotated[
-        str,
-        typer.Option(help="Elbow plane: off, hold, swing; auto holds it where known.", rich_help_panel=_SCENE),
-    ] = "auto",
-    swing: Annotated[float, typer.Option(help="Amplitude of --plane swing [rad].", rich_help_panel=_SCENE)] = 0.5,
-    hold: Annotated[
-        list[str] | None,
-        typer.Option(help="Frame that must not move; default: feet of a floating robot.", rich_help_panel=_SCENE),
-    ] = None,
-    rate: Annotated[float, typer.Option(help="Ticks a second [Hz].", rich_help_panel=_CONTROL)] = 200.0,
-    solver: Annotated[str, typer.Option(help="QP solver.", rich_help_panel=_CONTROL)] = "daqp",
-    backend: Annotated[str, typer.Option(help="auto, native or vm.", rich_help_panel=_CONTROL)] = "auto",
-    gain: Annotated[float, typer.Option(help="Gain of the hand [1/s].", rich_help_panel=_CONTROL)] = 10.0,
-    margin: Annotated[float, typer.Option(help="Distance kept from obstacles [m].", rich_help_panel=_CONTROL)] = 0.02,
-    output: Annotated[
-        Path | None,
-        typer.Option(help="Run folder. Default: runs/ROBOT-PATH-TIME.", rich_help_panel=_OUTPUT),
-    ] = None,
-    force: Annotated[bool, typer.Option(help="Write into a folder that has a run.", rich_help_panel=_OUTPUT)] = False,
-    log: Annotated[str, typer.Option(help="parquet or npz.", rich_help_panel=_OUTPUT)] = "parquet",
-    plots: Annotated[bool, typer.Option(help="Draw the plots and the picture.", rich_help_panel=_OUTPUT)] = True,
+    robot: options.RobotName = "panda",
+    path: options.PathName = "circle",
+    frame: options.FrameName = None,
+    duration: options.Duration = None,
+    size: options.Size = None,
+    sphere: options.Spheres = None,
+    floor: options.Floor = None,
+    start: options.Start = None,
+    plane: options.Plane = "auto",
+    swing: options.SwingAmplitude = 0.5,
+    hold: options.Holds = None,
+    rate: options.Rate = 200.0,
+    solver: options.Solver = "daqp",
+    backend: options.Backend = "auto",
+    gain: options.Gain = 10.0,
+    margin: options.Margin = 0.02,
+    output: options.RunFolder = None,
+    force: options.Force = False,
+    log: options.LogFormat = "parquet",
+    plots: options.Plots = True,
 ) -> None:
     """Follow a timed Cartesian path, and leave a log, plots and a summary.
 

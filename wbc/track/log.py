@@ -72,9 +72,9 @@ def save(log: Log, folder: pathlib.Path, kind: str = "parquet") -> pathlib.Path:
     # Written beside its place and renamed into it, so that no reader ever meets half a file
     fresh = folder / f".log.{kind}"
     if kind == "npz":
-        arrays: dict[str, Any] = dict(log.columns)
+        arrays: dict[str, Any] = {**log.columns, f"__{_META}__": np.array(text)}
         with fresh.open("wb") as stream:
-            np.savez_compressed(stream, **arrays, **{f"__{_META}__": np.array(text)})
+            np.savez_compressed(stream, allow_pickle=False, **arrays)
     else:
         import pyarrow as pa
         import pyarrow.parquet as pq

@@ -27,14 +27,16 @@ ELBOW: Colour = (0.90, 0.50, 0.10)
 OBSTACLE: Colour = (0.86, 0.27, 0.22)
 #: Tint of the robot at other times than the main one, and how much of it is seen
 TINT: Colour = (0.62, 0.74, 0.90)
-GHOST = 0.36
+GHOST = 0.32
 SUPERSAMPLING = 2
+#: Surfaces nearer to each other than this count as one [m]
+BIAS = 0.003
 #: Part of the picture's width or height that the scene takes
 FILLED = 0.90
 
 
 def save_picture(
-    log: Log, robot: Robot, file: pathlib.Path, main: float | None = None, size: tuple[int, int] = (1100, 690)
+    log: Log, robot: Robot, file: pathlib.Path, main: float | None = None, size: tuple[int, int] = (960, 600)
 ) -> pathlib.Path | None:
     """Draw a run; returns the file, or None for a log without ticks.
 
@@ -46,10 +48,13 @@ def save_picture(
         return None
     meshes = _link_meshes(robot)
     solid = _main_tick(log) if main is None else int(np.argmin(np.abs(log["t"] - main)))
-    others = [k for k in np.linspace(0, len(log) - 1, 6).astype(int)[:5] if abs(k - solid) > len(log) // 12]
-    poses = {k: _posed(robot, meshes, log.array("q")[k], log.meta["frame"]) for k in [solid, *others]}
+    others = _other_ticks(log, solid)
+    poses = {
+        k: _posed(robot, meshes, log.array("q")[k], log.meta["frame"], moving=k != solid) for k in [solid, *others]
+    }
     things = [*_obstacles(log, float(log["t"][solid])), *_traces(log, robot)]
-    camera = _camera(_points([m for meshes in [*poses.values(), things] for m in meshes]), size)
+    # A point in thirty is enough to see how large the scene is
+    camera = _camera(_points([m for meshes in [*poses.values(), things] for m in meshes])[::30], size)
     image = _render(camera, poses[solid], [poses[k] for k in others], things)
     _annotate(image, log, file)
     return file
@@ -58,6 +63,18 @@ def save_picture(
 def _main_tick(log: Log) -> int:
     gaps = log.array("clearance")
     return int(np.argmin(gaps.min(axis=1))) if gaps.size else len(log) // 2
+
+
+def _other_ticks(log: Log, solid: int) -> list[int]:
+    """Up to two ticks at which the frame is far from where it is at the main one, and far from each other."""
+    place = log.array("pose")[:, :3]
+    chosen: list[int] = []
+    away = np.linalg.norm(place - place[solid], axis=1)
+    least = 0.3 * float(away.max())
+    while len(chosen) < 2 and away.max() > max(least, 0.02):
+        chosen.append(int(np.argmax(away)))
+        away = np.minimum(away, np.linalg.norm(place - place[chosen[-1]], axis=1))
+    return chosen
 
 
 def _link_meshes(robot: Robot) -> list[tuple[str, Array]]:
@@ -79,7 +96,10 @@ def _link_meshes(robot: Robot) -> list[tuple[str, Array]]:
     return out
 
 
-def _posed(robot: Robot, meshes: Sequence[tuple[str, Array]], q: Array, tip: str) -> list[render.Mesh]:
+def _posed(
+    robot: Robot, meshes: Sequence[tuple[str, Array]], q: Array, tip: str, moving: bool = False
+) -> list[render.Mesh]:
+    """The links at a configuration; with ``moving`` those that no joint moves are left out."""
     data = robot.model.createData()
     pin.framesForwardKinematics(robot.model, data, q)
     last = robot.model.frames[robot.model.getFrameId(tip)].parentJoint
@@ -87,6 +107,8 @@ def _posed(robot: Robot, meshes: Sequence[tuple[str, Array]], q: Array, tip: str
     for link, triangles in meshes:
         index = robot.model.getFrameId(link)
         pose = data.oMf[index]
+        if moving and robot.model.frames[index].parentJoint == 0:
+            continue
         carried = robot.model.frames[index].parentJoint == last and last > 0
         moved = triangles @ pose.rotation.T + pose.translation
         out.append(render.Mesh(moved, DARK if carried else WHITE))
@@ -122,7 +144,7 @@ def _elbow(log: Log, robot: Robot) -> Array:
 
 def _camera(points: Array, size: tuple[int, int]) -> render.Camera:
     """Looks from the front, the left and above, so that the points fill the picture."""
-    azimuth, elevation, view = math.radians(42.0), math.radians(22.0), math.radians(16.0)
+    azimuth, elevation, view = math.radians(16.0), math.radians(24.0), math.radians(16.0)
     width, height = (SUPERSAMPLING * s for s in size)
     flat, rise = math.cos(elevation), math.sin(elevation)
     direction = np.array([flat * math.cos(azimuth), flat * math.sin(azimuth), rise])
@@ -157,7 +179,7 @@ def _render(
         tinted = [render.Mesh(m.triangles, TINT) for m in meshes]
         layer = render.draw(tinted, camera)
         seen, colours = render.shade(layer, camera, shadows)
-        front = seen & (layer.depth < depth)
+        front = seen & (layer.depth < depth - BIAS)
         image[front] = (1.0 - GHOST) * image[front] + GHOST * colours[front[seen]]
     far = float(depth[np.isfinite(layer.depth)].max()) + 1.0
     darker = render.occlusion(np.minimum(depth, far), 5.0 * SUPERSAMPLING)
@@ -176,19 +198,19 @@ def _annotate(image: Array, log: Log, file: pathlib.Path) -> None:
         panel = figure.add_axes((0, 0, 1, 1))
         panel.imshow(np.clip(image, 0.0, 1.0), interpolation="none")
         panel.set_axis_off()
-        _key(panel, log, width, height)
+        _key(panel, log, width)
         figure.savefig(file, dpi=100)
         plt.close(figure)
 
 
-def _key(panel: Any, log: Log, width: int, height: int) -> None:
-    """The colours and what they mean, at the left edge."""
+def _key(panel: Any, log: Log, width: int) -> None:
+    """The colours and what they mean, in the upper right corner."""
     entries: list[tuple[Colour, str]] = [(PATH, f"path of {log.meta['frame']}")]
     if "plane.command" in log:
         entries.append((ELBOW, "path of the elbow"))
     if any(obstacle["radius"] is not None for obstacle in log.meta["obstacles"].values()):
         entries.append((OBSTACLE, "obstacles"))
     for row, (colour, text) in enumerate(entries):
-        y = height - 28.0 * (len(entries) - row)
-        panel.plot([24.0, 52.0], [y, y], color=colour, lw=6.0)
-        panel.text(64.0, y, text, va="center", fontsize=13, color=style.INK)
+        y = 34.0 + 28.0 * row
+        panel.plot([width - 50.0, width - 22.0], [y, y], color=colour, lw=6.0)
+        panel.text(width - 62.0, y, text, va="center", ha="right", fontsize=12, color=style.INK)

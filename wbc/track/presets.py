@@ -105,7 +105,7 @@ def around_obstacle(start: pin.SE3, duration: float, size: float) -> Preset:
     """To the other side of a sphere of radius ``size``, round it in front, and back the same way.
 
     With s the start position and r = size, the far end is s + (0, -7 r, 0), so the straight way passes through the
-    sphere at s + (-r/3, -7 r/2, 0), and the path goes by s + (1.5 r, -7 r/2, 0) instead. The hand turns by
+    sphere at s + (-r/3, -7 r/2, 0), and the path goes by s + (2 r/3 + 0.1 m, -7 r/2, 0) instead. The hand turns by
     -0.6 rad about the world's z axis on the way there. The spline is at rest only at the start and at the end.
     """
     across = 7.0 * size
@@ -114,7 +114,7 @@ def around_obstacle(start: pin.SE3, duration: float, size: float) -> Preset:
         turn = np.array(pin.AngleAxis(yaw, np.array([0.0, 0.0, 1.0])).matrix())
         return pin.SE3(turn @ start.rotation, start.translation + np.array([x, y, 0.0]))
 
-    front, far = pose(1.5 * size, -across / 2, -0.3), pose(0.0, -across, -0.6)
+    front, far = pose(2.0 * size / 3.0 + 0.1, -across / 2, -0.3), pose(0.0, -across, -0.6)
     path = SplinePath(np.linspace(0.0, duration, 5), [start, front, far, front, start])
     center = start.translation + np.array([-size / 3, -across / 2, 0.0])
     return Preset(path, ((shapes.Sphere(size), center),))

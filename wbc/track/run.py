@@ -74,6 +74,8 @@ def _loop(
     model, dt, duration = plan.robot.model, plan.dt, plan.path.duration
     q = plan.start.copy()
     controller.reset(q)
+    for name in plan.obstacles:
+        controller[name].rate = min(plan.approach, 1.0 / controller.stack.dt_range[1])
     rest = float(controller["plane"].target) if plan.plane is not None else 0.0
     clock = time.perf_counter_ns
     for k in range(plan.ticks):
@@ -125,6 +127,7 @@ def _meta(plan: Plan, controller: Controller, recorder: Recorder, compile_time: 
         "compile_time": compile_time,
         "stack": str(controller),
         "margin": plan.margin,
+        "approach": plan.approach,
         "plane": None if plan.plane is None else {"amplitude": plan.plane.amplitude, "cycles": plan.plane.cycles},
         "holds": list(plan.holds),
         "obstacles": {

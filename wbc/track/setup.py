@@ -72,6 +72,7 @@ class Plan:
         dt: time between commands [s].
         obstacles: name -> obstacle; every link with shapes keeps clear of it by ``margin`` [m].
         margin: see ``obstacles``.
+        approach: rate of the obstacles' rows [1/s]; a lower one brakes earlier. Cut to what ``dt`` allows.
         plane: command of the elbow plane, or None for none.
         holds: frames that must not move (the feet of a humanoid).
         gain: of the hand [1/s].
@@ -86,6 +87,7 @@ class Plan:
     dt: float = 0.005
     obstacles: dict[str, Moving] = field(default_factory=dict)
     margin: float = 0.02
+    approach: float = 10.0
     plane: Swing | None = None
     holds: tuple[str, ...] = ()
     gain: float = 10.0
@@ -95,6 +97,8 @@ class Plan:
     def __post_init__(self) -> None:
         self.robot.check_frame("frame", self.frame)
         validation.scalar("dt", self.dt, low=0.0, open_low=True, unit="s")
+        validation.scalar("margin", self.margin, low=0.0, unit="m")
+        validation.scalar("approach", self.approach, low=0.0, open_low=True, unit="1/s")
         object.__setattr__(self, "start", self.robot.configuration("start", self.start))
 
     @property

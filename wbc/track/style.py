@@ -56,5 +56,6 @@ def pyplot() -> Iterator[Any]:
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
 
-    with plt.rc_context({**SETTINGS, "axes.prop_cycle": cycler(color=CYCLE)}):
+    settings: Any = {**SETTINGS, "axes.prop_cycle": cycler(color=CYCLE)}
+    with plt.rc_context(settings):
         yield plt

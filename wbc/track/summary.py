@@ -50,7 +50,8 @@ def save_summary(figures: list[Figure], folder: pathlib.Path) -> pathlib.Path:
 def rotation_angles(log: Log) -> Array:
     """Angle between commanded and reached orientation of the frame [rad]."""
     a, b = (log.array(name)[:, 3:] for name in ("pose", "target"))
-    return np.asarray(2.0 * np.arctan2(_chord(a, b, -1.0), _chord(a, b, 1.0)))
+    # |a - b| and |a + b| are 2 sin and 2 cos of a quarter of the angle
+    return np.asarray(4.0 * np.arctan2(_chord(a, b, -1.0), _chord(a, b, 1.0)))
 
 
 def position_errors(log: Log) -> Array:

@@ -1,0 +1,268 @@
+"""The commands as a user types them, within this process."""
+
+from __future__ import annotations
+
+import functools
+import json
+import os
+import pathlib
+import signal
+from pathlib import Path
+from typing import Any
+
+import pytest
+from typer.testing import CliRunner
+
+import wbc
+from wbc import track
+from wbc.cli import bench, session
+from wbc.cli.app import app
+from wbc.errors import UnknownNameError, WbcError
+from wbc.track.picture import save_picture
+
+FAST = ["--backend", "vm", "--rate", "50", "--duration", "0.5", "--no-plots"]
+
+
+def run(*arguments: str | Path) -> tuple[int, str, str]:
+    """(exit code, standard output, standard error) of ``wbc ARGUMENTS``."""
+    result = CliRunner(env={"COLUMNS": "200"}).invoke(app, [str(a) for a in arguments])
+    if result.exception is not None and not isinstance(result.exception, SystemExit):
+        raise result.exception
+    return result.exit_code, result.stdout, result.stderr
+
+
+def test_help_names_every_command() -> None:
+    code, out, _ = run("--help")
+    assert code == 0
+    for name in ("robots", "robot", "track", "demo", "bench"):
+        assert f" {name} " in out
+    code, out, _ = run("track", "--help")
+    assert code == 0
+    for option in ("--path", "--sphere", "--solver", "--rate", "--duration", "--backend", "--log"):
+        assert option in out
+
+
+def test_version() -> None:
+    assert run("--version") == (0, f"wbc {wbc.__version__}\n", "")
+
+
+def test_robots_lists_the_table() -> None:
+    code, out, _ = run("robots")
+    assert code == 0
+    assert {line.split()[0] for line in out.splitlines()[2:]} == set(wbc.robots.names())
+    code, out, _ = run("robots", "panda")
+    assert {line.split()[0] for line in out.splitlines()[2:]} == {"panda", "panda_collision"}
+    broken = [r for r in wbc.robots.table() if r.problem]
+    code, out, _ = run("robots", "--all")
+    assert all(recipe.name in out for recipe in broken)
+
+
+def test_robots_without_a_match_names_the_nearest() -> None:
+    code, out, err = run("robots", "pandda")
+    assert (code, out) == (2, "")
+    assert "did you mean 'panda'" in err
+
+
+def test_robot_shows_limits_and_frames() -> None:
+    code, out, _ = run("robot", "panda")
+    assert code == 0
+    row = next(line for line in out.splitlines() if line.startswith("panda_joint4"))
+    assert row.split() == ["panda_joint4", "rad", "-3.072", "-0.0698", "2.175", "12.5", "87", "-2.356"]
+    assert "panda_hand_tcp" in out
+    assert "Franka" in out
+    code, out, _ = run("robot", "talos", "--no-frames")
+    assert code == 0
+    assert "floating base" in out
+
+
+@pytest.mark.parametrize("kind", ["parquet", "npz"])
+def test_track_leaves_a_run_folder(kind: str, tmp_path: Path) -> None:
+    folder = tmp_path / "run"
+    ball = ["--sphere", "0.5,0.3,0.5,0.1,0,-0.1,0", "--floor", "-0.5", "--plane", "swing", "--swing", "0.2"]
+    code, out, err = run("track", "panda", *FAST, *ball, "--log", kind, "--output", folder)
+    assert (code, err) == (0, "")
+    assert {p.name for p in folder.iterdir()} == {f"log.{kind}", "summary.json"}
+    log = track.load(folder)
+    assert len(log) == 25
+    assert set(log.meta["obstacles"]) == {"sphere1", "floor"}
+    assert log.meta["plane"] == {"amplitude": 0.2, "cycles": 2.0}
+    assert json.loads((folder / "summary.json").read_text())["status"]["solved"] == 25
+    for words in ("complete, 25 of 25 ticks", "position error", "least clearance", "tick time", "log."):
+        assert words in out
+
+
+def test_track_solvers_agree(tmp_path: Path) -> None:
+    logs = []
+    for solver in ("daqp", "qpoases"):
+        code, _, _ = run("track", *FAST, "--solver", solver, "--output", tmp_path / solver)
+        assert code == 0
+        logs.append(track.load(tmp_path / solver))
+    assert logs[1].meta["solver"] == "qpoases"
+    assert abs(logs[0].array("v") - logs[1].array("v")).max() < 1e-6
+
+
+def test_track_follows_a_file_after_an_approach(tmp_path: Path) -> None:
+    file = tmp_path / "way.csv"
+    file.write_text("t,x,y,z,qx,qy,qz,qw\n0,0.4,0.1,0.5,1,0,0,0\n1,0.4,-0.1,0.5,1,0,0,0\n")
+    code, _, err = run("track", "--path", file, *FAST, "--output", tmp_path / "run")
+    assert (code, err) == (0, "")
+    log = track.load(tmp_path / "run")
+    assert log.meta["path"] == "way"
+    assert log.meta["duration"] == pytest.approx(1.0, abs=0.2)
+    assert log["target.y"][-1] < -0.095
+    assert log["target.x"][0] == pytest.approx(log["pose.x"][0], abs=1e-12)
+
+
+def test_track_with_holds_and_start(tmp_path: Path) -> None:
+    start = ",".join(str(x) for x in wbc.robots.load("ur5").neutral + 0.1)
+    code, _, _ = run("track", "ur5", "--start", start, "--plane", "off", *FAST, "--output", tmp_path / "ur5")
+    assert code == 0
+    assert track.load(tmp_path / "ur5")["q.shoulder_pan_joint"][0] == pytest.approx(
+        wbc.robots.load("ur5").neutral[0] + 0.1
+    )
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["robot", "pandda"], "robot: unknown name, did you mean 'panda'?"),
+        (["track", "pandda"], "robot: unknown name, did you mean 'panda'?"),
+        (["track", "--path", "circel"], "path: unknown name, did you mean 'circle'?"),
+        (["track", "--path", "none.csv"], "path: there is no such file"),
+        (["track", "--frame", "panda_hand_tpc"], "did you mean 'panda_hand_tcp'?"),
+        (["track", "--solver", "dapq"], "solver: unknown name, did you mean 'daqp'?"),
+        (["track", "--backend", "nativ"], "backend: unknown name, did you mean 'native'?"),
+        (["track", "--log", "parqet"], "log: unknown name, did you mean 'parquet'?"),
+        (["track", "--plane", "swin"], "plane: unknown name, did you mean 'swing'?"),
+        (["track", "--rate", "0"], "rate: expected a value in (0, inf] Hz"),
+        (["track", "--rate", "nan"], "rate: expected finite numbers"),
+        (["track", "--duration", "-1"], "duration: expected"),
+        (["track", "--gain", "-1"], "gain"),
+        (["track", "--margin", "-1"], "margin"),
+        (["track", "--size", "0"], "size: expected"),
+        (["track", "--sphere", "1,2,3"], "sphere: expected X,Y,Z,RADIUS"),
+        (["track", "--sphere", "1,2,3,x"], "sphere: expected numbers"),
+        (["track", "--sphere", "1,2,3,-1"], "radius"),
+        (["track", "--start", "0,0"], "start: expected shape (7,)"),
+        (["track", "--hold", "panda_link99"], "Hold.frame"),
+        (["track", "double_pendulum", "--plane", "hold"], "knows no shoulder, elbow and wrist"),
+    ],
+    ids=lambda value: "_".join(value) if isinstance(value, list) else "",
+)
+def test_bad_input_is_one_line_and_exit_code_2(
+    arguments: list[str], message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    options: list[str] = []
+    if arguments[0] == "track":
+        defaults = {"--output": "run", "--backend": "vm", "--duration": "0.2"}
+        options = ["--no-plots", *(x for pair in defaults.items() if pair[0] not in arguments for x in pair)]
+    code, out, err = run(*arguments, *options)
+    assert (code, out) == (2, "")
+    assert message in err
+    assert err.startswith("error: ")
+    assert err.count("\n") == 1
+    assert "Traceback" not in err
+    assert not list(tmp_path.rglob("log.*"))
+
+
+def test_a_run_is_not_written_over_by_accident(tmp_path: Path) -> None:
+    assert run("track", *FAST, "--output", tmp_path)[0] == 0
+    before = (tmp_path / "log.parquet").stat().st_mtime_ns
+    code, _, err = run("track", *FAST, "--output", tmp_path)
+    assert code == 2
+    assert "use --force" in err
+    assert (tmp_path / "log.parquet").stat().st_mtime_ns == before
+    assert run("track", *FAST, "--log", "npz", "--output", tmp_path, "--force")[0] == 0
+    assert {p.name for p in tmp_path.iterdir()} == {"log.npz", "summary.json"}
+
+
+def test_a_folder_that_cannot_be_made(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    code, _, err = run("track", *FAST, "--output", tmp_path / "file" / "run")
+    assert code == 2
+    assert "output: cannot be written" in err
+
+
+def test_default_folder_is_under_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert run("track", *FAST)[0] == 0
+    (folder,) = (tmp_path / "runs").iterdir()
+    assert folder.name.startswith("panda-circle-")
+    assert (folder / "log.parquet").is_file()
+
+
+@pytest.mark.slow
+def test_interrupt_leaves_a_valid_run_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Ctrl-C at tick 9 of the demo: log, plots and summary of nine ticks, exit code 130."""
+    real = session.track
+
+    def interrupted(plan: Any, progress: Any, stop: Any, compiled: Any) -> track.Log:
+        def at_nine(ticks: int) -> None:
+            progress(ticks)
+            if ticks == 9:
+                os.kill(os.getpid(), signal.SIGINT)
+
+        return real(plan, at_nine, stop, compiled)
+
+    monkeypatch.setattr(session, "track", interrupted)
+    monkeypatch.setattr(session, "save_picture", functools.partial(save_picture, size=(96, 60)))
+    handler = signal.getsignal(signal.SIGINT)
+    code, out, _ = run("demo", "--backend", "vm", "--rate", "50", "--output", tmp_path)
+    assert code == 130
+    assert "interrupted, 9 of 600 ticks" in out
+    log = track.load(tmp_path)
+    assert len(log) == 9
+    assert log.meta["interrupted"]
+    assert json.loads((tmp_path / "summary.json").read_text())["run"] == "interrupted"
+    plots = {"joints", "velocities", "accelerations", "errors", "tick_time", "plane", "clearance", "overview"}
+    assert {p.stem for p in tmp_path.glob("*.png")} == plots
+    assert all(p.read_bytes().startswith(b"\x89PNG") for p in tmp_path.glob("*.png"))
+    assert signal.getsignal(signal.SIGINT) is handler
+
+
+def test_interrupt_before_the_first_tick_leaves_an_empty_log(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(session.Stopper, "__call__", lambda self: True)
+    code, out, _ = run("demo", "--backend", "vm", "--output", tmp_path)
+    assert code == 130
+    assert "interrupted, 0 of 2400" in out
+    assert len(track.load(tmp_path)) == 0
+
+
+def test_second_interrupt_is_not_held_back() -> None:
+    stopper = session.Stopper()
+    with stopper.listening():
+        os.kill(os.getpid(), signal.SIGINT)
+        assert stopper()
+        with pytest.raises(KeyboardInterrupt):
+            os.kill(os.getpid(), signal.SIGINT)
+
+
+def test_bench_runs_the_module_of_the_repository(monkeypatch: pytest.MonkeyPatch) -> None:
+    calls: list[tuple[list[str], pathlib.Path]] = []
+
+    class Done:
+        returncode = 3
+
+    def fake(command: list[str], cwd: pathlib.Path, check: bool) -> Done:
+        calls.append((command, cwd))
+        return Done()
+
+    monkeypatch.setattr(bench.subprocess, "run", fake)
+    assert run("bench", "--problems", "panda")[0] == 3
+    command, root = calls[0]
+    assert command[1:] == ["-m", "bench", "--problems", "panda"]
+    assert (root / "bench" / "__main__.py").is_file()
+
+
+def test_bench_without_the_repository(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(bench, "ROOT", tmp_path)
+    code, _, err = run("bench")
+    assert code == 2
+    assert "from a clone of the repository" in err
+
+
+def test_errors_are_of_one_family() -> None:
+    assert issubclass(session.OutputError, WbcError)
+    assert issubclass(bench.BenchError, WbcError)
+    assert issubclass(UnknownNameError, WbcError)
