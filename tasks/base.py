@@ -100,6 +100,10 @@ class Item:
     #: Abstract classes stay out of the registry
     abstract: ClassVar[bool] = True
 
+    #: Fields that only give an input its first value. Expressions must not read them (the input holds the present
+    #: value); in return the compiled code is the same for all of their values.
+    initial_only: ClassVar[tuple[str, ...]] = ()
+
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)
         if "abstract" not in cls.__dict__:
@@ -133,7 +137,9 @@ class Item:
     def declaration(self, robot: Robot) -> dict[str, Any]:
         """Everything that decides the compiled code besides the robot, as plain data; part of the cache key."""
         return {"class": f"{type(self).__module__}.{type(self).__qualname__}"} | {
-            f.name: _plain(getattr(self, f.name), robot) for f in dataclasses.fields(self)
+            f.name: _plain(getattr(self, f.name), robot)
+            for f in dataclasses.fields(self)
+            if f.name not in self.initial_only
         }
 
 
@@ -146,6 +152,8 @@ class Task(Item):
     """
 
     abstract: ClassVar[bool] = True
+
+    initial_only: ClassVar[tuple[str, ...]] = ("gain",)
 
     #: Default gain [1/s]: e decays like exp(-gain t) where nothing hinders it
     default_gain: ClassVar[float] = 2.0

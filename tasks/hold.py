@@ -48,6 +48,7 @@ class Hold(Constraint):
 
     order: ClassVar[Order] = Order.HOLD
     equality: ClassVar[bool] = True
+    initial_only: ClassVar[tuple[str, ...]] = ("gain",)
 
     frame: str
     kind: Literal["pose", "position", "orientation"] = "pose"

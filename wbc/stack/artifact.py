@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import functools
 import pathlib
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -12,6 +14,7 @@ from wbc import validation
 from wbc.errors import CompileError
 from wbc.stack import cache, codegen, toolchain
 from wbc.stack.declaration import Declaration
+from wbc.stack.key import key
 from wbc.stack.layout import Layout
 from wbc.stack.program import Program, build
 
@@ -41,31 +44,49 @@ def compile_stack(stack: Declaration, backend: str, version: str) -> Artifact:
     Args:
         backend: ``native`` (needs gcc), ``vm``, or ``auto``: native where it can be.
 
+    Where ``auto`` finds a compiler that fails, the first lines of its message are in the log and the virtual machine
+    does the work.
+
     Raises:
         UnknownNameError: another backend. CompileError: native without a compiler, or it failed.
     """
     validation.one_of("backend", backend, ("auto", "native", "vm"))
-    if backend == "native" and not toolchain.available():
-        raise CompileError("backend", backend, "needs gcc and the static daqp library of the casadi package")
-    native = backend != "vm" and toolchain.available()
+    if backend == "native" and toolchain.missing():
+        raise CompileError("backend", backend, f"cannot compile: {', '.join(toolchain.missing())}")
     layout = Layout(stack)
-    name = cache.key(stack.key_data(), version, toolchain.identity() if native else "vm")
+    program = functools.cache(lambda: build(stack, layout))
+    if backend == "native" or (backend == "auto" and toolchain.available()):
+        try:
+            return _native(stack, layout, program, version)
+        except CompileError as error:
+            if backend == "native":
+                raise
+            toolchain.fall_back(str(error))
+    return _virtual(stack, layout, program, version)
 
-    def fill_native(folder: pathlib.Path) -> None:
-        toolchain.compile_tick(codegen.sources(stack, layout, build(stack, layout)), folder / "tick.so")
 
-    def fill_vm(folder: pathlib.Path) -> None:
-        program = build(stack, layout)
-        program.rows.save(str(folder / "rows.casadi"))
-        if program.ahead is not None:
-            program.ahead.save(str(folder / "ahead.casadi"))
+def _native(stack: Declaration, layout: Layout, program: Callable[[], Program], version: str) -> Artifact:
+    """The shared library, compiled or from the cache."""
 
-    if native:
-        folder, cached = cache.fetch(name, fill_native)
-        return Artifact(layout, folder / "tick.so", None, cached)
-    folder, cached = cache.fetch(name, fill_vm)
+    def fill(folder: pathlib.Path) -> None:
+        toolchain.compile_tick(codegen.sources(stack, layout, program()), folder / "tick.so")
+
+    folder, cached = cache.fetch(key(stack, version, toolchain.identity()), fill, library=True)
+    return Artifact(layout, folder / "tick.so", None, cached)
+
+
+def _virtual(stack: Declaration, layout: Layout, program: Callable[[], Program], version: str) -> Artifact:
+    """The functions for the virtual machine, built or from the cache."""
+
+    def fill(folder: pathlib.Path) -> None:
+        functions = program()
+        functions.rows.save(str(folder / "rows.casadi"))
+        if functions.ahead is not None:
+            functions.ahead.save(str(folder / "ahead.casadi"))
+
+    folder, cached = cache.fetch(key(stack, version, "vm"), fill)
     later = folder / "ahead.casadi"
-    program = Program(
+    functions = Program(
         ca.Function.load(str(folder / "rows.casadi")), ca.Function.load(str(later)) if later.exists() else None
     )
-    return Artifact(layout, None, program, cached)
+    return Artifact(layout, None, functions, cached)

@@ -1,14 +1,17 @@
-"""Compiled ticks on disk, one folder a declaration, in the user's cache directory.
+"""Compiled stacks on disk, one folder each, in the user's cache directory.
 
-The key is the hash of the declaration (robot data, items, package and compiler versions), so that a hit
-builds no expression. Folders are private to the user; every file's hash is in the manifest and is checked
-before the file is loaded; an entry that fails the check is built again. An entry is written beside its place
-and renamed into it, so parallel builds at worst do the work twice.
+An entry's name is :func:`wbc.stack.key.key`. Folders are private to the user; every file's hash is in the manifest and
+is checked before the file is loaded; an entry that fails the check is built again. An entry is written beside its
+place and renamed into it under a lock, so that of parallel builds of one entry the first does the work. A cache
+directory that cannot be used, or that others may write to, is replaced by a temporary one for this process.
 """
 
 from __future__ import annotations
 
+import atexit
 import contextlib
+import fcntl
+import functools
 import hashlib
 import json
 import logging
@@ -17,11 +20,8 @@ import pathlib
 import shutil
 import stat
 import tempfile
-from collections.abc import Callable
-from importlib import metadata
-from typing import Any
+from collections.abc import Callable, Iterator
 
-import numpy as np
 import platformdirs
 
 log = logging.getLogger("wbc")
@@ -35,46 +35,94 @@ def root() -> pathlib.Path:
     return pathlib.Path(chosen) if chosen else pathlib.Path(platformdirs.user_cache_dir("wbc"))
 
 
-def key(data: Any, version: str, toolchain: str) -> str:
-    """Hash of everything that the build is a function of."""
-    own = {p.name: p.read_text() for p in sorted((pathlib.Path(__file__).parent / "native").iterdir())}
-    versions = [metadata.version("casadi"), metadata.version("pin"), np.__version__, version, toolchain]
-    text = json.dumps([data, versions, own], sort_keys=True)
-    return hashlib.sha256(text.encode()).hexdigest()[:32]
+def fetch(name: str, build: Callable[[pathlib.Path], None], *, library: bool = False) -> tuple[pathlib.Path, bool]:
+    """Folder of entry ``name``, and whether it was there; ``build(folder)`` fills a new one.
 
-
-def fetch(name: str, build: Callable[[pathlib.Path], None]) -> tuple[pathlib.Path, bool]:
-    """Folder of entry ``name``, and whether it was there; ``build(folder)`` fills a new one."""
+    Args:
+        library: files of the entry will be loaded as code, so its file system must allow that.
+    """
     base = root()
-    base.mkdir(mode=0o700, parents=True, exist_ok=True)
+    problem = _problem(base, name, library)
+    if problem:
+        base = _instead(base, problem)
     final = base / name
     if _valid(final):
         return final, True
-    if final.exists():
-        log.warning("cache entry %s is damaged or not private; building it again", name)
-    fresh = pathlib.Path(tempfile.mkdtemp(prefix=f".{name[:8]}-", dir=base))
-    try:
-        build(fresh)
-        hashes = {p.name: _hash(p) for p in sorted(fresh.iterdir())}
-        (fresh / MANIFEST).write_text(json.dumps(hashes))
-        for path in fresh.iterdir():
-            path.chmod(0o500 if path.suffix == ".so" else 0o400)
-        _install(fresh, final)
-    finally:
-        shutil.rmtree(fresh, ignore_errors=True)
+    with _locked(base / f".{name}.lock"):
+        if _valid(final):  # another process has built it in the meantime
+            return final, True
+        if os.path.lexists(final):
+            log.warning("cache entry %s is damaged or not private; building it again", name)
+        fresh = pathlib.Path(tempfile.mkdtemp(prefix=f".{name[:8]}-", dir=base))
+        try:
+            build(fresh)
+            _seal(fresh)
+            _install(fresh, final)
+        finally:
+            shutil.rmtree(fresh, ignore_errors=True)
     return final, False
 
 
 def clear() -> int:
-    """Remove all entries; returns how many there were."""
+    """Remove everything in the cache directory; returns how many entries there were."""
     base = root()
-    entries = [p for p in base.iterdir() if p.is_dir()] if base.is_dir() else []
-    for path in entries:
-        shutil.rmtree(path, ignore_errors=True)
-    return len(entries)
+    found = list(base.iterdir()) if base.is_dir() else []
+    for path in found:
+        if path.is_dir() and not path.is_symlink():
+            shutil.rmtree(path, ignore_errors=True)
+        else:
+            path.unlink(missing_ok=True)
+    return sum(not path.name.startswith(".") for path in found)
+
+
+def _problem(base: pathlib.Path, name: str, library: bool) -> str:
+    """Why the directory cannot serve, or an empty text. It is made if it is not there."""
+    try:
+        base.mkdir(mode=0o700, parents=True, exist_ok=True)
+        info = base.stat()
+    except OSError as error:
+        return error.strerror or type(error).__name__
+    # Who may rename entries could swap one between its check and its loading; a sticky folder prevents that
+    if info.st_mode & (stat.S_IWGRP | stat.S_IWOTH) and not info.st_mode & stat.S_ISVTX:
+        return "others may write to it"
+    if info.st_uid not in (os.getuid(), 0):
+        return "it belongs to another user"
+    if library and os.statvfs(base).f_flag & os.ST_NOEXEC:
+        return "its file system is mounted noexec"
+    if not os.access(base, os.R_OK | os.W_OK | os.X_OK) and not _valid(base / name):
+        return "it cannot be written to"
+    return ""
+
+
+@functools.cache
+def _instead(base: pathlib.Path, problem: str) -> pathlib.Path:
+    """A private folder that lives as long as this process; said once in the log."""
+    folder = tempfile.mkdtemp(prefix="wbc-cache-")
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    log.warning("cache directory %s cannot be used (%s); compiled stacks are kept for this process only", base, problem)
+    return pathlib.Path(folder)
+
+
+@contextlib.contextmanager
+def _locked(path: pathlib.Path) -> Iterator[None]:
+    """Keep other processes and threads out; a process that dies lets go."""
+    with path.open("a") as file:
+        # Some network file systems have no locks: then parallel builds do the work twice
+        with contextlib.suppress(OSError):
+            fcntl.flock(file, fcntl.LOCK_EX)
+        yield
+
+
+def _seal(folder: pathlib.Path) -> None:
+    """Write the manifest and take away the right to write."""
+    hashes = {p.name: _hash(p) for p in sorted(folder.iterdir())}
+    (folder / MANIFEST).write_text(json.dumps(hashes))
+    for path in folder.iterdir():
+        path.chmod(0o500 if path.suffix == ".so" else 0o400)
 
 
 def _install(fresh: pathlib.Path, final: pathlib.Path) -> None:
+    """Put a finished entry into its place."""
     for _ in range(5):
         with contextlib.suppress(OSError):
             fresh.rename(final)
@@ -90,23 +138,24 @@ def _install(fresh: pathlib.Path, final: pathlib.Path) -> None:
 
 
 def _valid(folder: pathlib.Path) -> bool:
+    """Private, complete and unchanged since it was sealed."""
     try:
-        if not _private(folder):
+        if not (_private(folder) and _private(folder / MANIFEST)):
             return False
         hashes = json.loads((folder / MANIFEST).read_text())
         present = {p.name for p in folder.iterdir()} - {MANIFEST}
-        return present == set(hashes) and all(
+        return bool(hashes and present == set(hashes)) and all(
             _private(folder / n) and _hash(folder / n) == h for n, h in hashes.items()
         )
-    except (OSError, ValueError, AttributeError):
+    except (OSError, ValueError, AttributeError, TypeError):
         return False
 
 
 def _private(path: pathlib.Path) -> bool:
     """Owned by this user and writable by nobody else; no link."""
     info = path.lstat()
-    if stat.S_ISLNK(info.st_mode) or not hasattr(os, "getuid"):
-        return not stat.S_ISLNK(info.st_mode)
+    if stat.S_ISLNK(info.st_mode):
+        return False
     return info.st_uid == os.getuid() and not info.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
 
 

@@ -43,16 +43,29 @@ def compiler() -> str | None:
 
 
 @functools.cache
+def missing() -> tuple[str, ...]:
+    """What is not there and native ticks need; empty where all is."""
+    out = []
+    if compiler() is None:
+        chosen = os.environ.get("WBC_CC")
+        why = "neither gcc nor cc is on the PATH" if chosen is None else f"WBC_CC is {chosen!r}"
+        out.append(f"no C compiler ({why})")
+    if not (library().exists() and (headers() / "daqp" / "api.h").exists()):
+        out.append("no static daqp library in the casadi package")
+    return tuple(out)
+
+
 def available() -> bool:
     """A compiler and DAQP's library and headers are there. Says once in the log if not."""
-    missing = []
-    if compiler() is None:
-        missing.append("no C compiler")
-    if not (library().exists() and (headers() / "daqp" / "api.h").exists()):
-        missing.append("the casadi package has no static daqp library")
-    if missing:
-        log.warning("%s: ticks run on the CasADi virtual machine, some 10 times slower", " and ".join(missing))
-    return not missing
+    if missing():
+        fall_back(" and ".join(missing()))
+    return not missing()
+
+
+@functools.cache
+def fall_back(reason: str) -> None:
+    """Say once for each reason that ticks are not native."""
+    log.warning("%s: ticks run on the CasADi virtual machine, some 10 times slower", reason)
 
 
 def headers() -> pathlib.Path:
@@ -71,10 +84,8 @@ def identity() -> str:
     cc = compiler()
     if cc is None:
         return "none"
-    version = subprocess.run([cc, "--version"], capture_output=True, text=True, check=False).stdout.splitlines()[:1]
-    target = subprocess.run(
-        [cc, "-march=native", "-Q", "--help=target"], capture_output=True, text=True, check=False
-    ).stdout
+    version = _output([cc, "--version"]).splitlines()[:1]
+    target = _output([cc, "-march=native", "-Q", "--help=target"])
     return "\n".join([*version, target, *ROWS_FLAGS, *TICK_FLAGS, *COMMON_FLAGS])
 
 
@@ -111,7 +122,19 @@ def compile_tick(files: dict[str, str], output: pathlib.Path) -> None:
         )
 
 
+def _output(command: list[str]) -> str:
+    """What a command prints; nothing where it cannot be started."""
+    try:
+        return subprocess.run(command, capture_output=True, text=True, errors="replace", check=False).stdout
+    except OSError:
+        return ""
+
+
 def _run(command: list[str], folder: pathlib.Path) -> None:
-    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    try:
+        done = subprocess.run(command, cwd=folder, capture_output=True, text=True, errors="replace", check=False)
+    except OSError as error:
+        raise CompileError("compiler", command[0], f"cannot be started: {error.strerror}") from error
     if done.returncode != 0:
-        raise CompileError("compiler", command[0], "failed: " + " / ".join(done.stderr.splitlines()[:4]))
+        said = " / ".join(done.stderr.splitlines()[:4]) or f"exit status {done.returncode}, no message"
+        raise CompileError("compiler", command[0], f"failed: {said}")

@@ -1,0 +1,56 @@
+"""The name of a compiled stack in the cache: a hash of everything that its code is a function of."""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import importlib
+import json
+import marshal
+import pathlib
+import sys
+from importlib import metadata
+
+import numpy as np
+
+from wbc.stack.declaration import Declaration
+
+#: Packages whose code decides what expressions and C code come out. Robots do not: their data are in the key.
+_PARTS = ("wbc.symbolic", "wbc.tasks", "wbc.stack")
+
+
+def key(stack: Declaration, version: str, toolchain: str) -> str:
+    """Hash of the declaration, of the code that builds from it, and of package and compiler versions.
+
+    ``toolchain`` is :func:`wbc.stack.toolchain.identity`, or ``vm``. Weights, targets, gains and masks are run-time
+    values and not in it. Of an item that is not this package's own, the file that its class stands in is in the hash,
+    but not what that file imports.
+    """
+    versions = [metadata.version("casadi"), metadata.version("pin"), np.__version__, version, toolchain]
+    items = sorted({_source(base) for entry in stack.entries for base in type(entry.item).__mro__})
+    text = json.dumps([stack.key_data(), versions, _own_code(), items], sort_keys=True)
+    return hashlib.sha256(text.encode()).hexdigest()[:32]
+
+
+@functools.cache
+def _own_code() -> str:
+    """Hash of this package's builders; about 4 ms, once a process."""
+    digest = hashlib.sha256()
+    for part in _PARTS:
+        folder = pathlib.Path(str(importlib.import_module(part).__file__)).parent
+        for path in sorted(p for p in folder.rglob("*") if p.suffix in (".py", ".c", ".h")):
+            digest.update(f"{part}/{path.relative_to(folder)}\n".encode() + path.read_bytes())
+    return digest.hexdigest()
+
+
+def _source(of: type) -> str:
+    """Hash of what a user's class says; empty for classes that came with a package version of their own."""
+    module = of.__module__
+    if module in ("builtins", "abc", "typing") or module.startswith(tuple(f"{part}." for part in _PARTS)):
+        return ""
+    file = getattr(sys.modules.get(module), "__file__", None)
+    if file is not None and pathlib.Path(file).is_file():
+        return hashlib.sha256(pathlib.Path(file).read_bytes()).hexdigest()
+    # Typed at a prompt: there is no file, so the byte code speaks for it
+    codes = [f.__code__ for _, f in sorted(vars(of).items()) if hasattr(f, "__code__")]
+    return hashlib.sha256(b"".join(marshal.dumps(code) for code in codes)).hexdigest()
