@@ -123,7 +123,8 @@ class Robot:
         data = self.model.createData()
         pin.computeJointJacobians(self.model, data, self.neutral)
         for j in range(1, self.model.njoints):
-            jacobian = pin.getJointJacobian(self.model, data, j, pin.LOCAL)
+            # Pinocchio gives a single column without its second dimension
+            jacobian = pin.getJointJacobian(self.model, data, j, pin.LOCAL).reshape(6, self.nv)
             start, nv = int(self.model.idx_vs[j]), int(self.model.nvs[j])
             for column in jacobian[:, start : start + nv].T:
                 units.append("rad" if np.abs(column[3:]).max() > 1e-9 else "m")
