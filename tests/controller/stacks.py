@@ -158,6 +158,35 @@ def inside(bot: Robot, rng: np.random.Generator, share: float = 0.6) -> np.ndarr
     return q
 
 
+def aim(controller: Controller, rng: np.random.Generator) -> None:
+    """Move every target that the first configuration has set; put the ball somewhere, moving."""
+    for name, block in controller.layout.blocks.items():
+        item = controller[name]
+        slot = block.slots.get("target")
+        if slot is None or "foot" in name:
+            continue
+        if slot.input.kind == "pose":
+            turn, place = pin.exp3(rng.normal(0.0, 0.3, 3)) @ item.target.rotation, item.target.translation
+            item.target = pin.SE3(turn, place + rng.normal(0.0, 0.1, 3))
+        elif slot.input.kind == "vector":
+            item.target = item.target + rng.normal(0.0, 0.1, slot.size)
+    if "ball" in controller:
+        controller["ball"].pose = pin.SE3(np.eye(3), rng.uniform(-0.6, 0.6, 3))
+        controller["ball"].velocity = rng.normal(0.0, 0.2, 6)
+
+
+def quarrel(controller: Controller, rng: np.random.Generator) -> None:
+    """Run-time values of :func:`conflicts` that contradict each other in many ways."""
+    aim(controller, rng)
+    for name in ("hold", "hold_elbow"):
+        hold = controller[name]
+        off = rng.normal(0.0, 0.02, 3) * (rng.random() < 0.5)
+        hold.target = pin.SE3(hold.target.rotation, hold.target.translation + off)
+        hold.enabled = bool(rng.random() < 0.6)
+    controller["hand"].enabled = bool(rng.random() < 0.8)
+    controller["speed"].linear = rng.uniform(0.0, 0.3, 3)
+
+
 @cache
 def _declared(builder: str, *args: Any) -> Stack:
     return {"everything": everything, "arm": arm, "conflicts": conflicts, "humanoid": humanoid}[builder](*args)

@@ -64,10 +64,11 @@ class Equalities:
 def independent(qp: QP, threshold: float = THRESHOLD, order: NDArray[np.int_] | None = None) -> Equalities:
     """Pivoted modified Gram-Schmidt on the normalised equality rows of ``qp``.
 
-    Variables with lower == upper are constants: their columns move to the right side first. Then, class by
-    class of ``order`` (low numbers first; one class if None), the row with the longest remainder is
-    taken next, near-ties (within 1e-6) by lowest index, and every remaining row is orthogonalised against it twice.
-    Rows whose remainder is at most ``threshold`` of their length are dropped. A dropped row is
+    Variables with lower == upper are constants: their columns move to the right side first; a row of which they leave
+    at most ``threshold`` of its length is dropped. Then, class by class of ``order`` (low numbers first; one class if
+    None), the row with the longest remainder is taken next, near-ties (within 1e-6) by lowest index, and every
+    remaining row is orthogonalised against it twice. Rows whose remainder is at most ``threshold`` of their length are
+    dropped. A dropped row is
     consistent if its right side is met within 1e-9 + threshold |A_i| |x|, x the nearest-to-zero point
     of the kept rows: the threshold hides no more than that.
     """
@@ -78,9 +79,9 @@ def independent(qp: QP, threshold: float = THRESHOLD, order: NDArray[np.int_] | 
     free = np.where(fixed, 0.0, qp.A[rows])
     right = qp.lower[n + rows] - qp.A[rows] @ constant
     length = np.sqrt(np.einsum("ij,ij->i", free, free))
-    # a remainder of at most rounding of the whole row is no direction at all
+    # what the constants leave of a row may be no direction at all
     whole = np.sqrt(np.einsum("ij,ij->i", qp.A[rows], qp.A[rows]))
-    usable = length > 1e-14 * whole
+    usable = length > threshold * whole
     rest = np.where(usable[:, None], free / np.where(usable, length, 1.0)[:, None], 0.0)
     priority = np.zeros(rows.size, dtype=np.int_) if order is None else np.asarray(order)[rows]
 
@@ -105,11 +106,19 @@ def independent(qp: QP, threshold: float = THRESHOLD, order: NDArray[np.int_] | 
                 rest -= along[:, None] * basis[k]
                 coordinates[:, k] += along
     coordinates *= length[:, None]
-    return _finish(rows, free, right, basis[: len(chosen)], coordinates[:, : len(chosen)], chosen, threshold)
+    independent_part = basis[: len(chosen)], coordinates[:, : len(chosen)]
+    return _finish(rows, free, right, *independent_part, chosen, threshold * whole, constant)
 
 
 def _finish(
-    rows: Index, free: Array, right: Array, basis: Array, coordinates: Array, chosen: list[int], threshold: float
+    rows: Index,
+    free: Array,
+    right: Array,
+    basis: Array,
+    coordinates: Array,
+    chosen: list[int],
+    hidden: Array,
+    constant: Array,
 ) -> Equalities:
     kept = np.array(chosen, dtype=np.intp)
     left = np.setdiff1d(np.arange(rows.size), kept)
@@ -119,8 +128,7 @@ def _finish(
         target[k] = (right[kept[k]] - triangle[k, :k] @ target[:k]) / triangle[k, k]
     point = target @ basis
     inconsistency = np.abs(free[left] @ point - right[left])
-    lengths = np.sqrt(np.einsum("ij,ij->i", free[left], free[left]))
-    room = _ROOM + threshold * lengths * float(np.linalg.norm(point))
+    room = _ROOM + hidden[left] * float(np.linalg.norm(point + constant))
     return Equalities(rows[kept], rows[left], inconsistency, inconsistency <= room, basis, target, triangle)
 
 

@@ -117,9 +117,8 @@ class Relaxation:
                 # no verdict: the rows of this class stay free, later ones are still tried
                 work.lower[n + rows], work.upper[n + rows] = -np.inf, np.inf
                 continue
-            v = np.clip(stage.x[:n], qp.lower[:n], qp.upper[:n])
             iterations += stage.iterations
-            self._freeze(work, rows, stage)
+            v = self._freeze(work, rows, stage)
         last = self._final.solve(work, warm=False)
         iterations += last.iterations
         flag = "relaxed" if last.solved else "failed"
@@ -153,25 +152,29 @@ class Relaxation:
                 break
         return None if best is None else Solution(best.x, best.multipliers, "solved", iterations)
 
-    def _freeze(self, work: QP, rows: NDArray[np.intp], stage: Solution) -> None:
-        """Write the least violation of a class into the bounds of its rows, and hold what pushes against it."""
+    def _freeze(self, work: QP, rows: NDArray[np.intp], stage: Solution) -> Array:
+        """Write the least violation of a class into the bounds of its rows, and hold what pushes against it.
+
+        Returns the point at which all that is held meets: the stage's x, put exactly on the bounds that are held.
+        """
         n, m = self.n, self.m
         s = np.zeros(m)
         s[rows] = stage.x[n + rows]
+        x = np.clip(stage.x[:n], work.lower[:n], work.upper[:n])
         given = rows[np.abs(s[rows]) > ROOM]
-        equal = rows[work.lower[n + rows] == work.upper[n + rows]]
-        value = work.A @ stage.x[:n]
+        equal = np.flatnonzero(work.lower[n:] == work.upper[n:])
         pushing = np.abs(stage.multipliers) > _PUSHING * np.abs(s).max(initial=0.0)
         others = np.setdiff1d(rows, np.union1d(given, equal))
         work.lower[n + others] -= ROOM
         work.upper[n + others] += ROOM
-        held = np.union1d(given, equal)
         if given.size:
             fixed = np.flatnonzero(pushing[:n])
             at = np.where(stage.multipliers[fixed] > 0.0, work.upper[fixed], work.lower[fixed])
-            work.lower[fixed] = work.upper[fixed] = at
-            held = np.union1d(held, np.setdiff1d(np.flatnonzero(pushing[n + m :]), rows))
-        work.lower[n + held] = work.upper[n + held] = value[held]
+            x[fixed] = work.lower[fixed] = work.upper[fixed] = at
+            before = np.setdiff1d(np.flatnonzero(pushing[n + m :]), rows)
+            held = np.union1d(np.union1d(given, equal), before)
+            work.lower[n + held] = work.upper[n + held] = (work.A @ x)[held]
+        return x
 
     def _meet(self, work: QP, x: Array) -> None:
         """Move the sides that x misses by rounding to x: of dependent equalities, one set of digits holds them all."""
