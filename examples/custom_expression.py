@@ -1,6 +1,5 @@
-"""A task of one's own in three lines: the hand keeps a height and stays as far from the elbow as a target says."""
+"""A task of one's own: any CasADi expression of the robot's kinematics; its Jacobian is derived."""
 
-import casadi as ca
 import pinocchio as pin
 
 import wbc
@@ -9,23 +8,23 @@ from wbc.tasks import Expression, Input
 robot = wbc.robots.load("panda")
 stack = wbc.Stack(robot, dt=0.005)
 
-height = Expression(
-    lambda kin, p: kin.position("panda_hand_tcp")[2] - p["height"],
-    inputs=(Input("height", unit="m", default=0.5),),
-    units=("m",),
-)
-stretch = Expression(
-    lambda kin, p: ca.norm_2(kin.position("panda_hand_tcp") - kin.position("panda_link4")) - p["distance"],
-    inputs=(Input("distance", unit="m", default=0.45),),
-    units=("m",),
-)
-stack.add(height, name="height").add(stretch, name="stretch").add(wbc.tasks.Posture(), weight=1e-4)
+# The three lines: the flange looks at a point, so two components of its direction in the flange's frame vanish
+point = Input("point", size=3, unit="m", default=[0.6, 0.3, 0.2])
+look = Expression(lambda kin, p: kin.pose("panda_link8").inverse_point(p["point"])[:2], units="m", inputs=[point])
+stack.add(look, name="look")
+
+stack.add(wbc.tasks.Posture(), name="posture", weight=1e-3)
 stack.add(wbc.tasks.JointLimits())
 controller = stack.compile()
 
 q = robot.neutral
-controller["height"].height = 0.35
-for _ in range(1000):
+for _ in range(600):
     step = controller.step(q)
     q = pin.integrate(robot.model, q, step.v * stack.dt)
-print("height error", step.residuals["height"], "| distance error", step.residuals["stretch"])
+print(step)
+
+controller["look"].point = [0.3, -0.5, 0.4]
+for _ in range(600):
+    step = controller.step(q)
+    q = pin.integrate(robot.model, q, step.v * stack.dt)
+print(step)
