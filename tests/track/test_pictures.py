@@ -1,0 +1,102 @@
+"""The renderer against known projections and shadows; a picture of a robot without meshes."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import wbc
+from wbc import track
+from wbc.shapes import Capsule, PlacedShape
+from wbc.track import render
+from wbc.track.picture import save_picture
+from wbc.track.plots import save_plots
+
+CAMERA = render.Camera(np.array([4.0, 0.0, 1.0]), np.array([0.0, 0.0, 1.0]), math.radians(40.0), 160, 120)
+RED = (1.0, 0.0, 0.0)
+
+
+def test_projection_of_known_points() -> None:
+    middle, right, up = CAMERA.project(np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 1.0], [0.0, 0.0, 2.0]]))
+    focal = 60.0 / math.tan(math.radians(20.0))
+    np.testing.assert_allclose(middle, [80.0, 60.0, 4.0])
+    np.testing.assert_allclose(right, [80.0 + focal / 4.0, 60.0, 4.0])
+    np.testing.assert_allclose(up, [80.0, 60.0 - focal / 4.0, 4.0])
+    rays = CAMERA.rays()
+    again = CAMERA.project(CAMERA.eye + 3.0 * rays)
+    np.testing.assert_allclose(again[30, 40], [40.5, 30.5, 3.0], atol=1e-9)
+    mask = np.zeros((120, 160), dtype=bool)
+    mask[30, 40] = True
+    np.testing.assert_allclose(CAMERA.rays(mask)[0], rays[30, 40])
+
+
+def test_sphere_covers_its_disc_and_has_its_depth() -> None:
+    layer = render.draw([render.sphere(np.array([0.0, 0.0, 1.0]), 0.5, RED)], CAMERA)
+    rays = CAMERA.rays()
+    # Ray against sphere, in closed form
+    a, b = np.sum(rays**2, axis=-1), rays @ (CAMERA.eye - np.array([0.0, 0.0, 1.0]))
+    root = b**2 - a * (16.0 - 0.25)
+    expected = np.where(root > 0.0, (-b - np.sqrt(np.maximum(root, 0.0))) / a, np.inf)
+    seen = np.isfinite(layer.depth)
+    assert (seen != np.isfinite(expected)).sum() < 30
+    both = seen & np.isfinite(expected) & (root > 0.02)
+    assert both.sum() > 800
+    np.testing.assert_allclose(layer.depth[both], expected[both], atol=5e-3)
+    normals = layer.normal[both]
+    points = CAMERA.eye + rays[both] * layer.depth[both][:, None]
+    outward = (points - np.array([0.0, 0.0, 1.0])) / 0.5
+    assert np.abs(np.sum(normals * outward, axis=1)).min() > 0.99
+
+
+def test_nearer_surfaces_hide_farther_ones() -> None:
+    near = render.sphere(np.array([1.0, 0.0, 1.0]), 0.2, RED)
+    far = render.sphere(np.array([0.0, 0.0, 1.0]), 0.5, (0.0, 0.0, 1.0))
+    for meshes in ([near, far], [far, near]):
+        layer = render.draw(meshes, CAMERA)
+        assert tuple(layer.colour[60, 80]) == RED
+        assert tuple(layer.colour[60 - 20, 80]) == (0.0, 0.0, 1.0)
+
+
+def test_a_ball_throws_its_shadow_along_the_light() -> None:
+    center = np.array([0.0, 0.0, 1.0])
+    shadows = render.Shadows([render.sphere(center, 0.3, RED), render.sphere(np.array([2.0, 2.0, 0.1]), 0.1, RED)])
+    below = center - render.LIGHT * (center[2] / render.LIGHT[2])
+    around = below + np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
+    np.testing.assert_allclose(shadows.lit(around, 0.01), [0.0, 1.0, 1.0])
+
+
+def test_tube_stays_at_its_radius() -> None:
+    t = np.linspace(0.0, 3.0, 50) ** 2
+    line = np.column_stack([np.cos(t / 3.0), np.sin(t / 3.0), t / 9.0])
+    points = render.tube(line, 0.02, RED).triangles.reshape(-1, 3)
+    gaps = np.linalg.norm(points[:, None] - line[None], axis=2).min(axis=1)
+    assert gaps.max() < 0.1
+    assert len(render.tube(np.zeros((4, 3)), 0.02, RED).triangles) == 0
+
+
+@pytest.mark.slow
+def test_picture_and_plots_of_a_robot_without_meshes(tmp_path: Path) -> None:
+    rows = [wbc.robots.DHRow(a=0.4) for _ in range(3)]
+    robot = wbc.robots.from_dh(rows)
+    lying = pin.SE3(pin.utils.rotate("y", math.pi / 2), np.array([-0.2, 0.0, 0.0]))
+    robot = robot.with_shapes({f"link{k}": [PlacedShape(Capsule(0.04, 0.4), lying)] for k in (1, 2, 3)})
+    start = np.array([0.3, 0.5, 0.5])
+    data = robot.model.createData()
+    pin.framesForwardKinematics(robot.model, data, start)
+    here = data.oMf[robot.model.getFrameId("tip")].copy()
+    there = pin.SE3(here.rotation, here.translation + np.array([0.0, -0.2, 0.0]))
+    plan = track.Plan(robot, "tip", track.SplinePath([0.0, 1.0], [here, there]), "down", start, dt=0.02, backend="vm")
+    log = track.track(plan)
+    file = save_picture(log, robot, tmp_path / "overview.png", size=(120, 80))
+    assert file is not None
+    import matplotlib.image
+
+    pixels = matplotlib.image.imread(file)
+    assert pixels.shape[:2] == (80, 120)
+    assert pixels[..., :3].std() > 0.02
+    names = {f.stem for f in save_plots(log, tmp_path)}
+    assert names == {"joints", "velocities", "accelerations", "errors", "tick_time"}
