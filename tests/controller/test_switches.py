@@ -1,291 +1,275 @@
-"""Run-time switches, masks, weights and gains: the same answer as from a stack that is declared that way."""
+"""Run-time switches and numbers mean what the declaration would have meant: held to stacks without the item or row."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from functools import cache
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
 import pytest
 
-from tests.controller.stacks import DT, FRAMES, controller, inside, robot
-from wbc import Controller, Stack
-from wbc.shapes import HalfSpace, Sphere
-from wbc.tasks import (
-    CenterOfMass,
-    Damping,
-    Elbow,
-    EndEffector,
-    Expression,
-    Fixed,
-    FrameVelocityLimit,
-    Hold,
-    Item,
-    JointLimits,
-    Obstacle,
-    PitchPlane,
-    PitchPlaneLimit,
-    Posture,
-)
-from wbc.tasks.base import registry
-
-TIP, MIDDLE, PLANE = FRAMES["panda"].tip, FRAMES["panda"].middle, FRAMES["panda"].plane
-JOINTS = robot("panda").joint_names
-LINKS = tuple(robot("panda").shapes)[1:]
-STATES = 8
-TARGET = pin.SE3(pin.exp3(np.array([0.3, 2.0, 0.7])), np.array([0.4, 0.2, 0.6]))
+from tests.controller.stacks import DT, FRAMES, controller, everything, near_limits, randomise, robot
+from wbc.controller import Controller, Stack
+from wbc.qp import QP
+from wbc.tasks import CenterOfMass, Damping, Elbow, EndEffector, Obstacle, Posture
 
 
-@dataclass(frozen=True, eq=False)
-class Kind:
-    """An item, the rows to keep, and an item that has these rows only; values to write before."""
-
-    item: Item
-    keep: tuple[int, ...] = ()
-    part: Item | None = None
-    values: Mapping[str, Any] = field(default_factory=dict)
-    #: values of the part where they are not those of the item
-    part_values: Mapping[str, Any] | None = None
-
-
-KINDS = {
-    "pose, position": Kind(
-        EndEffector(TIP),
-        (0, 1, 2),
-        EndEffector(TIP, kind="position"),
-        {"target": TARGET},
-        {"target": TARGET.translation},
-    ),
-    "pose, orientation": Kind(
-        EndEffector(TIP),
-        (3, 4, 5),
-        EndEffector(TIP, kind="orientation"),
-        {"target": TARGET},
-        {"target": TARGET.rotation},
-    ),
-    "elbow": Kind(
-        Elbow(MIDDLE),
-        (1, 2),
-        Expression(lambda kin, p: kin.position(MIDDLE)[1:] - np.array([0.1, 0.4]), units="m"),
-        {"target": (0.5, 0.1, 0.4)},
-        {},
-    ),
-    "mass": Kind(
-        CenterOfMass(),
-        (2,),
-        Expression(lambda kin, p: kin.center_of_mass()[2] - 0.3, units="m"),
-        {"target": (0.1, 0.1, 0.3)},
-        {},
-    ),
-    "posture": Kind(Posture(), (0, 2, 5), Posture((JOINTS[0], JOINTS[2], JOINTS[5])), {"target": np.full(7, 0.3)}),
-    "damping": Kind(
-        Damping(weights=(1, 2, 3, 4, 5, 6, 7)), (1, 6), Damping(weights=(0, 2, 0, 0, 0, 0, 7)), {"weight": 3.0}
-    ),
-    "plane": Kind(PitchPlane(*PLANE), values={"target": 1.0}),
-    "expression": Kind(
-        Expression(lambda kin, p: kin.q[:2] - 1.0, units="rad"),
-        (1,),
-        Expression(lambda kin, p: kin.q[1] - 1.0, units="rad"),
-    ),
-    "limits": Kind(JointLimits(margin=0.4), (1, 3), JointLimits(margin=0.4, joints=(JOINTS[1], JOINTS[3]))),
-    "fixed": Kind(Fixed(JOINTS[:3], acceleration=False), (0, 3, 4, 5, 6), Fixed(JOINTS[0], acceleration=False)),
-    "hold": Kind(Hold(TIP), (0, 1, 2), Hold(TIP, kind="position")),
-    "hold, turning": Kind(Hold(TIP), (3, 4, 5), Hold(TIP, kind="orientation")),
-    "speed": Kind(FrameVelocityLimit(TIP, linear=0.1, angular=0.1), (3, 4, 5), FrameVelocityLimit(TIP, angular=0.1)),
-    "ball": Kind(
-        Obstacle(Sphere(0.2), links=LINKS, pose=pin.SE3(np.eye(3), np.array([0.4, 0.0, 0.5]))),
-        (0, 1),
-        Obstacle(Sphere(0.2), links=LINKS[0], pose=pin.SE3(np.eye(3), np.array([0.4, 0.0, 0.5]))),
-        {"rate": 2.0},
-    ),
-    "floor": Kind(
-        Obstacle(HalfSpace(), links=LINKS),
-        (0, 1, 2),
-        Obstacle(HalfSpace(), links=LINKS[0]),
-        {"pose": pin.SE3(np.eye(3), np.array([0.0, 0.0, 0.2])), "rate": 2.0},
-    ),
-    "plane limit": Kind(PitchPlaneLimit(*PLANE, lower=-0.6, upper=0.6), values={"rate": 2.0}),
-}
-
-
-def declare(item: Item | None, backend: str) -> Controller:
-    """A posture that leaves nothing singular, and the item."""
-    stack = Stack(robot("panda"), DT).add(Posture(weights=(1, 1.5, 1, 2, 1, 1, 0.5)), name="rest", weight=0.3)
-    if item is not None:
-        stack.add(item, name="item")
-    return stack.compile(backend=backend)
-
-
-@cache
-def without() -> Controller:
-    return declare(None, "vm")
-
-
-def write(controller: Controller, values: Mapping[str, Any]) -> None:
-    for key, value in values.items():
-        setattr(controller["item"], key, value)
-
-
-def answers(controller: Controller) -> np.ndarray:
-    """Commands at some states, each about a measured velocity, towards a posture far away."""
-    rng, out = np.random.default_rng(8), []
-    controller.reset(robot("panda").neutral)
-    controller["rest"].target, controller["rest"].gain = np.array([1.0, -1.0, 1.5, -0.5, -1.5, 0.2, 2.0]), 3.0
-    for _ in range(STATES):
-        q = inside(robot("panda"), rng, 0.7)
-        out.append(controller.step(q, 0.3 * rng.normal(size=7)).v)
-    return np.array(out)
-
-
-def close(one: np.ndarray, two: np.ndarray) -> bool:
-    return bool(np.abs(one - two).max() < 1e-12)
-
-
-def differ(one: np.ndarray, two: np.ndarray) -> bool:
-    return bool(np.abs(one - two).max() > 1e-4)
-
-
-def test_every_class_is_here() -> None:
-    shipped = {name for name, kind in registry().items() if kind.__module__.startswith("wbc.tasks")} - {"Mechanism"}
-    assert {type(kind.item).__name__ for kind in KINDS.values()} == shipped
-
-
-@pytest.mark.parametrize("name", KINDS)
-def test_switched_off_is_not_there(name: str) -> None:
-    one = declare(KINDS[name].item, "vm")
-    write(one, KINDS[name].values)
-    on, off = answers(one), answers(without())
-    assert differ(on, off)
-    one["item"].enabled = False
-    assert close(answers(one), off)
-    one["item"].enabled = True
-    assert close(answers(one), on)
-    one["item"].mask = 0.0
-    assert close(answers(one), off)
-    one["item"].mask = 1.0
-    assert close(answers(one), on)
-    if one.layout.blocks["item"].form == "task":
-        one["item"].weight = 0.0
-        assert close(answers(one), off)
-
-
-@pytest.mark.parametrize("name", [name for name, kind in KINDS.items() if kind.part is not None])
-def test_a_masked_row_is_not_there(name: str) -> None:
-    kind = KINDS[name]
-    one, other = declare(kind.item, "vm"), declare(kind.part, "vm")
-    write(one, kind.values)
-    write(other, kind.values if kind.part_values is None else kind.part_values)
-    whole = answers(one)
-    mask = np.zeros(len(one.layout.blocks["item"].rows))
-    mask[list(kind.keep)] = 1.0
-    one["item"].mask = mask
-    part = answers(one)
-    assert differ(part, whole)
-    assert differ(part, answers(without()))
-    assert close(part, answers(other))
-    assert np.array_equal(one["item"].mask, mask)
-
-
-def test_each_side_of_a_plane_limit() -> None:
-    """With one side off: the whole limit where that side does not bind, and no limit where it alone binds."""
-    whole, lower, upper, none = (declare(PitchPlaneLimit(*PLANE, lower=-0.6, upper=0.6), "vm") for _ in range(4))
-    rng, seen = np.random.default_rng(9), set()
-    for each, mask in ((whole, (1, 1)), (lower, (1, 0)), (upper, (0, 1)), (none, (0, 0))):
-        each.reset(robot("panda").neutral)
-        each["item"].mask, each["item"].rate = mask, 2.0
-        each["rest"].target = np.zeros(7)
-    for _ in range(20):
-        q = inside(robot("panda"), rng, 0.7)
-        steps = [each.step(q, np.zeros(7)) for each in (whole, lower, upper, none)]
-        rows = [b.row for b in steps[0].binding]
-        for row, kept, dropped in (("lower", 1, 2), ("upper", 2, 1)):
-            if rows == [row]:
-                seen.add(row)
-                assert close(steps[kept].v, steps[0].v)
-                assert close(steps[dropped].v, steps[3].v)
-                assert differ(steps[kept].v, steps[3].v)
-    assert seen == {"lower", "upper"}
-
-
-def arm(backend: str, **hand: Any) -> Controller:
-    stack = Stack(robot("panda"), DT)
-    stack.add(EndEffector(TIP, gain=hand.get("gain")), name="hand", weight=hand.get("weight", 1.0))
-    stack.add(Posture(), name="posture", weight=hand.get("posture", 0.01))
-    stack.add(JointLimits(), name="limits")
-    return stack.compile(backend=backend)
-
-
-def walk(one: Controller, ticks: int = 8) -> list[bytes]:
-    """A few ticks in open loop towards a target; all numbers of each."""
-    q = inside(robot("panda"), np.random.default_rng(2), 0.3)
-    out = []
-    for tick in range(ticks):
-        step = one.step(q)
-        if tick == 0:
-            one["hand"].target = TARGET
-        q = pin.integrate(robot("panda").model, q, DT * step.v)
-        out.append(step._data)
+def without(stack: Stack, name: str) -> Stack:
+    """The same stack declared without one item."""
+    out = Stack(stack.robot, stack.dt)
+    for entry in stack.entries:
+        if entry.name != name:
+            out.add(entry.item, name=entry.name, weight=entry.weight)
     return out
 
 
-@pytest.mark.parametrize("backend", ["vm", "native"])
-def test_weights_and_gains_written_are_weights_and_gains_declared(backend: str) -> None:
-    declared, written = arm(backend, weight=0.3, posture=0.2), arm(backend)
-    written["hand"].weight, written["posture"].weight = 0.3, 0.2
-    assert walk(written) == walk(declared)
-    if backend == "vm":
-        declared, written = arm(backend, gain=7.5), arm(backend)
-        assert written["hand"].gain == EndEffector.default_gain
-        written["hand"].gain = 7.5
-        assert declared["hand"].gain == 7.5
-        assert walk(written) == walk(declared)
-    assert walk(arm(backend)) != walk(declared)
+def copy_values(source: Controller, target: Controller) -> None:
+    """All run-time values, by name."""
+    for name in target.layout.blocks:
+        for value in target[name].names:
+            setattr(target[name], value, getattr(source[name], value))
+
+
+def same(one: QP, two: QP) -> None:
+    """Equal problems; rows that are off may be there or not."""
+    assert one.H == pytest.approx(two.H, rel=1e-12, abs=1e-14)
+    assert one.g == pytest.approx(two.g, rel=1e-12, abs=1e-12)
+    n = one.n
+    assert np.array_equal(one.lower[:n], two.lower[:n])
+    assert np.array_equal(one.upper[:n], two.upper[:n])
+    rows = [
+        np.column_stack([qp.A, qp.lower[n:], qp.upper[n:]])[np.isfinite(qp.lower[n:]) | np.isfinite(qp.upper[n:])]
+        for qp in (one, two)
+    ]
+    assert np.array_equal(rows[0], rows[1])
+
+
+@pytest.fixture(scope="module")
+def full() -> Controller:
+    return controller("everything", "panda")
+
+
+@pytest.mark.parametrize("name", [entry.name for entry in everything("panda").entries])
+def test_disabled_is_as_if_not_declared(full: Controller, name: str) -> None:
+    rng = np.random.default_rng(len(name))
+    q, v = near_limits(full.stack.robot, rng), rng.normal(size=7)
+    randomise(full, rng)
+    for each in full.layout.blocks:
+        full[each].enabled = True
+    full[name].enabled = False
+    smaller = without(full.stack, name).compile(backend="vm")
+    copy_values(full, smaller)
+    full.step(q, v)
+    smaller.step(q, v)
+    for each in (full, smaller):
+        each.tick.v_last[:] = v
+    same(full.qp(), smaller.qp())
+    # what is off is still measured
+    if name in full.step(q, v).residuals:
+        assert full.step(q, v).residuals[name].values.size == len(full.layout.blocks[name].rows)
+
+
+def test_masked_rows_are_as_if_not_there(full: Controller) -> None:
+    """Rows of tasks by the referee of the whole QP; here each row alone, of every item."""
+    rng = np.random.default_rng(5)
+    q, v = near_limits(full.stack.robot, rng), rng.normal(size=7)
+    randomise(full, rng)
+    for name, block in full.layout.blocks.items():
+        full[name].enabled = True
+        full[name].mask = 1.0
+        if block.form == "task":
+            full[name].weight = 1.0
+    full.step(q, v)
+    full.tick.v_last[:] = v
+    whole = full.qp()
+    for name, block in full.layout.blocks.items():
+        for k in range(len(block.rows)):
+            mask = np.ones(len(block.rows))
+            mask[k] = 0.0
+            full[name].mask = mask
+            part = full.qp()
+            if block.form == "task":
+                full[name].mask = 1.0 - mask
+                only = full.qp()
+                full[name].enabled = False
+                none = full.qp()
+                full[name].enabled = True
+                scale = np.abs(whole.H).max()
+                assert np.abs((whole.H - part.H) - (only.H - none.H)).max() < 1e-12 * scale
+                assert np.linalg.matrix_rank(only.H - none.H, tol=1e-9 * scale) <= 1
+            elif block.form == "bounds":
+                others = np.arange(7) != k
+                assert np.array_equal(part.lower[:7][others], whole.lower[:7][others])
+            else:
+                row = 7 + block.start + k
+                assert np.isneginf(part.lower[row])
+                assert np.isposinf(part.upper[row])
+                others = np.arange(whole.lower.size) != row
+                assert np.array_equal(part.lower[others], whole.lower[others])
+        full[name].mask = 1.0
 
 
 @pytest.mark.parametrize("backend", ["vm", "native"])
-def test_a_mask_multiplies_declared_row_weights(backend: str) -> None:
-    """Row weight = weight * mask * declared row weight / scale^2."""
-    one = controller("everything", "panda", backend=backend)
-    span, length = one.layout.blocks["hand_in_base"].span, one.stack.length
-    one["hand_in_base"].mask, one["hand_in_base"].weight = (1, 0, 2, 3, 0.5, 7), 0.25
-    declared, scale = np.array([1, 2, 3, 4, 5, 0]), np.array([length] * 3 + [1.0] * 3)
-    expected = 0.25 * np.array([1, 0, 2, 3, 0.5, 7]) * declared / scale**2
-    np.testing.assert_allclose(one.tick.weight[span], expected, rtol=1e-15)
-    one["hand_in_base"].enabled = False
-    assert not one.tick.weight[span].any()
-    one["hand_in_base"].enabled = True
-    np.testing.assert_allclose(one.tick.weight[span], expected, rtol=1e-15)
+def test_weights_gains_and_rates_equal_those_declared(backend: str) -> None:
+    """One controller with numbers set at run time, one that was declared with them."""
+    bot, f = robot("panda"), FRAMES["panda"]
+    one, two = Stack(bot, DT), Stack(bot, DT)
+    for stack, w, gain, weights in ((one, 1.0, None, None), (two, 0.25, 3.5, (1, 2, 0, 0.5, 1, 3))):
+        stack.add(EndEffector(f.tip, weights=weights, gain=gain), name="hand", weight=w)
+        stack.add(Posture(), name="posture", weight=1e-3 * w)
+    changed, declared = one.compile(backend=backend), two.compile(backend=backend)
+    changed["hand"].weight, changed["hand"].gain, changed["posture"].weight = 0.25, 3.5, 0.25e-3
+    changed["hand"].mask = (1, 2, 0, 0.5, 1, 3)
+    target = pin.SE3(pin.exp3(np.array([0.1, 0.2, -0.3])), np.array([0.4, 0.2, 0.6]))
+    rng = np.random.default_rng(0)
+    for each in (changed, declared):
+        each["hand"].target = target
+    for _ in range(10):
+        q = near_limits(bot, rng)
+        for each in (changed, declared):
+            each["posture"].target = bot.neutral
+        assert np.array_equal(changed.step(q).v, declared.step(q).v)
 
 
-@pytest.mark.parametrize("switch", ["ball", "limits", "posture"])
-def test_switches_of_the_compiled_tick(switch: str) -> None:
-    """The compiled tick with an item off against the virtual machine with the same item off, and against itself on."""
-    found: dict[tuple[str, bool], np.ndarray] = {}
-    for backend in ("native", "vm"):
-        for on in (True, False):
-            one = controller("arm", "panda", 0.3, backend=backend)
-            one["hand"].enabled = False
-            one["ball"].pose, one["ball"].rate = pin.SE3(np.eye(3), np.array([0.4, 0.0, 0.5])), 2.0
-            one["posture"].target = np.array([1.0, -1.0, 1.5, -0.5, -1.5, 0.2, 2.0])
-            one[switch].enabled = on
-            rng = np.random.default_rng(8)
-            steps = [one.step(inside(robot("panda"), rng, 0.7), 0.1 * rng.normal(size=7)) for _ in range(STATES)]
-            found[backend, on] = np.array([s.v for s in steps])
-    for on in (True, False):
-        assert np.abs(found["native", on] - found["vm", on]).max() < 1e-6
-    assert differ(found["native", True], found["native", False])
+def test_written_values_read_back() -> None:
+    tick, rng = controller("everything", "talos"), np.random.default_rng(1)
+    written = randomise(tick, rng)
+    for name, values in written.items():
+        for key, value in values.items():
+            back = getattr(tick[name], key)
+            if isinstance(value, pin.SE3):
+                assert isinstance(back, pin.SE3)
+                assert back.isApprox(value, 1e-15)
+            else:
+                assert np.array_equal(back, value)
+                assert isinstance(back, type(value))
+    # what is read is a copy
+    tick["hand"].target.translation[:] = 0.0
+    tick["posture"].target[:] = 0.0
+    tick["hand"].mask[:] = 0.0
+    assert tick["hand"].target.isApprox(written["hand"]["target"], 1e-15)
+    assert np.array_equal(tick["posture"].target, written["posture"]["target"])
+    assert np.array_equal(tick["hand"].mask, written["hand"]["mask"])
+    # and so is what was written
+    mine = np.array(written["posture"]["target"])
+    tick["posture"].target = mine
+    mine[:] = 0.0
+    assert np.array_equal(tick["posture"].target, written["posture"]["target"])
 
 
-def test_an_item_that_is_off_binds_nothing_and_still_reports() -> None:
-    one = declare(KINDS["floor"].item, "vm")
-    write(one, {"pose": pin.SE3(np.eye(3), np.array([0.0, 0.0, 0.8])), "enabled": False})
-    one["rest"].enabled = False
-    step = one.step(robot("panda").neutral)
-    assert step.margins["item"].min() < 0.0
-    assert step.binding == ()
-    assert step.relaxed == ()
-    one["item"].enabled = True
-    assert {b.item for b in one.step(robot("panda").neutral).binding} == {"item"}
+def test_first_configuration_is_the_default_target() -> None:
+    """A fresh controller stays where it is, every task and hold; a moved robot is pulled back."""
+    tick = controller("everything", "ur5")
+    bot, rng = tick.stack.robot, np.random.default_rng(3)
+    q = near_limits(bot, rng, share=0.0)
+    for name in ("ball", "floor", "limits", "fixed"):
+        tick[name].enabled = False
+    step = tick.step(q)
+    assert np.abs(step.v).max() < 1e-9
+    assert all(np.abs(r.values).max() < 1e-12 for r in step.residuals.values())
+    data = bot.model.createData()
+    pin.framesForwardKinematics(bot.model, data, q)
+    assert tick["hand"].target.isApprox(data.oMf[bot.model.getFrameId("tool0")], 1e-12)
+    assert tick["com"].target == pytest.approx(pin.centerOfMass(bot.model, data, q))
+    assert np.array_equal(tick["posture"].target, q)
+    moved = q + 0.05
+    assert np.abs(tick.step(moved).v).max() > 1e-3
+    assert np.array_equal(tick["posture"].target, q)  # taken once
+    # a reset takes those again that nobody has set, and only those
+    tick["com"].target = (0.1, 0.2, 0.3)
+    tick.reset(moved)
+    assert np.array_equal(tick["posture"].target, moved)
+    assert tick["com"].target == pytest.approx([0.1, 0.2, 0.3])
+    tick.reset()
+    tick.step(q)
+    assert np.array_equal(tick["posture"].target, q)
+    assert tick["com"].target == pytest.approx([0.1, 0.2, 0.3])
+
+
+def test_default_rate_fits_the_longest_tick() -> None:
+    stack = Stack(robot("panda"), dt=0.1).add(Obstacle(everything("panda")["ball"].item.shape), name="ball")
+    tick = stack.compile(backend="vm")
+    assert tick["ball"].rate * stack.dt_range[1] <= 1.0
+    assert tick["ball"].rate == pytest.approx(5.0)
+
+
+def test_reset_starts_anew() -> None:
+    """After any history a reset gives the bits of a fresh controller with the same values."""
+    for backend in ("vm", "native"):
+        used, fresh = (controller("arm", "panda", backend=backend) for _ in range(2))
+        bot, rng = used.stack.robot, np.random.default_rng(2)
+        for _ in range(20):
+            used.step(near_limits(bot, rng), rng.normal(size=7), DT * rng.uniform(0.3, 1.9))
+        v = rng.normal(size=7)
+        path = [near_limits(bot, rng) for _ in range(5)]
+        for each in (used, fresh):
+            each.reset(path[0], v)
+        assert np.array_equal(used.last_command, v)
+        for q in path:
+            assert used.step(q)._data == fresh.step(q)._data
+        used.reset()
+        assert not used.last_command.any()
+
+
+def test_acceleration_counts_from_the_last_command_or_from_v() -> None:
+    tick = controller("arm", "panda", backend="native")
+    bot = tick.stack.robot
+    q = bot.neutral
+    tick.reset(q)
+    tick["hand"].target = pin.SE3(np.eye(3), np.array([5.0, 5.0, 5.0]))
+    reach = bot.limits.acceleration * DT
+    first = tick.step(q)
+    assert np.abs(first.v).max() == pytest.approx(reach.max())
+    second = tick.step(q)
+    assert np.abs(second.v).max() == pytest.approx(2 * reach.max())
+    assert np.array_equal(tick.last_command, second.v)
+    measured = np.full(7, 0.01)
+    third = tick.step(q, measured)
+    assert (np.abs(third.v - measured) <= reach + 1e-15).all()
+    # a longer tick reaches further, a shorter one less, and the declared one is back afterwards
+    for dt in (tick.stack.dt_range[1], tick.stack.dt_range[0], DT):
+        step = tick.step(q, measured, dt)
+        assert np.abs(step.v - measured).max() == pytest.approx(10.0 * dt)
+    assert np.abs(tick.step(q, measured).v - measured).max() == pytest.approx(10.0 * DT)
+
+
+def test_margins_ahead_are_the_margins_of_the_next_state() -> None:
+    """h(q (+) v dt), the moving ball moved on: held to the margins that the next step measures."""
+    for name in ("panda", "kinova", "talos"):
+        tick, rng = controller("everything", name), np.random.default_rng(7)
+        bot = tick.stack.robot
+        for _ in range(4):
+            q, v, dt = near_limits(bot, rng), rng.normal(size=bot.nv), DT * rng.uniform(0.25, 2.0)
+            randomise(tick, rng)
+            step = tick.step(q, v, dt)
+            for obstacle in ("ball", "floor"):
+                pose, twist = tick[obstacle].pose, tick[obstacle].velocity
+                turn = pin.exp3(twist[3:] * dt) @ pose.rotation
+                tick[obstacle].pose = pin.SE3(turn, pose.translation + twist[:3] * dt)
+            after = tick.step(pin.integrate(bot.model, q, step.v * dt), v, dt)
+            for obstacle in ("ball", "floor"):
+                assert step.margins_ahead[obstacle] == pytest.approx(after.margins[obstacle], abs=1e-10)
+
+
+def residual_items() -> list[tuple[Any, str]]:
+    f = FRAMES["panda"]
+    return [
+        (EndEffector(f.tip), "m"),
+        (EndEffector(f.tip, kind="orientation"), "rad"),
+        (Elbow(f.middle), "m"),
+        (CenterOfMass(), "m"),
+        (Posture(), "rad"),
+        (Damping(), "rad"),
+    ]
+
+
+@pytest.mark.parametrize(("item", "unit"), residual_items(), ids=lambda x: type(x).__name__ if hasattr(x, "rows") else x)
+def test_residuals_name_rows_and_units(item: Any, unit: str) -> None:
+    tick = Stack(robot("panda"), DT).add(item, name="it").compile(backend="vm")
+    residual = tick.step(robot("panda").neutral).residuals["it"]
+    rows = item.rows(robot("panda"))
+    assert residual.labels == tuple(r.label for r in rows)
+    assert residual.units == tuple(r.unit for r in rows)
+    assert unit in residual.units
+    assert residual.norm(unit) == pytest.approx(0.0, abs=1e-12)
+    assert unit in str(residual)
