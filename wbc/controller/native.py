@@ -8,6 +8,7 @@ import pathlib
 import numpy as np
 
 from wbc.controller.report import INFINITE, ReportLayout
+from wbc.controller.tick import Assembly
 from wbc.errors import CompileError
 from wbc.qp.problem import QP
 from wbc.stack.layout import Layout
@@ -33,8 +34,8 @@ _FIELDS = (
 )
 
 
-class NativeTick:
-    """Memory of one controller and the functions of its library; see :class:`wbc.controller.tick.Tick`.
+class NativeTick(Assembly):
+    """Memory of one controller and the functions of its library; see :class:`wbc.controller.tick.Buffers`.
 
     The report's size in memory is checked against the layout, so that a library of another layout is refused.
     """

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Protocol
-
 import numpy as np
 from numpy.typing import NDArray
 
 from wbc.controller.report import BRAKED, INFINITE, RELAXED, SOLVED, TOLERANCE, ReportLayout
+from wbc.controller.tick import Assembly, Buffers
 from wbc.qp.certificate import Certificate, certify
 from wbc.qp.problem import QP, Solution
 from wbc.qp.relax import Relaxation, Relaxed
@@ -21,58 +20,18 @@ from wbc.validation import Array
 _NONE = Certificate(INFINITE, INFINITE, INFINITE, INFINITE)
 
 
-class Assembly(Protocol):
-    """Buffers and the QP at their values."""
-
-    q: Array
-    v_last: Array
-    v_in: Array
-    use_v: Array
-    p: Array
-    dt: Array
-    weight: Array
-    enabled: Array
-    bound_enabled: Array
-    report: Array
-
-    def check(self) -> int:
-        """0, or the flag of refused inputs."""
-
-    @property
-    def usable(self) -> bool:
-        """Numbers of the last QP are finite and every simple bound leaves an interval."""
-
-    def qp(self) -> QP:
-        """The QP."""
-
-    def look_ahead(self) -> None:
-        """Margins after the step."""
-
-
-class SolvedTick:
+class SolvedTick(Buffers):
     """Assembly, then a kept solver with its relaxation, then the certificate; see ``native/tick.c``."""
 
     def __init__(self, assembly: Assembly, stack: Declaration, layout: Layout, solver: str) -> None:
         self._assembly = assembly
-        for name in ("q", "v_last", "v_in", "use_v", "p", "dt", "weight", "enabled", "bound_enabled", "report"):
-            setattr(self, name, getattr(assembly, name))
+        self.share(assembly)
         self._nv = layout.nv
         self._places = ReportLayout(layout)
         self._solver = make_solver(solver, layout.nv, layout.general_rows)
         self._relaxation = Relaxation(layout.nv, layout.general_rows, self._solver)
         self._orders = np.array(row_orders(layout), dtype=np.int_)
         self._units = np.array(row_units(stack, layout), dtype=np.float64)
-
-    q: Array
-    v_last: Array
-    v_in: Array
-    use_v: Array
-    p: Array
-    dt: Array
-    weight: Array
-    enabled: Array
-    bound_enabled: Array
-    report: Array
 
     def reset(self) -> None:
         self._solver.reset()

@@ -1,20 +1,29 @@
-"""What a tick is to the controller: named buffers, and one call."""
+"""What ticks have in common: the flat buffers that the controller writes and the report that it reads."""
 
 from __future__ import annotations
 
-from typing import Protocol
+from abc import ABC, abstractmethod
 
 from wbc.qp.problem import QP
 from wbc.validation import Array
 
 
-class Tick(Protocol):
-    """Buffers that the controller writes, a report that it reads, and ``step``."""
+class Buffers:
+    """Flat float64 arrays, written in place.
+
+    Attributes:
+        q: configuration. v_in, use_v: a measured velocity, taken where ``use_v`` is not 0.
+        v_last: the velocity that accelerations are counted from.
+        p: run-time inputs, see :class:`wbc.stack.layout.Layout`. dt: one number.
+        weight: of each task row, scale included. enabled: 1 or 0 for each general row.
+        bound_enabled: the same for each entry of each bound block.
+        report: see :class:`wbc.controller.report.ReportLayout`.
+    """
 
     q: Array
-    v_last: Array
     v_in: Array
     use_v: Array
+    v_last: Array
     p: Array
     dt: Array
     weight: Array
@@ -22,14 +31,28 @@ class Tick(Protocol):
     bound_enabled: Array
     report: Array
 
+    def share(self, other: Buffers) -> None:
+        """Use the arrays of ``other``."""
+        for name in Buffers.__annotations__:
+            setattr(self, name, getattr(other, name))
+
+
+class Assembly(Buffers, ABC):
+    """Buffers and the QP at their values."""
+
+    @abstractmethod
     def check(self) -> int:
         """Take q and a measured velocity over, or put the last good q back; negative for refused inputs."""
 
-    def step(self) -> int:
-        """Run one cycle; the flag, negative for refused inputs."""
+    @property
+    @abstractmethod
+    def usable(self) -> bool:
+        """Numbers of the last QP are finite and every simple bound leaves an interval."""
 
-    def reset(self) -> None:
-        """Forget the active set of the last cycle."""
-
+    @abstractmethod
     def qp(self) -> QP:
-        """The QP of the last cycle, before any relaxation."""
+        """The QP at the buffers' values, before any relaxation."""
+
+    @abstractmethod
+    def look_ahead(self) -> None:
+        """Margins after the step, into the report."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from wbc.controller.report import BAD_Q, BAD_UNIT, BAD_V, INFINITE, TOLERANCE, UNIT_TOLERANCE, ReportLayout
+from wbc.controller.tick import Assembly
 from wbc.qp.problem import QP
 from wbc.stack.codegen import bound_sequence, unit_groups
 from wbc.stack.declaration import Declaration
@@ -30,7 +31,7 @@ def _room(count: int) -> Array:
     return np.zeros(max(1, count))
 
 
-class VmAssembly:
+class VmAssembly(Assembly):
     """Buffers of a controller and the QP at their values; mirrors the first half of ``native/tick.c``."""
 
     def __init__(self, program: Program, stack: Declaration, layout: Layout) -> None:
@@ -60,7 +61,7 @@ class VmAssembly:
         self._units = unit_groups(stack)
         self._dof_scales = layout.dof_scales(stack)
         self._q_good = self.q.copy()
-        self.usable = True
+        self._usable = True
 
     def check(self) -> int:
         """Refuse bad inputs, or take over a measured velocity; 0 or a negative flag."""
@@ -89,7 +90,7 @@ class VmAssembly:
         self._A[self._a_index] = out["at"][: len(self._a_index[0])]
         factor, wish = out["factor"][: layout.task_rows].copy(), out["wish"][: layout.task_rows].copy()
         J = self._J.copy()
-        self.usable = self._drop_idle_rows(J, wish, factor)
+        self._usable = self._drop_idle_rows(J, wish, factor)
         self.report[self.places["factor"]] = factor
         weighted = (self.weight * factor)[:, None] * J
         H = J.T @ weighted
@@ -101,7 +102,7 @@ class VmAssembly:
         A = np.where(on[:, None], self._A, 0.0)
         low_rows = np.where(on, out["low"][: layout.general_rows], -np.inf)
         high_rows = np.where(on, out["high"][: layout.general_rows], np.inf)
-        self.usable &= bool(np.isfinite(A).all() and (low_rows < INFINITE).all() and (high_rows > -INFINITE).all())
+        self._usable &= bool(np.isfinite(A).all() and (low_rows < INFINITE).all() and (high_rows > -INFINITE).all())
         low_rows[low_rows <= -INFINITE], high_rows[high_rows >= INFINITE] = -np.inf, np.inf
         return QP(H, g, np.concatenate((low, low_rows)), np.concatenate((high, high_rows)), A)
 
@@ -137,7 +138,7 @@ class VmAssembly:
             first, last = np.where(rounding, middle, first), np.where(rounding, middle, last)
             on = self.bound_enabled[part] != 0.0
             interval = (first <= last) & (first < INFINITE) & (last > -INFINITE)
-            self.usable &= bool((interval | ~on).all())
+            self._usable &= bool((interval | ~on).all())
             on &= interval
             new_low = np.where(on, np.clip(first, low, high), low)
             new_high = np.where(on, np.clip(last, low, high), high)
@@ -145,6 +146,11 @@ class VmAssembly:
             owner_high[new_high < high] = b
             low, high = new_low, new_high
         return low, high
+
+    @property
+    def usable(self) -> bool:
+        """Numbers of the last QP are finite and every simple bound leaves an interval."""
+        return self._usable
 
     def look_ahead(self) -> None:
         """Margins at q (+) v dt, into the report."""
