@@ -1,0 +1,259 @@
+"""Declaring a stack: what ``add`` takes and refuses, and the rows of the mechanism that come by themselves."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import wbc.robots
+from tests.stack import small
+from wbc.controller import Stack
+from wbc.errors import (
+    DuplicateNameError,
+    LevelError,
+    NotFiniteError,
+    RangeError,
+    ShapeError,
+    UnknownNameError,
+    WbcError,
+)
+from wbc.robot import Robot
+from wbc.tasks import Damping, Elbow, EndEffector, Fixed, FrameVelocityLimit, Hold, JointLimits, Posture
+from wbc.tasks.mechanism import Mechanism
+
+
+def fresh() -> Stack:
+    """A stack that has an item already."""
+    return Stack(small.arm(), 0.01).add(Posture())
+
+
+@pytest.mark.parametrize(
+    ("add", "error", "field", "says"),
+    [
+        pytest.param(lambda s: s.add(Posture()), DuplicateNameError, "name", "'posture'", id="default name twice"),
+        pytest.param(
+            lambda s: s.add(Damping(), name="posture"), DuplicateNameError, "name", "name=", id="another item's name"
+        ),
+        pytest.param(lambda s: s.add(Damping(), level=1), LevelError, "level", "valid: 0", id="level 1"),
+        pytest.param(lambda s: s.add(Damping(), level=-1), LevelError, "level", "never", id="level -1"),
+        pytest.param(lambda s: s.add(Damping(), level=0.0), ShapeError, "level", "integer", id="level 0.0"),
+        pytest.param(lambda s: s.add(Damping(), level=True), ShapeError, "level", "integer", id="level True"),
+        pytest.param(lambda s: s.add(Damping(), level="0"), ShapeError, "level", "integer", id="level a word"),
+        pytest.param(lambda s: s.add(Damping(), weight=-1), RangeError, "weight", "[0, inf]", id="negative weight"),
+        pytest.param(lambda s: s.add(Damping(), weight=float("nan")), NotFiniteError, "weight", "nan", id="weight NaN"),
+        pytest.param(lambda s: s.add(Damping(), weight=np.inf), NotFiniteError, "weight", "inf", id="weight inf"),
+        pytest.param(lambda s: s.add(Damping(), weight=[1, 2]), ShapeError, "weight", "shape", id="weight of two"),
+        pytest.param(lambda s: s.add(Damping(), weight="1"), ShapeError, "weight", "real", id="weight a word"),
+        pytest.param(lambda s: s.add(Damping(), weight=None), ShapeError, "weight", "real", id="weight None"),
+        pytest.param(lambda s: s.add(JointLimits(), weight=2.0), RangeError, "weight", "hard", id="constraint 2"),
+        pytest.param(lambda s: s.add(JointLimits(), weight=0.0), RangeError, "weight", "hard", id="constraint 0"),
+        pytest.param(lambda s: s.add(Damping), ShapeError, "item", "instance", id="a class"),
+        pytest.param(lambda s: s.add(None), ShapeError, "item", "a task or a constraint", id="nothing"),
+        pytest.param(lambda s: s.add("posture"), ShapeError, "item", "a task or a constraint", id="a word"),
+        pytest.param(lambda s: s.add(Damping(), name=""), ShapeError, "name", "non-empty", id="an empty name"),
+        pytest.param(lambda s: s.add(Damping(), name=3), ShapeError, "name", "string", id="a number for a name"),
+        pytest.param(lambda s: s.add(Damping(weights=(1,))), ShapeError, "Damping.weights", "2", id="weights of rows"),
+        pytest.param(lambda s: s.add(Fixed(("joint9",))), UnknownNameError, "Fixed.joints", "joint1", id="a joint"),
+    ],
+)
+def test_refused(add: Callable[[Stack], Any], error: type[WbcError], field: str, says: str) -> None:
+    stack = fresh()
+    before = stack.entries
+    with pytest.raises(error) as caught:
+        add(stack)
+    assert caught.value.field == field
+    assert says in str(caught.value)
+    assert stack.entries == before
+    assert len(stack.add(Damping(), name="next")) == 2, "the next good call works"
+
+
+@pytest.mark.parametrize(
+    ("item", "field"),
+    [
+        (EndEffector, "EndEffector.frame"),
+        (lambda frame: EndEffector("tip", relative_to=frame), "EndEffector.relative_to"),
+        (lambda frame: EndEffector("tip", axes=frame), "EndEffector.axes"),
+        (Elbow, "Elbow.frame"),
+        (Hold, "Hold.frame"),
+        (lambda frame: FrameVelocityLimit(frame, linear=1.0), "FrameVelocityLimit.frame"),
+    ],
+)
+@pytest.mark.parametrize(("wrong", "meant"), [("tpi", "tip"), ("Link2", "link2"), ("link_1", "link1")])
+def test_unknown_frames_list_the_nearest(item: Callable[[str], Any], field: str, wrong: str, meant: str) -> None:
+    stack = fresh()
+    with pytest.raises(UnknownNameError) as caught:
+        stack.add(item(wrong), name="x")
+    assert caught.value.field == field
+    assert caught.value.value == wrong
+    assert caught.value.choices[0] == meant
+    assert set(stack.robot.frame_names) <= set(caught.value.choices)
+    assert f"did you mean {meant!r}" in str(caught.value)
+    assert "x" not in stack
+
+
+def test_unknown_items_list_the_nearest() -> None:
+    stack = fresh().add(EndEffector("tip"), name="hand").add(JointLimits(), name="limits")
+    for names in (stack, stack.compile(backend="vm")):
+        with pytest.raises(UnknownNameError) as caught:
+            names["hnad"]
+        assert caught.value.field == "item"
+        assert caught.value.choices[0] == "hand"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "error", "field"),
+    [
+        ({"dt": 0.0}, RangeError, "dt"),
+        ({"dt": -0.01}, RangeError, "dt"),
+        ({"dt": float("nan")}, NotFiniteError, "dt"),
+        ({"dt": np.inf}, NotFiniteError, "dt"),
+        ({"dt": "0.01"}, ShapeError, "dt"),
+        ({"dt": [0.01]}, ShapeError, "dt"),
+        ({"dt": None}, ShapeError, "dt"),
+        ({"damping": 0.0}, RangeError, "damping"),
+        ({"damping": -1e-8}, RangeError, "damping"),
+        ({"damping": 9e-13}, RangeError, "damping"),
+        ({"damping": 1.1}, RangeError, "damping"),
+        ({"damping": float("nan")}, NotFiniteError, "damping"),
+        ({"length": 0.0}, RangeError, "length"),
+        ({"length": -1.0}, RangeError, "length"),
+        ({"length": float("nan")}, NotFiniteError, "length"),
+        ({"robot": "panda"}, ShapeError, "robot"),
+        ({"robot": None}, ShapeError, "robot"),
+        ({"robot": pin.Model()}, ShapeError, "robot"),
+    ],
+)
+def test_stack_arguments_are_checked(arguments: dict[str, Any], error: type[WbcError], field: str) -> None:
+    with pytest.raises(error) as caught:
+        Stack(**{"robot": small.arm(), "dt": 0.01} | arguments)
+    assert caught.value.field == field
+
+
+@pytest.mark.parametrize("damping", [1e-12, 1e-8, 1.0, 1])
+def test_damping_within_its_range(damping: float) -> None:
+    assert Stack(small.arm(), 0.01, damping=damping).damping == damping
+
+
+@pytest.mark.parametrize(
+    ("options", "error"), [({"solver": "dapq"}, UnknownNameError), ({"backend": "gpu"}, UnknownNameError)]
+)
+def test_compile_options_are_names(options: dict[str, str], error: type[WbcError]) -> None:
+    with pytest.raises(error) as caught:
+        fresh().compile(**options)
+    assert [caught.value.field] == list(options)
+    assert caught.value.choices
+
+
+def test_calls_chain_and_keep_their_order() -> None:
+    stack = Stack(small.arm(), np.float32(0.5))
+    same = (
+        stack.add(JointLimits())
+        .add(EndEffector("tip"), name="hand", weight=np.int64(3))
+        .add(Damping(), level=0)
+        .add(FrameVelocityLimit("tip", linear=1.0), weight=1)
+    )
+    assert same is stack
+    assert [e.name for e in stack.entries] == ["joint_limits", "hand", "damping", "frame_velocity_limit"]
+    assert [e.name for e in stack.tasks] == ["hand", "damping"]
+    assert [e.name for e in stack.constraints] == ["joint_limits", "frame_velocity_limit"]
+    assert (stack["hand"].weight, stack["hand"].level, stack["hand"].is_task) == (3.0, 0, True)
+    assert "hand" in stack
+    assert "Hand" not in stack
+    assert len(stack) == 4
+    assert stack.dt == 0.5
+    assert stack.dt_range == (0.125, 1.0)
+
+
+# The mechanism
+
+
+@cache
+def robot(name: str) -> Robot:
+    """A robot of the table, with speed limits everywhere."""
+    bare = wbc.robots.load(name, shapes="none")
+    return bare.with_limits(velocity=np.where(np.isfinite(bare.limits.velocity), bare.limits.velocity, 1.0))
+
+
+def test_no_mechanism_without_reason() -> None:
+    assert not robot("panda").couplings
+    assert not robot("panda").locked_dofs
+    assert len(Stack(robot("panda"), 0.005)) == 0
+
+
+@pytest.mark.parametrize("name", ["tiago", "talos_full", "panda_fingers"])
+def test_mechanism_comes_by_itself(name: str) -> None:
+    bot = loaded(name)
+    assert bot.couplings or bot.locked_dofs
+    stack = Stack(bot, 0.005)
+    assert [e.name for e in stack.entries] == ["mechanism"]
+    assert isinstance(stack["mechanism"].item, Mechanism)
+    assert len(stack["mechanism"].item.rows(bot)) == len(bot.couplings) + len(bot.locked_dofs)
+    with pytest.raises(DuplicateNameError):
+        stack.add(Mechanism())
+
+
+def loaded(name: str) -> Robot:
+    """A robot by name; ``panda_fingers`` is the arm with its two coupled fingers."""
+    if name != "panda_fingers":
+        return robot(name)
+    return wbc.robots.load("panda", lock=(), shapes="none")
+
+
+def consistent(bot: Robot, q: np.ndarray) -> np.ndarray:
+    """q with every follower where its leader puts it."""
+    out = np.array(q)
+    for c in bot.couplings:
+        here, there = (int(bot.position_index[i]) for i in (c.follower, c.leader))
+        out[here] = c.ratio * out[there] + c.offset
+    return out
+
+
+@pytest.mark.parametrize("name", ["tiago", "talos_full", "panda_fingers"])
+def test_mechanism_holds_on_the_command(name: str) -> None:
+    bot, rng = loaded(name), np.random.default_rng(5)
+    stack = Stack(bot, 0.005).add(Posture(gain=1.0), name="posture").add(JointLimits(acceleration=False))
+    tick = stack.compile(backend="vm")
+    spread = np.where(bot.position_index < 0, 0.5, 0.1)
+    moved, sideways = 0.0, 0.0
+    for _ in range(20):
+        q = consistent(bot, bot.neutral)
+        goal = pin.integrate(bot.model, q, spread * rng.uniform(-1.0, 1.0, bot.nv))
+        tick.reset()
+        tick["posture"].target = goal
+        step = tick.step(q)
+        assert step.status == "solved"
+        for c in bot.couplings:
+            assert abs(step.v[c.follower] - c.ratio * step.v[c.leader]) < 1e-9
+            moved = max(moved, abs(step.v[c.leader]))
+        wish = pin.difference(bot.model, q, goal)
+        for i in bot.locked_dofs:
+            assert abs(step.v[i]) < 1e-9
+            sideways = max(sideways, abs(wish[i]))
+    if bot.couplings:
+        assert moved > 1e-3, "leaders move, so followers had something to follow"
+    if bot.locked_dofs:
+        assert sideways > 0.1, "the posture did ask for sideways motion"
+
+
+def test_mechanism_brings_back_what_does_not_fit() -> None:
+    """A follower off its place returns at the declared gain."""
+    bot = loaded("panda_fingers")
+    (coupling,) = bot.couplings
+    here, there = (int(bot.position_index[i]) for i in (coupling.follower, coupling.leader))
+    q = consistent(bot, bot.neutral)
+    q[there], off = 0.02, 0.004
+    q = consistent(bot, q)
+    q[here] += off
+    tick = Stack(bot, 0.005).add(Damping()).compile(backend="vm")
+    v = tick.step(q).v
+    gain = tick["mechanism"].gain
+    assert gain > 0.0
+    assert v[coupling.follower] - coupling.ratio * v[coupling.leader] == pytest.approx(-gain * off, abs=1e-9)
+    tick["mechanism"].gain = 2.0 * gain
+    v = tick.step(q).v
+    assert v[coupling.follower] - coupling.ratio * v[coupling.leader] == pytest.approx(-2.0 * gain * off, abs=1e-9)
