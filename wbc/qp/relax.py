@@ -14,7 +14,7 @@ The least-violation problem has no unique v; it is solved by a proximal sequence
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -75,16 +75,18 @@ class Relaxation:
         self._final = solver if solver is not None else Prepared(Daqp(n, m))
         self._stage = Prepared(Daqp(n + m, m))
 
-    def solve(self, qp: QP, order: NDArray[np.int_], unit: Array | None = None) -> Relaxed:
+    def solve(self, qp: QP, order: NDArray[np.int_], unit: Array | None = None, size: Array | None = None) -> Relaxed:
         """Solve ``qp`` with its rows, or with as few as must give way in the declared order.
 
         Args:
             order: class of each general row; rows of a higher class give way first, those of class 0 never [m].
             unit: size of a violation that counts as 1, per row, in the row's units; default: the norm of
                 the row, so that slacks are compared as joint motion [m].
+            size: value of each variable that counts as 1, default 1: the problem is solved in x / size, so that the
+                variables' units do not matter [n].
 
         Raises:
-            ShapeError: ``order`` or ``unit`` of the wrong length.
+            ShapeError: ``order``, ``unit`` or ``size`` of the wrong length.
             BoundsError: a simple bound or a row whose lower value is above its upper one.
         """
         order = validation.real_array("order", order, (self.m,)).astype(np.int_)
@@ -94,6 +96,22 @@ class Relaxation:
         if crossed.size:
             i = int(crossed[0])
             raise BoundsError(f"lower[{i}]", float(qp.lower[i]), f"above upper {qp.upper[i]:g}")
+        if size is None:
+            return self._solve(qp, order, scale)
+        size = validation.real_array("size", size, (self.n,))
+        ends = np.concatenate((size, np.ones(self.m)))
+        scaled = QP(qp.H * np.outer(size, size), qp.g * size, qp.lower / ends, qp.upper / ends, qp.A * size)
+        found = self._solve(scaled, order, scale)
+        x = np.clip(found.x * size, qp.lower[: self.n], qp.upper[: self.n])
+        # a bound that is as it was comes back to the last digit
+        lower = np.where(found.lower == scaled.lower, qp.lower, found.lower * ends)
+        upper = np.where(found.upper == scaled.upper, qp.upper, found.upper * ends)
+        low = (found.lower != scaled.lower) & (found.lower == scaled.upper)
+        high = (found.upper != scaled.upper) & (found.upper == scaled.lower)
+        lower, upper = np.where(low, qp.upper, lower), np.where(high, qp.lower, upper)
+        return replace(found, x=x, multipliers=found.multipliers / ends, lower=lower, upper=upper)
+
+    def _solve(self, qp: QP, order: NDArray[np.int_], scale: Array) -> Relaxed:
         plain = self._final.solve(qp)
         if plain.solved:
             return self._answer(qp, plain, "solved", plain.iterations, scale, (qp.lower, qp.upper))

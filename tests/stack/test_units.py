@@ -1,0 +1,165 @@
+"""A robot described in millimetres moves exactly as the same robot in metres: the characteristic length sees to it."""
+
+from __future__ import annotations
+
+from collections import Counter
+from functools import cache
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import wbc.robots
+from tests.stack.millimetres import configuration, moved, scaled, velocity
+from wbc.controller import Controller, Stack, Step
+from wbc.qp.problem import QP
+from wbc.qp.relax import Relaxation
+from wbc.robot import Robot
+from wbc.robots import DHRow, from_dh
+from wbc.shapes import Capsule, PlacedShape, Sphere
+from wbc.tasks import CenterOfMass, EndEffector, FrameVelocityLimit, JointLimits, Obstacle, Posture
+
+DT = 0.005
+STATES = 150
+#: The relaxation of the virtual machine minimises violations in v's own units, and its answers depend on them
+COMPARED = {"native": ("solved", "relaxed"), "vm": ("solved",)}
+RADIUS, MARGIN, SPEED = 0.08, 0.02, 0.25
+
+
+@cache
+def robot(name: str) -> Robot:
+    """An arm, a mobile manipulator with a sliding torso, an arm on a rail; with a ball and a rod on the tip."""
+    if name == "rail":
+        rows = [DHRow(joint="prismatic", alpha=np.pi / 2, lower=-1.0, upper=1.0, velocity=0.8)]
+        for a, alpha, d in ((0.1, -1.5, 0.3), (0.4, 0.2, 0.05), (0.0, 1.6, 0.1), (0.1, -1.6, 0.3), (0.0, 1.5, 0.1)):
+            rows.append(DHRow(a=a, alpha=alpha, d=d, lower=-2.8, upper=2.8, velocity=2.0))
+        bare = from_dh(rows, name="rail")
+        for j in range(1, bare.model.njoints):  # Denavit-Hartenberg rows bring no masses
+            bare.model.inertias[j] = pin.Inertia(1.0 + j, np.array([0.1, 0.02 * j, 0.05]), 0.01 * np.eye(3))
+    else:
+        bare = wbc.robots.load(name, shapes="none")
+    slow = np.where(np.isfinite(bare.limits.velocity), bare.limits.velocity, 1.0)
+    bare = bare.with_limits(velocity=slow, acceleration=100.0)
+    tilt = pin.SE3(pin.exp3(np.array([0.4, 0.3, 0.1])), np.array([0.02, 0.0, -0.05]))
+    return bare.with_shapes(
+        {bare.frames["tip"]: [PlacedShape(Sphere(0.04), tilt), PlacedShape(Capsule(0.03, 0.1), tilt)]}
+    )
+
+
+def controller(bot: Robot, scale: float, backend: str) -> Controller:
+    """Tasks in metres and radians against limits in both."""
+    tip = bot.frames["tip"]
+    stack = Stack(bot, DT)
+    stack.add(EndEffector(tip), name="hand")
+    stack.add(CenterOfMass(), name="com", weight=0.1)
+    stack.add(Posture(), name="posture", weight=1e-3)
+    stack.add(Obstacle(Sphere(scale * RADIUS), margin=scale * MARGIN), name="ball")
+    stack.add(FrameVelocityLimit(tip, linear=scale * SPEED, angular=1.0), name="speed")
+    stack.add(JointLimits(), name="limits")
+    return stack.compile(backend=backend)
+
+
+def state(bot: Robot, rng: np.random.Generator) -> tuple[np.ndarray, ...]:
+    """Configuration, measured velocity, targets of hand, mass and posture, pose and velocity of the ball; in metres."""
+    free = np.where(np.isfinite(bot.limits.position_lower), 0.0, 0.8)
+    q = pin.integrate(bot.model, bot.neutral, free * rng.uniform(-1, 1, bot.nv))
+    for i, k in enumerate(bot.position_index):
+        low, high = bot.limits.position_lower[i], bot.limits.position_upper[i]
+        if k >= 0 and np.isfinite(low):
+            q[k] = rng.uniform(low, high) if rng.random() < 0.8 else rng.choice([low + 0.002, high - 0.002])
+    v = np.where(np.array(bot.dof_names) == "root_joint.y", 0.0, rng.uniform(-0.05, 0.05, bot.nv))
+    data = bot.model.createData()
+    pin.framesForwardKinematics(bot.model, data, q)
+    tip = data.oMf[bot.model.getFrameId(bot.frames["tip"])]
+    goal = pin.SE3(tip.rotation @ pin.exp3(rng.uniform(-0.6, 0.6, 3)), tip.translation + rng.uniform(-0.3, 0.3, 3))
+    ahead = goal.translation - tip.translation  # in the way, and near enough to matter
+    ball = tip.translation + (0.17 + 0.03 * rng.random()) * ahead / np.linalg.norm(ahead)
+    mass = pin.centerOfMass(bot.model, data, q) + rng.uniform(-0.1, 0.1, 3)
+    posture = pin.integrate(bot.model, q, 0.3 * rng.uniform(-1, 1, bot.nv))
+    return q, v, goal, mass, posture, pin.SE3(np.eye(3), ball), rng.uniform(-0.1, 0.1, 3)
+
+
+def step(tick: Controller, bot: Robot, given: tuple[np.ndarray, ...], scale: float) -> Step:
+    """One tick at a state, all of its lengths times ``scale``."""
+    q, v, goal, mass, posture, ball, drift = given
+    tick.reset()
+    tick["hand"].target = moved(goal, scale)
+    tick["com"].target = scale * mass
+    tick["posture"].target = configuration(bot, posture, scale)
+    tick["ball"].pose = moved(ball, scale)
+    tick["ball"].velocity = np.concatenate([scale * drift, np.zeros(3)])
+    return tick.step(configuration(bot, q, scale), velocity(bot, v, scale))
+
+
+@pytest.mark.parametrize("scale", [1000.0, 1e-3])
+@pytest.mark.parametrize(("name", "backend"), [("panda", "vm"), ("tiago", "vm"), ("rail", "vm"), ("rail", "native")])
+def test_units_change_no_answer(name: str, backend: str, scale: float) -> None:
+    bot, rng = robot(name), np.random.default_rng(3)
+    other = scaled(bot, scale)
+    assert other.characteristic_length == pytest.approx(scale * bot.characteristic_length, rel=1e-12)
+    assert ("m" in bot.dof_units) == (name != "panda")
+    metres, others = controller(bot, 1.0, backend), controller(other, scale, backend)
+    seen: Counter[str] = Counter()
+    for _ in range(STATES):
+        given = state(bot, rng)
+        one, two = step(metres, bot, given, 1.0), step(others, bot, given, scale)
+        wanted = velocity(bot, one.v, scale)
+        assert one.status == two.status
+        seen[str(one.status)] += 1
+        if one.status not in COMPARED[backend]:
+            continue
+        size = velocity(bot, np.full(bot.nv, np.abs(one.v).max()), scale)
+        assert np.abs((two.v - wanted) / size).max() < 1e-9
+        assert [str(b) for b in one.binding] == [str(b) for b in two.binding]
+        np.testing.assert_allclose(two.margins["ball"], scale * one.margins["ball"], rtol=0, atol=1e-9 * scale)
+        for task, residual in one.residuals.items():
+            factor = np.array([scale if u == "m" else 1.0 for u in residual.units])
+            np.testing.assert_allclose(two.residuals[task].values, factor * residual.values, rtol=0, atol=1e-9 * scale)
+        seen.update({b.item for b in one.binding})
+    # the answers are those of limits at work, not of free motion alone
+    assert min(seen[item] for item in ("ball", "speed", "limits", *COMPARED[backend])) >= 5, seen
+
+
+def test_a_fixed_length_would_change_the_answer() -> None:
+    """The check above can fail: without the characteristic length it does."""
+    bot, rng = robot("rail"), np.random.default_rng(3)
+    given, answers = state(bot, rng), []
+    for scale in (1.0, 1000.0):
+        stack = Stack(scaled(bot, scale), DT, length=1.0)
+        stack.add(EndEffector("tip"), name="hand").add(CenterOfMass(), name="com", weight=0.1)
+        stack.add(Posture(), name="posture", weight=1e-3)
+        tick = stack.compile(backend="vm")
+        tick["hand"].target = moved(given[2], scale)
+        tick["com"].target = scale * given[3]
+        tick["posture"].target = configuration(bot, given[4], scale)
+        answers.append(velocity(bot, tick.step(configuration(bot, given[0], scale)).v, 1.0 / scale))
+    assert np.abs(answers[0] - answers[1]).max() > 1e-3
+
+
+def test_relaxation_does_not_depend_on_units() -> None:
+    """Contradicting rows in metres and in millimetres, some variables metres: the same compromise."""
+    rng, given = np.random.default_rng(8), 0
+    for _ in range(60):
+        n, m = 6, 5
+        size, unit = np.where(rng.random(n) < 0.5, 1000.0, 1.0), np.where(rng.random(m) < 0.5, 1000.0, 1.0)
+        J, A = rng.normal(size=(n, n)), rng.normal(size=(m, n))
+        middle, ends = rng.normal(0.0, 1.5, m), np.full(n, 0.6)
+        one = QP(J.T @ J + 1e-6 * np.eye(n), rng.normal(size=n), np.r_[-ends, middle - 0.1], np.r_[ends, middle], A)
+        both = np.concatenate((size, unit))
+        two = QP(
+            one.H / np.outer(size, size), one.g / size, one.lower * both, one.upper * both, (unit[:, None] * A) / size
+        )
+        order = np.array([1, 1, 2, 3, 3])
+        wanted = Relaxation(n, m).solve(one, order, np.ones(m))
+        found = Relaxation(n, m).solve(two, order, unit, size)
+        assert found.flag == wanted.flag
+        assert np.abs(found.x / size - wanted.x).max() < 1e-9
+        assert np.abs(found.slack / unit - wanted.slack).max() < 1e-9
+        assert (found.relaxed == wanted.relaxed).all()
+        # bounds that were not moved are the given ones, to the last digit
+        for side in ("lower", "upper"):
+            kept = getattr(wanted, side)[:n] == getattr(one, side)[:n]
+            assert (getattr(found, side)[:n] == getattr(two, side)[:n])[kept].all()
+        np.testing.assert_allclose(found.multipliers * both, wanted.multipliers, rtol=0, atol=1e-6)
+        given += wanted.flag == "relaxed"
+    assert given > 20
