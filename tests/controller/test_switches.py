@@ -32,7 +32,7 @@ def copy_values(source: Controller, target: Controller) -> None:
 
 def same(one: QP, two: QP) -> None:
     """Equal problems; rows that are off may be there or not."""
-    assert one.H == pytest.approx(two.H, rel=1e-12, abs=1e-14)
+    assert pytest.approx(two.H, rel=1e-12, abs=1e-14) == one.H
     assert one.g == pytest.approx(two.g, rel=1e-12, abs=1e-12)
     n = one.n
     assert np.array_equal(one.lower[:n], two.lower[:n])
@@ -263,7 +263,7 @@ def residual_items() -> list[tuple[Any, str]]:
     ]
 
 
-@pytest.mark.parametrize(("item", "unit"), residual_items(), ids=lambda x: type(x).__name__ if hasattr(x, "rows") else x)
+@pytest.mark.parametrize(("item", "unit"), residual_items(), ids=lambda x: getattr(x, "kind", "") or type(x).__name__)
 def test_residuals_name_rows_and_units(item: Any, unit: str) -> None:
     tick = Stack(robot("panda"), DT).add(item, name="it").compile(backend="vm")
     residual = tick.step(robot("panda").neutral).residuals["it"]

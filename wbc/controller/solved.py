@@ -32,6 +32,7 @@ class SolvedTick(Buffers):
         self._relaxation = Relaxation(layout.nv, layout.general_rows, self._solver)
         self._orders = np.array(row_orders(layout), dtype=np.int_)
         self._units = np.array(row_units(stack, layout), dtype=np.float64)
+        self._dof_scales = layout.dof_scales(stack)
 
     def reset(self) -> None:
         self._solver.reset()
@@ -84,7 +85,7 @@ class SolvedTick(Buffers):
             sides, crossed = self._uncrossed(qp)
             if crossed[self._orders == 0].any():
                 return BRAKED, np.clip(0.0, qp.lower[:n], qp.upper[:n]), None
-            answer = self._relaxation.solve(sides, self._orders, self._units)
+            answer = self._relaxation.solve(sides, self._orders, self._units, self._dof_scales)
             if answer.flag != "failed":
                 return RELAXED if crossed.any() or answer.flag == "relaxed" else SOLVED, answer.x, answer
         return BRAKED, np.clip(0.0, qp.lower[:n], qp.upper[:n]), None
