@@ -91,6 +91,12 @@ def test_track_leaves_a_run_folder(kind: str, tmp_path: Path) -> None:
         assert words in out
 
 
+def test_an_obstacle_in_the_arm_at_the_start_is_said(tmp_path: Path) -> None:
+    code, _, err = run("track", *FAST, "--sphere", "0.3,0,0.5,0.1", "--output", tmp_path)
+    assert code == 0
+    assert "warning: at the start panda_hand is -" in err
+
+
 def test_track_solvers_agree(tmp_path: Path) -> None:
     logs = []
     for solver in ("daqp", "qpoases"):

@@ -39,7 +39,10 @@ Start = Annotated[
     str | None, typer.Option(help="First configuration, numbers with commas. Default: neutral.", rich_help_panel=_SCENE)
 ]
 Plane = Annotated[
-    str, typer.Option(help="Elbow plane: off, hold, swing; auto holds it where known.", rich_help_panel=_SCENE)
+    str,
+    typer.Option(
+        help="Elbow plane: off, hold, swing; auto holds it if more than six joints move.", rich_help_panel=_SCENE
+    ),
 ]
 SwingAmplitude = Annotated[float, typer.Option(help="Amplitude of --plane swing, in rad.", rich_help_panel=_SCENE)]
 Holds = Annotated[

@@ -102,6 +102,8 @@ def perform(plan: Plan, output: Output) -> None:
             if output.plots:
                 files += _drawn(plan, log, folder, bar, stage)
     report(plan, log, figures, folder, files)
+    for warning in start_warnings(log):
+        console.print(f"[yellow]warning[/yellow]: {escape(warning)}", soft_wrap=True)
     if log.meta["interrupted"]:
         raise typer.Exit(INTERRUPTED)
 
@@ -147,6 +149,16 @@ def prepare(plan: Plan, output: Output) -> Path:
     except OSError as error:
         raise OutputError("output", str(folder), f"cannot be written: {error.strerror}") from error
     return folder
+
+
+def start_warnings(log: Log) -> list[str]:
+    """Links that are too near to an obstacle before anything has moved: nothing can be promised for such a run."""
+    margin = log.meta["margin"]
+    close = {link: float(gap[0]) for link, gap in log.group("clearance").items() if len(gap) and gap[0] < margin - 1e-6}
+    return [
+        f"at the start {link} is {1e3 * gap:.0f} mm from an obstacle, the margin is {1e3 * margin:g} mm"
+        for link, gap in close.items()
+    ]
 
 
 def report(plan: Plan, log: Log, figures: list[Figure], folder: Path, files: list[Path]) -> None:

@@ -140,7 +140,8 @@ def plane_command(robot: Robot, plane: str, swing: float) -> Swing | None:
     """The command of the elbow plane that an option means."""
     validation.one_of("plane", plane, PLANES)
     known = all(role in robot.frames for role in ("shoulder", "elbow", "wrist"))
-    if plane == "off" or (plane == "auto" and not known):
+    # Six joints have none to spare for the elbow once the hand has its pose
+    if plane == "off" or (plane == "auto" and not (known and robot.nv > 6)):
         return None
     amplitude = validation.scalar("swing", swing, low=-math.pi, high=math.pi, unit="rad")
     return Swing(amplitude if plane == "swing" else 0.0)

@@ -163,6 +163,8 @@ def _tick_time(plt: Any, log: Log) -> Any:
     figure, panel = plt.subplots(figsize=(9.2, 3.4), layout="constrained")
     panel.hist(micro, bins=edges, color=style.TEAL, alpha=0.85)
     panel.set_xscale("log")
+    for axis in (panel.xaxis.set_major_formatter, panel.xaxis.set_minor_formatter):
+        axis(lambda x, _: f"{x:g}")
     panel.set_yscale("log")
     for name, value, colour in (
         ("median", float(np.median(micro)), style.INK),
