@@ -32,7 +32,8 @@ class SolvedTick(Buffers):
         self._relaxation = Relaxation(layout.nv, layout.general_rows, self._solver)
         self._orders = np.array(row_orders(layout), dtype=np.int_)
         self._units = np.array(row_units(stack, layout), dtype=np.float64)
-        self._dof_scales = layout.dof_scales(stack)
+        scales = layout.dof_scales(stack)
+        self._dof_scales = None if (scales == 1.0).all() else scales
 
     def reset(self) -> None:
         self._solver.reset()

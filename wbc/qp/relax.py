@@ -74,7 +74,6 @@ class Relaxation:
         self.n, self.m = n, m
         self._final = solver if solver is not None else Prepared(Daqp(n, m))
         self._stage = Prepared(Daqp(n + m, m))
-        self._size = np.ones(n)
 
     def solve(self, qp: QP, order: NDArray[np.int_], unit: Array | None = None, size: Array | None = None) -> Relaxed:
         """Solve ``qp`` with its rows, or with as few as must give way in the declared order.
@@ -93,7 +92,6 @@ class Relaxation:
         order = validation.real_array("order", order, (self.m,)).astype(np.int_)
         scale = np.linalg.norm(qp.A, axis=1) if unit is None else validation.real_array("unit", unit, (self.m,))
         scale = np.where(scale > 0.0, scale, 1.0)
-        self._size = np.ones(self.n) if size is None else validation.real_array("size", size, (self.n,))
         crossed = np.flatnonzero(qp.lower > qp.upper)
         if crossed.size:
             i = int(crossed[0])
@@ -149,31 +147,28 @@ class Relaxation:
         return self._answer(qp, final, flag, iterations, unit, (work.lower * size, work.upper * size))
 
     def _least_violation(self, work: QP, rows: NDArray[np.intp], v: Array) -> Solution | None:
-        """(v, s) of the least |s| for ``rows``, the other rows of ``work`` hard; multipliers are those of v / size."""
-        n, m, size = self.n, self.m, self._size
+        """(v, s) of the least |s| for ``rows``; the other rows of ``work`` are hard."""
+        n, m = self.n, self.m
         free = np.full(m, np.inf)
         H = np.diag(np.concatenate((np.full(n, PROXIMAL), np.ones(m))))
-        A = np.hstack((work.A * size, np.zeros((m, m))))
+        A = np.hstack((work.A, np.zeros((m, m))))
         A[rows, n + rows] = 1.0
-        lower = np.concatenate((work.lower[:n] / size, -free, work.lower[n:]))
-        upper = np.concatenate((work.upper[:n] / size, free, work.upper[n:]))
+        lower = np.concatenate((work.lower[:n], -free, work.lower[n:]))
+        upper = np.concatenate((work.upper[:n], free, work.upper[n:]))
         problem = QP(H, np.zeros(n + m), lower, upper, A)
         best: Solution | None = None
-        iterations, z = 0, v / size
+        iterations = 0
         for _ in range(STEPS):
-            problem.g[:n] = -PROXIMAL * z
+            problem.g[:n] = -PROXIMAL * v
             stage = self._stage.solve(problem, warm=best is not None)
             iterations += stage.iterations
             if not stage.solved:
                 break
             change = np.inf if best is None else float(np.abs(stage.x[n:] - best.x[n:]).max(initial=0.0))
-            best, z = stage, stage.x[:n]
+            best, v = stage, stage.x[:n]
             if change <= SETTLED:
                 break
-        if best is None:
-            return None
-        x = np.concatenate((best.x[:n] * size, best.x[n:]))
-        return Solution(x, best.multipliers, "solved", iterations)
+        return None if best is None else Solution(best.x, best.multipliers, "solved", iterations)
 
     def _freeze(self, work: QP, rows: NDArray[np.intp], stage: Solution) -> Array:
         """Write the least violation of a class into the bounds of its rows, and hold what pushes against it.

@@ -1,4 +1,4 @@
-"""A robot described in millimetres gets the same joint rates: metres and radians are tied by the robot's own length."""
+"""Every item on a robot described in millimetres gives the same joint rates, relaxed ticks included."""
 
 from __future__ import annotations
 
@@ -147,22 +147,6 @@ def test_millimetres_change_no_joint_rate(name: str) -> None:
         check(steps[0], steps[1], small, 1e-9 if steps[0].status == "solved" else 1e-7)
         seen.add(str(steps[0].status))
     assert "solved" in seen or name != "panda"
-
-
-def test_millimetres_change_no_joint_rate_of_the_compiled_tick() -> None:
-    small = machine("panda")
-    large = in_millimetres(small)
-    ticks = [stack(small, "panda", 1.0).compile(), stack(large, "panda", FACTOR).compile()]
-    assert ticks[0].backend == "native"
-    rng = np.random.default_rng(10)
-    for k in range(40):
-        q, v, own = near_limits(small, rng), 0.3 * rng.normal(size=7), int(rng.integers(1 << 30))
-        steps = []
-        for tick, unit in zip(ticks, (1.0, FACTOR), strict=True):
-            tick.reset(q, v)
-            aim(tick, np.random.default_rng(own), unit, holds=k % 2 == 0)
-            steps.append(tick.step(q, v))
-        check(steps[0], steps[1], small, 1e-9 if steps[0].status == "solved" else 1e-7)
 
 
 def test_a_length_of_another_size_does_change_the_answer() -> None:
