@@ -21,8 +21,6 @@ from wbc.tasks import CenterOfMass, EndEffector, FrameVelocityLimit, JointLimits
 
 DT = 0.005
 STATES = 150
-#: The relaxation of the virtual machine minimises violations in v's own units, and its answers depend on them
-COMPARED = {"native": ("solved", "relaxed"), "vm": ("solved",)}
 RADIUS, MARGIN, SPEED = 0.08, 0.02, 0.25
 
 
@@ -106,8 +104,6 @@ def test_units_change_no_answer(name: str, backend: str, scale: float) -> None:
         wanted = velocity(bot, one.v, scale)
         assert one.status == two.status
         seen[str(one.status)] += 1
-        if one.status not in COMPARED[backend]:
-            continue
         size = velocity(bot, np.full(bot.nv, np.abs(one.v).max()), scale)
         assert np.abs((two.v - wanted) / size).max() < 1e-9
         assert [str(b) for b in one.binding] == [str(b) for b in two.binding]
@@ -117,7 +113,7 @@ def test_units_change_no_answer(name: str, backend: str, scale: float) -> None:
             np.testing.assert_allclose(two.residuals[task].values, factor * residual.values, rtol=0, atol=1e-9 * scale)
         seen.update({b.item for b in one.binding})
     # the answers are those of limits at work, not of free motion alone
-    assert min(seen[item] for item in ("ball", "speed", "limits", *COMPARED[backend])) >= 5, seen
+    assert min(seen[item] for item in ("ball", "speed", "limits", "solved", "relaxed")) >= 5, seen
 
 
 def test_a_fixed_length_would_change_the_answer() -> None:
@@ -156,10 +152,9 @@ def test_relaxation_does_not_depend_on_units() -> None:
         assert np.abs(found.x / size - wanted.x).max() < 1e-9
         assert np.abs(found.slack / unit - wanted.slack).max() < 1e-9
         assert (found.relaxed == wanted.relaxed).all()
-        # bounds that were not moved are the given ones, to the last digit
+        # bounds that were not moved are the given ones, to the last digit; multipliers need not be unique here
         for side in ("lower", "upper"):
             kept = getattr(wanted, side)[:n] == getattr(one, side)[:n]
             assert (getattr(found, side)[:n] == getattr(two, side)[:n])[kept].all()
-        np.testing.assert_allclose(found.multipliers * both, wanted.multipliers, rtol=0, atol=1e-6)
         given += wanted.flag == "relaxed"
     assert given > 20
