@@ -543,14 +543,37 @@ static int relax_class(wbc_tick *t, int order) {
     return 1;
 }
 
+/* The optimum over what the classes left. The set may be so thin that rounding makes it empty: then its bounds get
+ * room, and at last the point that the classes met at is the answer. */
+static int optimum_of_the_rest(wbc_tick *t) {
+    double met[WIDE], low[NV], high[NV];
+    memcpy(met, t->x, sizeof met);
+    memcpy(low, t->low, sizeof low);
+    memcpy(high, t->high, sizeof high);
+    /* The sides have moved, and with them what the equality rows contribute */
+    if (!factor(t)) return -1;
+    solve_transposed(t, t->y);
+    int flag = constrained(t, LOOSE);
+    if (flag >= 0) return flag;
+    for (int i = 0; i < NV; i++) {
+        if (low[i] == high[i]) continue;
+        t->low[i] -= TOLERANCE * dof_scale[i];
+        t->high[i] += TOLERANCE * dof_scale[i];
+    }
+    flag = constrained(t, LOOSE);
+    memcpy(t->low, low, sizeof low);
+    memcpy(t->high, high, sizeof high);
+    if (flag >= 0) return flag;
+    memcpy(t->x, met, sizeof met);
+    t->daqp.n_active = 0;
+    return 0;
+}
+
 static int relaxed(wbc_tick *t) {
     t->warm = 0;
     for (int order = 1; order <= LAST_ORDER; order++)
         if (!relax_class(t, order)) return -1;
-    /* The sides have moved, and with them what the equality rows contribute */
-    if (!factor(t)) return -1;
-    solve_transposed(t, t->y);
-    return constrained(t, LOOSE);
+    return optimum_of_the_rest(t);
 }
 
 /* Come to rest as fast as the bounds let each joint */
