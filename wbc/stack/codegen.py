@@ -17,12 +17,8 @@ from wbc.tasks.base import Constraint, Order
 def sources(stack: Declaration, layout: Layout, program: Program) -> dict[str, str]:
     """File name -> text of everything that makes the tick of a stack."""
     native = resources.files("wbc.stack") / "native"
-    return {
-        "rows.c": _casadi_source(program),
-        "stack.h": _header(stack, layout, program),
-        "tick.h": (native / "tick.h").read_text(),
-        "tick.c": (native / "tick.c").read_text(),
-    }
+    written = {file.name: file.read_text() for file in native.iterdir() if file.name.endswith((".c", ".h"))}
+    return {"rows.c": _casadi_source(program), "stack.h": _header(stack, layout, program), **written}
 
 
 def _casadi_source(program: Program) -> str:

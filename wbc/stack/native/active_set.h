@@ -1,0 +1,127 @@
+/* DAQP on the factored problem, and the optimum without rows that makes it unnecessary. */
+#ifndef WBC_ACTIVE_SET_H
+#define WBC_ACTIVE_SET_H
+
+#include "factor.h"
+
+static int row_is_dead(const wbc_tick *t, int i) {
+    return t->scaling[i] == 0.0 || (t->low[i] <= -WBC_INF && t->high[i] >= WBC_INF);
+}
+
+/* Sides of the distance problem: bounds scaled, and moved by the unconstrained optimum -v */
+static void shift(wbc_tick *t) {
+    for (int i = 0; i < NV; i++) {
+        const double sum = dot(t->inverse + i * WIDE, t->ldp_v, i) * t->scaling[i];
+        t->dupper[i] = t->high[i] * t->scaling[i] + sum;
+        t->dlower[i] = t->low[i] * t->scaling[i] + sum;
+    }
+    for (int k = 0; k < MC; k++) {
+        const double *row = t->M + k * NV;
+        double sum = 0.0;
+        for (int j = 0; j < NV; j++) sum += row[j] * t->ldp_v[j];
+        t->dupper[NV + k] = t->high[NV + k] * t->scaling[NV + k] + sum;
+        t->dlower[NV + k] = t->low[NV + k] * t->scaling[NV + k] + sum;
+    }
+}
+
+/* Put a row into the working set unless it depends on those that are in it; 1 if it went in */
+static int activate(wbc_tick *t, int i, int lower) {
+    DAQPWorkspace *work = &t->daqp;
+    const int kind = t->sense[i] & (IMMUTABLE | SOFT);
+    t->sense[i] = kind | ACTIVE | (lower ? LOWER : 0);
+    add_constraint(work, i, lower ? -1.0 : 1.0);
+    int ok = work->sing_ind == EMPTY_IND;
+    for (int k = work->n_active > 2 ? work->n_active - 2 : 0; k < work->n_active; k++)
+        if (work->D[k] < DEPENDENT) ok = 0;
+    if (ok) return 1;
+    for (int k = work->n_active - 1; k >= 0; k--)
+        if (work->WS[k] == i) {
+            work->sing_ind = EMPTY_IND;
+            remove_constraint(work, k);
+            break;
+        }
+    work->sing_ind = EMPTY_IND;
+    t->sense[i] = kind;
+    return 0;
+}
+
+/* Solve with the factorisation at hand. `warm`: start from the active set in `keep`. Rows of classes from
+ * `checked` on may be violated where the solver cannot move them, rows that depend on others by `angle` |row| |v|.
+ * `base`: the point that v is counted from, or NULL. DAQP's exit flag. */
+static int active_set(wbc_tick *t, int warm, int checked, double angle, const double *base) {
+    DAQPWorkspace *work = &t->daqp;
+    int dependent = 0;
+    reset_daqp_workspace(work);
+    for (int i = 0; i < M_ALL; i++) {
+        const int soft = t->sense[i] & SOFT;
+        t->sense[i] = row_is_dead(t, i) ? IMMUTABLE : soft;
+        if (t->low[i] == t->high[i] && !row_is_dead(t, i)) t->sense[i] |= IMMUTABLE;
+    }
+    /* Equalities first: the later, dependent ones are left out and checked afterwards */
+    for (int i = 0; i < M_ALL; i++)
+        if ((t->sense[i] & IMMUTABLE) && !row_is_dead(t, i) && !activate(t, i, 0)) dependent = 1;
+    if (warm)
+        for (int i = 0; i < M_ALL; i++)
+            if ((t->keep[i] & ACTIVE) && !(t->sense[i] & IMMUTABLE)) activate(t, i, t->keep[i] & LOWER);
+    int flag = daqp_ldp(work);
+    t->report.iterations += work->iterations;
+    if (flag < 0) return flag;
+    ldp2qp_solution(work);
+    for (int i = 0; base && i < NV; i++) t->x[i] += base[i];
+    /* Rows that the solver did not look at: dependent equalities and rows that v cannot move */
+    for (int k = 0; k < MC; k++) {
+        const int i = NV + k;
+        if (row_order[k] >= checked || (!dependent && t->scaling[i] != 0.0)) continue;
+        if (t->sense[i] & ACTIVE) continue;
+        double sum = 0.0, square = 0.0;
+        for (int e = a_start[k]; e < a_start[k + 1]; e++) {
+            sum += t->at[e] * t->x[a_col[e]];
+            square += t->at[e] * t->at[e];
+        }
+        const double room = TOLERANCE * row_scale[k] + angle * sqrt(square * dot(t->x, t->x, 0));
+        if (sum < t->low[i] - room || sum > t->high[i] + room) return EXIT_INFEASIBLE;
+    }
+    return flag;
+}
+
+static void remember(wbc_tick *t) {
+    for (int i = 0; i < M_ALL; i++) t->keep[i] = t->sense[i];
+    t->warm = 1;
+}
+
+static int within_bounds(const wbc_tick *t) {
+    for (int i = 0; i < NV; i++)
+        if (t->x[i] < t->low[i] || t->x[i] > t->high[i]) return 0;
+    for (int k = 0; k < MC; k++) {
+        const double low = t->low[NV + k], high = t->high[NV + k];
+        if (low == high) return 0;
+        double sum = 0.0;
+        for (int e = a_start[k]; e < a_start[k + 1]; e++) sum += t->at[e] * t->x[a_col[e]];
+        if (sum < low || sum > high) return 0;
+    }
+    return 1;
+}
+
+/* The optimum without rows; 1 if it respects all of them and is therefore the answer */
+static int unconstrained(wbc_tick *t) {
+    solve_transposed(t, t->y);
+    solve_upper(t, t->y, t->x);
+    t->daqp.n_active = 0;
+    return within_bounds(t);
+}
+
+static int constrained(wbc_tick *t, double angle) {
+    if (!t->factored) {
+        invert(t);
+        image(t);
+        for (int i = 0; i < WIDE; i++) t->ldp_v[i] = -t->y[i];
+        t->factored = 1;
+    }
+    shift(t);
+    for (int i = 0; i < M_ALL; i++) t->sense[i] = 0;
+    int flag = active_set(t, t->warm, LAST_ORDER + 1, angle, NULL);
+    if (flag < 0 && t->warm) flag = active_set(t, 0, LAST_ORDER + 1, angle, NULL);
+    return flag;
+}
+
+#endif

@@ -1,0 +1,119 @@
+/* Rows from CasADi, and the QP that they make. */
+#ifndef WBC_ASSEMBLE_H
+#define WBC_ASSEMBLE_H
+
+#include "settings.h"
+
+/* H += J' diag(w) J, g -= J' diag(w) wish, for `count` rows that share the `cols` columns listed from `first` */
+INLINE void block(wbc_tick *t, int row, int count, int first, int cols) {
+    const int *col = j_col + first;
+    const double *J = t->jt + first;
+    for (int a = 0; a < cols; a++) {
+        double f[count], line[WIDE], rhs = 0.0;
+        for (int r = 0; r < count; r++) {
+            f[r] = t->weight[row + r] * t->report.factor[row + r] * J[r * cols + a];
+            rhs += f[r] * t->wish[row + r];
+        }
+        t->g[col[a]] -= rhs;
+        for (int b = a & ~7; b < cols; b++) {
+            double sum = 0.0;
+            for (int r = 0; r < count; r++) sum += f[r] * J[r * cols + b];
+            line[b] = sum;
+        }
+        double *out = t->H + col[a] * WIDE;
+        for (int b = a; b < cols; b++) out[col[b]] += line[b];
+    }
+}
+
+/* The same for rows with one non-zero each */
+INLINE void diagonal(wbc_tick *t, int row, int count, int first) {
+    for (int r = 0; r < count; r++) {
+        const int c = j_col[first + r];
+        const double wa = t->weight[row + r] * t->report.factor[row + r] * t->jt[first + r];
+        t->g[c] -= wa * t->wish[row + r];
+        t->H[c * WIDE + c] += wa * t->jt[first + r];
+    }
+}
+
+/* 1 if no entry is NaN or infinite */
+INLINE int all_finite(const double *x, int count) {
+    int bad = 0;
+    for (int i = 0; i < count; i++) bad |= !(fabs(x[i]) <= DBL_MAX);
+    return !bad;
+}
+
+/* Task rows without weight leave the problem, whatever their numbers are. 0 where others are not finite. */
+static int usable_tasks(wbc_tick *t) {
+    int ok = 1;
+    for (int k = 0; k < MT; k++) {
+        const int first = j_start[k], count = j_start[k + 1] - first;
+        const int fine = all_finite(t->jt + first, count) && all_finite(t->wish + k, 1) && all_finite(t->report.factor + k, 1);
+        if (fine) continue;
+        ok &= t->weight[k] == 0.0;
+        memset(t->jt + first, 0, count * sizeof(double));
+        t->wish[k] = t->report.factor[k] = 0.0;
+    }
+    return ok;
+}
+
+static void form_bounds(wbc_tick *t) {
+    for (int i = 0; i < NV; i++) {
+        t->low[i] = -WBC_INF;
+        t->high[i] = WBC_INF;
+        t->report.owner_low[i] = t->report.owner_high[i] = -1.0;
+    }
+    /* In the order of sacrifice; a later block is clipped into what the earlier ones left */
+    for (int k = 0; k < NB; k++) {
+        const int b = bound_sequence[k];
+        for (int i = 0; i < NV; i++) {
+            if (t->bound_enabled[b * NV + i] == 0.0) continue;
+            const double low = t->low[i], high = t->high[i];
+            double from = t->bound_low[b * NV + i], to = t->bound_high[b * NV + i];
+            if (from > to && from - to <= TOLERANCE * dof_scale[i]) from = to = 0.5 * (from + to);
+            /* No interval, or NaN: what the other blocks leave stands, and the tick brakes */
+            if (!(from <= to && from < WBC_INF && to > -WBC_INF)) {
+                t->unusable = 1.0;
+                continue;
+            }
+            t->low[i] = clamp(from, low, high);
+            t->high[i] = clamp(to, low, high);
+            if (t->low[i] > low) t->report.owner_low[i] = b;
+            if (t->high[i] < high) t->report.owner_high[i] = b;
+        }
+    }
+}
+
+EXPORT void wbc_tick_assemble(wbc_tick *t) {
+    const double *arg[4] = {t->q, t->v_last, t->p, &t->dt};
+    double *res[11] = {t->report.error, t->wish, t->report.factor, t->jt, t->at, t->free_low,
+                       t->free_high, t->report.margin, t->bound_low, t->bound_high, t->report.margin_factor};
+    rows(arg, res, t->work_iw, t->work_w, 0);
+    memset(t->H, 0, sizeof t->H);
+    memset(t->g, 0, sizeof t->g);
+    /* Comparisons with NaN are false, so a row of NaN would pass as satisfied: such a tick brakes */
+    t->unusable = 0.0;
+    if (!(all_finite(t->jt, NNZJ) && all_finite(t->wish, MT) && all_finite(t->report.factor, MT)))
+        t->unusable = !usable_tasks(t);
+    for (int i = 0; i < NV; i++) t->H[i * WIDE + i] = damping[i];
+    BLOCKS
+    form_bounds(t);
+    for (int k = 0; k < MC; k++) {
+        double *row = t->at + a_start[k];
+        const int on = t->enabled[k] != 0.0, count = a_start[k + 1] - a_start[k];
+        if (!on) {
+            memset(row, 0, count * sizeof(double));
+            t->free_low[k] = -WBC_INF;
+            t->free_high[k] = WBC_INF;
+        } else if (!(all_finite(row, count) && t->free_low[k] < WBC_INF && t->free_high[k] > -WBC_INF)) {
+            t->unusable = 1.0;
+        }
+        if (t->free_low[k] < -WBC_INF) t->free_low[k] = -WBC_INF;
+        if (t->free_high[k] > WBC_INF) t->free_high[k] = WBC_INF;
+        t->low[NV + k] = t->free_low[k];
+        t->high[NV + k] = t->free_high[k];
+        t->report.slack[k] = 0.0;
+        for (int e = a_start[k]; e < a_start[k + 1]; e++) t->A[k * NV + a_col[e]] = t->at[e];
+    }
+}
+
+#endif

@@ -1,0 +1,208 @@
+/* How far the command can be from the optimum. */
+#ifndef WBC_CERTIFY_H
+#define WBC_CERTIFY_H
+
+#include "solve.h"
+
+/* No output is NaN: an error without a value is reported as inf, a margin as -inf */
+static void replace_nan(double *x, int count, double by) {
+    for (int i = 0; i < count; i++)
+        if (x[i] != x[i]) x[i] = by;
+}
+
+/* Length of the correction, in the metric of H, that the residual of the active rows asks for */
+static double active_residual(wbc_tick *t) {
+    DAQPWorkspace *work = &t->daqp;
+    double total = 0.0, z[ACTIVE_MAX];
+    for (int a = 0, at = 0; a < work->n_active; a++) {
+        const int i = work->WS[a];
+        double value = 0.0;
+        if (i < NV) {
+            value = t->report.v[i];
+        } else {
+            for (int e = a_start[i - NV]; e < a_start[i - NV + 1]; e++) value += t->at[e] * t->report.v[a_col[e]];
+        }
+        double r = (value - (t->sense[i] & LOWER ? t->low[i] : t->high[i])) * t->scaling[i];
+        for (int b = 0; b < a; b++) r -= work->L[at++] * z[b];
+        at++;
+        z[a] = r;
+        total += r * r / work->D[a];
+    }
+    return sqrt(total);
+}
+
+/* |v - v*| <= |R^-1| |R^-T size|, with 1 / |R^-1|^2 >= the smallest entry of the purely diagonal part of H */
+static double quick_bound(wbc_tick *t, const double *size) {
+    double floor = WBC_INF;
+    for (int i = 0; i < NV; i++) t->y[i] = damping[i];
+    DIAGONALS
+    for (int i = 0; i < NV; i++)
+        if (t->y[i] < floor) floor = t->y[i];
+    return sqrt(dot(size, size, 0)) / floor;
+}
+
+/* |v_i - v*_i| <= |row i of R^-1| (| |R^-T| size | + the part of the active rows) */
+static double sharp_bound(wbc_tick *t, const double *size) {
+    double longest = 0.0, image_of_size[WIDE] = {0};
+    if (!t->factored) invert(t);
+    for (int i = 0; i < NV; i++) {
+        const double *row = t->inverse + i * WIDE;
+        for (int b = i / 8; b < WIDE / 8; b++)
+            for (int k = 0; k < 8; k++) image_of_size[8 * b + k] += fabs(row[8 * b + k]) * size[i];
+        if (1.0 / t->scaling[i] > longest) longest = 1.0 / t->scaling[i];
+    }
+    return longest * (sqrt(dot(image_of_size, image_of_size, 0)) + active_residual(t));
+}
+
+/* residual = H v + g, and the size of the terms that were added up */
+static void gradient(const wbc_tick *t, const double *v, double *residual, double *size) {
+    for (int i = 0; i < WIDE; i++) {
+        residual[i] = t->g[i];
+        size[i] = fabs(t->g[i]);
+    }
+    for (int i = 0; i < NV; i++) {
+        const double *row = t->H + i * WIDE;
+        double part[8] = {0}, bulk[8] = {0};
+        for (int b = i / 8; b < WIDE / 8; b++)
+            for (int k = 0; k < 8; k++) {
+                const double up = row[8 * b + k] * v[8 * b + k], down = row[8 * b + k] * v[i];
+                part[k] += up;
+                bulk[k] += fabs(up);
+                residual[8 * b + k] += down;
+                size[8 * b + k] += fabs(down);
+            }
+        /* the diagonal went in twice */
+        residual[i] -= row[i] * v[i];
+        for (int k = 0; k < 8; k++) {
+            residual[i] += part[k];
+            size[i] += bulk[k];
+        }
+    }
+}
+
+/* Add the forces of the active rows, set the multipliers and the complementarity */
+static void add_forces(wbc_tick *t, const double *v, double *residual, double *size) {
+    wbc_report *out = &t->report;
+    const DAQPWorkspace *work = &t->daqp;
+    for (int i = 0; i < M_ALL; i++) out->lambda[i] = 0.0;
+    out->complementarity = 0.0;
+    for (int a = 0; a < work->n_active; a++) {
+        const int i = work->WS[a], k = i - NV;
+        if (i < NV) continue;
+        const double value = row_at(t, k, v);
+        double lambda = work->lam_star[a];
+        if (t->strength[k] > 0.0) lambda += t->strength[k] * (value - t->low[i]);
+        out->lambda[i] = lambda;
+        for (int e = a_start[k]; e < a_start[k + 1]; e++) {
+            const double part = t->at[e] * lambda;
+            residual[a_col[e]] += part;
+            size[a_col[e]] += fabs(part);
+        }
+        const double gap = fabs(lambda * (value - (t->sense[i] & LOWER ? t->low[i] : t->high[i])));
+        if (gap > out->complementarity) out->complementarity = gap;
+    }
+    /* Any multiplier of the right sign certifies: that of an active bound is what the other forces leave, which takes
+     * their rounding too */
+    for (int a = 0; a < work->n_active; a++) {
+        const int i = work->WS[a];
+        if (i >= NV) continue;
+        const double lambda = -residual[i], rounding = (NV + work->n_active + 4) * EPS * size[i];
+        if (t->low[i] != t->high[i] && (t->sense[i] & LOWER ? -lambda : lambda) <= rounding) continue;
+        out->lambda[i] = lambda;
+        residual[i] = size[i] = 0.0;
+    }
+}
+
+/* Residuals and the error bound of v; leaves the residual of the stationarity in `scratch` */
+static void examine(wbc_tick *t) {
+    wbc_report *out = &t->report;
+    double *residual = t->scratch, *size = t->product, v[WIDE] = {0};
+    memcpy(v, out->v, sizeof out->v);
+    gradient(t, v, residual, size);
+    add_forces(t, v, residual, size);
+    out->violation = 0.0;
+    for (int k = 0; k < MC; k++) {
+        const double value = row_at(t, k, v);
+        const double below = t->low[NV + k] - value, above = value - t->high[NV + k];
+        if (below > out->violation) out->violation = below;
+        if (above > out->violation) out->violation = above;
+    }
+    out->stationarity = 0.0;
+    for (int i = 0; i < NV; i++) {
+        if (fabs(residual[i]) > out->stationarity) out->stationarity = fabs(residual[i]);
+        /* residual of the exact sum: what was computed plus the rounding of its terms */
+        size[i] = fabs(residual[i]) + (NV + t->daqp.n_active + 4) * EPS * size[i];
+    }
+    out->error_bound = t->factored ? WBC_INF : quick_bound(t, size);
+    if (out->error_bound > QUICK_BOUND) out->error_bound = sharp_bound(t, size);
+}
+
+/* One Newton step on the active set, with y = R v:   dy + M' mu = -R^-T residual,   M dy = side - M y.
+ * Needs what `constrained` leaves: R^-1, M, and the factors of M M'. */
+static void refine(wbc_tick *t) {
+    DAQPWorkspace *work = &t->daqp;
+    double dy[WIDE] = {0}, mu[ACTIVE_MAX];
+    for (int i = 0; i < NV; i++) axpy(dy, t->inverse + i * WIDE, -t->scratch[i], i);
+    for (int a = 0, at = 0; a < work->n_active; a++) {
+        const int i = work->WS[a];
+        double value = i < NV ? t->report.v[i] : row_at(t, i - NV, t->report.v);
+        double r = (value - (t->sense[i] & LOWER ? t->low[i] : t->high[i])) * t->scaling[i];
+        if (i < NV) r += t->scaling[i] * dot(t->inverse + i * WIDE, dy, i);
+        for (int j = 0; i >= NV && j < NV; j++) r += t->M[(i - NV) * NV + j] * dy[j];
+        for (int b = 0; b < a; b++) r -= work->L[at++] * mu[b];
+        at++;
+        mu[a] = r;
+    }
+    for (int a = work->n_active - 1; a >= 0; a--) {
+        mu[a] /= work->D[a];
+        for (int b = a + 1; b < work->n_active; b++) mu[a] -= work->L[b * (b + 1) / 2 + a] * mu[b];
+    }
+    for (int a = 0; a < work->n_active; a++) {
+        const int i = work->WS[a];
+        if (i < NV) axpy(dy, t->inverse + i * WIDE, -mu[a] * t->scaling[i], i);
+        for (int j = 0; i >= NV && j < NV; j++) dy[j] -= mu[a] * t->M[(i - NV) * NV + j];
+        work->lam_star[a] += mu[a] * t->scaling[i];
+    }
+    for (int i = 0; i < NV; i++) t->x[i] = t->report.v[i] + dot(t->inverse + i * WIDE, dy, i);
+    command(t);
+}
+
+EXPORT void wbc_tick_certify(wbc_tick *t) {
+    wbc_report *out = &t->report;
+    replace_nan(out->error, MT, HUGE_VAL);
+    replace_nan(out->factor, MT, 0.0);
+    replace_nan(out->margin, MH, -HUGE_VAL);
+    replace_nan(out->margin_factor, MH, 0.0);
+    if (out->flag == WBC_BRAKED) {
+        for (int i = 0; i < M_ALL; i++) out->lambda[i] = 0.0;
+        out->stationarity = out->violation = out->complementarity = out->error_bound = WBC_INF;
+        return;
+    }
+    examine(t);
+    if (out->error_bound > GOOD_BOUND && t->factored) {
+        const double bound = out->error_bound;
+        double v[NV], multipliers[ACTIVE_MAX];
+        memcpy(v, out->v, sizeof v);
+        memcpy(multipliers, t->daqp.lam_star, sizeof multipliers);
+        refine(t);
+        examine(t);
+        if (!(out->error_bound < bound)) {
+            memcpy(out->v, v, sizeof v);
+            memcpy(t->daqp.lam_star, multipliers, sizeof multipliers);
+            examine(t);
+        }
+    }
+}
+
+EXPORT void wbc_tick_look_ahead(wbc_tick *t) {
+#if MH > 0
+    const double *arg[4] = {t->q, t->report.v, t->p, &t->dt};
+    double *res[1] = {t->report.ahead};
+    ahead(arg, res, t->work_iw, t->work_w, 0);
+    replace_nan(t->report.ahead, MH, -HUGE_VAL);
+#else
+    (void)t;
+#endif
+}
+
+#endif

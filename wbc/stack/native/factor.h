@@ -1,0 +1,147 @@
+/* The Cholesky factor of the Hessian, its inverse, and the rows seen through it. */
+#ifndef WBC_FACTOR_H
+#define WBC_FACTOR_H
+
+#include "settings.h"
+
+/* Rows of matrices are padded to WIDE, a multiple of 8, and loops run over whole groups of 8, so that they
+ * become vector code with a fixed order of summation. Entries left of the diagonal in its group are 0. */
+INLINE void axpy(double *out, const double *in, double f, int from) {
+    for (int b = from / 8; b < WIDE / 8; b++)
+        for (int k = 0; k < 8; k++) out[8 * b + k] += f * in[8 * b + k];
+}
+
+INLINE double dot(const double *x, const double *y, int from) {
+    double part[8] = {0};
+    for (int b = from / 8; b < WIDE / 8; b++)
+        for (int k = 0; k < 8; k++) part[k] += x[8 * b + k] * y[8 * b + k];
+    return ((part[0] + part[4]) + (part[1] + part[5])) + ((part[2] + part[6]) + (part[3] + part[7]));
+}
+
+/* Equality rows a'v = b, fixed variables among them, enter the Hessian as well, H + rho a a' / |a|^2 and
+ * g - rho b a / |a|^2: a constant where they hold, so the optimum is the same, but seen through R they are then as
+ * independent as they are in v. */
+static void strengthen(wbc_tick *t) {
+    double rho = 0.0;
+    for (int i = 0; i < NV; i++)
+        if (t->H[i * WIDE + i] > rho) rho = t->H[i * WIDE + i];
+    for (int i = 0; i < NV; i++) {
+        if (t->low[i] != t->high[i]) continue;
+        t->R[i * WIDE + i] += rho;
+        t->y[i] += rho * t->low[i];
+    }
+    for (int k = 0; k < MC; k++) {
+        t->strength[k] = 0.0;
+        if (t->low[NV + k] != t->high[NV + k]) continue;
+        double square = 0.0;
+        for (int e = a_start[k]; e < a_start[k + 1]; e++) square += t->at[e] * t->at[e];
+        if (square <= DEAD) continue;
+        t->strength[k] = rho / square;
+        for (int e = a_start[k]; e < a_start[k + 1]; e++) {
+            const double f = t->strength[k] * t->at[e];
+            t->y[a_col[e]] += f * t->low[NV + k];
+            for (int c = e; c < a_start[k + 1]; c++) t->R[a_col[e] * WIDE + a_col[c]] += f * t->at[c];
+        }
+    }
+}
+
+/* Eight rows of R from the rows above them. `from` is a constant after unrolling: the row stays in registers. */
+INLINE int factor_group(wbc_tick *t, const int from) {
+    const int to = from + 8 < NV ? from + 8 : NV;
+    int ok = 1;
+    for (int k = from; k < to; k++) {
+        double row[WIDE];
+        for (int j = from; j < WIDE; j++) row[j] = t->R[k * WIDE + j];
+        for (int i = 0; i < k; i++) {
+            const double *above = t->R + i * WIDE, f = above[k];
+            for (int j = from; j < WIDE; j++) row[j] -= f * above[j];
+        }
+        const double pivot = row[k];
+        ok &= pivot > 0.0;
+        const double scale = t->inverse_diagonal[k] = 1.0 / sqrt(pivot);
+        for (int j = from; j < WIDE; j++) t->R[k * WIDE + j] = row[j] * scale;
+        for (int j = from; j < k; j++) t->R[k * WIDE + j] = 0.0;
+    }
+    return ok;
+}
+
+/* Eight rows of R^-1 from the rows below them */
+INLINE void invert_group(wbc_tick *t, const int from) {
+    const int to = from + 8 < NV ? from + 8 : NV;
+    for (int i = to - 1; i >= from; i--) {
+        const double *source = t->R + i * WIDE;
+        const double first = t->inverse_diagonal[i];
+        double row[WIDE] = {0};
+        for (int k = i + 1; k < to; k++) {
+            const double *below = t->inverse + k * WIDE;
+            for (int j = from; j < WIDE; j++) row[j] += source[k] * below[j];
+        }
+#pragma GCC unroll 64
+        for (int later = from + 8; later < NV; later += 8)
+            for (int k = later; k < (later + 8 < NV ? later + 8 : NV); k++) {
+                const double *below = t->inverse + k * WIDE;
+                for (int j = later; j < WIDE; j++) row[j] += source[k] * below[j];
+            }
+        double *out = t->inverse + i * WIDE;
+        for (int j = 0; j < from; j++) out[j] = 0.0;
+        for (int j = from; j < WIDE; j++) out[j] = -first * row[j];
+        out[i] = first;
+    }
+}
+
+/* H = R'R, upper triangle of H only, with the inverse of its diagonal; 0 where H is not positive definite.
+ * Leaves -g in y. */
+static int factor(wbc_tick *t) {
+    memcpy(t->R, t->H, sizeof t->R);
+    for (int i = 0; i < WIDE; i++) t->y[i] = -t->g[i];
+    strengthen(t);
+    int ok = 1;
+#pragma GCC unroll 64
+    for (int group = 0; group < WIDE / 8; group++) ok &= factor_group(t, 8 * group);
+    return ok;
+}
+
+/* y = R^-T y, in place */
+static void solve_transposed(const wbc_tick *t, double *y) {
+    for (int i = 0; i < NV; i++) {
+        const double f = y[i] * t->inverse_diagonal[i];
+        axpy(y, t->R + i * WIDE, -f, i);
+        y[i] = f;
+    }
+}
+
+/* x = R^-1 y */
+static void solve_upper(const wbc_tick *t, const double *y, double *x) {
+    for (int i = 0; i < WIDE; i++) x[i] = 0.0;
+    for (int i = NV - 1; i >= 0; i--) x[i] = (y[i] - dot(t->R + i * WIDE, x, i)) * t->inverse_diagonal[i];
+}
+
+#define PACK(i) ((2 * NV - (i) - 1) * (i) / 2)
+
+/* R^-1 by rows: full rows in `inverse`; packed for DAQP and divided by their lengths, which go to `scaling` as
+ * 1/length, in Rinv */
+static void invert(wbc_tick *t) {
+#pragma GCC unroll 64
+    for (int group = WIDE / 8 - 1; group >= 0; group--) invert_group(t, 8 * group);
+    for (int i = 0; i < NV; i++) {
+        const double *row = t->inverse + i * WIDE;
+        const double scale = t->scaling[i] = 1.0 / sqrt(dot(row, row, i));
+        double *packed = t->Rinv + PACK(i);
+        for (int j = i; j < NV; j++) packed[j] = row[j] * scale;
+    }
+}
+
+/* M = A R^-1, rows of length one */
+static void image(wbc_tick *t) {
+    for (int k = 0; k < MC; k++) {
+        double row[WIDE] = {0};
+        for (int e = a_start[k]; e < a_start[k + 1]; e++)
+            axpy(row, t->inverse + a_col[e] * WIDE, t->at[e], a_col[e]);
+        const double square = dot(row, row, 0);
+        const double scale = square > DEAD ? 1.0 / sqrt(square) : 0.0;
+        t->scaling[NV + k] = scale;
+        for (int j = 0; j < NV; j++) t->M[k * NV + j] = row[j] * scale;
+    }
+}
+
+#endif

@@ -1,0 +1,175 @@
+/* What gives way when the rows cannot all hold: the declared order of sacrifice. */
+#ifndef WBC_RELAX_H
+#define WBC_RELAX_H
+
+#include "active_set.h"
+
+/* Whether a row of a class misses its sides at x by more than rounding */
+static int gives_way(const wbc_tick *t, int k) {
+    const double value = row_at(t, k, t->x), room = TOLERANCE * row_scale[k];
+    return value < t->low[NV + k] - room || value > t->high[NV + k] + room;
+}
+
+/* A class has found its least violation at x. Where a row gave way, it and what pushed against it become equalities
+ * that meet at x: all least violations lie there, and what is left to move has no boundary within rounding. Rows of
+ * the class that hold get room. */
+static void freeze(wbc_tick *t, int order, const char *pushing) {
+    int given = 0;
+    for (int k = 0; k < MC; k++) given |= row_order[k] == order && gives_way(t, k);
+    for (int i = 0; given && i < NV; i++) {
+        if (!pushing[i] || t->low[i] == t->high[i]) continue;
+        /* The other side is not what binds here, whatever sign the last multiplier takes */
+        if (pushing[i] == LOWER) {
+            t->high[i] = t->low[i];
+            t->report.owner_high[i] = -1.0;
+        } else {
+            t->low[i] = t->high[i];
+            t->report.owner_low[i] = -1.0;
+        }
+        t->x[i] = t->low[i];
+    }
+    for (int k = 0; k < MC; k++) {
+        double *low = t->low + NV + k, *high = t->high + NV + k;
+        const int equal = *low == *high, own = row_order[k] == order;
+        if (given && row_order[k] <= order && (equal || (own ? gives_way(t, k) : pushing[NV + k]))) {
+            *low = *high = row_at(t, k, t->x);
+        } else if (own && !equal) {
+            *low -= TOLERANCE * row_scale[k];
+            *high += TOLERANCE * row_scale[k];
+        }
+    }
+}
+
+/* Rows of class `order` and before it as DAQP takes them, in v / dof_scale and per row_scale */
+static int class_rows(wbc_tick *t, int order) {
+    int found = 0;
+    for (int i = 0; i < NV; i++) t->scaling[i] = 1.0 / dof_scale[i];
+    for (int k = 0; k < MC; k++) {
+        double *row = t->M + k * NV, square = 0.0;
+        for (int j = 0; j < NV; j++) row[j] = 0.0;
+        for (int e = a_start[k]; e < a_start[k + 1]; e++) row[a_col[e]] = t->at[e] * dof_scale[a_col[e]] / row_scale[k];
+        for (int j = 0; j < NV; j++) square += row[j] * row[j];
+        const double scale = square > DEAD && row_order[k] <= order ? 1.0 / sqrt(square) : 0.0;
+        for (int j = 0; j < NV; j++) row[j] *= scale;
+        t->scaling[NV + k] = scale;
+        found |= row_order[k] == order;
+    }
+    return found;
+}
+
+/* One proximal step: min |(v - base) / dof_scale|^2 / 2 + sum (slack / row_scale)^2 / (2 rho) */
+static int least_slack(wbc_tick *t, int order, const double *base, int warm) {
+    for (int i = 0; i < NV; i++) {
+        t->dupper[i] = (t->high[i] - base[i]) * t->scaling[i];
+        t->dlower[i] = (t->low[i] - base[i]) * t->scaling[i];
+        t->sense[i] = 0;
+    }
+    for (int k = 0; k < MC; k++) {
+        const double scale = t->scaling[NV + k] / row_scale[k], value = row_at(t, k, base);
+        t->dupper[NV + k] = (t->high[NV + k] - value) * scale;
+        t->dlower[NV + k] = (t->low[NV + k] - value) * scale;
+        t->sense[NV + k] = row_order[k] == order ? SOFT : 0;
+    }
+    if (!(warm && active_set(t, 1, order, LOOSE, base) >= 0) && active_set(t, 0, order, LOOSE, base) < 0) return 0;
+    memcpy(t->keep, t->sense, sizeof t->keep);
+    for (int i = 0; i < NV; i++) t->x[i] = clamp(t->x[i], t->low[i], t->high[i]);
+    return 1;
+}
+
+/* Which active rows and bounds hold the slack of the class up: their multipliers are not small against its own */
+static void find_pushing(const wbc_tick *t, int order, char *pushing) {
+    const DAQPWorkspace *work = &t->daqp;
+    double largest = 0.0;
+    for (int i = 0; i < M_ALL; i++) pushing[i] = 0;
+    for (int a = 0; a < work->n_active; a++) {
+        const int i = work->WS[a];
+        const double force = fabs(work->lam_star[a]) / t->scaling[i];
+        if (i >= NV && row_order[i - NV] == order && force > largest) largest = force;
+    }
+    for (int a = 0; a < work->n_active; a++) {
+        const int i = work->WS[a];
+        if (fabs(work->lam_star[a]) / t->scaling[i] > PUSHING * largest)
+            pushing[i] = t->sense[i] & LOWER ? LOWER : ACTIVE;
+    }
+}
+
+/* The least sum of squared slack of one class, with the bounds and the classes before it as they stand; then they are
+ * frozen there. The proximal steps take the share of |v| out of the multipliers. */
+static int relax_class(wbc_tick *t, int order) {
+    DAQPWorkspace *work = &t->daqp;
+    double base[WIDE] = {0};
+    char pushing[M_ALL];
+    int found = 0;
+    t->factored = 0;
+    if (!class_rows(t, order)) return 1;
+    work->Rinv = NULL;
+    work->RinvD = (double *)dof_scale;
+    work->v = NULL;
+    for (int step = 0; step < PROXIMAL_STEPS && least_slack(t, order, base, step > 0); step++) {
+        double moved = 0.0;
+        for (int k = 0; k < MC; k++)
+            if (row_order[k] == order) moved = fmax(moved, fabs(row_at(t, k, t->x) - row_at(t, k, base)) / row_scale[k]);
+        memcpy(base, t->x, sizeof base);
+        find_pushing(t, order, pushing);
+        found = 1;
+        if (moved <= SETTLED) break;
+    }
+    work->Rinv = t->Rinv;
+    work->RinvD = NULL;
+    work->v = t->ldp_v;
+    if (!found) return 0;
+    memcpy(t->x, base, sizeof base);
+    freeze(t, order, pushing);
+    return 1;
+}
+
+/* The optimum over what the classes left. The set may be so thin that rounding makes it empty: then its bounds get
+ * room, then the joints of frozen rows are fixed, and at last the point that the classes met at is the answer. */
+static int optimum_of_the_rest(wbc_tick *t) {
+    double met[WIDE], low[NV], high[NV];
+    memcpy(met, t->x, sizeof met);
+    memcpy(low, t->low, sizeof low);
+    memcpy(high, t->high, sizeof high);
+    /* The sides have moved, and with them what the equality rows contribute */
+    if (!factor(t)) return -1;
+    solve_transposed(t, t->y);
+    int flag = constrained(t, LOOSE);
+    if (flag >= 0) return flag;
+    for (int i = 0; i < NV; i++) {
+        if (low[i] == high[i]) continue;
+        t->low[i] -= TOLERANCE * dof_scale[i];
+        t->high[i] += TOLERANCE * dof_scale[i];
+    }
+    flag = constrained(t, LOOSE);
+    memcpy(t->low, low, sizeof low);
+    memcpy(t->high, high, sizeof high);
+    if (flag >= 0) return flag;
+    /* Joints that frozen rows speak of stay where the classes met; the others still serve the tasks */
+    for (int k = 0; k < MC; k++)
+        for (int e = a_start[k]; t->low[NV + k] == t->high[NV + k] && e < a_start[k + 1]; e++)
+            if (t->at[e] != 0.0) t->low[a_col[e]] = t->high[a_col[e]] = met[a_col[e]];
+    if (factor(t)) {
+        t->factored = 0;
+        solve_transposed(t, t->y);
+        flag = constrained(t, LOOSE);
+        if (flag >= 0) return flag;
+    }
+    memcpy(t->low, low, sizeof low);
+    memcpy(t->high, high, sizeof high);
+    memcpy(t->x, met, sizeof met);
+    t->daqp.n_active = 0;
+    /* Not an optimum, so nothing for the certificate to refine */
+    t->factored = 0;
+    return 0;
+}
+
+static int relaxed(wbc_tick *t) {
+    t->warm = 0;
+    /* Rows of class 0 never give way */
+    if (LAST_ORDER == 0) return -1;
+    for (int order = 1; order <= LAST_ORDER; order++)
+        if (!relax_class(t, order)) return -1;
+    return optimum_of_the_rest(t);
+}
+
+#endif

@@ -1,0 +1,84 @@
+/* From the QP to the command. */
+#ifndef WBC_SOLVE_H
+#define WBC_SOLVE_H
+
+#include "relax.h"
+
+/* Come to rest as fast as the bounds let each joint */
+static void brake(wbc_tick *t) {
+    /* A relaxation may have moved the sides */
+    form_bounds(t);
+    for (int i = 0; i < NV; i++) {
+        const double low = t->low[i], high = t->high[i];
+        t->x[i] = low <= high ? clamp(0.0, low, high) : 0.0;
+    }
+    t->daqp.n_active = 0;
+    t->warm = 0;
+}
+
+/* Rows whose sides have crossed are met half-way; 1 if any gives way by more than rounding. Actuators never do. */
+static int uncross(wbc_tick *t) {
+    int crossed = 0;
+    for (int k = 0; k < MC; k++) {
+        const double gap = t->low[NV + k] - t->high[NV + k];
+        if (gap <= 0.0) continue;
+        t->low[NV + k] = t->high[NV + k] = 0.5 * (t->low[NV + k] + t->high[NV + k]);
+        if (gap <= 4.0 * TOLERANCE * row_scale[k]) continue;
+        crossed = 1;
+        if (row_order[k] == 0) t->unusable = 1.0;
+    }
+    return crossed;
+}
+
+/* x as the command: within its bounds, and exactly on those that are active */
+static void command(wbc_tick *t) {
+    for (int i = 0; i < NV; i++) t->report.v[i] = clamp(t->x[i], t->low[i], t->high[i]);
+    for (int a = 0; a < t->daqp.n_active; a++) {
+        const int i = t->daqp.WS[a];
+        if (i < NV) t->report.v[i] = t->sense[i] & LOWER ? t->low[i] : t->high[i];
+    }
+}
+
+EXPORT int wbc_tick_solve(wbc_tick *t) {
+    int flag = uncross(t) ? WBC_RELAXED : WBC_SOLVED;
+    t->report.iterations = 0.0;
+    t->factored = 0;
+    if (t->unusable != 0.0 || !factor(t)) {
+        brake(t);
+        flag = WBC_BRAKED;
+    } else if (unconstrained(t)) {
+        t->warm = 0;
+    } else {
+        int exit_flag = constrained(t, TIGHT);
+        if (exit_flag < 0 && MC > 0) {
+            flag = WBC_RELAXED;
+            exit_flag = relaxed(t);
+        }
+        if (exit_flag < 0) {
+            brake(t);
+            flag = WBC_BRAKED;
+        } else {
+            remember(t);
+        }
+    }
+    int finite = 1;
+    for (int i = 0; i < NV; i++) finite &= isfinite(t->x[i]) != 0;
+    if (!finite) {
+        brake(t);
+        flag = WBC_BRAKED;
+    }
+    command(t);
+    int gave_way = 0;
+    for (int k = 0; flag == WBC_RELAXED && k < MC; k++) {
+        const double value = row_at(t, k, t->report.v);
+        const double slack = fmax(t->free_low[k] - value, value - t->free_high[k]);
+        t->report.slack[k] = slack > 2.0 * TOLERANCE * row_scale[k] ? slack : 0.0;
+        gave_way |= t->report.slack[k] > 0.0;
+    }
+    /* Rows that contradict each other by rounding only */
+    if (flag == WBC_RELAXED && !gave_way) flag = WBC_SOLVED;
+    t->report.flag = flag;
+    return flag;
+}
+
+#endif
