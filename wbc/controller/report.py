@@ -15,7 +15,7 @@ BAD_Q, BAD_UNIT, BAD_V = -1, -2, -3
 INFINITE = 1e30
 
 #: Violations up to this, in row units, are rounding; squared lengths of quaternions may be off by the other
-#: (both as in ``native/tick.c``)
+#: (both as in ``native/settings.h``)
 TOLERANCE, UNIT_TOLERANCE = 1e-9, 2.00001e-6
 
 

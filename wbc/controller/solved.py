@@ -21,7 +21,7 @@ _NONE = Certificate(INFINITE, INFINITE, INFINITE, INFINITE)
 
 
 class SolvedTick(Buffers):
-    """Assembly, then a kept solver with its relaxation, then the certificate; see ``native/tick.c``."""
+    """Assembly, then a kept solver with its relaxation, then the certificate; see ``wbc/stack/native``."""
 
     def __init__(self, assembly: Assembly, stack: Declaration, layout: Layout, solver: str) -> None:
         self._assembly = assembly

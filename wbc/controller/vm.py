@@ -32,7 +32,7 @@ def _room(count: int) -> Array:
 
 
 class VmAssembly(Assembly):
-    """Buffers of a controller and the QP at their values; mirrors the first half of ``native/tick.c``."""
+    """Buffers of a controller and the QP at their values; mirrors ``native/assemble.h``."""
 
     def __init__(self, program: Program, stack: Declaration, layout: Layout) -> None:
         nv, rows, tasks = layout.nv, layout.general_rows, layout.task_rows
