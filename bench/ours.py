@@ -66,7 +66,7 @@ class Ours(Contender):
     def aim(self, tick: int) -> None:
         self.tick = tick
         for target, pose in zip(self.targets, self.case.poses[tick], strict=True):
-            target.target = pin.SE3(pose)
+            target.target = pose
         if self.com is not None:
             self.com.target = self.case.com[tick]
 

@@ -105,11 +105,13 @@ def pose(field: str, value: Any) -> pin.SE3:
 
 def pose_numbers(field: str, value: Any) -> Array:
     """A pose as 12 numbers, rotation by columns, then position; from whatever :func:`pose` takes."""
-    if isinstance(value, pin.SE3):
+    matrix = value.homogeneous if isinstance(value, pin.SE3) else value
+    if type(matrix) is np.ndarray and matrix.shape == (4, 4) and matrix.dtype == np.float64:
         # The columns of the upper three rows are those of the rotation, then the position
-        numbers: Array = np.ravel(value.homogeneous[:3], order="F")
+        numbers: Array = np.ravel(matrix[:3], order="F")
         *nine, x, y, z = numbers.tolist()
-        if _is_rotation(nine) and math.isfinite(x) and math.isfinite(y) and math.isfinite(z):
+        finite = math.isfinite(x) and math.isfinite(y) and math.isfinite(z)
+        if finite and _is_rotation(nine) and matrix[3].tolist() == [0.0, 0.0, 0.0, 1.0]:
             return numbers
     return np.ravel(pose(field, value).homogeneous[:3], order="F")
 
