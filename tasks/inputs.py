@@ -77,14 +77,14 @@ class Symbols:
 def symbols(robot: Robot, declared: Sequence[Input]) -> Symbols:
     """Fresh symbols for the inputs."""
     numbers = {d.name: ca.SX.sym(d.name, size(robot, d)) for d in declared}
-    values: dict[str, ca.SX | Pose] = {}
-    for d in declared:
-        part = numbers[d.name]
-        if d.kind == "pose":
-            values[d.name] = Pose(ca.reshape(part[:9], 3, 3), part[9:])
-        else:
-            values[d.name] = ca.reshape(part, 3, 3) if d.kind == "rotation" else part
-    return Symbols(numbers, values)
+    return Symbols(numbers, {d.name: as_value(d, numbers[d.name]) for d in declared})
+
+
+def as_value(declared: Input, numbers: ca.SX) -> ca.SX | Pose:
+    """What an item's expression receives for an input with these numbers."""
+    if declared.kind == "pose":
+        return Pose(ca.reshape(numbers[:9], 3, 3), numbers[9:])
+    return ca.reshape(numbers, 3, 3) if declared.kind == "rotation" else numbers
 
 
 def check(robot: Robot, field: str, declared: Sequence[Input]) -> None:

@@ -32,6 +32,7 @@ from wbc.symbolic import rotations as rot
 from wbc.symbolic.kinematics import Kinematics, Pose
 from wbc.symbolic.tracer import Tracer, rotation_rate
 from wbc.tasks.base import Constraint, Rows, Task
+from wbc.tasks.inputs import as_value
 
 ROWS_OUTPUTS = (
     "error",
@@ -63,17 +64,9 @@ class _Builder:
         self.p = ca.SX.sym("p", layout.parameters)
         self.dt = ca.SX.sym("dt")
 
-    def value(self, slot: Slot, source: ca.SX) -> ca.SX | Pose:
-        """What the item's expression receives for an input."""
-        part = source[slot.span]
-        if slot.input.kind == "pose":
-            return Pose(ca.reshape(part[:9], 3, 3), part[9:])
-        if slot.input.kind == "rotation":
-            return ca.reshape(part, 3, 3)
-        return part
-
-    def values(self, block: Block, source: ca.SX) -> dict[str, ca.SX | Pose]:
-        return {name: self.value(slot, source) for name, slot in block.slots.items()}
+    def values(self, block: Block) -> dict[str, ca.SX | Pose]:
+        """What the item's expressions receive for its inputs."""
+        return {name: as_value(slot.input, self.p[slot.span]) for name, slot in block.slots.items()}
 
     def rate(self, block: Block, slot: Slot) -> ca.SX | None:
         """Time derivative of an input's numbers, or None for one that stands still."""
@@ -133,7 +126,7 @@ class _Builder:
         """error, wish, factor, J of a task."""
         item = block.entry.item
         assert isinstance(item, Task)
-        robot, tracer, inputs = self.stack.robot, Tracer(self.kinematics), self.values(block, self.p)
+        robot, tracer, inputs = self.stack.robot, Tracer(self.kinematics), self.values(block)
         error = self.column(block, "error", item.error(robot, tracer, inputs))
         own = item.jacobian(robot, tracer, inputs)
         jacobian = tracer.jacobian(error) if own is None else tracer.expand(ca.SX(own))
@@ -147,7 +140,7 @@ class _Builder:
         """Rows of a constraint, its margins and their factors."""
         item = block.entry.item
         assert isinstance(item, Constraint)
-        robot, tracer, inputs = self.stack.robot, Tracer(self.kinematics), self.values(block, self.p)
+        robot, tracer, inputs = self.stack.robot, Tracer(self.kinematics), self.values(block)
         count = len(block.rows)
         if block.form == "rows":
             rows = item.velocity_rows(robot, tracer, inputs, self.dt)
@@ -169,7 +162,7 @@ class _Builder:
         item = block.entry.item
         assert isinstance(item, Constraint)
         tracer = Tracer(self.kinematics)
-        margins = item.margins(self.stack.robot, tracer, self.values(block, self.p))
+        margins = item.margins(self.stack.robot, tracer, self.values(block))
         assert margins is not None
         here = ca.Function("h", [self.kinematics.q, self.p], [ca.densify(tracer.expand(margins))])
         later = self.kinematics.integrate(self.kinematics.q, self.kinematics.v * self.dt)
@@ -191,7 +184,7 @@ def build(stack: Declaration, layout: Layout) -> Program:
         item = block.entry.item
         assert isinstance(item, Constraint)
         tracer = Tracer(b.kinematics)
-        got = item.bounds(stack.robot, tracer, b.values(block, b.p), b.dt)
+        got = item.bounds(stack.robot, tracer, b.values(block), b.dt)
         assert got is not None
         bounds.append((b.column(block, "lower", got.lower), b.column(block, "upper", got.upper)))
     empty = ca.SX(0, 1)

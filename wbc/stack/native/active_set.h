@@ -73,11 +73,9 @@ static int active_set(wbc_tick *t, int warm, int checked, double angle, const do
         const int i = NV + k;
         if (row_order[k] >= checked || (!dependent && t->scaling[i] != 0.0)) continue;
         if (t->sense[i] & ACTIVE) continue;
-        double sum = 0.0, square = 0.0;
-        for (int e = a_start[k]; e < a_start[k + 1]; e++) {
-            sum += t->at[e] * t->x[a_col[e]];
-            square += t->at[e] * t->at[e];
-        }
+        const double sum = row_at(t, k, t->x);
+        double square = 0.0;
+        for (int e = a_start[k]; e < a_start[k + 1]; e++) square += t->at[e] * t->at[e];
         const double room = TOLERANCE * row_scale[k] + angle * sqrt(square * dot(t->x, t->x, 0));
         if (sum < t->low[i] - room || sum > t->high[i] + room) return EXIT_INFEASIBLE;
     }
@@ -95,8 +93,7 @@ static int within_bounds(const wbc_tick *t) {
     for (int k = 0; k < MC; k++) {
         const double low = t->low[NV + k], high = t->high[NV + k];
         if (low == high) return 0;
-        double sum = 0.0;
-        for (int e = a_start[k]; e < a_start[k + 1]; e++) sum += t->at[e] * t->x[a_col[e]];
+        const double sum = row_at(t, k, t->x);
         if (sum < low || sum > high) return 0;
     }
     return 1;
