@@ -16,12 +16,7 @@ static double active_residual(wbc_tick *t) {
     double total = 0.0, z[ACTIVE_MAX];
     for (int a = 0, at = 0; a < work->n_active; a++) {
         const int i = work->WS[a];
-        double value = 0.0;
-        if (i < NV) {
-            value = t->report.v[i];
-        } else {
-            for (int e = a_start[i - NV]; e < a_start[i - NV + 1]; e++) value += t->at[e] * t->report.v[a_col[e]];
-        }
+        const double value = i < NV ? t->report.v[i] : row_at(t, i - NV, t->report.v);
         double r = (value - (t->sense[i] & LOWER ? t->low[i] : t->high[i])) * t->scaling[i];
         for (int b = 0; b < a; b++) r -= work->L[at++] * z[b];
         at++;
