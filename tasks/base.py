@@ -20,7 +20,7 @@ import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, Protocol
 
 import casadi as ca
 import numpy as np
@@ -56,6 +56,7 @@ class Input:
             (linear; angular, 6, in the axes the pose is given in) for a pose, an angular velocity (3) for a
             rotation, nv numbers for a configuration.
         low, high: valid range of each number.
+        sensed: a :class:`Sensor` writes it before every tick; users only read it.
     """
 
     name: str
@@ -66,6 +67,7 @@ class Input:
     rate: str | None = None
     low: float = -np.inf
     high: float = np.inf
+    sensed: bool = False
 
 
 @dataclass(frozen=True)
@@ -90,7 +92,23 @@ class Order(IntEnum):
 #: :class:`wbc.symbolic.kinematics.Pose` for a pose.
 Values = Mapping[str, Any]
 
+#: The present numbers of an item's inputs: views of the controller's buffer, by input name.
+Numbers = Mapping[str, NDArray[np.float64]]
+
 _registry: dict[str, type[Item]] = {}
+
+
+class Sensor(Protocol):
+    """Measures, at a configuration, what expressions cannot state (distances of meshes). One a controller.
+
+    It writes the sensed inputs of its item, see :meth:`Constraint.sensed_rows`, in place.
+    """
+
+    def sense(self, q: NDArray[np.float64]) -> None:
+        """Write the sensed inputs for a finite configuration; called before every tick of an enabled item."""
+
+    def pairs(self) -> tuple[tuple[str, str, float], ...]:
+        """What the sensed rows were about in the last call: names of both bodies and their distance [m]."""
 
 
 @dataclass(frozen=True)
@@ -228,6 +246,26 @@ class Constraint(Item):
     def margins(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX | None:
         """h(q, inputs) >= 0, one entry a row, or None."""
         return None
+
+    def sensed_rows(self, robot: Robot) -> int:
+        """How many of the last margin rows are about pairs of bodies that a :class:`Sensor` chooses in every tick.
+
+        For k such rows the item has, besides its own, the sensed inputs
+
+            distance  k       signed distance of the two bodies of each row [m]
+            drift     k       its rate by what moves without the robot [m/s]
+            line      6 k     row by row, (n, p x n): unit normal from body A to body B and its moment about the
+                              origin of the world for a point p of the line through both witness points [1, m]
+            side      nv k    row by row, a number a degree of freedom: 1 if it moves B only, -1 if A only, else 0
+
+        and the row's derivative along v is ``side * (line @ screws)``: two bodies approach along their common normal.
+        The last k entries of :meth:`margins` are to be ``inputs["distance"]``, less what the item keeps clear.
+        """
+        return 0
+
+    def sensor(self, robot: Robot, numbers: Numbers) -> Sensor:
+        """The sensor of one controller; reads and writes the item's inputs in ``numbers``."""
+        raise TypeError(f"{type(self).__name__} has no sensed rows")
 
     def row_factor(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX | None:
         """None, or one factor in [0, 1] a margin row, 1 where the margin has its plain meaning: a limit that fades

@@ -22,6 +22,9 @@ if TYPE_CHECKING:
 #: Inputs that every item has, or may have, without declaring them.
 RESERVED = ("gain", "weight", "enabled", "mask", "rate")
 
+#: Distance [m] of a sensed row that has no pair.
+FAR = 1e3
+
 
 def size(robot: Robot, declared: Input) -> int:
     """How many numbers the input takes in a buffer."""
@@ -85,6 +88,16 @@ def as_value(declared: Input, numbers: ca.SX) -> ca.SX | Pose:
     if declared.kind == "pose":
         return Pose(ca.reshape(numbers[:9], 3, 3), numbers[9:])
     return ca.reshape(numbers, 3, 3) if declared.kind == "rotation" else numbers
+
+
+def sensed(robot: Robot, count: int) -> tuple[Input, ...]:
+    """The inputs of ``count`` sensed rows, see :meth:`wbc.tasks.base.Constraint.sensed_rows`."""
+    return (
+        Input("distance", unit="m", size=count, default=np.full(count, FAR), rate="drift", sensed=True),
+        Input("drift", unit="m/s", size=count, default=np.zeros(count), sensed=True),
+        Input("line", unit="1, m", size=6 * count, default=np.zeros(6 * count), sensed=True),
+        Input("side", size=robot.nv * count, default=np.zeros(robot.nv * count), sensed=True),
+    )
 
 
 def check(robot: Robot, field: str, declared: Sequence[Input]) -> None:

@@ -17,6 +17,7 @@ FLOORS = {
     "wbc.symbolic": 1,
     "wbc.robot": 2,
     "wbc.robots": 2,
+    "wbc.proximity": 2,
     "wbc.tasks": 3,
     "wbc.stack": 4,
     "wbc.qp": 5,

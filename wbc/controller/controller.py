@@ -21,6 +21,7 @@ from wbc.qp.problem import QP
 from wbc.stack.artifact import Artifact
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Slot
+from wbc.tasks.base import Constraint, Sensor
 from wbc.validation import Array
 
 _Array = np.ndarray
@@ -65,6 +66,8 @@ class Controller:
         self._first: dict[Slot, str] = {}
         self._waiting: dict[Slot, str] = {}
         self._handles = {name: Handle(self, block) for name, block in layout.blocks.items()}
+        #: sensors with the handles of their items
+        self._sensors = [(self._sensor(name), self._handles[name]) for name in layout.blocks if self._is_sensed(name)]
         self.tick.dt[0] = stack.dt
         self.tick.q[:] = stack.robot.neutral
         self.tick.check()
@@ -100,6 +103,8 @@ class Controller:
             self._v_in[:] = v
             self._use_v[0] = 1.0
         self._q[:] = q
+        if self._sensors:
+            self._sense()
         if self._call() < 0:
             self._refuse(q, v)
         return Step(self._snapshot(), self._context)
@@ -164,6 +169,30 @@ class Controller:
         """Values that wait for the first configuration cannot be read before it."""
         if slot in self._waiting:
             raise SolverError(field, None, "is taken from the first configuration; call step(q) or reset(q) first")
+
+    def pairs(self, name: str) -> tuple[tuple[str, str, float], ...]:
+        """What the sensed rows of an item were about in the last tick: names of both bodies, distance [m]."""
+        return next((sensor.pairs() for sensor, handle in self._sensors if handle.item_name == name), ())
+
+    # Sensors
+
+    def _is_sensed(self, name: str) -> bool:
+        item = self.stack[name].item
+        return isinstance(item, Constraint) and item.sensed_rows(self.stack.robot) > 0
+
+    def _sensor(self, name: str) -> Sensor:
+        item = self.stack[name].item
+        assert isinstance(item, Constraint)
+        slots = self.layout.blocks[name].slots
+        return item.sensor(self.stack.robot, {key: self.tick.p[slot.span] for key, slot in slots.items()})
+
+    def _sense(self) -> None:
+        """Measure what enabled items sense; not at numbers that the tick will refuse."""
+        if not np.isfinite(self._q).all():
+            return
+        for sensor, handle in self._sensors:
+            if handle.enabled:
+                sensor.sense(self._q)
 
     # The first configuration
 

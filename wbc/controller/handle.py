@@ -55,9 +55,10 @@ class Handle:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of all run-time values."""
+        """Names of all run-time values that can be set; sensed ones can also be read."""
         own = ("weight",) if self._block.form == "task" else ()
-        return (*self._block.slots, *own, "enabled", "mask")
+        given = [name for name, slot in self._block.slots.items() if not slot.input.sensed]
+        return (*given, *own, "enabled", "mask")
 
     def __dir__(self) -> list[str]:
         return [*self.names, "names"]
@@ -78,6 +79,8 @@ class Handle:
     def __setattr__(self, name: str, value: Any) -> None:
         slot = self._block.slots.get(name)
         if slot is not None:
+            if slot.input.sensed:
+                raise RangeError(self._field(name), value, "is measured in every tick and cannot be set")
             self._controller.write(slot, self._checked(slot, value))
             return
         field = self._field(name)
@@ -90,6 +93,11 @@ class Handle:
         else:
             raise UnknownValueError(field, name, self.names)
         self.apply()
+
+    @property
+    def item_name(self) -> str:
+        """Name of the item in the stack."""
+        return self._block.entry.name
 
     def checked(self, name: str, value: Any) -> Array:
         """The numbers of an input's value, validated.

@@ -76,6 +76,9 @@ class Layout:
         form: Form = "task"
         if isinstance(item, Constraint):
             form = item.form
+            count = item.sensed_rows(robot)
+            if count:
+                declared += inputs.sensed(robot, count)
             if form == "margins":
                 declared.append(Input("rate", unit="1/s", default=item.default_rate, low=0.0))
         elif isinstance(item, Task) and not any(i.name == "gain" for i in declared):

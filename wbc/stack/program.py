@@ -154,11 +154,21 @@ class _Builder:
         low = tracer.expand(-rate * margin - self.drift(block, margin))
         fade = item.row_factor(robot, tracer, inputs)
         factor = ca.SX.ones(count) if fade is None else self.column(block, "row_factor", fade)
-        rows = Rows(tracer.jacobian(margin), low, ca.SX.inf(count))
+        sensed = item.sensed_rows(robot)
+        matrix = tracer.jacobian(margin[: count - sensed, :])
+        if sensed:
+            matrix = ca.vertcat(matrix, self.sensed_matrix(block, sensed))
+        rows = Rows(matrix, low, ca.SX.inf(count))
         return rows, tracer.expand(margin), tracer.expand(factor)
 
+    def sensed_matrix(self, block: Block, count: int) -> ca.SX:
+        """Rows of sensed pairs, see :meth:`Constraint.sensed_rows`."""
+        line = ca.reshape(self.p[block.slots["line"].span], 6, count).T
+        side = ca.reshape(self.p[block.slots["side"].span], self.layout.nv, count).T
+        return side * ca.densify(line @ self.kinematics.screws)
+
     def ahead(self, block: Block) -> ca.SX:
-        """h(q (+) v dt) of a margin block."""
+        """h(q (+) v dt) of a margin block; of sensed rows h + (dh/dt) dt."""
         item = block.entry.item
         assert isinstance(item, Constraint)
         tracer = Tracer(self.kinematics)
@@ -166,7 +176,12 @@ class _Builder:
         assert margins is not None
         here = ca.Function("h", [self.kinematics.q, self.p], [ca.densify(tracer.expand(margins))])
         later = self.kinematics.integrate(self.kinematics.q, self.kinematics.v * self.dt)
-        return here(later, self.advanced(block))
+        margin = here(later, self.advanced(block))
+        sensed = item.sensed_rows(self.stack.robot)
+        if sensed:
+            closing = self.sensed_matrix(block, sensed) @ self.kinematics.v * self.dt
+            margin = margin + ca.vertcat(ca.SX(len(block.rows) - sensed, 1), closing)
+        return margin
 
 
 def build(stack: Declaration, layout: Layout) -> Program:

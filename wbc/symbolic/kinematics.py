@@ -218,6 +218,18 @@ class Kinematics:
             start += width
         return self.columns(6, blocks)
 
+    @cached_property
+    def screws(self) -> ca.SX:
+        """6 x nv (linear at the origin of the world; angular), world axes: the twist of each degree of freedom.
+
+        A body moves with the columns of the joints that it hangs on.
+        """
+        blocks = []
+        for j in range(1, self.njoints):
+            linear, angular = self.joint_twist(j)
+            blocks.append((j, ca.vertcat(linear + rot.skew(self.joint_pose(j).position) @ angular, angular)))
+        return self.columns(6, blocks)
+
     def _width(self, joint: int) -> int:
         return self.symbolic(joint).nv
 

@@ -1,0 +1,1 @@
+"""Distances between bodies that no expression states, measured with Coal (floor 2)."""
