@@ -1,7 +1,7 @@
 """Geometric shapes: parameters in metres, each in its own frame.
 
-Shapes are plain data. They are bounded bodies on links or obstacles
-in the world (also :class:`HalfSpace`); a mesh is a list of :class:`Convex` parts. Where a shape sits is said by whoever uses it.
+Shapes are plain data. They are bounded bodies on links or obstacles in the world (also :class:`HalfSpace`); a mesh
+is a list of :class:`Convex` parts. Where a shape sits is said by whoever uses it.
 """
 
 from __future__ import annotations

@@ -49,6 +49,7 @@ class Robot:
         locked_dofs: degrees of freedom that the robot cannot drive, whose velocity must stay 0 (the sideways
             velocity of a differential-drive base). Indices into v.
         source: the file that the model was read from; "" for a model made in memory.
+        self_pairs: pairs of links with shapes that must not touch each other; None: not chosen yet.
     """
 
     name: str
@@ -62,6 +63,7 @@ class Robot:
     notes: Mapping[str, str] = field(default_factory=dict)
     locked_dofs: tuple[int, ...] = ()
     source: str = ""
+    self_pairs: tuple[tuple[str, str], ...] | None = None
 
     def __post_init__(self) -> None:
         validation.one_of("robot.base", self.base, BASES)
@@ -264,6 +266,22 @@ class Robot:
             self.check_frame("shapes", frame)
         return replace(self, shapes={k: tuple(v) for k, v in shapes.items()})
 
+    def with_self_pairs(self, pairs: Sequence[tuple[str, str]] | None) -> Robot:
+        """A copy with other pairs of links that must not touch each other.
+
+        Raises:
+            UnknownNameError: a link frame that does not exist.
+            ShapeError: not pairs of names.
+        """
+        if pairs is None:
+            return replace(self, self_pairs=None)
+        for pair in pairs:
+            if isinstance(pair, str) or len(pair) != 2:
+                raise ShapeError("self_pairs", pair, "expected pairs of link names")
+            for link in pair:
+                self.check_frame("self_pairs", link)
+        return replace(self, self_pairs=tuple((str(a), str(b)) for a, b in pairs))
+
     @cached_property
     def fingerprint(self) -> str:
         """Hash of everything about the model that compiled code depends on."""
@@ -279,7 +297,7 @@ class Robot:
             self.neutral,
         ):
             h.update(np.ascontiguousarray(array).tobytes())
-        h.update(repr((self.base, self.couplings, self.locked_dofs)).encode())
+        h.update(repr((self.base, self.couplings, self.locked_dofs, self.self_pairs)).encode())
         for frame, shapes in sorted(self.shapes.items()):
             for s in shapes:
                 h.update(f"{frame} {s.shape} {s.excess!r}".encode() + s.placement.homogeneous.tobytes())
