@@ -56,6 +56,9 @@ class Input:
             (linear; angular, 6, in the axes the pose is given in) for a pose, an angular velocity (3) for a
             rotation, nv numbers for a configuration.
         low, high: valid range of each number.
+        infinite: the infinity that is a valid number, too: no limit on that side.
+        below: name of an input of the same size, with a default like this one, whose numbers this one's never exceed.
+        direction: a vector that is kept at unit length; its rate is the derivative of the unit vector.
         sensed: a :class:`Sensor` writes it before every tick; users only read it.
     """
 
@@ -67,6 +70,9 @@ class Input:
     rate: str | None = None
     low: float = -np.inf
     high: float = np.inf
+    infinite: float | None = None
+    below: str | None = None
+    direction: bool = False
     sensed: bool = False
 
 

@@ -11,7 +11,7 @@ import casadi as ca
 import numpy as np
 
 from wbc import validation
-from wbc.errors import BoundsError, DuplicateNameError, RangeError, ShapeError
+from wbc.errors import BoundsError, DuplicateNameError, NotFiniteError, RangeError, ShapeError, UnknownNameError
 from wbc.symbolic.kinematics import Pose
 from wbc.tasks.base import Input, Kind
 from wbc.validation import Array
@@ -52,12 +52,17 @@ def flat(robot: Robot, field: str, declared: Input, value: Any) -> Array:
         return robot.configuration(field, value)
     count = declared.size if declared.kind == "vector" else size(robot, declared)
     bounded = declared.low > -math.inf or declared.high < math.inf
-    ready = type(value) is np.ndarray and value.dtype == np.float64 and value.shape == (count,) and not bounded
+    plain = not (bounded or declared.direction)
+    ready = type(value) is np.ndarray and value.dtype == np.float64 and value.shape == (count,) and plain
     # Set every tick, so without a numpy call: the sum of the magnitudes is finite only if all numbers are
     if ready and math.isfinite(sum(map(abs, value.tolist()))):
         return np.asarray(value)
     shape = (count,) if count else ()
-    numbers = np.atleast_1d(validation.real_array(field, value, shape))
+    numbers = np.atleast_1d(validation.real_array(field, value, shape, finite=declared.infinite is None))
+    if declared.infinite is not None and not (np.isfinite(numbers) | (numbers == declared.infinite)).all():
+        raise NotFiniteError(field, value, f"expected finite numbers, or {declared.infinite:g} for no limit")
+    if declared.direction:
+        return validation.unit_vector(field, numbers)
     if bounded:
         for number in numbers:
             validation.scalar(field, number, low=declared.low, high=declared.high, unit=declared.unit)
@@ -124,6 +129,8 @@ def check(robot: Robot, field: str, declared: Sequence[Input]) -> None:
             raise BoundsError(f"{where}.low", d.low, f"above high = {d.high!r}, or NaN")
         if d.default is not None:
             flat(robot, f"{where}.default", d, d.default)
+        if d.below is not None:
+            _check_order(robot, where, d, declared)
         if d.rate is not None:
             validation.one_of(f"{where}.rate", d.rate, names)
             other = declared[names.index(d.rate)]
@@ -131,3 +138,27 @@ def check(robot: Robot, field: str, declared: Sequence[Input]) -> None:
             if found != wanted or other.kind not in ("vector", "tangent"):
                 reason = f"the rate of {d.name!r} has {wanted} numbers, the {other.kind} {d.rate!r} has {found}"
                 raise ShapeError(f"{where}.rate", d.rate, reason)
+
+
+def _check_order(robot: Robot, where: str, lower: Input, declared: Sequence[Input]) -> None:
+    upper = next((d for d in declared if d.name == lower.below), None)
+    if upper is None:
+        raise UnknownNameError(f"{where}.below", lower.below, [d.name for d in declared])
+    if (upper.kind, size(robot, upper)) != (lower.kind, size(robot, lower)):
+        raise ShapeError(f"{where}.below", upper.name, "expected an input of the same kind and size")
+    if lower.default is None or upper.default is None:
+        raise ShapeError(f"{where}.below", upper.name, "both inputs need a default")
+    low, high = (flat(robot, where, d, d.default) for d in (lower, upper))
+    require_order(where, low, high, f"above {upper.name}")
+
+
+def require_order(field: str, lower: Array, upper: Array, reason: str) -> None:
+    """Refuse lower > upper in any entry.
+
+    Raises:
+        BoundsError: with the first such pair.
+    """
+    wrong = np.flatnonzero(lower > upper)
+    if wrong.size:
+        k = int(wrong[0])
+        raise BoundsError(field, (float(lower[k]), float(upper[k])), f"entry {k}: {reason}")

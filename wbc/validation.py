@@ -21,6 +21,9 @@ Array = NDArray[np.float64]
 #: How far a rotation may be from orthonormal (Frobenius norm of R'R - I) or a quaternion from unit length.
 ROTATION_TOLERANCE = 1e-6
 
+#: A vector whose entries are all smaller than this has no direction.
+LEAST_DIRECTION = 1e-12
+
 
 def real_array(field: str, value: Any, shape: tuple[int, ...] | None = None, *, finite: bool = True) -> Array:
     """A float64 copy of ``value`` with the given shape; int, float32, lists and tuples are welcome."""
@@ -54,6 +57,21 @@ def scalar(
         left = "(" if open_low else "["
         raise RangeError(field, value, f"expected a value in {left}{low:g}, {high:g}] {unit}".rstrip())
     return number
+
+
+def unit_vector(field: str, value: Any) -> Array:
+    """A vector in space scaled to unit length.
+
+    Raises:
+        ShapeError, NotFiniteError: not three finite numbers. RangeError: of no length.
+    """
+    vector = real_array(field, value, (3,))
+    largest = float(np.abs(vector).max())
+    if not largest > LEAST_DIRECTION:
+        raise RangeError(field, value, "expected a direction: a vector of non-zero length")
+    vector = vector / largest  # whatever its size, its square neither overflows nor vanishes
+    out: Array = vector / np.linalg.norm(vector)
+    return out
 
 
 def flag(field: str, value: Any) -> bool:

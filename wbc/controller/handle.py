@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -34,6 +35,7 @@ class Handle:
         "_enabled",
         "_fields",
         "_mask",
+        "_ordered",
         "_rate",
         "_robot",
         "_row_weights",
@@ -48,6 +50,9 @@ class Handle:
         # the one input with a limit that the item does not know: rate dt <= 1
         put("_rate", block.slots.get("rate") if block.form == "margins" else None)
         put("_fields", {name: f"{block.entry.name}.{name}" for name in block.slots})
+        # inputs that may not exceed another, by the name of either
+        pairs = [(slot, block.slots[slot.input.below]) for slot in block.slots.values() if slot.input.below]
+        put("_ordered", {slot.input.name: pair for pair in pairs for slot in pair})
         put("_enabled", True)
         put("_weight", block.entry.weight)
         put("_mask", np.ones(len(block.rows)))
@@ -61,7 +66,7 @@ class Handle:
         return (*given, *own, "enabled", "mask")
 
     def __dir__(self) -> list[str]:
-        return [*self.names, "names"]
+        return [*self.names, "names", "set"]
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("__"):
@@ -81,7 +86,10 @@ class Handle:
         if slot is not None:
             if slot.input.sensed:
                 raise RangeError(self._field(name), value, "is measured in every tick and cannot be set")
-            self._controller.write(slot, self._checked(slot, value))
+            numbers = self._checked(slot, value)
+            if name in self._ordered:
+                self._check_order({name: numbers})
+            self._controller.write(slot, numbers)
             return
         field = self._field(name)
         if name == "enabled":
@@ -94,10 +102,34 @@ class Handle:
             raise UnknownValueError(field, name, self.names)
         self.apply()
 
+    def set(self, **values: Any) -> None:
+        """Set several of the item's inputs at once: all are checked, bounds against each other, before any is written.
+
+        Raises:
+            WbcError: as for one of them; nothing is changed.
+        """
+        settable = [name for name, slot in self._block.slots.items() if not slot.input.sensed]
+        for name in values:
+            if name not in settable:
+                raise UnknownValueError(self._field(name), name, settable)
+        numbers = {name: self.checked(name, value) for name, value in values.items()}
+        self._check_order(numbers)
+        for name, given in numbers.items():
+            self._controller.write(self._slot(name), given)
+
+    def _check_order(self, numbers: Mapping[str, Array]) -> None:
+        p = self._controller.tick.p
+        for name in numbers:
+            if name in self._ordered:
+                low, high = self._ordered[name]
+                lower, upper = (numbers.get(s.input.name, p[s.span]) for s in (low, high))
+                reason = f"{low.input.name} is above {high.input.name}"
+                inputs.require_order(self._field(name), lower, upper, reason)
+
     @property
     def item_name(self) -> str:
         """Name of the item in the stack."""
-        return self._block.entry.name
+        return str(self._block.entry.name)
 
     def checked(self, name: str, value: Any) -> Array:
         """The numbers of an input's value, validated.
