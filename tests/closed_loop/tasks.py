@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -63,12 +63,12 @@ def errors(loop: Loop, subject: Subject, path: Array, target: Any) -> Array:
     return np.array([subject.error(loop.eyes, loop.frames, q, target) for q in path])
 
 
-def decay(loop: Loop, name: str, seed: int = 1) -> Figures:
+def decay(loop: Loop, name: str, seed: int = 1, subjects: Mapping[str, Subject] = SUBJECTS) -> Figures:
     """Alone, the error of every row falls by 1 - gain dt a tick, on a straight line in the class's coordinates.
 
     The first ticks bend the line by the curvature of the robot; the last show the bare rate.
     """
-    subject = SUBJECTS[name]
+    subject = subjects[name]
     loop.only(name)
     loop[name].gain = GAIN
     worst = {"left": 0.0, "bend": 0.0, "rate": 0.0, "unsolved": 0.0}
@@ -102,12 +102,14 @@ def feedforward(target: Any, later: Any, step: float) -> Any:
     return (later - target) / step
 
 
-def tracking(loop: Loop, name: str, seed: int = 2, ticks: int = 60) -> Figures:
+def tracking(
+    loop: Loop, name: str, seed: int = 2, ticks: int = 60, subjects: Mapping[str, Subject] = SUBJECTS
+) -> Figures:
     """A moving target is followed with a small part of the lag, speed over gain, that a loop without its rate has.
 
     What is left is of first order in dt: each tick follows the tangent of a curve.
     """
-    subject, eyes, f = SUBJECTS[name], loop.eyes, loop.frames
+    subject, eyes, f = subjects[name], loop.eyes, loop.frames
     model, step, settled, omega = loop.robot.model, 1e-6, 20, 4.0
     loop.only(name)
     loop[name].gain = GAIN
