@@ -146,21 +146,29 @@ class Tracer:
         self._symbols.append(_Symbol(f"turn {frame} {base}", phi, lambda: value, motion, spin, inner=True))
         if not ca.symvar(target):
             return phi
-        # ``here`` is the target held still, so ``turn`` is zero and only its derivative counts
-        here, nv = ca.SX.sym("R_here", 3, 3), kinematics.nv
+        # With the target held still ``turn`` is zero and only its derivative counts
+        here = self.held(target)
+        change = (target - here) @ here.T
+        turn = 0.5 * ca.vertcat(change[2, 1] - change[1, 2], change[0, 2] - change[2, 0], change[1, 0] - change[0, 1])
+        return phi - rot.left_jacobian_inverse(-phi) @ turn
+
+    def held(self, expression: ca.SX) -> ca.SX:
+        """The value of an expression, which derivatives take for a constant: neither q nor inputs move it.
+
+        With ``here = held(x)`` the term ``f(here) (x - here)`` is zero and has the rate f(x) dx/dt.
+        """
+        symbol, nv = ca.SX.sym("held", expression.shape[0], expression.shape[1]), self.kinematics.nv
         self._symbols.append(
             _Symbol(
-                "target held still",
-                ca.vec(here),
-                lambda: ca.vec(target),
-                ca.SX(9, 0),
+                "held still",
+                ca.vec(symbol),
+                lambda: ca.vec(expression),
+                ca.SX(expression.numel(), 0),
                 lambda: ca.SX(0, nv),
                 inner=True,
             )
         )
-        change = (target - here) @ here.T
-        turn = 0.5 * ca.vertcat(change[2, 1] - change[1, 2], change[0, 2] - change[2, 0], change[1, 0] - change[0, 1])
-        return phi - rot.left_jacobian_inverse(-phi) @ turn
+        return symbol
 
     def joint(self, name: str) -> ca.SX:
         """Coordinate of a one-dof joint [rad or m]; for an unbounded joint its angle in (-pi, pi].

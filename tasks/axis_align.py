@@ -1,0 +1,113 @@
+"""An axis of a frame aligns with a direction."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from wbc.symbolic.kinematics import WORLD
+from wbc.symbolic.tracer import Tracer
+from wbc.tasks._pointing import checked_around, checked_axis, row_axes, shortest_turn, turned_back
+from wbc.tasks._stereographic import TINY, Triple, square, unit
+from wbc.tasks.base import Input, Row, Task, Values
+from wbc.tasks.frames import frame_pose, require_motion
+
+if TYPE_CHECKING:
+    from wbc.robot import Robot
+
+
+@dataclass(frozen=True)
+class AxisAlign(Task):
+    """An axis a, fixed in a frame R, aligns with a direction d given in a reference frame b; the turn about a is free.
+
+        e = F' R' theta n                 theta = angle from d to a, n = d x a / |d x a|           [rad]
+
+    theta n is the rotation vector of the shortest turn that takes d to a. F = (b1, b2) are two unit vectors fixed in
+    the frame and perpendicular to a, so that no direction of a or d is left out; theta n has no part along a. The rows
+    are those of the angular velocity across a,
+
+        F' R' (w - w_b - d x dd/dt) = -gain e,
+
+    with w_b that of the reference. Hence theta falls exactly like exp(-gain t) and a moves, as seen from b, on the
+    great circle to d, whatever the spin about a does. The rows have unit size at every angle, while the derivative of e
+    itself grows without bound towards theta = pi; along e both agree: e' J v is the rate of theta^2 / 2.
+
+    Opposite directions: from theta = pi to within 1e-9 rad, where every turn is as short, it turns about ``around``.
+
+    Inputs:
+        target: d, 3 numbers of any length in the axes of the reference. Default: where a points at the first step.
+            Below a length of 1e-12 there is no direction: the rows are off and reported as faded.
+        feedforward: rate of the target vector [1/s]. Default 0.
+
+    Example:
+        >>> AxisAlign("panda_hand", axis=(0, 0, 1))          # then target = (0, 0, -1): the hand points down
+
+    What it cannot do: it does not choose the turn about the axis, and it tells a direction from its opposite (for a
+    line without a sense choose the nearer of the two as target). Noise may choose the way round near theta = pi.
+
+    Attributes:
+        frame: name of the frame that the axis is fixed in.
+        axis: the direction a in that frame, of any length.
+        relative_to: frame b that the target is given in; ``"world"`` or a frame of the robot, which may move.
+        around: b1, a direction in the frame; its part along the axis is dropped. None: the coordinate axis of the frame
+            that follows the one nearest to ``axis`` (x, y for a z axis).
+
+    Raises:
+        UnknownNameError, ShapeError, NotFiniteError, RangeError: on construction or in :meth:`validate`.
+    """
+
+    frame: str
+    axis: Triple = (0.0, 0.0, 1.0)
+    relative_to: str = WORLD
+    around: Triple | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "axis", checked_axis("AxisAlign.axis", self.axis))
+        object.__setattr__(self, "around", checked_around("AxisAlign.around", self.around, self.axis))
+
+    def validate(self, robot: Robot) -> None:
+        """Check the frames, see :meth:`Item.validate`."""
+        robot.check_frame("AxisAlign.frame", self.frame)
+        robot.check_frame("AxisAlign.relative_to", self.relative_to)
+        require_motion(robot, "AxisAlign.frame", self.frame, self.relative_to)
+
+    def inputs(self, robot: Robot) -> tuple[Input, ...]:
+        """``target`` and ``feedforward``, see the class."""
+        return (
+            Input("target", unit="1", size=3, rate="feedforward"),
+            Input("feedforward", unit="1/s", size=3, default=np.zeros(3)),
+        )
+
+    def rows(self, robot: Robot) -> tuple[Row, ...]:
+        """r1 and r2 [rad], about b1 and b2."""
+        return (Row("r1", "rad"), Row("r2", "rad"))
+
+    def initial(self, robot: Robot, q: NDArray[np.float64]) -> dict[str, Any]:
+        """The target where the axis points at ``q``."""
+        turn = frame_pose(robot, self.relative_to, q).rotation.T @ frame_pose(robot, self.frame, q).rotation
+        return {"target": turn @ np.array(self.axis)}
+
+    def error(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
+        """The formula of the class, with the rate -F' R' (d x dd/dt) of a moving target."""
+        into = turned_back(kin.rotation(self.frame), row_axes(self.axis, self.around))
+        if self.relative_to != WORLD:
+            into = into @ kin.rotation(self.relative_to)
+        direction = unit(inputs["target"])
+        here = kin.held(direction)
+        turning = into @ ca.cross(here, direction)
+        return shortest_turn(into @ here) - turning[:2]
+
+    def jacobian(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
+        """F' R' (w - w_b), the relative angular velocity across the axis."""
+        spin = kin.kinematics.jacobian(self.frame)[3:, :]
+        if self.relative_to != WORLD:
+            spin = spin - kin.kinematics.jacobian(self.relative_to)[3:, :]
+        return turned_back(kin.rotation(self.frame), row_axes(self.axis, self.around))[:2, :] @ spin
+
+    def row_factor(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
+        """1, or 0 for a target without a direction."""
+        return ca.repmat(ca.if_else(square(inputs["target"]) > TINY, 1.0, 0.0), 2, 1)

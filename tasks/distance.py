@@ -1,0 +1,97 @@
+"""The distance between two points follows a length."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from wbc import validation
+from wbc.symbolic import rotations as rot
+from wbc.symbolic.kinematics import WORLD
+from wbc.symbolic.tracer import Tracer
+from wbc.tasks._stereographic import Triple, triple
+from wbc.tasks.base import Input, Row, Task, Values
+from wbc.tasks.frames import frame_pose, require_motion
+from wbc.tasks.obstacle import distance
+
+if TYPE_CHECKING:
+    from wbc.robot import Robot
+
+
+@dataclass(frozen=True)
+class Distance(Task):
+    """The distance of two points, of a frame (R, p) and of another frame (R_b, p_b) or the world, follows a length:
+
+        e = |p + R offset - (p_b + R_b point)| - target                                            [m]
+
+    It moves the points along the line between them and leaves everything else free: the hand may go anywhere on a
+    sphere round the point. Its gradient by the points is a unit vector everywhere; where they coincide to within 1e-10
+    m, and no line is defined, they part along the z axis of the other frame.
+
+    Inputs:
+        target: the distance, >= 0 [m]. Default: what it is at the first step.
+        feedforward: rate of the target [m/s]. Default 0.
+        point: the point of the other frame [m]; first value: the field ``point``.
+        point_velocity: its rate in the axes of the other frame [m/s]. Default 0.
+
+    Example:
+        >>> Distance("gripper_left", "gripper_right")            # the hands keep their distance, however they turn
+
+    What it cannot do: keep two bodies apart: it is a wish for one distance of two points, not a margin (use Obstacle).
+    A target of 0 leaves the direction of approach to the other tasks and is served up to the tick's rounding of a
+    cone's tip; to bring two points together command a position (EndEffector with ``relative_to``).
+
+    Attributes:
+        frame: name of the frame of the first point.
+        other: frame b of the second point; ``"world"`` or a frame of the robot, which may move.
+        offset: the first point in its frame [m].
+        point: first value of the input ``point`` [m].
+
+    Raises:
+        UnknownNameError, ShapeError, NotFiniteError, RangeError: on construction or in :meth:`validate`.
+    """
+
+    initial_only: ClassVar[tuple[str, ...]] = ("gain", "point")
+
+    frame: str
+    other: str = WORLD
+    offset: Triple = (0.0, 0.0, 0.0)
+    point: Triple = (0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        for name in ("offset", "point"):
+            given = validation.real_array(f"Distance.{name}", getattr(self, name), (3,))
+            object.__setattr__(self, name, triple(given))
+
+    def validate(self, robot: Robot) -> None:
+        """Check the frames, see :meth:`Item.validate`."""
+        robot.check_frame("Distance.frame", self.frame)
+        robot.check_frame("Distance.other", self.other)
+        require_motion(robot, "Distance.frame", self.frame, self.other)
+
+    def inputs(self, robot: Robot) -> tuple[Input, ...]:
+        """``target``, ``feedforward``, ``point`` and ``point_velocity``, see the class."""
+        return (
+            Input("target", unit="m", rate="feedforward", low=0.0),
+            Input("feedforward", unit="m/s", default=0.0),
+            Input("point", unit="m", size=3, default=np.array(self.point), rate="point_velocity"),
+            Input("point_velocity", unit="m/s", size=3, default=np.zeros(3)),
+        )
+
+    def rows(self, robot: Robot) -> tuple[Row, ...]:
+        """One row [m]."""
+        return (Row("distance", "m"),)
+
+    def initial(self, robot: Robot, q: NDArray[np.float64]) -> dict[str, Any]:
+        """The distance at ``q`` from the first value of ``point``."""
+        relative = frame_pose(robot, self.other, q).actInv(frame_pose(robot, self.frame, q))
+        return {"target": float(np.linalg.norm(relative.act(np.array(self.offset)) - np.array(self.point)))}
+
+    def error(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
+        """The formula of the class, in the axes of the other frame."""
+        here = kin.pose(self.frame).point(rot.constant(self.offset))
+        return distance(kin.pose(self.other).inverse_point(here) - inputs["point"]) - inputs["target"]

@@ -1,0 +1,140 @@
+"""An axis through a point of a frame points at a target point."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from wbc import validation
+from wbc.symbolic import rotations as rot
+from wbc.symbolic.kinematics import WORLD
+from wbc.symbolic.tracer import Tracer
+from wbc.tasks._pointing import checked_around, checked_axis, row_axes, shortest_turn, turned_back
+from wbc.tasks._stereographic import INNER, Triple, fade, square, triple
+from wbc.tasks.base import Input, Row, Task, Values
+from wbc.tasks.frames import frame_pose, require_motion
+
+if TYPE_CHECKING:
+    from wbc.robot import Robot
+
+
+@dataclass(frozen=True)
+class LookAt(Task):
+    """The axis a through a point c of a frame (a camera) points at a point t given in a reference frame b:
+
+        e = F' R' theta n            theta = angle from d to a, n = d x a / |d x a|                [rad]
+                                     d = (t - c) / r, r = |t - c|, c = p + R offset                [m]
+
+    theta n is the rotation vector of the shortest turn that takes the line of sight d to the axis, F = (b1, b2) two
+    unit vectors fixed in the frame and perpendicular to a. The rows are those of the angular velocity across the axis
+    less that of the line of sight, which turns when the target, the camera or the reference moves:
+
+        F' R' (w - d x dd/dt) = -gain e,         d x dd/dt = d x (dt/dt - dc/dt) / r.
+
+    Hence theta falls exactly like exp(-gain t); the turn about the axis and the distance r are free. Along e the rows
+    agree with the derivative of e: e' J v is the rate of theta^2 / 2. From theta = pi (the target exactly behind, to
+    within 1e-9 rad) it turns about ``around``.
+
+    The weight fades where the target comes to the camera, which has no direction there: 1 from r = ``width`` L on, 0
+    below a tenth of that, twice differentiable between; L is the robot's characteristic length.
+
+    Inputs:
+        target: t, 3 numbers in the reference [m]. Default: the point on the axis at L from c, at the first step.
+        feedforward: rate of t in the axes of the reference [m/s]. Default 0.
+
+    Example:
+        >>> LookAt("head_camera", axis=(0, 0, 1), relative_to="gripper_left")     # watch what the hand does
+
+    What it cannot do: it sees no obstacle in the line of sight, keeps no distance (use Distance) and no horizon (a
+    second AxisAlign does). A target that passes close by asks for fast turns, speed over r, until it fades.
+
+    Attributes:
+        frame: name of the frame that carries the camera.
+        axis: the direction a in that frame, of any length.
+        offset: the point c in that frame [m].
+        relative_to: frame b that the target is given in; ``"world"`` or a frame of the robot, which may move.
+        around: b1, a direction in the frame; its part along the axis is dropped. None: the coordinate axis of the frame
+            that follows the one nearest to ``axis`` (x, y for a z axis).
+        width: distance below which the rows fade, as a part of the robot's characteristic length.
+
+    Raises:
+        UnknownNameError, ShapeError, NotFiniteError, RangeError: on construction or in :meth:`validate`.
+    """
+
+    frame: str
+    axis: Triple = (0.0, 0.0, 1.0)
+    offset: Triple = (0.0, 0.0, 0.0)
+    relative_to: str = WORLD
+    around: Triple | None = None
+    width: float = 0.05
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "axis", checked_axis("LookAt.axis", self.axis))
+        object.__setattr__(self, "around", checked_around("LookAt.around", self.around, self.axis))
+        object.__setattr__(self, "offset", triple(validation.real_array("LookAt.offset", self.offset, (3,))))
+        width = validation.scalar("LookAt.width", self.width, low=0.0, open_low=True, high=1.0)
+        object.__setattr__(self, "width", width)
+
+    def validate(self, robot: Robot) -> None:
+        """Check the frames, see :meth:`Item.validate`."""
+        robot.check_frame("LookAt.frame", self.frame)
+        robot.check_frame("LookAt.relative_to", self.relative_to)
+        require_motion(robot, "LookAt.frame", self.frame, self.relative_to)
+
+    def inputs(self, robot: Robot) -> tuple[Input, ...]:
+        """``target`` and ``feedforward``, see the class."""
+        return (
+            Input("target", unit="m", size=3, rate="feedforward"),
+            Input("feedforward", unit="m/s", size=3, default=np.zeros(3)),
+        )
+
+    def rows(self, robot: Robot) -> tuple[Row, ...]:
+        """r1 and r2 [rad], about b1 and b2."""
+        return (Row("r1", "rad"), Row("r2", "rad"))
+
+    def initial(self, robot: Robot, q: NDArray[np.float64]) -> dict[str, Any]:
+        """The target on the axis at ``q``."""
+        ahead = np.array(self.offset) + robot.characteristic_length * np.array(self.axis)
+        return {"target": frame_pose(robot, self.relative_to, q).actInv(frame_pose(robot, self.frame, q)).act(ahead)}
+
+    def error(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
+        """The formula of the class, with the rate -F' R' d x (dt/dt) / r of a moving target."""
+        target = inputs["target"]
+        here = kin.held(target)
+        sight, distance = self._sight(robot, kin, here)
+        into = turned_back(kin.rotation(self.frame), row_axes(self.axis, self.around))
+        if self.relative_to != WORLD:
+            into = into @ kin.rotation(self.relative_to)
+        turning = ca.cross(sight, into @ (target - here)) / distance
+        return shortest_turn(sight) - turning[:2]
+
+    def jacobian(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
+        """F' R' (w + d x dc/dt / r), with dc/dt as seen from the reference."""
+        sight, distance = self._sight(robot, kin, inputs["target"])
+        axes = row_axes(self.axis, self.around)
+        own = kin.kinematics.jacobian(self.frame, "local")
+        moving = own[:3, :] - rot.skew(rot.constant(self.offset)) @ own[3:, :]
+        if self.relative_to != WORLD:
+            base, arm = kin.kinematics.jacobian(self.relative_to), kin.rotation(self.relative_to) @ inputs["target"]
+            moving = moving - kin.rotation(self.frame).T @ (base[:3, :] - rot.skew(arm) @ base[3:, :])
+        turn = rot.constant(axes.T)
+        return turn[:2, :] @ own[3:, :] + (rot.skew(sight / distance)[:2, :] @ turn) @ moving
+
+    def row_factor(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
+        """1 where the target is away from the camera, see the class."""
+        away = self._away(kin, inputs["target"])
+        return ca.repmat(fade(square(away), self.width * robot.characteristic_length), 2, 1)
+
+    def _away(self, kin: Tracer, target: ca.SX) -> ca.SX:
+        """t - c in the axes of the frame."""
+        return kin.pose(self.frame).inverse_point(kin.pose(self.relative_to).point(target)) - rot.constant(self.offset)
+
+    def _sight(self, robot: Robot, kin: Tracer, target: ca.SX) -> tuple[ca.SX, ca.SX]:
+        """d in the axes of the rows, and r; where the rows are off both are continued by r = its value there."""
+        away, off = self._away(kin, target), INNER * self.width * robot.characteristic_length
+        distance = ca.sqrt(ca.fmax(square(away), off * off))
+        return rot.constant(row_axes(self.axis, self.around).T) @ away / distance, distance

@@ -1,0 +1,126 @@
+"""The momentum of the robot follows a momentum."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+import casadi as ca
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from wbc import validation
+from wbc.errors import RangeError
+from wbc.symbolic.centroidal import Centroidal
+from wbc.symbolic.dynamics import Dynamics
+from wbc.symbolic.tracer import Tracer
+from wbc.tasks.base import Input, Row, Task, Values
+from wbc.tasks.frames import checked_weights, weights_of_rows
+
+if TYPE_CHECKING:
+    from wbc.robot import Robot
+
+KINDS = ("both", "linear", "angular")
+
+#: A centroidal inertia below this part of m L^2 is that of a point mass and no scale for angular rows.
+SMALLEST_INERTIA = 1e-6
+
+
+@dataclass(frozen=True)
+class Momentum(Task):
+    """The momentum of the whole robot, in world axes, angular about its centre of mass, follows a momentum:
+
+        A(q) v = target + gain lag                                         [kg m/s; kg m^2/s]
+
+    A is the centroidal momentum matrix (Orin, Goswami and Lee, Autonomous Robots 35, 2013). The rows command a velocity
+    and have no error of their own: angular momentum is the derivative of no function of q. ``lag`` states by how much
+    the time integral of the momentum is behind, and is worked off at ``gain``; for the linear rows it is the mass times
+    the way that the centre of mass is behind. With lag = 0, the default, gain has no effect. The error is e = -lag.
+
+    Rows count alike: a linear row is weighed by 1 / (m L)^2 and an angular one by 1 / I^2, with m the mass of all
+    moving links, L the robot's characteristic length and I the mean principal inertia about the centre of mass at
+    ``robot.neutral``. So a linear row counts as the velocity of the centre of mass does in CenterOfMass, and an angular
+    one as the mean angular velocity of the robot.
+
+    Inputs:
+        target: momentum, linear [kg m/s] and angular [kg m^2/s], or the part that ``kind`` says. Default 0.
+        lag: what its time integral lacks [kg m; kg m^2]. Default 0.
+
+    Example:
+        >>> Momentum("angular")                                # swing the arms so that the feet need no twist
+
+    What it cannot do: it is a wish, no law of physics: a robot that floats freely keeps its momentum whatever it is
+    told (make that a constraint of your own where it matters). It holds no position, so the centre of mass drifts
+    (CenterOfMass holds it). Rotors of motors (armature) and payloads that the description does not have are not seen.
+
+    Attributes:
+        kind: which rows: ``both`` (6), ``linear`` (3) or ``angular`` (3).
+        weights: one number >= 0 a row, multiplies the weights above; None: 1 each.
+
+    Raises:
+        UnknownNameError, ShapeError, NotFiniteError, RangeError: on construction or in :meth:`validate`; a
+            robot without mass is a RangeError.
+    """
+
+    kind: Literal["both", "linear", "angular"] = "both"
+    weights: tuple[float, ...] | None = None
+
+    def __post_init__(self) -> None:
+        validation.one_of("Momentum.kind", self.kind, KINDS)
+        object.__setattr__(self, "weights", checked_weights("Momentum.weights", self.weights, self._count))
+
+    @property
+    def _count(self) -> int:
+        return 6 if self.kind == "both" else 3
+
+    @property
+    def _rows(self) -> slice:
+        return {"both": slice(0, 6), "linear": slice(0, 3), "angular": slice(3, 6)}[self.kind]
+
+    def validate(self, robot: Robot) -> None:
+        """Check that the robot has mass, see :meth:`Item.validate`."""
+        mass = _inertia(robot).mass
+        if mass <= 0.0:
+            raise RangeError("Momentum", mass, f"the moving links of {robot.name!r} have no mass [kg]")
+
+    def inputs(self, robot: Robot) -> tuple[Input, ...]:
+        """``lag`` and its rate ``target``, see the class."""
+        first = {"both": "kg m, kg m^2", "linear": "kg m", "angular": "kg m^2"}[self.kind]
+        rate = {"both": "kg m/s, kg m^2/s", "linear": "kg m/s", "angular": "kg m^2/s"}[self.kind]
+        return (
+            Input("lag", unit=first, size=self._count, default=np.zeros(self._count), rate="target"),
+            Input("target", unit=rate, size=self._count, default=np.zeros(self._count)),
+        )
+
+    def rows(self, robot: Robot) -> tuple[Row, ...]:
+        """x, y, z and rx, ry, rz; the unit is that of the momentum's integral, as for every task."""
+        every = [Row(label, "kg m") for label in "xyz"] + [Row(f"r{label}", "kg m^2") for label in "xyz"]
+        return tuple(every[self._rows])
+
+    def row_weights(self, robot: Robot) -> NDArray[np.float64]:
+        """The declared weights by the squares of m L and of I, see the class."""
+        total, length = _inertia(robot), robot.characteristic_length
+        # About the centre of mass, unlike the matrix that Inertia itself is in the world
+        mean = max(float(np.trace(total.inertia)) / 3, SMALLEST_INERTIA * total.mass * length**2)
+        scales = np.repeat([total.mass * length, mean], 3)[self._rows]
+        weights: NDArray[np.float64] = weights_of_rows(self.weights, self._count) / scales**2
+        return weights
+
+    def error(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
+        """-lag, whose rate is -target."""
+        return ca.SX(-inputs["lag"])
+
+    def jacobian(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
+        """The rows of A."""
+        return Centroidal(Dynamics(kin.kinematics)).matrix[self._rows, :]
+
+
+def _inertia(robot: Robot) -> pin.Inertia:
+    """Mass, centre and inertia about it of all moving links as one body in the world, at ``robot.neutral``."""
+    data, total = robot.model.createData(), pin.Inertia.Zero()
+    pin.forwardKinematics(robot.model, data, robot.neutral)
+    for j in range(1, robot.model.njoints):
+        if robot.model.inertias[j].mass > 0.0:
+            total = total + data.oMi[j].act(robot.model.inertias[j])
+    return total
