@@ -12,6 +12,7 @@ import numpy as np
 
 from wbc import validation
 from wbc.errors import BoundsError, DuplicateNameError, NotFiniteError, RangeError, ShapeError, UnknownNameError
+from wbc.shapes import FAR
 from wbc.symbolic.kinematics import Pose
 from wbc.tasks.base import Input, Kind
 from wbc.validation import Array
@@ -21,9 +22,6 @@ if TYPE_CHECKING:
 
 #: Inputs that every item has, or may have, without declaring them.
 RESERVED = ("gain", "weight", "enabled", "mask", "rate")
-
-#: Distance [m] of a sensed row that has no pair.
-FAR = 1e3
 
 
 def size(robot: Robot, declared: Input) -> int:

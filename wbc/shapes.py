@@ -106,6 +106,9 @@ class Convex:
         return f"Convex({len(self.points)} points, {digest})"
 
 
+#: Distance [m] that stands for nothing in reach.
+FAR = 1e3
+
 #: Points closer to a plane than this, relative to their extent, span no volume.
 FLAT = 1e-6
 

@@ -1,0 +1,94 @@
+"""Bodies: shapes fixed to a frame of the robot, to the world, or to an obstacle that moves by itself."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import pinocchio as pin
+
+from wbc import validation
+from wbc.errors import DuplicateNameError, ShapeError, UnknownNameError
+from wbc.shapes import Box, Capsule, Convex, Cylinder, HalfSpace, Shape, Sphere
+from wbc.symbolic.kinematics import WORLD, frame_index
+
+if TYPE_CHECKING:
+    from wbc.robot import Robot
+
+#: The frame of bodies that move with a pose given from outside.
+OBSTACLE = "obstacle"
+
+_SHAPES = (Sphere, Capsule, Box, Cylinder, Convex, HalfSpace)
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """A shape fixed to a frame.
+
+    Attributes:
+        name: for reports.
+        frame: a frame of the robot; ``"world"`` for a body at rest; :data:`OBSTACLE` for one that moves with a pose
+            given from outside.
+        placement: pose of the shape in that frame.
+        shape: any shape of :mod:`wbc.shapes`. A mesh is several bodies, a :class:`wbc.shapes.Convex` each.
+
+    Raises:
+        ShapeError: no name, or no shape.
+        RotationError, NotFiniteError: a placement that is no pose.
+    """
+
+    name: str
+    frame: str
+    placement: pin.SE3
+    shape: Shape
+
+    def __post_init__(self) -> None:
+        for field in ("name", "frame"):
+            if not isinstance(getattr(self, field), str):
+                raise ShapeError(f"Body.{field}", getattr(self, field), "expected a name")
+        if not isinstance(self.shape, _SHAPES):
+            names = [kind.__name__ for kind in _SHAPES]
+            raise ShapeError("Body.shape", self.shape, "this is no shape", names)
+        object.__setattr__(self, "placement", validation.pose("Body.placement", self.placement))
+
+
+#: Two bodies, A and B; normals point from A to B.
+Pair = tuple[Body, Body]
+
+
+def checked_pairs(field: str, robot: Robot, pairs: Any, moving: frozenset[str]) -> list[Pair]:
+    """The pairs as a list, with every frame known.
+
+    Raises:
+        ShapeError: not pairs of bodies, a body with itself, or two half-spaces.
+        UnknownNameError: a frame that neither the robot has nor moves from outside.
+        DuplicateNameError: a name of something that moves from outside is also a frame of the robot.
+    """
+    if isinstance(pairs, (str, bytes)) or not isinstance(pairs, Sequence):
+        raise ShapeError(field, pairs, "expected a sequence of pairs of bodies")
+    frames = {WORLD, *robot.frame_names}
+    out: list[Pair] = []
+    for k, pair in enumerate(pairs):
+        where = f"{field}[{k}]"
+        if not (isinstance(pair, (tuple, list)) and len(pair) == 2 and all(isinstance(b, Body) for b in pair)):
+            raise ShapeError(where, pair, "expected two bodies")
+        first, second = pair
+        if first is second:
+            raise ShapeError(where, first.name, "a body has no distance to itself")
+        if isinstance(first.shape, HalfSpace) and isinstance(second.shape, HalfSpace):
+            raise ShapeError(where, (first.name, second.name), "two half-spaces have no distance")
+        for body in (first, second):
+            if body.frame in moving and body.frame in frames:
+                raise DuplicateNameError(f"{where}.frame", body.frame, "the robot has a frame of this name")
+            if body.frame not in moving and body.frame not in frames:
+                raise UnknownNameError(f"{where}.frame", body.frame, [*robot.frame_names, *sorted(moving)])
+        out.append((first, second))
+    return out
+
+
+def joint_of(robot: Robot, body: Body, moving: frozenset[str]) -> int:
+    """Number of the joint that carries the body; 0 for one that no joint of the robot moves."""
+    if body.frame == WORLD or body.frame in moving:
+        return 0
+    return int(robot.model.frames[frame_index(robot.model, body.frame)].parentJoint)

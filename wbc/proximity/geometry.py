@@ -1,0 +1,68 @@
+"""Shapes as geometries of Coal, each about the centre of its bounding sphere."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+# isort: split
+import pinocchio as pin
+
+# isort: split
+import coal
+
+from wbc.errors import ShapeError
+from wbc.shapes import Box, Capsule, Convex, Cylinder, HalfSpace, Shape, Sphere
+from wbc.validation import Array
+
+
+@dataclass(frozen=True, eq=False)
+class Geometry:
+    """A shape for Coal.
+
+    Attributes:
+        geometry: the Coal object; its origin is the centre of a sphere round the shape.
+        center: that centre in the shape's frame [m].
+        radius: of that sphere [m]; infinite for a half-space, whose centre lies on its boundary.
+    """
+
+    geometry: Any
+    center: Array
+    radius: float
+
+    @property
+    def offset(self) -> pin.SE3:
+        """Pose of the geometry in the shape's frame."""
+        return pin.SE3(np.eye(3), self.center)
+
+
+def geometry_of(shape: Shape) -> Geometry:
+    """The geometry of a shape.
+
+    Raises:
+        ShapeError: no shape of :mod:`wbc.shapes`.
+    """
+    zero = np.zeros(3)
+    if isinstance(shape, Sphere):
+        return Geometry(coal.Sphere(shape.radius), zero, shape.radius)
+    if isinstance(shape, Capsule):
+        return Geometry(coal.Capsule(shape.radius, shape.length), zero, shape.radius + shape.length / 2)
+    if isinstance(shape, Box):
+        return Geometry(coal.Box(*shape.size), zero, float(np.linalg.norm(shape.size)) / 2)
+    if isinstance(shape, Cylinder):
+        return Geometry(
+            coal.Cylinder(shape.radius, shape.length), zero, float(np.hypot(shape.radius, shape.length / 2))
+        )
+    if isinstance(shape, HalfSpace):
+        return Geometry(coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0), zero, np.inf)
+    if isinstance(shape, Convex):
+        center = (shape.points.min(axis=0) + shape.points.max(axis=0)) / 2
+        points = coal.StdVec_Vec3s()
+        for point in shape.points - center:
+            points.append(point)
+        # "Qt": faces of more than three corners are cut into triangles, which Coal needs
+        hull = coal.Convex.convexHull(points, True, "Qt")
+        return Geometry(hull, center, float(np.linalg.norm(shape.points - center, axis=1).max()))
+    raise ShapeError("shape", shape, "this is no shape")
