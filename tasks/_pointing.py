@@ -21,11 +21,7 @@ def checked_axis(field: str, axis: object) -> Triple:
     Raises:
         ShapeError, NotFiniteError: not three finite numbers. RangeError: zero.
     """
-    given = validation.real_array(field, axis, (3,))
-    largest = float(np.abs(given).max())
-    if largest == 0.0:
-        raise RangeError(field, axis, "expected a vector of non-zero length")
-    return triple(given / largest / float(np.linalg.norm(given / largest)))
+    return triple(validation.unit_vector(field, axis))
 
 
 def checked_around(field: str, around: object, axis: Triple) -> Triple | None:
@@ -36,7 +32,7 @@ def checked_around(field: str, around: object, axis: Triple) -> Triple | None:
     """
     if around is None:
         return None
-    given = np.array(checked_axis(field, around))
+    given = validation.unit_vector(field, around)
     across = given - np.array(axis) * float(given @ axis)
     if not float(np.linalg.norm(across)) > 1e-6:
         raise RangeError(field, around, "expected a vector that is not parallel to the axis")

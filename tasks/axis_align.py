@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from wbc.symbolic.kinematics import WORLD
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks._pointing import checked_around, checked_axis, row_axes, shortest_turn, turned_back
-from wbc.tasks._stereographic import TINY, Triple, square, unit
+from wbc.tasks._stereographic import Triple
 from wbc.tasks.base import Input, Row, Task, Values
 from wbc.tasks.frames import frame_pose, require_motion
 
@@ -39,9 +39,9 @@ class AxisAlign(Task):
     Opposite directions: from theta = pi to within 1e-9 rad, where every turn is as short, it turns about ``around``.
 
     Inputs:
-        target: d, 3 numbers of any length in the axes of the reference. Default: where a points at the first step.
-            Below a length of 1e-12 there is no direction: the rows are off and reported as faded.
-        feedforward: rate of the target vector [1/s]. Default 0.
+        target: d, 3 numbers of any length but 0 in the axes of the reference, kept as a unit vector. Default: where a
+            points at the first step.
+        feedforward: dd/dt, rate of the unit vector [1/s]; its part along d has no effect. Default 0.
 
     Example:
         >>> AxisAlign("panda_hand", axis=(0, 0, 1))          # then target = (0, 0, -1): the hand points down
@@ -78,7 +78,7 @@ class AxisAlign(Task):
     def inputs(self, robot: Robot) -> tuple[Input, ...]:
         """``target`` and ``feedforward``, see the class."""
         return (
-            Input("target", unit="1", size=3, rate="feedforward"),
+            Input("target", unit="1", size=3, rate="feedforward", direction=True),
             Input("feedforward", unit="1/s", size=3, default=np.zeros(3)),
         )
 
@@ -96,9 +96,8 @@ class AxisAlign(Task):
         into = turned_back(kin.rotation(self.frame), row_axes(self.axis, self.around))
         if self.relative_to != WORLD:
             into = into @ kin.rotation(self.relative_to)
-        direction = unit(inputs["target"])
-        here = kin.held(direction)
-        turning = into @ ca.cross(here, direction)
+        here = kin.held(inputs["target"])
+        turning = into @ ca.cross(here, inputs["target"])
         return shortest_turn(into @ here) - turning[:2]
 
     def jacobian(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
@@ -107,7 +106,3 @@ class AxisAlign(Task):
         if self.relative_to != WORLD:
             spin = spin - kin.kinematics.jacobian(self.relative_to)[3:, :]
         return turned_back(kin.rotation(self.frame), row_axes(self.axis, self.around))[:2, :] @ spin
-
-    def row_factor(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
-        """1, or 0 for a target without a direction."""
-        return ca.repmat(ca.if_else(square(inputs["target"]) > TINY, 1.0, 0.0), 2, 1)
