@@ -13,14 +13,17 @@ moving obstacle) go through the same expression and give its partial derivative 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 
 import casadi as ca
 import numpy as np
 
 from wbc.errors import UnknownNameError
 from wbc.symbolic import rotations as rot
+from wbc.symbolic.gaps import Gap, gap_jacobian
+from wbc.symbolic.curvature import Pull
 from wbc.symbolic.kinematics import WORLD, Kinematics, Pose
 
 
@@ -31,6 +34,7 @@ class _Symbol:
     The rate is kept as two factors because ``(partial @ motion) @ jacobian`` is much smaller than
     ``partial @ (motion @ jacobian)``. Kinematics are built when they are needed, so that an item can be traced
     (to count its rows, to make its cache key) without them. ``inner``: value and motion are in other placeholders.
+    ``pulls``: what a force along the rate, given as a 3-vector in the axes of ``jacobian``, does to the robot.
     """
 
     name: str
@@ -39,6 +43,7 @@ class _Symbol:
     motion: ca.SX
     jacobian: Callable[[], ca.SX]
     inner: bool = False
+    pulls: Callable[[ca.SX], tuple[Pull, ...]] = lambda force: ()
 
 
 @dataclass
@@ -82,6 +87,7 @@ class Tracer:
                     lambda: kinematics.pose(frame).position,
                     _eye(),
                     lambda: kinematics.jacobian(frame)[:3, :],
+                    pulls=lambda force: (Pull("force", frame, force),),
                 ),
                 _Symbol(
                     f"rotation {frame}",
@@ -89,6 +95,7 @@ class Tracer:
                     lambda: ca.vec(kinematics.pose(frame).rotation),
                     rotation_rate(known.rotation),
                     lambda: kinematics.jacobian(frame)[3:, :],
+                    pulls=lambda torque: (Pull("torque", frame, torque),),
                 ),
             ]
         self._poses[frame] = known
@@ -114,6 +121,7 @@ class Tracer:
                     lambda: kinematics.center_of_mass,
                     _eye(),
                     lambda: kinematics.center_of_mass_jacobian,
+                    pulls=lambda force: (Pull("mass", WORLD, force),),
                 )
             )
         return self._com
@@ -143,7 +151,17 @@ class Tracer:
             return own if base == WORLD else own - kinematics.jacobian(base)[3:, :]
 
         value = rot.log3(relative @ target.T)
-        self._symbols.append(_Symbol(f"turn {frame} {base}", phi, lambda: value, motion, spin, inner=True))
+        self._symbols.append(
+            _Symbol(
+                f"turn {frame} {base}",
+                phi,
+                lambda: value,
+                motion,
+                spin,
+                inner=True,
+                pulls=lambda torque: (Pull("torque", frame, torque), Pull("torque", base, -torque)),
+            )
+        )
         if not ca.symvar(target):
             return phi
         # With the target held still ``turn`` is zero and only its derivative counts
@@ -170,6 +188,19 @@ class Tracer:
         )
         return symbol
 
+    def gaps(self, gaps: Sequence[Gap]) -> ca.SX:
+        """Distances of bodies as a column; derivatives along v by :func:`wbc.symbolic.gaps.gap_jacobian`.
+
+        Inputs in the distances are held: what they move is for the caller to add.
+        """
+        count, kinematics = len(gaps), self.kinematics
+        symbol = ca.SX.sym("gap", count)
+        value = ca.vertcat(ca.SX(0, 1), *[gap.distance for gap in gaps])
+        motion = ca.SX(ca.DM.eye(count))
+        slope = partial(gap_jacobian, kinematics, tuple(gaps))
+        self._symbols.append(_Symbol("gaps", symbol, lambda: value, motion, slope, inner=True))
+        return symbol
+
     def joint(self, name: str) -> ca.SX:
         """Coordinate of a one-dof joint [rad or m]; for an unbounded joint its angle in (-pi, pi].
 
@@ -187,10 +218,25 @@ class Tracer:
         """Derivative along the tangent space, rows x nv, of an expression in this tracer's symbols."""
         total = ca.jacobian(expression, self.q) @ self.kinematics.tangent_map
         for known in self._symbols:
+            if not known.motion.nnz():
+                continue
+            change = ca.jacobian(expression, known.symbol)
+            if change.nnz():
+                total = total + ca.sparsify(change @ known.motion) @ known.jacobian()
+        return self.expand(ca.sparsify(total))
+
+    def pulls(self, expression: ca.SX) -> list[Pull]:
+        """Forces and torques on the robot whose virtual work is the derivative of a scalar expression.
+
+        What depends on joint coordinates directly does not bend and gives none.
+        """
+        out: list[Pull] = []
+        for known in self._symbols:
             partial = ca.jacobian(expression, known.symbol)
             if partial.nnz() and known.motion.nnz():
-                total = total + ca.sparsify(partial @ known.motion) @ known.jacobian()
-        return self.expand(ca.sparsify(total))
+                along = self.expand(ca.densify(partial @ known.motion)).T
+                out += known.pulls(along)
+        return out
 
     def expand(self, expression: ca.SX) -> ca.SX:
         """The expression with every placeholder replaced by the kinematics that it stands for."""
