@@ -9,6 +9,8 @@ import casadi as ca
 import numpy as np
 
 from tests.constraints.items import FACTORIES as CONSTRAINTS
+from tests.constraints.items_limits import FACTORIES as LIMITS
+from tests.tasks.items_pointing import FACTORIES as POINTING
 from tests.tasks.robots import FRAMES
 from wbc.robot import Robot
 from wbc.tasks import (
@@ -117,5 +119,7 @@ FACTORIES: dict[str, Callable[[Robot], list[Declared]]] = {
     "Expression": _expression,
     "PitchPlane": _pitch_plane,
     "PitchPlaneLimit": _pitch_plane_limit,
+    **POINTING,
     **CONSTRAINTS,
+    **LIMITS,
 }

@@ -15,6 +15,7 @@ import pytest
 
 from tests.tasks.evaluate import Numbers, later, numbers, sample, slope
 from tests.tasks.items import FACTORIES
+from tests.tasks.items_pointing import RATES as POINTING
 from tests.tasks.robots import NAMES, placement, random_configuration, robot, velocity
 from wbc.robot import Robot
 from wbc.tasks import Damping, FrameVelocityLimit, Hold, Item, Mechanism, PitchPlane, Task, registry
@@ -100,7 +101,14 @@ def pin_jacobians(model: pin.Model, q: np.ndarray) -> pin.Data:
 
 
 #: What the rows times v are, where they are not the derivative of a value.
-RATES = {Damping: damping, FrameVelocityLimit: frame_velocity, Hold: hold, Mechanism: mechanism, PitchPlane: plane_rate}
+RATES = {
+    Damping: damping,
+    FrameVelocityLimit: frame_velocity,
+    Hold: hold,
+    Mechanism: mechanism,
+    PitchPlane: plane_rate,
+    **POINTING,
+}
 
 
 def test_every_shipped_class_has_a_factory_and_is_exported() -> None:
@@ -111,8 +119,8 @@ def test_every_shipped_class_has_a_factory_and_is_exported() -> None:
 
 
 def own_rows(item: Item) -> bool:
-    """Whether a task gives its own rows (damping always, a pitch plane in one of its forms)."""
-    return isinstance(item, Damping) or (isinstance(item, PitchPlane) and item.commands_rate)
+    """Whether a task gives its own rows (damping and pointing always, a pitch plane in one of its forms)."""
+    return isinstance(item, (Damping, *POINTING)) or (isinstance(item, PitchPlane) and item.commands_rate)
 
 
 @pytest.mark.parametrize("robot_name", NAMES)
