@@ -2,6 +2,7 @@
 
 from wbc.tasks._stereographic import PlaneReference
 from wbc.tasks.axis_align import AxisAlign
+from wbc.tasks.axis_cone import AxisCone
 from wbc.tasks.base import Bounds, Constraint, Form, Input, Item, Order, Row, Rows, Task, Values, registry
 from wbc.tasks.center_of_mass import CenterOfMass
 from wbc.tasks.damping import Damping
@@ -11,8 +12,10 @@ from wbc.tasks.end_effector import EndEffector
 from wbc.tasks.expression import Expression
 from wbc.tasks.fixed import Fixed
 from wbc.tasks.frame_velocity_limit import FrameVelocityLimit
+from wbc.tasks.gaze_cone import GazeCone
 from wbc.tasks.hold import Hold
 from wbc.tasks.joint_limits import JointLimits
+from wbc.tasks.limit import Limit
 from wbc.tasks.look_at import LookAt
 from wbc.tasks.mechanism import Mechanism
 from wbc.tasks.momentum import Momentum
@@ -20,9 +23,12 @@ from wbc.tasks.obstacle import Obstacle
 from wbc.tasks.pitch_plane import PitchPlane
 from wbc.tasks.pitch_plane_limit import PitchPlaneLimit
 from wbc.tasks.posture import Posture
+from wbc.tasks.workspace_box import WorkspaceBox
+from wbc.tasks.workspace_polyhedron import WorkspacePolyhedron
 
 __all__ = [
     "AxisAlign",
+    "AxisCone",
     "Bounds",
     "CenterOfMass",
     "Constraint",
@@ -34,10 +40,12 @@ __all__ = [
     "Fixed",
     "Form",
     "FrameVelocityLimit",
+    "GazeCone",
     "Hold",
     "Input",
     "Item",
     "JointLimits",
+    "Limit",
     "LookAt",
     "Mechanism",
     "Momentum",
@@ -51,5 +59,7 @@ __all__ = [
     "Rows",
     "Task",
     "Values",
+    "WorkspaceBox",
+    "WorkspacePolyhedron",
     "registry",
 ]

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from wbc import validation
 from wbc.errors import RangeError, ShapeError
+from wbc.symbolic import rotations as rot
 from wbc.symbolic.kinematics import WORLD, frame_index
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks.base import Row
@@ -53,6 +54,13 @@ def _joint(robot: Robot, frame: str) -> int:
 def into_axes(kin: Tracer, vector: ca.SX, axes: str) -> ca.SX:
     """R_a' vector: the components along the axes of a frame of a vector given in world axes."""
     return vector if axes == WORLD else kin.rotation(axes).T @ vector
+
+
+def point_in(kin: Tracer, frame: str, offset: tuple[float, float, float], reference: str) -> ca.SX:
+    """R_b' (p + R offset - p_b): a point fixed in a frame (R, p), as seen from a reference frame b [m]."""
+    own, base = kin.pose(frame), kin.pose(reference)
+    point = own.point(rot.constant(offset)) if any(offset) else own.position
+    return point if reference == WORLD else base.inverse_point(point)
 
 
 def frame_pose(robot: Robot, frame: str, q: NDArray[np.float64]) -> pin.SE3:

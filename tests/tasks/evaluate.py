@@ -95,6 +95,8 @@ def sample(robot: Robot, declared: Input, rng: np.random.Generator) -> Any:
         return turn
     if declared.kind == "configuration":
         return pin.integrate(robot.model, robot.neutral, rng.uniform(-1.0, 1.0, robot.nv))
+    if declared.direction:
+        return place / np.linalg.norm(place)
     count = run_time.size(robot, declared)
     drawn = rng.uniform(max(declared.low, -1.0), min(declared.high, 1.0), count)
     return float(drawn[0]) if declared.kind == "vector" and declared.size == 0 else drawn

@@ -1,0 +1,96 @@
+"""An axis of a frame stays within an angle of a direction."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
+
+import casadi as ca
+import numpy as np
+
+from wbc import validation
+from wbc.symbolic.kinematics import WORLD
+from wbc.symbolic.tracer import Tracer
+from wbc.tasks._cone import angle_between, checked_half_angle, cone_margin, half_angle_inputs
+from wbc.tasks._stereographic import Triple, triple, unit
+from wbc.tasks.base import Constraint, Input, Row, Values
+from wbc.tasks.frames import require_motion
+
+if TYPE_CHECKING:
+    from wbc.robot import Robot
+
+
+@dataclass(frozen=True)
+class AxisCone(Constraint):
+    """An axis a, fixed in a frame R, stays within an angle alpha of a direction d in a reference frame b. One row:
+
+        h = (alpha - theta) (1 + min(theta / alpha, 1)) / 2 >= 0,    theta = angle between R a and R_b d     [rad]
+
+    On the cone h has slope -1 in theta: near it h is the angle that is left, beyond it exactly alpha - theta, and on
+    the axis of the cone alpha / 2 with slope 0, where alpha - theta itself would have a tip. The turn about the axis
+    is free.
+
+    Inputs:
+        direction: d, 3 numbers of any length, kept at unit length, in the axes of the reference.
+        direction_rate: derivative of the unit vector d [1/s]; w x d for a direction that turns at w. Default 0.
+        half_angle: alpha in [0.001, pi] [rad]. half_angle_rate: its rate [rad/s]. Default 0.
+
+    Example:
+        >>> AxisCone("panda_hand", axis=(0, 0, -1), half_angle=0.2)       # the cup in the hand stays level
+
+    What it cannot do: at theta = pi every way back is as short: one is taken, and noise may choose another. It limits
+    an angle and not the point that the axis goes through (see ``GazeCone``). Over one tick of length dt an axis that
+    turns at w against the direction may leave the cone by (1 + 1 / alpha) (w dt)^2 / 2: a cone must be wide against
+    w dt. A direction that moves faster than the joints can follow is lost: actuator limits come first.
+
+    Attributes:
+        frame: name of the frame that the axis is fixed in.
+        half_angle: first value of the input [rad].
+        axis: a in that frame, of any length.
+        direction: first value of the input; ``(0, 0, 1)`` is up.
+        relative_to: frame b that the direction is given in, ``"world"`` or a frame of the robot, which may move.
+
+    Raises:
+        UnknownNameError, ShapeError, NotFiniteError: a bad field.
+        RangeError: a vector without length, a half angle out of range, or a frame that no joint moves.
+    """
+
+    initial_only: ClassVar[tuple[str, ...]] = ("half_angle", "direction")
+
+    frame: str
+    half_angle: float
+    axis: Triple = (0.0, 0.0, 1.0)
+    direction: Triple = (0.0, 0.0, 1.0)
+    relative_to: str = WORLD
+
+    def __post_init__(self) -> None:
+        for name in ("axis", "direction"):
+            vector = validation.unit_vector(f"AxisCone.{name}", getattr(self, name))
+            object.__setattr__(self, name, triple(vector))
+        object.__setattr__(self, "half_angle", checked_half_angle("AxisCone.half_angle", self.half_angle))
+
+    def validate(self, robot: Robot) -> None:
+        """Check the frames, see :meth:`Item.validate`."""
+        robot.check_frame("AxisCone.frame", self.frame)
+        robot.check_frame("AxisCone.relative_to", self.relative_to)
+        require_motion(robot, "AxisCone.frame", self.frame, self.relative_to)
+
+    def inputs(self, robot: Robot) -> tuple[Input, ...]:
+        """``direction`` and ``half_angle`` with their rates."""
+        return (
+            Input("direction", size=3, default=self.direction, rate="direction_rate", direction=True),
+            Input("direction_rate", unit="1/s", size=3, default=np.zeros(3)),
+            *half_angle_inputs(self.half_angle),
+        )
+
+    def rows(self, robot: Robot) -> tuple[Row, ...]:
+        """One row [rad]."""
+        return (Row("cone", "rad"),)
+
+    def margins(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
+        """The formula of the class, in the axes of the frame."""
+        # A direction that its rate has moved on is a little longer than 1
+        direction = unit(inputs["direction"])
+        if self.relative_to != WORLD:
+            direction = kin.rotation(self.relative_to) @ direction
+        return cone_margin(angle_between(self.axis, kin.rotation(self.frame).T @ direction), inputs["half_angle"])

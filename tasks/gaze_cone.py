@@ -1,0 +1,102 @@
+"""A point stays within a cone that a frame carries."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
+
+import casadi as ca
+import numpy as np
+
+from wbc import validation
+from wbc.symbolic import rotations as rot
+from wbc.symbolic.kinematics import WORLD
+from wbc.symbolic.tracer import Tracer
+from wbc.tasks._cone import angle_between, checked_half_angle, cone_margin, half_angle_inputs, reach
+from wbc.tasks._stereographic import Triple, triple
+from wbc.tasks.base import Constraint, Input, Row, Values
+from wbc.tasks.frames import require_motion
+
+if TYPE_CHECKING:
+    from wbc.robot import Robot
+
+
+@dataclass(frozen=True)
+class GazeCone(Constraint):
+    """A point stays within a cone of half angle alpha about an axis a, both fixed in a frame: in the field of view of a
+    camera, or, with the cone in the world, within a funnel. One row:
+
+        h = |r| (alpha - theta) (1 + min(theta / alpha, 1)) / 2 >= 0,      theta = angle between r and a       [m]
+
+        r = R' (p_t + R_t point - p) - apex,        (R, p) the frame, (R_t, p_t) the frame of the point
+
+    Near the cone h is the length of the arc, at the point's distance, that is left to the cone; beyond it exactly that
+    arc, negative. Unlike an angle it has a finite derivative everywhere: in the apex, where h = 0, it leads along the
+    axis.
+
+    Inputs:
+        point: 3 numbers in the axes of ``point_frame`` [m]. point_velocity: their rate [m/s]. Default 0.
+        half_angle: alpha in [0.001, pi] [rad]. half_angle_rate: its rate [rad/s]. Default 0.
+
+    Example:
+        >>> GazeCone("camera_link", half_angle=0.5, axis=(0, 0, 1), point_frame="panda_hand")   # the hand stays in view
+
+    What it cannot do: it sees no occlusion and no nearest or farthest distance of sharp sight, and it looks along one
+    axis: a rectangular image is its inscribed cone. Straight behind the apex every way back is as short: one is taken,
+    and noise may choose another. A point that moves faster than the joints can follow is lost: actuator limits come
+    first.
+
+    Attributes:
+        frame: name of the frame that carries the cone; ``"world"`` for one at rest.
+        half_angle: first value of the input [rad].
+        axis: a in ``frame``, of any length.
+        apex: tip of the cone in ``frame`` [m].
+        point_frame: name of the frame that carries the point; ``"world"`` for one that the input moves.
+        point: first value of the input [m].
+
+    Raises:
+        UnknownNameError, ShapeError, NotFiniteError: a bad field.
+        RangeError: an axis without length, a half angle out of range, or two frames that no joint moves against each
+            other.
+    """
+
+    initial_only: ClassVar[tuple[str, ...]] = ("half_angle", "point")
+
+    frame: str
+    half_angle: float
+    axis: Triple = (0.0, 0.0, 1.0)
+    apex: Triple = (0.0, 0.0, 0.0)
+    point_frame: str = WORLD
+    point: Triple = (0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "axis", triple(validation.unit_vector("GazeCone.axis", self.axis)))
+        for name in ("apex", "point"):
+            given = validation.real_array(f"GazeCone.{name}", getattr(self, name), (3,))
+            object.__setattr__(self, name, triple(given))
+        object.__setattr__(self, "half_angle", checked_half_angle("GazeCone.half_angle", self.half_angle))
+
+    def validate(self, robot: Robot) -> None:
+        """Check the frames, see :meth:`Item.validate`."""
+        robot.check_frame("GazeCone.frame", self.frame)
+        robot.check_frame("GazeCone.point_frame", self.point_frame)
+        require_motion(robot, "GazeCone.frame", self.frame, self.point_frame)
+
+    def inputs(self, robot: Robot) -> tuple[Input, ...]:
+        """``point`` and ``half_angle`` with their rates."""
+        return (
+            Input("point", unit="m", size=3, default=self.point, rate="point_velocity"),
+            Input("point_velocity", unit="m/s", size=3, default=np.zeros(3)),
+            *half_angle_inputs(self.half_angle),
+        )
+
+    def rows(self, robot: Robot) -> tuple[Row, ...]:
+        """One row [m]."""
+        return (Row("cone", "m"),)
+
+    def margins(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
+        """The formula of the class, in the axes of the frame."""
+        point = kin.pose(self.point_frame).point(inputs["point"])
+        seen = kin.pose(self.frame).inverse_point(point) - rot.constant(self.apex)
+        seen, length = reach(self.axis, seen)
+        return length * cone_margin(angle_between(self.axis, seen, length), inputs["half_angle"])

@@ -1,0 +1,122 @@
+"""A point of a frame stays on the allowed side of planes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import casadi as ca
+import numpy as np
+import pinocchio as pin
+
+from wbc import validation
+from wbc.errors import NotFiniteError, ShapeError
+from wbc.symbolic import rotations as rot
+from wbc.symbolic.kinematics import WORLD, Pose
+from wbc.symbolic.tracer import Tracer
+from wbc.tasks.base import Constraint, Input, Row, Values
+from wbc.tasks.frames import point_in, require_motion
+
+if TYPE_CHECKING:
+    from wbc.robot import Robot
+
+Triple = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class WorkspacePolyhedron(Constraint):
+    """A point x of a frame (R, p) stays in an intersection of k half-spaces n_i'x >= d_i (a polyhedron in
+    H-representation, bounded or not), whose planes are fixed to a body W:
+
+        h_i = n_i' x - d_i >= 0,    x = R_W' (R_b' (p + R offset - p_b) - p_W)        [m]
+
+    (R_W, p_W) is the input ``pose``, given in a reference frame b. One row a plane: ``plane[0]``, ``plane[1]``, ...
+
+    Inputs:
+        offsets: k numbers d_i [m], the distance of each plane from the origin of W along its normal; -inf: no plane.
+        offsets_rate: their rates [m/s]. Default 0.
+        pose: of W in the reference frame. Default: the field, or the identity.
+        velocity: twist of W (linear m/s; angular rad/s) in the axes of the reference, at the origin of W. Default 0.
+
+    Example:
+        >>> WorkspacePolyhedron("tool0", normals=[(0, 0, 1), (-1, 0, 0)], offsets=[0.1, -0.8])   # above, and before
+
+    What it cannot do: it guards one point, not the body around it (``Obstacle`` with link shapes does). It is
+    convex: a region with a re-entrant corner needs a planner. Planes that leave no point between them are not refused:
+    the rows then give way, see ``Step.relaxed``. Over one tick the point may pass a plane by the bend of its path.
+
+    Attributes:
+        frame: name of the frame that carries the point.
+        normals: k x 3 directions to the allowed side, in the axes of W, of any length; kept at unit length.
+        offsets: first values of the input: k numbers, or one for all.
+        relative_to: reference frame b, ``"world"`` or a frame of the robot, which may move.
+        offset: the point in ``frame`` [m].
+        pose: first value of the input; None: the identity.
+
+    Raises:
+        RangeError: a normal without length, or no joint moves the frame against the reference.
+        UnknownNameError, ShapeError, NotFiniteError, RotationError: a bad field.
+    """
+
+    initial_only: ClassVar[tuple[str, ...]] = ("offsets", "pose")
+
+    frame: str
+    normals: tuple[Triple, ...]
+    offsets: float | tuple[float, ...] = 0.0
+    relative_to: str = WORLD
+    offset: Triple = (0.0, 0.0, 0.0)
+    pose: pin.SE3 | None = None
+
+    def __post_init__(self) -> None:
+        owner = "WorkspacePolyhedron"
+        normals = _normals(f"{owner}.normals", self.normals)
+        object.__setattr__(self, "normals", normals)
+        offsets = validation.real_array(f"{owner}.offsets", self.offsets, finite=False)
+        if offsets.shape not in ((), (len(normals),)):
+            raise ShapeError(f"{owner}.offsets", self.offsets, f"expected one number or {len(normals)}, one a normal")
+        if not (np.isfinite(offsets) | (offsets == -math.inf)).all():
+            raise NotFiniteError(f"{owner}.offsets", self.offsets, "expected finite numbers, or -inf for no plane")
+        object.__setattr__(self, "offsets", tuple(np.broadcast_to(offsets, len(normals)).tolist()))
+        offset = validation.real_array(f"{owner}.offset", self.offset, (3,))
+        object.__setattr__(self, "offset", tuple(offset.tolist()))
+        if self.pose is not None:
+            object.__setattr__(self, "pose", validation.pose(f"{owner}.pose", self.pose))
+
+    def validate(self, robot: Robot) -> None:
+        """Check the frames, see :meth:`Item.validate`."""
+        robot.check_frame("WorkspacePolyhedron.frame", self.frame)
+        robot.check_frame("WorkspacePolyhedron.relative_to", self.relative_to)
+        require_motion(robot, "WorkspacePolyhedron.frame", self.frame, self.relative_to)
+
+    def inputs(self, robot: Robot) -> tuple[Input, ...]:
+        """``offsets`` and ``pose`` with their rates."""
+        count, start = len(self.normals), pin.SE3.Identity() if self.pose is None else self.pose
+        return (
+            Input("offsets", unit="m", size=count, default=self.offsets, rate="offsets_rate", infinite=-math.inf),
+            Input("offsets_rate", unit="m/s", size=count, default=np.zeros(count)),
+            Input("pose", "pose", unit="m, rad", default=start, rate="velocity"),
+            Input("velocity", unit="m/s, rad/s", size=6, default=np.zeros(6)),
+        )
+
+    def rows(self, robot: Robot) -> tuple[Row, ...]:
+        """One row a plane [m]."""
+        return tuple(Row(f"plane[{k}]", "m") for k in range(len(self.normals)))
+
+    def margins(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
+        """The formula of the class."""
+        walls: Pose = inputs["pose"]
+        point = walls.inverse_point(point_in(kin, self.frame, self.offset, self.relative_to))
+        return rot.constant(np.array(self.normals)) @ point - inputs["offsets"]
+
+
+def _normals(field: str, value: Any) -> tuple[Triple, ...]:
+    rows = list(value) if isinstance(value, Iterable) and not isinstance(value, str) else []
+    if not rows:
+        raise ShapeError(field, value, "expected normals of three numbers each, one at least")
+    out: list[Triple] = []
+    for k, row in enumerate(rows):
+        x, y, z = validation.unit_vector(f"{field}[{k}]", row).tolist()
+        out.append((x, y, z))
+    return tuple(out)
