@@ -287,6 +287,10 @@ class Constraint(Item):
         """Simple bounds on v, or None; ``kin.v`` is the velocity that accelerations are counted from."""
         return None
 
+    def acceleration_limits(self, robot: Robot) -> NDArray[np.float64]:
+        """Largest change of each velocity per second that :meth:`bounds` leave, nv numbers; inf where there is none."""
+        return np.full(robot.nv, np.inf)
+
 
 def registry() -> dict[str, type[Item]]:
     """Every concrete task and constraint class by name, the user's own included."""

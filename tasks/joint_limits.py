@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import casadi as ca
 import numpy as np
+from numpy.typing import NDArray
 
 from wbc import validation
 from wbc.errors import RangeError
@@ -100,6 +101,14 @@ class JointLimits(Constraint):
     def rows(self, robot: Robot) -> tuple[Row, ...]:
         """One row a degree of freedom of the robot, limited or not."""
         return dof_rows(robot)
+
+    def acceleration_limits(self, robot: Robot) -> NDArray[np.float64]:
+        """The description's, of the chosen joints."""
+        limits = np.full(robot.nv, np.inf)
+        if self.acceleration:
+            dofs = list(joint_dofs(robot, "JointLimits.joints", self.joints))
+            limits[dofs] = robot.limits.acceleration[dofs]
+        return limits
 
     def bounds(self, robot: Robot, kin: Tracer, inputs: Values, dt: ca.SX) -> Bounds:
         """See the class."""

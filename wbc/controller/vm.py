@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
+from wbc.controller.reach import DEAD, Reach
 from wbc.controller.report import BAD_Q, BAD_UNIT, BAD_V, INFINITE, TOLERANCE, UNIT_TOLERANCE, ReportLayout
 from wbc.controller.tick import Assembly
 from wbc.qp.problem import QP
@@ -52,6 +55,8 @@ class VmAssembly(Assembly):
         self._later, self._command = _room(layout.margin_rows), _room(nv)
         if program.ahead is not None:
             self._ahead = _Call(program.ahead, [self._q, self._command, self._p, self.dt], [self._later])
+        self._pull = _room(tasks)
+        self._reach = Reach(stack, layout, self._bender(program, arguments) if stack.curvature and tasks else None)
         jt, at = function.sparsity_out("jt"), function.sparsity_out("at")
         self._j_index = (np.repeat(np.arange(tasks), np.diff(jt.colind())), np.array(jt.row(), dtype=np.intp))
         self._a_index = (np.repeat(np.arange(rows), np.diff(at.colind())), np.array(at.row(), dtype=np.intp))
@@ -62,6 +67,24 @@ class VmAssembly(Assembly):
         self._dof_scales = layout.dof_scales(stack)
         self._q_good = self.q.copy()
         self._usable = True
+
+    def _bender(self, program: Program, arguments: list[Array]) -> Callable[[Array], Array] | None:
+        """Weights of the task rows -> curvature, nv x nv."""
+        if program.bend is None:
+            return None
+        entries = _room(program.bend.nnz_out(0))
+        call = _Call(program.bend, [*arguments, self._pull], [entries])
+        row, column = (np.array(i, dtype=np.intp) for i in program.bend.sparsity_out(0).get_triplet())
+        nv = self._layout.nv
+
+        def bend(pull: Array) -> Array:
+            self._pull[: len(pull)] = pull
+            call.run()
+            upper = np.zeros((nv, nv))
+            upper[row, column] = entries[: len(row)]
+            return upper + np.triu(upper, 1).T
+
+        return bend
 
     def check(self) -> int:
         """Refuse bad inputs, or take over a measured velocity; 0 or a negative flag."""
@@ -97,6 +120,7 @@ class VmAssembly(Assembly):
         H = 0.5 * (H + H.T)
         H[np.diag_indices(layout.nv)] += self._damping
         g = -weighted.T @ wish
+        error = out["error"][: layout.task_rows]
         low, high = self._bounds()
         on = self.enabled != 0.0
         A = np.where(on[:, None], self._A, 0.0)
@@ -104,6 +128,10 @@ class VmAssembly(Assembly):
         high_rows = np.where(on, out["high"][: layout.general_rows], np.inf)
         self._usable &= bool(np.isfinite(A).all() and (low_rows < INFINITE).all() and (high_rows > -INFINITE).all())
         low_rows[low_rows <= -INFINITE], high_rows[high_rows >= INFINITE] = -np.inf, np.inf
+        if self._usable and layout.task_rows:
+            equal = _unit_equalities(low, high, low_rows, high_rows, A)
+            weight = self.weight * factor
+            H, g = self._reach.change(H, J, weight, error, wish, self.p, equal, self.bound_enabled)
         return QP(H, g, np.concatenate((low, low_rows)), np.concatenate((high, high_rows)), A)
 
     def _report_rows(self) -> None:
@@ -159,3 +187,11 @@ class VmAssembly(Assembly):
             self._ahead.run()
             later = self._later[: self._layout.margin_rows]
             self.report[self.places["ahead"]] = np.where(np.isnan(later), -np.inf, later)
+
+
+def _unit_equalities(low: Array, high: Array, low_rows: Array, high_rows: Array, A: Array) -> Array:
+    """Fixed variables and equality rows, of unit length; rows that v cannot move left out."""
+    fixed = np.eye(len(low))[low == high]
+    rows = A[low_rows == high_rows]
+    squares = np.einsum("ij,ij->i", rows, rows)
+    return np.vstack((fixed, rows[squares > DEAD] / np.sqrt(squares[squares > DEAD])[:, None]))

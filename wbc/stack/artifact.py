@@ -79,14 +79,10 @@ def _virtual(stack: Declaration, layout: Layout, program: Callable[[], Program],
     """The functions for the virtual machine, built or from the cache."""
 
     def fill(folder: pathlib.Path) -> None:
-        functions = program()
-        functions.rows.save(str(folder / "rows.casadi"))
-        if functions.ahead is not None:
-            functions.ahead.save(str(folder / "ahead.casadi"))
+        for name, function in program().functions.items():
+            function.save(str(folder / f"{name}.casadi"))
 
     folder, cached = cache.fetch(key(stack, version, "vm"), fill)
-    later = folder / "ahead.casadi"
-    functions = Program(
-        ca.Function.load(str(folder / "rows.casadi")), ca.Function.load(str(later)) if later.exists() else None
-    )
+    saved = {path.stem: ca.Function.load(str(path)) for path in sorted(folder.glob("*.casadi"))}
+    functions = Program(saved["rows"], saved.get("ahead"), saved.get("bend"))
     return Artifact(layout, None, functions, cached)

@@ -23,9 +23,8 @@ def sources(stack: Declaration, layout: Layout, program: Program) -> dict[str, s
 
 def _casadi_source(program: Program) -> str:
     generator = ca.CodeGenerator("rows.c", {"with_header": False})
-    generator.add(program.rows)
-    if program.ahead is not None:
-        generator.add(program.ahead)
+    for function in program.functions.values():
+        generator.add(function)
     return str(generator.dump())
 
 
@@ -36,7 +35,9 @@ def _header(stack: Declaration, layout: Layout, program: Program) -> str:
     orders, scales, sequence = row_orders(layout), row_units(stack, layout), bound_sequence(layout)
     dofs = layout.dof_scales(stack)
     units = unit_groups(stack)
-    functions = [program.rows] + ([program.ahead] if program.ahead is not None else [])
+    functions = program.functions.values()
+    bent = ca.Sparsity(layout.nv, layout.nv) if program.bend is None else program.bend.sparsity_out(0)
+    brake_at, brake_limit = brakes(stack, layout)
     soft_rows = len(orders)
     lines = [
         "/* Sizes and tables of one stack; generated */",
@@ -53,6 +54,7 @@ def _header(stack: Declaration, layout: Layout, program: Program) -> str:
                 "MH": layout.margin_rows,
                 "NNZJ": jt.nnz(),
                 "NNZA": at.nnz(),
+                "NNZK": bent.nnz(),
                 "UNITS": len(units),
                 "LAST_ORDER": max(orders, default=0),
                 "ACTIVE_MAX": layout.nv + soft_rows + 1,
@@ -68,6 +70,12 @@ def _header(stack: Declaration, layout: Layout, program: Program) -> str:
         _table("int", "bound_sequence", sequence),
         _table("int", "unit_start", [u[0] for u in units]),
         _table("int", "unit_size", [u[1] for u in units]),
+        _table("int", "k_row", bent.get_triplet()[0]),
+        _table("int", "k_col", bent.get_triplet()[1]),
+        _table("int", "gain_at", gain_places(layout)),
+        _table("double", "pull_scale", pull_scales(stack, layout)),
+        _table("int", "brake_at", brake_at),
+        _table("double", "brake_limit", np.where(np.isfinite(brake_limit), brake_limit, 0.0)),
         _table("double", "row_scale", scales),
         _table("double", "dof_scale", dofs),
         _table("double", "damping", stack.damping / dofs**2),
@@ -110,6 +118,29 @@ def row_units(stack: Declaration, layout: Layout) -> list[float]:
     """Size of a violation that counts as one, per general row: the characteristic length for metres."""
     rows = [r for b in layout.of_form("margins", "rows") for r in b.rows]
     return [stack.length if r.unit.split("/")[0] == "m" else 1.0 for r in rows]
+
+
+def gain_places(layout: Layout) -> list[int]:
+    """Where the gain of each task row is in the parameters."""
+    return [b.slots["gain"].start for b in layout.of_form("task") for _ in b.rows]
+
+
+def pull_scales(stack: Declaration, layout: Layout) -> list[float]:
+    """How much curvature a task row of unit weighted error may have: its lever for metres, else 1."""
+    rows = [r for b in layout.of_form("task") for r in b.rows]
+    return [2.0 * stack.length if r.unit.split("/")[0] == "m" else 1.0 for r in rows]
+
+
+def brakes(stack: Declaration, layout: Layout) -> tuple[list[int], np.ndarray]:
+    """(entry of ``bound_enabled``, -1 for none; limit) of what limits each degree of freedom's acceleration most."""
+    places, limits = [-1] * layout.nv, np.full(layout.nv, np.inf)
+    for k, block in enumerate(layout.of_form("bounds")):
+        item = block.entry.item
+        assert isinstance(item, Constraint)
+        for i, limit in enumerate(item.acceleration_limits(stack.robot)):
+            if limit < limits[i]:
+                places[i], limits[i] = k * layout.nv + i, limit
+    return places, limits
 
 
 def bound_sequence(layout: Layout) -> list[int]:

@@ -38,7 +38,15 @@ class Entry:
 class Declaration:
     """Items on a robot. See :class:`wbc.Stack`, which adds ``compile``."""
 
-    def __init__(self, robot: Robot, dt: float, *, damping: float = DAMPING, length: float | None = None) -> None:
+    def __init__(
+        self,
+        robot: Robot,
+        dt: float,
+        *,
+        damping: float = DAMPING,
+        length: float | None = None,
+        curvature: bool = True,
+    ) -> None:
         if not isinstance(robot, Robot):
             raise ShapeError("robot", robot, "expected a wbc Robot, see wbc.robots.load")
         self._robot = robot
@@ -46,6 +54,7 @@ class Declaration:
         self._damping = validation.scalar("damping", damping, low=1e-12, high=1.0)
         chosen = robot.characteristic_length if length is None else length
         self._length = validation.scalar("length", chosen, low=0.0, open_low=True, unit="m")
+        self._curvature = validation.flag("curvature", curvature)
         self._entries: dict[str, Entry] = {}
         if robot.couplings or robot.locked_dofs:
             self.add(Mechanism())
@@ -74,6 +83,11 @@ class Declaration:
     def length(self) -> float:
         """Characteristic length [m]: a row in metres is divided by it."""
         return self._length
+
+    @property
+    def curvature(self) -> bool:
+        """Task errors that no step removes count with their curvature, see docs/reach.md."""
+        return self._curvature
 
     @property
     def entries(self) -> tuple[Entry, ...]:
@@ -141,6 +155,7 @@ class Declaration:
             "robot": self._robot.fingerprint,
             "length": self._length.hex(),
             "damping": self._damping.hex(),
+            "curvature": self._curvature,
             "items": [[e.name, e.item.declaration(self._robot)] for e in self.entries],
         }
 

@@ -15,7 +15,9 @@ Outputs of ``rows(q, v, p, dt)`` (MT task rows, MC general rows, NB bound blocks
 
 The tick forms H = sum w (factor J)'J + damping and g from these, so that the compiled expression stays
 small and the levels of later versions have their rows. ``ahead(q, v, p, dt)`` is h(q (+) v dt) with moving
-inputs advanced by their rates.
+inputs advanced by their rates. ``bend(q, v, p, dt, pull)`` is the upper triangle of sum_k pull_k d2(e_k)/dq2, the
+curvature of the task errors for a weight ``pull`` on each row, as far as it comes from the robot's links; see
+:mod:`wbc.symbolic.curvature`.
 """
 
 from __future__ import annotations
@@ -29,6 +31,7 @@ from wbc.errors import ShapeError
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Block, Layout, Slot
 from wbc.symbolic import rotations as rot
+from wbc.symbolic.curvature import Pull, curvature
 from wbc.symbolic.kinematics import Kinematics, Pose
 from wbc.symbolic.tracer import Tracer, rotation_rate
 from wbc.tasks.base import Constraint, Rows, Task
@@ -51,10 +54,19 @@ ROWS_OUTPUTS = (
 
 @dataclass(frozen=True, eq=False)
 class Program:
-    """The compiled-to-be functions of a stack; ``ahead`` is None where there are no margins."""
+    """The compiled-to-be functions of a stack; ``ahead`` is None where there are no margins, ``bend`` where no task
+    bends or the stack does not want it.
+    """
 
     rows: ca.Function
     ahead: ca.Function | None
+    bend: ca.Function | None
+
+    @property
+    def functions(self) -> dict[str, ca.Function]:
+        """Those that exist, by name."""
+        every = {"rows": self.rows, "ahead": self.ahead, "bend": self.bend}
+        return {name: function for name, function in every.items() if function is not None}
 
 
 class _Builder:
@@ -63,6 +75,8 @@ class _Builder:
         self.kinematics = Kinematics(stack.robot.model)
         self.p = ca.SX.sym("p", layout.parameters)
         self.dt = ca.SX.sym("dt")
+        self.pull = ca.SX.sym("pull", layout.task_rows)
+        self.pulls: list[Pull] = []
 
     def values(self, block: Block) -> dict[str, ca.SX | Pose]:
         """What the item's expressions receive for its inputs."""
@@ -130,6 +144,8 @@ class _Builder:
         error = self.column(block, "error", item.error(robot, tracer, inputs))
         own = item.jacobian(robot, tracer, inputs)
         jacobian = tracer.jacobian(error) if own is None else tracer.expand(ca.SX(own))
+        if own is None and self.stack.curvature:
+            self.pulls += tracer.pulls(ca.dot(self.pull[block.span], error))
         gain = self.p[block.slots["gain"].span]
         wish = tracer.expand(-gain * error - self.drift(block, error))
         fade = item.row_factor(robot, tracer, inputs)
@@ -223,7 +239,11 @@ def build(stack: Declaration, layout: Layout) -> Program:
     if layout.margin_rows:
         later = ca.vertcat(*[b.ahead(block) for block in layout.of_form("margins")])
         ahead = _function("ahead", inputs, [ca.densify(later)], ["ahead"])
-    return Program(rows, ahead)
+    bend = None
+    bent = ca.triu(curvature(b.kinematics, b.pulls)) if b.pulls else ca.SX(nv, nv)
+    if bent.nnz():
+        bend = _function("bend", [*inputs, b.pull], [bent], ["bend"])
+    return Program(rows, ahead, bend)
 
 
 def _shared_pattern(transposed: ca.SX) -> ca.SX:
@@ -241,7 +261,7 @@ def _function(name: str, inputs: list[ca.SX], outputs: list[ca.SX], labels: list
     stray = [s.name() for s in free if s.__hash__() not in known]
     if stray:
         raise ShapeError(f"stack.{name}", stray, "an item's expression contains symbols that are not its inputs")
-    return ca.Function(name, inputs, ca.cse(outputs), ["q", "v", "p", "dt"], labels)
+    return ca.Function(name, inputs, ca.cse(outputs), ["q", "v", "p", "dt", "pull"][: len(inputs)], labels)
 
 
 def sparsity_rows(transposed: ca.Sparsity) -> tuple[np.ndarray, np.ndarray]:

@@ -274,6 +274,17 @@ class Kinematics:
             moments[parent] = moments[parent] + moments[j]
         return list(zip(masses, moments, strict=True))
 
+    def body_shares(self) -> list[tuple[int, float, ca.SX]]:
+        """(joint, share of the robot's mass, first moment of that mass / all mass) of every body that has mass."""
+        total = self.mass
+        shares = []
+        for j in range(1, self.njoints):
+            inertia = self.model.inertias[j]
+            if inertia.mass > 0.0:
+                share = float(inertia.mass) / total
+                shares.append((j, share, share * self.joint_pose(j).point(rot.constant(inertia.lever))))
+        return shares
+
     @property
     def mass(self) -> float:
         """Mass of all moving bodies [kg]."""

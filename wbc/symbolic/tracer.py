@@ -22,8 +22,8 @@ import numpy as np
 
 from wbc.errors import UnknownNameError
 from wbc.symbolic import rotations as rot
-from wbc.symbolic.gaps import Gap, gap_jacobian
 from wbc.symbolic.curvature import Pull
+from wbc.symbolic.gaps import Gap, gap_jacobian
 from wbc.symbolic.kinematics import WORLD, Kinematics, Pose
 
 

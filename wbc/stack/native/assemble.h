@@ -2,7 +2,7 @@
 #ifndef WBC_ASSEMBLE_H
 #define WBC_ASSEMBLE_H
 
-#include "settings.h"
+#include "reach.h"
 
 /* H += J' diag(w) J, g -= J' diag(w) wish, for `count` rows that share the `cols` columns listed from `first` */
 INLINE void block(wbc_tick *t, int row, int count, int first, int cols) {
@@ -33,13 +33,6 @@ INLINE void diagonal(wbc_tick *t, int row, int count, int first) {
         t->g[c] -= wa * t->wish[row + r];
         t->H[c * WIDE + c] += wa * t->jt[first + r];
     }
-}
-
-/* 1 if no entry is NaN or infinite */
-INLINE int all_finite(const double *x, int count) {
-    int bad = 0;
-    for (int i = 0; i < count; i++) bad |= !(fabs(x[i]) <= DBL_MAX);
-    return !bad;
 }
 
 /* Task rows without weight leave the problem, whatever their numbers are. 0 where others are not finite. */
@@ -114,6 +107,8 @@ EXPORT void wbc_tick_assemble(wbc_tick *t) {
         t->report.slack[k] = 0.0;
         for (int e = a_start[k]; e < a_start[k + 1]; e++) t->A[k * NV + a_col[e]] = t->at[e];
     }
+    t->prepared = t->curved = 0;
+    if (t->unusable == 0.0 && MT > 0) reach(t);
 }
 
 #endif

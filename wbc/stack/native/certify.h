@@ -128,7 +128,7 @@ static void examine(wbc_tick *t) {
         /* residual of the exact sum: what was computed plus the rounding of its terms */
         size[i] = fabs(residual[i]) + (NV + t->daqp.n_active + 4) * EPS * size[i];
     }
-    out->error_bound = t->factored ? WBC_INF : quick_bound(t, size);
+    out->error_bound = t->factored || t->curved ? WBC_INF : quick_bound(t, size);
     if (out->error_bound > QUICK_BOUND) out->error_bound = sharp_bound(t, size);
 }
 

@@ -22,27 +22,33 @@ INLINE double dot(const double *x, const double *y, int from) {
  * g - rho b a / |a|^2: a constant where they hold, so the optimum is the same, but seen through R they are then as
  * independent as they are in v. */
 static void strengthen(wbc_tick *t) {
-    double rho = 0.0;
+    t->stiffness = 0.0;
     for (int i = 0; i < NV; i++)
-        if (t->H[i * WIDE + i] > rho) rho = t->H[i * WIDE + i];
-    for (int i = 0; i < NV; i++) {
-        if (t->low[i] != t->high[i]) continue;
-        t->R[i * WIDE + i] += rho;
-        t->y[i] += rho * t->low[i];
-    }
+        if (t->H[i * WIDE + i] > t->stiffness) t->stiffness = t->H[i * WIDE + i];
+    for (int i = 0; i < NV; i++)
+        if (t->low[i] == t->high[i]) t->R[i * WIDE + i] += t->stiffness;
     for (int k = 0; k < MC; k++) {
         t->strength[k] = 0.0;
         if (t->low[NV + k] != t->high[NV + k]) continue;
         double square = 0.0;
         for (int e = a_start[k]; e < a_start[k + 1]; e++) square += t->at[e] * t->at[e];
         if (square <= DEAD) continue;
-        t->strength[k] = rho / square;
+        t->strength[k] = t->stiffness / square;
         for (int e = a_start[k]; e < a_start[k + 1]; e++) {
             const double f = t->strength[k] * t->at[e];
-            t->y[a_col[e]] += f * t->low[NV + k];
             for (int c = e; c < a_start[k + 1]; c++) t->R[a_col[e] * WIDE + a_col[c]] += f * t->at[c];
         }
     }
+}
+
+/* y = -g and what the equality rows add to it */
+static void right_side(wbc_tick *t) {
+    for (int i = 0; i < WIDE; i++) t->y[i] = -t->g[i];
+    for (int i = 0; i < NV; i++)
+        if (t->low[i] == t->high[i]) t->y[i] += t->stiffness * t->low[i];
+    for (int k = 0; k < MC; k++)
+        for (int e = a_start[k]; t->strength[k] != 0.0 && e < a_start[k + 1]; e++)
+            t->y[a_col[e]] += t->strength[k] * t->at[e] * t->low[NV + k];
 }
 
 /* Eight rows of R from the rows above them. `from` is a constant after unrolling: the row stays in registers. */
@@ -89,16 +95,25 @@ INLINE void invert_group(wbc_tick *t, const int from) {
     }
 }
 
-/* H = R'R, upper triangle of H only, with the inverse of its diagonal; 0 where H is not positive definite.
- * Leaves -g in y. */
-static int factor(wbc_tick *t) {
+/* R = H with the equality rows in it, not yet factored */
+static void load(wbc_tick *t) {
     memcpy(t->R, t->H, sizeof t->R);
-    for (int i = 0; i < WIDE; i++) t->y[i] = -t->g[i];
     strengthen(t);
+}
+
+/* The matrix in R into its Cholesky factor, with the inverse of its diagonal; 0 where it is not positive definite */
+static int decompose(wbc_tick *t) {
     int ok = 1;
 #pragma GCC unroll 64
     for (int group = 0; group < WIDE / 8; group++) ok &= factor_group(t, 8 * group);
     return ok;
+}
+
+/* H = R'R, upper triangle of H only; leaves -g in y */
+static int factor(wbc_tick *t) {
+    load(t);
+    right_side(t);
+    return decompose(t);
 }
 
 /* y = R^-T y, in place */

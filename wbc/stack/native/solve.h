@@ -23,6 +23,7 @@ static int uncross(wbc_tick *t) {
         const double gap = t->low[NV + k] - t->high[NV + k];
         if (gap <= 0.0) continue;
         t->low[NV + k] = t->high[NV + k] = 0.5 * (t->low[NV + k] + t->high[NV + k]);
+        t->prepared = 0;
         if (gap <= 4.0 * TOLERANCE * row_scale[k]) continue;
         crossed = 1;
         if (row_order[k] == 0) t->unusable = 1.0;
@@ -43,7 +44,7 @@ EXPORT int wbc_tick_solve(wbc_tick *t) {
     int flag = uncross(t) ? WBC_RELAXED : WBC_SOLVED;
     t->report.iterations = 0.0;
     t->factored = 0;
-    if (t->unusable != 0.0 || !factor(t)) {
+    if (t->unusable != 0.0 || !(t->prepared || factor(t))) {
         brake(t);
         flag = WBC_BRAKED;
     } else if (unconstrained(t)) {

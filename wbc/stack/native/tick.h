@@ -6,6 +6,10 @@
  *   NNZJ NNZA   structural non-zeros of task rows and of general rows
  *   j_start j_col a_start a_col   their positions, row by row
  *   damping     cost of each velocity
+ *   NNZK k_row k_col   entries of the curvature's upper triangle
+ *   gain_at     where the gain of each task row is in p
+ *   pull_scale  how much curvature a row of unit error may have
+ *   brake_at brake_limit   entry of bound_enabled that limits the acceleration of a velocity (-1: none), and the limit
  *   row_order   class of each general row in the order of sacrifice
  *   row_scale   its unit: the characteristic length for rows in metres
  */
@@ -59,6 +63,10 @@ typedef struct {
     /* the QP */
     double H[NV * WIDE], g[WIDE], A[MC * NV + 1], low[M_ALL], high[M_ALL];
     double unusable;             /* not 0: numbers that are not finite, or bounds without an interval */
+    int prepared;                /* R is the factor of H, and y its right side */
+    int curved;                  /* H contains curvature */
+    double stiffness;            /* what fixed variables add to the Hessian */
+    double bent[NNZK + 1];       /* curvature */
     double q_good[NQ + 1];       /* q of the last tick that was not refused, put back by one that is */
     /* outputs of the generated rows */
     double wish[MT + 1], jt[NNZJ + 1], at[NNZA + 1], bound_low[NB * NV + 1], bound_high[NB * NV + 1];

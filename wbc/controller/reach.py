@@ -1,0 +1,151 @@
+"""What one step along the Jacobians cannot do, in numpy: mirrors ``native/reach.h``, formulas in docs/reach.md."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from wbc.stack.codegen import brakes, gain_places, pull_scales
+from wbc.stack.declaration import Declaration
+from wbc.stack.layout import Layout
+from wbc.validation import Array
+
+#: As in ``native/reach.h``
+TRUSTED, NEGLIGIBLE, LEAST_PIVOT, BRAKING, CORRECTIONS = 1.0, 0.05, 1e-2, 0.5, 2
+#: Squared length of a row that v cannot move, as in ``native/settings.h``
+DEAD = 1e-20
+
+
+class Reach:
+    """Curvature of the errors that no step removes, and gains that leave room to brake.
+
+    Args:
+        bend: weights of the task rows -> curvature (nv x nv, symmetric); None: no task bends.
+    """
+
+    def __init__(self, stack: Declaration, layout: Layout, bend: Callable[[Array], Array] | None) -> None:
+        self._bend = bend
+        self._gain_at = np.array(gain_places(layout), dtype=np.intp)
+        self._pull_scale = np.array(pull_scales(stack, layout))
+        self._dofs = layout.dof_scales(stack)
+        self._damping = stack.damping / self._dofs**2
+        places, self._brake_limit = brakes(stack, layout)
+        self._brake_at = np.array(places, dtype=np.intp)
+
+    def change(
+        self,
+        H: Array,
+        J: Array,
+        weight: Array,
+        error: Array,
+        wish: Array,
+        p: Array,
+        equal: Array,
+        bound_enabled: Array,
+    ) -> tuple[Array, Array]:
+        """(H, g) of the QP that is solved.
+
+        Args:
+            H: of the linear model. J: task rows. weight: of each, fading included. equal: unit rows of the equalities.
+        """
+        counts = weight != 0.0
+        error = np.where(counts, error, 0.0)
+        gain = p[self._gain_at]
+        largest = float(gain[counts].max(initial=0.0))
+        plain = -(J.T @ (weight * wish))
+        metric = _strengthened(H, equal)
+        slope = J.T @ (weight * error)
+        if not _is_definite(metric):
+            return H, plain
+        curved = False
+        if self._bend is not None:
+            added = self._curvature(H, metric, J, weight, error, slope, equal)
+            if added is not None:
+                H, curved = H + added, True
+                metric = _strengthened(H, equal)
+                if not _is_definite(metric):
+                    return H, plain
+        allowed = self._stoppable(metric, J, weight * gain**2 * error, largest, bound_enabled)
+        if not curved and allowed >= largest:
+            return H, plain
+        drift = -wish - gain * error
+        wanted = np.minimum(gain, allowed) * error
+        if not curved:
+            return H, J.T @ (weight * (wanted + drift))
+        g = J.T @ (weight * wanted)
+        if drift[counts].any():
+            g -= H @ self._following(metric, J, weight, -(J.T @ (weight * drift)))
+        return H, g
+
+    def _curvature(
+        self, H: Array, metric: Array, J: Array, weight: Array, error: Array, slope: Array, equal: Array
+    ) -> Array | None:
+        step = np.linalg.solve(metric, slope)
+        length = float(np.abs(step / self._dofs).max())
+        if length > TRUSTED:
+            more = float(np.abs(slope * self._dofs).max()) / TRUSTED * (1.0 - TRUSTED / length)
+            step = np.linalg.solve(metric + np.diag(more / self._dofs**2), slope)
+        pull = weight * (error - J @ step)
+        size = float((np.abs(pull) * self._pull_scale).sum())
+        pivots = np.diag(np.linalg.cholesky(metric)) * self._dofs
+        share = min(size / (NEGLIGIBLE * float((pivots**2).min())) - 1.0, 1.0)
+        if not share > 0.0:
+            return None
+        assert self._bend is not None
+        bent = share * self._bend(pull)
+        if not np.isfinite(bent).all():
+            return None
+        scale = np.outer(self._dofs, self._dofs)
+        least = LEAST_PIVOT * float(np.abs(bent * scale).max())
+        return bent + np.diag(definite((H + bent) * scale, least) / self._dofs**2)
+
+    def _stoppable(self, metric: Array, J: Array, wanted: Array, largest: float, bound_enabled: Array) -> float:
+        """The gain up to which all joints can brake on the way."""
+        limited = self._brake_at >= 0
+        limited[limited] = bound_enabled[self._brake_at[limited]] != 0.0
+        if not limited.any():
+            return largest
+        rate = np.abs(np.linalg.solve(metric, J.T @ wanted))[limited]
+        worst = float((rate / (BRAKING * self._brake_limit[limited])).max())
+        return largest / float(np.sqrt(worst)) if worst > 1.0 else largest
+
+    def _following(self, metric: Array, J: Array, weight: Array, wanted: Array) -> Array:
+        """The step that follows moving targets, corrected until only what no linear model resolves is damped."""
+        x = np.linalg.solve(metric, wanted)
+        for _ in range(CORRECTIONS):
+            x = x + np.linalg.solve(metric, wanted - J.T @ (weight * (J @ x)) - self._damping * x)
+        return np.asarray(x)
+
+
+def definite(matrix: Array, least: float) -> Array:
+    """The diagonal that makes a symmetric matrix positive definite, none where its pivots are above ``least``.
+
+    The modified Cholesky factorisation of Gill and Murray (Practical Optimization, 1981, section 4.4.2.2), without
+    pivoting.
+    """
+    a, n = matrix.copy(), len(matrix)
+    more = np.zeros(n)
+    largest = float(np.abs(np.diag(a)).max())
+    other = float(np.abs(a - np.diag(np.diag(a))).max())
+    bound = max(largest, other / np.sqrt(max(n * n - 1.0, 1.0)))
+    for k in range(n):
+        row = a[k, k + 1 :].copy()
+        aside = float(np.abs(row).max(initial=0.0))
+        pivot = max(abs(a[k, k]), aside * aside / bound, least)
+        more[k] = pivot - a[k, k]
+        a[k + 1 :, k + 1 :] -= np.outer(row, row) / pivot
+    return more
+
+
+def _strengthened(H: Array, equal: Array) -> Array:
+    """H with the equality rows in it, see ``native/factor.h``."""
+    return np.asarray(H + float(np.diag(H).max(initial=0.0)) * equal.T @ equal)
+
+
+def _is_definite(matrix: Array) -> bool:
+    try:
+        np.linalg.cholesky(matrix)
+    except np.linalg.LinAlgError:
+        return False
+    return True

@@ -1,0 +1,216 @@
+/* What one step along the Jacobians cannot do: errors that no step removes, and speeds that no joint can stop.
+ * The formulas are in docs/reach.md; wbc/controller/reach.py is the same in numpy. */
+#ifndef WBC_REACH_H
+#define WBC_REACH_H
+
+#include "factor.h"
+
+/* A step up to here [rad, or characteristic lengths] is what the Jacobians say */
+#define TRUSTED 1.0
+/* Curvature below this share of the least pivot of H does not count; it counts in full from twice of it on */
+#define NEGLIGIBLE 0.05
+/* Least pivot of H with the curvature in it, as a share of the largest entry of the curvature */
+#define LEAST_PIVOT 1e-2
+/* Share of the acceleration limits that slowing down towards the optimum may take */
+#define BRAKING 0.5
+/* Corrections of the step that follows moving targets */
+#define CORRECTIONS 2
+
+/* out = J' diag(weight) x */
+static void gather(const wbc_tick *t, const double *x, double *out) {
+    for (int i = 0; i < WIDE; i++) out[i] = 0.0;
+    for (int k = 0; k < MT; k++) {
+        const double f = t->weight[k] * t->report.factor[k];
+        if (f == 0.0) continue;
+        for (int e = j_start[k]; e < j_start[k + 1]; e++) out[j_col[e]] += f * x[k] * t->jt[e];
+    }
+}
+
+/* Row k of J times v */
+INLINE double along(const wbc_tick *t, int k, const double *v) {
+    double sum = 0.0;
+    for (int e = j_start[k]; e < j_start[k + 1]; e++) sum += t->jt[e] * v[j_col[e]];
+    return sum;
+}
+
+/* x = H^-1 b, in the metric that the factor has */
+static void solve_with(const wbc_tick *t, const double *b, double *x) {
+    double y[WIDE];
+    memcpy(y, b, sizeof y);
+    solve_transposed(t, y);
+    solve_upper(t, y, x);
+}
+
+static double largest_step(const double *x) {
+    double largest = 0.0;
+    for (int i = 0; i < NV; i++) largest = fmax(largest, fabs(x[i]) / dof_scale[i]);
+    return largest;
+}
+
+#if NNZK > 0
+
+/* Weighted errors that the step of the linear model leaves, kept to TRUSTED where that asks for more */
+static int left_over(wbc_tick *t, const double *error, const double *slope, double *pull) {
+    double step[WIDE];
+    solve_with(t, slope, step);
+    const double length = largest_step(step);
+    if (length > TRUSTED) {
+        double steepest = 0.0;
+        for (int i = 0; i < NV; i++) steepest = fmax(steepest, fabs(slope[i]) * dof_scale[i]);
+        const double more = steepest / TRUSTED * (1.0 - TRUSTED / length);
+        load(t);
+        for (int i = 0; i < NV; i++) t->R[i * WIDE + i] += more / (dof_scale[i] * dof_scale[i]);
+        if (!decompose(t)) return 0;
+        t->prepared = 0;
+        solve_with(t, slope, step);
+    }
+    for (int k = 0; k < MT; k++) {
+        const double f = t->weight[k] * t->report.factor[k];
+        pull[k] = f == 0.0 ? 0.0 : f * (error[k] - along(t, k, step));
+    }
+    return 1;
+}
+
+/* What makes a symmetric matrix positive definite, a diagonal: the modified factorisation of Gill and Murray */
+static void definite(const double *matrix, double least, double *more) {
+    double a[NV * NV], diagonal = 0.0, other = 0.0;
+    memcpy(a, matrix, sizeof a);
+    for (int i = 0; i < NV; i++) {
+        diagonal = fmax(diagonal, fabs(a[i * NV + i]));
+        for (int j = i + 1; j < NV; j++) other = fmax(other, fabs(a[i * NV + j]));
+    }
+    const double bound = fmax(diagonal, other / sqrt(fmax((double)NV * NV - 1.0, 1.0)));
+    for (int k = 0; k < NV; k++) {
+        double *row = a + k * NV, aside = 0.0;
+        for (int j = k + 1; j < NV; j++) aside = fmax(aside, fabs(row[j]));
+        const double pivot = fmax(fmax(fabs(row[k]), aside * aside / bound), least);
+        more[k] = pivot - row[k];
+        for (int i = k + 1; i < NV; i++) {
+            const double f = row[i] / pivot;
+            for (int j = i; j < NV; j++) a[i * NV + j] -= f * row[j];
+        }
+    }
+}
+
+/* H += curvature of the errors that are left, made positive definite; 1 where there is any to count */
+static int add_curvature(wbc_tick *t, const double *pull) {
+    double size = 0.0, least = WBC_INF, largest = 0.0, scaled[NV * NV], more[NV];
+    for (int k = 0; k < MT; k++) size += fabs(pull[k]) * pull_scale[k];
+    for (int i = 0; i < NV; i++) {
+        const double pivot = dof_scale[i] / t->inverse_diagonal[i];
+        least = fmin(least, pivot * pivot);
+    }
+    const double share = fmin(size / (NEGLIGIBLE * least) - 1.0, 1.0);
+    if (!(share > 0.0)) return 0;
+    const double *arg[5] = {t->q, t->v_last, t->p, &t->dt, pull};
+    double *res[1] = {t->bent};
+    bend(arg, res, t->work_iw, t->work_w, 0);
+    if (!all_finite(t->bent, NNZK)) return 0;
+    for (int e = 0; e < NNZK; e++) {
+        t->bent[e] *= share;
+        largest = fmax(largest, fabs(t->bent[e]) * dof_scale[k_row[e]] * dof_scale[k_col[e]]);
+        t->H[k_row[e] * WIDE + k_col[e]] += t->bent[e];
+    }
+    for (int i = 0; i < NV; i++)
+        for (int j = i; j < NV; j++) scaled[i * NV + j] = t->H[i * WIDE + j] * dof_scale[i] * dof_scale[j];
+    definite(scaled, LEAST_PIVOT * largest, more);
+    for (int i = 0; i < NV; i++) t->H[i * WIDE + i] += more[i] / (dof_scale[i] * dof_scale[i]);
+    t->prepared = 0;
+    return 1;
+}
+
+/* The step that follows moving targets, as if there were no curvature: corrected until only what the linear model
+ * cannot resolve either is damped */
+static int following(wbc_tick *t, const double *wanted, double *x) {
+    double moved[MT + 1], rest[WIDE], change[WIDE];
+    solve_with(t, wanted, x);
+    for (int n = 0; n < CORRECTIONS; n++) {
+        for (int k = 0; k < MT; k++) moved[k] = along(t, k, x);
+        gather(t, moved, rest);
+        for (int i = 0; i < NV; i++) rest[i] = wanted[i] - rest[i] - damping[i] * x[i];
+        for (int i = NV; i < WIDE; i++) rest[i] = 0.0;
+        solve_with(t, rest, change);
+        for (int i = 0; i < WIDE; i++) x[i] += change[i];
+    }
+    return 1;
+}
+
+/* out = H x, of whose symmetric matrix the upper triangle is stored */
+static void product(const wbc_tick *t, const double *x, double *out) {
+    for (int i = 0; i < WIDE; i++) out[i] = 0.0;
+    for (int i = 0; i < NV; i++) {
+        const double *row = t->H + i * WIDE;
+        out[i] += row[i] * x[i];
+        for (int j = i + 1; j < NV; j++) {
+            out[i] += row[j] * x[j];
+            out[j] += row[j] * x[i];
+        }
+    }
+}
+
+#endif
+
+/* The gain up to which all joints can brake on the way, at most `largest` */
+static double stoppable(wbc_tick *t, const double *error, double largest) {
+    double square[MT + 1], b[WIDE], rate[WIDE], worst = 0.0;
+    int limited = 0;
+    for (int i = 0; i < NV; i++) limited |= brake_at[i] >= 0 && t->bound_enabled[brake_at[i]] != 0.0;
+    if (!limited || !t->prepared) return largest;
+    for (int k = 0; k < MT; k++) {
+        const double gain = t->p[gain_at[k]];
+        square[k] = gain * gain * error[k];
+    }
+    gather(t, square, b);
+    solve_with(t, b, rate);
+    for (int i = 0; i < NV; i++)
+        if (brake_at[i] >= 0 && t->bound_enabled[brake_at[i]] != 0.0)
+            worst = fmax(worst, fabs(rate[i]) / (BRAKING * brake_limit[i]));
+    return worst > 1.0 ? largest / sqrt(worst) : largest;
+}
+
+/* The QP of the linear model becomes the one that is solved */
+static void reach(wbc_tick *t) {
+    double error[MT + 1], slope[WIDE], largest = 0.0;
+    int curved = 0;
+    for (int k = 0; k < MT; k++) {
+        const int counts = t->weight[k] * t->report.factor[k] != 0.0;
+        error[k] = counts ? t->report.error[k] : 0.0;
+        if (counts) largest = fmax(largest, t->p[gain_at[k]]);
+    }
+    if (!(t->prepared = factor(t))) return;
+    gather(t, error, slope);
+#if NNZK > 0
+    double pull[MT + 1];
+    if (left_over(t, error, slope, pull)) {
+        if (!t->prepared) t->prepared = factor(t);
+        curved = add_curvature(t, pull);
+    }
+    if (!t->prepared && !(t->prepared = factor(t))) return;
+#endif
+    t->curved = curved;
+    const double allowed = stoppable(t, error, largest);
+    if (!curved && allowed >= largest) return;
+    double wanted[MT + 1], drift[MT + 1];
+    int moving = 0;
+    for (int k = 0; k < MT; k++) {
+        const double gain = t->p[gain_at[k]];
+        wanted[k] = fmin(gain, allowed) * error[k];
+        drift[k] = -t->wish[k] - gain * error[k];
+        moving |= t->weight[k] * t->report.factor[k] != 0.0 && drift[k] != 0.0;
+        if (!curved) wanted[k] += drift[k];
+    }
+    gather(t, wanted, t->g);
+#if NNZK > 0
+    if (curved && moving) {
+        double follow[WIDE], step[WIDE];
+        for (int k = 0; k < MT; k++) drift[k] = -drift[k];
+        gather(t, drift, follow);
+        following(t, follow, step);
+        product(t, step, follow);
+        for (int i = 0; i < NV; i++) t->g[i] -= follow[i];
+    }
+#endif
+    right_side(t);
+}
+
+#endif

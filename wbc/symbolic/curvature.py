@@ -1,0 +1,108 @@
+"""How fixed forces and torques on a robot's bodies turn into joint torques that change with the configuration.
+
+For a force f at a point p of a body and a torque m on it, with joint torques J_lin' f + J_ang' m,
+
+    K = symmetric part of d (J_lin' f + J_ang' m) / dq
+
+so that v' K v is the power that f and m have on the accelerations J_dot v. With joint i on the way to joint k:
+
+    K_ik = w_i . (J_k x f + w_k x m / 2)        w: axes of rotation, J_k: velocity of p by joint k
+
+It is the part of the second derivative of an error that one step along a Jacobian does not see.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Literal
+
+import casadi as ca
+
+from wbc.symbolic.kinematics import Kinematics
+
+
+@dataclass(frozen=True, eq=False)
+class Pull:
+    """A force at the origin of ``frame``, a torque on it, or a force on every body in proportion to its mass.
+
+    ``vector``: world axes, 3 entries; for ``mass`` the force on the whole robot.
+    """
+
+    kind: Literal["force", "torque", "mass"]
+    frame: str
+    vector: ca.SX
+
+
+@dataclass(eq=False)
+class _Load:
+    """What pulls on a joint and on all that it carries: force, sum of f p', torque."""
+
+    force: ca.SX
+    moment: ca.SX
+    torque: ca.SX
+
+
+def curvature(kinematics: Kinematics, pulls: Iterable[Pull]) -> ca.SX:
+    """K of the module, nv x nv, symmetric, for all pulls together."""
+    loads = _loads(kinematics, pulls)
+    turned = {j: _turned(kinematics, j, load) for j, load in loads.items()}
+    K = ca.SX(kinematics.nv, kinematics.nv)
+    for k in turned:
+        for i in kinematics.support(k):
+            angular = kinematics.joint_twist(i)[1]
+            block = ca.sparsify(angular.T @ turned[k])
+            if i == k:
+                block = 0.5 * (block + block.T)
+            rows, columns = kinematics.joint_columns(i), kinematics.joint_columns(k)
+            K[rows, columns] += block
+            if i != k:
+                K[columns, rows] += block.T
+    return ca.sparsify(K)
+
+
+def _loads(kinematics: Kinematics, pulls: Iterable[Pull]) -> dict[int, _Load]:
+    """Per joint that carries a pull, all that it carries."""
+    loads: dict[int, _Load] = {}
+
+    def at(joint: int) -> _Load:
+        return loads.setdefault(joint, _Load(ca.SX(3, 1), ca.SX(3, 3), ca.SX(3, 1)))
+
+    for pull in pulls:
+        if pull.kind == "mass":
+            for j, share, moment in kinematics.body_shares():
+                load = at(j)
+                load.force += share * pull.vector
+                load.moment += pull.vector @ moment.T
+            continue
+        joint = kinematics.frame(pull.frame)[0]
+        if joint == 0:
+            continue
+        load = at(joint)
+        if pull.kind == "torque":
+            load.torque += pull.vector
+        else:
+            load.force += pull.vector
+            load.moment += pull.vector @ kinematics.pose(pull.frame).position.T
+    for j in range(kinematics.njoints - 1, 0, -1):
+        parent = kinematics.parents[j]
+        if j in loads and parent > 0:
+            below, load = loads[j], at(parent)
+            load.force += below.force
+            load.moment += below.moment
+            load.torque += below.torque
+    return loads
+
+
+def _turned(kinematics: Kinematics, joint: int, load: _Load) -> ca.SX:
+    """J_k x f + w_k x m / 2 of a joint's columns, 3 x nv_j, summed over the load."""
+    linear, angular = kinematics.joint_twist(joint)
+    origin = kinematics.joint_pose(joint).position
+    # sum of f (p - origin)'
+    moment = load.moment - load.force @ origin.T
+    columns = []
+    for c in range(linear.shape[1]):
+        v, w = linear[:, c], angular[:, c]
+        bent = moment.T @ w - ca.trace(moment) * w
+        columns.append(ca.cross(v, load.force) + bent + 0.5 * ca.cross(w, load.torque))
+    return ca.horzcat(*columns)
