@@ -1,0 +1,180 @@
+"""Joints that move in a fixed linear relation: equal, opposite, or in a gear's ratio."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from wbc import validation
+from wbc.errors import RangeError, ShapeError
+from wbc.symbolic.tracer import Tracer
+from wbc.tasks.base import Input, Row, Task, Values
+from wbc.tasks.frames import checked_weights, weights_of_rows
+
+if TYPE_CHECKING:
+    from wbc.robot import Robot
+
+#: One row: (joint, coefficient) pairs.
+Relation = tuple[tuple[str, float], ...]
+
+
+@dataclass(frozen=True)
+class JointCoupling(Task):
+    """A weighted sum of joint coordinates, one sum a row, goes to a target:
+
+        e_k = sum_i c_ki q_i - target_k                                    [rad, or m for rows of sliding joints]
+
+    An unbounded joint is known up to whole turns, so a row that has one is the angle in (-pi, pi] that is equal to e_k
+    up to whole turns, and its unbounded joints must have whole coefficients: write 2 a - 3 b for a gear of 2/3. The
+    other joints of that row may have any coefficient, and are read as angles, too.
+
+    Inputs:
+        target: one number a row. Default: ``target`` of the constructor, 0 where nothing is said; ``target=None``:
+            where the sum is at the first step.
+        feedforward: its rate. Default 0.
+
+    Example:
+        >>> JointCoupling({"left_elbow": 1, "right_elbow": -1})                    # keep them equal
+        >>> JointCoupling([{"wheel": 2, "motor": -3}, {"lift": 1, "screw": -0.005}])
+
+    A row has the unit of its first joint; coefficients carry what the others lack (0.005 m/rad of a screw).
+
+    What it cannot do: it is a wish, with a weight. What the mechanism itself couples (``robot.couplings``) is held
+    exactly by ``Mechanism``. Rows that contradict each other are served in the least-squares sense. At an error of half
+    a turn, a row with an unbounded joint may turn either way.
+
+    Attributes:
+        coefficients: joint name -> coefficient, or a sequence of such, one a row.
+        target: first value of the input: one number for all rows or one a row; None: see above.
+        weights: one number >= 0 a row, None: 1 each.
+
+    Raises:
+        ShapeError, NotFiniteError, UnknownNameError: no relation, a joint that does not exist or has several degrees of
+            freedom.
+        RangeError: a row without a coefficient other than 0, an uneven coefficient of an unbounded joint.
+    """
+
+    initial_only: ClassVar[tuple[str, ...]] = ("gain", "target")
+
+    coefficients: tuple[Relation, ...]
+    target: float | tuple[float, ...] | None = 0.0
+    weights: tuple[float, ...] | None = None
+
+    def __init__(
+        self,
+        coefficients: Mapping[str, float] | Sequence[Mapping[str, float]],
+        target: float | Sequence[float] | None = 0.0,
+        weights: Sequence[float] | None = None,
+        *,
+        gain: float | None = None,
+    ) -> None:
+        given = [coefficients] if isinstance(coefficients, Mapping) else coefficients
+        if isinstance(given, str) or not isinstance(given, Sequence) or not given:
+            raise ShapeError("JointCoupling.coefficients", coefficients, "expected {joint: coefficient}, or several")
+        labels = [""] if isinstance(coefficients, Mapping) else [f"[{k}]" for k in range(len(given))]
+        relations = tuple(_relation(f"JointCoupling.coefficients{k}", r) for k, r in zip(labels, given, strict=True))
+        object.__setattr__(self, "coefficients", relations)
+        object.__setattr__(self, "target", _targets(target, len(relations)))
+        object.__setattr__(self, "weights", checked_weights("JointCoupling.weights", weights, len(relations)))
+        object.__setattr__(self, "gain", gain)
+
+    def validate(self, robot: Robot) -> None:
+        """Check the joints, see :meth:`Item.validate`."""
+        single = [j for j in robot.joint_names if _width(robot, j) == 1]
+        for k, relation in enumerate(self.coefficients):
+            for joint, coefficient in relation:
+                field = f"JointCoupling.coefficients[{k}]"
+                validation.one_of(field, joint, single)
+                if _unbounded(robot, joint) and coefficient != round(coefficient):
+                    reason = f"unbounded joint {joint!r} is known up to whole turns: its coefficient must be whole"
+                    raise RangeError(field, coefficient, reason)
+
+    def inputs(self, robot: Robot) -> tuple[Input, ...]:
+        """``target`` and ``feedforward``, see the class."""
+        count, units = len(self.coefficients), ", ".join(dict.fromkeys(row.unit for row in self.rows(robot)))
+        rates = ", ".join(f"{unit}/s" for unit in units.split(", "))
+        return (
+            Input("target", unit=units, size=count, default=self.target, rate="feedforward"),
+            Input("feedforward", unit=rates, size=count, default=np.zeros(count)),
+        )
+
+    def rows(self, robot: Robot) -> tuple[Row, ...]:
+        """One row a relation, labelled ``a - 2 b``, in the unit of its first joint."""
+        names = [_label(relation) for relation in self.coefficients]
+        repeated = [f" ({k})" if names.count(name) > 1 else "" for k, name in enumerate(names)]
+        units = [robot.dof_units[robot.dofs(relation[0][0]).start] for relation in self.coefficients]
+        return tuple(Row(name + more, unit) for name, more, unit in zip(names, repeated, units, strict=True))
+
+    def row_weights(self, robot: Robot) -> NDArray[np.float64]:
+        """The declared weights."""
+        return weights_of_rows(self.weights, len(self.coefficients))
+
+    def initial(self, robot: Robot, q: NDArray[np.float64]) -> dict[str, Any]:
+        """The sums at ``q``; an unbounded joint counts as its angle in (-pi, pi]."""
+        sums = [sum(c * _coordinate(robot, joint, q) for joint, c in relation) for relation in self.coefficients]
+        return {"target": np.array(sums)}
+
+    def error(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
+        """The formula of the class."""
+        errors = []
+        for k, relation in enumerate(self.coefficients):
+            total = sum((c * kin.joint(joint) for joint, c in relation), ca.SX(0)) - inputs["target"][k]
+            turning = any(_unbounded(robot, joint) for joint, _ in relation)
+            errors.append(ca.atan2(ca.sin(total), ca.cos(total)) if turning else total)
+        return ca.vertcat(*errors)
+
+    def jacobian(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
+        """The coefficients: exactly constant, also where the error is an angle."""
+        matrix = ca.SX(len(self.coefficients), robot.nv)
+        for k, relation in enumerate(self.coefficients):
+            for joint, coefficient in relation:
+                matrix[k, robot.dofs(joint).start] = coefficient
+        return matrix
+
+
+def _relation(field: str, given: Any) -> Relation:
+    if isinstance(given, tuple) and all(isinstance(pair, tuple) and len(pair) == 2 for pair in given):
+        given = dict(given)  # as the field itself holds it, so that dataclasses.replace works
+    if not isinstance(given, Mapping) or not all(isinstance(joint, str) for joint in given):
+        raise ShapeError(field, given, "expected {joint: coefficient}")
+    numbers = [(joint, validation.scalar(f"{field}[{joint!r}]", c)) for joint, c in given.items()]
+    relation = tuple((joint, c) for joint, c in numbers if c != 0.0)
+    if not relation:
+        raise RangeError(field, given, "expected a coefficient other than 0")
+    return relation
+
+
+def _targets(given: Any, count: int) -> tuple[float, ...] | None:
+    if given is None:
+        return None
+    numbers = validation.real_array("JointCoupling.target", given)
+    if numbers.shape not in ((), (count,)):
+        raise ShapeError("JointCoupling.target", given, f"expected one number or {count}")
+    return tuple(float(x) for x in np.broadcast_to(numbers, count))
+
+
+def _label(relation: Relation) -> str:
+    text = ""
+    for joint, c in relation:
+        sign = ("- " if text else "-") if c < 0 else ("+ " if text else "")
+        size = "" if abs(c) == 1.0 else f"{abs(c):g} "
+        text += f"{' ' if text else ''}{sign}{size}{joint}"
+    return text
+
+
+def _width(robot: Robot, joint: str) -> int:
+    return int(robot.model.nvs[robot.model.getJointId(joint)])
+
+
+def _unbounded(robot: Robot, joint: str) -> bool:
+    return int(robot.model.nqs[robot.model.getJointId(joint)]) == 2
+
+
+def _coordinate(robot: Robot, joint: str, q: NDArray[np.float64]) -> float:
+    start = int(robot.model.idx_qs[robot.model.getJointId(joint)])
+    return float(np.arctan2(q[start + 1], q[start]) if _unbounded(robot, joint) else q[start])
