@@ -13,10 +13,10 @@ from wbc import validation
 from wbc.symbolic import rotations as rot
 from wbc.symbolic.kinematics import WORLD
 from wbc.symbolic.tracer import Tracer
+from wbc.tasks._nearest import distance
 from wbc.tasks._stereographic import Triple, triple
 from wbc.tasks.base import Input, Row, Task, Values
 from wbc.tasks.frames import frame_pose, require_motion
-from wbc.tasks.obstacle import distance
 
 if TYPE_CHECKING:
     from wbc.robot import Robot

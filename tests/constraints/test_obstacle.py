@@ -9,7 +9,7 @@ import pytest
 
 from tests.constraints.evaluation import numeric_jacobian, probe, random_configuration
 from tests.constraints.robots import NAMES, robot
-from wbc.errors import DuplicateNameError, MissingShapeError, RangeError, ShapeError, UnknownNameError
+from wbc.errors import DuplicateNameError, MissingShapeError, NotFiniteError, RangeError, ShapeError, UnknownNameError
 from wbc.robot import Robot
 from wbc.shapes import Capsule, HalfSpace, PlacedShape, Sphere
 from wbc.tasks.obstacle import Obstacle
@@ -180,8 +180,12 @@ def test_labels_and_units() -> None:
 def test_bad_declarations() -> None:
     bot = robot("panda")
     shaped = next(iter(bot.shapes))
-    with pytest.raises(ShapeError, match=r"Obstacle\.shape.*Sphere, HalfSpace"):
-        Obstacle(Capsule(0.1, 0.2))  # type: ignore[arg-type]
+    for shape in ("ball", PlacedShape(Sphere(0.1), pin.SE3.Identity()), [], [Sphere(0.1)]):
+        with pytest.raises(ShapeError, match=r"Obstacle\.shape.*valid: Sphere, Capsule, Box"):
+            Obstacle(shape)  # type: ignore[arg-type]
+    for count in (0, 1.5, True, float("inf")):
+        with pytest.raises((RangeError, NotFiniteError), match=r"Obstacle\.closest"):
+            Obstacle(Sphere(0.1), closest=count)  # type: ignore[arg-type]
     with pytest.raises(RangeError, match=r"Obstacle\.margin"):
         Obstacle(Sphere(0.1), margin=-0.01)
     with pytest.raises(DuplicateNameError, match=r"Obstacle\.links"):

@@ -30,6 +30,7 @@ class Gap:
         point: any point of the line through both nearest points, in the world [m], 3.
         offset: the constant place of ``point`` in frame a, where it has one [m]. Rows of one point against the
             world then share its Jacobian.
+        level: many gaps have this very normal, and share what is computed from it.
     """
 
     a: str
@@ -38,12 +39,13 @@ class Gap:
     normal: ca.SX
     point: ca.SX
     offset: tuple[float, float, float] | None = None
+    level: bool = False
 
 
 def gap_jacobian(kinematics: Kinematics, gaps: Sequence[Gap]) -> ca.SX:
     """Rows of the derivatives of the distances along v, rows x nv."""
     points: dict[tuple[str, tuple[float, float, float]], ca.SX] = {}
-    screws: dict[int, ca.SX] = {}
+    screws: dict[int, tuple[ca.SX, ca.SX]] = {}
     rows = [ca.SX(0, kinematics.nv)]
     for gap in gaps:
         joint = kinematics.frame(gap.a)[0]
@@ -56,18 +58,21 @@ def gap_jacobian(kinematics: Kinematics, gaps: Sequence[Gap]) -> ca.SX:
             continue
         own = set(kinematics.support(joint))
         other = set(kinematics.support(kinematics.frame(gap.b)[0]))
-        line = ca.vertcat(gap.normal, ca.cross(gap.point, gap.normal)).T
+        moment = ca.cross(gap.point, gap.normal).T
         blocks = []
         for j in sorted(own ^ other):
             if j not in screws:
                 screws[j] = _screw(kinematics, j)
-            along = line @ screws[j]
+            linear, angular = screws[j]
+            # The two are equal; which is smaller depends on what is shared with other rows
+            turning = gap.point.T @ (rot.skew(gap.normal) @ angular) if gap.level else moment @ angular
+            along = gap.normal.T @ linear + turning
             blocks.append((j, along if j in other else -along))
         rows.append(kinematics.columns(1, blocks))
     return ca.vertcat(*rows)
 
 
-def _screw(kinematics: Kinematics, joint: int) -> ca.SX:
-    """6 x nv_j twist (linear at the origin of the world; angular) of a joint's own motion."""
+def _screw(kinematics: Kinematics, joint: int) -> tuple[ca.SX, ca.SX]:
+    """Twist (linear at the origin of the world, angular) of a joint's own motion, 3 x nv_j each."""
     linear, angular = kinematics.joint_twist(joint)
-    return ca.vertcat(linear + rot.skew(kinematics.joint_pose(joint).position) @ angular, angular)
+    return linear + rot.skew(kinematics.joint_pose(joint).position) @ angular, angular

@@ -1,0 +1,85 @@
+"""Shapes of links as bodies of a constraint: which links have them, which can move, and the rows of sensed pairs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any
+
+import casadi as ca
+
+from wbc import validation
+from wbc.errors import MissingShapeError, RangeError, nearest
+from wbc.proximity import MAX_PAIRS, Body
+from wbc.shapes import PlacedShape
+from wbc.symbolic.kinematics import WORLD, frame_index
+from wbc.tasks.base import Row, Values
+
+if TYPE_CHECKING:
+    from wbc.robot import Robot
+
+#: Link, number of the shape within the link, shape
+LinkShape = tuple[str, int, PlacedShape]
+
+
+def joint_of(robot: Robot, link: str) -> int:
+    """Number of the joint that carries a frame; 0 for the world."""
+    return 0 if link == WORLD else int(robot.model.frames[frame_index(robot.model, link)].parentJoint)
+
+
+def shapes_of(robot: Robot, links: Iterable[str]) -> tuple[LinkShape, ...]:
+    """Every shape of the links."""
+    return tuple((link, k, placed) for link in links for k, placed in enumerate(robot.shapes.get(link, ())))
+
+
+def label(link: str, number: int) -> str:
+    """Name of shape ``number`` of a link."""
+    return f"{link}[{number}]"
+
+
+def body(link: str, number: int, placed: PlacedShape) -> Body:
+    """A link's shape for the sensor."""
+    return Body(label(link, number), link, placed.placement, placed.shape)
+
+
+def sensed_labels(count: int) -> tuple[Row, ...]:
+    """Rows of a sensor: which pairs they are about changes from tick to tick."""
+    return tuple(Row(f"closest[{k}]", "m") for k in range(count))
+
+
+def sensed_margins(inputs: Values, count: int) -> ca.SX:
+    """distance - margin of the sensed rows."""
+    return inputs["distance"] - inputs["margin"] if count else ca.SX(0, 1)
+
+
+def checked_count(field: str, value: Any) -> int:
+    """How many of the closest pairs have a row.
+
+    Raises:
+        RangeError: not an integer >= 1.
+    """
+    number = validation.scalar(field, value, low=1.0)
+    if isinstance(value, bool) or number != int(number):
+        raise RangeError(field, value, "expected an integer >= 1")
+    return int(number)
+
+
+def check_sensed(field: str, count: int) -> None:
+    """Refuse more pairs than a sensor takes.
+
+    Raises:
+        RangeError: too many.
+    """
+    if count > MAX_PAIRS:
+        raise RangeError(field, count, f"more pairs of shapes than a sensor measures, which are {MAX_PAIRS}")
+
+
+def check_shaped(robot: Robot, field: str, link: Any, available: Iterable[str]) -> None:
+    """Refuse a name that is no frame or that has no shapes.
+
+    Raises:
+        UnknownNameError, MissingShapeError: with the names that have shapes.
+    """
+    robot.check_frame(field, link)
+    if not robot.shapes.get(link):
+        reason = "this link has no collision shapes (give it some with robot.with_shapes)"
+        raise MissingShapeError(field, link, reason, nearest(link, available))
