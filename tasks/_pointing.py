@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 
 from wbc import validation
 from wbc.errors import RangeError
-from wbc.symbolic import rotations as rot
 from wbc.tasks._stereographic import Triple, triple
 
 #: An axis this close to opposite its direction [rad] turns the declared way round.
@@ -69,6 +68,9 @@ def shortest_turn(direction: ca.SX) -> ca.SX:
     return ca.vertcat(factor * y + half_turn, -factor * x)
 
 
-def turned_back(rotation: ca.SX, axes: NDArray[np.float64]) -> ca.SX:
-    """F' R': from the world's axes to those of the rows, for a frame R and :func:`row_axes` F."""
-    return rot.constant(axes.T) @ rotation.T
+def turning(axes: ca.SX, here: ca.SX) -> ca.SX:
+    """Zero, with the angular velocity about the first two of three unit axes as its rate: (c.b2, -c.b1).
+
+    ``axes``: 3x3, columns b1, b2, b3; ``here``: the same held still, whose third column is c.
+    """
+    return ca.vertcat(ca.dot(here[:, 2], axes[:, 1]), -ca.dot(here[:, 2], axes[:, 0]))

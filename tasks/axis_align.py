@@ -9,9 +9,10 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from wbc.symbolic import rotations as rot
 from wbc.symbolic.kinematics import WORLD
 from wbc.symbolic.tracer import Tracer
-from wbc.tasks._pointing import checked_around, checked_axis, row_axes, shortest_turn, turned_back
+from wbc.tasks._pointing import checked_around, checked_axis, row_axes, shortest_turn, turning
 from wbc.tasks._stereographic import Triple
 from wbc.tasks.base import Input, Row, Task, Values
 from wbc.tasks.frames import frame_pose, require_motion
@@ -92,17 +93,15 @@ class AxisAlign(Task):
         return {"target": turn @ np.array(self.axis)}
 
     def error(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
-        """The formula of the class, with the rate -F' R' (d x dd/dt) of a moving target."""
-        into = turned_back(kin.rotation(self.frame), row_axes(self.axis, self.around))
+        """The formula of the class, and terms of value zero whose rates are those of the rows."""
+        rotation, target = kin.rotation(self.frame), inputs["target"]
         if self.relative_to != WORLD:
-            into = into @ kin.rotation(self.relative_to)
-        here = kin.held(inputs["target"])
-        turning = into @ ca.cross(here, inputs["target"])
-        return shortest_turn(into @ here) - turning[:2]
+            rotation = kin.rotation(self.relative_to).T @ rotation
+        axes = rotation @ rot.constant(row_axes(self.axis, self.around))
+        here, direction = kin.held(axes), kin.held(target)
+        swept = here[:, :2].T @ ca.cross(direction, target)
+        return shortest_turn(here.T @ direction) + turning(axes, here) - swept
 
     def jacobian(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
         """F' R' (w - w_b), the relative angular velocity across the axis."""
-        spin = kin.kinematics.jacobian(self.frame)[3:, :]
-        if self.relative_to != WORLD:
-            spin = spin - kin.kinematics.jacobian(self.relative_to)[3:, :]
-        return turned_back(kin.rotation(self.frame), row_axes(self.axis, self.around))[:2, :] @ spin
+        return kin.jacobian(self.error(robot, kin, inputs))

@@ -13,7 +13,7 @@ from wbc import validation
 from wbc.symbolic import rotations as rot
 from wbc.symbolic.kinematics import WORLD
 from wbc.symbolic.tracer import Tracer
-from wbc.tasks._pointing import checked_around, checked_axis, row_axes, shortest_turn, turned_back
+from wbc.tasks._pointing import checked_around, checked_axis, row_axes, shortest_turn, turning
 from wbc.tasks._stereographic import INNER, Triple, fade, square, triple
 from wbc.tasks.base import Input, Row, Task, Values
 from wbc.tasks.frames import frame_pose, require_motion
@@ -102,27 +102,20 @@ class LookAt(Task):
         return {"target": frame_pose(robot, self.relative_to, q).actInv(frame_pose(robot, self.frame, q)).act(ahead)}
 
     def error(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
-        """The formula of the class, with the rate -F' R' d x (dt/dt) / r of a moving target."""
-        target = inputs["target"]
-        here = kin.held(target)
-        sight, distance = self._sight(robot, kin, here)
-        into = turned_back(kin.rotation(self.frame), row_axes(self.axis, self.around))
-        if self.relative_to != WORLD:
-            into = into @ kin.rotation(self.relative_to)
-        turning = ca.cross(sight, into @ (target - here)) / distance
-        return shortest_turn(sight) - turning[:2]
+        """The formula of the class, and terms of value zero whose rates are those of the rows."""
+        axes = kin.rotation(self.frame) @ rot.constant(row_axes(self.axis, self.around))
+        away = self._away(kin, inputs["target"])
+        here, sight = kin.held(axes), kin.held(away)
+        # Where the rows are off, r is continued by its value there
+        off = INNER * self.width * robot.characteristic_length
+        distance = ca.sqrt(ca.fmax(square(sight), off * off))
+        direction = here.T @ (sight / distance)
+        swept = ca.cross(direction, here.T @ ((away - sight) / distance))
+        return shortest_turn(direction) + turning(axes, here) - swept[:2]
 
     def jacobian(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
-        """F' R' (w + d x dc/dt / r), with dc/dt as seen from the reference."""
-        sight, distance = self._sight(robot, kin, inputs["target"])
-        axes = row_axes(self.axis, self.around)
-        own = kin.kinematics.jacobian(self.frame, "local")
-        moving = own[:3, :] - rot.skew(rot.constant(self.offset)) @ own[3:, :]
-        if self.relative_to != WORLD:
-            base, arm = kin.kinematics.jacobian(self.relative_to), kin.rotation(self.relative_to) @ inputs["target"]
-            moving = moving - kin.rotation(self.frame).T @ (base[:3, :] - rot.skew(arm) @ base[3:, :])
-        turn = rot.constant(axes.T)
-        return turn[:2, :] @ own[3:, :] + (rot.skew(sight / distance)[:2, :] @ turn) @ moving
+        """F' R' (w + d x dc/dt / r), with dc/dt as seen from the target."""
+        return kin.jacobian(self.error(robot, kin, inputs))
 
     def row_factor(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
         """1 where the target is away from the camera, see the class."""
@@ -130,11 +123,5 @@ class LookAt(Task):
         return ca.repmat(fade(square(away), self.width * robot.characteristic_length), 2, 1)
 
     def _away(self, kin: Tracer, target: ca.SX) -> ca.SX:
-        """t - c in the axes of the frame."""
-        return kin.pose(self.frame).inverse_point(kin.pose(self.relative_to).point(target)) - rot.constant(self.offset)
-
-    def _sight(self, robot: Robot, kin: Tracer, target: ca.SX) -> tuple[ca.SX, ca.SX]:
-        """d in the axes of the rows, and r; where the rows are off both are continued by r = its value there."""
-        away, off = self._away(kin, target), INNER * self.width * robot.characteristic_length
-        distance = ca.sqrt(ca.fmax(square(away), off * off))
-        return rot.constant(row_axes(self.axis, self.around).T) @ away / distance, distance
+        """t - c in the world [m]."""
+        return kin.pose(self.relative_to).point(target) - kin.pose(self.frame).point(rot.constant(self.offset))

@@ -1,0 +1,314 @@
+"""Axes, cameras, distances and momentum: values by scipy and Pinocchio, singular directions, bad input."""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from scipy.spatial.transform import Rotation
+
+import wbc
+from tests.tasks.evaluate import later, numbers, sample, slope
+from tests.tasks.items_pointing import FACTORIES, axes, line_of_sight
+from tests.tasks.robots import FRAMES, NAMES, placement, random_configuration, robot
+from wbc.controller import Controller
+from wbc.errors import NotFiniteError, RangeError, ShapeError, UnknownNameError, WbcError
+from wbc.robot import Limits, Robot
+from wbc.tasks import AxisAlign, Distance, Item, LookAt, Momentum
+
+STATES = 4
+HAND = "panda_hand"
+
+
+def states(name: str, item: Item, given: dict[str, Any]) -> list[tuple[np.ndarray, np.ndarray, dict[str, Any]]]:
+    """Configurations, velocities and run-time values."""
+    machine, rng = robot(name), np.random.default_rng(zlib.crc32(name.encode()))
+    out = []
+    for _ in range(STATES):
+        values = {d.name: sample(machine, d, rng) for d in item.inputs(machine)} | given
+        if isinstance(item, AxisAlign):
+            values["target"] = values["target"] / np.linalg.norm(values["target"])
+        out.append((random_configuration(machine, rng), rng.uniform(-1, 1, machine.nv), values))
+    return out
+
+
+def declared(name: str, *classes: str) -> list[tuple[Item, dict[str, Any]]]:
+    return [pair for cls in classes for pair in FACTORIES[cls](robot(name))]
+
+
+def wanted_direction(item: Item, machine: Robot, q: np.ndarray, target: np.ndarray) -> np.ndarray:
+    """Where the axis is to point, in the world."""
+    if isinstance(item, LookAt):
+        return line_of_sight(item, machine, q, target)
+    assert isinstance(item, AxisAlign)
+    return placement(machine, item.relative_to, q).rotation @ target
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_error_is_the_shortest_turn(name: str) -> None:
+    machine = robot(name)
+    for item, given in declared(name, "AxisAlign", "LookAt"):
+        assert isinstance(item, (AxisAlign, LookAt))
+        found = numbers(item, machine)
+        for q, _, values in states(name, item, given):
+            rows = placement(machine, item.frame, q).rotation @ axes(item)
+            direction, e = wanted_direction(item, machine, q, values["target"]), found(q, values)["value"]
+            direction = direction / np.linalg.norm(direction)
+            turn = Rotation.from_rotvec(rows[:, :2] @ e)
+            np.testing.assert_allclose(turn.apply(direction), rows[:, 2], rtol=0, atol=1e-12)
+            angle = np.arctan2(np.linalg.norm(np.cross(direction, rows[:, 2])), direction @ rows[:, 2])
+            np.testing.assert_allclose(np.linalg.norm(e), angle, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_rows_lower_the_angle_as_its_gradient_does(name: str) -> None:
+    """e' (J v + de/dt) is the rate of |e|^2 / 2 while robot, reference and target move."""
+    machine = robot(name)
+    for item, given in declared(name, "AxisAlign", "LookAt"):
+        found = numbers(item, machine)
+        for q, v, values in states(name, item, given):
+
+            def half_square(t: float, item=item, found=found, q=q, v=v, values=values) -> np.ndarray:
+                e = found(pin.integrate(machine.model, q, t * v), later(machine, item, values, t))["value"]
+                return np.array([e @ e / 2])
+
+            here = found(q, values)
+            rate = here["value"] @ (here["jacobian"] @ v + here["drift"])
+            np.testing.assert_allclose(rate, slope(half_square)[0], rtol=1e-7, atol=1e-7)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_moving_target_asks_for_the_turning_of_its_direction(name: str) -> None:
+    machine = robot(name)
+    for item, given in declared(name, "AxisAlign", "LookAt"):
+        assert isinstance(item, (AxisAlign, LookAt))
+        found = numbers(item, machine)
+        for q, _, values in states(name, item, given):
+            rate = placement(machine, item.relative_to, q).rotation @ values["feedforward"]
+            d = wanted_direction(item, machine, q, values["target"])
+            turning = np.cross(d, rate) / (d @ d)
+            rows = placement(machine, item.frame, q).rotation @ axes(item)
+            np.testing.assert_allclose(found(q, values)["drift"], -rows[:, :2].T @ turning, rtol=0, atol=1e-10)
+
+
+@pytest.mark.parametrize("name", ["panda", "talos"])
+@pytest.mark.parametrize("short", [0.0, 1e-12, 1e-6, 1e-3, 0.1])
+def test_opposite_and_aligned_directions(name: str, short: float) -> None:
+    """Finite with rows of unit size at and near theta = pi and 0; at pi the turn is about ``around``."""
+    machine = robot(name)
+    rng = np.random.default_rng(11)
+    for item, _ in declared(name, "AxisAlign"):
+        assert isinstance(item, AxisAlign)
+        found = numbers(item, machine)
+        for _ in range(STATES):
+            q = random_configuration(machine, rng)
+            frame = placement(machine, item.relative_to, q).actInv(placement(machine, item.frame, q))
+            rows, angle = frame.rotation @ axes(item), rng.uniform(-np.pi, np.pi)
+            tilted = pin.exp3(short * (np.cos(angle) * rows[:, 0] + np.sin(angle) * rows[:, 1])) @ rows[:, 2]
+            for sign in (1.0, -1.0):
+                here = found(q, {"target": sign * tilted, "feedforward": np.zeros(3)})
+                e = here["value"]
+                assert all(np.isfinite(x).all() for x in here.values())
+                sizes = np.linalg.svd(here["jacobian"], compute_uv=False)
+                assert sizes[0] < 10.0
+                np.testing.assert_allclose(np.linalg.norm(e), short if sign > 0 else np.pi - short, rtol=0, atol=1e-9)
+                if sign < 0 and short <= 1e-12:
+                    np.testing.assert_allclose(e, [np.pi, 0.0], rtol=0, atol=1e-12)
+                if short >= 1e-6:
+                    wanted = -short if sign > 0 else np.pi - short
+                    np.testing.assert_allclose(e, wanted * np.array([np.cos(angle), np.sin(angle)]), rtol=0, atol=1e-8)
+
+
+@pytest.mark.parametrize("axis", [(0, 0, 1), (0, 0, -3), (1, 0, 0), (0, 2, 0), (1, 1, 1), (-1e-9, 5, 3), (1e200, 0, 1)])
+def test_row_axes_of_any_axis(axis: tuple[float, float, float]) -> None:
+    from wbc.tasks._pointing import row_axes
+
+    item = AxisAlign(HAND, axis=axis)
+    rows = row_axes(item.axis, item.around)
+    np.testing.assert_allclose(rows.T @ rows, np.eye(3), rtol=0, atol=1e-15)
+    assert np.linalg.det(rows) > 0
+    np.testing.assert_allclose(
+        rows[:, 2],
+        np.array(axis) / np.linalg.norm(np.array(axis) / np.abs(axis).max()) / np.abs(axis).max(),
+        rtol=0,
+        atol=1e-15,
+    )
+
+
+def controller(item: Item, machine: Robot) -> Controller:
+    stack = wbc.Stack(machine, dt=0.01)
+    stack.add(item, name="item")
+    return stack.compile(backend="vm")
+
+
+@pytest.mark.parametrize("relative", [False, True])
+def test_camera_fades_where_the_target_is(relative: bool) -> None:
+    machine, f = wbc.robots.load("panda"), FRAMES["panda"]
+    base = f.base if relative else "world"
+    item = LookAt(f.tip, offset=(0.02, 0.0, 0.05), relative_to=base)
+    tick, q = controller(item, machine), random_configuration(machine, np.random.default_rng(2))
+    tick.step(q)
+    camera = placement(machine, base, q).actInv(placement(machine, f.tip, q)).act(np.array(item.offset))
+    width = item.width * machine.characteristic_length
+    for away in np.eye(3):
+        for distance in (0.0, 1e-13, 1e-6, 0.05, 0.3, 0.7, 1.001, 3.0):
+            tick["item"].target = camera + distance * width * away
+            tick["item"].feedforward = (0.1, -0.2, 0.3)
+            step = tick.step(q)
+            assert np.isfinite(step.v).all()
+            assert np.isfinite(step.residuals["item"].values).all()
+            assert (np.abs(step.v).max() == 0.0) == (distance <= 0.05)
+            assert step.faded == (("item",) if distance < 1.0 else ())
+
+
+@pytest.mark.parametrize("relative", [False, True])
+def test_coinciding_points_part_along_z_of_the_other_frame(relative: bool) -> None:
+    machine, f = robot("panda"), FRAMES["panda"]
+    base = f.base if relative else "world"
+    q = random_configuration(machine, np.random.default_rng(2))
+    found = numbers(Distance(f.tip, base, offset=(0.02, 0.0, 0.05)), machine)
+    other = placement(machine, base, q)
+    point = other.actInv(placement(machine, f.tip, q)).act(np.array((0.02, 0.0, 0.05)))
+    still = {"feedforward": 0.0, "point_velocity": np.zeros(3), "target": 0.1}
+    here = found(q, still | {"point": point})
+    np.testing.assert_allclose(here["value"], [-0.1], rtol=0, atol=1e-9)
+    v = np.random.default_rng(3).uniform(-1, 1, machine.nv)
+    tip = slope(lambda t: other_z(machine, base, f.tip, pin.integrate(machine.model, q, t * v), point))
+    np.testing.assert_allclose(here["jacobian"] @ v, tip, rtol=0, atol=1e-6)
+
+
+def other_z(machine: Robot, base: str, frame: str, q: np.ndarray, point: np.ndarray) -> np.ndarray:
+    """Height of the first point above the second, along the other frame's z axis."""
+    first = placement(machine, frame, q).act(np.array((0.02, 0.0, 0.05)))
+    return (placement(machine, base, q).actInv(first) - point)[2:]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_distance_by_pinocchio(name: str) -> None:
+    machine = robot(name)
+    for item, given in declared(name, "Distance"):
+        assert isinstance(item, Distance)
+        found = numbers(item, machine)
+        for q, _, values in states(name, item, given):
+            first = placement(machine, item.frame, q).act(np.array(item.offset))
+            second = placement(machine, item.other, q).act(np.array(values["point"]))
+            wanted = np.linalg.norm(first - second) - values["target"]
+            np.testing.assert_allclose(found(q, values)["value"], [wanted], rtol=0, atol=1e-12)
+
+
+def test_first_value_of_the_point_is_that_of_the_field() -> None:
+    machine, f = wbc.robots.load("talos"), FRAMES["talos"]
+    tick = controller(Distance(f.tip, f.base, point=(0.1, 0.2, 0.3)), machine)
+    step = tick.step(machine.neutral)
+    assert np.abs(step.v).max() < 1e-9
+    assert tick["item"].point.tolist() == [0.1, 0.2, 0.3]
+    second = placement(machine, f.base, machine.neutral).act(np.array((0.1, 0.2, 0.3)))
+    first = placement(machine, f.tip, machine.neutral).translation
+    assert tick["item"].target == pytest.approx(np.linalg.norm(first - second), abs=1e-12)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_rows_of_momentum_count_alike(name: str) -> None:
+    """A body of the robot's mass and mean inertia that moves at L a second and turns at 1 rad/s costs 1 a row."""
+    machine = robot(name)
+    data, length = machine.model.createData(), machine.characteristic_length
+    pin.ccrba(machine.model, data, machine.neutral, np.zeros(machine.nv))
+    mass, mean = data.Ig.mass, np.trace(data.Ig.inertia) / 3
+    wanted = np.repeat([1 / (mass * length) ** 2, 1 / mean**2], 3)
+    np.testing.assert_allclose(Momentum().row_weights(machine), wanted, rtol=1e-12)
+    np.testing.assert_allclose(Momentum("angular").row_weights(machine), wanted[3:], rtol=1e-12)
+    weighed = Momentum("linear", weights=(1, 2, 0)).row_weights(machine)
+    np.testing.assert_allclose(weighed, wanted[:3] * np.array([1, 2, 0]), rtol=1e-12)
+
+
+def test_momentum_of_a_point_mass_has_finite_weights() -> None:
+    model = pin.Model()
+    joint = model.addJoint(0, pin.JointModelRZ(), pin.SE3.Identity(), "turn")
+    model.appendBodyToJoint(joint, pin.Inertia(2.0, np.array([0.3, 0.0, 0.0]), np.zeros((3, 3))), pin.SE3.Identity())
+    model.addFrame(pin.Frame("tip", joint, 0, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
+    none = np.full(1, np.inf)
+    single = Robot("single", model, Limits(-none, none, none, none, none))
+    assert np.isfinite(Momentum().row_weights(single)).all()
+    tick = controller(Momentum(), single)
+    tick["item"].target = (0.0, 0.6, 0.0, 0.0, 0.0, 0.0)
+    np.testing.assert_allclose(tick.step([0.0]).v, [1.0], rtol=1e-5)
+
+
+CASES: dict[str, tuple[Callable[[], Item], type[WbcError], str]] = {
+    "axis frame": (lambda: AxisAlign("panda_hnd"), UnknownNameError, HAND),
+    "axis frame type": (lambda: AxisAlign(3), UnknownNameError, "AxisAlign.frame"),
+    "axis zero": (lambda: AxisAlign(HAND, axis=(0, 0, 0)), RangeError, "AxisAlign.axis"),
+    "axis two": (lambda: AxisAlign(HAND, axis=(0, 1)), ShapeError, "AxisAlign.axis"),
+    "axis text": (lambda: AxisAlign(HAND, axis="z"), ShapeError, "AxisAlign.axis"),
+    "axis NaN": (lambda: AxisAlign(HAND, axis=(0, 0, np.nan)), NotFiniteError, "AxisAlign.axis"),
+    "axis around": (lambda: AxisAlign(HAND, around=(0, 0, -2)), RangeError, "AxisAlign.around"),
+    "axis around shape": (lambda: AxisAlign(HAND, around=3.0), ShapeError, "AxisAlign.around"),
+    "axis reference": (lambda: AxisAlign(HAND, relative_to="wrld"), UnknownNameError, "'world'"),
+    "axis same body": (lambda: AxisAlign(HAND, relative_to="panda_link8"), RangeError, "no joint moves"),
+    "axis fixed": (lambda: AxisAlign("panda_link0"), RangeError, "no joint moves"),
+    "sight frame": (lambda: LookAt("panda_hnd"), UnknownNameError, HAND),
+    "sight axis": (lambda: LookAt(HAND, axis=(0, 0, 0)), RangeError, "LookAt.axis"),
+    "sight around": (lambda: LookAt(HAND, around=(0, 0, 1)), RangeError, "LookAt.around"),
+    "sight offset": (lambda: LookAt(HAND, offset=(1, 2)), ShapeError, "LookAt.offset"),
+    "sight offset inf": (lambda: LookAt(HAND, offset=(1, 2, np.inf)), NotFiniteError, "LookAt.offset"),
+    "sight width": (lambda: LookAt(HAND, width=0.0), RangeError, "LookAt.width"),
+    "sight width large": (lambda: LookAt(HAND, width=2.0), RangeError, "LookAt.width"),
+    "sight reference": (lambda: LookAt(HAND, relative_to="wrld"), UnknownNameError, "'world'"),
+    "sight same body": (lambda: LookAt(HAND, relative_to="panda_link8"), RangeError, "no joint moves"),
+    "distance frame": (lambda: Distance("panda_hnd"), UnknownNameError, HAND),
+    "distance other": (lambda: Distance(HAND, "wrld"), UnknownNameError, "'world'"),
+    "distance same body": (lambda: Distance(HAND, "panda_link8"), RangeError, "no joint moves"),
+    "distance fixed": (lambda: Distance("panda_link0"), RangeError, "no joint moves"),
+    "distance offset": (lambda: Distance(HAND, offset=(1, 2)), ShapeError, "Distance.offset"),
+    "distance point": (lambda: Distance(HAND, point=(1, 2, np.nan)), NotFiniteError, "Distance.point"),
+    "momentum kind": (lambda: Momentum("angulr"), UnknownNameError, "'angular'"),
+    "momentum weights": (lambda: Momentum("linear", weights=(1,) * 6), ShapeError, "3 numbers"),
+    "momentum negative": (lambda: Momentum(weights=(1, 1, 1, 1, 1, -1)), RangeError, "weights[5]"),
+    "momentum NaN": (lambda: Momentum(weights=[np.nan] * 6), NotFiniteError, "weights"),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_bad_declaration(case: str) -> None:
+    make, error, text = CASES[case]
+    with pytest.raises(WbcError) as caught:
+        make().validate(robot("panda"))
+    assert type(caught.value) is error
+    assert text in str(caught.value)
+
+
+def test_momentum_needs_mass() -> None:
+    model = pin.Model()
+    model.addJoint(0, pin.JointModelRZ(), pin.SE3.Identity(), "turn")
+    none = np.full(1, np.inf)
+    bare = Robot("bare", model, Limits(-none, none, none, none, none))
+    with pytest.raises(RangeError, match="no mass"):
+        Momentum().validate(bare)
+
+
+BAD_INPUTS: dict[str, tuple[Callable[[], Item], str, Any, type[WbcError]]] = {
+    "direction zero": (lambda: AxisAlign(HAND), "target", (0, 0, 0), RangeError),
+    "direction NaN": (lambda: AxisAlign(HAND), "target", (0, 0, np.nan), NotFiniteError),
+    "direction shape": (lambda: AxisAlign(HAND), "target", (0, 1), ShapeError),
+    "sight inf": (lambda: LookAt(HAND), "target", (0, 0, np.inf), NotFiniteError),
+    "distance negative": (lambda: Distance(HAND), "target", -0.1, RangeError),
+    "distance point": (lambda: Distance(HAND), "point", (0, 0), ShapeError),
+    "momentum shape": (lambda: Momentum("angular"), "target", np.zeros(6), ShapeError),
+}
+
+
+@pytest.mark.parametrize("case", BAD_INPUTS)
+def test_bad_input_changes_nothing(case: str) -> None:
+    make, name, value, error = BAD_INPUTS[case]
+    machine = wbc.robots.load("panda")
+    tick, q = controller(make(), machine), machine.neutral
+    before = np.array(tick.step(q).v)
+    kept = np.array(getattr(tick["item"], name))
+    with pytest.raises(error, match=name):
+        setattr(tick["item"], name, value)
+    np.testing.assert_array_equal(getattr(tick["item"], name), kept)
+    np.testing.assert_array_equal(tick.step(q).v, before)
