@@ -26,10 +26,11 @@ from wbc.symbolic.kinematics import Kinematics
 class Pull:
     """A force at the origin of ``frame``, a torque on it, or a force on every body in proportion to its mass.
 
-    ``vector``: world axes, 3 entries; for ``mass`` the force on the whole robot.
+    ``vector``: world axes, 3 entries; for ``mass`` the force on the whole robot. What is no force but knows its
+    curvature, or an estimate of it, gives that as ``own``: nv x nv, symmetric.
     """
 
-    kind: Literal["force", "torque", "mass"]
+    kind: Literal["force", "torque", "mass", "own"]
     frame: str
     vector: ca.SX
 
@@ -45,9 +46,13 @@ class _Load:
 
 def curvature(kinematics: Kinematics, pulls: Iterable[Pull]) -> ca.SX:
     """K of the module, nv x nv, symmetric, for all pulls together."""
-    loads = _loads(kinematics, pulls)
+    known = list(pulls)
+    loads = _loads(kinematics, [pull for pull in known if pull.kind != "own"])
     turned = {j: _turned(kinematics, j, load) for j, load in loads.items()}
     K = ca.SX(kinematics.nv, kinematics.nv)
+    for pull in known:
+        if pull.kind == "own":
+            K += pull.vector
     for k in turned:
         for i in kinematics.support(k):
             angular = kinematics.joint_twist(i)[1]

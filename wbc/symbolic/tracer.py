@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from functools import partial
+from functools import cache, partial
 
 import casadi as ca
 import numpy as np
@@ -25,6 +25,7 @@ from wbc.symbolic import rotations as rot
 from wbc.symbolic.curvature import Pull
 from wbc.symbolic.gaps import Gap, gap_jacobian
 from wbc.symbolic.kinematics import WORLD, Kinematics, Pose
+from wbc.symbolic.manipulability import bend, manipulability
 
 
 @dataclass
@@ -199,6 +200,25 @@ class Tracer:
         motion = ca.SX(ca.DM.eye(count))
         slope = partial(gap_jacobian, kinematics, tuple(gaps))
         self._symbols.append(_Symbol("gaps", symbol, lambda: value, motion, slope, inner=True))
+        return symbol
+
+    def manipulability(self, frame: str, base: str, rows: tuple[int, ...], length: float) -> ca.SX:
+        """Measure of how well a frame can be moved against a base, see :mod:`wbc.symbolic.manipulability`.
+
+        Raises:
+            UnknownNameError: no such frame.
+        """
+        kinematics, symbol = self.kinematics, ca.SX.sym(f"w_{frame}_{base}")
+        for name in (frame, base):
+            kinematics.frame(name)
+        both = cache(lambda: manipulability(kinematics, frame, base, rows, length))
+
+        def pulls(force: ca.SX) -> tuple[Pull, ...]:
+            return (Pull("own", frame, force * both()[0] * bend(kinematics, frame, base, length)),)
+
+        text = f"manipulability {frame} {base} {rows} {length!r}"
+        slope = _Symbol(text, symbol, lambda: both()[0], ca.SX(1), lambda: both()[1], pulls=pulls)
+        self._symbols.append(slope)
         return symbol
 
     def joint(self, name: str) -> ca.SX:

@@ -1,0 +1,159 @@
+"""A hand stays where it can move well: the measure of manipulability goes to a target."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal
+
+import casadi as ca
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from wbc import validation
+from wbc.errors import RangeError
+from wbc.symbolic.kinematics import WORLD, frame_index
+from wbc.symbolic.manipulability import FLOOR
+from wbc.symbolic.tracer import Tracer
+from wbc.tasks._selection import selection
+from wbc.tasks.base import Input, Row, Task, Values
+from wbc.tasks.frames import frame_pose, require_motion
+
+if TYPE_CHECKING:
+    from wbc.robot import Robot
+
+LABELS = ("x", "y", "z", "rx", "ry", "rz")
+KINDS = {"pose": LABELS, "position": LABELS[:3], "orientation": LABELS[3:]}
+FORMS = ("linear", "log")
+
+#: Configurations at which :meth:`Manipulability.validate` looks for one that is not singular, and what it calls so.
+_TRIED, _SINGULAR = 8, 1e-6
+
+
+@dataclass(frozen=True)
+class Manipulability(Task):
+    """How well a frame can be moved goes to a target:
+
+        e = w - target                    form "linear"
+        e = log(w / target)               form "log"                                         [1]
+        w = sqrt(det(J J' + floor^2 I))   = prod_i sqrt(s_i^2 + floor^2),  floor = 1e-4
+
+    J is the Jacobian of the frame as seen from ``relative_to``, its rows in metres divided by ``length``, and s_i are
+    its singular values: w is Yoshikawa's measure of manipulability (1985) as a pure number, up to a constant the volume
+    of the velocities that joint velocities of norm 1 can give the frame. The floor under every singular value keeps w
+    and its gradient finite everywhere; it changes w by less than sum_i floor^2 / (2 s_i^2) of itself (5e-5 for one s_i
+    of 0.01). In a singular configuration the gradient is zero, as w has its least value there.
+
+    Inputs:
+        target: what w shall be, > 0; a target above what the arm can reach drives w to a maximum. Default: the present
+            w, see :meth:`value`.
+        feedforward: its rate [1/s]. Default 0.
+
+    Example:
+        >>> Manipulability("gripper_left_base_link", relative_to="torso_2_link", kind="position")
+
+    Only the joints between ``relative_to`` and the frame count. From the world the base of a mobile robot counts, too,
+    and makes w large whatever the arm does: measure an arm from the body that it is mounted on.
+
+    The log form asks for a rate of w in proportion to w: equal shares in equal times, slow next to a singular
+    configuration. The linear form asks for more there, and more speed.
+
+    What it cannot do: find the best configuration. It climbs w, which has several maxima, and leaves a singular
+    configuration only when something else has moved the arm out of it. It measures velocities without joint limits.
+
+    Attributes:
+        frame: frame of the hand.
+        kind: ``pose`` (6 rows of J), ``position`` (3) or ``orientation`` (3).
+        along: rows of J that count instead, by their labels out of x, y, z, rx, ry, rz in the axes of ``relative_to``:
+            ("x", "y") for a planar arm.
+        relative_to: frame that the motion is seen from; ``"world"`` or a frame of the robot.
+        form: ``linear`` or ``log``.
+        length: what rows in metres are divided by [m]; None: ``robot.characteristic_length``.
+
+    Raises:
+        UnknownNameError, DuplicateNameError, ShapeError, NotFiniteError: on construction or in :meth:`validate`.
+        RangeError: w is zero wherever the arm is, or length <= 0.
+    """
+
+    frame: str
+    kind: Literal["pose", "position", "orientation"] = "pose"
+    along: tuple[str, ...] | None = None
+    relative_to: str = WORLD
+    form: Literal["linear", "log"] = "linear"
+    length: float | None = None
+
+    def __post_init__(self) -> None:
+        validation.one_of("Manipulability.kind", self.kind, KINDS)
+        validation.one_of("Manipulability.form", self.form, FORMS)
+        if self.along is not None:
+            labels = selection("Manipulability.along", self.along)
+            for label in labels:
+                validation.one_of("Manipulability.along", label, LABELS)
+            object.__setattr__(self, "along", tuple(sorted(labels, key=LABELS.index)))
+        if self.length is not None:
+            length = validation.scalar("Manipulability.length", self.length, low=0.0, open_low=True, unit="m")
+            object.__setattr__(self, "length", length)
+
+    def validate(self, robot: Robot) -> None:
+        """Check the frames, and that the arm is not singular in every configuration, see :meth:`Item.validate`."""
+        robot.check_frame("Manipulability.frame", self.frame)
+        robot.check_frame("Manipulability.relative_to", self.relative_to)
+        require_motion(robot, "Manipulability.frame", self.frame, self.relative_to)
+        rng = np.random.default_rng(0)
+        drawn = (pin.integrate(robot.model, robot.neutral, rng.uniform(-2.0, 2.0, robot.nv)) for _ in range(_TRIED))
+        if all(self._singular_values(robot, q)[-1] < _SINGULAR for q in drawn):
+            rows = ", ".join(LABELS[k] for k in self._rows)
+            reason = f"no joints move this frame in all of {rows}; choose fewer with along="
+            raise RangeError("Manipulability.frame", self.frame, reason)
+
+    def inputs(self, robot: Robot) -> tuple[Input, ...]:
+        """``target`` and ``feedforward``, see the class."""
+        least = FLOOR ** len(self._rows)
+        return (Input("target", low=least, rate="feedforward"), Input("feedforward", unit="1/s", default=0.0))
+
+    def rows(self, robot: Robot) -> tuple[Row, ...]:
+        """One row, a pure number."""
+        return (Row("w", "1"),)
+
+    def initial(self, robot: Robot, q: NDArray[np.float64]) -> dict[str, Any]:
+        """The measure at ``q``."""
+        return {"target": self.value(robot, q)}
+
+    def value(self, robot: Robot, q: NDArray[np.float64]) -> float:
+        """w at a configuration, by numpy."""
+        return float(np.prod(np.sqrt(self._singular_values(robot, q) ** 2 + FLOOR**2)))
+
+    def error(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
+        """The formula of the class."""
+        w = kin.manipulability(self.frame, self.relative_to, self._rows, self._length(robot))
+        return ca.log(w / inputs["target"]) if self.form == "log" else w - inputs["target"]
+
+    @property
+    def _rows(self) -> tuple[int, ...]:
+        return tuple(LABELS.index(label) for label in self.along or KINDS[self.kind])
+
+    def _length(self, robot: Robot) -> float:
+        return robot.characteristic_length if self.length is None else self.length
+
+    def _singular_values(self, robot: Robot, q: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Of the chosen rows of J, by Pinocchio; the largest first."""
+        data = robot.model.createData()
+        pin.computeJointJacobians(robot.model, data, q)
+        pin.updateFramePlacements(robot.model, data)
+        base = frame_pose(robot, self.relative_to, q)
+        arm = frame_pose(robot, self.frame, q).translation - base.translation
+        own, carrier = (_jacobian(robot, data, frame) for frame in (self.frame, self.relative_to))
+        linear = base.rotation.T @ (own[:3] - carrier[:3] + pin.skew(arm) @ carrier[3:])
+        angular = base.rotation.T @ (own[3:] - carrier[3:])
+        chosen = np.vstack([linear / self._length(robot), angular])[list(self._rows)]
+        values = np.zeros(len(self._rows))
+        found = np.linalg.svd(chosen, compute_uv=False)
+        values[: found.size] = found
+        return values
+
+
+def _jacobian(robot: Robot, data: pin.Data, frame: str) -> NDArray[np.float64]:
+    if frame == WORLD:
+        return np.zeros((6, robot.nv))
+    number = frame_index(robot.model, frame)
+    return np.array(pin.getFrameJacobian(robot.model, data, number, pin.LOCAL_WORLD_ALIGNED))

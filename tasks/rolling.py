@@ -1,0 +1,207 @@
+"""Wheels that roll on the ground without slip: plain, omni and mecanum."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import casadi as ca
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from wbc import validation
+from wbc.errors import DuplicateNameError, RangeError, ShapeError
+from wbc.symbolic.kinematics import Kinematics, Pose
+from wbc.symbolic.tracer import Tracer
+from wbc.tasks.base import Constraint, Input, Order, Row, Rows, Values
+
+if TYPE_CHECKING:
+    from wbc.robot import Robot
+
+#: Floor under the length of the ground's normal as seen in the plane of a wheel, which is 1 for one that stands upright
+#: and 0 for one that lies flat.
+FLAT = 1e-6
+
+#: Rollers whose axes are closer to the wheel's axis than this [rad] couple nothing.
+_ALONG_AXIS = 1e-2
+
+
+@dataclass(frozen=True)
+class Wheel:
+    """A thin wheel on a joint.
+
+    Attributes:
+        joint: the joint that it turns with: revolute, its axis through the wheel's centre, its origin in the centre.
+        radius: from the centre to the ground [m].
+        roller: None for a plain wheel. For one with rollers the angle from the rolling direction to the axis of the
+            roller that touches the ground, about the ground's normal [rad]: 0 for an omni wheel, +-pi/4 for mecanum.
+            The rolling direction is where the wheel goes when its joint turns forwards.
+
+    Raises:
+        ShapeError, NotFiniteError, RangeError: radius <= 0; rollers along the wheel's axis, |roller| >= pi/2.
+    """
+
+    joint: str
+    radius: float
+    roller: float | None = None
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.joint, str):
+            raise ShapeError("Wheel.joint", self.joint, "expected the name of a joint")
+        radius = validation.scalar("Wheel.radius", self.radius, low=0.0, open_low=True, unit="m")
+        object.__setattr__(self, "radius", radius)
+        if self.roller is not None:
+            end = math.pi / 2 - _ALONG_AXIS
+            object.__setattr__(self, "roller", validation.scalar("Wheel.roller", self.roller, low=-end, high=end))
+
+
+@dataclass(frozen=True)
+class Rolling(Constraint):
+    """The point of each wheel that touches the ground does not slip: equalities on its velocity u = J_c v, with
+
+        plain wheel         t'u = 0,  s'u = 0                    rolling direction and sideways        [m/s]
+        wheel with rollers  (cos(roller) t + sin(roller) s)'u = 0         along the roller's axis      [m/s]
+        on a floating base  n'u = -gain n'(c - o)                the wheel stays on the ground         [m/s]
+
+    n is the normal of the ground and o its origin; a the wheel's axis, p its centre; in the plane of the wheel the
+    direction closest to n is d = n - a (a'n), made a unit vector, and
+
+        c = p - radius d   the point of contact,     t = a x d   where it rolls to,     s = n x t   sideways.
+
+    J_c is the Jacobian of the point of the wheel that is at c: it has the columns of the base, of whatever carries or
+    steers the wheel, and of the wheel's joint. A roller turns freely about its axis, so it holds only along it.
+
+    Inputs:
+        ground: pose of the ground, its z axis the normal. Default: the z axis of the world, the origin at the
+            height of the first wheel's contact at the first step. Only the axis counts without rows of contact.
+        gain: of the rows of contact, if there are any [1/s].
+
+    Example:
+        >>> Rolling([Wheel("wheel_left_joint", 0.0985), Wheel("wheel_right_joint", 0.0985)])
+
+    Order of sacrifice: as ``Hold``, after the actuators and joint positions and before margins and tasks. Velocity and
+    acceleration limits of the wheels' joints limit the base through these rows.
+
+    What it cannot do: rows that repeat each other are dropped (the sideways rows of two wheels on one axle), but those
+    that contradict each other leave no motion: four plain wheels that cannot be steered only go straight. For a robot
+    that skids in turns declare rollers with ``roller=0`` and leave the sideways motion to ``base="differential"``.
+    There is no position to return to: slip that has happened is not undone. It knows no friction limit. For a wheel
+    that lies flat (|d| before it is made a unit vector, below 1e-6) the rows fade to zero.
+
+    Attributes:
+        wheels: one :class:`Wheel` or several.
+        contact: rows that keep wheels on the ground; None: on a floating base only, as others cannot leave it.
+        gain: first value of the input.
+
+    Raises:
+        ShapeError, NotFiniteError: no wheels, bad numbers. DuplicateNameError: a joint twice.
+        UnknownNameError: no such joint. RangeError: a joint that is not revolute, that nothing carries along the
+            ground, or whose axis is along the normal, so that it steers; gain < 0.
+    """
+
+    order: ClassVar[Order] = Order.HOLD
+    equality: ClassVar[bool] = True
+    initial_only: ClassVar[tuple[str, ...]] = ("gain",)
+
+    wheels: tuple[Wheel, ...]
+    contact: bool | None = None
+    gain: float = 10.0
+
+    def __post_init__(self) -> None:
+        given = (self.wheels,) if isinstance(self.wheels, Wheel) else self.wheels
+        wheels = tuple(given) if isinstance(given, Iterable) else ()
+        if not wheels or not all(isinstance(wheel, Wheel) for wheel in wheels):
+            raise ShapeError("Rolling.wheels", self.wheels, "expected one Wheel or several")
+        joints = [wheel.joint for wheel in wheels]
+        for joint in joints:
+            if joints.count(joint) > 1:
+                raise DuplicateNameError("Rolling.wheels", joint, "two wheels on one joint")
+        object.__setattr__(self, "wheels", wheels)
+        if self.contact is not None:
+            object.__setattr__(self, "contact", validation.flag("Rolling.contact", self.contact))
+        object.__setattr__(self, "gain", validation.scalar("Rolling.gain", self.gain, low=0.0, unit="1/s"))
+
+    def validate(self, robot: Robot) -> None:
+        """Check the joints, see :meth:`Item.validate`."""
+        model = robot.model
+        for wheel in self.wheels:
+            validation.one_of("Rolling.wheels", wheel.joint, robot.joint_names)
+            joint = int(model.getJointId(wheel.joint))
+            if not model.joints[joint].shortname().startswith("JointModelR"):
+                raise RangeError("Rolling.wheels", wheel.joint, "a wheel turns about a revolute joint")
+            if int(model.parents[joint]) == 0:
+                raise RangeError("Rolling.wheels", wheel.joint, "nothing carries this wheel along the ground")
+            axis = _axis(robot, joint, robot.neutral)
+            if robot.base != "floating" and np.linalg.norm(axis[:2]) < FLAT:
+                raise RangeError("Rolling.wheels", wheel.joint, "its axis is vertical: it steers, but does not roll")
+
+    def inputs(self, robot: Robot) -> tuple[Input, ...]:
+        """``ground``, and ``gain`` with rows of contact."""
+        gain = (Input("gain", unit="1/s", default=self.gain, low=0.0),) if self._touches(robot) else ()
+        return (Input("ground", "pose", unit="m, rad"), *gain)
+
+    def initial(self, robot: Robot, q: NDArray[np.float64]) -> dict[str, Any]:
+        """Level ground under the first wheel at ``q``."""
+        wheel = self.wheels[0]
+        joint = int(robot.model.getJointId(wheel.joint))
+        data = robot.model.createData()
+        pin.forwardKinematics(robot.model, data, q)
+        up = np.array([0.0, 0.0, 1.0])
+        axis = _axis(robot, joint, q)
+        down = up - axis * axis[2]
+        contact = data.oMi[joint].translation - wheel.radius * down / np.sqrt(down @ down + FLAT**2)
+        return {"ground": pin.SE3(np.eye(3), contact[2] * up)}
+
+    def rows(self, robot: Robot) -> tuple[Row, ...]:
+        """``joint rolling`` and ``joint sideways``, or ``joint roller``; then ``joint contact`` where there is one."""
+        out = []
+        for wheel in self.wheels:
+            names = ["rolling", "sideways"] if wheel.roller is None else ["roller"]
+            names += ["contact"] * self._touches(robot)
+            out += [Row(f"{wheel.joint} {name}", "m/s") for name in names]
+        return tuple(out)
+
+    def velocity_rows(self, robot: Robot, kin: Tracer, inputs: Values, dt: ca.SX) -> Rows:
+        """See the class."""
+        ground: Pose = inputs["ground"]
+        normal = ground.rotation[:, 2]
+        matrix, right = [], []
+        for wheel in self.wheels:
+            point, jacobian, forwards = _contact(kin.kinematics, wheel, normal)
+            sideways = ca.cross(normal, forwards)
+            if wheel.roller is None:
+                held = [forwards, sideways]
+            else:
+                held = [math.cos(wheel.roller) * forwards + math.sin(wheel.roller) * sideways]
+            wanted = [ca.SX(0)] * len(held)
+            if self._touches(robot):
+                held.append(normal)
+                wanted.append(-inputs["gain"] * ca.dot(normal, point - ground.position))
+            matrix += [direction.T @ jacobian for direction in held]
+            right += wanted
+        return Rows(ca.sparsify(ca.vertcat(*matrix)), ca.vertcat(*right), ca.vertcat(*right))
+
+    def _touches(self, robot: Robot) -> bool:
+        return robot.base == "floating" if self.contact is None else self.contact
+
+
+def _contact(kinematics: Kinematics, wheel: Wheel, normal: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
+    """(point of contact, its Jacobian 3 x nv as a point of the wheel, rolling direction)."""
+    joint = int(kinematics.model.getJointId(wheel.joint))
+    axis = kinematics.joint_twist(joint)[1]
+    upright = normal - axis * ca.dot(axis, normal)
+    upright = upright / ca.sqrt(ca.dot(upright, upright) + FLAT**2)
+    point = kinematics.joint_pose(joint).position - wheel.radius * upright
+    return point, kinematics.point_jacobian(joint, point)[:3, :], ca.cross(axis, upright)
+
+
+def _axis(robot: Robot, joint: int, q: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Axis of a revolute joint in the world at a configuration."""
+    data = robot.model.createData()
+    pin.computeJointJacobians(robot.model, data, q)
+    column = int(robot.model.idx_vs[joint])
+    jacobian = pin.getJointJacobian(robot.model, data, joint, pin.LOCAL_WORLD_ALIGNED).reshape(6, robot.nv)
+    return np.array(jacobian[3:, column])
