@@ -14,15 +14,19 @@ from wbc.tasks.fixed import Fixed
 from wbc.tasks.frame_velocity_limit import FrameVelocityLimit
 from wbc.tasks.gaze_cone import GazeCone
 from wbc.tasks.hold import Hold
+from wbc.tasks.joint_coupling import JointCoupling
 from wbc.tasks.joint_limits import JointLimits
 from wbc.tasks.limit import Limit
 from wbc.tasks.look_at import LookAt
+from wbc.tasks.manipulability import Manipulability
 from wbc.tasks.mechanism import Mechanism
 from wbc.tasks.momentum import Momentum
 from wbc.tasks.obstacle import Obstacle
 from wbc.tasks.pitch_plane import PitchPlane
 from wbc.tasks.pitch_plane_limit import PitchPlaneLimit
 from wbc.tasks.posture import Posture
+from wbc.tasks.relative_pose import RelativePose
+from wbc.tasks.rolling import Rolling, Wheel
 from wbc.tasks.workspace_box import WorkspaceBox
 from wbc.tasks.workspace_polyhedron import WorkspacePolyhedron
 
@@ -44,9 +48,11 @@ __all__ = [
     "Hold",
     "Input",
     "Item",
+    "JointCoupling",
     "JointLimits",
     "Limit",
     "LookAt",
+    "Manipulability",
     "Mechanism",
     "Momentum",
     "Obstacle",
@@ -55,10 +61,13 @@ __all__ = [
     "PitchPlaneLimit",
     "PlaneReference",
     "Posture",
+    "RelativePose",
+    "Rolling",
     "Row",
     "Rows",
     "Task",
     "Values",
+    "Wheel",
     "WorkspaceBox",
     "WorkspacePolyhedron",
     "registry",

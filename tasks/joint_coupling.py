@@ -128,14 +128,6 @@ class JointCoupling(Task):
             errors.append(ca.atan2(ca.sin(total), ca.cos(total)) if turning else total)
         return ca.vertcat(*errors)
 
-    def jacobian(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
-        """The coefficients: exactly constant, also where the error is an angle."""
-        matrix = ca.SX(len(self.coefficients), robot.nv)
-        for k, relation in enumerate(self.coefficients):
-            for joint, coefficient in relation:
-                matrix[k, robot.dofs(joint).start] = coefficient
-        return matrix
-
 
 def _relation(field: str, given: Any) -> Relation:
     if isinstance(given, tuple) and all(isinstance(pair, tuple) and len(pair) == 2 for pair in given):

@@ -10,6 +10,7 @@ import numpy as np
 
 from tests.constraints.items import FACTORIES as CONSTRAINTS
 from tests.constraints.items_limits import FACTORIES as LIMITS
+from tests.tasks.items_coordination import FACTORIES as COORDINATION
 from tests.tasks.items_pointing import FACTORIES as POINTING
 from tests.tasks.robots import FRAMES
 from wbc.robot import Robot
@@ -120,6 +121,7 @@ FACTORIES: dict[str, Callable[[Robot], list[Declared]]] = {
     "PitchPlane": _pitch_plane,
     "PitchPlaneLimit": _pitch_plane_limit,
     **POINTING,
+    **COORDINATION,
     **CONSTRAINTS,
     **LIMITS,
 }

@@ -15,6 +15,7 @@ import pytest
 
 from tests.tasks.evaluate import Numbers, later, numbers, sample, slope
 from tests.tasks.items import FACTORIES
+from tests.tasks.items_coordination import RATES as COORDINATION
 from tests.tasks.items_pointing import RATES as POINTING
 from tests.tasks.robots import NAMES, placement, random_configuration, robot, velocity
 from wbc.robot import Robot
@@ -108,6 +109,7 @@ RATES = {
     Mechanism: mechanism,
     PitchPlane: plane_rate,
     **POINTING,
+    **COORDINATION,
 }
 
 
