@@ -11,12 +11,13 @@ from tests.closed_loop.loop import Loop
 from tests.closed_loop.machines import CONSTRAINT_ROBOTS, TASK_ROBOTS
 from tests.closed_loop.mechanism import ROBOTS as COUPLED
 from tests.closed_loop.mechanism import build, mechanism
+from tests.closed_loop.pointing import CLASSES as POINTING
 from wbc.tasks import Mechanism, registry
 
 
 def test_every_shipped_class_has_a_case() -> None:
     shipped = {cls for cls in registry().values() if cls.__module__.startswith("wbc.tasks")}
-    assert shipped == {case.cls for case in (cases.TASKS | cases.CONSTRAINTS).values()} | {Mechanism}
+    assert shipped == {case.cls for case in (cases.TASKS | cases.CONSTRAINTS).values()} | {Mechanism} | POINTING
 
 
 @pytest.mark.parametrize("name", TASK_ROBOTS)

@@ -12,6 +12,7 @@ from tests.closed_loop.constraints import constraint_items
 from tests.closed_loop.loop import Loop
 from tests.closed_loop.machines import machine
 from tests.closed_loop.mechanism import build, mechanism
+from tests.closed_loop.pointing_mutations import MUTATIONS as POINTING
 from tests.closed_loop.subjects import task_items
 from wbc.stack import declaration
 from wbc.tasks import registry
@@ -57,5 +58,6 @@ def test_mechanism(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_every_shipped_class_is_mutated_and_no_mutation_is_shipped() -> None:
     shipped = {cls for cls in registry().values() if cls.__module__.startswith("wbc.tasks")}
     changed = [*mutations.TASKS.values(), *mutations.CONSTRAINTS.values(), *mutations.MECHANISM.values()]
+    changed += POINTING.values()
     assert {cls.__bases__[0] for cls in changed} == shipped
     assert not set(changed) & set(registry().values())

@@ -1,0 +1,34 @@
+"""Axes, cameras, distances and momentum in their loops on three robots, and that wrong formulas are noticed."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import pytest
+
+from tests.closed_loop.loop import Loop
+from tests.closed_loop.machines import TASK_ROBOTS
+from tests.closed_loop.pointing import CHECKS, CLASSES, build, pointing_loop
+from tests.closed_loop.pointing_mutations import MUTATIONS, OTHER_MUTATIONS
+
+
+@pytest.mark.parametrize("name", TASK_ROBOTS)
+@pytest.mark.parametrize("check", CHECKS)
+def test_loop(check: str, name: str) -> None:
+    CHECKS[check].run(pointing_loop(name))
+
+
+@cache
+def mutated(other: bool) -> Loop:
+    changed = OTHER_MUTATIONS if other else MUTATIONS
+    return build("panda", {CHECKS[check].item: cls for check, cls in changed.items()})
+
+
+@pytest.mark.parametrize("check", MUTATIONS | OTHER_MUTATIONS)
+def test_wrong_formula_is_noticed(check: str) -> None:
+    with pytest.raises(AssertionError, match=r"\{'"):
+        CHECKS[check].run(mutated(check in OTHER_MUTATIONS))
+
+
+def test_every_class_is_mutated() -> None:
+    assert {cls.__bases__[0] for cls in (MUTATIONS | OTHER_MUTATIONS).values()} == CLASSES
