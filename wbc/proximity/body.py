@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import pinocchio as pin
 
 from wbc import validation
-from wbc.errors import DuplicateNameError, ShapeError, UnknownNameError
+from wbc.errors import DuplicateNameError, RangeError, ShapeError, UnknownNameError
 from wbc.shapes import Box, Capsule, Convex, Cylinder, HalfSpace, Shape, Sphere
 from wbc.symbolic.kinematics import WORLD, frame_index
 
@@ -18,6 +18,9 @@ if TYPE_CHECKING:
 
 #: The frame of bodies that move with a pose given from outside.
 OBSTACLE = "obstacle"
+
+#: More pairs than this are refused: Pinocchio keeps 10 kB for each.
+MAX_PAIRS = 10_000
 
 _SHAPES = (Sphere, Capsule, Box, Cylinder, Convex, HalfSpace)
 
@@ -47,9 +50,9 @@ class Body:
         for field in ("name", "frame"):
             if not isinstance(getattr(self, field), str):
                 raise ShapeError(f"Body.{field}", getattr(self, field), "expected a name")
-        if not isinstance(self.shape, _SHAPES):
-            names = [kind.__name__ for kind in _SHAPES]
-            raise ShapeError("Body.shape", self.shape, "this is no shape", names)
+        shape: Any = self.shape
+        if not isinstance(shape, _SHAPES):
+            raise ShapeError("Body.shape", shape, "this is no shape", [kind.__name__ for kind in _SHAPES])
         object.__setattr__(self, "placement", validation.pose("Body.placement", self.placement))
 
 
@@ -63,10 +66,13 @@ def checked_pairs(field: str, robot: Robot, pairs: Any, moving: frozenset[str]) 
     Raises:
         ShapeError: not pairs of bodies, a body with itself, or two half-spaces.
         UnknownNameError: a frame that neither the robot has nor moves from outside.
+        RangeError: more than :data:`MAX_PAIRS`.
         DuplicateNameError: a name of something that moves from outside is also a frame of the robot.
     """
     if isinstance(pairs, (str, bytes)) or not isinstance(pairs, Sequence):
         raise ShapeError(field, pairs, "expected a sequence of pairs of bodies")
+    if len(pairs) > MAX_PAIRS:
+        raise RangeError(field, len(pairs), f"at most {MAX_PAIRS} pairs: leave out those that cannot meet")
     frames = {WORLD, *robot.frame_names}
     out: list[Pair] = []
     for k, pair in enumerate(pairs):

@@ -58,7 +58,7 @@ def geometry_of(shape: Shape) -> Geometry:
     if isinstance(shape, HalfSpace):
         return Geometry(coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0), zero, np.inf)
     if isinstance(shape, Convex):
-        center = (shape.points.min(axis=0) + shape.points.max(axis=0)) / 2
+        center = shape.points.mean(axis=0)
         points = coal.StdVec_Vec3s()
         for point in shape.points - center:
             points.append(point)

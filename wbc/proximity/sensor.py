@@ -7,23 +7,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 
 from wbc.errors import RangeError, ShapeError, UnknownNameError, UnsupportedJointError
 from wbc.proximity.body import OBSTACLE, Body, checked_pairs
+from wbc.proximity.choice import Choice
 from wbc.proximity.scene import Scene
 from wbc.shapes import FAR
 from wbc.validation import Array
 
 if TYPE_CHECKING:
     from wbc.robot import Robot
-
-#: More pairs than this are refused.
-MAX_PAIRS = 20_000
-
-#: A pair keeps its row until another one is closer by this share of its distance ...
-KEEP_SHARE = 0.1
-#: ... and by this share of the robot's characteristic length.
-KEEP_LENGTH = 0.005
 
 
 class PairSensor:
@@ -55,8 +49,8 @@ class PairSensor:
     ) -> None:
         outside = frozenset({OBSTACLE} if moving is None else {OBSTACLE, moving})
         checked = checked_pairs("pairs", robot, pairs, outside)
-        if not 1 <= len(checked) <= MAX_PAIRS:
-            raise RangeError("pairs", len(checked), f"expected 1 to {MAX_PAIRS} pairs")
+        if not checked:
+            raise RangeError("pairs", 0, "expected a pair at least")
         if isinstance(count, bool) or not isinstance(count, int) or count < 1:
             raise RangeError("count", count, "expected an integer >= 1")
         self._scene = Scene(robot, checked, outside)
@@ -65,50 +59,78 @@ class PairSensor:
         self.count = count
         self._distance, self._drift = _view(numbers, "distance", count), _view(numbers, "drift", count)
         self._line = _view(numbers, "line", 6 * count).reshape(count, 6)
-        self._rows_side = _view(numbers, "side", robot.nv * count).reshape(count, robot.nv)
+        self._row_side = _view(numbers, "side", robot.nv * count).reshape(count, robot.nv)
         self._pose = self._velocity = None
-        if self._scene.outside:
+        if self._scene.has_outside:
             self._pose = _view(numbers, "pose", 12)
             self._velocity = _view(numbers, "velocity", 6) if "velocity" in numbers else None
         self._outward = np.array([(b.frame in outside) - (a.frame in outside) for a, b in checked], dtype=float)
-        self._slack = KEEP_LENGTH * robot.characteristic_length
+        self._seen = b""
+        self._choice = Choice(self._scene, count)
+        rows = min(count, len(checked))
+        self._rows, self._got = slice(rows), np.zeros((16, rows))
         self.reset()
+
+    @property
+    def doubtful(self) -> NDArray[np.bool_]:
+        """Rows whose normal is a declared one because shapes lie inside each other, see :mod:`wbc.proximity.judge`."""
+        out = np.zeros(self.count, dtype=bool)
+        rows = self._choice.pairs >= 0
+        out[rows] = self._scene.doubtful[self._choice.pairs[rows]]
+        return out
 
     def reset(self) -> None:
         """Forget which pairs had which rows; until the next :meth:`sense` no row has a pair."""
-        self._chosen = np.full(self.count, -1, dtype=np.intp)
-        self._distance[:], self._drift[:], self._line[:], self._rows_side[:] = FAR, 0.0, 0.0, 0.0
+        self._choice.reset()
+        self._distance[:], self._drift[:], self._line[:], self._row_side[:] = FAR, 0.0, 0.0, 0.0
 
     def sense(self, q: Array) -> None:
         """Measure at a configuration [nq] and write the rows."""
-        if self._pose is not None:
-            self._scene.move(pin.SE3(self._pose[:9].reshape(3, 3).T, self._pose[9:]))
-        distance, normal, point = self._scene.measure(q)
-        self._choose(distance)
-        rows = np.flatnonzero(self._chosen >= 0)
-        pair = self._chosen[rows]
-        self._distance[:], self._drift[:], self._line[:], self._rows_side[:] = FAR, 0.0, 0.0, 0.0
-        self._distance[rows] = distance[pair]
-        self._line[rows, :3] = normal[pair]
-        self._line[rows, 3:] = np.cross(point[pair], normal[pair])
-        self._rows_side[rows] = self._side[pair]
-        if self._pose is not None and self._velocity is not None:
-            at = self._velocity[:3] + np.cross(self._velocity[3:], point[pair] - self._pose[9:])
-            self._drift[rows] = self._outward[pair] * np.einsum("ij,ij->i", normal[pair], at)
+        scene = self._scene
+        if self._pose is not None and self._pose.tobytes() != self._seen:
+            scene.move(pin.SE3(self._pose[:9].reshape(3, 3).T, self._pose[9:]))
+            self._seen = self._pose.tobytes()
+        scene.place(q)
+        if self._choice.update():
+            self._arrange()
+        self._write()
 
     def pairs(self) -> tuple[tuple[str, str, float], ...]:
         """(name of A, name of B, distance [m]) of the rows that have a pair, in the last call."""
-        rows = [(int(k), float(d)) for k, d in zip(self._chosen, self._distance, strict=True) if k >= 0]
-        return tuple((*self._names[k], d) for k, d in rows)
+        rows = zip(self._choice.pairs.tolist(), self._distance.tolist(), strict=True)
+        return tuple((*self._names[k], d) for k, d in rows if k >= 0)
 
-    def _choose(self, distance: Array) -> None:
-        score = distance.copy()
-        kept = self._chosen[self._chosen >= 0]
-        score[kept] -= KEEP_SHARE * np.maximum(distance[kept], 0.0) + self._slack
-        best = np.argsort(score, kind="stable")[: self.count]
-        self._chosen[~np.isin(self._chosen, best)] = -1
-        fresh = best[~np.isin(best, self._chosen)]
-        self._chosen[np.flatnonzero(self._chosen < 0)[: len(fresh)]] = fresh
+    def _arrange(self) -> None:
+        """Rows whose pairs have changed: their sides, and where their results are."""
+        results, pairs = self._scene.results, self._choice.pairs[self._rows]
+        self._row_side[self._rows] = self._side[pairs]
+        n, p = results.start[pairs], results.start[pairs] + results.place
+        nx, ny, nz, px, py, pz = n, n + 1, n + 2, p, p + 1, p + 2
+        # p x n is the difference of six products, which two blocks of six columns hold
+        columns = (n + results.gap, nx, ny, nz, py, pz, px, pz, px, py, nz, nx, ny, ny, nz, nx)
+        self._where = np.array(columns)
+        self._pair_outward = self._outward[pairs]
+
+    def _write(self) -> None:
+        got = self._got
+        # Not "raise", with which numpy takes into a copy; all numbers are valid
+        self._scene.results.numbers.take(self._where, out=got, mode="clip")
+        left, right = got[4:10], got[10:16]
+        np.multiply(left, right, out=left)
+        np.subtract(left[:3], left[3:], out=got[4:7])
+        self._distance[self._rows] = got[0]
+        line = self._line[self._rows]
+        line[:] = got[1:7].T
+        if self._pose is not None and self._velocity is not None:
+            twist = twist_at_origin(self._velocity, self._pose[9:])
+            self._drift[self._rows] = line @ twist * self._pair_outward
+
+
+def twist_at_origin(velocity: Array, origin: Array) -> Array:
+    """A twist (linear; angular) in world axes, taken from one point of the body to its point at the world's origin."""
+    vx, vy, vz, wx, wy, wz = velocity.tolist()
+    x, y, z = origin.tolist()
+    return np.array([vx - wy * z + wz * y, vy - wz * x + wx * z, vz - wx * y + wy * x, wx, wy, wz])
 
 
 def sides(robot: Robot, scene: Scene) -> Array:

@@ -1,0 +1,150 @@
+"""Checks Coal's normals with support functions, and declares one where none is right.
+
+Coal is wrong in places where shapes lie inside each other: a ball whose centre lies on the axis of a capsule, capsules
+whose axes cross, a ball in a cylinder, EPA on cylinders now and then; the distance is then too large or -1.8e308. So
+every pair that overlaps, or is closer than TRUST, is checked:
+
+    distance - clearance(normal) <= TRUST,      clearance as in :mod:`wbc.proximity.support`.
+
+A pair that fails takes the first direction of greatest clearance out of the declared ones (:func:`declared`) and of
+Coal's answers with B turned a little, and that clearance as its distance. So does an overlapping pair whose opposite
+normal holds as well (balls about one centre), and a ball in a cylinder, where a normal can hold next to a better one.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+# isort: split
+import pinocchio as pin
+
+# isort: split
+import coal
+from numpy.typing import NDArray
+
+from wbc.proximity.memory import Index
+from wbc.proximity.support import Supports, clearance
+from wbc.shapes import Cylinder, HalfSpace, Sphere
+from wbc.validation import Array
+
+if TYPE_CHECKING:
+    from wbc.proximity.scene import Scene
+
+#: How far a distance may be above what its normal proves, in parts of the robot's characteristic length.
+TRUST = 1e-5
+#: Clearances closer than this are equal, in the same parts.
+TIE = 1e-9
+#: How far from 1 the square of a unit normal may be.
+UNIT = 1e-6
+#: Directions more nearly parallel than this have no cross product.
+PARALLEL = 1e-6
+#: How far B is turned to get Coal out of a degenerate place [rad].
+TURN = 1e-4
+
+
+class Judge:
+    """Checks the results of a scene in place.
+
+    Attributes:
+        doubtful: pairs whose last result is a declared one.
+    """
+
+    def __init__(self, scene: Scene, geometries: list[object], centers: list[Array]) -> None:
+        self.scene = scene
+        self.trust = TRUST * scene.robot.characteristic_length
+        self.tie = TIE * scene.robot.characteristic_length
+        self.doubtful = np.zeros(len(scene.first), dtype=bool)
+        self._marked = False
+        shapes = [body.shape for body in scene.bodies]
+        self._supports = Supports(shapes, centers)
+        self._geometries = geometries
+        kinds = [(type(shapes[a]), type(shapes[b])) for a, b in zip(scene.first, scene.second, strict=True)]
+        #: clearances of half-spaces have one direction only, and Coal's closed forms have it
+        self._bounded = np.array([HalfSpace not in pair for pair in kinds])
+        self._blunt = np.array([set(pair) == {Cylinder, Sphere} for pair in kinds])
+
+    def check(self, measured: NDArray[np.bool_]) -> None:
+        """Check the pairs of a mask, just measured; those of them that fail are mended."""
+        scene = self.scene
+        if self._marked:
+            self.doubtful[measured] = False
+            self._marked = bool(self.doubtful.any())
+        # NaN fails every comparison
+        flags = ~(scene.results.distance > self.trust)
+        flags &= self._bounded
+        flags &= measured
+        if not np.count_nonzero(flags):
+            return
+        suspect = flags.nonzero()[0]
+        distance, normal = scene.results.distance[suspect], scene.results.normal[suspect]
+        holds = distance - self._clearance(suspect, normal) <= self.trust
+        holds &= np.abs(np.einsum("ij,ij->i", normal, normal) - 1.0) < UNIT
+        both_ways = distance - self._clearance(suspect, -normal) <= self.tie
+        mend = ~holds | both_ways | self._blunt[suspect]
+        for k in suspect[mend].tolist():
+            self._mend(k)
+
+    def _clearance(self, pairs: Index, normal: Array) -> Array:
+        scene = self.scene
+        a, b = scene.first[pairs], scene.second[pairs]
+        turned = (scene.rotations[a], scene.rotations[b])
+        return clearance(self._supports, (a, b), turned, scene.centers[b] - scene.centers[a], normal)
+
+    def _mend(self, pair: int) -> None:
+        """Give a pair the best direction there is."""
+        scene = self.scene
+        a, b = int(scene.first[pair]), int(scene.second[pair])
+        offset = scene.centers[b] - scene.centers[a]
+        own = float(scene.results.distance[pair]), np.array(scene.results.normal[pair])
+        choices = [*declared(scene.rotations[a], scene.rotations[b], offset), *self._turned(a, b), own[1]]
+        directions = np.array([n for n in choices if np.isfinite(n).all() and abs(n @ n - 1.0) < UNIT])
+        values = self._clearance(np.full(len(directions), pair), directions)
+        best = int(np.argmax(values >= values.max() - self.tie))
+        normal, value = directions[best], float(values[best])
+        if np.array_equal(normal, own[1]) and own[0] - value <= self.trust:
+            return
+        first = scene.rotations[a] @ self._supports.point(a, scene.rotations[a].T @ normal) + scene.centers[a]
+        second = scene.rotations[b] @ self._supports.point(b, -scene.rotations[b].T @ normal) + scene.centers[b]
+        results = scene.results
+        results.distance[pair], results.normal[pair] = value, normal
+        results.point[pair] = (first + second - value * normal) / 2
+        self.doubtful[pair] = self._marked = True
+
+    def _turned(self, a: int, b: int) -> list[Array]:
+        """Coal's normals with B turned a little about each axis, and with the bodies in the other order."""
+        scene = self.scene
+        request, places = coal.DistanceRequest(), {}
+        for k in (a, b):
+            places[k] = coal.Transform3s(scene.rotations[k], scene.centers[k])
+        out = []
+        for axis in np.eye(3):
+            result = coal.DistanceResult()
+            turned = coal.Transform3s(scene.rotations[b] @ pin.exp3(TURN * axis), scene.centers[b])
+            coal.distance(self._geometries[a], places[a], self._geometries[b], turned, request, result)
+            out.append(np.array(result.normal))
+        result = coal.DistanceResult()
+        coal.distance(self._geometries[b], places[b], self._geometries[a], places[a], request, result)
+        return [*out, -np.array(result.normal)]
+
+
+def declared(first: Array, second: Array, offset: Array) -> list[Array]:
+    """Directions from A to B for pairs that have no normal of their own, most wanted first.
+
+    The line from the centre of A to that of B; the axes z, y, x of A, then of B; what is left of the line across the
+    axes z of A and of B; the cross products of an axis of A and one of B; then the opposites in the same order.
+
+    Args:
+        first, second: axes of A and of B in the world, as columns.
+        offset: from the centre of A to that of B [m].
+    """
+    axes = [*first.T[::-1], *second.T[::-1]]
+    across = [offset - (offset @ z) * z for z in (first[:, 2], second[:, 2])]
+    crossed = [np.cross(u, w) for u in first.T for w in second.T]
+    length = np.linalg.norm(offset)
+    lines = [line / length for line in (offset, *across)] if length > 0.0 else []
+    found = [*lines[:1], *axes, *lines[1:], *crossed]
+    lengths = [float(np.linalg.norm(n)) for n in found]
+    out = [n / size for n, size in zip(found, lengths, strict=True) if size > PARALLEL]
+    return [*out, *(-n for n in out)]
