@@ -9,6 +9,7 @@ import pytest
 
 from tests.closed_loop import cases, constraints, mutations, tasks
 from tests.closed_loop.constraints import constraint_items
+from tests.closed_loop.limit_mutations import MUTATIONS as LIMITS
 from tests.closed_loop.loop import Loop
 from tests.closed_loop.machines import machine
 from tests.closed_loop.mechanism import build, mechanism
@@ -59,5 +60,6 @@ def test_every_shipped_class_is_mutated_and_no_mutation_is_shipped() -> None:
     shipped = {cls for cls in registry().values() if cls.__module__.startswith("wbc.tasks")}
     changed = [*mutations.TASKS.values(), *mutations.CONSTRAINTS.values(), *mutations.MECHANISM.values()]
     changed += POINTING.values()
+    changed += LIMITS.values()
     assert {cls.__bases__[0] for cls in changed} == shipped
     assert not set(changed) & set(registry().values())
