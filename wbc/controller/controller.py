@@ -16,7 +16,7 @@ from wbc.controller.solved import SolvedTick
 from wbc.controller.step import Context, Step
 from wbc.controller.table import describe
 from wbc.controller.vm import VmAssembly
-from wbc.errors import SolverError, UnknownNameError
+from wbc.errors import PicklingError, SolverError, UnknownNameError
 from wbc.qp.problem import QP
 from wbc.stack.artifact import Artifact
 from wbc.stack.declaration import Declaration
@@ -127,6 +127,10 @@ class Controller:
         self.tick.v_last[:] = velocity
         self.tick.reset()
         self._slow = True
+
+    def __reduce_ex__(self, protocol: Any) -> Any:
+        reason = "lives in the memory of its process; pickle controller.stack, and compile it there"
+        raise PicklingError("controller", self.stack.robot.name, reason)
 
     def __getitem__(self, name: str) -> Handle:
         try:

@@ -12,7 +12,7 @@ from wbc.stack.layout import Layout
 from wbc.validation import Array
 
 #: As in ``native/reach.h``
-TRUSTED, NEGLIGIBLE, LEAST_PIVOT, BRAKING, CORRECTIONS = 1.0, 0.05, 1e-2, 0.5, 2
+TRUSTED, NEGLIGIBLE, LEAST_PIVOT, BRAKING, FAR, CORRECTIONS = 2.0, 0.05, 1e-2, 0.5, 1e50, 2
 #: Squared length of a row that v cannot move, as in ``native/settings.h``
 DEAD = 1e-20
 
@@ -47,23 +47,24 @@ class Reach:
         """(H, g) of the QP that is solved.
 
         Args:
-            H: of the linear model. J: task rows. weight: of each, fading included. equal: unit rows of the equalities.
+            H: of the linear model. J: task rows. weight: of each, fading included.
+            equal: rows of the equalities, of unit length in v / dof scales.
         """
         counts = weight != 0.0
         error = np.where(counts, error, 0.0)
         gain = p[self._gain_at]
         largest = float(gain[counts].max(initial=0.0))
         plain = -(J.T @ (weight * wish))
-        metric = _strengthened(H, equal)
+        metric = self._strengthened(H, equal)
         slope = J.T @ (weight * error)
-        if not _is_definite(metric):
+        if not (np.abs(error) < FAR).all() or not _is_definite(metric):
             return H, plain
         curved = False
         if self._bend is not None:
             added = self._curvature(H, metric, J, weight, error, slope, equal)
             if added is not None:
                 H, curved = H + added, True
-                metric = _strengthened(H, equal)
+                metric = self._strengthened(H, equal)
                 if not _is_definite(metric):
                     return H, plain
         allowed = self._stoppable(metric, J, weight * gain**2 * error, largest, bound_enabled)
@@ -110,6 +111,11 @@ class Reach:
         worst = float((rate / (BRAKING * self._brake_limit[limited])).max())
         return largest / float(np.sqrt(worst)) if worst > 1.0 else largest
 
+    def _strengthened(self, H: Array, equal: Array) -> Array:
+        """H with the equality rows in it, see ``native/factor.h``."""
+        stiffness = float((np.diag(H) * self._dofs**2).max(initial=0.0))
+        return np.asarray(H + stiffness * equal.T @ equal)
+
     def _following(self, metric: Array, J: Array, weight: Array, wanted: Array) -> Array:
         """The step that follows moving targets, corrected until only what no linear model resolves is damped."""
         x = np.linalg.solve(metric, wanted)
@@ -136,11 +142,6 @@ def definite(matrix: Array, least: float) -> Array:
         more[k] = pivot - a[k, k]
         a[k + 1 :, k + 1 :] -= np.outer(row, row) / pivot
     return more
-
-
-def _strengthened(H: Array, equal: Array) -> Array:
-    """H with the equality rows in it, see ``native/factor.h``."""
-    return np.asarray(H + float(np.diag(H).max(initial=0.0)) * equal.T @ equal)
 
 
 def _is_definite(matrix: Array) -> bool:

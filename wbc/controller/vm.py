@@ -56,7 +56,7 @@ class VmAssembly(Assembly):
         if program.ahead is not None:
             self._ahead = _Call(program.ahead, [self._q, self._command, self._p, self.dt], [self._later])
         self._pull = _room(tasks)
-        self._reach = Reach(stack, layout, self._bender(program, arguments) if stack.curvature and tasks else None)
+        self._reach = Reach(stack, layout, self._bender(program, arguments)) if stack.calm and tasks else None
         jt, at = function.sparsity_out("jt"), function.sparsity_out("at")
         self._j_index = (np.repeat(np.arange(tasks), np.diff(jt.colind())), np.array(jt.row(), dtype=np.intp))
         self._a_index = (np.repeat(np.arange(rows), np.diff(at.colind())), np.array(at.row(), dtype=np.intp))
@@ -128,8 +128,8 @@ class VmAssembly(Assembly):
         high_rows = np.where(on, out["high"][: layout.general_rows], np.inf)
         self._usable &= bool(np.isfinite(A).all() and (low_rows < INFINITE).all() and (high_rows > -INFINITE).all())
         low_rows[low_rows <= -INFINITE], high_rows[high_rows >= INFINITE] = -np.inf, np.inf
-        if self._usable and layout.task_rows:
-            equal = _unit_equalities(low, high, low_rows, high_rows, A)
+        if self._reach is not None and self._usable:
+            equal = _unit_equalities(low, high, low_rows, high_rows, A, self._dof_scales)
             weight = self.weight * factor
             H, g = self._reach.change(H, J, weight, error, wish, self.p, equal, self.bound_enabled)
         return QP(H, g, np.concatenate((low, low_rows)), np.concatenate((high, high_rows)), A)
@@ -189,9 +189,9 @@ class VmAssembly(Assembly):
             self.report[self.places["ahead"]] = np.where(np.isnan(later), -np.inf, later)
 
 
-def _unit_equalities(low: Array, high: Array, low_rows: Array, high_rows: Array, A: Array) -> Array:
-    """Fixed variables and equality rows, of unit length; rows that v cannot move left out."""
-    fixed = np.eye(len(low))[low == high]
+def _unit_equalities(low: Array, high: Array, low_rows: Array, high_rows: Array, A: Array, dofs: Array) -> Array:
+    """Fixed variables and equality rows, of unit length in v / dofs; rows that v cannot move left out."""
+    fixed = np.diag(1.0 / dofs)[low == high]
     rows = A[low_rows == high_rows]
-    squares = np.einsum("ij,ij->i", rows, rows)
+    squares = np.einsum("ij,ij->i", rows * dofs, rows * dofs)
     return np.vstack((fixed, rows[squares > DEAD] / np.sqrt(squares[squares > DEAD])[:, None]))

@@ -55,6 +55,7 @@ def _header(stack: Declaration, layout: Layout, program: Program) -> str:
                 "NNZJ": jt.nnz(),
                 "NNZA": at.nnz(),
                 "NNZK": bent.nnz(),
+                "CALM": int(stack.calm),
                 "UNITS": len(units),
                 "LAST_ORDER": max(orders, default=0),
                 "ACTIVE_MAX": layout.nv + soft_rows + 1,

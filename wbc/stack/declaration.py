@@ -6,10 +6,10 @@ import re
 from dataclasses import dataclass
 from typing import Any
 
-from wbc import validation
-from wbc.errors import DuplicateNameError, LevelError, RangeError, ShapeError, UnknownNameError
+from wbc import pickling, validation
+from wbc.errors import DuplicateNameError, LevelError, PicklingError, RangeError, ShapeError, UnknownNameError
 from wbc.robot import Robot
-from wbc.tasks.base import Constraint, Item, Task
+from wbc.tasks.base import Constraint, Item, Task, inner_items
 from wbc.tasks.mechanism import Mechanism
 
 #: Default cost of velocity against a task row of weight 1, per (rad/s)^2: keeps the optimum unique.
@@ -45,7 +45,7 @@ class Declaration:
         *,
         damping: float = DAMPING,
         length: float | None = None,
-        curvature: bool = True,
+        calm: bool = True,
     ) -> None:
         if not isinstance(robot, Robot):
             raise ShapeError("robot", robot, "expected a wbc Robot, see wbc.robots.load")
@@ -54,7 +54,7 @@ class Declaration:
         self._damping = validation.scalar("damping", damping, low=1e-12, high=1.0)
         chosen = robot.characteristic_length if length is None else length
         self._length = validation.scalar("length", chosen, low=0.0, open_low=True, unit="m")
-        self._curvature = validation.flag("curvature", curvature)
+        self._calm = validation.flag("calm", calm)
         self._entries: dict[str, Entry] = {}
         if robot.couplings or robot.locked_dofs:
             self.add(Mechanism())
@@ -85,9 +85,9 @@ class Declaration:
         return self._length
 
     @property
-    def curvature(self) -> bool:
-        """Task errors that no step removes count with their curvature, see docs/reach.md."""
-        return self._curvature
+    def calm(self) -> bool:
+        """Targets out of reach make no chatter, see docs/reach.md; False: the plain linear model."""
+        return self._calm
 
     @property
     def entries(self) -> tuple[Entry, ...]:
@@ -149,13 +149,25 @@ class Declaration:
     def __len__(self) -> int:
         return len(self._entries)
 
+    def __getstate__(self) -> dict[str, Any]:
+        for entry in self.entries:
+            for item in inner_items(entry.item):
+                try:
+                    item.__getstate__()
+                except PicklingError as error:
+                    raise error.within(entry.name) from error
+        return pickling.declared(self)
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Declaration:
+        return pickling.deep_copy(self, memo)
+
     def key_data(self) -> dict[str, Any]:
         """Plain data that the compiled code is a function of. Weights are run-time values and not in it."""
         return {
             "robot": self._robot.fingerprint,
             "length": self._length.hex(),
             "damping": self._damping.hex(),
-            "curvature": self._curvature,
+            "calm": self._calm,
             "items": [[e.name, e.item.declaration(self._robot)] for e in self.entries],
         }
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import functools
 import hashlib
 import importlib
@@ -10,13 +9,12 @@ import json
 import marshal
 import pathlib
 import sys
-from collections.abc import Iterator
 from importlib import metadata
 
 import numpy as np
 
 from wbc.stack.declaration import Declaration
-from wbc.tasks.base import Item
+from wbc.tasks.base import inner_items
 
 #: Packages whose code decides what expressions and C code come out. Robots do not: their data are in the key.
 _PARTS = ("wbc.symbolic", "wbc.tasks", "wbc.stack")
@@ -30,7 +28,7 @@ def key(stack: Declaration, version: str, toolchain: str) -> str:
     but not what that file imports.
     """
     versions = [metadata.version("casadi"), metadata.version("pin"), np.__version__, version, toolchain]
-    classes = {base for entry in stack.entries for item in _parts(entry.item) for base in type(item).__mro__}
+    classes = {base for entry in stack.entries for item in inner_items(entry.item) for base in type(item).__mro__}
     items = sorted({_source(base) for base in classes})
     text = json.dumps([stack.key_data(), versions, _own_code(), items], sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()[:32]
@@ -45,16 +43,6 @@ def _own_code() -> str:
         for path in sorted(p for p in folder.rglob("*") if p.suffix in (".py", ".c", ".h")):
             digest.update(f"{part}/{path.relative_to(folder)}\n".encode() + path.read_bytes())
     return digest.hexdigest()
-
-
-def _parts(item: Item) -> Iterator[Item]:
-    """An item and the items that it is made from."""
-    yield item
-    for field in dataclasses.fields(item):
-        value = getattr(item, field.name)
-        for part in value if isinstance(value, tuple) else (value,):
-            if isinstance(part, Item):
-                yield from _parts(part)
 
 
 def _source(of: type) -> str:

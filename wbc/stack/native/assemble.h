@@ -108,7 +108,7 @@ EXPORT void wbc_tick_assemble(wbc_tick *t) {
         for (int e = a_start[k]; e < a_start[k + 1]; e++) t->A[k * NV + a_col[e]] = t->at[e];
     }
     t->prepared = t->curved = 0;
-    if (t->unusable == 0.0 && MT > 0) reach(t);
+    if (CALM && MT > 0 && t->unusable == 0.0) reach(t);
 }
 
 #endif

@@ -19,19 +19,21 @@ INLINE double dot(const double *x, const double *y, int from) {
 }
 
 /* Equality rows a'v = b, fixed variables among them, enter the Hessian as well, H + rho a a' / |a|^2 and
- * g - rho b a / |a|^2: a constant where they hold, so the optimum is the same, but seen through R they are then as
+ * g - rho b a / |a|^2 with v counted in its own units: a constant where they hold, so the optimum is the same, but seen through R they are then as
  * independent as they are in v. */
 static void strengthen(wbc_tick *t) {
     t->stiffness = 0.0;
+    for (int i = 0; i < NV; i++) t->stiffness = fmax(t->stiffness, t->H[i * WIDE + i] * dof_scale[i] * dof_scale[i]);
     for (int i = 0; i < NV; i++)
-        if (t->H[i * WIDE + i] > t->stiffness) t->stiffness = t->H[i * WIDE + i];
-    for (int i = 0; i < NV; i++)
-        if (t->low[i] == t->high[i]) t->R[i * WIDE + i] += t->stiffness;
+        if (t->low[i] == t->high[i]) t->R[i * WIDE + i] += t->stiffness / (dof_scale[i] * dof_scale[i]);
     for (int k = 0; k < MC; k++) {
         t->strength[k] = 0.0;
         if (t->low[NV + k] != t->high[NV + k]) continue;
         double square = 0.0;
-        for (int e = a_start[k]; e < a_start[k + 1]; e++) square += t->at[e] * t->at[e];
+        for (int e = a_start[k]; e < a_start[k + 1]; e++) {
+            const double a = t->at[e] * dof_scale[a_col[e]];
+            square += a * a;
+        }
         if (square <= DEAD) continue;
         t->strength[k] = t->stiffness / square;
         for (int e = a_start[k]; e < a_start[k + 1]; e++) {
@@ -45,7 +47,7 @@ static void strengthen(wbc_tick *t) {
 static void right_side(wbc_tick *t) {
     for (int i = 0; i < WIDE; i++) t->y[i] = -t->g[i];
     for (int i = 0; i < NV; i++)
-        if (t->low[i] == t->high[i]) t->y[i] += t->stiffness * t->low[i];
+        if (t->low[i] == t->high[i]) t->y[i] += t->stiffness / (dof_scale[i] * dof_scale[i]) * t->low[i];
     for (int k = 0; k < MC; k++)
         for (int e = a_start[k]; t->strength[k] != 0.0 && e < a_start[k + 1]; e++)
             t->y[a_col[e]] += t->strength[k] * t->at[e] * t->low[NV + k];

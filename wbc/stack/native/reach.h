@@ -6,13 +6,15 @@
 #include "factor.h"
 
 /* A step up to here [rad, or characteristic lengths] is what the Jacobians say */
-#define TRUSTED 1.0
+#define TRUSTED 2.0
 /* Curvature below this share of the least pivot of H does not count; it counts in full from twice of it on */
 #define NEGLIGIBLE 0.05
 /* Least pivot of H with the curvature in it, as a share of the largest entry of the curvature */
 #define LEAST_PIVOT 1e-2
 /* Share of the acceleration limits that slowing down towards the optimum may take */
 #define BRAKING 0.5
+/* Errors beyond this are left to the linear model, before squares of them overflow */
+#define FAR 1e50
 /* Corrections of the step that follows moving targets */
 #define CORRECTIONS 2
 
@@ -178,6 +180,8 @@ static void reach(wbc_tick *t) {
         if (counts) largest = fmax(largest, t->p[gain_at[k]]);
     }
     if (!(t->prepared = factor(t))) return;
+    for (int k = 0; k < MT; k++)
+        if (!(fabs(error[k]) < FAR)) return;
     gather(t, error, slope);
 #if NNZK > 0
     double pull[MT + 1];

@@ -6,6 +6,7 @@
  *   NNZJ NNZA   structural non-zeros of task rows and of general rows
  *   j_start j_col a_start a_col   their positions, row by row
  *   damping     cost of each velocity
+ *   CALM        0: the linear model as it is
  *   NNZK k_row k_col   entries of the curvature's upper triangle
  *   gain_at     where the gain of each task row is in p
  *   pull_scale  how much curvature a row of unit error may have
@@ -65,7 +66,7 @@ typedef struct {
     double unusable;             /* not 0: numbers that are not finite, or bounds without an interval */
     int prepared;                /* R is the factor of H, and y its right side */
     int curved;                  /* H contains curvature */
-    double stiffness;            /* what fixed variables add to the Hessian */
+    double stiffness;            /* what fixed variables add to the Hessian, in units of dof_scale */
     double bent[NNZK + 1];       /* curvature */
     double q_good[NQ + 1];       /* q of the last tick that was not refused, put back by one that is */
     /* outputs of the generated rows */
