@@ -8,7 +8,18 @@ from pathlib import Path
 import pytest
 
 PAGES = Path(__file__).parents[2] / "docs" / "tasks"
-NAMES = ("center_of_mass", "damping", "elbow", "end_effector", "expression", "posture")
+NAMES = (
+    "axis_align",
+    "center_of_mass",
+    "damping",
+    "distance",
+    "elbow",
+    "end_effector",
+    "expression",
+    "look_at",
+    "momentum",
+    "posture",
+)
 
 
 def examples() -> list[tuple[str, str]]:
