@@ -17,7 +17,7 @@ tables are derived from the expressions.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from enum import IntEnum
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, Protocol
@@ -26,6 +26,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from wbc import pickling
 from wbc.errors import ShapeError
 from wbc.symbolic.tracer import Tracer
 
@@ -134,6 +135,15 @@ class Item:
             cls.abstract = False
         if not cls.abstract:
             _registry[cls.__name__] = cls
+
+    def __getstate__(self) -> dict[str, Any]:
+        return pickling.declared(self)
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        pickling.restore(self, state, {f.name for f in dataclasses.fields(self)})
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Item:
+        return pickling.deep_copy(self, memo)
 
     def validate(self, robot: Robot) -> None:
         """Check the declaration against a robot; called by ``stack.add``.
@@ -290,6 +300,16 @@ class Constraint(Item):
     def acceleration_limits(self, robot: Robot) -> NDArray[np.float64]:
         """Largest change of each velocity per second that :meth:`bounds` leave, nv numbers; inf where there is none."""
         return np.full(robot.nv, np.inf)
+
+
+def inner_items(item: Item) -> Iterator[Item]:
+    """An item and the items that it is made from."""
+    yield item
+    for field in dataclasses.fields(item):
+        value = getattr(item, field.name)
+        for part in value if isinstance(value, tuple) else (value,):
+            if isinstance(part, Item):
+                yield from inner_items(part)
 
 
 def registry() -> dict[str, type[Item]]:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wbc.errors import NotFiniteError, ShapeError, UnknownNameError, WbcError
+from wbc.pickling import by_name_or_value
 from wbc.symbolic.kinematics import Kinematics
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks import inputs as run_time
@@ -53,6 +54,9 @@ class Expression(Task):
         labels: name of each row; None: "value" for one row, else "0", "1", ...
         weights: one number >= 0 a row, None: 1 each.
 
+    A pickle of it finds the function by its name again. A lambda or local function has none and is pickled by value,
+    for which ``cloudpickle`` must be installed; else pickling raises a ``PicklingError``.
+
     Raises:
         WbcError: the function raised. UnknownNameError: a frame, joint or input that does not exist.
         ShapeError: the result is no SX column, has symbols of its own, or does not depend on q.
@@ -83,6 +87,9 @@ class Expression(Task):
         object.__setattr__(self, "labels", None if labels is None else _strings("labels", labels))
         object.__setattr__(self, "weights", checked_weights("Expression.weights", weights))
         object.__setattr__(self, "gain", gain)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return super().__getstate__() | {"function": by_name_or_value("Expression.function", self.function)}
 
     def validate(self, robot: Robot) -> None:
         """Trace the function and evaluate it at the robot's neutral configuration, see the class."""

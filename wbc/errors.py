@@ -7,6 +7,7 @@ from a list, the valid *choices* with the nearest one first. Raising leaves ever
 from __future__ import annotations
 
 import difflib
+import pickle
 from collections.abc import Iterable
 from typing import Any
 
@@ -30,6 +31,10 @@ class WbcError(Exception):
             more = f", ... {len(self.choices) - 8} more" if len(self.choices) > 8 else ""
             text += f"; valid: {shown}{more}"
         super().__init__(text)
+
+    def within(self, name: str) -> WbcError:
+        """The same error about ``name.field``."""
+        return _rebuilt(type(self), (f"{name}.{self}",), {**self.__dict__, "field": f"{name}.{self.field}"})
 
     def __reduce__(self) -> tuple[Any, ...]:
         # Exceptions are rebuilt from their text alone, which no constructor here takes: they must cross processes
@@ -87,6 +92,10 @@ class LevelError(WbcError):
 
 class SolverError(WbcError):
     """A solver that is missing or that failed outside of a tick."""
+
+
+class PicklingError(WbcError, pickle.PicklingError):
+    """Something that cannot be pickled, or a pickle that does not fit."""
 
 
 class CompileError(WbcError):

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import hashlib
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
-from wbc import validation
+from wbc import pickling, validation
 from wbc.errors import RangeError, ShapeError
 from wbc.validation import Array
 
@@ -94,6 +95,10 @@ class Convex:
         kept = np.array(points[ConvexHull(points).vertices])
         kept.flags.writeable = False
         object.__setattr__(self, "points", kept)
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        pickling.restore(self, state, {"points"})
+        pickling.freeze(self)
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Convex) and np.array_equal(self.points, other.points)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from wbc import validation
+from wbc import pickling, validation
 from wbc.errors import BoundsError, NotFiniteError, RangeError
 from wbc.validation import Array
 
@@ -41,6 +41,10 @@ class Limits:
             object.__setattr__(self, f.name, array)
         if (self.position_lower > self.position_upper).any():
             raise BoundsError("limits.position_lower", self.position_lower, "above position_upper")
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        pickling.restore(self, state, {f.name for f in fields(self)})
+        pickling.freeze(self)
 
     def override(self, **changes: Any) -> Limits:
         """A copy with some arrays replaced; a scalar is spread over all degrees of freedom."""

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from wbc import validation
+from wbc import pickling, validation
 from wbc.errors import DuplicateNameError, RangeError, RotationError, ShapeError
 from wbc.robot.limits import Limits
 from wbc.shapes import PlacedShape
@@ -75,6 +75,12 @@ class Robot:
                 raise RangeError("robot.locked_dofs", dof, f"expected an index into v, 0 to {self.nv - 1}")
         neutral = self.neutral if np.size(self.neutral) else pin.neutral(self.model)
         object.__setattr__(self, "neutral", self.configuration("robot.neutral", neutral))
+
+    def __getstate__(self) -> dict[str, Any]:
+        return pickling.declared(self)
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        pickling.restore(self, state, {f.name for f in fields(self)})
 
     @property
     def nq(self) -> int:

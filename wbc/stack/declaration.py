@@ -158,6 +158,11 @@ class Declaration:
                     raise error.within(entry.name) from error
         return pickling.declared(self)
 
+    def __copy__(self) -> Declaration:
+        out = object.__new__(type(self))
+        out.__dict__ |= vars(self) | {"_entries": dict(self._entries)}
+        return out
+
     def __deepcopy__(self, memo: dict[int, Any]) -> Declaration:
         return pickling.deep_copy(self, memo)
 
