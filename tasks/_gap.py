@@ -8,12 +8,12 @@ Inside a box or cylinder the distance of a centre is minus the shortest way out.
 are unit vectors everywhere. Where a distance has no direction it is declared: from the first shape to the second
 
     centres of spheres coincide                         down (-z of the world)
-    centre on the core of a capsule                     x axis of the capsule
+    centre on the core of a capsule                     from the sphere to the capsule: the capsule's x axis
     cores of capsules cross                             perpendicular to both; the first one's x axis if parallel
-    centre inside a box or cylinder, several ways out   along the first of x, y, z (box); axial (cylinder); through
-                                                        the positive face if it is in the middle
+    centre inside a box or cylinder, several ways out   the sphere leaves along the first of x, y, z (box), along the
+                                                        axis (cylinder), through the positive face from the middle
 
-Such points are met within :data:`wbc.tasks._nearest.COINCIDENT`, and the value is then off by at most three times that.
+To that end the first three move one shape by :data:`wbc.tasks._nearest.SHIFT`, and are off by no more than that.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from wbc.symbolic import rotations as rot
 from wbc.symbolic.gaps import Gap
 from wbc.symbolic.kinematics import WORLD, Pose
 from wbc.symbolic.tracer import Tracer
-from wbc.tasks._nearest import COINCIDENT, between, clamp, out_of_box, out_of_cylinder
+from wbc.tasks._nearest import COINCIDENT, SHIFT, between, clamp, out_of_box, out_of_cylinder
 from wbc.validation import Array
 
 #: sin^2 of the angle between the axes of capsules, added so that parallel ones have nearest points. Within about its
@@ -121,9 +121,9 @@ def gaps(first: Placed, second: Placed) -> list[Gap]:
     a, b = (first, second) if isinstance(first.shape, Sphere) else (second, first)
     if isinstance(b.shape, Sphere):
         assert isinstance(a.shape, Sphere)
-        down = ca.SX(ca.DM([0.0, 0.0, -1.0]))
-        distance, normal = between(a.pose.position, b.pose.position, down)
-        return [_gap(a, b, distance - a.shape.radius - b.shape.radius, normal)]
+        up = ca.SX(ca.DM([0.0, 0.0, SHIFT]))
+        distance, normal = between(a.pose.position + up, b.pose.position)
+        return [_gap(a, b, distance - (a.shape.radius + b.shape.radius), normal)]
     if isinstance(b.shape, Capsule):
         return [_to_capsule(a, b) if isinstance(a.shape, Sphere) else _capsules(first, second)]
     assert isinstance(a.shape, Sphere)
@@ -155,9 +155,10 @@ def _to_capsule(sphere: Placed, capsule: Placed) -> Gap:
     assert isinstance(capsule.shape, Capsule)
     pose, center = capsule.pose, sphere.pose.position
     axis = pose.rotation[:, 2]
-    along = clamp(ca.dot(axis, center - pose.position), capsule.shape.length / 2)
-    distance, normal = between(center, pose.position + along * axis, pose.rotation[:, 0])
-    return _gap(sphere, capsule, distance - sphere.shape.radius - capsule.shape.radius, normal)
+    offset = center - (pose.position + SHIFT * pose.rotation[:, 0])
+    along = clamp(ca.dot(axis, offset), capsule.shape.length / 2)
+    distance, normal = between(offset, along * axis)
+    return _gap(sphere, capsule, distance - (sphere.shape.radius + capsule.shape.radius), normal)
 
 
 def _capsules(first: Placed, second: Placed) -> Gap:
@@ -176,8 +177,8 @@ def _capsules(first: Placed, second: Placed) -> Gap:
     both = ca.cross(u, w) / ca.sqrt(ca.if_else(crossed, across, 1))
     instead = ca.if_else(crossed, both, first.pose.rotation[:, 0])
     start = first.pose.position + s * u
-    distance, normal = between(start, second.pose.position + t * w, instead)
-    return Gap(first.frame, second.frame, distance - a.radius - b.radius, normal, start)
+    distance, normal = between(start, second.pose.position + t * w + SHIFT * instead)
+    return Gap(first.frame, second.frame, distance - (a.radius + b.radius), normal, start)
 
 
 def _over_plane(solid: Placed, plane: Placed) -> list[Gap]:
