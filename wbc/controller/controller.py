@@ -16,7 +16,7 @@ from wbc.controller.solved import SolvedTick
 from wbc.controller.step import Context, Step
 from wbc.controller.table import describe
 from wbc.controller.vm import VmAssembly
-from wbc.errors import PicklingError, SolverError, UnknownNameError
+from wbc.errors import BusyError, PicklingError, SolverError, UnknownNameError
 from wbc.qp.problem import QP
 from wbc.stack.artifact import Artifact
 from wbc.stack.declaration import Declaration
@@ -31,7 +31,7 @@ _FLOAT = np.dtype(np.float64)
 class Controller:
     """A compiled stack with its run-time values. Made by :meth:`wbc.Stack.compile`.
 
-    Each controller has its own memory; one controller must not be stepped from two threads at once.
+    Each controller has its own memory, see :meth:`clone`; one controller must not be stepped from two threads at once.
 
     Attributes:
         stack: the declaration that it was compiled from.
@@ -44,6 +44,7 @@ class Controller:
         layout = artifact.layout
         self.stack, self.solver, self.cached = stack, solver, artifact.cached
         self.backend = "native" if artifact.library is not None else "vm"
+        self._artifact = artifact
         self.layout = layout
         self._context = Context(stack, layout)
         self.row_costs: Array = 1.0 / layout.row_scales(stack) ** 2
@@ -62,6 +63,7 @@ class Controller:
         # of all ways to copy some hundred numbers into something immutable, the fastest
         self._snapshot = self.tick.report.data.cast("B").tobytes
         self._q_shape, self._v_shape = (layout.nq,), (layout.nv,)
+        self._busy = False
         #: inputs that follow the first configuration, with their items, and those of them that it still has to fill
         self._first: dict[Slot, str] = {}
         self._waiting: dict[Slot, str] = {}
@@ -92,22 +94,29 @@ class Controller:
 
         Raises:
             ShapeError, NotFiniteError, RotationError, RangeError: bad input; the controller is unchanged.
+            BusyError: another thread is within ``step`` of this controller.
         """
-        if dt is not None or self._slow:
-            self._prepare(q, v, dt)
-        if not (type(q) is _Array and q.dtype is _FLOAT and q.shape == self._q_shape):
-            q = validation.real_array("q", q, self._q_shape)
-        if v is not None:
-            if not (type(v) is _Array and v.dtype is _FLOAT and v.shape == self._v_shape):
-                v = validation.real_array("v", v, self._v_shape)
-            self._v_in[:] = v
-            self._use_v[0] = 1.0
-        self._q[:] = q
-        if self._sensors:
-            self._sense()
-        if self._call() < 0:
-            self._refuse(q, v)
-        return Step(self._snapshot(), self._context)
+        if self._busy:
+            raise BusyError("step", self.stack.robot.name, "this controller is in use by another thread; clone() it")
+        try:
+            self._busy = True
+            if dt is not None or self._slow:
+                self._prepare(q, v, dt)
+            if not (type(q) is _Array and q.dtype is _FLOAT and q.shape == self._q_shape):
+                q = validation.real_array("q", q, self._q_shape)
+            if v is not None:
+                if not (type(v) is _Array and v.dtype is _FLOAT and v.shape == self._v_shape):
+                    v = validation.real_array("v", v, self._v_shape)
+                self._v_in[:] = v
+                self._use_v[0] = 1.0
+            self._q[:] = q
+            if self._sensors:
+                self._sense()
+            if self._call() < 0:
+                self._refuse(q, v)
+            return Step(self._snapshot(), self._context)
+        finally:
+            self._busy = False
 
     def reset(self, q: Any = None, v: Any = None) -> None:
         """Start anew: the last command becomes ``v`` (default zero) and the solver forgets its active set.
@@ -127,6 +136,20 @@ class Controller:
         self.tick.v_last[:] = velocity
         self.tick.reset()
         self._slow = True
+
+    def clone(self) -> Controller:
+        """Another controller of the same compiled stack: its own memory, the run-time values and last command of this one.
+
+        Its solver and sensors start as after a reset. Nothing is read from disk or compiled.
+        """
+        out = Controller(self.stack, self._artifact, self.solver)
+        for name, handle in out._handles.items():
+            handle.assume(self._handles[name])
+        for name in ("q", "v_last", "p", "dt", "weight", "enabled", "bound_enabled"):
+            getattr(out.tick, name)[:] = getattr(self.tick, name)
+        out.tick.check()
+        out._first, out._waiting, out._slow = dict(self._first), dict(self._waiting), self._slow
+        return out
 
     def __reduce_ex__(self, protocol: Any) -> Any:
         reason = "lives in the memory of its process; pickle controller.stack, and compile it there"

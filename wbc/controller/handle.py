@@ -152,6 +152,12 @@ class Handle:
             raise RangeError(field, value, reason)
         return numbers
 
+    def assume(self, other: Handle) -> None:
+        """Take the weight and switches of a handle of the same item over, without writing them to the buffers."""
+        for name in ("_enabled", "_weight"):
+            super().__setattr__(name, getattr(other, name))
+        super().__setattr__("_mask", other._mask.copy())
+
     def apply(self) -> None:
         """Write weights or row switches to the buffers."""
         tick, block, form = self._controller.tick, self._block, self._block.form

@@ -6,13 +6,15 @@ from collections.abc import Callable
 
 import numpy as np
 
-from wbc.stack.codegen import brakes, gain_places, pull_scales
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Layout
+from wbc.stack.places import brakes, gain_places, margin_places, pull_scales, rate_places
 from wbc.validation import Array
 
 #: As in ``native/reach.h``
 TRUSTED, NEGLIGIBLE, LEAST_PIVOT, BRAKING, FAR, CORRECTIONS = 2.0, 0.05, 1e-2, 0.5, 1e50, 2
+#: As in ``native/margins.h``
+BRAKING_MARGIN = 0.25
 #: Squared length of a row that v cannot move, as in ``native/settings.h``
 DEAD = 1e-20
 
@@ -32,6 +34,10 @@ class Reach:
         self._damping = stack.damping / self._dofs**2
         places, self._brake_limit = brakes(stack, layout)
         self._brake_at = np.array(places, dtype=np.intp)
+        margins = np.array(margin_places(layout), dtype=np.intp)
+        self._margin_rows = np.flatnonzero(margins >= 0)
+        self._margin_at = margins[self._margin_rows]
+        self._rate_at = np.array(rate_places(layout), dtype=np.intp)[self._margin_rows]
 
     def change(
         self,
@@ -103,8 +109,7 @@ class Reach:
 
     def _stoppable(self, metric: Array, J: Array, wanted: Array, largest: float, bound_enabled: Array) -> float:
         """The gain up to which all joints can brake on the way."""
-        limited = self._brake_at >= 0
-        limited[limited] = bound_enabled[self._brake_at[limited]] != 0.0
+        limited = self._limited(bound_enabled)
         if not limited.any():
             return largest
         rate = np.abs(np.linalg.solve(metric, J.T @ wanted))[limited]
@@ -115,6 +120,28 @@ class Reach:
         """H with the equality rows in it, see ``native/factor.h``."""
         stiffness = float((np.diag(H) * self._dofs**2).max(initial=0.0))
         return np.asarray(H + stiffness * equal.T @ equal)
+
+    def _limited(self, bound_enabled: Array) -> Array:
+        """Which degrees of freedom have a limit of their acceleration now."""
+        limited = self._brake_at >= 0
+        limited[limited] = bound_enabled[self._brake_at[limited]] != 0.0
+        return limited
+
+    def brake_for_margins(self, A: Array, low: Array, margin: Array, p: Array, dt: float, bound_enabled: Array) -> None:
+        """Raise the lower sides of margin rows to what the joints can brake for, see ``native/margins.h``."""
+        limited = self._limited(bound_enabled)
+        if not limited.any() or not len(self._margin_rows):
+            return
+        limit = np.where(limited, BRAKING_MARGIN * self._brake_limit, np.inf)
+        rows = np.abs(A[self._margin_rows])
+        a = np.where(rows != 0.0, rows, 0.0) @ np.where(limited, limit, 0.0)
+        free = (rows[:, ~limited] != 0.0).any(axis=1)
+        h = margin[self._margin_at]
+        plain = p[self._rate_at] * h
+        with np.errstate(invalid="ignore", divide="ignore"):
+            speed = 2.0 * h / (dt + np.sqrt(dt * dt + 2.0 * h / a))
+            lower = (plain > 0.0) & (a > 0.0) & ~free & (speed < plain)
+        low[self._margin_rows[lower]] += (plain - speed)[lower]
 
     def _following(self, metric: Array, J: Array, weight: Array, wanted: Array) -> Array:
         """The step that follows moving targets, corrected until only what no linear model resolves is damped."""

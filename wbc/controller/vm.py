@@ -56,7 +56,7 @@ class VmAssembly(Assembly):
         if program.ahead is not None:
             self._ahead = _Call(program.ahead, [self._q, self._command, self._p, self.dt], [self._later])
         self._pull = _room(tasks)
-        self._reach = Reach(stack, layout, self._bender(program, arguments)) if stack.calm and tasks else None
+        self._reach = Reach(stack, layout, self._bender(program, arguments)) if stack.calm else None
         jt, at = function.sparsity_out("jt"), function.sparsity_out("at")
         self._j_index = (np.repeat(np.arange(tasks), np.diff(jt.colind())), np.array(jt.row(), dtype=np.intp))
         self._a_index = (np.repeat(np.arange(rows), np.diff(at.colind())), np.array(at.row(), dtype=np.intp))
@@ -124,11 +124,14 @@ class VmAssembly(Assembly):
         low, high = self._bounds()
         on = self.enabled != 0.0
         A = np.where(on[:, None], self._A, 0.0)
+        if self._reach is not None:
+            sides, margin = out["low"][: layout.general_rows], out["margin"][: layout.margin_rows]
+            self._reach.brake_for_margins(self._A, sides, margin, self.p, float(self.dt[0]), self.bound_enabled)
         low_rows = np.where(on, out["low"][: layout.general_rows], -np.inf)
         high_rows = np.where(on, out["high"][: layout.general_rows], np.inf)
         self._usable &= bool(np.isfinite(A).all() and (low_rows < INFINITE).all() and (high_rows > -INFINITE).all())
         low_rows[low_rows <= -INFINITE], high_rows[high_rows >= INFINITE] = -np.inf, np.inf
-        if self._reach is not None and self._usable:
+        if self._reach is not None and self._usable and layout.task_rows:
             equal = _unit_equalities(low, high, low_rows, high_rows, A, self._dof_scales)
             weight = self.weight * factor
             H, g = self._reach.change(H, J, weight, error, wish, self.p, equal, self.bound_enabled)

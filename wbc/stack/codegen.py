@@ -10,6 +10,7 @@ import numpy as np
 
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Layout
+from wbc.stack.places import brakes, gain_places, margin_places, pull_scales, rate_places
 from wbc.stack.program import Program, sparsity_rows
 from wbc.tasks.base import Constraint, Order
 
@@ -73,6 +74,8 @@ def _header(stack: Declaration, layout: Layout, program: Program) -> str:
         _table("int", "unit_size", [u[1] for u in units]),
         _table("int", "k_row", bent.get_triplet()[0]),
         _table("int", "k_col", bent.get_triplet()[1]),
+        _table("int", "margin_at", margin_places(layout)),
+        _table("int", "rate_at", rate_places(layout)),
         _table("int", "gain_at", gain_places(layout)),
         _table("double", "pull_scale", pull_scales(stack, layout)),
         _table("int", "brake_at", brake_at),
@@ -119,29 +122,6 @@ def row_units(stack: Declaration, layout: Layout) -> list[float]:
     """Size of a violation that counts as one, per general row: the characteristic length for metres."""
     rows = [r for b in layout.of_form("margins", "rows") for r in b.rows]
     return [stack.length if r.unit.split("/")[0] == "m" else 1.0 for r in rows]
-
-
-def gain_places(layout: Layout) -> list[int]:
-    """Where the gain of each task row is in the parameters."""
-    return [b.slots["gain"].start for b in layout.of_form("task") for _ in b.rows]
-
-
-def pull_scales(stack: Declaration, layout: Layout) -> list[float]:
-    """How much curvature a task row of unit weighted error may have: its lever for metres, else 1."""
-    rows = [r for b in layout.of_form("task") for r in b.rows]
-    return [2.0 * stack.length if r.unit.split("/")[0] == "m" else 1.0 for r in rows]
-
-
-def brakes(stack: Declaration, layout: Layout) -> tuple[list[int], np.ndarray]:
-    """(entry of ``bound_enabled``, -1 for none; limit) of what limits each degree of freedom's acceleration most."""
-    places, limits = [-1] * layout.nv, np.full(layout.nv, np.inf)
-    for k, block in enumerate(layout.of_form("bounds")):
-        item = block.entry.item
-        assert isinstance(item, Constraint)
-        for i, limit in enumerate(item.acceleration_limits(stack.robot)):
-            if limit < limits[i]:
-                places[i], limits[i] = k * layout.nv + i, limit
-    return places, limits
 
 
 def bound_sequence(layout: Layout) -> list[int]:

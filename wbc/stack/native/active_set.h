@@ -16,6 +16,7 @@ static void shift(wbc_tick *t) {
         t->dlower[i] = t->low[i] * t->scaling[i] + sum;
     }
     for (int k = 0; k < MC; k++) {
+        if (t->idle[k]) continue;
         const double *row = t->M + k * NV;
         double sum = 0.0;
         for (int j = 0; j < NV; j++) sum += row[j] * t->ldp_v[j];
@@ -71,7 +72,7 @@ static int active_set(wbc_tick *t, int warm, int checked, double angle, const do
     /* Rows that the solver did not look at: dependent equalities and rows that v cannot move */
     for (int k = 0; k < MC; k++) {
         const int i = NV + k;
-        if (row_order[k] >= checked || (!dependent && t->scaling[i] != 0.0)) continue;
+        if (t->idle[k] || row_order[k] >= checked || (!dependent && t->scaling[i] != 0.0)) continue;
         if (t->sense[i] & ACTIVE) continue;
         const double sum = row_at(t, k, t->x);
         double square = 0.0;
@@ -92,6 +93,7 @@ static int within_bounds(const wbc_tick *t) {
         if (t->x[i] < t->low[i] || t->x[i] > t->high[i]) return 0;
     for (int k = 0; k < MC; k++) {
         const double low = t->low[NV + k], high = t->high[NV + k];
+        if (t->idle[k]) continue;
         if (low == high) return 0;
         const double sum = row_at(t, k, t->x);
         if (sum < low || sum > high) return 0;

@@ -2,6 +2,7 @@
 #ifndef WBC_ASSEMBLE_H
 #define WBC_ASSEMBLE_H
 
+#include "margins.h"
 #include "reach.h"
 
 /* H += J' diag(w) J, g -= J' diag(w) wish, for `count` rows that share the `cols` columns listed from `first` */
@@ -90,6 +91,7 @@ EXPORT void wbc_tick_assemble(wbc_tick *t) {
     for (int i = 0; i < NV; i++) t->H[i * WIDE + i] = damping[i];
     BLOCKS
     form_bounds(t);
+    if (CALM) brake_for_margins(t);
     for (int k = 0; k < MC; k++) {
         double *row = t->at + a_start[k];
         const int on = t->enabled[k] != 0.0, count = a_start[k + 1] - a_start[k];

@@ -151,6 +151,10 @@ static void invert(wbc_tick *t) {
 /* M = A R^-1, rows of length one */
 static void image(wbc_tick *t) {
     for (int k = 0; k < MC; k++) {
+        if (t->idle[k]) {
+            t->scaling[NV + k] = 0.0;
+            continue;
+        }
         double row[WIDE] = {0};
         for (int e = a_start[k]; e < a_start[k + 1]; e++)
             axpy(row, t->inverse + a_col[e] * WIDE, t->at[e], a_col[e]);

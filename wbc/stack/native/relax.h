@@ -165,6 +165,7 @@ static int optimum_of_the_rest(wbc_tick *t) {
 
 static int relaxed(wbc_tick *t) {
     t->warm = 0;
+    memset(t->idle, 0, sizeof t->idle);
     /* Rows of class 0 never give way */
     if (LAST_ORDER == 0) return -1;
     for (int order = 1; order <= LAST_ORDER; order++)

@@ -2,6 +2,7 @@
 #ifndef WBC_SOLVE_H
 #define WBC_SOLVE_H
 
+#include "margins.h"
 #include "relax.h"
 
 /* Come to rest as fast as the bounds let each joint */
@@ -44,6 +45,7 @@ EXPORT int wbc_tick_solve(wbc_tick *t) {
     int flag = uncross(t) ? WBC_RELAXED : WBC_SOLVED;
     t->report.iterations = 0.0;
     t->factored = 0;
+    find_idle_rows(t);
     if (t->unusable != 0.0 || !(t->prepared || factor(t))) {
         brake(t);
         flag = WBC_BRAKED;

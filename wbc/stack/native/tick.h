@@ -8,6 +8,7 @@
  *   damping     cost of each velocity
  *   CALM        0: the linear model as it is
  *   NNZK k_row k_col   entries of the curvature's upper triangle
+ *   margin_at rate_at   margin of each general row (-1: none), and where its rate is in p
  *   gain_at     where the gain of each task row is in p
  *   pull_scale  how much curvature a row of unit error may have
  *   brake_at brake_limit   entry of bound_enabled that limits the acceleration of a velocity (-1: none), and the limit
@@ -68,6 +69,7 @@ typedef struct {
     int curved;                  /* H contains curvature */
     double stiffness;            /* what fixed variables add to the Hessian, in units of dof_scale */
     double bent[NNZK + 1];       /* curvature */
+    int idle[MC + 1];            /* rows that no velocity within the bounds violates */
     double q_good[NQ + 1];       /* q of the last tick that was not refused, put back by one that is */
     /* outputs of the generated rows */
     double wish[MT + 1], jt[NNZJ + 1], at[NNZA + 1], bound_low[NB * NV + 1], bound_high[NB * NV + 1];

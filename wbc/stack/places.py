@@ -1,0 +1,46 @@
+"""Tables that tie rows to the buffers: gains, rates, margins and the limits of accelerations."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from wbc.stack.declaration import Declaration
+from wbc.stack.layout import Layout
+from wbc.tasks.base import Constraint
+
+
+def gain_places(layout: Layout) -> list[int]:
+    """Where the gain of each task row is in the parameters."""
+    return [b.slots["gain"].start for b in layout.of_form("task") for _ in b.rows]
+
+
+def pull_scales(stack: Declaration, layout: Layout) -> list[float]:
+    """How much curvature a task row of unit weighted error may have: its lever for metres, else 1."""
+    rows = [r for b in layout.of_form("task") for r in b.rows]
+    return [2.0 * stack.length if r.unit.split("/")[0] == "m" else 1.0 for r in rows]
+
+
+def brakes(stack: Declaration, layout: Layout) -> tuple[list[int], np.ndarray]:
+    """(entry of ``bound_enabled``, -1 for none; limit) of what limits each degree of freedom's acceleration most."""
+    places, limits = [-1] * layout.nv, np.full(layout.nv, np.inf)
+    for k, block in enumerate(layout.of_form("bounds")):
+        item = block.entry.item
+        assert isinstance(item, Constraint)
+        for i, limit in enumerate(item.acceleration_limits(stack.robot)):
+            if limit < limits[i]:
+                places[i], limits[i] = k * layout.nv + i, limit
+    return places, limits
+
+
+def margin_places(layout: Layout) -> list[int]:
+    """Margin row of each general row, -1 for rows that are none."""
+    out: list[int] = []
+    for block in layout.of_form("margins", "rows"):
+        out += [block.margin_start + k if block.form == "margins" else -1 for k in range(len(block.rows))]
+    return out
+
+
+def rate_places(layout: Layout) -> list[int]:
+    """Where the rate of each general row is in the parameters, 0 for rows without."""
+    blocks = layout.of_form("margins", "rows")
+    return [b.slots["rate"].start if b.form == "margins" else 0 for b in blocks for _ in b.rows]
