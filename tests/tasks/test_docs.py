@@ -10,15 +10,20 @@ import pytest
 PAGES = Path(__file__).parents[2] / "docs" / "tasks"
 NAMES = (
     "axis_align",
+    "axis_cone",
     "center_of_mass",
     "damping",
     "distance",
     "elbow",
     "end_effector",
     "expression",
+    "gaze_cone",
+    "limit",
     "look_at",
     "momentum",
     "posture",
+    "workspace_box",
+    "workspace_polyhedron",
 )
 
 
