@@ -7,12 +7,16 @@ from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
+
+# isort: split
+import coal
 import pytest
 
 import wbc
 from wbc import track
-from wbc.shapes import Capsule, PlacedShape
-from wbc.track import render
+from wbc.proximity.geometry import geometry_of
+from wbc.shapes import Box, Capsule, Convex, Cylinder, PlacedShape, Solid, Sphere
+from wbc.track import render, solids
 from wbc.track.picture import save_picture
 from wbc.track.plots import save_plots
 
@@ -100,3 +104,36 @@ def test_picture_and_plots_of_a_robot_without_meshes(tmp_path: Path) -> None:
     assert pixels[..., :3].std() > 0.02
     names = {f.stem for f in save_plots(log, tmp_path)}
     assert names == {"joints", "velocities", "accelerations", "errors", "tick_time"}
+
+
+@pytest.mark.parametrize(
+    "shape",
+    [
+        Sphere(0.2),
+        Capsule(0.1, 0.3),
+        Box((0.1, 0.2, 0.3)),
+        Cylinder(0.1, 0.3),
+        Convex(np.random.default_rng(0).normal(size=(30, 3))),
+    ],
+    ids=lambda s: type(s).__name__,
+)
+def test_surface_of_every_solid(shape: Solid) -> None:
+    """Corners lie on the surface that Coal sees, and the triangles reach as far as it does along every direction."""
+    place = pin.SE3(pin.exp3(np.array([0.3, -0.5, 0.7])), np.array([0.1, 0.2, -0.3]))
+    points = solids.triangles(PlacedShape(shape, place)).reshape(-1, 3)
+    geometry = geometry_of(shape)
+    where = place * geometry.offset
+    there = coal.Transform3s(where.rotation, where.translation)
+    request = coal.DistanceRequest()
+    request.enable_signed_distance = True
+    # Coal errs for a ball on the middle of a cylinder's end
+    off_axis = np.linalg.norm(place.rotation[:, :2].T @ (points - place.translation).T, axis=0) > 1e-6
+    for point in points[off_axis][:: max(1, len(points) // 50)]:
+        dot = coal.Transform3s(np.eye(3), point)
+        gap = coal.distance(coal.Sphere(0.01), dot, geometry.geometry, there, request, coal.DistanceResult())
+        assert gap == pytest.approx(-0.01, abs=1e-6)
+    for direction in np.concatenate([np.eye(3), -np.eye(3)]):
+        far = pin.SE3(pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), -direction).matrix(), 9.0 * direction)
+        plane, wall = coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0), coal.Transform3s(far.rotation, far.translation)
+        gap = coal.distance(geometry.geometry, there, plane, wall, request, coal.DistanceResult())
+        assert 9.0 - (points @ direction).max() == pytest.approx(gap, abs=2e-3)

@@ -11,9 +11,10 @@ import coal
 import numpy as np
 import pinocchio as pin
 
+from wbc.proximity.geometry import geometry_of
 from wbc.robot import Robot
 from wbc.robot.files import captured_stderr
-from wbc.shapes import Capsule, HalfSpace, PlacedShape
+from wbc.shapes import Shape
 from wbc.track.setup import Moving
 from wbc.validation import Array
 
@@ -24,7 +25,7 @@ Body = tuple[int, pin.SE3, Any]
 
 
 def clearances(robot: Robot, q: Array, obstacles: Mapping[str, Moving], t: Array) -> dict[str, Array]:
-    """Smallest distance of each moving link's spheres and capsules to any obstacle, tick by tick [m].
+    """Smallest distance of each moving link's shapes to any obstacle, tick by tick [m].
 
     Args:
         q: configurations, n x nq.
@@ -33,7 +34,7 @@ def clearances(robot: Robot, q: Array, obstacles: Mapping[str, Moving], t: Array
     bodies: dict[str, list[Body]] = {}
     for link, placed in robot.shapes.items():
         if _moves(robot, link):
-            bodies[link] = [(int(robot.model.getFrameId(link)), p.placement, _coal(p)) for p in placed]
+            bodies[link] = [(int(robot.model.getFrameId(link)), *_geometry(p.shape, p.placement)) for p in placed]
     return _distances(robot, bodies, q, obstacles, t)
 
 
@@ -103,17 +104,14 @@ def _distances(
 
 
 def _obstacle(obstacle: Moving, t: float) -> tuple[Any, Any]:
-    pose = obstacle.at(t)
-    place = coal.Transform3s(pose.rotation, pose.translation)
-    if isinstance(obstacle.shape, HalfSpace):
-        return coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0), place
-    return coal.Sphere(obstacle.shape.radius), place
+    pose, geometry = _geometry(obstacle.shape, obstacle.at(t))
+    return geometry, coal.Transform3s(pose.rotation, pose.translation)
 
 
-def _coal(placed: PlacedShape) -> Any:
-    if isinstance(placed.shape, Capsule):
-        return coal.Capsule(placed.shape.radius, placed.shape.length)
-    return coal.Sphere(placed.shape.radius)
+def _geometry(shape: Shape, pose: pin.SE3) -> tuple[pin.SE3, Any]:
+    """(pose of Coal's geometry, geometry) of a shape at a pose."""
+    geometry = geometry_of(shape)
+    return pose * geometry.offset, geometry.geometry
 
 
 def _moves(robot: Robot, link: str) -> bool:

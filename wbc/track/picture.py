@@ -12,8 +12,7 @@ import numpy as np
 import pinocchio as pin
 
 from wbc.robot import Robot
-from wbc.shapes import Capsule
-from wbc.track import render, style
+from wbc.track import render, solids, style
 from wbc.track.clearance import bodies_of
 from wbc.track.log import Log
 from wbc.validation import Array
@@ -87,13 +86,7 @@ def _link_meshes(robot: Robot) -> list[tuple[str, Array]]:
             out.append((link, vertices[np.array(faces, dtype=np.int64)]))
     if out:
         return out
-    for link, shapes in robot.shapes.items():
-        for placed in shapes:
-            start, end = placed.ends()
-            out += [(link, render.sphere(e, placed.shape.radius, WHITE).triangles) for e in (start, end)]
-            if isinstance(placed.shape, Capsule):
-                out.append((link, render.tube(np.array([start, end]), placed.shape.radius, WHITE).triangles))
-    return out
+    return [(link, solids.triangles(placed)) for link, shapes in robot.shapes.items() for placed in shapes]
 
 
 def _posed(

@@ -20,6 +20,7 @@ import numpy as np
 import pinocchio as pin
 
 from wbc.controller import Controller
+from wbc.shapes import Sphere
 from wbc.track.clearance import clearances, least_mesh_clearance
 from wbc.track.log import Log
 from wbc.track.recorder import Recorder
@@ -133,7 +134,7 @@ def _meta(plan: Plan, controller: Controller, recorder: Recorder, compile_time: 
         "obstacles": {
             name: {
                 "shape": repr(o.shape),
-                "radius": getattr(o.shape, "radius", None),
+                "radius": o.shape.radius if isinstance(o.shape, Sphere) else None,
                 "pose": np.asarray(o.pose.homogeneous).tolist(),
                 "velocity": o.velocity.tolist(),
             }
