@@ -94,4 +94,5 @@ class Distance(Task):
     def error(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
         """The formula of the class, in the axes of the other frame."""
         here = kin.pose(self.frame).point(rot.constant(self.offset))
-        return distance(kin.pose(self.other).inverse_point(here) - inputs["point"]) - inputs["target"]
+        between = kin.pose(self.other).inverse_point(here) - inputs["point"]
+        return ca.SX(distance(between) - inputs["target"])
