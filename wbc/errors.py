@@ -98,6 +98,10 @@ class PicklingError(WbcError, pickle.PicklingError):
     """Something that cannot be pickled, or a pickle that does not fit."""
 
 
+class BusyError(WbcError):
+    """A controller that two threads use at once."""
+
+
 class CompileError(WbcError):
     """The C compiler was asked for and could not build the tick."""
 

@@ -138,7 +138,7 @@ class Controller:
         self._slow = True
 
     def clone(self) -> Controller:
-        """Another controller of the same compiled stack: its own memory, the run-time values and last command of this one.
+        """Another controller of the same compiled stack, with its own memory and this one's values and last command.
 
         Its solver and sensors start as after a reset. Nothing is read from disk or compiled.
         """
