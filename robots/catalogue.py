@@ -19,10 +19,12 @@ from wbc.robot.recipe import Recipe, lock_mapping
 from wbc.robot.robot import Robot
 from wbc.robot.table import read_table
 
+_FOLDER = pathlib.Path(__file__).parent
+
 
 @functools.cache
 def _by_name() -> dict[str, Recipe]:
-    return read_table(pathlib.Path(__file__).parent)
+    return read_table(_FOLDER)
 
 
 def table() -> tuple[Recipe, ...]:
@@ -84,6 +86,7 @@ def load(
     changes: dict[str, Any] = {}
     if lock is not None:
         changes["lock"] = lock_mapping(lock)
+        changes["pairs"] = ""  # other links move against each other
     if neutral is not None:
         changes["neutral"] = {**recipe.neutral, **neutral}
     if name is not None:
@@ -128,7 +131,8 @@ def _find(robot: Any) -> tuple[Recipe, Any]:
     if isinstance(robot, str):
         recipe = _by_name().get(robot)
         if recipe is not None:
-            return recipe, example_data_folder() / recipe.file
+            pairs = str(_FOLDER / recipe.pairs) if recipe.pairs else ""
+            return replace(recipe, pairs=pairs), example_data_folder() / recipe.file
         if not looks_like_path(robot):
             raise unknown(robot, _by_name())
     if isinstance(robot, (str, os.PathLike)):

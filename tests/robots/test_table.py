@@ -108,7 +108,7 @@ def test_published_accelerations() -> None:
     np.testing.assert_array_equal(wbc.robots.load("xarm7").limits.acceleration, np.full(7, 20.0))
 
 
-@pytest.mark.parametrize("name", [n for n in LOADABLE if TABLE[n].srdf])
+@pytest.mark.parametrize("name", [n for n in LOADABLE if TABLE[n].state])
 def test_neutral_configuration_is_the_srdf_state(name: str) -> None:
     robot = bare(name)
     tree = ElementTree.parse(example(TABLE[name].srdf))

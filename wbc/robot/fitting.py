@@ -1,11 +1,4 @@
-"""Spheres and capsules that contain given bodies, and how far they stand out of them.
-
-The *excess* of a shape A around a convex body B is the Hausdorff distance of the two. As A contains B it is
-
-    max over unit u of  h_A(u) - h_B(u),       h the support function            [m]
-
-(Schneider, Convex Bodies, theorem 1.8.11).
-"""
+"""Spheres and capsules that contain given bodies, and how far they stand out of them: see :mod:`wbc.robot.hull`."""
 
 from __future__ import annotations
 
@@ -15,12 +8,10 @@ import numpy as np
 
 from wbc import validation
 from wbc.errors import ShapeError
+from wbc.robot.hull import excess, hull_vertices
 from wbc.robot.recipe import segment_shape
-from wbc.shapes import PlacedShape
+from wbc.shapes import Capsule, PlacedShape, Sphere
 from wbc.validation import Array
-
-#: Directions in which the excess of a fitted shape is sampled, before the best are refined.
-DIRECTIONS = 4000
 
 
 def fit_capsule(points: Array) -> PlacedShape:
@@ -30,8 +21,8 @@ def fit_capsule(points: Array) -> PlacedShape:
         points: n x 3 [m], at least one.
 
     Returns:
-        The shape in the points' frame. ``excess`` is measured against the points' convex hull by sampling
-        :data:`DIRECTIONS` directions and refining the worst; it is exact to about 1e-6 of the points' size.
+        The shape in the points' frame. ``excess`` is over the points' convex hull, see
+        :func:`~wbc.robot.hull.excess` for its accuracy.
 
     Raises:
         ShapeError, NotFiniteError: not n x 3 finite numbers.
@@ -53,21 +44,20 @@ def fit_capsule(points: Array) -> PlacedShape:
     # the rotation from z to the axis rounds the ends, so the radius is measured from where the shape has them
     line = segment_shape(middle + size * ends[0], middle + size * ends[1], 0.0, 0.0)
     radius = float(distance_to_segment(cloud, *line.ends()).max()) * (1 + 1e-12)
-    return replace(line, shape=replace(line.shape, radius=radius), excess=excess(corners, *line.ends(), radius))
+    shape = Capsule(radius, line.shape.length) if isinstance(line.shape, Capsule) else Sphere(radius)
+    return replace(line, shape=shape, excess=excess(corners, *line.ends(), radius))
 
 
-def hull_vertices(points: Array) -> Array:
-    """The vertices of the convex hull; all distinct points where they are flat or too few for a hull."""
-    # Imported here: most processes fit no shapes, and scipy takes longer to import than all the rest
-    from scipy.spatial import ConvexHull, QhullError
-
-    distinct = np.unique(points, axis=0)
-    if len(distinct) < 5:
-        return distinct
-    try:
-        return np.asarray(distinct[ConvexHull(distinct).vertices])
-    except QhullError:
-        return distinct
+def quick_capsule(points: Array) -> tuple[Array, Array, float]:
+    """(end, end, radius) of a capsule about the points' principal axis that contains them all: no fit, but fast."""
+    center = points.mean(axis=0)
+    axis = np.linalg.svd(points - center, full_matrices=False)[2][0]
+    across = points - np.outer(points @ axis, axis)
+    middle = (across.min(axis=0) + across.max(axis=0)) / 2
+    middle -= axis * (middle @ axis)
+    radius = float(np.linalg.norm(across - middle, axis=1).max())
+    a, b = _shortest(points, np.concatenate([middle, middle + axis, [radius]]))
+    return a, b, float(distance_to_segment(points, a, b).max())
 
 
 def distance_to_segment(points: Array, a: Array, b: Array) -> Array:
@@ -76,32 +66,6 @@ def distance_to_segment(points: Array, a: Array, b: Array) -> Array:
     square = float(span @ span)
     t = np.clip((points - a) @ span / square, 0.0, 1.0) if square > 0.0 else np.zeros(len(points))
     return np.asarray(np.linalg.norm(points - a - t[:, None] * span, axis=1))
-
-
-def excess(corners: Array, a: Array, b: Array, radius: float) -> float:
-    """How far the capsule about a b stands out of the convex hull of ``corners`` [m], by sampled directions."""
-    corners = np.asarray(corners)
-
-    def gap(u: Array) -> Array:
-        capsule = np.maximum(u @ a, u @ b) + radius
-        return np.asarray(capsule - (u @ corners.T).max(axis=1))
-
-    directions = _spread_directions(DIRECTIONS)
-    values = gap(directions)
-    worst = float(values.max())
-    cone = _spread_directions(100)
-    for start in directions[np.argsort(values)[-8:]]:
-        best, width = start, 2.0 / np.sqrt(DIRECTIONS)
-        for _ in range(24):
-            around = best + width * cone
-            around = around / np.linalg.norm(around, axis=1, keepdims=True)
-            inside = gap(around)
-            top = int(np.argmax(inside))
-            if inside[top] > worst:
-                worst = float(inside[top])
-            best = around[top] if inside[top] >= gap(best[None])[0] else best
-            width *= 0.6
-    return max(worst, 0.0)
 
 
 def around_cylinder(radius: float, half: float, inner: float | None = None) -> tuple[float, float, float]:

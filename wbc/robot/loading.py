@@ -13,11 +13,14 @@ import pinocchio as pin
 from wbc import validation
 from wbc.errors import RobotFileError, ShapeError, UnknownNameError
 from wbc.robot.assembly import assemble, override_limits
+from wbc.robot.collision_pairs import find_self_pairs
 from wbc.robot.description import Description, with_base
 from wbc.robot.dh import DHRow, read_dh
 from wbc.robot.files import example_data_folder, read_xml
 from wbc.robot.geometry import description_shapes, fit_shapes
+from wbc.robot.link_pairs import shaped_links
 from wbc.robot.mjcf import read_mjcf
+from wbc.robot.pairs_file import read_self_pairs
 from wbc.robot.recipe import Recipe
 from wbc.robot.robot import Robot
 from wbc.robot.srdf import read_states
@@ -71,7 +74,7 @@ def finish(
 ) -> Robot:
     """The robot of a description: states, joints, limits, shapes."""
     states = dict(description.states)
-    if recipe.srdf:
+    if recipe.state:
         states |= read_states(example_data_folder() / recipe.srdf)
     if not recipe.state and "home" in states:
         recipe = replace(recipe, state="home")
@@ -79,10 +82,10 @@ def finish(
     if shapes == "none" or not (robot.source or recipe.shapes):
         return robot
     if shapes == "fit":
-        return fit_shapes(robot, package_dirs=package_dirs)
+        return _with_pairs(fit_shapes(robot, package_dirs=package_dirs), recipe)
     if shapes == "auto" and recipe.shapes:
-        return _table_shapes(robot, recipe)
-    return description_shapes(robot, package_dirs)
+        return _with_pairs(_table_shapes(robot, recipe), recipe, recipe.pairs)
+    return _with_pairs(description_shapes(robot, package_dirs), recipe)
 
 
 def _table_shapes(robot: Robot, recipe: Recipe) -> Robot:
@@ -93,6 +96,22 @@ def _table_shapes(robot: Robot, recipe: Recipe) -> Robot:
     largest = max(shape.excess for shape in recipe.shapes)
     note = f"{len(recipe.shapes)} shapes on {len(shapes)} links from the table, largest excess {largest:.4g} m"
     return replace(robot.with_shapes(shapes), notes={**robot.notes, "shapes": note})
+
+
+def _with_pairs(robot: Robot, recipe: Recipe, file: str = "") -> Robot:
+    """The robot with the pairs of links that must not touch: from a file, else what is known without sampling."""
+    if len(shaped_links(robot)) < 2:
+        return robot
+    if file:
+        found = read_self_pairs(file, robot)
+    else:
+        srdf = example_data_folder() / recipe.srdf if recipe.srdf else None
+        found = find_self_pairs(robot, srdf=srdf, samples=0)
+    note = found.summary()
+    touching = [" and ".join(pair.links) for pair in found.pairs if pair.reason == "neutral"]
+    if touching:
+        note += f"; not watched, as they touch in the neutral configuration: {', '.join(touching)}"
+    return replace(robot.with_self_pairs(found.kept), notes={**robot.notes, "self_pairs": note})
 
 
 def looks_like_path(text: str) -> bool:

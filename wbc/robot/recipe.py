@@ -41,13 +41,15 @@ class Recipe:
         file: relative to the folder ``robots`` of the example-robot-data wheel.
         base: one of :data:`~wbc.robot.robot.BASES`.
         lock: joint name or pattern (``finger_*``) -> value of q to lock it at, or None for the neutral one.
-        srdf, state: where the neutral configuration stands, "" for none.
+        srdf: file of collision rules and named configurations, "" for none.
+        state: its configuration that is the neutral one, "" for none.
         neutral: joint name -> number, on top of that.
         frames: role -> frame name.
         acceleration: joint name -> limit [rad/s^2 or m/s^2].
         source: where the acceleration limits were published; "" where none are known.
         mimic_leaders: follower -> leader, where the file misspells the leader.
         shapes: spheres and capsules fitted in advance.
+        pairs: file of the pairs of links that must not touch, found with these shapes and locks; "" for none.
         problem: why the file cannot be loaded; "" for robots that can.
     """
 
@@ -64,6 +66,7 @@ class Recipe:
     source: str = ""
     mimic_leaders: Mapping[str, str] = field(default_factory=dict)
     shapes: tuple[LinkShape, ...] = ()
+    pairs: str = ""
     problem: str = ""
 
 

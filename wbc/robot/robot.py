@@ -263,14 +263,16 @@ class Robot:
                 raise RangeError(f"limits.{name}", dof, "this degree of freedom has no single coordinate to limit")
 
     def with_shapes(self, shapes: Mapping[str, Sequence[PlacedShape]]) -> Robot:
-        """A copy with other link shapes.
+        """A copy with other link shapes. Where other links have shapes than before, ``self_pairs`` must be chosen anew.
 
         Raises:
             UnknownNameError: a link frame that does not exist.
         """
         for frame in shapes:
             self.check_frame("shapes", frame)
-        return replace(self, shapes={k: tuple(v) for k, v in shapes.items()})
+        new = {k: tuple(v) for k, v in shapes.items()}
+        same = {k for k, v in new.items() if v} == {k for k, v in self.shapes.items() if v}
+        return replace(self, shapes=new, self_pairs=self.self_pairs if same else None)
 
     def with_self_pairs(self, pairs: Sequence[tuple[str, str]] | None) -> Robot:
         """A copy with other pairs of links that must not touch each other.

@@ -7,12 +7,13 @@ A file holds one TOML table for each robot:
     file = "folder/file.urdf"          below the wheel's folder ``robots``
     base = "fixed"                     fixed | floating | planar | differential
     lock = ["finger_*"]                joints to lock, or a table joint = value
-    srdf = "folder/file.srdf"          with state = "name": the neutral configuration
+    srdf = "folder/file.srdf"          collision rules; with state = "name" also the neutral configuration
     neutral = { joint = 1.0 }          rad or m, on top of it
     frames = { tip = "frame" }         role = frame
     acceleration = { joint = 15.0 }    rad/s^2 or m/s^2, needs ``source``
     source = "..."                     where the acceleration limits were published
     mimic_leaders = { joint = "joint"} corrections of misspelt leaders
+    pairs = "pairs/file.toml"          below this folder, needs ``shapes``: pairs of links that must not touch
     problem = "..."                    why the file cannot be loaded
     shapes = [{ link = "...", a = [x, y, z], b = [x, y, z], radius = r, excess = e }]
 """
@@ -74,8 +75,10 @@ def read_row(where: str, name: str, row: Any) -> Recipe:
         raise ShapeError(f"{where} file", None, "this field must be there")
     if bool(recipe.acceleration) != bool(recipe.source):
         raise RangeError(f"{where} source", recipe.source, "acceleration and source come together or not at all")
-    if bool(recipe.state) != bool(recipe.srdf):
-        raise RangeError(f"{where} state", recipe.state, "srdf and state come together or not at all")
+    if recipe.state and not recipe.srdf:
+        raise RangeError(f"{where} state", recipe.state, "a state needs its srdf")
+    if recipe.pairs and not recipe.shapes:
+        raise RangeError(f"{where} pairs", recipe.pairs, "pairs are found with shapes of the table, and need them")
     return recipe
 
 

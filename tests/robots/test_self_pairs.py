@@ -1,0 +1,350 @@
+"""Pairs of links that must not touch: neighbours, SRDF rules, sampling and descents, against Coal and closed forms."""
+
+from __future__ import annotations
+
+import itertools
+from pathlib import Path
+
+import coal
+import numpy as np
+import pinocchio as pin
+import pytest
+from scipy.optimize import minimize
+
+import wbc.robots
+from tests import models
+from tests.robots.files import joints
+from wbc.errors import MissingShapeError, RangeError, RobotFileError, ShapeError
+from wbc.robot import Limits, Robot
+from wbc.robot.collision_pairs import REASONS, find_self_pairs
+from wbc.robot.pair_distances import Links
+from wbc.robot.sampling import configuration, draw
+from wbc.robot.segments import bounding_capsule, segment_distances
+from wbc.shapes import Box, Capsule, Convex, Cylinder, PlacedShape, Sphere
+
+HERE = pin.SE3.Identity()
+
+
+def with_balls(robot: Robot, radii: dict[str, float]) -> Robot:
+    """A copy with one sphere about the origin of each named frame."""
+    return robot.with_shapes({link: [PlacedShape(Sphere(r), HERE)] for link, r in radii.items()})
+
+
+def body_links(robot: Robot) -> list[str]:
+    return [str(f.name) for f in robot.model.frames if f.type == pin.FrameType.BODY and f.name != "universe"]
+
+
+def test_distances_of_segments_are_those_of_thin_capsules() -> None:
+    rng = np.random.default_rng(1)
+    ends = rng.normal(size=(4, 3, 300))
+    ends[1, :, :30] = ends[0, :, :30]  # points
+    ends[3, :, 20:50] = ends[2, :, 20:50]
+    ends[3, :, 50:90] = ends[2, :, 50:90] + 2.0 * (ends[1] - ends[0])[:, 50:90]  # parallel
+    ends[2, :, 90:120] = (ends[0] + ends[1])[:, 90:120] / 2  # crossing
+    measured = segment_distances(*ends)
+    s, t = np.meshgrid(np.linspace(0, 1, 101), np.linspace(0, 1, 101))
+    for k in range(ends.shape[2]):
+        a, b, c, d = ends[:, :, k]
+        gaps = (a + s[..., None] * (b - a)) - (c + t[..., None] * (d - c))
+        grid = np.linalg.norm(gaps, axis=-1).min()
+        spacing = (np.linalg.norm(b - a) + np.linalg.norm(d - c)) / 100
+        assert grid - spacing <= measured[k] <= grid + 1e-7
+    assert np.abs(measured[90:120]).max() < 1e-7
+
+
+@pytest.mark.parametrize(
+    "shape",
+    [
+        Sphere(0.2),
+        Capsule(0.1, 0.4),
+        Box((0.3, 0.1, 0.5)),
+        Box((0.4, 0.4, 0.1)),
+        Cylinder(0.3, 0.2),
+        Convex(np.random.default_rng(5).normal(size=(40, 3)) * [0.3, 0.1, 0.2]),
+    ],
+    ids=repr,
+)
+def test_bounding_capsules_contain_their_shapes(shape: object) -> None:
+    place = pin.SE3(pin.rpy.rpyToMatrix(0.3, -0.7, 1.1), np.array([0.1, 0.2, -0.3]))
+    a, b, radius = bounding_capsule(PlacedShape(shape, place))  # type: ignore[arg-type]
+    corners = {
+        Box: lambda s: np.array(list(itertools.product(*[(-x / 2, x / 2) for x in s.size]))),
+        Convex: lambda s: s.points,
+        Cylinder: lambda s: np.array(
+            [
+                (s.radius * np.cos(t), s.radius * np.sin(t), z)
+                for t in np.linspace(0, 6.3, 90)
+                for z in (-s.length / 2, s.length / 2)
+            ]
+        ),
+    }.get(type(shape), lambda s: np.zeros((1, 3)))(shape)
+    for corner in corners:
+        point = place * corner
+        t = np.clip((point - a) @ (b - a) / max((b - a) @ (b - a), 1e-300), 0, 1)
+        assert np.linalg.norm(point - a - t * (b - a)) <= radius + 1e-9
+    if isinstance(shape, (Sphere, Capsule)):
+        assert radius == shape.radius
+
+
+def test_broad_and_narrow_phase_agree_with_coal_on_every_sample() -> None:
+    robot = wbc.robots.load("ur5", shapes="none")
+    robot = robot.with_shapes(
+        {
+            "shoulder_link": [
+                PlacedShape(Capsule(0.08, 0.2), HERE),
+                PlacedShape(Sphere(0.1), pin.SE3(np.eye(3), np.ones(3) / 9)),
+            ],
+            "forearm_link": [PlacedShape(Capsule(0.05, 0.4), pin.SE3(pin.rpy.rpyToMatrix(1, 2, 3), np.zeros(3)))],
+            "wrist_2_link": [PlacedShape(Box((0.1, 0.2, 0.15)), HERE)],
+            "ee_link": [PlacedShape(Cylinder(0.05, 0.3), HERE)],
+        }
+    )
+    links, steps = Links(robot), draw(robot, 200, np.random.default_rng(0))
+    scenes, data = links.place(steps), robot.model.createData()
+    request = coal.DistanceRequest()
+    request.enable_signed_distance = True
+    solids = {
+        Sphere: lambda s: coal.Sphere(s.radius),
+        Capsule: lambda s: coal.Capsule(s.radius, s.length),
+        Box: lambda s: coal.Box(*s.size),
+        Cylinder: lambda s: coal.Cylinder(s.radius, s.length),
+    }
+    for first, second in itertools.combinations(robot.shapes, 2):
+        bounds = scenes.bounds(first, second)
+        for n, step in enumerate(steps):
+            pin.framesForwardKinematics(robot.model, data, configuration(robot, step))
+            least = np.inf
+            for a, b in itertools.product(robot.shapes[first], robot.shapes[second]):
+                where = [data.oMf[robot.model.getFrameId(k)] * s.placement for k, s in ((first, a), (second, b))]
+                places = [coal.Transform3s(w.rotation, w.translation) for w in where]
+                pair = [solids[type(s.shape)](s.shape) for s in (a, b)]
+                least = min(
+                    least, coal.distance(pair[0], places[0], pair[1], places[1], request, coal.DistanceResult())
+                )
+            assert scenes.distance(first, second, n) == pytest.approx(least, abs=1e-6)
+            assert bounds[n] <= least + 1e-6
+            if links.is_exact(first, second):
+                assert bounds[n] == pytest.approx(least, abs=1e-6)
+
+
+@pytest.mark.parametrize("name", ["panda", "talos", "g1", "baxter", "tiago_dual"])
+def test_no_pair_across_one_joint_is_kept(name: str) -> None:
+    bare = wbc.robots.load(name, shapes="none")
+    robot = with_balls(bare, dict.fromkeys(body_links(bare), 0.01))
+    kept = {frozenset(pair) for pair in find_self_pairs(robot, samples=0).kept}
+    assert len(kept) > 20
+    crossed = 0
+    for element in joints(robot.source).values():
+        ends = frozenset(str(element.find(tag).get("link")) for tag in ("parent", "child"))  # type: ignore[union-attr]
+        assert ends not in kept
+        crossed += ends <= set(robot.shapes)
+    assert crossed >= 10
+
+
+def test_welded_links_and_joints_that_share_an_origin() -> None:
+    panda = wbc.robots.load("panda")
+    reasons = {pair.links: pair.reason for pair in find_self_pairs(panda, samples=0).pairs}
+    assert reasons["panda_link7", "panda_hand"] == "same body"
+    assert reasons["panda_leftfinger", "panda_rightfinger"] == "same body"  # locked
+    assert reasons["panda_link6", "panda_hand"] == "adjacent"  # across joint 7, hand welded to link 7
+    assert reasons["panda_link5", "panda_hand"] == "unsampled"
+    free = wbc.robots.load("panda", lock=())
+    reasons = {pair.links: pair.reason for pair in find_self_pairs(free, samples=0).pairs}
+    assert reasons["panda_hand", "panda_leftfinger"] == "adjacent"
+    assert reasons["panda_leftfinger", "panda_rightfinger"] != "same body"
+    # The shoulder of this arm is three joints at one point, the wrist too
+    arm = models.spherical_seven()
+    reasons = {
+        pair.links: pair.reason
+        for pair in find_self_pairs(with_balls(arm, {"F1": 0.1, "F3": 0.1, "F4": 0.1, "F7": 0.1}), samples=0).pairs
+    }
+    assert reasons["F1", "F3"] == "adjacent"
+    assert reasons["F4", "F7"] == "adjacent"
+    assert reasons["F1", "F4"] == "unsampled"  # the elbow stands off the shoulder
+    (pair,) = find_self_pairs(with_balls(arm, {"F1": 0.1, "F4": 0.1}), samples=0).pairs
+    assert pair.reason == "unsampled"
+
+
+def planar(limit: float) -> Robot:
+    """Upper arm 1 m, forearm 0.8 m, elbow within +-limit."""
+    arm = models.arm("planar", [((0, 1, 0), (1.0, 0, 0)), ((0, 1, 0), (0.8, 0, 0)), ((0, 1, 0), (0.3, 0, 0))])
+    bound = np.array([3.0, limit, 0.5])
+    none = np.full(3, np.inf)
+    return Robot("planar", arm.model, Limits(-bound, bound, none, none, none), neutral=arm.neutral)
+
+
+def test_least_distance_is_the_closed_form() -> None:
+    # Distance of shoulder and wrist: the law of cosines at the elbow's limit
+    for limit in (1.0, 2.0, 2.7):
+        robot = with_balls(planar(limit), {"F1": 0.1, "F3": 0.2})
+        (pair,) = find_self_pairs(robot, samples=50).pairs
+        wanted = np.sqrt(1 + 0.64 + 1.6 * np.cos(limit)) - 0.3
+        assert pair.distance == pytest.approx(wanted, abs=1e-4)
+        assert (pair.keep, pair.reason) == (False, "never")
+
+
+def test_descents_find_touch_that_samples_miss() -> None:
+    # Touches only in the last 0.01 rad of the elbow's 5.8: one sample in 300 or so
+    limit = 2.9
+    reach = np.sqrt(1 + 0.64 + 1.6 * np.cos(limit - 0.01))
+    robot = with_balls(planar(limit), {"F1": reach / 2, "F3": reach / 2})
+    elbow = draw(robot, 20, np.random.default_rng(0))[:, 1]
+    assert np.abs(elbow).max() < limit - 0.01
+    (pair,) = find_self_pairs(robot, samples=20).pairs
+    assert (pair.keep, pair.reason) == (True, "touches")
+
+
+def test_reasons() -> None:
+    robot = with_balls(planar(2.0), {"F1": 0.35, "F2": 0.05, "F3": 0.3, "tip": 0.05})
+    found = {pair.links: pair for pair in find_self_pairs(robot, samples=300).pairs}
+    assert found["F1", "F2"].reason == found["F2", "F3"].reason == "adjacent"
+    assert found["F3", "tip"].reason == "same body"
+    assert found["F1", "F3"].reason == "never"
+    assert found["F1", "F3"].distance == pytest.approx(np.sqrt(1.64 + 1.6 * np.cos(2.0)) - 0.65, abs=1e-4)
+    wide = with_balls(planar(2.0), {"F1": 1.0, "F3": 0.5, "tip": 0.2})
+    found = {pair.links: pair for pair in find_self_pairs(wide, samples=300).pairs}
+    assert found["F1", "F3"].reason == "touches"
+    always = with_balls(planar(2.0), {"F1": 1.2, "F3": 0.9})
+    (pair,) = find_self_pairs(always, samples=300).pairs
+    assert (pair.keep, pair.reason) == (False, "always")
+    bent = Robot("bent", robot.model, robot.limits, neutral=np.array([0.0, 2.0, 0.0]))
+    (pair,) = find_self_pairs(with_balls(bent, {"F1": 0.6, "F3": 0.6}), samples=300).pairs
+    assert (pair.keep, pair.reason) == (False, "neutral")
+    (pair,) = find_self_pairs(with_balls(bent, {"F1": 0.6, "F3": 0.6}), samples=0).pairs
+    assert (pair.keep, pair.reason) == (False, "neutral")
+    near = find_self_pairs(with_balls(planar(2.0), {"F1": 0.35, "F3": 0.3}), samples=300, clearance=0.5).pairs
+    assert near[0].reason == "touches"
+
+
+def test_srdf_rules_and_their_order(tmp_path: Path) -> None:
+    file = tmp_path / "r.srdf"
+    file.write_text(
+        '<robot name="r"><disable_default_collisions link="tip"/>'
+        '<enable_collisions link1="tip" link2="F1"/><enable_collisions link1="F1" link2="F2"/>'
+        '<enable_collisions link1="F2" link2="tip"/><disable_collisions link1="tip" link2="F2" reason="User"/>'
+        '<disable_collisions link1="F3" link2="F1"/><disable_collisions link1="F1" link2="gone"/></robot>'
+    )
+    robot = with_balls(planar(2.0), dict.fromkeys(("F1", "F2", "F3", "tip"), 0.01))
+    found = find_self_pairs(robot, srdf=file, samples=0)
+    pairs = {pair.links: (pair.keep, pair.reason, pair.detail) for pair in found.pairs}
+    assert pairs["F1", "F2"] == (True, "enabled", "")  # although they are adjacent
+    assert pairs["F1", "tip"] == (True, "enabled", "")
+    assert pairs["F2", "tip"] == (False, "adjacent", "")
+    assert pairs["F1", "F3"] == (False, "srdf", "")
+    assert pairs["F3", "tip"] == (False, "same body", "")
+    assert found.unknown == ("gone",)
+    sampled = find_self_pairs(robot, srdf=file, samples=100)
+    assert sampled.kept == found.kept
+    assert all(pair.distance is not None for pair in sampled.pairs)
+    for text in ('<robot><disable_collisions link1="F1"/></robot>', "<sdf/>", "<robot>"):
+        file.write_text(text)
+        with pytest.raises(RobotFileError, match=r"r\.srdf"):
+            find_self_pairs(robot, srdf=file, samples=0)
+
+
+def test_srdf_of_the_panda_is_used_by_name() -> None:
+    panda = wbc.robots.load("panda")
+    found = wbc.robots.find_self_pairs(panda, samples=0)
+    detail = {pair.links: pair.detail for pair in found.pairs if pair.reason == "srdf"}
+    assert detail["panda_link5", "panda_link7"] == "Default"
+    assert detail["panda_link0", "panda_link4"] == "Never"
+    assert not [p for p in wbc.robots.find_self_pairs(panda, samples=0, srdf=None).pairs if p.reason == "srdf"]
+
+
+def test_hands_of_talos_that_touch_are_kept() -> None:
+    hands = ("gripper_left_base_link", "gripper_right_base_link")
+    robot = wbc.robots.fit_shapes(
+        wbc.robots.load("talos", shapes="none"), [*hands, "arm_left_4_link", "arm_right_4_link"]
+    )
+    assert set(robot.shapes) >= set(hands)
+    # A configuration in which the hands' own meshes touch, by Pinocchio and an optimiser that knows nothing of ours
+    model, data = robot.model, robot.model.createData()
+    geometry = pin.buildGeomFromUrdf(
+        model, robot.source, pin.GeometryType.COLLISION, None, [str(Path(robot.source).parents[4])]
+    )
+    ids = [next(k for k, g in enumerate(geometry.geometryObjects) if g.name.startswith(hand)) for hand in hands]
+    geometry.addCollisionPair(pin.CollisionPair(*ids))
+    measured = geometry.createData()
+    middles = [np.array(geometry.geometryObjects[k].geometry.vertices()).mean(axis=0) for k in ids]
+    arms = [robot.dofs(name).start for name in robot.joint_names if name.startswith("arm_")]
+
+    def gap(x: np.ndarray) -> float:
+        q = np.array(robot.neutral)
+        q[robot.position_index[arms]] = x
+        pin.computeDistances(model, data, geometry, measured, q)
+        centers = [measured.oMg[k] * middle for k, middle in zip(ids, middles, strict=True)]
+        return float(np.linalg.norm(centers[0] - centers[1]))
+
+    limits = [(robot.limits.position_lower[k], robot.limits.position_upper[k]) for k in arms]
+    best = minimize(gap, robot.neutral[robot.position_index[arms]], bounds=limits, method="L-BFGS-B")
+    gap(best.x)
+    assert measured.distanceResults[0].min_distance <= 0.0
+    found = {pair.links: pair for pair in wbc.robots.find_self_pairs(robot, samples=100).pairs}
+    pair = found.get(hands) or found[hands[::-1]]
+    assert (pair.keep, pair.reason) == (True, "touches")
+
+
+def test_arms_of_a_dual_arm_robot_are_kept_from_each_other() -> None:
+    bare = wbc.robots.load("baxter")
+    chosen = [
+        "left_lower_forearm",
+        "right_lower_forearm",
+        "left_hand_link",
+        "right_hand_link",
+        "head",
+        "left_upper_shoulder",
+    ]
+    robot = bare.with_shapes({link: bare.shapes[link] for link in chosen})
+    kept = {frozenset(pair) for pair in wbc.robots.find_self_pairs(robot, samples=400, srdf=None).kept}
+    for side, other in itertools.product(chosen[:4:2], chosen[1:4:2]):
+        assert frozenset((side, other)) in kept
+
+
+def test_same_seed_same_pairs_and_progress_is_told() -> None:
+    robot = wbc.robots.load("ur5")
+    told: list[tuple[int, int]] = []
+    first = wbc.robots.find_self_pairs(robot, samples=3000, progress=lambda done, total: told.append((done, total)))
+    assert [done for done, _ in told] == list(range(1, len(told) + 1))
+    assert {total for _, total in told} == {len(told)}
+    assert wbc.robots.find_self_pairs(robot, samples=3000) == first
+    assert set(first.counts()) <= set(REASONS)
+    assert sum(first.counts().values()) == len(first.pairs) == 28
+
+
+@pytest.mark.parametrize("name", ["panda", "ur5"])
+def test_stored_pairs_are_those_that_the_search_finds(name: str) -> None:
+    robot = wbc.robots.load(name)
+    found = wbc.robots.find_self_pairs(robot)
+    assert robot.self_pairs == found.kept
+    assert robot.notes["self_pairs"] == found.summary()
+
+
+def test_loading_chooses_pairs_without_sampling() -> None:
+    anymal = wbc.robots.load("anymal_b")
+    assert anymal.self_pairs == wbc.robots.find_self_pairs(anymal, samples=0).kept
+    assert "LH_HIP and RH_HIP" in anymal.notes["self_pairs"]  # they touch as it stands
+    assert wbc.robots.load("ur5", shapes="none").self_pairs is None
+    free = wbc.robots.load("panda", lock=())  # the stored pairs are for locked fingers
+    assert free.self_pairs == wbc.robots.find_self_pairs(free, samples=0).kept
+
+
+def test_pairs_are_chosen_for_the_links_that_have_shapes() -> None:
+    robot = wbc.robots.load("ur5")
+    grown = {link: [PlacedShape(Sphere(0.2), HERE)] for link in robot.shapes}
+    assert robot.with_shapes(grown).self_pairs == robot.self_pairs
+    fewer = robot.with_shapes({"ee_link": robot.shapes["ee_link"]})
+    assert fewer.self_pairs is None
+
+
+def test_bad_arguments() -> None:
+    robot = wbc.robots.load("ur5")
+    with pytest.raises(MissingShapeError, match="ur5"):
+        wbc.robots.find_self_pairs(wbc.robots.load("ur5", shapes="none"))
+    for key in ("samples", "seed"):
+        with pytest.raises(RangeError, match=key):
+            wbc.robots.find_self_pairs(robot, **{key: -1})
+        for value in (1.5, True, "many"):
+            with pytest.raises(ShapeError, match=key):
+                wbc.robots.find_self_pairs(robot, **{key: value})
+    with pytest.raises(RobotFileError, match=r"gone\.srdf"):
+        wbc.robots.find_self_pairs(robot, srdf="gone.srdf")
