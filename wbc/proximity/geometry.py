@@ -44,6 +44,13 @@ def geometry_of(shape: Shape) -> Geometry:
     Raises:
         ShapeError: no shape of :mod:`wbc.shapes`.
     """
+    made = _made(shape)
+    # GJK starts from the boxes' centres
+    made.geometry.computeLocalAABB()
+    return made
+
+
+def _made(shape: Shape) -> Geometry:
     zero = np.zeros(3)
     if isinstance(shape, Sphere):
         return Geometry(coal.Sphere(shape.radius), zero, shape.radius)

