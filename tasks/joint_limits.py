@@ -110,6 +110,15 @@ class JointLimits(Constraint):
             limits[dofs] = robot.limits.acceleration[dofs]
         return limits
 
+    def position_limits(self, robot: Robot) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """The description's less the margin, of the chosen joints that have one coordinate."""
+        lower, upper = np.full(robot.nv, -np.inf), np.full(robot.nv, np.inf)
+        for i in joint_dofs(robot, "JointLimits.joints", self.joints) if self.position else ():
+            if robot.position_index[i] >= 0:
+                lower[i] = robot.limits.position_lower[i] + self.margin
+                upper[i] = robot.limits.position_upper[i] - self.margin
+        return lower, upper
+
     def bounds(self, robot: Robot, kin: Tracer, inputs: Values, dt: ca.SX) -> Bounds:
         """See the class."""
         limits, count = robot.limits, robot.nv

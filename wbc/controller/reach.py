@@ -8,11 +8,12 @@ import numpy as np
 
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Layout
-from wbc.stack.places import brakes, gain_places, margin_places, pull_scales, rate_places
+from wbc.stack.places import brakes, gain_places, margin_places, pull_scales, rate_places, stops
 from wbc.validation import Array
 
 #: As in ``native/reach.h``
-TRUSTED, NEGLIGIBLE, LEAST_PIVOT, BRAKING, FAR, CORRECTIONS = 2.0, 0.05, 1e-2, 0.5, 1e50, 2
+TRUSTED, AT_LIMIT, PUSHED, NEGLIGIBLE, LEAST_PIVOT, BRAKING = 2.0, 0.02, 0.01, 0.05, 1e-4, 0.5
+FAR, CORRECTIONS = 1e50, 2
 #: As in ``native/margins.h``
 BRAKING_MARGIN = 0.25
 #: Squared length of a row that v cannot move, as in ``native/settings.h``
@@ -34,6 +35,9 @@ class Reach:
         self._damping = stack.damping / self._dofs**2
         places, self._brake_limit = brakes(stack, layout)
         self._brake_at = np.array(places, dtype=np.intp)
+        stop_at, self._stop_low, self._stop_high = stops(stack, layout)
+        self._stop_at = np.array(stop_at, dtype=np.intp)
+        self._stop_q = np.maximum(stack.robot.position_index, 0)
         margins = np.array(margin_places(layout), dtype=np.intp)
         self._margin_rows = np.flatnonzero(margins >= 0)
         self._margin_at = margins[self._margin_rows]
@@ -46,6 +50,7 @@ class Reach:
         weight: Array,
         error: Array,
         wish: Array,
+        q: Array,
         p: Array,
         equal: Array,
         bound_enabled: Array,
@@ -61,58 +66,75 @@ class Reach:
         gain = p[self._gain_at]
         largest = float(gain[counts].max(initial=0.0))
         plain = -(J.T @ (weight * wish))
-        metric = self._strengthened(H, equal)
         slope = J.T @ (weight * error)
-        if not (np.abs(error) < FAR).all() or not _is_definite(metric):
+        if not (np.abs(error) < FAR).all():
             return H, plain
-        curved = False
-        if self._bend is not None:
-            added = self._curvature(H, metric, J, weight, error, slope, equal)
-            if added is not None:
-                H, curved = H + added, True
-                metric = self._strengthened(H, equal)
-                if not _is_definite(metric):
-                    return H, plain
-        allowed = self._stoppable(metric, J, weight * gain**2 * error, largest, bound_enabled)
-        if not curved and allowed >= largest:
+        free = self._free(q, slope, bound_enabled)
+        metric = _cut_off(self._strengthened(H, equal), free)
+        if not _is_definite(metric):
+            return H, plain
+        curved = self._curved(H, metric, J, weight, error, slope, free)
+        if curved is not None:
+            H, metric = curved, self._strengthened(curved, equal)
+            if not _is_definite(metric):
+                return H, plain
+        allowed = self._stoppable(metric, J, weight * gain**2 * error, largest, free, bound_enabled)
+        if curved is None and allowed >= largest:
             return H, plain
         drift = -wish - gain * error
         wanted = np.minimum(gain, allowed) * error
-        if not curved:
+        if curved is None:
             return H, J.T @ (weight * (wanted + drift))
         g = J.T @ (weight * wanted)
         if drift[counts].any():
             g -= H @ self._following(metric, J, weight, -(J.T @ (weight * drift)))
         return H, g
 
-    def _curvature(
-        self, H: Array, metric: Array, J: Array, weight: Array, error: Array, slope: Array, equal: Array
+    def _free(self, q: Array, slope: Array, bound_enabled: Array) -> Array:
+        """1 for joints that may move, 0 for those that their tasks push against a position limit."""
+        on = self._stop_at >= 0
+        on[on] = bound_enabled[self._stop_at[on]] != 0.0
+        steep = np.abs(slope) * self._dofs
+        here = q[self._stop_q]
+        with np.errstate(invalid="ignore"):
+            room = np.where(slope < 0.0, self._stop_high - here, here - self._stop_low)
+        near = np.clip(2.0 - room / (AT_LIMIT * self._dofs), 0.0, 1.0)
+        pushed = np.clip(steep / (PUSHED * steep.max(initial=0.0) + np.finfo(float).tiny), 0.0, 1.0)
+        return np.where(on, 1.0 - near * pushed, 1.0)
+
+    def _curved(
+        self, H: Array, metric: Array, J: Array, weight: Array, error: Array, slope: Array, free: Array
     ) -> Array | None:
+        """H with the curvature of the errors that one step leaves, None where there is none to count."""
+        if self._bend is None:
+            return None
         step = np.linalg.solve(metric, slope)
         length = float(np.abs(step / self._dofs).max())
         if length > TRUSTED:
             more = float(np.abs(slope * self._dofs).max()) / TRUSTED * (1.0 - TRUSTED / length)
             step = np.linalg.solve(metric + np.diag(more / self._dofs**2), slope)
-        pull = weight * (error - J @ step)
+        pull = weight * (error - J @ (free * step))
         size = float((np.abs(pull) * self._pull_scale).sum())
         pivots = np.diag(np.linalg.cholesky(metric)) * self._dofs
         share = min(size / (NEGLIGIBLE * float((pivots**2).min())) - 1.0, 1.0)
         if not share > 0.0:
             return None
-        assert self._bend is not None
-        bent = share * self._bend(pull)
+        bent = share * np.outer(free, free) * self._bend(pull)
         if not np.isfinite(bent).all():
             return None
+        whole = share * _cut_off(H, free) + (1.0 - share) * H + bent
         scale = np.outer(self._dofs, self._dofs)
-        least = LEAST_PIVOT * float(np.abs(bent * scale).max())
-        return bent + np.diag(definite((H + bent) * scale, least) / self._dofs**2)
+        more_pivot = definite(whole * scale, LEAST_PIVOT * float(np.abs(bent * scale).max()))
+        return np.asarray(whole + np.diag(more_pivot / self._dofs**2))
 
-    def _stoppable(self, metric: Array, J: Array, wanted: Array, largest: float, bound_enabled: Array) -> float:
+    def _stoppable(
+        self, metric: Array, J: Array, wanted: Array, largest: float, free: Array, bound_enabled: Array
+    ) -> float:
         """The gain up to which all joints can brake on the way."""
         limited = self._limited(bound_enabled)
         if not limited.any():
             return largest
-        rate = np.abs(np.linalg.solve(metric, J.T @ wanted))[limited]
+        rate = (free * np.abs(np.linalg.solve(metric, J.T @ wanted)))[limited]
         worst = float((rate / (BRAKING * self._brake_limit[limited])).max())
         return largest / float(np.sqrt(worst)) if worst > 1.0 else largest
 
@@ -169,6 +191,13 @@ def definite(matrix: Array, least: float) -> Array:
         more[k] = pivot - a[k, k]
         a[k + 1 :, k + 1 :] -= np.outer(row, row) / pivot
     return more
+
+
+def _cut_off(H: Array, free: Array) -> Array:
+    """H with blocked joints cut off from the others."""
+    shares = np.outer(free, free)
+    np.fill_diagonal(shares, 1.0)
+    return np.asarray(shares * H)
 
 
 def _is_definite(matrix: Array) -> bool:

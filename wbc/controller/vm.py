@@ -134,7 +134,7 @@ class VmAssembly(Assembly):
         if self._reach is not None and self._usable and layout.task_rows:
             equal = _unit_equalities(low, high, low_rows, high_rows, A, self._dof_scales)
             weight = self.weight * factor
-            H, g = self._reach.change(H, J, weight, error, wish, self.p, equal, self.bound_enabled)
+            H, g = self._reach.change(H, J, weight, error, wish, self.q, self.p, equal, self.bound_enabled)
         return QP(H, g, np.concatenate((low, low_rows)), np.concatenate((high, high_rows)), A)
 
     def _report_rows(self) -> None:

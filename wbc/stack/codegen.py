@@ -10,7 +10,7 @@ import numpy as np
 
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Layout
-from wbc.stack.places import brakes, gain_places, margin_places, pull_scales, rate_places
+from wbc.stack.places import brakes, gain_places, margin_places, pull_scales, rate_places, stops
 from wbc.stack.program import Program, sparsity_rows
 from wbc.tasks.base import Constraint, Order
 
@@ -39,6 +39,7 @@ def _header(stack: Declaration, layout: Layout, program: Program) -> str:
     functions = program.functions.values()
     bent = ca.Sparsity(layout.nv, layout.nv) if program.bend is None else program.bend.sparsity_out(0)
     brake_at, brake_limit = brakes(stack, layout)
+    stop_at, stop_low, stop_high = stops(stack, layout)
     soft_rows = len(orders)
     lines = [
         "/* Sizes and tables of one stack; generated */",
@@ -80,6 +81,10 @@ def _header(stack: Declaration, layout: Layout, program: Program) -> str:
         _table("double", "pull_scale", pull_scales(stack, layout)),
         _table("int", "brake_at", brake_at),
         _table("double", "brake_limit", np.where(np.isfinite(brake_limit), brake_limit, 0.0)),
+        _table("int", "stop_at", stop_at),
+        _table("int", "stop_q", np.maximum(stack.robot.position_index, 0)),
+        _table("double", "stop_low", np.clip(stop_low, -1e30, 1e30)),
+        _table("double", "stop_high", np.clip(stop_high, -1e30, 1e30)),
         _table("double", "row_scale", scales),
         _table("double", "dof_scale", dofs),
         _table("double", "damping", stack.damping / dofs**2),

@@ -44,3 +44,17 @@ def rate_places(layout: Layout) -> list[int]:
     """Where the rate of each general row is in the parameters, 0 for rows without."""
     blocks = layout.of_form("margins", "rows")
     return [b.slots["rate"].start if b.form == "margins" else 0 for b in blocks for _ in b.rows]
+
+
+def stops(stack: Declaration, layout: Layout) -> tuple[list[int], np.ndarray, np.ndarray]:
+    """(entry of ``bound_enabled``, -1 for none; lower; upper) of the position limits of each degree of freedom."""
+    places = [-1] * layout.nv
+    lower, upper = np.full(layout.nv, -np.inf), np.full(layout.nv, np.inf)
+    for k, block in enumerate(layout.of_form("bounds")):
+        item = block.entry.item
+        assert isinstance(item, Constraint)
+        below, above = item.position_limits(stack.robot)
+        for i in np.flatnonzero(np.isfinite(below) | np.isfinite(above)):
+            places[i] = k * layout.nv + int(i)
+        lower, upper = np.maximum(lower, below), np.minimum(upper, above)
+    return places, lower, upper

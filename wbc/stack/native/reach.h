@@ -7,10 +7,14 @@
 
 /* A step up to here [rad, or characteristic lengths] is what the Jacobians say */
 #define TRUSTED 2.0
+/* A joint this near to a limit [rad, or characteristic lengths] is at it, and is near it up to twice of it */
+#define AT_LIMIT 0.02
+/* Slopes above this share of the steepest one push in full */
+#define PUSHED 0.01
 /* Curvature below this share of the least pivot of H does not count; it counts in full from twice of it on */
 #define NEGLIGIBLE 0.05
 /* Least pivot of H with the curvature in it, as a share of the largest entry of the curvature */
-#define LEAST_PIVOT 1e-2
+#define LEAST_PIVOT 1e-4
 /* Share of the acceleration limits that slowing down towards the optimum may take */
 #define BRAKING 0.5
 /* Errors beyond this are left to the linear model, before squares of them overflow */
@@ -49,28 +53,55 @@ static double largest_step(const double *x) {
     return largest;
 }
 
+/* 1 for joints that may move, 0 for those that their tasks push against a position limit; 1 if there are such */
+static int find_free(const wbc_tick *t, const double *slope, double *free) {
+    double steepest = 0.0;
+    int blocked = 0;
+    for (int i = 0; i < NV; i++) steepest = fmax(steepest, fabs(slope[i]) * dof_scale[i]);
+    for (int i = 0; i < NV; i++) {
+        free[i] = 1.0;
+        if (stop_at[i] < 0 || t->bound_enabled[stop_at[i]] == 0.0) continue;
+        const double q = t->q[stop_q[i]], room = slope[i] < 0.0 ? stop_high[i] - q : q - stop_low[i];
+        const double near = clamp(2.0 - room / (AT_LIMIT * dof_scale[i]), 0.0, 1.0);
+        const double pushed = clamp(fabs(slope[i]) * dof_scale[i] / (PUSHED * steepest + DBL_MIN), 0.0, 1.0);
+        free[i] = 1.0 - near * pushed;
+        blocked |= free[i] < 1.0;
+    }
+    return blocked;
+}
+
+/* R = factor of H with blocked joints cut off from the others, and `more` on the diagonal */
+static int cut_off(wbc_tick *t, const double *free, double more) {
+    load(t);
+    for (int i = 0; i < NV; i++) {
+        for (int j = i + 1; j < NV; j++) t->R[i * WIDE + j] *= free[i] * free[j];
+        t->R[i * WIDE + i] += more / (dof_scale[i] * dof_scale[i]);
+    }
+    t->prepared = 0;
+    return decompose(t);
+}
+
 #if NNZK > 0
 
-/* Weighted errors that the step of the linear model leaves, kept to TRUSTED where that asks for more */
-static int left_over(wbc_tick *t, const double *error, const double *slope, double *pull) {
+/* Weighted errors that the step of the linear model leaves, kept to TRUSTED where that asks for more. R is the
+ * metric without curvature, before and after. */
+static int left_over(wbc_tick *t, const double *free, const double *error, const double *slope, double *pull) {
     double step[WIDE];
     solve_with(t, slope, step);
     const double length = largest_step(step);
-    if (length > TRUSTED) {
+    const int bounded = length > TRUSTED;
+    if (bounded) {
         double steepest = 0.0;
         for (int i = 0; i < NV; i++) steepest = fmax(steepest, fabs(slope[i]) * dof_scale[i]);
-        const double more = steepest / TRUSTED * (1.0 - TRUSTED / length);
-        load(t);
-        for (int i = 0; i < NV; i++) t->R[i * WIDE + i] += more / (dof_scale[i] * dof_scale[i]);
-        if (!decompose(t)) return 0;
-        t->prepared = 0;
+        if (!cut_off(t, free, steepest / TRUSTED * (1.0 - TRUSTED / length))) return 0;
         solve_with(t, slope, step);
     }
+    for (int i = 0; i < NV; i++) step[i] *= free[i];
     for (int k = 0; k < MT; k++) {
         const double f = t->weight[k] * t->report.factor[k];
         pull[k] = f == 0.0 ? 0.0 : f * (error[k] - along(t, k, step));
     }
-    return 1;
+    return !bounded || cut_off(t, free, 0.0);
 }
 
 /* What makes a symmetric matrix positive definite, a diagonal: the modified factorisation of Gill and Murray */
@@ -94,8 +125,9 @@ static void definite(const double *matrix, double least, double *more) {
     }
 }
 
-/* H += curvature of the errors that are left, made positive definite; 1 where there is any to count */
-static int add_curvature(wbc_tick *t, const double *pull) {
+/* H += curvature of the errors that are left, with blocked joints cut off and made positive definite; 1 where there
+ * is any to count */
+static int add_curvature(wbc_tick *t, const double *free, const double *pull) {
     double size = 0.0, least = WBC_INF, largest = 0.0, scaled[NV * NV], more[NV];
     for (int k = 0; k < MT; k++) size += fabs(pull[k]) * pull_scale[k];
     for (int i = 0; i < NV; i++) {
@@ -108,22 +140,24 @@ static int add_curvature(wbc_tick *t, const double *pull) {
     double *res[1] = {t->bent};
     bend(arg, res, t->work_iw, t->work_w, 0);
     if (!all_finite(t->bent, NNZK)) return 0;
+    for (int i = 0; i < NV; i++)
+        for (int j = i + 1; j < NV; j++) t->H[i * WIDE + j] *= 1.0 - share * (1.0 - free[i] * free[j]);
     for (int e = 0; e < NNZK; e++) {
-        t->bent[e] *= share;
-        largest = fmax(largest, fabs(t->bent[e]) * dof_scale[k_row[e]] * dof_scale[k_col[e]]);
-        t->H[k_row[e] * WIDE + k_col[e]] += t->bent[e];
+        const int i = k_row[e], j = k_col[e];
+        const double bent = share * free[i] * free[j] * t->bent[e];
+        largest = fmax(largest, fabs(bent) * dof_scale[i] * dof_scale[j]);
+        t->H[i * WIDE + j] += bent;
     }
     for (int i = 0; i < NV; i++)
         for (int j = i; j < NV; j++) scaled[i * NV + j] = t->H[i * WIDE + j] * dof_scale[i] * dof_scale[j];
     definite(scaled, LEAST_PIVOT * largest, more);
     for (int i = 0; i < NV; i++) t->H[i * WIDE + i] += more[i] / (dof_scale[i] * dof_scale[i]);
-    t->prepared = 0;
     return 1;
 }
 
 /* The step that follows moving targets, as if there were no curvature: corrected until only what the linear model
  * cannot resolve either is damped */
-static int following(wbc_tick *t, const double *wanted, double *x) {
+static void following(wbc_tick *t, const double *wanted, double *x) {
     double moved[MT + 1], rest[WIDE], change[WIDE];
     solve_with(t, wanted, x);
     for (int n = 0; n < CORRECTIONS; n++) {
@@ -134,7 +168,6 @@ static int following(wbc_tick *t, const double *wanted, double *x) {
         solve_with(t, rest, change);
         for (int i = 0; i < WIDE; i++) x[i] += change[i];
     }
-    return 1;
 }
 
 /* out = H x, of whose symmetric matrix the upper triangle is stored */
@@ -153,11 +186,11 @@ static void product(const wbc_tick *t, const double *x, double *out) {
 #endif
 
 /* The gain up to which all joints can brake on the way, at most `largest` */
-static double stoppable(wbc_tick *t, const double *error, double largest) {
+static double stoppable(wbc_tick *t, const double *free, const double *error, double largest) {
     double square[MT + 1], b[WIDE], rate[WIDE], worst = 0.0;
     int limited = 0;
     for (int i = 0; i < NV; i++) limited |= brake_at[i] >= 0 && t->bound_enabled[brake_at[i]] != 0.0;
-    if (!limited || !t->prepared) return largest;
+    if (!limited) return largest;
     for (int k = 0; k < MT; k++) {
         const double gain = t->p[gain_at[k]];
         square[k] = gain * gain * error[k];
@@ -166,34 +199,37 @@ static double stoppable(wbc_tick *t, const double *error, double largest) {
     solve_with(t, b, rate);
     for (int i = 0; i < NV; i++)
         if (brake_at[i] >= 0 && t->bound_enabled[brake_at[i]] != 0.0)
-            worst = fmax(worst, fabs(rate[i]) / (BRAKING * brake_limit[i]));
+            worst = fmax(worst, free[i] * fabs(rate[i]) / (BRAKING * brake_limit[i]));
     return worst > 1.0 ? largest / sqrt(worst) : largest;
 }
 
 /* The QP of the linear model becomes the one that is solved */
 static void reach(wbc_tick *t) {
-    double error[MT + 1], slope[WIDE], largest = 0.0;
-    int curved = 0;
+    double error[MT + 1], slope[WIDE], free[NV], largest = 0.0;
     for (int k = 0; k < MT; k++) {
         const int counts = t->weight[k] * t->report.factor[k] != 0.0;
         error[k] = counts ? t->report.error[k] : 0.0;
+        if (!(fabs(error[k]) < FAR)) return;
         if (counts) largest = fmax(largest, t->p[gain_at[k]]);
     }
-    if (!(t->prepared = factor(t))) return;
-    for (int k = 0; k < MT; k++)
-        if (!(fabs(error[k]) < FAR)) return;
     gather(t, error, slope);
+    t->prepared = 1;
+    const int blocked = find_free(t, slope, free);
+    if (!(blocked ? cut_off(t, free, 0.0) : factor(t))) {
+        t->prepared = 0;
+        return;
+    }
 #if NNZK > 0
     double pull[MT + 1];
-    if (left_over(t, error, slope, pull)) {
-        if (!t->prepared) t->prepared = factor(t);
-        curved = add_curvature(t, pull);
+    if (!left_over(t, free, error, slope, pull)) return;
+    if (add_curvature(t, free, pull)) {
+        t->curved = 1;
+        t->prepared = factor(t);
+        if (!t->prepared) return;
     }
-    if (!t->prepared && !(t->prepared = factor(t))) return;
 #endif
-    t->curved = curved;
-    const double allowed = stoppable(t, error, largest);
-    if (!curved && allowed >= largest) return;
+    const double allowed = stoppable(t, free, error, largest);
+    if (!t->curved && allowed >= largest) return;
     double wanted[MT + 1], drift[MT + 1];
     int moving = 0;
     for (int k = 0; k < MT; k++) {
@@ -201,11 +237,11 @@ static void reach(wbc_tick *t) {
         wanted[k] = fmin(gain, allowed) * error[k];
         drift[k] = -t->wish[k] - gain * error[k];
         moving |= t->weight[k] * t->report.factor[k] != 0.0 && drift[k] != 0.0;
-        if (!curved) wanted[k] += drift[k];
+        if (!t->curved) wanted[k] += drift[k];
     }
     gather(t, wanted, t->g);
 #if NNZK > 0
-    if (curved && moving) {
+    if (t->curved && moving) {
         double follow[WIDE], step[WIDE];
         for (int k = 0; k < MT; k++) drift[k] = -drift[k];
         gather(t, drift, follow);
@@ -214,7 +250,7 @@ static void reach(wbc_tick *t) {
         for (int i = 0; i < NV; i++) t->g[i] -= follow[i];
     }
 #endif
-    right_side(t);
+    if (t->prepared) right_side(t);
 }
 
 #endif

@@ -14,6 +14,7 @@
  *   brake_at brake_limit   entry of bound_enabled that limits the acceleration of a velocity (-1: none), and the limit
  *   row_order   class of each general row in the order of sacrifice
  *   row_scale   its unit: the characteristic length for rows in metres
+ *   stop_at stop_q stop_low stop_high   the same for position limits, with the coordinate that is limited
  */
 #ifndef WBC_TICK_H
 #define WBC_TICK_H
