@@ -125,7 +125,8 @@ def randomise(controller: Controller, rng: np.random.Generator) -> dict[str, dic
     """Write a random value to every input, weight, mask and switch; what was written, by item."""
     written: dict[str, dict[str, Any]] = {}
     for name, block in controller.layout.blocks.items():
-        values = {slot.input.name: sample(controller.stack.robot, slot.input, rng) for slot in block.slots.values()}
+        given = [slot.input for slot in block.slots.values() if not slot.input.sensed]
+        values = {declared.name: sample(controller.stack.robot, declared, rng) for declared in given}
         rows = len(block.rows)
         if block.form == "task":
             values |= {"weight": float(10.0 ** rng.uniform(-4, 1)), "mask": rng.uniform(0.0, 2.0, rows)}
