@@ -11,17 +11,25 @@ from tests.constraints.evaluation import numeric_jacobian, probe, random_configu
 from tests.constraints.robots import NAMES, robot
 from wbc.errors import DuplicateNameError, MissingShapeError, NotFiniteError, RangeError, ShapeError, UnknownNameError
 from wbc.robot import Robot
-from wbc.shapes import Capsule, HalfSpace, PlacedShape, Sphere
+from wbc.shapes import Box, Capsule, Convex, Cylinder, HalfSpace, PlacedShape, Shape, Sphere
 from wbc.tasks.obstacle import Obstacle
 
 OBSTACLES = [Sphere(0.15), HalfSpace()]
 
 
-def coal_shape(shape: Sphere | Capsule | HalfSpace) -> object:
+def coal_shape(shape: Shape) -> object:
     if isinstance(shape, Sphere):
         return coal.Sphere(shape.radius)
     if isinstance(shape, Capsule):
         return coal.Capsule(shape.radius, shape.length)
+    if isinstance(shape, Box):
+        return coal.Box(*shape.size)
+    if isinstance(shape, Cylinder):
+        return coal.Cylinder(shape.radius, shape.length)
+    if isinstance(shape, Convex):
+        points = coal.StdVec_Vec3s()
+        points.extend(shape.points)
+        return coal.Convex.convexHull(points, True, "Qt")
     return coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0)
 
 
