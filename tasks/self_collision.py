@@ -1,0 +1,201 @@
+"""Keeping links of the robot clear of each other."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
+
+import casadi as ca
+
+from wbc import validation
+from wbc.errors import DuplicateNameError, MissingShapeError, RangeError, ShapeError
+from wbc.proximity import Body, PairSensor
+from wbc.robot.link_pairs import link_pairs as every_link_pair
+from wbc.robot.link_pairs import neighbours, shaped_links
+from wbc.symbolic.tracer import Tracer
+from wbc.tasks import _bodies as bodies
+from wbc.tasks import _gap as gap
+from wbc.tasks.base import Constraint, Input, Numbers, Order, Row, Sensor, Values
+
+if TYPE_CHECKING:
+    from wbc.robot import Robot
+
+METHODS = ("auto", "symbolic", "sensed")
+
+#: More pairs of shapes than this get no rows of their own: each is some 200 operations in every tick.
+SYMBOLIC_PAIRS = 200
+
+#: A shape of each of two links
+ShapePair = tuple[bodies.LinkShape, bodies.LinkShape]
+
+
+@dataclass(frozen=True)
+class SelfCollision(Constraint):
+    """h = (signed distance between a shape of one link and a shape of another) - margin >= 0  [m], a row a pair.
+
+    Pairs of shapes are either expressions, with a row each in every tick (sphere with sphere, capsule, box, cylinder;
+    capsule with capsule), or sensed: ``closest`` rows in all for the nearest of them, chosen before every tick. A row
+    moves only the joints between its two links.
+
+    Attributes:
+        pairs: pairs of links; None: ``robot.self_pairs``, and where that is None all pairs of links with shapes that
+            are neither welded together nor neighbours across one joint.
+        margin: initial value of the input [m].
+        closest: rows of the sensed pairs; no more than there are such pairs.
+        method: ``"auto"``: expressions where the shapes have one, if these are at most :data:`SYMBOLIC_PAIRS` pairs of
+            shapes, else all are sensed; ``"symbolic"``: expressions or an error; ``"sensed"``: all are sensed.
+
+    Inputs: ``margin`` >= 0 [m]; ``rate`` as every margin has.
+
+    The rows hold dh/dt >= -rate h, hence h(t + dt) >= (1 - rate dt) h up to the bend of the links' paths over one tick.
+    From an overlap (h < 0) they push apart at -rate h at least; where limits do not let them, the step says
+    ``relaxed``.
+
+    It cannot see what the link shapes do not cover. Shapes that are larger than the links may overlap in every
+    configuration: leave such pairs out. Pairs beyond the ``closest`` sensed ones have no row in a tick. Nearest points
+    of parallel capsules, of faces and of edges jump, and the gradient with them; see :mod:`wbc.tasks._gap`.
+
+    Example:
+        >>> SelfCollision([("left_wrist", "right_wrist"), ("left_wrist", "torso")], margin=0.02)
+
+    Raises:
+        ShapeError, RangeError, NotFiniteError, UnknownNameError, DuplicateNameError: on construction.
+        UnknownNameError, MissingShapeError, RangeError, ShapeError: in :meth:`validate`.
+    """
+
+    order: ClassVar[Order] = Order.MARGIN
+
+    pairs: tuple[tuple[str, str], ...] | None = None
+    margin: float = 0.0
+    closest: int = 8
+    method: Literal["auto", "symbolic", "sensed"] = "auto"
+
+    def __post_init__(self) -> None:
+        if self.pairs is not None:
+            object.__setattr__(self, "pairs", _checked_pairs(self.pairs))
+        object.__setattr__(self, "margin", validation.scalar("SelfCollision.margin", self.margin, low=0.0, unit="m"))
+        object.__setattr__(self, "closest", bodies.checked_count("SelfCollision.closest", self.closest))
+        validation.one_of("SelfCollision.method", self.method, METHODS)
+
+    def validate(self, robot: Robot) -> None:
+        """Check the pairs.
+
+        Raises:
+            UnknownNameError: no such frame.
+            MissingShapeError: a link without shapes, or no pair at all.
+            RangeError: links that no joint moves against each other; too many pairs for the method.
+            ShapeError: ``method="symbolic"`` and shapes without an expression.
+        """
+        available = shaped_links(robot)
+        for a, b in self.pairs or ():
+            for link in (a, b):
+                bodies.check_shaped(robot, "SelfCollision.pairs", link, available)
+            if bodies.joint_of(robot, a) == bodies.joint_of(robot, b):
+                raise RangeError("SelfCollision.pairs", (a, b), "no joint moves these links against each other")
+        pairs = self._shape_pairs(robot)
+        if not pairs:
+            raise MissingShapeError("SelfCollision.pairs", self.pairs, "no pair of links with shapes to keep apart")
+        if self.method == "symbolic":
+            self._check_symbolic(pairs)
+        bodies.check_sensed("SelfCollision.pairs", len(pairs))
+
+    def _check_symbolic(self, pairs: list[ShapePair]) -> None:
+        advice = "use method='sensed', or name fewer pairs"
+        for first, second in pairs:
+            if not _has_rows(first, second):
+                names = (bodies.label(*first[:2]), bodies.label(*second[:2]))
+                kinds = " and ".join(type(s[2].shape).__name__ for s in (first, second))
+                raise ShapeError("SelfCollision.pairs", names, f"{kinds} have no expression; {advice}")
+        if len(pairs) > SYMBOLIC_PAIRS:
+            reason = f"more than {SYMBOLIC_PAIRS} pairs of shapes for method='symbolic'; {advice}"
+            raise RangeError("SelfCollision.pairs", len(pairs), reason)
+
+    def inputs(self, robot: Robot) -> tuple[Input, ...]:
+        """``margin``."""
+        return (Input("margin", unit="m", default=self.margin, low=0.0),)
+
+    def link_pairs(self, robot: Robot) -> tuple[tuple[str, str], ...]:
+        """The pairs of links that keep clear of each other."""
+        if self.pairs is not None:
+            return self.pairs
+        if robot.self_pairs is not None:
+            joint = {name: bodies.joint_of(robot, name) for name in shaped_links(robot)}
+            return tuple((a, b) for a, b in robot.self_pairs if a in joint and b in joint and joint[a] != joint[b])
+        known = neighbours(robot)
+        return tuple(pair for pair in every_link_pair(robot) if pair not in known)
+
+    def sensed_pairs(self, robot: Robot) -> tuple[tuple[Body, Body], ...]:
+        """Pairs of shapes that a sensor measures."""
+        known: dict[str, Body] = {}
+
+        def body(shape: bodies.LinkShape) -> Body:
+            return known.setdefault(bodies.label(*shape[:2]), bodies.body(*shape))
+
+        return tuple((body(a), body(b)) for a, b in self._split(robot)[1])
+
+    def sensed_rows(self, robot: Robot) -> int:
+        """At most ``closest``."""
+        return min(self.closest, len(self._split(robot)[1]))
+
+    def sensor(self, robot: Robot, numbers: Numbers) -> Sensor:
+        """Coal, for the sensed pairs."""
+        return PairSensor(robot, self.sensed_pairs(robot), self.sensed_rows(robot), numbers)
+
+    def rows(self, robot: Robot) -> tuple[Row, ...]:
+        """``link[i] link[k]`` for shapes i and k of two links; ``closest[k]``."""
+        own = [
+            Row(f"{bodies.label(*first[:2])} {bodies.label(*second[:2])}", "m")
+            for first, second in self._split(robot)[0]
+        ]
+        return (*own, *bodies.sensed_labels(self.sensed_rows(robot)))
+
+    def margins(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
+        """See the class."""
+        rows = []
+        for (a, _, first), (b, _, second) in self._split(robot)[0]:
+            rows += gap.gaps(gap.on_link(kin, a, first), gap.on_link(kin, b, second))
+        own = kin.gaps(rows) - inputs["margin"] if rows else ca.SX(0, 1)
+        return ca.vertcat(own, bodies.sensed_margins(inputs, self.sensed_rows(robot)))
+
+    def _shape_pairs(self, robot: Robot) -> list[ShapePair]:
+        return [
+            pair
+            for a, b in self.link_pairs(robot)
+            for pair in itertools.product(bodies.shapes_of(robot, (a,)), bodies.shapes_of(robot, (b,)))
+        ]
+
+    def _split(self, robot: Robot) -> tuple[list[ShapePair], list[ShapePair]]:
+        """Pairs with a row each, and sensed ones."""
+        pairs = self._shape_pairs(robot)
+        own = [pair for pair in pairs if _has_rows(*pair)] if self.method != "sensed" else []
+        if self.method == "auto" and len(own) > SYMBOLIC_PAIRS:
+            own = []
+        chosen = {id(pair) for pair in own}
+        return own, [pair for pair in pairs if id(pair) not in chosen]
+
+
+def _has_rows(first: bodies.LinkShape, second: bodies.LinkShape) -> bool:
+    return gap.pair_rows(first[2].shape, second[2].shape) is not None
+
+
+def _checked_pairs(pairs: Any) -> tuple[tuple[str, str], ...]:
+    """Pairs of names as tuples.
+
+    Raises:
+        ShapeError: not pairs of two different names. DuplicateNameError: a pair given twice, in either order.
+    """
+    if isinstance(pairs, str) or not isinstance(pairs, Iterable):
+        raise ShapeError("SelfCollision.pairs", pairs, "expected pairs of link names")
+    out: list[tuple[str, str]] = []
+    for pair in pairs:
+        names = tuple(pair) if isinstance(pair, (list, tuple)) else ()
+        if len(names) != 2 or not all(isinstance(name, str) for name in names) or names[0] == names[1]:
+            raise ShapeError("SelfCollision.pairs", pair, "expected pairs of two different link names")
+        if names in out or names[::-1] in out:
+            raise DuplicateNameError("SelfCollision.pairs", names, "named twice")
+        out.append((names[0], names[1]))
+    if not out:
+        raise ShapeError("SelfCollision.pairs", pairs, "expected at least one pair")
+    return tuple(out)
