@@ -34,16 +34,6 @@ class SineForAngle(AxisAlign):
             return super().error(robot, kin, inputs)
 
 
-class DirectionWithoutRate(AxisAlign):
-    """A turning direction that is taken to stand still."""
-
-    abstract: ClassVar[bool] = True
-
-    def inputs(self, robot: Robot) -> tuple[Input, ...]:
-        target, feedforward = super().inputs(robot)
-        return replace(target, rate=None), feedforward
-
-
 class CameraInTheOrigin(LookAt):
     """c = p for c = p + R offset."""
 
@@ -105,7 +95,7 @@ class LagAddedTwice(Momentum):
 
 #: Check that must fail -> class in the place of the right one
 MUTATIONS: dict[str, type] = {
-    "axis: tracking": DirectionWithoutRate,
+    "axis: opposite": SineForAngle,
     "axis from a moving frame: decay": ReferenceForgotten,
     "camera: decay": CameraInTheOrigin,
     "camera from a moving frame: tracking": CameraOnlyTurns,
@@ -114,5 +104,3 @@ MUTATIONS: dict[str, type] = {
     "angular momentum": AboutTheOrigin,
     "linear momentum": LagAddedTwice,
 }
-#: The same for a stack of its own, since these are about items that stand in the one above already
-OTHER_MUTATIONS: dict[str, type] = {"axis: opposite": SineForAngle}
