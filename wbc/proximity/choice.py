@@ -67,8 +67,7 @@ class Choice:
         wanted = bounds <= self._reach
         wanted |= self._has_row
         while True:
-            scene.measure(wanted)
-            pairs = wanted.nonzero()[0]
+            pairs = scene.measure(wanted)
             score, worst = self._score(pairs)
             more = bounds <= worst
             more &= ~wanted

@@ -22,7 +22,6 @@ import pinocchio as pin
 
 # isort: split
 import coal
-from numpy.typing import NDArray
 
 from wbc.proximity.memory import Index
 from wbc.proximity.support import Supports, clearance
@@ -65,19 +64,18 @@ class Judge:
         self._bounded = np.array([HalfSpace not in pair for pair in kinds])
         self._blunt = np.array([set(pair) == {Cylinder, Sphere} for pair in kinds])
 
-    def check(self, measured: NDArray[np.bool_]) -> None:
-        """Check the pairs of a mask, just measured; those of them that fail are mended."""
+    def check(self, measured: Index) -> None:
+        """Check the pairs just measured; those of them that fail are mended."""
         scene = self.scene
         if self._marked:
             self.doubtful[measured] = False
             self._marked = bool(self.doubtful.any())
         # NaN fails every comparison
-        flags = ~(scene.results.distance > self.trust)
-        flags &= self._bounded
-        flags &= measured
+        flags = ~(scene.results.distance[measured] > self.trust)
+        flags &= self._bounded[measured]
         if not np.count_nonzero(flags):
             return
-        suspect = flags.nonzero()[0]
+        suspect = measured[flags]
         normal = scene.results.normal[suspect]
         proven = self._clearance(suspect, normal)
         holds = scene.results.distance[suspect] - proven <= self.trust

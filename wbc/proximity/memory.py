@@ -59,11 +59,11 @@ class Results:
         self.normal = _rows(self.numbers, width, 0, count, 3)
         self.point = _rows(self.numbers, width, self.place, count, 3)
 
-    def refresh(self, which: NDArray[np.bool_]) -> None:
-        """Bring the numbers up to date for the pairs of a mask; nothing to do where they are the memory itself."""
+    def refresh(self, which: Index) -> None:
+        """Bring the numbers up to date for some pairs; nothing to do where they are the memory itself."""
         if self._direct:
             return
-        for k in which.nonzero()[0].tolist():
+        for k in which.tolist():
             result = self._results[k]
             self.distance[k], self.normal[k] = result.min_distance, result.normal
             self.point[k] = result.getNearestPoint1()

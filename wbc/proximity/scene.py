@@ -18,6 +18,7 @@ from wbc.proximity import memory
 from wbc.proximity.body import Body, Pair, joint_of
 from wbc.proximity.geometry import Geometry, geometry_of
 from wbc.proximity.judge import Judge
+from wbc.proximity.memory import Index
 from wbc.shapes import HalfSpace, Shape
 from wbc.symbolic.kinematics import WORLD, frame_index
 from wbc.validation import Array
@@ -71,7 +72,7 @@ class Scene:
         self._data = self._model.createData()
         self._data.deactivateAllCollisionPairs()
         self._active, self._all_active = np.zeros(len(pairs), dtype=bool), False
-        self._everything = np.ones(len(pairs), dtype=bool)
+        self._every: Index = np.arange(len(pairs))
         self._configure(robot.characteristic_length)
         self.results = memory.Results(self._data, memory.offsets())
         self._prepare_bounds(geometries)
@@ -111,10 +112,10 @@ class Scene:
             self._bound[self._over] = height - self.radii[self._over]
         return self._bound
 
-    def measure(self, which: NDArray[np.bool_] | None) -> None:
-        """Exact distances of the pairs that the mask ``which`` names, None: of all, at the bodies' present places."""
-        wanted = self._everything if which is None else which
-        if not (which is None and self._all_active):
+    def measure(self, which: NDArray[np.bool_] | None) -> Index:
+        """Exact distances at the bodies' present places of the pairs that a mask names (None: all); their numbers."""
+        if which is not None or not self._all_active:
+            wanted = np.ones(len(self._active), dtype=bool) if which is None else which
             for k in (wanted != self._active).nonzero()[0].tolist():
                 if wanted[k]:
                     self._data.activateCollisionPair(k + 1)
@@ -122,9 +123,11 @@ class Scene:
                     self._data.deactivateCollisionPair(k + 1)
             self._active[:] = wanted
             self._all_active = which is None
+        measured: Index = self._every if which is None else which.nonzero()[0]
         pin.computeDistances(self._model, self._data)
-        self.results.refresh(wanted)
-        self._judge.check(wanted)
+        self.results.refresh(measured)
+        self._judge.check(measured)
+        return measured
 
     def _add(self, joint: int, place: pin.SE3, geometry: Geometry) -> int:
         name = str(self._model.ngeoms)
