@@ -12,7 +12,7 @@ from wbc.stack.places import brakes, gain_places, margin_places, pull_scales, ra
 from wbc.validation import Array
 
 #: As in ``native/reach.h``
-TRUSTED, AT_LIMIT, PUSHED, NEGLIGIBLE, LEAST_PIVOT, BRAKING = 2.0, 0.02, 0.01, 0.05, 1e-4, 0.5
+TRUSTED, AT_LIMIT, PUSHED, NEGLIGIBLE, LEAST_PIVOT, BRAKING = 2.0, 0.02, 0.01, 0.05, 1e-4, 1.0
 FAR, CORRECTIONS = 1e50, 2
 #: As in ``native/margins.h``
 BRAKING_MARGIN = 0.25
@@ -116,7 +116,8 @@ class Reach:
         pull = weight * (error - J @ (free * step))
         size = float((np.abs(pull) * self._pull_scale).sum())
         pivots = np.diag(np.linalg.cholesky(metric)) * self._dofs
-        share = min(size / (NEGLIGIBLE * float((pivots**2).min())) - 1.0, 1.0)
+        least = float((pivots**2).min())
+        share = min(size / (NEGLIGIBLE * least) - 1.0, 1.0)
         if not share > 0.0:
             return None
         bent = share * np.outer(free, free) * self._bend(pull)
@@ -124,7 +125,7 @@ class Reach:
             return None
         whole = share * _cut_off(H, free) + (1.0 - share) * H + bent
         scale = np.outer(self._dofs, self._dofs)
-        more_pivot = definite(whole * scale, LEAST_PIVOT * float(np.abs(bent * scale).max()))
+        more_pivot = definite(whole * scale, max(LEAST_PIVOT * float(np.abs(bent * scale).max()), least))
         return np.asarray(whole + np.diag(more_pivot / self._dofs**2))
 
     def _stoppable(

@@ -144,7 +144,7 @@ class _Builder:
         error = self.column(block, "error", item.error(robot, tracer, inputs))
         own = item.jacobian(robot, tracer, inputs)
         jacobian = tracer.jacobian(error) if own is None else tracer.expand(ca.SX(own))
-        if own is None and self.stack.calm:
+        if self.stack.calm:
             self.pulls += tracer.pulls(ca.dot(self.pull[block.span], error))
         gain = self.p[block.slots["gain"].span]
         wish = tracer.expand(-gain * error - self.drift(block, error))

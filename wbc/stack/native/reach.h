@@ -13,10 +13,11 @@
 #define PUSHED 0.01
 /* Curvature below this share of the least pivot of H does not count; it counts in full from twice of it on */
 #define NEGLIGIBLE 0.05
-/* Least pivot of H with the curvature in it, as a share of the largest entry of the curvature */
+/* Least pivot of H with the curvature in it, as a share of the largest entry of the curvature; never less than
+ * without it */
 #define LEAST_PIVOT 1e-4
 /* Share of the acceleration limits that slowing down towards the optimum may take */
-#define BRAKING 0.5
+#define BRAKING 1.0
 /* Errors beyond this are left to the linear model, before squares of them overflow */
 #define FAR 1e50
 /* Corrections of the step that follows moving targets */
@@ -150,7 +151,7 @@ static int add_curvature(wbc_tick *t, const double *free, const double *pull) {
     }
     for (int i = 0; i < NV; i++)
         for (int j = i; j < NV; j++) scaled[i * NV + j] = t->H[i * WIDE + j] * dof_scale[i] * dof_scale[j];
-    definite(scaled, LEAST_PIVOT * largest, more);
+    definite(scaled, fmax(LEAST_PIVOT * largest, least), more);
     for (int i = 0; i < NV; i++) t->H[i * WIDE + i] += more[i] / (dof_scale[i] * dof_scale[i]);
     return 1;
 }
