@@ -41,11 +41,11 @@ def robot(name: str) -> Robot:
     return limited_robot(name)
 
 
-def everything(name: str) -> Stack:
+def everything(name: str, calm: bool = True) -> Stack:
     """Every shipped task and constraint at once: for the QP itself, which need not be feasible."""
     bot, f = robot(name), FRAMES[name]
     link = next(iter(bot.shapes))
-    stack = Stack(bot, DT)
+    stack = Stack(bot, DT, calm=calm)
     stack.add(EndEffector(f.tip), name="hand")
     stack.add(EndEffector(f.tip, relative_to=f.base, axes="frame", weights=(1, 2, 3, 4, 5, 0)), name="hand_in_base")
     stack.add(EndEffector(f.tip, kind="position", relative_to=f.base, axes=f.middle), name="hand_place")
@@ -62,6 +62,11 @@ def everything(name: str) -> Stack:
     stack.add(JointLimits(margin=1e-3), name="limits")
     stack.add(Fixed(bot.joint_names[1:3]), name="fixed")
     return stack
+
+
+def linear(name: str) -> Stack:
+    """Everything, in the plain linear model."""
+    return everything(name, calm=False)
 
 
 def arm(name: str = "panda", posture: float = 1e-3, obstacle: bool = True) -> Stack:
@@ -190,7 +195,8 @@ def quarrel(controller: Controller, rng: np.random.Generator) -> None:
 
 @cache
 def _declared(builder: str, *args: Any) -> Stack:
-    return {"everything": everything, "arm": arm, "conflicts": conflicts, "humanoid": humanoid}[builder](*args)
+    builders = {"everything": everything, "linear": linear, "arm": arm, "conflicts": conflicts, "humanoid": humanoid}
+    return builders[builder](*args)
 
 
 def controller(builder: str, *args: Any, backend: str = "vm", solver: str = "daqp") -> Controller:

@@ -16,7 +16,7 @@ from wbc.tasks import CenterOfMass, Damping, Elbow, EndEffector, Obstacle, Postu
 
 def without(stack: Stack, name: str) -> Stack:
     """The same stack declared without one item."""
-    out = Stack(stack.robot, stack.dt)
+    out = Stack(stack.robot, stack.dt, calm=stack.calm)
     for entry in stack.entries:
         if entry.name != name:
             out.add(entry.item, name=entry.name, weight=entry.weight)
@@ -46,7 +46,8 @@ def same(one: QP, two: QP) -> None:
 
 @pytest.fixture(scope="module")
 def full() -> Controller:
-    return controller("everything", "panda")
+    """The linear model: there H is a sum over rows."""
+    return controller("linear", "panda")
 
 
 @pytest.mark.parametrize("name", [entry.name for entry in everything("panda").entries])

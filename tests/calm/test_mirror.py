@@ -1,0 +1,29 @@
+"""The native cycle and its numpy mirror use the same constants."""
+
+from __future__ import annotations
+
+import re
+from importlib import resources
+
+import pytest
+
+from wbc.controller import reach
+
+NAMES = ("TRUSTED", "AT_LIMIT", "PUSHED", "NEGLIGIBLE", "LEAST_PIVOT", "BRAKING", "FAR", "CORRECTIONS")
+
+
+def native(file: str, name: str) -> float:
+    text = (resources.files("wbc.stack") / "native" / file).read_text()
+    found = re.search(rf"^#define {name} (\S+)$", text, re.MULTILINE)
+    assert found is not None, name
+    return float(found.group(1))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_of_reach(name: str) -> None:
+    assert native("reach.h", name) == getattr(reach, name)
+
+
+def test_of_margins() -> None:
+    assert native("margins.h", "BRAKING_MARGIN") == reach.BRAKING_MARGIN
+    assert native("settings.h", "DEAD") == reach.DEAD

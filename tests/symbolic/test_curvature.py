@@ -1,0 +1,62 @@
+"""Curvature of the work of fixed forces and torques: against differences of what Pinocchio says they do."""
+
+from __future__ import annotations
+
+import casadi as ca
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import wbc.robots
+from wbc.symbolic.curvature import Pull, curvature
+from wbc.symbolic.kinematics import Kinematics
+from wbc.symbolic.tracer import Tracer
+
+FRAMES = {
+    "panda": "panda_hand_tcp",
+    "kinova": "j2s6s200_end_effector",
+    "talos": "gripper_left_base_link",
+    "tiago": "torso_lift_link",
+}
+STEP = 1e-6
+
+
+@pytest.mark.parametrize("kind", ["force", "torque", "mass"])
+@pytest.mark.parametrize("name", FRAMES)
+def test_against_differences(name: str, kind: str) -> None:
+    """Revolute, unbounded and prismatic joints, floating and planar bases; 1e-7 of the largest entry."""
+    robot = wbc.robots.load(name, shapes="none")
+    model, data, rng = robot.model, robot.model.createData(), np.random.default_rng(3)
+    frame = model.getFrameId(FRAMES[name])
+    q = pin.integrate(model, robot.neutral, 0.3 * rng.normal(size=robot.nv))
+    vector = rng.normal(size=3)
+
+    def torques(at: np.ndarray) -> np.ndarray:
+        pin.computeJointJacobians(model, data, at)
+        pin.updateFramePlacements(model, data)
+        jacobian = pin.getFrameJacobian(model, data, frame, pin.LOCAL_WORLD_ALIGNED)
+        rows = {"force": jacobian[:3], "torque": jacobian[3:]}
+        return (rows[kind] if kind != "mass" else pin.jacobianCenterOfMass(model, data, at)).T @ vector
+
+    columns = [
+        (torques(pin.integrate(model, q, d)) - torques(pin.integrate(model, q, -d))) / (2 * STEP)
+        for d in STEP * np.eye(robot.nv)
+    ]
+    wanted = 0.5 * (np.array(columns) + np.array(columns).T)
+    kinematics = Kinematics(model)
+    K = curvature(kinematics, [Pull(kind, FRAMES[name], ca.SX(ca.DM(vector)))])  # type: ignore[arg-type]
+    found = np.array(ca.Function("K", [kinematics.q], [K])(q))
+    assert np.abs(found - wanted).max() < 1e-7 * max(1.0, float(np.abs(wanted).max()))
+    assert np.abs(wanted).max() > 1e-3
+
+
+def test_an_expression_pulls_at_what_it_is_made_of() -> None:
+    """The second derivative of a height is that of a force straight up."""
+    robot = wbc.robots.load("panda", shapes="none")
+    kinematics = Kinematics(robot.model)
+    tracer = Tracer(kinematics)
+    height = 2.0 * tracer.position(FRAMES["panda"])[2]
+    K = curvature(kinematics, tracer.pulls(height))
+    plain = ca.hessian(2.0 * kinematics.pose(FRAMES["panda"]).position[2], kinematics.q)[0]
+    difference = ca.Function("d", [kinematics.q], [K - plain])
+    assert np.abs(np.array(difference(robot.neutral))).max() < 1e-12
