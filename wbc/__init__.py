@@ -13,17 +13,20 @@ __version__ = "0.1.0"
 from wbc import robots as robots
 from wbc import shapes as shapes
 from wbc import tasks as tasks
-from wbc.controller import Certificate, Controller, Stack, Status, Step
+from wbc.controller import Certificate, Controller, Recording, Replay, Stack, Status, Step, replay
 from wbc.errors import WbcError
 
 __all__ = [
     "Certificate",
     "Controller",
+    "Recording",
+    "Replay",
     "Stack",
     "Status",
     "Step",
     "WbcError",
     "__version__",
+    "replay",
     "robots",
     "shapes",
     "tasks",

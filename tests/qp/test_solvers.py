@@ -50,6 +50,21 @@ def test_solvers_agree_on_samples(shape, weight):
         assert np.abs(answers[0].x - quadprog_solution(qp)).max() < 1e-6
 
 
+def test_every_reset_is_as_new(name):
+    """Not only the first one: the same bits as a solver that has seen nothing."""
+    rng = np.random.default_rng(4)
+    problems = [whole_body(rng, 12, 9, 3, 6, 1e-4) for _ in range(8)]
+    used = make_solver(name, 12, 9)
+    for _ in range(3):
+        for qp in problems[:4]:
+            used.solve(qp)
+        used.reset()
+        fresh = make_solver(name, 12, 9)
+        assert [used.solve(qp).x.tobytes() for qp in problems[4:]] == [
+            fresh.solve(qp).x.tobytes() for qp in problems[4:]
+        ]
+
+
 def test_cold_and_warm_starts_agree(name):
     rng = np.random.default_rng(3)
     warm, cold = make_solver(name, 12, 9), make_solver(name, 12, 9)

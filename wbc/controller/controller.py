@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import os
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -11,6 +12,8 @@ import numpy as np
 from wbc import validation
 from wbc.controller.handle import Handle
 from wbc.controller.native import NativeTick
+from wbc.controller.recorder import Recorder
+from wbc.controller.recording import RecordingError
 from wbc.controller.report import BAD_V
 from wbc.controller.solved import SolvedTick
 from wbc.controller.step import Context, Step
@@ -63,7 +66,8 @@ class Controller:
         # of all ways to copy some hundred numbers into something immutable, the fastest
         self._snapshot = self.tick.report.data.cast("B").tobytes
         self._q_shape, self._v_shape = (layout.nq,), (layout.nv,)
-        self._busy = False
+        self._busy, self._resets = False, 0
+        self._recorder: Recorder | None = None
         #: inputs that follow the first configuration, with their items, and those of them that it still has to fill
         self._first: dict[Slot, str] = {}
         self._waiting: dict[Slot, str] = {}
@@ -135,7 +139,24 @@ class Controller:
         self._waiting = {} if configuration is not None else dict(self._first)
         self.tick.v_last[:] = velocity
         self.tick.reset()
+        self._resets += 1
         self._slow = True
+
+    def record(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Recorder:
+        """Record every tick into a file from now on, until the recorder is closed; see :func:`wbc.replay`.
+
+            with controller.record("run.npz"):
+                ...
+
+        Args:
+            overwrite: a file that is there may be replaced.
+
+        Raises:
+            RecordingError: the file is there or cannot be written, or the controller records already.
+        """
+        if self._recorder is not None:
+            raise RecordingError("path", str(path), f"the controller records into {self._recorder.path} already")
+        return Recorder(self, path, overwrite)
 
     def clone(self) -> Controller:
         """Another controller of the same compiled stack, with its own memory and this one's values and last command.
@@ -154,6 +175,12 @@ class Controller:
     def __reduce_ex__(self, protocol: Any) -> Any:
         reason = "lives in the memory of its process; pickle controller.stack, and compile it there"
         raise PicklingError("controller", self.stack.robot.name, reason)
+
+    def again(self) -> Step:
+        """A tick on the buffers as they are, which a replay has written."""
+        if self._call() < 0:
+            self._refuse(self._q.copy(), self._v_in.copy())
+        return Step(self._snapshot(), self._context)
 
     def __getitem__(self, name: str) -> Handle:
         try:

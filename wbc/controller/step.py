@@ -106,7 +106,8 @@ class Context:
         return self.layout.of_form("bounds")
 
 
-_STATUSES = (Status.SOLVED, Status.RELAXED, Status.BRAKED)
+#: By the tick's flag
+STATUSES = (Status.SOLVED, Status.RELAXED, Status.BRAKED)
 _FLOAT = np.dtype(np.float64)
 _DOUBLE = struct.Struct("d").unpack_from
 
@@ -135,7 +136,7 @@ class Step:
     @property
     def status(self) -> Status:
         """How the tick ended."""
-        return _STATUSES[int(_DOUBLE(self._data, self._context.flag_offset)[0])]
+        return STATUSES[int(_DOUBLE(self._data, self._context.flag_offset)[0])]
 
     @property
     def iterations(self) -> int:

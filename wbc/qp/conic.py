@@ -49,21 +49,29 @@ class Conic(Backend):
         if not ca.has_conic(plugin):
             raise SolverError("plugin", plugin, "this CasADi has no such plugin")
         self.name = plugin
-        # without any row the qpOASES plugin ignored the bounds of one variable: one free row of zeros stands in
-        patterns = {"h": ca.Sparsity.dense(n, n), "a": ca.Sparsity.dense(max(m, 1), n)}
-        try:
-            with quiet_stdout():
-                self._function = ca.conic("qp", plugin, patterns, {**PLUGINS[plugin], "error_on_fail": False})
-        except RuntimeError as error:
-            raise SolverError("plugin", plugin, str(error).strip().splitlines()[-1]) from error
+        self._function = self._made()
         # FunctionBuffer keeps addresses, not references: these dictionaries keep the arrays alive
         self._in = {name: np.zeros(max(1, self._function.nnz_in(name))) for name in self._function.name_in()}
         self._out = {name: np.zeros(max(1, self._function.nnz_out(name))) for name in self._function.name_out()}
         self._in["lba"][:], self._in["uba"][:] = -np.inf, np.inf
-        self.reset()
+        self._bind()
+
+    def _made(self) -> ca.Function:
+        n, m, plugin = self.n, self.m, self.name
+        # without any row the qpOASES plugin ignored the bounds of one variable: one free row of zeros stands in
+        patterns = {"h": ca.Sparsity.dense(n, n), "a": ca.Sparsity.dense(max(m, 1), n)}
+        try:
+            with quiet_stdout():
+                return ca.conic("qp", plugin, patterns, {**PLUGINS[plugin], "error_on_fail": False})
+        except RuntimeError as error:
+            raise SolverError("plugin", plugin, str(error).strip().splitlines()[-1]) from error
 
     def reset(self) -> None:
-        """Take a fresh memory object of the solver."""
+        """Make the solver anew: a function hands memory objects out again that still know their last problem."""
+        self._function = self._made()
+        self._bind()
+
+    def _bind(self) -> None:
         with quiet_stdout():  # qpOASES prints a banner whenever a solver object is made
             buffer: tuple[Any, Any] = self._function.buffer()
         self._buffer, self._call = buffer

@@ -1,0 +1,179 @@
+"""Recording what a controller is given and commands, tick by tick."""
+
+from __future__ import annotations
+
+import atexit
+import contextlib
+import functools
+import hashlib
+import json
+import logging
+import os
+import pathlib
+import pickle
+import platform
+import struct
+from importlib import metadata
+from typing import TYPE_CHECKING, Any
+
+from wbc.controller.recording import FORMAT, RecordingError, Writer
+from wbc.stack.declaration import Declaration
+
+if TYPE_CHECKING:
+    from wbc.controller.controller import Controller
+
+log = logging.getLogger("wbc")
+
+#: What a tick is a function of, besides the solver's memory of the last one; sensed inputs are in ``p``.
+INPUTS = ("q", "v_last", "v_in", "use_v", "dt", "p", "weight", "enabled", "bound_enabled")
+#: In place of a number of resets: what the solver remembers is not what was recorded
+UNKNOWN = -1
+#: The part ``reset`` of a tick
+COLD, WARM = struct.pack("d", 1.0), struct.pack("d", 0.0)
+#: Packages whose version decides the bits of a command
+PACKAGES = ("casadi", "pin", "daqp", "osqp", "numpy")
+
+
+class Recorder:
+    """Writes every tick of a controller into a file; made by :meth:`wbc.Controller.record`.
+
+        with controller.record("run.npz") as recorder:
+            ...                                             # step as usual
+        print(recorder.count)
+
+    The solver forgets its active set when a recording begins, as in a reset, so that a replay begins where the
+    recording did. Where the file can no longer be written (disk full) the controller goes on without it, one line in
+    the log says so, and :meth:`close` raises.
+
+    Attributes:
+        path: the file.
+        count: ticks so far. Refused inputs are no tick.
+    """
+
+    def __init__(self, controller: Controller, path: str | os.PathLike[str], overwrite: bool) -> None:
+        self.path = pathlib.Path(path)
+        self.count = 0
+        self._controller, self._tick = controller, controller.tick
+        views = {name: getattr(self._tick, name) for name in INPUTS}
+        sizes = {name: view.size for name, view in views.items()} | {"reset": 1, "v": controller.layout.nv, "flag": 1}
+        self._given = [view.data.cast("B") for view in views.values() if view.size]
+        # the report begins with the command and the flag
+        self._command = self._tick.report.data.cast("B")[: 8 * (controller.layout.nv + 1)]
+        pickled, problem = _pickled(controller.stack)
+        text = about(controller) | {"sizes": sizes, "not_pickled": problem}
+        self._writer: Writer | None = Writer(self.path, text, pickled, overwrite)
+        self._chunk, self._process = self._writer.chunk, os.getpid()
+        self._rows: list[bytes] = []
+        #: resets of the controller before the last tick that was recorded whole
+        self._seen = UNKNOWN
+        self._problem: OSError | None = None
+        self._call = controller._call
+        controller._call = functools.partial(_recorded, self)
+        controller._recorder = self
+        atexit.register(self._leave)
+
+    def close(self) -> None:
+        """End the recording; what is not written yet is written. More calls do nothing.
+
+        Raises:
+            RecordingError: the file could not be written.
+        """
+        atexit.unregister(self._leave)
+        self.flush()
+        if self._writer is not None:
+            try:
+                self._writer.close()
+            except OSError as error:
+                self._problem = error
+            self._detach()
+        problem, self._problem = self._problem, None
+        if problem is not None:
+            reason = f"the recording ends after {self.count} ticks: {problem.strerror}"
+            raise RecordingError("path", str(self.path), reason) from problem
+
+    def flush(self) -> None:
+        """Write the ticks that are only in memory."""
+        if self._writer is None:
+            return
+        if self._process != os.getpid():
+            # a fork has a copy of the controller, but the file is its parent's
+            self._writer.abandon()
+            self._detach()
+        elif self._rows:
+            try:
+                self._writer.write(b"".join(self._rows))
+            except OSError as error:
+                self._problem = error
+                self.count -= len(self._rows)
+                log.warning("the recording %s ends after %d ticks: %s", self.path, self.count, error.strerror)
+                self._writer.abandon()
+                self._detach()
+            self._rows.clear()
+
+    def _leave(self) -> None:
+        """At the end of a process that did not close; what could not be written is in the log already."""
+        with contextlib.suppress(RecordingError):
+            self.close()
+
+    def _detach(self) -> None:
+        self._writer = None
+        self._controller._call = self._call
+        self._controller._recorder = None
+
+    def __enter__(self) -> Recorder:
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self.close()
+
+
+def _recorded(recorder: Recorder) -> int:
+    """A tick, recorded."""
+    resets, seen = recorder._controller._resets, recorder._seen
+    if seen == UNKNOWN:
+        # the first one, or the one before was interrupted between its call and its record
+        recorder._tick.reset()
+    # joining bytes is several times as fast as copying as many numpy arrays
+    given = b"".join(recorder._given)
+    recorder._seen = UNKNOWN
+    flag = recorder._call()
+    if flag < 0:
+        recorder._seen = seen
+        return flag
+    recorder._rows.append(b"".join((given, WARM if resets == seen else COLD, recorder._command)))
+    recorder._seen = resets
+    recorder.count += 1
+    if len(recorder._rows) >= recorder._chunk:
+        recorder.flush()
+    return flag
+
+
+def about(controller: Controller) -> dict[str, Any]:
+    """What a recording says about its controller, besides the sizes of a tick's parts."""
+    from wbc import __version__
+
+    return {
+        "format": FORMAT,
+        "wbc": __version__,
+        "robot": controller.stack.robot.name,
+        "declaration": declaration_key(controller.stack),
+        "items": [[e.name, type(e.item).__name__] for e in controller.stack.entries],
+        "dt": controller.stack.dt,
+        "solver": controller.solver,
+        "backend": controller.backend,
+        "versions": {name: metadata.version(name) for name in PACKAGES},
+        "machine": f"{platform.system()} {platform.machine()}",
+    }
+
+
+def declaration_key(stack: Declaration) -> str:
+    """Hash of what the compiled code is declared by, whatever code compiles it."""
+    return hashlib.sha256(json.dumps(stack.key_data(), sort_keys=True).encode()).hexdigest()[:32]
+
+
+def _pickled(stack: Declaration) -> tuple[bytes | None, str]:
+    """The stack's pickle, or None and why there is none."""
+    try:
+        return pickle.dumps(stack, protocol=4), ""
+    except (pickle.PicklingError, AttributeError, TypeError) as error:
+        return None, str(error)

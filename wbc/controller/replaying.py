@@ -1,0 +1,175 @@
+"""The ticks of a recording again, bit for bit."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from wbc import validation
+from wbc.controller.controller import Controller
+from wbc.controller.recorder import INPUTS, about, declaration_key
+from wbc.controller.recording import Recording, RecordingError
+from wbc.controller.stack import Stack
+from wbc.controller.step import STATUSES, Step
+from wbc.controller.unpickle import load_stack
+from wbc.validation import Array
+
+
+@dataclass(frozen=True, eq=False)
+class Tick:
+    """A recorded tick and its replay.
+
+    Attributes:
+        number: from 0. recorded: the command then [nv]. status: how the tick ended then. step: what it is now.
+    """
+
+    number: int
+    recorded: Array
+    status: str
+    step: Step
+
+    @property
+    def identical(self) -> bool:
+        """Every bit of the command and the status are as recorded."""
+        return self.step.v.tobytes() == self.recorded.tobytes() and self.step.status == self.status
+
+    @property
+    def difference(self) -> float:
+        """Largest |v - v recorded| of any degree of freedom [rad/s, m/s]."""
+        return float(np.abs(self.step.v - self.recorded).max(initial=0.0))
+
+
+@dataclass(frozen=True, eq=False)
+class Replay:
+    """The outcome of a replay.
+
+    Attributes:
+        ticks: how many were replayed.
+        differing: how many are not bit-identical.
+        first: the first of those, or None.
+        worst: the tick with the largest difference, or None.
+        backend: what replayed them.
+        complete: the recording was closed properly.
+        notes: what is not as it was when the recording was made (versions, machine, back end).
+    """
+
+    ticks: int
+    differing: int
+    first: Tick | None
+    worst: Tick | None
+    backend: str
+    complete: bool
+    notes: tuple[str, ...]
+
+    @property
+    def identical(self) -> bool:
+        """No tick differs."""
+        return self.differing == 0
+
+    def __str__(self) -> str:
+        if self.first is None or self.worst is None:
+            return f"{self.ticks} ticks: every command is bit-identical"
+        text = f"{self.differing} of {self.ticks} ticks differ; the first is {_said(self.first)}"
+        return text if self.worst is self.first else f"{text}; the worst is {_said(self.worst)}"
+
+
+def replay(
+    recording: Recording | str | os.PathLike[str],
+    stack: Stack | None = None,
+    *,
+    backend: str | None = None,
+    trust: bool = False,
+    progress: Callable[[int], None] | None = None,
+) -> Replay:
+    """Do the ticks of a recording again and compare every bit of their commands.
+
+    Args:
+        recording: the file, or what was read from it.
+        stack: the declaration; default: the one in the recording.
+        backend: default: that of the recording. Another gives the same commands only up to rounding.
+        trust: see :func:`wbc.controller.unpickle.load_stack`.
+        progress: called with the number of finished ticks after each.
+
+    Raises:
+        RecordingError: damaged, of another format, version, stack or layout.
+        PicklingError: the stack in it cannot be read without ``trust``. CompileError: ``native`` without a compiler.
+    """
+    source = recording if isinstance(recording, Recording) else Recording(recording)
+    controller = compiled(source, stack, backend=backend, trust=trust)
+    count = differing = 0
+    first = worst = None
+    for tick in replayed(source, controller):
+        count += 1
+        if not tick.identical:
+            differing += 1
+            first = first or tick
+            if worst is None or tick.difference > worst.difference:
+                worst = tick
+        if progress is not None:
+            progress(count)
+    return Replay(count, differing, first, worst, controller.backend, source.complete, _notes(source, controller))
+
+
+def compiled(
+    recording: Recording, stack: Stack | None = None, *, backend: str | None = None, trust: bool = False
+) -> Controller:
+    """A controller for the ticks of a recording; arguments and errors as of :func:`replay`."""
+    from wbc import __version__
+
+    told = recording.about
+    if told["wbc"] != __version__:
+        raise RecordingError("recording", told["wbc"], f"was made by another version of wbc, this is {__version__}")
+    chosen = told["backend"] if backend is None else validation.one_of("backend", backend, ("auto", "native", "vm"))
+    if stack is None:
+        stack = _own_stack(recording, trust)
+    if declaration_key(stack) != told["declaration"]:
+        items = [[e.name, type(e.item).__name__] for e in stack.entries]
+        reason = f"is of another stack: {told['robot']} with {told['items']}, not {stack.robot.name} with {items}"
+        raise RecordingError("recording", told["declaration"], reason)
+    controller = stack.compile(solver=told["solver"], backend=chosen)
+    sizes = {name: getattr(controller.tick, name).size for name in INPUTS}
+    expected = {name: told["sizes"][name] for name in INPUTS}
+    if sizes != expected:
+        raise RecordingError("recording", expected, f"is of another layout, this version's is {sizes}")
+    return controller
+
+
+def replayed(recording: Recording, controller: Controller) -> Iterator[Tick]:
+    """The ticks of a recording one by one, each with the whole step: ``print(tick.step)`` says what bound it."""
+    tick, parts = controller.tick, recording.parts
+    buffers = [(getattr(tick, name), parts[name]) for name in INPUTS]
+    reset, v, flag = parts["reset"].start, parts["v"], parts["flag"].start
+    number = 0
+    for rows in recording.chunks():
+        for row in rows:
+            for buffer, part in buffers:
+                buffer[:] = row[part]
+            if row[reset]:
+                tick.reset()
+            yield Tick(number, row[v].copy(), STATUSES[int(row[flag])], controller.again())
+            number += 1
+
+
+def _own_stack(recording: Recording, trust: bool) -> Stack:
+    if recording.stack_pickle is None:
+        reason = f"holds no stack, which could not be pickled ({recording.about['not_pickled']}): give it"
+        raise RecordingError("recording", str(recording.path), reason)
+    stack = load_stack(recording.stack_pickle, trust=trust)
+    if not isinstance(stack, Stack):
+        raise RecordingError("recording", type(stack).__name__, "holds no Stack that compiles")
+    return stack
+
+
+def _notes(recording: Recording, controller: Controller) -> tuple[str, ...]:
+    then, now = recording.about, about(controller)
+    pairs = {name: (then["versions"][name], now["versions"][name]) for name in now["versions"]}
+    pairs |= {name: (then[name], now[name]) for name in ("backend", "machine")}
+    return tuple(f"{name} was {a}, is {b}" for name, (a, b) in pairs.items() if a != b)
+
+
+def _said(tick: Tick) -> str:
+    text = f"tick {tick.number}, by {tick.difference:.3g}"
+    return text if tick.step.status == tick.status else f"{text}, {tick.status} then, {tick.step.status} now"
