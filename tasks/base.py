@@ -114,6 +114,9 @@ class Sensor(Protocol):
     def sense(self, q: NDArray[np.float64]) -> None:
         """Write the sensed inputs for a finite configuration; called before every tick of an enabled item."""
 
+    def reset(self) -> None:
+        """Forget what was sensed before."""
+
     def pairs(self) -> tuple[tuple[str, str, float], ...]:
         """What the sensed rows were about in the last call: names of both bodies and their distance [m]."""
 

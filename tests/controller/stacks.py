@@ -69,9 +69,9 @@ def linear(name: str) -> Stack:
     return everything(name, calm=False)
 
 
-def arm(name: str = "panda", posture: float = 1e-3, obstacle: bool = True) -> Stack:
+def arm(name: str = "panda", posture: float = 1e-3, obstacle: bool = True, calm: bool = True) -> Stack:
     """A hand, a posture, joint limits and a ball: the usual stack."""
-    stack = Stack(robot(name), DT)
+    stack = Stack(robot(name), DT, calm=calm)
     stack.add(EndEffector(FRAMES[name].tip), name="hand")
     stack.add(Posture(), name="posture", weight=posture)
     stack.add(JointLimits(), name="limits")
@@ -94,10 +94,10 @@ def conflicts() -> Stack:
     return stack
 
 
-def humanoid() -> Stack:
+def humanoid(calm: bool = True) -> Stack:
     """Talos: feet held, hands and centre of mass commanded, posture, joint limits."""
     bot = robot("talos")
-    stack = Stack(bot, DT)
+    stack = Stack(bot, DT, calm=calm)
     stack.add(Hold("left_sole_link"), name="left_foot")
     stack.add(Hold("right_sole_link"), name="right_foot")
     stack.add(EndEffector("gripper_left_base_link"), name="left_hand")

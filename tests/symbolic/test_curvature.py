@@ -16,7 +16,7 @@ FRAMES = {
     "panda": "panda_hand_tcp",
     "kinova": "j2s6s200_end_effector",
     "talos": "gripper_left_base_link",
-    "tiago": "torso_lift_link",
+    "tiago": "arm_tool_link",
 }
 STEP = 1e-6
 
@@ -47,7 +47,6 @@ def test_against_differences(name: str, kind: str) -> None:
     K = curvature(kinematics, [Pull(kind, FRAMES[name], ca.SX(ca.DM(vector)))])  # type: ignore[arg-type]
     found = np.array(ca.Function("K", [kinematics.q], [K])(q))
     assert np.abs(found - wanted).max() < 1e-7 * max(1.0, float(np.abs(wanted).max()))
-    assert np.abs(wanted).max() > 1e-3
 
 
 def test_an_expression_pulls_at_what_it_is_made_of() -> None:

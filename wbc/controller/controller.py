@@ -139,6 +139,8 @@ class Controller:
         self._waiting = {} if configuration is not None else dict(self._first)
         self.tick.v_last[:] = velocity
         self.tick.reset()
+        for sensor, _ in self._sensors:
+            sensor.reset()
         self._resets += 1
         self._slow = True
 
