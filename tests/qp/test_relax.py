@@ -124,6 +124,20 @@ def test_row_of_zeros_with_an_impossible_bound():
     assert found.slack == pytest.approx([2.0])
 
 
+def test_a_row_that_holds_nearly_every_joint():
+    """A row that asks for more than the bounds give fixes all joints but one, whose part is within rounding of none."""
+    rng = np.random.default_rng(0)
+    for _ in range(200):
+        n = int(rng.integers(3, 12))
+        row, bound = rng.uniform(-1.0, 1.0, n), rng.uniform(0.2, 1.0, n)
+        row[0] = 10.0 ** rng.uniform(-9.0, -5.0)
+        ends = np.concatenate([-bound, [20.0]]), np.concatenate([bound, [np.inf]])
+        qp = QP(np.diag(rng.uniform(0.1, 2.0, n)), rng.normal(size=n), *ends, row[None])
+        answer = relax(qp, np.array([3]), rng.uniform(0.5, 3.0, 1))
+        assert answer.flag == "relaxed"
+        assert answer.slack[0] == pytest.approx(20.0 - np.abs(row) @ bound, abs=1e-4)
+
+
 def test_bad_input():
     qp = QP.checked(np.eye(1), [0.0], [-1, 0.0], [1, 0.0], [[1.0]])
     with pytest.raises(ShapeError):

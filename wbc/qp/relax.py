@@ -137,14 +137,35 @@ class Relaxation:
                 continue
             iterations += stage.iterations
             v = self._freeze(work, rows, stage)
-        last = self._final.solve(work, warm=False)
-        iterations += last.iterations
+        last, tries = self._rest(work, v)
+        iterations += tries
         flag = "relaxed" if last.solved else "failed"
         size = np.concatenate((np.ones(n), unit))
         x = np.clip(last.x if last.solved else v, work.lower[:n], work.upper[:n])
         final = Solution(x, last.multipliers / size, last.flag)
         self._meet(work, x)
         return self._answer(qp, final, flag, iterations, unit, (work.lower * size, work.upper * size))
+
+    def _rest(self, work: QP, v: Array) -> tuple[Solution, int]:
+        """The optimum over what the classes left, and the iterations; all that is held meets at v.
+
+        Where nearly every joint is held, rounding may leave nothing else: then rows held as equalities get room, and
+        at last their joints stay where they are.
+        """
+        last = self._final.solve(work, warm=False)
+        iterations, rows = last.iterations, np.flatnonzero(work.lower[self.n :] == work.upper[self.n :])
+        for room in (ROOM, np.inf):
+            if last.solved or not rows.size:
+                break
+            if room == np.inf:
+                joints = np.flatnonzero((work.A[rows] != 0.0).any(axis=0))
+                work.lower[joints] = work.upper[joints] = v[joints]
+            roomy = work.copy()
+            roomy.lower[self.n + rows] -= room
+            roomy.upper[self.n + rows] += room
+            last = self._final.solve(roomy, warm=False)
+            iterations += last.iterations
+        return last, iterations
 
     def _least_violation(self, work: QP, rows: NDArray[np.intp], v: Array) -> Solution | None:
         """(v, s) of the least |s| for ``rows``; the other rows of ``work`` are hard."""
