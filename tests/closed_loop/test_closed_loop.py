@@ -7,6 +7,7 @@ from functools import cache
 import pytest
 
 from tests.closed_loop import cases
+from tests.closed_loop.coordination_mutations import CLASSES as COORDINATION
 from tests.closed_loop.limits import GUARDS
 from tests.closed_loop.loop import Loop
 from tests.closed_loop.machines import CONSTRAINT_ROBOTS, TASK_ROBOTS
@@ -19,7 +20,7 @@ from wbc.tasks import Mechanism, registry
 def test_every_shipped_class_has_a_case() -> None:
     shipped = {cls for cls in registry().values() if cls.__module__.startswith("wbc.tasks")}
     shared = {case.cls for case in (cases.TASKS | cases.CONSTRAINTS).values()}
-    assert shipped == shared | {Mechanism} | POINTING | {guard.cls for guard in GUARDS.values()}
+    assert shipped == shared | {Mechanism} | POINTING | COORDINATION | {guard.cls for guard in GUARDS.values()}
 
 
 @pytest.mark.parametrize("name", TASK_ROBOTS)

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import cache
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
+from tests.closed_loop.eyes import cross
 from tests.tasks.robots import FRAMES
 from wbc.robot import Robot
 from wbc.tasks import Item, JointCoupling, Manipulability, RelativePose, Rolling, Wheel
@@ -35,9 +37,10 @@ def _relative_pose(robot: Robot) -> list[Declared]:
     return [(item, {}) for item in items]
 
 
-def single_joints(robot: Robot) -> list[str]:
+@cache
+def single_joints(robot: Robot) -> tuple[str, ...]:
     """Joints of one degree of freedom."""
-    return [j for j in robot.joint_names if int(robot.model.nvs[robot.model.getJointId(j)]) == 1]
+    return tuple(j for j in robot.joint_names if int(robot.model.nvs[robot.model.getJointId(j)]) == 1)
 
 
 def _joint_coupling(robot: Robot) -> list[Declared]:
@@ -75,32 +78,36 @@ def _rolling(robot: Robot) -> list[Declared]:
     ]
 
 
+@cache
+def data_of(robot: Robot) -> pin.Data:
+    """Pinocchio's workspace of a robot, which takes longer to make than to use."""
+    return robot.model.createData()
+
+
 def wheel_axis(robot: Robot, joint: str, q: np.ndarray) -> np.ndarray:
     """Axis of a joint in the world, from the motion of its body when only it turns."""
-    v = np.zeros(robot.nv)
+    v, data = np.zeros(robot.nv), data_of(robot)
     v[robot.dofs(joint)] = 1.0
-    data = robot.model.createData()
     pin.forwardKinematics(robot.model, data, q, v)
     return np.array(pin.getVelocity(robot.model, data, robot.model.getJointId(joint), pin.WORLD).angular)
 
 
 def contact(robot: Robot, wheel: Wheel, ground: pin.SE3, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """(lowest point of a wheel's rim, horizontal direction across its axis that it rolls to)."""
-    data, normal = robot.model.createData(), ground.rotation[:, 2]
-    pin.forwardKinematics(robot.model, data, q)
+    data, normal = data_of(robot), ground.rotation[:, 2]
     axis = wheel_axis(robot, wheel.joint, q)
-    up = np.cross(axis, np.cross(normal, axis))
+    up = cross(axis, cross(normal, axis))
     up = up / math.sqrt(up @ up + FLAT**2)
     centre = data.oMi[robot.model.getJointId(wheel.joint)].translation
-    return centre - wheel.radius * up, np.cross(axis, up)
+    return centre - wheel.radius * up, cross(axis, up)
 
 
 def slip(robot: Robot, wheel: Wheel, ground: pin.SE3, q: np.ndarray, v: np.ndarray) -> np.ndarray:
     """Velocity of the wheel's material point that touches the ground."""
-    data, point = robot.model.createData(), contact(robot, wheel, ground, q)[0]
+    data, point = data_of(robot), contact(robot, wheel, ground, q)[0]
     pin.forwardKinematics(robot.model, data, q, v)
     twist = pin.getVelocity(robot.model, data, robot.model.getJointId(wheel.joint), pin.WORLD)
-    return np.array(twist.linear + np.cross(twist.angular, point))
+    return np.array(twist.linear + cross(twist.angular, point))
 
 
 def rolling(item: Rolling, robot: Robot, q: np.ndarray, v: np.ndarray) -> np.ndarray:
@@ -108,7 +115,7 @@ def rolling(item: Rolling, robot: Robot, q: np.ndarray, v: np.ndarray) -> np.nda
     out, normal = [], GROUND.rotation[:, 2]
     for wheel in item.wheels:
         moved, forwards = slip(robot, wheel, GROUND, q, v), contact(robot, wheel, GROUND, q)[1]
-        sideways = np.cross(normal, forwards)
+        sideways = cross(normal, forwards)
         if wheel.roller is None:
             out += [forwards @ moved, sideways @ moved]
         else:

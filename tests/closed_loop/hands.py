@@ -1,0 +1,105 @@
+"""Closed loops of two hands on one object, on three robots with two arms; judged with Pinocchio's poses."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+import wbc.robots
+from tests.closed_loop.eyes import Array, Eyes
+from tests.closed_loop.loop import Loop
+from tests.closed_loop.subjects import Subject
+from tests.closed_loop.tasks import DT
+from wbc.robot import Robot
+from wbc.tasks import Item, RelativePose
+
+#: A humanoid, an arm on either side of a fixed torso, and two arms with unbounded joints on a mobile base
+ROBOTS = ("talos", "baxter", "pr2")
+
+#: A point of the object in the left hand's frame, away from both hands [m]
+AT = (0.1, -0.2, 0.15)
+
+
+@dataclass(frozen=True)
+class Hands:
+    """Frames of the two hands."""
+
+    left: str
+    right: str
+
+
+FRAMES = {
+    "talos": Hands("gripper_left_base_link", "gripper_right_base_link"),
+    "baxter": Hands("left_gripper", "right_gripper"),
+    "pr2": Hands("l_gripper_tool_frame", "r_gripper_tool_frame"),
+}
+
+
+class HandsLoop(Loop):
+    """A loop whose checks speak of two hands."""
+
+    @property
+    def frames(self) -> Any:
+        return FRAMES[self._known]
+
+
+def seen(eyes: Eyes, f: Hands, q: Array) -> pin.SE3:
+    """The right hand from the left."""
+    left, right = eyes.poses(q, f.left, f.right)
+    return left.actInv(right)
+
+
+def images(eyes: Eyes, f: Hands, q: Array, target: pin.SE3) -> tuple[pin.SE3, pin.SE3]:
+    """The object as each hand holds it: frames at the point, parallel when the grasp is as wanted."""
+    left, right = eyes.poses(q, f.left, f.right)
+    held = pin.SE3(np.eye(3), np.array(AT))
+    return left * held, right * target.inverse() * held
+
+
+def midway(eyes: Eyes, f: Hands, q: Array, target: pin.SE3) -> Array:
+    """From the left image to the right one, in the axes of the rotation halfway between them."""
+    a, b = images(eyes, f, q, target)
+    turn = pin.log3(a.rotation.T @ b.rotation)
+    half = pin.Quaternion(a.rotation).slerp(0.5, pin.Quaternion(b.rotation)).matrix()
+    return np.concatenate([half.T @ (b.translation - a.translation), half.T @ a.rotation @ turn])
+
+
+def apart(eyes: Eyes, f: Hands, q: Array, target: pin.SE3) -> Array:
+    return midway(eyes, f, q, target)[:3]
+
+
+def turned(eyes: Eyes, f: Hands, q: Array, target: pin.SE3) -> Array:
+    a, b = images(eyes, f, q, target)
+    return np.array(pin.log3(a.rotation.T @ b.rotation))
+
+
+def subject(kind: str, error: Any) -> Subject:
+    def declare(cls: Any, f: Any, robot: Robot) -> Item:
+        return cls(f.left, f.right, kind=kind, at=AT)
+
+    measure: Any = seen
+    return Subject(RelativePose, declare, measure, error)
+
+
+SUBJECTS: dict[str, Subject] = {
+    "object": subject("pose", midway),
+    "pivot": subject("position", apart),
+    "parallel": subject("orientation", turned),
+}
+
+
+@cache
+def robot(name: str) -> Robot:
+    return wbc.robots.load(name, shapes="none")
+
+
+def build(name: str, mutations: dict[str, Any] | None = None) -> Loop:
+    """Every form of the task, some of mutated classes."""
+    other = mutations or {}
+    f: Any = FRAMES[name]
+    items = {key: s.declare(other.get(key, s.cls), f, robot(name)) for key, s in SUBJECTS.items()}
+    return HandsLoop(robot(name), items, DT, name)
