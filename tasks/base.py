@@ -17,7 +17,7 @@ tables are derived from the expressions.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import IntEnum
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, Protocol
@@ -307,16 +307,6 @@ class Constraint(Item):
     def position_limits(self, robot: Robot) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """(lower, upper) of the coordinates that :meth:`bounds` keep within limits, nv numbers each; else +-inf."""
         return np.full(robot.nv, -np.inf), np.full(robot.nv, np.inf)
-
-
-def inner_items(item: Item) -> Iterator[Item]:
-    """An item and the items that it is made from."""
-    yield item
-    for field in dataclasses.fields(item):
-        value = getattr(item, field.name)
-        for part in value if isinstance(value, tuple) else (value,):
-            if isinstance(part, Item):
-                yield from inner_items(part)
 
 
 def registry() -> dict[str, type[Item]]:

@@ -34,7 +34,7 @@ def run(*arguments: str | Path) -> tuple[int, str, str]:
 def test_help_names_every_command() -> None:
     code, out, _ = run("--help")
     assert code == 0
-    for name in ("robots", "robot", "track", "demo", "bench"):
+    for name in ("robots", "robot", "track", "demo", "replay", "bench"):
         assert f" {name} " in out
     code, out, _ = run("track", "--help")
     assert code == 0
@@ -81,7 +81,7 @@ def test_track_leaves_a_run_folder(kind: str, tmp_path: Path) -> None:
     ball = ["--sphere", "0.5,0.3,0.5,0.1,0,-0.1,0", "--floor", "-0.5", "--plane", "swing", "--swing", "0.2"]
     code, out, err = run("track", "panda", *FAST, *ball, "--log", kind, "--output", folder)
     assert (code, err) == (0, "")
-    assert {p.name for p in folder.iterdir()} == {f"log.{kind}", "summary.json"}
+    assert {p.name for p in folder.iterdir()} == {f"log.{kind}", "summary.json", "ticks.npz"}
     log = track.load(folder)
     assert len(log) == 25
     assert set(log.meta["obstacles"]) == {"sphere1", "floor"}
@@ -180,7 +180,7 @@ def test_a_run_is_not_written_over_by_accident(tmp_path: Path) -> None:
     assert "use --force" in err
     assert (tmp_path / "log.parquet").stat().st_mtime_ns == before
     assert run("track", *FAST, "--log", "npz", "--output", tmp_path, "--force")[0] == 0
-    assert {p.name for p in tmp_path.iterdir()} == {"log.npz", "summary.json"}
+    assert {p.name for p in tmp_path.iterdir()} == {"log.npz", "summary.json", "ticks.npz"}
 
 
 def test_a_folder_that_cannot_be_made(tmp_path: Path) -> None:

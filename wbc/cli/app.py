@@ -8,11 +8,11 @@ import typer
 from typer.core import TyperGroup
 
 from wbc import __version__
-from wbc.cli import bench, demo, robots, track
+from wbc.cli import bench, demo, replay, robots, track
 from wbc.cli.console import complain
 from wbc.errors import WbcError
 
-#: Exit codes besides 0
+#: Exit codes besides 0 and the one of a replay that differs
 BAD_INPUT, INTERRUPTED = 2, 130
 
 
@@ -58,4 +58,5 @@ app.command("robots")(robots.table)
 app.command("robot")(robots.show)
 app.command("track")(track.track)
 app.command("demo")(demo.demo)
+app.command("replay")(replay.replay)
 app.command("bench", context_settings={"allow_extra_args": True, "ignore_unknown_options": True})(bench.bench)

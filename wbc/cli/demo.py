@@ -56,7 +56,8 @@ def demo(
     solver: options.Solver = "daqp",
     backend: options.Backend = "auto",
     log: options.LogFormat = "parquet",
+    record: options.Record = True,
     plots: options.Plots = True,
 ) -> None:
     """Do the main job: a Panda follows a timed path round an obstacle with its elbow plane commanded."""
-    perform(plan(duration, rate, solver, backend), Output(output, True, log, plots))
+    perform(plan(duration, rate, solver, backend), Output(output, True, log, plots, record))

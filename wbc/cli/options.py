@@ -59,4 +59,7 @@ RunFolder = Annotated[
 ]
 Force = Annotated[bool, typer.Option(help="Write into a folder that has a run.", rich_help_panel=_OUTPUT)]
 LogFormat = Annotated[str, typer.Option(help="parquet or npz.", rich_help_panel=_OUTPUT)]
+Record = Annotated[
+    bool, typer.Option(help="Record the inputs of every tick, for `wbc replay`.", rich_help_panel=_OUTPUT)
+]
 Plots = Annotated[bool, typer.Option(help="Draw the plots and the picture.", rich_help_panel=_OUTPUT)]

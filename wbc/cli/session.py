@@ -18,6 +18,8 @@ from rich.table import Table
 
 from wbc import validation
 from wbc.cli.console import err, out
+from wbc.controller import Controller
+from wbc.controller.recording import RecordingError
 from wbc.errors import WbcError
 from wbc.track.log import FORMATS, Log, save
 from wbc.track.picture import save_picture
@@ -27,6 +29,8 @@ from wbc.track.setup import Plan
 from wbc.track.summary import Figure, save_summary, summarise
 
 INTERRUPTED = 130
+#: Inputs of every tick, in the run folder
+RECORDING = "ticks.npz"
 #: Ticks between two moves of the progress bar, so that the bar costs nothing
 STRIDE = 25
 
@@ -43,6 +47,7 @@ class Output:
     force: bool = False
     log: str = "parquet"
     plots: bool = True
+    record: bool = True
 
 
 class Stopper:
@@ -95,10 +100,12 @@ def perform(plan: Plan, output: Output) -> None:
     )
     with bar:
         stage = bar.add_task("compiling", total=None)
-        log = _tracked(plan, bar, stage, stopper)
+        log = _tracked(plan, bar, stage, stopper, folder / RECORDING if output.record else None)
         with stopper.listening():
             figures = summarise(log)
             files = [save(log, folder, output.log), save_summary(figures, folder)]
+            if output.record:
+                files.append(folder / RECORDING)
             if output.plots:
                 files += _drawn(plan, log, folder, bar, stage)
     report(plan, log, figures, folder, files)
@@ -108,12 +115,17 @@ def perform(plan: Plan, output: Output) -> None:
         raise typer.Exit(INTERRUPTED)
 
 
-def _tracked(plan: Plan, bar: Progress, stage: Any, stopper: Stopper) -> Log:
+def _tracked(plan: Plan, bar: Progress, stage: Any, stopper: Stopper, recording: Path | None) -> Log:
     with contextlib.ExitStack() as stack:
 
-        def compiled(controller: object) -> None:
+        def compiled(controller: Controller) -> None:
             # From here on there is a log to write; a Ctrl-C while compiling ends the command at once
             stack.enter_context(stopper.listening())
+            if recording is not None:
+                recorder = controller.record(recording, overwrite=True)
+                # One that cannot be written to the end says so in the log; the run is worth keeping all the same
+                stack.enter_context(contextlib.suppress(RecordingError))
+                stack.enter_context(recorder)
             bar.update(stage, description=f"{plan.robot.name}: {plan.label}", total=plan.ticks)
 
         def progress(ticks: int) -> None:
@@ -144,7 +156,7 @@ def prepare(plan: Plan, output: Output) -> Path:
         raise OutputError("output", str(folder), "there is a run in this folder; choose another, or use --force")
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        for log in logs:
+        for log in (*logs, folder / RECORDING):
             log.unlink(missing_ok=True)
     except OSError as error:
         raise OutputError("output", str(folder), f"cannot be written: {error.strerror}") from error

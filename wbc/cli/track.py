@@ -43,6 +43,7 @@ def track(
     output: options.RunFolder = None,
     force: options.Force = False,
     log: options.LogFormat = "parquet",
+    record: options.Record = True,
     plots: options.Plots = True,
 ) -> None:
     """Follow a timed Cartesian path, and leave a log, plots and a summary.
@@ -73,7 +74,7 @@ def track(
         solver=solver,
         backend=backend,
     )
-    perform(plan, Output(output, force, log, plots))
+    perform(plan, Output(output, force, log, plots, record))
 
 
 def tip_frame(robot: Robot, frame: str | None) -> str:

@@ -84,7 +84,7 @@ class Recorder:
             try:
                 self._writer.close()
             except OSError as error:
-                self._problem = error
+                self._fail(error)
             self._detach()
         problem, self._problem = self._problem, None
         if problem is not None:
@@ -103,9 +103,8 @@ class Recorder:
             try:
                 self._writer.write(b"".join(self._rows))
             except OSError as error:
-                self._problem = error
                 self.count -= len(self._rows)
-                log.warning("the recording %s ends after %d ticks: %s", self.path, self.count, error.strerror)
+                self._fail(error)
                 self._writer.abandon()
                 self._detach()
             self._rows.clear()
@@ -114,6 +113,10 @@ class Recorder:
         """At the end of a process that did not close; what could not be written is in the log already."""
         with contextlib.suppress(RecordingError):
             self.close()
+
+    def _fail(self, error: OSError) -> None:
+        self._problem = error
+        log.warning("the recording %s ends after %d ticks: %s", self.path, self.count, error.strerror)
 
     def _detach(self) -> None:
         self._writer = None

@@ -9,7 +9,8 @@ from typing import Any
 from wbc import pickling, validation
 from wbc.errors import DuplicateNameError, LevelError, PicklingError, RangeError, ShapeError, UnknownNameError
 from wbc.robot import Robot
-from wbc.tasks.base import Constraint, Item, Task, inner_items
+from wbc.stack.parts import inner_items
+from wbc.tasks.base import Constraint, Item, Task
 from wbc.tasks.mechanism import Mechanism
 
 #: Default cost of velocity against a task row of weight 1, per (rad/s)^2: keeps the optimum unique.

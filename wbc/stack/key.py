@@ -14,7 +14,7 @@ from importlib import metadata
 import numpy as np
 
 from wbc.stack.declaration import Declaration
-from wbc.tasks.base import inner_items
+from wbc.stack.parts import inner_items
 
 #: Packages whose code decides what expressions and C code come out. Robots do not: their data are in the key.
 _PARTS = ("wbc.symbolic", "wbc.tasks", "wbc.stack")

@@ -1,0 +1,76 @@
+"""``wbc replay``: the ticks of a run again, bit for bit."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.markup import escape
+from rich.progress import BarColumn, Progress, TextColumn
+from rich.table import Table
+
+from wbc import controller, validation
+from wbc.cli.console import err, out
+from wbc.cli.session import RECORDING, STRIDE
+
+#: Exit code of a replay whose commands are not those of the recording
+DIFFERS = 1
+
+BACKENDS = ("as recorded", "auto", "native", "vm")
+
+
+def replay(
+    run: Annotated[Path, typer.Argument(help="A run folder of `wbc track`, or a recording.")],
+    backend: Annotated[str, typer.Option(help="native, vm, auto, or as recorded.")] = BACKENDS[0],
+    trust: Annotated[
+        bool, typer.Option("--trust", help="Run code from the recording: items and functions that are not wbc's.")
+    ] = False,
+) -> None:
+    """Do the ticks of a recording again and compare every bit of their commands.
+
+    Exit code 1 if a command differs. The stack comes from the recording, and without --trust only what this package
+    declares is read from it.
+    """
+    validation.one_of("backend", backend, BACKENDS)
+    recording = controller.Recording(run / RECORDING if run.is_dir() else run)
+    console = err()
+    bar = Progress(
+        TextColumn("replaying"),
+        BarColumn(pulse_style="cyan"),
+        TextColumn("{task.completed} ticks"),
+        console=console,
+        transient=True,
+        disable=not console.is_terminal,
+        refresh_per_second=5,
+    )
+    with bar:
+        stage = bar.add_task("ticks", total=None)
+
+        def progress(ticks: int) -> None:
+            if ticks % STRIDE == 0:
+                bar.update(stage, completed=ticks)
+
+        chosen = None if backend == BACKENDS[0] else backend
+        found = controller.replay(recording, backend=chosen, trust=trust, progress=progress)
+    report(recording, found)
+    for note in found.notes:
+        console.print(f"[yellow]note[/yellow]: {escape(note)}", soft_wrap=True)
+    if not found.complete:
+        console.print("[yellow]note[/yellow]: the recording was not closed; its last ticks may be missing")
+    if not found.identical:
+        raise typer.Exit(DIFFERS)
+
+
+def report(recording: controller.Recording, found: controller.Replay) -> None:
+    """Print what was replayed and what came of it."""
+    told = recording.about
+    table = Table(title=f"{told['robot']}: {recording.path}", title_justify="left", title_style="bold")
+    table.box, table.show_header, table.pad_edge = None, False, False
+    table.add_column(style="cyan", no_wrap=True)
+    table.add_column()
+    table.add_row("stack", escape(", ".join(f"{name} ({kind})" for name, kind in told["items"])))
+    table.add_row("recorded", f"{found.ticks} ticks, dt {told['dt']:g} s, {told['solver']} ({told['backend']})")
+    table.add_row("replayed", f"{told['solver']} ({found.backend})")
+    table.add_row("result", escape(str(found)))
+    out().print(table)
