@@ -1,0 +1,297 @@
+"""Two hands, coupled joints and manipulability: values, symmetry, singular configurations, bad input."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import wbc
+from tests.models import X, Z, arm
+from tests.models import robot as bare
+from tests.tasks.evaluate import numbers, sample, slope
+from tests.tasks.robots import FRAMES, NAMES, placement, random_configuration, robot
+from wbc.errors import DuplicateNameError, NotFiniteError, RangeError, ShapeError, UnknownNameError, WbcError
+from wbc.robot import Robot
+from wbc.symbolic.kinematics import Kinematics
+from wbc.symbolic.manipulability import FLOOR, bend, manipulability
+from wbc.tasks import EndEffector, Expression, Item, JointCoupling, Limit, Manipulability, Posture, RelativePose
+
+HAND, OTHER = "panda_hand", "panda_link4"
+
+
+def drawn(item: Item, machine: Robot, seed: int) -> tuple[np.ndarray, dict[str, Any]]:
+    rng = np.random.default_rng(seed)
+    return random_configuration(machine, rng), {d.name: sample(machine, d, rng) for d in item.inputs(machine)}
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_relative_pose_at_the_second_hand_is_its_pose_from_the_first(name: str) -> None:
+    """With the point in b's wanted origin and the axes of a, nothing is left of the difference."""
+    machine, f = robot(name), FRAMES[name]
+    ours = numbers(RelativePose(f.base, f.tip, axes=f.base), machine)
+    other = numbers(EndEffector(f.tip, relative_to=f.base), machine)
+    for seed in range(4):
+        q, values = drawn(ours.item, machine, seed)
+        values["at"] = values["target"].translation
+        given = {key: values[key] for key in ("target", "feedforward")}
+        for what in ("value", "jacobian"):
+            assert ours(q, values)[what] == pytest.approx(other(q, given)[what], abs=1e-10)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_neither_hand_is_preferred(name: str) -> None:
+    """Written from the other hand, every row and its derivative is -R_t' times what it was."""
+    machine, f = robot(name), FRAMES[name]
+    one, two = (numbers(RelativePose(*frames), machine) for frames in ((f.base, f.tip), (f.tip, f.base)))
+    for seed in range(4):
+        q, values = drawn(one.item, machine, seed)
+        target = values["target"]
+        back = {"target": target.inverse(), "at": target.actInv(values["at"]), "feedforward": np.zeros(6)}
+        turn = np.kron(np.eye(2), target.rotation.T)
+        for what in ("value", "jacobian"):
+            assert two(q, back)[what] == pytest.approx(-turn @ one(q, values)[what], abs=1e-9)
+
+
+def test_point_of_the_object_stays_while_the_rotation_is_corrected() -> None:
+    """Velocities that serve the rotation rows alone turn the hand about the point."""
+    machine = robot("talos")
+    left, right = FRAMES["talos"].tip, "gripper_right_base_link"
+    item = RelativePose(left, right)
+    q, values = drawn(item, machine, 5)
+    values["target"] = placement(machine, left, q).actInv(placement(machine, right, q))
+    rows = numbers(item, machine)(q, values)["jacobian"]
+    v = np.linalg.lstsq(rows, np.array([0.0, 0.0, 0.0, 0.3, -0.2, 0.5]), rcond=None)[0]
+    grasp = values["target"].actInv(values["at"])
+
+    def apart(time: float) -> np.ndarray:
+        moved = pin.integrate(machine.model, q, time * v)
+        return placement(machine, left, moved).actInv(placement(machine, right, moved).act(grasp)) - values["at"]
+
+    assert slope(apart) == pytest.approx(np.zeros(3), abs=1e-8)
+
+
+def test_default_point_is_halfway_between_the_hands_and_may_be_declared() -> None:
+    machine, q = robot("panda"), drawn(Posture(), robot("panda"), 1)[0]
+    item = RelativePose(OTHER, HAND)
+    initial = item.initial(machine, q)
+    between = (placement(machine, OTHER, q).translation + placement(machine, HAND, q).translation) / 2
+    assert placement(machine, OTHER, q).act(initial["at"]) == pytest.approx(between, abs=1e-12)
+    fixed = replace(item, at=(1, 2, 3))
+    assert [d.default for d in fixed.inputs(machine) if d.name == "at"] == [(1.0, 2.0, 3.0)]
+    assert fixed.declaration(machine) == item.declaration(machine)
+
+
+def test_coupling_of_unbounded_joints_is_an_angle() -> None:
+    machine = robot("kinova")
+    a, b = "j2s6s200_joint_1", "j2s6s200_joint_2"
+    item = JointCoupling([{a: 2, b: -0.5}, {b: 1}])
+    found = numbers(item, machine)
+    for turn in (-2.9, 0.4, 2.9):
+        q = machine.neutral.copy()
+        q[0:2], q[2] = (np.cos(turn), np.sin(turn)), 7.0
+        e = found(q, {"target": np.array([1.0, 1.0]), "feedforward": np.zeros(2)})
+        plain = 2 * turn - 0.5 * 7.0 - 1.0
+        assert e["value"][0] == pytest.approx(np.arctan2(np.sin(plain), np.cos(plain)), abs=1e-12)
+        assert e["value"][1] == pytest.approx(6.0, abs=1e-12)
+        assert e["jacobian"] == pytest.approx(np.array([[2, -0.5, 0, 0, 0, 0], [0, 1, 0, 0, 0, 0]]), abs=1e-12)
+    assert [(row.label, row.unit) for row in item.rows(machine)] == [(f"2 {a} - 0.5 {b}", "rad"), (b, "rad")]
+
+
+def test_coupling_starts_where_it_is_told() -> None:
+    machine = robot("panda")
+    relation = {"panda_joint1": 1, "panda_joint2": -2}
+    q = drawn(Posture(), machine, 2)[0]
+    assert JointCoupling(relation).inputs(machine)[0].default == (0.0,)
+    assert JointCoupling([relation, relation], target=(1, 2)).inputs(machine)[0].default == (1.0, 2.0)
+    staying = JointCoupling(relation, target=None)
+    assert staying.inputs(machine)[0].default is None
+    assert staying.initial(machine, q)["target"] == pytest.approx([q[0] - 2 * q[1]], abs=1e-12)
+    assert replace(staying, target=3.0) == JointCoupling(relation, target=3.0)
+
+
+def plain(machine: Robot, frame: str, q: np.ndarray, rows: slice, length: float) -> float:
+    """Yoshikawa's measure from Pinocchio's Jacobian, without a floor."""
+    data = machine.model.createData()
+    number = machine.model.getFrameId(frame)
+    jacobian = pin.computeFrameJacobian(machine.model, data, q, number, pin.LOCAL_WORLD_ALIGNED).copy()
+    jacobian[:3] /= length
+    return float(np.sqrt(np.linalg.det(jacobian[rows] @ jacobian[rows].T)))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_measure_is_yoshikawas(name: str) -> None:
+    machine, f = robot(name), FRAMES[name]
+    rows = {"pose": slice(0, 6), "position": slice(0, 3), "orientation": slice(3, 6)}
+    for kind, chosen in rows.items():
+        item = Manipulability(f.tip, kind=kind, length=0.4)  # type: ignore[arg-type]
+        for seed in range(3):
+            q = random_configuration(machine, np.random.default_rng(seed))
+            wanted = plain(machine, f.tip, q, chosen, 0.4)
+            assert item.value(machine, q) == pytest.approx(wanted, rel=1e-3, abs=1e-4)
+            found = numbers(item, machine)(q, {"target": 1.0, "feedforward": 0.0})["value"][0]
+            assert found + 1.0 == pytest.approx(item.value(machine, q), rel=1e-10)
+
+
+def test_singular_configurations_have_a_value_and_no_slope() -> None:
+    """Stretched out, wrist aligned, and every column the same: no NaN, and the floor."""
+    machine = arm("planar", [(Z, (1.0, 0.0, 0.0)), (Z, (1.0, 0.0, 0.0))])
+    item = Manipulability("tip", along=("x", "y"), length=1.0)
+    for form in ("linear", "log"):
+        found = numbers(replace(item, form=form), machine)
+        stretched = found(np.zeros(2), {"target": 0.5, "feedforward": 0.0})
+        w = np.sqrt(5.0 + FLOOR**2) * FLOOR
+        assert stretched["value"][0] == pytest.approx(np.log(w / 0.5) if form == "log" else w - 0.5, rel=1e-9)
+        assert stretched["jacobian"] == pytest.approx(np.zeros((1, 2)), abs=1e-9)
+        beside = found(np.array([0.0, 1e-3]), {"target": 0.5, "feedforward": 0.0})
+        assert np.isfinite(beside["jacobian"]).all()
+    for q2 in (0.3, 1.2, -2.0):
+        assert item.value(machine, np.array([0.7, q2])) == pytest.approx(abs(np.sin(q2)), rel=1e-3)
+
+
+def odd_robot() -> Robot:
+    """A chain of joints whose motion is not constant in their child."""
+    model, place = pin.Model(), pin.SE3(pin.exp3(np.array([0.1, 0.2, 0.3])), np.array([0.1, 0.3, 0.2]))
+    composite = pin.JointModelComposite(pin.JointModelRX(), place)
+    composite.addJoint(pin.JointModelPZ(), place)
+    composite.addJoint(pin.JointModelRY(), place)
+    universal = pin.JointModelUniversal(np.array(X), np.array([0.0, 1.0, 0.0]))
+    joints = [pin.JointModelSphericalZYX(), universal, pin.JointModelSpherical(), composite, pin.JointModelPlanar()]
+    last = 0
+    for k, joint in enumerate(joints):
+        last = model.addJoint(last, joint, place, f"joint{k}")
+        model.addFrame(pin.Frame(f"frame{k}", last, 0, place, pin.FrameType.OP_FRAME))
+    return bare("odd", model)
+
+
+@pytest.mark.parametrize(("frame", "base"), [("frame4", "world"), ("frame4", "frame1"), ("frame1", "frame4")])
+@pytest.mark.parametrize("along", [("x", "y", "z"), ("y", "rx")])
+def test_slope_on_joints_of_every_kind(frame: str, base: str, along: tuple[str, ...]) -> None:
+    machine = odd_robot()
+    item = Manipulability(frame, along=along, relative_to=base, length=0.5)
+    found = numbers(item, machine)
+    for seed in range(2):
+        rng = np.random.default_rng(seed)
+        q = pin.integrate(machine.model, machine.neutral, rng.uniform(-1, 1, machine.nv))
+        direction = rng.uniform(-1, 1, machine.nv)
+        row = found(q, {"target": 1.0, "feedforward": 0.0})["jacobian"]
+        along_it = slope(lambda t, q=q, d=direction: item.value(machine, pin.integrate(machine.model, q, t * d)))
+        assert float(row[0] @ direction) == pytest.approx(along_it, rel=1e-6, abs=1e-7)
+
+
+def test_slope_costs_less_than_automatic_differentiation() -> None:
+    kinematics = Kinematics(robot("talos").model)
+    tip = FRAMES["talos"].tip
+    w, row = manipulability(kinematics, tip, "torso_2_link", range(6), 1.0)
+    counts = [
+        ca.Function("w", [kinematics.q], ca.cse([w, slopes])).n_instructions()
+        for slopes in (row, kinematics.derivative(w))
+    ]
+    assert counts[0] < 1700
+    assert counts[0] < 0.75 * counts[1]
+    bound = ca.diag(bend(kinematics, tip, "torso_2_link", 2.0))
+    assert np.count_nonzero(np.array(ca.DM(bound))) == 7
+
+
+def test_manipulability_in_a_limit_and_in_an_expression() -> None:
+    machine, tip = wbc.robots.load("panda", shapes="none"), "panda_hand_tcp"
+    item = Manipulability(tip, kind="position")
+    stack = wbc.Stack(machine, 0.01)
+    own = Expression(
+        lambda kin, p: kin.manipulability(tip, "world", (0, 1, 2), machine.characteristic_length), units="1"
+    )
+    stack.add(Limit(item, lower=0.1), name="agile").add(own, name="own").add(EndEffector(tip, kind="position"))
+    controller = stack.compile(backend="vm")
+    controller["agile"].target, controller["own"].enabled = FLOOR**3, False
+    controller.reset(machine.neutral)
+    goal = controller["end_effector"].target + np.array([0.6, 0.0, 0.2])
+
+    def least(guarded: bool) -> float:
+        controller["agile"].enabled, q = guarded, machine.neutral
+        controller.reset(q)
+        controller["end_effector"].target = goal
+        found = np.inf
+        for _ in range(300):
+            q = pin.integrate(machine.model, q, controller.step(q).v * 0.01)
+            found = min(found, item.value(machine, q))
+        return float(found)
+
+    assert least(guarded=False) < 0.08
+    assert 0.0999 < least(guarded=True) < 0.103
+    q = random_configuration(machine, np.random.default_rng(4))
+    assert numbers(own, machine)(q, {})["value"][0] == pytest.approx(item.value(machine, q), rel=1e-10)
+
+
+CASES: dict[str, tuple[Callable[[], Item], type[WbcError], str]] = {
+    "hand": (lambda: RelativePose("panda_hnd", OTHER), UnknownNameError, "RelativePose.frame_a"),
+    "other hand": (lambda: RelativePose(HAND, "panda_lnk4"), UnknownNameError, "'panda_link4'"),
+    "welded": (lambda: RelativePose(HAND, "panda_link7"), RangeError, "no joint moves this frame"),
+    "same": (lambda: RelativePose(HAND, HAND), RangeError, "RelativePose.frame_b"),
+    "kind": (lambda: RelativePose(HAND, OTHER, kind="poses"), UnknownNameError, "'pose'"),
+    "axes": (lambda: RelativePose(HAND, OTHER, axes="midwy"), UnknownNameError, "'midway'"),
+    "at": (lambda: RelativePose(HAND, OTHER, at=(1, 2)), ShapeError, "RelativePose.at"),
+    "at NaN": (lambda: RelativePose(HAND, OTHER, at=(1, 2, np.nan)), NotFiniteError, "RelativePose.at"),
+    "weights": (lambda: RelativePose(HAND, OTHER, kind="position", weights=(1,) * 6), ShapeError, "3 numbers"),
+    "negative": (lambda: RelativePose(HAND, OTHER, weights=(1, 1, 1, 1, 1, -1)), RangeError, "weights[5]"),
+    "no relation": (lambda: JointCoupling([]), ShapeError, "JointCoupling.coefficients"),
+    "text": (lambda: JointCoupling("panda_joint1"), ShapeError, "JointCoupling.coefficients"),
+    "names": (lambda: JointCoupling(["panda_joint1", "panda_joint2"]), ShapeError, "coefficients[0]"),
+    "joint": (lambda: JointCoupling({"panda_jont1": 1}), UnknownNameError, "'panda_joint1'"),
+    "zero": (lambda: JointCoupling({"panda_joint1": 0}), RangeError, "other than 0"),
+    "empty": (lambda: JointCoupling([{"panda_joint1": 1}, {}]), RangeError, "coefficients[1]"),
+    "coefficient": (lambda: JointCoupling({"panda_joint1": np.inf}), NotFiniteError, "'panda_joint1'"),
+    "targets": (lambda: JointCoupling({"panda_joint1": 1}, target=(1, 2)), ShapeError, "JointCoupling.target"),
+    "coupling weights": (lambda: JointCoupling({"panda_joint1": 1}, weights=(1, 2)), ShapeError, "1 numbers"),
+    "frame": (lambda: Manipulability("panda_hnd"), UnknownNameError, HAND),
+    "from": (lambda: Manipulability(HAND, relative_to="wrld"), UnknownNameError, "'world'"),
+    "fixed": (lambda: Manipulability("panda_link0"), RangeError, "no joint moves"),
+    "few joints": (lambda: Manipulability("panda_link4"), RangeError, "choose fewer with along="),
+    "flat": (lambda: Manipulability("panda_link2", kind="orientation"), RangeError, "rx, ry, rz"),
+    "measure": (lambda: Manipulability(HAND, kind="velocity"), UnknownNameError, "Manipulability.kind"),
+    "form": (lambda: Manipulability(HAND, form="logarithm"), UnknownNameError, "'log'"),
+    "row": (lambda: Manipulability(HAND, along=("x", "w")), UnknownNameError, "Manipulability.along"),
+    "rows": (lambda: Manipulability(HAND, along=()), ShapeError, "Manipulability.along"),
+    "twice": (lambda: Manipulability(HAND, along=("x", "x")), DuplicateNameError, "twice"),
+    "length": (lambda: Manipulability(HAND, length=0), RangeError, "Manipulability.length"),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_bad_declaration_leaves_the_stack_as_it_was(case: str) -> None:
+    make, error, text = CASES[case]
+    stack = wbc.Stack(robot("panda"), 0.01)
+    entries = stack.entries
+    with pytest.raises(WbcError) as caught:
+        stack.add(make())
+    assert type(caught.value) is error
+    assert text in str(caught.value)
+    assert stack.entries == entries
+
+
+def test_joints_that_no_relation_can_have() -> None:
+    uneven = JointCoupling({"j2s6s200_joint_1": 0.5, "j2s6s200_joint_2": 1})
+    with pytest.raises(RangeError, match="must be whole"):
+        uneven.validate(robot("kinova"))
+    with pytest.raises(UnknownNameError, match="root_joint"):
+        JointCoupling({"root_joint": 1}).validate(robot("talos"))
+
+
+def test_bad_targets_change_nothing() -> None:
+    machine = robot("panda")
+    stack = wbc.Stack(machine, 0.01).add(Manipulability(HAND), name="w").add(RelativePose(OTHER, HAND), name="both")
+    controller = stack.compile(backend="vm")
+    controller.reset(machine.neutral)
+    before = controller["w"].target
+    for bad, error in ((0.0, RangeError), (-1.0, RangeError), (np.nan, NotFiniteError), ([1, 2], ShapeError)):
+        with pytest.raises(error, match=r"w\.target"):
+            controller["w"].target = bad
+    assert controller["w"].target == before
+    at = controller["both"].at.copy()
+    with pytest.raises(ShapeError, match=r"both\.at"):
+        controller["both"].at = (1, 2)
+    assert controller["both"].at.tolist() == at.tolist()
