@@ -26,10 +26,11 @@ from wbc.errors import PicklingError
 from wbc.robot import Coupling, Robot
 from wbc.shapes import Convex, PlacedShape, Sphere
 from wbc.stack.key import key
-from wbc.tasks import Expression, Item, Limit, Obstacle, Posture, registry
+from wbc.tasks import Expression, Item, Limit, Obstacle, Posture
 
 TOP = Path(__file__).parents[2]
-SHIPPED = sorted(name for name, cls in registry().items() if cls.__module__.startswith("wbc."))
+#: Held to be all of the registry by the walk over derivatives
+SHIPPED = sorted(FACTORIES)
 TETRAHEDRON = np.array([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, 0.1]])
 
 
