@@ -87,7 +87,7 @@ def side_margins(value: ca.SX, inputs: Values, factor: ca.SX | None = None) -> c
     lower, upper = (inputs.get(name) for name in ("lower", "upper"))
     if factor is None:
         plain = ([] if lower is None else [value - lower]) + ([] if upper is None else [upper - value])
-        return ca.vertcat(*plain)
+        return ca.SX(ca.vertcat(*plain))
     low = -ca.SX.inf(count) if lower is None else lower
     high = ca.SX.inf(count) if upper is None else upper
     margins: list[ca.SX] = []

@@ -108,7 +108,8 @@ class WorkspacePolyhedron(Constraint):
         """The formula of the class."""
         walls: Pose = inputs["pose"]
         point = walls.inverse_point(point_in(kin, self.frame, self.offset, self.relative_to))
-        return rot.constant(np.array(self.normals)) @ point - inputs["offsets"]
+        offsets: ca.SX = inputs["offsets"]
+        return rot.constant(np.array(self.normals)) @ point - offsets
 
 
 def _normals(field: str, value: Any) -> tuple[Triple, ...]:
