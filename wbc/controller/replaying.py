@@ -137,8 +137,13 @@ def compiled(
     return controller
 
 
-def replayed(recording: Recording, controller: Controller) -> Iterator[Tick]:
-    """The ticks of a recording one by one, each with the whole step: ``print(tick.step)`` says what bound it."""
+def replayed(recording: Recording, controller: Controller | None = None) -> Iterator[Tick]:
+    """The ticks of a recording one by one, each with the whole step: ``print(tick.step)`` says what bound it.
+
+    Args:
+        controller: whose buffers are used, see :func:`compiled`; default: one of the stack in the recording.
+    """
+    controller = compiled(recording) if controller is None else controller
     tick, parts = controller.tick, recording.parts
     buffers = [(getattr(tick, name), parts[name]) for name in INPUTS]
     reset, v, flag = parts["reset"].start, parts["v"], parts["flag"].start
