@@ -9,7 +9,7 @@ import pytest
 
 from wbc.controller import reach
 
-NAMES = ("TRUSTED", "AT_LIMIT", "PUSHED", "NEGLIGIBLE", "LEAST_PIVOT", "BRAKING", "FAR", "CORRECTIONS")
+NAMES = ("TRUSTED", "AT_LIMIT", "PUSHED", "NEGLIGIBLE", "LEAST_PIVOT", "BRAKING", "REMOVED", "FAR", "CORRECTIONS")
 
 
 def native(file: str, name: str) -> float:

@@ -9,11 +9,12 @@ import numpy as np
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Layout
 from wbc.stack.places import brakes, gain_places, margin_places, pull_scales, rate_places, stops
+from wbc.stack.program import Program
 from wbc.validation import Array
 
 #: As in ``native/reach.h``
 TRUSTED, AT_LIMIT, PUSHED, NEGLIGIBLE, LEAST_PIVOT, BRAKING = 2.0, 0.02, 0.01, 0.05, 1e-4, 1.0
-FAR, CORRECTIONS = 1e50, 2
+REMOVED, FAR, CORRECTIONS = 0.02, 1e50, 2
 #: As in ``native/margins.h``
 BRAKING_MARGIN = 0.25
 #: Squared length of a row that v cannot move, as in ``native/settings.h``
@@ -27,10 +28,12 @@ class Reach:
         bend: weights of the task rows -> curvature (nv x nv, symmetric); None: no task bends.
     """
 
-    def __init__(self, stack: Declaration, layout: Layout, bend: Callable[[Array], Array] | None) -> None:
+    def __init__(
+        self, stack: Declaration, layout: Layout, program: Program, bend: Callable[[Array], Array] | None
+    ) -> None:
         self._bend = bend
         self._gain_at = np.array(gain_places(layout), dtype=np.intp)
-        self._pull_scale = np.array(pull_scales(stack, layout))
+        self._pull_scale = np.array(pull_scales(stack, layout, program))
         self._dofs = layout.dof_scales(stack)
         self._damping = stack.damping / self._dofs**2
         places, self._brake_limit = brakes(stack, layout)
@@ -114,19 +117,20 @@ class Reach:
             more = float(np.abs(slope * self._dofs).max()) / TRUSTED * (1.0 - TRUSTED / length)
             step = np.linalg.solve(metric + np.diag(more / self._dofs**2), slope)
         pull = weight * (error - J @ (free * step))
-        size = float((np.abs(pull) * self._pull_scale).sum())
+        size, whole = (float((np.abs(x) * self._pull_scale).sum()) for x in (pull, weight * error))
         pivots = np.diag(np.linalg.cholesky(metric)) * self._dofs
         least = float((pivots**2).min())
-        share = min(size / (NEGLIGIBLE * least) - 1.0, 1.0)
+        share = float(np.clip(size / (NEGLIGIBLE * least) - 1.0, 0.0, 1.0))
+        share *= float(np.clip(size / (REMOVED * whole + np.finfo(float).tiny) - 1.0, 0.0, 1.0))
         if not share > 0.0:
             return None
         bent = share * np.outer(free, free) * self._bend(pull)
         if not np.isfinite(bent).all():
             return None
-        whole = share * _cut_off(H, free) + (1.0 - share) * H + bent
+        mixed = share * _cut_off(H, free) + (1.0 - share) * H + bent
         scale = np.outer(self._dofs, self._dofs)
-        more_pivot = definite(whole * scale, max(LEAST_PIVOT * float(np.abs(bent * scale).max()), least))
-        return np.asarray(whole + np.diag(more_pivot / self._dofs**2))
+        more_pivot = definite(mixed * scale, max(LEAST_PIVOT * float(np.abs(bent * scale).max()), least))
+        return np.asarray(mixed + np.diag(more_pivot / self._dofs**2))
 
     def _stoppable(
         self, metric: Array, J: Array, wanted: Array, largest: float, free: Array, bound_enabled: Array

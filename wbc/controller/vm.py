@@ -56,7 +56,7 @@ class VmAssembly(Assembly):
         if program.ahead is not None:
             self._ahead = _Call(program.ahead, [self._q, self._command, self._p, self.dt], [self._later])
         self._pull = _room(tasks)
-        self._reach = Reach(stack, layout, self._bender(program, arguments)) if stack.calm else None
+        self._reach = Reach(stack, layout, program, self._bender(program, arguments)) if stack.calm else None
         jt, at = function.sparsity_out("jt"), function.sparsity_out("at")
         self._j_index = (np.repeat(np.arange(tasks), np.diff(jt.colind())), np.array(jt.row(), dtype=np.intp))
         self._a_index = (np.repeat(np.arange(rows), np.diff(at.colind())), np.array(at.row(), dtype=np.intp))

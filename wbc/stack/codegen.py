@@ -78,7 +78,7 @@ def _header(stack: Declaration, layout: Layout, program: Program) -> str:
         _table("int", "margin_at", margin_places(layout)),
         _table("int", "rate_at", rate_places(layout)),
         _table("int", "gain_at", gain_places(layout)),
-        _table("double", "pull_scale", pull_scales(stack, layout)),
+        _table("double", "pull_scale", pull_scales(stack, layout, program)),
         _table("int", "brake_at", brake_at),
         _table("double", "brake_limit", np.where(np.isfinite(brake_limit), brake_limit, 0.0)),
         _table("int", "stop_at", stop_at),

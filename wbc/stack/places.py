@@ -6,6 +6,7 @@ import numpy as np
 
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Layout
+from wbc.stack.program import Program
 from wbc.tasks.base import Constraint
 
 
@@ -14,10 +15,16 @@ def gain_places(layout: Layout) -> list[int]:
     return [b.slots["gain"].start for b in layout.of_form("task") for _ in b.rows]
 
 
-def pull_scales(stack: Declaration, layout: Layout) -> list[float]:
-    """How much curvature a task row of unit weighted error may have: its lever for metres, else 1."""
+def pull_scales(stack: Declaration, layout: Layout, program: Program) -> list[float]:
+    """How much curvature a task row of unit weighted error may have: its lever for metres, else 1; 0 for rows that
+    do not bend.
+    """
     rows = [r for b in layout.of_form("task") for r in b.rows]
-    return [2.0 * stack.length if r.unit.split("/")[0] == "m" else 1.0 for r in rows]
+    if program.bend is None:
+        return [0.0] * len(rows)
+    bending = np.diff(program.bend.jac_sparsity(0, 4).colind()) > 0
+    scales = [2.0 * stack.length if r.unit.split("/")[0] == "m" else 1.0 for r in rows]
+    return [scale * float(bends) for scale, bends in zip(scales, bending, strict=True)]
 
 
 def brakes(stack: Declaration, layout: Layout) -> tuple[list[int], np.ndarray]:

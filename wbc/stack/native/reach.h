@@ -11,6 +11,8 @@
 #define AT_LIMIT 0.02
 /* Slopes above this share of the steepest one push in full */
 #define PUSHED 0.01
+/* Up to this share, what is left of an error is as good as removed; from twice of it on it counts in full */
+#define REMOVED 0.02
 /* Curvature below this share of the least pivot of H does not count; it counts in full from twice of it on */
 #define NEGLIGIBLE 0.05
 /* Least pivot of H with the curvature in it, as a share of the largest entry of the curvature; never less than
@@ -128,14 +130,18 @@ static void definite(const double *matrix, double least, double *more) {
 
 /* H += curvature of the errors that are left, with blocked joints cut off and made positive definite; 1 where there
  * is any to count */
-static int add_curvature(wbc_tick *t, const double *free, const double *pull) {
-    double size = 0.0, least = WBC_INF, largest = 0.0, scaled[NV * NV], more[NV];
-    for (int k = 0; k < MT; k++) size += fabs(pull[k]) * pull_scale[k];
+static int add_curvature(wbc_tick *t, const double *free, const double *error, const double *pull) {
+    double size = 0.0, whole = 0.0, least = WBC_INF, largest = 0.0, scaled[NV * NV], more[NV];
+    for (int k = 0; k < MT; k++) {
+        size += fabs(pull[k]) * pull_scale[k];
+        whole += fabs(t->weight[k] * t->report.factor[k] * error[k]) * pull_scale[k];
+    }
     for (int i = 0; i < NV; i++) {
         const double pivot = dof_scale[i] / t->inverse_diagonal[i];
         least = fmin(least, pivot * pivot);
     }
-    const double share = fmin(size / (NEGLIGIBLE * least) - 1.0, 1.0);
+    const double counts = clamp(size / (NEGLIGIBLE * least) - 1.0, 0.0, 1.0);
+    const double share = counts * clamp(size / (REMOVED * whole + DBL_MIN) - 1.0, 0.0, 1.0);
     if (!(share > 0.0)) return 0;
     const double *arg[5] = {t->q, t->v_last, t->p, &t->dt, pull};
     double *res[1] = {t->bent};
@@ -223,7 +229,7 @@ static void reach(wbc_tick *t) {
 #if NNZK > 0
     double pull[MT + 1];
     if (!left_over(t, free, error, slope, pull)) return;
-    if (add_curvature(t, free, pull)) {
+    if (add_curvature(t, free, error, pull)) {
         t->curved = 1;
         t->prepared = factor(t);
         if (!t->prepared) return;
