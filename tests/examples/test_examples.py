@@ -62,6 +62,18 @@ def test_humanoid_reaches_on_held_feet() -> None:
     assert number("left foot moved # um", text) < 1.0
 
 
+def test_dual_arm_carries_the_box() -> None:
+    text = output("dual_arm")
+    assert number("solved: box # mm", text) < 1.0
+    assert number("slipped # mm", text) < 0.5
+
+
+def test_mobile_base_rolls_to_where_the_hand_reaches() -> None:
+    text = output("mobile_base")
+    assert number("solved: hand # mm", text) < 0.5
+    assert number("and # m and turned", text) < -0.8
+
+
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda p: p.stem)
 def test_examples_are_short_and_use_public_names(path: Path) -> None:
     text = path.read_text()
