@@ -1,16 +1,19 @@
 """Robots by name, from files, from models and from Denavit-Hartenberg rows."""
 
 from wbc.robot.collision_pairs import LinkPair, SelfPairs
+from wbc.robot.convex_parts import ConvexParts
 from wbc.robot.dh import DHRow
-from wbc.robot.geometry import fit_shapes
+from wbc.robot.geometry import convex_parts, fit_shapes
 from wbc.robot.pairs_file import read_self_pairs, save_self_pairs
 from wbc.robots.catalogue import from_dh, load, names, table
 from wbc.robots.pairs import find_self_pairs
 
 __all__ = [
+    "ConvexParts",
     "DHRow",
     "LinkPair",
     "SelfPairs",
+    "convex_parts",
     "find_self_pairs",
     "fit_shapes",
     "from_dh",

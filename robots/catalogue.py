@@ -65,8 +65,10 @@ def load(
         name: of the robot; default: the table's, the file's stem, or the model's.
         neutral: joint -> value [rad or m], on top of the table's neutral configuration.
         shapes: ``auto`` (the table's spheres and capsules, else ``description``), ``description`` (primitives of
-            the file; meshes are skipped and named in the notes), ``fit`` (also a capsule around every mesh; about
-            0.2 s for one of some hundred vertices), ``none``.
+            the file, boxes and cylinders as capsules; meshes are skipped and named in the notes), ``exact`` (the
+            same, boxes and cylinders as they are), ``fit`` (also a capsule around every mesh; about 0.2 s for one
+            of some hundred vertices), ``spheres`` (at most four around every body), ``convex`` (``exact``, and
+            convex parts of every mesh), ``none``. :func:`~wbc.robots.fit_shapes` has more choices.
         package_dirs: folders to look for ``package://NAME/...`` meshes in, besides those above the file.
         position_lower, position_upper [rad or m], velocity [rad/s or m/s], acceleration [rad/s^2 or m/s^2],
             effort [N m or N]: limits that replace the description's; one number for all joints but the base, nv

@@ -8,7 +8,7 @@ import numpy as np
 
 from wbc import validation
 from wbc.errors import ShapeError
-from wbc.robot.hull import excess, hull_vertices
+from wbc.robot.hull import Hull
 from wbc.robot.recipe import segment_shape
 from wbc.shapes import Capsule, PlacedShape, Sphere
 from wbc.validation import Array
@@ -22,7 +22,7 @@ def fit_capsule(points: Array) -> PlacedShape:
 
     Returns:
         The shape in the points' frame. ``excess`` is over the points' convex hull, see
-        :func:`~wbc.robot.hull.excess` for its accuracy.
+        :meth:`~wbc.robot.hull.Hull.excess` for its accuracy.
 
     Raises:
         ShapeError, NotFiniteError: not n x 3 finite numbers.
@@ -33,7 +33,8 @@ def fit_capsule(points: Array) -> PlacedShape:
     cloud = validation.real_array("points", points)
     if cloud.ndim != 2 or cloud.shape[1] != 3 or len(cloud) == 0:
         raise ShapeError("points", points, "expected n x 3 numbers, n >= 1")
-    corners = hull_vertices(cloud)
+    hull = Hull(cloud)
+    corners = hull.vertices
     middle = (corners.min(axis=0) + corners.max(axis=0)) / 2
     size = float(np.abs(corners - middle).max())
     if size == 0.0:
@@ -45,7 +46,7 @@ def fit_capsule(points: Array) -> PlacedShape:
     line = segment_shape(middle + size * ends[0], middle + size * ends[1], 0.0, 0.0)
     radius = float(distance_to_segment(cloud, *line.ends()).max()) * (1 + 1e-12)
     shape = Capsule(radius, line.shape.length) if isinstance(line.shape, Capsule) else Sphere(radius)
-    return replace(line, shape=shape, excess=excess(corners, *line.ends(), radius))
+    return replace(line, shape=shape, excess=hull.excess(*line.ends(), radius))
 
 
 def quick_capsule(points: Array) -> tuple[Array, Array, float]:

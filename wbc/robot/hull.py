@@ -19,44 +19,55 @@ from wbc.validation import Array
 _HEAVY = 1e5
 
 
-def hull_vertices(points: Array) -> Array:
-    """The vertices of the convex hull; all distinct points where they are flat or too few for a hull."""
-    return _hull(points)[0]
+class Hull:
+    """The convex hull of points.
+
+    Attributes:
+        vertices: its vertices [n x 3]; all distinct points where they are flat or too few for a hull.
+        facets: rows (normal, offset) with normal . x + offset <= 0 inside [m x 4]; none where the points are flat.
+    """
+
+    def __init__(self, points: Array) -> None:
+        # Imported here: most processes fit no shapes, and scipy takes longer to import than all the rest
+        from scipy.spatial import ConvexHull, QhullError
+
+        self.vertices = np.unique(points, axis=0)
+        self.facets = np.zeros((0, 4))
+        if len(self.vertices) < 4:
+            return
+        try:
+            hull = ConvexHull(self.vertices)
+        except QhullError:
+            return
+        self.vertices, self.facets = np.asarray(self.vertices[hull.vertices]), np.asarray(hull.equations)
+
+    def beyond(self, points: Array) -> Array:
+        """Per point (n x 3), the largest signed distance to a facet's plane [m]: negative inside. 0 for a flat hull."""
+        if len(self.facets) == 0:
+            return np.zeros(len(points))
+        return np.asarray((points @ self.facets[:, :3].T + self.facets[:, 3]).max(axis=1))
+
+    def excess(self, a: Array, b: Array, radius: float) -> float:
+        """How far the capsule about the segment a b stands out of the hull [m].
+
+        Exact to rounding for ends inside the hull; for ends outside, an upper bound within 1e-7 of the hull's size.
+        """
+        return max(0.0, *(float(radius + self._distance(end)) for end in (a, b)))
+
+    def _distance(self, point: Array) -> float:
+        """Distance of a point to the hull [m]; negative inside, where it is that to the nearest facet."""
+        beyond = float(self.beyond(point[None])[0])
+        if len(self.facets) and beyond <= 0.0:
+            return beyond
+        from scipy.optimize import nnls
+
+        centred = self.vertices - point
+        size = max(float(np.abs(centred).max()), 1e-300)
+        matrix = np.vstack([centred.T / size, np.full(len(centred), _HEAVY)])
+        weights, _ = nnls(matrix, np.array([0.0, 0.0, 0.0, _HEAVY]))
+        return float(np.linalg.norm(weights @ centred) / weights.sum())
 
 
 def excess(corners: Array, a: Array, b: Array, radius: float) -> float:
-    """How far the capsule about the segment a b stands out of the convex hull of ``corners`` [m].
-
-    Exact to rounding for ends inside the hull; for ends outside, an upper bound within 1e-7 of the hull's size.
-    """
-    vertices, facets = _hull(np.asarray(corners))
-    return max(0.0, *(radius + _signed_distance(vertices, facets, end) for end in (a, b)))
-
-
-def _hull(points: Array) -> tuple[Array, Array | None]:
-    """(vertices, facets [n x 4] with normal . x + offset <= 0 inside, or None where the points are flat or few)."""
-    # Imported here: most processes fit no shapes, and scipy takes longer to import than all the rest
-    from scipy.spatial import ConvexHull, QhullError
-
-    distinct = np.unique(points, axis=0)
-    if len(distinct) < 5:
-        return distinct, None
-    try:
-        hull = ConvexHull(distinct)
-    except QhullError:
-        return distinct, None
-    return np.asarray(distinct[hull.vertices]), np.asarray(hull.equations)
-
-
-def _signed_distance(vertices: Array, facets: Array | None, point: Array) -> float:
-    """Distance of a point to the hull [m]; negative inside, where it is that to the nearest facet."""
-    if facets is not None:
-        beyond = float((facets[:, :3] @ point + facets[:, 3]).max())
-        if beyond <= 0.0:
-            return beyond
-    from scipy.optimize import nnls
-
-    centred = vertices - point
-    size = max(float(np.abs(centred).max()), 1e-300)
-    weights, _ = nnls(np.vstack([centred.T / size, np.full(len(vertices), _HEAVY)]), np.array([0, 0, 0, _HEAVY]))
-    return float(np.linalg.norm(weights @ centred) / weights.sum())
+    """:meth:`Hull.excess` over the convex hull of ``corners``."""
+    return Hull(np.asarray(corners)).excess(a, b, radius)

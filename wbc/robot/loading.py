@@ -26,7 +26,10 @@ from wbc.robot.robot import Robot
 from wbc.robot.srdf import read_states
 from wbc.robot.urdf import read_urdf
 
-SHAPES = ("auto", "description", "fit", "none")
+SHAPES = ("auto", "description", "exact", "fit", "spheres", "convex", "none")
+
+#: Choices of :data:`SHAPES` that read meshes -> kind of :func:`~wbc.robot.geometry.fit_shapes`.
+_FITTED = {"fit": "capsule", "spheres": "spheres", "convex": "convex"}
 
 
 def read(source: Any, base: str | None, recipe: Recipe) -> Description:
@@ -81,11 +84,11 @@ def finish(
     robot = override_limits(assemble(description, recipe, states), limits)
     if shapes == "none" or not (robot.source or recipe.shapes):
         return robot
-    if shapes == "fit":
-        return _with_pairs(fit_shapes(robot, package_dirs=package_dirs), recipe)
+    if shapes in _FITTED:
+        return _with_pairs(fit_shapes(robot, kind=_FITTED[shapes], package_dirs=package_dirs), recipe)
     if shapes == "auto" and recipe.shapes:
         return _with_pairs(_table_shapes(robot, recipe), recipe, recipe.pairs)
-    return _with_pairs(description_shapes(robot, package_dirs), recipe)
+    return _with_pairs(description_shapes(robot, package_dirs, exact=shapes == "exact"), recipe)
 
 
 def _table_shapes(robot: Robot, recipe: Recipe) -> Robot:
