@@ -69,15 +69,16 @@ static int active_set(wbc_tick *t, int warm, int checked, double angle, const do
     if (flag < 0) return flag;
     ldp2qp_solution(work);
     for (int i = 0; base && i < NV; i++) t->x[i] += base[i];
-    /* Rows that the solver did not look at: dependent equalities and rows that v cannot move */
+    /* Rows that the solver did not look at: dependent equalities and rows that v cannot move. Of those that it did
+     * look at, ones that v can hardly move may still be far off in their own units. */
     for (int k = 0; k < MC; k++) {
-        const int i = NV + k;
-        if (t->idle[k] || row_order[k] >= checked || (!dependent && t->scaling[i] != 0.0)) continue;
-        if (t->sense[i] & ACTIVE) continue;
+        const int i = NV + k, seen = !dependent && t->scaling[i] != 0.0;
+        if (t->idle[k] || row_order[k] >= checked) continue;
+        if (!seen && (t->sense[i] & ACTIVE)) continue;
         const double sum = row_at(t, k, t->x);
         double square = 0.0;
         for (int e = a_start[k]; e < a_start[k + 1]; e++) square += t->at[e] * t->at[e];
-        const double room = TOLERANCE * row_scale[k] + angle * sqrt(square * dot(t->x, t->x, 0));
+        const double room = (seen ? SEEN : TOLERANCE) * row_scale[k] + angle * sqrt(square * dot(t->x, t->x, 0));
         if (sum < t->low[i] - room || sum > t->high[i] + room) return EXIT_INFEASIBLE;
     }
     return flag;

@@ -40,6 +40,8 @@ int bend(const double **arg, double **res, long long *iw, double *w, int mem);
 #define UNIT_TOLERANCE 2.00001e-6
 /* Violations up to this, in row units, are rounding */
 #define TOLERANCE 1e-9
+/* Violations of rows that the solver took into account, in row units: beyond this the row cannot hold */
+#define SEEN 1e-6
 
 INLINE double clamp(double x, double low, double high) { return x < low ? low : (x > high ? high : x); }
 
