@@ -22,6 +22,8 @@ class Stack(Declaration):
         dt: time between commands [s], > 0. ``step`` accepts ``dt_range``, a quarter to twice of it.
         damping: cost of velocity against a task row of weight 1, keeps the optimum unique (1e-12 to 1).
         length: characteristic length [m] that ties metres to radians; default: the robot's.
+        calm: treat targets out of reach, and speeds that the joints cannot brake from, as docs/reach.md says; False:
+            the plain linear model.
 
     Raises:
         ShapeError, RangeError, NotFiniteError: bad arguments.
