@@ -119,13 +119,15 @@ class RelativePose(Task):
         if self.kind != "position" or self.axes == MIDWAY:
             phi = kin.rotation_error(self.frame_b, self.frame_a, target.rotation)
         if self.kind != "orientation":
-            a, b = kin.pose(self.frame_a), kin.pose(self.frame_b)
-            gap = b.point(target.inverse_point(inputs["at"])) - a.point(inputs["at"])
+            a, b, at = kin.pose(self.frame_a), kin.pose(self.frame_b), inputs["at"]
+            seen = b.point(target.inverse_point(at))
             if self.axes == MIDWAY:
                 half = rot.from_quaternion(rot.exp3(phi / 2))
-                parts.append(half.T @ (a.rotation.T @ gap))
+                parts.append(half.T @ (a.inverse_point(seen) - at))
+            elif self.axes == self.frame_a:
+                parts.append(a.inverse_point(seen) - at)
             else:
-                parts.append(into_axes(kin, gap, self.axes))
+                parts.append(into_axes(kin, seen - a.point(at), self.axes))
         if self.kind != "position":
             # phi is the axis of its own rotation, so it has the same components in a's axes and midway
             own = self.axes in (MIDWAY, self.frame_a)
