@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -10,8 +11,13 @@ from rich.markup import escape
 from rich.table import Table
 
 from wbc import robots
+from wbc.cli.collisions import SAMPLES, Collisions
+from wbc.cli.collisions import show as show_collisions
 from wbc.cli.console import err, out
 from wbc.robot import Robot
+from wbc.robot.loading import SHAPES
+
+_PAIRS = "With --collisions, which --samples, --srdf, --pairs and --save imply"
 
 
 def table(
@@ -43,9 +49,35 @@ def show(
     name: Annotated[str, typer.Argument(help="A name of `wbc robots`, or a URDF or MJCF file.", show_default=False)],
     base: Annotated[str | None, typer.Option(help="fixed, floating, planar or differential.")] = None,
     frames: Annotated[bool, typer.Option("--frames/--no-frames", help="List the frames.")] = True,
+    shapes: Annotated[str, typer.Option(help="Shapes of the links: " + ", ".join(SHAPES) + ".")] = "auto",
+    collisions: Annotated[
+        bool, typer.Option("--collisions", help="Shapes of the links, and the pairs that must not touch.")
+    ] = False,
+    samples: Annotated[
+        int | None,
+        typer.Option(help=f"Random configurations to look at; default {SAMPLES}.", rich_help_panel=_PAIRS),
+    ] = None,
+    seed: Annotated[int, typer.Option(help="Of the random configurations.", rich_help_panel=_PAIRS)] = 0,
+    clearance: Annotated[
+        float, typer.Option(help="Links this close count as touching, in m.", rich_help_panel=_PAIRS)
+    ] = 0.0,
+    srdf: Annotated[
+        Path | None, typer.Option(help="SRDF file. Default: the table's, if any.", rich_help_panel=_PAIRS)
+    ] = None,
+    pairs: Annotated[Path | None, typer.Option(help="Show the pairs in this file.", rich_help_panel=_PAIRS)] = None,
+    save: Annotated[
+        Path | None, typer.Option(help="Write the pairs to this file, to be edited.", rich_help_panel=_PAIRS)
+    ] = None,
+    force: Annotated[bool, typer.Option(help="Write over a file that is there.", rich_help_panel=_PAIRS)] = False,
 ) -> None:
-    """Show a robot: joints, limits, frames, shapes and where the numbers come from."""
-    robot = robots.load(name, base=base)
+    """Show a robot: joints, limits, frames, shapes and where the numbers come from.
+
+    With --collisions, show which links must not touch each other, and why the others need not be watched.
+    """
+    robot = robots.load(name, base=base, shapes=shapes)
+    if collisions or samples is not None or any((srdf, pairs, save)):
+        show_collisions(robot, Collisions(samples, seed, clearance, srdf, pairs, save, force))
+        return
     console = out()
     console.print(
         f"[bold]{robot.name}[/bold]: {robot.nv} degrees of freedom, {robot.base} base, "

@@ -124,7 +124,9 @@ def find_self_pairs(
     rules = read_collisions(pathlib.Path(srdf)) if srdf is not None else CollisionRules({}, frozenset(), frozenset())
     pairs = link_pairs(robot)
     if not any(robot.shapes.values()):
-        raise MissingShapeError("robot.shapes", robot.name, "no link of this robot has shapes to measure")
+        raise MissingShapeError(
+            "robot.shapes", robot.name, "no link of this robot has shapes; load it with shapes='fit'"
+        )
     links, near = Links(robot), neighbours(robot)
     settled = {pair: _without_measure(pair, near.get(pair), rules) for pair in pairs}
     neutral = links.at_neutral([pair for pair in pairs if samples or settled[pair] is None])
