@@ -286,8 +286,8 @@ class Robot:
         for pair in pairs:
             if isinstance(pair, str) or len(pair) != 2:
                 raise ShapeError("self_pairs", pair, "expected pairs of link names")
-            for link in pair:
-                self.check_frame("self_pairs", link)
+        for link in dict.fromkeys(link for pair in pairs for link in pair):
+            self.check_frame("self_pairs", link)
         return replace(self, self_pairs=tuple((str(a), str(b)) for a, b in pairs))
 
     @cached_property
