@@ -76,7 +76,7 @@ class Reach:
         metric = _cut_off(self._strengthened(H, equal), free)
         if not _is_definite(metric):
             return H, plain
-        curved = self._curved(H, metric, J, weight, error, slope, free)
+        curved = self._curved(H, metric, J, weight, error, slope, free, equal)
         if curved is not None:
             H, metric = curved, self._strengthened(curved, equal)
             if not _is_definite(metric):
@@ -106,7 +106,15 @@ class Reach:
         return np.where(on, 1.0 - near * pushed, 1.0)
 
     def _curved(
-        self, H: Array, metric: Array, J: Array, weight: Array, error: Array, slope: Array, free: Array
+        self,
+        H: Array,
+        metric: Array,
+        J: Array,
+        weight: Array,
+        error: Array,
+        slope: Array,
+        free: Array,
+        equal: Array,
     ) -> Array | None:
         """H with the curvature of the errors that one step leaves, None where there is none to count."""
         if self._bend is None:
@@ -129,7 +137,8 @@ class Reach:
             return None
         mixed = share * _cut_off(H, free) + (1.0 - share) * H + bent
         scale = np.outer(self._dofs, self._dofs)
-        more_pivot = definite(mixed * scale, max(LEAST_PIVOT * float(np.abs(bent * scale).max()), least))
+        least = max(LEAST_PIVOT * float(np.abs(bent * scale).max()), least)
+        more_pivot = definite(self._strengthened(mixed, equal) * scale, least)
         return np.asarray(mixed + np.diag(more_pivot / self._dofs**2))
 
     def _stoppable(

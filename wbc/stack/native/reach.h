@@ -128,25 +128,29 @@ static void definite(const double *matrix, double least, double *more) {
     }
 }
 
-/* H += curvature of the errors that are left, with blocked joints cut off and made positive definite; 1 where there
- * is any to count */
-static int add_curvature(wbc_tick *t, const double *free, const double *error, const double *pull) {
-    double size = 0.0, whole = 0.0, least = WBC_INF, largest = 0.0, scaled[NV * NV], more[NV];
-    for (int k = 0; k < MT; k++) {
-        size += fabs(pull[k]) * pull_scale[k];
-        whole += fabs(t->weight[k] * t->report.factor[k] * error[k]) * pull_scale[k];
-    }
+static double least_pivot(const wbc_tick *t) {
+    double least = WBC_INF;
     for (int i = 0; i < NV; i++) {
         const double pivot = dof_scale[i] / t->inverse_diagonal[i];
         least = fmin(least, pivot * pivot);
     }
+    return least;
+}
+
+/* H += curvature of the errors that are left, with blocked joints cut off; how large it is, 0 for none to count */
+static double bend_errors(wbc_tick *t, const double *free, const double *error, const double *pull, double least) {
+    double size = 0.0, whole = 0.0, largest = 0.0;
+    for (int k = 0; k < MT; k++) {
+        size += fabs(pull[k]) * pull_scale[k];
+        whole += fabs(t->weight[k] * t->report.factor[k] * error[k]) * pull_scale[k];
+    }
     const double counts = clamp(size / (NEGLIGIBLE * least) - 1.0, 0.0, 1.0);
     const double share = counts * clamp(size / (REMOVED * whole + DBL_MIN) - 1.0, 0.0, 1.0);
-    if (!(share > 0.0)) return 0;
+    if (!(share > 0.0)) return 0.0;
     const double *arg[5] = {t->q, t->v_last, t->p, &t->dt, pull};
     double *res[1] = {t->bent};
     bend(arg, res, t->work_iw, t->work_w, 0);
-    if (!all_finite(t->bent, NNZK)) return 0;
+    if (!all_finite(t->bent, NNZK)) return 0.0;
     for (int i = 0; i < NV; i++)
         for (int j = i + 1; j < NV; j++) t->H[i * WIDE + j] *= 1.0 - share * (1.0 - free[i] * free[j]);
     for (int e = 0; e < NNZK; e++) {
@@ -155,10 +159,23 @@ static int add_curvature(wbc_tick *t, const double *free, const double *error, c
         largest = fmax(largest, fabs(bent) * dof_scale[i] * dof_scale[j]);
         t->H[i * WIDE + j] += bent;
     }
+    return largest;
+}
+
+/* Curvature into H and what makes it positive definite again; leaves the factor. 1 where there is any to count. */
+static int add_curvature(wbc_tick *t, const double *free, const double *error, const double *pull) {
+    double scaled[NV * NV], more[NV], least = least_pivot(t);
+    const double largest = bend_errors(t, free, error, pull, least);
+    if (largest == 0.0) return 0;
+    least = fmax(LEAST_PIVOT * largest, least);
+    /* Where no pivot is too small the modified factorisation is the plain one */
+    if (factor(t) && least_pivot(t) >= least) return 1;
+    load(t);
     for (int i = 0; i < NV; i++)
-        for (int j = i; j < NV; j++) scaled[i * NV + j] = t->H[i * WIDE + j] * dof_scale[i] * dof_scale[j];
-    definite(scaled, fmax(LEAST_PIVOT * largest, least), more);
+        for (int j = i; j < NV; j++) scaled[i * NV + j] = t->R[i * WIDE + j] * dof_scale[i] * dof_scale[j];
+    definite(scaled, least, more);
     for (int i = 0; i < NV; i++) t->H[i * WIDE + i] += more[i] / (dof_scale[i] * dof_scale[i]);
+    t->prepared = factor(t);
     return 1;
 }
 
@@ -229,11 +246,11 @@ static void reach(wbc_tick *t) {
 #if NNZK > 0
     double pull[MT + 1];
     if (!left_over(t, free, error, slope, pull)) return;
-    if (add_curvature(t, free, error, pull)) {
-        t->curved = 1;
-        t->prepared = factor(t);
-        if (!t->prepared) return;
-    }
+    const int prepared = t->prepared;
+    t->prepared = 1;
+    t->curved = add_curvature(t, free, error, pull);
+    if (!t->prepared) return;
+    if (!t->curved) t->prepared = prepared;
 #endif
     const double allowed = stoppable(t, free, error, largest);
     if (!t->curved && allowed >= largest) return;
