@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -42,9 +43,13 @@ FRAMES = {
 class HandsLoop(Loop):
     """A loop whose checks speak of two hands."""
 
+    def __init__(self, robot: Robot, items: Mapping[str, Item], dt: float, name: str) -> None:
+        self._hands = FRAMES[name]
+        super().__init__(robot, items, dt, name)
+
     @property
     def frames(self) -> Any:
-        return FRAMES[self._known]
+        return self._hands
 
 
 def seen(eyes: Eyes, f: Hands, q: Array) -> pin.SE3:
