@@ -17,6 +17,7 @@ from tests.robots.files import joints
 from wbc.errors import MissingShapeError, RangeError, RobotFileError, ShapeError
 from wbc.robot import Limits, Robot
 from wbc.robot.collision_pairs import REASONS, find_self_pairs
+from wbc.robot.pair_descent import Descent
 from wbc.robot.pair_distances import Links
 from wbc.robot.sampling import configuration, draw
 from wbc.robot.segments import bounding_capsule, segment_distances
@@ -192,6 +193,19 @@ def test_descents_find_touch_that_samples_miss() -> None:
     assert np.abs(elbow).max() < limit - 0.01
     (pair,) = find_self_pairs(robot, samples=20).pairs
     assert (pair.keep, pair.reason) == (True, "touches")
+
+
+@pytest.mark.parametrize(("name", "links"), [("ur5", ("upper_arm_link", "wrist_3_link")), ("panda", None)])
+def test_gradient_of_the_distance(name: str, links: tuple[str, str] | None) -> None:
+    robot = wbc.robots.load(name)
+    first, second = links or ("panda_link1", "panda_hand")
+    descent = Descent(robot, Links(robot), 0.0)
+    for step in draw(robot, 10, np.random.default_rng(3)):
+        _, gradient = descent._slope(first, second, step)
+        h = 1e-6
+        for k, slope in enumerate(gradient):
+            ends = [descent._slope(first, second, step + sign * h * np.eye(robot.nv)[k])[0] for sign in (1, -1)]
+            assert slope == pytest.approx((ends[0] - ends[1]) / (2 * h), abs=1e-4)
 
 
 def test_reasons() -> None:
