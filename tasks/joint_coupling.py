@@ -74,7 +74,7 @@ class JointCoupling(Task):
         gain: float | None = None,
     ) -> None:
         given = [coefficients] if isinstance(coefficients, Mapping) else coefficients
-        if isinstance(given, str) or not isinstance(given, Sequence) or not given:
+        if not isinstance(given, (list, tuple)) or not given:
             raise ShapeError("JointCoupling.coefficients", coefficients, "expected {joint: coefficient}, or several")
         labels = [""] if isinstance(coefficients, Mapping) else [f"[{k}]" for k in range(len(given))]
         relations = tuple(_relation(f"JointCoupling.coefficients{k}", r) for k, r in zip(labels, given, strict=True))
@@ -121,7 +121,7 @@ class JointCoupling(Task):
 
     def error(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
         """The formula of the class."""
-        errors = []
+        errors: list[ca.SX] = []
         for k, relation in enumerate(self.coefficients):
             total = sum((c * kin.joint(joint) for joint, c in relation), ca.SX(0)) - inputs["target"][k]
             turning = any(_unbounded(robot, joint) for joint, _ in relation)

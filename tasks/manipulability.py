@@ -126,7 +126,8 @@ class Manipulability(Task):
     def error(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
         """The formula of the class."""
         w = kin.manipulability(self.frame, self.relative_to, self._rows, self._length(robot))
-        return ca.log(w / inputs["target"]) if self.form == "log" else w - inputs["target"]
+        error: ca.SX = ca.log(w / inputs["target"]) if self.form == "log" else w - inputs["target"]
+        return error
 
     @property
     def _rows(self) -> tuple[int, ...]:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from wbc import validation
 from wbc.symbolic import rotations as rot
+from wbc.symbolic.kinematics import Pose
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks.base import Input, Row, Task, Values
 from wbc.tasks.frames import checked_weights, frame_pose, into_axes, point_rows, require_motion, weights_of_rows
@@ -115,7 +116,8 @@ class RelativePose(Task):
 
     def error(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
         """The formula of the class."""
-        target, parts = inputs["target"], []
+        target: Pose = inputs["target"]
+        parts: list[ca.SX] = []
         if self.kind != "position" or self.axes == MIDWAY:
             phi = kin.rotation_error(self.frame_b, self.frame_a, target.rotation)
         if self.kind != "orientation":

@@ -162,7 +162,8 @@ def _solve(square: ca.SX, right: ca.SX) -> tuple[list[ca.SX], ca.SX]:
     The pivots are at least FLOOR^2 but for rounding, which is kept from making them negative.
     """
     n = square.shape[0]
-    lower, pivots = ca.SX.eye(n), []
+    lower = ca.SX.eye(n)
+    pivots: list[ca.SX] = []
     for i in range(n):
         for j in range(i):
             inner = sum((lower[i, k] * lower[j, k] * pivots[k] for k in range(j)), ca.SX(0))
