@@ -27,6 +27,7 @@ from wbc.tasks.pitch_plane_limit import PitchPlaneLimit
 from wbc.tasks.posture import Posture
 from wbc.tasks.relative_pose import RelativePose
 from wbc.tasks.rolling import Rolling, Wheel
+from wbc.tasks.self_collision import SelfCollision
 from wbc.tasks.workspace_box import WorkspaceBox
 from wbc.tasks.workspace_polyhedron import WorkspacePolyhedron
 
@@ -65,6 +66,7 @@ __all__ = [
     "Rolling",
     "Row",
     "Rows",
+    "SelfCollision",
     "Task",
     "Values",
     "Wheel",

@@ -1,7 +1,8 @@
 """Signed distances of shapes as expressions, one or more rows a pair; negative where the shapes overlap.
 
     sphere    to sphere, capsule, box, cylinder     distance of the centre to the other shape, less the radius
-    capsule   to capsule                            distance of the two core segments, less both radii
+    capsule   to capsule                            distance of the two core segments, less both radii; and of each end
+    capsule   to box, cylinder                      distances of its two end spheres, see :func:`is_sensed`
     any solid to half-space                         height of the lowest points, see :func:`plane_rows`
 
 Inside a box or cylinder the distance of a centre is minus the shortest way out. Gradients with respect to places
@@ -37,6 +38,10 @@ from wbc.validation import Array
 #: root (1e-4 rad) of parallel these run from one end of the overlap to the other, and the direction of the row's
 #: moment with them; the distance is then too large by less than PARALLEL length^2 / distance.
 PARALLEL = 1e-8
+
+#: Rows of two capsules: the nearest points; the ends of the first, then those of the second, each with the other
+#: capsule. Parallel ones would rock on the first row alone, whose points jump from one end of the overlap to the other.
+CAPSULES = ("", ".start-", ".end-", "-.start", "-.end")
 
 #: A convex hull with at most this many vertices has a row a vertex over a half-space, else one row for the lowest.
 VERTEX_ROWS = 12
@@ -83,8 +88,8 @@ def core(shape: Shape) -> Shape:
     return Sphere(shape.radius) if isinstance(shape, Capsule) and shape.length == 0.0 else shape
 
 
-def plane_rows(solid: Solid) -> tuple[str, ...] | None:
-    """Names of the rows of a solid over a half-space, or None if it has no expression.
+def plane_rows(solid: Solid) -> tuple[str, ...]:
+    """Names of the rows of a solid over a half-space; none for a convex hull of many vertices.
 
         sphere          ``""``
         capsule         ``.start``, ``.end``      ends of the core
@@ -102,22 +107,38 @@ def plane_rows(solid: Solid) -> tuple[str, ...] | None:
         return tuple("." + "".join(signs) for signs in itertools.product("-+", repeat=3))
     if isinstance(shape, Convex) and len(shape.points) <= VERTEX_ROWS:
         return tuple(f".{k}" for k in range(len(shape.points)))
-    return None if isinstance(shape, Convex) and len(shape.points) > SUPPORT_VERTICES else ("",)
+    return () if isinstance(shape, Convex) and len(shape.points) > SUPPORT_VERTICES else ("",)
 
 
-def pair_rows(first: Solid, second: Shape) -> tuple[str, ...] | None:
-    """Names of the rows of a pair, or None if there is no expression for it."""
+def pair_rows(first: Solid, second: Shape) -> tuple[str, ...]:
+    """Names of the rows of a pair that are expressions; none if there are no such."""
     if isinstance(second, HalfSpace):
         return plane_rows(first)
     kinds = {type(core(first)), type(core(second))}
-    has = Sphere in kinds and kinds <= {Sphere, Capsule, Box, Cylinder}
-    return ("",) if has or kinds == {Capsule} else None
+    if Sphere in kinds and kinds <= {Sphere, Capsule, Box, Cylinder}:
+        return ("",)
+    if kinds == {Capsule}:
+        return CAPSULES
+    return (".start", ".end") if kinds in ({Capsule, Box}, {Capsule, Cylinder}) else ()
+
+
+def is_sensed(first: Solid, second: Shape) -> bool:
+    """Whether the distance of a pair is more than its rows say, so that a sensor has to measure it.
+
+    So it is for pairs without rows, and for a capsule with a box or a cylinder: its rows are for its ends, which keep
+    it from rocking on a face when the nearest point jumps from one end to the other; in between it is sensed.
+    """
+    rows = pair_rows(first, second)
+    return not rows or (rows == (".start", ".end") and not isinstance(second, HalfSpace))
 
 
 def gaps(first: Placed, second: Placed) -> list[Gap]:
     """The rows of a pair that :func:`pair_rows` names; normals point from the first to the second, or back."""
     if isinstance(second.shape, HalfSpace):
         return _over_plane(first, second)
+    for a, b in ((first, second), (second, first)):
+        if isinstance(a.shape, Capsule) and isinstance(b.shape, (Box, Cylinder)):
+            return [row for side in (-1.0, 1.0) for row in gaps(_end(a, a.shape, side), b)]
     a, b = (first, second) if isinstance(first.shape, Sphere) else (second, first)
     if isinstance(b.shape, Sphere):
         assert isinstance(a.shape, Sphere)
@@ -125,7 +146,7 @@ def gaps(first: Placed, second: Placed) -> list[Gap]:
         distance, normal = between(a.pose.position + up, b.pose.position)
         return [_gap(a, b, distance - (a.shape.radius + b.shape.radius), normal)]
     if isinstance(b.shape, Capsule):
-        return [_to_capsule(a, b) if isinstance(a.shape, Sphere) else _capsules(first, second)]
+        return [_to_capsule(a, b)] if isinstance(a.shape, Sphere) else _capsules(first, second)
     assert isinstance(a.shape, Sphere)
     local = b.pose.inverse_point(a.pose.position)
     distance, out = out_of_box(local, b.shape) if isinstance(b.shape, Box) else out_of_cylinder(local, b.shape)
@@ -142,6 +163,13 @@ def drift(kin: Tracer, gap: Gap, moved: Placed) -> ca.SX:
     if not isinstance(moved.shape, Sphere):
         place = pose.point(kin.held(pose.inverse_point(gap.point)))
     return sign * ca.dot(kin.held(gap.normal), place - kin.held(place))
+
+
+def _end(placed: Placed, capsule: Capsule, side: float) -> Placed:
+    """The sphere at one end of a capsule."""
+    local = np.array([0.0, 0.0, side * capsule.length / 2])
+    pose = Pose(placed.pose.rotation, placed.pose.point(rot.constant(local)))
+    return Placed(Sphere(capsule.radius), placed.frame, pose, placed.placement * pin.SE3(np.eye(3), local))
 
 
 def _gap(sphere: Placed, other: Placed, distance: ca.SX, normal: ca.SX) -> Gap:
@@ -161,16 +189,23 @@ def _to_capsule(sphere: Placed, capsule: Placed) -> Gap:
     return _gap(sphere, capsule, distance - (sphere.shape.radius + capsule.shape.radius), normal)
 
 
-def _capsules(first: Placed, second: Placed) -> Gap:
-    """Nearest points s, t of the segments m + s u, |s| <= half: of the lines, then each clamped for the other."""
+def _capsules(first: Placed, second: Placed) -> list[Gap]:
+    """The gap of the nearest points, and those of all ends."""
     a, b = first.shape, second.shape
     assert isinstance(a, Capsule)
     assert isinstance(b, Capsule)
+    ends = [_to_capsule(_end(first, a, side), second) for side in (-1.0, 1.0)]
+    ends += [_to_capsule(_end(second, b, side), first) for side in (-1.0, 1.0)]
+    return [_between_cores(first, second, a, b), *ends]
+
+
+def _between_cores(first: Placed, second: Placed, a: Capsule, b: Capsule) -> Gap:
+    """Nearest points s, t of the segments m + s u, |s| <= half: of the lines, then each clamped for the other."""
     u, w = first.pose.rotation[:, 2], second.pose.rotation[:, 2]
     offset = first.pose.position - second.pose.position
     cos, on_u, on_w = ca.dot(u, w), ca.dot(u, offset), ca.dot(w, offset)
     across = 1 - cos * cos
-    s = clamp((cos * on_w - on_u) / (ca.fmax(across, 0) + PARALLEL), a.length / 2)
+    s = clamp((cos * on_w - on_u) / (across + PARALLEL), a.length / 2)
     t = clamp(cos * s + on_w, b.length / 2)
     s = clamp(cos * t - on_u, a.length / 2)
     crossed = across > PARALLEL

@@ -30,10 +30,11 @@ SHAPES = (Sphere, Capsule, Box, Cylinder, Convex, HalfSpace)
 class Obstacle(Constraint):
     """h = (signed distance between a shape of a link and the obstacle) - margin >= 0  [m], a row a pair.
 
-    A pair is either an expression, with a row of its own in every tick, or sensed:
+    A pair has rows of its own in every tick, which are expressions, or is sensed, or both:
 
         sphere with sphere, capsule, box, cylinder; capsule with capsule      one row, either may be the link
         any with half-space      sphere 1, capsule 2, cylinder 2, box 8, hull of n <= 12 vertices n, of up to 64: 1
+        capsule with box, cylinder      2, for the capsule's ends; sensed, too
         all others, meshes       sensed: ``closest`` rows in all for the nearest pairs, chosen before every tick
 
     Attributes:
@@ -117,12 +118,12 @@ class Obstacle(Constraint):
         return bodies.shapes_of(robot, _available(robot) if self.links is None else self.links)
 
     def sensed_pairs(self, robot: Robot) -> tuple[tuple[Body, Body], ...]:
-        """Pairs without an expression: a link's shape and the obstacle, or a part of it."""
+        """Pairs that a sensor measures: a link's shape and the obstacle, or a part of it."""
         name = {1: OBSTACLE}.get(len(self.parts))
         parts = [Body(name or f"part[{k}]", OBSTACLE, pin.SE3.Identity(), s) for k, s in enumerate(self.parts)]
         out: list[tuple[Body, Body]] = []
         for link, k, placed in self.pairs(robot):
-            others = [part for part in parts if gap.pair_rows(placed.shape, part.shape) is None]
+            others = [part for part in parts if gap.is_sensed(placed.shape, part.shape)]
             own = bodies.body(link, k, placed)
             out += [(own, part) for part in others]
         return tuple(out)
@@ -132,11 +133,11 @@ class Obstacle(Constraint):
         return min(self.closest, len(self.sensed_pairs(robot)))
 
     def sensor(self, robot: Robot, numbers: Numbers) -> Sensor:
-        """Coal, for the pairs without an expression."""
+        """Coal, for the sensed pairs."""
         return PairSensor(robot, self.sensed_pairs(robot), self.sensed_rows(robot), numbers)
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
-        """``link[i]`` for shape i of a link, with the suffixes of its points over a half-space; ``closest[k]``."""
+        """``link[i]`` for shape i of a link, with suffixes where it has several; ``closest[k]``."""
         own = [
             Row(bodies.label(link, k) + suffix, "m")
             for link, k, placed in self.pairs(robot)
@@ -159,7 +160,7 @@ class Obstacle(Constraint):
 
     def _suffixes(self, solid: Shape) -> tuple[str, ...]:
         """Names of the rows of a link's shape against the obstacle; none if it is sensed."""
-        return gap.pair_rows(solid, self.parts[0]) or ()
+        return gap.pair_rows(solid, self.parts[0])
 
 
 def _available(robot: Robot) -> tuple[str, ...]:

@@ -35,9 +35,10 @@ ShapePair = tuple[bodies.LinkShape, bodies.LinkShape]
 class SelfCollision(Constraint):
     """h = (signed distance between a shape of one link and a shape of another) - margin >= 0  [m], a row a pair.
 
-    Pairs of shapes are either expressions, with a row each in every tick (sphere with sphere, capsule, box, cylinder;
-    capsule with capsule), or sensed: ``closest`` rows in all for the nearest of them, chosen before every tick. A row
-    moves only the joints between its two links.
+    Pairs of shapes have rows of their own in every tick, which are expressions (sphere with sphere, capsule, box,
+    cylinder; capsule with capsule), or are sensed: ``closest`` rows in all for the nearest of them, chosen before every
+    tick. A capsule with a box or a cylinder has two rows for its ends and is sensed, too. A row moves only the joints
+    between its two links.
 
     Attributes:
         pairs: pairs of links; None: ``robot.self_pairs``, and where that is None all pairs of links with shapes that
@@ -104,7 +105,7 @@ class SelfCollision(Constraint):
     def _check_symbolic(self, pairs: list[ShapePair]) -> None:
         advice = "use method='sensed', or name fewer pairs"
         for first, second in pairs:
-            if not _has_rows(first, second):
+            if _is_sensed(first, second):
                 names = (bodies.label(*first[:2]), bodies.label(*second[:2]))
                 kinds = " and ".join(type(s[2].shape).__name__ for s in (first, second))
                 raise ShapeError("SelfCollision.pairs", names, f"{kinds} have no expression; {advice}")
@@ -144,10 +145,11 @@ class SelfCollision(Constraint):
         return PairSensor(robot, self.sensed_pairs(robot), self.sensed_rows(robot), numbers)
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
-        """``link[i] link[k]`` for shapes i and k of two links; ``closest[k]``."""
+        """``link[i] link[k]`` for shapes i and k of two links, with suffixes where they are more; ``closest[k]``."""
         own = [
-            Row(f"{bodies.label(*first[:2])} {bodies.label(*second[:2])}", "m")
+            Row(f"{bodies.label(*first[:2])} {bodies.label(*second[:2])}{suffix}", "m")
             for first, second in self._split(robot)[0]
+            for suffix in gap.pair_rows(first[2].shape, second[2].shape)
         ]
         return (*own, *bodies.sensed_labels(self.sensed_rows(robot)))
 
@@ -167,17 +169,16 @@ class SelfCollision(Constraint):
         ]
 
     def _split(self, robot: Robot) -> tuple[list[ShapePair], list[ShapePair]]:
-        """Pairs with a row each, and sensed ones."""
+        """Pairs with rows of their own, and sensed ones; a pair may be both."""
         pairs = self._shape_pairs(robot)
-        own = [pair for pair in pairs if _has_rows(*pair)] if self.method != "sensed" else []
-        if self.method == "auto" and len(own) > SYMBOLIC_PAIRS:
-            own = []
-        chosen = {id(pair) for pair in own}
-        return own, [pair for pair in pairs if id(pair) not in chosen]
+        own = [pair for pair in pairs if gap.pair_rows(pair[0][2].shape, pair[1][2].shape)]
+        if self.method == "sensed" or (self.method == "auto" and len(own) > SYMBOLIC_PAIRS):
+            return [], pairs
+        return own, [pair for pair in pairs if _is_sensed(*pair)]
 
 
-def _has_rows(first: bodies.LinkShape, second: bodies.LinkShape) -> bool:
-    return gap.pair_rows(first[2].shape, second[2].shape) is not None
+def _is_sensed(first: bodies.LinkShape, second: bodies.LinkShape) -> bool:
+    return gap.is_sensed(first[2].shape, second[2].shape)
 
 
 def _checked_pairs(pairs: Any) -> tuple[tuple[str, str], ...]:

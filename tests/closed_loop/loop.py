@@ -36,13 +36,13 @@ class Loop:
         self.robot, self.dt, self.eyes = robot, dt, Eyes(robot)
         self.controller: Controller = stack.compile()
         self._names = [entry.name for entry in stack.entries]
-        self._known = name
+        self.known = name
         self._settle()
 
     @property
     def frames(self) -> Frames:
         """Frames that the checks speak of."""
-        return FRAMES[self._known]
+        return FRAMES[self.known]
 
     def _settle(self) -> None:
         """Give every input that waits for a first configuration a value, so that a reset has none to work out."""

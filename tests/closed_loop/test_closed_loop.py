@@ -14,13 +14,14 @@ from tests.closed_loop.machines import CONSTRAINT_ROBOTS, TASK_ROBOTS
 from tests.closed_loop.mechanism import ROBOTS as COUPLED
 from tests.closed_loop.mechanism import build, mechanism
 from tests.closed_loop.pointing import CLASSES as POINTING
-from wbc.tasks import Mechanism, registry
+from wbc.tasks import Mechanism, SelfCollision, registry
 
 
 def test_every_shipped_class_has_a_case() -> None:
     shipped = {cls for cls in registry().values() if cls.__module__.startswith("wbc.tasks")}
     shared = {case.cls for case in (cases.TASKS | cases.CONSTRAINTS).values()}
-    assert shipped == shared | {Mechanism} | POINTING | COORDINATION | {guard.cls for guard in GUARDS.values()}
+    guards = {guard.cls for guard in GUARDS.values()}
+    assert shipped == shared | {Mechanism, SelfCollision} | POINTING | COORDINATION | guards
 
 
 @pytest.mark.parametrize("name", TASK_ROBOTS)

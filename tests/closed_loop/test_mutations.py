@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 from tests.closed_loop import cases, constraints, mutations, tasks
+from tests.closed_loop.collision_mutations import MUTATIONS as COLLISIONS
 from tests.closed_loop.constraints import constraint_items
 from tests.closed_loop.coordination_mutations import MUTATIONS as COORDINATION
 from tests.closed_loop.limit_mutations import MUTATIONS as LIMITS
@@ -62,6 +63,7 @@ def test_every_shipped_class_is_mutated_and_no_mutation_is_shipped() -> None:
     changed = [*mutations.TASKS.values(), *mutations.CONSTRAINTS.values(), *mutations.MECHANISM.values()]
     changed += POINTING.values()
     changed += LIMITS.values()
+    changed += COLLISIONS.values()
     changed += COORDINATION
     assert {cls.__bases__[0] for cls in changed} == shipped
     assert not set(changed) & set(registry().values())

@@ -5,19 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-import numpy as np
-import pinocchio as pin
-
+from tests.constraints.items_collisions import FACTORIES as COLLISIONS
 from tests.constraints.robots import with_test_shapes
 from wbc.robot import Robot
-from wbc.shapes import HalfSpace, Sphere
 from wbc.tasks.base import Item
 from wbc.tasks.fixed import Fixed
 from wbc.tasks.frame_velocity_limit import FrameVelocityLimit
 from wbc.tasks.hold import Hold
 from wbc.tasks.joint_limits import JointLimits
 from wbc.tasks.mechanism import Mechanism
-from wbc.tasks.obstacle import Obstacle
 
 #: An item and the run-time values that differ from its defaults
 Declared = tuple[Item, dict[str, Any]]
@@ -52,13 +48,6 @@ def _joint_limits(robot: Robot) -> list[Declared]:
     ]
 
 
-def _obstacle(robot: Robot) -> list[Declared]:
-    pose = pin.SE3(pin.exp3(np.array([0.3, -0.2, 0.1])), np.array([0.2, 0.3, -0.1]))
-    moving = {"pose": pose, "velocity": [0.1, -0.2, 0.3, 0.4, -0.5, 0.6], "margin": 0.01}
-    link = Obstacle(HalfSpace()).pairs(robot)[0][0]
-    return [(Obstacle(Sphere(0.1), links=link), moving), (Obstacle(HalfSpace(), links=link), moving)]
-
-
 def _frame_velocity_limit(robot: Robot) -> list[Declared]:
     end = tip(robot)
     items = [
@@ -85,9 +74,9 @@ def _mechanism(robot: Robot) -> list[Declared]:
 #: Class name -> declarations on a robot. Obstacles need ``shaped(robot)``.
 FACTORIES: dict[str, Callable[[Robot], list[Declared]]] = {
     "JointLimits": _joint_limits,
-    "Obstacle": _obstacle,
     "FrameVelocityLimit": _frame_velocity_limit,
     "Hold": _hold,
     "Fixed": _fixed,
     "Mechanism": _mechanism,
+    **COLLISIONS,
 }

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import itertools
 import zlib
+from typing import ClassVar
 
 import casadi as ca
 import numpy as np
 import pinocchio as pin
+
+# isort: split
+import coal
 import pytest
 
 from tests.constraints.evaluation import probe, random_configuration
-from tests.constraints.test_obstacle import coal_distance, random_pose
+from tests.constraints.test_obstacle import coal_distance, coal_pose, coal_shape, random_pose
 from tests.tasks.evaluate import numbers
 from tests.tasks.robots import robot as registered
 from tests.tasks.test_registry import check_derivatives
@@ -30,8 +34,16 @@ def hull(count: int) -> Convex:
 
 HULL, CUT = hull(30), hull(6)
 SOLIDS: list[Solid] = [Sphere(0.07), Capsule(0.05, 0.2), Box((0.1, 0.2, 0.15)), Cylinder(0.06, 0.2), HULL, CUT]
-PAIRS = [(a, b) for a, b in itertools.product(SOLIDS, [*SOLIDS, HalfSpace()]) if gap.pair_rows(a, b) is not None]
-IDS = ["-".join(f"{type(s).__name__}{len(s.points) if isinstance(s, Convex) else ''}" for s in pair) for pair in PAIRS]
+ROWS = [(a, b) for a, b in itertools.product(SOLIDS, [*SOLIDS, HalfSpace()]) if gap.pair_rows(a, b)]
+PAIRS = [pair for pair in ROWS if not gap.is_sensed(*pair)]
+#: A capsule with a box or a cylinder has rows for its ends
+ENDS = [pair for pair in ROWS if gap.is_sensed(*pair)]
+
+
+def name_of(shape: Shape) -> str:
+    return f"{type(shape).__name__}{len(shape.points) if isinstance(shape, Convex) else ''}"
+
+
 ASKEW = pin.SE3(pin.exp3(np.array([0.4, -1.1, 0.7])), np.array([0.03, -0.05, 0.06]))
 
 
@@ -60,17 +72,41 @@ def cylinder_gap(ball: np.ndarray, radius: float, cylinder: Cylinder) -> float:
     return float(np.linalg.norm(np.maximum(over, 0)) + min(over.max(), 0.0) - radius)
 
 
+def ends(pose: pin.SE3, length: float) -> list[np.ndarray]:
+    return [pose.act(np.array([0.0, 0.0, side * length / 2])) for side in (-1, 1)]
+
+
+def ball_gap(center: np.ndarray, radius: float, face: Box | Cylinder, pose: pin.SE3) -> float:
+    """Distance of a ball to a box (by Coal) or to a cylinder."""
+    if isinstance(face, Cylinder):
+        return cylinder_gap(pose.actInv(center), radius, face)
+    request, ball = coal.DistanceRequest(), coal_pose(pin.SE3(np.eye(3), center))
+    request.enable_signed_distance = True
+    return coal.distance(coal.Sphere(radius), ball, coal_shape(face), coal_pose(pose), request, coal.DistanceResult())
+
+
+class Ends(Obstacle):
+    """Without the sensed rows."""
+
+    abstract: ClassVar[bool] = True
+
+    def sensed_rows(self, robot: Robot) -> int:
+        return 0
+
+
 def test_pairs_are_those_that_are_promised() -> None:
     kinds = {(type(a).__name__, type(b).__name__) for a, b in PAIRS}
     ball = {("Sphere", other) for other in ("Sphere", "Capsule", "Box", "Cylinder")}
     plane = {(type(solid).__name__, "HalfSpace") for solid in SOLIDS}
     assert kinds == ball | {pair[::-1] for pair in ball} | {("Capsule", "Capsule")} | plane
+    rods = {("Capsule", "Box"), ("Capsule", "Cylinder")}
+    assert {(type(a).__name__, type(b).__name__) for a, b in ENDS} == rods | {pair[::-1] for pair in rods}
     assert len(HULL.points) > gap.VERTEX_ROWS >= len(CUT.points)
     assert gap.pair_rows(hull(gap.SUPPORT_VERTICES), HalfSpace()) == ("",)
-    assert gap.pair_rows(hull(gap.SUPPORT_VERTICES + 1), HalfSpace()) is None
+    assert gap.pair_rows(hull(gap.SUPPORT_VERTICES + 1), HalfSpace()) == ()
 
 
-@pytest.mark.parametrize(("solid", "other"), PAIRS, ids=IDS)
+@pytest.mark.parametrize(("solid", "other"), PAIRS, ids=name_of)
 def test_margins_are_those_of_coal(solid: Solid, other: Shape) -> None:
     bot, link = carrying(solid)
     item, rng = Obstacle(other), np.random.default_rng(21)
@@ -96,11 +132,32 @@ def test_margins_are_those_of_coal(solid: Solid, other: Shape) -> None:
     assert min(inside, outside) >= 5
 
 
+@pytest.mark.parametrize(("solid", "other"), ENDS, ids=name_of)
+def test_ends_of_a_capsule_against_faces(solid: Solid, other: Shape) -> None:
+    """Two rows: the distances of the spheres at the ends. None is below that of the whole capsule."""
+    bot, link = carrying(solid)
+    clear, rng, touching = probe(Ends(other), bot), np.random.default_rng(22), 0
+    for _ in range(30):
+        q = random_configuration(bot, rng)
+        pose = near(bot, q, link, rng)
+        h, here = clear(q, pose=pose)[0], where(bot, q, link)
+        rod, face, at, other_at = (
+            (solid, other, here, pose) if isinstance(solid, Capsule) else (other, solid, pose, here)
+        )
+        for row, end in enumerate(ends(at, rod.length)):
+            truth = ball_gap(end, rod.radius, face, other_at)
+            assert h[row] == pytest.approx(truth, abs=1e-9)
+            touching += truth < 0
+        whole = coal_distance(bot, q, link, bot.shapes[link][0], other, pose)
+        assert whole < 0 or h.min() > whole - 1e-6
+    assert touching > 3
+
+
 @pytest.mark.parametrize("name", ["panda", "talos"])
-@pytest.mark.parametrize(("solid", "other"), PAIRS, ids=IDS)
+@pytest.mark.parametrize(("solid", "other"), ROWS, ids=name_of)
 def test_derivatives_along_v_and_in_time(solid: Solid, other: Shape, name: str) -> None:
     bot, link = carrying(solid, name)
-    found = numbers(Obstacle(other), bot)
+    found = numbers(Ends(other), bot)
     rng = np.random.default_rng(zlib.crc32(f"{solid} {other} {name}".encode()))
     for _ in range(2):
         q = random_configuration(bot, rng)
@@ -108,11 +165,11 @@ def test_derivatives_along_v_and_in_time(solid: Solid, other: Shape, name: str) 
         check_derivatives(found, q, values)
 
 
-@pytest.mark.parametrize(("solid", "other"), PAIRS, ids=IDS)
+@pytest.mark.parametrize(("solid", "other"), ROWS, ids=name_of)
 def test_gradient_is_a_unit_vector_wherever_the_shapes_are(solid: Solid, other: Shape) -> None:
     """Centres coincide, axes cross or are parallel, a centre in a face, on an edge, on an axis; in between as well."""
     bot, link = carrying(solid)
-    clear, q = probe(Obstacle(other), bot), bot.neutral
+    clear, q = probe(Ends(other), bot), bot.neutral
     here, quarter = where(bot, q, link), pin.utils.rotate("x", np.pi / 2)
     turns = [np.eye(3), quarter, pin.exp3(np.array([0.3, 0.2, 0.1])), pin.exp3(np.array([1e-9, 0.0, 0.0]))]
     steps = [
@@ -169,10 +226,6 @@ def test_way_out_of_the_very_middle(shape: Box | Cylinder, axis: int) -> None:
     size = shape.size[axis] / 2 if isinstance(shape, Box) else 0.2
     assert float(distance) == pytest.approx(-size)
     np.testing.assert_array_equal(np.array(direction)[:, 0], np.eye(3)[axis])
-
-
-def ends(pose: pin.SE3, length: float) -> list[np.ndarray]:
-    return [pose.act(np.array([0.0, 0.0, side * length / 2])) for side in (-1, 1)]
 
 
 def between_in_a_plane(first: list[np.ndarray], second: list[np.ndarray]) -> float:

@@ -1,0 +1,220 @@
+"""Closed loops of collision constraints: the hand is pulled into things and into the robot itself; Coal is the judge.
+
+Tick by tick every distance d that Coal measures, less the margin, is at least (1 - rate dt) d - bend of the tick
+before, with the bend of :mod:`tests.closed_loop.constraints`. Sensed shapes with edges have nearest points that jump,
+and a row for where they are now only; what that adds in a tick was below :data:`JUMP` in all of these runs.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import coal
+import numpy as np
+import pinocchio as pin
+
+from tests.closed_loop.constraints import bend, random_unit
+from tests.closed_loop.eyes import Array, length
+from tests.closed_loop.loop import Loop, Run
+from tests.closed_loop.machines import anywhere, machine
+from tests.constraints.test_obstacle import coal_pose, coal_shape
+from tests.tasks.robots import FRAMES, Frames
+from wbc.robot import Robot
+from wbc.shapes import Box, Capsule, Convex, Cylinder, PlacedShape, Shape
+from wbc.tasks import Constraint, EndEffector, Item, JointLimits, Obstacle
+from wbc.tasks.self_collision import SelfCollision
+
+DT, RATE, TICKS, MARGIN = 0.01, 20.0, 80, 0.01
+
+#: How much nearer than the row's points others may be one tick later, and the tolerance of Coal's iterations [m]
+JUMP = 1e-3
+
+_turns = np.random.default_rng(5).normal(size=(2, 40, 3))
+#: Two lumps that together are not convex
+ROCK = tuple(
+    Convex(0.08 * turn / np.linalg.norm(turn, axis=1, keepdims=True) + [side * 0.07, 0, 0])
+    for turn, side in zip(_turns, (-1, 1), strict=True)
+)
+
+Figures = dict[str, float]
+
+
+def parts(shape: Any) -> tuple[Shape, ...]:
+    return shape if isinstance(shape, tuple) else (shape,)
+
+
+@dataclass(frozen=True, eq=False)
+class Thing:
+    """An obstacle; ``size``: nothing of it is farther from its origin [m]."""
+
+    shape: Any
+    size: float
+
+
+THINGS: dict[str, Thing] = {
+    "rod": Thing(Capsule(0.04, 0.2), 0.14),
+    "crate": Thing(Box((0.2, 0.14, 0.1)), 0.14),
+    "can": Thing(Cylinder(0.07, 0.2), 0.13),
+    "rock": Thing(ROCK, 0.15),
+}
+
+#: Items that keep the robot clear of itself, and the method of each
+SELF = {"self": "auto", "self, sensed": "sensed"}
+
+#: What is sensed has one row a pair of shapes, so that a shape that rocks from one nearest point to another is seen to
+#: do so a tick later; how far it has come by then grows with the square of speed
+SENSED = ("rock", "self, sensed")
+
+
+def speed(loop: Loop, name: str) -> float:
+    """Share of the joints' speed limits that a check runs at: fewer where many joints add up to a fast hand."""
+    return (0.15 if loop.robot.base == "floating" else 0.3) if name in SENSED else 0.5
+
+
+@cache
+def geometry(shape: Shape) -> Any:
+    return coal_shape(shape)
+
+
+class Gaps:
+    """Signed distances of pairs of shapes, by Coal [m]. A shape stands on a link, or on ``None``, a pose of its own."""
+
+    def __init__(self, loop: Loop, pairs: list[tuple[tuple[str, PlacedShape], tuple[str | None, PlacedShape]]]) -> None:
+        self.eyes, self.pairs = loop.eyes, pairs
+        self.links = list(dict.fromkeys(link for pair in pairs for link, _ in pair if link is not None))
+        self.request = coal.DistanceRequest()
+        self.request.enable_signed_distance = True
+
+    def __call__(self, q: Array, pose: pin.SE3 | None = None) -> Array:
+        poses: dict[str | None, Any] = dict(zip(self.links, self.eyes.poses(q, *self.links), strict=True))
+        poses[None] = pose
+        out = []
+        for pair in self.pairs:
+            args = [a for link, p in pair for a in (geometry(p.shape), coal_pose(poses[link] * p.placement))]
+            out.append(coal.distance(*args, self.request, coal.DistanceResult()))
+        return np.array(out)
+
+
+def collision_machine(name: str) -> Robot:
+    """The robot of the other loops; the humanoid has the shapes of its left arm on its right arm, too."""
+    robot = machine(name)
+    if name != "talos":
+        return robot
+    f = FRAMES[name]
+    other = {link.replace("left", "right"): robot.shapes[link] for link in (f.tip, f.middle)}
+    return robot.with_shapes({**robot.shapes, **other})
+
+
+def self_pairs(name: str, f: Frames) -> list[tuple[str, str]]:
+    """Hand and wrist against the upper arm, or against the other arm."""
+    if name == "talos":
+        return [(a, b.replace("left", "right")) for a in (f.tip, f.middle) for b in (f.tip, f.middle)]
+    return [(f.tip, f.plane[0]), (f.plane[2], f.plane[0]), (f.tip, f.middle)]
+
+
+def collision_items(name: str, robot: Robot, mutations: dict[str, Any] | None = None) -> dict[str, Item]:
+    """Every constraint under test, some of mutated classes, and what pulls against them."""
+    f, other = FRAMES[name], mutations or {}
+    items: dict[str, Item] = {
+        key: other.get(key, Obstacle)(thing.shape, margin=MARGIN) for key, thing in THINGS.items()
+    }
+    for key, method in SELF.items():
+        items[key] = other.get(key, SelfCollision)(self_pairs(name, f), margin=MARGIN, method=method)
+    goal = self_pairs(name, f)[0][1]
+    return items | {
+        "reach": EndEffector(f.tip, kind="position"),
+        "fold": EndEffector(f.tip, kind="position", relative_to=goal),
+        "caps": JointLimits(acceleration=False),
+    }
+
+
+def judge(figures: Figures, loop: Loop, run: Run, d: Array, spin: float) -> None:
+    """Take the distances of a run, less the margin, ticks + 1 x pairs, into the figures."""
+    allowed = np.array([bend(loop, v, spin) for v in run.v])
+    short = (1 - RATE * loop.dt) * d[:-1] - d[1:]
+    figures["unsolved"] += run.unsolved
+    figures["deepest"] = min(figures["deepest"], float(d.min()))
+    figures["excess"] = max(figures["excess"], float((short - allowed[:, None]).max()))
+    figures["touching"] += bool(d.min() < 3e-3)
+
+
+def accept(figures: Figures, starts: int, touching: float) -> Figures:
+    """Nothing overlaps, and enough runs come to the limit."""
+    assert figures["excess"] < JUMP, figures
+    assert figures["deepest"] > -MARGIN, figures
+    assert figures["touching"] > touching * starts, figures
+    assert figures["unsolved"] == 0, figures
+    return figures
+
+
+def pressed(loop: Loop, name: str, starts: int, seed: int = 31) -> Figures:
+    """The hand is pulled to the origin of a thing that lies beyond it and, every second time, comes and turns."""
+    rng, thing = np.random.default_rng(seed), THINGS[name]
+    shapes = [(link, placed) for link, group in loop.robot.shapes.items() for placed in group]
+    others = [(None, PlacedShape(part, pin.SE3.Identity())) for part in parts(thing.shape)]
+    gaps = Gaps(loop, list(itertools.product(shapes, others)))
+    loop.only(name, "reach", "caps")
+    loop["caps"].velocity_scale, loop["reach"].gain = speed(loop, name), 3.0
+    figures = {"deepest": np.inf, "excess": -np.inf, "touching": 0.0, "unsolved": 0.0}
+    for start in range(starts):
+        q, pose, inward = beyond(loop, thing, gaps, rng)
+        twist = np.zeros(6)
+        if start % 2:
+            twist = np.concatenate([-0.1 * inward, rng.uniform(-0.3, 0.3, 3)])
+        poses = [
+            pin.SE3(pin.exp3(t * twist[3:]) @ pose.rotation, pose.translation + t * twist[:3])
+            for t in loop.dt * np.arange(TICKS + 1)
+        ]
+
+        def aim(k: int, _: Array, poses: list[pin.SE3] = poses, twist: Array = twist) -> None:
+            loop[name].pose, loop[name].velocity = poses[k], twist
+            loop["reach"].target = poses[k].translation
+
+        run = loop.run(q, TICKS, before=aim)
+        d = np.array([gaps(x, p) for x, p in zip(run.q, poses, strict=True)]) - MARGIN
+        judge(figures, loop, run, d, length(twist[3:]))
+    return accept(figures, starts, 0.5)
+
+
+def beyond(loop: Loop, thing: Thing, gaps: Gaps, rng: np.random.Generator) -> tuple[Array, pin.SE3, Array]:
+    """A configuration, a thing beyond the hand that touches nothing, and the direction into it."""
+    for _ in range(1000):
+        q = anywhere(loop.robot, rng)
+        shoulder, tip = (p.translation for p in loop.eyes.poses(q, loop.frames.plane[0], loop.frames.tip))
+        inward = (tip - shoulder) / length(tip - shoulder) + 0.3 * random_unit(rng)
+        inward /= length(inward)
+        pose = pin.SE3(pin.exp3(rng.uniform(-2, 2, 3)), tip + (0.2 + thing.size) * inward)
+        if gaps(q, pose).min() > MARGIN + 0.01:
+            return q, pose, inward
+    raise AssertionError("the obstacle is always in the way")
+
+
+def folded(loop: Loop, name: str, starts: int, seed: int = 32) -> Figures:
+    """The hand is pulled to the origin of the link that it must not touch."""
+    rng, shapes = np.random.default_rng(seed), loop.robot.shapes
+    pairs = self_pairs(loop.known, loop.frames)
+    groups = [([(a, p) for p in shapes[a]], [(b, p) for p in shapes[b]]) for a, b in pairs]
+    gaps = Gaps(loop, [pair for group in groups for pair in itertools.product(*group)])
+    loop.only(name, "fold", "caps")
+    loop["caps"].velocity_scale, loop["fold"].target = speed(loop, name), np.zeros(3)
+    loop["fold"].gain = 5.0
+    figures = {"deepest": np.inf, "excess": -np.inf, "touching": 0.0, "unsolved": 0.0}
+    found = 0
+    while found < starts:
+        q = anywhere(loop.robot, rng)
+        if not MARGIN + 0.01 < gaps(q).min() < 0.3:
+            continue
+        found += 1
+        run = loop.run(q, TICKS)
+        d = np.array([gaps(x) for x in run.q]) - MARGIN
+        judge(figures, loop, run, d, 0.0)
+    return accept(figures, starts, 0.3)
+
+
+def loop_of(name: str, mutations: dict[str, type[Constraint]] | None = None) -> Loop:
+    """The stack of all collision constraints on a robot."""
+    robot = collision_machine(name)
+    return Loop(robot, collision_items(name, robot, mutations), DT, name)

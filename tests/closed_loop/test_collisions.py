@@ -1,0 +1,46 @@
+"""Collision constraints in their loops, on three robots, and mutations that the loops notice.
+
+From 100 random starts for a capsule and two arms, else 40: Coal, asked for every pair of every tick, takes longer
+than the tick.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+
+import pytest
+
+from tests.closed_loop import collisions
+from tests.closed_loop.collision_mutations import MUTATIONS
+from tests.closed_loop.collisions import SELF, THINGS
+from tests.closed_loop.loop import Loop
+from tests.closed_loop.machines import CONSTRAINT_ROBOTS, STARTS
+
+FEWER = 40
+
+
+@cache
+def loop(name: str) -> Loop:
+    return collisions.loop_of(name)
+
+
+@cache
+def mutated() -> Loop:
+    return collisions.loop_of("panda", MUTATIONS)
+
+
+def check(loop: Loop, item: str, starts: int) -> None:
+    run = collisions.folded if item in SELF else collisions.pressed
+    run(loop, item, starts)
+
+
+@pytest.mark.parametrize("name", CONSTRAINT_ROBOTS)
+@pytest.mark.parametrize("item", [*THINGS, *SELF])
+def test_shapes_keep_clear(item: str, name: str) -> None:
+    check(loop(name), item, STARTS if item == "rod" and name != "talos" else FEWER)
+
+
+@pytest.mark.parametrize("item", MUTATIONS)
+def test_wrong_formula_is_noticed(item: str) -> None:
+    with pytest.raises(AssertionError, match=r"\{'"):
+        check(mutated(), item, 15)
