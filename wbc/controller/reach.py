@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+from numpy.typing import NDArray
 
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Layout
@@ -157,7 +158,7 @@ class Reach:
         stiffness = float((np.diag(H) * self._dofs**2).max(initial=0.0))
         return np.asarray(H + stiffness * equal.T @ equal)
 
-    def _limited(self, bound_enabled: Array) -> Array:
+    def _limited(self, bound_enabled: Array) -> NDArray[np.bool_]:
         """Which degrees of freedom have a limit of their acceleration now."""
         limited = self._brake_at >= 0
         limited[limited] = bound_enabled[self._brake_at[limited]] != 0.0
