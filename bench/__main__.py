@@ -10,13 +10,17 @@ from pathlib import Path
 
 from rich.console import Console
 
-from bench import report
+from bench import figure, report
+from bench.curve_run import measure_curves
 from bench.harness import Plan, machine, measure, measure_startup
 from bench.pool import ROOT
 from bench.prepare import prepare
 
 OWN = ("wbc", "casadi", "pin", "numpy", "daqp")
 PEERS = ("pin-pink", "mink", "mujoco", "placo", "qpsolvers", "daqp", "quadprog", "pin", "numpy")
+PROBLEMS = ("panda", "ur5", "talos")
+#: The problems of growing size, all of them
+CURVES = "curves"
 
 
 def main() -> None:
@@ -24,13 +28,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="bench", description=__doc__)
     parser.add_argument("--peers-python", help="interpreter with the peers; without it they are left out")
     parser.add_argument("--rounds", type=int, help="rounds a problem")
-    parser.add_argument("--problems", nargs="+", default=["panda", "ur5", "talos"], help="which problems")
+    parser.add_argument("--problems", nargs="+", default=[*PROBLEMS, CURVES], choices=[*PROBLEMS, CURVES])
     parser.add_argument("--work", type=Path, default=ROOT / "build" / "bench", help="folder for the problems")
     parser.add_argument("--output", type=Path, default=ROOT / "bench", help="folder for results.json and results.md")
     chosen = parser.parse_args()
     # Not resolved: a virtual environment's interpreter is a link
     peers = str(Path(chosen.peers_python).absolute()) if chosen.peers_python else None
-    plan = Plan(sys.executable, peers, chosen.work, chosen.rounds, chosen.problems)
+    plan = Plan(sys.executable, peers, chosen.work, chosen.rounds, [n for n in PROBLEMS if n in chosen.problems])
     console, progress = Console(), Console(stderr=True)
     if not console.is_terminal:
         console = Console(width=100)
@@ -43,14 +47,16 @@ def main() -> None:
             "startup": measure_startup(plan, status.update),
             "problems": {name: measure(plan, name, status.update) for name in plan.names},
         }
+        if CURVES in chosen.problems:
+            results[CURVES] = measure_curves(peers, plan.folder / "curves", chosen.rounds, status.update)
     chosen.output.mkdir(parents=True, exist_ok=True)
     (chosen.output / "results.json").write_text(json.dumps(results, indent=1) + "\n")
     (chosen.output / "results.md").write_text(report.markdown(results))
-    if (
-        set(plan.names) == {"panda", "ur5", "talos"}
-        and plan.peers_python is not None
-        and chosen.output == ROOT / "bench"
-    ):
+    complete = CURVES in results and peers is not None
+    picture = ROOT / "docs" / "images" if chosen.output == ROOT / "bench" else chosen.output
+    if complete:
+        figure.draw(results[CURVES], picture / "bench_curves.png")
+    if complete and len(plan.names) == len(PROBLEMS) and chosen.output == ROOT / "bench":
         report.update_readme(ROOT / "README.md", results)
     report.show(results, console)
 

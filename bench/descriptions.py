@@ -6,12 +6,18 @@ formats; spheres on links and obstacles are written as collision geometry, which
 
 from __future__ import annotations
 
+import math
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
+from bench.problems import Solid
+
 #: (centre [m] in the link's frame, radius [m])
 Sphere = tuple[tuple[float, float, float], float]
+
+#: Prefix of the links that carry what is fixed in the world
+FIXED = "fixed"
 
 
 def write_urdf(
@@ -21,6 +27,7 @@ def write_urdf(
     locked: Iterable[str] = (),
     spheres: Mapping[str, Sphere] | None = None,
     obstacles: Sequence[Sphere] = (),
+    solids: Sequence[Solid] = (),
 ) -> None:
     """Write a copy of a URDF without meshes.
 
@@ -30,6 +37,8 @@ def write_urdf(
         locked: joints that become fixed.
         spheres: link -> one collision sphere.
         obstacles: spheres fixed to the root link, written as links ``obstacle0``, ``obstacle1``, ...
+        solids: more shapes; the collision body of number k is named :func:`solid_name`, and a solid that is fixed in
+            the world is on a link ``fixed<k>``.
     """
     root = ET.parse(source).getroot()
     for link in root.iter("link"):
@@ -57,6 +66,8 @@ def write_urdf(
         ET.SubElement(joint, "parent", link=base)
         ET.SubElement(joint, "child", link=name)
         ET.SubElement(joint, "origin", xyz=_numbers(sphere[0]), rpy="0 0 0")
+    for k, solid in enumerate(solids):
+        _add_solid(root, links, base, k, solid)
     target.parent.mkdir(parents=True, exist_ok=True)
     ET.ElementTree(root).write(target, encoding="unicode", xml_declaration=True)
 
@@ -87,6 +98,47 @@ def _add_sphere(link: ET.Element, name: str, sphere: Sphere) -> None:
     collision = ET.SubElement(link, "collision", name=f"{name}_sphere")
     ET.SubElement(collision, "origin", xyz=_numbers(sphere[0]), rpy="0 0 0")
     ET.SubElement(ET.SubElement(collision, "geometry"), "sphere", radius=repr(sphere[1]))
+
+
+def solid_name(number: int) -> str:
+    """Name of the collision body of a solid; MuJoCo keeps it."""
+    return f"solid{number}"
+
+
+def solid_index(solids: Sequence[Solid], number: int) -> str:
+    """Name that Pinocchio gives it: that of the link, and its number there."""
+    link = solids[number].link
+    before = sum(solid.link == link for solid in solids[:number])
+    return f"{link}_{before}" if link else f"{FIXED}{number}_0"
+
+
+def _add_solid(root: ET.Element, links: Mapping[str | None, ET.Element], base: str, k: int, solid: Solid) -> None:
+    link = links[solid.link] if solid.link else ET.SubElement(root, "link", name=f"{FIXED}{k}")
+    if not solid.link:
+        joint = ET.SubElement(root, "joint", name=f"{FIXED}{k}_joint", type="fixed")
+        ET.SubElement(joint, "parent", link=base)
+        ET.SubElement(joint, "child", link=f"{FIXED}{k}")
+    collision = ET.SubElement(link, "collision", name=solid_name(k))
+    ET.SubElement(collision, "origin", xyz=_numbers(solid.place), rpy=_numbers(roll_pitch_yaw(solid.turn)))
+    geometry = ET.SubElement(collision, "geometry")
+    if solid.kind == "sphere":
+        ET.SubElement(geometry, "sphere", radius=repr(solid.size[0]))
+    elif solid.kind == "box":
+        ET.SubElement(geometry, "box", size=_numbers(solid.size))
+    else:
+        # Pinocchio takes a cylinder for a capsule where this element names it; in MuJoCo the contender does so
+        ET.SubElement(geometry, "cylinder", radius=repr(solid.size[0]), length=repr(solid.size[1]))
+        ET.SubElement(ET.SubElement(link, "collision_checking"), "capsule", name=solid_name(k))
+
+
+def roll_pitch_yaw(turn: Sequence[float]) -> tuple[float, float, float]:
+    """Fixed-axis angles [rad] of a unit quaternion (x, y, z, w)."""
+    x, y, z, w = turn
+    return (
+        math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y)),
+        math.asin(max(-1.0, min(1.0, 2 * (w * y - z * x)))),
+        math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)),
+    )
 
 
 def _numbers(values: Sequence[float]) -> str:

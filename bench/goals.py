@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -43,9 +44,25 @@ def goals(results: dict[str, Any]) -> list[Goal]:
         if name in startup["compile"]:
             out.append(Goal(f"{name} first compile", startup["compile"][name]["first"], limit, "s"))
             out.append(Goal(f"{name} cached compile", startup["compile"][name]["cached"], 0.5, "s"))
+    out += curve_goals(results.get("curves", ()))
     out.append(Goal("import wbc", startup["import"]["wbc"], 1.0, "s"))
     if "wbc" in startup["memory"]:
         out.append(Goal("memory of a Panda controller process", startup["memory"]["wbc"] / 1e6, 250.0, "MB"))
+    return out
+
+
+def curve_goals(curves: Sequence[dict[str, Any]]) -> list[Goal]:
+    """Those of the growing problems."""
+    out = []
+    for point in curves:
+        found = point["contenders"]
+        own = found["wbc"]["median"]
+        if point["curve"] == "g1":
+            for peer in [name for name in found if name.startswith("mink")]:
+                ratio = own / found[peer]["median"]
+                out.append(Goal(f"G1 tick, self-collision of 20 pairs, as a fraction of {peer}'s", ratio, 0.2, ""))
+        if (point["curve"], point["x"]) == ("spheres", 50.0):
+            out.append(Goal("panda tick with 50 spheres", own, 40.0, "us"))
     return out
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import xml.etree.ElementTree as ET
 from time import perf_counter_ns
 
@@ -11,7 +12,7 @@ import numpy as np
 import qpsolvers
 
 from bench.contender import Contender, exact_solution, stopwatch
-from bench.descriptions import mujoco_urdf
+from bench.descriptions import mujoco_urdf, solid_name
 from bench.problems import Array, Case
 
 #: Spheres farther apart than this give no row [m]; at the rate of the problems such a row never binds
@@ -21,14 +22,20 @@ DETECTION = 0.15
 class Mink(Contender):
     """``mink.solve_ik`` and ``Configuration.integrate_inplace``; obstacles by its collision limit."""
 
-    def __init__(self, case: Case) -> None:
+    def __init__(self, case: Case, detection: float = DETECTION) -> None:
         """Compile the model and build the tasks."""
         super().__init__(case)
+        self.detection = detection
         problem = self.problem
         text = case.urdf.read_text()
         spec = mujoco.MjSpec.from_string(mujoco_urdf(text))
         if problem.floating:
             spec.worldbody.first_body().add_freejoint()
+        capsules = {solid_name(k) for k, solid in enumerate(problem.solids) if solid.kind == "capsule"}
+        for geom in spec.geoms:
+            if geom.name in capsules:
+                # A URDF has no capsules; radius and half length mean the same in both
+                geom.type = mujoco.mjtGeom.mjGEOM_CAPSULE
         self.model = spec.compile()
         self.q0 = np.array(self.model.qpos0)
         self.slots = [int(self.model.joint(name).qposadr[0]) for name in problem.joints]
@@ -46,20 +53,22 @@ class Mink(Contender):
             mink.ConfigurationLimit(self.model, gain=1.0),
             mink.VelocityLimit(self.model, velocity_limits(text, problem.joints)),
         ]
-        if problem.obstacles:
+        if problem.obstacles or problem.pairs:
             self.limits.append(self._collisions())
+            self.facts["pairs"] = float(self.limits[-1].max_num_contacts)
         self.reset()
 
     def _collisions(self) -> mink.CollisionAvoidanceLimit:
         obstacles = [f"obstacle{k}_sphere" for k in range(len(self.problem.obstacles))]
         links = [f"{link}_sphere" for link in self.problem.spheres]
+        pairs = [([solid_name(a)], [solid_name(b)]) for a, b in self.problem.pairs]
         # mink bounds the displacement of a tick by gain * distance / dt, so a rate costs two factors of dt
         return mink.CollisionAvoidanceLimit(
             self.model,
-            [(links, obstacles)],
+            pairs or [(links, obstacles)],
             gain=self.problem.rate * self.problem.dt**2,
             minimum_distance_from_collisions=self.problem.margin,
-            collision_detection_distance=DETECTION,
+            collision_detection_distance=self.detection,
         )
 
     def reset(self) -> None:
@@ -108,6 +117,10 @@ class Mink(Contender):
         exact = exact_solution(problem.P, problem.q, problem.G, problem.h)
         found = qpsolvers.solve_problem(problem, solver="daqp").x
         return float(np.abs(found - exact).max() / self.problem.dt)
+
+
+#: With the distance of its default below which pairs have rows, 1 cm
+at_default_detection = functools.partial(Mink, detection=0.01)
 
 
 def velocity_limits(urdf: str, joints: list[str]) -> dict[str, float]:

@@ -14,6 +14,7 @@ import wbc
 from bench.contender import Contender
 from bench.problems import Array, Case
 from bench.reference import Referee
+from bench.solids import keep_clear, link_shapes
 from wbc.controller.native import NativeTick
 
 
@@ -29,7 +30,9 @@ class Ours(Contender):
             link: [wbc.shapes.PlacedShape(wbc.shapes.Sphere(radius), pin.SE3(np.eye(3), np.array(center)))]
             for link, (center, radius) in problem.spheres.items()
         }
-        self.robot = wbc.robots.load(problem.robot).with_shapes(shapes)
+        base = "floating" if problem.floating else "fixed"
+        robot = wbc.robots.load(problem.robot) if problem.robot else wbc.robots.load(case.urdf, base=base)
+        self.robot = robot.with_shapes(shapes | link_shapes(problem.solids))
         assert list(self.robot.joint_names)[-len(problem.joints) :] == problem.joints
         stack = wbc.Stack(self.robot, problem.dt, damping=problem.damping)
         for frame in problem.frames:
@@ -43,6 +46,9 @@ class Ours(Contender):
         for k, (place, radius) in enumerate(problem.obstacles):
             pose = pin.SE3(np.eye(3), np.array(place))
             stack.add(wbc.tasks.Obstacle(wbc.shapes.Sphere(radius), pose=pose, margin=problem.margin), name=f"ball{k}")
+        clear = keep_clear(problem)
+        for name, constraint in clear.items():
+            stack.add(constraint, name=name)
         self.tasks = [e.name for e in stack.tasks]
         start, cpu = perf_counter(), processor_time()
         self.controller = stack.compile()
@@ -51,8 +57,8 @@ class Ours(Contender):
         for name in self.tasks:
             self.controller[name].gain = 1.0 / problem.dt
         self.controller["posture"].target = self.case.q0
-        for k in range(len(problem.obstacles)):
-            self.controller[f"ball{k}"].rate = problem.rate
+        for name in [*(f"ball{k}" for k in range(len(problem.obstacles))), *clear]:
+            self.controller[name].rate = problem.rate
         self.targets = [self.controller[f] for f in problem.frames]
         self.com = self.controller["com"] if problem.com else None
         self.referee = Referee(case)
@@ -111,6 +117,10 @@ class Ours(Contender):
             crossing = float(perf_counter_ns() - start)
             # A call from Python costs about as much as a phase; it is taken off each and counted once, as Python's
             spent = {name: max(0.0, value - crossing) for name, value in spent.items()}
+        if self.problem.sensed:
+            start = perf_counter_ns()
+            self.controller._sense()
+            spent = {"sense": float(perf_counter_ns() - start)} | spent
         spent["python"] = whole - sum(spent.values())
         self.settle()
         return spent

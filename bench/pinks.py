@@ -11,6 +11,7 @@ import pinocchio as pin
 import qpsolvers
 
 from bench.contender import Contender, exact_solution, stopwatch
+from bench.descriptions import solid_index
 from bench.problems import Array, Case
 
 
@@ -37,7 +38,7 @@ class Pink(Contender):
             pink.limits.ConfigurationLimit(self.model, config_limit_gain=1.0),
             pink.limits.VelocityLimit(self.model),
         ]
-        self.barriers = [self._barrier()] if problem.obstacles else []
+        self.barriers = [self._barrier()] if problem.obstacles or problem.pairs else []
         self.reset()
 
     def _barrier(self) -> pink.barriers.SelfCollisionBarrier:
@@ -48,15 +49,21 @@ class Pink(Contender):
             for b in obstacles:
                 if a not in obstacles:
                     geometry.addCollisionPair(pin.CollisionPair(a, b))
+        solids = [names.index(solid_index(self.problem.solids, k)) for k in range(len(self.problem.solids))]
+        for a, b in self.problem.pairs:
+            geometry.addCollisionPair(pin.CollisionPair(solids[a], solids[b]))
         self.geometry = geometry
         pairs = len(geometry.collisionPairs)
+        self.facts["pairs"] = float(pairs)
+        if self.problem.sensed:
+            pairs = min(pairs, self.problem.sensed)
         return pink.barriers.SelfCollisionBarrier(
             pairs, gain=self.problem.rate, safe_displacement_gain=0.0, d_min=self.problem.margin
         )
 
     def reset(self) -> None:
         collision = {}
-        if self.problem.obstacles:
+        if self.problem.obstacles or self.problem.pairs:
             collision = {"collision_model": self.geometry, "collision_data": pin.GeometryData(self.geometry)}
         self.configuration = pink.Configuration(self.model, self.model.createData(), self.case.q0, **collision)
 

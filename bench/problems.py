@@ -17,6 +17,25 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
+class Solid:
+    """A collision shape that all contenders get.
+
+    Attributes:
+        link: the link that carries it; several may be on one. ``""``: fixed in the world.
+        kind: ``sphere``, ``capsule`` (axis z; ``size`` is radius, distance of the ends) or ``box`` (full sides).
+        size: [m].
+        place: of its centre in the link's frame [m].
+        turn: its orientation in the link's frame, a quaternion (x, y, z, w).
+    """
+
+    link: str
+    kind: str
+    size: list[float]
+    place: list[float]
+    turn: list[float] = field(default_factory=lambda: [0.0, 0.0, 0.0, 1.0])
+
+
+@dataclass(frozen=True)
 class Problem:
     """One control problem.
 
@@ -36,6 +55,9 @@ class Problem:
         obstacles: (centre, radius) of spheres fixed in the world [m].
         margin: smallest distance allowed [m].
         rate: a distance d above the margin may shrink by at most rate * d [1/s].
+        solids: collision shapes, on links and in the world; :attr:`pairs` says which keep clear.
+        pairs: pairs of indices into :attr:`solids`.
+        sensed: rows for the nearest pairs, which Coal measures (this package); 0: every pair has a row of its own.
         q0: first configuration: base position and quaternion (x, y, z, w) if floating, then the joints.
     """
 
@@ -55,6 +77,9 @@ class Problem:
     obstacles: list[tuple[tuple[float, float, float], float]] = field(default_factory=list)
     margin: float = 0.01
     rate: float = 100.0
+    solids: list[Solid] = field(default_factory=list)
+    pairs: list[tuple[int, int]] = field(default_factory=list)
+    sensed: int = 0
 
 
 @dataclass(frozen=True)
@@ -93,6 +118,7 @@ def save(folder: Path, problem: Problem, poses: Array, com: Array) -> None:
 
 def load(folder: Path) -> Case:
     """Read what :func:`save` wrote."""
-    problem = Problem(**json.loads((folder / "problem.json").read_text()))
+    stored = json.loads((folder / "problem.json").read_text())
+    problem = Problem(**stored | {"solids": [Solid(**solid) for solid in stored["solids"]]})
     with np.load(folder / "targets.npz") as data:
         return Case(problem, folder / "robot.urdf", data["poses"], data["com"])

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from rich.console import Console
-from rich.table import Table
 
+from bench.curve_report import NOTES, curve_readme, curve_sheets
 from bench.goals import Goal, goals
+from bench.sheet import Sheet, line, us
 
 #: Contender that ratios are taken to
 OURS = "wbc"
@@ -33,34 +33,12 @@ the velocity returned and an exact solution of the same QP, for wbc an independe
 placo does not show its QP."""
 
 
-@dataclass(frozen=True)
-class Sheet:
-    """A table: a title, columns and rows of text."""
-
-    title: str
-    columns: tuple[str, ...]
-    rows: list[tuple[str, ...]]
-
-    def rich(self) -> Table:
-        """For the terminal."""
-        table = Table(title=self.title, title_justify="left")
-        for k, column in enumerate(self.columns):
-            table.add_column(column, justify="left" if k == 0 else "right")
-        for row in self.rows:
-            table.add_row(*row)
-        return table
-
-    def markdown(self) -> str:
-        """For a page."""
-        lines = [f"**{self.title}**", "", _line(self.columns), _line(["---"] + ["---:"] * (len(self.columns) - 1))]
-        return "\n".join(lines + [_line(row) for row in self.rows])
-
-
 def sheets(results: dict[str, Any]) -> list[Sheet]:
     """All tables of a run."""
     out = []
     for problem in results["problems"].values():
         out += [ticks(problem), answers(problem), phases(problem)]
+    out += curve_sheets(results.get("curves", ()))
     return [*out, startup(results["startup"]), goal_sheet(goals(results))]
 
 
@@ -71,7 +49,7 @@ def ticks(problem: dict[str, Any]) -> Sheet:
     for name, measured in problem["contenders"].items():
         durations = measured["durations"]
         ratio = "1" if name == OURS else f"{durations['call']['median'] / ours:.2f}"
-        around = [_us(durations[part]["median"]) for part in ("aim", "cycle")]
+        around = [us(durations[part]["median"]) for part in ("aim", "cycle")]
         rows.append((name, *_tails(durations["call"]), ratio, *around))
         if "native" in durations:
             rows.append(("  native call alone", *_tails(durations["native"]), "", "", ""))
@@ -95,7 +73,7 @@ def answers(problem: dict[str, Any]) -> Sheet:
 def phases(problem: dict[str, Any]) -> Sheet:
     """Medians of the phases of a tick, in the order in which they come."""
     rows = [
-        (name, "  ".join(f"{phase} {_us(value)}" for phase, value in measured["phases"].items()) or "-")
+        (name, "  ".join(f"{phase} {us(value)}" for phase, value in measured["phases"].items()) or "-")
         for name, measured in problem["contenders"].items()
     ]
     return Sheet("Phases of a tick, medians [us]", ("", "phases"), rows)
@@ -133,6 +111,7 @@ def notes(results: dict[str, Any]) -> list[str]:
         CALLS,
         TERMS,
         ERRORS,
+        *(NOTES.split("\n\n") if results.get("curves") else ()),
     ]
 
 
@@ -157,20 +136,22 @@ def readme(results: dict[str, Any]) -> str:
     names = list(
         dict.fromkeys(name for p in problems.values() for name in p["contenders"] if "+expression" not in name)
     )
-    lines = [_line(["one tick / with new targets [us], medians", *(p["title"] for p in problems.values())])]
-    lines.append(_line(["---", *("---:" for _ in problems)]))
+    lines = [line(["one tick / with new targets [us], medians", *(p["title"] for p in problems.values())])]
+    lines.append(line(["---", *("---:" for _ in problems)]))
     for name in names:
         cells = []
         for problem in problems.values():
             found = problem["contenders"].get(name)
-            parts = [_us(found["durations"][part]["median"]) for part in ("call", "cycle")] if found else ["-"]
+            parts = [us(found["durations"][part]["median"]) for part in ("call", "cycle")] if found else ["-"]
             cells.append(" / ".join(parts))
-        lines.append(_line([name, *cells]))
+        lines.append(line([name, *cells]))
     about = results["machine"]
     lines += [
         "",
         f"{about['processor']}, Python {about['python']}, {about['cores']}. All reach the same pose to the same error.",
     ]
+    if results.get("curves"):
+        lines += ["", *curve_readme(results["curves"]), "", "![Tick against size](docs/images/bench_curves.png)", ""]
     lines.append(
         "What each call contains, percentiles, phases, compile times and goals: [bench/results.md](bench/results.md)."
     )
@@ -185,16 +166,8 @@ def update_readme(path: Path, results: dict[str, Any]) -> None:
         path.write_text(f"{head}{mark}\n\n{readme(results)}\n\n{end}{tail}")
 
 
-def _line(cells: Iterable[str]) -> str:
-    return "| " + " | ".join(cells) + " |"
-
-
-def _us(value: float) -> str:
-    return f"{value:.0f}" if value >= 100 else f"{value:.1f}" if value >= 10 else f"{value:.2f}"
-
-
 def _tails(durations: dict[str, float]) -> list[str]:
-    return [_us(durations[tail]) for tail in TAILS]
+    return [us(durations[tail]) for tail in TAILS]
 
 
 def _scaled(value: float | None, factor: float, style: str) -> str:

@@ -5,16 +5,21 @@
     {"do": "path"}                  ->  {"states": [[...], ...]}        one pass along the path
     {"do": "accuracy"}              ->  {"error": largest difference to the exact solution, or null}
     {"do": "memory"}                ->  {"peak": bytes}
+    {"do": "open", "folder": "..."} ->  {"facts": {...}}                another problem instead
+    {"do": "sample", "budget": 0.3} ->  {"call": [ns, ...], "states": [[...], ...]}
+                                        as many ticks of one pass as take that long [s]
 
 Every command starts from the first configuration. Run as ``python -m bench.worker CONTENDER FOLDER [CORE]``.
 """
 
 from __future__ import annotations
 
+import gc
 import importlib
 import json
 import os
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from time import perf_counter, perf_counter_ns
 from typing import Any
@@ -29,6 +34,7 @@ CONTENDERS = {
     "pink + daqp": ("bench.pinks", "with_daqp"),
     "pink + quadprog": ("bench.pinks", "with_quadprog"),
     "mink + daqp": ("bench.minks", "Mink"),
+    "mink + daqp, rows within 1 cm": ("bench.minks", "at_default_detection"),
     "placo": ("bench.placos", "Placo"),
 }
 #: Every how many ticks the answer is compared with an exact solution
@@ -72,6 +78,24 @@ def time_native(contender: Contender, ticks: int) -> list[int]:
         out.append(contender.native() or 0)
         contender.settle()
     return out
+
+
+def time_sample(contender: Contender, budget: float) -> dict[str, Any]:
+    """Durations of the call along the path, for at most ``budget`` seconds but five ticks at least [ns]."""
+    contender.reset()
+    out: list[int] = []
+    states = []
+    end = perf_counter() + budget
+    for k in range(contender.case.ticks):
+        contender.aim(k)
+        start = perf_counter_ns()
+        contender.call()
+        out.append(perf_counter_ns() - start)
+        contender.settle()
+        states.append(contender.state().tolist())
+        if k >= 4 and perf_counter() > end:
+            break
+    return {"call": out, "states": states}
 
 
 def time_phases(contender: Contender, ticks: int) -> dict[str, Any]:
@@ -122,18 +146,37 @@ def peak_memory() -> dict[str, Any]:
     raise OSError("no VmHWM in /proc/self/status")
 
 
-def serve(contender: Contender) -> None:
+def opened(name: str, folder: Path) -> Contender:
+    """The contender of that name on the problem in a folder; ``facts`` say how long that took."""
+    start = perf_counter()
+    contender = build(name, load(folder))
+    contender.facts = {"build": perf_counter() - start} | contender.facts
+    return contender
+
+
+def answer(contender: Contender, command: dict[str, Any]) -> dict[str, Any]:
+    """What a command about the open problem is answered with."""
+    answers: dict[str, Callable[[], dict[str, Any]]] = {
+        "time": lambda: time_calls(contender, command["ticks"]),
+        "phases": lambda: time_phases(contender, command["ticks"]),
+        "path": lambda: walk(contender),
+        "accuracy": lambda: accuracy(contender),
+        "memory": peak_memory,
+        "sample": lambda: time_sample(contender, command["budget"]),
+    }
+    return answers[command["do"]]()
+
+
+def serve(name: str, contender: Contender) -> None:
     """Answer commands until standard input ends."""
     for line in sys.stdin:
         command = json.loads(line)
-        answers = {
-            "time": lambda c: time_calls(contender, c["ticks"]),
-            "phases": lambda c: time_phases(contender, c["ticks"]),
-            "path": lambda c: walk(contender),
-            "accuracy": lambda c: accuracy(contender),
-            "memory": lambda c: peak_memory(),
-        }
-        print(json.dumps(answers[command["do"]](command)), flush=True)
+        if command["do"] == "open":
+            contender = opened(name, Path(command["folder"]))
+            gc.collect()
+            print(json.dumps({"facts": contender.facts}), flush=True)
+        else:
+            print(json.dumps(answer(contender, command)), flush=True)
 
 
 def main() -> None:
@@ -145,11 +188,9 @@ def main() -> None:
     protocol = os.dup(1)
     os.dup2(2, 1)
     sys.stdout = os.fdopen(protocol, "w")
-    start = perf_counter()
-    contender = build(name, load(Path(folder)))
-    facts = {"build": perf_counter() - start} | contender.facts
-    print(json.dumps({"ready": name, "facts": facts}), flush=True)
-    serve(contender)
+    contender = opened(name, Path(folder))
+    print(json.dumps({"ready": name, "facts": contender.facts}), flush=True)
+    serve(name, contender)
 
 
 if __name__ == "__main__":

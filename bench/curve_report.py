@@ -1,0 +1,107 @@
+"""The growing problems as tables."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from bench.sheet import Sheet, line, us
+
+OURS = "wbc"
+TITLES = {
+    "joints": "Tick against joints: two poses, posture, limits; medians [us]",
+    "tasks": "Tick against tasks: pose tasks on Talos, posture, limits; medians [us]",
+    "spheres": "Tick against obstacles: a Panda's 10 link capsules against spheres, a row for each pair; medians [us]",
+    "sensed": "Tick against measured pairs: 5 boxes on a Panda's links against boxes; medians [us]",
+    "g1": "Self-collision: Unitree G1, 4 poses, centre of mass, posture, limits, 20 pairs of capsules; medians [us]",
+}
+AXES = {
+    "joints": "degrees of freedom", "tasks": "pose tasks", "spheres": "spheres", "sensed": "pairs", "g1": "",
+}  # fmt: skip
+
+NOTES = """\
+Growing problems: targets are those of a path of the joints, all within reach; velocity limits, position limits and a \
+posture task as above. Degrees of freedom count the base's six where it floats. Switched off for wbc in all of them, \
+as in the problems above, because the peers have no such limit: `JointLimits(acceleration=False)`; all else is at its \
+default (`calm=True`, look-ahead and certificate on). Four rounds of up to one pass or a quarter of a second; a dash \
+in place of an end error: too slow for a whole pass in that time.
+
+Obstacles: wbc and pink have a row for every pair in every tick. mink and placo have rows for pairs nearer than 15 cm \
+only, and mink leaves out the link next to the base, whose parent is the world like the obstacles': 9 pairs a sphere \
+instead of 10. placo's constraint has no rate.
+
+Measured pairs: wbc and pink have rows for the 8 nearest of all pairs, mink and placo for those nearer than 15 cm. The \
+boxes in the world are one `Obstacle` for wbc, each a hull of eight corners.
+
+Self-collision: all have the same 20 pairs of the same capsules, fitted to the meshes of the links; wbc and pink have \
+a row for each pair, mink and placo for those nearer than 15 cm, mink's second column for those nearer than its \
+default of 1 cm, which lets joints close in faster than the rate of the others. mink's model is the same URDF, read by \
+MuJoCo, with these capsules as its geoms."""
+
+
+def curve_sheets(curves: Sequence[dict[str, Any]]) -> list[Sheet]:
+    """Tables of all curves."""
+    out = []
+    for curve, title in TITLES.items():
+        found = [point for point in curves if point["curve"] == curve]
+        if found:
+            out += [medians(title, curve, found), same_job(curve, found), own_phases(curve, found)]
+    return out
+
+
+def medians(title: str, curve: str, found: Sequence[dict[str, Any]]) -> Sheet:
+    """Median of the call, and its ratio to this package's."""
+    names = list(found[0]["contenders"])
+    rows = []
+    for point in found:
+        own = point["contenders"][OURS]["median"]
+        cells = [_ratio(point["contenders"][name]["median"], own, name) for name in names]
+        rows.append((point["label"], *cells))
+    return Sheet(title, (AXES[curve], *names), rows)
+
+
+def same_job(curve: str, found: Sequence[dict[str, Any]]) -> Sheet:
+    """End errors [mm] and least clearances [mm] of all."""
+    names = list(found[0]["contenders"])
+    rows = []
+    for point in found:
+        cells = []
+        for name in names:
+            one = point["contenders"][name]
+            parts = ["-" if one[key] is None else f"{one[key] * 1e3:.2f}" for key in ("position", "clearance")]
+            cells.append(" / ".join(parts if curve in ("spheres", "sensed", "g1") else parts[:1]))
+        rows.append((point["label"], *cells))
+    what = "End error / least clearance [mm]" if curve in ("spheres", "sensed", "g1") else "End error [mm]"
+    return Sheet(what, (AXES[curve], *names), rows)
+
+
+def own_phases(curve: str, found: Sequence[dict[str, Any]]) -> Sheet:
+    """Where this package's time goes."""
+    names = list(dict.fromkeys(phase for point in found for phase in point["phases"]))
+    rows = [
+        (point["label"], *(us(point["phases"][name]) if name in point["phases"] else "-" for name in names))
+        for point in found
+    ]
+    return Sheet("Phases of wbc's tick, medians [us]", (AXES[curve], *names), rows)
+
+
+def curve_readme(curves: Sequence[dict[str, Any]]) -> list[str]:
+    """The README's second table: the ends of the curves."""
+    chosen = [
+        ("joints", 7.0, "7 joints, 2 poses"), ("joints", 49.0, "49 degrees of freedom, 2 poses"),
+        ("tasks", 1.0, "Talos, 1 pose"), ("tasks", 20.0, "Talos, 20 poses"),
+        ("spheres", 5.0, "Panda, 5 spheres"), ("spheres", 50.0, "Panda, 50 spheres"),
+        ("sensed", 20.0, "Panda, 20 measured pairs"), ("sensed", 200.0, "Panda, 200 measured pairs"),
+        ("g1", 20.0, "Unitree G1, 4 poses, self-collision of 20 pairs"),
+    ]  # fmt: skip
+    by_place = {(point["curve"], point["x"]): point for point in curves}
+    names = list(curves[0]["contenders"])
+    lines = [line(["one tick [us], medians", *names]), line(["---", *("---:" for _ in names)])]
+    for curve, x, label in chosen:
+        found = by_place[curve, x]["contenders"]
+        lines.append(line([label, *(us(found[name]["median"]) for name in names)]))
+    return lines
+
+
+def _ratio(value: float, own: float, name: str) -> str:
+    return us(value) if name == OURS else f"{us(value)} ({value / own:.1f}x)"

@@ -1,0 +1,120 @@
+"""Measures the growing problems: one process a contender, which opens one problem after the other."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from bench.curves import Point, points, prepare_curves
+from bench.pool import Worker, cores
+from bench.problems import Case, load
+from bench.reference import Referee
+from bench.scenery import distances
+
+OURS = "wbc"
+PEERS = ("pink + daqp", "mink + daqp", "placo")
+#: On the humanoid only: mink with its own default for which pairs have rows
+DEFAULTS = "mink + daqp, rows within 1 cm"
+#: Rounds of a problem, and seconds that a contender has in each
+ROUNDS, BUDGET = 4, 0.25
+PHASE_TICKS = 100
+#: Every how many ticks clearances are measured
+STRIDE = 5
+Say = Callable[[str], None]
+
+
+def measure_curves(peers_python: str | None, folder: Path, rounds: int | None, say: Say) -> list[dict[str, Any]]:
+    """All points of all curves."""
+    say("curves: preparing")
+    prepare_curves(folder)
+    found = points()
+    compiled = compile_all([folder / point.folder for point in found], say)
+    core, _ = cores()
+    with contextlib.ExitStack() as stack:
+        first = folder / found[0].folder
+        pythons = {OURS: sys.executable} | ({} if peers_python is None else dict.fromkeys(PEERS, peers_python))
+        workers = {n: stack.enter_context(Worker(python, n, first, core)) for n, python in pythons.items()}
+        out = []
+        for point in found:
+            say(f"curves: {point.curve}, {point.label}")
+            some = dict(workers)
+            if point.curve == "g1" and peers_python is not None:
+                some[DEFAULTS] = stack.enter_context(Worker(peers_python, DEFAULTS, folder / point.folder, core))
+            measured = measure_point(point, folder / point.folder, some, rounds or ROUNDS)
+            out.append(measured | {"compile": compiled[point.folder]})
+    return out
+
+
+def compile_all(folders: Sequence[Path], say: Say) -> dict[str, float]:
+    """Compile this package's stacks into its cache before anything is timed, two at a time; seconds of each."""
+    done = 0
+
+    def compile_one(folder: Path) -> tuple[str, float]:
+        nonlocal done
+        with Worker(sys.executable, OURS, folder, None) as worker:
+            seconds = float(worker.ready["facts"]["compile"])
+        done += 1
+        say(f"curves: compiled {done} of {len(folders)}")
+        return folder.name, seconds
+
+    # The longest first, so that none is left alone at the end
+    with ThreadPoolExecutor(max(1, min(4, len(os.sched_getaffinity(0))))) as pool:
+        return dict(pool.map(compile_one, reversed(folders)))
+
+
+def measure_point(point: Point, folder: Path, workers: Mapping[str, Worker], rounds: int) -> dict[str, Any]:
+    """All contenders on one problem, in alternating rounds."""
+    case = load(folder)
+    facts = {name: worker.ask("open", folder=str(folder))["facts"] for name, worker in workers.items()}
+    calls: dict[str, list[float]] = {name: [] for name in workers}
+    states: dict[str, Any] = {}
+    names = list(workers)
+    for k in range(rounds):
+        turn = k % len(names)
+        for name in names[turn:] + names[:turn]:
+            answer = workers[name].ask("sample", budget=BUDGET)
+            calls[name] += answer["call"]
+            states[name] = answer["states"]
+    phases = workers[OURS].ask("phases", ticks=min(PHASE_TICKS, case.ticks))
+    judge = Judge(case)
+    return {
+        "curve": point.curve, "x": point.x, "label": point.label, "title": case.problem.title,
+        "phases": {phase: float(np.median(spent)) / 1e3 for phase, spent in phases.items()},
+        "contenders": {
+            name: {
+                "median": float(np.median(calls[name])) / 1e3, "p99": float(np.percentile(calls[name], 99)) / 1e3,
+                "ticks": len(calls[name]), "pairs": facts[name].get("pairs"), **judge.tracking(states[name]),
+            }
+            for name in names
+        },
+    }  # fmt: skip
+
+
+class Judge:
+    """What became of a path, by Pinocchio and Coal."""
+
+    def __init__(self, case: Case) -> None:
+        """Load the shared description."""
+        self.case, self.referee = case, Referee(case)
+
+    def tracking(self, states: Sequence[Sequence[float]]) -> dict[str, float | None]:
+        """Errors at the end of the path (None if a contender did not get there) and the least clearance [m, rad]."""
+        problem, model, data = self.case.problem, self.referee.model, self.referee.data
+        position: float | None = None
+        rotation: float | None = None
+        if len(states) == self.case.ticks:
+            position, rotation = self.referee.errors(np.array(states[-1]), self.case.ticks - 1)
+        least = None
+        for state in states[::STRIDE] if problem.pairs else ():
+            pin.framesForwardKinematics(model, data, np.array(state))
+            found = float(distances(model, data, problem.solids, problem.pairs).min())
+            least = found if least is None else min(least, found)
+        return {"position": position, "rotation": rotation, "clearance": least}

@@ -1,0 +1,118 @@
+"""Solids of the growing problems: link shapes of the robots, and clutter around them that a path stays clear of."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import coal
+import numpy as np
+import pinocchio as pin
+
+from bench.problems import Array, Solid
+from bench.solids import placement
+from wbc.robot import Robot
+from wbc.shapes import Capsule, Sphere
+
+#: Pairs of links of a Unitree G1 that reach each other: arms with the trunk, the legs and each other, legs together
+G1_PAIRS = [
+    ("left_wrist_yaw_link", "torso_link"), ("right_wrist_yaw_link", "torso_link"),
+    ("left_wrist_pitch_link", "torso_link"), ("right_wrist_pitch_link", "torso_link"),
+    ("left_elbow_link", "torso_link"), ("right_elbow_link", "torso_link"),
+    ("left_wrist_yaw_link", "pelvis_contour_link"), ("right_wrist_yaw_link", "pelvis_contour_link"),
+    ("left_wrist_yaw_link", "left_hip_yaw_link"), ("right_wrist_yaw_link", "right_hip_yaw_link"),
+    ("left_wrist_yaw_link", "right_hip_yaw_link"), ("right_wrist_yaw_link", "left_hip_yaw_link"),
+    ("left_wrist_yaw_link", "head_link"), ("right_wrist_yaw_link", "head_link"),
+    ("left_wrist_yaw_link", "right_wrist_yaw_link"), ("left_wrist_yaw_link", "right_elbow_link"),
+    ("left_elbow_link", "right_wrist_yaw_link"), ("left_elbow_link", "right_elbow_link"),
+    ("left_knee_link", "right_knee_link"), ("left_ankle_pitch_link", "right_ankle_pitch_link"),
+]  # fmt: skip
+
+#: Link of a Panda -> sides and centre of a box on it [m]
+PANDA_BOXES = {
+    "panda_link3": ([0.12, 0.12, 0.16], [0.04, 0.03, -0.06]),
+    "panda_link4": ([0.12, 0.14, 0.12], [-0.04, 0.04, 0.02]),
+    "panda_link5": ([0.10, 0.12, 0.28], [0.0, 0.03, -0.13]),
+    "panda_link6": ([0.16, 0.10, 0.12], [0.05, 0.0, 0.0]),
+    "panda_hand": ([0.06, 0.22, 0.14], [0.0, 0.0, 0.05]),
+}
+#: Sizes of the clutter: radius, sides [m]
+BALL, CRATE = 0.05, [0.08, 0.10, 0.12]
+#: Clearance that the path keeps from all clutter [m]
+CLEAR = 0.03
+
+
+def capsules(robot: Robot) -> list[Solid]:
+    """The spheres and capsules of all links that joints move."""
+    out = []
+    for link, shapes in robot.shapes.items():
+        if robot.model.frames[robot.model.getFrameId(link)].parentJoint == 0:
+            continue
+        for placed in shapes:
+            size = [placed.shape.radius]
+            if isinstance(placed.shape, Capsule):
+                size.append(placed.shape.length)
+            else:
+                assert isinstance(placed.shape, Sphere), placed.shape
+            numbers = pin.SE3ToXYZQUAT(placed.placement).tolist()
+            kind = "capsule" if len(size) == 2 else "sphere"
+            out.append(Solid(link, kind, [float(s) for s in size], numbers[:3], numbers[3:]))
+    return out
+
+
+def link_boxes(robot: Robot) -> list[Solid]:
+    """A box on each of five links."""
+    assert robot.name == "panda"
+    return [Solid(link, "box", size, place) for link, (size, place) in PANDA_BOXES.items()]
+
+
+def spheres_around(robot: Robot, own: Sequence[Solid], path: Sequence[Array], count: int) -> list[Solid]:
+    """Spheres, the nearest to the path first."""
+    return _around(robot, own, path, count, lambda place, turn: Solid("", "sphere", [BALL], place))
+
+
+def boxes_around(robot: Robot, own: Sequence[Solid], path: Sequence[Array], count: int) -> list[Solid]:
+    """Boxes at random angles, the nearest to the path first."""
+    return _around(robot, own, path, count, lambda place, turn: Solid("", "box", CRATE, place, turn))
+
+
+def _around(robot: Robot, own: Sequence[Solid], path: Sequence[Array], count: int, make: object) -> list[Solid]:
+    """Candidates at random within reach, those nearer than :data:`CLEAR` left out."""
+    assert callable(make)
+    rng = np.random.default_rng(3)
+    found: list[tuple[float, Solid]] = []
+    while len(found) < count:
+        turn = rng.normal(size=4)
+        solid = make(rng.uniform([-0.9, -0.9, 0.0], [0.9, 0.9, 1.2]).tolist(), (turn / np.linalg.norm(turn)).tolist())
+        solids = [*own, solid]
+        pairs = [(k, len(own)) for k in range(len(own))]
+        least = min(float(clearances(robot, solids, pairs, q).min()) for q in path[::10])
+        if least > CLEAR:
+            found.append((least, solid))
+    return [solid for _, solid in sorted(found, key=lambda one: one[0])]
+
+
+def clearances(robot: Robot, solids: Sequence[Solid], pairs: Sequence[tuple[int, int]], q: Array) -> Array:
+    """Distance of each pair at a configuration, by Coal [m]."""
+    data = robot.model.createData()
+    pin.framesForwardKinematics(robot.model, data, q)
+    return distances(robot.model, data, solids, pairs)
+
+
+def distances(model: pin.Model, data: pin.Data, solids: Sequence[Solid], pairs: Sequence[tuple[int, int]]) -> Array:
+    """The same with placements of frames that are computed already."""
+    places = [data.oMf[model.getFrameId(s.link)] * placement(s) if s.link else placement(s) for s in solids]
+    shapes = [_coal(solid) for solid in solids]
+    out, request, result = [], coal.DistanceRequest(), coal.DistanceResult()
+    for a, b in pairs:
+        result.clear()
+        at, of = (coal.Transform3s(p.rotation, p.translation) for p in (places[a], places[b]))
+        out.append(coal.distance(shapes[a], at, shapes[b], of, request, result))
+    return np.array(out)
+
+
+def _coal(solid: Solid) -> coal.CollisionGeometry:
+    if solid.kind == "sphere":
+        return coal.Sphere(solid.size[0])
+    if solid.kind == "capsule":
+        return coal.Capsule(solid.size[0], solid.size[1])
+    return coal.Box(*solid.size)
