@@ -70,11 +70,11 @@ static int active_set(wbc_tick *t, int warm, int checked, double angle, const do
     ldp2qp_solution(work);
     for (int i = 0; base && i < NV; i++) t->x[i] += base[i];
     /* Rows that the solver did not look at: dependent equalities and rows that v cannot move. Of those that it did
-     * look at, ones that v can hardly move may still be far off in their own units. */
+     * look at, ones that v can hardly move may still be far off in their own units; a relaxation has seen to them. */
     for (int k = 0; k < MC; k++) {
         const int i = NV + k, seen = !dependent && t->scaling[i] != 0.0;
         if (t->idle[k] || row_order[k] >= checked) continue;
-        if (!seen && (t->sense[i] & ACTIVE)) continue;
+        if (seen ? angle > TIGHT : t->sense[i] & ACTIVE) continue;
         const double sum = row_at(t, k, t->x);
         double square = 0.0;
         for (int e = a_start[k]; e < a_start[k + 1]; e++) square += t->at[e] * t->at[e];
