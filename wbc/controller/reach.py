@@ -77,7 +77,7 @@ class Reach:
         metric = _cut_off(self._strengthened(H, equal), free)
         if not _is_definite(metric):
             return H, plain
-        curved = self._curved(H, metric, J, weight, error, slope, free, equal)
+        curved = self._curved(H, metric, J, weight, error, slope, free)
         if curved is not None:
             H, metric = curved, self._strengthened(curved, equal)
             if not _is_definite(metric):
@@ -115,7 +115,6 @@ class Reach:
         error: Array,
         slope: Array,
         free: Array,
-        equal: Array,
     ) -> Array | None:
         """H with the curvature of the errors that one step leaves, None where there is none to count."""
         if self._bend is None:
@@ -139,7 +138,7 @@ class Reach:
         mixed = share * _cut_off(H, free) + (1.0 - share) * H + bent
         scale = np.outer(self._dofs, self._dofs)
         least = max(LEAST_PIVOT * float(np.abs(bent * scale).max()), least)
-        more_pivot = definite(self._strengthened(mixed, equal) * scale, least)
+        more_pivot = definite(mixed * scale, least)
         return np.asarray(mixed + np.diag(more_pivot / self._dofs**2))
 
     def _stoppable(

@@ -168,11 +168,12 @@ static int add_curvature(wbc_tick *t, const double *free, const double *error, c
     const double largest = bend_errors(t, free, error, pull, least);
     if (largest == 0.0) return 0;
     least = fmax(LEAST_PIVOT * largest, least);
-    /* Where no pivot is too small the modified factorisation is the plain one */
-    if (factor(t) && least_pivot(t) >= least) return 1;
-    load(t);
+    /* Where no pivot is too small the modified factorisation is the plain one; but equality rows are not in H */
+    int equalities = 0;
+    for (int i = 0; i < M_ALL; i++) equalities |= t->low[i] == t->high[i];
+    if (!equalities && factor(t) && least_pivot(t) >= least) return 1;
     for (int i = 0; i < NV; i++)
-        for (int j = i; j < NV; j++) scaled[i * NV + j] = t->R[i * WIDE + j] * dof_scale[i] * dof_scale[j];
+        for (int j = i; j < NV; j++) scaled[i * NV + j] = t->H[i * WIDE + j] * dof_scale[i] * dof_scale[j];
     definite(scaled, least, more);
     for (int i = 0; i < NV; i++) t->H[i * WIDE + i] += more[i] / (dof_scale[i] * dof_scale[i]);
     t->prepared = factor(t);
