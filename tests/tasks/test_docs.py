@@ -23,9 +23,11 @@ NAMES = (
     "look_at",
     "manipulability",
     "momentum",
+    "obstacle",
     "posture",
     "relative_pose",
     "rolling",
+    "self_collision",
     "workspace_box",
     "workspace_polyhedron",
 )
