@@ -148,6 +148,7 @@ def gaps(first: Placed, second: Placed) -> list[Gap]:
     if isinstance(b.shape, Capsule):
         return [_to_capsule(a, b)] if isinstance(a.shape, Sphere) else _capsules(first, second)
     assert isinstance(a.shape, Sphere)
+    assert isinstance(b.shape, (Box, Cylinder))
     local = b.pose.inverse_point(a.pose.position)
     distance, out = out_of_box(local, b.shape) if isinstance(b.shape, Box) else out_of_cylinder(local, b.shape)
     return [_gap(a, b, distance - a.shape.radius, -(b.pose.rotation @ out))]

@@ -13,7 +13,7 @@ import pinocchio as pin
 from wbc import validation
 from wbc.errors import MissingShapeError, RangeError, ShapeError
 from wbc.proximity import OBSTACLE, Body, PairSensor
-from wbc.shapes import Box, Capsule, Convex, Cylinder, HalfSpace, Shape, Sphere
+from wbc.shapes import Box, Capsule, Convex, Cylinder, HalfSpace, Shape, Solid, Sphere
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks import _bodies as bodies
 from wbc.tasks import _gap as gap
@@ -158,7 +158,7 @@ class Obstacle(Constraint):
         own = kin.gaps(rows) + ca.vertcat(*drifts) - inputs["margin"] if rows else ca.SX(0, 1)
         return ca.vertcat(own, bodies.sensed_margins(inputs, self.sensed_rows(robot)))
 
-    def _suffixes(self, solid: Shape) -> tuple[str, ...]:
+    def _suffixes(self, solid: Solid) -> tuple[str, ...]:
         """Names of the rows of a link's shape against the obstacle; none if it is sensed."""
         return gap.pair_rows(solid, self.parts[0])
 
