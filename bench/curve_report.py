@@ -23,7 +23,8 @@ NOTES = """\
 Growing problems: targets are those of a path of the joints, all within reach; velocity limits, position limits and a \
 posture task as above. Degrees of freedom count the base's six where it floats. Switched off for wbc in all of them, \
 as in the problems above, because the peers have no such limit: `JointLimits(acceleration=False)`; all else is at its \
-default (`calm=True`, look-ahead and certificate on). Four rounds of up to one pass or a quarter of a second; a dash \
+default (look-ahead and certificate on, `calm=True`, whose curvature and damping the QPs of the peers do not have). \
+Four rounds of up to one pass or a quarter of a second; a dash \
 in place of an end error: too slow for a whole pass in that time.
 
 Obstacles: wbc and pink have a row for every pair in every tick. mink and placo have rows for pairs nearer than 15 cm \

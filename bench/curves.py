@@ -54,8 +54,8 @@ HOME = {
         "right_hip_roll_joint": -0.08,
     },
 }  # fmt: skip
-#: Amplitude of the joints' paths [rad], less where a limit is near; a G1 has more links in its way
-AMPLITUDE = {"g1": 0.12}
+#: Amplitude of the joints' paths [rad], less where a limit is near: speeds stay below the limits but at the beginning
+AMPLITUDE = 0.12
 
 
 @dataclass(frozen=True)
@@ -141,10 +141,10 @@ def start(robot: Robot) -> Array:
 
 def joint_path(robot: Robot) -> list[Array]:
     """Configurations along a closed path that starts off its first one and rests at its end."""
-    q0, nv, base, most = start(robot), robot.nv, robot.base_nv, AMPLITUDE.get(robot.name, 0.25)
+    q0, nv, base = start(robot), robot.nv, robot.base_nv
     s = np.concatenate([np.sin(0.5 * np.pi * np.linspace(0.0, 1.0, TICKS - REST)), np.ones(REST)])
     lower, upper = robot.limits.position_lower[base:], robot.limits.position_upper[base:]
-    reach = np.clip(0.5 * np.minimum(upper - q0[-(nv - base) :], q0[-(nv - base) :] - lower), 0.0, most)
+    reach = np.clip(0.5 * np.minimum(upper - q0[-(nv - base) :], q0[-(nv - base) :] - lower), 0.0, AMPLITUDE)
     size = np.concatenate([np.full(base, 0.02), reach])
     shift = np.arange(nv) * 2.4
     return [np.array(pin.integrate(robot.model, q0, size * np.sin(2 * np.pi * t + shift))) for t in s]

@@ -21,8 +21,8 @@ from wbc.controller.native import NativeTick
 class Ours(Contender):
     """``controller.step(q)``; the velocity is integrated by whoever called it."""
 
-    def __init__(self, case: Case, expression: bool = False) -> None:
-        """Declare and compile the stack, with one more task of the user's own if ``expression``."""
+    def __init__(self, case: Case, expression: bool = False, calm: bool = True) -> None:
+        """Declare and compile the stack, with one more task of the user's own if ``expression``; ``calm`` as there."""
         super().__init__(case)
         self.expression = expression
         problem = self.problem
@@ -34,7 +34,7 @@ class Ours(Contender):
         robot = wbc.robots.load(problem.robot) if problem.robot else wbc.robots.load(case.urdf, base=base)
         self.robot = robot.with_shapes(shapes | link_shapes(problem.solids))
         assert list(self.robot.joint_names)[-len(problem.joints) :] == problem.joints
-        stack = wbc.Stack(self.robot, problem.dt, damping=problem.damping)
+        stack = wbc.Stack(self.robot, problem.dt, damping=problem.damping, calm=calm)
         for frame in problem.frames:
             stack.add(wbc.tasks.EndEffector(frame), name=frame)
         if problem.com:

@@ -7,6 +7,7 @@ import pinocchio as pin
 
 from bench.contender import exact_solution
 from bench.problems import Array, Case
+from bench.scenery import measured
 
 
 class Referee:
@@ -40,7 +41,7 @@ class Referee:
         return max(position), max(rotation)
 
     def clearances(self) -> tuple[Array, Array]:
-        """Distance of each link sphere to each obstacle [m], and its derivative, pairs x nv, after :meth:`update`."""
+        """Distance of each pair [m], and its derivative, pairs x nv, after :meth:`update`."""
         distances, gradients = [], []
         for link, (center, radius) in self.problem.spheres.items():
             frame = self.model.getFrameId(link)
@@ -53,7 +54,23 @@ class Referee:
                 norm = float(np.linalg.norm(away))
                 distances.append(norm - radius - size)
                 gradients.append(away / norm @ moving)
+        solids = self.problem.solids
+        for pair, found in zip(
+            self.problem.pairs, measured(self.model, self.data, solids, self.problem.pairs), strict=True
+        ):
+            points = [found.getNearestPoint1(), found.getNearestPoint2()]
+            first, second = (self._moving(solids[k].link, p) for k, p in zip(pair, points, strict=True))
+            distances.append(found.min_distance)
+            gradients.append(found.normal @ (second - first))
         return np.array(distances), np.array(gradients).reshape(-1, self.model.nv)
+
+    def _moving(self, link: str, point: Array) -> Array:
+        """Jacobian, 3 x nv, of the velocity of a point in the world that a link carries."""
+        if not link:
+            return np.zeros((3, self.model.nv))
+        frame = self.model.getFrameId(link)
+        jacobian = pin.getFrameJacobian(self.model, self.data, frame, pin.LOCAL_WORLD_ALIGNED)
+        return np.asarray(jacobian[:3] - pin.skew(point - self.data.oMf[frame].translation) @ jacobian[3:])
 
     def velocity(self, q: Array, tick: int) -> Array:
         """Exact solution [rad/s, m/s] of the QP that the problem states at ``q``."""

@@ -100,14 +100,25 @@ def clearances(robot: Robot, solids: Sequence[Solid], pairs: Sequence[tuple[int,
 
 def distances(model: pin.Model, data: pin.Data, solids: Sequence[Solid], pairs: Sequence[tuple[int, int]]) -> Array:
     """The same with placements of frames that are computed already."""
-    places = [data.oMf[model.getFrameId(s.link)] * placement(s) if s.link else placement(s) for s in solids]
-    shapes = [_coal(solid) for solid in solids]
-    out, request, result = [], coal.DistanceRequest(), coal.DistanceResult()
+    return np.array([result.min_distance for result in measured(model, data, solids, pairs)])
+
+
+def measured(
+    model: pin.Model, data: pin.Data, solids: Sequence[Solid], pairs: Sequence[tuple[int, int]]
+) -> list[coal.DistanceResult]:
+    """Coal's answer for each pair, nearest points in the world."""
+    used = sorted({k for pair in pairs for k in pair})
+    places, shapes = {}, {}
+    for k in used:
+        solid = solids[k]
+        place = data.oMf[model.getFrameId(solid.link)] * placement(solid) if solid.link else placement(solid)
+        places[k] = coal.Transform3s(place.rotation, place.translation)
+        shapes[k] = _coal(solid)
+    out, request = [], coal.DistanceRequest()
     for a, b in pairs:
-        result.clear()
-        at, of = (coal.Transform3s(p.rotation, p.translation) for p in (places[a], places[b]))
-        out.append(coal.distance(shapes[a], at, shapes[b], of, request, result))
-    return np.array(out)
+        out.append(coal.DistanceResult())
+        coal.distance(shapes[a], places[a], shapes[b], places[b], request, out[-1])
+    return out
 
 
 def _coal(solid: Solid) -> coal.CollisionGeometry:

@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 
 import wbc
-from bench.problems import Problem, Solid
+from bench.problems import Array, Problem, Solid
 from wbc.shapes import Box, Capsule, Convex, PlacedShape, Shape, Sphere
 from wbc.tasks import Constraint
 
@@ -57,7 +57,7 @@ def placement(solid: Solid) -> pin.SE3:
     return pin.XYZQUATToSE3(np.array([*solid.place, *solid.turn]))
 
 
-def corners(solid: Solid) -> np.ndarray:
+def corners(solid: Solid) -> Array:
     """The corners of a box in its link's frame, 8 x 3 [m]."""
     signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
     place = placement(solid)
