@@ -14,7 +14,7 @@ are unit vectors everywhere. Where a distance has no direction it is declared: f
     centre inside a box or cylinder, several ways out   the sphere leaves along the first of x, y, z (box), along the
                                                         axis (cylinder), through the positive face from the middle
 
-To that end the first three move one shape by :data:`wbc.tasks._nearest.SHIFT`, and are off by no more than that.
+To that end the first three move one shape by :data:`wbc.tasks._nearest.SHIFT` times its size.
 """
 
 from __future__ import annotations
@@ -142,7 +142,7 @@ def gaps(first: Placed, second: Placed) -> list[Gap]:
     a, b = (first, second) if isinstance(first.shape, Sphere) else (second, first)
     if isinstance(b.shape, Sphere):
         assert isinstance(a.shape, Sphere)
-        up = ca.SX(ca.DM([0.0, 0.0, SHIFT]))
+        up = ca.SX(ca.DM([0.0, 0.0, SHIFT * ((a.shape.radius + b.shape.radius) or 1.0)]))
         distance, normal = between(a.pose.position + up, b.pose.position)
         return [_gap(a, b, distance - (a.shape.radius + b.shape.radius), normal)]
     if isinstance(b.shape, Capsule):
@@ -184,7 +184,7 @@ def _to_capsule(sphere: Placed, capsule: Placed) -> Gap:
     assert isinstance(capsule.shape, Capsule)
     pose, center = capsule.pose, sphere.pose.position
     axis = pose.rotation[:, 2]
-    offset = center - (pose.position + SHIFT * pose.rotation[:, 0])
+    offset = center - (pose.position + SHIFT * (capsule.shape.length + capsule.shape.radius) * pose.rotation[:, 0])
     along = clamp(ca.dot(axis, offset), capsule.shape.length / 2)
     distance, normal = between(offset, along * axis)
     return _gap(sphere, capsule, distance - (sphere.shape.radius + capsule.shape.radius), normal)
@@ -213,7 +213,7 @@ def _between_cores(first: Placed, second: Placed, a: Capsule, b: Capsule) -> Gap
     both = ca.cross(u, w) / ca.sqrt(ca.if_else(crossed, across, 1))
     instead = ca.if_else(crossed, both, first.pose.rotation[:, 0])
     start = first.pose.position + s * u
-    distance, normal = between(start, second.pose.position + t * w + SHIFT * instead)
+    distance, normal = between(start, second.pose.position + t * w + SHIFT * (a.length + a.radius) * instead)
     return Gap(first.frame, second.frame, distance - (a.radius + b.radius), normal, start)
 
 

@@ -12,9 +12,9 @@ from wbc.shapes import Box, Cylinder
 #: Points closer than this [m] have no usable direction between them.
 COINCIDENT = 1e-10
 
-#: How far a point is moved [m] in the direction that is to be out where two points coincide: it costs an addition,
-#: where a case of its own would cost every row a branch.
-SHIFT = 1e-10
+#: How far a point is moved in the direction that is to be out where two points coincide, over the size of the shapes:
+#: it costs an addition, where a case of its own would cost every row a branch.
+SHIFT = 1e-11
 
 #: Added to squared lengths [m^2]: keeps a length of exactly zero from being divided by.
 NOTHING = 1e-40

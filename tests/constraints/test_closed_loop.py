@@ -24,7 +24,7 @@ from wbc.robot import Robot
 from wbc.shapes import HalfSpace, Sphere
 from wbc.symbolic import rotations as rot
 from wbc.symbolic.tracer import Tracer
-from wbc.tasks import fixed, hold, joint_limits, obstacle
+from wbc.tasks import _gap, fixed, hold, joint_limits
 from wbc.tasks.fixed import Fixed
 from wbc.tasks.frame_velocity_limit import FrameVelocityLimit
 from wbc.tasks.hold import Hold
@@ -88,8 +88,13 @@ def test_obstacle_is_never_entered(name: str, shape: Any) -> None:
 
 
 def test_a_wrong_obstacle_formula_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
-    right = obstacle.distance
-    monkeypatch.setattr(obstacle, "distance", lambda offset: right(offset) + 0.05)
+    right = _gap.between
+
+    def wrong(start: ca.SX, end: ca.SX) -> tuple[ca.SX, ca.SX]:
+        length, direction = right(start, end)
+        return length + 0.05, direction
+
+    monkeypatch.setattr(_gap, "between", wrong)
     assert obstacle_clearance("ur5", Sphere(0.1)) < -0.01
 
 
