@@ -15,7 +15,7 @@ TYPES := build/types
 SOURCES := wbc tasks robots tests bench examples
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test lint format types bench lock clean
+.PHONY: help setup demo test lint format types docs bench lock clean
 
 help:  ## list the targets
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 10
@@ -42,6 +42,9 @@ types: $(READY)  ## mypy --strict on the package
 	@ln -s $(CURDIR)/wbc/* $(CURDIR)/tasks $(CURDIR)/robots $(TYPES)/wbc/
 	cd $(TYPES) && $(abspath $(BIN))/mypy --config-file $(CURDIR)/pyproject.toml \
 		--cache-dir $(CURDIR)/.mypy_cache --strict -p wbc
+
+docs: $(READY)  ## write what the code declares into the pages of tasks and constraints
+	$(BIN)/wbc docs
 
 bench: $(READY) $(PEERS_READY)  ## compare with pink, mink and placo on the same problems
 	$(BIN)/python -m bench --peers-python $(PEERS_VENV)/bin/python

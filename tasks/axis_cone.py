@@ -33,7 +33,8 @@ class AxisCone(Constraint):
     Inputs:
         direction: d, 3 numbers of any length, kept at unit length, in the axes of the reference.
         direction_rate: derivative of the unit vector d [1/s]; w x d for a direction that turns at w. Default 0.
-        half_angle: alpha in [0.001, pi] [rad]. half_angle_rate: its rate [rad/s]. Default 0.
+        half_angle: alpha in [0.001, pi] [rad].
+        half_angle_rate: its rate [rad/s]. Default 0.
 
     Example:
         >>> AxisCone("panda_hand", axis=(0, 0, -1), half_angle=0.2)       # the cup in the hand stays level

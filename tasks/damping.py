@@ -26,7 +26,7 @@ class Damping(Task):
     There is no error to correct: e is zero, its rows are those of the identity, and ``gain`` has no effect.
 
     Inputs:
-        none of its own.
+        gain: has no effect.
 
     Example:
         >>> Damping(weights=(1, 1, 1, 1, 1, 1, 100))     # spare the last joint of seven

@@ -36,7 +36,7 @@ class Expression(Task):
     ``rate``.
 
     Inputs:
-        those declared. Each needs a default: nothing else can tell where the function starts from.
+        as declared. Each needs a default: nothing else can tell where the function starts from.
 
     Example:
         >>> height = Expression(
@@ -50,7 +50,7 @@ class Expression(Task):
     Attributes:
         function: called as ``function(kin, p)`` each time the task is built; it must give the same each time.
         units: unit of each row, or one for all; rows in ``m`` are divided by the characteristic length.
-        declared: the run-time inputs, ``inputs=`` of the constructor.
+        inputs, declared: the run-time inputs, each with a default; ``declared`` when it is read.
         labels: name of each row; None: "value" for one row, else "0", "1", ...
         weights: one number >= 0 a row, None: 1 each.
 

@@ -20,13 +20,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Fixed(Constraint):
-    """v_i = 0 for every degree of freedom i of the named joints, as bounds lower = upper [rad/s or m/s].
+    """The named joints stand still, as bounds lower = upper; one that still moves brakes at its acceleration limit A:
 
-    A joint that still moves is brought to rest at its acceleration limit A:
+        v_i = v0_i - clip(v0_i, -A dt, A dt)     for every degree of freedom i of the joints     [rad/s, m/s]
 
-        v_i = v0_i - clip(v0_i, -A dt, A dt)
-
-    with v0 the velocity that accelerations are counted from, which is 0 from the first tick on for a joint at rest.
+    with v0 the velocity that accelerations are counted from. For a joint at rest it is 0.
 
     Attributes:
         joints: names of the joints, one or several; a base joint fixes the whole base.

@@ -23,10 +23,10 @@ Triple = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class FrameVelocityLimit(Constraint):
-    """-limit <= C' J v <= limit for each limited axis of a frame's velocity at its origin.
+    """The velocity of a frame's origin stays in a box:
 
-        linear   C' (J_lin v)   [m/s]      three rows, the axes of the frame ``axes``
-        angular  C' (J_ang v)   [rad/s]    three rows
+        -linear  <= C' J_lin v <= linear      [m/s]
+        -angular <= C' J_ang v <= angular     [rad/s]
 
     C is the rotation of ``axes`` in the world. With ``relative_to`` = r the velocity is that seen from the moving
     frame r: J_lin - J_lin,r - w_r x (p - p_r) in place of J_lin, and J_ang - J_ang,r in place of J_ang.
@@ -38,7 +38,9 @@ class FrameVelocityLimit(Constraint):
         axes: name of the frame whose axes the rows are in; ``"world"`` by default.
         relative_to: name of the frame that the velocity is relative to; ``"world"`` by default.
 
-    Inputs: ``linear`` [m/s] and ``angular`` [rad/s], >= 0, one number a row.
+    Inputs:
+        linear: >= 0, one number a limited axis [m/s].
+        angular: >= 0, one number a limited axis [rad/s].
 
     It is a box, so the speed along a diagonal may be sqrt(3) times the limit: divide by sqrt(3) to bound the
     norm. It limits one point; other points of the body may be faster. It cannot slow a frame down faster than

@@ -35,8 +35,10 @@ class GazeCone(Constraint):
     axis.
 
     Inputs:
-        point: 3 numbers in the axes of ``point_frame`` [m]. point_velocity: their rate [m/s]. Default 0.
-        half_angle: alpha in [0.001, pi] [rad]. half_angle_rate: its rate [rad/s]. Default 0.
+        point: 3 numbers in the axes of ``point_frame`` [m].
+        point_velocity: their rate [m/s]. Default 0.
+        half_angle: alpha in [0.001, pi] [rad].
+        half_angle_rate: its rate [rad/s]. Default 0.
 
     Example:
         >>> GazeCone("camera_link", half_angle=0.5, axis=(0, 0, 1), point_frame="panda_hand")   # the hand stays in view

@@ -23,7 +23,7 @@ KINDS = ("pose", "position", "orientation")
 
 @dataclass(frozen=True)
 class Hold(Constraint):
-    """J v = -gain e, an equality: the frame stays at its target, and drift decays like exp(-gain t).
+    """A frame does not move, and drift from its target decays like exp(-gain t): the equality J v = -gain e, with
 
         position     J = J_lin (3 x nv), e = p - p_target                             [m/s]
         orientation  J = J_ang (3 x nv), e = log3(R R_target'), |e| <= pi             [rad/s]
@@ -37,8 +37,9 @@ class Hold(Constraint):
         kind: ``"pose"``, ``"position"`` (the frame may turn about its origin) or ``"orientation"``.
         gain: initial value of the input [1/s].
 
-    Inputs: ``target`` (pose in the world; default: the pose at the first step) and ``gain`` [1/s], which should stay
-    below 1/dt.
+    Inputs:
+        target: pose in the world [m, rad]. Default: the pose at the first step.
+        gain: how fast drift decays [1/s], to stay below 1/dt; 0 leaves it as it is.
 
     It cannot hold what the robot cannot do: six rows on an arm with fewer free joints, or in a singular pose, are
     dependent, and with drift left they may contradict. A frame that moves when it becomes held cannot stop faster than

@@ -23,10 +23,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class JointLimits(Constraint):
-    """lower <= v <= upper from position, velocity and acceleration limits, one interval a degree of freedom:
+    """Position, velocity and acceleration limits of the joints, as one interval a degree of freedom, never empty:
 
         actuator  [-s V, s V] cut with [v0 - A dt, v0 + A dt]
-        position  -b(q - q_lower - margin) <= v <= b(q_upper - margin - q)
+        position  -b(q - q_lower - margin) <= v <= b(q_upper - margin - q)             [rad/s, m/s]
 
     b(d) is the braking bound (:func:`wbc.tasks.braking.braking_bound`) at distance d >= 0 and
     b(d) = -min(return_rate |d|, b(|d|)) outside; v0 is the velocity that accelerations are counted from; V and A
@@ -48,7 +48,9 @@ class JointLimits(Constraint):
             its limit, by up to A shortest_dt / 2; with ``shortest_dt`` = dt constant the bound is the exact one.
         return_rate: initial value of the input [1/s].
 
-    Inputs: ``velocity_scale`` in [0, 1] and ``return_rate`` >= 0 [1/s].
+    Inputs:
+        velocity_scale: s, from 0 to 1, shrinks the velocity limits.
+        return_rate: slowest return from outside [1/s]; 0: none is asked for.
 
     It cannot keep the limit when v0 is not the velocity that the joint has, when the robot starts too fast too
     close to a limit, or when the description gives no acceleration limit and the real joint has one.

@@ -18,11 +18,14 @@ if TYPE_CHECKING:
 class Mechanism(Constraint):
     """Equality rows of the robot's couplings and of its undriven degrees of freedom; every stack has them by itself.
 
-        mimic joint   v_follower - ratio v_leader = -gain (q_follower - ratio q_leader - offset)
-        undriven      v_i = 0          (sideways motion of a differential-drive base)
+        mimic joint   v_follower - ratio v_leader = -gain (q_follower - ratio q_leader - offset)      [rad/s or m/s]
+        undriven      v_i = 0          (sideways motion of a differential-drive base)                 [m/s]
 
-    Rows in rad/s or m/s; the right side of a mimic row brings back a configuration that does not fit. Input: ``gain``
-    [1/s]. It is added under the name ``mechanism`` where ``robot.couplings`` or ``robot.locked_dofs`` is not empty.
+    The right side of a mimic row brings back a configuration that does not fit. It is added under the name
+    ``mechanism`` where ``robot.couplings`` or ``robot.locked_dofs`` is not empty.
+
+    Inputs:
+        gain: how fast a configuration that does not fit its couplings is brought back [1/s].
 
     It cannot couple joints without a plain coordinate (unbounded joints are coupled in velocity only).
     """

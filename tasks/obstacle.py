@@ -28,7 +28,9 @@ SHAPES = (Sphere, Capsule, Box, Cylinder, Convex, HalfSpace)
 
 @dataclass(frozen=True)
 class Obstacle(Constraint):
-    """h = (signed distance between a shape of a link and the obstacle) - margin >= 0  [m], a row a pair.
+    """Links keep clear of a sphere, capsule, box, cylinder, convex hull, mesh or half-space, at rest or moving:
+
+        h = (signed distance between a shape of a link and the obstacle) - margin >= 0     [m]
 
     A pair has rows of its own in every tick, which are expressions, or is sensed, or both:
 
@@ -44,8 +46,10 @@ class Obstacle(Constraint):
         pose: initial value of the input; None: the identity. Set one of them before the first step.
         closest: rows of the sensed pairs; no more than there are such pairs.
 
-    Inputs: ``pose`` of the obstacle in the world, its ``velocity`` (twist: linear m/s; angular rad/s; world axes, at
-    the obstacle's origin) and ``margin`` >= 0 [m]; ``rate`` as every margin has.
+    Inputs:
+        pose: of the obstacle in the world [m, rad]. Set it here or in the declaration before the first step.
+        velocity: twist of the obstacle: linear [m/s], angular [rad/s]; world axes, at its origin. Default 0.
+        margin: what is kept between the shapes, >= 0 [m].
 
     The rows hold dh/dt >= -rate h, hence h(t + dt) >= (1 - rate dt) h up to the curvature of h over one tick. The
     distance of convex shapes is convex in their relative place, which only helps; what remains is the bend of the

@@ -16,7 +16,10 @@ from wbc.tasks.base import Input, Row, Task, Values
 
 @dataclass(frozen=True)
 class PitchPlane(PlaneItem, Task):
-    """Turn the plane of shoulder, elbow and wrist about the shoulder-wrist line. One row.
+    """The plane of shoulder, elbow and wrist turns about the shoulder-wrist line to an angle, or at a rate. One row:
+
+        e = wrap(psi - target)                 the angle psi of three points, or of the plane across an axis    [rad]
+        alpha = feedforward + gain target      the rate alpha of the plane across an axis                       [rad/s]
 
     With points s, e, w of the three frames and u = (w - s) / |w - s|:
 
@@ -25,8 +28,7 @@ class PitchPlane(PlaneItem, Task):
         e = wrap(psi - target),    psi = atan2(b(u).(e - s), a(u).(e - s)),    wrap to (-pi, pi],
 
     where a(u), b(u) are the stereographic reference directions of :class:`wbc.tasks.PlaneReference` (Elias and
-    Wen, arXiv:2307.13122). psi counts right-handed about u. Inputs: ``target`` [rad] (default: the angle at the
-    first step) and its rate ``feedforward`` [rad/s].
+    Wen, arXiv:2307.13122). psi counts right-handed about u.
 
     **Axis form**, ``PitchPlane(shoulder, elbow, wrist, axis=joint)``, for arms whose pitch axes are parallel and
     offset along each other: the plane is perpendicular to the joint's axis y, the line is r = (w - s) - y (y.(w - s)),
@@ -53,6 +55,10 @@ class PitchPlane(PlaneItem, Task):
 
     It cannot: hold an angle on a singular set; tell psi from psi + 2 pi (no turns are counted); approach a target
     exactly opposite, e = pi, in a defined sense of rotation; act on an arm whose frames move rigidly together.
+
+    Inputs:
+        target: psi [rad]; in the axis form without ``reference`` an angle from wherever the plane is now, default 0.
+        feedforward: rate of the target, or of the plane [rad/s]. Default 0.
 
     Attributes:
         shoulder, elbow, wrist: frames whose origins (plus offsets) are s, e, w. In the axis form the elbow only

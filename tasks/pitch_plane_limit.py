@@ -17,14 +17,13 @@ from wbc.tasks.base import Constraint, Row, Values
 
 @dataclass(frozen=True)
 class PitchPlaneLimit(PlaneItem, Constraint):
-    """Keep the plane of shoulder, elbow and wrist within lower <= psi <= upper on the circle. Two rows.
+    """The plane of shoulder, elbow and wrist stays within lower <= psi <= upper on the circle:
+
+        h = (c + f wrap(psi - m),  c - f wrap(psi - m)) >= 0                                           [rad]
 
     psi is the angle of :class:`wbc.tasks.PitchPlane`: of three points, or of the plane perpendicular to ``axis``
-    (with ``PlaneReference()`` if no ``reference`` is given, because a limit needs an angle). With the middle
-    m = (lower + upper) / 2, the half range c = (upper - lower) / 2 and the fading factor f of PitchPlane, the
-    margins [rad] are
-
-        h = (c + f wrap(psi - m),  c - f wrap(psi - m)) >= 0.
+    (with ``PlaneReference()`` if no ``reference`` is given, because a limit needs an angle); m = (lower + upper) / 2
+    is the middle, c = (upper - lower) / 2 the half range and f the fading factor of PitchPlane.
 
     Where f = 1 that is psi - lower and upper - psi, the short way round. Towards a singular set f falls
     smoothly to 0 and both margins to the constant c, whose derivative is zero: the limit is switched off there by

@@ -33,7 +33,9 @@ ShapePair = tuple[bodies.LinkShape, bodies.LinkShape]
 
 @dataclass(frozen=True)
 class SelfCollision(Constraint):
-    """h = (signed distance between a shape of one link and a shape of another) - margin >= 0  [m], a row a pair.
+    """Links of the robot keep clear of each other:
+
+        h = (signed distance between a shape of one link and a shape of another) - margin >= 0     [m]
 
     Pairs of shapes have rows of their own in every tick, which are expressions (sphere with sphere, capsule, box,
     cylinder; capsule with capsule), or are sensed: ``closest`` rows in all for the nearest of them, chosen before every
@@ -48,7 +50,8 @@ class SelfCollision(Constraint):
         method: ``"auto"``: expressions where the shapes have one, if these are at most :data:`SYMBOLIC_PAIRS` pairs of
             shapes, else all are sensed; ``"symbolic"``: expressions or an error; ``"sensed"``: all are sensed.
 
-    Inputs: ``margin`` >= 0 [m]; ``rate`` as every margin has.
+    Inputs:
+        margin: what is kept between the shapes, >= 0 [m].
 
     The rows hold dh/dt >= -rate h, hence h(t + dt) >= (1 - rate dt) h up to the bend of the links' paths over one tick.
     From an overlap (h < 0) they push apart at -rate h at least; where limits do not let them, the step says

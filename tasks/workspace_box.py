@@ -22,7 +22,7 @@ Triple = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class WorkspaceBox(Constraint):
-    """lower <= x <= upper for a point x of a frame (R, p), as seen from a reference frame b:
+    """A point x of a frame (R, p) stays in a box, as seen from a reference frame b:
 
         h = (x - lower, upper - x) >= 0,    x = R_b' (p + R offset - p_b)      [m]
 

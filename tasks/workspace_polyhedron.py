@@ -27,12 +27,12 @@ Triple = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class WorkspacePolyhedron(Constraint):
-    """A point x of a frame (R, p) stays in an intersection of k half-spaces n_i'x >= d_i (a polyhedron in
-    H-representation, bounded or not), whose planes are fixed to a body W:
+    """A point x of a frame (R, p) stays in an intersection of k half-spaces, whose planes are fixed to a body W:
 
         h_i = n_i' x - d_i >= 0,    x = R_W' (R_b' (p + R offset - p_b) - p_W)        [m]
 
-    (R_W, p_W) is the input ``pose``, given in a reference frame b. One row a plane: ``plane[0]``, ``plane[1]``, ...
+    That is a polyhedron in H-representation, bounded or not. (R_W, p_W) is the input ``pose``, given in a reference
+    frame b. One row a plane: ``plane[0]``, ``plane[1]``, ...
 
     Inputs:
         offsets: k numbers d_i [m], the distance of each plane from the origin of W along its normal; -inf: no plane.

@@ -24,6 +24,7 @@ FLOORS = {
     "wbc.qp": 5,
     "wbc.controller": 6,
     "wbc.track": 8,
+    "wbc.pages": 8,
     "wbc.cli": 9,
 }
 #: Parts that may import only the listed floors, whatever stands below them

@@ -8,7 +8,7 @@ import typer
 from typer.core import TyperGroup
 
 from wbc import __version__
-from wbc.cli import bench, demo, replay, robots, track
+from wbc.cli import bench, demo, docs, replay, robots, track
 from wbc.cli.console import complain
 from wbc.errors import WbcError
 
@@ -60,3 +60,4 @@ app.command("track")(track.track)
 app.command("demo")(demo.demo)
 app.command("replay")(replay.replay)
 app.command("bench", context_settings={"allow_extra_args": True, "ignore_unknown_options": True})(bench.bench)
+app.command("docs")(docs.docs)
