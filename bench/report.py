@@ -29,8 +29,8 @@ constraint has no rate."""
 
 ERRORS = """\
 End error and clearance are of the path that each one took, by Pinocchio. Solver error: largest difference between \
-the velocity returned and an exact solution of the same QP, for wbc an independent build of it by Pinocchio and numpy; \
-placo does not show its QP."""
+the velocity returned and an exact solution of the QP that the package itself built; placo does not show its QP. With \
+`calm=False` wbc's QP is the one that Pinocchio and numpy build from the problem, which `tests/bench` checks."""
 
 
 def sheets(results: dict[str, Any]) -> list[Sheet]:

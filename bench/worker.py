@@ -121,14 +121,18 @@ def walk(contender: Contender) -> dict[str, Any]:
     return {"states": states}
 
 
-def accuracy(contender: Contender) -> dict[str, Any]:
-    """Largest difference to an exact solution of the same QP along the path; null if the QP is not shown."""
+def accuracy(contender: Contender, reference: Callable[[], float | None] | None = None) -> dict[str, Any]:
+    """Largest difference to an exact solution of the same QP along the path; null if the QP is not shown.
+
+    ``reference`` measures it at one tick; default: the contender's own.
+    """
     contender.reset()
+    measure = reference or contender.reference_error
     worst: float | None = None
     for k in range(contender.case.ticks):
         contender.aim(k)
         if k % ACCURACY_STRIDE == 0:
-            error = contender.reference_error()
+            error = measure()
             worst = error if worst is None or error is None else max(worst, error)
         contender.call()
         contender.settle()

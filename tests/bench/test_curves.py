@@ -68,7 +68,7 @@ def test_answers_are_those_of_an_independent_build_of_the_qp(
 ) -> None:
     # The damping at the border of the workspace, which the QP of the problem does not have, is switched off
     ours = Ours(request.getfixturevalue(name), calm=False)
-    error = worker.accuracy(ours)["error"]
+    error = worker.accuracy(ours, ours.independent_error)["error"]
     assert error is not None
     assert error < largest
 
