@@ -24,12 +24,13 @@ Growing problems: targets are those of a path of the joints, all within reach; v
 posture task as above. Degrees of freedom count the base's six where it floats. Switched off for wbc in all of them, \
 as in the problems above, because the peers have no such limit: `JointLimits(acceleration=False)`; all else is at its \
 default (look-ahead and certificate on, `calm=True`, whose curvature and damping the QPs of the peers do not have). \
-Four rounds of up to one pass or a quarter of a second; a dash \
-in place of an end error: too slow for a whole pass in that time.
+Three rounds of up to one pass or a quarter of a second; a dash in place of an end error: too slow for a whole pass in \
+that time.
 
 Obstacles: wbc and pink have a row for every pair in every tick. mink and placo have rows for pairs nearer than 15 cm \
 only, and mink leaves out the link next to the base, whose parent is the world like the obstacles': 9 pairs a sphere \
-instead of 10. placo's constraint has no rate.
+instead of 10. placo's constraint has no rate. What pink costs with rows for the 8 nearest only is in the table of \
+measured pairs.
 
 Measured pairs: wbc and pink have rows for the 8 nearest of all pairs, mink and placo for those nearer than 15 cm. The \
 boxes in the world are one `Obstacle` for wbc, each a hull of eight corners.

@@ -24,7 +24,7 @@ PEERS = ("pink + daqp", "mink + daqp", "placo")
 #: On the humanoid only: mink with its own default for which pairs have rows
 DEFAULTS = "mink + daqp, rows within 1 cm"
 #: Rounds of a problem, and seconds that a contender has in each
-ROUNDS, BUDGET = 4, 0.25
+ROUNDS, BUDGET = 3, 0.25
 PHASE_TICKS = 100
 #: Every how many ticks clearances are measured
 STRIDE = 5
