@@ -119,6 +119,8 @@ class Reach:
         """H with the curvature of the errors that one step leaves, None where there is none to count."""
         if self._bend is None:
             return None
+        # what blocked joints are asked for is not asked of the others
+        slope = free * slope
         step = np.linalg.solve(metric, slope)
         length = float(np.abs(step / self._dofs).max())
         if length > TRUSTED:
@@ -148,7 +150,7 @@ class Reach:
         limited = self._limited(bound_enabled)
         if not limited.any():
             return largest
-        rate = (free * np.abs(np.linalg.solve(metric, J.T @ wanted)))[limited]
+        rate = (free * np.abs(np.linalg.solve(metric, free * (J.T @ wanted))))[limited]
         worst = float((rate / (BRAKING * self._brake_limit[limited])).max())
         return largest / float(np.sqrt(worst)) if worst > 1.0 else largest
 

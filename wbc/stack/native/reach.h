@@ -88,8 +88,10 @@ static int cut_off(wbc_tick *t, const double *free, double more) {
 
 /* Weighted errors that the step of the linear model leaves, kept to TRUSTED where that asks for more. R is the
  * metric without curvature, before and after. */
-static int left_over(wbc_tick *t, const double *free, const double *error, const double *slope, double *pull) {
-    double step[WIDE];
+static int left_over(wbc_tick *t, const double *free, const double *error, const double *whole, double *pull) {
+    double step[WIDE], slope[WIDE] = {0};
+    /* What blocked joints are asked for is not asked of the others */
+    for (int i = 0; i < NV; i++) slope[i] = free[i] * whole[i];
     solve_with(t, slope, step);
     const double length = largest_step(step);
     const int bounded = length > TRUSTED;
@@ -221,6 +223,7 @@ static double stoppable(wbc_tick *t, const double *free, const double *error, do
         square[k] = gain * gain * error[k];
     }
     gather(t, square, b);
+    for (int i = 0; i < NV; i++) b[i] *= free[i];
     solve_with(t, b, rate);
     for (int i = 0; i < NV; i++)
         if (brake_at[i] >= 0 && t->bound_enabled[brake_at[i]] != 0.0)
