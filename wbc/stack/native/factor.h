@@ -23,7 +23,7 @@ INLINE double dot(const double *x, const double *y, int from) {
  * independent as they are in v. */
 static void strengthen(wbc_tick *t) {
     t->stiffness = 0.0;
-    for (int i = 0; i < NV; i++) t->stiffness = fmax(t->stiffness, t->H[i * WIDE + i] * dof_scale[i] * dof_scale[i]);
+    for (int i = 0; i < NV; i++) t->stiffness = larger(t->stiffness, t->H[i * WIDE + i] * dof_scale[i] * dof_scale[i]);
     for (int i = 0; i < NV; i++)
         if (t->low[i] == t->high[i]) t->R[i * WIDE + i] += t->stiffness / (dof_scale[i] * dof_scale[i]);
     for (int k = 0; k < MC; k++) {

@@ -39,8 +39,8 @@ static void find_idle_rows(wbc_tick *t) {
         for (int e = a_start[k]; e < a_start[k + 1]; e++) {
             const int i = a_col[e];
             const double one = t->at[e] * t->low[i], other = t->at[e] * t->high[i];
-            least += fmin(one, other);
-            most += fmax(one, other);
+            least += smaller(one, other);
+            most += larger(one, other);
         }
         t->idle[k] = low < high && least > low + TOLERANCE * row_scale[k] && most < high - TOLERANCE * row_scale[k];
     }

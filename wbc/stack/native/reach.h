@@ -52,7 +52,7 @@ static void solve_with(const wbc_tick *t, const double *b, double *x) {
 
 static double largest_step(const double *x) {
     double largest = 0.0;
-    for (int i = 0; i < NV; i++) largest = fmax(largest, fabs(x[i]) / dof_scale[i]);
+    for (int i = 0; i < NV; i++) largest = larger(largest, fabs(x[i]) / dof_scale[i]);
     return largest;
 }
 
@@ -60,7 +60,7 @@ static double largest_step(const double *x) {
 static int find_free(const wbc_tick *t, const double *slope, double *free) {
     double steepest = 0.0;
     int blocked = 0;
-    for (int i = 0; i < NV; i++) steepest = fmax(steepest, fabs(slope[i]) * dof_scale[i]);
+    for (int i = 0; i < NV; i++) steepest = larger(steepest, fabs(slope[i]) * dof_scale[i]);
     for (int i = 0; i < NV; i++) {
         free[i] = 1.0;
         if (stop_at[i] < 0 || t->bound_enabled[stop_at[i]] == 0.0) continue;
@@ -97,7 +97,7 @@ static int left_over(wbc_tick *t, const double *free, const double *error, const
     const int bounded = length > TRUSTED;
     if (bounded) {
         double steepest = 0.0;
-        for (int i = 0; i < NV; i++) steepest = fmax(steepest, fabs(slope[i]) * dof_scale[i]);
+        for (int i = 0; i < NV; i++) steepest = larger(steepest, fabs(slope[i]) * dof_scale[i]);
         if (!cut_off(t, free, steepest / TRUSTED * (1.0 - TRUSTED / length))) return 0;
         solve_with(t, slope, step);
     }
@@ -114,14 +114,14 @@ static void definite(const double *matrix, double least, double *more) {
     double a[NV * NV], diagonal = 0.0, other = 0.0;
     memcpy(a, matrix, sizeof a);
     for (int i = 0; i < NV; i++) {
-        diagonal = fmax(diagonal, fabs(a[i * NV + i]));
-        for (int j = i + 1; j < NV; j++) other = fmax(other, fabs(a[i * NV + j]));
+        diagonal = larger(diagonal, fabs(a[i * NV + i]));
+        for (int j = i + 1; j < NV; j++) other = larger(other, fabs(a[i * NV + j]));
     }
-    const double bound = fmax(diagonal, other / sqrt(fmax((double)NV * NV - 1.0, 1.0)));
+    const double bound = larger(diagonal, other / sqrt(larger((double)NV * NV - 1.0, 1.0)));
     for (int k = 0; k < NV; k++) {
         double *row = a + k * NV, aside = 0.0;
-        for (int j = k + 1; j < NV; j++) aside = fmax(aside, fabs(row[j]));
-        const double pivot = fmax(fmax(fabs(row[k]), aside * aside / bound), least);
+        for (int j = k + 1; j < NV; j++) aside = larger(aside, fabs(row[j]));
+        const double pivot = larger(larger(fabs(row[k]), aside * aside / bound), least);
         more[k] = pivot - row[k];
         for (int i = k + 1; i < NV; i++) {
             const double f = row[i] / pivot;
@@ -134,7 +134,7 @@ static double least_pivot(const wbc_tick *t) {
     double least = WBC_INF;
     for (int i = 0; i < NV; i++) {
         const double pivot = dof_scale[i] / t->inverse_diagonal[i];
-        least = fmin(least, pivot * pivot);
+        least = smaller(least, pivot * pivot);
     }
     return least;
 }
@@ -158,7 +158,7 @@ static double bend_errors(wbc_tick *t, const double *free, const double *error, 
     for (int e = 0; e < NNZK; e++) {
         const int i = k_row[e], j = k_col[e];
         const double bent = share * free[i] * free[j] * t->bent[e];
-        largest = fmax(largest, fabs(bent) * dof_scale[i] * dof_scale[j]);
+        largest = larger(largest, fabs(bent) * dof_scale[i] * dof_scale[j]);
         t->H[i * WIDE + j] += bent;
     }
     return largest;
@@ -169,7 +169,7 @@ static int add_curvature(wbc_tick *t, const double *free, const double *error, c
     double scaled[NV * NV], more[NV], least = least_pivot(t);
     const double largest = bend_errors(t, free, error, pull, least);
     if (largest == 0.0) return 0;
-    least = fmax(LEAST_PIVOT * largest, least);
+    least = larger(LEAST_PIVOT * largest, least);
     /* Where no pivot is too small the modified factorisation is the plain one; but equality rows are not in H */
     int equalities = 0;
     for (int i = 0; i < M_ALL; i++) equalities |= t->low[i] == t->high[i];
@@ -227,7 +227,7 @@ static double stoppable(wbc_tick *t, const double *free, const double *error, do
     solve_with(t, b, rate);
     for (int i = 0; i < NV; i++)
         if (brake_at[i] >= 0 && t->bound_enabled[brake_at[i]] != 0.0)
-            worst = fmax(worst, free[i] * fabs(rate[i]) / (BRAKING * brake_limit[i]));
+            worst = larger(worst, free[i] * fabs(rate[i]) / (BRAKING * brake_limit[i]));
     return worst > 1.0 ? largest / sqrt(worst) : largest;
 }
 
@@ -238,7 +238,7 @@ static void reach(wbc_tick *t) {
         const int counts = t->weight[k] * t->report.factor[k] != 0.0;
         error[k] = counts ? t->report.error[k] : 0.0;
         if (!(fabs(error[k]) < FAR)) return;
-        if (counts) largest = fmax(largest, t->p[gain_at[k]]);
+        if (counts) largest = larger(largest, t->p[gain_at[k]]);
     }
     gather(t, error, slope);
     t->prepared = 1;
@@ -262,7 +262,7 @@ static void reach(wbc_tick *t) {
     int moving = 0;
     for (int k = 0; k < MT; k++) {
         const double gain = t->p[gain_at[k]];
-        wanted[k] = fmin(gain, allowed) * error[k];
+        wanted[k] = smaller(gain, allowed) * error[k];
         drift[k] = -t->wish[k] - gain * error[k];
         moving |= t->weight[k] * t->report.factor[k] != 0.0 && drift[k] != 0.0;
         if (!t->curved) wanted[k] += drift[k];

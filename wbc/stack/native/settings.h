@@ -45,6 +45,10 @@ int bend(const double **arg, double **res, long long *iw, double *w, int mem);
 
 INLINE double clamp(double x, double low, double high) { return x < low ? low : (x > high ? high : x); }
 
+/* Not fmin and fmax, which are calls; NaN in the first argument gives the second */
+INLINE double smaller(double x, double y) { return x < y ? x : y; }
+INLINE double larger(double x, double y) { return x > y ? x : y; }
+
 /* A v for general row k */
 INLINE double row_at(const wbc_tick *t, int k, const double *v) {
     double sum = 0.0;
