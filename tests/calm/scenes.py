@@ -74,7 +74,8 @@ def built(
     stack.add(EndEffector(TIPS[name], kind=kind), name="hand")  # type: ignore[arg-type]
     stack.add(Posture(), name="posture", weight=POSTURE).add(JointLimits())
     for key, (shape, pose) in SCENES[scene].items():
-        stack.add(Obstacle(shape, links=("panda_hand",), pose=pose), name=key)
+        links = None if scene == "passing" else ("panda_hand",)
+        stack.add(Obstacle(shape, links=links, pose=pose, margin=MARGINS.get(scene, 0.0)), name=key)
     return stack.compile()
 
 
@@ -96,8 +97,13 @@ SCENES: Mapping[str, Mapping[str, tuple[Any, pin.SE3]]] = {
         "front": wall((-1.0, 0.0, 0.0), (0.5, 0.0, 0.0)),
         "side": wall((0.0, -1.0, 0.0), (0.0, 0.25, 0.0)),
     },
+    "passing": {"ball": (Sphere(0.1), pin.SE3.Identity())},
     "between": {"left": ball(0.5, 0.22, 0.45), "right": ball(0.5, -0.22, 0.45)},
 }
+
+
+#: Asked beyond contact [m]
+MARGINS: Mapping[str, float] = {"passing": 0.02}
 
 
 def run(

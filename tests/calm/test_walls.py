@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 from tests.calm.scenes import Array, built, machine, run, tip_pose
@@ -71,6 +72,31 @@ def test_noise_at_a_wall_stays_small() -> None:
     done = run(built("panda", DT, scene="wall"), 10.0, towards(lambda t: PULLS["wall"]), 1200, lag=0.02, noise=1e-4)
     assert done.margin.min() > -2e-3
     assert np.abs(done.v[-300:]).max() < 0.05
+
+
+@pytest.mark.parametrize("rate", [5.0, 20.0])
+def test_a_ball_that_comes_by_is_given_way_no_earlier_than_needed(rate: float) -> None:
+    """Links that can hardly move away from it ask nothing of the joints: no more way than the plain model gives."""
+    robot, pushed = machine("panda"), {}
+    for calm in (True, False):
+        controller = built("panda", DT, calm=calm, scene="passing")
+        home, velocity, q = tip_pose(robot, robot.neutral, "panda"), np.array([0.0, -0.3, 0.0]), robot.neutral
+        controller.reset(q)
+        controller["hand"].set(target=home, gain=5.0)
+        controller["ball"].set(rate=rate, velocity=[*velocity, 0.0, 0.0, 0.0])
+        off, least, statuses = [], np.inf, set()
+        for k in range(1000):
+            controller["ball"].pose = pin.SE3(np.eye(3), np.array([0.42, 0.7, 0.45]) + velocity * k * DT)
+            step = controller.step(q)
+            statuses.add(step.status)
+            off.append(float(np.linalg.norm(tip_pose(robot, q, "panda").translation - home.translation)))
+            least = min(least, float(step.margins["ball"].min()))
+            q = pin.integrate(robot.model, q, step.v * DT)
+        assert statuses == {"solved"}
+        assert least > -1e-5
+        assert off[-1] < 1e-4
+        pushed[calm] = max(off)
+    assert 0.005 < pushed[True] < pushed[False] + 1e-3
 
 
 def test_the_plain_model_relaxes_there() -> None:

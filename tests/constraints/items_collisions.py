@@ -25,7 +25,11 @@ def _obstacle(robot: Robot) -> list[tuple[Item, dict[str, Any]]]:
 
 def _self_collision(robot: Robot) -> list[tuple[Item, dict[str, Any]]]:
     links = [link for link, shapes in robot.shapes.items() if shapes]
-    far = (links[0], links[-1])
+    # A link near the base and the one that most joints move: their distance takes many values
+    depth = {
+        link: len(robot.model.supports[robot.model.frames[robot.model.getFrameId(link)].parentJoint]) for link in links
+    }
+    far = (links[0], max(links[1:], key=lambda link: depth[link]))
     some = [pair for pair in itertools.combinations(links, 2) if pair != far]
     return [
         (SelfCollision([far], method="symbolic"), {"margin": 0.02}),

@@ -179,7 +179,9 @@ class Reach:
         with np.errstate(invalid="ignore", divide="ignore"):
             speed = 2.0 * h / (dt + np.sqrt(dt * dt + 2.0 * h / a))
             lower = (plain > 0.0) & (a > 0.0) & ~free & (speed < plain)
-        low[self._margin_rows[lower]] += (plain - speed)[lower]
+        rows, raised = self._margin_rows[lower], (plain - speed)[lower]
+        # What comes nearer by itself no joint brakes: of the joints this asks no more than to stand still
+        low[rows] = np.minimum(low[rows] + raised, np.maximum(low[rows], 0.0))
 
     def _following(self, metric: Array, J: Array, weight: Array, wanted: Array) -> Array:
         """The step that follows moving targets, corrected until only what no linear model resolves is damped."""

@@ -8,7 +8,8 @@
 #define BRAKING_MARGIN 0.25
 
 /* A margin h > 0 may fall by rate h, as the row says, or by the speed from which the joints can stop within h with a
- * part of their acceleration, whichever is less: v dt + v^2 / (2 a) <= h. docs/reach.md */
+ * part of their acceleration, whichever is less: v dt + v^2 / (2 a) <= h. What comes nearer by itself no joint brakes:
+ * of the joints the second asks no more than to stand still. docs/reach.md */
 static void brake_for_margins(wbc_tick *t) {
     double limit[NV];
     int limited = 0;
@@ -27,7 +28,7 @@ static void brake_for_margins(wbc_tick *t) {
         /* also where a is 0 and nothing moves the margin */
         if (!(a > 0.0 && a < WBC_INF * 1e-6)) continue;
         const double speed = 2.0 * h / (t->dt + sqrt(t->dt * t->dt + 2.0 * h / a));
-        if (speed < plain) t->free_low[k] += plain - speed;
+        if (speed < plain) t->free_low[k] = smaller(t->free_low[k] + plain - speed, larger(t->free_low[k], 0.0));
     }
 }
 
