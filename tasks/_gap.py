@@ -142,7 +142,7 @@ def gaps(first: Placed, second: Placed) -> list[Gap]:
     a, b = (first, second) if isinstance(first.shape, Sphere) else (second, first)
     if isinstance(b.shape, Sphere):
         assert isinstance(a.shape, Sphere)
-        up = ca.SX(ca.DM([0.0, 0.0, SHIFT * ((a.shape.radius + b.shape.radius) or 1.0)]))
+        up = ca.SX(ca.DM([0.0, 0.0, SHIFT * (a.shape.radius or b.shape.radius or 1.0)]))
         distance, normal = between(a.pose.position + up, b.pose.position)
         return [_gap(a, b, distance - (a.shape.radius + b.shape.radius), normal)]
     if isinstance(b.shape, Capsule):

@@ -32,6 +32,7 @@ from wbc.symbolic.tracer import Tracer
 
 if TYPE_CHECKING:
     from wbc.robot import Robot
+    from wbc.tasks._ball import BallRow
 
 Kind = Literal["vector", "pose", "rotation", "configuration", "tangent"]
 
@@ -285,6 +286,15 @@ class Constraint(Item):
     def sensor(self, robot: Robot, numbers: Numbers) -> Sensor:
         """The sensor of one controller; reads and writes the item's inputs in ``numbers``."""
         raise TypeError(f"{type(self).__name__} has no sensed rows")
+
+    def ball_rows(self, robot: Robot) -> tuple[BallRow, ...]:
+        """What every row of :meth:`margins` is, where all are distances between one ball and links, less what is kept
+        clear; else nothing.
+
+        The ball's centre is the position of the input ``pose``, its velocity that of ``velocity``, and ``margin`` is
+        kept clear. A compiled tick computes such rows in a loop, and leaves out those that are too far to matter.
+        """
+        return ()
 
     def row_factor(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX | None:
         """None, or one factor in [0, 1] a margin row, 1 where the margin has its plain meaning: a limit that fades

@@ -17,6 +17,7 @@ from wbc.shapes import Box, Capsule, Convex, Cylinder, HalfSpace, Shape, Solid, 
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks import _bodies as bodies
 from wbc.tasks import _gap as gap
+from wbc.tasks._ball import BallRow
 from wbc.tasks._selection import selection
 from wbc.tasks.base import Constraint, Input, Numbers, Order, Row, Sensor, Values
 
@@ -161,6 +162,16 @@ class Obstacle(Constraint):
                 drifts.append(gap.drift(kin, row, obstacle))
         own = kin.gaps(rows) + ca.vertcat(*drifts) - inputs["margin"] if rows else ca.SX(0, 1)
         return ca.vertcat(own, bodies.sensed_margins(inputs, self.sensed_rows(robot)))
+
+    def ball_rows(self, robot: Robot) -> tuple[BallRow, ...]:
+        """All of them, if a sphere keeps clear of spheres and capsules only."""
+        ball, pairs = self.parts[0], self.pairs(robot)
+        if not isinstance(gap.core(ball), Sphere) or not all(
+            isinstance(p.shape, (Sphere, Capsule)) for _, _, p in pairs
+        ):
+            return ()
+        assert isinstance(ball, (Sphere, Capsule))
+        return tuple(BallRow(link, k, placed, ball.radius) for link, k, placed in pairs)
 
     def _suffixes(self, solid: Solid) -> tuple[str, ...]:
         """Names of the rows of a link's shape against the obstacle; none if it is sensed."""

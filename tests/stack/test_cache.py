@@ -177,7 +177,7 @@ def test_a_hit_builds_no_graph(backend: str, folder: Folder, monkeypatch: pytest
     assert not first.cached
     assert first.backend == backend
 
-    def refuse(*arguments: object) -> None:
+    def refuse(*arguments: object, **options: object) -> None:
         raise AssertionError("a graph was built")
 
     monkeypatch.setattr(artifact, "build", refuse)

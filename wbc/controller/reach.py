@@ -176,12 +176,13 @@ class Reach:
         free = (rows[:, ~limited] != 0.0).any(axis=1)
         h = margin[self._margin_at]
         plain = p[self._rate_at] * h
+        closing = low[self._margin_rows] + plain
         with np.errstate(invalid="ignore", divide="ignore"):
-            speed = 2.0 * h / (dt + np.sqrt(dt * dt + 2.0 * h / a))
-            lower = (plain > 0.0) & (a > 0.0) & ~free & (speed < plain)
-        rows, raised = self._margin_rows[lower], (plain - speed)[lower]
-        # What comes nearer by itself no joint brakes: of the joints this asks no more than to stand still
-        low[rows] = np.minimum(low[rows] + raised, np.maximum(low[rows], 0.0))
+            lag = dt + np.maximum(closing, 0.0) / a
+            speed = 2.0 * h / (lag + np.sqrt(lag * lag + 2.0 * h / a))
+            counts = (plain > 0.0) & (a > 0.0) & ~free
+        raised = (np.minimum(closing, 0.0) - speed)[counts]
+        low[self._margin_rows[counts]] = np.maximum(low[self._margin_rows[counts]], raised)
 
     def _following(self, metric: Array, J: Array, weight: Array, wanted: Array) -> Array:
         """The step that follows moving targets, corrected until only what no linear model resolves is damped."""

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import functools
 import pathlib
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -54,32 +52,32 @@ def compile_stack(stack: Declaration, backend: str, version: str) -> Artifact:
     if backend == "native" and toolchain.missing():
         raise CompileError("backend", backend, f"cannot compile: {', '.join(toolchain.missing())}")
     layout = Layout(stack)
-    program = functools.cache(lambda: build(stack, layout))
     if backend == "native" or (backend == "auto" and toolchain.available()):
         try:
-            return _native(stack, layout, program, version)
+            return _native(stack, layout, version)
         except CompileError as error:
             if backend == "native":
                 raise
             toolchain.fall_back(str(error))
-    return _virtual(stack, layout, program, version)
+    return _virtual(stack, layout, version)
 
 
-def _native(stack: Declaration, layout: Layout, program: Callable[[], Program], version: str) -> Artifact:
+def _native(stack: Declaration, layout: Layout, version: str) -> Artifact:
     """The shared library, compiled or from the cache."""
 
     def fill(folder: pathlib.Path) -> None:
-        toolchain.compile_tick(codegen.sources(stack, layout, program()), folder / "tick.so")
+        program = build(stack, layout, loops=True)
+        toolchain.compile_tick(codegen.sources(stack, layout, program), folder / "tick.so")
 
     folder, cached = cache.fetch(key(stack, version, toolchain.identity()), fill, library=True)
     return Artifact(layout, folder / "tick.so", None, cached)
 
 
-def _virtual(stack: Declaration, layout: Layout, program: Callable[[], Program], version: str) -> Artifact:
+def _virtual(stack: Declaration, layout: Layout, version: str) -> Artifact:
     """The functions for the virtual machine, built or from the cache."""
 
     def fill(folder: pathlib.Path) -> None:
-        for name, function in program().functions.items():
+        for name, function in build(stack, layout).functions.items():
             function.save(str(folder / f"{name}.casadi"))
 
     folder, cached = cache.fetch(key(stack, version, "vm"), fill)

@@ -32,7 +32,7 @@ def _casadi_source(program: Program) -> str:
 def _header(stack: Declaration, layout: Layout, program: Program) -> str:
     jt, at = program.rows.sparsity_out("jt"), program.rows.sparsity_out("at")
     j_start, j_col = sparsity_rows(jt)
-    a_start, a_col = sparsity_rows(at)
+    a_start, a_end, a_col = program.balls.entries(*sparsity_rows(at))
     orders, scales, sequence = row_orders(layout), row_units(stack, layout), bound_sequence(layout)
     dofs = layout.dof_scales(stack)
     units = unit_groups(stack)
@@ -55,7 +55,9 @@ def _header(stack: Declaration, layout: Layout, program: Program) -> str:
                 "NB": layout.bound_blocks,
                 "MH": layout.margin_rows,
                 "NNZJ": jt.nnz(),
-                "NNZA": at.nnz(),
+                "NNZA": len(a_col),
+                "BALLS": len(program.balls.items),
+                "SEGMENTS": len(program.balls.segment_rows),
                 "NNZK": bent.nnz(),
                 "CALM": int(stack.calm),
                 "UNITS": len(units),
@@ -68,6 +70,7 @@ def _header(stack: Declaration, layout: Layout, program: Program) -> str:
         _table("int", "j_start", j_start),
         _table("int", "j_col", j_col),
         _table("int", "a_start", a_start),
+        _table("int", "a_end", a_end),
         _table("int", "a_col", a_col),
         _table("int", "row_order", orders),
         _table("int", "bound_sequence", sequence),
@@ -88,6 +91,9 @@ def _header(stack: Declaration, layout: Layout, program: Program) -> str:
         _table("double", "row_scale", scales),
         _table("double", "dof_scale", dofs),
         _table("double", "damping", stack.damping / dofs**2),
+        *(_table("int", name, values) for name, values in program.balls.places().items()),
+        _table("double", "row_reach", program.balls.reaches),
+        _table("double", "segment_half", program.balls.halves),
         *_blocks(j_start, j_col),
     ]
     return "\n".join(lines) + "\n"

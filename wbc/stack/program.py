@@ -18,16 +18,24 @@ small and the levels of later versions have their rows. ``ahead(q, v, p, dt)`` i
 inputs advanced by their rates. ``bend(q, v, p, dt, pull)`` is the upper triangle of sum_k pull_k d2(e_k)/dq2, the
 curvature of the task errors for a weight ``pull`` on each row, as far as it comes from the robot's links; see
 :mod:`wbc.symbolic.curvature`.
+
+For a compiled tick the rows of :meth:`Constraint.ball_rows` are left to the loop in ``native/balls.h``: here they have
+no entries, ``low`` and ``margin`` are 0, and what the loop needs is added,
+
+    segment  segments x 6   (middle; axis) of every link core, of ``rows`` and of ``ahead``
+    screw    6 x nv         (linear at the origin of the world; angular) of every degree of freedom, of ``rows``
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
 
 import casadi as ca
 import numpy as np
 
 from wbc.errors import ShapeError
+from wbc.stack.balls import Balls
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Block, Layout, Slot
 from wbc.symbolic import rotations as rot
@@ -55,12 +63,13 @@ ROWS_OUTPUTS = (
 @dataclass(frozen=True, eq=False)
 class Program:
     """The compiled-to-be functions of a stack; ``ahead`` is None where there are no margins, ``bend`` where no task
-    bends or the stack does not want it.
+    bends or the stack does not want it; ``balls`` are rows that are left to a loop.
     """
 
     rows: ca.Function
     ahead: ca.Function | None
     bend: ca.Function | None
+    balls: Balls = field(default_factory=Balls)
 
     @property
     def functions(self) -> dict[str, ca.Function]:
@@ -70,13 +79,18 @@ class Program:
 
 
 class _Builder:
-    def __init__(self, stack: Declaration, layout: Layout) -> None:
-        self.stack, self.layout = stack, layout
+    def __init__(self, stack: Declaration, layout: Layout, balls: Balls) -> None:
+        self.stack, self.layout, self.balls = stack, layout, balls
         self.kinematics = Kinematics(stack.robot.model)
         self.p = ca.SX.sym("p", layout.parameters)
         self.dt = ca.SX.sym("dt")
         self.pull = ca.SX.sym("pull", layout.task_rows)
         self.pulls: list[Pull] = []
+
+    @cached_property
+    def later(self) -> ca.SX:
+        """q (+) v dt."""
+        return self.kinematics.integrate(self.kinematics.q, self.kinematics.v * self.dt)
 
     def values(self, block: Block) -> dict[str, ca.SX | Pose]:
         """What the item's expressions receive for its inputs."""
@@ -163,6 +177,12 @@ class _Builder:
             assert rows is not None
             low, high = self.column(block, "lower", rows.lower), self.column(block, "upper", rows.upper)
             return Rows(tracer.expand(ca.SX(rows.matrix)), tracer.expand(low), tracer.expand(high)), None, None
+        if block.entry.name in self.balls:
+            return (
+                Rows(ca.SX(count, self.layout.nv), ca.SX(count, 1), ca.SX.inf(count)),
+                ca.SX(count, 1),
+                ca.SX.ones(count),
+            )
         margins = item.margins(robot, tracer, inputs)
         assert margins is not None
         margin = self.column(block, "margins", margins)
@@ -184,15 +204,16 @@ class _Builder:
         return side * ca.densify(line @ self.kinematics.screws)
 
     def ahead(self, block: Block) -> ca.SX:
-        """h(q (+) v dt) of a margin block; of sensed rows h + (dh/dt) dt."""
+        """h(q (+) v dt) of a margin block; of sensed rows h + (dh/dt) dt; 0 for rows that are left to the loop."""
         item = block.entry.item
         assert isinstance(item, Constraint)
+        if block.entry.name in self.balls:
+            return ca.SX(len(block.rows), 1)
         tracer = Tracer(self.kinematics)
         margins = item.margins(self.stack.robot, tracer, self.values(block))
         assert margins is not None
         here = ca.Function("h", [self.kinematics.q, self.p], [ca.densify(tracer.expand(margins))])
-        later = self.kinematics.integrate(self.kinematics.q, self.kinematics.v * self.dt)
-        margin = here(later, self.advanced(block))
+        margin = here(self.later, self.advanced(block))
         sensed = item.sensed_rows(self.stack.robot)
         if sensed:
             closing = self.sensed_matrix(block, sensed) @ self.kinematics.v * self.dt
@@ -200,13 +221,14 @@ class _Builder:
         return margin
 
 
-def build(stack: Declaration, layout: Layout) -> Program:
-    """Build the functions of a stack.
+def build(stack: Declaration, layout: Layout, loops: bool = False) -> Program:
+    """Build the functions of a stack; ``loops``: without what a compiled tick computes in loops.
 
     Raises:
         ShapeError: an item's expression has another number of rows than it declares, or free symbols.
     """
-    b = _Builder(stack, layout)
+    balls = Balls.of(stack, layout) if loops else Balls()
+    b = _Builder(stack, layout, balls)
     nv = layout.nv
     tasks = [b.task(block) for block in layout.of_form("task")]
     general = [b.general(block) for block in layout.of_form("margins", "rows")]
@@ -234,16 +256,19 @@ def build(stack: Declaration, layout: Layout) -> Program:
     ]
     outputs = [o if k in (3, 4) else ca.densify(o) for k, o in enumerate(outputs)]
     inputs = [b.kinematics.q, b.kinematics.v, b.p, b.dt]
-    rows = _function("rows", inputs, outputs, list(ROWS_OUTPUTS))
+    segments = balls.segments(b.kinematics)
+    more = [segments, ca.densify(b.kinematics.screws)] if balls else []
+    rows = _function("rows", inputs, outputs + more, [*ROWS_OUTPUTS, "segment", "screw"][: len(outputs + more)])
     ahead = None
     if layout.margin_rows:
         later = ca.vertcat(*[b.ahead(block) for block in layout.of_form("margins")])
-        ahead = _function("ahead", inputs, [ca.densify(later)], ["ahead"])
+        more = [ca.Function("segments", [b.kinematics.q], [segments])(b.later)] if balls else []
+        ahead = _function("ahead", inputs, [ca.densify(later), *more], ["ahead", "segment"][: 1 + len(more)])
     bend = None
     bent = ca.triu(curvature(b.kinematics, b.pulls)) if b.pulls else ca.SX(nv, nv)
     if bent.nnz():
         bend = _function("bend", [*inputs, b.pull], [bent], ["bend"])
-    return Program(rows, ahead, bend)
+    return Program(rows, ahead, bend, balls)
 
 
 def _shared_pattern(transposed: ca.SX) -> ca.SX:

@@ -77,7 +77,7 @@ static int active_set(wbc_tick *t, int warm, int checked, double angle, const do
         if (seen ? angle > TIGHT : t->sense[i] & ACTIVE) continue;
         const double sum = row_at(t, k, t->x);
         double square = 0.0;
-        for (int e = a_start[k]; e < a_start[k + 1]; e++) square += t->at[e] * t->at[e];
+        for (int e = a_start[k]; e < a_end[k]; e++) square += t->at[e] * t->at[e];
         const double room = (seen ? SEEN : TOLERANCE) * row_scale[k] + angle * sqrt(square * dot(t->x, t->x, 0));
         if (sum < t->low[i] - room || sum > t->high[i] + room) return EXIT_INFEASIBLE;
     }

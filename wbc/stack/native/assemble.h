@@ -2,7 +2,7 @@
 #ifndef WBC_ASSEMBLE_H
 #define WBC_ASSEMBLE_H
 
-#include "margins.h"
+#include "balls.h"
 #include "reach.h"
 
 /* H += J' diag(w) J, g -= J' diag(w) wish, for `count` rows that share the `cols` columns listed from `first` */
@@ -77,10 +77,11 @@ static void form_bounds(wbc_tick *t) {
     }
 }
 
-EXPORT void wbc_tick_assemble(wbc_tick *t) {
+/* `screen`: without rows that no velocity within the bounds could violate */
+static void assemble(wbc_tick *t, int screen) {
     const double *arg[4] = {t->q, t->v_last, t->p, &t->dt};
-    double *res[11] = {t->report.error, t->wish, t->report.factor, t->jt, t->at, t->free_low,
-                       t->free_high, t->report.margin, t->bound_low, t->bound_high, t->report.margin_factor};
+    double *res[13] = {t->report.error, t->wish, t->report.factor, t->jt, t->at, t->free_low, t->free_high,
+                       t->report.margin, t->bound_low, t->bound_high, t->report.margin_factor, t->segment, t->screw};
     rows(arg, res, t->work_iw, t->work_w, 0);
     memset(t->H, 0, sizeof t->H);
     memset(t->g, 0, sizeof t->g);
@@ -91,10 +92,21 @@ EXPORT void wbc_tick_assemble(wbc_tick *t) {
     for (int i = 0; i < NV; i++) t->H[i * WIDE + i] = damping[i];
     BLOCKS
     form_bounds(t);
+#if BALLS > 0
+    ball_rows(t, screen);
+#else
+    (void)screen;
+#endif
     if (CALM) brake_for_margins(t);
     for (int k = 0; k < MC; k++) {
+        t->report.slack[k] = 0.0;
+        if (t->far[k]) {
+            t->low[NV + k] = t->free_low[k];
+            t->high[NV + k] = t->free_high[k] = WBC_INF;
+            continue;
+        }
         double *row = t->at + a_start[k];
-        const int on = t->enabled[k] != 0.0, count = a_start[k + 1] - a_start[k];
+        const int on = t->enabled[k] != 0.0, count = a_end[k] - a_start[k];
         if (!on) {
             memset(row, 0, count * sizeof(double));
             t->free_low[k] = -WBC_INF;
@@ -106,11 +118,13 @@ EXPORT void wbc_tick_assemble(wbc_tick *t) {
         if (t->free_high[k] > WBC_INF) t->free_high[k] = WBC_INF;
         t->low[NV + k] = t->free_low[k];
         t->high[NV + k] = t->free_high[k];
-        t->report.slack[k] = 0.0;
-        for (int e = a_start[k]; e < a_start[k + 1]; e++) t->A[k * NV + a_col[e]] = t->at[e];
+        for (int e = a_start[k]; e < a_end[k]; e++) t->A[k * NV + a_col[e]] = t->at[e];
     }
     t->prepared = t->curved = 0;
     if (CALM && MT > 0 && t->unusable == 0.0) reach(t);
 }
+
+/* All rows of the QP */
+EXPORT void wbc_tick_assemble(wbc_tick *t) { assemble(t, 0); }
 
 #endif

@@ -88,7 +88,7 @@ static void add_forces(wbc_tick *t, const double *v, double *residual, double *s
         double lambda = work->lam_star[a];
         if (t->strength[k] > 0.0) lambda += t->strength[k] * (value - t->low[i]);
         out->lambda[i] = lambda;
-        for (int e = a_start[k]; e < a_start[k + 1]; e++) {
+        for (int e = a_start[k]; e < a_end[k]; e++) {
             const double part = t->at[e] * lambda;
             residual[a_col[e]] += part;
             size[a_col[e]] += fabs(part);
@@ -117,6 +117,7 @@ static void examine(wbc_tick *t) {
     add_forces(t, v, residual, size);
     out->violation = 0.0;
     for (int k = 0; k < MC; k++) {
+        if (t->low[NV + k] <= -WBC_INF && t->high[NV + k] >= WBC_INF) continue;
         const double value = row_at(t, k, v);
         const double below = t->low[NV + k] - value, above = value - t->high[NV + k];
         if (below > out->violation) out->violation = below;
@@ -192,8 +193,11 @@ EXPORT void wbc_tick_certify(wbc_tick *t) {
 EXPORT void wbc_tick_look_ahead(wbc_tick *t) {
 #if MH > 0
     const double *arg[4] = {t->q, t->report.v, t->p, &t->dt};
-    double *res[1] = {t->report.ahead};
+    double *res[2] = {t->report.ahead, t->segment_ahead};
     ahead(arg, res, t->work_iw, t->work_w, 0);
+#if BALLS > 0
+    balls_ahead(t);
+#endif
     replace_nan(t->report.ahead, MH, -HUGE_VAL);
 #else
     (void)t;

@@ -30,15 +30,15 @@ static void strengthen(wbc_tick *t) {
         t->strength[k] = 0.0;
         if (t->low[NV + k] != t->high[NV + k]) continue;
         double square = 0.0;
-        for (int e = a_start[k]; e < a_start[k + 1]; e++) {
+        for (int e = a_start[k]; e < a_end[k]; e++) {
             const double a = t->at[e] * dof_scale[a_col[e]];
             square += a * a;
         }
         if (square <= DEAD) continue;
         t->strength[k] = t->stiffness / square;
-        for (int e = a_start[k]; e < a_start[k + 1]; e++) {
+        for (int e = a_start[k]; e < a_end[k]; e++) {
             const double f = t->strength[k] * t->at[e];
-            for (int c = e; c < a_start[k + 1]; c++) t->R[a_col[e] * WIDE + a_col[c]] += f * t->at[c];
+            for (int c = e; c < a_end[k]; c++) t->R[a_col[e] * WIDE + a_col[c]] += f * t->at[c];
         }
     }
 }
@@ -49,7 +49,7 @@ static void right_side(wbc_tick *t) {
     for (int i = 0; i < NV; i++)
         if (t->low[i] == t->high[i]) t->y[i] += t->stiffness / (dof_scale[i] * dof_scale[i]) * t->low[i];
     for (int k = 0; k < MC; k++)
-        for (int e = a_start[k]; t->strength[k] != 0.0 && e < a_start[k + 1]; e++)
+        for (int e = a_start[k]; t->strength[k] != 0.0 && e < a_end[k]; e++)
             t->y[a_col[e]] += t->strength[k] * t->at[e] * t->low[NV + k];
 }
 
@@ -156,7 +156,7 @@ static void image(wbc_tick *t) {
             continue;
         }
         double row[WIDE] = {0};
-        for (int e = a_start[k]; e < a_start[k + 1]; e++)
+        for (int e = a_start[k]; e < a_end[k]; e++)
             axpy(row, t->inverse + a_col[e] * WIDE, t->at[e], a_col[e]);
         const double square = dot(row, row, 0);
         const double scale = square > DEAD ? 1.0 / sqrt(square) : 0.0;

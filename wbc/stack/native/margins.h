@@ -7,9 +7,15 @@
 /* Share of the joints' accelerations along a margin that braking in front of it counts on */
 #define BRAKING_MARGIN 0.25
 
-/* A margin h > 0 may fall by rate h, as the row says, or by the speed from which the joints can stop within h with a
- * part of their acceleration, whichever is less: v dt + v^2 / (2 a) <= h. What comes nearer by itself no joint brakes:
- * of the joints the second asks no more than to stand still. docs/reach.md */
+/* How fast the joints may lessen a margin h > 0 that falls by `closing` without them, so that with the deceleration a
+ * they stand still before it is used up: v dt + v^2 / (2 a) + closing v / a = h */
+INLINE double stopping(double h, double a, double closing, double dt) {
+    const double lag = dt + closing / a;
+    return 2.0 * h / (lag + sqrt(lag * lag + 2.0 * h / a));
+}
+
+/* A margin h > 0 may fall by rate h, as the row says, or as fast as the joints can stop with a part of their
+ * acceleration, whichever is less. Joints at rest always satisfy the second. docs/reach.md */
 static void brake_for_margins(wbc_tick *t) {
     double limit[NV];
     int limited = 0;
@@ -19,16 +25,16 @@ static void brake_for_margins(wbc_tick *t) {
         limited |= on;
     }
     for (int k = 0; limited && k < MC; k++) {
-        if (margin_at[k] < 0) continue;
+        if (margin_at[k] < 0 || t->free_low[k] <= -WBC_INF) continue;
         const double h = t->report.margin[margin_at[k]], plain = t->p[rate_at[k]] * h;
         if (!(plain > 0.0)) continue;
         double a = 0.0;
-        for (int e = a_start[k]; e < a_start[k + 1]; e++)
+        for (int e = a_start[k]; e < a_end[k]; e++)
             if (t->at[e] != 0.0) a += fabs(t->at[e]) * limit[a_col[e]];
         /* also where a is 0 and nothing moves the margin */
         if (!(a > 0.0 && a < WBC_INF * 1e-6)) continue;
-        const double speed = 2.0 * h / (t->dt + sqrt(t->dt * t->dt + 2.0 * h / a));
-        if (speed < plain) t->free_low[k] = smaller(t->free_low[k] + plain - speed, larger(t->free_low[k], 0.0));
+        const double closing = t->free_low[k] + plain, speed = stopping(h, a, larger(closing, 0.0), t->dt);
+        t->free_low[k] = larger(t->free_low[k], smaller(closing, 0.0) - speed);
     }
 }
 
@@ -36,8 +42,10 @@ static void brake_for_margins(wbc_tick *t) {
 static void find_idle_rows(wbc_tick *t) {
     for (int k = 0; k < MC; k++) {
         const double low = t->low[NV + k], high = t->high[NV + k];
+        t->idle[k] = low <= -WBC_INF && high >= WBC_INF;
+        if (t->idle[k]) continue;
         double least = 0.0, most = 0.0;
-        for (int e = a_start[k]; e < a_start[k + 1]; e++) {
+        for (int e = a_start[k]; e < a_end[k]; e++) {
             const int i = a_col[e];
             const double one = t->at[e] * t->low[i], other = t->at[e] * t->high[i];
             least += smaller(one, other);

@@ -47,7 +47,7 @@ static int class_rows(wbc_tick *t, int order) {
     for (int k = 0; k < MC; k++) {
         double *row = t->M + k * NV, square = 0.0;
         for (int j = 0; j < NV; j++) row[j] = 0.0;
-        for (int e = a_start[k]; e < a_start[k + 1]; e++) row[a_col[e]] = t->at[e] * dof_scale[a_col[e]] / row_scale[k];
+        for (int e = a_start[k]; e < a_end[k]; e++) row[a_col[e]] = t->at[e] * dof_scale[a_col[e]] / row_scale[k];
         for (int j = 0; j < NV; j++) square += row[j] * row[j];
         const double scale = square > DEAD && row_order[k] <= order ? 1.0 / sqrt(square) : 0.0;
         for (int j = 0; j < NV; j++) row[j] *= scale;
@@ -146,7 +146,7 @@ static int optimum_of_the_rest(wbc_tick *t) {
     if (flag >= 0) return flag;
     /* Joints that frozen rows speak of stay where the classes met; the others still serve the tasks */
     for (int k = 0; k < MC; k++)
-        for (int e = a_start[k]; t->low[NV + k] == t->high[NV + k] && e < a_start[k + 1]; e++)
+        for (int e = a_start[k]; t->low[NV + k] == t->high[NV + k] && e < a_end[k]; e++)
             if (t->at[e] != 0.0) t->low[a_col[e]] = t->high[a_col[e]] = met[a_col[e]];
     if (factor(t)) {
         t->factored = 0;

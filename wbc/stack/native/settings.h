@@ -52,7 +52,7 @@ INLINE double larger(double x, double y) { return x > y ? x : y; }
 /* A v for general row k */
 INLINE double row_at(const wbc_tick *t, int k, const double *v) {
     double sum = 0.0;
-    for (int e = a_start[k]; e < a_start[k + 1]; e++) sum += t->at[e] * v[a_col[e]];
+    for (int e = a_start[k]; e < a_end[k]; e++) sum += t->at[e] * v[a_col[e]];
     return sum;
 }
 

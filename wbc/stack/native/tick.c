@@ -28,7 +28,7 @@ EXPORT int wbc_tick_check(wbc_tick *t) {
 EXPORT int wbc_tick_step(wbc_tick *t) {
     const int bad = wbc_tick_check(t);
     if (bad) return bad;
-    wbc_tick_assemble(t);
+    assemble(t, 1);
     const int flag = wbc_tick_solve(t);
     wbc_tick_certify(t);
     wbc_tick_look_ahead(t);

@@ -4,7 +4,7 @@
  *   NQ NV NP    configuration, velocity, parameters
  *   MT MC NB MH task rows, general constraint rows, bound blocks, margin rows (arrays have at least one entry)
  *   NNZJ NNZA   structural non-zeros of task rows and of general rows
- *   j_start j_col a_start a_col   their positions, row by row
+ *   j_start j_col a_start a_end a_col   their positions, row by row
  *   damping     cost of each velocity
  *   CALM        0: the linear model as it is
  *   NNZK k_row k_col   entries of the curvature's upper triangle
@@ -14,6 +14,11 @@
  *   brake_at brake_limit   entry of bound_enabled that limits the acceleration of a velocity (-1: none), and the limit
  *   row_order   class of each general row in the order of sacrifice
  *   row_scale   its unit: the characteristic length for rows in metres
+ *   BALLS SEGMENTS   items whose rows are distances between a ball and segments of links, and those segments
+ *   ball_pose ball_velocity ball_margin ball_rate   where their inputs are in p
+ *   ball_row ball_first   their first general row; their first entry in row_segment and row_reach, and the end
+ *   row_segment row_reach   segment of such a row, and its thickness together with the ball's
+ *   segment_half segment_row   half a segment's length, and a row whose entries are the joints that move it
  *   stop_at stop_q stop_low stop_high   the same for position limits, with the coordinate that is limited
  */
 #ifndef WBC_TICK_H
@@ -71,6 +76,8 @@ typedef struct {
     double stiffness;            /* what fixed variables add to the Hessian, in units of dof_scale */
     double bent[NNZK + 1];       /* curvature */
     int idle[MC + 1];            /* rows that no velocity within the bounds violates */
+    int far[MC + 1];             /* rows of balls that are left out of this tick */
+    double segment[6 * SEGMENTS + 1], screw[6 * NV], segment_ahead[6 * SEGMENTS + 1];
     double q_good[NQ + 1];       /* q of the last tick that was not refused, put back by one that is */
     /* outputs of the generated rows */
     double wish[MT + 1], jt[NNZJ + 1], at[NNZA + 1], bound_low[NB * NV + 1], bound_high[NB * NV + 1];

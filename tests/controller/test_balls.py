@@ -1,0 +1,152 @@
+"""Rows of balls against segments: the compiled loop against the expressions, and what it leaves out."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import wbc
+from tests.tasks.robots import FRAMES, robot
+from wbc.controller import Controller
+from wbc.shapes import Box, Capsule, PlacedShape, Sphere
+from wbc.tasks import EndEffector, JointLimits, Obstacle, Posture
+
+DT = 0.01
+ROBOTS = ("panda", "talos", "kinova")
+BALLS = 6
+
+
+@cache
+def stack(name: str, calm: bool = True) -> wbc.Stack:
+    """Balls of several sizes, one of radius 0, among other margins, with limits on velocity and acceleration."""
+    machine = robot(name)
+    speeds = np.where(np.isfinite(machine.limits.velocity), machine.limits.velocity, 1.0)
+    machine = machine.with_limits(velocity=speeds, acceleration=10.0)
+    out = wbc.Stack(machine, DT, calm=calm)
+    out.add(EndEffector(FRAMES[name].tip, kind="position"), name="hand")
+    out.add(Posture(), name="posture", weight=1e-2).add(JointLimits())
+    links = [link for link, shapes in machine.shapes.items() if shapes and _moved(machine, link)]
+    for k in range(BALLS):
+        chosen = None if k % 2 else tuple(links[k // 2 :])
+        shape: Any = Capsule(0.05, 0.0) if k == 1 else Sphere(0.04 * k)
+        out.add(Obstacle(shape, links=chosen, margin=0.01), name=f"ball{k}")
+        if k == 2:
+            out.add(Obstacle(Capsule(0.05, 0.3), links=chosen), name="capsule")
+    return out
+
+
+def _moved(machine: wbc.Robot, link: str) -> bool:
+    return bool(machine.model.frames[machine.model.getFrameId(link)].parentJoint)
+
+
+@cache
+def pair(name: str, calm: bool = True) -> tuple[Controller, Controller]:
+    """(native, vm)."""
+    return stack(name, calm).compile(backend="native"), stack(name, calm).compile(backend="vm")
+
+
+def configuration(machine: wbc.Robot, rng: np.random.Generator) -> np.ndarray:
+    step = rng.uniform(-1.0, 1.0, machine.nv) * np.where(machine.dof_units == "m", 0.2, 1.0)
+    return np.asarray(pin.integrate(machine.model, machine.neutral, 0.5 * step))
+
+
+def scatter(controllers: tuple[Controller, ...], rng: np.random.Generator, size: float, speed: float) -> None:
+    """Balls anywhere within a cube, rotated, turning and flying; the same in all controllers."""
+    for k in range(BALLS):
+        pose = pin.SE3(pin.exp3(rng.uniform(-2, 2, 3)), rng.uniform(-size, size, 3))
+        velocity, rate = rng.uniform(-speed, speed, 6), rng.uniform(1.0, 0.5 / DT)
+        for controller in controllers:
+            controller[f"ball{k}"].set(pose=pose, velocity=velocity, rate=rate)
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_rows_are_those_of_the_expressions(name: str) -> None:
+    rng, controllers = np.random.default_rng(0), pair(name)
+    for _ in range(40):
+        q = configuration(controllers[0].stack.robot, rng)
+        scatter(controllers, rng, 1.0, 0.5)
+        steps = []
+        for controller in controllers:
+            controller.reset(q)
+            steps.append(controller.step(q))
+        native, vm = (controller.tick.qp() for controller in controllers)
+        # q is what the last step left in the buffers
+        assert np.abs(native.A - vm.A).max() < 1e-12
+        n = controllers[0].layout.nv
+        assert np.abs(native.lower - vm.lower)[n:][np.isfinite(vm.lower[n:])].max() < 1e-11
+        assert (np.isfinite(native.lower) == np.isfinite(vm.lower)).all()
+        for k in range(BALLS):
+            assert np.abs(steps[0].margins[f"ball{k}"] - steps[1].margins[f"ball{k}"]).max() < 1e-13
+        if steps[1].status == "solved":
+            assert np.abs(steps[0].v - steps[1].v).max() < 1e-8
+            for k in range(BALLS):
+                ahead = [step.margins_ahead[f"ball{k}"] for step in steps]
+                assert np.abs(ahead[0] - ahead[1]).max() < 1e-9
+
+
+@pytest.mark.parametrize("place", [(0.0, 0.0, 0.0), (0.0, 0.0, 0.07), (1e-9, 0.0, 0.02)])
+def test_a_ball_on_the_core_of_a_link_has_a_direction_to_leave_in(place: tuple[float, float, float]) -> None:
+    """The same declared one in both."""
+    controllers, machine = pair("panda"), stack("panda").robot
+    q = machine.neutral
+    data = machine.model.createData()
+    pin.framesForwardKinematics(machine.model, data, q)
+    for link, shapes in machine.shapes.items():
+        for placed in shapes:
+            if not _moved(machine, link):
+                continue
+            pose = data.oMf[machine.model.getFrameId(link)] * placed.placement
+            matrices = []
+            for controller in controllers:
+                controller["ball3"].set(pose=pin.SE3(np.eye(3), pose.act(np.array(place))), velocity=np.zeros(6))
+                controller.reset(q)
+                step = controller.step(q)
+                assert np.isfinite(step.v).all()
+                matrices.append(controller.tick.qp().A)
+            assert np.isfinite(matrices[0]).all()
+            assert np.abs(matrices[0] - matrices[1]).max() < 1e-5
+            assert np.abs(matrices[0]).max() > 0.05
+
+
+@pytest.mark.parametrize("calm", [True, False])
+@pytest.mark.parametrize("name", ROBOTS)
+def test_rows_that_are_left_out_hold_whatever_the_joints_do(name: str, calm: bool) -> None:
+    """In motion: for every velocity within the bounds, with the limit for braking in front of a margin."""
+    rng, (native, vm) = np.random.default_rng(1), pair(name, calm)
+    machine, left_out, kept, bound = stack(name, calm).robot, 0, 0, 0
+    n = machine.nv
+    for trial in range(6):
+        q = configuration(machine, rng)
+        scatter((native, vm), rng, 0.8, 0.1 * (trial % 3))
+        # Into one of the balls that the hand keeps clear of
+        target = native["ball5"].pose.translation
+        for controller in (native, vm):
+            controller.reset(q)
+            controller["hand"].target = target
+        for _ in range(150):
+            step, reference = native.step(q), vm.step(q)
+            low = native.tick._low[n:].copy()
+            full = native.tick.qp()
+            far = (low <= -1e29) & np.isfinite(full.lower[n:])
+            least = np.minimum(full.A[far] * full.lower[:n], full.A[far] * full.upper[:n]).sum(axis=1)
+            assert (least >= full.lower[n:][far]).all()
+            if reference.status == "solved":
+                assert np.abs(step.v - reference.v).max() < 1e-6
+            left_out, kept = left_out + int(far.sum()), kept + int((~far).sum())
+            bound += any(b.item.startswith("ball") for b in step.binding)
+            vm.tick.v_last[:] = native.tick.v_last
+            q = pin.integrate(machine.model, q, step.v * DT)
+    assert left_out > 0.2 * (left_out + kept)
+    assert bound > 20
+
+
+def test_other_shapes_are_no_balls() -> None:
+    machine = robot("panda")
+    boxed = machine.with_shapes({"panda_link5": [PlacedShape(Box((0.1, 0.1, 0.1)), pin.SE3.Identity())]})
+    assert Obstacle(Sphere(0.1)).ball_rows(machine)
+    assert not Obstacle(Capsule(0.1, 0.2)).ball_rows(machine)
+    assert not Obstacle(Sphere(0.1)).ball_rows(boxed)
