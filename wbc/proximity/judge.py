@@ -64,17 +64,19 @@ class Judge:
         self._bounded = np.array([HalfSpace not in pair for pair in kinds])
         self._blunt = np.array([set(pair) == {Cylinder, Sphere} for pair in kinds])
 
-    def check(self, measured: Index) -> None:
-        """Check the pairs just measured; those of them that fail are mended."""
+    def check(self, measured: Index, gaps: Array) -> bool:
+        """Check the pairs just measured and their distances; those of them that fail are mended. Whether any was."""
         scene = self.scene
         if self._marked:
             self.doubtful[measured] = False
             self._marked = bool(self.doubtful.any())
-        # NaN fails every comparison
-        flags = ~(scene.results.distance[measured] > self.trust)
+        # NaN fails every comparison, and is the least of all
+        if gaps.item(gaps.argmin()) > self.trust:
+            return False
+        flags = ~(gaps > self.trust)
         flags &= self._bounded[measured]
         if not np.count_nonzero(flags):
-            return
+            return False
         suspect = measured[flags]
         normal = scene.results.normal[suspect]
         proven = self._clearance(suspect, normal)
@@ -82,8 +84,10 @@ class Judge:
         holds &= np.abs(np.einsum("ij,ij->i", normal, normal) - 1.0) < UNIT
         both_ways = proven - self._clearance(suspect, -normal) <= self.tie
         doubtful = ~holds | both_ways
-        for row in (doubtful | self._blunt[suspect]).nonzero()[0]:
+        mend = (doubtful | self._blunt[suspect]).nonzero()[0]
+        for row in mend:
             self._mend(int(suspect[row]), bool(doubtful[row]))
+        return len(mend) > 0
 
     def _clearance(self, pairs: Index, normal: Array) -> Array:
         scene = self.scene

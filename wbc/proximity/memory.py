@@ -82,6 +82,24 @@ def strided(views: Sequence[Array]) -> Array | None:
     return np.asarray(out)
 
 
+def poses(placements: Sequence[pin.SE3]) -> Array | None:
+    """Rotations (column by column) and translations of poses as one array, n x 12, that shows their memory; None where
+    they do not lie equally spaced.
+    """
+    if not len(placements):
+        return None
+    rotations = [p.rotation.T for p in placements]
+    turned = strided([r.reshape(9) for r in rotations])
+    moved = strided([p.translation for p in placements])
+    if turned is None or moved is None:
+        return None
+    starts = [a.__array_interface__["data"][0] for a in (turned, moved)]
+    if starts[1] - starts[0] != 9 * WORD or turned.strides[0] != moved.strides[0]:
+        return None
+    out = np.lib.stride_tricks.as_strided(turned, shape=(len(placements), 12), strides=(turned.strides[0], WORD))
+    return np.asarray(out)
+
+
 @functools.cache
 def offsets() -> tuple[int, int] | None:
     """Where distance and first witness lie, in words from the normal; None if that cannot be told."""

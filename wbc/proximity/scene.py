@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import warnings
 from typing import TYPE_CHECKING
 
@@ -12,7 +13,6 @@ import pinocchio as pin
 
 # isort: split
 import coal
-from numpy.typing import NDArray
 
 from wbc.proximity import memory
 from wbc.proximity.body import Body, Pair, joint_of
@@ -31,6 +31,9 @@ if TYPE_CHECKING:
 GJK_TOLERANCE = 1e-8
 EPA_TOLERANCE = 1e-6
 
+#: A turn of a half-space counts as if nothing of the others were farther from the middle of its boundary [m].
+ENDLESS = 1e4
+
 
 class Scene:
     """Bodies, placed by the configuration and by the pose of what moves from outside, and their pairs.
@@ -42,6 +45,7 @@ class Scene:
         results: signed distance, unit normal from A to B, and a point of the line through both witness points, of
             every pair at its last :meth:`measure`.
         radii: of the bounding spheres of both bodies of a pair together [m]; 0 for a half-space.
+        gaps: signed distances of the watched pairs at their last :meth:`measure` [m], in the order of :meth:`watch`.
         doubtful: Coal's normal did not hold, or the opposite one holds as well; see :mod:`wbc.proximity.judge`.
     """
 
@@ -71,11 +75,12 @@ class Scene:
             self._model.collisionPairs.append(pin.CollisionPair(a, b))
         self._data = self._model.createData()
         self._data.deactivateAllCollisionPairs()
-        self._active, self._all_active = np.zeros(len(pairs), dtype=bool), False
+        self._active = np.zeros(len(pairs), dtype=bool)
         self._every: Index = np.arange(len(pairs))
         self._configure(robot.characteristic_length)
         self.results = memory.Results(self._data, memory.offsets())
-        self._prepare_bounds(geometries)
+        self._prepare_bounds(geometries, moving)
+        self.watch(None)
         self._judge = Judge(self, [g.geometry for g in geometries], [g.center for g in geometries])
         self.doubtful = self._judge.doubtful
 
@@ -96,6 +101,26 @@ class Scene:
             for k in range(len(self.bodies)):
                 self.centers[k], self.rotations[k] = self._data.oMg[k].translation, self._data.oMg[k].rotation
 
+    def settle(self) -> None:
+        """Take the bodies' present places as those that :meth:`moved` and :meth:`moved_bodies` start from."""
+        self._rest[:] = self.poses
+
+    def moved(self) -> float:
+        """No pair has come closer than since :meth:`settle` by more than this [m]."""
+        squares = self._squares()
+        return self._parties * math.sqrt(squares.item(squares.argmax()))
+
+    def moved_bodies(self) -> Array:
+        """No point of a body has moved since :meth:`settle` by more than this [m], number by number of the bodies."""
+        return np.asarray(np.sqrt(self._squares()))
+
+    def _squares(self) -> Array:
+        """2 |change of centre|^2 + (radius |change of rotation|)^2, of which the root is at least the sum of both."""
+        np.subtract(self.poses, self._rest, out=self._change)
+        np.multiply(self._change, self._scale, out=self._change)
+        np.multiply(self._change, self._change, out=self._change)
+        return self._change.dot(self._ones, out=self._square)
+
     def lower_bounds(self) -> Array:
         """No pair is closer than this [m]: bounding spheres, over planes where there are half-spaces. Overwritten by
         the next call.
@@ -103,7 +128,8 @@ class Scene:
         self.centers.take(self.first, axis=0, out=self._from, mode="clip")
         self.centers.take(self.second, axis=0, out=self._to, mode="clip")
         np.subtract(self._to, self._from, out=self._to)
-        np.einsum("ij,ij->i", self._to, self._to, out=self._bound)
+        np.multiply(self._to, self._to, out=self._to)
+        self._to.dot(self._ones[:3], out=self._bound)
         np.sqrt(self._bound, out=self._bound)
         np.subtract(self._bound, self.radii, out=self._bound)
         if len(self._over):
@@ -112,22 +138,34 @@ class Scene:
             self._bound[self._over] = height - self.radii[self._over]
         return self._bound
 
-    def measure(self, which: NDArray[np.bool_] | None) -> Index:
-        """Exact distances at the bodies' present places of the pairs that a mask names (None: all); their numbers."""
-        if which is not None or not self._all_active:
-            wanted = np.ones(len(self._active), dtype=bool) if which is None else which
-            for k in (wanted != self._active).nonzero()[0].tolist():
-                if wanted[k]:
-                    self._data.activateCollisionPair(k + 1)
-                else:
-                    self._data.deactivateCollisionPair(k + 1)
-            self._active[:] = wanted
-            self._all_active = which is None
-        measured: Index = self._every if which is None else which.nonzero()[0]
+    def watch(self, which: Index | None) -> None:
+        """Choose the pairs that :meth:`measure` measures, and their order (None: all)."""
+        wanted = np.ones(len(self._active), dtype=bool)
+        if which is not None:
+            wanted[:] = False
+            wanted[which] = True
+        for k in (wanted != self._active).nonzero()[0].tolist():
+            if wanted[k]:
+                self._data.activateCollisionPair(k + 1)
+            else:
+                self._data.deactivateCollisionPair(k + 1)
+        self._active = wanted
+        self._measured = self._every if which is None else which
+        self._where = self.results.start[self._measured] + self.results.gap
+        self.gaps: Array = np.zeros(len(self._measured))
+
+    def measure(self) -> Array:
+        """Exact distances of the watched pairs at the bodies' present places: :attr:`gaps`."""
         pin.computeDistances(self._model, self._data)
-        self.results.refresh(measured)
-        self._judge.check(measured)
-        return measured
+        self.results.refresh(self._measured)
+        self._read()
+        if self._judge.check(self._measured, self.gaps):
+            self._read()
+        return self.gaps
+
+    def _read(self) -> None:
+        # Not "raise", with which numpy takes into a copy; all numbers are valid
+        self.results.numbers.take(self._where, out=self.gaps, mode="clip")
 
     def _add(self, joint: int, place: pin.SE3, geometry: Geometry) -> int:
         name = str(self._model.ngeoms)
@@ -152,14 +190,16 @@ class Scene:
                 request.enable_signed_distance = True
                 request.gjk_tolerance, request.epa_tolerance = GJK_TOLERANCE * length, EPA_TOLERANCE * length
 
-    def _prepare_bounds(self, geometries: list[Geometry]) -> None:
+    def _prepare_bounds(self, geometries: list[Geometry], moving: frozenset[str]) -> None:
         count, bodies = len(self.first), range(len(self.bodies))
-        centers = memory.strided([self._data.oMg[k].translation for k in bodies])
-        rotations = memory.strided([self._data.oMg[k].rotation for k in bodies])
-        self._copied = centers is None or rotations is None
-        #: centres and axes of the bodies' geometries in the world
-        self.centers = np.zeros((len(bodies), 3)) if centers is None or self._copied else centers
-        self.rotations = np.zeros((len(bodies), 3, 3)) if rotations is None or self._copied else rotations
+        poses = memory.poses([self._data.oMg[k] for k in bodies])
+        self._copied = poses is None
+        #: rotation, column by column, and centre of the bodies' geometries in the world
+        self.poses: Array = np.zeros((len(bodies), 12)) if poses is None else poses
+        self.centers = self.poses[:, 9:]
+        self.rotations = np.lib.stride_tricks.as_strided(
+            self.poses, shape=(len(bodies), 3, 3), strides=(self.poses.strides[0], 8, 24)
+        )
         radius = np.array([g.radius for g in geometries])
         flat = np.array([isinstance(body.shape, HalfSpace) for body in self.bodies])
         self._over = np.flatnonzero(flat[self.first] | flat[self.second])
@@ -168,6 +208,13 @@ class Scene:
         self._floating = np.where(swapped, self.second[self._over], self.first[self._over])
         finite = np.where(flat, 0.0, radius)
         self.radii = finite[self.first] + finite[self.second]
+        still = np.array([self.joints[k] == 0 and self.bodies[k].frame not in moving for k in bodies])
+        self._parties = 1.0 if (still[self.first] | still[self.second]).all() else 2.0
+        # A turn by an angle a changes the rotation by 2 sqrt(2) sin(a/2), and moves nothing by more than 2 r sin(a/2)
+        self._scale = np.full((len(bodies), 12), np.sqrt(2.0))
+        self._scale[:, :9] = np.where(flat, ENDLESS, radius)[:, None]
+        self._rest, self._change = np.zeros((len(bodies), 12)), np.zeros((len(bodies), 12))
+        self._square, self._ones = np.zeros(len(bodies)), np.ones(12)
         self._from, self._to, self._bound = np.zeros((count, 3)), np.zeros((count, 3)), np.zeros(count)
 
 

@@ -69,6 +69,10 @@ class PairSensor:
         self._choice = Choice(self._scene, count)
         rows = min(count, len(checked))
         self._rows, self._got = slice(rows), np.zeros((16, rows))
+        self._left, self._right = self._got[4:10], self._got[10:16]
+        self._plus, self._minus = self._got[4:7], self._got[7:10]
+        self._got_from, self._got_to = self._got[0], self._distance[self._rows]
+        self._line_from, self._line_to = self._got[1:7].T, self._line[self._rows]
         self.reset()
 
     @property
@@ -112,18 +116,18 @@ class PairSensor:
         self._pair_outward = self._outward[pairs]
 
     def _write(self) -> None:
-        got = self._got
         # Not "raise", with which numpy takes into a copy; all numbers are valid
-        self._scene.results.numbers.take(self._where, out=got, mode="clip")
-        left, right = got[4:10], got[10:16]
-        np.multiply(left, right, out=left)
-        np.subtract(left[:3], left[3:], out=got[4:7])
-        self._distance[self._rows] = got[0]
-        line = self._line[self._rows]
-        line[:] = got[1:7].T
+        self._scene.results.numbers.take(self._where, out=self._got, mode="clip")
+        np.multiply(self._left, self._right, out=self._left)
+        np.subtract(self._plus, self._minus, out=self._plus)
+        self._got_to[:] = self._got_from
+        self._line_to[:] = self._line_from
         if self._pose is not None and self._velocity is not None:
-            twist = twist_at_origin(self._velocity, self._pose[9:])
-            self._drift[self._rows] = line @ twist * self._pair_outward
+            if any(self._velocity.tolist()):
+                twist = twist_at_origin(self._velocity, self._pose[9:])
+                self._drift[self._rows] = self._line_to @ twist * self._pair_outward
+            else:
+                self._drift[:] = 0.0
 
 
 def twist_at_origin(velocity: Array, origin: Array) -> Array:

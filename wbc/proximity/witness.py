@@ -67,7 +67,7 @@ def witnesses(robot: Robot, pairs: Sequence[tuple[Body, Body]], q: Any, pose: An
     scene = Scene(robot, checked, outside)
     scene.move(where)
     scene.place(configuration)
-    scene.measure(None)
+    scene.measure()
     out = []
     results = scene.results
     for k in range(len(checked)):
