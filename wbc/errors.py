@@ -102,6 +102,14 @@ class BusyError(WbcError):
     """A controller that two threads use at once."""
 
 
+class ContinuityError(WbcError):
+    """Motions that do not meet, or a path that breaks; ``value`` says where or by how much."""
+
+
+class InfeasibleError(WbcError):
+    """No motion keeps what is asked for; ``value`` is what was asked."""
+
+
 class CompileError(WbcError):
     """The C compiler was asked for and could not build the tick."""
 

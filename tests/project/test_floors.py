@@ -23,6 +23,7 @@ FLOORS = {
     "wbc.stack": 4,
     "wbc.qp": 5,
     "wbc.controller": 6,
+    "wbc.trajectory": 7,
     "wbc.track": 8,
     "wbc.pages": 8,
     "wbc.cli": 9,

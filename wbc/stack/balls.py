@@ -102,7 +102,8 @@ class Balls:
         """(start, end, column) of the entries of all general rows, from those of the expressions' rows, which keep
         their places.
         """
-        begin, end, more, count = start[:-1].copy(), start[1:].copy(), [], len(column)
+        begin, end, count = start[:-1].copy(), start[1:].copy(), len(column)
+        more: list[int] = []
         for general, _, columns in self._rows:
             begin[general], end[general] = count, count + len(columns)
             count += len(columns)

@@ -1,0 +1,222 @@
+"""How much of its limits a law uses, at the worst place, bounded from above.
+
+For piecewise polynomial paths and timings each derivative of each joint is a polynomial between breaks. Its Bernstein
+coefficients bound it, and are halved until the bound is within 1e-13 of a value that is taken: ``exact``. Else the law
+is sampled, and what lies between two samples is bounded by their values and the largest slope that was seen:
+``sampled``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from wbc.trajectory import bernstein
+from wbc.trajectory.limits import Limits
+from wbc.trajectory.path import Index, Path
+from wbc.trajectory.timing import Timing
+from wbc.validation import Array
+
+Kind = Literal["exact", "sampled", "unbounded"]
+
+#: Quantity -> order of its derivative
+ORDERS = {"position": 0, "velocity": 1, "acceleration": 2, "jerk": 3}
+
+#: What `exact` calls kept
+TOLERANCE = 1e-6
+
+#: Steps of a derivative at a break, relative to its limit, that are rounding
+STEP = 1e-9
+
+
+@dataclass(frozen=True)
+class Worst:
+    """Where a quantity comes nearest to its limit, or goes farthest beyond it.
+
+    Attributes:
+        ratio: largest |quantity| / limit, bounded from above; for positions 1 + (how far beyond a limit) / half the
+            range, or over the limit's own size (at least 1) where the range has no other end. inf for ``unbounded``.
+        joint: its number. time: when [s].
+        kind: ``exact``; ``sampled``; ``unbounded``: the quantity one order below jumps.
+        between: share of the ratio that bounds what lies between samples, 0 for ``exact``.
+        spacing: largest time between samples [s], 0 for ``exact``.
+    """
+
+    ratio: float
+    joint: int
+    time: float
+    kind: Kind
+    between: float = 0.0
+    spacing: float = 0.0
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """Worst places by quantity: ``position``, ``velocity``, ``acceleration``, ``jerk``, and what else was asked for.
+
+    Quantities without a limit are not in it, but for jerk, which is in it as ``unbounded`` where accelerations jump.
+
+    Attributes:
+        worst: by quantity. limited: the quantities that have a limit.
+    """
+
+    worst: dict[str, Worst]
+    limited: frozenset[str] = frozenset()
+
+    @property
+    def ratio(self) -> float:
+        """The largest of all quantities with a limit; 0 where there is none."""
+        return max((w.ratio for name, w in self.worst.items() if name in self.limited), default=0.0)
+
+    @property
+    def kept(self) -> bool:
+        """Whether every limit is kept within 1e-6; where it was sampled, with what may lie between."""
+        return self.ratio <= 1.0 + TOLERANCE
+
+    def __str__(self) -> str:
+        parts = []
+        for name, w in self.worst.items():
+            if w.kind == "unbounded":
+                parts.append(f"{name}: unbounded")
+                continue
+            share = f" (+{w.between:.1e} between samples)" if w.kind == "sampled" else ""
+            parts.append(f"{name} {w.ratio:.7f}{share} at {w.time:.4g} s, joint {w.joint}, {w.kind}")
+        return "; ".join(parts) or "no limits"
+
+
+@dataclass(frozen=True, eq=False)
+class Pieces:
+    """Intervals of time on which a law is smooth, with the pieces of its timing and of its path."""
+
+    start: Array
+    span: Array
+    timing: Index
+    path: Index
+
+    @classmethod
+    def of(cls, path: Path, timing: Timing) -> Pieces:
+        """Breaks of the timing, and times at which s passes a knot."""
+        inside = timing.crossings(path.knots[1:-1])
+        times = np.unique(np.concatenate([timing.times, inside]))
+        start, span = times[:-1], np.diff(times)
+        middle = start + 0.5 * span
+        pieces = timing.pieces_at(middle)
+        return cls(start, span, pieces, path.pieces_at(timing.evaluate(middle, 0, pieces)))
+
+    def at(self, path: Path, timing: Timing, order: int, u: Array) -> Array:
+        """A derivative of the law at places u in [0, 1] of every piece: pieces x places x n."""
+        count, places = len(self.start), len(u)
+        times = (self.start[:, None] + self.span[:, None] * u).ravel()
+        on_timing, on_path = np.repeat(self.timing, places), np.repeat(self.path, places)
+        s = [timing.evaluate(times, k, on_timing) for k in range(order + 1)]
+        s[0] = np.clip(s[0], path.knots[on_path], path.knots[on_path + 1])
+        out = chain(path, s, on_path, order)
+        return out.reshape(count, places, *out.shape[1:])
+
+
+def chain(path: Path, s: list[Array], piece: Index, order: int) -> Array:
+    """The derivative along time of path(s(t)), from s and its derivatives along time."""
+    if order == 0:
+        return path.evaluate(s[0], 0, piece)
+    first = path.evaluate(s[0], 1, piece)
+    if order == 1:
+        return first * s[1][:, None]
+    second = path.evaluate(s[0], 2, piece)
+    if order == 2:
+        return second * (s[1] ** 2)[:, None] + first * s[2][:, None]
+    third = path.evaluate(s[0], 3, piece)
+    return third * (s[1] ** 3)[:, None] + second * (3.0 * s[1] * s[2])[:, None] + first * s[3][:, None]
+
+
+def certify(path: Path, timing: Timing, limits: Limits, samples: int = 16) -> Certificate:
+    """Worst places of a law; ``samples``: of each piece, where it is no polynomial."""
+    pieces = Pieces.of(path, timing)
+    worst: dict[str, Worst] = {}
+    limited = set()
+    for name, order in ORDERS.items():
+        scaled = _scaled(name, limits, path)
+        if scaled is not None:
+            limited.add(name)
+        if name == "jerk":
+            jump = _jump(path, timing, pieces, limits)
+            if jump is not None:
+                worst[name] = jump
+                continue
+        if scaled is None:
+            continue
+        if path.degree is not None:
+            degree = max(path.degree * timing.degree - order, 0)
+            values = scaled(pieces.at(path, timing, order, bernstein.nodes(degree)))
+            worst[name] = _exact(pieces, bernstein.coefficients(values), path.dof)
+        else:
+            values = scaled(pieces.at(path, timing, order, np.linspace(0.0, 1.0, samples + 1)))
+            worst[name] = sampled(pieces.start, pieces.span, values, path.dof)
+    return Certificate(worst, frozenset(limited))
+
+
+def sampled(start: Array, span: Array, values: Array, joints: int) -> Worst:
+    """The highest of samples (pieces x samples x numbers), evenly spaced over each piece, and a bound on what lies
+    between; numbers repeat with the joints.
+
+    Between two neighbours f rises above the larger by at most (L h - |f1 - f0|) / 2 for a Lipschitz constant L; the
+    largest slope between neighbours of the piece or of those beside it stands for L, and is doubled.
+    """
+    count = values.shape[1] - 1
+    slopes = np.abs(np.diff(values, axis=1)).max(axis=1)
+    beside = slopes.copy()
+    beside[1:] = np.maximum(beside[1:], slopes[:-1])
+    beside[:-1] = np.maximum(beside[:-1], slopes[1:])
+    over = np.maximum(values[:, 1:], values[:, :-1]) + (0.5 * (2.0 * beside[:, None] - np.abs(np.diff(values, axis=1))))
+    piece, place, column = (int(k) for k in np.unravel_index(int(values.argmax()), values.shape))
+    top = float(values.max())
+    time = float(start[piece] + span[piece] * place / count)
+    return Worst(
+        float(over.max()), column % joints, time, "sampled", float(over.max()) - top, float(span.max() / count)
+    )
+
+
+def _exact(pieces: Pieces, c: Array, joints: int) -> Worst:
+    count, size, columns = c.shape
+    ratio, number, place = bernstein.largest(c.transpose(0, 2, 1).reshape(count * columns, size))
+    piece, column = divmod(number, columns)
+    time = float(pieces.start[piece] + place * pieces.span[piece])
+    return Worst(ratio, column % joints, time, "exact")
+
+
+def _scaled(name: str, limits: Limits, path: Path) -> Callable[[Array], Array] | None:
+    """Values of a quantity -> numbers that are at most 1 where its limits are kept, both signs side by side."""
+    if name != "position":
+        limit = getattr(limits, name)
+        return None if limit is None else lambda x: np.concatenate([x / limit, -x / limit], axis=-1)
+    low, high = limits.lower, limits.upper
+    if low is None or high is None or path.space == "poses":
+        return None
+    both = np.isfinite(low) & np.isfinite(high)
+    size = np.maximum(np.where(np.isfinite(low), np.abs(low), 0.0), np.where(np.isfinite(high), np.abs(high), 0.0))
+    half = np.where(both, 0.5 * (np.where(both, high, 1.0) - np.where(both, low, -1.0)), np.maximum(size, 1.0))
+
+    def beyond(x: Array) -> Array:
+        over = np.where(np.isfinite(high), x - np.where(np.isfinite(high), high, 0.0), -half)
+        under = np.where(np.isfinite(low), np.where(np.isfinite(low), low, 0.0) - x, -half)
+        return 1.0 + np.concatenate([over / half, under / half], axis=-1)
+
+    return beyond
+
+
+def _jump(path: Path, timing: Timing, pieces: Pieces, limits: Limits) -> Worst | None:
+    """The largest step of the acceleration at a break, its beginning and its end from and to rest included."""
+    ends = pieces.at(path, timing, 2, np.array([0.0, 1.0]))
+    if limits.acceleration is not None:
+        scale: Array | float = limits.acceleration
+    else:
+        scale = max(float(np.abs(ends).max()), 1e-300)
+    steps = np.concatenate([ends[:1, 0], ends[1:, 0] - ends[:-1, 1], -ends[-1:, 1]]) / scale
+    size = np.abs(steps)
+    if not size.size or size.max() <= STEP:
+        return None
+    place, joint = (int(k) for k in np.unravel_index(int(size.argmax()), size.shape))
+    time = pieces.start[place] if place < len(pieces.start) else timing.duration
+    return Worst(np.inf, joint, float(time), "unbounded")

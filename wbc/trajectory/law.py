@@ -1,0 +1,162 @@
+"""A law: where a robot is at every time, with velocity and acceleration, and a certificate of the limits it keeps."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from wbc import validation
+from wbc.errors import ContinuityError, RangeError
+from wbc.trajectory.certificate import Certificate, certify, chain
+from wbc.trajectory.limits import Limits
+from wbc.trajectory.path import Index, JoinedPath, Path, Space
+from wbc.trajectory.timing import Timing
+from wbc.validation import Array
+
+#: Two laws that follow each other meet within this in position [rad or m] and velocity [per s]
+MEETING = 1e-8
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """A law at one time, or at m times.
+
+    Attributes:
+        position: n (m x n) joint coordinates [rad or m], or a pose 4 x 4 (m x 4 x 4).
+        velocity: n (m x n) [per s]; of a pose: linear velocity of its origin and angular velocity, world axes, 6.
+        acceleration: their derivative along time [per s^2].
+    """
+
+    position: Array
+    velocity: Array
+    acceleration: Array
+
+
+class Law:
+    """A path and its timing: q(t) = path(s(t)).
+
+        dq/dt = path' ds/dt,        d2q/dt2 = path'' (ds/dt)^2 + path' d2s/dt2
+
+    Before 0 and after ``duration`` the law stands still where it begins and ends.
+
+    Args:
+        path: positions over s. timing: s over time.
+        limits: what :attr:`certificate` is about; none by default.
+
+    Raises:
+        ShapeError: limits of another number of joints. RangeError: the timing leaves the path.
+    """
+
+    def __init__(self, path: Path, timing: Timing, limits: Limits | None = None) -> None:
+        self.path, self.timing = path, timing
+        self.limits = (limits or Limits()).for_dof(path.dof)
+        ends = timing.evaluate(np.array([0.0, timing.duration]), 0, np.array([0, len(timing.times) - 2]))
+        room = 1e-9 * (1.0 + np.abs(path.knots[[0, -1]]).max())
+        if ends.min() < path.knots[0] - room or ends.max() > path.knots[-1] + room:
+            raise RangeError(
+                "law.timing", ends, f"s must stay within the path, {path.knots[0]:g} to {path.knots[-1]:g}"
+            )
+
+    @property
+    def duration(self) -> float:
+        """[s]."""
+        return self.timing.duration
+
+    @property
+    def dof(self) -> int:
+        """Numbers of a velocity: n joints, or 6."""
+        return self.path.dof
+
+    @property
+    def space(self) -> Space:
+        """``joints`` or ``poses``."""
+        return self.path.space
+
+    def at(self, t: Any) -> State:
+        """Position, velocity and acceleration at a time or at an array of times [s].
+
+        Raises:
+            ShapeError, NotFiniteError: not numbers, or not finite.
+        """
+        times = validation.real_array("t", t)
+        flat = np.clip(np.atleast_1d(times).ravel(), 0.0, self.duration)
+        parts = [self._derivative(flat, order) for order in (0, 1, 2)]
+        outside = (np.atleast_1d(times).ravel() < 0.0) | (np.atleast_1d(times).ravel() > self.duration)
+        for part in parts[1:]:
+            part[outside] = 0.0
+        return State(*(part.reshape(*times.shape, *part.shape[1:]) for part in parts))
+
+    def jerk(self, t: Any) -> Array:
+        """Derivative of the acceleration, where it has one [per s^3]."""
+        times = validation.real_array("t", t)
+        flat = np.clip(np.atleast_1d(times).ravel(), 0.0, self.duration)
+        return self._derivative(flat, 3).reshape(*times.shape, self.dof)
+
+    def _derivative(self, times: Array, order: int) -> Array:
+        piece = self.timing.pieces_at(times)
+        s = [self.timing.evaluate(times, k, piece) for k in range(order + 1)]
+        s[0] = np.clip(s[0], self.path.knots[0], self.path.knots[-1])
+        return chain(self.path, s, self._path_pieces(times, s), order)
+
+    def _path_pieces(self, times: Array, s: list[Array]) -> Index:
+        """Pieces of the path: where s stands on a knot, the one that it comes from at the end and goes to before it."""
+        pieces = self.path.pieces_at(s[0])
+        speed = s[1] if len(s) > 1 else self.timing.evaluate(times, 1)
+        last = times >= self.duration
+        back = (speed < 0.0) ^ (last & (speed != 0.0))
+        on_knot = np.isin(s[0], self.path.knots) & (pieces > 0)
+        before = np.where(on_knot & back & (self.path.knots[pieces] == s[0]), pieces - 1, pieces)
+        return np.asarray(before)
+
+    @cached_property
+    def certificate(self) -> Certificate:
+        """How much of :attr:`limits` the law uses at worst."""
+        return certify(self.path, self.timing, self.limits)
+
+    def with_limits(self, limits: Limits) -> Law:
+        """The same law, to be compared with other limits."""
+        return Law(self.path, self.timing, limits)
+
+    def scaled(self, factor: float) -> Law:
+        """The same positions in ``factor`` times the time.
+
+        Raises:
+            RangeError: not positive.
+        """
+        factor = validation.scalar("factor", factor, low=0.0, open_low=True)
+        return Law(self.path, self.timing.scaled(factor), self.limits)
+
+    def reversed(self) -> Law:
+        """From the end to the beginning."""
+        return Law(self.path, self.timing.reversed(), self.limits)
+
+    def sliced(self, start: float, end: float) -> Law:
+        """The part from one time to a later one, whose time counts from 0.
+
+        Raises:
+            RangeError: outside [0, duration], or no time between them.
+        """
+        start = validation.scalar("start", start, low=0.0, high=self.duration, unit="s")
+        end = validation.scalar("end", end, low=0.0, high=self.duration, unit="s")
+        if not start < end:
+            raise RangeError("end", end, f"must be later than start, {start:g} s")
+        return Law(self.path, self.timing.sliced(start, end), self.limits)
+
+    def then(self, other: Law) -> Law:
+        """This law, and another from where this one ends, in position and in velocity.
+
+        Raises:
+            ShapeError: of another kind. ContinuityError: they do not meet.
+        """
+        path = JoinedPath(self.path, other.path)
+        here, there = self.at(self.duration), other.at(0.0)
+        for name in ("position", "velocity"):
+            off = float(np.abs(getattr(here, name) - getattr(there, name)).max())
+            if off > MEETING:
+                raise ContinuityError(
+                    f"law.{name}", off, f"the laws do not meet: {name}s differ by more than {MEETING}"
+                )
+        return Law(path, self.timing.then(other.timing, path.shift), self.limits)

@@ -1,0 +1,141 @@
+"""Geometric paths: positions over a path coordinate s, without time.
+
+A path has derivatives with respect to s, pieces between knots on which it is smooth, and a space:
+
+    joints   n coordinates [rad or m], as vectors
+    poses    SE(3): a pose, and (dp/ds; w) with dR/ds = [w]x R, both in world axes; then the derivatives of these six
+
+Where all pieces are polynomials, what a law does with the path can be bounded exactly.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wbc import validation
+from wbc.errors import RangeError, ShapeError
+from wbc.validation import Array
+
+Index = NDArray[np.intp]
+Space = Literal["joints", "poses"]
+
+
+class Path(ABC):
+    """Positions over s in [knots[0], knots[-1]].
+
+    Attributes:
+        knots: strictly increasing; the path is smooth between neighbours.
+        dof: numbers of a derivative: n joints, or 6.
+        space: see the module.
+        degree: highest degree of the polynomials between knots, None where they are no polynomials.
+    """
+
+    knots: Array
+    dof: int
+    space: Space = "joints"
+    degree: int | None = None
+
+    @abstractmethod
+    def evaluate(self, s: Array, order: int = 0, piece: Index | None = None) -> Array:
+        """Position (order 0: m x n, or m x 4 x 4) or a derivative along s (order 1 to 3: m x n), at m coordinates.
+
+        ``piece``: number of the piece to evaluate for each s, which decides on what side of a knot the derivative is
+        taken; without it, the piece that begins at the knot.
+        """
+
+    @property
+    def length(self) -> float:
+        """Of the interval of s."""
+        return float(self.knots[-1] - self.knots[0])
+
+    def pieces_at(self, s: Array) -> Index:
+        """Number of the piece that each coordinate is on."""
+        return np.clip(np.searchsorted(self.knots, s, side="right") - 1, 0, len(self.knots) - 2)
+
+    def same_kind(self, other: Path) -> bool:
+        """Whether both are about the same number of joints, or both about poses."""
+        return self.space == other.space and self.dof == other.dof
+
+
+class PolynomialPath(Path):
+    """Polynomials of one degree d between knots:
+
+        q(s) = sum over k of coefficients[k, i] (s - knots[i])^(d - k)      on piece i
+
+    Args:
+        knots: m + 1, strictly increasing.
+        coefficients: (d + 1) x m x n, highest power first, as in ``scipy.interpolate.PPoly``.
+
+    Raises:
+        ShapeError, NotFiniteError: of other shapes, or not finite. RangeError: knots do not increase.
+    """
+
+    def __init__(self, knots: Any, coefficients: Any) -> None:
+        self.knots = validation.real_array("path.knots", knots)
+        self.coefficients = validation.real_array("path.coefficients", coefficients)
+        if self.knots.ndim != 1 or len(self.knots) < 2:
+            raise ShapeError("path.knots", knots, "expected at least two numbers")
+        if (np.diff(self.knots) <= 0.0).any():
+            raise RangeError("path.knots", knots, "knots must increase strictly")
+        if self.coefficients.ndim != 3 or self.coefficients.shape[1] != len(self.knots) - 1:
+            raise ShapeError(
+                "path.coefficients",
+                self.coefficients.shape,
+                f"expected powers x {len(self.knots) - 1} pieces x joints",
+            )
+        self.degree = self.coefficients.shape[0] - 1
+        self.dof = self.coefficients.shape[2]
+
+    def evaluate(self, s: Array, order: int = 0, piece: Index | None = None) -> Array:
+        s = np.asarray(s, dtype=np.float64)
+        at = self.pieces_at(s) if piece is None else piece
+        local = (s - self.knots[at])[:, None]
+        out = np.zeros((len(s), self.dof))
+        highest = self.coefficients.shape[0] - 1
+        for k in range(highest - order + 1):
+            power = highest - k
+            factor = float(np.prod(np.arange(power, power - order, -1)))
+            out = out * local + factor * self.coefficients[k, at]
+        return out
+
+
+class JoinedPath(Path):
+    """One path after another: the second's coordinate is moved behind the first's, with room between them, so that
+    every coordinate belongs to one of the two.
+    """
+
+    #: Between the end of one path and the beginning of the next
+    ROOM = 1.0
+
+    def __init__(self, first: Path, second: Path) -> None:
+        if not first.same_kind(second):
+            kinds = ((first.space, first.dof), (second.space, second.dof))
+            raise ShapeError("path", kinds, "paths of one space and one number of joints can be joined")
+        self.first, self.second = first, second
+        self.shift = float(first.knots[-1] + self.ROOM - second.knots[0])
+        self.knots = np.concatenate([first.knots, second.knots + self.shift])
+        self.dof, self.space = first.dof, first.space
+        known = first.degree is not None and second.degree is not None
+        self.degree = max(first.degree or 0, second.degree or 0) if known else None
+
+    def pieces_at(self, s: Array) -> Index:
+        end = self.first.knots[-1]
+        behind = np.asarray(s) > end + 0.5 * self.ROOM
+        pieces = len(self.first.knots)
+        moved = self.second.pieces_at(np.asarray(s) - self.shift) + pieces
+        return np.where(behind, moved, self.first.pieces_at(np.minimum(s, end)))
+
+    def evaluate(self, s: Array, order: int = 0, piece: Index | None = None) -> Array:
+        s = np.asarray(s, dtype=np.float64)
+        at = self.pieces_at(s) if piece is None else np.asarray(piece)
+        pieces = len(self.first.knots)
+        behind = at >= pieces
+        shape = (len(s), 4, 4) if self.space == "poses" and order == 0 else (len(s), self.dof)
+        out = np.empty(shape)
+        out[~behind] = self.first.evaluate(s[~behind], order, at[~behind])
+        out[behind] = self.second.evaluate(s[behind] - self.shift, order, at[behind] - pieces)
+        return out

@@ -1,0 +1,150 @@
+"""The path coordinate over time, as a piecewise polynomial."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from wbc import validation
+from wbc.errors import RangeError, ShapeError
+from wbc.trajectory import bernstein
+from wbc.trajectory.path import Index
+from wbc.validation import Array
+
+
+class Timing:
+    """s(t) on [0, duration]:
+
+        s(t) = sum over k of coefficients[k, i] (t - times[i])^(d - k)      on piece i
+
+    Args:
+        times: m + 1 numbers from 0, strictly increasing [s].
+        coefficients: (d + 1) x m, highest power first.
+
+    Raises:
+        ShapeError, NotFiniteError: of other shapes, or not finite. RangeError: times do not increase from 0.
+    """
+
+    def __init__(self, times: Any, coefficients: Any) -> None:
+        self.times = validation.real_array("timing.times", times)
+        self.coefficients = validation.real_array("timing.coefficients", coefficients)
+        if self.times.ndim != 1 or len(self.times) < 2:
+            raise ShapeError("timing.times", times, "expected at least two numbers")
+        if self.times[0] != 0.0 or (np.diff(self.times) <= 0.0).any():
+            raise RangeError("timing.times", times, "times must increase strictly from 0")
+        if self.coefficients.ndim != 2 or self.coefficients.shape[1] != len(self.times) - 1:
+            raise ShapeError(
+                "timing.coefficients", self.coefficients.shape, f"expected powers x {len(self.times) - 1} pieces"
+            )
+
+    @classmethod
+    def identity(cls, duration: float, start: float = 0.0) -> Timing:
+        """s = start + t."""
+        return cls([0.0, duration], [[1.0], [start]])
+
+    @classmethod
+    def accelerations(cls, s: Array, speed: Array) -> Timing:
+        """Constant path acceleration between coordinates s with path speeds ds/dt >= 0, at least one > 0 in each pair:
+        dt = 2 ds / (speed_i + speed_i+1), and d2s/dt2 = (speed_i+1 - speed_i) / dt.
+        """
+        durations = 2.0 * np.diff(s) / (speed[:-1] + speed[1:])
+        times = np.concatenate([[0.0], np.cumsum(durations)])
+        return cls(times, [0.5 * np.diff(speed) / np.diff(times), speed[:-1], s[:-1]])
+
+    @property
+    def duration(self) -> float:
+        """[s]."""
+        return float(self.times[-1])
+
+    @property
+    def degree(self) -> int:
+        """Of the polynomials."""
+        return int(self.coefficients.shape[0]) - 1
+
+    def pieces_at(self, t: Array) -> Index:
+        """Number of the piece that each time is in."""
+        return np.clip(np.searchsorted(self.times, t, side="right") - 1, 0, len(self.times) - 2)
+
+    def evaluate(self, t: Array, order: int = 0, piece: Index | None = None) -> Array:
+        """s or a derivative of it along t, at m times; ``piece`` decides on what side of a break it is taken."""
+        t = np.asarray(t, dtype=np.float64)
+        at = self.pieces_at(t) if piece is None else piece
+        local, out = t - self.times[at], np.zeros(len(t))
+        highest = self.degree
+        for k in range(highest - order + 1):
+            power = highest - k
+            factor = float(np.prod(np.arange(power, power - order, -1)))
+            out = out * local + factor * self.coefficients[k, at]
+        return out
+
+    def scaled(self, factor: float) -> Timing:
+        """The same course in ``factor`` times the time."""
+        powers = np.arange(self.degree, -1, -1)
+        return Timing(self.times * factor, self.coefficients / factor ** powers[:, None])
+
+    def reversed(self) -> Timing:
+        """Back from the end: s(duration - t)."""
+        spans = np.diff(self.times)
+        moved = _shifted(self.coefficients, spans)
+        signs = (-1.0) ** np.arange(self.degree, -1, -1)
+        times = np.concatenate([[0.0], np.cumsum(spans[::-1])])
+        times[-1] = self.times[-1]
+        return Timing(times, (moved * signs[:, None])[:, ::-1])
+
+    def sliced(self, start: float, end: float) -> Timing:
+        """The part between two times, from 0 on."""
+        first, last = (int(p) for p in self.pieces_at(np.array([start, end])))
+        if last > first and self.times[last] >= end:
+            last -= 1
+        inner = self.times[first + 1 : last + 1]
+        times = np.concatenate([[start], inner, [end]])
+        shift = np.zeros(last - first + 1)
+        shift[0] = start - self.times[first]
+        return Timing(times - start, _shifted(self.coefficients[:, first : last + 1], shift))
+
+    def then(self, other: Timing, shift: float) -> Timing:
+        """This course, then another, whose s counts from ``shift``."""
+        degree = max(self.degree, other.degree)
+        parts = []
+        for timing, offset in ((self, 0.0), (other, shift)):
+            c = np.zeros((degree + 1, timing.coefficients.shape[1]))
+            c[degree - timing.degree :] = timing.coefficients
+            c[-1] += offset
+            parts.append(c)
+        times = np.concatenate([self.times, self.duration + other.times[1:]])
+        return Timing(times, np.concatenate(parts, axis=1))
+
+    def crossings(self, places: Array) -> Array:
+        """Times inside pieces at which s passes one of the places, ascending."""
+        spans = np.diff(self.times)
+        nodes = bernstein.nodes(self.degree)
+        count = len(spans)
+        at = np.repeat(np.arange(count), len(nodes))
+        values = self.evaluate((self.times[:-1, None] + spans[:, None] * nodes).ravel(), piece=at)
+        hull = bernstein.coefficients(values.reshape(count, -1))
+        # What only touches a break is not inside
+        room = 1e-12 * (1.0 + np.abs(hull).max(axis=1))
+        low, high = hull.min(axis=1) + room, hull.max(axis=1) - room
+        ordered = np.sort(places)
+        some = np.searchsorted(ordered, low) < np.searchsorted(ordered, high)
+        found = [np.zeros(0)]
+        for i in np.flatnonzero(some):
+            for place in ordered[(ordered > low[i]) & (ordered < high[i])]:
+                shifted = self.coefficients[:, i].copy()
+                shifted[-1] -= place
+                roots = np.roots(shifted)
+                real = roots.real[np.abs(roots.imag) < 1e-9 * spans[i]]
+                inside = real[(real > 1e-12 * spans[i]) & (real < (1.0 - 1e-12) * spans[i])]
+                found.append(self.times[i] + inside)
+        return np.unique(np.concatenate(found))
+
+
+def _shifted(coefficients: Array, by: Array) -> Array:
+    """Coefficients of p(x + by), a number for each column, by repeated synthetic division."""
+    out = coefficients.copy()
+    size = len(out)
+    for row in range(size - 1):
+        for k in range(1, size - row):
+            out[k] += by * out[k - 1]
+    return out
