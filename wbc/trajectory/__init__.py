@@ -1,1 +1,33 @@
-"""Laws of motion: paths, timings, and certificates of the limits that they keep."""
+"""Laws of motion: paths, timings, and certificates of the limits that they keep.
+
+Names are imported when they are first used, so that toppra and ruckig cost nothing until then.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import Any
+
+#: Public name -> module that defines it
+_WHERE = {
+    "Law": "law",
+    "State": "law",
+    "Limits": "limits",
+    "Certificate": "certificate",
+    "Worst": "certificate",
+    "Path": "path",
+    "PolynomialPath": "path",
+    "Timing": "timing",
+}
+
+__all__ = sorted(_WHERE)  # noqa: PLE0605
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _WHERE:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(importlib.import_module(f"{__name__}.{_WHERE[name]}"), name)
+
+
+def __dir__() -> list[str]:
+    return sorted(_WHERE)
