@@ -8,9 +8,9 @@ is sampled, and what lies between two samples is bounded by their values and the
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, Protocol
 
 import numpy as np
 
@@ -30,6 +30,25 @@ TOLERANCE = 1e-6
 
 #: Steps of a derivative at a break, relative to its limit, that are rounding
 STEP = 1e-9
+
+
+class Check(Protocol):
+    """A quantity with limits that is known by its values alone: torques, the speed of a frame, contact forces.
+
+    Attributes:
+        name: its entry in the certificate.
+        columns: numbers after which the ratios repeat with the other sign; the joint of :class:`Worst` counts them.
+    """
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def columns(self) -> int: ...
+
+    def ratios(self, position: Array, velocity: Array, acceleration: Array) -> Array:
+        """m x k numbers that are at most 1 where the limits are kept, at m states (m x n, or m x 4 x 4)."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -131,7 +150,7 @@ def chain(path: Path, s: list[Array], piece: Index, order: int) -> Array:
     return third * (s[1] ** 3)[:, None] + second * (3.0 * s[1] * s[2])[:, None] + first * s[3][:, None]
 
 
-def certify(path: Path, timing: Timing, limits: Limits, samples: int = 16) -> Certificate:
+def certify(path: Path, timing: Timing, limits: Limits, checks: Sequence[Check] = (), samples: int = 16) -> Certificate:
     """Worst places of a law; ``samples``: of each piece, where it is no polynomial."""
     pieces = Pieces.of(path, timing)
     worst: dict[str, Worst] = {}
@@ -154,7 +173,19 @@ def certify(path: Path, timing: Timing, limits: Limits, samples: int = 16) -> Ce
         else:
             values = scaled(pieces.at(path, timing, order, np.linspace(0.0, 1.0, samples + 1)))
             worst[name] = sampled(pieces.start, pieces.span, values, path.dof)
+    for check in checks:
+        limited.add(check.name)
+        worst[check.name] = checked(path, timing, pieces, check)
     return Certificate(worst, frozenset(limited))
+
+
+def checked(path: Path, timing: Timing, pieces: Pieces, check: Check, samples: int = 4) -> Worst:
+    """The worst place of a quantity that is known by its values, at samples of each piece."""
+    places = np.linspace(0.0, 1.0, samples + 1)
+    state = [pieces.at(path, timing, order, places) for order in (0, 1, 2)]
+    rows = [part.reshape(-1, *part.shape[2:]) for part in state]
+    values = check.ratios(*rows)
+    return sampled(pieces.start, pieces.span, values.reshape(len(pieces.start), samples + 1, -1), check.columns)
 
 
 def sampled(start: Array, span: Array, values: Array, joints: int) -> Worst:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -10,7 +11,7 @@ import numpy as np
 
 from wbc import validation
 from wbc.errors import ContinuityError, RangeError
-from wbc.trajectory.certificate import Certificate, certify, chain
+from wbc.trajectory.certificate import Certificate, Check, certify, chain
 from wbc.trajectory.limits import Limits
 from wbc.trajectory.path import Index, JoinedPath, Path, Space
 from wbc.trajectory.timing import Timing
@@ -45,13 +46,14 @@ class Law:
     Args:
         path: positions over s. timing: s over time.
         limits: what :attr:`certificate` is about; none by default.
+        checks: further quantities that it is about (torques, the speed of a frame); they go with the law.
 
     Raises:
         ShapeError: limits of another number of joints. RangeError: the timing leaves the path.
     """
 
-    def __init__(self, path: Path, timing: Timing, limits: Limits | None = None) -> None:
-        self.path, self.timing = path, timing
+    def __init__(self, path: Path, timing: Timing, limits: Limits | None = None, checks: Sequence[Check] = ()) -> None:
+        self.path, self.timing, self.checks = path, timing, tuple(checks)
         self.limits = (limits or Limits()).for_dof(path.dof)
         ends = timing.evaluate(np.array([0.0, timing.duration]), 0, np.array([0, len(timing.times) - 2]))
         room = 1e-9 * (1.0 + np.abs(path.knots[[0, -1]]).max())
@@ -113,12 +115,12 @@ class Law:
 
     @cached_property
     def certificate(self) -> Certificate:
-        """How much of :attr:`limits` the law uses at worst."""
-        return certify(self.path, self.timing, self.limits)
+        """How much of :attr:`limits` and of :attr:`checks` the law uses at worst."""
+        return certify(self.path, self.timing, self.limits, self.checks)
 
     def with_limits(self, limits: Limits) -> Law:
         """The same law, to be compared with other limits."""
-        return Law(self.path, self.timing, limits)
+        return Law(self.path, self.timing, limits, self.checks)
 
     def scaled(self, factor: float) -> Law:
         """The same positions in ``factor`` times the time.
@@ -127,11 +129,11 @@ class Law:
             RangeError: not positive.
         """
         factor = validation.scalar("factor", factor, low=0.0, open_low=True)
-        return Law(self.path, self.timing.scaled(factor), self.limits)
+        return Law(self.path, self.timing.scaled(factor), self.limits, self.checks)
 
     def reversed(self) -> Law:
         """From the end to the beginning."""
-        return Law(self.path, self.timing.reversed(), self.limits)
+        return Law(self.path, self.timing.reversed(), self.limits, self.checks)
 
     def sliced(self, start: float, end: float) -> Law:
         """The part from one time to a later one, whose time counts from 0.
@@ -143,7 +145,7 @@ class Law:
         end = validation.scalar("end", end, low=0.0, high=self.duration, unit="s")
         if not start < end:
             raise RangeError("end", end, f"must be later than start, {start:g} s")
-        return Law(self.path, self.timing.sliced(start, end), self.limits)
+        return Law(self.path, self.timing.sliced(start, end), self.limits, self.checks)
 
     def then(self, other: Law) -> Law:
         """This law, and another from where this one ends, in position and in velocity.
@@ -159,4 +161,4 @@ class Law:
                 raise ContinuityError(
                     f"law.{name}", off, f"the laws do not meet: {name}s differ by more than {MEETING}"
                 )
-        return Law(path, self.timing.then(other.timing, path.shift), self.limits)
+        return Law(path, self.timing.then(other.timing, path.shift), self.limits, self.checks)
