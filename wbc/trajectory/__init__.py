@@ -18,6 +18,18 @@ _WHERE = {
     "Path": "path",
     "PolynomialPath": "path",
     "Timing": "timing",
+    "standing_path": "joint_paths",
+    "straight_path": "joint_paths",
+    "spline_path": "joint_paths",
+    "blend_path": "joint_paths",
+    "FunctionPath": "function_path",
+    "function_path": "function_path",
+    "PosePath": "pose_path",
+    "geodesic_path": "pose_paths",
+    "pose_polyline": "pose_paths",
+    "pose_spline": "pose_paths",
+    "arc_path": "arcs",
+    "arc_through": "arcs",
 }
 
 __all__ = sorted(_WHERE)  # noqa: PLE0605

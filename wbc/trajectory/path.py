@@ -31,7 +31,8 @@ class Path(ABC):
         knots: strictly increasing; the path is smooth between neighbours.
         dof: numbers of a derivative: n joints, or 6.
         space: see the module.
-        degree: highest degree of the polynomials between knots, None where they are no polynomials.
+        degree: highest degree of the polynomials between knots, None where they are no polynomials; of poses, one more
+            than that of (dp/ds; w).
     """
 
     knots: Array
