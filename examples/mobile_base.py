@@ -1,32 +1,66 @@
-"""TIAGo Pro on its four mecanum wheels: a hand reaches out of range of the arm, so the wheels roll the base there."""
+"""TIAGo on its two driven wheels: the hand follows an eight far wider than the arm, so the wheels take it there."""
 
 import numpy as np
 import pinocchio as pin
 
 import wbc
+from wbc.track import Scene
 
-wheels = {"front_left": -1, "front_right": 1, "rear_left": 1, "rear_right": -1}
-robot = wbc.robots.load("tiago_pro", lock=["gripper_*_joint"], shapes="none")
-rolling = [wbc.tasks.Wheel(f"wheel_{place}_joint", 0.0762, side * np.pi / 4) for place, side in wheels.items()]
+# The table locks the wheels, because the base alone is enough to plan with; here their joints are commanded, too
+robot = wbc.robots.load("tiago_no_hand", lock=(), shapes="none")
+radius = 0.0985
+wheels = [wbc.tasks.Wheel(f"wheel_{side}_joint", radius) for side in ("left", "right")]
 
-stack = wbc.Stack(robot, dt=0.01)
-stack.add(wbc.tasks.Rolling(rolling), name="wheels")
-stack.add(wbc.tasks.EndEffector(robot.frames["right_hand"]), name="hand")
-rest = [j for j in robot.joint_names if "wheel" not in j and j != "root_joint"]
-stack.add(wbc.tasks.Posture(joints=rest), name="posture", weight=1e-5)
+stack = wbc.Stack(robot, dt=0.03)
+# Without slip: the base goes where its wheels turn, and nowhere sideways
+stack.add(wbc.tasks.Rolling(wheels), name="wheels")
+stack.add(wbc.tasks.EndEffector(robot.frames["tip"], kind="position", gain=10.0), name="hand")
+# The arm's own posture only: one of the base or of the wheels would pull the robot back to where it started
+arm = [name for name in robot.joint_names if "wheel" not in name and name != "root_joint"]
+stack.add(wbc.tasks.Posture(joints=arm), name="posture", weight=1e-5)
 stack.add(wbc.tasks.JointLimits())
 controller = stack.compile()
 
 q = robot.neutral
 controller.reset(q)
-start = controller["hand"].target
-controller["hand"].target = pin.SE3(start.rotation, start.translation + np.array([0.3, -1.2, 0.1]))
-turned = np.zeros(4)
-spin = [robot.dofs(wheel.joint).start for wheel in rolling]
-for _ in range(1000):
+start, ticks = controller["hand"].target, 1000
+
+
+def goal(k: int) -> np.ndarray:
+    """An eight 3 m wide and 1.2 m deep that rises and falls by 0.15 m, at rest at both ends."""
+    phase = 2 * np.pi * (k / ticks - np.sin(2 * np.pi * k / ticks) / (2 * np.pi))
+    return start + np.array([0.6 * np.sin(2 * phase), 1.5 * np.sin(phase), 0.15 * np.sin(3 * phase)])
+
+
+data = robot.model.createData()
+tip, base = (robot.model.getFrameId(robot.frames[role]) for role in ("tip", "base"))
+turning = [robot.dofs(wheel.joint).start for wheel in wheels]
+rolled, late, slip = np.zeros(2), 0.0, 0.0
+postures, hand, floor, seen = [], [], [], []
+for k in range(ticks):
+    # Where hand and base are is asked of Pinocchio, not of the controller
+    pin.framesForwardKinematics(robot.model, data, q)
+    postures.append(q)
+    hand.append(data.oMf[tip].translation.copy())
+    floor.append(np.array([*data.oMf[base].translation[:2], 0.02]))
+    seen.append(data.oMf[base].actInv(data.oMf[tip]).translation)
+    late = max(late, float(np.linalg.norm(hand[-1] - goal(k))))
+    controller["hand"].target = goal(k)
+    controller["hand"].feedforward = (goal(k + 1) - goal(k)) / stack.dt
     step = controller.step(q)
+    rolled += radius * np.abs(step.v[turning]) * stack.dt
+    # What both wheels roll on average is what the base drives, forwards
+    slip = max(slip, abs(float(radius * step.v[turning].mean() - step.v[0])))
     q = pin.integrate(robot.model, q, step.v * stack.dt)
-    turned += step.v[spin] * stack.dt
-x, y, yaw = q[0], q[1], np.arctan2(q[3], q[2])
-print(f"{step.status}: hand {1e3 * step.residuals['hand'].norm('m'):.2f} mm from its target,")
-print(f"base moved {x:+.3f} m and {y:+.3f} m and turned {yaw:+.3f} rad, wheels turned {np.round(turned, 2)} rad")
+
+x, y, z = np.ptp(seen, axis=0)
+print(f"{step.status}: hand at most {1e3 * late:.2f} mm off an eight of 3 m by 1.2 m;")
+print(f"seen from the base it stayed within {x:.2f} m by {y:.2f} m, and the arm raised it by {z:.2f} m")
+print(f"wheels rolled {rolled[0]:.2f} m (left) and {rolled[1]:.2f} m (right), slip at most {1e3 * slip:.4f} mm/s")
+
+scene = Scene(robot, dark=[robot.frames["tip"]], detail=0.005)
+scene.add_robot(postures[690])
+scene.add_robot(postures[330], pale=True)
+scene.add_path(np.array(hand), "path of the hand", radius=0.012)
+scene.add_path(np.array(floor), "path of the base", (0.9, 0.5, 0.1), radius=0.012)
+print(scene.save("runs/mobile_base.png", size=(800, 540), azimuth=3.3, elevation=0.6))

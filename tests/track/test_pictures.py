@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -11,14 +12,17 @@ import pinocchio as pin
 # isort: split
 import coal
 import pytest
+from matplotlib.image import imread
 
 import wbc
 from wbc import track
+from wbc.errors import NotFiniteError, RangeError, RotationError, ShapeError, UnknownNameError, WbcError
 from wbc.proximity.geometry import geometry_of
-from wbc.shapes import Box, Capsule, Convex, Cylinder, PlacedShape, Solid, Sphere
+from wbc.shapes import Box, Capsule, Convex, Cylinder, HalfSpace, PlacedShape, Solid, Sphere
 from wbc.track import render, solids
 from wbc.track.picture import save_picture
 from wbc.track.plots import save_plots
+from wbc.track.scene import OBSTACLE, PATH, simplified
 
 CAMERA = render.Camera(np.array([4.0, 0.0, 1.0]), np.array([0.0, 0.0, 1.0]), math.radians(40.0), 160, 120)
 RED = (1.0, 0.0, 0.0)
@@ -97,13 +101,84 @@ def test_picture_and_plots_of_a_robot_without_meshes(tmp_path: Path) -> None:
     log = track.track(plan)
     file = save_picture(log, robot, tmp_path / "overview.png", size=(120, 80))
     assert file is not None
-    import matplotlib.image
-
-    pixels = matplotlib.image.imread(file)
+    pixels = imread(file)
     assert pixels.shape[:2] == (80, 120)
     assert pixels[..., :3].std() > 0.02
     names = {f.stem for f in save_plots(log, tmp_path)}
     assert names == {"joints", "velocities", "accelerations", "errors", "tick_time"}
+
+
+def test_a_scene_shows_what_was_added(tmp_path: Path) -> None:
+    """Each thing where it is and in its colour; the pale links only where they have moved."""
+    robot = wbc.robots.from_dh([wbc.robots.DHRow(a=0.5)] * 2)
+    robot = robot.with_shapes({f"link{k}": [PlacedShape(Sphere(0.1), pin.SE3.Identity())] for k in (1, 2)})
+
+    def drawn(q2: float, balls: bool = True) -> np.ndarray:
+        scene = track.Scene(robot)
+        # Far apart in the corners, these hold the camera where it is
+        for side in (-1.0, 1.0):
+            scene.add_shape(Box((0.02, 0.02, 0.02)), pin.SE3(np.eye(3), np.array([0.0, 1.5 * side, side + 1.0])))
+        scene.add_robot(np.zeros(2))
+        scene.add_robot(np.array([0.0, q2]), pale=True)
+        if balls:
+            scene.add_shape(Sphere(0.2), pin.SE3(np.eye(3), np.array([0.0, -1.0, 1.5])), "ball")
+            scene.add_path(np.array([[0.0, -1.0, 0.4], [0.0, 1.0, 0.4]]), "path", radius=0.04)
+        pixels = imread(scene.save(tmp_path / "new" / "scene.png", size=(300, 200), azimuth=0.0, elevation=0.0))
+        return np.asarray(pixels[..., :3], dtype=float)
+
+    def part(pixels: np.ndarray, colour: tuple[float, float, float]) -> np.ndarray:
+        """Pixels of a hue, whatever light falls on them, left of the key."""
+        unit = pixels / np.linalg.norm(pixels, axis=2, keepdims=True)
+        there = unit @ (np.array(colour) / np.linalg.norm(colour)) > 0.985
+        there[:80, 180:] = False
+        return there
+
+    still, moved, bare = drawn(0.0), drawn(1.2), drawn(0.0, balls=False)
+    rows, columns = np.nonzero(part(still, OBSTACLE))
+    assert abs(columns.mean() - 60) < 15
+    assert rows.mean() < 80
+    rows, columns = np.nonzero(part(still, PATH))
+    assert columns.min() < 80
+    assert columns.max() > 220
+    assert rows.mean() > 100
+    assert part(bare, PATH).sum() == 0
+    assert np.abs(moved - still).max() > 0.02
+    assert np.array_equal(still, drawn(0.0))
+
+
+def test_simplified_meshes_stay_near_the_fine_ones() -> None:
+    fine = render.sphere(np.array([0.2, 0.1, 0.0]), 0.5, RED).triangles
+    assert simplified(fine, 0.0) is fine
+    coarse = simplified(fine, 0.05)
+    assert 100 < len(coarse) < len(fine) / 4
+    radii = np.linalg.norm(coarse - np.array([0.2, 0.1, 0.0]), axis=-1)
+    assert radii.min() > 0.45
+    assert radii.max() <= 0.5 + 1e-9
+
+
+def test_scenes_refuse_what_cannot_be_drawn(tmp_path: Path) -> None:
+    robot = wbc.robots.from_dh([wbc.robots.DHRow(a=0.5)] * 2)
+    with pytest.raises(UnknownNameError, match=r"Scene\.dark"):
+        track.Scene(robot, dark=["hand"])
+    with pytest.raises(RangeError, match=r"Scene\.detail"):
+        track.Scene(robot, detail=-1.0)
+    scene = track.Scene(robot)
+    scene.add_shape(Sphere(0.1), pin.SE3.Identity(), pale=True)
+    refused: list[tuple[type[WbcError], str, Callable[[], object]]] = [
+        (ShapeError, "q", lambda: scene.add_robot(np.zeros(3))),
+        (ShapeError, "Scene.shape", lambda: scene.add_shape(HalfSpace(), pin.SE3.Identity())),  # type: ignore[arg-type]
+        (RotationError, "Scene.pose", lambda: scene.add_shape(Sphere(0.1), np.zeros((4, 4)))),
+        (ShapeError, "Scene.points", lambda: scene.add_path(np.zeros((4, 2)))),
+        (NotFiniteError, "Scene.points", lambda: scene.add_path(np.full((4, 3), np.nan))),
+        (RangeError, "Scene.radius", lambda: scene.add_path(np.zeros((4, 3)), radius=0.0)),
+        (RangeError, "Scene.elevation", lambda: scene.save(tmp_path / "a.png", elevation=math.pi / 2)),
+        (RangeError, "Scene.size", lambda: scene.save(tmp_path / "a.png", size=(0, 10))),
+        (RangeError, "not pale", lambda: scene.save(tmp_path / "a.png")),
+    ]
+    for kind, field, call in refused:
+        with pytest.raises(kind, match=field):
+            call()
+    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize(

@@ -13,8 +13,9 @@ import pytest
 import wbc
 from wbc import track
 from wbc.cli.demo import plan as demo_plan
-from wbc.errors import UnknownNameError, WbcError
-from wbc.track.clearance import clearances
+from wbc.errors import MissingShapeError, UnknownNameError, WbcError
+from wbc.shapes import PlacedShape
+from wbc.track.clearance import clearances, self_clearances
 from wbc.track.log import LogFileError
 from wbc.track.setup import Moving, Swing
 from wbc.track.summary import save_summary, summarise
@@ -78,6 +79,22 @@ def test_clearance_of_a_moving_obstacle() -> None:
     gaps = clearances(robot, q, {"ball": ball}, np.array([0.0, 1.0]))
     for values in gaps.values():
         assert 0.3 < values[0] - values[1] <= 0.5 + 1e-9
+
+
+def test_clearance_of_links() -> None:
+    """Two balls on a planar arm that folds by an angle: their distance follows from the triangle of its links."""
+    robot = wbc.robots.from_dh([wbc.robots.DHRow(a=0.5)] * 3)
+    ball = [PlacedShape(wbc.shapes.Sphere(0.1), pin.SE3.Identity())]
+    robot = robot.with_shapes({"link1": ball, "link3": ball})
+    angles = np.array([0.0, 1.0, 2.0, np.pi - 0.1])
+    q = np.column_stack([0.3 * angles, angles / 2, angles / 2])
+    (gap,) = self_clearances(robot, q, [("link1", "link3")]).values()
+    ends = np.exp(1j * np.cumsum(q, axis=1)) * 0.5
+    np.testing.assert_allclose(gap, np.abs(ends[:, 1] + ends[:, 2]) - 0.2, atol=1e-6)
+    with pytest.raises(UnknownNameError, match="did you mean 'link3'"):
+        self_clearances(robot, q, [("link1", "link33")])
+    with pytest.raises(MissingShapeError, match="link2"):
+        self_clearances(robot, q, [("link1", "link2")])
 
 
 @pytest.mark.parametrize("kind", ["parquet", "npz"])

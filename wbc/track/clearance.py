@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import itertools
 import logging
 import pathlib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import coal
 import numpy as np
 import pinocchio as pin
 
+from wbc.errors import MissingShapeError
 from wbc.proximity.geometry import geometry_of
 from wbc.robot import Robot
 from wbc.robot.files import captured_stderr
@@ -31,11 +33,34 @@ def clearances(robot: Robot, q: Array, obstacles: Mapping[str, Moving], t: Array
         q: configurations, n x nq.
         t: times, n, at which the obstacles are looked at.
     """
-    bodies: dict[str, list[Body]] = {}
-    for link, placed in robot.shapes.items():
-        if _moves(robot, link):
-            bodies[link] = [(int(robot.model.getFrameId(link)), *_geometry(p.shape, p.placement)) for p in placed]
+    bodies = {link: _bodies(robot, link) for link in robot.shapes if _moves(robot, link)}
     return _distances(robot, bodies, q, obstacles, t)
+
+
+def self_clearances(robot: Robot, q: Array, pairs: Iterable[tuple[str, str]]) -> dict[tuple[str, str], Array]:
+    """Signed distance of the shapes of two links, tick by tick [m], for each of some pairs of links.
+
+    Args:
+        q: configurations, n x nq.
+        pairs: names of links with shapes.
+
+    Raises:
+        UnknownNameError: no such frame. MissingShapeError: no shapes on it.
+    """
+    out = {(first, second): np.full(len(q), np.inf) for first, second in pairs}
+    bodies = {link: _bodies(robot, robot.check_frame("pairs", link)) for pair in out for link in pair}
+    for link, group in bodies.items():
+        if not group:
+            raise MissingShapeError("pairs", link, "this link has no collision shapes")
+    data, request, result = robot.model.createData(), coal.DistanceRequest(), coal.DistanceResult()
+    for k, configuration in enumerate(q):
+        pin.framesForwardKinematics(robot.model, data, configuration)
+        where = {link: [_placed(data, body) for body in group] for link, group in bodies.items()}
+        for (first, second), gaps in out.items():
+            for a, b in itertools.product(where[first], where[second]):
+                result.clear()
+                gaps[k] = min(gaps[k], coal.distance(*a, *b, request, result))
+    return out
 
 
 def least_mesh_clearance(
@@ -95,12 +120,23 @@ def _distances(
         for obstacle in obstacles.values():
             geometry, where = _obstacle(obstacle, t[k])
             for link in out:
-                for frame, placement, shape in bodies[link]:
-                    pose = data.oMf[frame] * placement
+                for body in bodies[link]:
                     result.clear()
-                    place = coal.Transform3s(pose.rotation, pose.translation)
-                    out[link][k] = min(out[link][k], coal.distance(shape, place, geometry, where, request, result))
+                    gap = coal.distance(*_placed(data, body), geometry, where, request, result)
+                    out[link][k] = min(out[link][k], gap)
     return out
+
+
+def _bodies(robot: Robot, link: str) -> list[Body]:
+    frame = int(robot.model.getFrameId(link))
+    return [(frame, *_geometry(p.shape, p.placement)) for p in robot.shapes.get(link, ())]
+
+
+def _placed(data: pin.Data, body: Body) -> tuple[Any, Any]:
+    """(geometry, its pose in the world) for Coal."""
+    frame, placement, geometry = body
+    pose = data.oMf[frame] * placement
+    return geometry, coal.Transform3s(pose.rotation, pose.translation)
 
 
 def _obstacle(obstacle: Moving, t: float) -> tuple[Any, Any]:

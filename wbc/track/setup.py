@@ -25,9 +25,9 @@ WEIGHTS = {"hand": 1.0, "plane": 1e-4, "posture": 1e-6}
 
 @dataclass(frozen=True, eq=False)
 class Moving:
-    """An obstacle: a sphere or half-space, at a place at t = 0, with a constant linear velocity [m/s]."""
+    """An obstacle: a shape, at a place at t = 0, with a constant linear velocity [m/s]."""
 
-    shape: shapes.Sphere | shapes.HalfSpace
+    shape: shapes.Shape
     pose: pin.SE3
     velocity: Array = field(default_factory=lambda: np.zeros(3))
 

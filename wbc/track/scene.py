@@ -1,0 +1,251 @@
+"""Pictures put together from robots, shapes and paths."""
+
+from __future__ import annotations
+
+import math
+import pathlib
+from collections.abc import Sequence
+
+import coal
+import numpy as np
+import pinocchio as pin
+
+from wbc import validation
+from wbc.errors import RangeError, ShapeError
+from wbc.robot import Robot
+from wbc.shapes import Box, Capsule, Convex, Cylinder, PlacedShape, Solid, Sphere
+from wbc.track import render, solids, style
+from wbc.track.clearance import bodies_of
+from wbc.validation import Array
+
+Colour = tuple[float, float, float]
+
+WHITE: Colour = (0.93, 0.935, 0.945)
+DARK: Colour = (0.34, 0.36, 0.40)
+PATH: Colour = (0.12, 0.40, 0.75)
+ELBOW: Colour = (0.90, 0.50, 0.10)
+OBSTACLE: Colour = (0.86, 0.27, 0.22)
+#: Tint of what is drawn pale, and how much of it is seen
+TINT: Colour = (0.62, 0.74, 0.90)
+GHOST = 0.32
+SUPERSAMPLING = 2
+#: Surfaces nearer to each other than this count as one [m]
+BIAS = 0.003
+#: Largest angle above or below the scene: straight from above no direction is up [rad]
+HIGHEST = 1.5
+SOLIDS = (Sphere, Capsule, Box, Cylinder, Convex)
+#: Links whose poses differ by less stand at one place
+SAME = 1e-3
+#: Part of the picture's width or height that the scene takes
+FILLED = 0.90
+
+
+class Scene:
+    """What a picture shows. Robots, shapes and paths are added; :meth:`save` draws them.
+
+    Example:
+        >>> scene = Scene(robot)
+        >>> scene.add_robot(q)
+        >>> scene.add_shape(wbc.shapes.Sphere(0.1), pose, "ball")
+        >>> scene.add_path(points, "path of the hand")
+        >>> scene.save("runs/picture.png")
+
+    Args:
+        robot: the robot that is drawn with the visual meshes of its URDF, else with its link shapes.
+        dark: frames whose links are drawn dark, as the hands, with everything that the same joint moves.
+        detail: corners of meshes closer than this are drawn as one [m]; saves time on descriptions with fine meshes.
+
+    Raises:
+        UnknownNameError: no such frame. ShapeError, RangeError, NotFiniteError, RotationError: bad numbers, here and in
+            the methods, or a shape without a surface.
+    """
+
+    def __init__(self, robot: Robot, dark: Sequence[str] = (), detail: float = 0.0) -> None:
+        detail = validation.scalar("Scene.detail", detail, low=0.0, unit="m")
+        frames = [robot.model.getFrameId(robot.check_frame("Scene.dark", frame)) for frame in dark]
+        self._robot = robot
+        self._meshes = [(link, simplified(triangles, detail)) for link, triangles in link_meshes(robot)]
+        self._dark = {int(robot.model.frames[frame].parentJoint) for frame in frames} - {0}
+        self._stands: list[list[pin.SE3]] = [[] for _ in self._meshes]
+        self._solid: list[render.Mesh] = []
+        self._pale: list[list[render.Mesh]] = []
+        self._key: list[tuple[Colour, str]] = []
+
+    def add_robot(self, q: Array, pale: bool = False) -> None:
+        """The robot at a configuration; ``pale``: at another time, without links that stand where they stood before."""
+        model, data = self._robot.model, self._robot.model.createData()
+        pin.framesForwardKinematics(model, data, self._robot.configuration("q", q))
+        meshes = []
+        for (link, triangles), stands in zip(self._meshes, self._stands, strict=True):
+            index = model.getFrameId(link)
+            pose = data.oMf[index].copy()
+            if pale and any(pose.isApprox(other, SAME) for other in stands):
+                continue
+            stands.append(pose)
+            colour = DARK if int(model.frames[index].parentJoint) in self._dark else WHITE
+            meshes.append(render.Mesh(triangles @ pose.rotation.T + pose.translation, colour))
+        if pale:
+            self._pale.append(meshes)
+        else:
+            self._solid += meshes
+
+    def add_shape(
+        self,
+        shape: Solid | Sequence[Convex],
+        pose: pin.SE3,
+        label: str = "",
+        colour: Colour = OBSTACLE,
+        pale: bool = False,
+    ) -> None:
+        """A shape of :mod:`wbc.shapes`, or the parts of a mesh, at a pose in the world; a label goes into the key."""
+        place = validation.pose("Scene.pose", pose)
+        meshes = [_surface(part, place, colour) for part in (shape if isinstance(shape, Sequence) else [shape])]
+        if pale:
+            self._pale.append(meshes)
+        else:
+            self._solid += meshes
+        self._label(colour, label)
+
+    def add_path(self, points: Array, label: str = "", colour: Colour = PATH, radius: float = 0.006) -> None:
+        """A tube along points, n x 3 [m]."""
+        line = validation.real_array("Scene.points", points)
+        if line.ndim != 2 or line.shape[1] != 3:
+            raise ShapeError("Scene.points", points, f"expected n x 3, not {line.shape}")
+        wide = validation.scalar("Scene.radius", radius, low=0.0, open_low=True, unit="m")
+        self._solid.append(render.tube(line, wide, colour))
+        self._label(colour, label)
+
+    def save(
+        self,
+        file: str | pathlib.Path,
+        size: tuple[int, int] = (960, 600),
+        azimuth: float = math.radians(16.0),
+        elevation: float = math.radians(24.0),
+    ) -> pathlib.Path:
+        """Draw it into a PNG file, whose folder is made where it is not there; returns the file.
+
+        Args:
+            size: width and height [pixels].
+            azimuth: side that it is seen from: 0 is +x, pi/2 is +y [rad].
+            elevation: height that it is seen from: 0 is level, 1.5 nearly from above, which is the most [rad].
+        """
+        azimuth = validation.scalar("Scene.azimuth", azimuth, unit="rad")
+        elevation = validation.scalar("Scene.elevation", elevation, low=-HIGHEST, high=HIGHEST, unit="rad")
+        if not all(isinstance(side, int) and side > 0 for side in size) or len(size) != 2:
+            raise RangeError("Scene.size", size, "expected two whole numbers of pixels above 0")
+        if not any(len(mesh.triangles) for mesh in self._solid):
+            raise RangeError("Scene", len(self._solid), "nothing was added that is not pale")
+        # A point in thirty is enough to see how large the scene is
+        everything = _points([*self._solid, *(mesh for meshes in self._pale for mesh in meshes)])[::30]
+        camera = _camera(everything, size, azimuth, elevation)
+        image = _render(camera, self._solid, self._pale)
+        path = pathlib.Path(file)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        _write(image, self._key, path)
+        return path
+
+    def _label(self, colour: Colour, label: str) -> None:
+        if label and (colour, label) not in self._key:
+            self._key.append((colour, label))
+
+
+def link_meshes(robot: Robot) -> list[tuple[str, Array]]:
+    """(frame, triangles in it): the URDF's visual meshes, else the collision shapes."""
+    out = []
+    for link, placement, geometry in bodies_of(robot, pin.GeometryType.VISUAL):
+        if isinstance(geometry, coal.BVHModelBase):
+            vertices = np.array(geometry.vertices()) @ placement.rotation.T + placement.translation
+            faces = [(t[0], t[1], t[2]) for t in (geometry.tri_indices(k) for k in range(geometry.num_tris))]
+            out.append((link, vertices[np.array(faces, dtype=np.int64)]))
+    if out:
+        return out
+    return [(link, solids.triangles(placed)) for link, shapes in robot.shapes.items() for placed in shapes]
+
+
+def simplified(triangles: Array, detail: float) -> Array:
+    """The corners in each cell of a grid of pitch ``detail`` [m] become one, in their middle; flat triangles go."""
+    if detail <= 0.0:
+        return triangles
+    corners = triangles.reshape(-1, 3)
+    cells = np.floor((corners - corners.min(axis=0)) / detail).astype(np.int64)
+    # One number a cell: rows take numpy twenty times as long to sort
+    across = cells.max(axis=0) + 1
+    names, owner = np.unique((cells[:, 0] * across[1] + cells[:, 1]) * across[2] + cells[:, 2], return_inverse=True)
+    sums = np.stack([np.bincount(owner, corners[:, k], len(names)) for k in range(3)], axis=1)
+    middles = sums / np.bincount(owner, minlength=len(names))[:, None]
+    faces = owner.reshape(-1, 3)
+    kept = (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
+    return np.asarray(middles[faces[kept]])
+
+
+def _surface(shape: Solid, pose: pin.SE3, colour: Colour) -> render.Mesh:
+    if not isinstance(shape, SOLIDS):
+        raise ShapeError("Scene.shape", shape, "expected a shape", [kind.__name__ for kind in SOLIDS])
+    if isinstance(shape, Sphere):
+        return render.sphere(np.array(pose.translation), shape.radius, colour)
+    return render.Mesh(solids.triangles(PlacedShape(shape, pose)), colour)
+
+
+def _camera(points: Array, size: tuple[int, int], azimuth: float, elevation: float) -> render.Camera:
+    """Looks so that the points fill the picture."""
+    view = math.radians(16.0)
+    width, height = (SUPERSAMPLING * s for s in size)
+    flat, rise = math.cos(elevation), math.sin(elevation)
+    direction = np.array([flat * math.cos(azimuth), flat * math.sin(azimuth), rise])
+    target, distance = points.mean(axis=0), 6.0
+    for _ in range(6):
+        camera = render.Camera(target + distance * direction, target, view, width, height)
+        screen = camera.project(points)[:, :2]
+        low, high = screen.min(axis=0), screen.max(axis=0)
+        off = (low + high) / 2 - np.array([width, height]) / 2
+        right, up, _ = camera.axes
+        target = target + (off[0] * right - off[1] * up) * distance / camera.focal
+        distance *= float(np.max((high - low) / (FILLED * np.array([width, height]))))
+    return render.Camera(target + distance * direction, target, view, width, height)
+
+
+def _render(camera: render.Camera, solid: list[render.Mesh], pale: list[list[render.Mesh]]) -> Array:
+    points = _points(solid)
+    shadows = render.Shadows(solid)
+    base = min(0.0, float(points[:, 2].min()))
+    image, depth = render.floor(camera, shadows, base, points.mean(axis=0), 1.3)
+    layer = render.draw(solid, camera)
+    seen, colours = render.shade(layer, camera, shadows)
+    image[seen] = colours
+    depth = np.where(seen, layer.depth, depth)
+    # What is behind everything, as the horizon, casts no dark on anything
+    far = float(layer.depth[seen].max()) + 1.0
+    for meshes in pale:
+        tinted = [render.Mesh(m.triangles, _tinted(m.colour)) for m in meshes]
+        layer = render.draw(tinted, camera)
+        seen, colours = render.shade(layer, camera, shadows)
+        front = seen & (layer.depth < depth - BIAS)
+        image[front] = (1.0 - GHOST) * image[front] + GHOST * colours[front[seen]]
+    darker = render.occlusion(np.minimum(depth, far), 5.0 * SUPERSAMPLING)
+    image *= (1.0 - np.where(image.min(axis=-1) < 0.99, darker, 0.0))[..., None]
+    return render.reduced(image, SUPERSAMPLING)
+
+
+def _tinted(colour: Colour) -> Colour:
+    """Links become blue; what has a colour of its own keeps it."""
+    return TINT if colour in (WHITE, DARK) else colour
+
+
+def _points(meshes: Sequence[render.Mesh]) -> Array:
+    return np.concatenate([m.triangles.reshape(-1, 3) for m in meshes])
+
+
+def _write(image: Array, key: Sequence[tuple[Colour, str]], file: pathlib.Path) -> None:
+    """The image, and in its upper right corner the colours and what they mean."""
+    with style.pyplot() as plt:
+        height, width = image.shape[:2]
+        figure = plt.figure(figsize=(width / 100, height / 100), dpi=100)
+        panel = figure.add_axes((0, 0, 1, 1))
+        panel.imshow(np.clip(image, 0.0, 1.0), interpolation="none")
+        panel.set_axis_off()
+        for row, (colour, text) in enumerate(key):
+            y = 34.0 + 28.0 * row
+            panel.plot([width - 50.0, width - 22.0], [y, y], color=colour, lw=6.0)
+            panel.text(width - 62.0, y, text, va="center", ha="right", fontsize=12, color=style.INK)
+        figure.savefig(file, dpi=100)
+        plt.close(figure)
