@@ -150,8 +150,15 @@ def chain(path: Path, s: list[Array], piece: Index, order: int) -> Array:
     return third * (s[1] ** 3)[:, None] + second * (3.0 * s[1] * s[2])[:, None] + first * s[3][:, None]
 
 
-def certify(path: Path, timing: Timing, limits: Limits, checks: Sequence[Check] = (), samples: int = 16) -> Certificate:
-    """Worst places of a law; ``samples``: of each piece, where it is no polynomial."""
+def certify(
+    path: Path,
+    timing: Timing,
+    limits: Limits,
+    checks: Sequence[Check] = (),
+    samples: int = 16,
+    moving: tuple[bool, bool] = (False, False),
+) -> Certificate:
+    """Worst places of a law; ``samples``: of each piece, where it is no polynomial; ``moving``: as of the law."""
     pieces = Pieces.of(path, timing)
     worst: dict[str, Worst] = {}
     limited = set()
@@ -160,7 +167,7 @@ def certify(path: Path, timing: Timing, limits: Limits, checks: Sequence[Check] 
         if scaled is not None:
             limited.add(name)
         if name == "jerk":
-            jump = _jump(path, timing, pieces, limits)
+            jump = _jump(path, timing, pieces, limits, moving)
             if jump is not None:
                 worst[name] = jump
                 continue
@@ -237,7 +244,7 @@ def _scaled(name: str, limits: Limits, path: Path) -> Callable[[Array], Array] |
     return beyond
 
 
-def _jump(path: Path, timing: Timing, pieces: Pieces, limits: Limits) -> Worst | None:
+def _jump(path: Path, timing: Timing, pieces: Pieces, limits: Limits, moving: tuple[bool, bool]) -> Worst | None:
     """The largest step of the acceleration at a break, its beginning and its end from and to rest included."""
     ends = pieces.at(path, timing, 2, np.array([0.0, 1.0]))
     if limits.acceleration is not None:
@@ -246,6 +253,8 @@ def _jump(path: Path, timing: Timing, pieces: Pieces, limits: Limits) -> Worst |
         scale = max(float(np.abs(ends).max()), 1e-300)
     steps = np.concatenate([ends[:1, 0], ends[1:, 0] - ends[:-1, 1], -ends[-1:, 1]]) / scale
     size = np.abs(steps)
+    size[0] *= not moving[0]
+    size[-1] *= not moving[1]
     if not size.size or size.max() <= STEP:
         return None
     place, joint = (int(k) for k in np.unravel_index(int(size.argmax()), size.shape))

@@ -47,13 +47,22 @@ class Law:
         path: positions over s. timing: s over time.
         limits: what :attr:`certificate` is about; none by default.
         checks: further quantities that it is about (torques, the speed of a frame); they go with the law.
+        moving: whether another motion leads to the beginning, and goes on from the end: an acceleration there is then
+            no step.
 
     Raises:
         ShapeError: limits of another number of joints. RangeError: the timing leaves the path.
     """
 
-    def __init__(self, path: Path, timing: Timing, limits: Limits | None = None, checks: Sequence[Check] = ()) -> None:
-        self.path, self.timing, self.checks = path, timing, tuple(checks)
+    def __init__(
+        self,
+        path: Path,
+        timing: Timing,
+        limits: Limits | None = None,
+        checks: Sequence[Check] = (),
+        moving: tuple[bool, bool] = (False, False),
+    ) -> None:
+        self.path, self.timing, self.checks, self.moving = path, timing, tuple(checks), moving
         self.limits = (limits or Limits()).for_dof(path.dof)
         ends = timing.evaluate(np.array([0.0, timing.duration]), 0, np.array([0, len(timing.times) - 2]))
         room = 1e-9 * (1.0 + np.abs(path.knots[[0, -1]]).max())
@@ -116,11 +125,11 @@ class Law:
     @cached_property
     def certificate(self) -> Certificate:
         """How much of :attr:`limits` and of :attr:`checks` the law uses at worst."""
-        return certify(self.path, self.timing, self.limits, self.checks)
+        return certify(self.path, self.timing, self.limits, self.checks, moving=self.moving)
 
     def with_limits(self, limits: Limits) -> Law:
         """The same law, to be compared with other limits."""
-        return Law(self.path, self.timing, limits, self.checks)
+        return Law(self.path, self.timing, limits, self.checks, self.moving)
 
     def scaled(self, factor: float) -> Law:
         """The same positions in ``factor`` times the time.
@@ -129,11 +138,11 @@ class Law:
             RangeError: not positive.
         """
         factor = validation.scalar("factor", factor, low=0.0, open_low=True)
-        return Law(self.path, self.timing.scaled(factor), self.limits, self.checks)
+        return Law(self.path, self.timing.scaled(factor), self.limits, self.checks, self.moving)
 
     def reversed(self) -> Law:
         """From the end to the beginning."""
-        return Law(self.path, self.timing.reversed(), self.limits, self.checks)
+        return Law(self.path, self.timing.reversed(), self.limits, self.checks, self.moving[::-1])
 
     def sliced(self, start: float, end: float) -> Law:
         """The part from one time to a later one, whose time counts from 0.
@@ -145,7 +154,8 @@ class Law:
         end = validation.scalar("end", end, low=0.0, high=self.duration, unit="s")
         if not start < end:
             raise RangeError("end", end, f"must be later than start, {start:g} s")
-        return Law(self.path, self.timing.sliced(start, end), self.limits, self.checks)
+        moving = (start > 0.0 or self.moving[0], end < self.duration or self.moving[1])
+        return Law(self.path, self.timing.sliced(start, end), self.limits, self.checks, moving)
 
     def then(self, other: Law) -> Law:
         """This law, and another from where this one ends, in position and in velocity.
@@ -161,4 +171,5 @@ class Law:
                 raise ContinuityError(
                     f"law.{name}", off, f"the laws do not meet: {name}s differ by more than {MEETING}"
                 )
-        return Law(path, self.timing.then(other.timing, path.shift), self.limits, self.checks)
+        moving = (self.moving[0], other.moving[1])
+        return Law(path, self.timing.then(other.timing, path.shift), self.limits, self.checks, moving)
