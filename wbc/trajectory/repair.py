@@ -1,0 +1,135 @@
+"""Laws that are met on a grid, made to keep their limits everywhere."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from wbc.errors import InfeasibleError
+from wbc.trajectory.certificate import TOLERANCE, Certificate, Check, Pieces, sampled
+from wbc.trajectory.checks import at_rest
+from wbc.trajectory.fastest import Shrunk, Task
+from wbc.trajectory.law import Law
+from wbc.validation import Array
+
+#: A slower law than this is not looked for, where a finer grid may do
+LOSS = 0.005
+
+#: Grids, each twice as fine as the one before
+GRIDS = 4
+
+#: Rounds of shrinking limits on one grid
+ROUNDS = 6
+
+#: What is kept beyond the tolerance of a certificate
+ROOM = 1e-9
+
+#: Largest factor of time by which forces are repaired
+SLOWEST = 4.0
+
+
+def repaired(task: Task, count: int | None = None) -> Law:
+    """The fastest law of a task that its certificate finds within limits.
+
+    From rest to rest time is stretched evenly, by max(v, sqrt a) for velocities and accelerations and by bisection for
+    forces, since gravity does not shrink; between other speeds limits are shrunk on the grid.
+
+    Raises:
+        InfeasibleError: standing still or the end speeds exceed limits. RangeError: nothing limits the motion.
+    """
+    return _stretched(task, count) if task.rests else _shrunk(task, count)
+
+
+def _law(task: Task, refined: int, count: int | None, shrunk: Shrunk | None = None) -> Law:
+    total = None if count is None else count * refined
+    return Law(task.path, task.timing(refined, total, shrunk), task.limits, task.checks)
+
+
+def _stretched(task: Task, count: int | None) -> Law:
+    law, factor = _law(task, 1, count), np.inf
+    for k in range(GRIDS):
+        law = _law(task, 2**k, count) if k else law
+        factor = _factor(task, law)
+        if factor <= 1.0 + LOSS:
+            break
+    if not np.isfinite(factor):
+        worst = max((law.certificate.worst[f.name] for f in task.forces), key=lambda w: w.ratio)
+        raise InfeasibleError(
+            "path", worst.ratio, f"forces at {worst.time:.6g} s exceed their limits however slow the motion is"
+        )
+    return law.scaled(factor)
+
+
+def _factor(task: Task, law: Law) -> float:
+    """Factor of time at which all limits are kept, inf if there is none below :data:`SLOWEST`."""
+    worst = law.certificate.worst
+    linear = ["velocity", *(check.name for check in task.speeds)]
+    needed = [worst[name].ratio for name in linear if name in worst]
+    if "acceleration" in worst:
+        needed.append(float(np.sqrt(worst["acceleration"].ratio)))
+    factor = max(needed, default=0.0)
+    if not task.forces:
+        return factor
+    factor = max(factor, 1.0)
+    pieces = Pieces.of(law.path, law.timing)
+    for force in task.forces:
+        factor = _slower(law, pieces, force, factor)
+    return factor
+
+
+def _slower(law: Law, pieces: Pieces, force: Check, factor: float, samples: int = 4) -> float:
+    """The smallest factor of time from ``factor`` on at which sampled forces keep their limits, by bisection.
+
+    At k times the duration forces are c + (f - c) / k^2, with c those at rest.
+    """
+    places = np.linspace(0.0, 1.0, samples + 1)
+    parts = [pieces.at(law.path, law.timing, order, places) for order in (0, 1, 2)]
+    state = [part.reshape(-1, *part.shape[2:]) for part in parts]
+    shape = (len(pieces.start), samples + 1, -1)
+    rest, moving = at_rest(force, state[0]).reshape(shape), force.ratios(*state).reshape(shape)
+
+    def kept(k: float) -> bool:
+        values: Array = rest + (moving - rest) / k**2
+        return sampled(pieces.start, pieces.span, values, force.columns).ratio <= 1.0
+
+    low, high, step = factor, factor, 1e-3
+    while not kept(high):
+        low, high, step = high, factor * (1.0 + step), 2.0 * step
+        if high > SLOWEST * factor:
+            return np.inf
+    for _ in range(20):
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if kept(middle) else (middle, high)
+    return high
+
+
+def _shrunk(task: Task, count: int | None) -> Law:
+    """Between given path speeds: limits on the grid are shrunk by what the certificate finds beyond them."""
+    failed: InfeasibleError | None = None
+    for k in range(GRIDS):
+        shrunk = Shrunk()
+        for _ in range(ROUNDS):
+            try:
+                law = _law(task, 2**k, count, shrunk)
+            except InfeasibleError as error:
+                failed = error
+                if shrunk == Shrunk():
+                    raise
+                break
+            if law.certificate.kept:
+                return law
+            shrunk = _more(task, shrunk, law.certificate)
+    raise failed or InfeasibleError("start_speed", (task.start, task.end), "no law between these path speeds was found")
+
+
+def _more(task: Task, shrunk: Shrunk, certificate: Certificate) -> Shrunk:
+    def over(*names: str) -> float:
+        ratios = [certificate.worst[name].ratio for name in names if name in certificate.worst]
+        worst = max(ratios, default=0.0)
+        return worst + ROOM if worst > 1.0 + TOLERANCE else 1.0
+
+    return Shrunk(
+        shrunk.velocity * over("velocity"),
+        shrunk.acceleration * over("acceleration"),
+        shrunk.speed * over(*(check.name for check in task.speeds)),
+        shrunk.force * over(*(check.name for check in task.forces)),
+    )
