@@ -27,8 +27,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wbc import pickling
-from wbc.errors import ShapeError
 from wbc.symbolic.tracer import Tracer
+from wbc.tasks._plain import plain
 
 if TYPE_CHECKING:
     from wbc.robot import Robot
@@ -175,7 +175,7 @@ class Item:
     def declaration(self, robot: Robot) -> dict[str, Any]:
         """Everything that decides the compiled code besides the robot, as plain data; part of the cache key."""
         return {"class": f"{type(self).__module__}.{type(self).__qualname__}"} | {
-            f.name: _plain(getattr(self, f.name), robot)
+            f.name: plain(getattr(self, f.name), robot)
             for f in dataclasses.fields(self)
             if f.name not in self.initial_only
         }
@@ -322,29 +322,3 @@ class Constraint(Item):
 def registry() -> dict[str, type[Item]]:
     """Every concrete task and constraint class by name, the user's own included."""
     return dict(_registry)
-
-
-def _plain(value: Any, robot: Robot) -> Any:
-    if isinstance(value, Item):
-        return value.declaration(robot)
-    if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        return {"class": type(value).__qualname__} | {
-            f.name: _plain(getattr(value, f.name), robot) for f in dataclasses.fields(value)
-        }
-    if isinstance(value, (list, tuple)):
-        return [_plain(v, robot) for v in value]
-    if isinstance(value, Mapping):
-        return {str(k): _plain(v, robot) for k, v in value.items()}
-    if isinstance(value, np.ndarray):
-        return [float(v).hex() for v in value.ravel()] + list(value.shape)
-    if isinstance(value, np.generic):
-        return value.item()
-    if hasattr(value, "homogeneous"):
-        return _plain(np.asarray(value.homogeneous), robot)
-    if isinstance(value, (str, int, bool, type(None))):
-        return value
-    if isinstance(value, float):
-        return value.hex()
-    if isinstance(value, ca.Function):
-        return value.serialize()
-    raise ShapeError("declaration", value, "only plain data, arrays, poses and CasADi functions")

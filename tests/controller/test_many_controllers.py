@@ -218,7 +218,7 @@ def test_two_threads_compile_one_stack(backend: str, tmp_path: Path, monkeypatch
     monkeypatch.setenv("WBC_CACHE", str(tmp_path))
     builds: list[int] = []
     build = artifact.build
-    monkeypatch.setattr(artifact, "build", lambda *a: builds.append(1) or build(*a))
+    monkeypatch.setattr(artifact, "build", lambda *a, **k: builds.append(1) or build(*a, **k))
     stack = unlike_any(0.125)
     together = threading.Barrier(3)
 

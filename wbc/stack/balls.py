@@ -38,7 +38,7 @@ class Balls:
         for block in layout.of_form("margins"):
             assert isinstance(block.entry.item, Constraint)
             rows = block.entry.item.ball_rows(stack.robot)
-            if not rows:
+            if not rows or not _same_author(type(block.entry.item)):
                 continue
             joints = [int(model.frames[frame_index(model, row.link)].parentJoint) for row in rows]
             moved = [[j for j in model.supports[joint] if j] for joint in joints]
@@ -123,3 +123,9 @@ class Balls:
             "row_segment": [self._segments[row.segment_key] for _, row, _ in self._rows],
             "segment_row": self.segment_rows,
         }
+
+
+def _same_author(kind: type) -> bool:
+    """Whether ``ball_rows`` is not older than ``margins``; else the class has changed the margins of another."""
+    order = [base for base in kind.__mro__ if {"margins", "ball_rows"} & vars(base).keys()]
+    return "ball_rows" in vars(order[0])
