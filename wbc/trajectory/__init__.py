@@ -18,6 +18,7 @@ _WHERE = {
     "Path": "path",
     "PolynomialPath": "path",
     "Timing": "timing",
+    "time_optimal": "least_time",
     "jerk_limited": "between_states",
     "standing_path": "joint_paths",
     "straight_path": "joint_paths",
