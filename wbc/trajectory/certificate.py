@@ -28,6 +28,9 @@ ORDERS = {"position": 0, "velocity": 1, "acceleration": 2, "jerk": 3}
 #: What `exact` calls kept
 TOLERANCE = 1e-6
 
+#: Intervals between samples of checks in each piece
+SAMPLES = 8
+
 #: Steps of a derivative at a break, relative to its limit, that are rounding
 STEP = 1e-9
 
@@ -135,6 +138,12 @@ class Pieces:
         out = chain(path, s, on_path, order)
         return out.reshape(count, places, *out.shape[1:])
 
+    def states(self, path: Path, timing: Timing) -> list[Array]:
+        """Position, velocity and acceleration at both ends and between, :data:`SAMPLES` + 1 times in every piece."""
+        places = np.linspace(0.0, 1.0, SAMPLES + 1)
+        parts = [self.at(path, timing, order, places) for order in (0, 1, 2)]
+        return [part.reshape(-1, *part.shape[2:]) for part in parts]
+
 
 def chain(path: Path, s: list[Array], piece: Index, order: int) -> Array:
     """The derivative along time of path(s(t)), from s and its derivatives along time."""
@@ -186,13 +195,10 @@ def certify(
     return Certificate(worst, frozenset(limited))
 
 
-def checked(path: Path, timing: Timing, pieces: Pieces, check: Check, samples: int = 4) -> Worst:
+def checked(path: Path, timing: Timing, pieces: Pieces, check: Check) -> Worst:
     """The worst place of a quantity that is known by its values, at samples of each piece."""
-    places = np.linspace(0.0, 1.0, samples + 1)
-    state = [pieces.at(path, timing, order, places) for order in (0, 1, 2)]
-    rows = [part.reshape(-1, *part.shape[2:]) for part in state]
-    values = check.ratios(*rows)
-    return sampled(pieces.start, pieces.span, values.reshape(len(pieces.start), samples + 1, -1), check.columns)
+    values = check.ratios(*pieces.states(path, timing))
+    return sampled(pieces.start, pieces.span, values.reshape(len(pieces.start), SAMPLES + 1, -1), check.columns)
 
 
 def sampled(start: Array, span: Array, values: Array, joints: int) -> Worst:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from wbc.errors import InfeasibleError
-from wbc.trajectory.certificate import TOLERANCE, Certificate, Check, Pieces, sampled
+from wbc.trajectory.certificate import SAMPLES, TOLERANCE, Certificate, Check, Pieces, sampled
 from wbc.trajectory.checks import at_rest
 from wbc.trajectory.fastest import Shrunk, Task
 from wbc.trajectory.law import Law
@@ -46,7 +46,8 @@ def _law(task: Task, refined: int, count: int | None, shrunk: Shrunk | None = No
 
 def _stretched(task: Task, count: int | None) -> Law:
     law, factor = _law(task, 1, count), np.inf
-    for k in range(GRIDS):
+    # What a finer grid gains with checks is less than what it costs to sample them
+    for k in range(2 if task.checks else GRIDS):
         law = _law(task, 2**k, count) if k else law
         factor = _factor(task, law)
         if factor <= 1.0 + LOSS:
@@ -61,7 +62,7 @@ def _stretched(task: Task, count: int | None) -> Law:
 
 def _factor(task: Task, law: Law) -> float:
     """Factor of time at which all limits are kept, inf if there is none below :data:`SLOWEST`."""
-    worst = law.certificate.worst
+    worst = Law(law.path, law.timing, task.limits, task.speeds).certificate.worst
     linear = ["velocity", *(check.name for check in task.speeds)]
     needed = [worst[name].ratio for name in linear if name in worst]
     if "acceleration" in worst:
@@ -76,15 +77,13 @@ def _factor(task: Task, law: Law) -> float:
     return factor
 
 
-def _slower(law: Law, pieces: Pieces, force: Check, factor: float, samples: int = 4) -> float:
+def _slower(law: Law, pieces: Pieces, force: Check, factor: float) -> float:
     """The smallest factor of time from ``factor`` on at which sampled forces keep their limits, by bisection.
 
     At k times the duration forces are c + (f - c) / k^2, with c those at rest.
     """
-    places = np.linspace(0.0, 1.0, samples + 1)
-    parts = [pieces.at(law.path, law.timing, order, places) for order in (0, 1, 2)]
-    state = [part.reshape(-1, *part.shape[2:]) for part in parts]
-    shape = (len(pieces.start), samples + 1, -1)
+    state = pieces.states(law.path, law.timing)
+    shape = (len(pieces.start), SAMPLES + 1, -1)
     rest, moving = at_rest(force, state[0]).reshape(shape), force.ratios(*state).reshape(shape)
 
     def kept(k: float) -> bool:
