@@ -19,8 +19,8 @@ from wbc.validation import Array
 FIRST = 16
 
 #: Where the spline is compared with the function, within each interval: the middle, which is a sample of the next
-#: spline, and a place that no halving comes to, since a function may repeat itself with the samples
-PLACES = (0.5, 0.5 * (3.0 - 5.0**0.5))
+#: spline, and two that no halving comes to, since a function may repeat itself with the samples
+PLACES = (0.25 * (5.0**0.5 - 1.0), 0.5, 0.25 * (5.0 - 5.0**0.5))
 
 #: Largest change of q' from one spline to the next, as a share of the largest |q'|
 SETTLED = 1e-3
@@ -53,7 +53,7 @@ def function_path(
 ) -> FunctionPath:
     """The spline of degree 5 (C4) through samples of q(x), x from start to end, halved until it is near enough:
 
-        |path - function| <= tolerance        at two places within each interval, none of them a sample
+        |path - function| <= tolerance        at three places within each interval, none of them a sample
 
     and until q' has settled: it changes by at most 1e-3 of its largest value from one spline to the next. s runs from
     0 to the length of the way, in proportion to x. Limits are kept and certified for the path, which is what moves;
