@@ -13,7 +13,7 @@ import wbc
 from wbc.errors import ContinuityError, InfeasibleError, RangeError, ShapeError, UnknownNameError, WbcError
 from wbc.shapes import Sphere
 from wbc.tasks import EndEffector, JointLimits, Obstacle, Posture
-from wbc.trajectory.follow import follow
+from wbc.trajectory import follow
 from wbc.trajectory.path import Path, PolynomialPath
 
 TIP = "panda_hand_tcp"
