@@ -11,7 +11,7 @@ robot = wbc.robots.load("tiago_no_hand", lock=(), shapes="none")
 radius = 0.0985
 wheels = [wbc.tasks.Wheel(f"wheel_{side}_joint", radius) for side in ("left", "right")]
 
-stack = wbc.Stack(robot, dt=0.03)
+stack = wbc.Stack(robot, dt=0.04)
 # Without slip: the base goes where its wheels turn, and nowhere sideways
 stack.add(wbc.tasks.Rolling(wheels), name="wheels")
 stack.add(wbc.tasks.EndEffector(robot.frames["tip"], kind="position", gain=10.0), name="hand")
@@ -23,7 +23,7 @@ controller = stack.compile()
 
 q = robot.neutral
 controller.reset(q)
-start, ticks = controller["hand"].target, 1000
+start, ticks = controller["hand"].target, 750
 
 
 def goal(k: int) -> np.ndarray:
@@ -59,8 +59,8 @@ print(f"seen from the base it stayed within {x:.2f} m by {y:.2f} m, and the arm 
 print(f"wheels rolled {rolled[0]:.2f} m (left) and {rolled[1]:.2f} m (right), slip at most {1e3 * slip:.4f} mm/s")
 
 scene = Scene(robot, dark=[robot.frames["tip"]], detail=0.005)
-scene.add_robot(postures[690])
-scene.add_robot(postures[330], pale=True)
+scene.add_robot(postures[518])
+scene.add_robot(postures[248], pale=True)
 scene.add_path(np.array(hand), "path of the hand", radius=0.012)
 scene.add_path(np.array(floor), "path of the base", (0.9, 0.5, 0.1), radius=0.012)
 print(scene.save("runs/mobile_base.png", size=(800, 540), azimuth=3.3, elevation=0.6))

@@ -19,8 +19,8 @@ from wbc.validation import Array
 #: Arrays of other kinds of numbers: single precision, indices, masks
 Numbers = NDArray[Any]
 
-#: Triangles with a longer edge than this on the screen are split before they are drawn [pixels]
-LARGEST_EDGE = 10.0
+#: Pixels that are filled at once: some tens of MB
+AT_ONCE = 1_000_000
 #: Side of the square shadow map [pixels]
 SHADOW_MAP = 1200
 #: Looks at the shadow map for each pixel
@@ -101,24 +101,26 @@ class Layer:
 def draw(meshes: Sequence[Mesh], camera: Camera) -> Layer:
     """The nearest surfaces."""
     size = camera.width * camera.height
-    depth = np.full(size, np.inf, dtype=np.float32)
+    nearness = np.full(size, np.inf, dtype=np.float32)
     owner = np.full(size, -1, dtype=np.int64)
     normals, colours, start = [], [], 0
     for mesh in meshes:
-        # The pieces of a split triangle share its plane, so they have its normal
-        screen, parent = _split(camera.project(mesh.triangles))
-        ahead = (screen[..., 2] > 0.05).all(axis=1)
-        screen, parent = screen[ahead], parent[ahead]
+        screen = camera.project(mesh.triangles)
+        ahead = np.flatnonzero((screen[..., 2] > 0.05).all(axis=1))
+        screen = screen[ahead]
+        # In a picture with perspective the inverse of depth is linear, not depth
+        screen[..., 2] = -1.0 / screen[..., 2]
         edges = mesh.triangles[:, 1:] - mesh.triangles[:, :1]
         normal = np.cross(edges[:, 0], edges[:, 1])
         normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-30)
-        _fill(screen, parent + start, depth, owner, camera.width, camera.height)
+        _fill(screen, ahead + start, nearness, owner, camera.width, camera.height)
         normals.append(normal)
         colours.append(np.broadcast_to(mesh.colour, (len(normal), 3)))
         start += len(mesh.triangles)
     normals.append(np.zeros((1, 3)))
     colours.append(np.zeros((1, 3)))
     shape = (camera.height, camera.width)
+    depth = np.where(owner >= 0, -1.0 / nearness, np.inf)
     return Layer(
         depth.reshape(shape), np.vstack(normals)[owner].reshape(*shape, 3), np.vstack(colours)[owner].reshape(*shape, 3)
     )
@@ -138,8 +140,8 @@ class Shadows:
         screen = every.copy()
         screen[..., :2] = (screen[..., :2] - self._origin) * self._scale
         depth = np.full(SHADOW_MAP**2, np.inf, dtype=np.float32)
-        pieces, parent = _split(screen)
-        _fill(pieces, parent, depth, np.full(SHADOW_MAP**2, -1, dtype=np.int64), SHADOW_MAP, SHADOW_MAP)
+        owner = np.full(SHADOW_MAP**2, -1, dtype=np.int64)
+        _fill(screen, np.arange(len(screen)), depth, owner, SHADOW_MAP, SHADOW_MAP)
         self._depth = depth.reshape(SHADOW_MAP, SHADOW_MAP)
 
     def lit(self, points: Array, softness: float) -> Array:
@@ -258,67 +260,56 @@ def _quads(rings: Array) -> Array:
     )
 
 
-def _split(screen: Array) -> tuple[Array, Numbers]:
-    """Triangles on the screen split at their longest edges until all are short, and the triangle each came from.
+def _fill(screen: Array, names: Numbers, least: Numbers, owner: Numbers, width: int, height: int) -> None:
+    """Keep, at each pixel whose middle lies in a triangle, the least third coordinate and whose it is.
 
-    Splitting on the screen keeps depth linear there; with edges this short, the error against true perspective is
-    far below the size of a pixel.
+    Args:
+        screen: (column, row, a coordinate that is linear in them) of the corners, m x 3 x 3.
+        names: m numbers.
+        least, owner: what is kept, height * width.
     """
-    done, parents = [], []
-    parent = np.arange(len(screen))
-    while len(screen):
-        edges = np.linalg.norm(screen[:, [1, 2, 0], :2] - screen[:, :, :2], axis=2)
-        small = edges.max(axis=1) <= LARGEST_EDGE
-        done.append(screen[small])
-        parents.append(parent[small])
-        screen, parent, longest = screen[~small], parent[~small], edges[~small].argmax(axis=1)
-        rows = np.arange(len(screen))
-        a, b, c = (screen[rows, (longest + k) % 3] for k in range(3))
-        middle = (a + b) / 2
-        screen = np.concatenate([np.stack([a, middle, c], axis=1), np.stack([middle, b, c], axis=1)])
-        parent = np.concatenate([parent, parent])
-    return np.concatenate(done or [np.zeros((0, 3, 3))]), np.concatenate(parents or [np.zeros(0, dtype=np.int64)])
+    low, high = screen[..., 1].min(axis=1), screen[..., 1].max(axis=1)
+    first = np.clip(np.ceil(low - 0.5), 0, height).astype(np.int64)
+    rows = np.maximum(np.clip(np.floor(high - 0.5), -1, height - 1).astype(np.int64) - first + 1, 0)
+    a, b, c = screen[:, 0], screen[:, 1] - screen[:, 0], screen[:, 2] - screen[:, 0]
+    area = b[:, 0] * c[:, 1] - b[:, 1] * c[:, 0]
+    rows[np.abs(area) < 1e-9] = 0
+    with np.errstate(divide="ignore", invalid="ignore"):
+        slope = np.stack([b[:, 2] * c[:, 1] - c[:, 2] * b[:, 1], c[:, 2] * b[:, 0] - b[:, 2] * c[:, 0]], axis=1)
+        slope /= area[:, None]
+    triangle, step = _each(rows)
+    row = first[triangle] + step
+    left, right = _crossings(screen[triangle], row + 0.5)
+    start = np.clip(np.ceil(left - 0.5 - 1e-4), 0, width).astype(np.int64)
+    count = np.maximum(np.clip(np.floor(right - 0.5 + 1e-4), -1, width - 1).astype(np.int64) - start + 1, 0)
+    bottom, top = screen[..., 2].min(axis=1), screen[..., 2].max(axis=1)
+    for part in np.array_split(np.arange(len(row)), max(1, int(count.sum()) // AT_ONCE)):
+        span, step = _each(count[part])
+        span = part[span]
+        who, x, y = triangle[span], start[span] + step, row[span]
+        value = a[who, 2] + slope[who, 0] * (x + 0.5 - a[who, 0]) + slope[who, 1] * (y + 0.5 - a[who, 1])
+        # A sliver's slope is as steep as it is thin
+        value = np.clip(value, bottom[who], top[who]).astype(np.float32)
+        pixel = y * width + x
+        np.minimum.at(least, pixel, value)
+        kept = value <= least[pixel]
+        owner[pixel[kept]] = names[who[kept]]
 
 
-def _fill(screen: Array, names: Numbers, depth: Numbers, owner: Numbers, width: int, height: int) -> None:
-    """Write nearest depth and owner of each pixel whose middle lies in a triangle."""
-    low = np.floor(screen[..., :2].min(axis=1) - 0.5).astype(np.int64) + 1
-    high = np.floor(screen[..., :2].max(axis=1) - 0.5).astype(np.int64)
-    span = (high - low).max(axis=1) + 1 if len(screen) else np.zeros(0, dtype=np.int64)
-    on = (span > 0) & (high >= 0).all(axis=1) & (low[:, 0] < width) & (low[:, 1] < height)
-    for size in (1, 2, 3, 4, 5, 7, 9, int(LARGEST_EDGE) + 2):
-        chosen = np.flatnonzero(on & (span <= size))
-        on[chosen] = False
-        for part in np.array_split(chosen, max(1, len(chosen) * size * size // 2_000_000 + 1)):
-            if len(part):
-                _fill_group(screen[part], names[part], low[part], size, depth, owner, width, height)
+def _each(counts: Numbers) -> tuple[Numbers, Numbers]:
+    """For each of ``counts[k]`` things of k: k, and its number among them."""
+    owner = np.repeat(np.arange(len(counts)), counts)
+    return owner, np.arange(len(owner)) - np.repeat(np.cumsum(counts) - counts, counts)
 
 
-def _fill_group(
-    screen: Array, names: Numbers, low: Numbers, size: int, depth: Numbers, owner: Numbers, width: int, height: int
-) -> None:
-    # Within a small window single precision is enough, and half the memory to move
-    corner = np.concatenate([low, np.zeros((len(low), 1), dtype=np.int64)], axis=1)
-    local = (screen - corner[:, None]).astype(np.float32)
-    a, b, c = local[:, 0], local[:, 1], local[:, 2]
-    steps = np.arange(size)
-    x = (low[:, 0, None] + steps)[:, None, :]
-    y = (low[:, 1, None] + steps)[:, :, None]
-    area = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
-    area = np.where(np.abs(area) < 1e-9, np.float32(np.nan), area)[:, None, None]
-    middles = steps.astype(np.float32) + np.float32(0.5)
-    px, py = middles[None, None, :], middles[None, :, None]
-
-    def share(p: Numbers, r: Numbers) -> Numbers:
-        along = (r[:, 0] - p[:, 0])[:, None, None] * (py - p[:, 1, None, None])
-        across = (r[:, 1] - p[:, 1])[:, None, None] * (px - p[:, 0, None, None])
-        return np.asarray((along - across) / area)
-
-    wa, wb, wc = share(b, c), share(c, a), share(a, b)
-    inside = (wa >= -1e-5) & (wb >= -1e-5) & (wc >= -1e-5) & (x >= 0) & (x < width) & (y >= 0) & (y < height)
-    z = wa * a[:, 2, None, None] + wb * b[:, 2, None, None] + wc * c[:, 2, None, None]
-    where = np.broadcast_to(y * width + x, z.shape)[inside]
-    values = z[inside]
-    np.minimum.at(depth, where, values)
-    nearest = values <= depth[where]
-    owner[where[nearest]] = np.broadcast_to(names[:, None, None], z.shape)[inside][nearest]
+def _crossings(triangles: Array, y: Array) -> tuple[Array, Array]:
+    """Leftmost and rightmost column of each triangle on a line at height y; (inf, -inf) where they do not meet."""
+    left, right = np.full(len(y), np.inf), np.full(len(y), -np.inf)
+    for k in range(3):
+        (x1, y1), (x2, y2) = triangles[:, k, :2].T, triangles[:, k - 1, :2].T
+        with np.errstate(divide="ignore", invalid="ignore"):
+            x = x1 + (y - y1) / (y2 - y1) * (x2 - x1)
+        meets = (np.minimum(y1, y2) <= y) & (y <= np.maximum(y1, y2)) & (y1 != y2)
+        left[meets] = np.minimum(left, x)[meets]
+        right[meets] = np.maximum(right, x)[meets]
+    return left, right
