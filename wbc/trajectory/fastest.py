@@ -23,9 +23,6 @@ LEAST, PER_PIECE, LEAST_ON_PIECE = 500, 125, 8
 #: Tangents at a knot that differ by less than this share are one tangent
 SMOOTH = 1e-9
 
-#: Halvings in search of the largest end speed
-HALVINGS = 40
-
 
 @dataclass(frozen=True, eq=False)
 class Shrunk:
@@ -168,17 +165,23 @@ def _limited(grid: Grid, rows: list[Rows]) -> None:
 
 def _unreachable(program: Program, start: float, end: float) -> InfeasibleError:
     """What to say when no motion leads from one path speed to another."""
-    stops = program.fastest(start, 0.0)
-    if stops.speed is None:
-        most = 0.0 if stops.start is None else stops.start[1]
-        return InfeasibleError("start_speed", start, f"the largest path speed from which it can stop is {most:.6g}")
-    low, high = 0.0, end
-    for _ in range(HALVINGS):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if program.fastest(start, middle).speed is not None else (low, middle)
     reach = program.fastest(start, end).start
     if reach is not None and start > reach[1]:
         return InfeasibleError(
-            "start_speed", start, f"the largest path speed that works with this end speed is {reach[1]:.6g}"
+            "start_speed", start, f"the largest path speed that works with this end speed is {_below(reach[1])}"
         )
-    return InfeasibleError("end_speed", end, f"the largest path speed that works with this start speed is {low:.6g}")
+    back = program.reversed().fastest(end, start).start
+    if back is not None:
+        return InfeasibleError(
+            "end_speed", end, f"the largest path speed that works with this start speed is {_below(back[1])}"
+        )
+    stops = program.fastest(start, 0.0).start
+    most = 0.0 if stops is None else stops[1]
+    return InfeasibleError(
+        "start_speed", start, f"the largest path speed from which the path can be followed is {_below(most)}"
+    )
+
+
+def _below(speed: float) -> str:
+    """A speed in digits that do not round it up, and a little less, so that it works."""
+    return f"{speed * (1.0 - 1e-5):.6g}"

@@ -72,7 +72,8 @@ class Program:
         sigma[-1] = 1.0
         self.count = len(s) - 1
         self.spans = np.diff(sigma)
-        self.unit = _unit_of_time(rows, squared, self.length)
+        self._given = (s, rows, squared)
+        self.unit = _unit_of_time(rows, squared, np.diff(s))
         scale = self.length / self.unit**2
         constraints = [_Coefficients(_parameters(r, self.spans, scale, self.length)) for r in rows]
         bounds = np.zeros((self.count + 1, 2))
@@ -99,6 +100,12 @@ class Program:
         speed = np.sqrt(squared) / factor
         speed[0], speed[-1] = start, end
         return Speeds(speed, reach)
+
+    def reversed(self) -> Program:
+        """The same path from its end to its beginning."""
+        s, rows, squared = self._given
+        back = [Rows(-r.a[::-1, ::-1], r.b[::-1, ::-1], r.c[::-1, ::-1], r.both) for r in rows]
+        return Program(-s[::-1], back, squared[::-1])
 
     def _backwards(self, last: float) -> tuple[Array, Array]:
         """Lowest and highest squared speeds from which the end can be reached; NaN at the beginning if from nowhere."""
@@ -137,25 +144,31 @@ class Program:
 
 
 def _parameters(rows: Rows, spans: Array, scale: float, length: float) -> tuple[Any, ...]:
-    """Rows at both ends of each interval in terms of u and of x at its beginning, in units of length and time."""
+    """Rows at both ends of each interval in terms of u and of x at its beginning, in units of length and time.
+
+    Each row is divided by its largest factor, because the tolerances of the linear programs are absolute.
+    """
     count, _, size = rows.a.shape
     right = rows.a[:, 1] + 2.0 * (spans * length)[:, None] * rows.b[:, 1]
     a = np.concatenate([rows.a[:, 0], right], axis=1) * scale
     b = rows.b.reshape(count, 2 * size) * (scale * length)
-    c = rows.c.reshape(count, 2 * size)
-    parts = [np.concatenate([part, part[-1:]]) for part in (a, b, c)]
-    one = np.eye(2 * size)
-    factor = np.concatenate([one, -one]) if rows.both else one
-    return (*parts, factor, np.ones(len(factor)), None, None)
+    c = rows.c.reshape(count, 2 * size) - 1.0
+    if rows.both:
+        a, b, c = (np.concatenate([part, sign * part], axis=1) for part, sign in ((a, -1.0), (b, -1.0), (c, 1.0)))
+    largest = np.maximum(np.maximum(np.abs(a), np.abs(b)), 1e-9)
+    parts = [np.concatenate([part, part[-1:]]) for part in (a / largest, b / largest, c / largest)]
+    width = a.shape[1]
+    return (*parts, np.eye(width), np.zeros(width), None, None)
 
 
-def _unit_of_time(rows: Sequence[Rows], squared: Array, length: float) -> float:
+def _unit_of_time(rows: Sequence[Rows], squared: Array, spans: Array) -> float:
     """About the time that the path takes."""
+    length = float(spans.sum())
     slopes = max((float(np.abs(r.a).max(initial=0.0)) * length for r in rows), default=0.0)
-    bends = max((float(np.abs(r.b).max(initial=0.0)) * length**2 for r in rows), default=0.0)
-    quick = np.sqrt(slopes + bends)
-    known = squared[np.isfinite(squared)]
-    slow = length / float(np.sqrt(known.min())) if len(known) else 0.0
+    bends = [float((np.sqrt(np.abs(r.b).max(axis=(1, 2), initial=0.0)) * spans).sum()) for r in rows]
+    quick = float(np.sqrt(slopes)) + max(bends, default=0.0)
+    speeds = np.sqrt(np.minimum(squared[:-1], squared[1:]))
+    slow = float((spans / speeds).sum())
     if quick == 0.0:
         return slow or 1.0
-    return float(np.sqrt(quick * slow)) if slow > quick else float(quick)
+    return float(np.sqrt(quick * slow)) if slow > quick else quick
