@@ -22,6 +22,8 @@ _WHERE = {
     "Followed": "following",
     "time_optimal": "least_time",
     "jerk_limited": "between_states",
+    "online": "online_filter",
+    "Online": "online_filter",
     "standing_path": "joint_paths",
     "straight_path": "joint_paths",
     "spline_path": "joint_paths",

@@ -34,6 +34,9 @@ from wbc.validation import Array
 #: Limits in units of the motion that no course can reach; ruckig is exact up to 1e9
 UNREACHED = 1e7
 
+#: A motion of no size [rad or m]
+LEAST = 1e-200
+
 
 @dataclass(frozen=True, eq=False)
 class Task:
@@ -88,11 +91,9 @@ def by_ruckig(task: Task, synchronisation: str, duration: float = 0.0) -> list[C
     import ruckig
 
     length, tau = task.units
-    if length == 0.0:
+    if length < LEAST:
         return [Course((p, 0.0, 0.0), (), ()) for p in task.start[0].tolist()]
     scale = np.array([1.0, tau, tau * tau])[:, None] / length
-    if not np.isfinite(scale).all():
-        return None
     asked: Any = ruckig.InputParameter(task.dof)
     asked.current_position = np.zeros(task.dof)
     asked.target_position = (task.target[0] - task.start[0]) * scale[0]
