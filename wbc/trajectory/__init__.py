@@ -36,6 +36,7 @@ _WHERE = {
     "pose_spline": "pose_paths",
     "arc_path": "arcs",
     "arc_through": "arcs",
+    "via_points": "via_points",
 }
 
 __all__ = sorted(_WHERE)  # noqa: PLE0605
