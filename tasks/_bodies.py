@@ -41,9 +41,11 @@ def body(link: str, number: int, placed: PlacedShape) -> Body:
     return Body(label(link, number), link, placed.placement, placed.shape)
 
 
-def sensed_labels(count: int) -> tuple[Row, ...]:
+def sensed_labels(rows: int, corners: int) -> tuple[Row, ...]:
     """Rows of a sensor: which pairs they are about changes from tick to tick."""
-    return tuple(Row(f"closest[{k}]", "m") for k in range(count))
+    count = rows // (1 + corners)
+    nearest = tuple(Row(f"closest[{k}]", "m") for k in range(count))
+    return (*nearest, *(Row(f"closest[{k}].corner[{i}]", "m") for k in range(count) for i in range(corners)))
 
 
 def sensed_margins(inputs: Values, count: int) -> ca.SX:
@@ -51,15 +53,15 @@ def sensed_margins(inputs: Values, count: int) -> ca.SX:
     return inputs["distance"] - inputs["margin"] if count else ca.SX(0, 1)
 
 
-def checked_count(field: str, value: Any) -> int:
-    """How many of the closest pairs have a row.
+def checked_count(field: str, value: Any, least: int = 1) -> int:
+    """How many of the closest pairs, or of their corners, have a row.
 
     Raises:
-        RangeError: not an integer >= 1.
+        RangeError: not an integer >= ``least``.
     """
-    number = validation.scalar(field, value, low=1.0)
+    number = validation.scalar(field, value, low=float(least))
     if isinstance(value, bool) or number != int(number):
-        raise RangeError(field, value, "expected an integer >= 1")
+        raise RangeError(field, value, f"expected an integer >= {least}")
     return int(number)
 
 

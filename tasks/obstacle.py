@@ -46,6 +46,7 @@ class Obstacle(Constraint):
         margin: initial value of the input [m].
         pose: initial value of the input; None: the identity. Set one of them before the first step.
         closest: rows of the sensed pairs; no more than there are such pairs.
+        corners: further rows of each of them while it is near, for corners and ends: what nearest points jump to.
 
     Inputs:
         pose: of the obstacle in the world [m, rad]. Set it here or in the declaration before the first step.
@@ -77,11 +78,13 @@ class Obstacle(Constraint):
     margin: float = 0.0
     pose: pin.SE3 | None = None
     closest: int = 8
+    corners: int = 4
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "shape", _checked_shape(self.shape))
         object.__setattr__(self, "margin", validation.scalar("Obstacle.margin", self.margin, low=0.0, unit="m"))
         object.__setattr__(self, "closest", bodies.checked_count("Obstacle.closest", self.closest))
+        object.__setattr__(self, "corners", bodies.checked_count("Obstacle.corners", self.corners, least=0))
         if self.links is not None:
             object.__setattr__(self, "links", selection("Obstacle.links", self.links))
         if self.pose is not None:
@@ -134,21 +137,26 @@ class Obstacle(Constraint):
         return tuple(out)
 
     def sensed_rows(self, robot: Robot) -> int:
-        """At most ``closest``."""
-        return min(self.closest, len(self.sensed_pairs(robot)))
+        """Those of at most ``closest`` pairs: one each, then ``corners`` each."""
+        return self._nearest(robot) * (1 + self.corners)
 
     def sensor(self, robot: Robot, numbers: Numbers) -> Sensor:
         """Coal, for the sensed pairs."""
-        return PairSensor(robot, self.sensed_pairs(robot), self.sensed_rows(robot), numbers)
+        return PairSensor(robot, self.sensed_pairs(robot), self._nearest(robot), numbers, corners=self.corners)
+
+    def _nearest(self, robot: Robot) -> int:
+        return min(self.closest, len(self.sensed_pairs(robot)))
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
-        """``link[i]`` for shape i of a link, with suffixes where it has several; ``closest[k]``."""
+        """``link[i]`` for shape i of a link, with suffixes where it has several; ``closest[k]``,
+        then ``closest[k].corner[i]``.
+        """
         own = [
             Row(bodies.label(link, k) + suffix, "m")
             for link, k, placed in self.pairs(robot)
             for suffix in self._suffixes(placed.shape)
         ]
-        return (*own, *bodies.sensed_labels(self.sensed_rows(robot)))
+        return (*own, *bodies.sensed_labels(self.sensed_rows(robot), self.corners))
 
     def margins(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
         """See the class."""

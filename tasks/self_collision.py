@@ -47,6 +47,7 @@ class SelfCollision(Constraint):
             are neither welded together nor neighbours across one joint.
         margin: initial value of the input [m].
         closest: rows of the sensed pairs; no more than there are such pairs.
+        corners: further rows of each of them while it is near, for corners and ends: what nearest points jump to.
         method: ``"auto"``: expressions where the shapes have one, if these are at most :data:`SYMBOLIC_PAIRS` pairs of
             shapes, else all are sensed; ``"symbolic"``: expressions or an error; ``"sensed"``: all are sensed.
 
@@ -59,7 +60,8 @@ class SelfCollision(Constraint):
 
     It cannot see what the link shapes do not cover. Shapes that are larger than the links may overlap in every
     configuration: leave such pairs out. Pairs beyond the ``closest`` sensed ones have no row in a tick. Nearest points
-    of parallel capsules, of faces and of edges jump, and the gradient with them; see :mod:`wbc.tasks._gap`.
+    of parallel capsules, of faces and of edges jump, and the gradient with them; see :mod:`wbc.tasks._gap` and
+    :mod:`wbc.proximity.corners`.
 
     Example:
         >>> SelfCollision([("left_wrist", "right_wrist"), ("left_wrist", "torso")], margin=0.02)
@@ -74,6 +76,7 @@ class SelfCollision(Constraint):
     pairs: tuple[tuple[str, str], ...] | None = None
     margin: float = 0.0
     closest: int = 8
+    corners: int = 4
     method: Literal["auto", "symbolic", "sensed"] = "auto"
 
     def __post_init__(self) -> None:
@@ -81,6 +84,7 @@ class SelfCollision(Constraint):
             object.__setattr__(self, "pairs", _checked_pairs(self.pairs))
         object.__setattr__(self, "margin", validation.scalar("SelfCollision.margin", self.margin, low=0.0, unit="m"))
         object.__setattr__(self, "closest", bodies.checked_count("SelfCollision.closest", self.closest))
+        object.__setattr__(self, "corners", bodies.checked_count("SelfCollision.corners", self.corners, least=0))
         validation.one_of("SelfCollision.method", self.method, METHODS)
 
     def validate(self, robot: Robot) -> None:
@@ -140,21 +144,26 @@ class SelfCollision(Constraint):
         return tuple((body(a), body(b)) for a, b in self._split(robot)[1])
 
     def sensed_rows(self, robot: Robot) -> int:
-        """At most ``closest``."""
-        return min(self.closest, len(self._split(robot)[1]))
+        """Those of at most ``closest`` pairs: one each, then ``corners`` each."""
+        return self._nearest(robot) * (1 + self.corners)
 
     def sensor(self, robot: Robot, numbers: Numbers) -> Sensor:
         """Coal, for the sensed pairs."""
-        return PairSensor(robot, self.sensed_pairs(robot), self.sensed_rows(robot), numbers)
+        return PairSensor(robot, self.sensed_pairs(robot), self._nearest(robot), numbers, corners=self.corners)
+
+    def _nearest(self, robot: Robot) -> int:
+        return min(self.closest, len(self._split(robot)[1]))
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
-        """``link[i] link[k]`` for shapes i and k of two links, with suffixes where they are more; ``closest[k]``."""
+        """``link[i] link[k]`` for shapes i and k of two links, with suffixes where they are more; ``closest[k]``,
+        then ``closest[k].corner[i]``.
+        """
         own = [
             Row(f"{bodies.label(*first[:2])} {bodies.label(*second[:2])}{suffix}", "m")
             for first, second in self._split(robot)[0]
             for suffix in gap.pair_rows(first[2].shape, second[2].shape)
         ]
-        return (*own, *bodies.sensed_labels(self.sensed_rows(robot)))
+        return (*own, *bodies.sensed_labels(self.sensed_rows(robot), self.corners))
 
     def margins(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
         """See the class."""

@@ -40,6 +40,12 @@ def test_shapes_keep_clear(item: str, name: str) -> None:
     check(loop(name), item, STARTS if item == "rod" and name != "talos" else FEWER)
 
 
+def test_rows_for_corners_keep_arms_from_rocking() -> None:
+    """With one row a sensed pair two arms side by side roll over each other, deeper than the whole margin."""
+    with pytest.raises(AssertionError, match=r"\{'deepest': (np.float64\()?-0.02"):
+        check(collisions.one_row_a_pair(), "self, sensed", FEWER)
+
+
 @pytest.mark.parametrize("item", MUTATIONS)
 def test_wrong_formula_is_noticed(item: str) -> None:
     with pytest.raises(AssertionError, match=r"\{'"):

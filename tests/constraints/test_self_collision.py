@@ -105,8 +105,9 @@ def test_sensed_rows_in_the_stack(name: str) -> None:
     bot, item, rng = boxed(), ITEMS[name](), np.random.default_rng(42)
     control = Stack(bot, 0.01).add(item, name="item").compile(backend="vm")
     known = {(a.name, b.name): (a, b) for a, b in item.sensed_pairs(bot)}
-    count, rows, checked = item.sensed_rows(bot), len(item.rows(bot)), 0
-    assert 0 < count == min(item.closest, len(known))
+    sensed, rows, checked = item.sensed_rows(bot), len(item.rows(bot)), 0
+    count = min(item.closest, len(known))
+    assert 0 < count * (1 + item.corners) == sensed
     for _ in range(12):
         q, v = random_configuration(bot, rng), rng.uniform(-1, 1, bot.nv)
         pose, twist = pin.SE3(pin.exp3(rng.uniform(-2, 2, 3)), rng.uniform(-0.5, 0.5, 3)), rng.uniform(-1, 1, 6)
@@ -122,7 +123,7 @@ def test_sensed_rows_in_the_stack(name: str) -> None:
         assert max(d for _, _, d in pairs) < 1.2 * max(sorted(every.values())[count - 1], 0.0) + 0.02
         assert [d for _, _, d in pairs] == pytest.approx([every[a, b] for a, b, _ in pairs], abs=1e-6)
         for k, (a, b, distance) in enumerate(pairs):
-            row, low = qp.A[rows - count + k], qp.lower[bot.nv + rows - count + k]
+            row, low = qp.A[rows - sensed + k], qp.lower[bot.nv + rows - sensed + k]
             rate, bend = slope(bot, known[a, b], q, v, pose, twist * isinstance(item, Obstacle))
             if bend < 1e-3 and distance > 0:
                 drift = -low - control["item"].rate * (distance - 0.015)
@@ -229,8 +230,9 @@ def test_which_pairs_and_which_method() -> None:
     auto = [row.label for row in SelfCollision([("panda_link0", "panda_link6")]).rows(mixed)]
     assert auto == ["panda_link0[0] panda_link6[0]"]
     both = [row.label for row in SelfCollision([("panda_link0", "panda_hand")]).rows(mixed)]
-    assert both == ["panda_link0[0] panda_hand[0].start", "panda_link0[0] panda_hand[0].end", "closest[0]"]
-    assert SelfCollision([("panda_link0", "panda_hand")], method="sensed").sensed_rows(mixed) == 1
+    assert both[:3] == ["panda_link0[0] panda_hand[0].start", "panda_link0[0] panda_hand[0].end", "closest[0]"]
+    assert both[3:] == [f"closest[0].corner[{k}]" for k in range(4)]
+    assert SelfCollision([("panda_link0", "panda_hand")], method="sensed", corners=0).sensed_rows(mixed) == 1
 
 
 def test_many_pairs_are_sensed_or_refused(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -238,7 +240,8 @@ def test_many_pairs_are_sensed_or_refused(monkeypatch: pytest.MonkeyPatch) -> No
     first, *_, last = bot.shapes
     far = [(first, last)]
     monkeypatch.setattr(module, "SYMBOLIC_PAIRS", 3)
-    assert [row.label for row in SelfCollision(far, closest=2).rows(bot)] == ["closest[0]", "closest[1]"]
+    plain = SelfCollision(far, closest=2, corners=0)
+    assert [row.label for row in plain.rows(bot)] == ["closest[0]", "closest[1]"]
     with pytest.raises(RangeError, match=r"SelfCollision\.pairs: more than 3 pairs.*method='sensed'.*got 4"):
         SelfCollision(far, method="symbolic").validate(bot)
     crowd = bot.with_shapes(dict.fromkeys(far[0], (BALL,) * 150))
@@ -261,6 +264,9 @@ def test_bad_declarations() -> None:
     for count in (0, -1, 2.5, True):
         with pytest.raises(RangeError, match=r"SelfCollision\.closest"):
             SelfCollision(closest=count)
+    for count in (-1, 1.5, True):
+        with pytest.raises(RangeError, match=r"SelfCollision\.corners"):
+            SelfCollision(corners=count)
     with pytest.raises(UnknownNameError, match=r"SelfCollision\.method.*valid: symbolic"):
         SelfCollision(method="symbolik")
     with pytest.raises(UnknownNameError, match=rf"SelfCollision\.pairs.*{last}"):

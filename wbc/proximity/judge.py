@@ -48,6 +48,7 @@ class Judge:
 
     Attributes:
         doubtful: pairs whose last result is a declared one.
+        supports: support functions of the scene's bodies.
     """
 
     def __init__(self, scene: Scene, geometries: list[object], centers: list[Array]) -> None:
@@ -57,7 +58,7 @@ class Judge:
         self.doubtful = np.zeros(len(scene.first), dtype=bool)
         self._marked = False
         shapes = [body.shape for body in scene.bodies]
-        self._supports = Supports(shapes, centers)
+        self.supports = Supports(shapes, centers)
         self._geometries = geometries
         kinds = [(type(shapes[a]), type(shapes[b])) for a, b in zip(scene.first, scene.second, strict=True)]
         #: clearances of half-spaces have one direction only, and Coal's closed forms have it
@@ -93,7 +94,7 @@ class Judge:
         scene = self.scene
         a, b = scene.first[pairs], scene.second[pairs]
         turned = (scene.rotations[a], scene.rotations[b])
-        return clearance(self._supports, (a, b), turned, scene.centers[b] - scene.centers[a], normal)
+        return clearance(self.supports, (a, b), turned, scene.centers[b] - scene.centers[a], normal)
 
     def _mend(self, pair: int, doubtful: bool) -> None:
         """Give a pair the best direction there is; Coal's own stays where it is not in doubt and as good."""
@@ -108,8 +109,8 @@ class Judge:
             return
         best = int(np.argmax(values >= values.max() - self.tie))
         normal, value = directions[best], float(values[best])
-        first = scene.rotations[a] @ self._supports.point(a, scene.rotations[a].T @ normal) + scene.centers[a]
-        second = scene.rotations[b] @ self._supports.point(b, -scene.rotations[b].T @ normal) + scene.centers[b]
+        first = scene.rotations[a] @ self.supports.point(a, scene.rotations[a].T @ normal) + scene.centers[a]
+        second = scene.rotations[b] @ self.supports.point(b, -scene.rotations[b].T @ normal) + scene.centers[b]
         results = scene.results
         results.distance[pair], results.normal[pair] = value, normal
         results.point[pair] = (first + second - value * normal) / 2

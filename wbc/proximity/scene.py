@@ -44,6 +44,8 @@ class Scene:
         first, second: numbers of the bodies A and B of every pair.
         results: signed distance, unit normal from A to B, and a point of the line through both witness points, of
             every pair at its last :meth:`measure`.
+        supports: support functions of the bodies.
+        shifts: centres of the bodies' bounding spheres in the frames of their shapes [m].
         radii: of the bounding spheres of both bodies of a pair together [m]; 0 for a half-space.
         gaps: signed distances of the watched pairs at their last :meth:`measure` [m], in the order of :meth:`watch`.
         doubtful: Coal's normal did not hold, or the opposite one holds as well; see :mod:`wbc.proximity.judge`.
@@ -82,7 +84,8 @@ class Scene:
         self._prepare_bounds(geometries, moving)
         self.watch(None)
         self._judge = Judge(self, [g.geometry for g in geometries], [g.center for g in geometries])
-        self.doubtful = self._judge.doubtful
+        self.doubtful, self.supports = self._judge.doubtful, self._judge.supports
+        self.shifts = [g.center for g in geometries]
 
     @property
     def has_outside(self) -> bool:

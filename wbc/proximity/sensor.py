@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from wbc.errors import RangeError, ShapeError, UnknownNameError, UnsupportedJointError
 from wbc.proximity.body import OBSTACLE, Body, checked_pairs
 from wbc.proximity.choice import Choice
+from wbc.proximity.corners import NEAR, Corners
 from wbc.proximity.scene import Scene
 from wbc.shapes import FAR
 from wbc.validation import Array
@@ -23,15 +24,18 @@ if TYPE_CHECKING:
 class PairSensor:
     """Writes the ``count`` closest of some pairs into the inputs of sensed rows.
 
-    See :meth:`wbc.tasks.base.Constraint.sensed_rows` for what ``distance``, ``drift``, ``line`` and ``side`` mean.
+    See :meth:`wbc.tasks.base.Constraint.sensed_rows` for what ``distance``, ``drift``, ``line`` and ``side`` mean. The
+    first ``count`` rows are for the nearest points; then come ``corners`` rows a pair, see
+    :mod:`wbc.proximity.corners`.
 
     Args:
         robot: the robot that carries the bodies.
         pairs: bodies A and B each; normals point from A to B.
-        count: how many rows there are.
+        count: how many pairs have rows.
         numbers: views that are written (``distance``, ``drift``, ``line``, ``side``) and read (``pose``, and
-            ``velocity`` where given, of what moves from outside).
+            ``velocity`` where given, of what moves from outside; ``margin`` where given, [m]).
         moving: one more name, besides ``"obstacle"``, for the frame that moves with ``numbers["pose"]``.
+        corners: how many more rows a pair has.
 
     Raises:
         ShapeError, RangeError, UnknownNameError, DuplicateNameError: no pairs, too many, or bad ones.
@@ -46,6 +50,7 @@ class PairSensor:
         numbers: Mapping[str, Array],
         *,
         moving: str | None = None,
+        corners: int = 0,
     ) -> None:
         outside = frozenset({OBSTACLE} if moving is None else {OBSTACLE, moving})
         checked = checked_pairs("pairs", robot, pairs, outside)
@@ -53,19 +58,29 @@ class PairSensor:
             raise RangeError("pairs", 0, "expected a pair at least")
         if isinstance(count, bool) or not isinstance(count, int) or count < 1:
             raise RangeError("count", count, "expected an integer >= 1")
+        if isinstance(corners, bool) or not isinstance(corners, int) or corners < 0:
+            raise RangeError("corners", corners, "expected an integer >= 0")
         self._scene = Scene(robot, checked, outside)
         self._names = [(a.name, b.name) for a, b in checked]
         self._side = sides(robot, self._scene)
         self.count = count
-        self._distance, self._drift = _view(numbers, "distance", count), _view(numbers, "drift", count)
-        self._line = _view(numbers, "line", 6 * count).reshape(count, 6)
-        self._row_side = _view(numbers, "side", robot.nv * count).reshape(count, robot.nv)
+        whole, nv = count * (1 + corners), robot.nv
+        self._all = [_view(numbers, "distance", whole), _view(numbers, "drift", whole)]
+        self._all += [_view(numbers, "line", 6 * whole), _view(numbers, "side", nv * whole)]
+        self._distance, self._drift = self._all[0][:count], self._all[1][:count]
+        self._line = self._all[2][: 6 * count].reshape(count, 6)
+        self._row_side = self._all[3][: nv * count].reshape(count, nv)
+        self._corners = Corners(self._scene, corners) if corners else None
+        rest = zip(self._all, (1, 1, 6, nv), strict=True)
+        self._more = [values[count * size :].reshape(count, corners, size) for values, size in rest]
+        self._margin = numbers["margin"] if "margin" in numbers else np.zeros(1)
         self._pose = self._velocity = None
         if self._scene.has_outside:
             self._pose = _view(numbers, "pose", 12)
             self._velocity = _view(numbers, "velocity", 6) if "velocity" in numbers else None
         self._outward = np.array([(b.frame in outside) - (a.frame in outside) for a, b in checked], dtype=float)
-        self._seen = b""
+        self._seen, self._bare = b"", True
+        self._drifts, self._twist = False, np.zeros(6)
         self._choice = Choice(self._scene, count)
         rows = min(count, len(checked))
         self._rows, self._got = slice(rows), np.zeros((16, rows))
@@ -86,7 +101,9 @@ class PairSensor:
     def reset(self) -> None:
         """Forget which pairs had which rows; until the next :meth:`sense` no row has a pair."""
         self._choice.reset()
-        self._distance[:], self._drift[:], self._line[:], self._row_side[:] = FAR, 0.0, 0.0, 0.0
+        for values, empty in zip(self._all, (FAR, 0.0, 0.0, 0.0), strict=True):
+            values[:] = empty
+        self._bare = True
 
     def sense(self, q: Array) -> None:
         """Measure at a configuration [nq] and write the rows."""
@@ -98,6 +115,8 @@ class PairSensor:
         if self._choice.update():
             self._arrange()
         self._write()
+        if self._corners is not None:
+            self._write_corners(self._corners)
 
     def pairs(self) -> tuple[tuple[str, str, float], ...]:
         """(name of A, name of B, distance [m]) of the rows that have a pair, in the last call."""
@@ -123,11 +142,27 @@ class PairSensor:
         self._got_to[:] = self._got_from
         self._line_to[:] = self._line_from
         if self._pose is not None and self._velocity is not None:
-            if any(self._velocity.tolist()):
-                twist = twist_at_origin(self._velocity, self._pose[9:])
-                self._drift[self._rows] = self._line_to @ twist * self._pair_outward
+            self._drifts = any(self._velocity.tolist())
+            if self._drifts:
+                self._twist = twist_at_origin(self._velocity, self._pose[9:])
+                self._drift[self._rows] = self._line_to @ self._twist * self._pair_outward
             else:
                 self._drift[:] = 0.0
+
+    def _write_corners(self, corners: Corners) -> None:
+        """Rows for the corners of the pairs that are near; all others are far."""
+        distance, drift, line, side = self._more
+        limit = self._margin.item() + NEAR * self._scene.robot.characteristic_length
+        near = (self._got_to < limit).nonzero()[0]
+        if not self._bare:
+            distance[:], drift[:], line[:], side[:] = FAR, 0.0, 0.0, 0.0
+        self._bare = not near.size
+        if not near.size:
+            return
+        gaps, lines = corners.measure(self._choice.pairs[near])
+        distance[near, :, 0], line[near], side[near] = gaps, lines, self._row_side[near, None]
+        if self._drifts:
+            drift[near, :, 0] = lines @ self._twist * self._pair_outward[near, None]
 
 
 def twist_at_origin(velocity: Array, origin: Array) -> Array:

@@ -1,0 +1,169 @@
+"""Rows for corners: what they measure, by Coal; that they forbid nothing; where there are none."""
+
+from __future__ import annotations
+
+import coal
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from tests.constraints.evaluation import random_configuration
+from tests.models import Y, arm
+from tests.proximity.world import Referee, buffers, coal_shape, link_bodies, place, robot, set_pose, things
+from wbc.errors import RangeError
+from wbc.proximity import FAR, Body, PairSensor
+from wbc.proximity.corners import HULL_CORNERS, corners_of, spread
+from wbc.robot import Robot
+from wbc.shapes import Box, Capsule, Convex, Cylinder, HalfSpace, Sphere
+
+CORNERS = 4
+
+
+def made(
+    bot: Robot, pairs: list[tuple[Body, Body]], count: int, margin: float = 0.0, corners: int = CORNERS
+) -> tuple[PairSensor, dict[str, np.ndarray]]:
+    numbers = buffers(bot, count * (1 + corners)) | {"margin": np.array([margin])}
+    return PairSensor(bot, pairs, count, numbers, corners=corners), numbers
+
+
+def rows_of(bot: Robot, numbers: dict[str, np.ndarray], q: np.ndarray) -> np.ndarray:
+    count = len(numbers["distance"])
+    screws = pin.computeJointJacobians(bot.model, bot.model.createData(), q).reshape(6, -1)
+    return np.asarray(numbers["side"].reshape(count, -1) * (numbers["line"].reshape(count, 6) @ screws))
+
+
+def truths(referee: Referee, pair: tuple[Body, Body], q: np.ndarray, pose: pin.SE3) -> np.ndarray:
+    """Distances by Coal of the corners of each body, as balls, from the other body, sorted."""
+    pin.framesForwardKinematics(referee.bot.model, referee.data, q)
+    out = []
+    for own, other in (pair, pair[::-1]):
+        if isinstance(other.shape, (Convex, HalfSpace)):
+            continue
+        center = own.shape.points.mean(axis=0) if isinstance(own.shape, Convex) else np.zeros(3)
+        ball = own.shape.radius if isinstance(own.shape, Capsule) else 0.0
+        where, there = referee.pose(own, pose), referee.pose(other, pose)
+        for corner in corners_of(own.shape, center):
+            at = coal.Transform3s(np.eye(3), where.act(corner + center))
+            tip, place_ = coal.Sphere(ball), coal.Transform3s(there.rotation, there.translation)
+            request = coal.DistanceRequest()
+            request.gjk_tolerance = 1e-10
+            result = coal.DistanceResult()
+            out.append(coal.distance(tip, at, coal_shape(other.shape), place_, request, result))
+    return np.sort(np.array(out))
+
+
+@pytest.mark.parametrize("name", ["panda", "talos"])
+def test_corners_are_measured_as_coal_says(name: str) -> None:
+    """The nearest corners, for all pairs of shapes; none is nearer than the bodies themselves."""
+    bot, rng = robot(name), np.random.default_rng(30)
+    links, others = link_bodies(bot, rng), things(rng)
+    pairs = [(a, b) for a in links for b in others] + [(b, a) for a in links for b in others]
+    sensing, numbers = made(bot, pairs, len(pairs), margin=10.0)
+    referee, compared = Referee(bot), 0
+    for _ in range(2):
+        q, pose = random_configuration(bot, rng), place(rng, 0.4)
+        set_pose(numbers, pose)
+        sensing.sense(q)
+        main, more = numbers["distance"][: len(pairs)], numbers["distance"][len(pairs) :].reshape(-1, CORNERS)
+        for k, pair in enumerate(pairs):
+            truth = truths(referee, pair, q, pose)
+            if main[k] < 1e-3 or not len(truth):
+                continue
+            found = np.sort(more[k][more[k] < FAR / 2])
+            assert len(found) == min(CORNERS, len(truth))
+            assert found == pytest.approx(truth[: len(found)], abs=2e-5)
+            assert found.min() > main[k] - 4e-6, "nothing is asked for but the distance"
+            compared += 1
+    assert compared > 60
+
+
+def test_rows_are_the_derivatives_of_the_corners_distances() -> None:
+    """Corner by corner, against central differences, with what moves by itself."""
+    bot, rng, step = robot("ur5"), np.random.default_rng(31), 1e-6
+    links, others = link_bodies(bot, rng), things(rng)
+    pairs = [(a, b) for a in links[1:] for b in others]
+    sensing, numbers = made(bot, pairs, len(pairs), margin=10.0)
+    checked = moving = 0
+    for _ in range(3):
+        q, v = random_configuration(bot, rng), rng.uniform(-1, 1, bot.nv)
+        pose, twist = place(rng, 0.4), rng.uniform(-1, 1, 6)
+        found = []
+        for t in (-step, 0.0, step):
+            set_pose(numbers, pin.SE3(pin.exp3(t * twist[3:]) @ pose.rotation, pose.translation + t * twist[:3]))
+            numbers["velocity"][:] = twist
+            sensing.sense(pin.integrate(bot.model, q, t * v))
+            rate = rows_of(bot, numbers, pin.integrate(bot.model, q, t * v)) @ v + numbers["drift"]
+            found.append((numbers["distance"].copy(), rate, numbers["drift"].copy()))
+        (before, _, _), (here, rate, drift), (after, _, _) = found
+        smooth = np.abs(after - 2 * here + before) < 1e-9
+        use = (np.arange(len(here)) >= len(pairs)) & (here < 10.0) & (here > 1e-3) & smooth
+        assert rate[use] == pytest.approx((after - before)[use] / (2 * step), abs=1e-3)
+        checked, moving = checked + use.sum(), moving + np.count_nonzero(drift[use])
+    assert checked > 200
+    assert moving > 20
+
+
+def test_a_slab_on_a_hinge_has_a_row_for_each_edge() -> None:
+    """Tilted by 1e-6 rad, its nearest point is on one edge; the other edge, 20 cm away, has rows of its own."""
+    bot, slab = arm("hinge", [(Y, (0.0, 0.0, 0.0))]), Box((0.2, 0.2, 0.02))
+    table = Body("table", "world", pin.SE3(np.eye(3), np.array([0.0, 0.0, -0.12])), Box((0.3, 0.3, 0.02)))
+    sensing, numbers = made(bot, [(table, Body("slab", "F1", pin.SE3.Identity(), slab))], 1, margin=0.1)
+    for tilt in (-1e-6, 0.0, 1e-6):
+        sensing.sense(np.array([tilt]))
+        rows = rows_of(bot, numbers, np.array([tilt]))[1:, 0]
+        assert np.sort(rows) == pytest.approx([-0.1, -0.1, 0.1, 0.1], abs=1e-4)
+        assert numbers["distance"][1:] == pytest.approx(np.full(4, 0.1), abs=1e-6)
+
+
+def test_pairs_that_are_far_have_no_such_rows() -> None:
+    bot = arm("hinge", [(Y, (0.0, 0.0, 0.0))])
+    ball, slab = Sphere(0.05), Body("slab", "F1", pin.SE3.Identity(), Box((0.2, 0.2, 0.02)))
+    there = Body("ball", "obstacle", pin.SE3.Identity(), ball)
+    sensing, numbers = made(bot, [(slab, there)], 1)
+    for height, corners in ((0.07, 4), (3.0, 0), (0.08, 4)):
+        set_pose(numbers, pin.SE3(np.eye(3), np.array([0.0, 0.0, height])))
+        sensing.sense(np.zeros(1))
+        assert np.count_nonzero(numbers["distance"][1:] < FAR) == corners
+        assert numbers["line"][6:].reshape(4, 6).any(axis=1).sum() == corners
+    sensing.reset()
+    assert set(numbers["distance"]) == {FAR}
+    assert not numbers["line"].any()
+    assert not numbers["side"].any()
+
+
+def test_balls_have_no_corners_and_overlaps_no_normals() -> None:
+    """Two balls; a corner that is inside the other body; hulls against hulls: far, and never NaN."""
+    bot = arm("hinge", [(Y, (0.0, 0.0, 0.0))])
+    here = pin.SE3.Identity()
+    hull = Convex(0.1 * np.vstack([np.eye(3), -np.eye(3)]))
+    box = Box((0.1, 0.1, 0.1))
+    for own, other in ((Sphere(0.1), Sphere(0.05)), (box, Box((1.0, 1.0, 1.0))), (hull, hull), (box, HalfSpace())):
+        pair = (Body("own", "F1", here, own), Body("other", "world", here, other))
+        sensing, numbers = made(bot, [pair], 1)
+        sensing.sense(np.zeros(1))
+        assert np.isfinite(numbers["line"]).all()
+        if not (isinstance(own, Box) and isinstance(other, Box)):
+            assert set(numbers["distance"][1:]) == {FAR}
+
+
+def test_corners_of_shapes() -> None:
+    zero = np.zeros(3)
+    assert len(corners_of(Box((0.1, 0.2, 0.3)), zero)) == 8
+    assert corners_of(Capsule(0.1, 0.4), zero) == pytest.approx(np.array([[0, 0, -0.2], [0, 0, 0.2]]))
+    rim = corners_of(Cylinder(0.1, 0.4), zero)
+    assert np.hypot(rim[:, 0], rim[:, 1]) == pytest.approx(np.full(len(rim), 0.1))
+    assert len(corners_of(Sphere(0.1), zero)) == len(corners_of(HalfSpace(), zero)) == 0
+    points = np.random.default_rng(3).normal(size=(60, 3))
+    chosen = spread(points, HULL_CORNERS)
+    assert len(chosen) == HULL_CORNERS
+    assert all(np.linalg.norm(points - p, axis=1).min() == 0.0 for p in chosen)
+    assert len(spread(points[:5], HULL_CORNERS)) == 5
+
+
+@pytest.mark.parametrize("corners", [-1, 1.5, True, None])
+def test_bad_numbers_of_corners(corners: object) -> None:
+    bot = robot("panda")
+    hand = Body("hand", "panda_hand", pin.SE3.Identity(), Sphere(0.1))
+    block = Body("block", "world", pin.SE3.Identity(), Box((0.1, 0.1, 0.1)))
+    with pytest.raises(RangeError, match="corners"):
+        PairSensor(bot, [(hand, block)], 1, buffers(bot, 1), corners=corners)  # type: ignore[arg-type]
