@@ -85,10 +85,11 @@ def time_optimal(
     longer = None if duration is None else validation.scalar("duration", duration, low=0.0, open_low=True, unit="s")
     if longer is not None and not task.rests:
         raise RangeError("duration", duration, "a duration can only be asked for from rest to rest")
-    if intervals is not None and (isinstance(intervals, bool) or int(intervals) != intervals or intervals < 2):
-        raise RangeError("intervals", intervals, "expected a whole number, at least 2")
+    count = None if intervals is None else validation.scalar("intervals", intervals, low=2.0)
+    if count is not None and count != int(count):
+        raise RangeError("intervals", intervals, "expected a whole number")
     _within_positions(way, kept)
-    law = _law(task, intervals, longer)
+    law = _law(task, None if count is None else int(count), longer)
     if longer is None:
         return law
     if longer < law.duration * (1.0 - 1e-12):
@@ -133,11 +134,11 @@ def _standing(task: Task, duration: float | None) -> Law:
 
 def _limits(path: Path, limits: Limits | None, velocity: Any, acceleration: Any) -> Limits:
     """Limits with numbers spread over the joints."""
-    out = limits or Limits()
+    out = (limits or Limits()).for_dof(path.dof)
     if out.jerk is not None and np.isfinite(out.jerk).any():
         raise RangeError("limits.jerk", out.jerk, "laws of least time step in acceleration, see jerk_limited")
     given = {"velocity": velocity, "acceleration": acceleration}
-    return replace(out, **{k: _spread(k, v, path.dof) for k, v in given.items() if v is not None}).for_dof(path.dof)
+    return replace(out, **{k: _spread(k, v, path.dof) for k, v in given.items() if v is not None})
 
 
 def _spread(name: str, value: Any, count: int) -> Array:
