@@ -14,8 +14,8 @@ import pinocchio as pin
 import pytest
 
 from tests.published.via_walker import INCH, inches, place, rot_z, swing
+from wbc.trajectory import via_points
 from wbc.trajectory.turning import quaternion, turn_between
-from wbc.trajectory.via_points import via_points
 from wbc.trajectory.via_speeds import Bounds, corner_speeds
 
 AXIAL, ROUND = swing((13, 12), (13, 16)), swing((13, 12), (17, 12))

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from wbc.trajectory import Law
-from wbc.trajectory.via_points import via_points
+from wbc.trajectory import Law, via_points
 
 INCH = 0.0254
 

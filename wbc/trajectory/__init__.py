@@ -36,7 +36,7 @@ _WHERE = {
     "pose_spline": "pose_paths",
     "arc_path": "arcs",
     "arc_through": "arcs",
-    "via_points": "via_points",
+    "via_points": "via_poses",
 }
 
 __all__ = sorted(_WHERE)  # noqa: PLE0605
