@@ -11,6 +11,7 @@ import numpy as np
 import pinocchio as pin
 
 from wbc.errors import RangeError
+from wbc.trajectory import bernstein
 from wbc.trajectory.path import Index, PolynomialPath
 from wbc.validation import Array
 
@@ -91,12 +92,15 @@ class QuaternionSpline:
 
     def __init__(self, spline: PolynomialPath, field: str) -> None:
         self.spline, self.knots = spline, spline.knots
-        shares = np.arange(20) / 20.0
-        grid = (spline.knots[:-1, None] + np.diff(spline.knots)[:, None] * shares).ravel()
-        sizes = np.linalg.norm(spline.evaluate(grid), axis=1)
-        if sizes.min() < SHORTEST_QUATERNION:
-            at = int(sizes.argmin()) // len(shares)
-            raise RangeError(f"{field}[{at}]", at, "orientations change too unevenly behind this pose; add poses")
+        nodes = bernstein.nodes(2 * (spline.degree or 0))
+        pieces = np.repeat(np.arange(len(spline.knots) - 1), len(nodes))
+        grid = (spline.knots[:-1, None] + np.diff(spline.knots)[:, None] * nodes).ravel()
+        squares = np.sum(spline.evaluate(grid, 0, pieces) ** 2, axis=1).reshape(-1, len(nodes))
+        # Squares are polynomials as well: their smallest value is found, not sampled
+        lowest, at, _ = bernstein.largest(-bernstein.coefficients(squares))
+        if -lowest < SHORTEST_QUATERNION**2:
+            place = f"between {at} and {at + 1} of the poses that differ"
+            raise RangeError(field, place, "orientations change too unevenly here; add poses")
 
     def evaluate(self, s: Array, order: int, piece: Index) -> Array:
         parts = [self.spline.evaluate(s, k, piece) for k in range(order + 1)]
