@@ -22,6 +22,7 @@ _WHERE = {
     "Followed": "following",
     "time_optimal": "least_time",
     "jerk_limited": "between_states",
+    "jerk_limited_along": "along",
     "online": "online_filter",
     "Online": "online_filter",
     "standing_path": "joint_paths",

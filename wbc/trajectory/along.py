@@ -1,0 +1,134 @@
+"""Jerk-limited laws along paths."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from wbc import validation
+from wbc.errors import BoundsError, ContinuityError, InfeasibleError, ShapeError
+from wbc.trajectory.between_states import limits_of, sizes_of
+from wbc.trajectory.certificate import TOLERANCE
+from wbc.trajectory.joined_courses import STILL
+from wbc.trajectory.law import Law
+from wbc.trajectory.path import Path
+from wbc.trajectory.path_speed import Stretch, fastest
+from wbc.trajectory.timing import Timing
+from wbc.validation import Array
+
+#: Steps of the first or second derivative at a knot, as a share of its size, that are rounding
+STEP = 1e-9
+
+#: Laws are slowed down by this share more than the certificate asks for
+ROOM = 1e-9
+
+
+def jerk_limited_along(
+    path: Path,
+    *,
+    velocity: Any,
+    acceleration: Any,
+    jerk: Any,
+    lower: Any = None,
+    upper: Any = None,
+    stops: bool = False,
+    cells: int = 200,
+) -> Law:
+    """A fast law exactly on a path, from rest to rest, with bounded jerk:
+
+        |q' s'| <= V,    |q'' s'^2 + q' s''| <= A,    |q''' s'^3 + 3 q'' s' s'' + q' s'''| <= J
+
+    by linear programs over the squared path speed (after D. Verscheure et al., "Time-optimal path tracking for robots:
+    a convex optimization approach", IEEE TAC 54(10), 2009, with the jerk's limit replaced by its tangents), quintics in
+    time between grid points, and a uniform slowing down by what the certificate still finds: max(v, sqrt a, cbrt j).
+
+    Args:
+        path: twice continuously differentiable between its ends, and moving everywhere; else see ``stops``.
+        velocity, acceleration, jerk: n finite positive numbers, or one for all [per s, s^2, s^3]; for poses 6.
+        lower, upper: limits of joint positions; a path that leaves them is refused.
+        stops: come to rest where the direction or the curvature of the path jumps, instead of refusing it.
+        cells: of the grid between two stops; more make the law faster by 1 % at best, and take longer.
+
+    Raises:
+        ShapeError, NotFiniteError, RangeError, BoundsError: of arguments; BoundsError: the path leaves its limits.
+        ContinuityError: direction or curvature jump, with the coordinate, and not ``stops``. InfeasibleError: there is
+        nothing to move, or no speed is found.
+    """
+    if not isinstance(path, Path):
+        raise ShapeError("path", path, "expected a path")
+    cells = int(validation.scalar("cells", cells, low=8.0))
+    stops = validation.flag("stops", stops)
+    limits = limits_of(path.dof, velocity, acceleration, jerk, lower, upper)
+    breaks = _breaks(path)
+    if breaks and not stops:
+        place, what = breaks[0]
+        raise ContinuityError(
+            "path", place, f"{what} jumps at this coordinate, which no finite jerk follows; stops=True rests there"
+        )
+    ends = [float(path.knots[0]), *(place for place, _ in breaks), float(path.knots[-1])]
+    timing: Timing | None = None
+    for start, end in zip(ends[:-1], ends[1:], strict=True):
+        part = _part(path, start, end, sizes_of(limits), cells)
+        timing = part if timing is None else timing.then(part, 0.0)
+    assert timing is not None
+    law = Law(path, timing, limits)
+    law = law.scaled(_slower(law) * (1.0 + ROOM))
+    position = law.certificate.worst.get("position")
+    if position is not None and position.ratio > 1.0 + TOLERANCE:
+        value = float(law.at(position.time).position[position.joint])
+        raise BoundsError(f"position of joint {position.joint}", value, "the path leaves the limits of this joint")
+    return law
+
+
+def _part(path: Path, start: float, end: float, sizes: tuple[Array, Array, Array], cells: int) -> Timing:
+    """The timing between two stops; of a part on which nothing moves, a moment."""
+    stretch = Stretch.of(path, start, end, sizes, cells)
+    if not any(part.any() for place in (0.0, 0.5, 1.0) for part in stretch.derivatives(place)):
+        return Timing([0.0, STILL], [[(end - start) / STILL], [start]])
+    timing = fastest(stretch)
+    return timing.scaled(_slower(Law(path, timing, None), sizes))
+
+
+def _slower(law: Law, sizes: tuple[Array, Array, Array] | None = None) -> float:
+    """The factor of time at which the limits are just kept, at least 1."""
+    if sizes is not None:
+        from wbc.trajectory.limits import Limits
+
+        law = law.with_limits(Limits(velocity=sizes[0], acceleration=sizes[1], jerk=sizes[2]))
+    worst = law.certificate.worst
+    factor = 1.0
+    for order, name in enumerate(("velocity", "acceleration", "jerk"), 1):
+        if not np.isfinite(worst[name].ratio):
+            raise InfeasibleError("path", worst[name].time, f"{name} has no bound at this time")
+        factor = max(factor, worst[name].ratio ** (1.0 / order))
+    return factor
+
+
+def _breaks(path: Path) -> list[tuple[float, str]]:
+    """Inner knots at which the direction or the curvature jumps."""
+    knots = path.knots[1:-1]
+    if not knots.size:
+        return []
+    before = np.arange(len(knots))
+    steps = []
+    for order in (1, 2):
+        left = path.evaluate(knots, order, before)
+        right = path.evaluate(knots, order, before + 1)
+        size = max(float(np.abs(left).max()), float(np.abs(right).max()), 1e-300)
+        steps.append(np.abs(right - left).max(axis=1) / size)
+    # A second derivative may be rounding altogether
+    if _bend(path) < STEP:
+        steps[1][:] = 0.0
+    return [
+        (float(s), "the direction" if first > STEP else "the curvature")
+        for s, first, second in zip(knots, *steps, strict=True)
+        if max(first, second) > STEP
+    ]
+
+
+def _bend(path: Path) -> float:
+    """Largest second derivative over the largest first one, times the length."""
+    s = np.unique(np.concatenate([path.knots, np.linspace(path.knots[0], path.knots[-1], 101)]))
+    first, second = (float(np.abs(path.evaluate(s, order)).max()) for order in (1, 2))
+    return second * path.length / first if first > 0.0 else 0.0
