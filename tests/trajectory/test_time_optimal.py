@@ -137,7 +137,7 @@ def test_limits_of_very_different_sizes(velocity, acceleration):
 
 
 def test_time_scales_with_the_path():
-    waypoints, velocity, acceleration = random_problem(np.random.default_rng(10), 5)
+    waypoints, _, acceleration = random_problem(np.random.default_rng(10), 5)
     whole = time_optimal(waypoints, 1e9, acceleration).duration
     for size in (1e-6, 1e6):
         part = time_optimal(size * waypoints, 1e9 * size, acceleration).duration

@@ -56,7 +56,7 @@ def test_knots_of_paths_increase():
 def test_paths_beyond_position_limits_are_refused_with_joint_and_place():
     # The parabola through 0, 1, 0 over s = 0, 1, 2 peaks at s = 1
     limits = Limits(lower=[-1.0, -1.0], upper=[1.0, 0.9])
-    with pytest.raises(BoundsError, match="joint 1 .* at s = 1") as caught:
+    with pytest.raises(BoundsError, match=r"joint 1 .* at s = 1") as caught:
         time_optimal([[0.0, 0.0], [0.0, 1.0], [0.0, 0.0]], 1.0, 1.0, limits=limits)
     assert caught.value.value == pytest.approx(1.0)
 

@@ -1,7 +1,7 @@
 """The 21 instances of toppra's robustness suite: ours take no longer than the published durations.
 
-Numbers from tests/retime/robustness of github.com/hungpham2511/toppra: problems, and durations with hotqpOASES by number
-of grid points; a duration that was asked for is published as reached within 1e-5.
+Numbers from tests/retime/robustness of github.com/hungpham2511/toppra: problems, and durations with hotqpOASES by
+number of grid points; a duration that was asked for is published as reached within 1e-5.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 For piecewise polynomial paths and timings each derivative of each joint is a polynomial between breaks. Its Bernstein
 coefficients bound it, and are halved until the bound is within 1e-13 of a value that is taken: ``exact``. Else the law
-is sampled, and what lies between two samples is bounded by their values and the largest slope that was seen:
+is sampled, and what lies between two samples is bounded by their values and twice the largest slope that was seen:
 ``sampled``.
 """
 
@@ -15,6 +15,7 @@ from typing import Literal, Protocol
 import numpy as np
 
 from wbc.trajectory import bernstein
+from wbc.trajectory.between import Highest, highest
 from wbc.trajectory.limits import Limits
 from wbc.trajectory.path import Index, Path
 from wbc.trajectory.timing import Timing
@@ -138,9 +139,13 @@ class Pieces:
         out = chain(path, s, on_path, order)
         return out.reshape(count, places, *out.shape[1:])
 
-    def states(self, path: Path, timing: Timing) -> list[Array]:
-        """Position, velocity and acceleration at both ends and between, :data:`SAMPLES` + 1 times in every piece."""
-        places = np.linspace(0.0, 1.0, SAMPLES + 1)
+    def some(self, numbers: Index) -> Pieces:
+        """Those of some numbers."""
+        return Pieces(self.start[numbers], self.span[numbers], self.timing[numbers], self.path[numbers])
+
+    def states(self, path: Path, timing: Timing, count: int = SAMPLES) -> list[Array]:
+        """Position, velocity and acceleration at both ends and between, count + 1 times in every piece."""
+        places = np.linspace(0.0, 1.0, count + 1)
         parts = [self.at(path, timing, order, places) for order in (0, 1, 2)]
         return [part.reshape(-1, *part.shape[2:]) for part in parts]
 
@@ -196,30 +201,25 @@ def certify(
 
 
 def checked(path: Path, timing: Timing, pieces: Pieces, check: Check) -> Worst:
-    """The worst place of a quantity that is known by its values, at samples of each piece."""
-    values = check.ratios(*pieces.states(path, timing))
-    return sampled(pieces.start, pieces.span, values.reshape(len(pieces.start), SAMPLES + 1, -1), check.columns)
+    """The worst place of a quantity that is known by its values, at samples of each piece, more of them at need."""
+
+    def evaluate(some: Index, count: int) -> Array:
+        values = check.ratios(*pieces.some(some).states(path, timing, count))
+        return values.reshape(len(some), count + 1, -1)
+
+    return _worst(pieces.start, pieces.span, highest(pieces.span, evaluate, SAMPLES), check.columns)
 
 
 def sampled(start: Array, span: Array, values: Array, joints: int) -> Worst:
     """The highest of samples (pieces x samples x numbers), evenly spaced over each piece, and a bound on what lies
     between; numbers repeat with the joints.
-
-    Between two neighbours f rises above the larger by at most (L h - |f1 - f0|) / 2 for a Lipschitz constant L; the
-    largest slope between neighbours of the piece or of those beside it stands for L, and is doubled.
     """
-    count = values.shape[1] - 1
-    slopes = np.abs(np.diff(values, axis=1)).max(axis=1)
-    beside = slopes.copy()
-    beside[1:] = np.maximum(beside[1:], slopes[:-1])
-    beside[:-1] = np.maximum(beside[:-1], slopes[1:])
-    over = np.maximum(values[:, 1:], values[:, :-1]) + (0.5 * (2.0 * beside[:, None] - np.abs(np.diff(values, axis=1))))
-    piece, place, column = (int(k) for k in np.unravel_index(int(values.argmax()), values.shape))
-    top = float(values.max())
-    time = float(start[piece] + span[piece] * place / count)
-    return Worst(
-        float(over.max()), column % joints, time, "sampled", float(over.max()) - top, float(span.max() / count)
-    )
+    return _worst(start, span, highest(span, lambda some, count: values, values.shape[1] - 1, rounds=0), joints)
+
+
+def _worst(start: Array, span: Array, top: Highest, joints: int) -> Worst:
+    time = float(start[top.piece] + top.place * span[top.piece])
+    return Worst(top.bound, top.column % joints, time, "sampled", top.bound - top.seen, top.spacing)
 
 
 def _exact(pieces: Pieces, c: Array, joints: int) -> Worst:

@@ -24,7 +24,7 @@ LEAST, PER_PIECE, LEAST_ON_PIECE = 500, 125, 8
 SMOOTH = 1e-9
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class Shrunk:
     """Factors by which limits are made smaller before they are met on the grid."""
 

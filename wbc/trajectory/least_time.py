@@ -62,7 +62,7 @@ def time_optimal(
         robot: whose torques and frames are meant.
         inequality: (function, F, g), or name -> (function, F, g), with F w <= g for w = function(q, dq/dt, d2q/dt2)
             that is affine in d2q/dt2 and quadratic in dq/dt: contact wrenches.
-        start_speed, end_speed: of the path coordinate, ds/dt >= 0; near |dq/dt| for waypoints.
+        start_speed, end_speed: of the path coordinate, ds/dt >= 0, so that dq/dt = q' ds/dt.
         duration: a longer time than the least, from rest to rest [s].
         intervals: of the grid; by default 125 for each piece of the path and at least 500.
 

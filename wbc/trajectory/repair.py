@@ -5,10 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from wbc.errors import InfeasibleError
-from wbc.trajectory.certificate import SAMPLES, TOLERANCE, Certificate, Check, Pieces, sampled
+from wbc.trajectory.between import highest
+from wbc.trajectory.certificate import SAMPLES, TOLERANCE, Certificate, Check, Pieces
 from wbc.trajectory.checks import at_rest
 from wbc.trajectory.fastest import Shrunk, Task
 from wbc.trajectory.law import Law
+from wbc.trajectory.path import Index
 from wbc.validation import Array
 
 #: A slower law than this is not looked for, where a finer grid may do
@@ -77,27 +79,40 @@ def _factor(task: Task, law: Law) -> float:
     return factor
 
 
+class _Forces:
+    """Forces of a law by the factor k of its time, c + (f - c) / k^2 with c those at rest; sampled once a place."""
+
+    def __init__(self, law: Law, pieces: Pieces, force: Check) -> None:
+        self.law, self.pieces, self.force = law, pieces, force
+        self._known: dict[tuple[int, int], tuple[Array, Array]] = {}
+
+    def kept(self, factor: float) -> bool:
+        """Whether the bound of all ratios is at most 1."""
+        return highest(self.pieces.span, lambda some, count: self._at(some, count, factor), SAMPLES).bound <= 1.0
+
+    def _at(self, some: Index, count: int, factor: float) -> Array:
+        missing = np.array([n for n in some if (int(n), count) not in self._known], dtype=np.intp)
+        if missing.size:
+            state = self.pieces.some(missing).states(self.law.path, self.law.timing, count)
+            shape = (len(missing), count + 1, -1)
+            rest = at_rest(self.force, state[0]).reshape(shape)
+            moving = self.force.ratios(*state).reshape(shape)
+            self._known |= {(int(n), count): (c, f - c) for n, c, f in zip(missing, rest, moving, strict=True)}
+        known = [self._known[int(n), count] for n in some]
+        return np.stack([c + f / factor**2 for c, f in known])
+
+
 def _slower(law: Law, pieces: Pieces, force: Check, factor: float) -> float:
-    """The smallest factor of time from ``factor`` on at which sampled forces keep their limits, by bisection.
-
-    At k times the duration forces are c + (f - c) / k^2, with c those at rest.
-    """
-    state = pieces.states(law.path, law.timing)
-    shape = (len(pieces.start), SAMPLES + 1, -1)
-    rest, moving = at_rest(force, state[0]).reshape(shape), force.ratios(*state).reshape(shape)
-
-    def kept(k: float) -> bool:
-        values: Array = rest + (moving - rest) / k**2
-        return sampled(pieces.start, pieces.span, values, force.columns).ratio <= 1.0
-
+    """The smallest factor of time from ``factor`` on at which sampled forces keep their limits, by bisection."""
+    forces = _Forces(law, pieces, force)
     low, high, step = factor, factor, 1e-3
-    while not kept(high):
+    while not forces.kept(high):
         low, high, step = high, factor * (1.0 + step), 2.0 * step
         if high > SLOWEST * factor:
             return np.inf
-    for _ in range(20):
+    for _ in range(20 if high > low else 0):
         middle = 0.5 * (low + high)
-        low, high = (low, middle) if kept(middle) else (middle, high)
+        low, high = (low, middle) if forces.kept(middle) else (middle, high)
     return high
 
 
