@@ -31,7 +31,7 @@ def test_bounds_hold_and_come_near(seed, rounds):
     top = highest(span, evaluate, 8, rounds)
     dense = value(np.linspace(start[0], start[-1], 200_001))
     largest = dense.max()
-    assert top.seen <= largest + 1e-9
+    assert top.seen <= largest + 1e-7  # 200 001 places miss the peak by so much
     assert largest <= top.bound
     assert top.column == dense.max(axis=0).argmax()
     at = value(np.array(start[top.piece] + top.place * span[top.piece]))
