@@ -8,6 +8,7 @@ from importlib import resources
 import casadi as ca
 import numpy as np
 
+from wbc.shapes import FAR
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Layout
 from wbc.stack.places import brakes, gain_places, margin_places, pull_scales, rate_places, stops
@@ -32,7 +33,7 @@ def _casadi_source(program: Program) -> str:
 def _header(stack: Declaration, layout: Layout, program: Program) -> str:
     jt, at = program.rows.sparsity_out("jt"), program.rows.sparsity_out("at")
     j_start, j_col = sparsity_rows(jt)
-    a_start, a_end, a_col = program.balls.entries(*sparsity_rows(at))
+    a_start, a_end, a_col = program.sensed.entries(*program.balls.entries(*sparsity_rows(at)))
     orders, scales, sequence = row_orders(layout), row_units(stack, layout), bound_sequence(layout)
     dofs = layout.dof_scales(stack)
     units = unit_groups(stack)
@@ -58,6 +59,8 @@ def _header(stack: Declaration, layout: Layout, program: Program) -> str:
                 "NNZA": len(a_col),
                 "BALLS": len(program.balls.items),
                 "SEGMENTS": len(program.balls.segment_rows),
+                "SENSED": len(program.sensed.blocks),
+                "FAR": FAR,
                 "NNZK": bent.nnz(),
                 "CALM": int(stack.calm),
                 "UNITS": len(units),
@@ -91,7 +94,7 @@ def _header(stack: Declaration, layout: Layout, program: Program) -> str:
         _table("double", "row_scale", scales),
         _table("double", "dof_scale", dofs),
         _table("double", "damping", stack.damping / dofs**2),
-        *(_table("int", name, values) for name, values in program.balls.places().items()),
+        *(_table("int", name, values) for name, values in (program.balls.places() | program.sensed.places()).items()),
         _table("double", "row_reach", program.balls.reaches),
         _table("double", "segment_half", program.balls.halves),
         *_blocks(j_start, j_col),

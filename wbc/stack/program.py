@@ -20,7 +20,7 @@ curvature of the task errors for a weight ``pull`` on each row, as far as it com
 :mod:`wbc.symbolic.curvature`.
 
 For a compiled tick the rows of :meth:`Constraint.ball_rows` are left to the loop in ``native/balls.h``: here they have
-no entries, ``low`` and ``margin`` are 0, and what the loop needs is added,
+no entries, ``low`` and ``margin`` are 0. Sensed rows have no entries either (``native/sensed.h``). For the loops there are
 
     segment  segments x 6   (middle; axis) of every link core, of ``rows`` and of ``ahead``
     screw    6 x nv         (linear at the origin of the world; angular) of every degree of freedom, of ``rows``
@@ -38,6 +38,7 @@ from wbc.errors import ShapeError
 from wbc.stack.balls import Balls
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Block, Layout, Slot
+from wbc.stack.sensed import Sensed
 from wbc.symbolic import rotations as rot
 from wbc.symbolic.curvature import Pull, curvature
 from wbc.symbolic.kinematics import Kinematics, Pose
@@ -63,13 +64,14 @@ ROWS_OUTPUTS = (
 @dataclass(frozen=True, eq=False)
 class Program:
     """The compiled-to-be functions of a stack; ``ahead`` is None where there are no margins, ``bend`` where no task
-    bends or the stack does not want it; ``balls`` are rows that are left to a loop.
+    bends or the stack does not want it; ``balls`` and ``sensed`` are rows that are left to loops.
     """
 
     rows: ca.Function
     ahead: ca.Function | None
     bend: ca.Function | None
     balls: Balls = field(default_factory=Balls)
+    sensed: Sensed = field(default_factory=Sensed)
 
     @property
     def functions(self) -> dict[str, ca.Function]:
@@ -79,8 +81,9 @@ class Program:
 
 
 class _Builder:
-    def __init__(self, stack: Declaration, layout: Layout, balls: Balls) -> None:
-        self.stack, self.layout, self.balls = stack, layout, balls
+    def __init__(self, stack: Declaration, layout: Layout, loops: bool) -> None:
+        self.stack, self.layout, self.loops = stack, layout, loops
+        self.balls = Balls.of(stack, layout) if loops else Balls()
         self.kinematics = Kinematics(stack.robot.model)
         self.p = ca.SX.sym("p", layout.parameters)
         self.dt = ca.SX.sym("dt")
@@ -193,7 +196,8 @@ class _Builder:
         sensed = item.sensed_rows(robot)
         matrix = tracer.jacobian(margin[: count - sensed, :])
         if sensed:
-            matrix = ca.vertcat(matrix, self.sensed_matrix(block, sensed))
+            empty = ca.SX(sensed, self.layout.nv)
+            matrix = ca.vertcat(matrix, empty if self.loops else self.sensed_matrix(block, sensed))
         rows = Rows(matrix, low, ca.SX.inf(count))
         return rows, tracer.expand(margin), tracer.expand(factor)
 
@@ -204,7 +208,7 @@ class _Builder:
         return side * ca.densify(line @ self.kinematics.screws)
 
     def ahead(self, block: Block) -> ca.SX:
-        """h(q (+) v dt) of a margin block; of sensed rows h + (dh/dt) dt; 0 for rows that are left to the loop."""
+        """h(q (+) v dt) of a margin block; of sensed rows h + (dh/dt) dt, what loops add left out."""
         item = block.entry.item
         assert isinstance(item, Constraint)
         if block.entry.name in self.balls:
@@ -215,7 +219,7 @@ class _Builder:
         here = ca.Function("h", [self.kinematics.q, self.p], [ca.densify(tracer.expand(margins))])
         margin = here(self.later, self.advanced(block))
         sensed = item.sensed_rows(self.stack.robot)
-        if sensed:
+        if sensed and not self.loops:
             closing = self.sensed_matrix(block, sensed) @ self.kinematics.v * self.dt
             margin = margin + ca.vertcat(ca.SX(len(block.rows) - sensed, 1), closing)
         return margin
@@ -227,8 +231,8 @@ def build(stack: Declaration, layout: Layout, loops: bool = False) -> Program:
     Raises:
         ShapeError: an item's expression has another number of rows than it declares, or free symbols.
     """
-    balls = Balls.of(stack, layout) if loops else Balls()
-    b = _Builder(stack, layout, balls)
+    b = _Builder(stack, layout, loops)
+    balls, sensed = b.balls, Sensed.of(stack, layout) if loops else Sensed()
     nv = layout.nv
     tasks = [b.task(block) for block in layout.of_form("task")]
     general = [b.general(block) for block in layout.of_form("margins", "rows")]
@@ -257,7 +261,7 @@ def build(stack: Declaration, layout: Layout, loops: bool = False) -> Program:
     outputs = [o if k in (3, 4) else ca.densify(o) for k, o in enumerate(outputs)]
     inputs = [b.kinematics.q, b.kinematics.v, b.p, b.dt]
     segments = balls.segments(b.kinematics)
-    more = [segments, ca.densify(b.kinematics.screws)] if balls else []
+    more = [segments, ca.densify(b.kinematics.screws)] if balls or sensed else []
     rows = _function("rows", inputs, outputs + more, [*ROWS_OUTPUTS, "segment", "screw"][: len(outputs + more)])
     ahead = None
     if layout.margin_rows:
@@ -268,7 +272,7 @@ def build(stack: Declaration, layout: Layout, loops: bool = False) -> Program:
     bent = ca.triu(curvature(b.kinematics, b.pulls)) if b.pulls else ca.SX(nv, nv)
     if bent.nnz():
         bend = _function("bend", [*inputs, b.pull], [bent], ["bend"])
-    return Program(rows, ahead, bend, balls)
+    return Program(rows, ahead, bend, balls, sensed)
 
 
 def _shared_pattern(transposed: ca.SX) -> ca.SX:

@@ -2,8 +2,8 @@
 #ifndef WBC_ASSEMBLE_H
 #define WBC_ASSEMBLE_H
 
-#include "balls.h"
 #include "reach.h"
+#include "sensed.h"
 
 /* H += J' diag(w) J, g -= J' diag(w) wish, for `count` rows that share the `cols` columns listed from `first` */
 INLINE void block(wbc_tick *t, int row, int count, int first, int cols) {
@@ -94,9 +94,11 @@ static void assemble(wbc_tick *t, int screen) {
     form_bounds(t);
 #if BALLS > 0
     ball_rows(t, screen);
-#else
-    (void)screen;
 #endif
+#if SENSED > 0
+    sensed_rows(t, screen);
+#endif
+    (void)screen;
     if (CALM) brake_for_margins(t);
     for (int k = 0; k < MC; k++) {
         t->report.slack[k] = 0.0;

@@ -11,6 +11,17 @@
 
 #include "margins.h"
 
+#if BALLS > 0 || SENSED > 0
+static void leave_out(wbc_tick *t, int k) {
+    if (!t->far[k]) {
+        memset(t->at + a_start[k], 0, (a_end[k] - a_start[k]) * sizeof(double));
+        memset(t->A + k * NV, 0, NV * sizeof(double));
+    }
+    t->far[k] = 1;
+    t->free_low[k] = -WBC_INF;
+}
+#endif
+
 #if BALLS > 0
 
 typedef double segment_numbers[SEGMENTS];
@@ -57,15 +68,6 @@ static double slowest_stop(const wbc_tick *t) {
         longest = larger(longest, speed / (BRAKING_MARGIN * brake_limit[i]));
     }
     return longest;
-}
-
-static void leave_out(wbc_tick *t, int k) {
-    if (!t->far[k]) {
-        memset(t->at + a_start[k], 0, (a_end[k] - a_start[k]) * sizeof(double));
-        memset(t->A + k * NV, 0, NV * sizeof(double));
-    }
-    t->far[k] = 1;
-    t->free_low[k] = -WBC_INF;
 }
 
 /* Entries of the row of general row k: n is the direction from the ball's centre to the nearest point */

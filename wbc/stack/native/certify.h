@@ -198,6 +198,9 @@ EXPORT void wbc_tick_look_ahead(wbc_tick *t) {
 #if BALLS > 0
     balls_ahead(t);
 #endif
+#if SENSED > 0
+    sensed_ahead(t);
+#endif
     replace_nan(t->report.ahead, MH, -HUGE_VAL);
 #else
     (void)t;

@@ -19,6 +19,9 @@
  *   ball_row ball_first   their first general row; their first entry in row_segment and row_reach, and the end
  *   row_segment row_reach   segment of such a row, and its thickness together with the ball's
  *   segment_half segment_row   half a segment's length, and a row whose entries are the joints that move it
+ *   SENSED sensed_row sensed_count   items with sensed rows, their first such row, and how many there are
+ *   sensed_distance sensed_line sensed_side   where their numbers are in p
+ *   FAR         a distance of no pair [m]
  *   stop_at stop_q stop_low stop_high   the same for position limits, with the coordinate that is limited
  */
 #ifndef WBC_TICK_H
@@ -76,7 +79,7 @@ typedef struct {
     double stiffness;            /* what fixed variables add to the Hessian, in units of dof_scale */
     double bent[NNZK + 1];       /* curvature */
     int idle[MC + 1];            /* rows that no velocity within the bounds violates */
-    int far[MC + 1];             /* rows of balls that are left out of this tick */
+    int far[MC + 1];             /* rows of balls and sensed pairs that are left out of this tick */
     double segment[6 * SEGMENTS + 1], screw[6 * NV], segment_ahead[6 * SEGMENTS + 1];
     double q_good[NQ + 1];       /* q of the last tick that was not refused, put back by one that is */
     /* outputs of the generated rows */
