@@ -20,7 +20,7 @@ curvature of the task errors for a weight ``pull`` on each row, as far as it com
 :mod:`wbc.symbolic.curvature`.
 
 For a compiled tick the rows of :meth:`Constraint.ball_rows` are left to the loop in ``native/balls.h``: here they have
-no entries, and ``low`` and ``margin`` are 0. Sensed rows have no entries either (``native/sensed.h``). Outputs for both:
+no entries, and ``low`` and ``margin`` are 0. Sensed rows have no entries either (``native/sensed.h``). Both need:
 
     segment  segments x 6   (middle; axis) of every link core, of ``rows`` and of ``ahead``
     screw    6 x nv         (linear at the origin of the world; angular) of every degree of freedom, of ``rows``
