@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from wbc import validation
 from wbc.errors import ContinuityError, RangeError
@@ -64,12 +65,7 @@ class Law:
     ) -> None:
         self.path, self.timing, self.checks, self.moving = path, timing, tuple(checks), moving
         self.limits = (limits or Limits()).for_dof(path.dof)
-        ends = timing.evaluate(np.array([0.0, timing.duration]), 0, np.array([0, len(timing.times) - 2]))
-        room = 1e-9 * (1.0 + np.abs(path.knots[[0, -1]]).max())
-        if ends.min() < path.knots[0] - room or ends.max() > path.knots[-1] + room:
-            raise RangeError(
-                "law.timing", ends, f"s must stay within the path, {path.knots[0]:g} to {path.knots[-1]:g}"
-            )
+        _check_within(path, timing)
 
     @property
     def duration(self) -> float:
@@ -115,12 +111,12 @@ class Law:
     def _path_pieces(self, times: Array, s: list[Array]) -> Index:
         """Pieces of the path: where s stands on a knot, the one that it comes from at the end and goes to before it."""
         pieces = self.path.pieces_at(s[0])
-        speed = s[1] if len(s) > 1 else self.timing.evaluate(times, 1)
         last = times >= self.duration
+        speed = s[1] if len(s) > 1 else self.timing.evaluate(times, 1)
+        # At rest, the acceleration tells where it goes, or where it came from
+        speed = np.where(speed == 0.0, np.where(last, -1.0, 1.0) * self.timing.evaluate(times, 2), speed)
         back = (speed < 0.0) ^ (last & (speed != 0.0))
-        on_knot = np.isin(s[0], self.path.knots) & (pieces > 0)
-        before = np.where(on_knot & back & (self.path.knots[pieces] == s[0]), pieces - 1, pieces)
-        return np.asarray(before)
+        return np.where(back, self.path.pieces_before(s[0], pieces), pieces)
 
     @cached_property
     def certificate(self) -> Certificate:
@@ -173,3 +169,21 @@ class Law:
                 )
         moving = (self.moving[0], other.moving[1])
         return Law(path, self.timing.then(other.timing, path.shift), self.limits, self.checks, moving)
+
+
+def _check_within(path: Path, timing: Timing) -> None:
+    """Every piece of a timing stays on one stretch of a path without gaps."""
+    starts = path.knots[np.concatenate([[0], path.gaps + 1])]
+    ends = path.knots[np.concatenate([path.gaps, [-1]])]
+    room = 1e-9 * (1.0 + np.abs(path.knots[[0, -1]]).max())
+    low, high = timing.ranges(lambda low, high: _within(starts, ends, room, low, high))
+    bad = np.flatnonzero(~_within(starts, ends, room, low, high))
+    if bad.size:
+        reached = (float(low[bad[0]]), float(high[bad[0]]))
+        stretches = " or ".join(f"{a:g} to {b:g}" for a, b in zip(starts, ends, strict=True))
+        raise RangeError("law.timing", reached, f"s must stay within the path, {stretches}")
+
+
+def _within(starts: Array, ends: Array, room: float, low: Array, high: Array) -> NDArray[np.bool_]:
+    stretch = np.clip(np.searchsorted(starts, 0.5 * (low + high), side="right") - 1, 0, None)
+    return np.asarray((low >= starts[stretch] - room) & (high <= ends[stretch] + room))

@@ -33,12 +33,14 @@ class Path(ABC):
         space: see the module.
         degree: highest degree of the polynomials between knots, None where they are no polynomials; of poses, one more
             than that of (dp/ds; w).
+        gaps: numbers of pieces on which there is no path, see :class:`JoinedPath`.
     """
 
     knots: Array
     dof: int
     space: Space = "joints"
     degree: int | None = None
+    gaps: Index = np.zeros(0, dtype=np.intp)
 
     @abstractmethod
     def evaluate(self, s: Array, order: int = 0, piece: Index | None = None) -> Array:
@@ -54,8 +56,18 @@ class Path(ABC):
         return float(self.knots[-1] - self.knots[0])
 
     def pieces_at(self, s: Array) -> Index:
-        """Number of the piece that each coordinate is on."""
-        return np.clip(np.searchsorted(self.knots, s, side="right") - 1, 0, len(self.knots) - 2)
+        """Number of the piece that each coordinate is on: on a knot, the one behind it; in a gap, the nearest."""
+        at = np.clip(np.searchsorted(self.knots, s, side="right") - 1, 0, len(self.knots) - 2)
+        if not len(self.gaps):
+            return at
+        behind = np.asarray(s) > 0.5 * (self.knots[at] + self.knots[at + 1])
+        return np.where(np.isin(at, self.gaps), np.where(behind, at + 1, at - 1), at)
+
+    def pieces_before(self, s: Array, piece: Index) -> Index:
+        """The pieces before knots that coordinates stand on; for others, and where there is no path, their own."""
+        before = piece - 1
+        on_knot = (self.knots[piece] == s) & (before >= 0) & ~np.isin(before, self.gaps)
+        return np.where(on_knot, before, piece)
 
     def same_kind(self, other: Path) -> bool:
         """Whether both are about the same number of joints, or both about poses."""
@@ -119,16 +131,11 @@ class JoinedPath(Path):
         self.first, self.second = first, second
         self.shift = float(first.knots[-1] + self.ROOM - second.knots[0])
         self.knots = np.concatenate([first.knots, second.knots + self.shift])
+        behind = len(first.knots)
+        self.gaps = np.concatenate([first.gaps, [behind - 1], second.gaps + behind]).astype(np.intp)
         self.dof, self.space = first.dof, first.space
         known = first.degree is not None and second.degree is not None
         self.degree = max(first.degree or 0, second.degree or 0) if known else None
-
-    def pieces_at(self, s: Array) -> Index:
-        end = self.first.knots[-1]
-        behind = np.asarray(s) > end + 0.5 * self.ROOM
-        pieces = len(self.first.knots)
-        moved = self.second.pieces_at(np.asarray(s) - self.shift) + pieces
-        return np.where(behind, moved, self.first.pieces_at(np.minimum(s, end)))
 
     def evaluate(self, s: Array, order: int = 0, piece: Index | None = None) -> Array:
         s = np.asarray(s, dtype=np.float64)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from wbc import validation
 from wbc.errors import RangeError, ShapeError
@@ -115,28 +117,43 @@ class Timing:
         times = np.concatenate([self.times, self.duration + other.times[1:]])
         return Timing(times, np.concatenate(parts, axis=1))
 
+    def hull(self) -> Array:
+        """Numbers that enclose s on each piece, pieces x coefficients of Bernstein's polynomials."""
+        spans = np.diff(self.times)
+        nodes = bernstein.nodes(self.degree)
+        at = np.repeat(np.arange(len(spans)), len(nodes))
+        values = self.evaluate((self.times[:-1, None] + spans[:, None] * nodes).ravel(), piece=at)
+        return bernstein.coefficients(values.reshape(len(spans), -1))
+
+    def ranges(self, enough: Callable[[Array, Array], NDArray[np.bool_]]) -> tuple[Array, Array]:
+        """Lowest and highest s of each piece, or numbers beyond them that are good ``enough``, piece by piece."""
+        hull = self.hull()
+        low, high = hull.min(axis=1), hull.max(axis=1)
+        for i in np.flatnonzero(~enough(low, high)):
+            low[i], high[i] = -bernstein.largest(-hull[i : i + 1])[0], bernstein.largest(hull[i : i + 1])[0]
+        return low, high
+
     def crossings(self, places: Array) -> Array:
         """Times inside pieces at which s passes one of the places, ascending."""
         spans = np.diff(self.times)
-        nodes = bernstein.nodes(self.degree)
-        count = len(spans)
-        at = np.repeat(np.arange(count), len(nodes))
-        values = self.evaluate((self.times[:-1, None] + spans[:, None] * nodes).ravel(), piece=at)
-        hull = bernstein.coefficients(values.reshape(count, -1))
+        hull = self.hull()
         # What only touches a break is not inside
         room = 1e-12 * (1.0 + np.abs(hull).max(axis=1))
         low, high = hull.min(axis=1) + room, hull.max(axis=1) - room
         ordered = np.sort(places)
         some = np.searchsorted(ordered, low) < np.searchsorted(ordered, high)
+        powers = np.arange(self.degree, -1, -1)
         found = [np.zeros(0)]
         for i in np.flatnonzero(some):
             for place in ordered[(ordered > low[i]) & (ordered < high[i])]:
-                shifted = self.coefficients[:, i].copy()
+                shifted = self.coefficients[:, i] * spans[i] ** powers
                 shifted[-1] -= place
+                # What a leading power adds below rounding would only spoil the roots
+                shifted[np.abs(shifted) < 1e-18 * np.abs(shifted).max()] = 0.0
                 roots = np.roots(shifted)
-                real = roots.real[np.abs(roots.imag) < 1e-9 * spans[i]]
-                inside = real[(real > 1e-12 * spans[i]) & (real < (1.0 - 1e-12) * spans[i])]
-                found.append(self.times[i] + inside)
+                real = roots.real[np.abs(roots.imag) < 1e-9]
+                inside = real[(real > 1e-12) & (real < 1.0 - 1e-12)]
+                found.append(self.times[i] + spans[i] * inside)
         return np.unique(np.concatenate(found))
 
 

@@ -81,7 +81,7 @@ def via_points(
         turn_speed = validation.scalar("angular_speed", angular_speed, low=0.0, open_low=True, unit="rad/s")
     points, quaternions = _poses(poses)
     limits = Limits(
-        velocity=[bounds.speed] * 3 + [turn_speed] * 3, acceleration=[bounds.acceleration] * 3 + [turning] * 3
+        velocity=np.repeat([bounds.speed, turn_speed], 3), acceleration=np.repeat([bounds.acceleration, turning], 3)
     )
     path = _path(points, quaternions, bounds, turning, turn_speed)
     return Law(path, Timing.identity(STILL if path.degree == 0 else path.length), limits)
