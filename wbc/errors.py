@@ -110,6 +110,10 @@ class InfeasibleError(WbcError):
     """No motion keeps what is asked for; ``value`` is what was asked."""
 
 
+class LawFileError(WbcError):
+    """A file that holds no law of motion, or a law that no file can hold."""
+
+
 class CompileError(WbcError):
     """The C compiler was asked for and could not build the tick."""
 

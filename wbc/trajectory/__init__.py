@@ -38,6 +38,7 @@ _WHERE = {
     "arc_path": "arcs",
     "arc_through": "arcs",
     "via_points": "via_poses",
+    "load": "files",
 }
 
 __all__ = sorted(_WHERE)  # noqa: PLE0605

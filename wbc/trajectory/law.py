@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -169,6 +170,17 @@ class Law:
                 )
         moving = (self.moving[0], other.moving[1])
         return Law(path, self.timing.then(other.timing, path.shift), self.limits, self.checks, moving)
+
+    def save(self, file: str | os.PathLike[str]) -> None:
+        """Into a file, from which ``wbc.trajectory.load`` makes the same law; ``checks`` are not kept.
+
+        Raises:
+            LawFileError: the file cannot be written, or the path is of a kind that files do not hold.
+        """
+        # Files know laws, so laws meet them late
+        from wbc.trajectory import files
+
+        files.save(self, file)
 
 
 def _check_within(path: Path, timing: Timing) -> None:
