@@ -15,6 +15,7 @@ FLOORS = {
     "wbc.pickling": 0,
     "wbc.validation": 0,
     "wbc.shapes": 0,
+    "wbc.style": 0,
     "wbc.symbolic": 1,
     "wbc.robot": 2,
     "wbc.robots": 2,

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from wbc.track import style
+from wbc import style
 from wbc.track.log import Log
 from wbc.track.summary import position_errors, rotation_angles
 from wbc.validation import Array

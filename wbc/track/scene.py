@@ -10,11 +10,11 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from wbc import validation
+from wbc import style, validation
 from wbc.errors import RangeError, ShapeError
 from wbc.robot import Robot
 from wbc.shapes import Box, Capsule, Convex, Cylinder, PlacedShape, Solid, Sphere
-from wbc.track import render, solids, style
+from wbc.track import render, solids
 from wbc.track.clearance import bodies_of
 from wbc.validation import Array
 

@@ -1,4 +1,4 @@
-"""Colours and settings that all plots of a run share."""
+"""Colours and settings that all plots share."""
 
 from __future__ import annotations
 
