@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import Any
 
 import numpy as np
@@ -68,7 +69,7 @@ def jerk_limited_along(
         )
     ends = [float(path.knots[0]), *(place for place, _ in breaks), float(path.knots[-1])]
     timing: Timing | None = None
-    for start, end in zip(ends[:-1], ends[1:], strict=True):
+    for start, end in itertools.pairwise(ends):
         part = _part(path, start, end, sizes_of(limits), cells)
         timing = part if timing is None else timing.then(part, 0.0)
     assert timing is not None

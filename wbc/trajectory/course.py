@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -48,10 +49,14 @@ class Course:
 
     def points(self) -> list[Point]:
         """States at the beginning of every phase, and at the end."""
+        return list(self._points)
+
+    @cached_property
+    def _points(self) -> tuple[Point, ...]:
         out = [self.start]
         for jerk, span in zip(self.jerks, self.spans, strict=True):
             out.append(moved(out[-1], jerk, span))
-        return out
+        return tuple(out)
 
     def extrema(self) -> tuple[tuple[float, float], tuple[float, float]]:
         """((lowest position, its time), (highest position, its time)), exact: at ends and where v = 0."""

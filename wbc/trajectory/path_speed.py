@@ -6,8 +6,8 @@ With x = (ds/dt)^2 and y = d2s/dt2 over the path coordinate s, dx/ds = 2 y, and
 
 Velocities and accelerations bound x and y linearly. The jerk's limit J / sqrt(x) is convex in x, so its tangent at any
 speed lies below it: what keeps the tangent keeps the limit, and the tangent at the last solution gives room for a
-faster one. y is linear in s between grid points, so x is quadratic there; the cells at both ends, from and to rest, have
-constant jerk instead: x = 3/2 s y.
+faster one. Between grid points y is linear in u, where s = start + L g(u): beside rest s goes with u^3 and constant
+jerk makes y go with u. So dx/du = 2 y L g'(u) is integrated exactly.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ import numpy as np
 
 from wbc.errors import InfeasibleError
 from wbc.trajectory.certificate import chain
-from wbc.trajectory.course import rest_to_rest
+from wbc.trajectory.course import moved, rest_to_rest
 from wbc.trajectory.path import Path
 from wbc.trajectory.timing import Timing
 from wbc.validation import Array
 
-#: Programs are solved until one gains less than this share of the duration, and no more than so many
-GAIN, ROUNDS = 1e-3, 25
+#: Programs are solved until so many in a row gain less than this share of the duration, and no more than so many
+PATIENCE, GAIN, ROUNDS = 3, 5e-4, 20
 
 #: x of a program is no lower than this share of the last one's, so that the next one has a tangent
 LOWEST = 1e-4
@@ -39,36 +39,54 @@ class Stretch:
     """A smooth part of a path between two places at which it is at rest, on a grid.
 
     Attributes:
-        s: grid, knots of the path in it. piece: of the path, by cell. limits: velocity, acceleration, jerk, n each.
+        u: grid in [0, 1]; s: its path coordinates, knots of the path among them. limits: velocity, acceleration, jerk.
     """
 
     path: Path
+    u: Array
     s: Array
     limits: tuple[Array, Array, Array]
 
     @classmethod
     def of(cls, path: Path, start: float, end: float, limits: tuple[Array, Array, Array], cells: int) -> Stretch:
-        """Places s = start + L (10 u^3 - 15 u^4 + 6 u^5): even in time where the jerk is constant at the ends."""
+        """Even in u, but that grid points beside knots give way to them."""
         u = np.linspace(0.0, 1.0, cells + 1)
-        s = start + (end - start) * u**3 * (10.0 - 15.0 * u + 6.0 * u * u)
+        s = start + (end - start) * _grade(u)
         knots = path.knots[(path.knots > start) & (path.knots < end)]
         if knots.size:
-            # A grid point that stands beside a knot gives way to it
-            room = 0.4 * np.interp(s, 0.5 * (s[1:] + s[:-1]), np.diff(s))
-            near = np.searchsorted(knots, s)
-            before = np.abs(s - knots[np.maximum(near - 1, 0)])
-            after = np.abs(knots[np.minimum(near, len(knots) - 1)] - s)
-            keep = np.minimum(before, after) > room
+            fine = np.linspace(0.0, 1.0, 20 * cells + 1)
+            at = np.interp((knots - start) / (end - start), _grade(fine), fine)
+            for _ in range(3):
+                at = np.clip(at - (_grade(at) - (knots - start) / (end - start)) / _slope(at), 0.0, 1.0)
+            near = np.searchsorted(at, u)
+            away = np.minimum(np.abs(u - at[np.maximum(near - 1, 0)]), np.abs(at[np.minimum(near, len(at) - 1)] - u))
+            keep = away > 0.4 / cells
             keep[[0, -1]] = True
-            s = np.union1d(s[keep], knots)
-        return cls(path, s, limits)
+            order = np.argsort(np.concatenate([u[keep], at]))
+            u, s = (np.concatenate(pair)[order] for pair in ((u[keep], at), (s[keep], knots)))
+        s[[0, -1]] = start, end
+        return cls(path, u, s, limits)
+
+    def places(self, place: float) -> Array:
+        """Coordinates at a place in [0, 1] of every cell."""
+        if place in (0.0, 1.0):
+            return self.s[int(place) :][: len(self.s) - 1]
+        inside = self.s[0] + (self.s[-1] - self.s[0]) * _grade(self.u[:-1] + place * np.diff(self.u))
+        return np.asarray(np.clip(inside, self.s[:-1], self.s[1:]))
 
     def derivatives(self, place: float) -> tuple[Array, Array, Array]:
-        """q', q'', q''' at a place in [0, 1] of every cell: cells x n."""
-        s = self.s[:-1] + place * np.diff(self.s)
+        """q', q'', q''' there: cells x n."""
         piece = self.path.pieces_at(0.5 * (self.s[1:] + self.s[:-1]))
-        first, second, third = (self.path.evaluate(s, order, piece) for order in (1, 2, 3))
+        first, second, third = (self.path.evaluate(self.places(place), order, piece) for order in (1, 2, 3))
         return first, second, third
+
+    def gained(self, place: float) -> Array:
+        """(w0, w1) by cell with x(place) = x0 + w0 y0 + w1 y1."""
+        nodes, weights = np.polynomial.legendre.leggauss(6)
+        share = 0.5 * place * (nodes + 1.0)
+        span = np.diff(self.u)[:, None]
+        part = (self.s[-1] - self.s[0]) * _slope(self.u[:-1, None] + span * share) * span * place * weights
+        return np.stack([part @ (1.0 - share), part @ share], axis=1)
 
     def constant(self) -> tuple[float, float, float]:
         """Speed, acceleration and jerk of s that no joint minds anywhere: half of each limit for the curvature."""
@@ -90,48 +108,57 @@ class Stretch:
         return speed, push, jerk
 
 
+def _grade(u: Array) -> Array:
+    return np.asarray(u**3 * (10.0 - 15.0 * u + 6.0 * u * u))
+
+
+def _slope(u: Array) -> Array:
+    return np.asarray(30.0 * (u * (1.0 - u)) ** 2)
+
+
 def fastest(stretch: Stretch) -> Timing:
     """The timing from rest to rest, its violations of a few percent not yet taken away.
 
     Raises:
         InfeasibleError: the solver of the linear programs gave up.
     """
-    s = stretch.s
-    x, shares = _first(stretch), np.ones((3, len(s) - 1))
-    best, least = None, np.inf
+    x, y = _first(stretch)
+    shares = np.ones((3, len(x) - 1))
+    best, least, idle = None, np.inf, 0
     for _ in range(ROUNDS):
-        x, y = _program(stretch, x, shares)
-        timing = _timing(s, x, y)
+        x, y = _program(stretch, x, y, shares)
+        timing = _timing(stretch, x, y)
         ratios = _ratios(stretch, timing)
         loss = max(1.0, *(float(r.max()) ** (1.0 / order) for order, r in enumerate(ratios, 1)))
         # Cells in which more is used between the places that the program looks at are given less
-        shares *= np.clip(0.9999 / ratios, 0.8, 1.0)
+        shares = np.minimum(shares * np.clip(0.9999 / ratios, 0.8, 1.01), 1.0)
         gained = 1.0 - timing.duration * loss / least
         if gained > 0.0:
             best, least = timing, timing.duration * loss
-        if best is not None and abs(gained) < GAIN:
+        idle = idle + 1 if gained < GAIN else 0
+        if idle == PATIENCE:
             break
     assert best is not None
     return best
 
 
-def _first(stretch: Stretch) -> Array:
-    """x of the course from rest to rest under constant limits."""
+def _first(stretch: Stretch) -> tuple[Array, Array]:
+    """x and y of the course from rest to rest under constant limits."""
     s = stretch.s - stretch.s[0]
     course = rest_to_rest(float(s[-1]), *stretch.constant())
-    points = np.array(course.points())
-    places, speeds = [], []
-    for point, jerk, span in zip(points[:-1], course.jerks, course.spans, strict=True):
-        t = np.linspace(0.0, span, 60)
-        places.append(point[0] + t * (point[1] + t * (0.5 * point[2] + t * jerk / 6.0)))
-        speeds.append(point[1] + t * (point[2] + 0.5 * jerk * t))
-    x = np.interp(s, np.concatenate(places), np.concatenate(speeds)) ** 2
-    # Interpolated beside rest, it would be far too low
-    least = 1e-3 * x.max() * (np.minimum(s, s[-1] - s) / s[-1]) ** (4.0 / 3.0)
-    return np.asarray(np.maximum(x, least))
+    rows = []
+    for point, jerk, span in zip(course.points(), course.jerks, course.spans, strict=False):
+        rows += [moved(point, jerk, t) for t in np.linspace(0.0, span, 200)]
+    places, speeds, pushes = np.array(rows).T
+    # Between places beside rest the speed goes with s^(2/3), which an interpolation over s^(1/3) sees as a parabola
+    near = np.minimum(s, s[-1] - s)
+    x = np.interp(s, places, speeds) ** 2
+    least = 0.5 * x.max() * (near / s[-1]) ** (4.0 / 3.0)
+    low = x < least
+    return np.where(low, least, x), np.where(low, 0.0, np.interp(s, places, pushes))
 
 
-def _program(stretch: Stretch, x0: Array, shares: Array) -> tuple[Array, Array]:
+def _program(stretch: Stretch, x0: Array, y0: Array, shares: Array) -> tuple[Array, Array]:
     """x and y that maximise sum h x / x0^(3/2), the gain of time, under the limits linearised at x0.
 
     Unknowns are x / x0 and y over what it is where the jerk is constant, at inner grid points.
@@ -153,14 +180,20 @@ def _program(stretch: Stretch, x0: Array, shares: Array) -> tuple[Array, Array]:
 
     every, ends = np.arange(count), np.array([0, count - 1])
     pushes = [matrix(*rows, every) for rows in _accelerations(stretch, shares[1])]
-    jerks = [matrix(*rows, every[:-1]) for rows in _jerks(stretch, x0, shares[2])]
-    upper = sparse.vstack([*pushes, *(-rows for rows in pushes), *jerks])
-    tops = [np.ones(2 * len(pushes) * count), np.full(len(jerks) * (count - 1), 1.5)]
-    # dx/ds = 2 y within, x = 3/2 s y at both ends
-    inside, unit = h[1:-1, None], 1.0 / size_x[:-1, None]
-    within = matrix(np.array([[-1.0, 1.0]]) * unit, -np.array([[1.0, 1.0]]) * inside * unit, every[:-1])
+    jerks = [matrix(*rows, every[:-1]) for rows in _jerks(stretch, x0, y0, shares[2])]
+    # The square of the speed in the middle of cells, over its limit
+    lever, inside = stretch.gained(0.5)[1:-1], slice(1, -1)
+    with np.errstate(divide="ignore"):
+        most = (np.min(stretch.limits[0] / np.abs(stretch.derivatives(0.5)[0]), axis=1) * shares[0])[inside, None] ** 2
+    middles = matrix(np.array([[1.0, 0.0]]) / most, lever / most, every[:-1])
+    upper = sparse.vstack([*pushes, *(-rows for rows in pushes), middles, *jerks])
+    tops = [np.ones(2 * len(pushes) * count + count - 1), np.full(len(jerks) * (count - 1), 1.5)]
+    # x goes on by what y adds over each cell, from and to 0
+    w = stretch.gained(1.0)
+    unit = 1.0 / size_x[:-1, None]
+    within = matrix(np.array([[-1.0, 1.0]]) * unit, -w[1:-1] * unit, every[:-1])
     unit = 1.0 / size_x[ends, None]
-    at_ends = matrix(unit, np.array([[-1.5 * h[0]], [1.5 * h[-1]]]) * unit, ends)
+    at_ends = matrix(unit, np.array([[-w[0, 1]], [w[-1, 0]]]) * unit, ends)
     top = np.maximum(_speeds(stretch, shares) / size_x, 2.0 * LOWEST)
     free = np.full(count, np.inf)
     gain = 0.5 * (h[1:] + h[:-1]) / np.sqrt(size_x)
@@ -191,61 +224,63 @@ def _accelerations(stretch: Stretch, shares: Array) -> list[tuple[Array, Array]]
     return rows
 
 
-def _jerks(stretch: Stretch, x0: Array, shares: Array) -> list[tuple[Array, Array]]:
+def _jerks(stretch: Stretch, x0: Array, y0: Array, shares: Array) -> list[tuple[Array, Array]]:
     """(coefficients of x, of y) of both ends of every inner cell, by joint and sign; at most 3/2.
 
-    In the middle of a cell x = (x0 + x1)/2 + h (y0 - y1)/8; over its limit J / sqrt(x), linearised at X, the jerk is
+    In the middle of a cell x = x0 + w0 y0 + w1 y1; over its limit J / sqrt(x), linearised at X, the jerk is
 
         sqrt(X)/J |q''' x + 3 q'' y + q' dy/ds| + x/(2 X) <= 3/2
     """
-    h = np.diff(stretch.s)[1:-1]
+    cells = np.diff(stretch.u)
     first, second, third = (part[1:-1] for part in stretch.derivatives(0.5))
-    before = 0.5 * (x0[1:-2] + x0[2:-1])
-    half = np.full((len(h), 2), 0.5)
-    lever = np.stack([h / 8.0, -h / 8.0], axis=1)
-    slope = np.stack([-1.0 / h, 1.0 / h], axis=1)
+    lever = stretch.gained(0.5)[1:-1]
+    whole = np.tile([1.0, 0.0], (len(lever), 1))
+    before = np.maximum(x0[1:-2] + (lever * np.stack([y0[1:-2], y0[2:-1]], axis=1)).sum(axis=1), 1e-3 * x0[1:-2])
+    half = np.full((len(lever), 2), 0.5)
+    steep = _slope(stretch.u[:-1] + 0.5 * cells) * (stretch.s[-1] - stretch.s[0]) * cells
+    slope = np.array([-1.0, 1.0]) / steep[1:-1, None]
     tangent = 0.5 / before[:, None]
     rows = []
     for i, limit in enumerate(stretch.limits[2]):
         unit = (np.sqrt(before) / (limit * shares[1:-1]))[:, None]
-        of_x = third[:, i, None] * half * unit
+        of_x = third[:, i, None] * whole * unit
         of_y = (third[:, i, None] * lever + 3.0 * second[:, i, None] * half + first[:, i, None] * slope) * unit
         for sign in (1.0, -1.0):
-            rows.append((sign * of_x + tangent * half, sign * of_y + tangent * lever))
+            rows.append((sign * of_x + tangent * whole, sign * of_y + tangent * lever))
     return rows
 
 
 def _speeds(stretch: Stretch, shares: Array) -> Array:
     """Largest x at inner grid points: by the velocities, and by the jerk of the cells at both ends."""
     v, _, j = stretch.limits
-    h = np.diff(stretch.s)
     at, end = stretch.derivatives(0.0)[0], stretch.derivatives(1.0)[0][-1]
     share = np.minimum(shares[0, 1:], shares[0, :-1])
     with np.errstate(divide="ignore"):
         top = np.min((v / np.abs(at[1:])) ** 2, axis=1) * share**2
         for place, q in ((0, at[0]), (-1, end)):
             # x = 3/2 h y with y^3 = 6 h jerk^2
+            h = abs(float(stretch.s[place] - stretch.s[1 if place == 0 else -2]))
             jerk = float(np.min(j / np.abs(q))) * shares[2, place]
-            top[place] = min(top[place], 1.5 * h[place] * np.cbrt(6.0 * h[place] * jerk * jerk))
+            top[place] = min(top[place], 1.5 * h * np.cbrt(6.0 * h * jerk * jerk))
     return np.asarray(top)
 
 
-def _timing(s: Array, x: Array, y: Array) -> Timing:
+def _timing(stretch: Stretch, x: Array, y: Array) -> Timing:
     """Quintics in time between grid points, with the s, ds/dt and d2s/dt2 of both."""
-    h = np.diff(s)
+    s, h = stretch.s, np.diff(stretch.s)
     nodes, weights = np.polynomial.legendre.leggauss(10)
-    u = 0.5 * (nodes + 1.0)
-    # Time over a cell: the integral of ds / sqrt(x); at rest at one end: 3 h / speed
-    inner = x[:-1, None] + 2.0 * h[:, None] * u * (y[:-1, None] + 0.5 * u * np.diff(y)[:, None])
-    span = np.empty(len(h))
-    span[1:-1] = (h[:, None] * 0.5 * weights / np.sqrt(np.maximum(inner, 1e-300)))[1:-1].sum(axis=1)
-    span[[0, -1]] = 3.0 * h[[0, -1]] / np.sqrt(x[[1, -2]])
+    # Time over a cell: the integral of ds / sqrt(x)
+    span = np.zeros(len(h))
+    for node, weight in zip(0.5 * (nodes + 1.0), 0.5 * weights, strict=True):
+        w = stretch.gained(float(node))
+        inside = np.maximum(x[:-1] + w[:, 0] * y[:-1] + w[:, 1] * y[1:], 1e-9 * np.maximum(x[:-1], x[1:]))
+        span += weight * _slope(stretch.u[:-1] + node * np.diff(stretch.u)) / np.sqrt(inside)
+    span *= np.diff(stretch.u) * (s[-1] - s[0])
     v = np.sqrt(x)
-    p0, v0, a0, v1, a1 = 0.0, v[:-1] * span, y[:-1] * span**2, v[1:] * span, y[1:] * span**2
-    way = h - p0
-    c3 = 10.0 * way - 6.0 * v0 - 4.0 * v1 - 1.5 * a0 + 0.5 * a1
-    c4 = -15.0 * way + 8.0 * v0 + 7.0 * v1 + 1.5 * a0 - a1
-    c5 = 6.0 * way - 3.0 * (v0 + v1) - 0.5 * (a0 - a1)
+    v0, a0, v1, a1 = v[:-1] * span, y[:-1] * span**2, v[1:] * span, y[1:] * span**2
+    c3 = 10.0 * h - 6.0 * v0 - 4.0 * v1 - 1.5 * a0 + 0.5 * a1
+    c4 = -15.0 * h + 8.0 * v0 + 7.0 * v1 + 1.5 * a0 - a1
+    c5 = 6.0 * h - 3.0 * (v0 + v1) - 0.5 * (a0 - a1)
     rows = [c5 / span**5, c4 / span**4, c3 / span**3, 0.5 * y[:-1], v[:-1], s[:-1]]
     return Timing(np.concatenate([[0.0], np.cumsum(span)]), rows)
 

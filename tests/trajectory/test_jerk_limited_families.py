@@ -1,0 +1,31 @@
+"""Random families of motions between two states: no refusal, no limit passed, ends met. The judge is the test's own."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.trajectory.families import NAMES, drawn, judged
+
+#: Members of a family
+MANY = {"random": 10_000, "near rest": 10_000, "mixed": 1000, "speeds only": 1000}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", NAMES)
+def test_limits_are_kept_and_ends_met(name):
+    rng = np.random.default_rng(17)
+    for _ in range(MANY[name] // 500):
+        family = [drawn(name, rng) for _ in range(500)]
+        laws, excess, off = judged(family)
+        worst = int(excess.argmax())
+        assert excess[worst] <= 1e-9, family[worst]
+        spans = np.array([law.duration for law in laws])
+        share = off / (1.0 + np.array([np.abs(a["target"]).max() for a in family])) / np.maximum(1.0, spans)
+        worst = int(share.argmax())
+        assert share[worst] <= 1e-10, (off[worst], family[worst])
+        for law, over in zip(laws[::100], excess[::100], strict=True):
+            certificate = law.certificate
+            assert certificate.kept, certificate
+            assert {w.kind for w in certificate.worst.values()} == {"exact"}, certificate
+            assert abs(certificate.ratio - 1.0 - over) < 1e-9
