@@ -95,6 +95,28 @@ def test_mobile_base_rolls_along_with_the_hand() -> None:
     check_picture(text)
 
 
+def test_clutter_is_not_touched() -> None:
+    text = output("clutter")
+    gaps = dict(re.findall(rf"(\w+): panda_\w+ came within {NUMBER} mm", text))
+    assert set(gaps) == {"house", "box", "post", "bar", "ball"}
+    # The margin is 15 mm; a tick of 20 ms bends the way by some tenths
+    assert min(float(gap) for gap in gaps.values()) > 13.5
+    # Four of five do hinder the arm
+    assert sorted(float(gap) for gap in gaps.values())[3] < 20.0
+    assert number("solved, hand # mm", text) < 1.0
+    check_picture(text)
+
+
+def test_self_collision_keeps_the_arms_apart() -> None:
+    text = output("self_collision")
+    assert number("without SelfCollision: least distance # mm", text) < -100.0
+    assert number("with SelfCollision: least distance # mm", text) > 17.0
+    off = [float(x) for x in re.findall(rf"solved, hands at most {NUMBER} mm", text)]
+    assert len(off) == 2
+    assert max(off) < 6.0
+    check_picture(text)
+
+
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda p: p.stem)
 def test_examples_are_short_and_use_public_names(path: Path) -> None:
     text = path.read_text()
@@ -103,7 +125,7 @@ def test_examples_are_short_and_use_public_names(path: Path) -> None:
     assert ast.get_docstring(tree)
     modules = {a.name for n in ast.walk(tree) if isinstance(n, ast.Import) for a in n.names}
     modules |= {n.module or "" for n in ast.walk(tree) if isinstance(n, ast.ImportFrom)}
-    assert modules <= {"wbc", "wbc.tasks", "wbc.track", "numpy", "pinocchio", "casadi"}
+    assert modules <= {"itertools", "wbc", "wbc.tasks", "wbc.track", "wbc.shapes", "numpy", "pinocchio", "casadi"}
     assert not [n.attr for n in ast.walk(tree) if isinstance(n, ast.Attribute) and n.attr.startswith("_")]
 
 

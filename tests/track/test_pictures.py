@@ -113,8 +113,8 @@ def test_a_scene_shows_what_was_added(tmp_path: Path) -> None:
     robot = wbc.robots.from_dh([wbc.robots.DHRow(a=0.5)] * 2)
     robot = robot.with_shapes({f"link{k}": [PlacedShape(Sphere(0.1), pin.SE3.Identity())] for k in (1, 2)})
 
-    def drawn(q2: float, balls: bool = True) -> np.ndarray:
-        scene = track.Scene(robot)
+    def drawn(q2: float, balls: bool = True, hidden: tuple[str, ...] = ()) -> np.ndarray:
+        scene = track.Scene(robot, hidden=hidden)
         # Far apart in the corners, these hold the camera where it is
         for side in (-1.0, 1.0):
             scene.add_shape(Box((0.02, 0.02, 0.02)), pin.SE3(np.eye(3), np.array([0.0, 1.5 * side, side + 1.0])))
@@ -143,6 +143,8 @@ def test_a_scene_shows_what_was_added(tmp_path: Path) -> None:
     assert rows.mean() > 100
     assert part(bare, PATH).sum() == 0
     assert np.abs(moved - still).max() > 0.02
+    assert np.array_equal(drawn(0.0, hidden=("link*",)), drawn(1.2, hidden=("link1", "link2")))
+    assert not np.array_equal(drawn(0.0, hidden=("link*",)), still)
     assert np.array_equal(still, drawn(0.0))
 
 
@@ -160,6 +162,8 @@ def test_scenes_refuse_what_cannot_be_drawn(tmp_path: Path) -> None:
     robot = wbc.robots.from_dh([wbc.robots.DHRow(a=0.5)] * 2)
     with pytest.raises(UnknownNameError, match=r"Scene\.dark"):
         track.Scene(robot, dark=["hand"])
+    with pytest.raises(UnknownNameError, match=r"Scene\.hidden.*did you mean 'link1'"):
+        track.Scene(robot, hidden=["link*", "linc1"])
     with pytest.raises(RangeError, match=r"Scene\.detail"):
         track.Scene(robot, detail=-1.0)
     scene = track.Scene(robot)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fnmatch
 import math
 import pathlib
 from collections.abc import Sequence
@@ -54,17 +55,19 @@ class Scene:
         robot: the robot that is drawn with the visual meshes of its URDF, else with its link shapes.
         dark: frames whose links are drawn dark, as the hands, with everything that the same joint moves.
         detail: corners of meshes closer than this are drawn as one [m]; saves time on descriptions with fine meshes.
+        hidden: links that are not drawn, by name or pattern such as ``leg_*``.
 
     Raises:
         UnknownNameError: no such frame. ShapeError, RangeError, NotFiniteError, RotationError: bad numbers, here and in
             the methods, or a shape without a surface.
     """
 
-    def __init__(self, robot: Robot, dark: Sequence[str] = (), detail: float = 0.0) -> None:
+    def __init__(self, robot: Robot, dark: Sequence[str] = (), detail: float = 0.0, hidden: Sequence[str] = ()) -> None:
         detail = validation.scalar("Scene.detail", detail, low=0.0, unit="m")
         frames = [robot.model.getFrameId(robot.check_frame("Scene.dark", frame)) for frame in dark]
         self._robot = robot
-        self._meshes = [(link, simplified(triangles, detail)) for link, triangles in link_meshes(robot)]
+        unseen = _matching(robot, hidden)
+        self._meshes = [(link, simplified(m, detail)) for link, m in link_meshes(robot) if link not in unseen]
         self._dark = {int(robot.model.frames[frame].parentJoint) for frame in frames} - {0}
         self._stands: list[list[pin.SE3]] = [[] for _ in self._meshes]
         self._solid: list[render.Mesh] = []
@@ -135,9 +138,10 @@ class Scene:
             raise RangeError("Scene.size", size, "expected two whole numbers of pixels above 0")
         if not any(len(mesh.triangles) for mesh in self._solid):
             raise RangeError("Scene", len(self._solid), "nothing was added that is not pale")
-        # A point in thirty is enough to see how large the scene is
-        everything = _points([*self._solid, *(mesh for meshes in self._pale for mesh in meshes)])[::30]
-        camera = _camera(everything, size, azimuth, elevation)
+        everything = [*self._solid, *(mesh for meshes in self._pale for mesh in meshes)]
+        # Some hundred points of each are enough to see how large the scene is
+        sample = [mesh.triangles.reshape(-1, 3)[:: max(1, len(mesh.triangles) // 200)] for mesh in everything]
+        camera = _camera(np.concatenate(sample), size, azimuth, elevation)
         image = _render(camera, self._solid, self._pale)
         path = pathlib.Path(file)
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -160,6 +164,14 @@ def link_meshes(robot: Robot) -> list[tuple[str, Array]]:
     if out:
         return out
     return [(link, solids.triangles(placed)) for link, shapes in robot.shapes.items() for placed in shapes]
+
+
+def _matching(robot: Robot, patterns: Sequence[str]) -> set[str]:
+    found: set[str] = set()
+    for pattern in patterns:
+        names = fnmatch.filter(robot.frame_names, pattern)
+        found.update(names or [robot.check_frame("Scene.hidden", pattern)])
+    return found
 
 
 def simplified(triangles: Array, detail: float) -> Array:
