@@ -1,0 +1,128 @@
+"""The reference of the angle of an arm's plane, and full turns of the self-motion."""
+
+from __future__ import annotations
+
+import functools
+
+import casadi as ca
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from tests.tasks.planes import (
+    SPHERICAL,
+    TILTED,
+    clear,
+    evaluate,
+    robot,
+    wrap,
+)
+from wbc.tasks import _stereographic as stereo
+
+
+@functools.cache
+def coordinates() -> ca.Function:
+    u, d = ca.SX.sym("u", 3), ca.SX.sym("d", 3)
+    return ca.Function("c", [u, d], list(stereo.coordinates(u, d, TILTED)))
+
+
+def field(line: np.ndarray) -> np.ndarray:
+    """a(u) of the expressions under test, from the coordinates of a direction across the line."""
+    first = np.cross(line, [0.1, 0.7, -0.4])
+    first /= np.linalg.norm(first)
+    x, y = (float(c) for c in coordinates()(line, first))
+    across = np.cross(line, first)
+    return (x * first - y * across) / np.hypot(x, y)
+
+
+def sphere(count: int, seed: int) -> np.ndarray:
+    points = np.random.default_rng(seed).normal(size=(count, 3))
+    return points / np.linalg.norm(points, axis=1)[:, None]
+
+
+def test_reference_is_continuous_away_from_one_half_line() -> None:
+    """|da| <= |du| / cos(theta / 2), theta the angle to the pole: bounded on the sphere without -pole."""
+    pole, step = np.array(TILTED.pole), 1e-5
+    spread = np.random.default_rng(5).normal(size=(300, 3))
+    lines = [*sphere(250, 6), *(pole + 1e-3 * s for s in spread[:50])]
+    largest = 0.0
+    for line, other in zip(lines, spread, strict=True):
+        line = line / np.linalg.norm(line)
+        near = line + step * other
+        near /= np.linalg.norm(near)
+        theta = np.arccos(np.clip(pole @ line, -1, 1))
+        if theta > 0.97 * np.pi:
+            continue
+        change = np.linalg.norm(field(near) - field(line)) / np.linalg.norm(near - line)
+        largest = max(largest, change * np.cos(theta / 2))
+        assert abs(field(line) @ line) < 1e-12
+    assert 0.9 < largest < 1.01
+
+
+def test_reference_turns_twice_round_the_half_line_and_not_round_the_pole() -> None:
+    """The index of the singular direction -pole is 2, all that a field on the sphere must have; at +pole it is 0."""
+    pole, side = np.array(TILTED.pole), np.array(TILTED.direction)
+    up = np.cross(pole, side)
+    for centre, turns in ((-pole, 2), (pole, 0)):
+        last, total = None, 0.0
+        for t in np.linspace(0, 2 * np.pi, 201):
+            line = centre + 1e-3 * (np.cos(t) * side + np.sin(t) * up)
+            line /= np.linalg.norm(line)
+            a = field(line)
+            now = np.arctan2(a @ up, a @ side)
+            total += 0.0 if last is None else wrap(now - last)
+            last = now
+        assert abs(total) == pytest.approx(2 * np.pi * turns, abs=1e-6)
+
+
+def test_reference_is_the_stereographic_one() -> None:
+    """((u - e_t) x e_r) x u of Elias and Wen with e_t = -pole, e_r = direction, up to length."""
+    for line in sphere(100, 7):
+        theirs = np.cross(np.cross(line + np.array(TILTED.pole), TILTED.direction), line)
+        np.testing.assert_allclose(field(line), theirs / np.linalg.norm(theirs), atol=1e-12)
+
+
+def euler_zyz(rotation: np.ndarray) -> np.ndarray:
+    second = np.arctan2(np.hypot(rotation[0, 2], rotation[1, 2]), rotation[2, 2])
+    return np.array([np.arctan2(rotation[1, 2], rotation[0, 2]), second, np.arctan2(rotation[2, 1], -rotation[2, 0])])
+
+
+def self_motion(q: np.ndarray, turn: float) -> np.ndarray:
+    """The spherical arm with its elbow turned about the shoulder-wrist line, hand kept."""
+    model = robot("spherical").model
+    data = model.createData()
+    pin.framesForwardKinematics(model, data, q)
+    wrist, hand = data.oMi[5].translation, data.oMi[7].rotation
+    arm = pin.AngleAxis(turn, wrist / np.linalg.norm(wrist)).matrix() @ data.oMi[3].rotation
+    lower = arm @ pin.rpy.rpyToMatrix(0.0, q[3], 0.0)
+    return np.concatenate([euler_zyz(arm), [q[3]], euler_zyz(lower.T @ hand)])
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_full_turn_of_the_self_motion(seed: int) -> None:
+    """psi follows the elbow's turn exactly, through +-pi, and the error passes its target smoothly."""
+    q = clear("spherical", SPHERICAL, 1, seed=seed + 20)[0]
+    model = robot("spherical").model
+    data = model.createData()
+    tip = model.getFrameId("tip")
+    pin.framesForwardKinematics(model, data, q)
+    pose = data.oMf[tip].copy()
+    start, last, total = SPHERICAL.angle(robot("spherical"), q), None, 0.0
+    rows = []
+    for turn in np.linspace(0, 2 * np.pi, 73):
+        moved = self_motion(q, turn)
+        pin.framesForwardKinematics(model, data, moved)
+        assert np.linalg.norm(pin.log6(pose.actInv(data.oMf[tip])).vector) < 1e-12
+        error, jacobian, factor = evaluate("spherical", SPHERICAL, moved)
+        assert factor[0] == 1.0
+        assert wrap(error[0] - start - turn) == pytest.approx(0, abs=1e-12)
+        around = evaluate("spherical", SPHERICAL, moved, np.pi)
+        assert wrap(around[0][0] - error[0] + np.pi) == pytest.approx(0, abs=1e-12)
+        np.testing.assert_allclose(around[1], jacobian, atol=1e-9)
+        if last is not None:
+            assert wrap(error[0] - last) > 0
+            total += wrap(error[0] - last)
+        last = error[0]
+        rows.append(jacobian)
+    assert total == pytest.approx(2 * np.pi, abs=1e-12)
+    np.testing.assert_allclose(rows[0], rows[-1], atol=1e-9)
