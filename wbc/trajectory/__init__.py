@@ -39,6 +39,7 @@ _WHERE = {
     "arc_through": "arcs",
     "via_points": "via_poses",
     "load": "files",
+    "plot": "plots",
 }
 
 __all__ = sorted(_WHERE)  # noqa: PLE0605
