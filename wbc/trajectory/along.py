@@ -49,12 +49,12 @@ def jerk_limited_along(
         velocity, acceleration, jerk: n finite positive numbers, or one for all [per s, s^2, s^3]; for poses 6.
         lower, upper: limits of joint positions; a path that leaves them is refused.
         stops: come to rest where the direction or the curvature of the path jumps, instead of refusing it.
-        cells: of the grid between two stops; more make the law faster by 1 % at best, and take longer.
+        cells: of the grid between two stops; more come nearer to the limits, and take longer.
 
     Raises:
         ShapeError, NotFiniteError, RangeError, BoundsError: of arguments; BoundsError: the path leaves its limits.
-        ContinuityError: direction or curvature jump, with the coordinate, and not ``stops``. InfeasibleError: there is
-        nothing to move, or no speed is found.
+        ContinuityError: direction or curvature jump, with the coordinate, and not ``stops``. InfeasibleError: a part
+        of the path between two stops begins without moving, or no speed is found.
     """
     if not isinstance(path, Path):
         raise ShapeError("path", path, "expected a path")
@@ -74,7 +74,9 @@ def jerk_limited_along(
         timing = part if timing is None else timing.then(part, 0.0)
     assert timing is not None
     law = Law(path, timing, limits)
-    law = law.scaled(_slower(law) * (1.0 + ROOM))
+    slower = _slower(law)
+    if slower > 1.0:
+        law = law.scaled(slower * (1.0 + ROOM))
     position = law.certificate.worst.get("position")
     if position is not None and position.ratio > 1.0 + TOLERANCE:
         value = float(law.at(position.time).position[position.joint])
@@ -107,29 +109,25 @@ def _slower(law: Law, sizes: tuple[Array, Array, Array] | None = None) -> float:
 
 
 def _breaks(path: Path) -> list[tuple[float, str]]:
-    """Inner knots at which the direction or the curvature jumps."""
+    """Inner knots at which the direction or the curvature jumps, as shares of their largest sizes anywhere."""
     knots = path.knots[1:-1]
     if not knots.size:
         return []
     before = np.arange(len(knots))
-    steps = []
+    pieces = np.arange(len(knots) + 1)
+    starts, spans = path.knots[:-1], np.diff(path.knots)
+    sizes = []
     for order in (1, 2):
-        left = path.evaluate(knots, order, before)
-        right = path.evaluate(knots, order, before + 1)
-        size = max(float(np.abs(left).max()), float(np.abs(right).max()), 1e-300)
+        inside = [np.abs(path.evaluate(starts + u * spans, order, pieces)).max() for u in np.linspace(0.0, 1.0, 9)]
+        sizes.append(max(*map(float, inside), 1e-300))
+    # A second derivative that turns the direction by less than rounding over the whole path is none
+    sizes[1] = max(sizes[1], sizes[0] / path.length)
+    steps = []
+    for order, size in enumerate(sizes, 1):
+        left, right = path.evaluate(knots, order, before), path.evaluate(knots, order, before + 1)
         steps.append(np.abs(right - left).max(axis=1) / size)
-    # A second derivative may be rounding altogether
-    if _bend(path) < STEP:
-        steps[1][:] = 0.0
     return [
         (float(s), "the direction" if first > STEP else "the curvature")
         for s, first, second in zip(knots, *steps, strict=True)
         if max(first, second) > STEP
     ]
-
-
-def _bend(path: Path) -> float:
-    """Largest second derivative over the largest first one, times the length."""
-    s = np.unique(np.concatenate([path.knots, np.linspace(path.knots[0], path.knots[-1], 101)]))
-    first, second = (float(np.abs(path.evaluate(s, order)).max()) for order in (1, 2))
-    return second * path.length / first if first > 0.0 else 0.0
