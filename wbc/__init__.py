@@ -13,6 +13,7 @@ __version__ = "0.1.0"
 from wbc import robots as robots
 from wbc import shapes as shapes
 from wbc import tasks as tasks
+from wbc import trajectory as trajectory
 from wbc.controller import Certificate, Controller, Recording, Replay, Stack, Status, Step, replay
 from wbc.errors import WbcError
 
@@ -30,4 +31,5 @@ __all__ = [
     "robots",
     "shapes",
     "tasks",
+    "trajectory",
 ]
