@@ -150,7 +150,7 @@ def _first(stretch: Stretch) -> tuple[Array, Array]:
     for point, jerk, span in zip(course.points(), course.jerks, course.spans, strict=False):
         rows += [moved(point, jerk, t) for t in np.linspace(0.0, span, 200)]
     places, speeds, pushes = np.array(rows).T
-    # Between places beside rest the speed goes with s^(2/3), which an interpolation over s^(1/3) sees as a parabola
+    # Beside rest an interpolated speed is far too low
     near = np.minimum(s, s[-1] - s)
     x = np.interp(s, places, speeds) ** 2
     least = 0.5 * x.max() * (near / s[-1]) ** (4.0 / 3.0)
@@ -182,13 +182,12 @@ def _program(stretch: Stretch, x0: Array, y0: Array, shares: Array) -> tuple[Arr
     pushes = [matrix(*rows, every) for rows in _accelerations(stretch, shares[1])]
     jerks = [matrix(*rows, every[:-1]) for rows in _jerks(stretch, x0, y0, shares[2])]
     # The square of the speed in the middle of cells, over its limit
-    lever, inside = stretch.gained(0.5)[1:-1], slice(1, -1)
+    lever = stretch.gained(0.5)[1:-1]
     with np.errstate(divide="ignore"):
-        most = (np.min(stretch.limits[0] / np.abs(stretch.derivatives(0.5)[0]), axis=1) * shares[0])[inside, None] ** 2
+        most = (np.min(stretch.limits[0] / np.abs(stretch.derivatives(0.5)[0]), axis=1) * shares[0])[1:-1, None] ** 2
     middles = matrix(np.array([[1.0, 0.0]]) / most, lever / most, every[:-1])
     upper = sparse.vstack([*pushes, *(-rows for rows in pushes), middles, *jerks])
     tops = [np.ones(2 * len(pushes) * count + count - 1), np.full(len(jerks) * (count - 1), 1.5)]
-    # x goes on by what y adds over each cell, from and to 0
     w = stretch.gained(1.0)
     unit = 1.0 / size_x[:-1, None]
     within = matrix(np.array([[-1.0, 1.0]]) * unit, -w[1:-1] * unit, every[:-1])
@@ -209,8 +208,8 @@ def _program(stretch: Stretch, x0: Array, y0: Array, shares: Array) -> tuple[Arr
     if answer.x is None:
         raise InfeasibleError("path", float(stretch.s[0]), f"no speed was found from here on: {answer.message}")
     zero = np.zeros(1)
-    x, y = answer.x[:count] * size_x, answer.x[count:] * size_y
-    return np.concatenate([zero, x, zero]), np.concatenate([zero, y, zero])
+    x, y = np.split(answer.x, 2)
+    return np.concatenate([zero, x * size_x, zero]), np.concatenate([zero, y * size_y, zero])
 
 
 def _accelerations(stretch: Stretch, shares: Array) -> list[tuple[Array, Array]]:
