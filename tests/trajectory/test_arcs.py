@@ -64,7 +64,7 @@ def test_through_three_points(seed: int, scale: float) -> None:
     reach = scale * float(np.linalg.norm(x))
     assert np.abs(np.linalg.norm(places(path) - middle, axis=1) - reach).max() < 1e-9 * reach
     np.testing.assert_allclose(path.evaluate(path.knots)[0], start.homogeneous, atol=1e-11 * (1.0 + scale))
-    np.testing.assert_allclose(path.evaluate(path.knots)[1], end.homogeneous, atol=1e-11 * (1.0 + scale))
+    np.testing.assert_allclose(path.evaluate(path.knots)[-1], end.homogeneous, atol=1e-11 * (1.0 + scale))
     # The way round on which the point between lies: passed after its share of the arc
     between = path.evaluate(np.array([path.length * angles[0] / angles[1]]))[0]
     np.testing.assert_allclose(between[:3, 3], points[1], atol=1e-9 * reach)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any, Literal
 
 import numpy as np
@@ -116,10 +117,15 @@ def _arc(center: Array, x: Array, normal: Array, angle: float, turn: Array, rota
         raise RangeError("path.turn", angle, "the length of the arc is no finite number")
     if length <= SMALLEST:
         return standing_pose(center + x, rotation)
+    # A knot a radian, so that samples between them do not meet the same phase of every turn
+    pieces = max(1, math.ceil(angle)) if travel > SMALLEST else 1
+    knots = np.linspace(0.0, length, pieces + 1)
     position: Path
     if travel <= SMALLEST:
-        position = PolynomialPath([0.0, length], np.array([np.zeros(3), center + x])[:, None])
+        position = PolynomialPath(knots, np.array([np.zeros(3), center + x])[:, None])
     else:
-        position = Circle(center, x, np.cross(normal, x), angle / length, length)
-    angles = PolynomialPath([0.0, length], [[[0.0, 1.0]], [[0.0, 0.0]]])
-    return PosePath(position, Turns(angles, np.zeros((1, 3)), turn[None] / length, rotation))
+        position = Circle(center, x, np.cross(normal, x), angle / length, knots)
+    angles = np.zeros((2, pieces, 2))
+    angles[0, :, 1], angles[1, :, 1] = 1.0, knots[:-1]
+    parts = (np.zeros((pieces, 3)), np.tile(turn / length, (pieces, 1)), np.repeat(rotation, pieces, axis=0))
+    return PosePath(position, Turns(PolynomialPath(knots, angles), *parts))

@@ -10,6 +10,12 @@ from numpy.typing import NDArray
 
 from wbc.validation import Array
 
+#: Up to this degree, coefficients found from values are off by less than 1e-8 of them
+HIGHEST = 24
+
+#: Bounds are this near to a value that is taken, as a share of the largest coefficient
+CLOSE = 1e-13
+
 
 @cache
 def nodes(degree: int) -> Array:
@@ -23,6 +29,12 @@ def _to_coefficients(degree: int) -> Array:
     k = np.arange(degree + 1)
     basis = np.array([comb(degree, i) for i in k]) * u**k * (1.0 - u) ** (degree - k)
     return np.asarray(np.linalg.inv(basis), dtype=np.float64)
+
+
+@cache
+def rounding(degree: int) -> float:
+    """How far :func:`coefficients` may be off, as a share of the largest value, for values that are rounded."""
+    return 4.0 * float(np.finfo(float).eps * np.abs(_to_coefficients(degree)).sum(axis=1).max())
 
 
 def coefficients(values: Array) -> Array:
@@ -40,7 +52,7 @@ def halves(c: Array) -> tuple[Array, Array]:
     return low, high
 
 
-def largest(c: Array, tolerance: float = 1e-13) -> tuple[float, int, float]:
+def largest(c: Array, tolerance: float = CLOSE) -> tuple[float, int, float]:
     """max p over [0, 1] and over all polynomials: (a bound of it, above it by at most ``tolerance`` of the largest
     coefficient, the number of the polynomial, the place).
 

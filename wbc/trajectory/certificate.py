@@ -172,7 +172,9 @@ def certify(
     samples: int = 16,
     moving: tuple[bool, bool] = (False, False),
 ) -> Certificate:
-    """Worst places of a law; ``samples``: of each piece, where it is no polynomial; ``moving``: as of the law."""
+    """Worst places of a law; ``samples``: of each piece, at first, where it is no polynomial or one of a degree above
+    24; ``moving``: as of the law.
+    """
     pieces = Pieces.of(path, timing)
     worst: dict[str, Worst] = {}
     limited = set()
@@ -187,17 +189,24 @@ def certify(
                 continue
         if scaled is None:
             continue
-        if path.degree is not None:
+        if path.degree is not None and path.degree * timing.degree <= bernstein.HIGHEST:
             degree = max(path.degree * timing.degree - order, 0)
             values = scaled(pieces.at(path, timing, order, bernstein.nodes(degree)))
             worst[name] = _exact(pieces, bernstein.coefficients(values), path.dof)
         else:
-            values = scaled(pieces.at(path, timing, order, np.linspace(0.0, 1.0, samples + 1)))
-            worst[name] = sampled(pieces.start, pieces.span, values, path.dof)
+            evaluate = _sampling(path, timing, pieces, order, scaled)
+            worst[name] = _worst(pieces.start, pieces.span, highest(pieces.span, evaluate, samples), path.dof)
     for check in checks:
         limited.add(check.name)
         worst[check.name] = checked(path, timing, pieces, check)
     return Certificate(worst, frozenset(limited))
+
+
+def _sampling(
+    path: Path, timing: Timing, pieces: Pieces, order: int, scaled: Callable[[Array], Array]
+) -> Callable[[Index, int], Array]:
+    """Numbers of pieces, and a count -> what is to be at most 1, at count + 1 places of each."""
+    return lambda some, count: scaled(pieces.some(some).at(path, timing, order, np.linspace(0.0, 1.0, count + 1)))
 
 
 def checked(path: Path, timing: Timing, pieces: Pieces, check: Check) -> Worst:
@@ -224,7 +233,8 @@ def _worst(start: Array, span: Array, top: Highest, joints: int) -> Worst:
 
 def _exact(pieces: Pieces, c: Array, joints: int) -> Worst:
     count, size, columns = c.shape
-    ratio, number, place = bernstein.largest(c.transpose(0, 2, 1).reshape(count * columns, size))
+    room = max(bernstein.CLOSE, bernstein.rounding(size - 1))
+    ratio, number, place = bernstein.largest(c.transpose(0, 2, 1).reshape(count * columns, size), room)
     piece, column = divmod(number, columns)
     time = float(pieces.start[piece] + place * pieces.span[piece])
     return Worst(ratio, column % joints, time, "exact")

@@ -63,7 +63,7 @@ KINDS = {
         _from_function,
     ),
     "poses": Kind("pose_path", "PosePath", ("position", "turning")),
-    "circle": Kind("pose_path", "Circle", ("center", "x", "y", "rate", "length")),
+    "circle": Kind("pose_path", "Circle", ("center", "x", "y", "rate", "knots")),
     "turns": Kind("turning", "Turns", ("angles", "first", "second", "base")),
     "quaternions": Kind(
         "turning", "QuaternionSpline", ("spline",), lambda make, parts: make(parts["spline"], "path.poses")
@@ -108,10 +108,10 @@ def load(file: str | os.PathLike[str], checks: Sequence[Check] = ()) -> Law:
     """
     name = str(file)
     try:
-        archive = np.load(file, allow_pickle=False)
-        if not isinstance(archive, np.lib.npyio.NpzFile):
-            raise LawFileError("file", name, "not a saved law: one array")
-        with archive:
+        with FilePath(file).open("rb") as stream:
+            archive = np.load(stream, allow_pickle=False)
+            if not isinstance(archive, np.lib.npyio.NpzFile):
+                raise LawFileError("file", name, "not a saved law: one array")
             arrays = {key: archive[key] for key in archive.files}
     except OSError as error:
         raise LawFileError("file", name, f"cannot be read: {error.strerror or error}") from error

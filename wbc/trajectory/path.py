@@ -94,7 +94,8 @@ class PolynomialPath(Path):
             raise ShapeError("path.knots", knots, "expected at least two numbers")
         if (np.diff(self.knots) <= 0.0).any():
             raise RangeError("path.knots", knots, "knots must increase strictly")
-        if self.coefficients.ndim != 3 or self.coefficients.shape[1] != len(self.knots) - 1:
+        shape = self.coefficients.shape
+        if len(shape) != 3 or shape[1] != len(self.knots) - 1 or 0 in shape:
             raise ShapeError(
                 "path.coefficients",
                 self.coefficients.shape,

@@ -53,11 +53,12 @@ class Circle(Path):
 
     Args:
         center, x, y: 3 each [m]; x and y span the plane, and are as long as the radius. rate: k, angle per s.
+        knots: from 0 to length. What samples a path does so between knots: a radian is far enough.
     """
 
-    def __init__(self, center: Array, x: Array, y: Array, rate: float, length: float) -> None:
+    def __init__(self, center: Array, x: Array, y: Array, rate: float, knots: Array) -> None:
         self.center, self.x, self.y, self.rate = center, x, y, rate
-        self.knots, self.dof = np.array([0.0, length]), 3
+        self.knots, self.dof = knots, 3
 
     def evaluate(self, s: Array, order: int = 0, piece: Index | None = None) -> Array:
         # A derivative of sine and cosine is a quarter of a turn ahead

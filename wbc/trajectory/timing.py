@@ -35,7 +35,11 @@ class Timing:
             raise ShapeError("timing.times", times, "expected at least two numbers")
         if self.times[0] != 0.0 or (np.diff(self.times) <= 0.0).any():
             raise RangeError("timing.times", times, "times must increase strictly from 0")
-        if self.coefficients.ndim != 2 or self.coefficients.shape[1] != len(self.times) - 1:
+        if (
+            self.coefficients.ndim != 2
+            or self.coefficients.shape[1] != len(self.times) - 1
+            or not len(self.coefficients)
+        ):
             raise ShapeError(
                 "timing.coefficients", self.coefficients.shape, f"expected powers x {len(self.times) - 1} pieces"
             )
@@ -46,13 +50,24 @@ class Timing:
         return cls([0.0, duration], [[1.0], [start]])
 
     @classmethod
-    def accelerations(cls, s: Array, speed: Array) -> Timing:
+    def accelerations(cls, s: Any, speed: Any) -> Timing:
         """Constant path acceleration between coordinates s with path speeds ds/dt >= 0, at least one > 0 in each pair:
         dt = 2 ds / (speed_i + speed_i+1), and d2s/dt2 = (speed_i+1 - speed_i) / dt.
+
+        Raises:
+            ShapeError, NotFiniteError: not two vectors of one length. RangeError: s does not increase, or bad speeds.
         """
-        durations = 2.0 * np.diff(s) / (speed[:-1] + speed[1:])
-        times = np.concatenate([[0.0], np.cumsum(durations)])
-        return cls(times, [0.5 * np.diff(speed) / np.diff(times), speed[:-1], s[:-1]])
+        places = validation.real_array("timing.s", s)
+        if places.ndim != 1 or len(places) < 2:
+            raise ShapeError("timing.s", s, "expected at least two numbers")
+        speeds = validation.real_array("timing.speed", speed, places.shape)
+        if (np.diff(places) <= 0.0).any():
+            raise RangeError("timing.s", s, "must increase strictly")
+        mean = 0.5 * (speeds[:-1] + speeds[1:])
+        if (speeds < 0.0).any() or (mean <= 0.0).any():
+            raise RangeError("timing.speed", speed, "must not be negative, nor 0 at both ends of an interval")
+        times = np.concatenate([[0.0], np.cumsum(np.diff(places) / mean)])
+        return cls(times, [0.5 * np.diff(speeds) / np.diff(times), speeds[:-1], places[:-1]])
 
     @property
     def duration(self) -> float:

@@ -1,0 +1,129 @@
+"""Limits and polynomial paths: what they hold, and bad input."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from wbc.errors import BoundsError, NotFiniteError, RangeError, ShapeError
+from wbc.trajectory import Limits, PolynomialPath
+from wbc.trajectory.path import JoinedPath
+
+
+@pytest.mark.parametrize(
+    ("given", "error", "field"),
+    [
+        ({"velocity": [1.0, 0.0]}, RangeError, "limits.velocity"),
+        ({"velocity": [1.0, -1.0]}, RangeError, "limits.velocity"),
+        ({"acceleration": [1.0, np.nan]}, ShapeError, "limits.acceleration"),
+        ({"jerk": [[1.0]]}, ShapeError, "limits.jerk"),
+        ({"jerk": "fast"}, ShapeError, "limits.jerk"),
+        ({"velocity": [1.0], "jerk": [1.0, 2.0]}, ShapeError, "limits"),
+        ({"lower": [0.0]}, ShapeError, "limits"),
+        ({"lower": [0.0], "upper": [0.0]}, BoundsError, "limits.lower"),
+        ({"lower": [0.0, 2.0], "upper": [1.0, 1.0]}, BoundsError, "limits.lower"),
+        ({"lower": [np.nan], "upper": [1.0]}, ShapeError, "limits.lower"),
+    ],
+)
+def test_bad_limits(given: dict[str, Any], error: type[Exception], field: str) -> None:
+    with pytest.raises(error, match=field.replace(".", r"\.")):
+        Limits(**given)
+
+
+def test_limits_of_one_joint_may_be_a_number() -> None:
+    assert Limits(velocity=2.0).velocity.tolist() == [2.0]
+    assert Limits(velocity=[1, 2]).dof == 2
+    assert Limits().dof is None
+    assert Limits().for_dof(7).dof is None
+    with pytest.raises(ShapeError, match="limits"):
+        Limits(velocity=[1.0, 2.0]).for_dof(3)
+
+
+def test_scaled_limits() -> None:
+    limits = Limits([-1.0], [np.inf], [2.0], None, [np.inf]).scaled(0.5)
+    assert (limits.lower.tolist(), limits.upper.tolist(), limits.velocity.tolist()) == ([-1.0], [np.inf], [1.0])
+    assert limits.acceleration is None
+    assert limits.jerk.tolist() == [np.inf]
+
+
+def test_limits_keep_their_own_numbers() -> None:
+    numbers = np.ones(2)
+    limits = Limits(velocity=numbers)
+    numbers[0] = 5.0
+    assert limits.velocity.tolist() == [1.0, 1.0]
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(0, 9), st.integers(1, 4), st.integers(1, 3))
+@settings(max_examples=30)
+def test_polynomial_paths(seed: int, degree: int, pieces: int, dof: int) -> None:
+    random = np.random.default_rng(seed)
+    knots = np.cumsum(random.uniform(0.1, 1.0, pieces + 1)) - 3.0
+    path = PolynomialPath(knots, random.normal(size=(degree + 1, pieces, dof)))
+    assert (path.dof, path.degree, path.space) == (dof, degree, "joints")
+    assert path.length == knots[-1] - knots[0]
+    s = random.uniform(knots[0], knots[-1], 20)
+    at = path.pieces_at(s)
+    assert ((knots[at] <= s) & (s <= knots[at + 1])).all()
+    for order in range(4):
+        ours = path.evaluate(s, order)
+        assert ours.shape == (20, dof)
+        for i, k in np.ndindex(20, dof):
+            p = np.poly1d(path.coefficients[:, at[i], k]).deriv(order)
+            assert ours[i, k] == pytest.approx(p(s[i] - knots[at[i]]), rel=1e-9, abs=1e-9)
+
+
+@given(st.integers(0, 2**32 - 1))
+@settings(max_examples=30)
+def test_joined_paths_are_their_parts(seed: int) -> None:
+    """However they are nested: knots are on the side that they belong to, and the gaps between are of nobody."""
+    random = np.random.default_rng(seed)
+    parts = []
+    for _ in range(4):
+        knots = np.cumsum(random.uniform(0.1, 1.0, random.integers(2, 5))) * 10.0 ** random.integers(-2, 3)
+        parts.append(PolynomialPath(knots, random.normal(size=(3, len(knots) - 1, 2))))
+    a, b, c, d = parts
+    for joined in (JoinedPath(JoinedPath(a, b), JoinedPath(c, d)), JoinedPath(JoinedPath(JoinedPath(a, b), c), d)):
+        assert len(joined.gaps) == 3
+        begin = 0
+        for part in parts:
+            knots = joined.knots[begin : begin + len(part.knots)]
+            for order in range(3):
+                expected = part.evaluate(part.knots, order)
+                room = 1e-9 * (1.0 + np.abs(expected).max())
+                assert np.abs(joined.evaluate(knots, order) - expected).max() < room
+            before = joined.pieces_before(knots, joined.pieces_at(knots))
+            ends = np.arange(len(part.knots) - 1) + begin
+            assert before.tolist() == [begin, *ends[:-1], ends[-1]]
+            begin += len(part.knots)
+        gap = joined.knots[joined.gaps]
+        assert joined.pieces_at(gap + 1e-9).tolist() == (joined.gaps - 1).tolist()
+        assert joined.pieces_at(gap + JoinedPath.ROOM - 1e-9).tolist() == (joined.gaps + 1).tolist()
+
+
+@pytest.mark.parametrize(
+    ("knots", "coefficients", "error", "field"),
+    [
+        ([0.0, 0.0], np.zeros((2, 1, 1)), RangeError, "path.knots"),
+        ([0.0, 2.0, 1.0], np.zeros((2, 2, 1)), RangeError, "path.knots"),
+        ([0.0], np.zeros((2, 0, 1)), ShapeError, "path.knots"),
+        ([0.0, np.nan], np.zeros((2, 1, 1)), NotFiniteError, "path.knots"),
+        ([0.0, 1.0], np.zeros((2, 2, 1)), ShapeError, "path.coefficients"),
+        ([0.0, 1.0], np.zeros((2, 1)), ShapeError, "path.coefficients"),
+        ([0.0, 1.0], np.zeros((0, 1, 1)), ShapeError, "path.coefficients"),
+        ([0.0, 1.0], np.zeros((2, 1, 0)), ShapeError, "path.coefficients"),
+        ([0.0, 1.0], np.full((2, 1, 1), np.inf), NotFiniteError, "path.coefficients"),
+    ],
+)
+def test_bad_paths(knots: Any, coefficients: Any, error: type[Exception], field: str) -> None:
+    with pytest.raises(error, match=field.replace(".", r"\.")):
+        PolynomialPath(knots, coefficients)
+
+
+def test_paths_of_different_joints_are_not_joined() -> None:
+    one, two = (PolynomialPath([0.0, 1.0], np.zeros((1, 1, n))) for n in (1, 2))
+    with pytest.raises(ShapeError, match="path"):
+        JoinedPath(one, two)
