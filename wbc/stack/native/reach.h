@@ -21,7 +21,7 @@
 /* Share of the acceleration limits that slowing down towards the optimum may take */
 #define BRAKING 1.0
 /* Errors beyond this are left to the linear model, before squares of them overflow */
-#define FAR 1e50
+#define TOO_FAR 1e50
 /* Corrections of the step that follows moving targets */
 #define CORRECTIONS 2
 
@@ -237,7 +237,7 @@ static void reach(wbc_tick *t) {
     for (int k = 0; k < MT; k++) {
         const int counts = t->weight[k] * t->report.factor[k] != 0.0;
         error[k] = counts ? t->report.error[k] : 0.0;
-        if (!(fabs(error[k]) < FAR)) return;
+        if (!(fabs(error[k]) < TOO_FAR)) return;
         if (counts) largest = larger(largest, t->p[gain_at[k]]);
     }
     gather(t, error, slope);
