@@ -31,6 +31,7 @@ _FIELDS = (
     "low",
     "high",
     "unusable",
+    "plain",
 )
 
 
@@ -76,8 +77,10 @@ class NativeTick(Assembly):
         self._g = view("g", nv)
         self._A = view("A", rows * nv).reshape(rows, nv)
         self._low, self._high = view("low", nv + rows), view("high", nv + rows)
-        self._unusable = view("unusable", 1)
+        self._unusable, self.plain = view("unusable", 1), view("plain", 1)
         self.step_function = self._library.wbc_tick_step
+        self.converge_function = self._library.wbc_tick_converge
+        self.converge_function.restype = None
 
     def step(self) -> int:
         return int(self.step_function(self.pointer))

@@ -24,7 +24,7 @@ class SolvedTick(Buffers):
     """Assembly, then a kept solver with its relaxation, then the certificate; see ``wbc/stack/native``."""
 
     def __init__(self, assembly: Assembly, stack: Declaration, layout: Layout, solver: str) -> None:
-        self._assembly = assembly
+        self.assembly = assembly
         self.share(assembly)
         self._nv = layout.nv
         self._places = ReportLayout(layout)
@@ -39,16 +39,19 @@ class SolvedTick(Buffers):
         self._solver.reset()
 
     def check(self) -> int:
-        return self._assembly.check()
+        return self.assembly.check()
 
     def qp(self) -> QP:
-        return self._assembly.qp()
+        return self.assembly.qp()
 
     def step(self) -> int:
-        refused = self._assembly.check()
+        refused = self.assembly.check()
         if refused:
             return refused
-        qp = self._assembly.qp()
+        return self.finish(self.assembly.qp())
+
+    def finish(self, qp: QP) -> int:
+        """Solve a QP of this layout and write the report; the flag."""
         flag, v, answer = self._answer(qp)
         slack = qp.violation(v)[self._nv :] if flag == RELAXED else np.zeros(self._units.size)
         slack = np.where(slack > 2.0 * TOLERANCE * self._units, slack, 0.0)
@@ -67,7 +70,7 @@ class SolvedTick(Buffers):
         report[places["iterations"]] = answer.iterations if answer is not None else 0
         report[places["multipliers"]] = multipliers
         report[places["slack"]] = slack
-        self._assembly.look_ahead()
+        self.assembly.look_ahead()
         self.v_last[:] = v
         return flag
 
@@ -82,7 +85,7 @@ class SolvedTick(Buffers):
     def _answer(self, qp: QP) -> tuple[int, Array, Relaxed | None]:
         """Flag, command and, unless the tick brakes, what the solver answered."""
         n = self._nv
-        if self._assembly.usable:
+        if self.assembly.usable:
             sides, crossed = self._uncrossed(qp)
             if crossed[self._orders == 0].any():
                 return BRAKED, np.clip(0.0, qp.lower[:n], qp.upper[:n]), None

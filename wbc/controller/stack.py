@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
 from wbc import validation
 from wbc.controller.controller import Controller
 from wbc.qp.solvers import available_solvers
 from wbc.stack.artifact import compile_stack
 from wbc.stack.declaration import Declaration
+
+if TYPE_CHECKING:
+    from wbc.controller.solver import Solver
 
 
 class Stack(Declaration):
@@ -43,3 +49,18 @@ class Stack(Declaration):
 
         validation.one_of("solver", solver, available_solvers(experimental=True))
         return Controller(self, compile_stack(self, backend, __version__), solver)
+
+    def solver(self, goals: Iterable[str] | None = None, backend: str = "auto") -> Solver:
+        """Inverse kinematics of these tasks and constraints, compiled; see :class:`wbc.Solver`.
+
+        Args:
+            goals: names of the tasks to be met within the tolerance, all others are wishes; default: those of the
+                greatest weight, postures and damping left out.
+            backend: as for :meth:`compile`.
+
+        Raises:
+            UnknownNameError: unknown task or backend. RangeError: no goal is left. CompileError: see :meth:`compile`.
+        """
+        from wbc.controller.solver import Solver
+
+        return Solver(self, goals, backend)

@@ -38,7 +38,9 @@ class Buffers:
 
 
 class Assembly(Buffers, ABC):
-    """Buffers and the QP at their values."""
+    """Buffers and the QP at their values; ``plain``: not 0 for the linear model as it is, without curvature."""
+
+    plain: Array
 
     @abstractmethod
     def check(self) -> int:

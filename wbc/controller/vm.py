@@ -42,7 +42,7 @@ class VmAssembly(Assembly):
         self._layout = layout
         self._q, self._v, self._p = _room(layout.nq), _room(nv), _room(layout.parameters)
         self.q, self.v_last, self.p = self._q[: layout.nq], self._v[:nv], self._p[: layout.parameters]
-        self.v_in, self.use_v, self.dt = np.zeros(nv), np.zeros(1), np.zeros(1)
+        self.v_in, self.use_v, self.dt, self.plain = np.zeros(nv), np.zeros(1), np.zeros(1), np.zeros(1)
         self.weight, self.enabled = np.ones(tasks), np.ones(rows)
         self.bound_enabled = np.ones(layout.bound_blocks * nv)
         self.places = ReportLayout(layout)
@@ -131,7 +131,7 @@ class VmAssembly(Assembly):
         high_rows = np.where(on, out["high"][: layout.general_rows], np.inf)
         self._usable &= bool(np.isfinite(A).all() and (low_rows < INFINITE).all() and (high_rows > -INFINITE).all())
         low_rows[low_rows <= -INFINITE], high_rows[high_rows >= INFINITE] = -np.inf, np.inf
-        if self._reach is not None and self._usable and layout.task_rows:
+        if self._reach is not None and not self.plain[0] and self._usable and layout.task_rows:
             equal = _unit_equalities(low, high, low_rows, high_rows, A, self._dof_scales)
             weight = self.weight * factor
             H, g = self._reach.change(H, J, weight, error, wish, self.q, self.p, equal, self.bound_enabled)

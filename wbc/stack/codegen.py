@@ -11,6 +11,7 @@ import numpy as np
 from wbc.shapes import FAR
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Layout
+from wbc.stack.motion import motion
 from wbc.stack.places import brakes, gain_places, margin_places, pull_scales, rate_places, stops
 from wbc.stack.program import Program, sparsity_rows
 from wbc.tasks.base import Constraint, Order
@@ -20,24 +21,24 @@ def sources(stack: Declaration, layout: Layout, program: Program) -> dict[str, s
     """File name -> text of everything that makes the tick of a stack."""
     native = resources.files("wbc.stack") / "native"
     written = {file.name: file.read_text() for file in native.iterdir() if file.name.endswith((".c", ".h"))}
-    return {"rows.c": _casadi_source(program), "stack.h": _header(stack, layout, program), **written}
+    functions = [*program.functions.values(), motion(stack)]
+    return {"rows.c": _casadi_source(functions), "stack.h": _header(stack, layout, program, functions), **written}
 
 
-def _casadi_source(program: Program) -> str:
+def _casadi_source(functions: list[ca.Function]) -> str:
     generator = ca.CodeGenerator("rows.c", {"with_header": False})
-    for function in program.functions.values():
+    for function in functions:
         generator.add(function)
     return str(generator.dump())
 
 
-def _header(stack: Declaration, layout: Layout, program: Program) -> str:
+def _header(stack: Declaration, layout: Layout, program: Program, functions: list[ca.Function]) -> str:
     jt, at = program.rows.sparsity_out("jt"), program.rows.sparsity_out("at")
     j_start, j_col = sparsity_rows(jt)
     a_start, a_end, a_col = program.sensed.entries(*program.balls.entries(*sparsity_rows(at)))
     orders, scales, sequence = row_orders(layout), row_units(stack, layout), bound_sequence(layout)
     dofs = layout.dof_scales(stack)
     units = unit_groups(stack)
-    functions = program.functions.values()
     bent = ca.Sparsity(layout.nv, layout.nv) if program.bend is None else program.bend.sparsity_out(0)
     brake_at, brake_limit = brakes(stack, layout)
     stop_at, stop_low, stop_high = stops(stack, layout)

@@ -104,7 +104,7 @@ def compile_tick(files: dict[str, str], output: pathlib.Path) -> None:
             (place / name).write_text(text)
         include = (f"-I{headers()}",)
         _run([cc, *COMMON_FLAGS, *ROWS_FLAGS, "-c", "rows.c", "-o", "rows.o"], place)
-        _run([cc, *COMMON_FLAGS, *TICK_FLAGS, *include, "-c", "tick.c", "-o", "tick.o"], place)
+        _run([cc, *COMMON_FLAGS, *TICK_FLAGS, *include, "-c", "converge.c", "-o", "tick.o"], place)
         _run(
             [
                 cc,

@@ -123,7 +123,7 @@ static void assemble(wbc_tick *t, int screen) {
         for (int e = a_start[k]; e < a_end[k]; e++) t->A[k * NV + a_col[e]] = t->at[e];
     }
     t->prepared = t->curved = 0;
-    if (CALM && MT > 0 && t->unusable == 0.0) reach(t);
+    if (CALM && t->plain == 0.0 && MT > 0 && t->unusable == 0.0) reach(t);
 }
 
 /* All rows of the QP */

@@ -41,11 +41,11 @@ EXPORT long long wbc_tick_size(void) { return (long long)sizeof(wbc_tick); }
 #define OFFSET(field) (long long)offsetof(wbc_tick, field)
 
 /* Where the caller finds q, v_last, v_in, use_v, p, dt, weight, enabled, bound_enabled, report, H, g, A, low, high,
- * unusable */
+ * unusable, plain */
 EXPORT void wbc_tick_layout(long long *out) {
     const long long offsets[] = {OFFSET(q), OFFSET(v_last), OFFSET(v_in), OFFSET(use_v), OFFSET(p), OFFSET(dt),
                                  OFFSET(weight), OFFSET(enabled), OFFSET(bound_enabled), OFFSET(report), OFFSET(H),
-                                 OFFSET(g), OFFSET(A), OFFSET(low), OFFSET(high), OFFSET(unusable)};
+                                 OFFSET(g), OFFSET(A), OFFSET(low), OFFSET(high), OFFSET(unusable), OFFSET(plain)};
     memcpy(out, offsets, sizeof offsets);
 }
 

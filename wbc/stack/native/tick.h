@@ -70,6 +70,7 @@ typedef struct {
     double weight[MT + 1];       /* weight of each task row, scale included */
     double enabled[MC + 1];      /* 1 or 0 for each general row */
     double bound_enabled[NB * NV + 1];
+    double plain;                /* not 0: the linear model as it is, whatever CALM says */
     wbc_report report;
     /* the QP */
     double H[NV * WIDE], g[WIDE], A[MC * NV + 1], low[M_ALL], high[M_ALL];

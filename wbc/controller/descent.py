@@ -1,0 +1,143 @@
+"""The search of ``native/converge.h`` in Python: for the virtual machine, and for items whose rows are measured."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from time import perf_counter
+
+import numpy as np
+import pinocchio as pin
+
+from wbc.controller.report import ReportLayout
+from wbc.controller.search import EXHAUSTED, FOUND, OUT_OF_TIME, REFUSED, Found, Query
+from wbc.controller.solved import SolvedTick
+from wbc.controller.tick import Assembly
+from wbc.qp.problem import QP
+from wbc.stack.codegen import row_units
+from wbc.stack.declaration import Declaration
+from wbc.stack.layout import Layout
+from wbc.validation import Array
+
+#: As in ``native/converge.h``
+STRIDE, SHORT_STRIDE, EASE, PATIENCE, PROGRESS = 1.0, 0.2, 0.03, 3, 0.8
+DESCENT, SETTLING, AT_REST, SEEKING = 60, 200, 1e-7, 0.9
+
+
+class Search:
+    """The search on the buffers of an assembly; ``sense`` measures what items want measured at the tick's q."""
+
+    def __init__(self, assembly: Assembly, stack: Declaration, layout: Layout, sense: Callable[[], None]) -> None:
+        self._assembly, self._sense = assembly, sense
+        self._tick = SolvedTick(assembly, stack, layout, "daqp")
+        self._model, self._rows = stack.robot.model, layout.task_rows
+        self._places = ReportLayout(layout)
+        self._dofs = layout.dof_scales(stack)
+        self._units = np.concatenate([self._dofs, np.array(row_units(stack, layout))])
+        self._best, self._cost, self._ticks = assembly.q.copy(), np.inf, 0
+
+    def run(self, query: Query) -> Found:
+        """Search from the tick's q, where the answer then is."""
+        begin, tick = perf_counter(), self._tick
+        self._cost, self._ticks, descents = np.inf, 0, 0
+        if tick.check():
+            return Found(REFUSED, 0, 0, perf_counter() - begin, np.inf)
+        first, weight = tick.q.copy(), tick.weight.copy()
+        self._best, ending = first, EXHAUSTED
+        tick.weight[:] = query.seeking
+        self._assembly.plain[0] = 1.0
+        for start in (None, *query.starts):
+            if start is not None:
+                tick.q[:] = np.where(query.chosen != 0.0, start, first)
+            ending = self._descend(query, begin + SEEKING * query.seconds)
+            if ending == OUT_OF_TIME:
+                break
+            descents += 1
+            if ending == FOUND:
+                break
+        self._assembly.plain[0] = 0.0
+        if query.wishes if ending == FOUND else self._cost < np.inf:
+            ending = self._settle(query, ending, begin + query.seconds)
+        tick.q[:], tick.weight[:] = self._best, weight
+        tick.reset()
+        return Found(ending, self._ticks, descents, perf_counter() - begin, self._cost)
+
+    def _descend(self, query: Query, end: float) -> int:
+        least, idle = np.inf, 0
+        self._tick.reset()
+        for _ in range(DESCENT):
+            if perf_counter() >= end:
+                return OUT_OF_TIME
+            qp = self._qp()
+            cost, met = self._squares(query, wishes=False)
+            if not (self._assembly.usable and cost < np.inf):
+                return EXHAUSTED
+            allowed = self._may_rest(qp, query.room)
+            if allowed and cost < self._cost:
+                self._cost, self._best = cost, self._tick.q.copy()
+            if met and allowed:
+                return FOUND
+            if cost < PROGRESS * least:
+                least, idle = cost, 0
+            else:
+                idle += 1
+                if idle > PATIENCE:
+                    return EXHAUSTED
+            self._step(qp, EASE * cost, STRIDE)
+            self._move_on()
+        return EXHAUSTED
+
+    def _settle(self, query: Query, ending: int, end: float) -> int:
+        found, least, tick = ending == FOUND, np.inf, self._tick
+        tick.reset()
+        tick.q[:] = self._best
+        tick.weight[:] = query.settling if found else query.seeking
+        for _ in range(SETTLING):
+            if perf_counter() >= end:
+                break
+            qp = self._qp()
+            if not self._assembly.usable:
+                break
+            cost, reached = self._squares(query, wishes=False)
+            if found:
+                cost, _ = self._squares(query, wishes=True)
+            if cost < least and (reached or not found) and self._may_rest(qp, query.room):
+                least, self._best = cost, tick.q.copy()
+                if not found:
+                    self._cost = min(cost, self._cost)
+                    if reached:
+                        return FOUND
+            self._step(qp, 0.0, SHORT_STRIDE)
+            if np.abs(self._v() / self._dofs).max(initial=0.0) <= AT_REST:
+                break
+            self._move_on()
+        return ending
+
+    def _qp(self) -> QP:
+        self._sense()
+        self._ticks += 1
+        return self._assembly.qp()
+
+    def _squares(self, query: Query, *, wishes: bool) -> tuple[float, bool]:
+        """Weighted square of the errors of goals or wishes, and whether all are within their tolerance."""
+        weight, error = self._tick.weight, self._tick.report[self._places["error"]]
+        those = ((query.tolerance < 0.0) == wishes) & (weight != 0.0)
+        size = np.abs(error[those])
+        return float(weight[those] @ size**2), bool((size <= query.tolerance[those]).all())
+
+    def _may_rest(self, qp: QP, room: float) -> bool:
+        """Whether standing still keeps all rows and bounds."""
+        return bool((qp.lower <= room * self._units).all() and (qp.upper >= -room * self._units).all())
+
+    def _step(self, qp: QP, damped: float, stride: float) -> None:
+        """Solve the QP, damped and within a stride."""
+        nv, most = len(self._dofs), stride * self._dofs
+        qp.H[np.diag_indices(nv)] += damped / self._dofs**2
+        qp.lower[:nv] = np.clip(qp.lower[:nv], -most, most)
+        qp.upper[:nv] = np.clip(qp.upper[:nv], -most, most)
+        self._tick.finish(qp)
+
+    def _v(self) -> Array:
+        return self._tick.report[self._places["v"]]
+
+    def _move_on(self) -> None:
+        self._tick.q[:] = pin.integrate(self._model, self._tick.q, self._v())

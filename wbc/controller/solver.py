@@ -1,0 +1,195 @@
+"""Inverse kinematics: the tasks and constraints of a stack, converged to a configuration."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+
+from wbc import validation
+from wbc.controller.controller import Controller
+from wbc.controller.descent import Search
+from wbc.controller.handle import Handle
+from wbc.controller.native import NativeTick
+from wbc.controller.search import EXHAUSTED, FOUND, Found, NativeSearch, Query
+from wbc.controller.sensing import Sensing
+from wbc.controller.solution import Ending, Solution
+from wbc.controller.solved import SolvedTick
+from wbc.controller.starts import Starts
+from wbc.controller.tick import Assembly
+from wbc.controller.timeless import FIRST, TICK, chosen_goals, goal_rows, hasten, timeless
+from wbc.errors import RangeError, ShapeError
+from wbc.stack.declaration import Declaration
+from wbc.stack.places import stops
+from wbc.validation import Array
+
+#: How far constraints may be off at an answer [m, rad, or the margin's unit]
+ROOM = 1e-9
+
+#: Share of the time that is kept for the question which goals contradict each other
+ASKING = 0.2
+
+#: What counts as a joint that the goals move: its share of the Hessian
+_MOVED = 1e-6
+
+
+class Solver:
+    """Inverse kinematics of a stack, compiled once. Made by :meth:`wbc.Stack.solver`.
+
+        solver = stack.solver()
+        solver["hand"].target = pose
+        solution = solver.solve(q0)
+
+    A search makes Newton steps on the rows of the controller, with gains of one step, no limits of speed, and a damping
+    that falls with the error, from q0 and then from random configurations, until the goals are met and the constraints
+    hold. Then the wishes (all other tasks) are followed as far as they cost the goals nothing. docs/ik.md
+
+    Attributes:
+        stack: the same items without time.
+        goals: names of the tasks to be met.
+        backend: ``native`` (the loop in C) or ``vm``.
+
+    What it cannot do: prove that a target is out of reach; that there is no answer is what the descents say for which
+    there was time. Of several answers it returns the first one. Limits of speed and acceleration do not count.
+    """
+
+    def __init__(self, stack: Declaration, goals: Iterable[str] | None = None, backend: str = "auto") -> None:
+        self.goals = chosen_goals(stack, goals)
+        self.stack = timeless(stack)
+        self._controller: Controller = self.stack.compile(backend=backend)
+        hasten(self._controller)
+        self.backend = self._controller.backend
+        layout, tick = self._controller.layout, self._controller.tick
+        self._rows = goal_rows(self._controller, self.goals)
+        self._stops = stops(self.stack, layout)
+        self._tick: Assembly = tick.assembly if isinstance(tick, SolvedTick) else tick
+        sensing = Sensing(self._controller, self._tick)
+        self._search: NativeSearch | Search
+        if isinstance(tick, NativeTick) and not sensing:
+            self._search = NativeSearch(tick)
+        else:
+            self._search = Search(self._tick, self.stack, layout, sensing.sense)
+        self._starts: Starts | None = None
+        self._table: tuple[int, Array] = (0, np.zeros((0, layout.nq)))
+
+    def __getitem__(self, name: str) -> Handle:
+        """Run-time values of an item, as ``controller[name]``; targets that nobody sets are taken from q0."""
+        return self._controller[name]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._controller
+
+    def solve(
+        self,
+        q0: Any,
+        *,
+        seed: int = 0,
+        budget: float | None = 0.005,
+        restarts: int = 100,
+        tolerance: float = 1e-5,
+    ) -> Solution:
+        """The configuration at which the goals are met, or the nearest one that was found, and why.
+
+        Args:
+            q0: where the search begins [nq]; what lies outside the position limits is moved to them.
+            seed: of the random configurations. The answer is a function of q0, the run-time values, the seed and the
+                number of restarts, unless the time ends the search.
+            budget: time for the search [s], overrun by one iteration and the report of the answer at most; None: no
+                limit.
+            restarts: random configurations to start from after q0 at most.
+            tolerance: of every row of a goal, in metres and radians.
+
+        Raises:
+            ShapeError, NotFiniteError, RotationError, RangeError: bad input.
+        """
+        q = self.stack.robot.configuration("q0", q0)
+        seconds = math.inf if budget is None else validation.scalar("budget", budget, low=0.0, open_low=True, unit="s")
+        near = validation.scalar("tolerance", tolerance, low=0.0, open_low=True)
+        count, number = _count("restarts", restarts), _count("seed", seed)
+        self._controller.reset(q)
+        first = self._within_limits(q)
+        if self._starts is None:
+            self._starts = self._find_starts(first)
+        if self._table[0] != number or len(self._table[1]) < count or not self._table[1].flags.c_contiguous:
+            self._table = (number, self._starts.table(count, number))
+        found = self._run(first, self._rows, seconds * (1.0 - ASKING if len(self.goals) > 1 else 1.0), near, count)
+        answer, spent, ticks = self._tick.q.copy(), found.seconds, found.ticks
+        status = _ending(found)
+        if status == Ending.UNREACHABLE and len(self.goals) > 1:
+            share = (seconds - spent) / len(self.goals)
+            alone = [self._run(first, self._only(name), share, near, count) for name in self.goals]
+            spent, ticks = spent + sum(a.seconds for a in alone), ticks + sum(a.ticks for a in alone)
+            if all(a.ending == FOUND for a in alone):
+                status = Ending.CONTRADICTORY
+        answer = self._inside(answer)
+        step = self._controller.step(answer, np.zeros(self.stack.robot.nv), dt=TICK)
+        return Solution(answer, status, self.goals, ticks, found.descents + (found.ending > EXHAUSTED), spent, step)
+
+    def _run(self, first: Array, goals: Array, seconds: float, tolerance: float, count: int) -> Found:
+        """Search from a configuration for the rows of some goals."""
+        assert self._starts is not None
+        tick = self._tick
+        aims, wishes = tick.weight * goals, tick.weight * (1.0 - self._rows)
+        heaviest = float((wishes * self._controller.row_costs**-1).max(initial=0.0))
+        query = Query(
+            starts=self._table[1][:count],
+            chosen=self._starts.chosen,
+            tolerance=np.where(goals > 0.0, tolerance, -1.0),
+            seeking=aims,
+            settling=aims * max(1.0, FIRST * heaviest) + wishes,
+            seconds=seconds,
+            room=ROOM,
+            wishes=heaviest > 0.0,
+        )
+        tick.dt[0], tick.q[:], tick.v_last[:] = TICK, first, 0.0
+        return self._search.run(query)
+
+    def _only(self, name: str) -> Array:
+        return goal_rows(self._controller, (name,))
+
+    def _find_starts(self, q: Array) -> Starts:
+        """Joints that move a goal, as the Hessian of the goals at a configuration off all symmetries shows."""
+        tick, robot = self._tick, self.stack.robot
+        weight = tick.weight.copy()
+        _, lower, upper = self._stops
+        everywhere = Starts(robot, lower, upper, np.ones(robot.nv, dtype=bool))
+        random = everywhere.table(1, 0)[0]
+        tick.weight[:] = weight * self._rows
+        tick.q[:] = np.where(everywhere.chosen != 0.0, random, q)
+        tick.dt[0] = TICK
+        tick.plain[0] = 1.0
+        share = np.diag(tick.qp().H) * self._controller.layout.dof_scales(self.stack) ** 2
+        tick.plain[0] = 0.0
+        tick.weight[:] = weight
+        return Starts(robot, lower, upper, share > _MOVED * share.max(initial=0.0))
+
+    def _within_limits(self, q: Array) -> Array:
+        """The nearest configuration within the position limits that are on."""
+        places, lower, upper = self._stops
+        enabled, index = self._tick.bound_enabled, self.stack.robot.position_index
+        out = q.copy()
+        for i, place in enumerate(places):
+            if place >= 0 and enabled[place] != 0.0:
+                out[index[i]] = min(max(out[index[i]], lower[i]), upper[i])
+        return out
+
+    # Rounding of the last tick may pass a limit by its last digit
+    _inside = _within_limits
+
+
+def _ending(found: Found) -> Ending:
+    if found.ending == FOUND:
+        return Ending.SOLVED
+    if found.descents == 0:
+        return Ending.OUT_OF_TIME
+    return Ending.UNREACHABLE if found.cost < np.inf else Ending.CONTRADICTORY
+
+
+def _count(field: str, value: Any) -> int:
+    if isinstance(value, bool) or not isinstance(value, (int, np.integer)):
+        raise ShapeError(field, value, "expected an integer")
+    if value < 0:
+        raise RangeError(field, value, "expected an integer of 0 or more")
+    return int(value)

@@ -1,0 +1,81 @@
+"""A stack without time: its tick is a displacement, for inverse kinematics."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterable
+
+import numpy as np
+
+from wbc import validation
+from wbc.controller.controller import Controller
+from wbc.controller.stack import Stack
+from wbc.errors import RangeError
+from wbc.stack.declaration import Declaration
+from wbc.tasks import Damping, JointLimits, Posture
+from wbc.tasks.base import Constraint
+from wbc.validation import Array
+
+#: Length of a tick [s], the longest that the stack allows: velocities are displacements
+TICK = 1.0
+
+#: What joints may move in a tick at most [rad, or characteristic lengths]; descents take shorter strides
+LONGEST = 1.0
+
+#: Goals outweigh wishes by this once they are met, so that the wishes cost them nothing
+FIRST = 1e8
+
+
+def timeless(stack: Declaration) -> Stack:
+    """The same items on joints that may move by :data:`LONGEST` a tick, without accelerations; always calm."""
+    scales = np.array([stack.length if u == "m" else 1.0 for u in stack.robot.dof_units])
+    robot = stack.robot.with_limits(velocity=LONGEST / TICK * scales, acceleration=np.inf)
+    # dt_range ends at twice the declared step
+    out = Stack(robot, 0.5 * TICK, damping=stack.damping, length=stack.length)
+    for entry in stack.entries:
+        item = entry.item
+        if isinstance(item, JointLimits):
+            item = dataclasses.replace(item, velocity=True, acceleration=False, shortest_dt=None)
+        if entry.name not in out:
+            out.add(item, name=entry.name, level=entry.level, weight=entry.weight)
+    return out
+
+
+def hasten(controller: Controller) -> None:
+    """Errors and margins are corrected in one tick; limits of speed are off, which mean nothing without time."""
+    for entry in controller.stack.entries:
+        handle, item = controller[entry.name], entry.item
+        for name in ("gain", "rate", "return_rate"):
+            if name in handle.names:
+                handle.set(**{name: 1.0 / TICK})
+        block = controller.layout.blocks[entry.name]
+        if isinstance(item, Constraint) and block.form == "rows" and not item.equality:
+            handle.enabled = False
+
+
+def chosen_goals(stack: Declaration, goals: Iterable[str] | None) -> tuple[str, ...]:
+    """Names of the tasks to be met; by default those of the greatest weight, postures and damping left out.
+
+    Raises:
+        UnknownNameError: no such task. RangeError: none is left.
+    """
+    names = [entry.name for entry in stack.tasks]
+    if goals is not None:
+        chosen = tuple(dict.fromkeys((goals,) if isinstance(goals, str) else goals))
+        for name in chosen:
+            validation.one_of("goals", name, names)
+    else:
+        aims = [entry for entry in stack.tasks if not isinstance(entry.item, (Posture, Damping))]
+        most = max((entry.weight for entry in aims), default=0.0)
+        chosen = tuple(entry.name for entry in aims if entry.weight == most > 0.0)
+    if not chosen:
+        raise RangeError("goals", goals, "no task is to be met; name at least one", names)
+    return chosen
+
+
+def goal_rows(controller: Controller, goals: Iterable[str]) -> Array:
+    """1 for the task rows of goals, 0 for those of wishes."""
+    out = np.zeros(controller.layout.task_rows)
+    for name in goals:
+        out[controller.layout.blocks[name].span] = 1.0
+    return out
