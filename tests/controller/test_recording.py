@@ -26,7 +26,7 @@ from wbc.tasks import Obstacle
 
 TOP = Path(__file__).parents[2]
 #: Ticks of the small stack in a chunk
-CHUNK = 992
+CHUNK = 963
 
 
 def history(one: Controller, rng: np.random.Generator, ticks: int) -> list[bytes]:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from wbc import validation
+from wbc.controller.deployment import Deployment
 from wbc.controller.handle import Handle
 from wbc.controller.native import NativeTick
 from wbc.controller.recorder import Recorder
@@ -31,7 +32,7 @@ _Array = np.ndarray
 _FLOAT = np.dtype(np.float64)
 
 
-class Controller:
+class Controller(Deployment):
     """A compiled stack with its run-time values. Made by :meth:`wbc.Stack.compile`.
 
     Each controller has its own memory, see :meth:`clone`; one controller must not be stepped from two threads at once.
@@ -51,7 +52,6 @@ class Controller:
         self.layout = layout
         self._context = Context(stack, layout)
         self.row_costs: Array = 1.0 / layout.row_scales(stack) ** 2
-        self.tick: NativeTick | SolvedTick
         if artifact.library is not None:
             native = NativeTick(artifact.library, layout)
             self.tick = native if solver == "daqp" else SolvedTick(native, stack, layout, solver)
@@ -168,7 +168,7 @@ class Controller:
         out = Controller(self.stack, self._artifact, self.solver)
         for name, handle in out._handles.items():
             handle.assume(self._handles[name])
-        for name in ("q", "v_last", "p", "dt", "weight", "enabled", "bound_enabled"):
+        for name in ("q", "v_last", "p", "cap", "dt", "weight", "enabled", "bound_enabled"):
             getattr(out.tick, name)[:] = getattr(self.tick, name)
         out.tick.check()
         out._first, out._waiting, out._slow = dict(self._first), dict(self._waiting), self._slow

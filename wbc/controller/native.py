@@ -32,6 +32,7 @@ _FIELDS = (
     "high",
     "unusable",
     "plain",
+    "cap",
 )
 
 
@@ -67,6 +68,7 @@ class NativeTick(Assembly):
         self.q = view("q", layout.nq)
         self.v_last, self.v_in = view("v_last", nv), view("v_in", nv)
         self.use_v = view("use_v", 1)
+        self.cap = view("cap", 1)
         self.p = view("p", layout.parameters)
         self.dt = view("dt", 1)
         self.weight = view("weight", layout.task_rows)

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 log = logging.getLogger("wbc")
 
 #: What a tick is a function of, besides the solver's memory of the last one; sensed inputs are in ``p``.
-INPUTS = ("q", "v_last", "v_in", "use_v", "dt", "p", "weight", "enabled", "bound_enabled")
+INPUTS = ("q", "v_last", "v_in", "use_v", "cap", "dt", "p", "weight", "enabled", "bound_enabled")
 #: In place of a number of resets: what the solver remembers is not what was recorded
 UNKNOWN = -1
 #: The part ``reset`` of a tick

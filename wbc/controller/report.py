@@ -7,7 +7,7 @@ from functools import cached_property
 from wbc.stack.layout import Layout
 
 #: Flags of a tick
-SOLVED, RELAXED, BRAKED = 0, 1, 2
+SOLVED, RELAXED, BRAKED, CAPPED = 0, 1, 2, 3
 #: Refusals: nothing was changed
 BAD_Q, BAD_UNIT, BAD_V = -1, -2, -3
 

@@ -25,6 +25,9 @@ class Status(StrEnum):
     RELAXED = "relaxed"
     #: No optimum was found: v brings every joint to rest as fast as its bounds allow
     BRAKED = "braked"
+    #: :attr:`Controller.iteration_cap` ended the search: v is as near to what it had found as the rows allow, seen from
+    #: braking
+    CAPPED = "capped"
 
 
 @dataclass(frozen=True)
@@ -71,7 +74,7 @@ class Residual:
 
 @dataclass(frozen=True)
 class Certificate:
-    """How good the answer is, computed within the tick; all inf for a braked tick.
+    """How good the answer is, computed within the tick; all inf for a braked or capped tick.
 
     Attributes:
         stationarity: largest entry of |H v + g + A' lambda| (cost per rad/s).
@@ -107,7 +110,7 @@ class Context:
 
 
 #: By the tick's flag
-STATUSES = (Status.SOLVED, Status.RELAXED, Status.BRAKED)
+STATUSES = (Status.SOLVED, Status.RELAXED, Status.BRAKED, Status.CAPPED)
 _FLOAT = np.dtype(np.float64)
 _DOUBLE = struct.Struct("d").unpack_from
 

@@ -13,6 +13,7 @@ class Buffers:
 
     Attributes:
         q: configuration. v_in, use_v: a measured velocity, taken where ``use_v`` is not 0.
+        cap: iterations of the native solver a tick at most, 0 for no cap.
         v_last: the velocity that accelerations are counted from.
         p: run-time inputs, see :class:`wbc.stack.layout.Layout`. dt: one number.
         weight: of each task row, scale included. enabled: 1 or 0 for each general row.
@@ -23,6 +24,7 @@ class Buffers:
     q: Array
     v_in: Array
     use_v: Array
+    cap: Array
     v_last: Array
     p: Array
     dt: Array

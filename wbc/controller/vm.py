@@ -42,6 +42,7 @@ class VmAssembly(Assembly):
         self._layout = layout
         self._q, self._v, self._p = _room(layout.nq), _room(nv), _room(layout.parameters)
         self.q, self.v_last, self.p = self._q[: layout.nq], self._v[:nv], self._p[: layout.parameters]
+        self.cap = np.zeros(1)
         self.v_in, self.use_v, self.dt, self.plain = np.zeros(nv), np.zeros(1), np.zeros(1), np.zeros(1)
         self.weight, self.enabled = np.ones(tasks), np.ones(rows)
         self.bound_enabled = np.ones(layout.bound_blocks * nv)

@@ -46,12 +46,37 @@ static int activate(wbc_tick *t, int i, int lower) {
     return 0;
 }
 
+/* What DAQP is given as its limit, one more than the iterations it may make; 0 where the cap leaves none */
+static int granted(wbc_tick *t) {
+    const int limit = 100 + 10 * M_ALL;
+    if (!(t->cap > 0.0)) return limit;
+    const double left = t->cap - t->report.iterations;
+    if (left >= limit) return limit;
+    if (left >= 1.0) return (int)left + 1;
+    t->spent = 1;
+    return 0;
+}
+
+/* DAQP from the working set at hand, with its iterations counted; DAQP's exit flag */
+static int search(wbc_tick *t, int limit) {
+    DAQPWorkspace *work = &t->daqp;
+    t->settings.iter_limit = limit;
+    /* Where the cap ends the search before its first iterate, the optimum without rows stands for it */
+    if (t->cap > 0.0) memset(t->u, 0, sizeof t->u);
+    const int flag = daqp_ldp(work);
+    t->spent = t->cap > 0.0 && flag == EXIT_ITERLIMIT;
+    t->report.iterations += work->iterations - t->spent;
+    return flag;
+}
+
 /* Solve with the factorisation at hand. `warm`: start from the active set in `keep`. Rows of classes from
  * `checked` on may be violated where the solver cannot move them, rows that depend on others by `angle` |row| |v|.
  * `base`: the point that v is counted from, or NULL. DAQP's exit flag. */
 static int active_set(wbc_tick *t, int warm, int checked, double angle, const double *base) {
     DAQPWorkspace *work = &t->daqp;
+    const int limit = granted(t);
     int dependent = 0;
+    if (limit == 0) return EXIT_ITERLIMIT;
     reset_daqp_workspace(work);
     for (int i = 0; i < M_ALL; i++) {
         const int soft = t->sense[i] & SOFT;
@@ -64,8 +89,7 @@ static int active_set(wbc_tick *t, int warm, int checked, double angle, const do
     if (warm)
         for (int i = 0; i < M_ALL; i++)
             if ((t->keep[i] & ACTIVE) && !(t->sense[i] & IMMUTABLE)) activate(t, i, t->keep[i] & LOWER);
-    int flag = daqp_ldp(work);
-    t->report.iterations += work->iterations;
+    const int flag = search(t, limit);
     if (flag < 0) return flag;
     ldp2qp_solution(work);
     for (int i = 0; base && i < NV; i++) t->x[i] += base[i];

@@ -169,7 +169,7 @@ EXPORT void wbc_tick_certify(wbc_tick *t) {
     replace_nan(out->factor, MT, 0.0);
     replace_nan(out->margin, MH, -HUGE_VAL);
     replace_nan(out->margin_factor, MH, 0.0);
-    if (out->flag == WBC_BRAKED) {
+    if (out->flag == WBC_BRAKED || out->flag == WBC_CAPPED) {
         for (int i = 0; i < M_ALL; i++) out->lambda[i] = 0.0;
         out->stationarity = out->violation = out->complementarity = out->error_bound = WBC_INF;
         return;

@@ -32,6 +32,34 @@ static int uncross(wbc_tick *t) {
     return crossed;
 }
 
+/* The cap ended the search. From braking towards the velocity that was found so far, `found`, as far as no row leaves
+ * its sides by it, and rows that braking misses are not missed by more; braking itself where `share` is 0. */
+static void partly(wbc_tick *t, const double *found, double share) {
+    double way[NV];
+    brake(t);
+    for (int i = 0; i < NV; i++) way[i] = (isfinite(found[i]) ? clamp(found[i], t->low[i], t->high[i]) : 0.0) - t->x[i];
+    for (int k = 0; k < MC; k++) {
+        const double at = row_at(t, k, t->x), change = row_at(t, k, way), rounding = TOLERANCE * row_scale[k];
+        const double down = t->free_low[k] - rounding - at, up = t->free_high[k] + rounding - at;
+        if (change < 0.0 && change < down) share = smaller(share, smaller(down, 0.0) / change);
+        if (change > 0.0 && change > up) share = smaller(share, larger(up, 0.0) / change);
+    }
+    for (int i = 0; i < NV; i++) t->x[i] += share * way[i];
+}
+
+/* What a tick commands whose search the cap has ended; `first`: that of the whole problem, from which the next tick
+ * goes on */
+static void stop_early(wbc_tick *t, int first) {
+    double found[NV];
+    if (first) {
+        ldp2qp_solution(&t->daqp);
+        remember(t);
+    }
+    memcpy(found, t->x, sizeof found);
+    partly(t, found, first ? 1.0 : 0.0);
+    t->warm = first;
+}
+
 /* x as the command: within its bounds, and exactly on those that are active */
 static void command(wbc_tick *t) {
     for (int i = 0; i < NV; i++) t->report.v[i] = clamp(t->x[i], t->low[i], t->high[i]);
@@ -44,7 +72,7 @@ static void command(wbc_tick *t) {
 EXPORT int wbc_tick_solve(wbc_tick *t) {
     int flag = uncross(t) ? WBC_RELAXED : WBC_SOLVED;
     t->report.iterations = 0.0;
-    t->factored = 0;
+    t->factored = t->spent = 0;
     find_idle_rows(t);
     if (t->unusable != 0.0 || !(t->prepared || factor(t))) {
         brake(t);
@@ -53,11 +81,15 @@ EXPORT int wbc_tick_solve(wbc_tick *t) {
         t->warm = 0;
     } else {
         int exit_flag = constrained(t, TIGHT);
-        if (exit_flag < 0 && MC > 0) {
+        const int first = t->spent;
+        if (exit_flag < 0 && MC > 0 && !first) {
             flag = WBC_RELAXED;
             exit_flag = relaxed(t);
         }
-        if (exit_flag < 0) {
+        if (t->spent) {
+            stop_early(t, first);
+            flag = WBC_CAPPED;
+        } else if (exit_flag < 0) {
             brake(t);
             flag = WBC_BRAKED;
         } else {
@@ -72,7 +104,7 @@ EXPORT int wbc_tick_solve(wbc_tick *t) {
     }
     command(t);
     int gave_way = 0;
-    for (int k = 0; flag == WBC_RELAXED && k < MC; k++) {
+    for (int k = 0; (flag == WBC_RELAXED || flag == WBC_CAPPED) && k < MC; k++) {
         const double value = row_at(t, k, t->report.v);
         const double slack = fmax(t->free_low[k] - value, value - t->free_high[k]);
         t->report.slack[k] = slack > 2.0 * TOLERANCE * row_scale[k] ? slack : 0.0;

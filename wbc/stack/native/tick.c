@@ -41,11 +41,12 @@ EXPORT long long wbc_tick_size(void) { return (long long)sizeof(wbc_tick); }
 #define OFFSET(field) (long long)offsetof(wbc_tick, field)
 
 /* Where the caller finds q, v_last, v_in, use_v, p, dt, weight, enabled, bound_enabled, report, H, g, A, low, high,
- * unusable, plain */
+ * unusable, plain, cap */
 EXPORT void wbc_tick_layout(long long *out) {
     const long long offsets[] = {OFFSET(q), OFFSET(v_last), OFFSET(v_in), OFFSET(use_v), OFFSET(p), OFFSET(dt),
                                  OFFSET(weight), OFFSET(enabled), OFFSET(bound_enabled), OFFSET(report), OFFSET(H),
-                                 OFFSET(g), OFFSET(A), OFFSET(low), OFFSET(high), OFFSET(unusable), OFFSET(plain)};
+                                 OFFSET(g), OFFSET(A), OFFSET(low), OFFSET(high), OFFSET(unusable), OFFSET(plain),
+                                 OFFSET(cap)};
     memcpy(out, offsets, sizeof offsets);
 }
 
@@ -63,7 +64,6 @@ EXPORT void wbc_tick_init(wbc_tick *t) {
     t->settings.primal_tol = 1e-11;
     t->settings.eps_prox = 0.0;
     t->settings.rho_soft = RHO;
-    t->settings.iter_limit = 100 + 10 * M_ALL;
     work->Rinv = t->Rinv;
     work->M = t->M;
     work->dupper = t->dupper;

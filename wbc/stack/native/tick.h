@@ -39,6 +39,7 @@
 #define WBC_SOLVED 0
 #define WBC_RELAXED 1
 #define WBC_BRAKED 2
+#define WBC_CAPPED 3
 #define WBC_BAD_Q (-1)
 #define WBC_BAD_UNIT (-2)
 #define WBC_BAD_V (-3)
@@ -67,6 +68,7 @@ typedef struct {
     /* inputs, written by the caller */
     double q[NQ + 1], v_last[NV], p[NP + 1], dt;
     double v_in[NV], use_v;      /* a measured velocity, taken in place of the last command where use_v is not 0 */
+    double cap;                  /* iterations of the active-set solver a tick at most; 0: as many as it takes */
     double weight[MT + 1];       /* weight of each task row, scale included */
     double enabled[MC + 1];      /* 1 or 0 for each general row */
     double bound_enabled[NB * NV + 1];
@@ -93,6 +95,7 @@ typedef struct {
     double work_w[WORK_W + 1];
     long long work_iw[WORK_IW + 1];
     int warm;                    /* the sense array holds the active set of the last tick */
+    int spent;                   /* the cap has ended a search of this tick */
     int factored;                /* R inverse and M of the last tick are in the workspace */
     /* DAQP workspace on our own memory */
     DAQPWorkspace daqp;
