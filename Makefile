@@ -15,10 +15,10 @@ TYPES := build/types
 SOURCES := wbc tasks robots tests bench examples
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test lint format types docs bench lock clean
+.PHONY: help setup demo test lint format types docs bench bench-time-laws lock clean
 
 help:  ## list the targets
-	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 10
+	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 18
 
 setup: $(READY)  ## create .venv with the pinned packages and this one
 
@@ -46,8 +46,12 @@ types: $(READY)  ## mypy --strict on the package
 docs: $(READY)  ## write what the code declares into the pages of tasks and constraints
 	$(BIN)/wbc docs
 
-bench: $(READY) $(PEERS_READY)  ## compare with pink, mink and placo on the same problems
+bench: $(READY) $(PEERS_READY)  ## compare with pink, mink and placo on the same problems, and a quick run of the laws
 	$(BIN)/python -m bench --peers-python $(PEERS_VENV)/bin/python
+	$(BIN)/python -m bench.time_laws
+
+bench-time-laws: $(READY)  ## laws of motion beside raw toppra and raw ruckig, 10^6 states; Ctrl-C keeps what it has
+	$(BIN)/python -m bench.time_laws --full
 
 lock: $(READY)  ## write the versions in .venv to requirements/lock.txt
 	$(BIN)/python requirements/freeze.py > requirements/lock.txt.new

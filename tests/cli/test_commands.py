@@ -244,20 +244,27 @@ def test_second_interrupt_is_not_held_back() -> None:
             os.kill(os.getpid(), signal.SIGINT)
 
 
-def test_bench_runs_the_module_of_the_repository(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(("first", "module"), [([], "bench"), (["time-laws"], "bench.time_laws")])
+def test_bench_runs_the_module_of_the_repository(
+    first: list[str], module: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     calls: list[tuple[list[str], pathlib.Path]] = []
 
     class Done:
         returncode = 3
 
     def fake(command: list[str], cwd: pathlib.Path, check: bool) -> Done:
+        # Ctrl-C is for the benchmark, which has something to say yet
+        os.kill(os.getpid(), signal.SIGINT)
         calls.append((command, cwd))
         return Done()
 
     monkeypatch.setattr(bench.subprocess, "run", fake)
-    assert run("bench", "--problems", "panda")[0] == 3
+    handler = signal.getsignal(signal.SIGINT)
+    assert run("bench", *first, "--problems", "3")[0] == 3
+    assert signal.getsignal(signal.SIGINT) is handler
     command, root = calls[0]
-    assert command[1:] == ["-m", "bench", "--problems", "panda"]
+    assert command[1:] == ["-m", module, "--problems", "3"]
     assert (root / "bench" / "__main__.py").is_file()
 
 

@@ -1,10 +1,12 @@
-"""``wbc bench``: the benchmark of the repository."""
+"""``wbc bench``: the benchmarks of the repository."""
 
 from __future__ import annotations
 
 import pathlib
+import signal
 import subprocess
 import sys
+from typing import Any
 
 import typer
 
@@ -12,6 +14,9 @@ from wbc.errors import WbcError
 
 #: The repository, if the package is installed from one
 ROOT = pathlib.Path(__file__).resolve().parents[2]
+
+#: First argument -> the module that measures something else than the tick
+OTHERS = {"time-laws": "bench.time_laws"}
 
 
 class BenchError(WbcError):
@@ -22,9 +27,21 @@ def bench(context: typer.Context) -> None:
     """Compare with pink, mink and placo on the same problems (needs the repository).
 
     Arguments after the command go to the benchmark: wbc bench --problems panda --rounds 2
+
+    wbc bench time-laws compares laws of motion with raw toppra and raw ruckig: wbc bench time-laws --count 100000
     """
     if not (ROOT / "bench" / "__main__.py").is_file():
         reason = "the benchmark is not installed with the package; run it from a clone of the repository"
         raise BenchError("bench", str(ROOT / "bench"), reason)
-    done = subprocess.run([sys.executable, "-m", "bench", *context.args], cwd=ROOT, check=False)
+    given = list(context.args)
+    module = OTHERS[given.pop(0)] if given and given[0] in OTHERS else "bench"
+
+    def ignore(number: int, frame: Any) -> None:
+        """Ctrl-C goes to the benchmark too, which ends with what it has; SIG_IGN would be inherited by it."""
+
+    before = signal.signal(signal.SIGINT, ignore)
+    try:
+        done = subprocess.run([sys.executable, "-m", module, *given], cwd=ROOT, check=False)
+    finally:
+        signal.signal(signal.SIGINT, before)
     raise typer.Exit(done.returncode)

@@ -1,0 +1,199 @@
+"""Laws of least time and jerk-limited laws through waypoints, a record for each problem."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+import wbc.robots
+from bench.time_laws import raw
+from bench.time_laws.suite import INSTANCES, PROBLEMS
+from wbc.errors import WbcError
+from wbc.trajectory import Law, Limits, PolynomialPath, jerk_limited_along, spline_path, time_optimal
+from wbc.trajectory.checks import TorqueCheck
+from wbc.trajectory.waypoints import Ends
+from wbc.validation import Array
+
+Record = dict[str, Any]
+
+#: Grid points of toppra beside which durations are compared
+REFERENCE = 6401
+#: Jerk limits of the random set over its acceleration limits [1/s]
+JERK = 10.0
+
+
+def random_problem(rng: np.random.Generator, count: int) -> tuple[Array, Array, Array]:
+    """Waypoints of 7 joints, velocity and acceleration limits: the problem of toppra's own examples."""
+    return rng.standard_normal((count, 7)), rng.uniform(10.0, 30.0, 7), rng.uniform(10.0, 20.0, 7)
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """Waypoints, evenly over s in [0, 1] as in toppra's examples, and limits."""
+
+    waypoints: Array
+    velocity: Array
+    acceleration: Array
+
+    def spline(self) -> Any:
+        """toppra's."""
+        return raw.spline(np.linspace(0.0, 1.0, len(self.waypoints)), self.waypoints)
+
+    def theirs(self, points: int | None, **how: Any) -> tuple[Any, Any, Any]:
+        """toppra's trajectory or None, its instance, its path."""
+        path = self.spline()
+        asked = [raw.velocity_limits(self.velocity), raw.acceleration_limits(self.acceleration)]
+        return *raw.solve(asked, path, points, **how), path
+
+    def law(self, trajectory: Any, instance: Any, path: Any) -> Law | None:
+        """toppra's trajectory as a law."""
+        limits = Limits(velocity=self.velocity, acceleration=self.acceleration)
+        return None if trajectory is None else raw.law_of(trajectory, instance, path, limits)
+
+    def ours(self) -> Law:
+        """A law along the same spline, with what a user reads of it."""
+        law = time_optimal(raw.polynomial(self.spline()), self.velocity, self.acceleration)
+        law.certificate  # noqa: B018 (it is made when it is first read)
+        return law
+
+
+def random_set(rng: np.random.Generator, count: int, repeats: int) -> Iterator[Record]:
+    """Raw toppra with its defaults, raw toppra at its best, and ours along the same splines."""
+    for number in (5, 10):
+        for _ in range(count):
+            problem = Problem(*random_problem(rng, number))
+            record: Record = {"waypoints": number}
+            for name, points, how in (("default", None, raw.DEFAULT), ("constant", 1001, raw.CONSTANT)):
+                spent, made = timed(partial(problem.theirs, points, **how), repeats)
+                record[name] = {"ms": spent, **judged(problem.law(*made))}
+            spent, law = timed(problem.ours, repeats)
+            record["ours"] = {"ms": spent, **judged(law)}
+            reference = problem.theirs(REFERENCE, **raw.CONSTANT)[0]
+            record["reference"] = None if reference is None else float(reference.duration)
+            yield record
+
+
+def timed(make: Callable[[], Any], repeats: int) -> tuple[float, Any]:
+    """(least of the wall times [ms], what was made)."""
+    spent = []
+    for _ in range(repeats):
+        begin = time.perf_counter()
+        made = make()
+        spent.append(1e3 * (time.perf_counter() - begin))
+    return min(spent), made
+
+
+def judged(law: Law | None) -> Record:
+    """Duration and largest share of velocity and acceleration limits, exact."""
+    if law is None:
+        return {"duration": None, "ratio": None}
+    worst = law.certificate.worst
+    assert {worst[name].kind for name in ("velocity", "acceleration")} == {"exact"}
+    return {"duration": law.duration, "ratio": max(worst[name].ratio for name in ("velocity", "acceleration"))}
+
+
+def small_moves(rng: np.random.Generator, count: int) -> Iterator[Record]:
+    """Straight moves of 6 joints between two waypoints: raw toppra over s in [0, 1], and ours."""
+    for exponent in range(2, 9):
+        for _ in range(count):
+            way = rng.standard_normal(6)
+            start = rng.uniform(-1.0, 1.0, 6)
+            waypoints = np.stack([start, start + 10.0**-exponent * way / np.linalg.norm(way)])
+            velocity, acceleration = rng.uniform(1.0, 3.0, 6), rng.uniform(2.0, 10.0, 6)
+            record = {"exponent": exponent}
+            record |= compared(waypoints, velocity, acceleration, 101)
+            yield record
+
+
+def suite() -> Iterator[Record]:
+    """toppra's robustness suite, with its own clamped splines and the published durations beside."""
+    for name, points, asked, published in INSTANCES:
+        waypoints, velocity, acceleration = PROBLEMS[name]
+        record = {"name": name, "published": published}
+        record |= compared(np.array(waypoints, dtype=np.float64), velocity, acceleration, points, asked, "clamped")
+        yield record
+
+
+def compared(
+    waypoints: Array,
+    velocity: Any,
+    acceleration: Any,
+    points: int,
+    asked: float | None = None,
+    ends: Ends = "not-a-knot",
+) -> Record:
+    """Raw toppra (waypoints evenly over s in [0, 1]) and ours on one problem, refusals as None."""
+    path = raw.spline(np.linspace(0.0, 1.0, len(waypoints)), waypoints, ends)
+    limits = Limits(velocity=np.array(velocity, float), acceleration=np.array(acceleration, float))
+    constraints = [raw.velocity_limits(velocity), raw.acceleration_limits(acceleration)]
+    found, _ = raw.solve(constraints, path, points, asked)
+    theirs: Record = {"duration": None, "ratio": None}
+    if found is not None and np.isfinite(found.duration) and found.duration > 0.0:
+        theirs = judged(raw.law_of(found, None, path, limits))
+    try:
+        law = time_optimal(spline_path(waypoints, ends), velocity, acceleration, duration=asked, intervals=points - 1)
+    except WbcError:
+        return {"raw": theirs, "ours": judged(None)}
+    return {"raw": theirs, "ours": judged(law)}
+
+
+def torques(rng: np.random.Generator, count: int) -> Iterator[Record]:
+    """Random paths of a UR5 within its torques and velocities; inverse dynamics by Pinocchio on both sides."""
+    robot = wbc.robots.load("ur5")
+    data = robot.model.createData()
+    velocity, effort = robot.limits.velocity, robot.limits.effort
+    check = TorqueCheck(robot, effort)
+
+    def dynamics(q: Array, v: Array, a: Array) -> Array:
+        return np.array(pin.rnea(robot.model, data, q, v, a))
+
+    for _ in range(count):
+        waypoints = robot.neutral + rng.uniform(-1.0, 1.0, (5, robot.nv))
+        path = raw.spline(np.linspace(0.0, 1.0, 5), waypoints)
+        record: Record = {}
+        for name, scheme, points, how in (
+            ("default", None, None, raw.DEFAULT),
+            ("collocation", "Collocation", 201, raw.CONSTANT),
+            ("interpolation", "Interpolation", 201, raw.CONSTANT),
+        ):
+            asked = [raw.velocity_limits(velocity), raw.torque_limits(dynamics, effort, scheme)]
+            spent, (found, instance) = timed(partial(raw.solve, asked, path, points, **how), 1)
+            law = None if found is None else raw.law_of(found, instance, path, Limits(velocity=velocity), (check,))
+            record[name] = {"ms": spent, **_torque(law)}
+        spent, law = timed(partial(time_optimal, raw.polynomial(path), velocity, torque=effort, robot=robot), 1)
+        record["ours"] = {"ms": spent, **_torque(law)}
+        yield record
+
+
+def _torque(law: Law | None) -> Record:
+    """Largest share of the torque limits that was seen, and its bound with what may lie between samples."""
+    if law is None:
+        return {"duration": None, "seen": None, "bound": None}
+    worst = law.certificate.worst["torque"]
+    return {"duration": law.duration, "seen": worst.ratio - worst.between, "bound": worst.ratio}
+
+
+def jerk_limited_paths(rng: np.random.Generator, count: int) -> Iterator[Record]:
+    """Jerk-limited laws along splines through waypoints, beside laws of least time along the same paths."""
+    for number in (5, 10):
+        for _ in range(count):
+            waypoints, velocity, acceleration = random_problem(rng, number)
+            path: PolynomialPath = raw.polynomial(raw.spline(np.linspace(0.0, 1.0, number), waypoints))
+            least = time_optimal(path, velocity, acceleration).duration
+            sizes = {"velocity": velocity, "acceleration": acceleration, "jerk": JERK * acceleration}
+            spent, law = timed(partial(jerk_limited_along, path, **sizes), 1)
+            worst = law.certificate.worst
+            yield {
+                "waypoints": number,
+                "ms": spent,
+                "longer": law.duration / least - 1.0,
+                "ratio": law.certificate.ratio,
+                "exact": all(w.kind == "exact" for w in worst.values()),
+                "jerk": worst["jerk"].ratio,
+            }

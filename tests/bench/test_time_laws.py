@@ -1,0 +1,137 @@
+"""The benchmark of laws: small runs, what Ctrl-C leaves, and judges that find what is wrong."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from rich.progress import Progress
+
+from bench.time_laws import __main__ as run
+from bench.time_laws import families, least_time, raw, states
+from bench.time_laws.goals import goals
+from bench.time_laws.tables import sheets
+from wbc.trajectory import Law, PolynomialPath, jerk_limited
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, dict[str, Any]]:
+    """What a tiny run writes."""
+    folder = tmp_path_factory.mktemp("laws")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(least_time, "REFERENCE", 1601)
+        run.main(["--problems", "1", "--count", "40", "--processes", "1", "--seed", "3", "--output", str(folder)])
+    return (folder / "time_laws.md").read_text(), json.loads((folder / "time_laws.json").read_text())
+
+
+def test_every_part_has_a_table_and_goals(written: tuple[str, dict[str, Any]]) -> None:
+    page, found = written
+    assert found["interrupted"] is None
+    assert len(found["tables"]) == len(run.QUICK) + 1
+    for table in found["tables"]:
+        assert table["rows"]
+        assert all(len(row) == len(table["columns"]) for row in table["rows"])
+        assert table["title"] in page
+    assert "toppra 0." in page
+    assert "seed 3" in page
+
+
+def test_goals_that_do_not_hang_on_the_clock_are_met(written: tuple[str, dict[str, Any]]) -> None:
+    clocked = ("time for a law", "median above")
+    met = {goal["text"]: goal["met"] for goal in written[1]["goals"] if not any(c in goal["text"] for c in clocked)}
+    assert len(met) > 12
+    assert [text for text, yes in met.items() if not yes] == []
+
+
+def test_ctrl_c_keeps_what_was_measured() -> None:
+    def endless() -> Iterator[dict[str, Any]]:
+        yield from states.straight_moves(np.random.default_rng(0), 3)
+        os.kill(os.getpid(), signal.SIGINT)
+        yield from states.straight_moves(np.random.default_rng(0), 1000)
+
+    work = {"straight": (1003, endless()), "walls": (5, states.walls(np.random.default_rng(1), 5))}
+    with Progress(disable=True) as progress:
+        parts, where = run.measure(work, progress)
+    assert where == "straight"
+    assert set(parts) == {"straight"}
+    assert 3 <= len(parts["straight"]) < 1000
+    assert len(sheets(parts)) == 1
+    assert len(goals(parts)) == 1
+
+
+def test_ctrl_c_ends_a_run_with_its_workers(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "bench.time_laws", "--parts", "straight", "states", "--problems", "2"]
+    command += ["--count", "10000000", "--processes", "2", "--output", str(tmp_path)]
+    # As on a terminal, where bars show how far it is
+    shown = {**os.environ, "FORCE_COLOR": "1"}
+    process = subprocess.Popen(command, cwd=ROOT, env=shown, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    assert process.stderr is not None
+    seen = ""
+    while "states" not in seen:
+        letter = process.stderr.read(1)
+        assert letter, seen
+        seen += letter
+    process.send_signal(signal.SIGINT)
+    out, _ = process.communicate(timeout=60)
+    assert process.returncode == 0
+    assert "Ended by Ctrl-C in: states" in out
+    assert json.loads((tmp_path / "time_laws.json").read_text())["interrupted"] == "states"
+
+
+def test_states_hang_on_the_seed_only() -> None:
+    one = list(states.random_states(5, 40, 1))
+    other = sorted(states.random_states(5, 40, 2), key=lambda r: families.FAMILIES.index(r["family"]))
+    assert [r["raw"] for r in one] == [r["raw"] for r in other]
+    assert sum(r["states"] for r in one) == 40
+    assert not any(r["ours"] for r in one)
+
+
+@pytest.mark.parametrize("family", families.FAMILIES)
+def test_the_judge_of_states_finds_what_is_wrong(family: str) -> None:
+    rng = np.random.default_rng(7)
+    asked = [families.drawn(family, rng) for _ in range(5)]
+    laws = [jerk_limited(**a) for a in asked]
+    excess, off = families.misses(laws, asked)
+    assert excess < 1e-9
+    assert off < 1e-8
+    slower = [{**a, "jerk": 0.9 * a["jerk"]} for a in asked]
+    assert families.misses(laws, slower)[0] > 0.05
+    moved = [*asked[:4], {**asked[4], "target_velocity": asked[4]["target_velocity"] + 1e-3}]
+    assert families.misses(laws, moved)[1] > 0.9e-3
+    path = laws[2].path
+    assert isinstance(path, PolynomialPath)
+    c = path.coefficients.copy()
+    c[-1, -1] += 1e-2
+    broken = Law(PolynomialPath(path.knots, c), laws[2].timing)
+    assert families.misses([*laws[:2], broken, *laws[3:]], asked)[1] > 0.9e-2
+
+
+def test_toppra_s_output_is_judged_as_it_is() -> None:
+    """As a law it has the positions, velocities and accelerations that toppra itself evaluates."""
+    problem = least_time.Problem(*least_time.random_problem(np.random.default_rng(2), 5))
+    for points, how in ((None, raw.DEFAULT), (201, raw.CONSTANT)):
+        found, instance, path = problem.theirs(points, **how)
+        law = problem.law(found, instance, path)
+        assert law is not None
+        assert law.duration == pytest.approx(found.duration, rel=1e-9)
+        times = np.linspace(0.01, 0.99, 57) * law.duration
+        state = law.at(times)
+        np.testing.assert_allclose(state.position, found(times), atol=1e-8)
+        np.testing.assert_allclose(state.velocity, found(times, 1), atol=1e-6)
+        seen = np.abs(found(np.linspace(0.0, law.duration, 4001), 2) / problem.acceleration).max()
+        ratio = law.certificate.worst["acceleration"].ratio
+        assert seen <= ratio * (1.0 + 1e-9)
+        assert seen > ratio - 2e-2
+    easy = replace(problem, acceleration=2.0 * problem.acceleration)
+    assert easy.ours().duration < problem.ours().duration
