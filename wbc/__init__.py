@@ -14,7 +14,7 @@ from wbc import robots as robots
 from wbc import shapes as shapes
 from wbc import tasks as tasks
 from wbc import trajectory as trajectory
-from wbc.controller import Certificate, Controller, Recording, Replay, Stack, Status, Step, replay
+from wbc.controller import Certificate, Controller, Recording, Replay, Solution, Solver, Stack, Status, Step, replay
 from wbc.errors import WbcError
 
 __all__ = [
@@ -22,6 +22,8 @@ __all__ = [
     "Controller",
     "Recording",
     "Replay",
+    "Solution",
+    "Solver",
     "Stack",
     "Status",
     "Step",

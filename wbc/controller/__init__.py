@@ -4,15 +4,20 @@ from wbc.controller.controller import Controller
 from wbc.controller.recorder import Recorder
 from wbc.controller.recording import Recording
 from wbc.controller.replaying import Replay, replay, replayed
+from wbc.controller.solution import Ending, Solution
+from wbc.controller.solver import Solver
 from wbc.controller.stack import Stack
 from wbc.controller.step import Certificate, Status, Step
 
 __all__ = [
     "Certificate",
     "Controller",
+    "Ending",
     "Recorder",
     "Recording",
     "Replay",
+    "Solution",
+    "Solver",
     "Stack",
     "Status",
     "Step",

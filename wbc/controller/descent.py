@@ -20,7 +20,7 @@ from wbc.validation import Array
 
 #: As in ``native/converge.h``
 STRIDE, SHORT_STRIDE, EASE, PATIENCE, PROGRESS = 1.0, 0.2, 0.03, 3, 0.8
-DESCENT, SETTLING, AT_REST, SEEKING = 60, 200, 1e-7, 0.9
+DESCENT, SETTLING, AT_REST, GAINED, CORRECTIONS, CLOSELY, SEEKING = 60, 200, 1e-7, 1e-9, 5, 0.01, 0.9
 
 
 class Search:
@@ -54,9 +54,9 @@ class Search:
             descents += 1
             if ending == FOUND:
                 break
-        self._assembly.plain[0] = 0.0
         if query.wishes if ending == FOUND else self._cost < np.inf:
             ending = self._settle(query, ending, begin + query.seconds)
+        self._assembly.plain[0] = 0.0
         tick.q[:], tick.weight[:] = self._best, weight
         tick.reset()
         return Found(ending, self._ticks, descents, perf_counter() - begin, self._cost)
@@ -68,7 +68,7 @@ class Search:
             if perf_counter() >= end:
                 return OUT_OF_TIME
             qp = self._qp()
-            cost, met = self._squares(query, wishes=False)
+            cost, met = self._squares(query)
             if not (self._assembly.usable and cost < np.inf):
                 return EXHAUSTED
             allowed = self._may_rest(qp, query.room)
@@ -86,30 +86,55 @@ class Search:
             self._move_on()
         return EXHAUSTED
 
-    def _settle(self, query: Query, ending: int, end: float) -> int:
-        found, least, tick = ending == FOUND, np.inf, self._tick
-        tick.reset()
-        tick.q[:] = self._best
-        tick.weight[:] = query.settling if found else query.seeking
-        for _ in range(SETTLING):
+    def _corrected(self, query: Query, found: bool, end: float) -> tuple[float, bool]:
+        """Cost of the goals or, where they were found, of the wishes, after ticks that bring the goals back; and
+        whether the goals are met.
+        """
+        self._assembly.plain[0] = 1.0
+        self._tick.weight[:] = query.seeking
+        for _ in range(CORRECTIONS):
             if perf_counter() >= end:
                 break
             qp = self._qp()
             if not self._assembly.usable:
                 break
-            cost, reached = self._squares(query, wishes=False)
-            if found:
-                cost, _ = self._squares(query, wishes=True)
-            if cost < least and (reached or not found) and self._may_rest(qp, query.room):
-                least, self._best = cost, tick.q.copy()
-                if not found:
-                    self._cost = min(cost, self._cost)
-                    if reached:
-                        return FOUND
+            cost, met = self._squares(query, share=CLOSELY if found else 1.0)
+            if self._may_rest(qp, query.room) and (met or not found):
+                return (self._squares(query, wishes=True)[0] if found else cost), met
             self._step(qp, 0.0, SHORT_STRIDE)
-            if np.abs(self._v() / self._dofs).max(initial=0.0) <= AT_REST:
+            self._move_on()
+        return np.inf, False
+
+    def _settle(self, query: Query, ending: int, end: float) -> int:
+        """On to where the stack rests; strides that bring nothing are taken back and shortened."""
+        found, stride, tick = ending == FOUND, SHORT_STRIDE, self._tick
+        tick.q[:] = self._best
+        least, _ = self._corrected(query, found, end)
+        for _ in range(SETTLING):
+            if perf_counter() >= end or least == np.inf:
+                break
+            self._assembly.plain[0] = 0.0
+            tick.reset()
+            tick.q[:], tick.weight[:] = self._best, query.settling if found else query.seeking
+            self._step(self._qp(), 0.0, stride)
+            largest = float(np.abs(self._v() / self._dofs).max(initial=0.0))
+            if largest <= AT_REST:
                 break
             self._move_on()
+            cost, met = self._corrected(query, found, end)
+            if cost < least:
+                enough, least = least - cost <= GAINED * least, cost
+                self._best, stride = tick.q.copy(), min(2.0 * stride, SHORT_STRIDE)
+                if not found:
+                    self._cost = cost
+                    if met:
+                        return FOUND
+                if enough:
+                    break
+            else:
+                stride = 0.25 * min(stride, largest)
+                if stride <= AT_REST:
+                    break
         return ending
 
     def _qp(self) -> QP:
@@ -117,12 +142,13 @@ class Search:
         self._ticks += 1
         return self._assembly.qp()
 
-    def _squares(self, query: Query, *, wishes: bool) -> tuple[float, bool]:
-        """Weighted square of the errors of goals or wishes, and whether all are within their tolerance."""
-        weight, error = self._tick.weight, self._tick.report[self._places["error"]]
+    def _squares(self, query: Query, *, wishes: bool = False, share: float = 1.0) -> tuple[float, bool]:
+        """Weighted square of the errors of goals or wishes, and whether all are within a share of their tolerance."""
+        weight = query.settling if wishes else query.seeking
+        error = self._tick.report[self._places["error"]]
         those = ((query.tolerance < 0.0) == wishes) & (weight != 0.0)
         size = np.abs(error[those])
-        return float(weight[those] @ size**2), bool((size <= query.tolerance[those]).all())
+        return float(weight[those] @ size**2), bool((size <= share * query.tolerance[those]).all())
 
     def _may_rest(self, qp: QP, room: float) -> bool:
         """Whether standing still keeps all rows and bounds."""

@@ -123,7 +123,8 @@ class Solver:
             spent, ticks = spent + sum(a.seconds for a in alone), ticks + sum(a.ticks for a in alone)
             if all(a.ending == FOUND for a in alone):
                 status = Ending.CONTRADICTORY
-        answer = self._inside(answer)
+        # Rounding of the last tick may pass a limit by its last digit
+        answer = self._within_limits(answer)
         step = self._controller.step(answer, np.zeros(self.stack.robot.nv), dt=TICK)
         return Solution(answer, status, self.goals, ticks, found.descents + (found.ending > EXHAUSTED), spent, step)
 
@@ -174,9 +175,6 @@ class Solver:
             if place >= 0 and enabled[place] != 0.0:
                 out[index[i]] = min(max(out[index[i]], lower[i]), upper[i])
         return out
-
-    # Rounding of the last tick may pass a limit by its last digit
-    _inside = _within_limits
 
 
 def _ending(found: Found) -> Ending:

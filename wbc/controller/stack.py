@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING, Any
 
 from wbc import validation
 from wbc.controller.controller import Controller
@@ -12,6 +12,7 @@ from wbc.stack.artifact import compile_stack
 from wbc.stack.declaration import Declaration
 
 if TYPE_CHECKING:
+    from wbc.controller.solution import Solution
     from wbc.controller.solver import Solver
 
 
@@ -64,3 +65,28 @@ class Stack(Declaration):
         from wbc.controller.solver import Solver
 
         return Solver(self, goals, backend)
+
+    def solve(
+        self,
+        q0: Any,
+        targets: Mapping[str, Any] | None = None,
+        *,
+        goals: Iterable[str] | None = None,
+        backend: str = "auto",
+        **options: Any,
+    ) -> Solution:
+        """One configuration that meets the tasks: :meth:`solver` and :meth:`wbc.Solver.solve` in one.
+
+        Args:
+            q0: where the search begins [nq].
+            targets: name of a task -> its ``target``; others stay where q0 has them.
+            goals, backend: as for :meth:`solver`.
+            options: ``seed``, ``budget``, ``restarts`` and ``tolerance`` of :meth:`wbc.Solver.solve`.
+
+        Raises:
+            WbcError: as these two.
+        """
+        solver = self.solver(goals, backend)
+        for name, target in (targets or {}).items():
+            solver[name].target = target
+        return solver.solve(q0, **options)

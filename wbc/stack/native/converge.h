@@ -30,8 +30,14 @@ int move(const double **arg, double **res, long long *iw, double *w, int mem);
 /* Ticks of a descent and of settling at most */
 #define DESCENT 60
 #define SETTLING 200
-/* Settling ends where no joint would move by more than this [rad, or characteristic lengths] */
+/* Settling ends where no joint would move by more than this [rad, or characteristic lengths], or a tick lessens the cost
+ * by less than this share */
 #define AT_REST 1e-7
+#define GAINED 1e-9
+/* Ticks that bring the goals back after one that follows wishes at most, to within this share of their tolerance: else
+ * wishes would gain by errors of the goals */
+#define CORRECTIONS 5
+#define CLOSELY 0.01
 /* Share of the time after which no goal is sought any more and the nearest configuration settles */
 #define SEEKING 0.9
 
@@ -58,15 +64,16 @@ static double clock_seconds(void) {
     return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
-/* Weighted square of errors, of the goals or of the wishes; and whether all these are within their tolerance */
-static double squares(const wbc_tick *t, const wbc_search *s, int wishes, int *met) {
+/* Weighted square of errors, of the goals or of the wishes; and whether all these are within a share of their tolerance */
+static double squares(const wbc_tick *t, const wbc_search *s, int wishes, double share, int *met) {
+    const double *weight = wishes ? s->settling : s->seeking;
     double sum = 0.0;
     *met = 1;
     for (int k = 0; k < MT; k++) {
         const double e = t->report.error[k];
-        if ((s->tolerance[k] < 0.0) != wishes || t->weight[k] == 0.0) continue;
-        sum += t->weight[k] * e * e;
-        *met &= fabs(e) <= s->tolerance[k];
+        if ((s->tolerance[k] < 0.0) != wishes || weight[k] == 0.0) continue;
+        sum += weight[k] * e * e;
+        *met &= fabs(e) <= share * s->tolerance[k];
     }
     return sum;
 }
@@ -107,7 +114,7 @@ static int descend(wbc_tick *t, const wbc_search *s, wbc_found *out, double end)
         if (clock_seconds() >= end) return WBC_OUT_OF_TIME;
         assemble(t, 1);
         out->ticks += 1.0;
-        const double cost = squares(t, s, 0, &met);
+        const double cost = squares(t, s, 0, 1.0, &met);
         if (t->unusable != 0.0 || !(cost < HUGE_VAL)) return WBC_EXHAUSTED;
         const int allowed = may_rest(t, s->room);
         if (allowed && cost < out->cost) {
@@ -128,38 +135,60 @@ static int descend(wbc_tick *t, const wbc_search *s, wbc_found *out, double end)
     return WBC_EXHAUSTED;
 }
 
-/* From the best configuration to where the stack rests, with curvature. Goals that are met stay met and the wishes come
- * nearer; of goals that are not met, the error falls. */
-static void settle(wbc_tick *t, const wbc_search *s, wbc_found *out, double end) {
-    const int found = out->ending == WBC_FOUND;
-    double least = HUGE_VAL;
-    int met;
-    t->plain = 0.0;
-    t->warm = 0;
-    memcpy(t->q, t->q_good, NQ * sizeof(double));
-    memcpy(t->weight, found ? s->settling : s->seeking, MT * sizeof(double));
-    for (int n = 0; n < SETTLING && clock_seconds() < end; n++) {
-        double largest = 0.0;
+/* Ticks of the goals alone until they are met again; the cost of the goals or, where they were found, of the wishes, at
+ * t->q. Infinite where constraints or goals that were met are not. */
+static double corrected(wbc_tick *t, const wbc_search *s, wbc_found *out, int found, double end) {
+    double cost = HUGE_VAL;
+    t->plain = 1.0;
+    memcpy(t->weight, s->seeking, MT * sizeof(double));
+    for (int n = 0; n < CORRECTIONS && clock_seconds() < end; n++) {
+        int met, any;
         assemble(t, 1);
         out->ticks += 1.0;
-        if (t->unusable != 0.0) return;
-        double cost = squares(t, s, 0, &met);
-        const int reached = met;
-        if (found) cost = squares(t, s, 1, &met);
-        if (cost < least && (reached || !found) && may_rest(t, s->room)) {
-            least = cost;
-            if (!found) out->cost = smaller(cost, out->cost);
-            memcpy(t->q_good, t->q, NQ * sizeof(double));
-            if (!found && reached) {
-                out->ending = WBC_FOUND;
-                return;
-            }
+        if (t->unusable != 0.0) return HUGE_VAL;
+        cost = squares(t, s, 0, found ? CLOSELY : 1.0, &met);
+        if (may_rest(t, s->room) && (met || !found)) {
+            if (met && !found) out->ending = WBC_FOUND;
+            return found ? squares(t, s, 1, 1.0, &any) : cost;
         }
         soften(t, 0.0, SHORT_STRIDE);
+        wbc_tick_solve(t);
+        move_on(t);
+    }
+    return HUGE_VAL;
+}
+
+/* From the best configuration on to where the stack rests, with curvature: goals that are met stay met and the wishes
+ * come nearer; of goals that are not met, the error falls. Strides that bring nothing are taken back and shortened. */
+static void settle(wbc_tick *t, const wbc_search *s, wbc_found *out, double end) {
+    const int found = out->ending == WBC_FOUND;
+    double stride = SHORT_STRIDE, least, largest;
+    memcpy(t->q, t->q_good, NQ * sizeof(double));
+    least = corrected(t, s, out, found, end);
+    for (int n = 0; n < SETTLING && clock_seconds() < end && least < HUGE_VAL; n++) {
+        t->plain = largest = 0.0;
+        t->warm = 0;
+        memcpy(t->q, t->q_good, NQ * sizeof(double));
+        memcpy(t->weight, found ? s->settling : s->seeking, MT * sizeof(double));
+        assemble(t, 1);
+        out->ticks += 1.0;
+        soften(t, 0.0, stride);
         wbc_tick_solve(t);
         for (int i = 0; i < NV; i++) largest = larger(largest, fabs(t->report.v[i]) / dof_scale[i]);
         if (largest <= AT_REST) return;
         move_on(t);
+        const double cost = corrected(t, s, out, found, end);
+        if (cost < least) {
+            const int enough = least - cost <= GAINED * least;
+            least = cost;
+            if (!found) out->cost = cost;
+            memcpy(t->q_good, t->q, NQ * sizeof(double));
+            stride = smaller(2.0 * stride, SHORT_STRIDE);
+            if (enough || (!found && out->ending == WBC_FOUND)) return;
+        } else {
+            stride = 0.25 * smaller(stride, largest);
+            if (stride <= AT_REST) return;
+        }
     }
 }
 

@@ -1,0 +1,159 @@
+"""Inverse kinematics: bad input, budgets, and stacks whose joints the goals do not all move."""
+
+from __future__ import annotations
+
+from functools import cache
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import wbc
+from tests.controller.test_inverse_kinematics import TIPS, arm, random_q, solver, stack, tip
+from wbc.controller import Solver, Stack
+from wbc.errors import NotFiniteError, RangeError, ShapeError, UnknownNameError, WbcError
+from wbc.tasks import Damping, EndEffector, FrameVelocityLimit, JointLimits, Posture, SelfCollision
+
+NAN = np.full(7, np.nan)
+
+
+@pytest.mark.parametrize(
+    ("options", "error", "field"),
+    [
+        ({"q0": NAN}, NotFiniteError, "q0"),
+        ({"q0": np.zeros(6)}, ShapeError, "q0"),
+        ({"budget": 0.0}, RangeError, "budget"),
+        ({"budget": -1.0}, RangeError, "budget"),
+        ({"budget": np.nan}, NotFiniteError, "budget"),
+        ({"tolerance": 0.0}, RangeError, "tolerance"),
+        ({"tolerance": np.inf}, NotFiniteError, "tolerance"),
+        ({"restarts": -1}, RangeError, "restarts"),
+        ({"restarts": 2.5}, ShapeError, "restarts"),
+        ({"seed": -1}, RangeError, "seed"),
+        ({"seed": "x"}, ShapeError, "seed"),
+    ],
+)
+def test_bad_input_is_refused_and_changes_nothing(options: dict[str, Any], error: type[WbcError], field: str) -> None:
+    robot, ik = arm("panda"), solver()
+    ik["hand"].target = tip(robot, random_q(robot, np.random.default_rng(1)), TIPS["panda"])
+    before = ik.solve(robot.neutral, budget=None)
+    with pytest.raises(error) as raised:
+        ik.solve(**{"q0": robot.neutral, **options})
+    assert raised.value.field == field
+    np.testing.assert_array_equal(ik.solve(robot.neutral, budget=None).q, before.q)
+
+
+def test_targets_are_checked() -> None:
+    ik = solver()
+    with pytest.raises(WbcError) as raised:
+        ik["hand"].target = np.full((4, 4), np.nan)
+    assert raised.value.field == "hand.target"
+    with pytest.raises(UnknownNameError) as unknown:
+        stack().solve(arm("panda").neutral, {"hnad": pin.SE3.Identity()})
+    assert unknown.value.choices[0] == "hand"
+
+
+def test_goals_are_named_or_chosen_by_weight() -> None:
+    arms = stack().add(Posture(), name="posture", weight=5.0).add(Damping(), name="calm", weight=2.0)
+    arms.add(EndEffector("panda_link7", kind="position"), name="wrist", weight=0.5)
+    assert arms.solver().goals == ("hand",)
+    assert arms.solver(goals=("wrist", "hand")).goals == ("wrist", "hand")
+    with pytest.raises(UnknownNameError) as unknown:
+        arms.solver(goals=("hend",))
+    assert unknown.value.field == "goals"
+    assert unknown.value.choices[0] == "hand"
+    with pytest.raises(RangeError) as none:
+        Stack(arm("panda"), 0.01).add(Posture(), name="posture").solver()
+    assert none.value.field == "goals"
+
+
+def test_a_budget_is_kept_and_says_so() -> None:
+    robot, ik = arm("panda"), solver()
+    ik["hand"].target = pin.SE3(np.eye(3), np.array([0.0, 0.0, 5.0]))
+    # the machine may be busy: the best of some
+    searches = [ik.solve(robot.neutral, budget=0.003, restarts=100_000) for _ in range(10)]
+    assert {s.status.value for s in searches} <= {"unreachable", "out of time"}
+    assert min(s.seconds for s in searches) < 0.003 + 2e-4
+    begin = perf_counter()
+    hurried = ik.solve(robot.neutral, budget=1e-9)
+    assert hurried.status == "out of time"
+    assert hurried.ticks == 0
+    np.testing.assert_array_equal(hurried.q, robot.neutral)
+    assert perf_counter() - begin < 1.0
+
+
+def test_no_restarts_is_one_descent() -> None:
+    robot, ik = arm("panda"), solver()
+    ik["hand"].target = pin.SE3(np.eye(3), np.array([0.0, 0.0, 5.0]))
+    solution = ik.solve(robot.neutral, budget=None, restarts=0)
+    assert solution.descents == 1
+    assert solution.status == "unreachable"
+
+
+def test_a_start_outside_the_limits_is_moved_to_them() -> None:
+    robot, ik = arm("panda"), solver()
+    goal = tip(robot, random_q(robot, np.random.default_rng(6)), TIPS["panda"])
+    ik["hand"].target = goal
+    solution = ik.solve(robot.neutral + 9.0, budget=None)
+    assert solution.solved
+    low, high = robot.limits.position_lower, robot.limits.position_upper
+    assert (solution.q >= low).all()
+    assert (solution.q <= high).all()
+
+
+def test_one_call_is_enough() -> None:
+    robot = arm("panda")
+    goal = tip(robot, random_q(robot, np.random.default_rng(7)), TIPS["panda"])
+    solution = stack().solve(robot.neutral, {"hand": goal}, budget=None)
+    assert solution.solved
+    assert solution.error <= 1e-5
+    resting = stack().solve(robot.neutral)
+    assert resting.solved
+    assert resting.descents == 1
+    np.testing.assert_allclose(resting.q, robot.neutral, atol=1e-12)
+
+
+def test_limits_of_speed_do_not_count() -> None:
+    robot = arm("panda")
+    slow = stack().add(FrameVelocityLimit(TIPS["panda"], linear=1e-3, angular=1e-3), name="slow")
+    goal = tip(robot, random_q(robot, np.random.default_rng(7)), TIPS["panda"])
+    assert slow.solve(robot.neutral, {"hand": goal}, budget=None).solved
+
+
+@cache
+def humanoid() -> Solver:
+    robot = wbc.robots.load("talos")
+    out = Stack(robot, 0.005).add(EndEffector("gripper_left_base_link", relative_to="torso_2_link"), name="hand")
+    return out.add(JointLimits(), name="limits").solver()
+
+
+def test_joints_that_no_goal_moves_stay() -> None:
+    robot, ik = wbc.robots.load("talos"), humanoid()
+    rng, index = np.random.default_rng(3), robot.position_index
+    arms = [i for i, name in enumerate(robot.dof_names) if name.startswith("arm_left")]
+    solved = restarted = 0
+    for _ in range(20):
+        q = robot.neutral.copy()
+        for i in arms:
+            q[index[i]] = rng.uniform(robot.limits.position_lower[i], robot.limits.position_upper[i])
+        torso = tip(robot, q, "torso_2_link")
+        ik["hand"].target = torso.actInv(tip(robot, q, "gripper_left_base_link"))
+        solution = ik.solve(robot.neutral, budget=None)
+        solved, restarted = solved + solution.solved, restarted + (solution.descents > 1)
+        others = np.setdiff1d(np.arange(robot.nq), index[arms])
+        np.testing.assert_allclose(solution.q[others], robot.neutral[others], atol=1e-6)
+    assert solved == 20
+    assert restarted > 0
+
+
+def test_measured_pairs_are_respected() -> None:
+    robot = arm("panda")
+    ik = stack().add(SelfCollision(margin=0.01), name="self").solver()
+    rng = np.random.default_rng(0)
+    for _ in range(3):
+        ik["hand"].target = tip(robot, random_q(robot, rng), TIPS["panda"])
+        solution = ik.solve(robot.neutral, budget=None, restarts=5)
+        assert solution.status in ("solved", "unreachable", "contradictory")
+        assert solution.status == "contradictory" or min(solution.margins["self"]) > -1e-8
