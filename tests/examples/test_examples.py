@@ -117,6 +117,25 @@ def test_self_collision_keeps_the_arms_apart() -> None:
     check_picture(text)
 
 
+@pytest.mark.slow
+def test_time_laws_keep_their_limits() -> None:
+    text = output("time_laws")
+    fast, smooth = (line for line in text.splitlines() if re.match(r"(least time|jerk-limited) ", line))
+    assert "jerk: unbounded" in fast
+    # Used to the full, and no further
+    for line, names in ((fast, ("velocity", "acceleration", "torque")), (smooth, ("velocity", "acceleration", "jerk"))):
+        used = [number(f"{name} #", line) for name in names]
+        assert 0.999 < max(used) <= 1.000001
+    assert smooth.count("exact") == 4
+    assert number("along the law: at most # um", text) < 1.5
+    for name in ("time_laws", "time_laws_fast"):
+        pixels = imread(f"runs/{name}.png")[..., :3]
+        assert pixels.shape[0] > 800
+        # Curves on white
+        assert pixels.mean() > 0.8
+        assert pixels.std() > 0.05
+
+
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda p: p.stem)
 def test_examples_are_short_and_use_public_names(path: Path) -> None:
     text = path.read_text()
@@ -125,7 +144,8 @@ def test_examples_are_short_and_use_public_names(path: Path) -> None:
     assert ast.get_docstring(tree)
     modules = {a.name for n in ast.walk(tree) if isinstance(n, ast.Import) for a in n.names}
     modules |= {n.module or "" for n in ast.walk(tree) if isinstance(n, ast.ImportFrom)}
-    assert modules <= {"itertools", "wbc", "wbc.tasks", "wbc.track", "wbc.shapes", "numpy", "pinocchio", "casadi"}
+    ours = {"wbc", "wbc.tasks", "wbc.track", "wbc.shapes", "wbc.trajectory"}
+    assert modules <= {"itertools", "pathlib", "numpy", "pinocchio", "casadi"} | ours
     assert not [n.attr for n in ast.walk(tree) if isinstance(n, ast.Attribute) and n.attr.startswith("_")]
 
 

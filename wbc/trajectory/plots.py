@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path as FilePath
@@ -68,7 +69,9 @@ def plot(law: Law, file: str | os.PathLike[str], names: Sequence[str] | None = N
                 _draw(axis, times, panel)
             _legend(column[0], panels[0])
         figure.supxlabel("time [s]", fontsize=11, color=style.INK)
-        figure.suptitle(f"{title}: {_summary(law)}", x=0.01, ha="left", fontweight="bold", fontsize=13)
+        # A line of this size holds so many letters
+        words = textwrap.fill(f"{title}: {_summary(law)}", int(8.2 * size[0]))
+        figure.suptitle(words, x=0.01, ha="left", fontweight="bold", fontsize=13)
         try:
             figure.savefig(file)
         except (OSError, ValueError) as error:
