@@ -103,7 +103,7 @@ def setting(chosen: argparse.Namespace, sizes: dict[str, int]) -> list[str]:
     versions = ", ".join(f"{name} {importlib.metadata.version(name)}" for name in PACKAGES)
     listed = ", ".join(f"{name} {size}" for name, size in sizes.items())
     return [
-        f"{host['processor']}, {os.cpu_count()} cores, Python {host['python']}; load {host['load']}.",
+        f"{host['processor']}, {len(os.sched_getaffinity(0))} of {os.cpu_count()} cores, Python {host['python']}; load {host['load']}.",
         f"{host['threads']}; states on {chosen.processes} processes, all else in one.",
         f"{versions}; seed {chosen.seed}; {listed}.",
     ]
