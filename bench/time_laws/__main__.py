@@ -101,9 +101,10 @@ def setting(chosen: argparse.Namespace, sizes: dict[str, int]) -> list[str]:
     """What a reader has to know about the run."""
     host = machine()
     versions = ", ".join(f"{name} {importlib.metadata.version(name)}" for name in PACKAGES)
+    cores = f"{len(os.sched_getaffinity(0))} of {os.cpu_count()} cores"
     listed = ", ".join(f"{name} {size}" for name, size in sizes.items())
     return [
-        f"{host['processor']}, {len(os.sched_getaffinity(0))} of {os.cpu_count()} cores, Python {host['python']}; load {host['load']}.",
+        f"{host['processor']}, {cores}, Python {host['python']}; load {host['load']}.",
         f"{host['threads']}; states on {chosen.processes} processes, all else in one.",
         f"{versions}; seed {chosen.seed}; {listed}.",
     ]
