@@ -23,6 +23,7 @@ FLOORS = {
     "wbc.tasks": 3,
     "wbc.stack": 4,
     "wbc.qp": 5,
+    "wbc.export": 5,
     "wbc.controller": 6,
     "wbc.trajectory": 7,
     "wbc.track": 8,

@@ -226,6 +226,11 @@ class Controller(Deployment):
         if slot in self._waiting:
             raise SolverError(field, None, "is taken from the first configuration; call step(q) or reset(q) first")
 
+    def require_values(self) -> None:
+        """No value waits for the first configuration."""
+        for slot, name in self._waiting.items():
+            self.require_value(slot, f"{name}.{slot.input.name}")
+
     def pairs(self, name: str) -> tuple[tuple[str, str, float], ...]:
         """What the sensed rows of an item were about in the last tick: names of both bodies, distance [m]."""
         return next((sensor.pairs() for sensor, handle in self._sensors if handle.item_name == name), ())

@@ -2,10 +2,18 @@
 
 from __future__ import annotations
 
-from wbc import validation
+import os
+import pathlib
+from typing import TYPE_CHECKING, cast
+
+from wbc import export, validation
 from wbc.controller.native import NativeTick
 from wbc.controller.solved import SolvedTick
+from wbc.controller.vectors import vectors
 from wbc.errors import RangeError, SolverError
+
+if TYPE_CHECKING:
+    from wbc.controller.controller import Controller
 
 
 class Deployment:
@@ -46,3 +54,58 @@ class Deployment:
             reason = f"only the native tick with daqp can be capped, this one is {self.backend} with {self.solver}"
             raise SolverError("iteration_cap", cap, reason)
         self.tick.cap[0] = float(cap)
+
+    def export(
+        self,
+        folder: str | os.PathLike[str],
+        *,
+        overwrite: bool = False,
+        solver_source: bool | str | os.PathLike[str] = False,
+        states: int = 1000,
+    ) -> pathlib.Path:
+        """Write the tick as self-contained C99, with its QP solver, a header, build files and a check.
+
+            controller.reset(q)
+            controller.export("arm_tick")           # then: make -C arm_tick run
+
+        The values that the controller has now (targets, gains, weights, switches, the cap) are those that the C code
+        begins with. Nothing is compiled, and any backend will do; the C code is the native tick. docs/export.md.
+
+        Args:
+            folder: where to; it must be empty or not there.
+            overwrite: an export that is there is replaced.
+            solver_source: the solver's source in place of the library for this platform: True fetches it from the
+                package index, or the path of its archive. Its hash is checked.
+            states: how many states the check has, with this controller's commands; other backends than the native one
+                give those of them that they solve with certainty.
+
+        Raises:
+            ExportError: the folder is not empty or cannot be written.
+            SolverError: run-time values still wait for the first configuration.
+            SolverSourceError: the solver cannot be had. RangeError: ``states`` is no integer >= 1.
+        """
+        from wbc import __version__
+
+        me = cast("Controller", self)
+        if isinstance(states, bool) or not isinstance(states, int) or states < 1:
+            raise RangeError("states", states, "expected an integer >= 1")
+        me.require_values()
+        tick, layout, robot = self.tick, me.layout, me.stack.robot
+        cost = me.row_costs.copy()
+        for block in layout.of_form("task"):
+            cost[block.span] *= block.entry.item.row_weights(robot)
+        snapshot = export.Snapshot(
+            me.stack,
+            layout,
+            tick.q.copy(),
+            tick.p.copy(),
+            tick.weight.copy(),
+            cost,
+            tick.enabled.copy(),
+            tick.bound_enabled.copy(),
+            float(tick.cap[0]),
+            __version__,
+            vectors(me, states),
+            f"the {self.backend} tick with {self.solver}",
+        )
+        return export.write(snapshot, folder, overwrite, solver_source)

@@ -1,0 +1,52 @@
+/* Compares this build with the commands that were computed where it was exported:  ./check [check.bin]
+ *
+ * check.bin holds numbers of 8 bytes: a mark that tells the byte order, the number of states, NQ, NV, NP; then for each
+ * state q, v measured, the run-time inputs, the status and v commanded. Exit status 0 where all agree. */
+#include "wbc_tick.h"
+
+#include <math.h>
+#include <stdio.h>
+
+#define MARK 1234567.0
+#define AGREES 1e-9
+
+static int numbers(FILE *file, double *to, int count) { return fread(to, 8, (size_t)count, file) == (size_t)count; }
+
+int main(int argc, char **argv) {
+    static wbc_memory memory;
+    static double q[WBC_NQ + 1], v[WBC_NV], expected[1 + WBC_NV];
+    double head[5], largest = 0.0;
+    int differ = 0, seen[4] = {0, 0, 0, 0};
+    const char *name = argc > 1 ? argv[1] : "check.bin";
+    FILE *file = fopen(name, "rb");
+    if (!file || !numbers(file, head, 5)) {
+        printf("%s cannot be read\n", name);
+        return 2;
+    }
+    if (head[0] != MARK || head[2] != WBC_NQ || head[3] != WBC_NV || head[4] != WBC_NP) {
+        printf("%s is of another export or of another byte order\n", name);
+        return 2;
+    }
+    wbc_controller *c = wbc_init(&memory);
+    const int states = (int)head[1];
+    for (int k = 0; k < states; k++) {
+        if (!numbers(file, q, WBC_NQ) || !numbers(file, v, WBC_NV) || !numbers(file, wbc_inputs(c), WBC_NP) ||
+            !numbers(file, expected, 1 + WBC_NV)) {
+            printf("%s ends early\n", name);
+            return 2;
+        }
+        const int status = wbc_step(c, q, v);
+        int same = status == (int)expected[0];
+        for (int i = 0; i < WBC_NV; i++) {
+            const double difference = fabs(wbc_last(c)->v[i] - expected[1 + i]);
+            if (!(difference <= largest)) largest = difference;
+            same = same && difference <= AGREES;
+        }
+        differ += !same;
+        if (status >= 0) seen[status]++;
+    }
+    fclose(file);
+    printf("%d states: %d solved, %d relaxed, %d braked, %d capped; %d differ, by %.3g at most\n", states, seen[0], seen[1],
+           seen[2], seen[3], differ, largest);
+    return differ != 0;
+}

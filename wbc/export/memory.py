@@ -1,0 +1,44 @@
+"""How much memory a tick needs, from the text of its structures: known without a compiler."""
+
+from __future__ import annotations
+
+import re
+
+#: Bytes of what the fields are, a pointer counted as 8; those of DAQP are bounds, which the compiler checks
+_BYTES = {"double": 8, "long long": 8, "int": 4, "DAQPWorkspace": 1024, "DAQPProblem": 256, "DAQPSettings": 512}
+_DEFINE = re.compile(r"^#define (\w+) +([-+*/() \w]+?)\s*$", re.MULTILINE)
+_STRUCT = re.compile(r"typedef struct \{(.*?)\} (\w+);", re.DOTALL)
+_FIELD = re.compile(r"\s*(\w+)\s*(?:\[(.+)\])?\s*$", re.DOTALL)
+
+
+def bytes_of_tick(tick: str, stack: str) -> int:
+    """Bound on the size of ``wbc_tick``.
+
+    Args:
+        tick: text of ``tick.h``. stack: text of ``stack.h``.
+    """
+    known = dict(_DEFINE.findall(stack + tick))
+    sizes = dict(_BYTES)
+    for body, name in _STRUCT.findall(re.sub(r"/\*.*?\*/", "", tick, flags=re.DOTALL)):
+        sizes[name] = sum(_bytes(declaration, sizes, known) for declaration in body.split(";") if declaration.strip())
+    return sizes["wbc_tick"] // 64 * 64 + 64
+
+
+def _bytes(declaration: str, sizes: dict[str, int], known: dict[str, str]) -> int:
+    text = " ".join(declaration.split())
+    kind = next(k for k in sorted(sizes, key=len, reverse=True) if text.startswith(f"{k} "))
+    total = 0
+    for field in text[len(kind) :].split(","):
+        match = _FIELD.match(field)
+        assert match is not None, field
+        # 8 for the padding that may follow
+        total += sizes[kind] * (_value(match[2], known) if match[2] else 1) + 8
+    return total
+
+
+def _value(expression: str, known: dict[str, str]) -> int:
+    """A constant expression of integers; C's division rounds down for what is not negative."""
+    while names := set(re.findall(r"[A-Za-z_]\w*", expression)):
+        for name in names:
+            expression = re.sub(rf"\b{name}\b", f"({known[name]})", expression)
+    return int(eval(expression.replace("/", "//"), {"__builtins__": {}}))
