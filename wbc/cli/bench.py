@@ -16,7 +16,7 @@ from wbc.errors import WbcError
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 
 #: First argument -> the module that measures something else than the tick
-OTHERS = {"time-laws": "bench.time_laws"}
+OTHERS = {"time-laws": "bench.time_laws", "ik": "bench.ik"}
 
 
 class BenchError(WbcError):
@@ -29,6 +29,8 @@ def bench(context: typer.Context) -> None:
     Arguments after the command go to the benchmark: wbc bench --problems panda --rounds 2
 
     wbc bench time-laws compares laws of motion with raw toppra and raw ruckig: wbc bench time-laws --count 100000
+
+    wbc bench ik measures inverse kinematics on the protocol of TRAC-IK: wbc bench ik --full
     """
     if not (ROOT / "bench" / "__main__.py").is_file():
         reason = "the benchmark is not installed with the package; run it from a clone of the repository"

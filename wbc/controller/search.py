@@ -72,7 +72,8 @@ class NativeSearch:
         """Search; keeps the interpreter lock, as a tick does."""
         arrays = (query.starts, query.chosen, query.tolerance, query.seeking, query.settling)
         numbers = (float(len(query.starts)), query.seconds, query.room, float(query.wishes))
-        given = _Query(*(array.ctypes.data for array in arrays), *numbers)
+        # of the ways to an array's address a quick one
+        given = _Query(*(array.__array_interface__["data"][0] for array in arrays), *numbers)
         self._call(self._tick.pointer, ctypes.byref(given), ctypes.byref(self._found))
         f = self._found
         return Found(int(f.ending), int(f.ticks), int(f.descents), float(f.seconds), float(f.cost))

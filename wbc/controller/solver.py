@@ -64,6 +64,10 @@ class Solver:
         layout, tick = self._controller.layout, self._controller.tick
         self._rows = goal_rows(self._controller, self.goals)
         self._stops = stops(self.stack, layout)
+        at, lower, upper = np.array(self._stops[0]), *self._stops[1:]
+        dofs = np.flatnonzero(at >= 0)
+        #: coordinates with position limits: where they are in q and in ``bound_enabled``, and the limits
+        self._limited = self.stack.robot.position_index[dofs], at[dofs], lower[dofs], upper[dofs]
         self._tick: Assembly = tick.assembly if isinstance(tick, SolvedTick) else tick
         sensing = Sensing(self._controller, self._tick)
         self._search: NativeSearch | Search
@@ -168,12 +172,9 @@ class Solver:
 
     def _within_limits(self, q: Array) -> Array:
         """The nearest configuration within the position limits that are on."""
-        places, lower, upper = self._stops
-        enabled, index = self._tick.bound_enabled, self.stack.robot.position_index
-        out = q.copy()
-        for i, place in enumerate(places):
-            if place >= 0 and enabled[place] != 0.0:
-                out[index[i]] = min(max(out[index[i]], lower[i]), upper[i])
+        coordinates, places, lower, upper = self._limited
+        out, here, on = q.copy(), q[coordinates], self._tick.bound_enabled[places] != 0.0
+        out[coordinates] = np.where(on, np.minimum(np.maximum(here, lower), upper), here)
         return out
 
 
