@@ -9,6 +9,7 @@ import pathlib
 import shutil
 import subprocess
 import tempfile
+from concurrent.futures import ThreadPoolExecutor
 
 import casadi as ca
 
@@ -103,8 +104,12 @@ def compile_tick(files: dict[str, str], output: pathlib.Path) -> None:
         for name, text in files.items():
             (place / name).write_text(text)
         include = (f"-I{headers()}",)
-        _run([cc, *COMMON_FLAGS, *ROWS_FLAGS, "-c", "rows.c", "-o", "rows.o"], place)
-        _run([cc, *COMMON_FLAGS, *TICK_FLAGS, *include, "-c", "converge.c", "-o", "tick.o"], place)
+        parts = (
+            [cc, *COMMON_FLAGS, *ROWS_FLAGS, "-c", "rows.c", "-o", "rows.o"],
+            [cc, *COMMON_FLAGS, *TICK_FLAGS, *include, "-c", "converge.c", "-o", "tick.o"],
+        )
+        with ThreadPoolExecutor(len(parts)) as pool:
+            list(pool.map(lambda part: _run(part, place), parts))
         _run(
             [
                 cc,
