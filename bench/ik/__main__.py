@@ -34,8 +34,7 @@ of the rotation's (the logarithm in the axes of the base, rad) is at most {toler
 limits of the URDF are kept, as Pinocchio judges. One thread; wall-clock time of the whole Python call, on a machine \
 with a load of {load:.1f} at the start. "+-" is one binomial standard error. Times are of all calls, failures too. \
 pink and mink: their own convergence loop, gain 1, Levenberg-Marquardt damping 1e-3, position limits, DAQP, no \
-restarts, the same budget. Published rates: Beeson and Ames, TRAC-IK (2015), and its table at traclabs.com, on another \
-machine, some of them with other limits."""
+restarts, the same budget. Published rates: those of TRAC-IK's authors, of another machine."""
 
 
 def main() -> None:

@@ -26,7 +26,7 @@ class Chain:
         file: URDF below the wheel's robots.
         arm: what the names of its joints begin with; "": all joints but fingers.
         tip: frame whose pose is asked for.
-        published: rate of TRAC-IK [%], https://traclabs.com/projects/trac-ik; None: not published.
+        published: rate of TRAC-IK that its authors publish [%]; None: they publish none.
     """
 
     name: str

@@ -157,3 +157,34 @@ def test_measured_pairs_are_respected() -> None:
         solution = ik.solve(robot.neutral, budget=None, restarts=5)
         assert solution.status in ("solved", "unreachable", "contradictory")
         assert solution.status == "contradictory" or min(solution.margins["self"]) > -1e-8
+
+
+def test_a_batch_gives_what_single_searches_give() -> None:
+    robot, rng, ik = arm("panda"), np.random.default_rng(12), solver()
+    goals = [tip(robot, random_q(robot, rng), TIPS["panda"]) for _ in range(40)]
+    batch = ik.solve_batch(robot.neutral, {"hand": goals}, budget=None, workers=3)
+    alone = ik.solve_batch(robot.neutral, {"hand": goals}, budget=None, workers=1)
+    np.testing.assert_array_equal(batch.q, alone.q)
+    assert batch.solved.all()
+    for k, goal in enumerate(goals):
+        ik["hand"].target = goal
+        single = ik.solve(robot.neutral, budget=None)
+        np.testing.assert_array_equal(batch.q[k], single.q)
+        assert batch.descents[k] == single.descents
+    slow = solver("panda", "vm").solve_batch(robot.neutral, {"hand": goals[:2]}, budget=None)
+    np.testing.assert_allclose(slow.q, batch.q[:2], atol=1e-8)
+
+
+def test_a_batch_checks_its_targets() -> None:
+    robot, ik = arm("panda"), solver()
+    good = pin.SE3.Identity()
+    with pytest.raises(ShapeError) as none:
+        ik.solve_batch(robot.neutral, {})
+    assert none.value.field == "targets"
+    with pytest.raises(WbcError) as bad:
+        ik.solve_batch(robot.neutral, {"hand": [good, np.full((4, 4), np.nan)]})
+    assert bad.value.field == "hand.target"
+    with pytest.raises(RangeError) as idle:
+        ik.solve_batch(robot.neutral, {"hand": [good]}, workers=0)
+    assert idle.value.field == "workers"
+    assert ik.solve_batch(robot.neutral, {"hand": []}).q.shape == (0, 7)

@@ -83,6 +83,9 @@ class NativeTick(Assembly):
         self.step_function = self._library.wbc_tick_step
         self.converge_function = self._library.wbc_tick_converge
         self.converge_function.restype = None
+        # Thousands of searches in one call are worth releasing the lock for
+        self.converge_many = ctypes.CDLL(str(library)).wbc_tick_converge_many
+        self.converge_many.restype = None
 
     def step(self) -> int:
         return int(self.step_function(self.pointer))

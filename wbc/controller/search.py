@@ -50,14 +50,31 @@ class Found:
     cost: float
 
 
-class _Query(ctypes.Structure):
+class CQuery(ctypes.Structure):
+    """``wbc_search`` of ``native/converge.h``."""
+
     _fields_ = [(name, ctypes.c_void_p) for name in ("starts", "chosen", "tolerance", "seeking", "settling")] + [
         (name, ctypes.c_double) for name in ("restarts", "seconds", "room", "wishes")
     ]
 
+    @classmethod
+    def of(cls, query: Query) -> CQuery:
+        """Points into the arrays of the query, which must outlive it."""
+        arrays = (query.starts, query.chosen, query.tolerance, query.seeking, query.settling)
+        numbers = (float(len(query.starts)), query.seconds, query.room, float(query.wishes))
+        # of the ways to an array's address a quick one
+        return cls(*(array.__array_interface__["data"][0] for array in arrays), *numbers)
 
-class _Found(ctypes.Structure):
+
+class CFound(ctypes.Structure):
+    """``wbc_found`` of ``native/converge.h``."""
+
     _fields_ = [(name, ctypes.c_double) for name in ("ending", "ticks", "descents", "seconds", "cost")]
+
+    @property
+    def found(self) -> Found:
+        """A copy."""
+        return Found(int(self.ending), int(self.ticks), int(self.descents), float(self.seconds), float(self.cost))
 
 
 class NativeSearch:
@@ -65,15 +82,10 @@ class NativeSearch:
 
     def __init__(self, tick: NativeTick) -> None:
         self._tick = tick
-        self._call = tick.converge_function
-        self._found = _Found()
+        self._found = CFound()
 
     def run(self, query: Query) -> Found:
         """Search; keeps the interpreter lock, as a tick does."""
-        arrays = (query.starts, query.chosen, query.tolerance, query.seeking, query.settling)
-        numbers = (float(len(query.starts)), query.seconds, query.room, float(query.wishes))
-        # of the ways to an array's address a quick one
-        given = _Query(*(array.__array_interface__["data"][0] for array in arrays), *numbers)
-        self._call(self._tick.pointer, ctypes.byref(given), ctypes.byref(self._found))
-        f = self._found
-        return Found(int(f.ending), int(f.ticks), int(f.descents), float(f.seconds), float(f.cost))
+        given = CQuery.of(query)
+        self._tick.converge_function(self._tick.pointer, ctypes.byref(given), ctypes.byref(self._found))
+        return self._found.found

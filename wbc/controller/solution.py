@@ -84,3 +84,25 @@ class Solution:
 
     def __repr__(self) -> str:
         return f"Solution({self.explain()})"
+
+
+@dataclass(frozen=True, eq=False)
+class Batch:
+    """Answers of :meth:`wbc.Solver.solve_batch`, one for each target.
+
+    Attributes:
+        q: configurations [count, nq].
+        statuses: how each search ended; ``contradictory`` only where no configuration kept the constraints.
+        descents: configurations that each search started from [count].
+        seconds: what each search took [s], [count].
+    """
+
+    q: Array
+    statuses: tuple[Ending, ...]
+    descents: Array
+    seconds: Array
+
+    @property
+    def solved(self) -> Array:
+        """1 where the goals are met, else 0 [count]."""
+        return np.array([float(status == Ending.SOLVED) for status in self.statuses])

@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+import os
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from wbc import validation
+from wbc.controller.batch import search_many
 from wbc.controller.controller import Controller
 from wbc.controller.descent import Search
 from wbc.controller.handle import Handle
 from wbc.controller.native import NativeTick
 from wbc.controller.search import EXHAUSTED, FOUND, Found, NativeSearch, Query
 from wbc.controller.sensing import Sensing
-from wbc.controller.solution import Ending, Solution
+from wbc.controller.solution import Batch, Ending, Solution
 from wbc.controller.solved import SolvedTick
 from wbc.controller.starts import Starts
 from wbc.controller.tick import Assembly
@@ -108,16 +110,7 @@ class Solver:
         Raises:
             ShapeError, NotFiniteError, RotationError, RangeError: bad input.
         """
-        q = self.stack.robot.configuration("q0", q0)
-        seconds = math.inf if budget is None else validation.scalar("budget", budget, low=0.0, open_low=True, unit="s")
-        near = validation.scalar("tolerance", tolerance, low=0.0, open_low=True)
-        count, number = _count("restarts", restarts), _count("seed", seed)
-        self._controller.reset(q)
-        first = self._within_limits(q)
-        if self._starts is None:
-            self._starts = self._find_starts(first)
-        if self._table[0] != number or len(self._table[1]) < count or not self._table[1].flags.c_contiguous:
-            self._table = (number, self._starts.table(count, number))
+        first, seconds, near, count = self._prepared(q0, seed, budget, restarts, tolerance)
         found = self._run(first, self._rows, seconds * (1.0 - ASKING if len(self.goals) > 1 else 1.0), near, count)
         answer, spent, ticks = self._tick.q.copy(), found.seconds, found.ticks
         status = _ending(found)
@@ -132,13 +125,96 @@ class Solver:
         step = self._controller.step(answer, np.zeros(self.stack.robot.nv), dt=TICK)
         return Solution(answer, status, self.goals, ticks, found.descents + (found.ending > EXHAUSTED), spent, step)
 
+    def solve_batch(
+        self,
+        q0: Any,
+        targets: Mapping[str, Sequence[Any]],
+        *,
+        seed: int = 0,
+        budget: float | None = 0.005,
+        restarts: int = 100,
+        tolerance: float = 1e-5,
+        workers: int | None = None,
+    ) -> Batch:
+        """:meth:`solve` for many targets, in threads that run at the same time.
+
+        Args:
+            q0: where every search begins [nq].
+            targets: name of a task -> its ``target`` in each search; all of one length.
+            budget: time for each search [s].
+            workers: threads; default: as many as cores. Without a compiler, or where rows are measured, there is one.
+
+        Raises:
+            WbcError: as for :meth:`solve`; ShapeError: no targets, or of different lengths.
+        """
+        lengths = {name: len(values) for name, values in targets.items()}
+        if len(set(lengths.values())) != 1:
+            raise ShapeError("targets", lengths, "expected targets of one length")
+        threads = _count("workers", os.cpu_count() or 1 if workers is None else workers)
+        if threads < 1:
+            raise RangeError("workers", workers, "expected at least one thread")
+        total = next(iter(lengths.values()))
+        first, seconds, near, count = self._prepared(q0, seed, budget, restarts, tolerance)
+        parameters = np.tile(self._tick.p, (total, 1))
+        for name, values in targets.items():
+            handle, span = self._controller[name], self._controller.layout.blocks[name].slots["target"].span
+            for k, value in enumerate(values):
+                parameters[k, span] = handle.checked("target", value)
+        query, before = self._query(self._rows, seconds, near, count), self._tick.p.copy()
+        starts = np.tile(first, (total, 1))
+        if isinstance(self._search, NativeSearch):
+            clones = [self._controller.clone().tick for _ in range(min(threads, max(1, total)))]
+            ticks = [tick for tick in clones if isinstance(tick, NativeTick)]
+            for tick in ticks:
+                tick.dt[0] = TICK
+            answers, found = search_many(ticks, query, starts, parameters)
+        else:
+            answers, found = starts, []
+            for k in range(total):
+                self._tick.p[:] = parameters[k]
+                found.append(self._from(first, query))
+                answers[k] = self._tick.q
+            self._tick.p[:] = before
+        descents = np.array([float(f.descents + (f.ending > EXHAUSTED)) for f in found])
+        return Batch(
+            self._within_limits(answers),
+            tuple(_ending(f) for f in found),
+            descents,
+            np.array([f.seconds for f in found]),
+        )
+
+    def _prepared(
+        self, q0: Any, seed: Any, budget: Any, restarts: Any, tolerance: Any
+    ) -> tuple[Array, float, float, int]:
+        """Checked input: first configuration, time, tolerance, restarts; targets that wait are taken from q0."""
+        q = self.stack.robot.configuration("q0", q0)
+        seconds = math.inf if budget is None else validation.scalar("budget", budget, low=0.0, open_low=True, unit="s")
+        near = validation.scalar("tolerance", tolerance, low=0.0, open_low=True)
+        count, number = _count("restarts", restarts), _count("seed", seed)
+        self._controller.reset(q)
+        first = self._within_limits(q)
+        if self._starts is None:
+            self._starts = self._find_starts(first)
+        if self._table[0] != number or len(self._table[1]) < count:
+            self._table = (number, self._starts.table(count, number))
+        return first, seconds, near, count
+
     def _run(self, first: Array, goals: Array, seconds: float, tolerance: float, count: int) -> Found:
         """Search from a configuration for the rows of some goals."""
+        return self._from(first, self._query(goals, seconds, tolerance, count))
+
+    def _from(self, first: Array, query: Query) -> Found:
+        """Search from a configuration."""
+        self._tick.dt[0], self._tick.q[:], self._tick.v_last[:] = TICK, first, 0.0
+        return self._search.run(query)
+
+    def _query(self, goals: Array, seconds: float, tolerance: float, count: int) -> Query:
+        """A search for the rows of some goals."""
         assert self._starts is not None
         tick = self._tick
         aims, wishes = tick.weight * goals, tick.weight * (1.0 - self._rows)
         heaviest = float((wishes * self._controller.row_costs**-1).max(initial=0.0))
-        query = Query(
+        return Query(
             starts=self._table[1][:count],
             chosen=self._starts.chosen,
             tolerance=np.where(goals > 0.0, tolerance, -1.0),
@@ -148,8 +224,6 @@ class Solver:
             room=ROOM,
             wishes=heaviest > 0.0,
         )
-        tick.dt[0], tick.q[:], tick.v_last[:] = TICK, first, 0.0
-        return self._search.run(query)
 
     def _only(self, name: str) -> Array:
         return goal_rows(self._controller, (name,))
@@ -171,10 +245,10 @@ class Solver:
         return Starts(robot, lower, upper, share > _MOVED * share.max(initial=0.0))
 
     def _within_limits(self, q: Array) -> Array:
-        """The nearest configuration within the position limits that are on."""
+        """The nearest configuration (or each of several) within the position limits that are on."""
         coordinates, places, lower, upper = self._limited
-        out, here, on = q.copy(), q[coordinates], self._tick.bound_enabled[places] != 0.0
-        out[coordinates] = np.where(on, np.minimum(np.maximum(here, lower), upper), here)
+        out, here, on = q.copy(), q[..., coordinates], self._tick.bound_enabled[places] != 0.0
+        out[..., coordinates] = np.where(on, np.minimum(np.maximum(here, lower), upper), here)
         return out
 
 

@@ -219,4 +219,14 @@ EXPORT void wbc_tick_converge(wbc_tick *t, const wbc_search *s, wbc_found *out) 
     out->seconds = clock_seconds() - begin;
 }
 
+/* One search after the other, each from its own configuration and with its own run-time values; answers go to `q` */
+EXPORT void wbc_tick_converge_many(wbc_tick *t, const wbc_search *s, int count, double *q, const double *p, wbc_found *out) {
+    for (int k = 0; k < count; k++) {
+        memcpy(t->q, q + k * NQ, NQ * sizeof(double));
+        memcpy(t->p, p + k * NP, NP * sizeof(double));
+        wbc_tick_converge(t, s, out + k);
+        memcpy(q + k * NQ, t->q, NQ * sizeof(double));
+    }
+}
+
 #endif
