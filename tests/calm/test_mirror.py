@@ -7,9 +7,9 @@ from importlib import resources
 
 import pytest
 
-from wbc.controller import reach
+from wbc.controller import descent, reach, search
 
-NAMES = ("TRUSTED", "AT_LIMIT", "PUSHED", "NEGLIGIBLE", "LEAST_PIVOT", "BRAKING", "REMOVED", "FAR", "CORRECTIONS")
+NAMES = ("TRUSTED", "AT_LIMIT", "PUSHED", "NEGLIGIBLE", "LEAST_PIVOT", "BRAKING", "REMOVED", "TOO_FAR", "CORRECTIONS")
 
 
 def native(file: str, name: str) -> float:
@@ -27,3 +27,29 @@ def test_of_reach(name: str) -> None:
 def test_of_margins() -> None:
     assert native("margins.h", "BRAKING_MARGIN") == reach.BRAKING_MARGIN
     assert native("settings.h", "DEAD") == reach.DEAD
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "STRIDE",
+        "SHORT_STRIDE",
+        "EASE",
+        "PATIENCE",
+        "PROGRESS",
+        "DESCENT",
+        "SETTLING",
+        "AT_REST",
+        "GAINED",
+        "RETURNS",
+        "CLOSELY",
+        "SEEKING",
+    ],
+)
+def test_of_inverse_kinematics(name: str) -> None:
+    assert native("converge.h", name) == getattr(descent, name)
+
+
+@pytest.mark.parametrize("name", ["FOUND", "EXHAUSTED", "OUT_OF_TIME", "REFUSED"])
+def test_of_endings(name: str) -> None:
+    assert native("converge.h", f"WBC_{name}") == getattr(search, name)

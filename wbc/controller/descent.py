@@ -20,7 +20,7 @@ from wbc.validation import Array
 
 #: As in ``native/converge.h``
 STRIDE, SHORT_STRIDE, EASE, PATIENCE, PROGRESS = 1.0, 0.2, 0.03, 3, 0.8
-DESCENT, SETTLING, AT_REST, GAINED, CORRECTIONS, CLOSELY, SEEKING = 60, 200, 1e-7, 1e-9, 5, 0.01, 0.9
+DESCENT, SETTLING, AT_REST, GAINED, RETURNS, CLOSELY, SEEKING = 60, 200, 1e-7, 1e-9, 5, 0.01, 0.9
 
 
 class Search:
@@ -92,7 +92,7 @@ class Search:
         """
         self._assembly.plain[0] = 1.0
         self._tick.weight[:] = query.seeking
-        for _ in range(CORRECTIONS):
+        for _ in range(RETURNS):
             if perf_counter() >= end:
                 break
             qp = self._qp()

@@ -15,7 +15,7 @@ from wbc.validation import Array
 
 #: As in ``native/reach.h``
 TRUSTED, AT_LIMIT, PUSHED, NEGLIGIBLE, LEAST_PIVOT, BRAKING = 2.0, 0.02, 0.01, 0.05, 1e-4, 1.0
-REMOVED, FAR, CORRECTIONS = 0.02, 1e50, 2
+REMOVED, TOO_FAR, CORRECTIONS = 0.02, 1e50, 2
 #: As in ``native/margins.h``
 BRAKING_MARGIN = 0.25
 #: Squared length of a row that v cannot move, as in ``native/settings.h``
@@ -71,7 +71,7 @@ class Reach:
         largest = float(gain[counts].max(initial=0.0))
         plain = -(J.T @ (weight * wish))
         slope = J.T @ (weight * error)
-        if not (np.abs(error) < FAR).all():
+        if not (np.abs(error) < TOO_FAR).all():
             return H, plain
         free = self._free(q, slope, bound_enabled)
         metric = _cut_off(self._strengthened(H, equal), free)

@@ -36,7 +36,7 @@ int move(const double **arg, double **res, long long *iw, double *w, int mem);
 #define GAINED 1e-9
 /* Ticks that bring the goals back after one that follows wishes at most, to within this share of their tolerance: else
  * wishes would gain by errors of the goals */
-#define CORRECTIONS 5
+#define RETURNS 5
 #define CLOSELY 0.01
 /* Share of the time after which no goal is sought any more and the nearest configuration settles */
 #define SEEKING 0.9
@@ -141,7 +141,7 @@ static double corrected(wbc_tick *t, const wbc_search *s, wbc_found *out, int fo
     double cost = HUGE_VAL;
     t->plain = 1.0;
     memcpy(t->weight, s->seeking, MT * sizeof(double));
-    for (int n = 0; n < CORRECTIONS && clock_seconds() < end; n++) {
+    for (int n = 0; n < RETURNS && clock_seconds() < end; n++) {
         int met, any;
         assemble(t, 1);
         out->ticks += 1.0;
