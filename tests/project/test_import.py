@@ -17,17 +17,11 @@ def run(code: str) -> str:
     return done.stdout
 
 
-@pytest.mark.parametrize("module", ["wbc", "wbc.tasks", "wbc.robots"])
+@pytest.mark.parametrize("module", ["wbc", "wbc.tasks", "wbc.robots", "wbc.trajectory"])
 def test_import_leaves_heavy_packages_alone(module: str) -> None:
     loaded = set(json.loads(run(f"import json, sys, {module}; print(json.dumps([m for m in sys.modules]))")))
     assert module in loaded
     assert not loaded & set(HEAVY)
-
-
-def test_import_takes_less_than_a_second() -> None:
-    code = "import time; t = time.process_time(); import wbc, wbc.tasks, wbc.robots; print(time.process_time() - t)"
-    # CPU time of the best of three: other processes of a test run must not decide
-    assert min(float(run(code)) for _ in range(3)) < 1.0
 
 
 def test_version_is_that_of_the_distribution() -> None:

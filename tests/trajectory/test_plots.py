@@ -92,7 +92,7 @@ def test_jumps_are_drawn_upright_and_jerk_is_left_out(figures: list[Figure]) -> 
     law = smooth(0)
     trajectory.plot(law, "unused.png")
     assert titles(figures[0]) == ["position", "velocity", "acceleration"]
-    assert "accelerations jump" in figures[0].get_suptitle()
+    assert "accelerations jump" in figures[0].get_suptitle().replace("\n", " ")
     times = figures[0].axes[2].lines[0].get_xdata()
     assert (np.diff(times) >= 0.0).all()
     for time in law.timing.times[1:-1]:

@@ -83,7 +83,7 @@ def plot(law: Law, file: str | os.PathLike[str], names: Sequence[str] | None = N
 def _summary(law: Law) -> str:
     certificate = law.certificate
     parts = [f"{law.duration:.4g} s"]
-    if certificate.limited:
+    if certificate.limited and certificate.ratio < np.inf:
         parts.append(f"at most {_percent(certificate.ratio)} of its limits")
     parts += [
         f"{name} {_percent(w.ratio)}"
