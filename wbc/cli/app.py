@@ -8,7 +8,7 @@ import typer
 from typer.core import TyperGroup
 
 from wbc import __version__
-from wbc.cli import bench, demo, docs, replay, robots, track
+from wbc.cli import bench, demo, docs, export, replay, robots, track
 from wbc.cli.console import complain
 from wbc.errors import WbcError
 
@@ -59,5 +59,6 @@ app.command("robot")(robots.show)
 app.command("track")(track.track)
 app.command("demo")(demo.demo)
 app.command("replay")(replay.replay)
+app.command("export")(export.export)
 app.command("bench", context_settings={"allow_extra_args": True, "ignore_unknown_options": True})(bench.bench)
 app.command("docs")(docs.docs)

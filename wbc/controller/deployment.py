@@ -15,6 +15,10 @@ from wbc.errors import RangeError, SolverError
 if TYPE_CHECKING:
     from wbc.controller.controller import Controller
 
+#: How far an export's commands may be from those of the tick that it is [rad/s, m/s], and from those of another solver:
+#: the native tick refines answers whose error it cannot bound by a tenth of that
+SAME, SIMILAR = 1e-9, 1e-6
+
 
 class Deployment:
     """The part of :class:`wbc.Controller` that deadlines and exports need."""
@@ -107,5 +111,6 @@ class Deployment:
             __version__,
             vectors(me, states),
             f"the {self.backend} tick with {self.solver}",
+            SAME if self.backend == "native" and self.solver == "daqp" else SIMILAR,
         )
         return export.write(snapshot, folder, overwrite, solver_source)

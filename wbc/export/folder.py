@@ -45,7 +45,7 @@ def write(
         ExportError: the folder is not empty, holds something else, or cannot be written.
         SolverSourceError: the solver cannot be had.
     """
-    place = pathlib.Path(folder)
+    place = pathlib.Path(folder).absolute()
     _check(place, overwrite)
     files = _files(snapshot, solver_source)
     try:
@@ -56,19 +56,17 @@ def write(
                 (fresh / name).parent.mkdir(parents=True, exist_ok=True)
                 (fresh / name).write_bytes(data)
             fresh.chmod(0o755)
+            old = fresh.with_name(f"{fresh.name}.old")
             if place.is_dir():
-                # not removed before the new one is complete
-                place.rename(fresh / ".old")
-                (fresh / ".old").rename(old := fresh.with_name(f"{fresh.name}.old"))
-                fresh.rename(place)
-                shutil.rmtree(old, ignore_errors=True)
-            else:
-                fresh.rename(place)
+                # what was there goes only when the new one is complete
+                place.rename(old)
+            fresh.rename(place)
+            shutil.rmtree(old, ignore_errors=True)
         finally:
             shutil.rmtree(fresh, ignore_errors=True)
     except OSError as error:
         raise ExportError("folder", str(place), f"cannot be written: {error.strerror}") from error
-    return place
+    return pathlib.Path(folder)
 
 
 def _check(place: pathlib.Path, overwrite: bool) -> None:
@@ -89,8 +87,9 @@ def _check(place: pathlib.Path, overwrite: bool) -> None:
 
 def _files(snapshot: Snapshot, solver_source: bool | str | os.PathLike[str]) -> dict[str, bytes]:
     """Everything, by its place in the folder."""
-    solver = from_wheel()
-    if solver_source is not False:
+    if solver_source is False:
+        solver = from_wheel()
+    else:
         solver = from_source(None if solver_source is True else solver_source)
     sources = snapshot.sources
     memory = bytes_of_tick(sources["tick.h"], sources["stack.h"])
@@ -99,7 +98,7 @@ def _files(snapshot: Snapshot, solver_source: bool | str | os.PathLike[str]) -> 
     texts |= {"wbc_tick.h": header(snapshot), "values.h": snapshot.values, "names.h": _names(sources["rows.c"])}
     texts |= build_files(snapshot, solver_source is not False, memory)
     layout = snapshot.layout
-    head = [MARK, len(snapshot.states), layout.nq, layout.nv, layout.parameters]
+    head = [MARK, len(snapshot.states), layout.nq, layout.nv, layout.parameters, snapshot.agrees]
     states = np.concatenate([head, snapshot.states.ravel()]).astype("=f8").tobytes()
     return {name: text.encode() for name, text in texts.items()} | {"check.bin": states} | solver
 

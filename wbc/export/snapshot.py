@@ -26,6 +26,7 @@ class Snapshot:
         version: of this package.
         states: a test vector, a state a row: q, v measured, p, flag, v commanded.
         author: which tick the commands of ``states`` are from.
+        agrees: how far the commands of the C code may be from those [rad/s, m/s].
     """
 
     stack: Declaration
@@ -40,6 +41,7 @@ class Snapshot:
     version: str
     states: Array
     author: str
+    agrees: float
 
     @cached_property
     def sources(self) -> dict[str, str]:

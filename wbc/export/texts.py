@@ -85,7 +85,8 @@ One control cycle of {robot}, as C: wbc {version} wrote this folder.
     wbc_tick.h      all that a program needs to know: the functions, the places of inputs by name, units
     wbc_tick.c wbc_rows.c names.h values.h tick/    the cycle; the rows of tasks and constraints are generated
     daqp/           the QP solver, {solver}
-    check.c check.bin    {count} states with the commands of {author}
+    check.c check.bin    {count} states with the commands of {author},
+                    to be met within {agrees:g} rad/s or m/s
     Makefile CMakeLists.txt
 
 Build and check:
@@ -96,9 +97,11 @@ Use, with the two libraries that this makes:
 
     gcc -std=c99 main.c libwbc_tick.a {library} -lm
 
-It is C99 (gcc or clang), and needs sqrt, sin, cos and their like from libm. A step allocates no memory, keeps no state
-outside of the wbc_memory that it is given, and uses {stack} of stack and {memory} of wbc_memory or less. Loops are
-bounded; wbc_set_iteration_cap bounds those of the solver more tightly, for a deadline.
+It is C99 (gcc or clang), and needs sqrt, sin, cos and their like from libm. A step allocates no memory and
+keeps no state outside of the wbc_memory that it is given, {memory} or less. Its loops are bounded;
+wbc_set_iteration_cap bounds those of the solver more tightly, for a deadline.
+
+daqp's functions have names without a prefix of their own (add_constraint, tic, ...).
 
 What wbc_inputs holds is not checked in C as it is in Python: see wbc_tick.h.
 
@@ -110,22 +113,17 @@ what it generates. daqp is by Daniel Arnstrom and contributors (MIT), daqp/LICEN
 def build_files(snapshot: Snapshot, from_source: bool, memory: int) -> dict[str, str]:
     """Makefile, CMakeLists.txt and README.txt."""
     library = "libdaqp.a" if from_source else "daqp/libdaqp.a"
-    layout = snapshot.layout
-    # The largest frames: a matrix or two of nv x nv, the rows that CasADi keeps in registers and spills
-    frames = 8 * (4 * layout.nv**2 + 20 * (layout.nv + layout.general_rows + layout.task_rows)) + (1 << 15)
     readme = README.format(
         robot=snapshot.stack.robot.name,
         version=snapshot.version,
         solver=f"source of release {VERSION}" if from_source else "headers and static library of the casadi wheel",
         count=len(snapshot.states),
         author=snapshot.author,
+        agrees=snapshot.agrees,
         library=library,
-        stack=f"about {frames // 1024} KiB",
         memory=f"{memory / 1024:.0f} KiB",
     )
     more = " daqp/src/*.o" if from_source else ""
-    if not from_source:
-        more = ""
     made = MAKEFILE.format(library=library, build=BUILD_SOLVER if from_source else "", more=more)
     if not from_source:
         made = made.replace("the libraries libwbc_tick.a and libdaqp.a", "the library libwbc_tick.a")

@@ -1,6 +1,10 @@
 /* The public functions, and with them the whole cycle, as one translation unit. wbc_tick.h documents them. */
 #include "names.h"
 
+#if defined(__GNUC__)
+/* Not every stack needs all of the cycle's parts */
+#pragma GCC diagnostic ignored "-Wunused-function"
+#endif
 #if defined(__GNUC__) && !defined(__clang__)
 /* gcc unrolls loops over groups of 8 velocities and warns of a last turn that their condition excludes */
 #pragma GCC diagnostic ignored "-Waggressive-loop-optimizations"

@@ -83,7 +83,7 @@ static void add_forces(wbc_tick *t, const double *v, double *residual, double *s
     out->complementarity = 0.0;
     for (int a = 0; a < work->n_active; a++) {
         const int i = work->WS[a], k = i - NV;
-        if (i < NV) continue;
+        if (i < NV || MC == 0) continue; /* the second for compilers that look for rows where there are none */
         const double value = row_at(t, k, v);
         double lambda = work->lam_star[a];
         if (t->strength[k] > 0.0) lambda += t->strength[k] * (value - t->low[i]);

@@ -1,0 +1,101 @@
+"""``wbc export``: the tick of a robot as C."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import pinocchio as pin
+import typer
+
+from wbc import robots, shapes, validation
+from wbc.cli import options
+from wbc.cli.track import configuration, feet, parse_sphere, plane_command, scene, tip_frame
+from wbc.track.setup import Moving, Plan
+
+_WHAT, _CONTROL = "What it writes", "How it is controlled"
+
+Folder = Annotated[Path | None, typer.Option(help="Folder. Default: ROBOT_tick.", rich_help_panel=_WHAT)]
+Cap = Annotated[
+    int, typer.Option(help="Iterations of the QP solver a tick at most; 0: no cap.", rich_help_panel=_CONTROL)
+]
+States = Annotated[int, typer.Option(help="States of the check.", rich_help_panel=_WHAT)]
+SolverSource = Annotated[
+    bool,
+    typer.Option(
+        "--solver-source",
+        help="The QP solver's source, fetched from the package index, in place of its library for this platform.",
+        rich_help_panel=_WHAT,
+    ),
+]
+SolverArchive = Annotated[
+    Path | None, typer.Option(help="The archive of that source, where there is no network.", rich_help_panel=_WHAT)
+]
+Force = Annotated[bool, typer.Option("--force", help="Replace an export that is there.", rich_help_panel=_WHAT)]
+
+
+def export(
+    robot: options.RobotName = "panda",
+    output: Folder = None,
+    frame: options.FrameName = None,
+    sphere: options.Spheres = None,
+    floor: options.Floor = None,
+    start: options.Start = None,
+    plane: options.Plane = "off",
+    hold: options.Holds = None,
+    rate: options.Rate = 200.0,
+    gain: options.Gain = 10.0,
+    margin: options.Margin = 0.02,
+    backend: options.Backend = "auto",
+    iteration_cap: Cap = 0,
+    states: States = 1000,
+    solver_source: SolverSource = False,
+    solver_archive: SolverArchive = None,
+    force: Force = False,
+) -> None:
+    """Write one control cycle of a robot, QP solver included, as C99 with a header, build files and a check.
+
+    The stack is that of [bold]wbc track[/bold]: a hand that follows a target, a posture, joint limits, obstacles. Other
+    stacks: controller.export in Python.
+    """
+    machine = robots.load(robot)
+    frequency = validation.scalar("rate", rate, low=0.0, open_low=True, unit="Hz")
+    tip = tip_frame(machine, frame)
+    first = machine.neutral if start is None else configuration(machine, start)
+    # A plan has a path; its stack does not depend on it
+    way, _, label = scene(machine, tip, first, "circle", None, None)
+    plan = Plan(
+        machine,
+        tip,
+        way,
+        label,
+        first,
+        dt=1.0 / frequency,
+        obstacles=_obstacles(sphere, floor),
+        margin=margin,
+        plane=plane_command(machine, plane, 0.0),
+        holds=tuple(hold) if hold else feet(machine),
+        gain=gain,
+    )
+    controller = plan.stack().compile(backend=backend)
+    controller.reset(first)
+    controller.tick.q[:] = first
+    controller.tick.check()
+    for name, obstacle in plan.obstacles.items():
+        controller[name].velocity = np.concatenate([obstacle.velocity, np.zeros(3)])
+    if iteration_cap:
+        controller.iteration_cap = iteration_cap
+    place = Path(f"{machine.name}_tick") if output is None else output
+    source: bool | Path = solver_source if solver_archive is None else solver_archive
+    controller.export(place, overwrite=force, solver_source=source, states=states)
+    typer.echo(f"{place}: {machine.name}, {controller.layout.nv} degrees of freedom; try `make -C {place} run`")
+
+
+def _obstacles(sphere: list[str] | None, floor: float | None) -> dict[str, Moving]:
+    """Obstacles by name, as their options say."""
+    out = {f"sphere{k}": parse_sphere(text) for k, text in enumerate(sphere or (), 1)}
+    if floor is not None:
+        height = validation.scalar("floor", floor, unit="m")
+        out["floor"] = Moving(shapes.HalfSpace(), pin.SE3(np.eye(3), np.array([0.0, 0.0, height])))
+    return out
