@@ -1,42 +1,10 @@
-"""Random motions between two states, and a judge that evaluates laws itself."""
+"""A judge of laws between two states that evaluates them itself."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from wbc.trajectory import jerk_limited
-
-NAMES = ("random", "near rest", "mixed", "speeds only")
-
-
-def drawn(name, rng, dof=3):
-    """Arguments of ``jerk_limited``: ruckig's own random inputs, states 1e-13 to 1e-8 from their target, one joint far
-    from its target beside two that are near, and states in their target but for speed and acceleration.
-    """
-    if name == "random":
-        start, target = rng.normal(size=(2, 3, dof)) * np.array([4.0, 0.8, 0.8])[:, None]
-        jerk = rng.uniform(0.08, 16.0, dof)
-        push = rng.uniform(0.08, 16.0, dof) + np.maximum(np.abs(start[2]), np.abs(target[2]))
-        speed = rng.uniform(0.08, 16.0, dof) + np.maximum(np.abs(start[1]), np.abs(target[1]))
-        speed += np.maximum(start[2] ** 2, target[2] ** 2) / (2.0 * jerk)
-    else:
-        size = 10.0 ** rng.uniform(-13.0, -8.0)
-        start = rng.normal(size=(3, dof)) * np.array([1.0, 10.0 * size, 100.0 * size])[:, None]
-        target = np.zeros((3, dof))
-        target[0] = start[0] + (name != "speeds only") * size * rng.normal(size=dof)
-        target[0, 0] += (name == "mixed") * rng.normal()
-        speed, push, jerk = np.full(dof, 5.0), np.full(dof, 10.0), np.full(dof, 150.0)
-    return {
-        "start": start[0],
-        "start_velocity": start[1],
-        "start_acceleration": start[2],
-        "target": target[0],
-        "target_velocity": target[1],
-        "target_acceleration": target[2],
-        "velocity": speed,
-        "acceleration": push,
-        "jerk": jerk,
-    }
 
 
 def judged(family):

@@ -5,14 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.trajectory.families import NAMES, drawn, judged
+from bench.time_laws.families import FAMILIES, drawn
+from tests.trajectory.families import judged
 
 #: Members of a family
-MANY = {"random": 10_000, "near rest": 10_000, "mixed": 1000, "speeds only": 1000}
+MANY = {"random": 10_000, "near rest": 10_000, "one joint far": 1000, "speeds only": 1000}
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", FAMILIES)
 def test_limits_are_kept_and_ends_met(name):
     rng = np.random.default_rng(17)
     for _ in range(MANY[name] // 500):

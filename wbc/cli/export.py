@@ -6,13 +6,12 @@ from pathlib import Path
 from typing import Annotated
 
 import numpy as np
-import pinocchio as pin
 import typer
 
-from wbc import robots, shapes, validation
+from wbc import robots, validation
 from wbc.cli import options
-from wbc.cli.track import configuration, feet, parse_sphere, plane_command, scene, tip_frame
-from wbc.track.setup import Moving, Plan
+from wbc.cli.track import configuration, feet, given_obstacles, plane_command, scene, tip_frame
+from wbc.track.setup import Plan
 
 _WHAT, _CONTROL = "What it writes", "How it is controlled"
 
@@ -72,7 +71,7 @@ def export(
         label,
         first,
         dt=1.0 / frequency,
-        obstacles=_obstacles(sphere, floor),
+        obstacles=given_obstacles(sphere, floor),
         margin=margin,
         plane=plane_command(machine, plane, 0.0),
         holds=tuple(hold) if hold else feet(machine),
@@ -90,12 +89,3 @@ def export(
     source: bool | Path = solver_source if solver_archive is None else solver_archive
     controller.export(place, overwrite=force, solver_source=source, states=states)
     typer.echo(f"{place}: {machine.name}, {controller.layout.nv} degrees of freedom; try `make -C {place} run`")
-
-
-def _obstacles(sphere: list[str] | None, floor: float | None) -> dict[str, Moving]:
-    """Obstacles by name, as their options say."""
-    out = {f"sphere{k}": parse_sphere(text) for k, text in enumerate(sphere or (), 1)}
-    if floor is not None:
-        height = validation.scalar("floor", floor, unit="m")
-        out["floor"] = Moving(shapes.HalfSpace(), pin.SE3(np.eye(3), np.array([0.0, 0.0, height])))
-    return out

@@ -55,10 +55,7 @@ def track(
     tip = tip_frame(machine, frame)
     first = machine.neutral if start is None else configuration(machine, start)
     way, obstacles, label = scene(machine, tip, first, path, duration, size)
-    obstacles |= {f"sphere{k}": parse_sphere(text) for k, text in enumerate(sphere or (), 1)}
-    if floor is not None:
-        height = validation.scalar("floor", floor, unit="m")
-        obstacles["floor"] = Moving(shapes.HalfSpace(), pin.SE3(np.eye(3), np.array([0.0, 0.0, height])))
+    obstacles |= given_obstacles(sphere, floor)
     plan = Plan(
         machine,
         tip,
@@ -126,6 +123,15 @@ def scene(
     # Half a second, or as long as 0.25 m/s and 1 rad/s need
     time = max(0.5, float(np.linalg.norm(away.linear)) / 0.25, float(np.linalg.norm(away.angular)))
     return Approach(here, way, time), {}, label
+
+
+def given_obstacles(sphere: list[str] | None, floor: float | None) -> dict[str, Moving]:
+    """Obstacles by name, as their options say."""
+    out = {f"sphere{k}": parse_sphere(text) for k, text in enumerate(sphere or (), 1)}
+    if floor is not None:
+        height = validation.scalar("floor", floor, unit="m")
+        out["floor"] = Moving(shapes.HalfSpace(), pin.SE3(np.eye(3), np.array([0.0, 0.0, height])))
+    return out
 
 
 def parse_sphere(text: str) -> Moving:
