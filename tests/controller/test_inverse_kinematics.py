@@ -227,3 +227,9 @@ def nearest(robot: Robot, q: Array, ball: pin.SE3) -> float:
             found = coal.distance(coal_shape(placed.shape), where, coal.Sphere(0.15), coal_pose(ball), request, result)
             least = min(least, found)
     return least
+
+
+def test_a_controller_is_compiled_without_the_search() -> None:
+    tick, own = stack().compile(backend="native").tick, solver(backend="native")._engine.tick
+    assert not hasattr(tick._library, "wbc_tick_converge")
+    assert hasattr(own._library, "wbc_tick_converge")

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import ctypes
+import functools
 import pathlib
+from typing import Any
 
 import numpy as np
 
@@ -81,11 +83,20 @@ class NativeTick(Assembly):
         self._low, self._high = view("low", nv + rows), view("high", nv + rows)
         self._unusable, self.plain = view("unusable", 1), view("plain", 1)
         self.step_function = self._library.wbc_tick_step
-        self.converge_function = self._library.wbc_tick_converge
-        self.converge_function.restype = None
-        # Thousands of searches in one call are worth releasing the lock for
-        self.converge_many = ctypes.CDLL(str(library)).wbc_tick_converge_many
-        self.converge_many.restype = None
+
+    @functools.cached_property
+    def converge_function(self) -> Any:
+        """One search; of a library that was compiled with inverse kinematics."""
+        function = self._library.wbc_tick_converge
+        function.restype = None
+        return function
+
+    @functools.cached_property
+    def converge_many(self) -> Any:
+        """Thousands of searches in one call, which are worth releasing the lock for."""
+        function = ctypes.CDLL(self._library._name).wbc_tick_converge_many
+        function.restype = None
+        return function
 
     def step(self) -> int:
         return int(self.step_function(self.pointer))

@@ -21,7 +21,7 @@ from wbc.controller.solution import Batch, Ending, Solution
 from wbc.controller.solved import SolvedTick
 from wbc.controller.starts import Starts
 from wbc.controller.tick import Assembly
-from wbc.controller.timeless import FIRST, TICK, chosen_goals, goal_rows, hasten, timeless
+from wbc.controller.timeless import FIRST, TICK, chosen_goals, goal_rows, hasten, searching, timeless
 from wbc.errors import RangeError, ShapeError
 from wbc.stack.declaration import Declaration
 from wbc.stack.places import stops
@@ -60,7 +60,7 @@ class Solver:
     def __init__(self, stack: Declaration, goals: Iterable[str] | None = None, backend: str = "auto") -> None:
         self.goals = chosen_goals(stack, goals)
         self.stack = timeless(stack)
-        self._controller: Controller = self.stack.compile(backend=backend)
+        self._controller: Controller = searching(self.stack, backend)
         hasten(self._controller)
         self.backend = self._controller.backend
         layout, tick = self._controller.layout, self._controller.tick

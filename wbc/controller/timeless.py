@@ -11,6 +11,7 @@ from wbc import validation
 from wbc.controller.controller import Controller
 from wbc.controller.stack import Stack
 from wbc.errors import RangeError
+from wbc.stack.artifact import compile_stack
 from wbc.stack.declaration import Declaration
 from wbc.tasks import Damping, JointLimits, Posture
 from wbc.tasks.base import Constraint
@@ -39,6 +40,17 @@ def timeless(stack: Declaration) -> Stack:
         if entry.name not in out:
             out.add(item, name=entry.name, level=entry.level, weight=entry.weight)
     return out
+
+
+def searching(stack: Stack, backend: str) -> Controller:
+    """The stack's controller, with inverse kinematics in its library; :meth:`Stack.compile` leaves that out.
+
+    Raises:
+        UnknownNameError, CompileError: as there.
+    """
+    from wbc import __version__
+
+    return Controller(stack, compile_stack(stack, backend, __version__, search=True), "daqp")
 
 
 def hasten(controller: Controller) -> None:

@@ -36,11 +36,12 @@ class Artifact:
     cached: bool
 
 
-def compile_stack(stack: Declaration, backend: str, version: str) -> Artifact:
+def compile_stack(stack: Declaration, backend: str, version: str, search: bool = False) -> Artifact:
     """Compile a stack, or find it in the cache.
 
     Args:
         backend: ``native`` (needs gcc), ``vm``, or ``auto``: native where it can be.
+        search: a native library with inverse kinematics.
 
     Where ``auto`` finds a compiler that fails, the first lines of its message are in the log and the virtual machine
     does the work.
@@ -54,7 +55,7 @@ def compile_stack(stack: Declaration, backend: str, version: str) -> Artifact:
     layout = Layout(stack)
     if backend == "native" or (backend == "auto" and toolchain.available()):
         try:
-            return _native(stack, layout, version)
+            return _native(stack, layout, version, search)
         except CompileError as error:
             if backend == "native":
                 raise
@@ -62,14 +63,15 @@ def compile_stack(stack: Declaration, backend: str, version: str) -> Artifact:
     return _virtual(stack, layout, version)
 
 
-def _native(stack: Declaration, layout: Layout, version: str) -> Artifact:
+def _native(stack: Declaration, layout: Layout, version: str, search: bool) -> Artifact:
     """The shared library, compiled or from the cache."""
 
     def fill(folder: pathlib.Path) -> None:
         program = build(stack, layout, loops=True)
-        toolchain.compile_tick(codegen.sources(stack, layout, program), folder / "tick.so")
+        toolchain.compile_tick(codegen.sources(stack, layout, program), folder / "tick.so", search)
 
-    folder, cached = cache.fetch(key(stack, version, toolchain.identity()), fill, library=True)
+    built_by = toolchain.identity() + ("\nsearch" if search else "")
+    folder, cached = cache.fetch(key(stack, version, built_by), fill, library=True)
     return Artifact(layout, folder / "tick.so", None, cached)
 
 
