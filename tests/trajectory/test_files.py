@@ -67,7 +67,7 @@ def assert_same(ours: Law, theirs: Law) -> None:
     assert np.array_equal(ours.timing.times, theirs.timing.times)
     assert np.array_equal(ours.path.knots, theirs.path.knots)
     times = np.linspace(-0.1, theirs.duration + 0.1, 997)
-    for name, value in vars(theirs.at(times)).items():
+    for name, value in theirs.at(times)._asdict().items():
         assert getattr(ours.at(times), name).tobytes() == value.tobytes()
     assert ours.jerk(times).tobytes() == theirs.jerk(times).tobytes()
     assert ours.certificate == theirs.certificate

@@ -129,6 +129,23 @@ def compile_tick(files: dict[str, str], output: pathlib.Path, search: bool = Fal
         )
 
 
+def compile_rows(text: str, output: pathlib.Path) -> None:
+    """Compile generated straight-line code to a shared library at ``output``.
+
+    Raises:
+        CompileError: as of :func:`compile_tick`.
+    """
+    cc = compiler()
+    if cc is None:
+        raise CompileError("compiler", None, "no C compiler found")
+    with tempfile.TemporaryDirectory(prefix="wbc-") as folder:
+        place = pathlib.Path(folder)
+        (place / "rows.c").write_text(text)
+        # What generated code exports must be seen by who loads the library
+        flags = [f for f in COMMON_FLAGS if not f.startswith(("-fvisibility", "-DCASADI_SYMBOL_EXPORT"))]
+        _run([cc, *flags, *ROWS_FLAGS, "-shared", "rows.c", "-lm", "-o", str(output)], place)
+
+
 def _output(command: list[str]) -> str:
     """What a command prints; nothing where it cannot be started."""
     try:

@@ -7,16 +7,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any, Protocol
 
+import casadi as ca
 import numpy as np
 import pinocchio as pin
 
 from wbc import validation
 from wbc.errors import RangeError, ShapeError
 from wbc.robot.robot import Robot
-from wbc.symbolic.kinematics import frame_index
+from wbc.stack.many import ManyStates
+from wbc.symbolic.dynamics import Dynamics
+from wbc.symbolic.kinematics import Kinematics, frame_index
 from wbc.trajectory.certificate import Check
 from wbc.validation import Array
 
@@ -40,7 +43,7 @@ def at_rest(check: Check, position: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class TorqueCheck:
-    """|M(q) a + C(q, v) v + g(q)| <= limit, by ``pin.rnea`` (armature included, joint friction not).
+    """|M(q) a + C(q, v) v + g(q)| <= limit, by compiled inverse dynamics (armature included, joint friction not).
 
     Args:
         robot: its nv coordinates are those of the path. limit: nv positive numbers, inf where there is none [N m or N].
@@ -65,16 +68,21 @@ class TorqueCheck:
 
     def torques(self, position: Array, velocity: Array, acceleration: Array) -> Array:
         """Generalised forces at m states, m x nv."""
-        model = self.robot.model
-        data = model.createData()
-        states = zip(configurations(self.robot, position), velocity, acceleration, strict=True)
-        out = [pin.rnea(model, data, q, v, a) for q, v, a in states]
-        return np.array(out).reshape(len(position), self.columns)
+        return inverse_dynamics(self.robot)(configurations(self.robot, position), velocity, acceleration)
 
     def ratios(self, position: Array, velocity: Array, acceleration: Array) -> Array:
         """Both signs side by side, m x 2 nv."""
         used = self.torques(position, velocity, acceleration) / self.limit
         return np.concatenate([used, -used], axis=1)
+
+
+@lru_cache(maxsize=16)
+def inverse_dynamics(robot: Robot) -> ManyStates:
+    """tau(q, v, a) of a robot at many states, [m x nq, m x nv, m x nv] to m x nv, as ``pin.rnea``."""
+    dynamics = Dynamics(Kinematics(robot.model))
+    kinematics = dynamics.kinematics
+    torques = dynamics.inverse_dynamics
+    return ManyStates(ca.Function("inverse_dynamics", [kinematics.q, kinematics.v, dynamics.a], [torques]))
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,9 +22,8 @@ from wbc.validation import Array
 MEETING = 1e-8
 
 
-@dataclass(frozen=True, eq=False)
-class State:
-    """A law at one time, or at m times.
+class State(NamedTuple):
+    """A law at one time, or at m times: ``position, velocity, acceleration = law.at(t)``.
 
     Attributes:
         position: n (m x n) joint coordinates [rad or m], or a pose 4 x 4 (m x 4 x 4).

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from math import isfinite
-from operator import le
 from typing import Any, Literal
 
 import numpy as np
@@ -11,19 +10,17 @@ import numpy as np
 from wbc import validation
 from wbc.errors import BoundsError, RangeError
 from wbc.trajectory.between_states import limits_of, sizes_of
-from wbc.trajectory.braking import after, guarded, reach
+from wbc.trajectory.braking import after
 from wbc.trajectory.course import Course, Point, stop
 from wbc.trajectory.law import State
 from wbc.trajectory.limits import Limits
 from wbc.trajectory.state_to_state import Task, plan
+from wbc.trajectory.walls import Walls
 from wbc.validation import Array
 
 Status = Literal["moving", "reached", "guarded", "recovered"]
 
 _FLOAT = np.dtype(np.float64)
-
-#: Positions beyond their limits by less than this [rad or m] are rounding
-ROOM = 1e-9
 
 #: Walls that are farther away than this many seconds are no targets for a velocity: ruckig ends at 7e3 s
 FAR = 1e3
@@ -94,11 +91,12 @@ class Online:
         self._answer: Any = ruckig.OutputParameter(self.dof)
         self._fastest = np.zeros(self.dof)
         self._shape = (self.dof,)
-        self._aims: tuple[list[float], Array, Array, Array] = ([], np.zeros(0), np.zeros(0), np.zeros(0))
+        self._goal: list[float] = []
+        self._aims: tuple[Array, Array, Array] = (np.zeros(0), np.zeros(0), np.zeros(0))
         self._plain = False
         self._kind: Literal["position", "velocity"] = "position"
         self._take(limits)
-        self.reset(np.clip(np.zeros(self.dof), self._low, self._high))
+        self.reset(np.clip(np.zeros(self.dof), self._walls.lower, self._walls.upper))
 
     @property
     def current_limits(self) -> Limits:
@@ -113,8 +111,9 @@ class Online:
             velocity or an acceleration beyond its limit.
         """
         rows = [validation.real_array("position", position, (self.dof,))]
-        if ((rows[0] < self._low) | (rows[0] > self._high)).any():
-            raise BoundsError("position", position, f"expected within {self._low.tolist()} and {self._high.tolist()}")
+        low, high = self._walls.lower, self._walls.upper
+        if ((rows[0] < low) | (rows[0] > high)).any():
+            raise BoundsError("position", position, f"expected within {low.tolist()} and {high.tolist()}")
         sizes = sizes_of(self._limits)
         for name, value, limit in (("velocity", velocity, sizes[0]), ("acceleration", acceleration, sizes[1])):
             row = np.zeros(self.dof) if value is None else validation.real_array(name, value, (self.dof,))
@@ -136,7 +135,7 @@ class Online:
             return
         place = validation.real_array("target.position", position, (self.dof,))
         speed = None if velocity is None else self._speed("target.velocity", velocity)
-        self._kind, self._place, self._pace = "position", place, np.zeros(self.dof) if speed is None else speed
+        self._kind, self._place, self._pace = "position", place.tolist(), np.zeros(self.dof) if speed is None else speed
         self._aim()
 
     def target_velocity(self, velocity: Any) -> None:
@@ -179,14 +178,13 @@ class Online:
             self._put(rows)
             self.status = "recovered"
         else:
-            if self._walled and self._guard(p, v, a):
+            if self._walls.closed and self._walls.guard(self._now, p, v, a):
                 self._put([p, v, a])
                 self.status = "guarded"
             else:
                 answer.pass_to_input(self._asked)
                 self._now = (p, v, a)
-        rows_now = np.array((p, v, a))
-        return State(rows_now[0], rows_now[1], rows_now[2])
+        return State(*np.array((p, v, a)))
 
     def _only_place(self, position: Array) -> bool:
         """Take a target at rest after another one: all but the place stays. False for what has to be looked at.
@@ -198,14 +196,11 @@ class Online:
         place: list[float] = position.tolist()
         if not isfinite(sum(place)):
             return False
-        self._place = np.array(place)
-        if self._walled:
-            low, high = self._sizes[:2]
-            self.clipped = not (all(map(le, low, place)) and all(map(le, place, high)))
-            if self.clipped:
-                place = np.clip(place, self._low, self._high).tolist()
-        self._asked.target_position = place
-        self._aims = (place, *self._aims[1:])
+        self._place = place
+        self.clipped = self._walls.closed and not self._walls.contain(place)
+        if self.clipped:
+            place = self._walls.nearest(place)
+        self._asked.target_position = self._goal = place
         return True
 
     def _speed(self, name: str, value: Any) -> Array:
@@ -223,18 +218,9 @@ class Online:
     def _take(self, limits: Limits) -> None:
         v, a, j = sizes_of(limits)
         self._limits = limits
-        none = np.full(self.dof, np.inf)
-        self._low = -none if limits.lower is None else limits.lower
-        self._high = none if limits.upper is None else limits.upper
-        self._walled = bool(np.isfinite([self._low, self._high]).any())
         self._asked.max_acceleration, self._asked.max_jerk = a, j
-        # A joint that is farther from its walls than its longest stop need not be looked at
         self._fastest = np.maximum(self._fastest, v)
-        far = [reach(*row)[1] for row in zip(self._fastest.tolist(), a.tolist(), a.tolist(), j.tolist(), strict=True)]
-        self._near_low, self._near_high = (self._low + far).tolist(), (self._high - far).tolist()
-        self._joints = range(self.dof)
-        self._short = ((0.5 / a).tolist(), (0.5 * a / j).tolist(), (1.0 / j).tolist())
-        self._sizes = (self._low.tolist(), self._high.tolist(), a.tolist(), j.tolist())
+        self._walls = Walls(limits.lower, limits.upper, self._fastest, a, j, self.dt)
 
     def _aim(self) -> None:
         """Tell ruckig what is wanted, within the limits."""
@@ -243,16 +229,16 @@ class Online:
         pace = np.clip(self._pace, -limit, limit)
         asked.max_velocity, asked.min_velocity = limit, -limit
         if self._kind == "position":
-            place = np.clip(self._place, self._low, self._high)
-            self.clipped = bool((place != self._place).any())
+            place = self._walls.nearest(self._place)
+            self.clipped = place != self._place
             asked.control_interface, asked.synchronization = self._modes.Position, self._together
             asked.per_dof_control_interface = None
             asked.target_position, asked.target_velocity = place, pace
-            self._aims = (place.tolist(), pace, limit, np.ones(self.dof, dtype=bool))
+            self._goal, self._aims = place, (pace, limit, np.ones(self.dof, dtype=bool))
             return
         self.clipped = False
         # Towards a wall, a velocity is a way to the wall that is no faster: so the joint comes to rest there in time
-        wall = np.where(pace > 0.0, self._high, self._low)
+        wall = np.where(pace > 0.0, self._walls.upper, self._walls.lower)
         here = np.array(self._now[0])
         to_wall = (pace != 0.0) & np.isfinite(wall)
         to_wall[to_wall] = np.abs(wall - here)[to_wall] < FAR * np.abs(pace)[to_wall]
@@ -262,51 +248,29 @@ class Online:
         asked.synchronization = self._alone
         asked.per_dof_control_interface = [self._modes.Position if w else self._modes.Velocity for w in to_wall]
         asked.target_position, asked.target_velocity = place, speed
-        self._aims = (place.tolist(), speed, np.where(to_wall, np.abs(pace), limit), to_wall)
-
-    def _guard(self, p: list[float], v: list[float], a: list[float]) -> bool:
-        """Brake joints that could no longer stop within their limits; whether there were any."""
-        low, high, acceleration, jerk = self._sizes
-        slow, ramp, push = self._short
-        changed = False
-        for i, place in enumerate(p):
-            if self._near_low[i] < place < self._near_high[i]:
-                continue
-            # From w = |v| + a^2/2j, the highest speed to come, a stop is no longer than w (w/2A + A/2j + |a|/j)
-            speed, size = abs(v[i]), abs(a[i])
-            speed += 0.5 * push[i] * size * size
-            way = speed * (speed * slow[i] + ramp[i] + size * push[i]) - ROOM
-            if low[i] + way <= place <= high[i] - way and size <= acceleration[i]:
-                continue
-            now = (self._now[0][i], self._now[1][i], self._now[2][i])
-            wanted = (p[i], v[i], a[i])
-            other = guarded(now, wanted, low[i], high[i], acceleration[i], jerk[i], self.dt, ROOM)
-            if other is not None:
-                p[i], v[i], a[i] = other
-                changed = True
-        return changed
+        self._goal, self._aims = place.tolist(), (speed, np.where(to_wall, np.abs(pace), limit), to_wall)
 
     def _recovered(self) -> list[list[float]]:
         """The next state by courses of our own: to the aims, or where these are velocities, a stop about them."""
         _, acceleration_limit, jerk_limit = sizes_of(self._limits)
-        place, pace, top, _ = self._aims
+        pace, top, _ = self._aims
         now = np.array(self._now)
         if self._kind == "position":
-            aim = np.stack([place, pace, np.zeros(self.dof)])
+            aim = np.stack([self._goal, pace, np.zeros(self.dof)])
             courses = plan(Task(now, aim, top, acceleration_limit, jerk_limit), "time")
         else:
-            courses = [self._alone_to(i, now) for i in self._joints]
+            courses = [self._alone_to(i, now) for i in range(self.dof)]
         points: list[Point] = [after(c, self.dt) for c in courses]
-        low, high, acceleration, jerk = self._sizes
-        for i in self._joints:
+        for i in range(self.dof):
             here = (float(now[0, i]), float(now[1, i]), float(now[2, i]))
-            other = guarded(here, points[i], low[i], high[i], acceleration[i], jerk[i], self.dt, ROOM)
+            other = self._walls.held_back(i, here, points[i])
             points[i] = points[i] if other is None else other
         return [[point[k] for point in points] for k in range(3)]
 
     def _alone_to(self, i: int, now: Array) -> Course:
         _, a, j = sizes_of(self._limits)
-        place, pace, top, by_place = self._aims
+        place = self._goal
+        pace, top, by_place = self._aims
         if by_place[i]:
             aim = np.array([[place[i]], [pace[i]], [0.0]])
             return plan(Task(now[:, i : i + 1], aim, top[i : i + 1], a[i : i + 1], j[i : i + 1]), "none")[0]

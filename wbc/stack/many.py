@@ -1,0 +1,70 @@
+"""An expression evaluated at many states at once: compiled to C and cached, or on the virtual machine."""
+
+from __future__ import annotations
+
+import hashlib
+import pathlib
+
+import casadi as ca
+import numpy as np
+
+from wbc.errors import CompileError
+from wbc.stack import cache, toolchain
+from wbc.validation import Array
+
+#: States of one call of the compiled loop
+CHUNK = 128
+
+
+class ManyStates:
+    """f(x_1), ..., f(x_m) of a CasADi function with column vectors in and one column vector out.
+
+    Args:
+        function: what to evaluate. With a C compiler it becomes a library in the cache, named by what it computes.
+    """
+
+    def __init__(self, function: ca.Function) -> None:
+        self.size = int(function.size1_out(0))
+        library = _library(function) if toolchain.available() else None
+        self.compiled = library is not None
+        loop = library if library is not None else function.map(CHUNK)
+        # CasADi keeps columns, numpy rows: the same memory
+        self._inputs = [np.zeros((CHUNK, function.size1_in(k))) for k in range(function.n_in())]
+        self._output = np.zeros((CHUNK, self.size))
+        # The buffers point into arrays that must live as long as they do; so does the function
+        self._loop = loop
+        self._buffer, self._run = loop.buffer()
+        for k, array in enumerate(self._inputs):
+            self._buffer.set_arg(k, memoryview(array.reshape(-1)))
+        self._buffer.set_res(0, memoryview(self._output.reshape(-1)))
+
+    def __call__(self, *inputs: Array) -> Array:
+        """Values at m states, m x size; each input is m x its length."""
+        count = len(inputs[0])
+        out = np.empty((count, self.size))
+        for begin in range(0, count, CHUNK):
+            here = min(CHUNK, count - begin)
+            for array, values in zip(self._inputs, inputs, strict=True):
+                # The last chunk is filled up with its last state
+                array[:here], array[here:] = values[begin : begin + here], values[begin + here - 1]
+            self._run()
+            out[begin : begin + here] = self._output[:here]
+        return out
+
+
+def _library(function: ca.Function) -> ca.Function | None:
+    """The loop as compiled code; None where the compiler fails, which the log says."""
+    loop = function.map(CHUNK)
+    name = hashlib.sha256(f"{function.serialize()}\n{CHUNK}\n{toolchain.identity()}".encode()).hexdigest()
+
+    def fill(folder: pathlib.Path) -> None:
+        generator = ca.CodeGenerator("many.c", {"with_header": False})
+        generator.add(loop)
+        toolchain.compile_rows(generator.dump(), folder / "many.so")
+
+    try:
+        folder, _ = cache.fetch(name, fill, library=True)
+    except CompileError as error:
+        toolchain.fall_back(str(error))
+        return None
+    return ca.external(loop.name(), str(folder / "many.so"))
