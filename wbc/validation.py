@@ -51,6 +51,8 @@ def scalar(
     unit: str = "",
 ) -> float:
     """A finite float within [low, high], or (low, high] with ``open_low``."""
+    if type(value) is float and low < value < high:
+        return value
     number = float(real_array(field, value, ()))
     bad = number <= low if open_low else number < low
     if bad or number > high:

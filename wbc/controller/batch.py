@@ -14,9 +14,9 @@ from wbc.validation import Array
 
 
 def search_many(
-    ticks: Sequence[NativeTick], query: Query, first: Array, parameters: Array
+    ticks: Sequence[NativeTick], query: Query, seconds: float, first: Array, parameters: Array
 ) -> tuple[Array, list[Found]]:
-    """Search from each configuration [count, nq] with its run-time values [count, parameters].
+    """Search for some seconds from each configuration [count, nq] with its run-time values [count, parameters].
 
     The ticks, one a thread, have the same switches. Answers do not depend on how many there are.
 
@@ -25,7 +25,7 @@ def search_many(
     """
     q, p = np.ascontiguousarray(first), np.ascontiguousarray(parameters)
     found = (CFound * len(q))()
-    given = CQuery.of(query)
+    given = CQuery.of(query, seconds)
     edges = np.linspace(0, len(q), len(ticks) + 1).astype(int)
 
     def run(number: int) -> None:

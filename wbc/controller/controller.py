@@ -48,8 +48,7 @@ class Controller(Deployment):
         layout = artifact.layout
         self.stack, self.solver, self.cached = stack, solver, artifact.cached
         self.backend = "native" if artifact.library is not None else "vm"
-        self._artifact = artifact
-        self.layout = layout
+        self._artifact, self.layout = artifact, layout
         self._context = Context(stack, layout)
         self.row_costs: Array = 1.0 / layout.row_scales(stack) ** 2
         if artifact.library is not None:
@@ -131,18 +130,8 @@ class Controller(Deployment):
         Raises:
             ShapeError, NotFiniteError, RotationError: bad input; the controller is unchanged.
         """
-        robot = self.stack.robot
-        configuration = None if q is None else robot.configuration("q", q)
-        velocity = np.zeros(robot.nv) if v is None else validation.real_array("v", v, (robot.nv,))
-        if configuration is not None:
-            self._initialise(self._first, configuration)
-        self._waiting = {} if configuration is not None else dict(self._first)
-        self.tick.v_last[:] = velocity
-        self.tick.reset()
-        for sensor, _ in self._sensors:
-            sensor.reset()
-        self._resets += 1
-        self._slow = True
+        velocity = np.zeros(self.layout.nv) if v is None else validation.real_array("v", v, self._v_shape)
+        self.begin(None if q is None else self.stack.robot.configuration("q", q), velocity)
 
     def record(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Recorder:
         """Record every tick into a file from now on, until the recorder is closed; see :func:`wbc.replay`.
@@ -212,7 +201,19 @@ class Controller(Deployment):
     def __str__(self) -> str:
         return describe(self)
 
-    # What handles need; not for users
+    # What handles and inverse kinematics need; not for users
+
+    def begin(self, configuration: Array | None, velocity: Array) -> None:
+        """A reset with checked values."""
+        if configuration is not None:
+            self._initialise(self._first, configuration)
+        self._waiting = {} if configuration is not None else dict(self._first)
+        self.tick.v_last[:] = velocity
+        self.tick.reset()
+        for sensor, _ in self._sensors:
+            sensor.reset()
+        self._resets += 1
+        self._slow = True
 
     def write(self, slot: Slot, numbers: Array) -> None:
         """Write validated numbers of an input; it no longer follows the first configuration."""
@@ -242,9 +243,8 @@ class Controller(Deployment):
         return isinstance(item, Constraint) and item.sensed_rows(self.stack.robot) > 0
 
     def _sensor(self, name: str) -> Sensor:
-        item = self.stack[name].item
+        item, slots = self.stack[name].item, self.layout.blocks[name].slots
         assert isinstance(item, Constraint)
-        slots = self.layout.blocks[name].slots
         return item.sensor(self.stack.robot, {key: self.tick.p[slot.span] for key, slot in slots.items()})
 
     def _sense(self) -> None:

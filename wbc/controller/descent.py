@@ -35,8 +35,8 @@ class Search:
         self._units = np.concatenate([self._dofs, np.array(row_units(stack, layout))])
         self._best, self._cost, self._ticks = assembly.q.copy(), np.inf, 0
 
-    def run(self, query: Query) -> Found:
-        """Search from the tick's q, where the answer then is."""
+    def run(self, query: Query, seconds: float) -> Found:
+        """Search from the tick's q, where the answer then is, for some seconds."""
         begin, tick = perf_counter(), self._tick
         self._cost, self._ticks, descents = np.inf, 0, 0
         if tick.check():
@@ -48,14 +48,14 @@ class Search:
         for start in (None, *query.starts):
             if start is not None:
                 tick.q[:] = np.where(query.chosen != 0.0, start, first)
-            ending = self._descend(query, begin + SEEKING * query.seconds)
+            ending = self._descend(query, begin + SEEKING * seconds)
             if ending == OUT_OF_TIME:
                 break
             descents += 1
             if ending == FOUND:
                 break
         if query.wishes if ending == FOUND else self._cost < np.inf:
-            ending = self._settle(query, ending, begin + query.seconds)
+            ending = self._settle(query, ending, begin + seconds)
         self._assembly.plain[0] = 0.0
         tick.q[:], tick.weight[:] = self._best, weight
         tick.reset()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import functools
 from dataclasses import dataclass
 
 from wbc.controller.native import NativeTick
@@ -22,7 +23,6 @@ class Query:
         tolerance: of each task row in its unit, negative for wishes [task rows].
         seeking: weights of the task rows while the goals are sought [task rows].
         settling: weights while wishes are followed [task rows].
-        seconds: until the search ends.
         room: how far constraints may be off at the answer, in row units.
         wishes: there are wishes to follow once the goals are met.
     """
@@ -32,7 +32,6 @@ class Query:
     tolerance: Array
     seeking: Array
     settling: Array
-    seconds: float
     room: float
     wishes: bool
 
@@ -58,12 +57,11 @@ class CQuery(ctypes.Structure):
     ]
 
     @classmethod
-    def of(cls, query: Query) -> CQuery:
-        """Points into the arrays of the query, which must outlive it."""
+    def of(cls, query: Query, seconds: float) -> CQuery:
+        """Points into the arrays of the query, which must outlive it; the search ends after some seconds."""
         arrays = (query.starts, query.chosen, query.tolerance, query.seeking, query.settling)
-        numbers = (float(len(query.starts)), query.seconds, query.room, float(query.wishes))
-        # of the ways to an array's address a quick one
-        return cls(*(array.__array_interface__["data"][0] for array in arrays), *numbers)
+        numbers = (float(len(query.starts)), seconds, query.room, float(query.wishes))
+        return cls(*(array.ctypes.data for array in arrays), *numbers)
 
 
 class CFound(ctypes.Structure):
@@ -83,9 +81,18 @@ class NativeSearch:
     def __init__(self, tick: NativeTick) -> None:
         self._tick = tick
         self._found = CFound()
+        self._query: Query | None = None
 
-    def run(self, query: Query) -> Found:
-        """Search; keeps the interpreter lock, as a tick does."""
-        given = CQuery.of(query)
-        self._tick.converge_function(self._tick.pointer, ctypes.byref(given), ctypes.byref(self._found))
+    def run(self, query: Query, seconds: float) -> Found:
+        """Search for some seconds; keeps the interpreter lock, as a tick does."""
+        if query is not self._query:
+            self._query, self._given = query, CQuery.of(query, seconds)
+            self._call = functools.partial(
+                self._tick.converge_function,
+                self._tick.pointer,
+                ctypes.byref(self._given),
+                ctypes.byref(self._found),
+            )
+        self._given.seconds = seconds
+        self._call()
         return self._found.found

@@ -1,0 +1,120 @@
+"""Along a path of targets: configurations of one branch, each found from the one before in steps without a jump."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+
+from wbc.controller.engine import Engine
+from wbc.controller.search import FOUND
+from wbc.controller.step import Step
+from wbc.errors import ContinuityError, InfeasibleError
+from wbc.validation import Array
+
+#: Neighbouring configurations farther apart than this [rad, or characteristic lengths] have a jump between them if
+#: halving does not help
+JUMP = 0.02
+
+#: How often a step is halved to tell a jump, or the end of what is reached, from a steep place
+HALVINGS = 24
+
+
+@dataclass(frozen=True, eq=False)
+class Branch:
+    """Answer of :meth:`wbc.Solver.along`.
+
+    Attributes:
+        s: path coordinates that were asked for [count].
+        q: the configurations there, within the position limits [count, nq].
+        steps: the tick at each of them: residuals, margins and binding rows.
+        samples: configurations that were found, those between the coordinates included.
+        moved: what a joint moved from one of these to the next at most [rad, or characteristic lengths].
+    """
+
+    s: Array
+    q: Array
+    steps: tuple[Step, ...]
+    samples: int
+    moved: float
+
+
+class Tracker:
+    """Goals that are met at one path coordinate after the other; ``aim`` sets the targets of a coordinate."""
+
+    def __init__(self, engine: Engine, aim: Callable[[float], None], tolerance: float) -> None:
+        self._engine, self._aim = engine, aim
+        self._query = engine.query(engine.goals, tolerance, 0, 0)
+        #: where the last step ended, and dq/ds there
+        self._slope = math.nan, np.zeros(engine.stack.robot.nv)
+        self.samples, self.moved = 0, 0.0
+
+    def at(self, s: float, start: Array) -> Array:
+        """Where a search from a configuration nearby ends.
+
+        Raises:
+            InfeasibleError: the goals are not met there.
+        """
+        q = self._near(s, start)
+        if q is None:
+            raise self._unmet(s, s)
+        return q
+
+    def go(self, before: float, here: float, q: Array) -> Array:
+        """From the configuration at one coordinate to that at the next.
+
+        Raises:
+            InfeasibleError: from some coordinate on the goals are not met. ContinuityError: configurations jump.
+        """
+        engine, place, halved = self._engine, before, 0
+        model, step = engine.stack.robot.model, here - before
+        slope = self._slope[1] if self._slope[0] == before else np.zeros(engine.stack.robot.nv)
+        while place < here:
+            ahead = min(place + step, here) if here - place > 1.5 * step else here
+            found = self._near(ahead, np.asarray(pin.integrate(model, q, (ahead - place) * slope)))
+            way = np.full(len(slope), np.inf) if found is None else np.asarray(pin.difference(model, q, found))
+            moved = float(np.abs(way / engine.dof_scales).max())
+            if found is None or moved > JUMP:
+                if halved >= HALVINGS:
+                    beyond = min(here, place + (here - before) * 2.0 ** (-HALVINGS // 3))
+                    raise self._unmet(ahead, beyond) if found is None else self._torn(ahead, q, way, beyond)
+                # What was predicted may be what leads astray
+                step, halved, slope = 0.5 * (ahead - place), halved + 1, 0.0 * slope
+                continue
+            self.samples, self.moved = self.samples + 1, max(self.moved, moved)
+            if halved and moved < 0.25 * JUMP:
+                step, halved = 2.0 * step, halved - 1
+            place, q, slope = ahead, found, way / (ahead - place)
+        self._slope = here, slope
+        return q
+
+    def _near(self, s: float, start: Array) -> Array | None:
+        """The answer of a search without restarts, None where there is none."""
+        engine = self._engine
+        self._aim(s)
+        found = engine.run(engine.within_limits(start), self._query, math.inf)
+        return engine.within_limits(engine.tick.q) if found.ending == FOUND else None
+
+    def _unmet(self, s: float, beyond: float) -> InfeasibleError:
+        """Of the configuration that the last search ended with."""
+        engine = self._engine
+        q = engine.within_limits(engine.tick.q)
+        step = engine.look(q)
+        far = "; ".join(f"{name} off by {step.residuals[name]}" for name in engine.goals)
+        return InfeasibleError("s", float(s), f"not reached: {far}; {self._blocking(q, beyond)}")
+
+    def _torn(self, s: float, q: Array, way: Array, beyond: float) -> ContinuityError:
+        robot = self._engine.stack.robot
+        worst = int(np.abs(way / self._engine.dof_scales).argmax())
+        size = f"{abs(way[worst]):.3g} {robot.dof_units[worst]}"
+        reason = f"{robot.dof_names[worst]} jumps by {size} here; before it, {self._blocking(q, beyond)}"
+        return ContinuityError("s", float(s), reason)
+
+    def _blocking(self, q: Array, beyond: float) -> str:
+        """What keeps a configuration from the targets of a coordinate some way on."""
+        self._aim(beyond)
+        binding = self._engine.look(q).binding
+        return "binding: " + ", ".join(str(b) for b in binding) if binding else "no row binds"

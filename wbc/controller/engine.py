@@ -1,0 +1,167 @@
+"""What every form of inverse kinematics shares: a stack without time, compiled, and its search."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from wbc.controller.controller import Controller
+from wbc.controller.descent import Search
+from wbc.controller.native import NativeTick
+from wbc.controller.search import FOUND, Found, NativeSearch, Query
+from wbc.controller.sensing import Sensing
+from wbc.controller.solution import Ending
+from wbc.controller.solved import SolvedTick
+from wbc.controller.starts import Starts
+from wbc.controller.step import Step
+from wbc.controller.tick import Assembly
+from wbc.controller.timeless import FIRST, TICK, chosen_goals, goal_rows, hasten, searching, timeless
+from wbc.errors import RangeError, ShapeError
+from wbc.stack.declaration import Declaration
+from wbc.stack.places import stops
+from wbc.validation import Array
+
+#: How far constraints may be off at an answer [m, rad, or the margin's unit]
+ROOM = 1e-9
+
+#: What counts as a joint that the goals move: its share of the Hessian
+_MOVED = 1e-6
+
+#: Searches that are prepared for other goals or another tolerance at most
+_KEPT = 16
+
+
+class Engine:
+    """A timeless stack with the memory of its tick; see :class:`wbc.Solver`.
+
+    Attributes:
+        goals: names of the tasks to be met. rows: 1 for their task rows, 0 for those of wishes.
+        stack: the items without time. controller: their controller, whose tick is :attr:`tick`.
+    """
+
+    def __init__(self, stack: Declaration, goals: Iterable[str] | None, backend: str) -> None:
+        self.goals = chosen_goals(stack, goals)
+        self.stack = timeless(stack)
+        self.controller: Controller = searching(self.stack, backend)
+        hasten(self.controller)
+        layout, tick = self.controller.layout, self.controller.tick
+        self.rows = goal_rows(self.controller, self.goals)
+        self.dof_scales = layout.dof_scales(self.stack)
+        self.tick: Assembly = tick.assembly if isinstance(tick, SolvedTick) else tick
+        self._stops = stops(self.stack, layout)
+        at, lower, upper = np.array(self._stops[0]), *self._stops[1:]
+        dofs = np.flatnonzero(at >= 0)
+        #: coordinates with position limits: where they are in q and in ``bound_enabled``, and the limits
+        self._limited = self.stack.robot.position_index[dofs], at[dofs], lower[dofs], upper[dofs]
+        self._switches, self._limits = b"", (np.zeros(0), np.zeros(0))
+        self._sensing = Sensing(self.controller, self.tick)
+        self.search: NativeSearch | Search
+        if isinstance(tick, NativeTick) and not self._sensing:
+            self.search = NativeSearch(tick)
+        else:
+            self.search = Search(self.tick, self.stack, layout, self._sensing.sense)
+        self._table: tuple[int, Array] = (0, np.zeros((0, layout.nq)))
+        self._queries: dict[Any, Query] = {}
+        self._weights = b""
+        self._rest = np.zeros(layout.nv)
+
+    def begin(self, q0: Any) -> Array:
+        """Checked, as the first configuration of a search: targets that wait are taken from q0, then limits hold."""
+        q = self.stack.robot.configuration("q0", q0)
+        self.controller.begin(q, self._rest)
+        self.tick.dt[0] = TICK
+        self.tick.q[:] = self.within_limits(q)
+        return self.tick.q.copy()
+
+    def run(self, first: Array, query: Query, seconds: float) -> Found:
+        """Search from a configuration for some seconds; the answer is in the tick's q."""
+        self.tick.q[:], self.tick.v_last[:] = first, 0.0
+        return self.search.run(query, seconds)
+
+    def look(self, q: Array) -> Step:
+        """The tick at q."""
+        if self._sensing:
+            return self.controller.step(q, self._rest, dt=TICK)
+        self.tick.q[:], self.tick.v_last[:] = q, 0.0
+        return self.controller.again()
+
+    def query(self, goals: Sequence[str], tolerance: float, restarts: int, seed: int) -> Query:
+        """A search for some goals, with the weights as they are."""
+        weight = self.tick.weight
+        now = weight.tobytes()
+        if now != self._weights:
+            self._queries.clear()
+            self._weights = now
+        key = (tuple(goals), tolerance, restarts, seed)
+        if key not in self._queries:
+            if len(self._queries) > _KEPT:
+                self._queries.clear()
+            rows = goal_rows(self.controller, goals)
+            aims, wishes = weight * rows, weight * (1.0 - self.rows)
+            heaviest = float((wishes / self.controller.row_costs).max(initial=0.0))
+            self._queries[key] = Query(
+                starts=self.random(restarts, seed),
+                chosen=self.starts.chosen,
+                tolerance=np.where(rows > 0.0, tolerance, -1.0),
+                seeking=aims,
+                settling=aims * max(1.0, FIRST * heaviest) + wishes,
+                room=ROOM,
+                wishes=heaviest > 0.0,
+            )
+        return self._queries[key]
+
+    def within_limits(self, q: Array) -> Array:
+        """The nearest configuration (or each of several) within the position limits that are on."""
+        switches = self.tick.bound_enabled.tobytes()
+        if switches != self._switches:
+            coordinates, places, lower, upper = self._limited
+            on = self.tick.bound_enabled[places] != 0.0
+            low, high = np.full(self.stack.robot.nq, -np.inf), np.full(self.stack.robot.nq, np.inf)
+            low[coordinates], high[coordinates] = np.where(on, lower, -np.inf), np.where(on, upper, np.inf)
+            self._switches, self._limits = switches, (low, high)
+        return np.minimum(np.maximum(q, self._limits[0]), self._limits[1])
+
+    @cached_property
+    def starts(self) -> Starts:
+        """Random configurations of the joints that move a goal."""
+        _, lower, upper = self._stops
+        robot = self.stack.robot
+        everywhere = Starts(robot, lower, upper, np.ones(robot.nv, dtype=bool))
+        q = np.where(everywhere.chosen != 0.0, everywhere.table(1, 0)[0], self.tick.q)
+        share = np.diag(self.hessian(q, self.tick.weight * self.rows)) * self.dof_scales**2
+        return Starts(robot, lower, upper, share > _MOVED * share.max(initial=0.0))
+
+    def random(self, count: int, seed: int) -> Array:
+        """Configurations that searches start again from [count, nq]; coordinates that stay mean nothing."""
+        if self._table[0] != seed or len(self._table[1]) < count:
+            self._table = (seed, self.starts.table(count, seed))
+        return self._table[1][:count]
+
+    def hessian(self, q: Array, weight: Array) -> Array:
+        """J' W J and the damping of the task rows at q [nv, nv]."""
+        tick, before, here = self.tick, self.tick.weight.copy(), self.tick.q.copy()
+        tick.weight[:], tick.q[:], tick.dt[0], tick.plain[0] = weight, q, TICK, 1.0
+        H = tick.qp().H
+        tick.weight[:], tick.q[:], tick.plain[0] = before, here, 0.0
+        return H
+
+
+def ending(found: Found) -> Ending:
+    """How a search ended, in words."""
+    if found.ending == FOUND:
+        return Ending.SOLVED
+    if found.descents == 0:
+        return Ending.OUT_OF_TIME
+    return Ending.UNREACHABLE if found.cost < np.inf else Ending.CONTRADICTORY
+
+
+def count(field: str, value: Any) -> int:
+    """An integer of 0 or more."""
+    if isinstance(value, bool) or not isinstance(value, (int, np.integer)):
+        raise ShapeError(field, value, "expected an integer")
+    if value < 0:
+        raise RangeError(field, value, "expected an integer of 0 or more")
+    return int(value)
