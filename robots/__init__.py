@@ -1,4 +1,4 @@
-"""Robots by name, from files, from models and from Denavit-Hartenberg rows."""
+"""Robots by name, from files, from models and from Denavit-Hartenberg rows; machines that walk on holds."""
 
 from wbc.robot.collision_pairs import LinkPair, SelfPairs
 from wbc.robot.convex_parts import ConvexParts
@@ -7,12 +7,19 @@ from wbc.robot.geometry import convex_parts, fit_shapes
 from wbc.robot.pairs_file import read_self_pairs, save_self_pairs
 from wbc.robots.catalogue import from_dh, load, names, table
 from wbc.robots.pairs import find_self_pairs
+from wbc.robots.walker_arms import Arm
+from wbc.robots.walker_data import TwoEndedData, WalkerData
+from wbc.robots.walker_robot import Walker, walker
 
 __all__ = [
+    "Arm",
     "ConvexParts",
     "DHRow",
     "LinkPair",
     "SelfPairs",
+    "TwoEndedData",
+    "Walker",
+    "WalkerData",
     "convex_parts",
     "find_self_pairs",
     "fit_shapes",
@@ -22,4 +29,5 @@ __all__ = [
     "read_self_pairs",
     "save_self_pairs",
     "table",
+    "walker",
 ]

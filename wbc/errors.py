@@ -114,6 +114,10 @@ class LawFileError(WbcError):
     """A file that holds no law of motion, or a law that no file can hold."""
 
 
+class StructureFileError(WbcError):
+    """A file that describes no structure to walk on; ``field`` names the line and the column."""
+
+
 class CompileError(WbcError):
     """The C compiler was asked for and could not build the tick."""
 

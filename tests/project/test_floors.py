@@ -27,6 +27,7 @@ FLOORS = {
     "wbc.controller": 6,
     "wbc.trajectory": 7,
     "wbc.track": 8,
+    "wbc.walking": 8,
     "wbc.pages": 8,
     "wbc.cli": 9,
 }

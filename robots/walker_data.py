@@ -1,0 +1,194 @@
+"""The numbers of the walker and of the two-ended arm, read from the one file that holds them."""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import pathlib
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from math import pi
+from typing import Any, Self
+
+import numpy as np
+
+from wbc import validation
+from wbc.errors import RangeError, RobotFileError, ShapeError, UnknownNameError
+
+FILE = pathlib.Path(__file__).parent / "data" / "walker.toml"
+#: Metres in an inch
+INCH = 0.0254
+#: Joints of one arm of the walker
+JOINTS = 6
+#: Suffix of a key of the file -> factor to SI; the longest that fits counts
+_UNITS = {"_deg_s": pi / 180, "_m_s": 1.0, "_deg": pi / 180, "_in": INCH, "_m": 1.0, "_s": 1.0}
+#: Fields that may be 0 or below
+_SIGNED = ("elbow_limit", "shoulder_limit", "initial_posture", "elbow_offset")
+
+
+class _Numbers:
+    """What both data classes do: check their numbers, and hash them."""
+
+    def __post_init__(self) -> None:
+        kind = type(self).__name__
+        for f in fields(self):  # type: ignore[arg-type]
+            label, value, signed = f"{kind}.{f.name}", getattr(self, f.name), f.name in _SIGNED
+            if "tuple" in str(f.type):
+                numbers = validation.real_array(label, value, (JOINTS,))
+                if not signed and (numbers <= 0).any():
+                    raise RangeError(label, value, "expected values > 0")
+                object.__setattr__(self, f.name, tuple(numbers.tolist()))
+            else:
+                low = -np.inf if signed else 0.0
+                object.__setattr__(self, f.name, validation.scalar(label, value, low=low, open_low=True))
+
+    @property
+    def digest(self) -> str:
+        """First 12 digits of the SHA-256 of all fields, names and exact values; runs print it."""
+        lines = [f"{f.name} {_exact(getattr(self, f.name))}" for f in fields(self)]  # type: ignore[arg-type]
+        return hashlib.sha256("\n".join(lines).encode()).hexdigest()[:12]
+
+    @classmethod
+    def _of(cls, groups: tuple[str, ...], path: Any, changes: Mapping[str, Any]) -> Self:
+        known = [f.name for f in fields(cls)]  # type: ignore[arg-type]
+        values = {k: v for group in groups for k, v in _read(pathlib.Path(path))[group].items()}
+        for key in values:
+            if key not in known:
+                raise RobotFileError("data", f"{path}: {key}", "this class has no such field")
+        for key in changes:
+            if key not in known:
+                raise UnknownNameError(cls.__name__, key, known)
+        missing = [name for name in known if name not in values and name not in changes]
+        if missing:
+            raise RobotFileError("data", str(path), f"the file lacks {', '.join(missing)}")
+        return cls(**{**values, **changes})
+
+
+@dataclass(frozen=True)
+class WalkerData(_Numbers):
+    """Numbers of the walker in SI. Tuples have one number a joint of an arm; ``robots/data/walker.toml`` says
+    which are published and which are assumed.
+
+    Attributes:
+        neck_length, shoulder_offset, upper_arm_length, forearm_length, hand_length: of an arm [m].
+        position_limits: largest \\|theta_i\\| [rad].
+        elbow_limit: theta3 <= this [rad]. shoulder_limit: theta2 >= -theta3/2 + this [rad].
+        initial_posture: of an arm [rad]. body_height: of the body's origin above the surface [m].
+        lift_height: at which a swinging hand crosses [m]. grasp_distance: of the published walker [m].
+        shoulder_radius: body centre to arm base [m].
+        joint_rates: largest [rad/s]. acceleration_time: from rest to the full rate [s].
+        neck_radius, upper_arm_radius, forearm_radius, hand_radius: of the capsules [m].
+        body_half_thickness, clearance, exempt_distance: [m]. latch_time: [s].
+        close_distance, close_angle, close_speed, close_rate: within which our walker closes a hand
+            [m, rad, m/s, rad/s].
+        body_tilt, body_shift: what the body may deviate from its command [rad, m].
+
+    Raises:
+        ShapeError, NotFiniteError, RangeError: a field that is no number, or no positive one where it must be.
+    """
+
+    neck_length: float
+    shoulder_offset: float
+    upper_arm_length: float
+    forearm_length: float
+    hand_length: float
+    position_limits: tuple[float, ...]
+    elbow_limit: float
+    shoulder_limit: float
+    initial_posture: tuple[float, ...]
+    body_height: float
+    lift_height: float
+    grasp_distance: float
+    shoulder_radius: float
+    joint_rates: tuple[float, ...]
+    acceleration_time: float
+    neck_radius: float
+    upper_arm_radius: float
+    forearm_radius: float
+    hand_radius: float
+    body_half_thickness: float
+    clearance: float
+    exempt_distance: float
+    latch_time: float
+    close_distance: float
+    close_angle: float
+    close_speed: float
+    close_rate: float
+    body_tilt: float
+    body_shift: float
+
+    @property
+    def joint_accelerations(self) -> tuple[float, ...]:
+        """Largest accelerations: rate / ``acceleration_time`` [rad/s^2]."""
+        return tuple(rate / self.acceleration_time for rate in self.joint_rates)
+
+    @classmethod
+    def read(cls, path: Any = FILE, **changes: Any) -> WalkerData:
+        """The data of a file, with some fields changed (SI).
+
+        Raises:
+            UnknownNameError: no such field. RobotFileError: a file that cannot be read or lacks a number.
+        """
+        return cls._of(("published", "assumed"), path, changes)
+
+
+@dataclass(frozen=True)
+class TwoEndedData(_Numbers):
+    """Numbers of the two-ended arm in SI: offsets and lengths [m], limit [rad], rate [rad/s], radii [m].
+
+    Raises:
+        ShapeError, NotFiniteError, RangeError: a field that is no number, or no positive one where it must be.
+    """
+
+    roll_offset: float
+    yaw_offset: float
+    pitch_offset: float
+    boom_length: float
+    elbow_offset: float
+    position_limit: float
+    joint_rate: float
+    boom_radius: float
+    wrist_radius: float
+    acceleration_time: float
+
+    @classmethod
+    def read(cls, path: Any = FILE, **changes: Any) -> TwoEndedData:
+        """The data of a file, with some fields changed (SI).
+
+        Raises:
+            UnknownNameError: no such field. RobotFileError: a file that cannot be read or lacks a number.
+        """
+        return cls._of(("two_ended",), path, changes)
+
+
+def _exact(value: Any) -> str:
+    return " ".join(float(x).hex() for x in (value if isinstance(value, tuple) else (value,)))
+
+
+@functools.cache
+def _read(path: pathlib.Path) -> dict[str, dict[str, Any]]:
+    """Group -> field -> value in SI."""
+    try:
+        groups = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise RobotFileError("data", str(path), f"cannot be read: {error}") from error
+    out: dict[str, dict[str, Any]] = {}
+    for group in ("published", "assumed", "two_ended"):
+        rows = groups.get(group)
+        if not isinstance(rows, dict):
+            raise RobotFileError("data", str(path), f"the group [{group}] must be there")
+        out[group] = dict(_si(f"{path.name} [{group}] {key}", key, value) for key, value in rows.items())
+    return out
+
+
+def _si(label: str, key: str, value: Any) -> tuple[str, Any]:
+    """Name without its unit, value in SI."""
+    suffix = next((s for s in _UNITS if key.endswith(s)), None)
+    if suffix is None:
+        raise RobotFileError("data", label, f"the name must end with its unit: {', '.join(_UNITS)}")
+    numbers = validation.real_array(label, value)
+    if numbers.ndim > 1:
+        raise ShapeError(label, value, "expected a number or a list of numbers")
+    scaled = (numbers * _UNITS[suffix]).tolist()
+    return key.removesuffix(suffix), tuple(scaled) if isinstance(scaled, list) else scaled

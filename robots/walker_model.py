@@ -1,0 +1,130 @@
+"""Models of branching machines with a floating base, made joint by joint, and their description as URDF."""
+
+from __future__ import annotations
+
+import os
+import pathlib
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+
+from wbc.errors import RobotFileError
+from wbc.robot import Robot
+from wbc.robot.description import ROOT
+from wbc.shapes import Capsule, Convex, PlacedShape, Sphere
+
+
+@dataclass(frozen=True, eq=False)
+class Link:
+    """A link and the joint that carries it: revolute about z of ``placement``, or welded.
+
+    Attributes:
+        name: of the link; its frame is the joint's, turned by the coordinate.
+        parent: the link below.
+        placement: of the joint in the parent's frame.
+        joint: its name; "" for a weld.
+        lower, upper: limits [rad]. velocity, acceleration: largest [rad/s, rad/s^2].
+    """
+
+    name: str
+    parent: str
+    placement: pin.SE3
+    joint: str = ""
+    lower: float = 0.0
+    upper: float = 0.0
+    velocity: float = 0.0
+    acceleration: float = 0.0
+
+
+def build_model(name: str, root: str, links: Iterable[Link]) -> pin.Model:
+    """The model on a free flyer that carries the link ``root``; frames have the names of the links and joints.
+
+    URDF's parser makes the same joints and frames out of :func:`urdf_text`.
+    """
+    model = pin.Model()
+    model.name = name
+    index = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), ROOT)
+    model.addJointFrame(index)
+    frames = {root: model.addFrame(pin.Frame(root, index, 0, pin.SE3.Identity(), pin.FrameType.BODY))}
+    for link in links:
+        below = model.frames[frames[link.parent]]
+        local = below.placement * link.placement
+        if not link.joint:
+            frame = pin.Frame(link.name, below.parentJoint, frames[link.parent], local, pin.FrameType.BODY)
+            frames[link.name] = model.addFrame(frame)
+            continue
+        numbers = [np.array([x]) for x in (np.inf, link.velocity, link.lower, link.upper)]
+        index = model.addJoint(below.parentJoint, pin.JointModelRZ(), local, link.joint, *numbers)
+        above = model.addJointFrame(index, frames[link.parent])
+        frames[link.name] = model.addFrame(pin.Frame(link.name, index, above, pin.SE3.Identity(), pin.FrameType.BODY))
+    return model
+
+
+def write_urdf(path: str | os.PathLike[str], robot: Robot, root: str, links: Iterable[Link]) -> pathlib.Path:
+    """Writes :func:`urdf_text`.
+
+    Raises:
+        RobotFileError: the file cannot be written.
+    """
+    file = pathlib.Path(path)
+    try:
+        file.write_text(urdf_text(robot, root, links), encoding="utf-8")
+    except OSError as error:
+        raise RobotFileError("path", str(path), f"cannot be written: {error.strerror}") from error
+    return file
+
+
+def urdf_text(robot: Robot, root: str, links: Iterable[Link]) -> str:
+    """The robot as URDF: joints with position and velocity limits, shapes as collision and visual bodies.
+
+    A capsule becomes a cylinder with a ball at each end, a convex body is left out (URDF has it as a mesh only). URDF
+    has no accelerations, and its effort limits must be there: 0 stands for none.
+    """
+    tree = ElementTree.Element("robot", name=robot.name)
+    _add_link(tree, root, robot.shapes)
+    for link in links:
+        _add_link(tree, link.name, robot.shapes)
+        kind = "revolute" if link.joint else "fixed"
+        joint = ElementTree.SubElement(tree, "joint", name=link.joint or f"{link.name}_weld", type=kind)
+        ElementTree.SubElement(joint, "parent", link=link.parent)
+        ElementTree.SubElement(joint, "child", link=link.name)
+        _add_origin(joint, link.placement)
+        if link.joint:
+            ElementTree.SubElement(joint, "axis", xyz="0 0 1")
+            limits = {"lower": link.lower, "upper": link.upper, "velocity": link.velocity, "effort": 0.0}
+            ElementTree.SubElement(joint, "limit", {k: repr(float(v)) for k, v in limits.items()})
+    ElementTree.indent(tree)
+    return '<?xml version="1.0"?>\n' + ElementTree.tostring(tree, encoding="unicode") + "\n"
+
+
+def _add_link(tree: ElementTree.Element, name: str, shapes: Mapping[str, tuple[PlacedShape, ...]]) -> None:
+    link = ElementTree.SubElement(tree, "link", name=name)
+    for placed in shapes.get(name, ()):
+        for kind in ("visual", "collision"):
+            for placement, tag, numbers in _primitives(placed):
+                body = ElementTree.SubElement(link, kind)
+                _add_origin(body, placement)
+                geometry = ElementTree.SubElement(body, "geometry")
+                ElementTree.SubElement(geometry, tag, {k: repr(v) for k, v in numbers.items()})
+
+
+def _primitives(placed: PlacedShape) -> list[tuple[pin.SE3, str, dict[str, float]]]:
+    """(placement, URDF's name of the body, its numbers) of what a shape consists of."""
+    shape, at = placed.shape, placed.placement
+    if isinstance(shape, Sphere):
+        return [(at, "sphere", {"radius": shape.radius})]
+    if isinstance(shape, Capsule):
+        balls = [(pin.SE3(np.eye(3), end), "sphere", {"radius": shape.radius}) for end in placed.ends()]
+        return [(at, "cylinder", {"radius": shape.radius, "length": shape.length}), *balls]
+    if isinstance(shape, Convex):
+        return []
+    raise RobotFileError("shape", type(shape).__name__, "neither sphere, capsule nor convex body")
+
+
+def _add_origin(parent: ElementTree.Element, placement: pin.SE3) -> None:
+    roll_pitch_yaw = pin.rpy.matrixToRpy(placement.rotation)
+    numbers = {"xyz": placement.translation, "rpy": roll_pitch_yaw}
+    ElementTree.SubElement(parent, "origin", {k: " ".join(repr(float(x)) for x in v) for k, v in numbers.items()})

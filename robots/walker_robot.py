@@ -1,0 +1,221 @@
+"""``walker``: bodies with n arms, and the two-ended arm."""
+
+from __future__ import annotations
+
+import os
+import pathlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from math import pi
+
+import numpy as np
+import pinocchio as pin
+
+from wbc import validation
+from wbc.errors import RangeError, ShapeError
+from wbc.robot import Robot
+from wbc.robot.description import Description
+from wbc.robot.loading import finish
+from wbc.robot.recipe import Recipe, segment_shape
+from wbc.robots.walker_arms import Arm, chain, puma_rows, puma_shapes, reversed_chain, two_ended_rows
+from wbc.robots.walker_data import TwoEndedData, WalkerData
+from wbc.robots.walker_model import Link, build_model, write_urdf
+from wbc.shapes import Convex, PlacedShape
+
+BODY = "body"
+BODY_SHAPES = ("capsules", "prism", "none")
+
+
+@dataclass(frozen=True, eq=False)
+class Walker:
+    """A machine that walks on holds with its hands.
+
+    Attributes:
+        robot: on a floating base that carries the frame ``body``; q is position, quaternion x, y, z, w, then the
+            arms' joints.
+        arms: in the order of the robot's joints.
+        min_holds: fewest hands that must hold at any time.
+        data: the numbers that it was made of.
+        links: the tree of links and joints, as the URDF has it.
+    """
+
+    robot: Robot
+    arms: tuple[Arm, ...]
+    min_holds: int
+    data: WalkerData | TwoEndedData
+    links: tuple[Link, ...] = field(repr=False)
+
+    def arm(self, name: str) -> Arm:
+        """The arm of a name.
+
+        Raises:
+            UnknownNameError: no such arm.
+        """
+        names = [arm.name for arm in self.arms]
+        return self.arms[names.index(validation.one_of("arm", name, names))]
+
+    def urdf(self, path: str | os.PathLike[str]) -> pathlib.Path:
+        """Writes the robot as URDF without its floating base; returns the file. The root link is ``body``.
+
+        Raises:
+            RobotFileError: the file cannot be written.
+        """
+        return write_urdf(path, self.robot, BODY, self.links)
+
+
+def walker(
+    arms: int = 3,
+    shoulder_radius: float | None = None,
+    data: WalkerData | TwoEndedData | None = None,
+    two_ended: bool = False,
+    *,
+    artificial_limits: bool = False,
+    body_shape: str = "capsules",
+) -> Walker:
+    """A walking machine.
+
+    A body with n PUMA 600 arms at 0, 360/n, ... degrees about its z axis, which points into the structure. An arm's
+    base has its x axis outwards and its z axis along the body's. Frames: ``body``; of arm 1 ``arm1_base``,
+    ``arm1_link1`` ... ``arm1_link6`` and ``arm1_hand``, the frame 6 of Table II, whose z axis is the approach
+    direction.
+
+    Two-ended: the arm with joints roll, yaw, pitch, pitch, pitch, yaw, roll. ``body`` is at its elbow, fixed to the
+    first boom; ``arm1`` goes from there to one tip by joints 3, 2, 1, ``arm2`` to the other by joints 4 to 7.
+
+    Args:
+        arms: number of arms, at least 2; two ends always are two.
+        shoulder_radius: body centre to arm base [m]; default: the data's.
+        data: numbers; default: those of the file.
+        two_ended: make the two-ended arm.
+        artificial_limits: let theta3 end at the data's elbow limit. The shoulder limit joins two joints and is
+            no limit of the robot.
+        body_shape: ``capsules`` (about the edges of the body and from its centre to the arms), ``prism`` (a convex
+            body, exact, which URDF does not get) or ``none``.
+
+    Raises:
+        ShapeError, NotFiniteError, RangeError: a bad number, or data of the other machine.
+        UnknownNameError: no such body shape.
+    """
+    validation.one_of("body_shape", body_shape, BODY_SHAPES)
+    if two_ended:
+        if shoulder_radius is not None or arms not in (2, 3):
+            raise RangeError("two_ended", (arms, shoulder_radius), "the two-ended arm has no body to place arms on")
+        numbers = TwoEndedData.read() if data is None else data
+        if not isinstance(numbers, TwoEndedData):
+            raise ShapeError("data", type(numbers).__name__, "expected TwoEndedData")
+        return _two_ended(numbers)
+    if isinstance(arms, bool) or not isinstance(arms, int) or arms < 2:
+        raise RangeError("arms", arms, "expected a whole number of arms, at least 2")
+    found = WalkerData.read() if data is None else data
+    if not isinstance(found, WalkerData):
+        raise ShapeError("data", type(found).__name__, "expected WalkerData")
+    if shoulder_radius is not None:
+        found = replace(found, shoulder_radius=shoulder_radius)
+    return _bodied(arms, found, artificial_limits, body_shape)
+
+
+def _bodied(count: int, data: WalkerData, artificial_limits: bool, body_shape: str) -> Walker:
+    names = [f"arm{i + 1}" for i in range(count)]
+    corners = [pin.SE3(pin.utils.rotate("z", 2 * pi * i / count), np.zeros(3)) for i in range(count)]
+    out = pin.SE3(np.eye(3), np.array([data.shoulder_radius, 0.0, 0.0]))
+    bases = [corner * out for corner in corners]
+    links: list[Link] = []
+    shapes = _body_shapes([np.array(base.translation) for base in bases], data, body_shape)
+    for name, base in zip(names, bases, strict=True):
+        links.append(Link(f"{name}_base", BODY, base))
+        links += chain(name, f"{name}_base", puma_rows(data, artificial_limits), f"{name}_hand")
+        shapes |= puma_shapes(name, data)
+    neutral = {f"{name}_joint{k + 1}": x for name in names for k, x in enumerate(data.initial_posture)}
+    robot = _robot("walker" if count == 3 else f"walker{count}", links, neutral, {"body": BODY}, data.digest)
+    arms = tuple(
+        _arm(
+            robot,
+            name,
+            base,
+            [f"{name}_joint{k}" for k in range(1, 7)],
+            [k for k in shapes if k.startswith(f"{name}_")],
+        )
+        for name, base in zip(names, bases, strict=True)
+    )
+    robot = robot.with_shapes(shapes).with_self_pairs(_pairs(arms, BODY in shapes))
+    return Walker(robot, arms, 2 if count > 2 else 1, data, tuple(links))
+
+
+def _two_ended(data: TwoEndedData) -> Walker:
+    rows = two_ended_rows(data)
+    bases = [pin.SE3.Identity(), pin.SE3.Identity()]
+    # Joints have the numbers 1 to 7 from tip to tip, whichever half they belong to
+    links = [Link("arm1_base", BODY, bases[0]), *reversed_chain("arm1", "arm1_base", rows[:3], "arm1_hand", 1)]
+    links += [Link("arm2_base", BODY, bases[1]), *chain("arm2", "arm2_base", rows[3:], "arm2_hand")]
+    neutral = {"arm1_joint3": -0.5, "arm2_joint1": 1.0}
+    robot = _robot("two_ended_arm", links, neutral, {"body": BODY, "elbow": BODY}, data.digest)
+    model, shapes = robot.model, _two_ended_shapes(data)
+    arms = []
+    for name, base in zip(("arm1", "arm2"), bases, strict=True):
+        joints = [n for n in list(model.names) if str(n).startswith(name)]
+        arms.append(_arm(robot, name, base, [str(n) for n in joints], [k for k in shapes if k.startswith(name)]))
+    pairs = [("arm1_link1", BODY), ("arm1_link1", "arm2_link1"), ("arm1_link1", "arm2_link4"), (BODY, "arm2_link4")]
+    robot = robot.with_shapes(shapes).with_self_pairs(pairs)
+    return Walker(robot, tuple(arms), 1, data, tuple(links))
+
+
+def _two_ended_shapes(data: TwoEndedData) -> dict[str, tuple[PlacedShape, ...]]:
+    """Capsules about the two booms and the two rolling tips."""
+    zero, boom = np.zeros(3), data.boom_length
+    return {
+        BODY: (segment_shape(np.array([-boom, 0.0, 0.0]), zero, data.boom_radius, 0.0),),
+        "arm1_link1": (segment_shape(zero, np.array([0.0, 0.0, data.roll_offset]), data.wrist_radius, 0.0),),
+        "arm2_link1": (
+            segment_shape(
+                np.array([0.0, 0.0, data.elbow_offset]), np.array([boom, 0.0, data.elbow_offset]), data.boom_radius, 0.0
+            ),
+        ),
+        "arm2_link4": (segment_shape(zero, np.array([0.0, 0.0, data.roll_offset]), data.wrist_radius, 0.0),),
+    }
+
+
+def _robot(
+    name: str, links: Sequence[Link], neutral: Mapping[str, float], frames: Mapping[str, str], digest: str
+) -> Robot:
+    """The robot of a tree of links, without shapes."""
+    source = f"assumed: rate / acceleration time of the data {digest}"
+    acceleration = {link.joint: link.acceleration for link in links if link.joint}
+    recipe = Recipe(name, neutral=neutral, frames=frames, acceleration=acceleration, source=source)
+    notes = {"inertia": "the data have no masses: kinematics only", "data": digest}
+    description = Description(build_model(name, BODY, links), "floating", notes=notes)
+    return finish(description, recipe, "none", (), {})
+
+
+def _arm(robot: Robot, name: str, base: pin.SE3, joints: Sequence[str], links: Sequence[str]) -> Arm:
+    model = robot.model
+    first, last = robot.dofs(joints[0]), robot.dofs(joints[-1])
+    start = int(model.idx_qs[model.getJointId(joints[0])])
+    q = slice(start, start + len(joints))
+    return Arm(
+        name, base, tuple(joints), q, slice(first.start, last.stop), f"{name}_base", f"{name}_hand", tuple(links)
+    )
+
+
+def _pairs(arms: Sequence[Arm], body: bool) -> list[tuple[str, str]]:
+    """Links that must not touch: all but those next to each other and the necks, which no joint moves apart."""
+    out = []
+    for i, arm in enumerate(arms):
+        neck, upper, forearm, hand = arm.links
+        out += [(neck, forearm), (neck, hand), (upper, hand)]
+        out += [(BODY, link) for link in (upper, forearm, hand) if body]
+        for other in arms[i + 1 :]:
+            out += [(a, b) for a in arm.links for b in other.links if (a, b) != (neck, other.links[0])]
+    return out
+
+
+def _body_shapes(corners: Sequence[np.ndarray], data: WalkerData, kind: str) -> dict[str, tuple[PlacedShape, ...]]:
+    """The body: a prism over the polygon of the arm bases."""
+    half, count = data.body_half_thickness, len(corners)
+    if kind == "none":
+        return {}
+    if kind == "prism" and count > 2:
+        points = np.array([corner + [0.0, 0.0, side * half] for corner in corners for side in (-1.0, 1.0)])
+        return {BODY: (PlacedShape(Convex(points), pin.SE3.Identity()),)}
+    edges = [(corners[i], corners[(i + 1) % count]) for i in range(count if count > 2 else 1)]
+    spokes = [(np.zeros(3), corner) for corner in corners] if count > 2 else []
+    return {BODY: tuple(segment_shape(a, b, half, 0.0) for a, b in edges + spokes)}

@@ -1,0 +1,232 @@
+"""Structures: holds, the surface that they stand on, and obstacles."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from wbc import validation
+from wbc.errors import DuplicateNameError, ShapeError, UnknownNameError
+from wbc.shapes import Box, Capsule
+from wbc.validation import Array
+from wbc.walking.hold import FREE, Hold
+from wbc.walking.surface import CylinderSurface, PlaneSurface, Surface
+
+
+@dataclass(frozen=True, eq=False)
+class Obstacle:
+    """A box or capsule that no link may touch.
+
+    Attributes:
+        id: name, unique among the structure's obstacles.
+        shape: :class:`~wbc.shapes.Box` or :class:`~wbc.shapes.Capsule`.
+        placement: pose of the shape in the structure's frame.
+
+    Raises:
+        ShapeError: an empty id or another shape. NotFiniteError, RotationError: a bad placement.
+    """
+
+    id: str
+    shape: Box | Capsule
+    placement: pin.SE3
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.id, str) or not self.id.strip():
+            raise ShapeError("Obstacle.id", self.id, "expected a non-empty text")
+        if not isinstance(self.shape, (Box, Capsule)):
+            raise ShapeError("Obstacle.shape", self.shape, "expected a Box or a Capsule")
+        object.__setattr__(self, "placement", validation.pose("Obstacle.placement", self.placement))
+
+    def distance(self, points: Array) -> Array:
+        """Signed distance [m] of points ``[..., 3]`` in the structure's frame from the body."""
+        local = (np.asarray(points, dtype=np.float64) - self.placement.translation) @ self.placement.rotation
+        if isinstance(self.shape, Capsule):
+            half = self.shape.length / 2
+            local = local - np.clip(local[..., 2:], -half, half) * np.array([0.0, 0.0, 1.0])
+            length: Array = np.linalg.norm(local, axis=-1)
+            return length - self.shape.radius
+        beyond = np.abs(local) - np.array(self.shape.size) / 2
+        outside = np.linalg.norm(np.maximum(beyond, 0.0), axis=-1)
+        out: Array = outside + np.minimum(beyond.max(axis=-1), 0.0)
+        return out
+
+    def moved(self, pose: pin.SE3) -> Obstacle:
+        """The same obstacle on a structure that was moved by ``pose``."""
+        return Obstacle(self.id, self.shape, pose * self.placement)
+
+
+@dataclass(frozen=True, eq=False)
+class Structure:
+    """What a walker walks on, in the structure's own frame.
+
+    Attributes:
+        name: short.
+        holds: at least one, ids unique.
+        obstacles: ids unique.
+        surface: what the holds stand on, if it has a formula.
+
+    Raises:
+        ShapeError: no holds, or things of another type. DuplicateNameError: two of one id.
+    """
+
+    name: str
+    holds: tuple[Hold, ...]
+    obstacles: tuple[Obstacle, ...] = ()
+    surface: Surface | None = None
+
+    def __post_init__(self) -> None:
+        for field, kind in (("holds", Hold), ("obstacles", Obstacle)):
+            things = tuple(getattr(self, field))
+            if not all(isinstance(thing, kind) for thing in things):
+                raise ShapeError(f"Structure.{field}", things, f"expected {kind.__name__}s")
+            seen: set[str] = set()
+            for thing in things:
+                if thing.id in seen:
+                    raise DuplicateNameError(f"Structure.{field}", thing.id, "two of this id")
+                seen.add(thing.id)
+            object.__setattr__(self, field, things)
+        if not self.holds:
+            raise ShapeError("Structure.holds", (), "expected at least one hold")
+        if self.surface is not None and not isinstance(self.surface, (PlaneSurface, CylinderSurface)):
+            raise ShapeError("Structure.surface", self.surface, "expected a PlaneSurface, a CylinderSurface or None")
+
+    def __getitem__(self, hold: str) -> Hold:
+        """The hold of an id.
+
+        Raises:
+            UnknownNameError: no such hold; the nearest ids come first.
+        """
+        return self.holds[self.index(hold)]
+
+    def __contains__(self, hold: object) -> bool:
+        return hold in self._places
+
+    def __len__(self) -> int:
+        return len(self.holds)
+
+    def __iter__(self) -> Iterator[Hold]:
+        return iter(self.holds)
+
+    def index(self, hold: str) -> int:
+        """The row of a hold in :attr:`positions`, :attr:`axes` and :attr:`references`.
+
+        Raises:
+            UnknownNameError: no such hold.
+        """
+        if hold not in self._places:
+            raise UnknownNameError("hold", hold, self._places)
+        return self._places[hold]
+
+    @cached_property
+    def _places(self) -> dict[str, int]:
+        return {hold.id: k for k, hold in enumerate(self.holds)}
+
+    @cached_property
+    def ids(self) -> tuple[str, ...]:
+        """Ids of the holds."""
+        return tuple(self._places)
+
+    @cached_property
+    def positions(self) -> Array:
+        """Grasp points [m], ``[holds, 3]``."""
+        return _frozen(np.array([hold.position for hold in self.holds]))
+
+    @cached_property
+    def axes(self) -> Array:
+        """Approach directions, ``[holds, 3]``."""
+        return _frozen(np.array([hold.axis for hold in self.holds]))
+
+    @cached_property
+    def references(self) -> Array:
+        """Roll references (x axes), ``[holds, 3]``."""
+        return _frozen(np.array([hold.pose.rotation[:, 0] for hold in self.holds]))
+
+    @cached_property
+    def frames(self) -> Array:
+        """Homogeneous matrices of the holds, ``[holds, 4, 4]``."""
+        return _frozen(np.array([hold.pose.homogeneous for hold in self.holds]))
+
+    @cached_property
+    def tilts(self) -> Array:
+        """``max_tilt`` of the holds [rad]."""
+        return _frozen(np.array([hold.max_tilt for hold in self.holds]))
+
+    @cached_property
+    def free_rolls(self) -> tuple[bool, ...]:
+        """Whether a hand may roll as it likes, one entry a hold."""
+        return tuple(hold.roll == FREE for hold in self.holds)
+
+    @cached_property
+    def digest(self) -> str:
+        """First 12 digits of the SHA-256 of holds, obstacles and surface."""
+        h = hashlib.sha256()
+        for hold in self.holds:
+            h.update(f"{hold.id} {hold.roll} {hold.max_tilt.hex()}".encode() + hold.pose.homogeneous.tobytes())
+        for obstacle in self.obstacles:
+            h.update(f"{obstacle.id} {obstacle.shape}".encode() + obstacle.placement.homogeneous.tobytes())
+        if self.surface is not None:
+            h.update(f"{type(self.surface).__name__} {getattr(self.surface, 'radius', 0.0)!r}".encode())
+            h.update(self.surface.pose.homogeneous.tobytes())
+        return h.hexdigest()[:12]
+
+    def without(self, ids: Iterable[str]) -> Structure:
+        """The structure less some holds.
+
+        Raises:
+            UnknownNameError: no such hold. ShapeError: none would be left, or a text instead of several ids.
+        """
+        if isinstance(ids, str):
+            raise ShapeError("ids", ids, "expected several ids, not one text")
+        gone = {self.holds[self.index(hold)].id for hold in ids}
+        kept = tuple(hold for hold in self.holds if hold.id not in gone)
+        return Structure(self.name, kept, self.obstacles, self.surface)
+
+    def moved(self, pose: Any) -> Structure:
+        """The structure moved by ``pose``: every frame T becomes pose T.
+
+        Raises:
+            ShapeError, NotFiniteError, RotationError: a bad pose.
+        """
+        by = validation.pose("pose", pose)
+        surface = None if self.surface is None else self.surface.moved(by)
+        holds = tuple(hold.moved(by) for hold in self.holds)
+        return Structure(self.name, holds, tuple(o.moved(by) for o in self.obstacles), surface)
+
+    def clearance(self, points: Any) -> Array:
+        """Signed distance [m] of points ``[..., 3]`` from the structure; negative inside.
+
+        The least of the height above the surface and the distances from the obstacles. A structure with neither has
+        the height above the tangent plane of the nearest hold.
+
+        Raises:
+            ShapeError, NotFiniteError: not finite numbers, three a point.
+        """
+        array = validation.real_array("points", points)
+        if array.ndim < 1 or array.shape[-1] != 3:
+            raise ShapeError("points", points, "expected three numbers a point")
+        heights = [obstacle.distance(array) for obstacle in self.obstacles]
+        if self.surface is not None:
+            heights.append(self.surface.height(array))
+        if not heights:
+            return self._above_nearest(array)
+        out: Array = np.min(heights, axis=0)
+        return out
+
+    def _above_nearest(self, points: Array) -> Array:
+        """Height above the plane through the nearest hold, across its axis."""
+        offset = points[..., None, :] - self.positions
+        near = np.argmin((offset**2).sum(axis=-1), axis=-1)
+        chosen = np.take_along_axis(offset, near[..., None, None], axis=-2)[..., 0, :]
+        out: Array = -(chosen * self.axes[near]).sum(axis=-1)
+        return out
+
+
+def _frozen(array: Array) -> Array:
+    array.flags.writeable = False
+    return array
