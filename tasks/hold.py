@@ -12,13 +12,14 @@ from numpy.typing import NDArray
 from wbc import validation
 from wbc.symbolic import rotations as rot
 from wbc.symbolic.tracer import Tracer
+from wbc.tasks._pointing import shortest_turn
 from wbc.tasks.base import Constraint, Input, Order, Row, Rows, Values
 from wbc.tasks.frames import frame_pose, require_motion
 
 if TYPE_CHECKING:
     from wbc.robot import Robot
 
-KINDS = ("pose", "position", "orientation")
+KINDS = ("pose", "position", "orientation", "axis")
 
 
 @dataclass(frozen=True)
@@ -28,13 +29,16 @@ class Hold(Constraint):
         position     J = J_lin (3 x nv), e = p - p_target                             [m/s]
         orientation  J = J_ang (3 x nv), e = log3(R R_target'), |e| <= pi             [rad/s]
         pose         both, in this order (6 x nv)
+        axis         J = [J_lin; F'R' J_ang] (5 x nv), e = (p - p_target, F'R' theta n), F = (x, y) of the frame:
+                     theta n is the shortest turn of the frame's z axis to the target's; the turn about z is free
 
-    in world axes at the frame's origin. For the rotation, J_ang v = -gain e turns R R_target' about its own axis,
+    in world axes at the frame's origin, but for the last two rows of ``axis``. For the rotation, J_ang v = -gain e turns R R_target' about its own axis,
     so de/dt = -gain e exactly although J_ang is not de/dq.
 
     Attributes:
         frame: name of the frame.
-        kind: ``"pose"``, ``"position"`` (the frame may turn about its origin) or ``"orientation"``.
+        kind: ``"pose"``, ``"position"`` (the frame may turn about its origin), ``"orientation"`` or ``"axis"`` (the
+            frame may turn about its z axis: a hand round a bar, a pin in its hole).
         gain: initial value of the input [1/s].
 
     Inputs:
@@ -52,7 +56,7 @@ class Hold(Constraint):
     initial_only: ClassVar[tuple[str, ...]] = ("gain",)
 
     frame: str
-    kind: Literal["pose", "position", "orientation"] = "pose"
+    kind: Literal["pose", "position", "orientation", "axis"] = "pose"
     gain: float = 10.0
 
     def __post_init__(self) -> None:
@@ -78,10 +82,11 @@ class Hold(Constraint):
         return {"target": frame_pose(robot, self.frame, q)}
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
-        """x, y, z and rx, ry, rz, as far as held."""
+        """x, y, z and rx, ry, rz, as far as held; those of ``axis`` about the frame's own x and y."""
         position = tuple(Row(axis, "m/s") for axis in ("x", "y", "z"))
         orientation = tuple(Row(axis, "rad/s") for axis in ("rx", "ry", "rz"))
-        return {"pose": position + orientation, "position": position, "orientation": orientation}[self.kind]
+        rows = {"pose": position + orientation, "position": position, "orientation": orientation}
+        return rows.get(self.kind, position + orientation[:2])
 
     def velocity_rows(self, robot: Robot, kin: Tracer, inputs: Values, dt: ca.SX) -> Rows:
         """See the class."""
@@ -91,7 +96,11 @@ class Hold(Constraint):
         if self.kind != "orientation":
             drift.append(pose.position - target.position)
             matrix.append(jacobian[:3, :])
-        if self.kind != "position":
+        if self.kind == "axis":
+            # As seen from the frame, its z axis turns away from where the target's is
+            drift.append(shortest_turn(pose.rotation.T @ target.rotation[:, 2]))
+            matrix.append((pose.rotation.T @ jacobian[3:, :])[:2, :])
+        elif self.kind != "position":
             drift.append(rot.log3(pose.rotation @ target.rotation.T))
             matrix.append(jacobian[3:, :])
         wanted = -inputs["gain"] * ca.vertcat(*drift)

@@ -60,7 +60,7 @@ def _frame_velocity_limit(robot: Robot) -> list[Declared]:
 
 
 def _hold(robot: Robot) -> list[Declared]:
-    return [(Hold(tip(robot), kind), {"gain": 3.0}) for kind in ("pose", "position", "orientation")]
+    return [(Hold(tip(robot), kind), {"gain": 3.0}) for kind in ("pose", "position", "orientation", "axis")]
 
 
 def _fixed(robot: Robot) -> list[Declared]:

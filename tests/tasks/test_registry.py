@@ -74,6 +74,8 @@ def frame_velocity(item: FrameVelocityLimit, robot: Robot, q: np.ndarray, v: np.
 
 def hold(item: Hold, robot: Robot, q: np.ndarray, v: np.ndarray) -> np.ndarray:
     twist = velocity(robot, item.frame, q, v)
+    if item.kind == "axis":
+        return np.concatenate([twist[:3], (placement(robot, item.frame, q).rotation.T @ twist[3:])[:2]])
     return {"pose": twist, "position": twist[:3], "orientation": twist[3:]}[item.kind]
 
 
