@@ -15,7 +15,7 @@ TYPES := build/types
 SOURCES := wbc tasks robots tests bench examples
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test lint format types docs bench bench-time-laws lock clean
+.PHONY: help setup demo test lint format types docs bench bench-ik bench-time-laws lock clean
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 18
@@ -46,9 +46,13 @@ types: $(READY)  ## mypy --strict on the package
 docs: $(READY)  ## write what the code declares into the pages of tasks and constraints
 	$(BIN)/wbc docs
 
-bench: $(READY) $(PEERS_READY)  ## compare with pink, mink and placo on the same problems, and a quick run of the laws
+bench: $(READY) $(PEERS_READY)  ## compare with pink, mink and placo on the same problems, inverse kinematics, and a quick run of the laws
 	$(BIN)/python -m bench --peers-python $(PEERS_VENV)/bin/python
+	$(BIN)/python -m bench.ik --full --peers-python $(PEERS_VENV)/bin/python
 	$(BIN)/python -m bench.time_laws
+
+bench-ik: $(READY) $(PEERS_READY)  ## inverse kinematics on TRAC-IK's protocol, 10 000 poses a chain; Ctrl-C keeps what it has
+	$(BIN)/python -m bench.ik --full --peers-python $(PEERS_VENV)/bin/python
 
 bench-time-laws: $(READY)  ## laws of motion beside raw toppra and raw ruckig, 10^6 states; Ctrl-C keeps what it has
 	$(BIN)/python -m bench.time_laws --full

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import subprocess
 import sys
 from pathlib import Path
 
@@ -15,6 +14,7 @@ from bench.curve_run import measure_curves
 from bench.harness import Plan, machine, measure, measure_startup
 from bench.pool import ROOT
 from bench.prepare import prepare
+from bench.versions import versions
 
 OWN = ("wbc", "casadi", "pin", "numpy", "daqp")
 PEERS = ("pin-pink", "mink", "mujoco", "placo", "qpsolvers", "daqp", "quadprog", "pin", "numpy")
@@ -43,7 +43,7 @@ def main() -> None:
     with progress.status("") as status:
         results = {
             "machine": about,
-            "versions": versions(plan),
+            "versions": versions(plan.python, OWN, plan.peers_python, PEERS),
             "startup": measure_startup(plan, status.update),
             "problems": {name: measure(plan, name, status.update) for name in plan.names},
         }
@@ -57,24 +57,8 @@ def main() -> None:
     if complete:
         figure.draw(results[CURVES], picture / "bench_curves.png")
     if complete and len(plan.names) == len(PROBLEMS) and chosen.output == ROOT / "bench":
-        report.update_readme(ROOT / "README.md", results)
+        report.put_between(ROOT / "README.md", "bench", report.readme(results))
     report.show(results, console)
-
-
-def versions(plan: Plan) -> dict[str, str]:
-    """Versions in both environments."""
-    out = _versions(plan.python, OWN)
-    if plan.peers_python is not None:
-        found = _versions(plan.peers_python, PEERS)
-        out |= {name if name not in out else f"peers' {name}": version for name, version in found.items()}
-    return out
-
-
-def _versions(python: str, names: tuple[str, ...]) -> dict[str, str]:
-    code = "import importlib.metadata as m, json, sys; print(json.dumps({n: m.version(n) for n in sys.argv[1:]}))"
-    done = subprocess.run([python, "-c", code, *names], capture_output=True, text=True, check=True, cwd=ROOT.anchor)
-    found: dict[str, str] = json.loads(done.stdout)
-    return found
 
 
 if __name__ == "__main__":

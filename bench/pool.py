@@ -23,15 +23,21 @@ class WorkerError(RuntimeError):
 
 
 class Worker:
-    """One process with one package on one problem, see ``bench.worker``."""
+    """One process with one package on one problem, see ``bench.worker``, or another module that serves as that does."""
 
     def __init__(
-        self, python: str, contender: str, folder: Path, core: int | None, environment: Mapping[str, str] | None = None
+        self,
+        python: str,
+        contender: str,
+        folder: Path,
+        core: int | None,
+        environment: Mapping[str, str] | None = None,
+        module: str = "bench.worker",
     ) -> None:
         """Start the process; :attr:`ready` is what it said when it had built its problem."""
         self.contender = contender
         self._log: IO[str] = tempfile.TemporaryFile("w+")  # noqa: SIM115 (closed with the worker)
-        command = [python, "-m", "bench.worker", contender, str(folder)] + ([str(core)] if core is not None else [])
+        command = [python, "-m", module, contender, str(folder)] + ([str(core)] if core is not None else [])
         self._process = subprocess.Popen(
             command,
             stdin=subprocess.PIPE,

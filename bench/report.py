@@ -158,12 +158,12 @@ def readme(results: dict[str, Any]) -> str:
     return "\n".join(lines)
 
 
-def update_readme(path: Path, results: dict[str, Any]) -> None:
-    """Put the table between the marks in the README."""
-    head, mark, rest = path.read_text().partition("<!-- bench -->")
-    _, end, tail = rest.partition("<!-- /bench -->")
+def put_between(path: Path, name: str, text: str) -> None:
+    """Put text between the marks ``<!-- name -->`` and ``<!-- /name -->`` of a page."""
+    head, mark, rest = path.read_text().partition(f"<!-- {name} -->")
+    _, end, tail = rest.partition(f"<!-- /{name} -->")
     if mark and end:
-        path.write_text(f"{head}{mark}\n\n{readme(results)}\n\n{end}{tail}")
+        path.write_text(f"{head}{mark}\n\n{text}\n\n{end}{tail}")
 
 
 def _tails(durations: dict[str, float]) -> list[str]:

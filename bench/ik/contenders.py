@@ -1,16 +1,18 @@
 """The contenders: each solves for one pose after the other and says how long each call took.
 
-``python -m bench.ik.contenders NAME FOLDER`` runs one of them in an interpreter of its own and writes the answers to
-``FOLDER/NAME.npz``; the peers have their own environment.
+``python -m bench.ik.contenders NAME FOLDER [CORE]`` runs one of them in an interpreter of its own, see
+:class:`bench.pool.Worker`; the peers have their own environment.
 """
 
 from __future__ import annotations
 
 import json
+import os
 import sys
 from collections.abc import Callable
 from pathlib import Path
 from time import perf_counter
+from typing import Any
 
 import numpy as np
 
@@ -20,17 +22,22 @@ from bench.problems import Array
 Solve = Callable[[Array], tuple[Array, float]]
 
 
-def wbc_solver(given: dict, budget: float, tolerance: float) -> Solve:
-    """``Solver.solve``, the whole Python call."""
-    import pinocchio as pin
-
+def wbc_stack(given: dict) -> Any:
+    """The compiled solver."""
     import wbc
 
     robot = wbc.robots.load(given["urdf"], shapes="none")
     stack = wbc.Stack(robot, dt=0.005)
     stack.add(wbc.tasks.EndEffector(given["tip"]), name="hand")
     stack.add(wbc.tasks.JointLimits())
-    solver, start = stack.solver(), np.array(given["q0"])
+    return stack.solver()
+
+
+def wbc_solver(given: dict, budget: float, tolerance: float) -> Solve:
+    """``Solver.solve``, the whole Python call."""
+    import pinocchio as pin
+
+    solver, start = wbc_stack(given), np.array(given["q0"])
 
     def solve(pose: Array) -> tuple[Array, float]:
         solver["hand"].target = pin.SE3(pose)
@@ -104,16 +111,44 @@ def mink_loop(given: dict, budget: float, tolerance: float) -> Solve:
 CONTENDERS = {"wbc": wbc_solver, "pink": pink_loop, "mink": mink_loop}
 
 
+def wbc_batch(given: dict, poses: Array) -> dict:
+    """``Solver.solve_batch`` for all poses at once, on all cores."""
+    import pinocchio as pin
+
+    solver, start = wbc_stack(given), np.array(given["q0"])
+    targets = [pin.SE3(pose) for pose in poses]
+    threads = len(os.sched_getaffinity(0))
+    options = {"budget": given["budget"], "tolerance": given["tolerance"], "restarts": 1000, "workers": threads}
+    solver.solve_batch(start, {"hand": targets[:20]}, **options)
+    begin = perf_counter()
+    found = solver.solve_batch(start, {"hand": targets}, **options)
+    return {"seconds": perf_counter() - begin, "q": found.q.tolist(), "search": float(np.sum(found.seconds)),
+            "threads": threads}  # fmt: skip
+
+
 def main() -> None:
-    """Solve for all poses of a folder."""
-    name, folder = sys.argv[1], Path(sys.argv[2])
-    given = json.loads((folder / "given.json").read_text())
-    poses = np.load(folder / "poses.npy")[: given["counts"][name]]
+    """Answer each line of standard input: {"do": "solve", "first": i, "end": k} or {"do": "batch"}."""
+    name, folder, *core = sys.argv[1:]
+    if core:
+        os.sched_setaffinity(0, {int(core[0])})
+    # Packages print to standard output at will; the protocol keeps a copy of it to itself
+    protocol = os.dup(1)
+    os.dup2(2, 1)
+    sys.stdout = os.fdopen(protocol, "w")
+    given = json.loads((Path(folder) / "given.json").read_text())
+    poses = np.load(Path(folder) / "poses.npy")
     solve = CONTENDERS[name](given, given["budget"], given["tolerance"])
     for pose in poses[:20]:
         solve(pose)
-    answers = [solve(pose) for pose in poses]
-    np.savez(folder / f"{name}.npz", q=np.array([a for a, _ in answers]), seconds=np.array([t for _, t in answers]))
+    print(json.dumps({"ready": name}), flush=True)
+    for line in sys.stdin:
+        asked = json.loads(line)
+        if asked["do"] == "batch":
+            print(json.dumps(wbc_batch(given, poses)), flush=True)
+            continue
+        answers = [solve(pose) for pose in poses[asked["first"] : asked["end"]]]
+        out = {"q": [q.tolist() for q, _ in answers], "seconds": [seconds for _, seconds in answers]}
+        print(json.dumps(out), flush=True)
 
 
 if __name__ == "__main__":

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
+import pytest
 
+import bench.ik.__main__ as program
+from bench.ik import run, tables
+from bench.ik.__main__ import main
 from bench.ik.chains import CHAINS, Judge, configuration, prepare
-
-ROOT = Path(__file__).parents[2]
 
 
 def test_every_chain_is_an_arm_and_its_poses_can_be_reached(tmp_path: Path) -> None:
@@ -39,12 +41,49 @@ def test_the_judge_refuses_joints_outside_their_limits(tmp_path: Path) -> None:
     assert not judge.accepts(q, pose, 1e-5)
 
 
-def test_a_small_run_writes_its_table(tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "bench.ik", "--count", "30", "--chains", "Panda", "--budget", "0.5"]
-    folders = ["--work", str(tmp_path / "work"), "--output", str(tmp_path)]
-    done = subprocess.run([*command, *folders], cwd=ROOT, capture_output=True, text=True, check=True)
-    assert "pink and mink are left out" in done.stdout
-    (row,) = json.loads((tmp_path / "inverse_kinematics.json").read_text())["rows"]
-    assert row["rate"] == 100.0
-    assert row["published"] == 99.88
-    assert "| Panda | 7 | wbc | 30 | 100.00 |" in (tmp_path / "inverse_kinematics.md").read_text()
+def options(folder: Path) -> list[str]:
+    places = ["--work", str(folder / "work"), "--output", str(folder)]
+    return ["--count", "30", "--chains", "Panda", "--budget", "0.5", *places]
+
+
+def test_a_small_run_writes_its_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    main(options(tmp_path))
+    assert "pink and mink are left out" in capsys.readouterr().out
+    results = json.loads((tmp_path / "ik.json").read_text())
+    (row,), (batch,), (chain,) = results["rows"], results["batches"], results["chains"]
+    assert (row["rate"], row["published"], row["poses"], results["interrupted"]) == (100.0, 99.88, 30, None)
+    assert (batch["rate"], batch["poses"]) == (100.0, 30)
+    assert chain["limits"][3] == "-3.072 to -0.0698"
+    page = (tmp_path / "ik.md").read_text()
+    # 99.88 less twice the root of 99.88 * 0.12 / 30
+    assert "| Panda | 7 | wbc | 30 | 100.00 | 0.00 | 99.88 | 98.62 | yes |" in page
+    assert "Ctrl-C" not in page
+    assert tables.summary(results).startswith("| chain | joints | solved [%] | +- [%] |")
+
+
+def test_an_interrupted_run_keeps_what_it_has(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(*given: Any) -> Iterator[dict[str, run.Answers]]:
+        answers = run.measure(*given)
+        yield next(answers)
+        yield next(answers)
+        answers.close()
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(program, "measure", interrupted)
+    main(options(tmp_path))
+    results = json.loads((tmp_path / "ik.json").read_text())
+    assert [row["poses"] for row in results["rows"]] == [3]
+    assert (tmp_path / "ik.md").read_text().count("Ended by Ctrl-C in Panda, chain 1 of 1.") == 1
+
+
+def test_goals_are_published_rates_less_two_standard_errors_and_means_on_the_same_poses() -> None:
+    ur5, xarm = (next(c for c in CHAINS if c.name == name) for name in ("UR5", "xArm7"))
+    assert run.published(ur5, 10_000)["goal"] == pytest.approx(99.17 - 2 * 100 * (0.9917 * 0.0083 / 10_000) ** 0.5)
+    assert run.published(xarm, 10_000)["goal"] is None
+    times = {"median": 1.0, "p95": 2.0, "p99.9": 3.0, "error": 0.1, "joints": 6, "chain": "UR5"}
+    own = {**times, "solver": "wbc", "poses": 10_000, "rate": 98.9, **run.published(ur5, 10_000), "mean": 150.0}
+    rows = [own | {"compared": {"pink": 200.0}}, {**times, "solver": "pink", "poses": 9, "rate": 1.0, "mean": 160.0}]
+    rows[1]["compared"] = {}
+    (goal,) = tables.goals({"rows": rows})
+    assert (goal.value, goal.met) == (1.25, False)
+    assert [cells[8] for cells in tables.main_sheet({"rows": rows}).rows] == ["no", "-"]
