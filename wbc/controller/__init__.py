@@ -1,5 +1,6 @@
 """The controller (floor 6)."""
 
+from wbc.controller.continuation import Branch
 from wbc.controller.controller import Controller
 from wbc.controller.recorder import Recorder
 from wbc.controller.recording import Recording
@@ -10,6 +11,7 @@ from wbc.controller.stack import Stack
 from wbc.controller.step import Certificate, Status, Step
 
 __all__ = [
+    "Branch",
     "Certificate",
     "Controller",
     "Ending",

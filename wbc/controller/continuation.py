@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -42,6 +43,17 @@ class Branch:
     moved: float
 
 
+def branch(engine: Engine, aim: Callable[[float], None], s: Array, first: Array, tolerance: float) -> Branch:
+    """The branch at coordinates, from a configuration at which the search of the first one begins."""
+    tracker = Tracker(engine, aim, tolerance)
+    q = [tracker.at(float(s[0]), first)]
+    steps = [engine.look(q[0])]
+    for before, here in itertools.pairwise(s.tolist()):
+        q.append(tracker.go(before, here, q[-1]))
+        steps.append(engine.look(q[-1]))
+    return Branch(s, np.array(q), tuple(steps), tracker.samples, tracker.moved)
+
+
 class Tracker:
     """Goals that are met at one path coordinate after the other; ``aim`` sets the targets of a coordinate."""
 
@@ -61,6 +73,7 @@ class Tracker:
         q = self._near(s, start)
         if q is None:
             raise self._unmet(s, s)
+        self.samples += 1
         return q
 
     def go(self, before: float, here: float, q: Array) -> Array:

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from wbc import validation
 from wbc.controller.batch import search_many
+from wbc.controller.continuation import Branch, branch
 from wbc.controller.engine import Engine, count, ending
 from wbc.controller.handle import Handle
+from wbc.controller.moving_targets import MovingTargets
 from wbc.controller.native import NativeTick
 from wbc.controller.search import EXHAUSTED, FOUND, NativeSearch
 from wbc.controller.solution import Batch, Ending, Solution
@@ -154,6 +156,51 @@ class Solver:
             np.array([float(f.descents + (f.ending > EXHAUSTED)) for f in found]),
             np.array([f.seconds for f in found]),
         )
+
+    def along(
+        self,
+        targets: Mapping[str, Callable[[float], Any] | Sequence[Any]],
+        s: Any,
+        q0: Any,
+        *,
+        tolerance: float = 1e-8,
+    ) -> Branch:
+        """The branch of configurations over targets that change with a path coordinate.
+
+            q(s_0) = where a descent from q0 ends,    q(s + ds) = where one from q(s) + (dq/ds) ds ends,
+
+        and the wishes are at rest. ds is halved where the descent fails or a joint moves by more than 0.02 (rad, or
+        characteristic lengths), and doubled again where all move by less than a quarter of that. What is still so after
+        24 halvings is a jump, or the end of what can be reached.
+
+        Args:
+            targets: name of a task -> function of s that returns its ``target``, or a sequence with one for each entry
+                of s (between two of them: a screw motion of poses, the shortest turn of rotations, else straight).
+                Targets that are not named stay as they are.
+            s: where configurations are asked for, increasing [count].
+            q0: where the first one is searched [nq].
+            tolerance: of every row of a goal, in metres and radians.
+
+        Raises:
+            InfeasibleError: from some s on the goals cannot be met; ``value`` is that s, and the message says how far
+                they are off and what binds. ContinuityError: the branch ends or folds; ``value`` is the s where q
+                jumps, and the message names the joint and what binds there. WbcError: bad input.
+
+        Cannot do: change the branch, or pass a limit by a detour; jumps below 0.02 are not seen.
+        """
+        engine = self._engine
+        places = validation.real_array("s", s)
+        if places.ndim != 1 or not len(places):
+            raise ShapeError("s", s, "expected at least one number, in one row")
+        if (np.diff(places) <= 0.0).any():
+            raise RangeError("s", s, "path coordinates must increase strictly")
+        near = validation.scalar("tolerance", tolerance, low=0.0, open_low=True)
+        moving = MovingTargets(engine.controller, targets, places)
+        before = engine.tick.p.copy()
+        try:
+            return branch(engine, moving.aim, places, engine.begin(q0), near)
+        finally:
+            engine.tick.p[:] = before
 
 
 def _options(budget: Any, tolerance: Any, restarts: Any, seed: Any) -> tuple[float, float, int, int]:
