@@ -18,6 +18,7 @@ from wbc.robot.loading import build, finish, looks_like_path, unknown
 from wbc.robot.recipe import Recipe, lock_mapping
 from wbc.robot.robot import Robot
 from wbc.robot.table import read_table
+from wbc.robots.walker_robot import made_here, recipe_of
 
 _FOLDER = pathlib.Path(__file__).parent
 
@@ -55,7 +56,8 @@ def load(
     """A robot from the table, a file, a model, or a chain of Denavit-Hartenberg rows.
 
     Args:
-        robot: a name of the table (:func:`names`), a path of a URDF or MJCF file, a ``pin.Model``, or DH rows.
+        robot: a name of the table (:func:`names`), ``walker`` or ``two_ended_arm`` (see :func:`~wbc.robots.walker`), a
+            path of a URDF or MJCF file, a ``pin.Model``, or DH rows.
         base: ``fixed``, ``floating`` (free flyer: q has position and quaternion x, y, z, w), ``planar`` (x, y,
             cos, sin; any direction) or ``differential`` (planar, sideways velocity must stay 0, see
             ``Robot.locked_dofs``). Default: the table's, or the one that the model or MJCF file brings, or fixed.
@@ -84,7 +86,8 @@ def load(
     Cannot do: SDF and xacro files; closed kinematic chains (a URDF is a tree); loop closures of MJCF (said in
     ``notes["mimic"]``).
     """
-    recipe, source = _find(robot)
+    made = made_here(robot) if isinstance(robot, str) else None
+    recipe, source = _find(robot) if made is None else (recipe_of(made), made.model)
     changes: dict[str, Any] = {}
     if lock is not None:
         changes["lock"] = lock_mapping(lock)
@@ -101,7 +104,16 @@ def load(
         "acceleration": acceleration,
         "effort": effort,
     }
-    return build(source, replace(recipe, **changes), wanted, shapes, package_dirs, limits)
+    built = build(source, replace(recipe, **changes), wanted, shapes, package_dirs, limits)
+    if made is None:
+        return built
+    if lock is None and shapes == "auto" and built.base == made.base:
+        # Nothing of its links changed: keep its own shapes and pairs, and what it says about them
+        given = {key for key, value in limits.items() if value is not None} | ({"neutral"} if neutral else set())
+        kept = {key: note for key, note in made.notes.items() if key not in given}
+        notes = {**built.notes, **kept}
+        return replace(made, name=built.name, limits=built.limits, neutral=built.neutral, notes=notes)
+    return replace(built, notes={**built.notes, **{key: made.notes[key] for key in ("inertia", "data")}})
 
 
 def from_dh(

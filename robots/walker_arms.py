@@ -66,10 +66,10 @@ def puma_rows(data: WalkerData, artificial_limits: bool = False) -> tuple[DHRow,
     )
 
 
-def chain(prefix: str, base: str, rows: Sequence[DHRow], hand: str) -> list[Link]:
-    """Links ``prefix_link1`` ... on joints ``prefix_joint1`` ..., and the last row's frame as ``hand``."""
+def chain(prefix: str, base: str, rows: Sequence[DHRow], hand: str, first: int = 1) -> list[Link]:
+    """Links ``prefix_link1`` ... on joints ``prefix_joint1`` ..., counted from ``first``; ``hand``: last frame."""
     links, parent, tail = [], base, pin.SE3.Identity()
-    for number, row in enumerate(rows, start=1):
+    for number, row in enumerate(rows, start=first):
         link = f"{prefix}_link{number}"
         limits = (row.lower, row.upper, row.velocity, row.acceleration)
         links.append(Link(link, parent, tail * row.before(), f"{prefix}_joint{number}", *limits))

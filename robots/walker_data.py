@@ -9,7 +9,7 @@ import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from math import pi
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -19,8 +19,6 @@ from wbc.errors import RangeError, RobotFileError, ShapeError, UnknownNameError
 FILE = pathlib.Path(__file__).parent / "data" / "walker.toml"
 #: Metres in an inch
 INCH = 0.0254
-#: Joints of one arm of the walker
-JOINTS = 6
 #: Suffix of a key of the file -> factor to SI; the longest that fits counts
 _UNITS = {"_deg_s": pi / 180, "_m_s": 1.0, "_deg": pi / 180, "_in": INCH, "_m": 1.0, "_s": 1.0}
 #: Fields that may be 0 or below
@@ -30,12 +28,15 @@ _SIGNED = ("elbow_limit", "shoulder_limit", "initial_posture", "elbow_offset")
 class _Numbers:
     """What both data classes do: check their numbers, and hash them."""
 
+    #: Numbers in a tuple
+    joints: ClassVar[int]
+
     def __post_init__(self) -> None:
         kind = type(self).__name__
         for f in fields(self):  # type: ignore[arg-type]
             label, value, signed = f"{kind}.{f.name}", getattr(self, f.name), f.name in _SIGNED
             if "tuple" in str(f.type):
-                numbers = validation.real_array(label, value, (JOINTS,))
+                numbers = validation.real_array(label, value, (self.joints,))
                 if not signed and (numbers <= 0).any():
                     raise RangeError(label, value, "expected values > 0")
                 object.__setattr__(self, f.name, tuple(numbers.tolist()))
@@ -88,6 +89,8 @@ class WalkerData(_Numbers):
         ShapeError, NotFiniteError, RangeError: a field that is no number, or no positive one where it must be.
     """
 
+    joints: ClassVar[int] = 6
+
     neck_length: float
     shoulder_offset: float
     upper_arm_length: float
@@ -135,11 +138,13 @@ class WalkerData(_Numbers):
 
 @dataclass(frozen=True)
 class TwoEndedData(_Numbers):
-    """Numbers of the two-ended arm in SI: offsets and lengths [m], limit [rad], rate [rad/s], radii [m].
+    """Numbers of the two-ended arm in SI: offsets and lengths [m], limit and posture [rad], rate [rad/s], radii [m].
 
     Raises:
         ShapeError, NotFiniteError, RangeError: a field that is no number, or no positive one where it must be.
     """
+
+    joints: ClassVar[int] = 7
 
     roll_offset: float
     yaw_offset: float
@@ -147,6 +152,7 @@ class TwoEndedData(_Numbers):
     boom_length: float
     elbow_offset: float
     position_limit: float
+    initial_posture: tuple[float, ...]
     joint_rate: float
     boom_radius: float
     wrist_radius: float

@@ -16,11 +16,11 @@ from wbc.errors import RangeError, ShapeError
 from wbc.robot import Robot
 from wbc.robot.description import Description
 from wbc.robot.loading import finish
-from wbc.robot.recipe import Recipe, segment_shape
+from wbc.robot.recipe import LinkShape, Recipe, segment_shape
 from wbc.robots.walker_arms import Arm, chain, puma_rows, puma_shapes, reversed_chain, two_ended_rows
 from wbc.robots.walker_data import TwoEndedData, WalkerData
 from wbc.robots.walker_model import Link, build_model, write_urdf
-from wbc.shapes import Convex, PlacedShape
+from wbc.shapes import Capsule, Convex, PlacedShape, Sphere
 
 BODY = "body"
 BODY_SHAPES = ("capsules", "prism", "none")
@@ -114,6 +114,33 @@ def walker(
     return _bodied(arms, found, artificial_limits, body_shape)
 
 
+def made_here(name: str) -> Robot | None:
+    """The robot that ``wbc.robots.load`` gives for ``walker`` and ``two_ended_arm``; None for other names."""
+    if name == "walker":
+        return walker().robot
+    return walker(two_ended=True).robot if name == "two_ended_arm" else None
+
+
+def recipe_of(robot: Robot) -> Recipe:
+    """The recipe that makes ``robot`` out of its model."""
+    joints = robot.joint_names[1:]
+    coordinates = [int(robot.model.idx_qs[robot.model.getJointId(joint)]) for joint in joints]
+    return Recipe(
+        robot.name,
+        frames=robot.frames,
+        neutral={joint: float(robot.neutral[k]) for joint, k in zip(joints, coordinates, strict=True)},
+        acceleration={joint: float(robot.limits.acceleration[robot.dofs(joint)][0]) for joint in joints},
+        source=robot.notes["acceleration"].split(";")[0],
+        shapes=tuple(_link_shape(link, shape) for link, group in robot.shapes.items() for shape in group),
+    )
+
+
+def _link_shape(link: str, placed: PlacedShape) -> LinkShape:
+    a, b = (tuple(end.tolist()) for end in placed.ends())
+    assert isinstance(placed.shape, (Capsule, Sphere))
+    return LinkShape(link, a, b, placed.shape.radius)
+
+
 def _bodied(count: int, data: WalkerData, artificial_limits: bool, body_shape: str) -> Walker:
     names = [f"arm{i + 1}" for i in range(count)]
     corners = [pin.SE3(pin.utils.rotate("z", 2 * pi * i / count), np.zeros(3)) for i in range(count)]
@@ -137,7 +164,7 @@ def _bodied(count: int, data: WalkerData, artificial_limits: bool, body_shape: s
         )
         for name, base in zip(names, bases, strict=True)
     )
-    robot = robot.with_shapes(shapes).with_self_pairs(_pairs(arms, BODY in shapes))
+    robot = _with_shapes(robot, shapes, _pairs(arms, BODY in shapes))
     return Walker(robot, arms, 2 if count > 2 else 1, data, tuple(links))
 
 
@@ -146,31 +173,29 @@ def _two_ended(data: TwoEndedData) -> Walker:
     bases = [pin.SE3.Identity(), pin.SE3.Identity()]
     # Joints have the numbers 1 to 7 from tip to tip, whichever half they belong to
     links = [Link("arm1_base", BODY, bases[0]), *reversed_chain("arm1", "arm1_base", rows[:3], "arm1_hand", 1)]
-    links += [Link("arm2_base", BODY, bases[1]), *chain("arm2", "arm2_base", rows[3:], "arm2_hand")]
-    neutral = {"arm1_joint3": -0.5, "arm2_joint1": 1.0}
+    links += [Link("arm2_base", BODY, bases[1]), *chain("arm2", "arm2_base", rows[3:], "arm2_hand", 4)]
+    neutral = {f"arm{1 if k <= 3 else 2}_joint{k}": angle for k, angle in enumerate(data.initial_posture, start=1)}
     robot = _robot("two_ended_arm", links, neutral, {"body": BODY, "elbow": BODY}, data.digest)
     model, shapes = robot.model, _two_ended_shapes(data)
     arms = []
     for name, base in zip(("arm1", "arm2"), bases, strict=True):
         joints = [n for n in list(model.names) if str(n).startswith(name)]
         arms.append(_arm(robot, name, base, [str(n) for n in joints], [k for k in shapes if k.startswith(name)]))
-    pairs = [("arm1_link1", BODY), ("arm1_link1", "arm2_link1"), ("arm1_link1", "arm2_link4"), (BODY, "arm2_link4")]
-    robot = robot.with_shapes(shapes).with_self_pairs(pairs)
+    tip, boom, far_tip = "arm1_link1", "arm2_link4", "arm2_link7"
+    pairs = [(tip, BODY), (tip, boom), (tip, far_tip), (BODY, far_tip), (boom, far_tip)]
+    robot = _with_shapes(robot, shapes, pairs)
     return Walker(robot, tuple(arms), 1, data, tuple(links))
 
 
 def _two_ended_shapes(data: TwoEndedData) -> dict[str, tuple[PlacedShape, ...]]:
     """Capsules about the two booms and the two rolling tips."""
-    zero, boom = np.zeros(3), data.boom_length
+    zero, tip = np.zeros(3), np.array([0.0, 0.0, data.roll_offset])
+    elbow, along = np.array([0.0, 0.0, data.elbow_offset]), np.array([data.boom_length, 0.0, 0.0])
     return {
-        BODY: (segment_shape(np.array([-boom, 0.0, 0.0]), zero, data.boom_radius, 0.0),),
-        "arm1_link1": (segment_shape(zero, np.array([0.0, 0.0, data.roll_offset]), data.wrist_radius, 0.0),),
-        "arm2_link1": (
-            segment_shape(
-                np.array([0.0, 0.0, data.elbow_offset]), np.array([boom, 0.0, data.elbow_offset]), data.boom_radius, 0.0
-            ),
-        ),
-        "arm2_link4": (segment_shape(zero, np.array([0.0, 0.0, data.roll_offset]), data.wrist_radius, 0.0),),
+        BODY: (segment_shape(-along, zero, data.boom_radius, 0.0),),
+        "arm1_link1": (segment_shape(zero, -tip, data.wrist_radius, 0.0),),
+        "arm2_link4": (segment_shape(elbow, elbow + along, data.boom_radius, 0.0),),
+        "arm2_link7": (segment_shape(zero, tip, data.wrist_radius, 0.0),),
     }
 
 
@@ -183,7 +208,18 @@ def _robot(
     recipe = Recipe(name, neutral=neutral, frames=frames, acceleration=acceleration, source=source)
     notes = {"inertia": "the data have no masses: kinematics only", "data": digest}
     description = Description(build_model(name, BODY, links), "floating", notes=notes)
-    return finish(description, recipe, "none", (), {})
+    robot = finish(description, recipe, "none", (), {})
+    return replace(robot, notes={**robot.notes, "neutral": "the initial posture of the data"})
+
+
+def _with_shapes(
+    robot: Robot, shapes: Mapping[str, tuple[PlacedShape, ...]], pairs: Sequence[tuple[str, str]]
+) -> Robot:
+    notes = {
+        "shapes": "assumed: capsules with the radii of the data",
+        "self_pairs": f"{len(pairs)} pairs; links next to each other and links that no joint moves apart are left out",
+    }
+    return replace(robot.with_shapes(shapes).with_self_pairs(pairs), notes={**robot.notes, **notes})
 
 
 def _arm(robot: Robot, name: str, base: pin.SE3, joints: Sequence[str], links: Sequence[str]) -> Arm:

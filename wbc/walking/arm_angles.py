@@ -24,21 +24,46 @@ def frame3(q: Array) -> Array:
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
-def wrist_angles(z: Array, x: Array | None, theta4: Any) -> Array:
-    """theta4 to theta6 of both wrists ``[N, b, 2, 3]`` from the hand's z axis (and x axis) in frame 3 ``[N, b, 3]``."""
-    sine = np.hypot(z[..., 0], z[..., 1])
-    chosen = np.broadcast_to(validation.real_array("theta4", theta4), z.shape[:1])[:, None]
-    out = np.zeros((*z.shape[:-1], 2, 3))
-    for k, sign in enumerate((1.0, -1.0)):
-        fourth = np.where(sine > ALIGNED, np.arctan2(sign * z[..., 1], sign * z[..., 0]), chosen)
-        fifth = np.arctan2(sign * sine, z[..., 2])
-        out[..., k, 0], out[..., k, 1] = fourth, fifth
-        if x is not None:
-            (s4, c4), (s5, c5) = sines(fourth), sines(fifth)
-            across = c4 * x[..., 1] - s4 * x[..., 0]
-            along = c4 * c5 * x[..., 0] + s4 * c5 * x[..., 1] - s5 * x[..., 2]
-            out[..., k, 2] = np.arctan2(across, along)
+def wrist_angles(first: Array, z: Array, x: Array | None, theta4: Any) -> Array:
+    """theta4 to theta6 of both wrists, ``[N, b, 2, 3]``: theta5 >= 0, then theta5 < 0.
+
+    ``first`` are theta1 to theta3 ``[N, b, 3]``; ``z`` and ``x`` the hand's axes in the base ``[N, 3]``, x None for
+    theta6 = 0. In frame 3 the z axis is (c4 s5, s4 s5, c5). The second wrist is (theta4 + pi, -theta5, theta6 + pi);
+    where theta5 = 0, theta4 is as given and the two are one.
+
+    Raises:
+        ShapeError, NotFiniteError: theta4 that is neither a number nor N of them.
+    """
+    turn = sines(first[..., 0]), sines(first[..., 1] + first[..., 2])
+    zx, zy, zz = _in_frame3(turn, z)
+    sine = np.hypot(zx, zy)
+    aligned = sine <= ALIGNED
+    chosen = validation.real_array("theta4", theta4)
+    if chosen.shape not in ((), z.shape[:1]):
+        raise ShapeError("theta4", theta4, f"expected one number, or {len(z)}")
+    fourth = np.where(aligned, chosen.reshape(-1, 1), np.arctan2(zy, zx))
+    out = np.zeros((*sine.shape, 2, 3))
+    out[..., 0, 0], out[..., 0, 1] = fourth, np.arctan2(sine, zz)
+    out[..., 1, 0], out[..., 1, 1] = np.where(aligned, fourth, _opposite(fourth)), -out[..., 0, 1]
+    if x is not None:
+        xx, xy, xz = _in_frame3(turn, x)
+        s4, c4 = sines(fourth)
+        sixth = np.arctan2(c4 * xy - s4 * xx, zz * (c4 * xx + s4 * xy) - sine * xz)
+        out[..., 0, 2], out[..., 1, 2] = sixth, np.where(aligned, sixth, _opposite(sixth))
     return out
+
+
+def _in_frame3(turn: tuple[tuple[Array, Array], tuple[Array, Array]], vector: Array) -> tuple[Array, Array, Array]:
+    """Components of vectors ``[N, 3]`` along the axes of frame 3, ``[N, b]`` each."""
+    (s1, c1), (s, c) = turn
+    vx, vy, vz = vector[:, :1], vector[:, 1:2], vector[:, 2:]
+    outward = c1 * vx + s1 * vy
+    return c * outward - s * vz, c1 * vy - s1 * vx, s * outward + c * vz
+
+
+def _opposite(angle: Array) -> Array:
+    """Angles turned by half a turn, within (-pi, pi]."""
+    return np.where(angle > 0, angle - pi, angle + pi)
 
 
 def zyz(a: Array, b: Array, c: Array) -> Array:

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from math import hypot, pi, tan
+from math import pi
 from typing import Any
 
 import numpy as np
@@ -73,20 +73,27 @@ class ArmKinematics:
         """Signed distance-like margin [m] of wrist positions ``[..., 3]`` from the bounds of the first three joints.
 
         The least of: (longest - d) and (d - shortest), where d is the distance from the shoulder, which lies between
-        what the limit of joint 3 and the elbow limit leave; and the distance from the cylinder about the axis of
-        joint 1 that the shoulder limit keeps free. Negative: out of reach. The limits of joints 1 and 2 are left to
-        :meth:`margins`.
+        what the limit of joint 3 and the elbow limit leave; and the distance from the cone that the shoulder limit
+        keeps free, in the plane of the bent arm. Negative: out of reach. It is the arm that reaches forwards with
+        theta3 < 0; the limits of joints 1 and 2 are left to :meth:`margins`.
 
         Raises:
             ShapeError, NotFiniteError: not three finite numbers a point.
         """
         points, data = vectors("wrists", wrists, (3,)), self.data
-        rho2 = (points[..., :2] ** 2).sum(axis=-1)
-        offset2 = data.shoulder_offset**2
-        distance = np.sqrt(np.maximum(rho2 - offset2, 0.0) + (points[..., 2] - data.neck_length) ** 2)
+        es, we = data.upper_arm_length, data.forearm_length
+        across2 = (points[..., :2] ** 2).sum(axis=-1) - data.shoulder_offset**2
+        r, z = np.sqrt(np.maximum(across2, 0.0)), points[..., 2] - data.neck_length
+        distance = np.hypot(r, z)
         longest, shortest = (self._span(angle) for angle in (data.elbow_limit, -data.position_limits[2]))
-        inner = hypot(data.shoulder_offset, tan(data.shoulder_limit) * longest)
-        out: Array = np.minimum(np.minimum(longest - distance, distance - shortest), np.sqrt(rho2) - inner)
+        bend = -np.arccos(np.clip((distance**2 - es * es - we * we) / (2 * es * we), -1.0, 1.0))
+        # theta2 + theta3 / 2, which is the direction of the wrist from the shoulder where ES = WE
+        lean = np.arctan2(r, z) - np.arctan2(we * np.sin(bend), es + we * np.cos(bend)) + bend / 2
+        over = lean - data.shoulder_limit
+        cone = np.where(over < pi / 2, distance * np.sin(np.maximum(over, -pi / 2)), distance)
+        # Nearer to the axis of joint 1 than the shoulder's offset there is no posture
+        cone = np.where(across2 < 0, -np.sqrt(np.maximum(-across2, 0.0)), cone)
+        out: Array = np.minimum(np.minimum(longest - distance, distance - shortest), cone)
         return out
 
     def inverse(
@@ -121,8 +128,7 @@ class ArmKinematics:
         rotations = frames[:, :3, :3]
         wrists = frames[:, :3, 3] - self.data.hand_length * rotations[:, :, 2]
         first, solved = self._first_three(wrists, elbows, shoulders)
-        turned = np.einsum("nbji,njk->nbik", frame3(first), rotations)
-        wrist = wrist_angles(turned[..., :, 2], turned[..., :, 0], theta4)
+        wrist = wrist_angles(first, rotations[:, :, 2], rotations[:, :, 0], theta4)
         return self._finish(first, solved, wrist, limits)
 
     def inverse_axis(
@@ -144,8 +150,7 @@ class ArmKinematics:
         """
         at, along = vectors("points", points, (3,)).reshape(-1, 3), unit_vectors("axes", axes)
         first, solved = self._first_three(at - self.data.hand_length * along, elbows, shoulders)
-        turned = np.einsum("nbji,nj->nbi", frame3(first), along)
-        wrist = wrist_angles(turned, None, theta4)
+        wrist = wrist_angles(first, along, None, theta4)
         return self._finish(first, solved, wrist, limits)
 
     def margins(self, q: Any) -> Array:

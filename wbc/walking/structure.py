@@ -167,12 +167,12 @@ class Structure:
         """First 12 digits of the SHA-256 of holds, obstacles and surface."""
         h = hashlib.sha256()
         for hold in self.holds:
-            h.update(f"{hold.id} {hold.roll} {hold.max_tilt.hex()}".encode() + hold.pose.homogeneous.tobytes())
+            h.update(f"{hold.id} {hold.roll} {hold.max_tilt.hex()}".encode() + _bytes(hold.pose))
         for obstacle in self.obstacles:
-            h.update(f"{obstacle.id} {obstacle.shape}".encode() + obstacle.placement.homogeneous.tobytes())
+            h.update(f"{obstacle.id} {obstacle.shape}".encode() + _bytes(obstacle.placement))
         if self.surface is not None:
             h.update(f"{type(self.surface).__name__} {getattr(self.surface, 'radius', 0.0)!r}".encode())
-            h.update(self.surface.pose.homogeneous.tobytes())
+            h.update(_bytes(self.surface.pose))
         return h.hexdigest()[:12]
 
     def without(self, ids: Iterable[str]) -> Structure:
@@ -230,3 +230,8 @@ class Structure:
 def _frozen(array: Array) -> Array:
     array.flags.writeable = False
     return array
+
+
+def _bytes(pose: pin.SE3) -> bytes:
+    """The numbers of a pose; 0 and -0 are one."""
+    return bytes((pose.homogeneous + 0.0).tobytes())

@@ -118,8 +118,9 @@ def module(length: float = 6.0, radius: float = 2.1, max_tilt: float = TILT) -> 
     """A station module: a hull about the x axis with handrails, and three boxes of equipment that stand out.
 
     Handrails run along the hull every 6 degrees over its upper half and stand 0.07 m off it; grasp points are 0.22 m
-    apart on top of them, in rails of three with a gap of 0.3 m. Ids are "rail,number". The surface is that of the
-    rails' tops, so that what stays above it clears the rails. The approach direction is towards the axis, x along +x.
+    apart on top of them, in rails of three with a gap of 0.3 m. Ids are "rail,number"; grasp points within 0.15 m of a
+    box are left out. The surface is that of the rails' tops, so that what stays above it clears the rails. The approach
+    direction is towards the axis, x along +x.
 
     Raises:
         RangeError: a module too short for one rail, or a radius under 1 m.
@@ -146,7 +147,8 @@ def module(length: float = 6.0, radius: float = 2.1, max_tilt: float = TILT) -> 
         centre = turn @ np.array([0.0, 0.0, top + 0.1]) + [x * length, 0.0, 0.0]
         boxes.append(Obstacle(name, Box((0.3, 0.2, 0.2)), pin.SE3(turn, centre)))
     axis = pin.SE3(pin.utils.rotate("y", pi / 2), np.zeros(3))
-    return Structure("module", tuple(holds), tuple(boxes), CylinderSurface(axis, top))
+    kept = tuple(hold for hold in holds if all(box.distance(hold.position) >= 0.15 for box in boxes))
+    return Structure("module", kept, tuple(boxes), CylinderSurface(axis, top))
 
 
 #: Name -> function, as ``wbc walk --structure`` takes them
