@@ -18,7 +18,7 @@ from wbc.robot.loading import build, finish, looks_like_path, unknown
 from wbc.robot.recipe import Recipe, lock_mapping
 from wbc.robot.robot import Robot
 from wbc.robot.table import read_table
-from wbc.robots.walker_robot import made_here, recipe_of
+from wbc.robots.walker_robot import as_made, made_here, recipe_of
 
 _FOLDER = pathlib.Path(__file__).parent
 
@@ -105,15 +105,7 @@ def load(
         "effort": effort,
     }
     built = build(source, replace(recipe, **changes), wanted, shapes, package_dirs, limits)
-    if made is None:
-        return built
-    if lock is None and shapes == "auto" and built.base == made.base:
-        # Nothing of its links changed: keep its own shapes and pairs, and what it says about them
-        given = {key for key, value in limits.items() if value is not None} | ({"neutral"} if neutral else set())
-        kept = {key: note for key, note in made.notes.items() if key not in given}
-        notes = {**built.notes, **kept}
-        return replace(made, name=built.name, limits=built.limits, neutral=built.neutral, notes=notes)
-    return replace(built, notes={**built.notes, **{key: made.notes[key] for key in ("inertia", "data")}})
+    return built if made is None else as_made(built, made, lock is None and shapes == "auto", limits, neutral)
 
 
 def from_dh(

@@ -7,6 +7,7 @@ import pathlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import pi
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -133,6 +134,19 @@ def recipe_of(robot: Robot) -> Recipe:
         source=robot.notes["acceleration"].split(";")[0],
         shapes=tuple(_link_shape(link, shape) for link, group in robot.shapes.items() for shape in group),
     )
+
+
+def as_made(built: Robot, made: Robot, whole: bool, limits: Mapping[str, Any], neutral: Any) -> Robot:
+    """``built`` out of the recipe of ``made``, with what a recipe does not hold.
+
+    With ``whole`` links and joints are as they were made, unless the base is another: then shapes, pairs and notes are
+    those of ``made``, except notes about ``limits`` and ``neutral`` that were given.
+    """
+    if whole and built.base == made.base:
+        given = {key for key, value in limits.items() if value is not None} | ({"neutral"} if neutral else set())
+        notes = {**built.notes, **{key: note for key, note in made.notes.items() if key not in given}}
+        return replace(made, name=built.name, limits=built.limits, neutral=built.neutral, notes=notes)
+    return replace(built, notes={**built.notes, **{key: made.notes[key] for key in ("inertia", "data")}})
 
 
 def _link_shape(link: str, placed: PlacedShape) -> LinkShape:
