@@ -104,7 +104,7 @@ def test_20_no_hold_to_begin_from() -> None:
     walker = PublishedWalker((13, 12), removed=everything)
     outcome = walker.drive((0.0, INCH, 0.0), 5.0)
     assert (outcome.reason, outcome.arm, outcome.set_down) == ("no hold", 3, False)
-    assert outcome.message == "ARM 3 FINDS NO HANDHOLD."
+    assert outcome.message == "ARM 3 IS ON NO HANDHOLD."
     assert walker.place == pytest.approx((13.0, 12.0, 0.0), abs=1e-12)
 
 

@@ -21,7 +21,7 @@ from wbc.validation import Array
 from wbc.walking.published.arm_control import ArmTask
 from wbc.walking.published.body import body_place, body_twist
 from wbc.walking.published.commands import Command
-from wbc.walking.published.gait import LATE, Gait
+from wbc.walking.published.gait import LATE, Gait, Lift
 from wbc.walking.published.grid import Place
 from wbc.walking.published.holds import handholds
 from wbc.walking.published.motion import CYCLE
@@ -40,10 +40,11 @@ class Outcome:
     """How a mode ended.
 
     Attributes:
-        reason: ``key``, ``time``, ``reached``, ``limits`` (a joint), ``no hold`` (an arm found none before it began).
+        reason: ``key``, ``time``, ``reached``, ``limits`` (a joint), ``no hold`` (it did not begin).
         time: of the mode [s]. message: as the walker prints it.
         joint, arm: of the fault, from 1; None without one.
         set_down: whether all arms hold now. rows: of the log, those of the mode.
+        lifts, replans: of the mode, in the order of time.
     """
 
     reason: Reason
@@ -53,6 +54,8 @@ class Outcome:
     arm: int | None
     set_down: bool
     rows: slice
+    lifts: tuple[Lift, ...]
+    replans: tuple[Lift, ...]
 
 
 class Supervisor:
@@ -97,27 +100,30 @@ class Supervisor:
 
         return self._mode(cycle, key, duration)
 
-    def set_down(self) -> bool:
-        """Bring every arm in the air to a hold, the body standing; whether all hold."""
+    def set_down(self) -> Fault | None:
+        """Bring every arm in the air to a hold, the body standing; the last fault on the way, if there was one."""
+        fault = None
         for arm in range(ARMS):
             if not self.gait.supporting[arm]:
-                self._set_down(arm)
-        return all(self.gait.supporting)
+                fault = self._set_down(arm) or fault
+        return fault
 
-    def _set_down(self, arm: int) -> None:
+    def _set_down(self, arm: int) -> Fault | None:
         place = self._resting_place(arm)
         if place is None:
-            return
+            return None
         motion = self.gait.swing(arm, self.plant, place)
         self.gait.start(arm, motion, place)
         for _ in range(int((motion.duration + LATE) / CYCLE) + 1):
             self.recorder.add(self.plant, self.gait, np.zeros(3))
             command = self.gait.track(arm, self.plant)
-            if self.plant.move(np.zeros(6), self.gait.order(arm, command)) is not None:
-                return
+            fault = self.plant.move(np.zeros(6), self.gait.order(arm, command))
+            if fault is not None:
+                return fault
             self.gait.cycle += 1
             if self.gait.supporting[arm]:
-                return
+                break
+        return None
 
     def _resting_place(self, arm: int) -> Place | None:
         view = View(self.gait.shoulders, self.plant.body)
@@ -131,12 +137,14 @@ class Supervisor:
         return int(column), int(row)
 
     def _mode(self, cycle: Callable[[Array], Fault | Reason | None], key: Key, duration: float) -> Outcome:
-        first = len(self.recorder.rows)
-        if not self.set_down():
-            arm = self.gait.supporting.index(False) + 1
-            return self._outcome("no hold", f"ARM {arm} FINDS NO HANDHOLD.", first, None, arm)
-        first = len(self.recorder.rows)
+        fault = self.set_down()
         self.gait.restart()
+        first = len(self.recorder.rows)
+        arm = self.gait.in_air
+        if arm is not None:
+            if fault is not None:
+                return self._ended("limits", str(fault), first, fault)
+            return self._ended("no hold", f"ARM {arm + 1} IS ON NO HANDHOLD.", first)
         while True:
             place = self.place
             if key(self.gait.time, place):
@@ -152,9 +160,20 @@ class Supervisor:
 
     def _ended(self, reason: Reason, message: str, first: int, fault: Fault | None = None) -> Outcome:
         """The mode's outcome, all arms being set down."""
-        time, rows = self.gait.time, slice(first, len(self.recorder.rows))
-        joint, arm = (None, None) if fault is None else (fault.joint, fault.arm)
-        return Outcome(reason, time, message, joint, arm, self.set_down(), rows)
-
-    def _outcome(self, reason: Reason, message: str, first: int, joint: int | None, arm: int | None) -> Outcome:
-        return Outcome(reason, 0.0, message, joint, arm, False, slice(first, len(self.recorder.rows)))
+        gait = self.gait
+        time, rows = gait.time, slice(first, len(self.recorder.rows))
+        joint = None if fault is None else fault.joint
+        arm = gait.in_air if reason == "no hold" else None if fault is None else fault.arm - 1
+        if reason != "no hold":
+            self.set_down()
+        return Outcome(
+            reason,
+            time,
+            message,
+            joint,
+            None if arm is None else arm + 1,
+            gait.in_air is None,
+            rows,
+            tuple(gait.lifts),
+            tuple(gait.replans),
+        )
