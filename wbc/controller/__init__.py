@@ -1,5 +1,6 @@
 """The controller (floor 6)."""
 
+from wbc.controller.branches import Branches
 from wbc.controller.continuation import Branch
 from wbc.controller.controller import Controller
 from wbc.controller.recorder import Recorder
@@ -12,6 +13,7 @@ from wbc.controller.step import Certificate, Status, Step
 
 __all__ = [
     "Branch",
+    "Branches",
     "Certificate",
     "Controller",
     "Ending",

@@ -47,10 +47,10 @@ def branch(engine: Engine, aim: Callable[[float], None], s: Array, first: Array,
     """The branch at coordinates, from a configuration at which the search of the first one begins."""
     tracker = Tracker(engine, aim, tolerance)
     q = [tracker.at(float(s[0]), first)]
-    steps = [engine.look(q[0])]
+    steps = [tracker.look(q[0])]
     for before, here in itertools.pairwise(s.tolist()):
         q.append(tracker.go(before, here, q[-1]))
-        steps.append(engine.look(q[-1]))
+        steps.append(tracker.look(q[-1]))
     return Branch(s, np.array(q), tuple(steps), tracker.samples, tracker.moved)
 
 
@@ -104,6 +104,10 @@ class Tracker:
         self._slope = here, slope
         return q
 
+    def look(self, q: Array) -> Step:
+        """The tick at q, with the targets that were set last."""
+        return self._engine.look(q, self._query.settling)
+
     def _near(self, s: float, start: Array) -> Array | None:
         """The answer of a search without restarts, None where there is none."""
         engine = self._engine
@@ -115,7 +119,7 @@ class Tracker:
         """Of the configuration that the last search ended with."""
         engine = self._engine
         q = engine.within_limits(engine.tick.q)
-        step = engine.look(q)
+        step = self.look(q)
         far = "; ".join(f"{name} off by {step.residuals[name]}" for name in engine.goals)
         return InfeasibleError("s", float(s), f"not reached: {far}; {self._blocking(q, beyond)}")
 
@@ -129,5 +133,5 @@ class Tracker:
     def _blocking(self, q: Array, beyond: float) -> str:
         """What keeps a configuration from the targets of a coordinate some way on."""
         self._aim(beyond)
-        binding = self._engine.look(q).binding
+        binding = self.look(q).binding
         return "binding: " + ", ".join(str(b) for b in binding) if binding else "no row binds"

@@ -54,7 +54,9 @@ class Search:
             descents += 1
             if ending == FOUND:
                 break
-        if query.wishes if ending == FOUND else self._cost < np.inf:
+        if ending != FOUND and self._cost < np.inf:
+            ending = self._settle(query, ending, begin + seconds)
+        if ending == FOUND and query.wishes:
             ending = self._settle(query, ending, begin + seconds)
         self._assembly.plain[0] = 0.0
         tick.q[:], tick.weight[:] = self._best, weight

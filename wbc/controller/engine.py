@@ -20,6 +20,7 @@ from wbc.controller.step import Step
 from wbc.controller.tick import Assembly
 from wbc.controller.timeless import FIRST, TICK, chosen_goals, goal_rows, hasten, searching, timeless
 from wbc.errors import RangeError, ShapeError
+from wbc.qp.problem import QP
 from wbc.stack.declaration import Declaration
 from wbc.stack.places import stops
 from wbc.validation import Array
@@ -81,12 +82,17 @@ class Engine:
         self.tick.q[:], self.tick.v_last[:] = first, 0.0
         return self.search.run(query, seconds)
 
-    def look(self, q: Array) -> Step:
-        """The tick at q."""
+    def look(self, q: Array, weight: Array) -> Step:
+        """The tick at q, for weights that a search ended with."""
+        tick, before = self.tick, self.tick.weight.copy()
+        tick.weight[:] = weight
         if self._sensing:
-            return self.controller.step(q, self._rest, dt=TICK)
-        self.tick.q[:], self.tick.v_last[:] = q, 0.0
-        return self.controller.again()
+            step = self.controller.step(q, self._rest, dt=TICK)
+        else:
+            tick.q[:], tick.v_last[:] = q, 0.0
+            step = self.controller.again()
+        tick.weight[:] = before
+        return step
 
     def query(self, goals: Sequence[str], tolerance: float, restarts: int, seed: int) -> Query:
         """A search for some goals, with the weights as they are."""
@@ -131,7 +137,7 @@ class Engine:
         robot = self.stack.robot
         everywhere = Starts(robot, lower, upper, np.ones(robot.nv, dtype=bool))
         q = np.where(everywhere.chosen != 0.0, everywhere.table(1, 0)[0], self.tick.q)
-        share = np.diag(self.hessian(q, self.tick.weight * self.rows)) * self.dof_scales**2
+        share = np.diag(self.qp(q, self.tick.weight * self.rows).H) * self.dof_scales**2
         return Starts(robot, lower, upper, share > _MOVED * share.max(initial=0.0))
 
     def random(self, count: int, seed: int) -> Array:
@@ -140,13 +146,13 @@ class Engine:
             self._table = (seed, self.starts.table(count, seed))
         return self._table[1][:count]
 
-    def hessian(self, q: Array, weight: Array) -> Array:
-        """J' W J and the damping of the task rows at q [nv, nv]."""
+    def qp(self, q: Array, weight: Array) -> QP:
+        """The QP at q, without curvature, for some weights of the task rows."""
         tick, before, here = self.tick, self.tick.weight.copy(), self.tick.q.copy()
         tick.weight[:], tick.q[:], tick.dt[0], tick.plain[0] = weight, q, TICK, 1.0
-        H = tick.qp().H
+        qp = tick.qp()
         tick.weight[:], tick.q[:], tick.plain[0] = before, here, 0.0
-        return H
+        return qp
 
 
 def ending(found: Found) -> Ending:

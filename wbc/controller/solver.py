@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
@@ -11,6 +12,7 @@ import numpy as np
 
 from wbc import validation
 from wbc.controller.batch import search_many
+from wbc.controller.branches import Branches, branches
 from wbc.controller.continuation import Branch, branch
 from wbc.controller.engine import Engine, count, ending
 from wbc.controller.handle import Handle
@@ -95,7 +97,7 @@ class Solver:
             spent, ticks = spent + sum(a.seconds for a in alone), ticks + sum(a.ticks for a in alone)
             if all(a.ending == FOUND for a in alone):
                 status = Ending.CONTRADICTORY
-        step = engine.look(answer)
+        step = engine.look(answer, query.settling if status == Ending.SOLVED else query.seeking)
         return Solution(answer, status, goals, ticks, found.descents + (found.ending > EXHAUSTED), spent, step)
 
     def solve_batch(
@@ -201,6 +203,49 @@ class Solver:
             return branch(engine, moving.aim, places, engine.begin(q0), near)
         finally:
             engine.tick.p[:] = before
+
+    def branches(
+        self,
+        q0: Any,
+        *,
+        most: int | None = None,
+        seed: int = 0,
+        budget: float | None = 1.0,
+        restarts: int = 500,
+        tolerance: float = 1e-5,
+    ) -> Branches:
+        """The distinct configurations that meet the goals, as one descent from each of many configurations finds them.
+
+        Two are distinct where a joint differs by more than 0.01 (rad, or characteristic lengths), full turns not
+        counted; of those that differ by full turns the one nearest to q0 within the limits is given. With wishes, a
+        branch is a configuration where they are at rest: the best one of its neighbourhood.
+
+        Answers are points only where tasks, holds and couplings leave no direction free. A redundant arm with a pose
+        alone has curves of answers, of which any list would be arbitrary: such a stack is refused. With a wish that
+        decides, as a Posture of small weight, the points are those of the curves where it is at rest.
+
+        Args:
+            q0: where the first descent begins [nq], and what distances are counted from.
+            most: branches that are enough; None: go on until the restarts or the time are used up.
+            seed: of the random configurations. The answer is a function of q0, the run-time values, the seed and the
+                number of restarts, unless the time ends the search.
+            budget: time for the search [s], overrun by one iteration and the report of the answers at most; None: no
+                limit.
+            restarts: random configurations to start from after q0.
+            tolerance: of every row of a goal, in metres and radians.
+
+        Raises:
+            RangeError: a direction is free. InfeasibleError: no descent met the goals; ``value`` is the largest error
+                at the nearest configuration, and the message names what binds there. WbcError: bad input.
+
+        What it cannot do: prove that these are all; :attr:`Branches.unseen` estimates what was missed.
+        """
+        engine = self._engine
+        seconds, near, starts, number = _options(budget, tolerance, restarts, seed)
+        wanted = count("most", sys.maxsize if most is None else most)
+        if wanted < 1:
+            raise RangeError("most", most, "expected at least one branch")
+        return branches(engine, engine.begin(q0), wanted, number, seconds, starts, near)
 
 
 def _options(budget: Any, tolerance: Any, restarts: Any, seed: Any) -> tuple[float, float, int, int]:

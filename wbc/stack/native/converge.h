@@ -211,7 +211,8 @@ EXPORT void wbc_tick_converge(wbc_tick *t, const wbc_search *s, wbc_found *out) 
         out->descents += 1.0;
         if (out->ending == WBC_FOUND) break;
     }
-    if (out->ending != WBC_FOUND ? out->cost < HUGE_VAL : s->wishes != 0.0) settle(t, s, out, end);
+    if (out->ending != WBC_FOUND && out->cost < HUGE_VAL) settle(t, s, out, end);
+    if (out->ending == WBC_FOUND && s->wishes != 0.0) settle(t, s, out, end);
     memcpy(t->q, t->q_good, NQ * sizeof(double));
     memcpy(t->weight, weight, MT * sizeof(double));
     t->plain = 0.0;
