@@ -10,10 +10,11 @@ import numpy as np
 import pinocchio as pin
 
 from wbc.robot import DHRow
-from wbc.robot.recipe import segment_shape
 from wbc.robots.walker_data import TwoEndedData, WalkerData
 from wbc.robots.walker_model import Link
-from wbc.shapes import PlacedShape
+
+#: Link and frame of the body
+BODY = "body"
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,21 +77,6 @@ def chain(prefix: str, base: str, rows: Sequence[DHRow], hand: str, first: int =
         parent, tail = link, row.after()
     links.append(Link(hand, parent, tail))
     return links
-
-
-def puma_shapes(prefix: str, data: WalkerData) -> dict[str, tuple[PlacedShape, ...]]:
-    """Capsules about neck (O to N), upper arm (S to E), forearm (E to W) and hand (W to H)."""
-    segments = {
-        f"{prefix}_link1": ((0.0, 0.0, 0.0), (0.0, 0.0, data.neck_length), data.neck_radius),
-        f"{prefix}_link2": (
-            (0.0, 0.0, data.shoulder_offset),
-            (data.upper_arm_length, 0.0, data.shoulder_offset),
-            data.upper_arm_radius,
-        ),
-        f"{prefix}_link4": ((0.0, 0.0, 0.0), (0.0, 0.0, data.forearm_length), data.forearm_radius),
-        f"{prefix}_link6": ((0.0, 0.0, 0.0), (0.0, 0.0, data.hand_length), data.hand_radius),
-    }
-    return {k: (segment_shape(np.array(a), np.array(b), r, 0.0),) for k, (a, b, r) in segments.items()}
 
 
 def two_ended_rows(data: TwoEndedData) -> tuple[DHRow, ...]:

@@ -17,13 +17,13 @@ from wbc.errors import RangeError, ShapeError
 from wbc.robot import Robot
 from wbc.robot.description import Description
 from wbc.robot.loading import finish
-from wbc.robot.recipe import LinkShape, Recipe, segment_shape
-from wbc.robots.walker_arms import Arm, chain, puma_rows, puma_shapes, reversed_chain, two_ended_rows
+from wbc.robot.recipe import LinkShape, Recipe
+from wbc.robots.walker_arms import BODY, Arm, chain, puma_rows, reversed_chain, two_ended_rows
 from wbc.robots.walker_data import TwoEndedData, WalkerData
 from wbc.robots.walker_model import Link, build_model, write_urdf
-from wbc.shapes import Capsule, Convex, PlacedShape, Sphere
+from wbc.robots.walker_shapes import body_shapes, link_pairs, puma_shapes, two_ended_shapes
+from wbc.shapes import Capsule, PlacedShape, Sphere
 
-BODY = "body"
 BODY_SHAPES = ("capsules", "prism", "none")
 
 
@@ -90,8 +90,8 @@ def walker(
         two_ended: make the two-ended arm.
         artificial_limits: let theta3 end at the data's elbow limit. The shoulder limit joins two joints and is
             no limit of the robot.
-        body_shape: ``capsules`` (about the edges of the body and from its centre to the arms), ``prism`` (a convex
-            body, exact, which URDF does not get) or ``none``.
+        body_shape: ``capsules`` (about the edges of the body, and in its middle what leaves no gap for a hand),
+            ``prism`` (a convex body, exact, which URDF does not get) or ``none``.
 
     Raises:
         ShapeError, NotFiniteError, RangeError: a bad number, or data of the other machine.
@@ -161,7 +161,7 @@ def _bodied(count: int, data: WalkerData, artificial_limits: bool, body_shape: s
     out = pin.SE3(np.eye(3), np.array([data.shoulder_radius, 0.0, 0.0]))
     bases = [corner * out for corner in corners]
     links: list[Link] = []
-    shapes = _body_shapes([np.array(base.translation) for base in bases], data, body_shape)
+    shapes = body_shapes([np.array(base.translation) for base in bases], data, body_shape)
     for name, base in zip(names, bases, strict=True):
         links.append(Link(f"{name}_base", BODY, base))
         links += chain(name, f"{name}_base", puma_rows(data, artificial_limits), f"{name}_hand")
@@ -178,7 +178,7 @@ def _bodied(count: int, data: WalkerData, artificial_limits: bool, body_shape: s
         )
         for name, base in zip(names, bases, strict=True)
     )
-    robot = _with_shapes(robot, shapes, _pairs(arms, BODY in shapes))
+    robot = _with_shapes(robot, shapes, link_pairs(arms, BODY in shapes, data))
     return Walker(robot, arms, 2 if count > 2 else 1, data, tuple(links))
 
 
@@ -190,7 +190,7 @@ def _two_ended(data: TwoEndedData) -> Walker:
     links += [Link("arm2_base", BODY, bases[1]), *chain("arm2", "arm2_base", rows[3:], "arm2_hand", 4)]
     neutral = {f"arm{1 if k <= 3 else 2}_joint{k}": angle for k, angle in enumerate(data.initial_posture, start=1)}
     robot = _robot("two_ended_arm", links, neutral, {"body": BODY, "elbow": BODY}, data.digest)
-    model, shapes = robot.model, _two_ended_shapes(data)
+    model, shapes = robot.model, two_ended_shapes(data)
     arms = []
     for name, base in zip(("arm1", "arm2"), bases, strict=True):
         joints = [n for n in list(model.names) if str(n).startswith(name)]
@@ -199,18 +199,6 @@ def _two_ended(data: TwoEndedData) -> Walker:
     pairs = [(tip, BODY), (tip, boom), (tip, far_tip), (BODY, far_tip), (boom, far_tip)]
     robot = _with_shapes(robot, shapes, pairs)
     return Walker(robot, tuple(arms), 1, data, tuple(links))
-
-
-def _two_ended_shapes(data: TwoEndedData) -> dict[str, tuple[PlacedShape, ...]]:
-    """Capsules about the two booms and the two rolling tips."""
-    zero, tip = np.zeros(3), np.array([0.0, 0.0, data.roll_offset])
-    elbow, along = np.array([0.0, 0.0, data.elbow_offset]), np.array([data.boom_length, 0.0, 0.0])
-    return {
-        BODY: (segment_shape(-along, zero, data.boom_radius, 0.0),),
-        "arm1_link1": (segment_shape(zero, -tip, data.wrist_radius, 0.0),),
-        "arm2_link4": (segment_shape(elbow, elbow + along, data.boom_radius, 0.0),),
-        "arm2_link7": (segment_shape(zero, tip, data.wrist_radius, 0.0),),
-    }
 
 
 def _robot(
@@ -231,7 +219,7 @@ def _with_shapes(
 ) -> Robot:
     notes = {
         "shapes": "assumed: capsules with the radii of the data",
-        "self_pairs": f"{len(pairs)} pairs; links next to each other and links that no joint moves apart are left out",
+        "self_pairs": f"{len(pairs)} pairs; left out: neighbours, and links that no joint moves apart or together",
     }
     return replace(robot.with_shapes(shapes).with_self_pairs(pairs), notes={**robot.notes, **notes})
 
@@ -244,28 +232,3 @@ def _arm(robot: Robot, name: str, base: pin.SE3, joints: Sequence[str], links: S
     return Arm(
         name, base, tuple(joints), q, slice(first.start, last.stop), f"{name}_base", f"{name}_hand", tuple(links)
     )
-
-
-def _pairs(arms: Sequence[Arm], body: bool) -> list[tuple[str, str]]:
-    """Links that must not touch: all but those next to each other and the necks, which no joint moves apart."""
-    out = []
-    for i, arm in enumerate(arms):
-        neck, upper, forearm, hand = arm.links
-        out += [(neck, forearm), (neck, hand), (upper, hand)]
-        out += [(BODY, link) for link in (upper, forearm, hand) if body]
-        for other in arms[i + 1 :]:
-            out += [(a, b) for a in arm.links for b in other.links if (a, b) != (neck, other.links[0])]
-    return out
-
-
-def _body_shapes(corners: Sequence[np.ndarray], data: WalkerData, kind: str) -> dict[str, tuple[PlacedShape, ...]]:
-    """The body: a prism over the polygon of the arm bases."""
-    half, count = data.body_half_thickness, len(corners)
-    if kind == "none":
-        return {}
-    if kind == "prism" and count > 2:
-        points = np.array([corner + [0.0, 0.0, side * half] for corner in corners for side in (-1.0, 1.0)])
-        return {BODY: (PlacedShape(Convex(points), pin.SE3.Identity()),)}
-    edges = [(corners[i], corners[(i + 1) % count]) for i in range(count if count > 2 else 1)]
-    spokes = [(np.zeros(3), corner) for corner in corners] if count > 2 else []
-    return {BODY: tuple(segment_shape(a, b, half, 0.0) for a, b in edges + spokes)}

@@ -106,9 +106,10 @@ def test_urdf_gives_the_same_machine(name: str, tmp_path: Path) -> None:
         # A capsule is a cylinder and two balls in URDF
         cores = [shape for shape in loaded.shapes[link] if isinstance(shape.shape, Cylinder)]
         balls = [shape for shape in loaded.shapes[link] if isinstance(shape.shape, Sphere)]
-        ends = [end for shape in group for end in shape.ends()]
+        ends = [end for shape in group for end in shape.ends()[: 2 if isinstance(shape.shape, Capsule) else 1]]
         np.testing.assert_allclose([ball.placement.translation for ball in balls], ends, atol=1e-12)
-        for shape, core in zip(group, cores, strict=True):
+        capsules = [shape for shape in group if isinstance(shape.shape, Capsule)]
+        for shape, core in zip(capsules, cores, strict=True):
             np.testing.assert_allclose(core.placement.homogeneous, shape.placement.homogeneous, atol=1e-12)
             assert isinstance(core.shape, Cylinder)
             assert isinstance(shape.shape, Capsule)
@@ -174,13 +175,36 @@ def test_capsules_lie_between_the_named_points() -> None:
 
 def test_neighbours_and_necks_are_no_pairs() -> None:
     pairs = {frozenset(pair) for pair in MACHINES["three"].robot.self_pairs or ()}
-    assert len(pairs) == 63
+    assert len(pairs) == 60
     for i in (1, 2, 3):
         chain = ["body", *(f"arm{i}_link{k}" for k in (1, 2, 4, 6))]
         assert not {frozenset(pair) for pair in pairwise(chain)} & pairs
         assert frozenset(("body", f"arm{i}_link6")) in pairs
+        assert frozenset(("body", f"arm{i}_link2")) not in pairs
     assert frozenset(("arm1_link1", "arm2_link1")) not in pairs
     assert frozenset(("arm1_link1", "arm2_link6")) in pairs
+
+
+def test_an_upper_arm_that_reaches_the_body_is_a_pair() -> None:
+    data = WalkerData.read(upper_arm_length=0.6)
+    assert ("body", "arm1_link2") in (walker(data=data).robot.self_pairs or ())
+
+
+@pytest.mark.parametrize(("radius", "count"), [(None, 4), (0.45, 6)])
+def test_no_hand_fits_through_the_body(radius: float | None, count: int) -> None:
+    machine = walker(shoulder_radius=radius)
+    shapes, data = machine.robot.shapes["body"], machine.data
+    assert isinstance(data, WalkerData)
+    assert len(shapes) == count
+    corners = np.array([arm.base.translation for arm in machine.arms])
+    weights = np.random.default_rng(4).dirichlet(np.ones(3), 3000)
+    distances = []
+    for shape in shapes:
+        a, b = shape.ends()
+        span = b - a
+        along = np.clip((weights @ corners - a) @ span / max(float(span @ span), 1e-12), 0.0, 1.0)
+        distances.append(np.linalg.norm(weights @ corners - a - along[:, None] * span, axis=1))
+    assert np.min(distances, axis=0).max() < data.body_half_thickness + data.hand_radius
 
 
 def test_body_shapes() -> None:
