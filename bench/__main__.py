@@ -10,17 +10,22 @@ from pathlib import Path
 from rich.console import Console
 
 from bench import figure, report
+from bench.code.run import measure as measure_code
 from bench.curve_run import measure_curves
+from bench.deadlines.course import KINDS
+from bench.deadlines.run import measure as measure_deadlines
 from bench.harness import Plan, machine, measure, measure_startup
 from bench.pool import ROOT
 from bench.prepare import prepare
 from bench.versions import versions
+from wbc.stack import toolchain
 
 OWN = ("wbc", "casadi", "pin", "numpy", "daqp")
 PEERS = ("pin-pink", "mink", "mujoco", "placo", "qpsolvers", "daqp", "quadprog", "pin", "numpy")
 PROBLEMS = ("panda", "ur5", "talos")
-#: The problems of growing size, all of them
-CURVES = "curves"
+#: The problems of growing size, all of them; the exported tick on the problems; caps on iterations
+CURVES, CODE, DEADLINES = "curves", "code", "deadlines"
+PARTS = (*PROBLEMS, CURVES, CODE, DEADLINES)
 
 
 def main() -> None:
@@ -28,7 +33,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="bench", description=__doc__)
     parser.add_argument("--peers-python", help="interpreter with the peers; without it they are left out")
     parser.add_argument("--rounds", type=int, help="rounds a problem")
-    parser.add_argument("--problems", nargs="+", default=[*PROBLEMS, CURVES], choices=[*PROBLEMS, CURVES])
+    parser.add_argument("--problems", nargs="+", default=PARTS, choices=PARTS)
     parser.add_argument("--work", type=Path, default=ROOT / "build" / "bench", help="folder for the problems")
     parser.add_argument("--output", type=Path, default=ROOT / "bench", help="folder for results.json and results.md")
     chosen = parser.parse_args()
@@ -37,7 +42,7 @@ def main() -> None:
     plan = Plan(sys.executable, peers, chosen.work, chosen.rounds, [n for n in PROBLEMS if n in chosen.problems])
     console, progress = Console(), Console(stderr=True)
     if not console.is_terminal:
-        console = Console(width=100)
+        console = Console(width=160)
     about = machine()
     prepare(plan.folder)
     with progress.status("") as status:
@@ -49,6 +54,10 @@ def main() -> None:
         }
         if CURVES in chosen.problems:
             results[CURVES] = measure_curves(peers, plan.folder / "curves", chosen.rounds, status.update)
+        if CODE in chosen.problems and toolchain.available():
+            results[CODE] = {name: measure_code(plan, name, status.update) for name in PROBLEMS}
+        if DEADLINES in chosen.problems and toolchain.available():
+            results[DEADLINES] = {name: measure_deadlines(plan, name, status.update) for name in KINDS}
     chosen.output.mkdir(parents=True, exist_ok=True)
     (chosen.output / "results.json").write_text(json.dumps(results, indent=1) + "\n")
     (chosen.output / "results.md").write_text(report.markdown(results))
@@ -58,6 +67,8 @@ def main() -> None:
         figure.draw(results[CURVES], picture / "bench_curves.png")
     if complete and len(plan.names) == len(PROBLEMS) and chosen.output == ROOT / "bench":
         report.put_between(ROOT / "README.md", "bench", report.readme(results))
+    if CODE in results and DEADLINES in results and chosen.output == ROOT / "bench":
+        report.put_between(ROOT / "docs" / "export.md", "bench", report.export_page(results))
     report.show(results, console)
 
 

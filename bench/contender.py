@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from pathlib import Path
 from time import perf_counter_ns
 
 import numpy as np
@@ -47,6 +48,10 @@ class Contender(ABC):
     def native(self) -> int | None:
         """As :meth:`call`, through the native function alone; its duration [ns], None where there is no such thing."""
         return None
+
+    def export(self, folder: Path) -> bool:
+        """Write the tick as C and a path of states; whether the package can."""
+        return False
 
     def settle(self) -> None:  # noqa: B027 (most packages move their own state)
         """What is left to do after the timed call, such as moving a state that the package does not keep."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import os
+from pathlib import Path
 from time import perf_counter, perf_counter_ns
 from typing import Any
 
@@ -87,6 +88,21 @@ class Ours(Contender):
         start = perf_counter_ns()
         tick.step_function(tick.pointer)
         return perf_counter_ns() - start
+
+    def export(self, folder: Path) -> bool:
+        """``export``: the tick as C; ``path.bin``: configuration, run-time inputs and command of every tick."""
+        self.reset()
+        self.controller.export(folder / "export", states=100)
+        layout = self.controller.layout
+        path = [np.array([self.case.ticks, layout.nq, layout.nv, layout.parameters], dtype=np.float64)]
+        for k in range(self.case.ticks):
+            self.aim(k)
+            path += [self.q.copy(), self.controller.tick.p.copy()]
+            self.call()
+            path.append(self.velocity)
+            self.settle()
+        np.concatenate(path).tofile(folder / "path.bin")
+        return True
 
     def settle(self) -> None:
         # The last command is the velocity of the step, also after a native call that made no Step

@@ -8,7 +8,9 @@ from typing import Any
 
 from rich.console import Console
 
+from bench.code import tables as code
 from bench.curve_report import NOTES, curve_readme, curve_sheets
+from bench.deadlines import run as deadlines
 from bench.goals import Goal, goals
 from bench.sheet import Sheet, line, us
 
@@ -39,7 +41,26 @@ def sheets(results: dict[str, Any]) -> list[Sheet]:
     for problem in results["problems"].values():
         out += [ticks(problem), answers(problem), phases(problem)]
     out += curve_sheets(results.get("curves", ()))
-    return [*out, startup(results["startup"]), goal_sheet(goals(results))]
+    return [*out, *code_sheets(results), startup(results["startup"]), goal_sheet(goals(results))]
+
+
+def code_sheets(results: dict[str, Any]) -> list[Sheet]:
+    """The exported tick, and caps on iterations."""
+    out = [code.sheet(measured) for measured in results.get("code", {}).values()]
+    return out + [deadlines.sheet(name, course) for name, course in results.get("deadlines", {}).items()]
+
+
+def code_notes(results: dict[str, Any]) -> list[str]:
+    """What these two need."""
+    out = [code.note(results["code"])] if results.get("code") else []
+    return out + ([deadlines.NOTE] if results.get("deadlines") else [])
+
+
+def export_page(results: dict[str, Any]) -> str:
+    """The tables of docs/export.md."""
+    about = results["machine"]
+    told = f"{about['processor']}, {about['cores']}, load {about['load']}."
+    return "\n\n".join([*(sheet.markdown() for sheet in code_sheets(results)), *code_notes(results), told])
 
 
 def ticks(problem: dict[str, Any]) -> Sheet:
@@ -112,6 +133,7 @@ def notes(results: dict[str, Any]) -> list[str]:
         TERMS,
         ERRORS,
         *(NOTES.split("\n\n") if results.get("curves") else ()),
+        *code_notes(results),
     ]
 
 

@@ -5,6 +5,7 @@
     {"do": "path"}                  ->  {"states": [[...], ...]}        one pass along the path
     {"do": "accuracy"}              ->  {"error": largest difference to the exact solution, or null}
     {"do": "memory"}                ->  {"peak": bytes}
+    {"do": "export", "folder": "..."}  ->  {"done": true}             the tick as C and a path, see bench.code
     {"do": "open", "folder": "..."} ->  {"facts": {...}}                another problem instead
     {"do": "sample", "budget": 0.3} ->  {"call": [ns, ...], "states": [[...], ...]}
                                         as many ticks of one pass as take that long [s]
@@ -166,6 +167,7 @@ def answer(contender: Contender, command: dict[str, Any]) -> dict[str, Any]:
         "path": lambda: walk(contender),
         "accuracy": lambda: accuracy(contender),
         "memory": peak_memory,
+        "export": lambda: {"done": contender.export(Path(command["folder"]))},
         "sample": lambda: time_sample(contender, command["budget"]),
     }
     return answers[command["do"]]()

@@ -1,0 +1,71 @@
+"""The courses of the deadlines: the same in every turn, and a cap that is kept."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from bench import prepare
+from bench.deadlines import course, run, worker
+from bench.deadlines.course import Course
+from bench.problems import load
+
+TICKS = 150
+
+
+@pytest.fixture(scope="module")
+def short(tmp_path_factory: pytest.TempPathFactory) -> Course:
+    """The first ticks of a Panda's course, with two balls."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setitem(course.KINDS, "panda", dataclasses.replace(course.KINDS["panda"], balls=2))
+        patch.setattr(course, "TICKS", TICKS)
+        patch.setattr(course, "HOLD", 50)
+        return Course(load(prepare.panda(tmp_path_factory.mktemp("course"))))
+
+
+@pytest.fixture(autouse=True)
+def few(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(worker, "TICKS", TICKS)
+    monkeypatch.setattr(worker, "HOLD", 50)
+    monkeypatch.setattr(run, "TICKS", TICKS)
+
+
+def test_targets_jump_and_balls_move(short: Course) -> None:
+    changes = np.linalg.norm(np.diff(short.wanted[:, 0], axis=0), axis=1)
+    assert np.flatnonzero(changes > 0.0).tolist() == [49, 99]
+    assert (np.abs(np.diff(short.inputs, axis=0)).max(axis=1) > 0.0).all()
+
+
+def test_a_cap_is_kept_and_walks_repeat(short: Course) -> None:
+    free, one, again = (worker.walk(short, cap) for cap in (None, 1, None))
+    assert free == again
+    assert max(free["iterations"]) > 3
+    assert "capped" not in free["statuses"]
+    assert max(one["iterations"]) == 1
+    assert 0 < one["statuses"]["capped"] < TICKS
+    assert one["error"] > free["error"] > 0.0
+    assert free["margin"] < 1.0
+
+
+def test_what_is_timed_is_the_same_loop(short: Course, monkeypatch: pytest.MonkeyPatch) -> None:
+    seen: list[np.ndarray] = []
+    step = short.place
+    monkeypatch.setattr(short, "place", lambda q, frame: seen.append(q) or step(q, frame))
+    worker.walk(short, 2)
+    spent = worker.durations(short, 2)
+    assert len(spent) == TICKS
+    assert min(spent) > 0
+    c = short.controller
+    np.testing.assert_allclose(c.tick.q + course.DT * c.last_command, seen[-1], atol=1e-12)
+
+
+def test_the_table_tells_shares_and_tails() -> None:
+    row = {
+        "cap": 5, "times": {"median": 1.0, "p99": 2.0, "p99.9": 3.0, "max": 4.0}, "shares": {"capped": 0.25},
+        "error": 0.001, "settled": 0.0005, "margin": -0.002, "iterations": {"median": 1.0, "p99.9": 5.0, "max": 5},
+    }  # fmt: skip
+    sheet = run.sheet("panda", {"rows": [row], "ticks": 9, "constraints": 7, "dofs": 6, "balls": 2})
+    expected = ("cap 5", "1.00", "2.00", "3.00", "4.00", "5", "5", "25.00", "0.00", "1.0", "0.5", "-2.0")
+    assert sheet.rows == [expected]
