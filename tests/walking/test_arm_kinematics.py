@@ -232,3 +232,25 @@ def test_bad_input_is_refused() -> None:
         KINEMATICS.inverse(np.eye(4)[None], theta4=[0.0, 1.0])
     with pytest.raises(ShapeError, match="valid"):
         KINEMATICS.nearest(np.zeros((1, 2, 6)), [True], np.zeros(6))
+
+
+def test_points_of_the_arm(postures: np.ndarray) -> None:
+    found = KINEMATICS.points(postures)
+    assert found.shape == (200, 6, 3)
+    model = MACHINE.robot.model
+    data = model.createData()
+    for q, points in zip(postures[:10], found, strict=False):
+        whole = pin.neutral(model)
+        whole[ARM.q] = q
+        pin.framesForwardKinematics(model, data, whole)
+        base = data.oMf[model.getFrameId(ARM.base_frame)]
+        for link, first, radius in zip(ARM.links, (0, 2, 3, 4), KINEMATICS.radii, strict=True):
+            (placed,) = MACHINE.robot.shapes[link]
+            frame = base.actInv(data.oMf[model.getFrameId(link)])
+            ends = [frame.act(end) for end in placed.ends()]
+            np.testing.assert_allclose(points[first : first + 2], ends, atol=1e-12)
+            assert placed.shape.radius == radius  # type: ignore[union-attr]
+    wrists = np.linalg.norm(found[:, 4] - found[:, 1], axis=1)
+    straight = KINEMATICS.points([0.0, 1.0, KINEMATICS.data.elbow_limit, 0.0, 0.0, 0.0])
+    assert np.linalg.norm(straight[4] - straight[1]) == pytest.approx(KINEMATICS.wrist_span, abs=1e-12)
+    assert (wrists[postures[:, 2] < KINEMATICS.data.elbow_limit] < KINEMATICS.wrist_span).all()

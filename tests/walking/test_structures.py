@@ -142,12 +142,31 @@ def test_clearances_by_hand() -> None:
         assert float(pipe.distance(POSE.act(np.array(point)))) == pytest.approx(distance, abs=1e-12)
 
 
+@pytest.mark.parametrize("name", ALL)
+def test_clearance_of_segments_is_the_least_of_their_points(name: str) -> None:
+    structure = ALL[name].moved(POSE)
+    rng = np.random.default_rng(2)
+    a = structure.positions[rng.integers(len(structure), size=40)] + rng.normal(size=(40, 3)) * 0.4
+    b = a + rng.normal(size=(40, 3)) * 0.6
+    b[:3] = a[:3]
+    found = structure.segment_clearance(a, b)
+    share = np.linspace(0.0, 1.0, 801)[:, None, None]
+    sampled = structure.clearance(a + share * (b - a)).min(axis=0)
+    # A signed distance changes by no more than the way, so between two samples by half a step
+    step = np.linalg.norm(b - a, axis=1) / 800
+    assert (found <= sampled + 1e-9).all()
+    assert (found >= sampled - step / 2 - 1e-9).all()
+    np.testing.assert_allclose(structure.segment_clearance(b, a), found, atol=1e-8)
+    np.testing.assert_allclose(structure.segment_clearance(a, a), structure.clearance(a), atol=1e-7)
+
+
 def test_without_a_surface_the_nearest_hold_has_a_tangent_plane() -> None:
     low = Hold("low", pin.SE3(pin.utils.rotate("x", pi), np.zeros(3)))
     high = Hold("high", pin.SE3(pin.utils.rotate("x", pi), np.array([5.0, 0.0, 1.0])))
     structure = Structure("two", (low, high))
     np.testing.assert_allclose(structure.clearance([[0.3, 0.2, 0.4], [4.9, 0.0, 0.4]]), [0.4, -0.6], atol=1e-15)
     assert structure.clearance([0.0, 0.0, 2.0]).shape == ()
+    assert float(structure.segment_clearance([0.3, 0.2, 0.4], [0.3, 0.2, 0.1])) == pytest.approx(0.1)
 
 
 def test_rolls() -> None:

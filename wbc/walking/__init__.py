@@ -3,7 +3,8 @@
 from wbc.errors import StructureFileError
 from wbc.walking.arm_kinematics import ArmKinematics
 from wbc.walking.hold import Hold
-from wbc.walking.structure import Obstacle, Structure
+from wbc.walking.obstacle import Obstacle
+from wbc.walking.structure import Structure
 from wbc.walking.structure_file import parse_structure, read_structure, save_structure
 from wbc.walking.structures import (
     cylinder,

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from math import pi
+from math import hypot, pi
 from typing import Any
 
 import numpy as np
@@ -24,6 +24,7 @@ from wbc.robots import WalkerData
 from wbc.validation import Array
 from wbc.walking.arm_angles import checked_signs, frame3, sines, unit_vectors, vectors, wrapped, wrist_angles, zyz
 from wbc.walking.arm_rates import joint_rates
+from wbc.walking.arm_reach import shoulder_span, wrist_margin
 
 Flags = NDArray[np.bool_]
 
@@ -65,6 +66,30 @@ class ArmKinematics:
         """
         return self._wrist(vectors("q", q, (6,)))
 
+    def points(self, q: Any) -> Array:
+        """Base O, neck N, shoulder S, elbow E, wrist W and hand H at ``q`` ``[..., 6]``: ``[..., 6, 3]`` [m].
+
+        The capsules of the links are about O N, S E, E W and W H, with the radii :attr:`radii`.
+
+        Raises:
+            ShapeError, NotFiniteError: not six finite numbers a posture.
+        """
+        array, data = vectors("q", q, (6,)), self.data
+        (s1, c1), (s2, c2) = sines(array[..., 0]), sines(array[..., 1])
+        out = np.zeros((*array.shape[:-1], 6, 3))
+        out[..., 1:, 2] = data.neck_length
+        out[..., 2, 0], out[..., 2, 1] = -data.shoulder_offset * s1, data.shoulder_offset * c1
+        out[..., 3, :] = out[..., 2, :] + data.upper_arm_length * np.stack([c1 * s2, s1 * s2, c2], axis=-1)
+        out[..., 4, :] = self._wrist(array)
+        out[..., 5, :] = self.forward(array)[..., :3, 3]
+        return out
+
+    @property
+    def radii(self) -> tuple[float, float, float, float]:
+        """Radii of the capsules of neck, upper arm, forearm and hand [m]."""
+        data = self.data
+        return data.neck_radius, data.upper_arm_radius, data.forearm_radius, data.hand_radius
+
     def wrist_of(self, points: Any, axes: Any) -> Array:
         """Where the wrist of a hand at ``points`` [m] is whose z axis is ``axes``: p - HW z, ``[..., 3]``."""
         return vectors("points", points, (3,)) - self.data.hand_length * vectors("axes", axes, (3,))
@@ -80,21 +105,12 @@ class ArmKinematics:
         Raises:
             ShapeError, NotFiniteError: not three finite numbers a point.
         """
-        points, data = vectors("wrists", wrists, (3,)), self.data
-        es, we = data.upper_arm_length, data.forearm_length
-        across2 = (points[..., :2] ** 2).sum(axis=-1) - data.shoulder_offset**2
-        r, z = np.sqrt(np.maximum(across2, 0.0)), points[..., 2] - data.neck_length
-        distance = np.hypot(r, z)
-        longest, shortest = (self._span(angle) for angle in (data.elbow_limit, -data.position_limits[2]))
-        bend = -np.arccos(np.clip((distance**2 - es * es - we * we) / (2 * es * we), -1.0, 1.0))
-        # theta2 + theta3 / 2, which is the direction of the wrist from the shoulder where ES = WE
-        lean = np.arctan2(r, z) - np.arctan2(we * np.sin(bend), es + we * np.cos(bend)) + bend / 2
-        over = lean - data.shoulder_limit
-        cone = np.where(over < pi / 2, distance * np.sin(np.maximum(over, -pi / 2)), distance)
-        # Nearer to the axis of joint 1 than the shoulder's offset there is no posture
-        cone = np.where(across2 < 0, -np.sqrt(np.maximum(-across2, 0.0)), cone)
-        out: Array = np.minimum(np.minimum(longest - distance, distance - shortest), cone)
-        return out
+        return wrist_margin(self.data, vectors("wrists", wrists, (3,)))
+
+    @property
+    def wrist_span(self) -> float:
+        """Largest distance of the wrist from the neck [m], at the elbow limit."""
+        return hypot(self.data.shoulder_offset, shoulder_span(self.data, self.data.elbow_limit))
 
     def inverse(
         self,
@@ -221,11 +237,6 @@ class ArmKinematics:
             ShapeError, NotFiniteError: not six finite numbers each.
         """
         return joint_rates(self.data, vectors("q", q, (6,)), vectors("twists", twists, (6,)))
-
-    def _span(self, theta3: float) -> float:
-        """Distance from shoulder to wrist at an elbow angle [m]."""
-        es, we = self.data.upper_arm_length, self.data.forearm_length
-        return float(np.sqrt(es * es + we * we + 2 * es * we * np.cos(theta3)))
 
     def _wrist(self, q: Array) -> Array:
         data = self.data

@@ -33,7 +33,8 @@ import pinocchio as pin
 from wbc.errors import StructureFileError, WbcError
 from wbc.shapes import Box, Capsule
 from wbc.walking.hold import FIXED, FREE, Hold, frame_of
-from wbc.walking.structure import Obstacle, Structure
+from wbc.walking.obstacle import Obstacle
+from wbc.walking.structure import Structure
 from wbc.walking.surface import CylinderSurface, PlaneSurface, Surface
 
 _POSE = ("x", "y", "z", "ax", "ay", "az", "rx", "ry", "rz")

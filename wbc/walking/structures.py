@@ -13,7 +13,8 @@ from wbc import validation
 from wbc.errors import RangeError, ShapeError
 from wbc.shapes import Box, Capsule
 from wbc.walking.hold import FREE, Hold, frame_of
-from wbc.walking.structure import Obstacle, Structure
+from wbc.walking.obstacle import Obstacle
+from wbc.walking.structure import Structure
 from wbc.walking.surface import CylinderSurface, PlaneSurface
 
 #: Metres in an inch

@@ -29,6 +29,10 @@ class PlaneSurface:
         out: Array = (points - self.pose.translation) @ self.pose.rotation[:, 2]
         return out
 
+    def segment_height(self, a: Array, b: Array) -> Array:
+        """Least signed height [m] on the segments from ``a`` to ``b``, ``[..., 3]`` each."""
+        return np.minimum(self.height(a), self.height(b))
+
     def normal(self, points: Array) -> Array:
         """The outward normal at points ``[..., 3]``."""
         return np.broadcast_to(self.pose.rotation[:, 2], np.shape(points)).copy()
@@ -58,6 +62,15 @@ class CylinderSurface:
         """Signed height [m] of points ``[..., 3]``: distance from the axis less the radius."""
         across = self._across(points)
         out: Array = np.linalg.norm(across, axis=-1) - self.radius
+        return out
+
+    def segment_height(self, a: Array, b: Array) -> Array:
+        """Least signed height [m] on the segments from ``a`` to ``b``, ``[..., 3]`` each."""
+        start = self._across(a)
+        span = self._across(b) - start
+        square = (span**2).sum(axis=-1)
+        foot = np.clip(-(start * span).sum(axis=-1) / np.where(square > 0, square, 1.0), 0.0, 1.0)
+        out: Array = np.linalg.norm(start + foot[..., None] * span, axis=-1) - self.radius
         return out
 
     def normal(self, points: Array) -> Array:
