@@ -19,6 +19,8 @@ from wbc.errors import RangeError, RobotFileError, ShapeError, UnknownNameError
 FILE = pathlib.Path(__file__).parent / "data" / "walker.toml"
 #: Metres in an inch
 INCH = 0.0254
+#: Digest of the walker's data as they are published and assumed here; figures in pages hold for these
+WALKER_DIGEST = "826c69aef4cf"
 #: Suffix of a key of the file -> factor to SI; the longest that fits counts
 _UNITS = {"_deg_s": pi / 180, "_m_s": 1.0, "_deg": pi / 180, "_in": INCH, "_m": 1.0, "_s": 1.0}
 #: Fields that may be 0 or below
@@ -30,6 +32,8 @@ class _Numbers:
 
     #: Numbers in a tuple
     joints: ClassVar[int]
+    #: Of the file
+    groups: ClassVar[tuple[str, ...]]
 
     def __post_init__(self) -> None:
         kind = type(self).__name__
@@ -50,10 +54,26 @@ class _Numbers:
         lines = [f"{f.name} {_exact(getattr(self, f.name))}" for f in fields(self)]  # type: ignore[arg-type]
         return hashlib.sha256("\n".join(lines).encode()).hexdigest()[:12]
 
+    def origins(self) -> dict[str, str]:
+        """Field -> ``published`` or ``assumed``, as the file says, or ``changed`` where the value is not the file's."""
+        groups = _read(FILE)
+        out: dict[str, str] = {}
+        for f in fields(self):  # type: ignore[arg-type]
+            group = next(name for name in self.groups if f.name in groups[name])
+            same = groups[group][f.name] == getattr(self, f.name)
+            out[f.name] = ("assumed" if group.endswith("assumed") else "published") if same else "changed"
+        return out
+
+    def summary(self) -> str:
+        """One line for a run: the digest, and the fields that are not the file's with their values (SI)."""
+        changed = [f"{k} = {getattr(self, k)}" for k, origin in self.origins().items() if origin == "changed"]
+        what = f"; changed: {', '.join(changed)}" if changed else ""
+        return f"{type(self).__name__} {self.digest}{what}"
+
     @classmethod
-    def _of(cls, groups: tuple[str, ...], path: Any, changes: Mapping[str, Any]) -> Self:
+    def _of(cls, path: Any, changes: Mapping[str, Any]) -> Self:
         known = [f.name for f in fields(cls)]  # type: ignore[arg-type]
-        values = {k: v for group in groups for k, v in _read(pathlib.Path(path))[group].items()}
+        values = {k: v for group in cls.groups for k, v in _read(pathlib.Path(path))[group].items()}
         for key in values:
             if key not in known:
                 raise RobotFileError("data", f"{path}: {key}", "this class has no such field")
@@ -90,6 +110,7 @@ class WalkerData(_Numbers):
     """
 
     joints: ClassVar[int] = 6
+    groups: ClassVar[tuple[str, ...]] = ("published", "assumed")
 
     neck_length: float
     shoulder_offset: float
@@ -133,7 +154,7 @@ class WalkerData(_Numbers):
         Raises:
             UnknownNameError: no such field. RobotFileError: a file that cannot be read or lacks a number.
         """
-        return cls._of(("published", "assumed"), path, changes)
+        return cls._of(path, changes)
 
 
 @dataclass(frozen=True)
@@ -145,6 +166,7 @@ class TwoEndedData(_Numbers):
     """
 
     joints: ClassVar[int] = 7
+    groups: ClassVar[tuple[str, ...]] = ("two_ended", "two_ended_assumed")
 
     roll_offset: float
     yaw_offset: float
@@ -165,7 +187,7 @@ class TwoEndedData(_Numbers):
         Raises:
             UnknownNameError: no such field. RobotFileError: a file that cannot be read or lacks a number.
         """
-        return cls._of(("two_ended",), path, changes)
+        return cls._of(path, changes)
 
 
 def _exact(value: Any) -> str:
@@ -180,7 +202,7 @@ def _read(path: pathlib.Path) -> dict[str, dict[str, Any]]:
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise RobotFileError("data", str(path), f"cannot be read: {error}") from error
     out: dict[str, dict[str, Any]] = {}
-    for group in ("published", "assumed", "two_ended"):
+    for group in (*WalkerData.groups, *TwoEndedData.groups):
         rows = groups.get(group)
         if not isinstance(rows, dict):
             raise RobotFileError("data", str(path), f"the group [{group}] must be there")

@@ -15,7 +15,7 @@ import pytest
 import wbc.robots
 from wbc.errors import NotFiniteError, RangeError, RobotFileError, ShapeError, UnknownNameError
 from wbc.robots import TwoEndedData, Walker, WalkerData, walker
-from wbc.robots.walker_data import FILE, INCH
+from wbc.robots.walker_data import FILE, INCH, WALKER_DIGEST
 from wbc.shapes import Capsule, Convex, Cylinder, Sphere
 
 MACHINES = {
@@ -229,7 +229,7 @@ def test_the_table_of_names_knows_the_machines() -> None:
 
 def test_data_is_the_file_in_si_and_every_change_has_its_digest(tmp_path: Path) -> None:
     data, raw = WalkerData.read(), tomllib.loads(FILE.read_text())
-    assert set(raw) == {"published", "assumed", "two_ended"}
+    assert set(raw) == {"published", "assumed", "two_ended", "two_ended_assumed"}
     assert data.neck_length == 26 * INCH
     assert data.joint_rates[0] == pytest.approx(radians(82), rel=1e-15)
     assert data.clearance == INCH
@@ -241,6 +241,17 @@ def test_data_is_the_file_in_si_and_every_change_has_its_digest(tmp_path: Path) 
     other = tmp_path / "other.toml"
     other.write_text(FILE.read_text().replace("latch_time_s = 0.1", "latch_time_s = 0.3"))
     assert WalkerData.read(other).latch_time == 0.3
+
+
+def test_data_says_where_its_numbers_come_from() -> None:
+    data = WalkerData.read(clearance=0.03)
+    assert WalkerData.read().digest == WALKER_DIGEST
+    origins = data.origins()
+    assert set(origins.values()) == {"published", "assumed", "changed"}
+    assert (origins["neck_length"], origins["joint_rates"], origins["clearance"]) == ("published", "assumed", "changed")
+    assert data.summary() == f"WalkerData {data.digest}; changed: clearance = 0.03"
+    assert WalkerData.read().summary() == f"WalkerData {WALKER_DIGEST}"
+    assert set(TwoEndedData.read().origins().values()) == {"published", "assumed"}
 
 
 @pytest.mark.parametrize(
