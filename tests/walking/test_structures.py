@@ -247,6 +247,16 @@ def test_a_file_by_hand() -> None:
     assert round_.surface.radius == 2.5
 
 
+def test_the_page_shows_a_file_that_is_read() -> None:
+    page = (Path(__file__).parents[2] / "docs" / "walking.md").read_text()
+    lines = page[page.index("    id, x, y") : page.index("(x, y, z) is the origin")].splitlines()
+    structure = parse_structure("\n".join(line.strip() for line in lines))
+    assert (structure.ids, len(structure.obstacles)) == (("h1", "h2"), 2)
+    with pytest.raises(StructureFileError) as caught:
+        parse_structure("\n\n".join([lines[0].strip(), lines[1].strip().replace("0.05", "-0.05")]))
+    assert str(caught.value) in page
+
+
 @pytest.mark.parametrize(
     ("old", "new", "field", "said"),
     [
