@@ -151,7 +151,8 @@ def as_made(built: Robot, made: Robot, whole: bool, limits: Mapping[str, Any], n
 
 def _link_shape(link: str, placed: PlacedShape) -> LinkShape:
     a, b = (tuple(end.tolist()) for end in placed.ends())
-    assert isinstance(placed.shape, (Capsule, Sphere))
+    if not isinstance(placed.shape, (Capsule, Sphere)):
+        raise ShapeError("shape", placed.shape, "a recipe holds spheres and capsules only")
     return LinkShape(link, a, b, placed.shape.radius)
 
 

@@ -174,15 +174,16 @@ def test_rolls() -> None:
     assert Hold("a", pose).rolls == ()
     assert Hold("a", pose, "fixed").rolls == (0.0,)
     np.testing.assert_allclose(Hold("a", pose, 4).rolls, [0, pi / 2, pi, 3 * pi / 2])
-    for bad in (1, 0, -2, True, 2.5, "loose"):
+    for bad in (1, 0, -2, 361, True, 2.5, "loose"):
         with pytest.raises(RangeError, match="roll"):
             Hold("a", pose, bad)  # type: ignore[arg-type]
 
 
 def test_bad_holds_and_structures_are_refused() -> None:
     pose = pin.SE3.Identity()
-    with pytest.raises(ShapeError, match="id"):
-        Hold(" ", pose)
+    for bad in ("", " ", " a", "a\nb", 3):
+        with pytest.raises(ShapeError, match="id"):
+            Hold(bad, pose)  # type: ignore[arg-type]
     with pytest.raises(RangeError, match="max_tilt"):
         Hold("a", pose, "free", -0.1)
     with pytest.raises(NotFiniteError, match="max_tilt"):
@@ -247,6 +248,30 @@ def test_a_file_by_hand() -> None:
     assert round_.surface.radius == 2.5
 
 
+def test_any_id_survives_a_file(tmp_path: Path) -> None:
+    ids = ("#1", "[obstacles]", "a,b", 'say "hi"', '"', "é 2", "id", "-")
+    structure = Structure("s", tuple(Hold(name, pin.SE3.Identity(), 3) for name in ids))
+    back = read_structure(save_structure(structure, tmp_path / "file.csv"))
+    assert back.ids == ids
+    assert {hold.roll for hold in back} == {3}
+
+
+def test_garbled_files_raise_nothing_else() -> None:
+    rng = np.random.default_rng(3)
+    signs = list('0123456789.,-e"#[]\n x\x00') + ["nan", "inf", "free", "[surface]", "1e400", "\u2028"]
+    refused = 0
+    for _ in range(400):
+        text = GOOD
+        for _ in range(rng.integers(1, 4)):
+            k = int(rng.integers(len(text)))
+            text = text[:k] + signs[int(rng.integers(len(signs)))] + text[k + int(rng.integers(3)) :]
+        try:
+            assert len(parse_structure(text)) > 0
+        except StructureFileError:
+            refused += 1
+    assert 100 < refused < 400
+
+
 def test_the_page_shows_a_file_that_is_read() -> None:
     page = (Path(__file__).parents[2] / "docs" / "walking.md").read_text()
     lines = page[page.index("    id, x, y") : page.index("(x, y, z) is the origin")].splitlines()
@@ -268,7 +293,10 @@ def test_the_page_shows_a_file_that_is_read() -> None:
         ("free, 0.05", "free, 3", "line 3: max_tilt", "[0, 1.5708]"),
         ("free, 0.05", "free", "line 3", "expected 12 values, not 11"),
         ("free, 0.05", "loose, 0.05", "line 3: roll", "fixed"),
-        ("4, 0\n", "1, 0\n", "line 5: roll", "at least 2"),
+        ("free, 0.05", "999999999, 0.05", "line 3: roll", "2 to 360"),
+        ("free, 0.05", "4.0, 0.05", "line 3: roll", "2 to 360"),
+        ("h1, 0,", "h\t1, 0,", "line 3: id", "on one line"),
+        ("4, 0\n", "1, 0\n", "line 5: roll", "2 to 360"),
         ("0, 0, -2, 1, 0, 5", "0, 0, 0, 1, 0, 5", "line 3: ax, ay, az", "direction"),
         ("0, 0, -2, 1, 0, 5", "0, 0, -2, 0, 0, 5", "line 3: rx, ry, rz", "parallel"),
         ("0, 0, -2, 1, 0, 5", "0, 0, -2, 0, 0, 0", "line 3: rx, ry, rz", "direction"),

@@ -15,6 +15,8 @@ from wbc.validation import Array
 
 FREE = "free"
 FIXED = "fixed"
+#: Most positions of an n-fold roll
+MOST_ROLLS = 360
 #: An axis and a roll reference closer to each other than this [rad] leave the roll undetermined
 LEAST_ANGLE = 1e-6
 
@@ -30,8 +32,8 @@ class Hold:
         id: name, unique in a structure.
         pose: in the structure's frame [m]: origin at the grasp point, z the approach direction (into the
             structure), x the roll reference.
-        roll: ``"free"``, ``"fixed"`` (the hand's x axis along the hold's) or n >= 2 (fixed, or turned by a multiple
-            of 2 pi / n).
+        roll: ``"free"``, ``"fixed"`` (the hand's x axis along the hold's) or n, 2 to 360 (fixed, or turned by a
+            multiple of 2 pi / n).
         max_tilt: largest angle between the two z axes while closed [rad]; 0 fixes them.
 
     Raises:
@@ -44,8 +46,7 @@ class Hold:
     max_tilt: float = 0.0
 
     def __post_init__(self) -> None:
-        if not isinstance(self.id, str) or not self.id.strip():
-            raise ShapeError("Hold.id", self.id, "expected a non-empty text")
+        object.__setattr__(self, "id", checked_id("Hold.id", self.id))
         object.__setattr__(self, "pose", validation.pose("Hold.pose", self.pose))
         object.__setattr__(self, "roll", checked_roll("Hold.roll", self.roll))
         tilt = validation.scalar("Hold.max_tilt", self.max_tilt, low=0.0, high=pi / 2, unit="rad")
@@ -74,17 +75,28 @@ class Hold:
         return Hold(self.id, pose * self.pose, self.roll, self.max_tilt)
 
 
+def checked_id(field: str, value: Any) -> str:
+    """A name on one line, without blanks around it.
+
+    Raises:
+        ShapeError: something else.
+    """
+    if not isinstance(value, str) or not value or value != value.strip() or not value.isprintable():
+        raise ShapeError(field, value, "expected a non-empty text on one line, without blanks around it")
+    return value
+
+
 def checked_roll(field: str, value: Any) -> str | int:
-    """``"free"``, ``"fixed"`` or a whole number of at least 2.
+    """``"free"``, ``"fixed"`` or a whole number from 2 to 360.
 
     Raises:
         RangeError: something else.
     """
     if value in (FREE, FIXED):
         return str(value)
-    if isinstance(value, (int, np.integer)) and not isinstance(value, bool) and value >= 2:
+    if isinstance(value, (int, np.integer)) and not isinstance(value, bool) and 2 <= value <= MOST_ROLLS:
         return int(value)
-    raise RangeError(field, value, f"expected '{FREE}', '{FIXED}' or a whole number of at least 2")
+    raise RangeError(field, value, f"expected {FREE}, {FIXED} or a whole number from 2 to {MOST_ROLLS}")
 
 
 def frame_of(field: str, position: Any, axis: Any, reference: Any) -> pin.SE3:

@@ -13,6 +13,7 @@ from wbc.errors import ShapeError
 from wbc.robot.segments import segment_distances
 from wbc.shapes import Box, Capsule
 from wbc.validation import Array
+from wbc.walking.hold import checked_id
 
 #: Golden ratio's inverse, and how often an interval is cut by it: to 5e-10 of its length
 GOLDEN, CUTS = (5**0.5 - 1) / 2, 45
@@ -36,8 +37,7 @@ class Obstacle:
     placement: pin.SE3
 
     def __post_init__(self) -> None:
-        if not isinstance(self.id, str) or not self.id.strip():
-            raise ShapeError("Obstacle.id", self.id, "expected a non-empty text")
+        object.__setattr__(self, "id", checked_id("Obstacle.id", self.id))
         if not isinstance(self.shape, (Box, Capsule)):
             raise ShapeError("Obstacle.shape", self.shape, "expected a Box or a Capsule")
         object.__setattr__(self, "placement", validation.pose("Obstacle.placement", self.placement))

@@ -13,8 +13,8 @@
     plane, 0, 0, 0, 0, 0, 1, 1, 0, 0,
 
 (x, y, z) is the origin [m], (ax, ay, az) the z axis and (rx, ry, rz) the direction whose part across it is the x axis,
-of any length. Holds come first, with z the approach direction, roll ``free``, ``fixed`` or a whole number of at least
-2, and max_tilt [rad]. The numbers d1, d2, d3 of a box are its sides along x, y, z; of a capsule radius and length
+of any length. Holds come first, with z the approach direction, roll ``free``, ``fixed`` or a whole number from 2 to
+360, and max_tilt [rad]. The numbers d1, d2, d3 of a box are its sides along x, y, z; of a capsule radius and length
 between the centres of its ends, along z; of a ``cylinder`` surface its radius about z, and a ``plane`` has none. A
 text with a comma in it stands in double quotes. Empty lines and lines that begin with ``#`` do not count.
 """
@@ -26,13 +26,13 @@ import os
 import pathlib
 from collections.abc import Mapping, Sequence
 from math import isfinite
-from typing import Any
+from typing import Any, TextIO
 
 import pinocchio as pin
 
 from wbc.errors import StructureFileError, WbcError
 from wbc.shapes import Box, Capsule
-from wbc.walking.hold import FIXED, FREE, Hold, frame_of
+from wbc.walking.hold import Hold, checked_id, checked_roll, frame_of
 from wbc.walking.obstacle import Obstacle
 from wbc.walking.structure import Structure
 from wbc.walking.surface import CylinderSurface, PlaneSurface, Surface
@@ -106,7 +106,7 @@ def save_structure(structure: Structure, path: str | os.PathLike[str]) -> pathli
     file = pathlib.Path(path)
     try:
         with file.open("w", encoding="utf-8", newline="") as stream:
-            out = csv.writer(stream, lineterminator="\n")
+            out = _Writer(stream)
             out.writerow(COLUMNS["holds"])
             for hold in structure.holds:
                 out.writerow([hold.id, *_numbers(hold.pose), hold.roll, repr(hold.max_tilt)])
@@ -127,6 +127,19 @@ def save_structure(structure: Structure, path: str | os.PathLike[str]) -> pathli
     return file
 
 
+class _Writer:
+    """Rows of cells; the first is quoted where it would be read as something else."""
+
+    def __init__(self, stream: TextIO) -> None:
+        self.stream = stream
+
+    def writerow(self, cells: Sequence[Any]) -> None:
+        first, *rest = (str(cell) for cell in cells)
+        if first[0] in "#[" or any(sign in first for sign in ',"'):
+            first = '"' + first.replace('"', '""') + '"'
+        self.stream.write(",".join([first, *rest]) + "\n")
+
+
 class _Row:
     """One line: its cells by column, read with errors that name both."""
 
@@ -140,6 +153,10 @@ class _Row:
         if not self.cells[column]:
             raise StructureFileError(self.field(column), "", "expected a text")
         return self.cells[column]
+
+    def name(self) -> str:
+        text = self.text("id")
+        return str(self.made("id", lambda: checked_id("id", text)))
 
     def real(self, column: str, low: float | None = None) -> float:
         value = self.cells[column]
@@ -182,26 +199,21 @@ class _Row:
         except StructureFileError:
             raise
         except WbcError as error:
-            raise StructureFileError(self.field(column), error.value, str(error)) from error
+            reason = str(error).removeprefix(f"{error.field}: ").split(" (got ")[0]
+            raise StructureFileError(self.field(column), error.value, reason) from error
 
 
 def _hold(row: _Row) -> Hold:
-    name, pose, tilt = row.text("id"), row.pose(), row.real("max_tilt", low=0.0)
-    roll: str | int = row.text("roll")
-    if roll not in (FREE, FIXED):
-        try:
-            roll = int(roll)
-        except ValueError as error:
-            reason = "expected free, fixed or a whole number of at least 2"
-            raise StructureFileError(row.field("roll"), roll, reason) from error
-        if roll < 2:
-            raise StructureFileError(row.field("roll"), roll, "expected free, fixed or a whole number of at least 2")
+    name, pose, tilt = row.name(), row.pose(), row.real("max_tilt", low=0.0)
+    text = row.text("roll")
+    whole = text.isdecimal() and len(text) < 9
+    roll = row.made("roll", lambda: checked_roll("roll", int(text) if whole else text))
     found: Hold = row.made("max_tilt", lambda: Hold(name, pose, roll, tilt))
     return found
 
 
 def _obstacle(row: _Row) -> Obstacle:
-    name, kind, pose = row.text("id"), row.choice("shape", ("box", "capsule")), row.pose()
+    name, kind, pose = row.name(), row.choice("shape", ("box", "capsule")), row.pose()
     sizes = row.sizes(kind)
     shape: Box | Capsule = row.made("d1, d2, d3", lambda: Capsule(*sizes) if kind == "capsule" else Box(tuple(sizes)))  # type: ignore[arg-type]
     return Obstacle(name, shape, pose)
