@@ -8,11 +8,11 @@ import typer
 from typer.core import TyperGroup
 
 from wbc import __version__
-from wbc.cli import bench, demo, docs, export, replay, robots, track
+from wbc.cli import bench, demo, docs, export, ik, replay, robots, track
 from wbc.cli.console import complain
 from wbc.errors import WbcError
 
-#: Exit codes besides 0 and the one of a replay that differs
+#: Exit codes besides 0 and 1, which commands give
 BAD_INPUT, INTERRUPTED = 2, 130
 
 
@@ -60,5 +60,6 @@ app.command("track")(track.track)
 app.command("demo")(demo.demo)
 app.command("replay")(replay.replay)
 app.command("export")(export.export)
+app.command("ik")(ik.ik)
 app.command("bench", context_settings={"allow_extra_args": True, "ignore_unknown_options": True})(bench.bench)
 app.command("docs")(docs.docs)

@@ -90,7 +90,7 @@ def tip_frame(robot: Robot, frame: str | None) -> str:
 
 def configuration(robot: Robot, text: str) -> Array:
     """A configuration from numbers with commas."""
-    return robot.configuration("start", _numbers("start", text))
+    return robot.configuration("start", comma_numbers("start", text))
 
 
 def scene(
@@ -136,7 +136,7 @@ def given_obstacles(sphere: list[str] | None, floor: float | None) -> dict[str, 
 
 def parse_sphere(text: str) -> Moving:
     """An obstacle from X,Y,Z,RADIUS[,VX,VY,VZ]."""
-    numbers = _numbers("sphere", text)
+    numbers = comma_numbers("sphere", text)
     if len(numbers) not in (4, 7):
         raise ShapeError("sphere", text, "expected X,Y,Z,RADIUS or X,Y,Z,RADIUS,VX,VY,VZ")
     velocity = numbers[4:] if len(numbers) == 7 else np.zeros(3)
@@ -161,7 +161,12 @@ def feet(robot: Robot) -> tuple[str, ...]:
     return tuple(frame for role, frame in robot.frames.items() if role.endswith("foot"))
 
 
-def _numbers(field: str, text: str) -> Array:
+def comma_numbers(field: str, text: str) -> Array:
+    """Numbers with commas between them.
+
+    Raises:
+        ShapeError, NotFiniteError: it is something else.
+    """
     try:
         return validation.real_array(field, [float(part) for part in text.split(",")])
     except ValueError as error:

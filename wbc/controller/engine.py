@@ -99,8 +99,10 @@ class Engine:
         weight = self.tick.weight
         now = weight.tobytes()
         if now != self._weights:
+            # Other weights, other goals: perhaps other joints move them
+            self._weights, self._table = now, (0, self._table[1][:0])
             self._queries.clear()
-            self._weights = now
+            self.__dict__.pop("starts", None)
         key = (tuple(goals), tolerance, restarts, seed)
         if key not in self._queries:
             if len(self._queries) > _KEPT:

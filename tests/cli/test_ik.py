@@ -1,0 +1,194 @@
+"""``wbc ik`` as a user types it; Pinocchio judges what it prints and writes."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from typer.testing import CliRunner
+
+import wbc
+from wbc.cli.app import app
+
+DOWN = "0.4,0.2,0.5,1,0,0,0"
+GOAL = pin.SE3(np.diag([1.0, -1.0, -1.0]), np.array([0.4, 0.2, 0.5]))
+
+
+def run(*arguments: str | Path) -> tuple[int, str, str]:
+    """(exit code, standard output, standard error) of ``wbc ik ARGUMENTS``."""
+    result = CliRunner(env={"COLUMNS": "200"}).invoke(app, ["ik", *map(str, arguments)])
+    if result.exception is not None and not isinstance(result.exception, SystemExit):
+        raise result.exception
+    return result.exit_code, result.stdout, result.stderr
+
+
+def place(name: str, q: Any, frame: str) -> pin.SE3:
+    robot = wbc.robots.load(name)
+    data = robot.model.createData()
+    pin.framesForwardKinematics(robot.model, data, np.array(q, dtype=float))
+    return data.oMf[robot.model.getFrameId(frame)].copy()
+
+
+def printed(out: str, label: str) -> list[float]:
+    """The configuration that a line of the output has."""
+    line = next(line for line in out.splitlines() if line.startswith(f"q {label} "))
+    return [float(x) for x in line.split()[2].split(",")]
+
+
+def test_help_has_an_example() -> None:
+    code, out, _ = run("--help")
+    assert code == 0
+    assert "wbc ik ur5 --target" in out
+    for option in ("--targets", "--branches", "--seed", "--budget", "--out", "--sphere", "--floor", "--frame"):
+        assert option in out
+
+
+def test_a_pose_is_reached() -> None:
+    code, out, err = run("ur5", "--target", DOWN)
+    assert (code, err) == (0, "")
+    assert "solved" in out
+    assert "elbow_joint" in out
+    assert place("ur5", printed(out, "1"), "tool0").isApprox(GOAL, 1e-6)
+
+
+def test_all_branches_of_a_pose(tmp_path: Path) -> None:
+    file = tmp_path / "q.csv"
+    code, out, err = run("ur5", "--target", DOWN, "--branches", "--out", file, "--seed", "3", "--budget", "60")
+    assert (code, err) == (0, "")
+    rows = list(csv.DictReader(file.open()))
+    assert [row["branch"] for row in rows] == [str(k) for k in range(1, 9)]
+    names = wbc.robots.load("ur5").dof_names
+    found = np.array([[float(row[name]) for name in names] for row in rows])
+    assert all(place("ur5", q, "tool0").isApprox(GOAL, 1e-5) for q in found)
+    assert {row["status"] for row in rows} == {"solved"}
+    assert max(float(row["position_error"]) for row in rows) < 2e-5
+    np.testing.assert_allclose(printed(out, "1.8"), found[7], atol=1e-7)
+    assert min(np.abs(a - b).max() for k, a in enumerate(found) for b in found[:k]) > 0.01
+
+
+def test_targets_from_files_and_positions(tmp_path: Path) -> None:
+    text = tmp_path / "way.csv"
+    text.write_text("# two poses\nt,x,y,z,qx,qy,qz,qw\n0,0.4,0.2,0.5,1,0,0,0\n\n1,0.4,-0.2,0.5,1,0,0.0002,0\n")
+    poses, positions, out = tmp_path / "a.npz", tmp_path / "b.npz", tmp_path / "out.npz"
+    np.savez(poses, poses=np.array([GOAL.homogeneous]))
+    np.savez(positions, positions=np.array([[0.4, 0.0, 0.5]]))
+    assert run("ur5", "--targets", text, "--out", out)[0] == 0
+    with np.load(out) as found:
+        assert found["target"].tolist() == [1, 2]
+        assert found["names"].tolist() == list(wbc.robots.load("ur5").dof_names)
+        ends = [place("ur5", q, "tool0").translation for q in found["q"]]
+    np.testing.assert_allclose(ends, [[0.4, 0.2, 0.5], [0.4, -0.2, 0.5]], atol=1e-5)
+    code, said, _ = run("ur5", "--targets", poses, "--target", "0.3,0.3,0.4")
+    assert code == 0
+    np.testing.assert_allclose(place("ur5", printed(said, "1"), "tool0").translation, [0.3, 0.3, 0.4], atol=1e-5)
+    assert place("ur5", printed(said, "2"), "tool0").isApprox(GOAL, 1e-6)
+    code, said, _ = run("ur5", "--targets", positions, "--frame", "tool0")
+    assert code == 0
+    np.testing.assert_allclose(place("ur5", printed(said, "1"), "tool0").translation, [0.4, 0.0, 0.5], atol=1e-5)
+
+
+def test_out_of_reach_is_exit_code_1_with_the_reason(tmp_path: Path) -> None:
+    file = tmp_path / "q.csv"
+    code, out, err = run("ur5", "--target", "3,0,0", "--target", DOWN, "--out", file, "--branches")
+    assert code == 1
+    assert "unreachable" in out
+    assert err.startswith("target 1: unreachable after 101 descents; off by 2.")
+    assert "rad" not in err
+    rows = list(csv.DictReader(file.open()))
+    assert [row["status"] for row in rows] == ["unreachable"] + ["solved"] * 8
+
+
+def test_obstacles_take_part() -> None:
+    """A ball where the hand shall be; a floor above the robot; both out of the way."""
+    code, _, err = run("ur5", "--target", "0.4,0.2,0.5", "--sphere", "0.4,0.2,0.5,0.1", "--floor", "-0.2")
+    assert code == 1
+    assert "target 1: unreachable" in err
+    assert "sphere1/" in err.split("binding: ")[1]
+    code, _, err = run("ur5", "--target", DOWN, "--sphere", "0.4,0.6,0.5,0.1", "--floor", "1.5")
+    assert code == 1
+    assert "contradictory" in err
+    assert "cannot be kept: floor/" in err
+    code, out, _ = run("ur5", "--target", DOWN, "--sphere", "0.4,0.6,0.5,0.1", "--floor", "-0.2")
+    assert code == 0
+    assert place("ur5", printed(out, "1"), "tool0").isApprox(GOAL, 1e-5)
+
+
+def test_the_search_begins_where_it_is_told(tmp_path: Path) -> None:
+    near = wbc.robots.load("ur5").neutral + 0.05
+    start = ",".join(str(x) for x in near)
+    goal = place("ur5", near + 0.01, "tool0")
+    numbers = ",".join(f"{x:.17g}" for x in pin.SE3ToXYZQUAT(goal))
+    code, out, _ = run("ur5", "--target", numbers, "--start", start)
+    assert code == 0
+    np.testing.assert_allclose(printed(out, "1"), near + 0.01, atol=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["pandda", "--target", DOWN], "did you mean 'panda'"),
+        (["ur5"], "target: give at least one with --target or --targets"),
+        (["ur5", "--target", "1,2"], "target: expected X,Y,Z or X,Y,Z,QX,QY,QZ,QW"),
+        (["ur5", "--target", "1,2,x"], "target: expected numbers"),
+        (["ur5", "--target", "1,2,nan"], "target: expected finite numbers"),
+        (["ur5", "--target", "1,2,3,1,1,0,0"], "quaternion of norm 1.41421"),
+        (["ur5", "--target", DOWN, "--frame", "tool1"], "did you mean 'tool0'"),
+        (["ur5", "--target", DOWN, "--budget", "0"], "budget: expected"),
+        (["ur5", "--target", DOWN, "--seed", "-1"], "seed: expected"),
+        (["ur5", "--target", DOWN, "--tolerance", "0"], "tolerance: expected"),
+        (["ur5", "--target", DOWN, "--sphere", "1,0,0,0.1,1,0,0"], "leave the velocity out"),
+        (["ur5", "--target", DOWN, "--start", "1,2"], "start: expected shape (6,)"),
+        (["ur5", "--target", DOWN, "--backend", "nativ"], "did you mean 'native'"),
+        (["ur5", "--target", DOWN, "--out", "q.txt"], "out: unknown name"),
+        (["ur5", "--target", DOWN, "--out", "none/q.csv"], "there is no such folder"),
+        (["ur5", "--target", DOWN, "--out", "there.csv"], "use --force"),
+        (["ur5", "--targets", "none.csv"], "there is no such file"),
+        (["ur5", "--targets", "none.txt"], "targets: unknown name"),
+        (["ur5", "--targets", "there.csv"], "has no target"),
+        (["ur5", "--targets", "header.csv"], "did you mean 'x'"),
+        (["ur5", "--targets", "short.csv"], "missing qy, qz, qw"),
+        (["ur5", "--targets", "ragged.csv"], "ragged.csv line 3: expected 3 values"),
+        (["ur5", "--targets", "words.csv"], "words.csv line 2: expected numbers"),
+        (["ur5", "--targets", "text.npz"], "cannot be read"),
+        (["ur5", "--targets", "other.npz"], "other.npz array: unknown name"),
+        (["ur5", "--targets", "shape.npz"], "expected the shape n x 7 or n x 4 x 4"),
+        (["ur5", "--targets", "nan.npz"], "nan.npz row 1: expected finite numbers"),
+        (["ur5", "--targets", "turn.npz"], "not a rotation matrix"),
+    ],
+    ids=lambda value: "_".join(value) if isinstance(value, list) else "",
+)
+def test_bad_input_is_one_line_and_exit_code_2(
+    arguments: list[str], message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    files = {
+        "there.csv": "",
+        "header.csv": "xx,y,z\n1,2,3\n",
+        "short.csv": "x,y,z,qx\n1,2,3,1\n",
+        "ragged.csv": "x,y,z\n1,2,3\n1,2\n",
+        "words.csv": "x,y,z\n1,2,a\n",
+        "text.npz": "no archive",
+    }
+    for name, text in files.items():
+        Path(name).write_text(text)
+    np.savez("other.npz", pose=np.zeros((1, 7)))
+    np.savez("shape.npz", poses=np.zeros((2, 6)))
+    np.savez("nan.npz", positions=np.array([[0.4, 0.0, 0.5], [np.nan, 0.0, 0.0]]))
+    np.savez("turn.npz", poses=np.ones((1, 4, 4)) * [[1], [1], [1], [0]] + np.diag([0, 0, 0, 1.0]))
+    code, out, err = run(*arguments)
+    assert (code, out) == (2, "")
+    assert message in err
+    assert err.startswith("error: ")
+    assert err.count("\n") == 1
+    assert Path("there.csv").read_text() == ""
+
+
+def test_a_file_is_written_over_where_that_is_asked_for(tmp_path: Path) -> None:
+    file = tmp_path / "q.csv"
+    file.write_text("old")
+    assert run("ur5", "--target", DOWN, "--out", file, "--force")[0] == 0
+    assert file.read_text().startswith("target,branch,status")
