@@ -18,7 +18,7 @@ from wbc.robot.loading import build, finish, looks_like_path, unknown
 from wbc.robot.recipe import Recipe, lock_mapping
 from wbc.robot.robot import Robot
 from wbc.robot.table import read_table
-from wbc.robots.walker_robot import as_made, made_here, recipe_of
+from wbc.robots.walker_robot import MADE, as_made, made_here, recipe_of
 
 _FOLDER = pathlib.Path(__file__).parent
 
@@ -140,7 +140,7 @@ def _find(robot: Any) -> tuple[Recipe, Any]:
             pairs = str(_FOLDER / recipe.pairs) if recipe.pairs else ""
             return replace(recipe, pairs=pairs), example_data_folder() / recipe.file
         if not looks_like_path(robot):
-            raise unknown(robot, _by_name())
+            raise unknown(robot, (*_by_name(), *MADE))
     if isinstance(robot, (str, os.PathLike)):
         return Recipe(pathlib.Path(robot).stem), robot
     return Recipe(str(robot.name) if isinstance(robot, pin.Model) else "dh"), robot

@@ -25,6 +25,8 @@ from wbc.robots.walker_shapes import body_shapes, link_pairs, puma_shapes, two_e
 from wbc.shapes import Capsule, PlacedShape, Sphere
 
 BODY_SHAPES = ("capsules", "prism", "none")
+#: Names that :func:`made_here` knows
+MADE = ("walker", "two_ended_arm")
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,10 +118,8 @@ def walker(
 
 
 def made_here(name: str) -> Robot | None:
-    """The robot that ``wbc.robots.load`` gives for ``walker`` and ``two_ended_arm``; None for other names."""
-    if name == "walker":
-        return walker().robot
-    return walker(two_ended=True).robot if name == "two_ended_arm" else None
+    """The robot that ``wbc.robots.load`` gives for the names :data:`MADE`; None for other names."""
+    return walker(two_ended=name == MADE[1]).robot if name in MADE else None
 
 
 def recipe_of(robot: Robot) -> Recipe:
@@ -168,7 +168,7 @@ def _bodied(count: int, data: WalkerData, artificial_limits: bool, body_shape: s
         links += chain(name, f"{name}_base", puma_rows(data, artificial_limits), f"{name}_hand")
         shapes |= puma_shapes(name, data)
     neutral = {f"{name}_joint{k + 1}": x for name in names for k, x in enumerate(data.initial_posture)}
-    robot = _robot("walker" if count == 3 else f"walker{count}", links, neutral, {"body": BODY}, data.digest)
+    robot = _robot(MADE[0] if count == 3 else f"walker{count}", links, neutral, {"body": BODY}, data.digest)
     arms = tuple(
         _arm(
             robot,
@@ -190,7 +190,7 @@ def _two_ended(data: TwoEndedData) -> Walker:
     links = [Link("arm1_base", BODY, bases[0]), *reversed_chain("arm1", "arm1_base", rows[:3], "arm1_hand", 1)]
     links += [Link("arm2_base", BODY, bases[1]), *chain("arm2", "arm2_base", rows[3:], "arm2_hand", 4)]
     neutral = {f"arm{1 if k <= 3 else 2}_joint{k}": angle for k, angle in enumerate(data.initial_posture, start=1)}
-    robot = _robot("two_ended_arm", links, neutral, {"body": BODY, "elbow": BODY}, data.digest)
+    robot = _robot(MADE[1], links, neutral, {"body": BODY, "elbow": BODY}, data.digest)
     model, shapes = robot.model, two_ended_shapes(data)
     arms = []
     for name, base in zip(("arm1", "arm2"), bases, strict=True):

@@ -61,7 +61,9 @@ def test_unknown_names_list_the_nearest() -> None:
     with pytest.raises(UnknownNameError, match="did you mean 'panda'") as caught:
         wbc.robots.load("pandaa")
     assert caught.value.choices[0] == "panda"
-    assert set(caught.value.choices) == {recipe.name for recipe in wbc.robots.table()}
+    assert set(caught.value.choices) == {recipe.name for recipe in wbc.robots.table()} | {"walker", "two_ended_arm"}
+    with pytest.raises(UnknownNameError, match="did you mean 'walker'"):
+        wbc.robots.load("walkr")
     with pytest.raises(UnknownNameError, match="did you mean 'fit'"):
         wbc.robots.load("panda", shapes="fitt")
 

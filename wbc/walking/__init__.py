@@ -16,6 +16,7 @@ from wbc.walking.structures import (
     truss,
 )
 from wbc.walking.surface import CylinderSurface, PlaneSurface
+from wbc.walking.two_ended_kinematics import TwoEndedKinematics
 
 __all__ = [
     "ArmKinematics",
@@ -25,6 +26,7 @@ __all__ = [
     "PlaneSurface",
     "Structure",
     "StructureFileError",
+    "TwoEndedKinematics",
     "cylinder",
     "module",
     "parse_structure",
