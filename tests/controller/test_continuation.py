@@ -78,6 +78,20 @@ def test_what_the_goals_leave_open_is_at_rest() -> None:
         assert abs(free @ (q - robot.neutral)) < 1e-4
 
 
+def test_a_closed_path_is_gone_all_the_way_round() -> None:
+    """A whole turn about the base: the pose at its end is the first one, the configuration is not."""
+    robot, ik = arm("ur5"), solver("ur5")
+    start = HOME - np.array([2.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    home = tip(robot, start, "tool0")
+
+    def turned(s: float) -> pin.SE3:
+        return pin.SE3(pin.exp3(np.array([0.0, 0.0, s])), np.zeros(3)) * home
+
+    found = ik.along({"hand": turned}, [0.0, 2.0 * np.pi], start)
+    np.testing.assert_allclose(found.q[-1] - start, [2.0 * np.pi, 0, 0, 0, 0, 0], atol=1e-6)
+    assert found.samples > 2.0 * np.pi / 0.02
+
+
 def test_targets_are_also_sequences() -> None:
     robot, ik = arm("ur5"), solver("ur5")
     goal = tip(robot, HOME + 0.4, "tool0")

@@ -84,6 +84,30 @@ def test_a_budget_is_kept_and_says_so() -> None:
     assert perf_counter() - begin < 1.0
 
 
+@cache
+def crowded(backend: str) -> Solver:
+    """Two goals and a wish: a search, then two that ask which goal can be met, each with its settling."""
+    arms = stack(kind="position").add(EndEffector("panda_link7", kind="position"), name="wrist")
+    return arms.add(Posture(), name="posture", weight=1e-3).solver(backend=backend)
+
+
+@pytest.mark.parametrize(("backend", "budget"), [("native", 2e-4), ("native", 2e-3), ("vm", 0.02)])
+def test_a_budget_is_overrun_by_one_iteration_at_most(backend: str, budget: float) -> None:
+    """Budgets end within descents, within settling, and between the searches for goals that contradict each other."""
+    robot, ik = arm("panda"), crowded(backend)
+    overrun = []
+    for k in range(12):
+        ik["hand"].target = tip(robot, robot.neutral, TIPS["panda"]).translation
+        ik["wrist"].target = np.array([0.1 * k, 0.0, 2.0])
+        found = ik.solve(robot.neutral, budget=budget, restarts=100_000)
+        assert found.status != "solved"
+        assert found.ticks > 3
+        assert found.seconds > 0.5 * budget
+        overrun.append((found.seconds - budget) / (found.seconds / found.ticks))
+    # In mean iterations, of which one of the settling, with its curvature, takes two. The machine may be busy in some
+    assert np.median(overrun) <= 3.0
+
+
 def test_no_restarts_is_one_descent() -> None:
     robot, ik = arm("panda"), solver()
     ik["hand"].target = pin.SE3(np.eye(3), np.array([0.0, 0.0, 5.0]))

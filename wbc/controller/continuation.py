@@ -23,6 +23,9 @@ JUMP = 0.02
 #: How often a step is halved to tell a jump, or the end of what is reached, from a steep place
 HALVINGS = 24
 
+#: Steps that targets given by functions are looked at in at least, from the first coordinate to the last
+LOOKS = 100
+
 
 @dataclass(frozen=True, eq=False)
 class Branch:
@@ -43,9 +46,13 @@ class Branch:
     moved: float
 
 
-def branch(engine: Engine, aim: Callable[[float], None], s: Array, first: Array, tolerance: float) -> Branch:
-    """The branch at coordinates, from a configuration at which the search of the first one begins."""
-    tracker = Tracker(engine, aim, tolerance)
+def branch(
+    engine: Engine, aim: Callable[[float], None], s: Array, first: Array, tolerance: float, smooth: bool
+) -> Branch:
+    """The branch at coordinates, from a configuration at which the search of the first one begins; ``smooth``: targets
+    go straight from one coordinate to the next, and no step is too long.
+    """
+    tracker = Tracker(engine, aim, tolerance, math.inf if smooth else (s[-1] - s[0]) / LOOKS)
     q = [tracker.at(float(s[0]), first)]
     steps = [tracker.look(q[0])]
     for before, here in itertools.pairwise(s.tolist()):
@@ -55,10 +62,16 @@ def branch(engine: Engine, aim: Callable[[float], None], s: Array, first: Array,
 
 
 class Tracker:
-    """Goals that are met at one path coordinate after the other; ``aim`` sets the targets of a coordinate."""
+    """Goals that are met at one path coordinate after the other.
 
-    def __init__(self, engine: Engine, aim: Callable[[float], None], tolerance: float) -> None:
-        self._engine, self._aim = engine, aim
+    Args:
+        aim: sets the targets of a coordinate. longest: of the steps.
+    """
+
+    def __init__(
+        self, engine: Engine, aim: Callable[[float], None], tolerance: float, longest: float = math.inf
+    ) -> None:
+        self._engine, self._aim, self._longest = engine, aim, longest
         self._query = engine.query(engine.goals, tolerance, 0, 0)
         #: where the last step ended, and dq/ds there
         self._slope = math.nan, np.zeros(engine.stack.robot.nv)
@@ -83,7 +96,7 @@ class Tracker:
             InfeasibleError: from some coordinate on the goals are not met. ContinuityError: configurations jump.
         """
         engine, place, halved = self._engine, before, 0
-        model, step = engine.stack.robot.model, here - before
+        model, step = engine.stack.robot.model, min(here - before, self._longest)
         slope = self._slope[1] if self._slope[0] == before else np.zeros(engine.stack.robot.nv)
         while place < here:
             ahead = min(place + step, here) if here - place > 1.5 * step else here

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 from time import perf_counter
 
@@ -45,7 +46,7 @@ class Search:
         self._best, ending = first, EXHAUSTED
         tick.weight[:] = query.seeking
         self._assembly.plain[0] = 1.0
-        for start in (None, *query.starts):
+        for start in itertools.chain((None,), query.starts):
             if start is not None:
                 tick.q[:] = np.where(query.chosen != 0.0, start, first)
             ending = self._descend(query, begin + SEEKING * seconds)

@@ -37,6 +37,8 @@ class MovingTargets:
 
     def __init__(self, controller: Controller, targets: Mapping[str, Any], s: Array) -> None:
         self._p = controller.tick.p
+        #: between neighbouring coordinates all targets go straight
+        self.smooth = not any(callable(given) for given in targets.values())
         self._parts: list[tuple[slice, Numbers]] = []
         robot = controller.stack.robot
         for name, given in targets.items():

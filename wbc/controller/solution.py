@@ -74,10 +74,12 @@ class Solution:
         return self.step.binding
 
     def explain(self) -> str:
-        """One line: how it ended, how far the goals are, what binds."""
+        """One line: how it ended, how far the goals are, what cannot be kept and what binds."""
         residuals = self.residuals
         text = f"{self.status} after {self.descents} descents, {self.ticks} ticks, {1e3 * self.seconds:.3g} ms"
         text += "".join(f"; {name} off by {residuals[name]}" for name in self.goals)
+        if not self.solved and self.step.relaxed:
+            text += "; cannot be kept: " + ", ".join(str(slack) for slack in self.step.relaxed)
         if not self.solved and self.binding:
             text += "; binding: " + ", ".join(str(b) for b in self.binding)
         return text

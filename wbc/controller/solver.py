@@ -92,9 +92,12 @@ class Solver:
         answer, spent, ticks = engine.within_limits(engine.tick.q), found.seconds, found.ticks
         status = ending(found)
         if status == Ending.UNREACHABLE and len(goals) > 1:
-            share = (seconds - spent) / len(goals)
-            alone = [engine.run(first, engine.query((name,), near, starts, number), share) for name in goals]
-            spent, ticks = spent + sum(a.seconds for a in alone), ticks + sum(a.ticks for a in alone)
+            alone = []
+            for left, name in zip(range(len(goals), 0, -1), goals, strict=True):
+                # What one search takes too long, the next ones have less
+                share = (seconds - spent) / left
+                alone.append(engine.run(first, engine.query((name,), near, starts, number), share))
+                spent, ticks = spent + alone[-1].seconds, ticks + alone[-1].ticks
             if all(a.ending == FOUND for a in alone):
                 status = Ending.CONTRADICTORY
         step = engine.look(answer, query.settling if status == Ending.SOLVED else query.seeking)
@@ -171,9 +174,10 @@ class Solver:
 
             q(s_0) = where a descent from q0 ends,    q(s + ds) = where one from q(s) + (dq/ds) ds ends,
 
-        and the wishes are at rest. ds is halved where the descent fails or a joint moves by more than 0.02 (rad, or
-        characteristic lengths), and doubled again where all move by less than a quarter of that. What is still so after
-        24 halvings is a jump, or the end of what can be reached.
+        and the wishes are at rest. ds goes to the next s, but no farther than a hundredth of the whole where a target
+        is a function. It is halved where the descent fails or a joint moves by more than 0.02 (rad, or characteristic lengths), and
+        doubled again where all move by less than a quarter of that. What is still so after 24 halvings is a jump, or
+        the end of what can be reached.
 
         Args:
             targets: name of a task -> function of s that returns its ``target``, or a sequence with one for each entry
@@ -200,7 +204,7 @@ class Solver:
         moving = MovingTargets(engine.controller, targets, places)
         before = engine.tick.p.copy()
         try:
-            return branch(engine, moving.aim, places, engine.begin(q0), near)
+            return branch(engine, moving.aim, places, engine.begin(q0), near, moving.smooth)
         finally:
             engine.tick.p[:] = before
 
