@@ -175,9 +175,9 @@ class Solver:
             q(s_0) = where a descent from q0 ends,    q(s + ds) = where one from q(s) + (dq/ds) ds ends,
 
         and the wishes are at rest. ds goes to the next s, but no farther than a hundredth of the whole where a target
-        is a function. It is halved where the descent fails or a joint moves by more than 0.02 (rad, or characteristic lengths), and
-        doubled again where all move by less than a quarter of that. What is still so after 24 halvings is a jump, or
-        the end of what can be reached.
+        is a function. It is halved where the descent fails or a joint moves by more than 0.02 (rad, or characteristic
+        lengths), and doubled again where all move by less than a quarter of that. What is still so after 24 halvings is
+        a jump, or the end of what can be reached.
 
         Args:
             targets: name of a task -> function of s that returns its ``target``, or a sequence with one for each entry
