@@ -18,7 +18,7 @@ from wbc.tasks import EndEffector
 from wbc.trajectory.path import Path, PolynomialPath
 from wbc.validation import Array
 
-#: The goal's errors at the samples, however small the tolerance [m, rad]
+#: The pose's errors at the samples [m, rad], far below any tolerance: a law's jerk sees the spline's third derivative
 CLOSEST = 1e-9
 
 #: Samples that a path may have
@@ -121,7 +121,7 @@ class _Seeker:
     def begin(self, start: Any) -> tuple[Tracker, Array]:
         """A tracker that begins at a configuration. What nobody has set, as the posture's target, is taken from it."""
         first = self.engine.begin(start)
-        return Tracker(self.engine, self.aim, max(CLOSEST, 0.1 * min(self.near, self.turned))), first
+        return Tracker(self.engine, self.aim, CLOSEST), first
 
     def aim(self, s: float) -> None:
         """The target becomes pose(s)."""
