@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import pathlib
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -33,10 +34,11 @@ class ManyStates:
         self._output = np.zeros((CHUNK, self.size))
         # The buffers point into arrays that must live as long as they do; so does the function
         self._loop = loop
-        self._buffer, self._run = loop.buffer()
+        pair: Any = loop.buffer()
+        self._buffer, self._run = pair
         for k, array in enumerate(self._inputs):
-            self._buffer.set_arg(k, memoryview(array.reshape(-1)))
-        self._buffer.set_res(0, memoryview(self._output.reshape(-1)))
+            self._buffer.set_arg(k, memoryview(array.reshape(-1).data))
+        self._buffer.set_res(0, memoryview(self._output.reshape(-1).data))
 
     def __call__(self, *inputs: Array) -> Array:
         """Values at m states, m x size; each input is m x its length."""

@@ -91,7 +91,9 @@ class Online:
         self._answer: Any = ruckig.OutputParameter(self.dof)
         self._fastest = np.zeros(self.dof)
         self._shape = (self.dof,)
+        self._place: list[float] = []
         self._goal: list[float] = []
+        self._now: tuple[list[float], list[float], list[float]] = ([], [], [])
         self._aims: tuple[Array, Array, Array] = (np.zeros(0), np.zeros(0), np.zeros(0))
         self._plain = False
         self._kind: Literal["position", "velocity"] = "position"
@@ -229,12 +231,12 @@ class Online:
         pace = np.clip(self._pace, -limit, limit)
         asked.max_velocity, asked.min_velocity = limit, -limit
         if self._kind == "position":
-            place = self._walls.nearest(self._place)
-            self.clipped = place != self._place
+            goal = self._walls.nearest(self._place)
+            self.clipped = goal != self._place
             asked.control_interface, asked.synchronization = self._modes.Position, self._together
             asked.per_dof_control_interface = None
-            asked.target_position, asked.target_velocity = place, pace
-            self._goal, self._aims = place, (pace, limit, np.ones(self.dof, dtype=bool))
+            asked.target_position, asked.target_velocity = goal, pace
+            self._goal, self._aims = goal, (pace, limit, np.ones(self.dof, dtype=bool))
             return
         self.clipped = False
         # Towards a wall, a velocity is a way to the wall that is no faster: so the joint comes to rest there in time

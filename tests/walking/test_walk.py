@@ -1,0 +1,97 @@
+"""Plans are carried out: the body keeps its pace, hands keep their holds, joints their limits."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import combinations
+
+import numpy as np
+import pytest
+
+import wbc
+from wbc.robots import Walker
+from wbc.walking import Structure, cylinder
+from wbc.walking.body_path import grid_path
+from wbc.walking.plan import Plan
+from wbc.walking.planner import plan_walk
+from wbc.walking.walk import Tick, Walk
+from wbc.walking.walk_stack import WalkStack
+
+INCH = 0.0254
+PATHS = {"+A": [(13, 9), (13, 14)], "-T": [(16, 12), (11, 12)]}
+
+
+@pytest.fixture(scope="module")
+def machine() -> Walker:
+    return wbc.robots.walker()
+
+
+@pytest.fixture(scope="module")
+def structure() -> Structure:
+    return cylinder(rigid=True)
+
+
+@pytest.fixture(scope="module")
+def stack(machine: Walker, structure: Structure) -> WalkStack:
+    return WalkStack(machine, structure, collisions=False)
+
+
+def walked(
+    machine: Walker, structure: Structure, stack: WalkStack, points: Sequence[tuple[float, float]], speed: float
+):
+    plan = plan_walk(machine, structure, grid_path(points, speed * INCH))
+    walk, ticks = Walk(machine, structure, plan, stack=stack), list[Tick]()
+    assert walk.run(ticks.append) == "arrived"
+    return plan, walk, ticks
+
+
+@pytest.mark.parametrize("name", sorted(PATHS))
+def test_six_inches_a_second(machine: Walker, structure: Structure, stack: WalkStack, name: str) -> None:
+    plan, walk, ticks = walked(machine, structure, stack, PATHS[name], 6.0)
+    assert plan.complete
+    assert plan.delay == 0.0
+    assert len(plan.regrasps) >= 2
+    assert plan.path.duration / (walk.time - 0.5) >= 0.98  # ramps at both ends take half a second
+    assert max(tick.body_error for tick in ticks) < 0.002
+    assert max(tick.slip for tick in ticks) < 0.001
+    assert all(tick.status == "solved" for tick in ticks)
+    rates = np.array([tick.v[6:] for tick in ticks])
+    assert (np.abs(rates) <= machine.robot.limits.velocity[6:] * (1 + 1e-6)).all()
+    q = np.array([tick.q[7:] for tick in ticks])
+    limits = machine.robot.limits
+    assert (q >= limits.position_lower[6:] - 1e-6).all()
+    assert (q <= limits.position_upper[6:] + 1e-6).all()
+    for tick in ticks:
+        closed = [hold for hold, hand in zip(tick.holds, tick.hands, strict=True) if hand == "closed"]
+        assert len(closed) >= machine.min_holds
+        assert len(set(tick.holds)) == 3
+
+
+def test_a_plan_is_the_same_every_time_and_on_a_moved_structure(machine: Walker, structure: Structure) -> None:
+    import pinocchio as pin
+
+    path = grid_path(PATHS["+A"], 6 * INCH)
+    plan = plan_walk(machine, structure, path)
+    again = plan_walk(machine, structure, path)
+    pose = pin.SE3(pin.exp3(np.array([0.3, -0.7, 0.2])), np.array([1.0, -2.0, 0.5]))
+    moved = plan_walk(machine, structure.moved(pose), path.moved(pose))
+    assert plan.rows() == again.rows()
+    assert [row["target"] for row in plan.rows()] == [row["target"] for row in moved.rows()]
+
+
+def test_grips_of_a_plan_are_what_it_says(machine: Walker, structure: Structure) -> None:
+    plan = plan_walk(machine, structure, grid_path(PATHS["-T"], 6 * INCH))
+    check(plan, machine)
+
+
+def check(plan: Plan, machine: Walker) -> None:
+    """Hands move one by one, are on different holds, and lift before their grip ends."""
+    held = dict(zip([arm.name for arm in machine.arms], plan.start, strict=True))
+    free = 0.0
+    for step in plan.regrasps:
+        assert step.lift >= free - 1e-9
+        assert step.land > step.lift
+        assert step.margin >= 0.0
+        assert held[step.arm] == step.source
+        held[step.arm], free = step.target, step.land
+        assert all(a != b for a, b in combinations(held.values(), 2))

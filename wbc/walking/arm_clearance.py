@@ -1,0 +1,98 @@
+"""Room between the arms of one body: capsules about upper arms, forearms, hands and necks, in the body's frame."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from wbc.robots import Walker
+from wbc.validation import Array
+from wbc.walking.arm_kinematics import ArmKinematics
+from wbc.walking.grips import Grips, Ints
+
+#: Every so many samples of a path are looked at
+EVERY = 4
+#: What the plan keeps of the clearance for feedback, besides the clearance itself [m]
+ROOM = 0.01
+#: No conflict: a sample after every path
+NEVER = 1 << 40
+
+
+def segment_distances(a: Array, b: Array, c: Array, d: Array) -> Array:
+    """Distances between segments a-b and c-d, ``[..., 3]`` each: clamped parameters of the nearest points."""
+    u, v, w = b - a, d - c, a - c
+    uu, vv, uv = (u * u).sum(-1), (v * v).sum(-1), (u * v).sum(-1)
+    uw, vw = (u * w).sum(-1), (v * w).sum(-1)
+    det = uu * vv - uv * uv
+    with np.errstate(divide="ignore", invalid="ignore"):
+        s = np.where(det > 1e-12 * uu * vv, np.clip((uv * vw - vv * uw) / det, 0.0, 1.0), 0.0)
+        t = np.where(vv > 0, (uv * s + vw) / vv, 0.0)
+        clipped = np.clip(t, 0.0, 1.0)
+        s = np.where(clipped == t, s, np.where(uu > 0, np.clip((uv * clipped - uw) / uu, 0.0, 1.0), 0.0))
+    gap = w + s[..., None] * u - clipped[..., None] * v
+    out: Array = np.linalg.norm(gap, axis=-1)
+    return out
+
+
+class ArmClearance:
+    """When two grips bring their arms too near to each other; answers are kept.
+
+    Args:
+        walker: its capsules and clearance. grips: over one path.
+    """
+
+    def __init__(self, walker: Walker, grips: Grips) -> None:
+        self._grips = grips
+        self._kinematics = ArmKinematics(walker.data)  # type: ignore[arg-type]
+        self._bases = [arm.base for arm in walker.arms]
+        neck, upper, fore, hand = self._kinematics.radii
+        # Named points O N S E W H of an arm: capsules O-N, S-E, E-W, W-H
+        self._from, self._to = [0, 2, 3, 4], [1, 3, 4, 5]
+        radii = np.array([neck, upper, fore, hand])
+        self._least = radii[:, None] + radii[None, :] + walker.data.clearance + ROOM  # type: ignore[union-attr]
+        self._least[0, 0] = 0.0  # necks stand still
+        self._points: dict[int, Array] = {}
+        self._conflicts: dict[tuple[int, int], Ints] = {}
+
+    def first_conflict(self, one: int, other: int, sample: int) -> int:
+        """The first sample from ``sample`` on at which the arms are too near, NEVER if there is none."""
+        pair = (one, other) if one < other else (other, one)
+        if pair not in self._conflicts:
+            self._conflicts[pair] = self._find(*pair)
+        found = self._conflicts[pair]
+        place = int(np.searchsorted(found, sample - EVERY + 1))
+        return int(found[place]) if place < len(found) else NEVER
+
+    def points(self, arm: int, postures: Array) -> Array:
+        """Named points of an arm in the body's frame, ``[..., 6, 3]``."""
+        base = self._bases[arm]
+        out: Array = self._kinematics.points(postures) @ base.rotation.T + base.translation
+        return out
+
+    def between(self, one: Array, other: Array) -> Array:
+        """Least distance beyond radii and clearance of two arms given by their points ``[..., 6, 3]``."""
+        a, b = one[..., self._from, None, :], one[..., self._to, None, :]
+        c, d = other[..., None, self._from, :], other[..., None, self._to, :]
+        shape = np.broadcast_shapes(a.shape, c.shape)
+        parts = [np.broadcast_to(x, shape) for x in (a, b, c, d)]
+        out: Array = (segment_distances(*parts) - self._least).min(axis=(-1, -2))
+        return out
+
+    def _find(self, one: int, other: int) -> Ints:
+        grips = self._grips
+        first = int(max(grips.first[one], grips.first[other]))
+        last = int(min(grips.last[one], grips.last[other]))
+        begin = -(-first // EVERY)
+        samples = np.arange(begin * EVERY, last + 1, EVERY)
+        if not len(samples):
+            return samples
+        near = self.between(self._of(one, samples), self._of(other, samples)) < 0.0
+        return samples[near]
+
+    def _of(self, grip: int, samples: Ints) -> Array:
+        """Points of a grip at samples that are multiples of EVERY."""
+        grips = self._grips
+        start = -(-int(grips.first[grip]) // EVERY)
+        if grip not in self._points:
+            every = np.arange(start * EVERY, grips.last[grip] + 1, EVERY)
+            self._points[grip] = self.points(int(grips.arm[grip]), grips.posture(np.array(grip), every))
+        return self._points[grip][samples // EVERY - start]

@@ -1,0 +1,163 @@
+"""Where the body is to be: poses over the time at which it is there when nothing slows it down."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from wbc import validation
+from wbc.errors import RangeError, ShapeError
+from wbc.validation import Array
+from wbc.walking.structures import PITCH, RADIUS, grid_angle, grid_pose
+
+#: Time from one sample to the next [s]
+SPACING = 0.05
+#: Rotations this far apart [rad] count as a metre and a half; for paths that only turn
+TURN_RADIUS = 1.5
+
+
+@dataclass(frozen=True, eq=False)
+class BodyPath:
+    """Poses of the body's frame in the structure's, evenly over the path time u.
+
+    u is the time of the walk at the commanded speed. A walker that must wait is at the same pose later.
+
+    Attributes:
+        poses: ``[samples, 4, 4]`` [m].
+        spacing: u from one sample to the next [s].
+
+    Raises:
+        ShapeError, NotFiniteError, RotationError: no poses. RangeError: spacing not positive.
+    """
+
+    poses: Array
+    spacing: float = SPACING
+
+    def __post_init__(self) -> None:
+        poses = validation.real_array("BodyPath.poses", self.poses)
+        if poses.ndim != 3 or poses.shape[1:] != (4, 4) or len(poses) < 1:
+            raise ShapeError("BodyPath.poses", self.poses, "expected samples x 4 x 4")
+        for pose in (poses[0], poses[-1]):
+            validation.pose("BodyPath.poses", pose)
+        # A path that stands still is two samples long, so that there is something to interpolate
+        poses = np.repeat(poses, 2, axis=0) if len(poses) == 1 else poses.copy()
+        poses.flags.writeable = False
+        object.__setattr__(self, "poses", poses)
+        spacing = validation.scalar("BodyPath.spacing", self.spacing, low=0.0, open_low=True, unit="s")
+        object.__setattr__(self, "spacing", spacing)
+
+    def __len__(self) -> int:
+        return len(self.poses)
+
+    @property
+    def duration(self) -> float:
+        """u at the last sample [s]."""
+        return (len(self.poses) - 1) * self.spacing
+
+    def at(self, u: float) -> tuple[pin.SE3, Array]:
+        """Pose, and its derivative along u: (linear; angular) in the structure's axes [m/s, rad/s].
+
+        Between samples the pose moves with constant twist. u is clipped to the path.
+        """
+        place = min(max(u / self.spacing, 0.0), len(self.poses) - 1.0)
+        k = min(int(place), len(self.poses) - 2)
+        first, last = pin.SE3(self.poses[k]), pin.SE3(self.poses[k + 1])
+        step = pin.log6(first.actInv(last))
+        pose = first * pin.exp6(step * (place - k))
+        rotation = pose.rotation
+        rate = np.concatenate([rotation @ step.linear, rotation @ step.angular]) / self.spacing
+        return pose, rate
+
+    def blended(self, samples: Array) -> Array:
+        """Matrices at fractional samples, by straight lines between entries: for estimates; ``[..., 4, 4]``."""
+        at = np.clip(samples, 0.0, len(self.poses) - 1.0)
+        low = np.minimum(at.astype(int), len(self.poses) - 2)
+        part = (at - low)[..., None, None]
+        out: Array = self.poses[low] * (1.0 - part) + self.poses[low + 1] * part
+        return out
+
+    def moved(self, pose: pin.SE3) -> BodyPath:
+        """The same path on a structure that was moved by ``pose``."""
+        return BodyPath(pose.homogeneous @ self.poses, self.spacing)
+
+
+def standing_path(pose: Any, duration: float = 1.0) -> BodyPath:
+    """A body that stays where it is.
+
+    Raises:
+        ShapeError, NotFiniteError, RotationError, RangeError: of arguments.
+    """
+    where = validation.pose("pose", pose).homogeneous
+    time = validation.scalar("duration", duration, low=0.0, open_low=True, unit="s")
+    return BodyPath(np.repeat(where[None], int(np.ceil(time / SPACING)) + 1, axis=0))
+
+
+def straight_path(poses: Sequence[Any], speed: float, turn_rate: float = 0.05) -> BodyPath:
+    """From pose to pose with constant twists: as slow as ``speed`` [m/s] of the origin and ``turn_rate`` [rad/s] ask.
+
+    Raises:
+        ShapeError, NotFiniteError, RotationError: fewer than one pose, or bad ones. RangeError: rates not positive.
+    """
+    speed, turn_rate = _rates(speed, turn_rate)
+    points = [validation.pose(f"poses[{k}]", pose) for k, pose in enumerate(poses)]
+    if not points:
+        raise ShapeError("poses", poses, "expected at least one pose")
+    out = [points[0].homogeneous[None]]
+    for first, last in itertools.pairwise(points):
+        step = pin.log6(first.actInv(last))
+        time = max(np.linalg.norm(step.linear) / speed, np.linalg.norm(step.angular) / turn_rate)
+        count = int(np.ceil(time / SPACING - 1e-9))
+        parts = np.arange(1, count + 1) / max(count, 1)
+        out += [(first * pin.exp6(step * part)).homogeneous[None] for part in parts]
+    return BodyPath(np.concatenate(out))
+
+
+def grid_path(
+    points: Sequence[Any],
+    speed: float,
+    turn_rate: float = 0.05,
+    height: float = 52 * 0.0254,
+    pose: pin.SE3 | None = None,
+) -> BodyPath:
+    """Over the published cylinder, along straight lines in (T, A, heading), at ``height`` [m] above the surface.
+
+    A segment takes as long as ``speed`` [m/s] of the body's origin and ``turn_rate`` [rad/s] ask, whichever is longer.
+
+    Args:
+        points: (T, A) or (T, A, heading [rad]), at least one.
+        pose: of the cylinder, if it was moved.
+
+    Raises:
+        ShapeError, NotFiniteError: bad points. RangeError: rates not positive.
+    """
+    speed, turn_rate = _rates(speed, turn_rate)
+    height = validation.scalar("height", height, low=0.0, open_low=True, unit="m")
+    rows = []
+    for k, point in enumerate(points):
+        row = validation.real_array(f"points[{k}]", point)
+        if row.shape not in ((2,), (3,)):
+            raise ShapeError(f"points[{k}]", point, "expected (T, A) or (T, A, heading)")
+        rows.append(np.append(row, np.zeros(3 - len(row))))
+    if not rows:
+        raise ShapeError("points", points, "expected at least one point")
+    radius, grid = RADIUS + height, [rows[0][None]]
+    for first, last in itertools.pairwise(rows):
+        step = last - first
+        way = np.hypot((grid_angle(1.0) - grid_angle(0.0)) * radius * step[0], PITCH * step[1])
+        count = int(np.ceil(max(way / speed, abs(step[2]) / turn_rate) / SPACING - 1e-9))
+        grid.append(first + step * (np.arange(1, count + 1) / max(count, 1))[:, None])
+    poses = np.array([grid_pose(t, a, radius, heading).homogeneous for t, a, heading in np.concatenate(grid)])
+    return BodyPath(poses if pose is None else pose.homogeneous @ poses)
+
+
+def _rates(speed: float, turn_rate: float) -> tuple[float, float]:
+    speed = validation.scalar("speed", speed, low=0.0, open_low=True, unit="m/s")
+    turn_rate = validation.scalar("turn_rate", turn_rate, low=0.0, open_low=True, unit="rad/s")
+    if not np.isfinite([speed, turn_rate]).all():
+        raise RangeError("speed", (speed, turn_rate), "expected finite rates")
+    return speed, turn_rate

@@ -1,0 +1,130 @@
+"""Grips: one hand on one hold with one wrist branch, over the samples of a body path at which that is possible."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from math import radians
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wbc.robots import Walker
+from wbc.validation import Array
+from wbc.walking.arm_kinematics import LIMIT_NAMES, ArmKinematics
+from wbc.walking.body_path import BodyPath
+from wbc.walking.structure import Structure
+
+Ints = NDArray[np.int64]
+
+#: What the plan keeps of the limits for feedback: part of a rate, angle [rad] and reach [m]
+RATE_PART, ANGLE_ROOM, REACH_ROOM = 0.85, radians(2.0), 0.3 * 0.0254
+#: A grip of fewer samples is none
+SHORTEST = 3
+#: The hand's approach and the body's z axis enclose less than 60 degrees: arms do not reach round the body
+LEAST_FACING = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class Grips:
+    """All grips over a body path; grip g is of ``arm[g]`` on ``hold[g]`` (its row in the structure).
+
+    Attributes:
+        arm, hold, branch: ``[grips]``; branch 0 is theta5 >= 0, 1 is theta5 < 0.
+        first, last: samples of the path, both included, ``[grips]``.
+        offset: grip g's postures are ``postures[offset[g] : offset[g] + last[g] - first[g] + 1]``.
+        postures: ``[all samples, 6]`` [rad]; joint 6 is 0 where the roll is free.
+        ends: why each ends: an index into :attr:`reasons`.
+    """
+
+    arm: Ints
+    hold: Ints
+    branch: Ints
+    first: Ints
+    last: Ints
+    offset: Ints
+    postures: Array
+    ends: Ints
+
+    #: What may end a grip
+    reasons = (*LIMIT_NAMES, "reach", *(f"joint {k} rate" for k in range(1, 7)), "end of the path")
+
+    def __len__(self) -> int:
+        return len(self.arm)
+
+    def posture(self, grip: Ints, sample: Ints) -> Array:
+        """Postures at samples, clipped to the grip, ``[..., 6]``."""
+        inside = np.clip(sample - self.first[grip], 0, self.last[grip] - self.first[grip])
+        out: Array = self.postures[self.offset[grip] + inside]
+        return out
+
+    def of_arm(self, arm: int) -> Ints:
+        """Grips of an arm."""
+        return np.nonzero(self.arm == arm)[0]
+
+
+def find_grips(walker: Walker, structure: Structure, path: BodyPath) -> Grips:
+    """Every grip over a path: in reach, all joints within their limits less a margin, and slow enough from sample to
+    sample at the commanded speed.
+    """
+    kinematics = ArmKinematics(walker.data)  # type: ignore[arg-type]
+    found = [grip for arm in range(len(walker.arms)) for grip in _of_arm(kinematics, walker, arm, structure, path)]
+    columns = list(zip(*found, strict=True)) if found else [()] * 7
+    postures = np.concatenate(columns[6]) if found else np.zeros((0, 6))
+    lengths = np.array([len(rows) for rows in columns[6]], dtype=int)
+    offset = np.concatenate([[0], np.cumsum(lengths)[:-1]]) if found else np.zeros(0)
+    whole = [np.array(column, dtype=np.int64) for column in columns[:6]]
+    arm, hold, branch, first, last, ends = whole
+    return Grips(arm, hold, branch, first, last, offset.astype(np.int64), postures, ends)
+
+
+def _of_arm(
+    kinematics: ArmKinematics, walker: Walker, arm: int, structure: Structure, path: BodyPath
+) -> Iterator[tuple[int, int, int, int, int, int, Array]]:
+    """(arm, hold, branch, first, last, reason of the end, postures) of every grip of an arm."""
+    base = walker.arms[arm].base.homogeneous
+    frames = path.poses @ base
+    data = kinematics.data
+    far = data.neck_length + data.shoulder_offset + data.upper_arm_length + data.forearm_length + data.hand_length
+    offset = structure.positions[None] - frames[:, None, :3, 3]
+    samples, holds = np.nonzero((offset**2).sum(axis=2) < far**2)
+    turn = frames[samples, :3, :3]
+    points = np.einsum("nji,nj->ni", turn, offset[samples, holds])
+    axes = np.einsum("nji,nj->ni", turn, structure.axes[holds])
+    axes /= np.linalg.norm(axes, axis=1)[:, None]
+    reach = kinematics.wrist_reach(kinematics.wrist_of(points, axes))
+    near = (reach > REACH_ROOM) & (axes[:, 2] > LEAST_FACING)
+    samples, holds = samples[near], holds[near]
+    order = np.lexsort((samples, holds))
+    samples, holds = samples[order], holds[order]
+    if not len(samples):
+        return
+    postures, solved = kinematics.inverse_axis(points[near][order], axes[near][order])
+    margins = kinematics.margins(postures)
+    margins[..., 5] = np.inf  # joint 6 turns the hand about its own axis, which is free
+    good = solved & (margins.min(axis=-1) > ANGLE_ROOM)
+    limit = RATE_PART * np.array(kinematics.data.joint_rates)
+    neighbours = (holds[1:] == holds[:-1]) & (samples[1:] == samples[:-1] + 1)
+    for branch in range(postures.shape[1]):
+        q, fits = postures[:, branch], good[:, branch]
+        used = np.abs(q[1:] - q[:-1])[:, :5] / path.spacing / limit[:5]
+        joined = neighbours & fits[1:] & fits[:-1] & (used <= 1.0).all(axis=1)
+        begins = np.nonzero(np.concatenate([[True], ~joined]))[0]
+        for begin, end in zip(begins, np.concatenate([begins[1:], [len(q)]]) - 1, strict=True):
+            if not fits[begin] or end - begin + 1 < SHORTEST:
+                continue
+            reason = _reason(samples, holds, margins[:, branch], used, neighbours, end, len(path))
+            first, last = int(samples[begin]), int(samples[end])
+            yield arm, int(holds[begin]), branch, first, last, reason, q[begin : end + 1]
+
+
+def _reason(samples: Ints, holds: Ints, margins: Array, used: Array, neighbours: Array, end: int, count: int) -> int:
+    """Why a grip ends after row ``end``: an index into ``Grips.reasons``."""
+    names = len(LIMIT_NAMES)
+    if samples[end] == count - 1:
+        return names + 7
+    if end + 1 == len(samples) or not neighbours[end]:
+        return names
+    if (used[end] > 1.0).any():
+        return names + 1 + int(np.argmax(used[end]))
+    return int(np.argmin(margins[end + 1]))

@@ -1,0 +1,119 @@
+"""Plans: which hand is moved to which hold, where on the body's path; as objects and as files."""
+
+from __future__ import annotations
+
+import json
+import os
+import pathlib
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+from wbc.errors import StructureFileError, WbcError
+from wbc.walking.body_path import BodyPath
+from wbc.walking.grips import Grips
+
+
+class NoPlanError(WbcError):
+    """No sequence of re-grasps leads to the end of the path; the message says where it ends, which holds and why."""
+
+
+class HoldLost(WbcError):
+    """Fewer hands hold than the robot needs."""
+
+
+@dataclass(frozen=True)
+class Regrasp:
+    """One swing of a plan.
+
+    Attributes:
+        arm: name. source, target: ids of holds.
+        branch: of the wrist on the target, 0: theta5 >= 0, 1: theta5 < 0.
+        lift, land: path time u of the body [s].
+        duration: of the swing, latches and settling included [s].
+        delay: by which the body is late after it [s].
+        margin: path time that the source could still have held at the lift [s].
+        limit: what ends the grip on the target.
+        until: path time until which the target can be held [s].
+    """
+
+    arm: str
+    source: str
+    target: str
+    branch: int
+    lift: float
+    land: float
+    duration: float
+    delay: float
+    margin: float
+    limit: str
+    until: float
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """A walk along a body path.
+
+    Attributes:
+        path: of the body. start: hold id an arm, in the order of arms. regrasps: in the order of time.
+        complete: it leads to the end of the path. reached: path time that it leads to [s].
+        reason: why it is not complete; "" if it is.
+        grips, chain: the table of grips, and for each arm the grips that it uses, first that of the start; for the
+            controller, not in files.
+    """
+
+    path: BodyPath
+    start: tuple[str, ...]
+    regrasps: tuple[Regrasp, ...]
+    complete: bool
+    reached: float
+    reason: str = ""
+    grips: Grips | None = field(default=None, repr=False)
+    chain: tuple[tuple[int, ...], ...] = field(default=(), repr=False)
+
+    @property
+    def delay(self) -> float:
+        """By which the body is late at the end [s]."""
+        return sum(step.delay for step in self.regrasps)
+
+    def rows(self) -> list[dict[str, Any]]:
+        """One dictionary a re-grasp, as in the file."""
+        return [asdict(step) for step in self.regrasps]
+
+    def save(self, path: str | os.PathLike[str]) -> pathlib.Path:
+        """Write start and re-grasps as JSON."""
+        file = pathlib.Path(path)
+        kept = {
+            "start": list(self.start),
+            "complete": self.complete,
+            "reached": self.reached,
+            "reason": self.reason,
+            "regrasps": self.rows(),
+        }
+        file.write_text(json.dumps(kept, indent=1) + "\n")
+        return file
+
+
+def read_rows(path: str | os.PathLike[str]) -> dict[str, Any]:
+    """What :meth:`Plan.save` wrote.
+
+    Raises:
+        StructureFileError: not such a file.
+    """
+    try:
+        kept = json.loads(pathlib.Path(path).read_text())
+        kept["regrasps"] = [Regrasp(**row) for row in kept["regrasps"]]
+        kept["start"] = tuple(kept["start"])
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise StructureFileError("plan", str(path), f"not a plan: {error}") from error
+    return dict(kept)
+
+
+def differences(one: Plan, other: Plan) -> list[str]:
+    """What two plans do differently, one line each; empty for equal plans."""
+    out = [] if one.start == other.start else [f"start: {' '.join(one.start)} / {' '.join(other.start)}"]
+    for k in range(max(len(one.regrasps), len(other.regrasps))):
+        steps = [plan.regrasps[k] if k < len(plan.regrasps) else None for plan in (one, other)]
+        shown = [f"{s.arm} {s.source} -> {s.target} at {s.lift:.2f} s" if s else "none" for s in steps]
+        if steps[0] != steps[1]:
+            out.append(f"re-grasp {k + 1}: {shown[0]} / {shown[1]}")
+    return out

@@ -1,0 +1,139 @@
+"""The free-gait planner: from a structure and a body path to a plan."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from itertools import product
+from typing import Literal
+
+from wbc import validation
+from wbc.errors import ShapeError
+from wbc.robots import Walker
+from wbc.walking.body_path import BodyPath
+from wbc.walking.grips import Grips, find_grips
+from wbc.walking.plan import NoPlanError, Plan, Regrasp
+from wbc.walking.stance_search import Found, StanceSearch
+from wbc.walking.structure import Structure
+
+Objective = Literal["velocity", "destination"]
+
+#: Delays of one swing that velocity mode allows one after the other [s]
+DELAYS = (0.0, 0.25, 0.5, 1.0, 2.0, float("inf"))
+#: Grips of an arm that a start may have, and stances that a search begins with
+START_GRIPS, STARTS = 12, 24
+
+
+def plan_walk(
+    walker: Walker,
+    structure: Structure,
+    path: BodyPath,
+    *,
+    start: Mapping[str, str] | None = None,
+    objective: Objective = "velocity",
+    width: int | None = 16,
+    time_budget: float | None = None,
+    partial: bool = False,
+) -> Plan:
+    """Which hands to move where so that the body can follow a path.
+
+    Velocity: of the plans that delay no swing by more than 0, else 0.25, 0.5, ... s, one with the fewest re-grasps.
+    Destination: the fewest re-grasps, however much the body slows down.
+
+    Args:
+        start: arm name -> hold id of the hands that hold at the beginning; default: the planner chooses.
+        width: stances kept for each number of re-grasps; None: all, which finds the fewest.
+        time_budget: [s]; after it what is found is returned or refused.
+        partial: return a plan that does not lead to the end instead of refusing.
+
+    Raises:
+        UnknownNameError: another arm, hold or objective. ShapeError: a walker that is no body with PUMA arms.
+        NoPlanError: there is no way, with where it ends, holds and limits.
+    """
+    validation.one_of("objective", objective, ("velocity", "destination"))
+    if walker.robot.name == "two_ended_arm":
+        raise ShapeError("walker", walker.robot.name, "expected a body with arms")
+    deadline = None if time_budget is None else time.perf_counter() + time_budget
+    grips = find_grips(walker, structure, path)
+    best: tuple[StanceSearch, Found] | None = None
+    for delay in DELAYS if objective == "velocity" else DELAYS[-1:]:
+        search = StanceSearch(walker, structure, path, grips, longest_delay=delay, width=width)
+        starts = _starts(walker, structure, search, grips, start)
+        found = search.run(starts, deadline=deadline)
+        if best is None or (found.complete, found.reached) > (best[1].complete, best[1].reached):
+            best = search, found
+        if found.complete or (deadline is not None and time.perf_counter() > deadline):
+            break
+    assert best is not None
+    plan = _plan(walker, structure, path, grips, best[1])
+    if not plan.complete and not partial:
+        raise NoPlanError("plan", structure.name, plan.reason)
+    return plan
+
+
+def _starts(
+    walker: Walker, structure: Structure, search: StanceSearch, grips: Grips, start: Mapping[str, str] | None
+) -> list[tuple[int, ...]]:
+    """Stances to begin with, those that last longest first."""
+    names = [arm.name for arm in walker.arms]
+    for name in start or {}:
+        validation.one_of("start", name, names)
+    choices = []
+    for k, name in enumerate(names):
+        mine = [int(g) for g in grips.of_arm(k) if grips.first[g] == 0]
+        if start is not None and name in start:
+            row = structure.index(start[name])
+            mine = [g for g in mine if grips.hold[g] == row]
+            if not mine:
+                raise NoPlanError(f"start.{name}", start[name], "the arm cannot hold it at the beginning of the path")
+        mine.sort(key=lambda g: (-int(grips.last[g]), int(grips.hold[g]), int(grips.branch[g])))
+        if not mine:
+            raise NoPlanError("plan", name, "no hold is in reach at the beginning of the path")
+        choices.append(mine[:START_GRIPS])
+    stances = []
+    for stance in product(*choices):
+        if len({int(grips.hold[g]) for g in stance}) == len(stance):
+            until = search.until(stance, 0)
+            if until > 0:
+                stances.append((-until, stance))
+    if not stances:
+        raise NoPlanError(
+            "plan", structure.name, "no stance is possible at the beginning: the arms are in each other's way"
+        )
+    return [stance for _, stance in sorted(stances)[:STARTS]]
+
+
+def _plan(walker: Walker, structure: Structure, path: BodyPath, grips: Grips, found: Found) -> Plan:
+    ids, spacing = structure.ids, path.spacing
+    steps, chain = [], [[g] for g in found.start]
+    for move in found.moves:
+        chain[move.arm].append(move.target)
+        steps.append(
+            Regrasp(
+                walker.arms[move.arm].name,
+                ids[grips.hold[move.source]],
+                ids[grips.hold[move.target]],
+                int(grips.branch[move.target]),
+                round(move.lift * spacing, 9),
+                round(move.land * spacing, 9),
+                round(move.duration, 6),
+                round(move.delay, 6),
+                round(float(grips.last[move.source] - move.lift) * spacing, 9),
+                grips.reasons[grips.ends[move.target]],
+                round(float(grips.last[move.target]) * spacing, 9),
+            )
+        )
+    reason = ""
+    if not found.complete:
+        causes = [
+            f"{walker.arms[grips.arm[g]].name} on {ids[grips.hold[g]]}: {grips.reasons[grips.ends[g]]}"
+            for g in found.blocking
+        ] or ["arms in each other's way"]
+        reason = (
+            f"no hand can be moved in time after {found.reached * spacing:.2f} s of {path.duration:.2f} s "
+            f"({'; '.join(causes)})"
+        )
+    start = tuple(ids[grips.hold[g]] for g in found.start)
+    return Plan(
+        path, start, tuple(steps), found.complete, found.reached * spacing, reason, grips, tuple(map(tuple, chain))
+    )

@@ -1,0 +1,247 @@
+"""Which hand goes where, and when: a search over stances along a body path.
+
+A stance is one grip an arm. From a stance whose last hand landed at sample j, an arm can be lifted at l >= j while its
+grip lasts and put down on another grip at d, while the grips of the others last. A grip x that begins late makes the
+arm wait, as it is never worse to move it as early as possible:
+
+    l = min(max(j, first_x - n), last),    d = max(l + n, first_x),    n = swing time / spacing
+
+If d lies behind the end of another hand's grip, the body slows down so that it is just there when the hand lands, which
+delays the walk. All stances that need k re-grasps are made before those that need k + 1, so the first that lasts
+to the end of the path needs the fewest; of equal stances the one that is earlier on the path is kept.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from wbc.robots import Walker
+from wbc.walking.arm_clearance import ArmClearance
+from wbc.walking.body_path import BodyPath
+from wbc.walking.grips import Grips
+from wbc.walking.structure import Structure
+from wbc.walking.swings import Swings
+
+Key = tuple[int, ...]
+
+#: Delays are counted in steps of this [s], so that rounding decides nothing
+QUANTUM = 1e-6
+
+
+@dataclass(frozen=True)
+class Move:
+    """An arm's swing: from grip to grip, lifted and landed at samples of the path.
+
+    Attributes:
+        arm, source, target: row of the arm, and grips.
+        lift, land: samples.
+        duration: of the swing, latches and settling included [s].
+        delay: by which the body is late after it, because it had to slow down [s].
+    """
+
+    arm: int
+    source: int
+    target: int
+    lift: int
+    land: int
+    duration: float
+    delay: float
+
+
+@dataclass(frozen=True)
+class Node:
+    """A stance: since when, by what move, and the delay until then in QUANTUM."""
+
+    sample: int
+    delay: int
+    parent: Key | None
+    move: Move | None
+
+
+@dataclass(frozen=True)
+class Found:
+    """Outcome of a search.
+
+    Attributes:
+        start: the stance that it begins with.
+        moves: the moves, or those of the stance that lasts longest.
+        complete: the last stance lasts to the end of the path.
+        reached: last sample that the last stance can hold.
+        expanded: stances looked at.
+        blocking: grips of the last stance whose end is ``reached``.
+    """
+
+    start: Key
+    moves: tuple[Move, ...]
+    complete: bool
+    reached: int
+    expanded: int
+    blocking: tuple[int, ...]
+
+
+class StanceSearch:
+    """A search over the grips of one path.
+
+    Args:
+        longest_delay: of one swing [s]; 0: the body never slows down.
+        width: stances kept of each number of re-grasps, None: all.
+    """
+
+    def __init__(
+        self,
+        walker: Walker,
+        structure: Structure,
+        path: BodyPath,
+        grips: Grips,
+        *,
+        longest_delay: float = np.inf,
+        width: int | None = 200,
+    ) -> None:
+        self.walker, self.path, self.grips = walker, path, grips
+        self.swings = Swings(walker, structure, path, grips)
+        self.clearance = ArmClearance(walker, grips)
+        self.longest_delay, self.width = longest_delay, width
+        self.expanded = 0
+        self._by_arm = [grips.of_arm(k) for k in range(len(walker.arms))]
+
+    def run(self, starts: Sequence[Sequence[int]], sample: int = 0, deadline: float | None = None) -> Found:
+        """The fewest moves from one of some stances (one grip an arm each) at a sample.
+
+        Args:
+            deadline: of ``time.perf_counter``; after it the best of what is known is returned.
+        """
+        level: dict[Key, Node] = {tuple(int(g) for g in start): Node(sample, 0, None, None) for start in starts}
+        levels = [level]
+        while True:
+            done = [
+                (node.delay, key) for key, node in level.items() if self.until(key, node.sample) >= len(self.path) - 1
+            ]
+            if done:
+                return self._result(levels, min(done)[1], True)
+            if deadline is not None and time.perf_counter() > deadline:
+                break
+            level = self._next(level)
+            if not level:
+                break
+            levels.append(level)
+        return self._result(levels, None, False)
+
+    def _next(self, level: dict[Key, Node]) -> dict[Key, Node]:
+        """Stances with one more re-grasp; the promising ones first, until there are enough."""
+        candidates: dict[Key, Node] = {}
+        for key, node in level.items():
+            self.expanded += 1
+            for target, move in self._moves(key, node):
+                child = tuple(target if k == move.arm else g for k, g in enumerate(key))
+                delay = node.delay + round(move.delay / QUANTUM)
+                known = candidates.get(child)
+                if known is None or (move.land, delay) < (known.sample, known.delay):
+                    candidates[child] = Node(move.land, delay, key, move)
+        order = sorted(candidates.items(), key=lambda item: self._promise(*item))
+        kept: dict[Key, Node] = {}
+        width = self.width or max(len(order), 1)
+        for begin in range(0, len(order), width):
+            part = order[begin : begin + width]
+            self.swings.prepare([node.move for _, node in part if node.move is not None])
+            for key, node in part:
+                better = self._checked(level, key, node)
+                if better is not None:
+                    kept[key] = better
+            if len(kept) >= width:
+                break
+        return kept
+
+    def _moves(self, key: Key, node: Node) -> Iterator[tuple[int, Move]]:
+        """Moves that estimates allow: (target, move)."""
+        grips, spacing = self.grips, self.path.spacing
+        for arm, source in enumerate(key):
+            others = [g for k, g in enumerate(key) if k != arm]
+            room = self._room(others, node.sample)
+            end = min(int(grips.last[source]), min(self._conflict(source, g, node.sample) for g in others) - 1)
+            targets = self._by_arm[arm]
+            targets = targets[(grips.last[targets] > grips.last[source]) & (grips.first[targets] < room)]
+            for g in others:
+                targets = targets[grips.hold[targets] != grips.hold[g]]
+            if not len(targets) or node.sample > min(room, end):
+                continue
+            duration = self.swings.estimate(source, targets)
+            count = np.ceil(duration / spacing).astype(np.int64)
+            lift = np.minimum(np.maximum(node.sample, grips.first[targets] + 1 - count), min(end, room))
+            land = np.maximum(lift + count, grips.first[targets] + 1)
+            late = np.maximum(land - room, 0)
+            land = np.minimum(land, room)
+            delay = late * spacing
+            fits = (land < grips.last[targets]) & (land > grips.first[targets]) & (delay <= self.longest_delay)
+            for target, begin, finish, need, lost in zip(
+                targets[fits].tolist(),
+                lift[fits].tolist(),
+                land[fits].tolist(),
+                duration[fits].tolist(),
+                delay[fits].tolist(),
+                strict=True,
+            ):
+                yield target, Move(arm, source, target, begin, finish, need, lost)
+
+    def _checked(self, level: dict[Key, Node], key: Key, node: Node) -> Node | None:
+        """The node with its swing computed along its way, None where it is not possible."""
+        move, parent = node.move, node.parent
+        if move is None or parent is None:
+            return node
+        duration = self.swings.duration(move)
+        if duration is None:
+            return None
+        before = level[parent]
+        others = [g for k, g in enumerate(key) if k != move.arm]
+        if min(self._conflict(move.target, g, move.land) for g in others) <= move.land:
+            return None
+        room = self._room(others, before.sample)
+        land = max(move.lift + int(np.ceil(duration / self.path.spacing)), move.land if not move.delay else 0)
+        late = max(land - room, 0) * self.path.spacing
+        land = min(land, room)
+        if late > self.longest_delay or not self.grips.first[move.target] < land < self.grips.last[move.target]:
+            return None
+        better = Move(move.arm, move.source, move.target, move.lift, land, duration, late)
+        return Node(land, before.delay + round(late / QUANTUM), parent, better)
+
+    def _room(self, others: Sequence[int], sample: int) -> int:
+        """Last sample that the grips of some arms can hold together."""
+        end = min(int(self.grips.last[g]) for g in others)
+        pairs = [self._conflict(a, b, sample) - 1 for a, b in combinations(others, 2)]
+        return min([end, *pairs])
+
+    def until(self, key: Sequence[int], sample: int) -> int:
+        """Last sample that a stance can hold, from a sample on."""
+        return self._room(key, sample)
+
+    def _conflict(self, one: int, other: int, sample: int) -> int:
+        return self.clearance.first_conflict(one, other, sample)
+
+    def _promise(self, key: Key, node: Node) -> tuple[float, int, Key]:
+        """Long grips and early landings first; ties by holds and arms."""
+        ends = sorted(int(self.grips.last[g]) for g in key)
+        worth = ends[0] + 0.5 * sum(ends[1:]) / max(len(ends) - 1, 1) - 0.5 * node.sample
+        return -worth + node.delay * QUANTUM / self.path.spacing, node.sample, key
+
+    def _result(self, levels: list[dict[Key, Node]], key: Key | None, complete: bool) -> Found:
+        depth = len(levels) - 1
+        if key is None:
+            reached = [
+                (self.until(k, node.sample), -d, k) for d, level in enumerate(levels) for k, node in level.items()
+            ]
+            _, depth, key = max(reached)
+            depth = -depth
+        last = self.until(key, levels[depth][key].sample)
+        blocking = tuple(g for g in key if self.grips.last[g] == last)
+        moves: list[Move] = []
+        for level in levels[depth:0:-1]:
+            node = level[key]
+            if node.move is None or node.parent is None:
+                break
+            moves.append(node.move)
+            key = node.parent
+        return Found(key, tuple(reversed(moves)), complete, min(last, len(self.path) - 1), self.expanded, blocking)

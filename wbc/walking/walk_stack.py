@@ -1,0 +1,105 @@
+"""The stack of a walking body: held hands exactly, the body's pose, the swinging hand, wrists and joint limits."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from wbc import tasks
+from wbc.controller.controller import Controller
+from wbc.controller.stack import Stack
+from wbc.robots import Walker
+from wbc.validation import Array
+from wbc.walking.structure import Structure
+from wbc.walking.swing_law import Aim
+
+#: Control period [s]
+DT = 0.01
+#: Weights: the body does not give way to a swing, a swing not to postures
+BODY, SWING, AXIS, WRIST = 1000.0, 10.0, 3.0, 1e-3
+#: Gains [1/s] of body, swinging hand, its axis and the wrists; holds: 1 / (5 dt)
+BODY_GAIN, SWING_GAIN, AXIS_GAIN, WRIST_GAIN, HOLD_TICKS = 8.0, 15.0, 12.0, 4.0, 5
+#: On the way the wrist turns to its posture on the next hold; near holds its axis counts
+FREE_AXIS, FREE_WRIST, RESTING = 0.01, 40.0, 0.1
+
+
+class WalkStack:
+    """A compiled stack with items for each arm that holds and for each that swings; the state of the hand switches.
+
+    Args:
+        collisions: keep the links clear of each other (compiles longer and costs time in every tick).
+        backend: as of ``Stack.compile``.
+    """
+
+    def __init__(
+        self, walker: Walker, structure: Structure, dt: float = DT, *, collisions: bool = True, backend: str = "auto"
+    ) -> None:
+        self.walker, self.structure, self.dt = walker, structure, dt
+        stack = Stack(walker.robot, dt=dt)
+        stack.add(tasks.EndEffector("body"), name="body", weight=BODY)
+        for arm in walker.arms:
+            stack.add(tasks.Hold(arm.hand, kind="axis", gain=1.0 / (HOLD_TICKS * dt)), name=f"{arm.name} hold")
+            stack.add(tasks.EndEffector(arm.hand, kind="position"), name=f"{arm.name} swing", weight=SWING)
+            stack.add(tasks.AxisAlign(arm.hand), name=f"{arm.name} axis", weight=AXIS)
+        stack.add(tasks.Posture(), name="posture", weight=WRIST)
+        stack.add(tasks.JointLimits(), name="limits")
+        if collisions:
+            margin = walker.data.clearance  # type: ignore[union-attr]
+            stack.add(tasks.SelfCollision(margin=margin), name="links")
+        self.stack = stack
+        self.controller: Controller = stack.compile(backend=backend)
+        self._posture = np.array(walker.robot.neutral)
+        self._mask = np.full(walker.robot.nv - 6, RESTING)
+        items: Any = self.controller
+        items["body"].gain, items["posture"].gain = BODY_GAIN, WRIST_GAIN
+        for arm in walker.arms:
+            items[f"{arm.name} swing"].gain, items[f"{arm.name} axis"].gain = SWING_GAIN, AXIS_GAIN
+
+    def hold(self, arm: int, hold: int) -> None:
+        """A closed hand: its hold is exact, nothing else is asked of it."""
+        self._switch(arm, True)
+        self.controller[f"{self.walker.arms[arm].name} hold"].target = pin.SE3(self.structure.frames[hold])
+        self._mask[self._joints(arm)] = RESTING
+        self.controller["posture"].mask = self._mask
+
+    def release(self, arm: int) -> None:
+        """An open hand, which follows aims."""
+        self._switch(arm, False)
+
+    def body(self, pose: pin.SE3, rate: Array) -> None:
+        """The pose that the body goes to, and its rate in the structure's axes [m/s, rad/s]."""
+        item = self.controller["body"]
+        item.target, item.feedforward = pose, rate
+
+    def swing(self, arm: int, aim: Aim, pace: float, posture: Array, near: bool) -> None:
+        """What a free hand follows.
+
+        Args:
+            pace: part of full speed that the aim goes on with. posture: of the arm on its next hold.
+            near: at a hold, where the axis of the hand counts and not the wrist's posture.
+        """
+        name = self.walker.arms[arm].name
+        swing, axis, resting = (
+            self.controller[f"{name} swing"],
+            self.controller[f"{name} axis"],
+            self.controller["posture"],
+        )
+        swing.target, swing.feedforward = aim.position, aim.velocity * pace
+        axis.target, axis.feedforward = aim.axis, aim.axis_rate * pace
+        axis.weight = AXIS if near else FREE_AXIS
+        joints = self._joints(arm)
+        self._posture[7:][joints] = posture
+        self._mask[joints][3:5] = 1.0 if near else FREE_WRIST
+        resting.target, resting.mask = self._posture, self._mask
+
+    def _joints(self, arm: int) -> slice:
+        of = self.walker.arms[arm].v
+        return slice(of.start - 6, of.stop - 6)
+
+    def _switch(self, arm: int, held: bool) -> None:
+        name = self.walker.arms[arm].name
+        self.controller[f"{name} hold"].enabled = held
+        self.controller[f"{name} swing"].enabled = not held
+        self.controller[f"{name} axis"].enabled = not held
