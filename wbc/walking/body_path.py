@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -37,6 +37,7 @@ class BodyPath:
 
     poses: Array
     spacing: float = SPACING
+    _steps: dict[int, tuple[pin.SE3, pin.Motion]] = field(default_factory=dict, init=False, repr=False)
 
     def __post_init__(self) -> None:
         poses = validation.real_array("BodyPath.poses", self.poses)
@@ -66,11 +67,14 @@ class BodyPath:
         """
         place = min(max(u / self.spacing, 0.0), len(self.poses) - 1.0)
         k = min(int(place), len(self.poses) - 2)
-        first, last = pin.SE3(self.poses[k]), pin.SE3(self.poses[k + 1])
-        step = pin.log6(first.actInv(last))
+        if k not in self._steps:
+            first, last = pin.SE3(self.poses[k]), pin.SE3(self.poses[k + 1])
+            self._steps[k] = first, pin.log6(first.actInv(last))
+        first, step = self._steps[k]
         pose = first * pin.exp6(step * (place - k))
-        rotation = pose.rotation
-        rate = np.concatenate([rotation @ step.linear, rotation @ step.angular]) / self.spacing
+        rate = np.empty(6)
+        rate[:3], rate[3:] = pose.rotation @ step.linear, pose.rotation @ step.angular
+        rate /= self.spacing
         return pose, rate
 
     def blended(self, samples: Array) -> Array:

@@ -26,6 +26,10 @@ class ClosedChain:
 
     Args:
         walker: its joints are what moves. structure: whose holds are meant.
+
+    Attributes:
+        origins, rotations: of all hands in the structure, after the last :meth:`settle`: ``[arms, 3]`` [m] and
+            ``[arms, 3, 3]``.
     """
 
     def __init__(self, walker: Walker, structure: Structure) -> None:
@@ -34,6 +38,8 @@ class ClosedChain:
         self._model, self._data = model, model.createData()
         self._hands = [model.getFrameId(arm.hand) for arm in walker.arms]
         self._still = np.array(pin.neutral(model))
+        count = len(walker.arms)
+        self.origins, self.rotations = np.zeros((count, 3)), np.zeros((count, 3, 3))
 
     def hands(self, q: Array) -> tuple[Array, Array]:
         """Origins and rotations of all hands in the body's frame: ``[arms, 3]`` [m] and ``[arms, 3, 3]``."""
@@ -59,21 +65,29 @@ class ClosedChain:
             raise RangeError("held", dict(held), "the body's pose needs two hands, or one that cannot roll")
         arms, holds = list(held), list(held.values())
         place, turn = self.hands(q)
-        p, z = place[arms], turn[arms][:, :, 2]
-        h, a = self.structure.positions[holds], self.structure.axes[holds]
-        weight = AXIS_LENGTH**2
-        first, second = p - p.mean(axis=0), h - h.mean(axis=0)
-        attitude = second.T @ first + weight * a.T @ z
+        count = len(arms)
+        # Rows: origins, less their means, then axes; of the hands in the body, and of the holds
+        ours, theirs = np.empty((2 * count, 3)), np.empty((2 * count, 3))
+        ours[:count], ours[count:] = place[arms], AXIS_LENGTH * turn[arms, :, 2]
+        theirs[:count], theirs[count:] = self.structure.positions[holds], AXIS_LENGTH * self.structure.axes[holds]
+        middle, center = ours[:count].sum(axis=0) / count, theirs[:count].sum(axis=0) / count
+        ours[:count] -= middle
+        theirs[:count] -= center
+        attitude = theirs.T @ ours
         for arm, hold in held.items():
             if not self.structure.free_rolls[hold]:
-                attitude += weight * np.outer(self.structure.references[hold], turn[arm][:, 0])
+                attitude += AXIS_LENGTH**2 * np.outer(self.structure.references[hold], turn[arm][:, 0])
         u, _, vt = np.linalg.svd(attitude)
-        rotation = u @ np.diag([1.0, 1.0, np.sign(np.linalg.det(u @ vt))]) @ vt
-        origin = h.mean(axis=0) - rotation @ p.mean(axis=0)
+        rotation = u @ vt
+        if np.linalg.det(rotation) < 0.0:
+            rotation -= 2.0 * np.outer(u[:, 2], vt[2])
+        origin = center - rotation @ middle
         out = q.copy()
         out[:3] = origin
         # The quaternion keeps its sign from tick to tick
         quaternion = pin.Quaternion(rotation).coeffs()
         out[3:7] = quaternion if quaternion @ q[3:7] >= 0.0 else -quaternion
-        slip = float(np.linalg.norm(p @ rotation.T + origin - h, axis=1).max())
+        gap = ours[:count] @ rotation.T - theirs[:count]
+        slip = float(np.sqrt((gap * gap).sum(axis=1).max()))
+        self.origins, self.rotations = place @ rotation.T + origin, rotation @ turn
         return out, slip

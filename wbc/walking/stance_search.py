@@ -6,6 +6,8 @@ arm wait, as it is never worse to move it as early as possible:
 
     l = min(max(j, first_x - n), last),    d = max(l + n, first_x),    n = swing time / spacing
 
+(first_x less a few samples inside, and d only where the wrist is bent enough, for the sake of the controller).
+
 If d lies behind the end of another hand's grip, the body slows down so that it is just there when the hand lands, which
 delays the walk. All stances that need k re-grasps are made before those that need k + 1, so the first that lasts
 to the end of the path needs the fewest; of equal stances the one that is earlier on the path is kept.
@@ -19,16 +21,19 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from wbc.robots import Walker
 from wbc.walking.arm_clearance import ArmClearance
 from wbc.walking.body_path import BodyPath
-from wbc.walking.grips import Grips
+from wbc.walking.grips import Grips, Ints
 from wbc.walking.structure import Structure
 from wbc.walking.swings import Swings
 
 Key = tuple[int, ...]
 
+#: Hands land at least INSIDE samples inside a grip, wait for it at most HOVER [s], with |sin theta5| of at least BENT
+INSIDE, HOVER, BENT = 3, 0.75, 0.08
 #: Delays are counted in steps of this [s], so that rounding decides nothing
 QUANTUM = 1e-6
 
@@ -107,6 +112,8 @@ class StanceSearch:
         self.clearance = ArmClearance(walker, grips)
         self.longest_delay, self.width = longest_delay, width
         self.expanded = 0
+        # The end of the path is no limit of the arm
+        self._latest = np.where(grips.last == len(path) - 1, grips.last, grips.last - INSIDE)
         self._by_arm = [grips.of_arm(k) for k in range(len(walker.arms))]
 
     def run(self, starts: Sequence[Sequence[int]], sample: int = 0, deadline: float | None = None) -> Found:
@@ -171,12 +178,15 @@ class StanceSearch:
                 continue
             duration = self.swings.estimate(source, targets)
             count = np.ceil(duration / spacing).astype(np.int64)
-            lift = np.minimum(np.maximum(node.sample, grips.first[targets] + 1 - count), min(end, room))
-            land = np.maximum(lift + count, grips.first[targets] + 1)
+            soonest = grips.first[targets] + INSIDE
+            lift = np.minimum(np.maximum(node.sample, soonest - count), min(end, room))
+            land = np.maximum(lift + count, soonest)
+            hovers = land - lift - count
             late = np.maximum(land - room, 0)
             land = np.minimum(land, room)
             delay = late * spacing
-            fits = (land < grips.last[targets]) & (land > grips.first[targets]) & (delay <= self.longest_delay)
+            fits = (land <= self._latest[targets]) & (land >= soonest) & (delay <= self.longest_delay)
+            fits &= (hovers * spacing <= HOVER) & self._bent(targets, land)
             for target, begin, finish, need, lost in zip(
                 targets[fits].tolist(),
                 lift[fits].tolist(),
@@ -203,10 +213,18 @@ class StanceSearch:
         land = max(move.lift + int(np.ceil(duration / self.path.spacing)), move.land if not move.delay else 0)
         late = max(land - room, 0) * self.path.spacing
         land = min(land, room)
-        if late > self.longest_delay or not self.grips.first[move.target] < land < self.grips.last[move.target]:
+        first, last = self.grips.first[move.target] + INSIDE, self._latest[move.target]
+        if late > self.longest_delay or not first <= land <= last:
+            return None
+        if not self._bent(np.array([move.target]), np.array([land]))[0]:
             return None
         better = Move(move.arm, move.source, move.target, move.lift, land, duration, late)
         return Node(land, before.delay + round(late / QUANTUM), parent, better)
+
+    def _bent(self, targets: Ints, samples: Ints) -> NDArray[np.bool_]:
+        """Whether the wrist is bent enough to land: joint 4 turns the hand's axis only then."""
+        out: NDArray[np.bool_] = np.abs(np.sin(self.grips.posture(targets, samples)[..., 4])) >= BENT
+        return out
 
     def _room(self, others: Sequence[int], sample: int) -> int:
         """Last sample that the grips of some arms can hold together."""

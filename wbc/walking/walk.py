@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -249,8 +249,8 @@ class Walk:
     def _aim(self, swinging: Swinging) -> None:
         """Move the aim of the hand on, as fast as the hand follows, and tell the stack."""
         move, pace = swinging.move, 0.0
-        place, turn = self._hand(move.arm)
-        swinging.place, swinging.axis = place, turn[:, 2]
+        place = self.chain.origins[move.arm]
+        swinging.place, swinging.axis = place, self.chain.rotations[move.arm][:, 2]
         target = self.grips.posture(np.array(move.target), np.array(round(self.path_time / self.plan.path.spacing)))
         if swinging.state == "opening":
             swinging.latch -= self.dt
@@ -265,6 +265,11 @@ class Walk:
                 pace *= min(max(1.0 - 2.0 * (begins - self.path_time), 0.0), 1.0)
             swinging.clock = min(swinging.clock + pace * self.dt, swinging.law.duration)
         aim = swinging.law.at(swinging.clock)
+        gap = aim.position - place
+        far = float(np.linalg.norm(gap))
+        if far > BEHIND:
+            # A hand that cannot follow must not pull at the body: its aim waits within reach of it
+            aim = replace(aim, position=place + gap * (BEHIND / far))
         self.stack.swing(move.arm, aim, pace, target, min(aim.part, 1.0 - aim.part) < NEAR)
 
     def _land(self, swinging: Swinging) -> None:
@@ -272,8 +277,7 @@ class Walk:
         move, data = swinging.move, self.data
         hold = int(self.grips.hold[move.target])
         if swinging.state == "open" and swinging.clock >= swinging.law.duration - 1e-9:
-            place, turn = self._hand(move.arm)
-            axis = turn[:, 2]
+            place, axis = self.chain.origins[move.arm], self.chain.rotations[move.arm][:, 2]
             off = float(np.linalg.norm(place - self.structure.positions[hold]))
             tilt = _angle(axis, self.structure.axes[hold])
             speed = float(np.linalg.norm(place - swinging.place)) / self.dt
@@ -295,12 +299,6 @@ class Walk:
                 self._next += 1
                 names = self.walker.arms[move.arm].name, self.structure.ids[hold]
                 self.events.append(Event(self.time, "land", *names, self.path_time))
-
-    def _hand(self, arm: int) -> tuple[Array, Array]:
-        """Where a hand is in the structure: origin and rotation."""
-        place, turn = self.chain.hands(self.q)
-        rotation = pin.Quaternion(self.q[3:7]).toRotationMatrix()
-        return rotation @ place[arm] + self.q[:3], rotation @ turn[arm]
 
     def _hands(self) -> tuple[Hand, ...]:
         out: list[Hand] = ["closed"] * len(self.walker.arms)

@@ -18,11 +18,13 @@ from wbc.walking.swing_law import Aim
 #: Control period [s]
 DT = 0.01
 #: Weights: the body does not give way to a swing, a swing not to postures
-BODY, SWING, AXIS, WRIST = 1000.0, 10.0, 3.0, 1e-3
+BODY, SWING, AXIS, WRIST = 1e4, 10.0, 3.0, 1e-3
 #: Gains [1/s] of body, swinging hand, its axis and the wrists; holds: 1 / (5 dt)
 BODY_GAIN, SWING_GAIN, AXIS_GAIN, WRIST_GAIN, HOLD_TICKS = 8.0, 15.0, 12.0, 4.0, 5
 #: On the way the wrist turns to its posture on the next hold; near holds its axis counts
 FREE_AXIS, FREE_WRIST, RESTING = 0.01, 40.0, 0.1
+#: The posture on the next hold changes little: it is told again after so many ticks
+POSTURE_TICKS = 5
 
 
 class WalkStack:
@@ -52,6 +54,7 @@ class WalkStack:
         self.controller: Controller = stack.compile(backend=backend)
         self._posture = np.array(walker.robot.neutral)
         self._mask = np.full(walker.robot.nv - 6, RESTING)
+        self._near, self._age = (-1, False), 0
         items: Any = self.controller
         items["body"].gain, items["posture"].gain = BODY_GAIN, WRIST_GAIN
         for arm in walker.arms:
@@ -67,6 +70,7 @@ class WalkStack:
     def release(self, arm: int) -> None:
         """An open hand, which follows aims."""
         self._switch(arm, False)
+        self._near = (-1, False)
 
     def body(self, pose: pin.SE3, rate: Array) -> None:
         """The pose that the body goes to, and its rate in the structure's axes [m/s, rad/s]."""
@@ -81,18 +85,20 @@ class WalkStack:
             near: at a hold, where the axis of the hand counts and not the wrist's posture.
         """
         name = self.walker.arms[arm].name
-        swing, axis, resting = (
-            self.controller[f"{name} swing"],
-            self.controller[f"{name} axis"],
-            self.controller["posture"],
-        )
+        swing, axis = self.controller[f"{name} swing"], self.controller[f"{name} axis"]
         swing.target, swing.feedforward = aim.position, aim.velocity * pace
         axis.target, axis.feedforward = aim.axis, aim.axis_rate * pace
-        axis.weight = AXIS if near else FREE_AXIS
-        joints = self._joints(arm)
+        if self._near == (arm, near) and self._age < POSTURE_TICKS:
+            self._age += 1
+            return
+        joints, resting = self._joints(arm), self.controller["posture"]
+        if self._near != (arm, near):
+            axis.weight = AXIS if near else FREE_AXIS
+            self._mask[joints][3:5] = 1.0 if near else FREE_WRIST
+            resting.mask = self._mask
         self._posture[7:][joints] = posture
-        self._mask[joints][3:5] = 1.0 if near else FREE_WRIST
-        resting.target, resting.mask = self._posture, self._mask
+        resting.target = self._posture
+        self._near, self._age = (arm, near), 0
 
     def _joints(self, arm: int) -> slice:
         of = self.walker.arms[arm].v
