@@ -41,8 +41,8 @@ class Answer:
 
     @property
     def binding(self) -> str:
-        """Rows and bounds that keep the frame from coming nearer."""
-        return ", ".join(str(b) for b in self.solution.binding)
+        """Rows and bounds that push; not those of holds, which always do."""
+        return ", ".join(str(b) for b in self.solution.binding if b.side != "equal")
 
     @property
     def reason(self) -> str:

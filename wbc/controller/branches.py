@@ -146,11 +146,12 @@ def branches(
     engine: Engine, first: Array, most: int, seed: int, seconds: float, restarts: int, tolerance: float
 ) -> Branches:
     """Descents from a configuration and from random ones, until there are as many branches as wanted."""
-    begin = perf_counter()
     _refuse_free_directions(engine, first)
     gathering, descents, complete = Gathering(engine, first, tolerance), 0, True
+    table, chosen = engine.random(restarts, seed), engine.starts.chosen != 0.0
+    begin = perf_counter()
     for k in range(-1, restarts):
-        start = first if k < 0 else np.where(engine.starts.chosen != 0.0, engine.random(restarts, seed)[k], first)
+        start = first if k < 0 else np.where(chosen, table[k], first)
         complete = gathering.descend(start, begin + seconds)
         if not complete:
             break
