@@ -1,0 +1,81 @@
+"""Checks of time, joints and twist: what needs no hands."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from wbc.validation import Array
+from wbc.walking.checker.holds import rotations, turns_between
+from wbc.walking.checker.report import Tally
+from wbc.walking.checker.rules import Rules
+from wbc.walking.checker.samples import Samples
+from wbc.walking.checker.urdf import Urdf
+from wbc.walking.run_log import WalkLog
+
+#: A step of time below this [s] is none
+LEAST_STEP = 1e-12
+
+
+def declare(tally: Tally, rules: Rules) -> None:
+    """The checks of this module."""
+    tally.declare("time increases", LEAST_STEP, "s", least=True)
+    tally.declare("time step is dt", 1e-9, "s")
+    tally.declare("joint beyond its limit", rules.position, "rad")
+    tally.declare("joint rate / limit", 1.0 + rules.rate)
+    tally.declare("joint step rate / limit", 1.0 + rules.rate)
+    tally.declare("joint step less rate x dt", rules.rounding, "rad")
+    tally.declare("twist speed", rules.twist_speed, "m/s")
+    tally.declare("twist turn rate", rules.twist_rate, "rad/s")
+
+
+def check_time(log: WalkLog, tally: Tally) -> None:
+    """t increases strictly, by dt each tick."""
+    steps = np.diff(log.t)
+    tally.add("time increases", steps, log.t[1:], lambda k: f"tick {k + 1}")
+    tally.add("time step is dt", np.abs(steps - log.dt), log.t[1:], lambda k: f"tick {k + 1}")
+
+
+def check_rates(log: WalkLog, urdf: Urdf, tally: Tally) -> None:
+    """|v| and |q[k + 1] - q[k]| / (t[k + 1] - t[k]) within the URDF's rates, and q[k + 1] = q[k] + v[k] dt."""
+    limits = np.array([urdf.joint(name).velocity for name in log.joints])
+    steps, gaps = np.diff(log.q, axis=0), np.diff(log.t)[:, None]
+
+    def where(tick: int, joint: int) -> str:
+        return log.joints[joint]
+
+    tally.add("joint rate / limit", np.abs(log.v) / limits, log.t, where)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        # Where time stands still a joint that moves has no rate
+        ratios = np.where(steps == 0.0, 0.0, np.abs(steps) / np.maximum(gaps, 0.0)) / limits
+    tally.add("joint step rate / limit", ratios, log.t, where)
+    tally.add("joint step less rate x dt", np.abs(steps - log.v[:-1] * gaps), log.t, where)
+
+
+def check_positions(samples: Samples, log: WalkLog, urdf: Urdf, tally: Tally) -> None:
+    """Joints within the URDF's limits at all samples."""
+    joints = [urdf.joint(name) for name in log.joints]
+    lower, upper = np.array([joint.lower for joint in joints]), np.array([joint.upper for joint in joints])
+    beyond = np.maximum(lower - samples.q, samples.q - upper)
+    tally.add("joint beyond its limit", beyond, samples.t, lambda _, joint: log.joints[joint])
+
+
+def check_twist(log: WalkLog, rules: Rules, tally: Tally) -> None:
+    """Means of the logged twist over a window against the body's motion in it."""
+    rotation, position = rotations(log.pose_body_in_structure[:, 3:]), log.pose_body_in_structure[:, :3]
+    window = min(max(round(rules.twist_window / log.dt), 1), len(log) - 1)
+    gaps = np.diff(log.t)[:, None]
+
+    def sums(part: slice) -> Array:
+        steps = (rotation[:-1] @ log.twist_body[:-1, part, None])[..., 0] * gaps
+        total = np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
+        return np.asarray(total[window:] - total[:-window])
+
+    span = np.maximum(log.t[window:] - log.t[:-window], 1e-12)
+    moved = position[window:] - position[:-window]
+    tally.add("twist speed", np.linalg.norm(sums(slice(0, 3)) - moved, axis=1) / span, log.t, lambda _: "body")
+    # exp(sum of w dt) R[k] against R[k + w]: to second order in the turn, which is small within a window
+    turn, angle = sums(slice(3, 6)), np.linalg.norm(sums(slice(3, 6)), axis=1)
+    axis = turn / np.maximum(angle, 1e-300)[:, None]
+    half = np.concatenate([axis * np.sin(angle / 2)[:, None], np.cos(angle / 2)[:, None]], axis=1)
+    off = turns_between(rotations(half) @ rotation[:-window], rotation[window:])
+    tally.add("twist turn rate", off / span, log.t, lambda _: "body")

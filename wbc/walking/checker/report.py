@@ -1,0 +1,179 @@
+"""What the checker found: one line a check, with the worst value, its time and its place."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from math import inf, isfinite, nan
+from typing import Any
+
+import numpy as np
+from rich import box
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from wbc.errors import UnknownNameError
+
+#: Unit -> (how it is shown, factor)
+SHOWN: Mapping[str, tuple[str, float]] = {
+    "m": ("mm", 1e3),
+    "rad": ("deg", 57.29577951308232),
+    "m/s": ("mm/s", 1e3),
+    "rad/s": ("deg/s", 57.29577951308232),
+    "s": ("s", 1.0),
+    "": ("", 1.0),
+}
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One check.
+
+    Attributes:
+        kind: its name.
+        count: samples that violate it; 0 if all is well.
+        worst: the largest value, or the least where values must not fall below ``limit``; NaN if nothing was to check.
+        limit, unit: in SI.
+        time: of the worst value [s]; NaN if there is none.
+        where: arm, joint, links or hold of the worst value.
+        least: values must not fall below the limit.
+    """
+
+    kind: str
+    count: int
+    worst: float
+    limit: float
+    unit: str
+    time: float
+    where: str
+    least: bool = False
+
+    @property
+    def ok(self) -> bool:
+        """Nothing violates the check."""
+        return self.count == 0
+
+
+@dataclass(frozen=True)
+class Report:
+    """All checks of a walk.
+
+    Attributes:
+        findings: one a check, in the order of the checks.
+        ticks, samples: how many were checked; duration [s].
+        open_freedoms: samples at which the holding hands leave freedoms of the body open; there the body is compared in
+            what they fix.
+    """
+
+    findings: tuple[Finding, ...]
+    ticks: int
+    samples: int
+    duration: float
+    open_freedoms: int
+
+    @property
+    def ok(self) -> bool:
+        """Every check holds."""
+        return all(finding.ok for finding in self.findings)
+
+    @property
+    def violations(self) -> tuple[Finding, ...]:
+        """The checks that do not hold."""
+        return tuple(finding for finding in self.findings if not finding.ok)
+
+    def __getitem__(self, kind: str) -> Finding:
+        """The finding of a check.
+
+        Raises:
+            UnknownNameError: no such check.
+        """
+        found = {finding.kind: finding for finding in self.findings}
+        if kind not in found:
+            raise UnknownNameError("check", kind, found)
+        return found[kind]
+
+    def __rich__(self) -> Table:
+        return self.table()
+
+    def __str__(self) -> str:
+        console = Console(file=io.StringIO(), width=130, color_system=None)
+        console.print(self.table())
+        stream = console.file
+        assert isinstance(stream, io.StringIO)
+        return "\n".join(line.rstrip() for line in stream.getvalue().rstrip().splitlines())
+
+    def table(self) -> Table:
+        """The report as a table."""
+        state = "the walk holds" if self.ok else f"{len(self.violations)} of {len(self.findings)} checks are violated"
+        title = f"{state}: {self.ticks} ticks, {self.samples} samples, {self.duration:.2f} s"
+        out = Table(title=title, title_justify="left", title_style="bold green" if self.ok else "bold red")
+        out.box, out.pad_edge = box.SIMPLE, False
+        for name, right in (("check", 0), ("worst", 1), ("limit", 1), ("unit", 0), ("at [s]", 1), ("where", 0)):
+            out.add_column(name, justify="right" if right else "left", overflow="fold")
+        out.add_column("violations", justify="right")
+        for finding in self.findings:
+            out.add_row(*_cells(finding), style="" if finding.ok else "red")
+        return out
+
+
+class Tally:
+    """Collects the values of checks; keeps of each the worst and how many violate it."""
+
+    def __init__(self) -> None:
+        self._findings: dict[str, Finding] = {}
+
+    def declare(self, kind: str, limit: float, unit: str = "", least: bool = False) -> None:
+        """A check whose values must be at most ``limit``, or at least, with ``least``."""
+        self._findings[kind] = Finding(kind, 0, nan, limit, unit, nan, "", least)
+
+    def worst(self, kind: str) -> float:
+        """The worst value so far; NaN if there is none."""
+        return self._findings[kind].worst
+
+    def add(self, kind: str, values: Any, times: Any, where: Callable[..., str]) -> None:
+        """Values of any shape, times that broadcast along the first axis; ``where`` names an index of the values.
+
+        A value that is no number violates the check.
+        """
+        array = np.asarray(values, dtype=float)
+        if array.size == 0:
+            return
+        old = self._findings[kind]
+        sign = -1.0 if old.least else 1.0
+        excess = np.where(np.isnan(array), inf, sign * (array - old.limit))
+        count = int((excess > 0.0).sum())
+        place = tuple(int(i) for i in np.unravel_index(int(np.argmax(excess)), array.shape))
+        worst, known = float(array[place]), sign * (old.worst - old.limit)
+        if np.isnan(known) or excess[place] > known:
+            time = float(np.asarray(times, dtype=float)[place[0]])
+            self._findings[kind] = Finding(
+                kind, old.count + count, worst, old.limit, old.unit, time, where(*place), old.least
+            )
+        elif count:
+            self._findings[kind] = Finding(
+                kind, old.count + count, old.worst, old.limit, old.unit, old.time, old.where, old.least
+            )
+
+    def findings(self) -> tuple[Finding, ...]:
+        """All checks in the order in which they were declared."""
+        return tuple(self._findings.values())
+
+
+def _cells(finding: Finding) -> list[Text]:
+    unit, factor = SHOWN[finding.unit]
+    measured = isfinite(finding.time)
+    # Where nothing is off, no place is the worst
+    placed = measured and (finding.worst != 0.0 or not finding.ok)
+    sign = "at least " if finding.least else ""
+    texts = [
+        finding.kind,
+        f"{finding.worst * factor:.5g}" if measured else "nothing to check",
+        f"{sign}{finding.limit * factor:.6g}",
+        unit,
+        f"{finding.time:.3f}" if placed else "",
+        finding.where if placed else "",
+        str(finding.count) if finding.count else "",
+    ]
+    return [Text(text) for text in texts]
