@@ -21,6 +21,8 @@ COARSE, FINE = 25, 97
 SETTLE = 0.2
 #: Joints 4 and 5 turn to their posture on the next hold during the swing: at this part of their rates, plus [s]
 WRIST_PART, WRIST_TIME = 0.9, 0.25
+#: Part of a swing in which the wrist turns: the hand's axis counts near both holds
+WRIST_SHARE = 0.75
 
 
 class Asked(Protocol):
@@ -81,7 +83,7 @@ class Swings:
             found = speeds(self.walker, arm, self.path, way, lift[:, None] + (land - lift)[:, None] * part)
             # The body moves on for as long as the swing takes, or is stopped before the landing sample
             land = np.minimum(lift + found.duration / self.path.spacing, len(self.path) - 1.0)
-        time = np.maximum(found.duration, self._wrist_time(moves)) + self.extra
+        time = np.maximum(found.duration, self._wrist_time(moves) / WRIST_SHARE) + self.extra
         for move, seconds, possible in zip(moves, time.tolist(), found.possible.tolist(), strict=True):
             self._known[_name(move)] = seconds if possible else None
 

@@ -27,8 +27,8 @@ Hand = Literal["closed", "opening", "open", "closing"]
 RAMP = 0.5
 #: A swing waits for a hand that is this far behind its aim [m]: full pace below half of it, least pace beyond
 BEHIND, LEAST_PACE = 0.02, 0.05
-#: Part of the way before and after which a hand is near its hold
-NEAR = 0.2
+#: Parts of the way before and after which a hand is near a hold; joints 4 and 5 this near to their posture [rad] there
+LIFTING, LANDING, TURNED = 0.2, 0.8, 0.5
 #: The walk is over when the body is this near to the end of the path [m]
 ARRIVED = 0.002
 #: A walk that takes this many times its path's duration and SLACK seconds more is given up
@@ -252,6 +252,9 @@ class Walk:
         place = self.chain.origins[move.arm]
         swinging.place, swinging.axis = place, self.chain.rotations[move.arm][:, 2]
         target = self.grips.posture(np.array(move.target), np.array(round(self.path_time / self.plan.path.spacing)))
+        # On the wrong side of theta5 = 0 the wrist cannot align the hand: it turns to its branch before the hand lands
+        wrist = self.q[self.walker.arms[move.arm].q][3:5]
+        turned = bool(np.abs(wrist - target[3:5]).max() < TURNED)
         if swinging.state == "opening":
             swinging.latch -= self.dt
             if swinging.latch <= 1e-9:
@@ -259,10 +262,12 @@ class Walk:
         elif swinging.state == "open":
             behind = float(np.linalg.norm(place - swinging.law.at(swinging.clock).position))
             pace = min(max(1.5 - behind / BEHIND, LEAST_PACE), 1.0)
-            part = swinging.clock / swinging.law.duration
             begins = float(self.grips.first[move.target]) * self.plan.path.spacing
+            part = swinging.law.at(swinging.clock).part
             if part > 0.6 and self.path_time < begins:
                 pace *= min(max(1.0 - 2.0 * (begins - self.path_time), 0.0), 1.0)
+            if part > LANDING and not turned:
+                pace = 0.0
             swinging.clock = min(swinging.clock + pace * self.dt, swinging.law.duration)
         aim = swinging.law.at(swinging.clock)
         gap = aim.position - place
@@ -270,7 +275,8 @@ class Walk:
         if far > BEHIND:
             # A hand that cannot follow must not pull at the body: its aim waits within reach of it
             aim = replace(aim, position=place + gap * (BEHIND / far))
-        self.stack.swing(move.arm, aim, pace, target, min(aim.part, 1.0 - aim.part) < NEAR)
+        near = aim.part < LIFTING or (aim.part > LANDING and turned)
+        self.stack.swing(move.arm, aim, pace, target, near)
 
     def _land(self, swinging: Swinging) -> None:
         """Close a hand that has come to rest on its hold; it holds when the latch is through."""
