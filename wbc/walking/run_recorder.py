@@ -74,10 +74,10 @@ class LogRecorder:
         }
         # One row a tick: t, pose, q, v, twist, command; and state, hold of every arm, kind of the command, fixed
         ends = np.cumsum([0, 1, 7, m, m, 6, 7])
-        self._t, self._pose, self._q, self._v, self._twist, self._command = (
+        _, self._pose, self._q, self._v, self._twist, self._command = (
             slice(int(i), int(j)) for i, j in itertools.pairwise(ends)
         )
-        self._reals = np.zeros((room, int(ends[-1])))
+        self._reals, self._least = np.zeros((room, int(ends[-1]))), int(ends[-2])
         self._whole = np.zeros((room, 2 * a + 2), dtype=np.int64)
         self._arms, self._count, self._lengths = a, 0, (7, m, m, 6, a, a)
         self._spans: list[list[float]] = [[k, -inf, inf] for k in range(len(structure))]
@@ -111,20 +111,19 @@ class LogRecorder:
         if k == len(self._reals):
             self._reals = np.concatenate([self._reals, np.zeros_like(self._reals)])
             self._whole = np.concatenate([self._whole, np.zeros_like(self._whole)])
-        row, whole, a = self._reals[k], self._whole[k], self._arms
         numbers = pin.SE3ToXYZQUAT(pose) if isinstance(pose, pin.SE3) else pose
-        given = 0 if command is None else len(command)
-        lengths = (len(numbers), len(q), len(v), len(twist), len(states), len(holds), given)
-        if lengths[:6] != self._lengths or given not in _KINDS:
+        given = () if command is None else command
+        lengths = (len(numbers), len(q), len(v), len(twist), len(states), len(holds))
+        if lengths != self._lengths or len(given) not in _KINDS:
             raise ShapeError(
-                "tick", lengths, f"expected {self._lengths} numbers of pose, q, v, twist, states, holds, and 0, 6 or 7"
+                "tick",
+                (*lengths, len(given)),
+                f"expected {self._lengths} numbers of pose, q, v, twist, states, holds, and 0, 6 or 7 of the command",
             )
-        row[0], row[self._pose], row[self._q], row[self._v], row[self._twist] = t, numbers, q, v, twist
-        row[self._command] = 0.0
-        if given:
-            row[self._command.start : self._command.start + given] = command
-        whole[:a], whole[a : 2 * a] = states, holds
-        whole[2 * a], whole[2 * a + 1] = _KINDS[given], bool(body_fixed)
+        # Rows are made of zeros, so what a command does not have is 0
+        row = self._reals[k, : self._least + len(given)]
+        np.concatenate(((t,), numbers, q, v, twist, given), out=row)
+        self._whole[k] = (*states, *holds, _KINDS[len(given)], bool(body_fixed))
         self._count = k + 1
 
     def vanish(self, t: float, hold: str) -> None:

@@ -67,8 +67,10 @@ def estimate(
     ]
     loose = np.zeros(len(position), dtype=bool)
     left = np.flatnonzero(held.any(axis=1))
-    loose[~held.any(axis=1)] = True
+    loose[:] = ~held.any(axis=1)
     for step in range(STEPS):
+        if not len(left):
+            break
         part = Hands(hands.position[left], hands.rotation[left])
         jacobian, error = _rows(part, row[left], [w[left] for w in weights], table, position[left], rotation[left])
         normal = np.swapaxes(jacobian, 1, 2) @ jacobian
@@ -79,8 +81,6 @@ def estimate(
         position[left] += move[:, :3]
         rotation[left] = _turn(move[:, 3:]) @ rotation[left]
         left = left[np.abs(move).max(axis=1) > SMALL]
-        if not len(left):
-            break
     return Bodies(position, rotation, loose)
 
 
