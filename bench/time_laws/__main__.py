@@ -62,13 +62,14 @@ def parts_of(sizes: dict[str, int], seed: int, repeats: int, processes: int) -> 
 
     n = sizes
     return {
+        # First: what the other parts leave in memory makes collections of garbage, and so ticks, slower
+        "ticks": (len(ticks.COURSES) * n["ticks"], ticks.blocks(rng(6), n["ticks"])),
         "random set": (2 * n["random set"], least_time.random_set(rng(1), n["random set"], repeats)),
         "small moves": (7 * n["small moves"], least_time.small_moves(rng(2), n["small moves"])),
         "suite": (len(INSTANCES), least_time.suite()),
         "torques": (n["torques"], least_time.torques(rng(3), n["torques"])),
         "straight": (n["straight"], states.straight_moves(rng(4), n["straight"])),
         "walls": (n["walls"], states.walls(rng(5), n["walls"])),
-        "ticks": (len(ticks.COURSES) * n["ticks"], ticks.blocks(rng(6), n["ticks"])),
         "along": (2 * n["along"], least_time.jerk_limited_paths(rng(7), n["along"])),
         # Last: it takes the longest, and a run that is ended in it has everything else
         "states": (states.chunks(n["states"]), states.random_states(seed, n["states"], processes)),

@@ -180,12 +180,13 @@ class Online:
             self._put(rows)
             self.status = "recovered"
         else:
-            if self._walls.closed and self._walls.guard(self._now, p, v, a):
-                self._put([p, v, a])
-                self.status = "guarded"
-            else:
+            rows_now = np.array((p, v, a))
+            if self._walls.clear(rows_now) or not self._walls.guard(self._now, p, v, a):
                 answer.pass_to_input(self._asked)
                 self._now = (p, v, a)
+                return State(*rows_now)
+            self._put([p, v, a])
+            self.status = "guarded"
         return State(*np.array((p, v, a)))
 
     def _only_place(self, position: Array) -> bool:
@@ -199,7 +200,7 @@ class Online:
         if not isfinite(sum(place)):
             return False
         self._place = place
-        self.clipped = self._walls.closed and not self._walls.contain(place)
+        self.clipped = not self._walls.contain(position)
         if self.clipped:
             place = self._walls.nearest(place)
         self._asked.target_position = self._goal = place

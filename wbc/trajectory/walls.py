@@ -1,9 +1,10 @@
-"""Position limits of all joints in a loop: who could no longer stop within them brakes. Plain floats and lists."""
+"""Position limits of all joints in a loop: who could no longer stop within them brakes."""
 
 from __future__ import annotations
 
-from operator import le
+from typing import Any
 
+import casadi as ca
 import numpy as np
 
 from wbc.trajectory.braking import guarded, reach
@@ -12,6 +13,22 @@ from wbc.validation import Array
 
 #: Positions beyond their limits by less than this [rad or m] are rounding
 ROOM = 1e-9
+
+
+class Kernel:
+    """A scalar function of one array, bound to where the array stands: a call costs a microsecond."""
+
+    def __init__(self, function: ca.Function, at: Array) -> None:
+        self._function, self._out = function, np.zeros(1)
+        buffer: Any = function.buffer()
+        self._buffer, self._run = buffer
+        self._buffer.set_arg(0, memoryview(at.reshape(-1).data))
+        self._buffer.set_res(0, memoryview(self._out.data))
+
+    def __call__(self) -> float:
+        self._run()
+        value: float = self._out[0]
+        return value
 
 
 class Walls:
@@ -42,10 +59,40 @@ class Walls:
         short = (0.5 / acceleration).tolist(), (0.5 * acceleration / jerk).tolist(), (1.0 / jerk).tolist()
         near = (self.lower + far).tolist(), (self.upper - far).tolist()
         self._rows = list(zip(*near, self._low, self._high, self._acceleration, *short, strict=True))
+        self._place, self._state = np.zeros(len(far)), np.zeros((3, len(far)))
+        self._inside, self._room = Kernel(self._within(), self._place), Kernel(self._least_room(), self._state)
 
-    def contain(self, place: list[float]) -> bool:
-        """Whether a position is within."""
-        return all(map(le, self._low, place)) and all(map(le, place, self._high))
+    def contain(self, place: Array) -> bool:
+        """Whether a position is within; not if a number of it is none."""
+        self._place[:] = place
+        return self._inside() >= 0.0
+
+    def clear(self, state: Array) -> bool:
+        """Whether every joint of a state, 3 x n, can stop within, by a bound; if not, :meth:`guard` looks closer."""
+        self._state[:] = state
+        return self._room() >= 0.0
+
+    def _within(self) -> ca.Function:
+        """Least distance from the walls."""
+        x = ca.SX.sym("x", len(self._rows))
+        return ca.Function("within", [x], [ca.fmin(ca.mmin(x - self.lower), ca.mmin(self.upper - x))])
+
+    def _least_room(self) -> ca.Function:
+        """Least room of a joint: what is left of the way to a wall after a stop, or the distance from where it counts.
+
+        From w = |v| + a^2/2j, the highest speed to come, a stop is no longer than w (w/2A + A/2j + |a|/j).
+        """
+        state = ca.SX.sym("state", 3 * len(self._rows))
+        place, rate, push = ca.vertsplit(state, len(self._rows))
+        rooms = []
+        for i, (near_low, near_high, low, high, most, slow, ramp, soft) in enumerate(self._rows):
+            size = ca.fabs(push[i])
+            speed = ca.fabs(rate[i]) + 0.5 * soft * size * size
+            way = speed * (speed * slow + ramp + size * soft) - ROOM
+            far = ca.fmin(place[i] - near_low, near_high - place[i])
+            left = ca.fmin(ca.fmin(place[i] - low - way, high - way - place[i]), most - size)
+            rooms.append(ca.fmax(far, left))
+        return ca.Function("room", [state], [ca.mmin(ca.vertcat(*rooms))])
 
     def nearest(self, place: list[float]) -> list[float]:
         """The nearest position within."""
@@ -57,19 +104,8 @@ class Walls:
     def guard(self, now: tuple[list[float], ...], p: list[float], v: list[float], a: list[float]) -> bool:
         """Brake joints that could no longer stop within, in the next state (p, v, a); whether there were any."""
         changed = False
-        i = -1
-        # strict=True costs a microsecond here; the lists come from one place
-        for place, rate, push, (near_low, near_high, low, high, most, slow, ramp, soft) in zip(p, v, a, self._rows):  # noqa: B905
-            i += 1
-            if near_low < place < near_high:
-                continue
-            # From w = |v| + a^2/2j, the highest speed to come, a stop is no longer than w (w/2A + A/2j + |a|/j)
-            speed, size = abs(rate), abs(push)
-            speed += 0.5 * soft * size * size
-            way = speed * (speed * slow + ramp + size * soft) - ROOM
-            if low + way <= place <= high - way and size <= most:
-                continue
-            other = self.held_back(i, (now[0][i], now[1][i], now[2][i]), (place, rate, push))
+        for i, wanted in enumerate(zip(p, v, a, strict=True)):
+            other = self.held_back(i, (now[0][i], now[1][i], now[2][i]), wanted)
             if other is not None:
                 p[i], v[i], a[i] = other
                 changed = True
