@@ -10,7 +10,7 @@ import numpy as np
 import pinocchio as pin
 
 from tests.closed_loop.eyes import Array, Eyes, wrap
-from tests.closed_loop.loop import Loop
+from tests.closed_loop.loop import Loop, backend_of
 from tests.closed_loop.machines import machine
 from tests.closed_loop.subjects import Subject
 from tests.closed_loop.tasks import DT
@@ -78,4 +78,4 @@ def build(name: str, mutations: dict[str, Any] | None = None) -> Loop:
     """The coupling alone."""
     other, s = mutations or {}, SUBJECTS["gear"]
     items: dict[str, Item] = {"gear": s.declare(other.get("gear", s.cls), FRAMES[name], machine(name))}
-    return Loop(machine(name), items, DT, name)
+    return Loop(machine(name), items, DT, name, backend_of(mutations))

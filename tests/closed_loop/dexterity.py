@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from tests.closed_loop.eyes import Array, Eyes
-from tests.closed_loop.loop import Loop
+from tests.closed_loop.loop import Loop, backend_of
 from tests.closed_loop.machines import anywhere, machine
 from tests.closed_loop.subjects import Subject
 from tests.closed_loop.tasks import DT
@@ -80,7 +80,7 @@ def build(name: str, mutations: dict[str, Any] | None = None) -> Loop:
     """Both forms, each with its own rows."""
     other, robot = mutations or {}, machine(name)
     items: dict[str, Item] = {key: s.declare(other.get(key, s.cls), FRAMES[name], robot) for key, s in SUBJECTS.items()}
-    return Loop(robot, items, DT, name)
+    return Loop(robot, items, DT, name, backend_of(mutations))
 
 
 def climb(loop: Loop, name: str, seed: int = 41, count: int = 20, ticks: int = 400) -> Figures:

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Sequence
 from typing import Any
 
-import coal
 import numpy as np
 import pinocchio as pin
 
-from tests.constraints.test_obstacle import coal_pose, coal_shape
+from tests.constraints.test_obstacle import coal_shape
 from wbc.robot import Robot
 from wbc.shapes import PlacedShape
 
@@ -34,6 +33,45 @@ def cross(a: Array, b: Array) -> Array:
 def length(a: Array) -> float:
     """|a|."""
     return math.sqrt(a @ a)
+
+
+#: A shape that stands on a link, or on ``None``, a pose of its own
+Standing = tuple[str | None, PlacedShape]
+
+
+class Gaps:
+    """Signed distances of pairs of shapes [m], by Coal, all of a configuration in one call of Pinocchio."""
+
+    def __init__(self, robot: Robot, pairs: Sequence[tuple[Standing, Standing]]) -> None:
+        self.model, self.data, self.geometry = robot.model, robot.model.createData(), pin.GeometryModel()
+        self.loose: list[tuple[int, pin.SE3]] = []
+        numbers: dict[tuple[str | None, int], int] = {}
+        for first, second in pairs:
+            for link, placed in (first, second):
+                if (link, id(placed)) not in numbers:
+                    numbers[link, id(placed)] = self._add(link, placed)
+            self.geometry.addCollisionPair(pin.CollisionPair(*(numbers[s[0], id(s[1])] for s in (first, second))))
+        self.found = self.geometry.createData()
+        for request in self.found.distanceRequests:
+            request.enable_signed_distance = True
+
+    def _add(self, link: str | None, placed: PlacedShape) -> int:
+        joint, place = 0, placed.placement
+        if link is not None:
+            frame = self.model.frames[self.model.getFrameId(link)]
+            joint, place = frame.parentJoint, frame.placement * place
+        name = str(self.geometry.ngeoms)
+        number = int(self.geometry.addGeometryObject(pin.GeometryObject(name, joint, place, coal_shape(placed.shape))))
+        if link is None:
+            self.loose.append((number, placed.placement))
+        return number
+
+    def __call__(self, q: Array, pose: pin.SE3 | None = None) -> Array:
+        """The distances at a configuration and at the pose of what stands on no link."""
+        for number, placement in self.loose:
+            self.geometry.geometryObjects[number].placement = pose * placement
+        pin.computeDistances(self.model, self.data, self.geometry, self.found, q)
+        return np.array([result.min_distance for result in self.found.distanceResults])
 
 
 class Eyes:
@@ -70,17 +108,6 @@ class Eyes:
     def velocity(self, before: Array, after: Array, dt: float) -> Array:
         """The constant velocity that leads from one configuration to the next."""
         return np.array(pin.difference(self.model, before, after)) / dt
-
-    def clearance(self, q: Array, pairs: Iterable[tuple[str, PlacedShape]], shape: Any, pose: pin.SE3) -> Array:
-        """Signed distance of every shape of a link to an obstacle, by Coal [m]."""
-        pin.forwardKinematics(self.model, self.data, q)
-        request, where, out = coal.DistanceRequest(), coal_pose(pose), []
-        request.enable_signed_distance = True
-        obstacle = coal_shape(shape)
-        for link, placed in pairs:
-            here = coal_pose(self._placement(link) * placed.placement)
-            out.append(coal.distance(coal_shape(placed.shape), here, obstacle, where, request, coal.DistanceResult()))
-        return np.array(out)
 
     def arm(self, q: Array, plane: tuple[str, str, str], axis: str | None = None) -> tuple[Array, Array, float, float]:
         """(unit line, direction in the plane, |line| and elbow's distance from it over the length of the arm)."""

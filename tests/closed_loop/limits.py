@@ -167,9 +167,9 @@ def check(loop: Loop, name: str, seed: int = 31, starts: int = STARTS) -> Figure
         figures["deepest"] = min(figures["deepest"], float(h.min()))
         figures["excess"] = max(figures["excess"], float((short - allowed[:, None]).max()))
         figures["at the limit"] += bool(h[-1].min() < 3e-3)
-    assert figures["excess"] < 1e-9, figures
-    assert figures["deepest"] > -2e-3, figures
+        assert figures["excess"] < 1e-9, figures
+        assert figures["deepest"] > -2e-3, figures
+    assert figures["unsolved"] == 0, figures
     assert figures["clear"] > 0.8 * starts, figures
     assert figures["at the limit"] > 0.6 * figures["clear"], figures
-    assert figures["unsolved"] == 0, figures
     return figures

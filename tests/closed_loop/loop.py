@@ -26,15 +26,20 @@ class Run:
     unsolved: int
 
 
+def backend_of(mutations: object) -> str:
+    """Wrong formulas are noticed within a few starts, sooner than C code is compiled."""
+    return "vm" if mutations else "auto"
+
+
 class Loop:
     """One compiled stack; each check switches on the items that it is about."""
 
-    def __init__(self, robot: Robot, items: Mapping[str, Item], dt: float, name: str) -> None:
+    def __init__(self, robot: Robot, items: Mapping[str, Item], dt: float, name: str, backend: str = "auto") -> None:
         stack = wbc.Stack(robot, dt)
         for key, item in items.items():
             stack.add(item, name=key)
         self.robot, self.dt, self.eyes = robot, dt, Eyes(robot)
-        self.controller: Controller = stack.compile()
+        self.controller: Controller = stack.compile(backend=backend)
         self._names = [entry.name for entry in stack.entries]
         self.known = name
         self._settle()

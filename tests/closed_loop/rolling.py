@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 
 from tests.closed_loop.eyes import Array, length
-from tests.closed_loop.loop import Loop
+from tests.closed_loop.loop import Loop, backend_of
 from tests.closed_loop.machines import STARTS
 from tests.tasks.items_coordination import contact, slip
 from tests.wheels import Vehicle, vehicle
@@ -28,7 +28,7 @@ def build(name: str, cls: type[Rolling] = Rolling) -> Loop:
         "rest": Posture(joints=known.robot.joint_names),
         "caps": JointLimits(acceleration=False),
     }
-    return Loop(known.robot, items, DT, name)
+    return Loop(known.robot, items, DT, name, backend_of(cls is not Rolling))
 
 
 def start(known: Vehicle, rng: np.random.Generator, reach: float) -> Array:
@@ -83,12 +83,12 @@ def roll(loop: Loop, name: str, seed: int = 31) -> Figures:
         there = loop.eyes.pose(run.q[-1], known.base)
         figures["moved"] = min(figures["moved"], length(there.translation - here.translation))
         figures["turned"] = min(figures["turned"], float(np.abs(np.array(speeds)[:, wheels]).max()))
-    assert figures["slip"] < 1e-8, figures
-    assert figures["fall"] < 1e-8, figures
-    assert figures["left"] < 1e-3, figures
-    assert figures["astray"] < 1e-8, figures
-    assert figures["too fast"] < 1e-9, figures
-    assert figures["unsolved"] == 0, figures
+        assert figures["slip"] < 1e-8, figures
+        assert figures["fall"] < 1e-8, figures
+        assert figures["left"] < 1e-3, figures
+        assert figures["astray"] < 1e-8, figures
+        assert figures["too fast"] < 1e-9, figures
+        assert figures["unsolved"] == 0, figures
     assert figures["moved"] > 1e-4, figures
     assert figures["turned"] > 1e-2, figures
     return figures

@@ -1,7 +1,6 @@
 """Collision constraints in their loops, on three robots, and mutations that the loops notice.
 
-From 100 random starts for a capsule and two arms, else 40: Coal, asked for every pair of every tick, takes longer
-than the tick.
+From 100 random starts for a capsule and two arms, else 40: every start is six things, three robots and 80 ticks.
 """
 
 from __future__ import annotations
@@ -42,7 +41,7 @@ def test_shapes_keep_clear(item: str, name: str) -> None:
 
 def test_rows_for_corners_keep_arms_from_rocking() -> None:
     """With one row a sensed pair two arms side by side roll over each other, deeper than the whole margin."""
-    with pytest.raises(AssertionError, match=r"\{'deepest': (np.float64\()?-0.02"):
+    with pytest.raises(AssertionError, match=r"\{'deepest': (np.float64\()?-0.0[1-9]"):
         check(collisions.one_row_a_pair(), "self, sensed", FEWER)
 
 

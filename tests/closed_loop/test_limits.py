@@ -23,7 +23,7 @@ def loop(name: str) -> Loop:
 @cache
 def mutated() -> Loop:
     items = limits.limit_items("panda", machine("panda"), MUTATIONS)
-    return Loop(machine("panda"), items, limits.DT, "panda")
+    return Loop(machine("panda"), items, limits.DT, "panda", "vm")
 
 
 @pytest.mark.parametrize("name", CONSTRAINT_ROBOTS)

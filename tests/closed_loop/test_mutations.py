@@ -30,13 +30,13 @@ def by_item(changed: dict[str, type], known: dict[str, cases.Case]) -> dict[str,
 @cache
 def mutated_tasks() -> Loop:
     items = task_items(ROBOT, machine(ROBOT), by_item(mutations.TASKS, cases.TASKS))
-    return Loop(machine(ROBOT), items, tasks.DT, ROBOT)
+    return Loop(machine(ROBOT), items, tasks.DT, ROBOT, "vm")
 
 
 @cache
 def mutated_constraints() -> Loop:
     items = constraint_items(ROBOT, machine(ROBOT), by_item(mutations.CONSTRAINTS, cases.CONSTRAINTS))
-    return Loop(machine(ROBOT), items, constraints.DT, ROBOT)
+    return Loop(machine(ROBOT), items, constraints.DT, ROBOT, "vm")
 
 
 @pytest.mark.parametrize("case", mutations.TASKS)
@@ -53,7 +53,7 @@ def test_constraint(case: str) -> None:
 
 def test_mechanism(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(declaration, "Mechanism", mutations.RatioTurned)
-    loop = build("panda")
+    loop = build("panda", "vm")
     with pytest.raises(AssertionError, match=r"\{'"):
         mechanism(loop)
 

@@ -8,8 +8,8 @@ import pytest
 from bench.time_laws.families import FAMILIES, drawn
 from tests.trajectory.families import judged
 
-#: Members of a family
-MANY = {"random": 10_000, "near rest": 10_000, "one joint far": 1000, "speeds only": 1000}
+#: Members of a family, 10^4 in all
+MANY = {"random": 4500, "near rest": 4500, "one joint far": 500, "speeds only": 500}
 
 
 @pytest.mark.slow
