@@ -9,8 +9,8 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from tests.closed_loop.collisions import ROCK, Gaps
-from tests.closed_loop.eyes import Eyes
+from tests.closed_loop.collisions import ROCK
+from tests.closed_loop.eyes import Gaps
 from tests.constraints.evaluation import probe, random_configuration
 from tests.constraints.robots import NAMES, robot
 from wbc.controller import Controller, Stack, Status
@@ -36,13 +36,6 @@ BARE = "panda_link7"
 BALL = PlacedShape(Sphere(0.06), pin.SE3.Identity())
 
 
-class Here:
-    """What :class:`Gaps` needs of a loop."""
-
-    def __init__(self, bot: Robot) -> None:
-        self.robot, self.eyes = bot, Eyes(bot)
-
-
 def split(label: str) -> tuple[str, int]:
     link, number = label.rstrip("]").split("[")
     return link, int(number)
@@ -57,7 +50,7 @@ def test_margins_are_those_of_coal(name: str) -> None:
     ends = [label.split(" ") for label in labels if label.count("]") == 2 and label.endswith("]")]
     pairs = [tuple((link, bot.shapes[link][k]) for link, k in map(split, pair)) for pair in ends]
     assert {(a, b) for (a, _), (b, _) in pairs} == set(link_pairs(bot)) - set(neighbours(bot))
-    truth, inside = Gaps(Here(bot), pairs), 0
+    truth, inside = Gaps(bot, pairs), 0
     for _ in range(30):
         q, margin = random_configuration(bot, rng), rng.uniform(0.0, 0.05)
         h = dict(zip(labels, clear(q, margin=margin)[0], strict=True))
