@@ -22,8 +22,8 @@ help:  ## list the targets
 
 setup: $(READY)  ## create .venv with the pinned packages and this one
 
-demo: $(READY)  ## the main job: a Panda follows a timed path round an obstacle
-	$(BIN)/wbc demo
+demo: $(READY)  ## a three-armed robot walks along a cylinder at 6 in/s, into runs/walk (the Panda: wbc demo)
+	$(BIN)/wbc walk --out runs/walk --force
 
 test: $(READY)  ## all tests
 	$(BIN)/python -m pytest -n $(PYTEST_JOBS) $(PYTEST_ARGS)

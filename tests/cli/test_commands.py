@@ -34,7 +34,7 @@ def run(*arguments: str | Path) -> tuple[int, str, str]:
 def test_help_names_every_command() -> None:
     code, out, _ = run("--help")
     assert code == 0
-    for name in ("robots", "robot", "track", "demo", "replay", "export", "ik", "docs", "bench"):
+    for name in ("robots", "robot", "walk", "plans", "track", "demo", "replay", "export", "ik", "docs", "bench"):
         assert f" {name} " in out
     code, out, _ = run("track", "--help")
     assert code == 0

@@ -136,6 +136,14 @@ def test_time_laws_keep_their_limits() -> None:
         assert pixels.std() > 0.05
 
 
+def test_walk_arrives_within_its_limits() -> None:
+    text = output("walk")
+    assert "arrived" in text
+    assert number("body at most # mm", text) < 3.0
+    assert number("held hands at most # mm", text) < 2.0
+    assert number("largest joint rate # of", text) <= 1.000001
+
+
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda p: p.stem)
 def test_examples_are_short_and_use_public_names(path: Path) -> None:
     text = path.read_text()
@@ -144,7 +152,7 @@ def test_examples_are_short_and_use_public_names(path: Path) -> None:
     assert ast.get_docstring(tree)
     modules = {a.name for n in ast.walk(tree) if isinstance(n, ast.Import) for a in n.names}
     modules |= {n.module or "" for n in ast.walk(tree) if isinstance(n, ast.ImportFrom)}
-    ours = {"wbc", "wbc.tasks", "wbc.track", "wbc.shapes", "wbc.trajectory"}
+    ours = {"wbc", "wbc.tasks", "wbc.track", "wbc.shapes", "wbc.trajectory", "wbc.walking.run"}
     assert modules <= {"itertools", "pathlib", "numpy", "pinocchio", "casadi"} | ours
     assert not [n.attr for n in ast.walk(tree) if isinstance(n, ast.Attribute) and n.attr.startswith("_")]
 

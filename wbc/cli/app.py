@@ -8,7 +8,7 @@ import typer
 from typer.core import TyperGroup
 
 from wbc import __version__
-from wbc.cli import bench, demo, docs, export, ik, replay, robots, track
+from wbc.cli import bench, demo, docs, export, ik, replay, robots, track, walk
 from wbc.cli.console import complain
 from wbc.errors import WbcError
 
@@ -50,7 +50,8 @@ def wbc(
 ) -> None:
     """Whole-body control: declarative tasks, one QP, one native tick.
 
-    [bold]wbc demo[/bold] does the main job: a Panda follows a timed path round an obstacle.
+    [bold]wbc walk[/bold] has a three-armed robot walk on a structure of holds, [bold]wbc demo[/bold] a Panda follow a
+    timed path round an obstacle.
     """
 
 
@@ -58,6 +59,8 @@ app.command("robots")(robots.table)
 app.command("robot")(robots.show)
 app.command("track")(track.track)
 app.command("demo")(demo.demo)
+app.command("walk")(walk.walk)
+app.command("plans")(walk.plans)
 app.command("replay")(replay.replay)
 app.command("export")(export.export)
 app.command("ik")(ik.ik)

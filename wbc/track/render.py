@@ -161,7 +161,7 @@ class Shadows:
         return np.asarray(total / LOOKS)
 
 
-def shade(layer: Layer, camera: Camera, shadows: Shadows) -> tuple[Numbers, Array]:
+def shade(layer: Layer, camera: Camera, shadows: Shadows | None) -> tuple[Numbers, Array]:
     """(mask of the pixels where something is seen, their colours): sky light, the light with shadows, a highlight."""
     seen = np.isfinite(layer.depth)
     rays = camera.rays(seen)
@@ -170,7 +170,7 @@ def shade(layer: Layer, camera: Camera, shadows: Shadows) -> tuple[Numbers, Arra
     normal = layer.normal[seen]
     normal = np.where(np.sum(normal * view, axis=1, keepdims=True) < 0.0, -normal, normal)
     lambert = np.clip(normal @ LIGHT, 0.0, 1.0)
-    lit = shadows.lit(points + 0.006 * normal, 0.006)
+    lit = np.ones(len(points)) if shadows is None else shadows.lit(points + 0.006 * normal, 0.006)
     half = LIGHT + view
     half /= np.linalg.norm(half, axis=1, keepdims=True)
     shine = np.clip(np.sum(normal * half, axis=1), 0.0, 1.0) ** 40

@@ -5,7 +5,7 @@ from __future__ import annotations
 import fnmatch
 import math
 import pathlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import coal
 import numpy as np
@@ -56,17 +56,29 @@ class Scene:
         dark: frames whose links are drawn dark, as the hands, with everything that the same joint moves.
         detail: corners of meshes closer than this are drawn as one [m]; saves time on descriptions with fine meshes.
         hidden: links that are not drawn, by name or pattern such as ``leg_*``.
+        colours: name or pattern of links -> their colour; the last that fits counts.
+        floor: whether there is a floor under everything.
 
     Raises:
         UnknownNameError: no such frame. ShapeError, RangeError, NotFiniteError, RotationError: bad numbers, here and in
             the methods, or a shape without a surface.
     """
 
-    def __init__(self, robot: Robot, dark: Sequence[str] = (), detail: float = 0.0, hidden: Sequence[str] = ()) -> None:
+    def __init__(
+        self,
+        robot: Robot,
+        dark: Sequence[str] = (),
+        detail: float = 0.0,
+        hidden: Sequence[str] = (),
+        colours: Mapping[str, Colour] | None = None,
+        floor: bool = True,
+    ) -> None:
         detail = validation.scalar("Scene.detail", detail, low=0.0, unit="m")
         frames = [robot.model.getFrameId(robot.check_frame("Scene.dark", frame)) for frame in dark]
         self._robot = robot
-        unseen = _matching(robot, hidden)
+        unseen = _matching(robot, "hidden", hidden)
+        self._floor = floor
+        self._colours = {link: c for p, c in (colours or {}).items() for link in _matching(robot, "colours", (p,))}
         self._meshes = [(link, simplified(m, detail)) for link, m in link_meshes(robot) if link not in unseen]
         self._dark = {int(robot.model.frames[frame].parentJoint) for frame in frames} - {0}
         self._stands: list[list[pin.SE3]] = [[] for _ in self._meshes]
@@ -85,7 +97,8 @@ class Scene:
             if pale and any(pose.isApprox(other, SAME) for other in stands):
                 continue
             stands.append(pose)
-            colour = DARK if int(model.frames[index].parentJoint) in self._dark else WHITE
+            plain = DARK if int(model.frames[index].parentJoint) in self._dark else WHITE
+            colour = self._colours.get(link, plain)
             meshes.append(render.Mesh(triangles @ pose.rotation.T + pose.translation, colour))
         if pale:
             self._pale.append(meshes)
@@ -107,6 +120,14 @@ class Scene:
             self._pale.append(meshes)
         else:
             self._solid += meshes
+        self._label(colour, label)
+
+    def add_triangles(self, triangles: Array, label: str = "", colour: Colour = OBSTACLE) -> None:
+        """Triangles in the world, m x 3 x 3 [m]."""
+        corners = validation.real_array("Scene.triangles", triangles)
+        if corners.ndim != 3 or corners.shape[1:] != (3, 3):
+            raise ShapeError("Scene.triangles", triangles, f"expected m x 3 x 3, not {corners.shape}")
+        self._solid.append(render.Mesh(corners, colour))
         self._label(colour, label)
 
     def add_path(self, points: Array, label: str = "", colour: Colour = PATH, radius: float = 0.006) -> None:
@@ -142,7 +163,7 @@ class Scene:
         # Some hundred points of each are enough to see how large the scene is
         sample = [mesh.triangles.reshape(-1, 3)[:: max(1, len(mesh.triangles) // 200)] for mesh in everything]
         camera = _camera(np.concatenate(sample), size, azimuth, elevation)
-        image = _render(camera, self._solid, self._pale)
+        image = _render(camera, self._solid, self._pale, self._floor)
         path = pathlib.Path(file)
         path.parent.mkdir(parents=True, exist_ok=True)
         _write(image, self._key, path)
@@ -166,11 +187,11 @@ def link_meshes(robot: Robot) -> list[tuple[str, Array]]:
     return [(link, solids.triangles(placed)) for link, shapes in robot.shapes.items() for placed in shapes]
 
 
-def _matching(robot: Robot, patterns: Sequence[str]) -> set[str]:
+def _matching(robot: Robot, field: str, patterns: Sequence[str]) -> set[str]:
     found: set[str] = set()
     for pattern in patterns:
         names = fnmatch.filter(robot.frame_names, pattern)
-        found.update(names or [robot.check_frame("Scene.hidden", pattern)])
+        found.update(names or [robot.check_frame(f"Scene.{field}", pattern)])
     return found
 
 
@@ -216,11 +237,13 @@ def _camera(points: Array, size: tuple[int, int], azimuth: float, elevation: flo
     return render.Camera(target + distance * direction, target, view, width, height)
 
 
-def _render(camera: render.Camera, solid: list[render.Mesh], pale: list[list[render.Mesh]]) -> Array:
+def _render(camera: render.Camera, solid: list[render.Mesh], pale: list[list[render.Mesh]], floor: bool) -> Array:
     points = _points(solid)
     shadows = render.Shadows(solid)
     base = min(0.0, float(points[:, 2].min()))
-    image, depth = render.floor(camera, shadows, base, points.mean(axis=0), 1.3)
+    image, depth = np.ones((camera.height, camera.width, 3)), np.full((camera.height, camera.width), np.inf)
+    if floor:
+        image, depth = render.floor(camera, shadows, base, points.mean(axis=0), 1.3)
     layer = render.draw(solid, camera)
     seen, colours = render.shade(layer, camera, shadows)
     image[seen] = colours

@@ -1,0 +1,222 @@
+"""``wbc walk`` and ``wbc plans`` as a user types them, within this process."""
+
+from __future__ import annotations
+
+import functools
+import json
+import os
+import signal
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from matplotlib.image import imread
+from PIL import Image
+
+from tests.cli.test_commands import run
+from wbc import style
+from wbc.walking import run as walking_run
+from wbc.walking.run import perform
+from wbc.walking.run.folder import RunFolderError
+from wbc.walking.run.request import WalkRequest, over_holds
+from wbc.walking.run_log import WalkLog
+from wbc.walking.structures import plane
+
+SHORT = ["--from", "13,9", "--to", "13,14"]
+
+
+#: Pictures as small as can be looked at by a test
+SMALL = {
+    "wbc.walking.run.stills.COUNT": 1,
+    "wbc.walking.run.stills.SIZE": (300, 200),
+    "wbc.walking.run.animation.SIZE": (300, 200),
+    "wbc.walking.run.animation.MOST": 6,
+    "wbc.walking.run.replay_page.MOST": 30,
+    "wbc.track.scene.SUPERSAMPLING": 1,
+    "wbc.track.render.SHADOW_MAP": 300,
+    "wbc.style.SETTINGS": {**style.SETTINGS, "savefig.dpi": 50},
+}
+
+
+@functools.cache
+def short_walk(folder: Path) -> tuple[int, str, str]:
+    """One walk with all that it leaves, for all tests of this file; no slower film than needed."""
+    return run("walk", *SHORT, "--out", folder)
+
+
+@pytest.fixture(scope="module")
+def walked(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, tuple[int, str, str]]:
+    folder = tmp_path_factory.mktemp("walk") / "run"
+    patch = pytest.MonkeyPatch()
+    for name, value in SMALL.items():
+        patch.setattr(name, value)
+    done = short_walk(folder)
+    patch.undo()
+    return folder, done
+
+
+def test_a_walk_leaves_its_folder(walked: Any) -> None:
+    folder, (code, out, err) = walked
+    assert code == 0, err
+    names = {path.name for path in folder.iterdir()}
+    assert {"run.npz", "ticks.npz", "plan.json", "structure.csv", "robot.urdf", "check.txt"} <= names
+    assert {"summary.json", "summary.txt", "walk.gif", "replay.html", "walk.png", "still_1.png"} <= names
+    plots = {"holds", "margins", "joints", "rates", "drift", "wrists", "speed", "tick_time", "reach_map"}
+    assert {f"{plot}.png" for plot in plots} <= names
+    for text in ("arrived", "re-grasps", "WalkerData", "real-time factor", "external checker"):
+        assert text in out
+
+
+def test_the_summary_is_that_of_the_log(walked: Any) -> None:
+    folder, _ = walked
+    log, told = WalkLog.load(folder), json.loads((folder / "summary.json").read_text())
+    assert told["outcome"] == "arrived"
+    assert told["duration"] == log.t[-1]
+    assert told["robot"] == log.meta["robot_digest"]
+    assert told["speed"]["part"] > 0.5
+    assert told["body_error"] < 0.005
+    assert told["slip"] < 0.002
+    steps = json.loads((folder / "plan.json").read_text())["regrasps"]
+    landed = np.diff((log.hand_state == 2).astype(int), axis=0) == 1
+    assert told["plan"]["regrasps"] == len(steps) == landed.sum() >= 1
+    # Positions follow from the rates that were commanded, and from nothing else
+    np.testing.assert_allclose(np.diff(log.q, axis=0), log.v[:-1] * log.dt, atol=1e-12)
+
+
+def test_pictures_show_something(walked: Any) -> None:
+    folder, _ = walked
+    for name in ("walk", "still_1", "reach_map", "holds", "joints"):
+        pixels = imread(folder / f"{name}.png")[..., :3]
+        assert pixels.std() > 0.03, name
+        assert pixels[:5, :5].min() > 0.8, name
+    with Image.open(folder / "walk.gif") as film:
+        first, count = np.array(film.convert("RGB"), dtype=int), film.n_frames
+        film.seek(count - 1)
+        last = np.array(film.convert("RGB"), dtype=int)
+    assert count == 6
+    assert (np.abs(first - last).max(axis=-1) > 40).mean() > 0.002  # it moves
+    assert np.abs(first - last)[-20:].max() < 40  # and what stands still does not
+
+
+def test_the_page_needs_no_network(walked: Any) -> None:
+    folder, _ = walked
+    page = (folder / "replay.html").read_text()
+    assert "__VISER_EMBED_DATA__" in page
+    assert 0.5e6 < len(page) < 5e6
+    assert 'src="http' not in page
+    assert 'href="http' not in page
+
+
+def test_a_folder_with_a_run_is_kept(walked: Any) -> None:
+    folder, _ = walked
+    code, _, err = run("walk", *SHORT, "--out", folder)
+    assert code == 2
+    assert "--force" in err
+
+
+def test_plans_are_compared(walked: Any, tmp_path: Path) -> None:
+    folder, _ = walked
+    plan = folder / "plan.json"
+    code, out, _ = run("plans", plan, plan)
+    assert (code, out.startswith("the same")) == (0, True)
+    other = json.loads(plan.read_text())
+    other["regrasps"][0]["target"] = "1,1"
+    (tmp_path / "plan.json").write_text(json.dumps(other))
+    code, out, _ = run("plans", plan, tmp_path / "plan.json")
+    assert code == 1
+    assert out.startswith("re-grasp 1: ")
+    assert "1,1" in out
+    (tmp_path / "plan.json").write_text("{}")
+    assert run("plans", plan, tmp_path / "plan.json")[0] == 2
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (["--structure", "cylindre"], "did you mean 'cylinder'"),
+        (["--structure", "there/is/none.csv"], "there/is/none.csv"),
+        (["--mode", "fast"], "mode"),
+        (["--planner", "fre"], "did you mean 'free'"),
+        (["--speed", "0"], "speed"),
+        (["--speed", "-0.1"], "speed"),
+        (["--speed", "nan"], "speed"),
+        (["--to", "13"], "T,A"),
+        (["--to", "13,40"], "place 2.A"),
+        (["--structure", "truss", "--to", "L9,1"], "L9,1"),
+        (["--remove-rows", "30"], "no hold has 30"),
+        (["--remove", "1.5"], "fraction"),
+        (["--structure", "plane", "--planner", "published"], "cylinder"),
+        (["--set", "hand_radius"], "NAME=NUMBER"),
+        (["--set", "hand_radus=0.1"], "did you mean 'hand_radius'"),
+    ],
+)
+def test_bad_input_is_named_and_nothing_is_written(arguments: list[str], told: str, tmp_path: Path) -> None:
+    code, out, err = run("walk", *arguments, "--out", tmp_path / "run")
+    assert (code, out) == (2, "")
+    assert told in err
+    assert not (tmp_path / "run").exists()
+
+
+def test_a_folder_that_cannot_be_written(tmp_path: Path) -> None:
+    file = tmp_path / "file"
+    file.touch()
+    code, _, err = run("walk", *SHORT, "--out", file / "run")
+    assert code == 2
+    assert "cannot be written" in err
+    assert issubclass(RunFolderError, Exception)
+
+
+def test_what_is_out_of_reach_is_refused_with_its_reason(tmp_path: Path) -> None:
+    folder = tmp_path / "run"
+    code, _, err = run("walk", *SHORT, "--remove-rows", "1-9,12-24", "--out", folder, "--no-pictures")
+    assert code == 3
+    assert "refused" in err
+    told = json.loads((folder / "summary.json").read_text())
+    assert told["outcome"] == "refused"
+    assert told["reason"]
+    assert not (folder / "run.npz").exists()
+
+
+def test_ctrl_c_leaves_what_there_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    tick, count = perform.Walk.tick, []
+
+    def pressed(self: Any) -> Any:
+        count.append(1)
+        if len(count) == 60:
+            os.kill(os.getpid(), signal.SIGINT)
+        return tick(self)
+
+    monkeypatch.setattr(perform.Walk, "tick", pressed)
+    folder = tmp_path / "run"
+    code, out, _ = run("walk", *SHORT, "--out", folder)
+    assert code == 130
+    assert len(WalkLog.load(folder)) == 61
+    assert json.loads((folder / "summary.json").read_text())["outcome"] == "interrupted"
+    assert "interrupted" in out
+
+
+def test_the_published_planner_walks(tmp_path: Path) -> None:
+    folder = tmp_path / "run"
+    code, out, _ = run("walk", *SHORT, "--planner", "published", "--speed", "0.0762", "--out", folder)
+    assert code == 0, out
+    data = np.load(folder / "published.npz")
+    assert data["bodies"].shape[1:] == (4, 4)
+    assert "published" in out
+
+
+def test_bodies_stand_over_holds() -> None:
+    structure = plane()
+    first, last = over_holds(structure, ("3,3", "3,9"), 1.3)
+    np.testing.assert_allclose(first.translation, structure["3,3"].pose.translation + [0, 0, 1.3])
+    np.testing.assert_allclose(first.rotation[:, 0], [1, 0, 0], atol=1e-12)
+    np.testing.assert_allclose(first.rotation[:, 2], [0, 0, -1], atol=1e-12)
+    np.testing.assert_allclose(last.rotation, first.rotation, atol=1e-12)
+
+
+def test_removed_holds_are_gone() -> None:
+    structure = WalkRequest(rows="12-14", fraction=0.1, seed=3).build()
+    assert len(structure) == 25 * 21 - round(0.1 * 25 * 21)
+    assert not any(hold.endswith((",12", ",13", ",14")) for hold in structure.ids)
+    assert WalkRequest(rows="12-14", fraction=0.1, seed=3).build().digest == structure.digest
+    assert walking_run.WalkRequest is WalkRequest

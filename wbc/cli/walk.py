@@ -1,0 +1,207 @@
+"""``wbc walk``: a walk on holds, planned, carried out, checked and shown; ``wbc plans`` compares two plans."""
+
+from __future__ import annotations
+
+import datetime
+import json
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import typer
+from rich.markup import escape
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+from wbc import robots
+from wbc.cli import walk_options as options
+from wbc.cli.console import err, out
+from wbc.cli.session import INTERRUPTED, Stopper
+from wbc.errors import ShapeError
+from wbc.robots import Walker, WalkerData
+from wbc.track.summary import Figure
+from wbc.walking.body_path import standing_path
+from wbc.walking.plan import Plan, differences, read_rows
+from wbc.walking.run.figures import figures_of, save_figures
+from wbc.walking.run.folder import make_folder, save_pictures, save_run
+from wbc.walking.run.perform import WalkRun, perform_walk
+from wbc.walking.run.published_run import perform_published, published_figures, save_published
+from wbc.walking.run.request import SPEED, WalkRequest
+
+#: Exit codes: the walk is not possible or did not arrive, and what a check of it violates
+REFUSED, VIOLATED = 3, 4
+
+
+def walk(
+    structure: options.StructureName = "cylinder",
+    mode: options.Mode = "velocity",
+    speed: options.Speed = SPEED,
+    turn_rate: options.TurnRate = 0.05,
+    start: options.From = "",
+    to: options.To = None,
+    remove_rows: options.RemoveRows = "",
+    remove_columns: options.RemoveColumns = "",
+    remove: options.Remove = 0.0,
+    seed: options.Seed = 0,
+    rigid: options.Rigid = False,
+    planner: options.PlannerName = "free",
+    change: options.Change = None,
+    backend: options.Backend = "auto",
+    output: options.RunFolder = None,
+    force: options.Force = False,
+    check: options.Check = True,
+    strict: options.Strict = False,
+    pictures: options.Pictures = True,
+) -> None:
+    """Walk on a structure of holds with three arms, and leave log, plan, check, plots, pictures and a replay page.
+
+    Ends with 3 if the walk is not possible or does not arrive. Ctrl-C ends it early; what was done until then is
+    written all the same.
+    """
+    request = WalkRequest(
+        structure,
+        mode,
+        speed,
+        turn_rate,
+        start,
+        tuple(to or ()),
+        remove_rows,
+        remove_columns,
+        remove,
+        seed,
+        planner,
+        rigid,
+    )
+    machine = robots.walker(data=changed_data(change or []))
+    request.path(request.build(), _body_data(machine))  # bad input shows before a folder is made
+    stamp = datetime.datetime.now().strftime("%Y%m%d-%H%M%S")
+    folder = make_folder(output or Path("runs") / f"walk-{Path(structure).stem}-{stamp}", force)
+    if planner == "published":
+        _published(request, folder)
+    else:
+        _free(request, machine, folder, backend, check or strict, pictures, strict)
+
+
+def plans(
+    one: Annotated[Path, typer.Argument(help="A plan.json.")],
+    other: Annotated[Path, typer.Argument(help="Another one.")],
+) -> None:
+    """Show what two plans do differently, one line each; exit code 1 if there is anything."""
+    first, second = (_read_plan(path) for path in (one, other))
+    lines = differences(first, second)
+    for line in lines:
+        out().print(line, markup=False, soft_wrap=True)
+    if lines:
+        raise typer.Exit(1)
+    out().print(f"the same {len(first.regrasps)} re-grasps")
+
+
+def changed_data(changes: list[str]) -> WalkerData:
+    """The walker's data with fields changed, from NAME=VALUE.
+
+    Raises:
+        ShapeError: no such text. UnknownNameError: no such field. What the data raise.
+    """
+    values: dict[str, Any] = {}
+    for text in changes:
+        name, sign, value = text.partition("=")
+        try:
+            read = json.loads(value)
+        except ValueError as error:
+            raise ShapeError("set", text, "expected NAME=NUMBER or NAME=[NUMBER, ...]") from error
+        if not sign:
+            raise ShapeError("set", text, "expected NAME=NUMBER or NAME=[NUMBER, ...]")
+        values[name] = tuple(read) if isinstance(read, list) else read
+    return WalkerData.read(**values)
+
+
+def _free(
+    request: WalkRequest, machine: Walker, folder: Path, backend: str, check: bool, pictures: bool, strict: bool
+) -> None:
+    stopper, console = Stopper(), err()
+    with _bar() as bar:
+        stage = bar.add_task("planning", total=None)
+
+        def told(what: str, part: float | None) -> None:
+            bar.update(stage, description=what, total=None if part is None else 1.0, completed=part or 0.0)
+
+        with stopper.listening():
+            run = perform_walk(request, machine, backend=backend, progress=told, stop=stopper)
+            told("checking and writing", None)
+            files, report = save_run(run, folder, check)
+            missing = list[str]()
+            if pictures and not stopper():
+                shown, missing = save_pictures(run, folder, told, stopper)
+                files += shown
+    _report(f"{machine.robot.name} on {run.structure.name}", figures_of(run, report), folder, files)
+    for text in missing:
+        console.print(f"[yellow]note[/yellow]: {escape(text)}", soft_wrap=True)
+    _end(run, stopper())
+    if report is not None and not report.ok:
+        kinds = ", ".join(finding.kind for finding in report.violations)
+        console.print(f"[bold red]the checker finds violations[/bold red]: {kinds}; see check.txt", soft_wrap=True)
+        if strict:
+            raise typer.Exit(VIOLATED)
+
+
+def _end(run: WalkRun, interrupted: bool) -> None:
+    """The exit code of a walk that did not arrive."""
+    if interrupted:
+        raise typer.Exit(INTERRUPTED)
+    if run.outcome != "arrived":
+        err().print(f"[bold red]{run.outcome}[/bold red]: {escape(run.reason)}", soft_wrap=True)
+        raise typer.Exit(REFUSED)
+
+
+def _published(request: WalkRequest, folder: Path) -> None:
+    run = perform_published(request)
+    figures = published_figures(run)
+    _report(
+        "published walker on cylinder", figures, folder, [*save_published(run, folder), *save_figures(figures, folder)]
+    )
+    if not run.arrived:
+        err().print(f"[bold red]stopped[/bold red]: {escape(run.reason)}", soft_wrap=True)
+        raise typer.Exit(REFUSED)
+
+
+def _body_data(machine: Walker) -> WalkerData:
+    assert isinstance(machine.data, WalkerData)
+    return machine.data
+
+
+def _read_plan(path: Path) -> Plan:
+    rows = read_rows(path)
+    return Plan(
+        standing_path(np.eye(4)),
+        rows["start"],
+        tuple(rows["regrasps"]),
+        rows["complete"],
+        rows["reached"],
+        rows["reason"],
+    )
+
+
+def _bar() -> Progress:
+    console = err()
+    return Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("{task.percentage:3.0f} %"),
+        TimeElapsedColumn(),
+        console=console,
+        transient=True,
+        disable=not console.is_terminal,
+        refresh_per_second=5,
+    )
+
+
+def _report(title: str, figures: list[Figure], folder: Path, files: list[Path]) -> None:
+    console = out()
+    table = Table(title=title, title_justify="left", title_style="bold", show_header=False, box=None, pad_edge=False)
+    table.add_column(style="cyan", no_wrap=True)
+    table.add_column()
+    for figure in figures:
+        if figure.label:
+            table.add_row(figure.label, escape(figure.text))
+    console.print(table)
+    console.print(f"[bold]{escape(str(folder))}[/bold]: {', '.join(file.name for file in files)}", soft_wrap=True)

@@ -1,0 +1,53 @@
+"""The options of ``wbc walk``: their types and help."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from wbc.walking.structures import BUILT_IN
+
+_SCENE, _HOW, _OUTPUT = "What it does", "How it is done", "What it writes"
+
+StructureName = Annotated[str, typer.Option(help=f"{', '.join(BUILT_IN)}, or FILE.csv.", rich_help_panel=_SCENE)]
+Mode = Annotated[
+    str,
+    typer.Option(
+        help="velocity: least delay, then fewest re-grasps; destination: fewest re-grasps.", rich_help_panel=_SCENE
+    ),
+]
+Speed = Annotated[
+    float, typer.Option(help="Of the body's origin in the structure's frame, in m/s.", rich_help_panel=_SCENE)
+]
+TurnRate = Annotated[float, typer.Option(help="Largest rate of turning, in rad/s.", rich_help_panel=_SCENE)]
+From = Annotated[
+    str,
+    typer.Option(
+        "--from",
+        help="Place that the body begins over: T,A or T,A,DEGREES on the cylinder, else a hold's id.",
+        rich_help_panel=_SCENE,
+    ),
+]
+To = Annotated[list[str] | None, typer.Option(help="Place that it goes to; may be repeated.", rich_help_panel=_SCENE)]
+RemoveRows = Annotated[str, typer.Option(help="Take away holds T,A by A, such as 12-14.", rich_help_panel=_SCENE)]
+RemoveColumns = Annotated[str, typer.Option(help="Take away holds T,A by T.", rich_help_panel=_SCENE)]
+Remove = Annotated[float, typer.Option(help="Take away this part of the holds at random.", rich_help_panel=_SCENE)]
+Seed = Annotated[int, typer.Option(help="Of the random choice.", rich_help_panel=_SCENE)]
+Rigid = Annotated[bool, typer.Option(help="Holds fix the tilt of a hand.", rich_help_panel=_SCENE)]
+PlannerName = Annotated[str, typer.Option(help="free or published.", rich_help_panel=_HOW)]
+Change = Annotated[
+    list[str] | None,
+    typer.Option("--set", help="NAME=VALUE of the walker's data, in SI; may be repeated.", rich_help_panel=_HOW),
+]
+Backend = Annotated[str, typer.Option(help="auto, native or vm.", rich_help_panel=_HOW)]
+RunFolder = Annotated[
+    Path | None, typer.Option("--out", help="Run folder. Default: runs/walk-STRUCTURE-TIME.", rich_help_panel=_OUTPUT)
+]
+Force = Annotated[bool, typer.Option(help="Write into a folder that has a run.", rich_help_panel=_OUTPUT)]
+Check = Annotated[bool, typer.Option(help="Run the external checker.", rich_help_panel=_OUTPUT)]
+Strict = Annotated[bool, typer.Option(help="End with 4 if the checker finds a violation.", rich_help_panel=_OUTPUT)]
+Pictures = Annotated[
+    bool, typer.Option(help="Draw plots, stills, animation and the replay page.", rich_help_panel=_OUTPUT)
+]

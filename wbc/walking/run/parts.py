@@ -1,0 +1,77 @@
+"""The machine as pictures show it: capsules that links carry, and where they are at a row of a log."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+
+from wbc.robots import Walker, WalkerData
+from wbc.shapes import Capsule, Solid
+from wbc.validation import Array
+from wbc.walking.run.surroundings import BODY, Colour, arm_colour, mixed
+from wbc.walking.run_log import WalkLog
+
+#: Part of white in the colour of an arm, and of its hand
+PALE_ARM, PALE_HAND = 0.6, 0.05
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """A shape that a link carries.
+
+    Attributes:
+        link: frame of the robot. shape, placement: in it. colour: of the picture.
+        shoulder: it joins a neck and an upper arm, which no shape of the robot does.
+    """
+
+    link: str
+    shape: Solid
+    placement: pin.SE3
+    colour: Colour
+    shoulder: bool = False
+
+
+def link_colours(walker: Walker) -> dict[str, Colour]:
+    """Link -> colour: arms in their own, hands darker."""
+    out = dict[str, Colour]()
+    for k, arm in enumerate(walker.arms):
+        out |= dict.fromkeys(arm.links, mixed(arm_colour(k), PALE_ARM))
+        out[arm.links[-1]] = mixed(arm_colour(k), PALE_HAND)
+    return out
+
+
+def parts_of(walker: Walker) -> list[Part]:
+    """All shapes of the machine."""
+    colours = link_colours(walker)
+    out = [
+        Part(link, placed.shape, placed.placement, colours.get(link, BODY))
+        for link, shapes in walker.robot.shapes.items()
+        for placed in shapes
+    ]
+    if isinstance(walker.data, WalkerData):
+        neck, across = walker.data.neck_length, walker.data.shoulder_offset
+        turn = pin.utils.rotate("x", -np.pi / 2)
+        place = pin.SE3(turn, np.array([0.0, -across / 2, neck]))
+        piece = Capsule(walker.data.upper_arm_radius, across)
+        out += [Part(arm.links[0], piece, place, colours[arm.links[0]], True) for arm in walker.arms]
+    return out
+
+
+def part_poses(walker: Walker, parts: list[Part], q: Array) -> list[pin.SE3]:
+    """Where shapes are at a configuration, in the frame of its base."""
+    model = walker.robot.model
+    data = model.createData()
+    pin.framesForwardKinematics(model, data, q)
+    return [data.oMf[model.getFrameId(part.link)] * part.placement for part in parts]
+
+
+def configuration(walker: Walker, log: WalkLog, row: int) -> Array:
+    """The robot's configuration at a row of a log, in the structure's frame."""
+    q = np.array(walker.robot.neutral)
+    q[:7] = log.pose_body_in_structure[row]
+    column = {name: k for k, name in enumerate(log.joints)}
+    for arm in walker.arms:
+        q[arm.q] = log.q[row, [column[joint] for joint in arm.joints]]
+    return q

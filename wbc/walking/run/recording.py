@@ -1,0 +1,122 @@
+"""Keeps what a walk does, tick by tick: the log, and beside it what the controller said."""
+
+from __future__ import annotations
+
+import os
+import pathlib
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from wbc.validation import Array
+from wbc.walking.run_log import CLOSED, HAND_STATES, OPEN, OPENING, WalkLog
+from wbc.walking.run_recorder import LogRecorder
+from wbc.walking.walk import Event, Tick, Walk
+
+#: Name of the file in a run's folder
+TICKS = "ticks.npz"
+
+
+@dataclass(frozen=True, eq=False)
+class TickColumns:
+    """n ticks; entry k belongs to the step from row k of the log to row k + 1.
+
+    Attributes:
+        path_time: u [s]. body_error: distance of the body from its command [m]. slip: of the worst held hand [m].
+        cost: of the controller's tick [s]. solved: whether the controller's answer is one of all rows.
+    """
+
+    path_time: Array
+    body_error: Array
+    slip: Array
+    cost: Array
+    solved: NDArray[np.bool_]
+
+    def save(self, path: str | os.PathLike[str]) -> pathlib.Path:
+        """Writes the columns into a folder; returns the file."""
+        file = pathlib.Path(path) / TICKS
+        np.savez_compressed(file, allow_pickle=False, **{f.name: getattr(self, f.name) for f in fields(self)})
+        return file
+
+
+class WalkRecorder:
+    """Records a :class:`Walk` from where it is; call :meth:`tick` after each of its ticks.
+
+    A row of the log is the state as a tick begins and the rates that it commands; :meth:`log` adds the last state with
+    rates 0. An opening hand is logged on the hold that it leaves.
+
+    Args:
+        meta: plain data for the log.
+    """
+
+    def __init__(self, walk: Walk, seed: int = 0, meta: Mapping[str, Any] | None = None) -> None:
+        walker = walk.walker
+        names = [arm.name for arm in walker.arms]
+        self._walk, self._arms = walk, {name: k for k, name in enumerate(names)}
+        self._structure = walk.structure
+        self._recorder = LogRecorder(
+            walk.structure,
+            [joint for arm in walker.arms for joint in arm.joints],
+            names,
+            [arm.hand for arm in walker.arms],
+            dt=walk.dt,
+            seed=seed,
+            robot=walker.robot.name,
+            robot_digest=walk.data.digest,
+            meta=meta,
+        )
+        self._time, self._q = walk.time, walk.q.copy()
+        self._states = [CLOSED] * len(names)
+        self._holds = [walk.held[k] for k in range(len(names))]
+        self._seen = len(walk.events)
+        self._command = pin.SE3ToXYZQUAT(walk.plan.path.at(walk.path_time)[0])
+        self._rows: list[tuple[float, float, float, float, bool]] = []
+
+    def __len__(self) -> int:
+        return len(self._rows)
+
+    def tick(self, tick: Tick) -> None:
+        """Keeps the tick that was just made."""
+        for event in self._walk.events[self._seen :]:
+            self._happened(event)
+        self._seen = len(self._walk.events)
+        self._command = pin.SE3ToXYZQUAT(tick.command)
+        v = tick.v
+        self._append(v[6:], v[:6])
+        self._rows.append((tick.path_time, tick.body_error, tick.slip, tick.cost, tick.status == "solved"))
+        self._time, self._q = tick.time, tick.q
+        self._states = [HAND_STATES.index(state) for state in tick.hands]
+        # Holds that vanish renumber the walk's structure; the log keeps the rows of the first one
+        ids = self._walk.structure.ids
+        now = [self._structure.index(ids[hold]) if hold >= 0 else -1 for hold in tick.holds]
+        leaving = [state == OPENING for state in self._states]
+        self._holds = [old if leaves else new for old, new, leaves in zip(self._holds, now, leaving, strict=True)]
+
+    def log(self) -> tuple[WalkLog, TickColumns]:
+        """What was recorded so far; afterwards nothing more can be.
+
+        Raises:
+            ShapeError: no tick was recorded.
+        """
+        self._append(np.zeros(len(self._q) - 7), np.zeros(6))
+        columns = [np.array(column) for column in zip(*self._rows, strict=True)] or [np.zeros(0)] * 5
+        return self._recorder.log(), TickColumns(*columns)
+
+    def _happened(self, event: Event) -> None:
+        """A hand that is lifted opens from its hold; one whose hold vanishes is open at once."""
+        if event.what == "lift":
+            arm = self._arms[event.arm]
+            self._states[arm], self._holds[arm] = OPENING, self._structure.index(event.hold)
+        elif event.what == "vanished":
+            self._recorder.vanish(event.time, event.hold)
+            row = self._structure.index(event.hold)
+            for arm in [arm for arm, hold in enumerate(self._holds) if hold == row]:
+                self._states[arm], self._holds[arm] = OPEN, -1
+
+    def _append(self, rates: Array, twist: Array) -> None:
+        q = self._q
+        self._recorder.append(self._time, q[:7], q[7:], rates, twist, self._states, self._holds, self._command)
