@@ -169,13 +169,18 @@ def test_a_folder_that_cannot_be_written(tmp_path: Path) -> None:
 
 def test_what_is_out_of_reach_is_refused_with_its_reason(tmp_path: Path) -> None:
     folder = tmp_path / "run"
-    code, _, err = run("walk", *SHORT, "--remove-rows", "1-9,12-24", "--out", folder, "--no-pictures")
+    folder.mkdir()
+    for name in ("summary.json", "run.npz", "still_7.png", "mine.txt"):
+        (folder / name).touch()
+    code, _, err = run("walk", *SHORT, "--remove-rows", "1-9,12-24", "--out", folder, "--force")
     assert code == 3
     assert "refused" in err
     told = json.loads((folder / "summary.json").read_text())
     assert told["outcome"] == "refused"
     assert told["reason"]
-    assert not (folder / "run.npz").exists()
+    assert (folder / "reach_map.png").exists()
+    # Of an earlier run nothing is left, of others everything
+    assert {"run.npz", "still_7.png", "mine.txt"} & {path.name for path in folder.iterdir()} == {"mine.txt"}
 
 
 def test_ctrl_c_leaves_what_there_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

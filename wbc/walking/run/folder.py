@@ -17,6 +17,12 @@ from wbc.walking.run.stills import save_stills
 from wbc.walking.structure_file import save_structure
 
 PLAN, STRUCTURE, URDF = "plan.json", "structure.csv", "robot.urdf"
+#: All files of a run, which the next one in the same folder does not leave behind
+WRITTEN = (
+    *("run.npz", "ticks.npz", "published.npz", PLAN, STRUCTURE, URDF, "check.txt", "summary.json", "summary.txt"),
+    *(f"{name}.png" for name in ("holds", "margins", "joints", "rates", "drift", "wrists", "speed", "tick_time")),
+    *("reach_map.png", "walk.png", "still_*.png", "walk.gif", "replay.html"),
+)
 
 
 class RunFolderError(WbcError):
@@ -24,7 +30,7 @@ class RunFolderError(WbcError):
 
 
 def make_folder(folder: pathlib.Path, force: bool = False) -> pathlib.Path:
-    """The folder, made, without files of an earlier run's log.
+    """The folder, made, without the files of an earlier run.
 
     Raises:
         RunFolderError: it has a run and ``force`` is off, or it cannot be written.
@@ -33,8 +39,8 @@ def make_folder(folder: pathlib.Path, force: bool = False) -> pathlib.Path:
         raise RunFolderError("out", str(folder), "there is a run in this folder; choose another, or use --force")
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        for name in ("run.npz", "ticks.npz", "published.npz", PLAN, "summary.json", "summary.txt"):
-            (folder / name).unlink(missing_ok=True)
+        for file in [file for name in WRITTEN for file in folder.glob(name)]:
+            file.unlink()
         # A folder that can be seen but not written says so before anything is computed
         probe = folder / ".probe"
         probe.touch()

@@ -174,10 +174,13 @@ def _sectors(panel: Any, places: Array, usable: NDArray[np.bool_], run: WalkRun)
 
 def _rims(panel: Any, places: Array, run: WalkRun) -> None:
     """Holds that the plan uses."""
+    from matplotlib.collections import PatchCollection
+    from matplotlib.patches import Circle
+
     if run.plan is None:
         return
     names = {*run.plan.start, *(step.target for step in run.plan.regrasps)}
     rows = [run.structure.index(name) for name in sorted(names)]
-    panel.scatter(
-        *places[rows].T, s=190, facecolor="none", edgecolor=style.INK, lw=1.6, zorder=3, label=f"used: {len(rows)}"
-    )
+    rims = [Circle(tuple(places[row]), 0.092) for row in rows]
+    panel.add_collection(PatchCollection(rims, facecolor="none", edgecolor=style.INK, lw=1.6, zorder=3))
+    panel.scatter([], [], s=150, facecolor="none", edgecolor=style.INK, lw=1.6, label=f"used: {len(rows)}")

@@ -32,7 +32,7 @@ DETAIL = 0.012
 #: Distance of the camera from the middle of the walk [m]
 DISTANCE = 5.2
 #: Surface below this radius of the body's way is shown [m]
-SHOWN = 2.6
+SHOWN = 1.9
 
 
 class ReplayPageError(WbcError):

@@ -24,7 +24,7 @@ PLANNERS = ("free", "published")
 #: Where a walk begins and ends on a built-in structure when nothing is said
 ENDS = {
     "cylinder": ("13,6", "13,18"),
-    "plane": ("8,6", "8,18"),
+    "plane": ("8,6", "8,17"),
     "truss": ("L2,6", "L2,18"),
     "module": ("15,4", "15,14"),
 }
