@@ -22,7 +22,7 @@ help:  ## list the targets
 
 setup: $(READY)  ## create .venv with the pinned packages and this one
 
-demo: $(READY)  ## a three-armed robot walks along a cylinder at 6 in/s, into runs/walk (the Panda: wbc demo)
+demo: $(READY)  ## a three-armed robot walks along a cylinder at 4 in/s, into runs/walk (the Panda: wbc demo)
 	$(BIN)/wbc walk --out runs/walk --force
 
 test: $(READY)  ## all tests

@@ -6,7 +6,7 @@ import wbc
 from wbc.walking.run import WalkRequest, perform_walk
 
 walker = wbc.robots.walker()
-request = WalkRequest("cylinder", speed=0.1524, start="13,9", points=("13,14",))
+request = WalkRequest("cylinder", speed=0.1016, start="13,9", points=("13,14",))
 run = perform_walk(request, walker)
 
 for step in run.plan.regrasps:

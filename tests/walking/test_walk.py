@@ -46,8 +46,8 @@ def walked(
 
 
 @pytest.mark.parametrize("name", sorted(PATHS))
-def test_six_inches_a_second(machine: Walker, structure: Structure, stack: WalkStack, name: str) -> None:
-    plan, walk, ticks = walked(machine, structure, stack, PATHS[name], 6.0)
+def test_four_inches_a_second(machine: Walker, structure: Structure, stack: WalkStack, name: str) -> None:
+    plan, walk, ticks = walked(machine, structure, stack, PATHS[name], 4.0)
     assert plan.complete
     assert plan.delay == 0.0
     assert len(plan.regrasps) >= 2
@@ -70,7 +70,7 @@ def test_six_inches_a_second(machine: Walker, structure: Structure, stack: WalkS
 def test_a_plan_is_the_same_every_time_and_on_a_moved_structure(machine: Walker, structure: Structure) -> None:
     import pinocchio as pin
 
-    path = grid_path(PATHS["+A"], 6 * INCH)
+    path = grid_path(PATHS["+A"], 4 * INCH)
     plan = plan_walk(machine, structure, path)
     again = plan_walk(machine, structure, path)
     pose = pin.SE3(pin.exp3(np.array([0.3, -0.7, 0.2])), np.array([1.0, -2.0, 0.5]))
@@ -80,7 +80,7 @@ def test_a_plan_is_the_same_every_time_and_on_a_moved_structure(machine: Walker,
 
 
 def test_grips_of_a_plan_are_what_it_says(machine: Walker, structure: Structure) -> None:
-    plan = plan_walk(machine, structure, grid_path(PATHS["-T"], 6 * INCH))
+    plan = plan_walk(machine, structure, grid_path(PATHS["-T"], 4 * INCH))
     check(plan, machine)
 
 

@@ -16,7 +16,7 @@ from wbc.errors import WbcError
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 
 #: First argument -> the module that measures something else than the tick
-OTHERS = {"time-laws": "bench.time_laws", "ik": "bench.ik"}
+OTHERS = {"time-laws": "bench.time_laws", "ik": "bench.ik", "walk": "bench.walk"}
 
 
 class BenchError(WbcError):
@@ -31,6 +31,8 @@ def bench(context: typer.Context) -> None:
     wbc bench time-laws compares laws of motion with raw toppra and raw ruckig: wbc bench time-laws --count 100000
 
     wbc bench ik measures inverse kinematics on the protocol of TRAC-IK: wbc bench ik --full
+
+    wbc bench walk plans and walks courses, turns and trenches: wbc bench walk --full
     """
     if not (ROOT / "bench" / "__main__.py").is_file():
         reason = "the benchmark is not installed with the package; run it from a clone of the repository"

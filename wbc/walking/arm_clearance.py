@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 
 from wbc.robots import Walker
@@ -45,19 +47,35 @@ class ArmClearance:
         self._kinematics = ArmKinematics(walker.data)  # type: ignore[arg-type]
         self._bases = [arm.base for arm in walker.arms]
         neck, upper, fore, hand = self._kinematics.radii
-        # Named points O N S E W H of an arm: capsules O-N, S-E, E-W, W-H
+        # Named points O N S E W H of an arm: capsules O-N, S-E, E-W, W-H. All pairs but that of the two necks
         self._from, self._to = [0, 2, 3, 4], [1, 3, 4, 5]
+        pairs = [(i, j) for i in range(4) for j in range(4) if i or j]
+        self._one, self._other = [i for i, _ in pairs], [j for _, j in pairs]
         radii = np.array([neck, upper, fore, hand])
-        self._least = radii[:, None] + radii[None, :] + walker.data.clearance + ROOM  # type: ignore[union-attr]
-        self._least[0, 0] = 0.0  # necks stand still
+        self._least = radii[self._one] + radii[self._other] + walker.data.clearance + ROOM  # type: ignore[union-attr]
         self._points: dict[int, Array] = {}
         self._conflicts: dict[tuple[int, int], Ints] = {}
 
+    def prepare(self, pairs: Iterable[tuple[int, int]]) -> None:
+        """Look at pairs of grips together."""
+        todo = sorted({_pair(a, b) for a, b in pairs} - self._conflicts.keys())
+        spans = [self._common(*pair) for pair in todo]
+        sizes = np.array([len(span) for span in spans], dtype=int)
+        if not sizes.sum():
+            self._conflicts.update(dict.fromkeys(todo, np.zeros(0, dtype=np.int64)))
+            return
+        kept = [k for k in range(len(todo)) if sizes[k]]
+        sides = [np.concatenate([self._of(todo[k][side], spans[k]) for k in kept]) for side in (0, 1)]
+        near = np.split(self.between(*sides) < 0.0, np.cumsum(sizes[kept])[:-1])
+        self._conflicts.update(dict.fromkeys(todo, np.zeros(0, dtype=np.int64)))
+        for k, flags in zip(kept, near, strict=True):
+            self._conflicts[todo[k]] = spans[k][flags]
+
     def first_conflict(self, one: int, other: int, sample: int) -> int:
         """The first sample from ``sample`` on at which the arms are too near, NEVER if there is none."""
-        pair = (one, other) if one < other else (other, one)
+        pair = _pair(one, other)
         if pair not in self._conflicts:
-            self._conflicts[pair] = self._find(*pair)
+            self.prepare([pair])
         found = self._conflicts[pair]
         place = int(np.searchsorted(found, sample - EVERY + 1))
         return int(found[place]) if place < len(found) else NEVER
@@ -69,24 +87,18 @@ class ArmClearance:
         return out
 
     def between(self, one: Array, other: Array) -> Array:
-        """Least distance beyond radii and clearance of two arms given by their points ``[..., 6, 3]``."""
-        a, b = one[..., self._from, None, :], one[..., self._to, None, :]
-        c, d = other[..., None, self._from, :], other[..., None, self._to, :]
-        shape = np.broadcast_shapes(a.shape, c.shape)
-        parts = [np.broadcast_to(x, shape) for x in (a, b, c, d)]
-        out: Array = (segment_distances(*parts) - self._least).min(axis=(-1, -2))
+        """Least distance beyond radii and clearance of two arms given by their points ``[m, 6, 3]``: ``[m]``."""
+        a, b = one[:, self._from][:, self._one], one[:, self._to][:, self._one]
+        c, d = other[:, self._from][:, self._other], other[:, self._to][:, self._other]
+        out: Array = (segment_distances(a, b, c, d) - self._least).min(axis=1)
         return out
 
-    def _find(self, one: int, other: int) -> Ints:
+    def _common(self, one: int, other: int) -> Ints:
+        """Samples, multiples of EVERY, that two grips share."""
         grips = self._grips
-        first = int(max(grips.first[one], grips.first[other]))
-        last = int(min(grips.last[one], grips.last[other]))
-        begin = -(-first // EVERY)
-        samples = np.arange(begin * EVERY, last + 1, EVERY)
-        if not len(samples):
-            return samples
-        near = self.between(self._of(one, samples), self._of(other, samples)) < 0.0
-        return samples[near]
+        first = max(int(grips.first[one]), int(grips.first[other]))
+        last = min(int(grips.last[one]), int(grips.last[other]))
+        return np.arange(-(-first // EVERY) * EVERY, last + 1, EVERY, dtype=np.int64)
 
     def _of(self, grip: int, samples: Ints) -> Array:
         """Points of a grip at samples that are multiples of EVERY."""
@@ -95,4 +107,9 @@ class ArmClearance:
         if grip not in self._points:
             every = np.arange(start * EVERY, grips.last[grip] + 1, EVERY)
             self._points[grip] = self.points(int(grips.arm[grip]), grips.posture(np.array(grip), every))
-        return self._points[grip][samples // EVERY - start]
+        out: Array = self._points[grip][samples // EVERY - start]
+        return out
+
+
+def _pair(one: int, other: int) -> tuple[int, int]:
+    return (one, other) if one < other else (other, one)

@@ -133,7 +133,7 @@ def grid_path(
     A segment takes as long as ``speed`` [m/s] of the body's origin and ``turn_rate`` [rad/s] ask, whichever is longer.
 
     Args:
-        points: (T, A) or (T, A, heading [rad]), at least one.
+        points: (T, A) or (T, A, heading [rad]), at least one; a single one stands still.
         pose: of the cylinder, if it was moved.
 
     Raises:

@@ -41,6 +41,12 @@ class ClosedChain:
         count = len(walker.arms)
         self.origins, self.rotations = np.zeros((count, 3)), np.zeros((count, 3, 3))
 
+    def on(self, structure: Structure) -> ClosedChain:
+        """The same robot, at the same place, on another structure."""
+        out = ClosedChain(self.walker, structure)
+        out.origins, out.rotations = self.origins, self.rotations
+        return out
+
     def hands(self, q: Array) -> tuple[Array, Array]:
         """Origins and rotations of all hands in the body's frame: ``[arms, 3]`` [m] and ``[arms, 3, 3]``."""
         self._still[7:] = q[7:]

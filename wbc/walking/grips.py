@@ -85,9 +85,11 @@ def _of_arm(
     base = walker.arms[arm].base.homogeneous
     frames = path.poses @ base
     data = kinematics.data
-    far = data.neck_length + data.shoulder_offset + data.upper_arm_length + data.forearm_length + data.hand_length
+    far = data.shoulder_offset + data.upper_arm_length + data.forearm_length + data.hand_length
     offset = structure.positions[None] - frames[:, None, :3, 3]
-    samples, holds = np.nonzero((offset**2).sum(axis=2) < far**2)
+    # From the neck, where the arm begins to move
+    neck = frames[:, None, :3, 2] * data.neck_length
+    samples, holds = np.nonzero(((offset - neck) ** 2).sum(axis=2) < far**2)
     turn = frames[samples, :3, :3]
     points = np.einsum("nji,nj->ni", turn, offset[samples, holds])
     axes = np.einsum("nji,nj->ni", turn, structure.axes[holds])

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
-from itertools import product
+from collections.abc import Collection, Mapping
+from itertools import combinations, product
 from typing import Literal
+
+import numpy as np
 
 from wbc import validation
 from wbc.errors import ShapeError
 from wbc.robots import Walker
+from wbc.validation import Array
 from wbc.walking.body_path import BodyPath
+from wbc.walking.detours import detours
 from wbc.walking.grips import Grips, find_grips
 from wbc.walking.plan import NoPlanError, Plan, Regrasp
 from wbc.walking.stance_search import Found, StanceSearch
@@ -18,10 +22,16 @@ from wbc.walking.structure import Structure
 
 Objective = Literal["velocity", "destination"]
 
+#: Holds that hands begin on, postures that they have, and holds that they must not begin on, by arm
+Beginning = tuple[Mapping[str, str], Mapping[str, Array], Mapping[str, Collection[str]]]
 #: Delays of one swing that velocity mode allows one after the other [s]
 DELAYS = (0.0, 0.25, 0.5, 1.0, 2.0, float("inf"))
 #: Grips of an arm that a start may have, and stances that a search begins with
-START_GRIPS, STARTS = 12, 24
+START_GRIPS, STARTS = 10, 24
+#: A search that fails is made again, so many times as wide
+WIDER = 5
+#: Joints 1 to 5 of one branch differ by less than this from where they are [rad]; other branches by more
+SAME_BRANCH = 0.3
 
 
 def plan_walk(
@@ -30,10 +40,13 @@ def plan_walk(
     path: BodyPath,
     *,
     start: Mapping[str, str] | None = None,
+    postures: Mapping[str, Array] | None = None,
+    avoid: Mapping[str, Collection[str]] | None = None,
     objective: Objective = "velocity",
     width: int | None = 16,
     time_budget: float | None = None,
     partial: bool = False,
+    detour: bool = False,
 ) -> Plan:
     """Which hands to move where so that the body can follow a path.
 
@@ -42,9 +55,13 @@ def plan_walk(
 
     Args:
         start: arm name -> hold id of the hands that hold at the beginning; default: the planner chooses.
+        postures: arm name -> its joints now [rad]: a hand that holds keeps the branch of its wrist.
+        avoid: arm name -> holds that it does not begin on.
         width: stances kept for each number of re-grasps; None: all, which finds the fewest.
         time_budget: [s]; after it what is found is returned or refused.
         partial: return a plan that does not lead to the end instead of refusing.
+        detour: where the body cannot follow the path, try it lower and turned, see :mod:`wbc.walking.detours`; the
+            plan's path says what was found.
 
     Raises:
         UnknownNameError: another arm, hold or objective. ShapeError: a walker that is no body with PUMA arms.
@@ -54,42 +71,75 @@ def plan_walk(
     if walker.robot.name == "two_ended_arm":
         raise ShapeError("walker", walker.robot.name, "expected a body with arms")
     deadline = None if time_budget is None else time.perf_counter() + time_budget
+    beginning = start or {}, postures or {}, avoid or {}
+    plan = _best(walker, structure, path, beginning, objective, width, deadline)
+    if not plan.complete and detour:
+        for other in detours():
+            if deadline is not None and time.perf_counter() > deadline:
+                break
+            changed = _best(walker, structure, other.along(path), beginning, "destination", width, deadline)
+            if changed.complete:
+                return changed
+    if not plan.complete and not partial:
+        raise NoPlanError("plan", structure.name, plan.reason)
+    return plan
+
+
+def _best(
+    walker: Walker,
+    structure: Structure,
+    path: BodyPath,
+    beginning: Beginning,
+    objective: Objective,
+    width: int | None,
+    deadline: float | None,
+) -> Plan:
+    """The best plan along one path, complete or not."""
     grips = find_grips(walker, structure, path)
     best: tuple[StanceSearch, Found] | None = None
-    for delay in DELAYS if objective == "velocity" else DELAYS[-1:]:
-        search = StanceSearch(walker, structure, path, grips, longest_delay=delay, width=width)
-        starts = _starts(walker, structure, search, grips, start)
+    delays = DELAYS if objective == "velocity" else DELAYS[-1:]
+    widths = (None,) if width is None else (width, WIDER * width)
+    for delay, wide in product(delays, widths):
+        search = StanceSearch(walker, structure, path, grips, longest_delay=delay, width=wide)
+        starts = _starts(walker, structure, search, grips, beginning)
         found = search.run(starts, deadline=deadline)
         if best is None or (found.complete, found.reached) > (best[1].complete, best[1].reached):
             best = search, found
         if found.complete or (deadline is not None and time.perf_counter() > deadline):
             break
     assert best is not None
-    plan = _plan(walker, structure, path, grips, best[1])
-    if not plan.complete and not partial:
-        raise NoPlanError("plan", structure.name, plan.reason)
-    return plan
+    return _plan(walker, structure, path, grips, best[1])
 
 
 def _starts(
-    walker: Walker, structure: Structure, search: StanceSearch, grips: Grips, start: Mapping[str, str] | None
+    walker: Walker,
+    structure: Structure,
+    search: StanceSearch,
+    grips: Grips,
+    beginning: Beginning,
 ) -> list[tuple[int, ...]]:
     """Stances to begin with, those that last longest first."""
+    start, postures, avoid = beginning
     names = [arm.name for arm in walker.arms]
-    for name in start or {}:
+    for name in (*start, *postures, *avoid):
         validation.one_of("start", name, names)
     choices = []
     for k, name in enumerate(names):
         mine = [int(g) for g in grips.of_arm(k) if grips.first[g] == 0]
-        if start is not None and name in start:
+        if name in start:
             row = structure.index(start[name])
             mine = [g for g in mine if grips.hold[g] == row]
+            if name in postures:
+                here = np.array(postures[name])[:5]
+                mine = [g for g in mine if np.abs(grips.postures[grips.offset[g]][:5] - here).max() < SAME_BRANCH]
             if not mine:
                 raise NoPlanError(f"start.{name}", start[name], "the arm cannot hold it at the beginning of the path")
+        mine = [g for g in mine if structure.ids[grips.hold[g]] not in avoid.get(name, ())]
         mine.sort(key=lambda g: (-int(grips.last[g]), int(grips.hold[g]), int(grips.branch[g])))
         if not mine:
             raise NoPlanError("plan", name, "no hold is in reach at the beginning of the path")
         choices.append(mine[:START_GRIPS])
+    search.clearance.prepare((a, b) for one, other in combinations(choices, 2) for a, b in product(one, other))
     stances = []
     for stance in product(*choices):
         if len({int(grips.hold[g]) for g in stance}) == len(stance):

@@ -34,6 +34,8 @@ Key = tuple[int, ...]
 
 #: Hands land at least INSIDE samples inside a grip, wait for it at most HOVER [s], with |sin theta5| of at least BENT
 INSIDE, HOVER, BENT = 3, 0.75, 0.08
+#: Ways to one stance that are looked at, and stances that are checked together, in widths
+WAYS, PARTS = 2, 2
 #: Delays are counted in steps of this [s], so that rounding decides nothing
 QUANTUM = 1e-6
 
@@ -140,28 +142,35 @@ class StanceSearch:
 
     def _next(self, level: dict[Key, Node]) -> dict[Key, Node]:
         """Stances with one more re-grasp; the promising ones first, until there are enough."""
-        candidates: dict[Key, Node] = {}
+        candidates: dict[Key, list[Node]] = {}
         for key, node in level.items():
             self.expanded += 1
             for target, move in self._moves(key, node):
                 child = tuple(target if k == move.arm else g for k, g in enumerate(key))
                 delay = node.delay + round(move.delay / QUANTUM)
-                known = candidates.get(child)
-                if known is None or (move.land, delay) < (known.sample, known.delay):
-                    candidates[child] = Node(move.land, delay, key, move)
-        order = sorted(candidates.items(), key=lambda item: self._promise(*item))
+                candidates.setdefault(child, []).append(Node(move.land, delay, key, move))
+        most = WAYS if self.width else None
+        ranked = {key: sorted(nodes, key=lambda n: (n.sample, n.delay))[:most] for key, nodes in candidates.items()}
+        order = sorted(ranked.items(), key=lambda item: self._promise(item[0], item[1][0]))
         kept: dict[Key, Node] = {}
-        width = self.width or max(len(order), 1)
-        for begin in range(0, len(order), width):
-            part = order[begin : begin + width]
-            self.swings.prepare([node.move for _, node in part if node.move is not None])
-            for key, node in part:
-                better = self._checked(level, key, node)
-                if better is not None:
-                    kept[key] = better
-            if len(kept) >= width:
+        size = PARTS * self.width if self.width else max(len(order), 1)
+        for begin in range(0, len(order), size):
+            part = order[begin : begin + size]
+            self._prepare(part)
+            for key, nodes in part:
+                checked = [better for node in nodes if (better := self._checked(level, key, node)) is not None]
+                if checked:
+                    kept[key] = min(checked, key=lambda n: (n.sample, n.delay))
+            if self.width and len(kept) >= self.width:
                 break
-        return kept
+        best = sorted(kept.items(), key=lambda item: self._worth(*item))
+        return dict(best[: self.width])
+
+    def _prepare(self, part: Sequence[tuple[Key, list[Node]]]) -> None:
+        """What the check of some stances needs, computed together."""
+        moves = [node.move for _, nodes in part for node in nodes if node.move is not None]
+        self.swings.prepare(moves)
+        self.clearance.prepare(pair for key, _ in part for pair in combinations(key, 2))
 
     def _moves(self, key: Key, node: Node) -> Iterator[tuple[int, Move]]:
         """Moves that estimates allow: (target, move)."""
@@ -244,6 +253,12 @@ class StanceSearch:
         ends = sorted(int(self.grips.last[g]) for g in key)
         worth = ends[0] + 0.5 * sum(ends[1:]) / max(len(ends) - 1, 1) - 0.5 * node.sample
         return -worth + node.delay * QUANTUM / self.path.spacing, node.sample, key
+
+    def _worth(self, key: Key, node: Node) -> tuple[float, int, Key]:
+        """As the promise, of a checked stance: arms that get in each other's way end it."""
+        until = self.until(key, node.sample)
+        promise, sample, _ = self._promise(key, node)
+        return promise + 2.0 * (min(int(self.grips.last[g]) for g in key) - until), sample, key
 
     def _result(self, levels: list[dict[Key, Node]], key: Key | None, complete: bool) -> Found:
         depth = len(levels) - 1

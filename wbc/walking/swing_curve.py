@@ -21,7 +21,7 @@ class Curves:
         p(x) = (1-x)^3 a + 3 (1-x)^2 x (a - c z_a) + 3 (1-x) x^2 (b - c z_b) + x^3 b
 
     from hold a to hold b with approach directions z_a and z_b: it leaves and arrives along them. Its middle is 3 c / 4
-    above the chord; c is 4/3 of the height asked for, and of what a chord loses on a surface that bulges.
+    above the chord.
 
     Attributes:
         begin, end: ``[m, 3]`` [m]. leave, arrive: approach directions there ``[m, 3]``. rise: c ``[m]`` [m].
@@ -60,12 +60,28 @@ class Curves:
         return axis, (across - along * axis) / np.maximum(length, 1e-9)
 
 
-def curves(structure: Structure, begin: Ints, end: Ints, height: float) -> Curves:
-    """Curves between holds, given by rows of the structure, ``height`` [m] above what lies between them."""
+def curves(structure: Structure, begin: Ints, end: Ints, height: float, free: float) -> Curves:
+    """Curves between holds, given by rows of the structure.
+
+    They are ``height`` [m] above what lies between where the hand is farther than ``free`` [m] from both holds.
+    """
     a, b = structure.positions[begin], structure.positions[end]
     za, zb = structure.axes[begin], structure.axes[end]
     middle, up = 0.5 * (a + b), -(za + zb)
     up /= np.maximum(np.linalg.norm(up, axis=1), 1e-9)[:, None]
     # What the middle of the chord lacks, clearance of obstacles included, is added where it helps: straight up
     lack = np.maximum(height - structure.clearance(middle + height * up), 0.0)
-    return Curves(a, b, za, zb, (height + lack) * 4.0 / 3.0)
+    # Across, the curve has come 3 x^2 - 2 x^3 of the span; there its height is 3 c x (1 - x)
+    part = np.clip(free / np.maximum(np.linalg.norm(b - a, axis=1), 1e-9), 0.0, 0.5)
+    grid = np.linspace(0.0, 0.5, 65)
+    x = np.interp(part, grid**2 * (3 - 2 * grid), grid)
+    return Curves(a, b, za, zb, (height + lack) / (3.0 * x * (1.0 - x)))
+
+
+def between(place: Array, axis: Array, structure: Structure, hold: int, height: float) -> Curves:
+    """The way of a hand that is in the air, at ``place`` with its z axis along ``axis``, to a hold."""
+    end, arrive = structure.positions[[hold]], structure.axes[[hold]]
+    # It need not rise more than it lacks, but must come down along the hold's normal
+    above = float(structure.clearance(place))
+    rise = max(height - above, 0.5 * height) * 4.0 / 3.0
+    return Curves(place[None], end, axis[None], arrive, np.array([rise]))

@@ -6,7 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from wbc.robots import Walker
 from wbc.validation import Array
+from wbc.walking.body_path import BodyPath
+from wbc.walking.swing_curve import Curves
 from wbc.walking.swing_speed import speeds
 from wbc.walking.swings import FINE, Asked, Swings
 
@@ -26,22 +29,26 @@ class Aim:
 
 
 class SwingLaw:
-    """A table of the least-time law along the curve of a move, stretched to the duration that the plan gives it.
+    """A table of the least-time law of an arm along a curve, stretched where it has to take longer.
 
     Between rows straight lines; rows are 5 ms apart, so that they miss the curve by a hundredth of a millimetre.
+
+    Args:
+        walker, arm, path: whose hand moves while the body is at ``samples`` ``[FINE]`` of the path.
+        way: one curve. least: duration that it takes at least [s].
     """
 
-    def __init__(self, swings: Swings, move: Asked) -> None:
-        way = swings.curve([move])
+    def __init__(
+        self, walker: Walker, arm: int, path: BodyPath, way: Curves, samples: Array, least: float = 0.0
+    ) -> None:
         x = np.linspace(0.0, 1.0, FINE)
-        samples = (move.lift + (move.land - move.lift) * x)[None]
-        found = speeds(swings.walker, move.arm, swings.path, way, samples)
-        planned = swings.duration(move)
-        motion = max(float(found.duration[0]), 0.0 if planned is None else planned - swings.extra)
-        times = np.concatenate([[0.0], np.cumsum(found.time[0])]) * (motion / float(found.duration[0]))
-        self.duration = motion
-        count = int(np.ceil(motion / SPACING)) + 1
-        self._times = np.linspace(0.0, motion, count)
+        found = speeds(walker, np.array([arm]), path, way, samples[None])
+        fastest = float(found.duration[0])
+        self.possible = bool(found.possible[0])
+        self.duration = max(fastest, least)
+        times = np.concatenate([[0.0], np.cumsum(found.time[0])]) * (self.duration / fastest)
+        count = int(np.ceil(self.duration / SPACING)) + 1
+        self._times = np.linspace(0.0, self.duration, count)
         along = np.interp(self._times, times, x)
         # dx/dt from the table itself, so that position and velocity agree
         rate = np.gradient(along, self._times)
@@ -51,6 +58,14 @@ class SwingLaw:
         self._rows = np.concatenate(
             [place[0], slope[0] * rate[:, None], axis[0], turn[0] * rate[:, None], along[:, None]], axis=1
         )
+
+    @staticmethod
+    def of(swings: Swings, move: Asked) -> SwingLaw:
+        """The law of a planned move, as long as the plan says."""
+        planned = swings.duration(move)
+        samples = move.lift + (move.land - move.lift) * np.linspace(0.0, 1.0, FINE)
+        least = 0.0 if planned is None else planned - swings.extra
+        return SwingLaw(swings.walker, move.arm, swings.path, swings.curve([move]), samples, least)
 
     def at(self, time: float) -> Aim:
         """The aim at a time since lifting, clipped to the swing."""

@@ -11,6 +11,7 @@ from wbc.robots import Walker
 from wbc.validation import Array
 from wbc.walking.arm_kinematics import ArmKinematics
 from wbc.walking.body_path import BodyPath
+from wbc.walking.grips import Ints
 from wbc.walking.swing_curve import Curves
 
 #: Parts of joint rates and accelerations that a swing is planned with; the rest is for feedback
@@ -29,11 +30,13 @@ class Speeds:
 
     Attributes:
         possible: the wrist stays in reach and joints 1 to 3 within their limits ``[m]``.
+        angles: of joints 1 to 3 ``[m, n, 3]`` [rad].
         rate: dx/dt ``[m, n]`` [1/s].
         time: from point to point ``[m, n - 1]`` [s].
     """
 
     possible: NDArray[np.bool_]
+    angles: Array
     rate: Array
     time: Array
 
@@ -44,8 +47,8 @@ class Speeds:
         return out
 
 
-def speeds(walker: Walker, arm: int, path: BodyPath, way: Curves, samples: Array) -> Speeds:
-    """Least times along curves for an arm of a body that is at fractional ``samples`` ``[m, n]`` of its path:
+def speeds(walker: Walker, arms: Ints, path: BodyPath, way: Curves, samples: Array) -> Speeds:
+    """Least times along m curves, each for an arm of a body that is at fractional ``samples`` ``[m, n]`` of its path:
 
         |q_k' x'| <= part rate_k,     |q_k' x'' + q_k'' x'^2| <= part acceleration_k,     |p' x'| <= fastest
 
@@ -55,7 +58,7 @@ def speeds(walker: Walker, arm: int, path: BodyPath, way: Curves, samples: Array
     points = samples.shape[1]
     x = np.linspace(0.0, 1.0, points)
     place, slope = way.at(x)
-    angles, possible = _wrist_angles(kinematics, walker, arm, path.blended(samples), place, way.axes(x)[0])
+    angles, possible = _wrist_angles(kinematics, walker, arms, path.blended(samples), place, way.axes(x)[0])
     step = 1.0 / (points - 1)
     first = np.gradient(angles, axis=1) / step
     second = np.abs(np.gradient(first, axis=1) / step)
@@ -78,16 +81,16 @@ def speeds(walker: Walker, arm: int, path: BodyPath, way: Curves, samples: Array
     for i in range(points - 1, 0, -1):
         square[:, i - 1] = np.minimum(square[:, i - 1], square[:, i] + 2 * step * push(i))
     rate = np.sqrt(square)
-    return Speeds(possible, rate, 2 * step / np.maximum(rate[:, 1:] + rate[:, :-1], 1e-6))
+    return Speeds(possible, angles, rate, 2 * step / np.maximum(rate[:, 1:] + rate[:, :-1], 1e-6))
 
 
 def _wrist_angles(
-    kinematics: ArmKinematics, walker: Walker, arm: int, bodies: Array, place: Array, axis: Array
+    kinematics: ArmKinematics, walker: Walker, arms: Ints, bodies: Array, place: Array, axis: Array
 ) -> tuple[Array, NDArray[np.bool_]]:
     """Angles of joints 1 to 3 ``[m, n, 3]`` with the hand at ``place`` along ``axis``, and whether that is possible."""
-    base = walker.arms[arm].base
-    turn = bodies[..., :3, :3] @ base.rotation
-    origin = bodies[..., :3, 3] + bodies[..., :3, :3] @ base.translation
+    bases = np.array([arm.base.homogeneous for arm in walker.arms])[arms]
+    frames = bodies @ bases[:, None]
+    turn, origin = frames[..., :3, :3], frames[..., :3, 3]
     points = np.einsum("mnji,mnj->mni", turn, place - origin)
     axes = np.einsum("mnji,mnj->mni", turn, axis)
     axes /= np.linalg.norm(axes, axis=2, keepdims=True)

@@ -20,7 +20,7 @@ DT = 0.01
 #: Weights: the body does not give way to a swing, a swing not to postures
 BODY, SWING, AXIS, WRIST = 1e4, 10.0, 3.0, 1e-3
 #: Gains [1/s] of body, swinging hand, its axis and the wrists; holds: 1 / (5 dt)
-BODY_GAIN, SWING_GAIN, AXIS_GAIN, WRIST_GAIN, HOLD_TICKS = 8.0, 15.0, 12.0, 4.0, 5
+BODY_GAIN, SWING_GAIN, AXIS_GAIN, WRIST_GAIN, HOLD_TICKS = 12.0, 15.0, 12.0, 4.0, 5
 #: On the way the wrist turns to its posture on the next hold; near holds its axis counts
 FREE_AXIS, FREE_WRIST, RESTING = 0.01, 40.0, 0.1
 #: The posture on the next hold changes little: it is told again after so many ticks
@@ -39,7 +39,7 @@ class WalkStack:
         self, walker: Walker, structure: Structure, dt: float = DT, *, collisions: bool = True, backend: str = "auto"
     ) -> None:
         self.walker, self.structure, self.dt = walker, structure, dt
-        stack = Stack(walker.robot, dt=dt)
+        stack = Stack(walker.robot, dt=dt, calm=False)
         stack.add(tasks.EndEffector("body"), name="body", weight=BODY)
         for arm in walker.arms:
             stack.add(tasks.Hold(arm.hand, kind="axis", gain=1.0 / (HOLD_TICKS * dt)), name=f"{arm.name} hold")
@@ -70,6 +70,14 @@ class WalkStack:
     def release(self, arm: int) -> None:
         """An open hand, which follows aims."""
         self._switch(arm, False)
+        self._near = (-1, False)
+
+    def rest(self, arm: int, place: Array, axis: Array) -> None:
+        """A free hand that stays where it is."""
+        name = self.walker.arms[arm].name
+        swing, aligned = self.controller[f"{name} swing"], self.controller[f"{name} axis"]
+        swing.target, swing.feedforward = place, np.zeros(3)
+        aligned.target, aligned.feedforward, aligned.weight = axis, np.zeros(3), AXIS
         self._near = (-1, False)
 
     def body(self, pose: pin.SE3, rate: Array) -> None:

@@ -28,8 +28,8 @@ ENDS = {
     "truss": ("L2,6", "L2,18"),
     "module": ("15,4", "15,14"),
 }
-#: 6 in/s
-SPEED = 0.1524
+#: 4 in/s
+SPEED = 0.1016
 
 
 @dataclass(frozen=True)

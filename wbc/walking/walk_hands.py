@@ -1,0 +1,50 @@
+"""How fast a swinging hand's aim goes on, and when a hand may close."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from wbc.robots import WalkerData
+from wbc.validation import Array
+from wbc.walking.walk_state import Swinging
+
+#: A swing waits for a hand that is this far behind its aim [m]: full pace below half of it, least pace beyond
+BEHIND, LEAST_PACE = 0.02, 0.05
+#: Parts of the way before and after which a hand is near a hold; joints 4 and 5 this near to their posture [rad] there
+LIFTING, LANDING, TURNED = 0.2, 0.8, 0.5
+#: The pace of a hand changes from nothing to all in [s]
+HAND_RAMP = 0.2
+
+
+def hand_pace(swinging: Swinging, place: Array, turned: bool, early: float, pace: float) -> float:
+    """Part of full speed at which the aim of a hand should go on.
+
+    Args:
+        place: of the hand [m]. turned: its wrist is on the branch that it lands with.
+        early: path time until the hold can be held [s]. pace: of the body.
+    """
+    aim = swinging.law.at(swinging.clock)
+    gap, speed = aim.position - place, float(np.linalg.norm(aim.velocity))
+    along = float(gap @ aim.velocity) / speed if speed > 1e-6 else 0.0
+    across = float(np.sqrt(max(float(gap @ gap) - along * along, 0.0)))
+    # A hand that is ahead must not be stopped: it could not
+    wanted = min(max(1.5 - (max(along, 0.0) + across) / BEHIND, LEAST_PACE), 1.0)
+    wait = early - pace * (swinging.law.duration - swinging.clock)
+    if wait > 0.0:
+        wanted /= 1.0 + 4.0 * wait
+    return 0.0 if aim.part > LANDING and not turned else wanted
+
+
+def at_rest(
+    swinging: Swinging, hand: tuple[Array, Array], hold: tuple[Array, Array], data: WalkerData, dt: float
+) -> bool:
+    """Whether a hand is on its hold and still, both given by place [m] and z axis, so that it may close."""
+    (place, axis), (there, wanted) = hand, hold
+    off, speed = float(np.linalg.norm(place - there)), float(np.linalg.norm(place - swinging.place)) / dt
+    still = speed < data.close_speed and angle(axis, swinging.axis) / dt < data.close_rate
+    return still and off < data.close_distance and angle(axis, wanted) < data.close_angle
+
+
+def angle(one: Array, other: Array) -> float:
+    """Between two unit vectors [rad]; exact for small angles."""
+    return float(np.arctan2(np.linalg.norm(np.cross(one, other)), one @ other))

@@ -1,0 +1,80 @@
+"""What a walk is made of from tick to tick: hands, swings, ticks and events."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+import pinocchio as pin
+
+from wbc.validation import Array
+from wbc.walking.swing_law import SwingLaw
+
+Hand = Literal["closed", "opening", "open", "closing"]
+What = Literal["lift", "land", "failed", "vanished", "replanned", "refused"]
+
+
+@dataclass(eq=False)
+class Swinging:
+    """A hand on its way.
+
+    Attributes:
+        arm: its row. hold: row of the hold that it goes to. grip: which it is to be.
+        law: the aims. clock: time on the law [s]. pace: part of full speed. latch: time until the latch is through [s].
+        place, axis: of the hand one tick before, for speeds.
+        counted: it is a move of the plan, not one that brings a free hand back to it.
+    """
+
+    arm: int
+    hold: int
+    grip: int
+    law: SwingLaw
+    latch: float
+    counted: bool = True
+    clock: float = 0.0
+    pace: float = 0.0
+    state: Hand = "opening"
+    tries: int = 0
+    place: Array = field(default_factory=lambda: np.zeros(3))
+    axis: Array = field(default_factory=lambda: np.zeros(3))
+
+
+@dataclass(frozen=True, eq=False)
+class Tick:
+    """What happened in one tick; arrays are the tick's own.
+
+    Attributes:
+        time: [s]. path_time: u [s]. q, v: configuration after it, and what the controller returned.
+        hands: state of each hand. holds: row of the hold that each hand is at or goes to, -1 for none.
+        command: pose that the body was to have. body_error: its distance from it [m].
+        slip: of the worst held hand [m].
+        status: of the controller. cost: of the controller's tick [s].
+    """
+
+    time: float
+    path_time: float
+    q: Array
+    v: Array
+    hands: tuple[Hand, ...]
+    holds: tuple[int, ...]
+    command: pin.SE3
+    body_error: float
+    slip: float
+    status: str
+    cost: float
+
+
+@dataclass(frozen=True)
+class Event:
+    """A hand that was lifted, has landed or failed to grasp; holds that vanished; a new plan.
+
+    Attributes:
+        time: [s]. what: which of these. arm, hold: names; "" for none. path_time: u [s].
+    """
+
+    time: float
+    what: What
+    arm: str
+    hold: str
+    path_time: float
