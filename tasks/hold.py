@@ -32,8 +32,8 @@ class Hold(Constraint):
         axis         J = [J_lin; F'R' J_ang] (5 x nv), e = (p - p_target, F'R' theta n), F = (x, y) of the frame:
                      theta n is the shortest turn of the frame's z axis to the target's; the turn about z is free
 
-    in world axes at the frame's origin, but for the last two rows of ``axis``. For the rotation, J_ang v = -gain e turns R R_target' about its own axis,
-    so de/dt = -gain e exactly although J_ang is not de/dq.
+    in world axes at the frame's origin, but for the last two rows of ``axis``. For the rotation, J_ang v = -gain e
+    turns R R_target' about its own axis, so de/dt = -gain e exactly although J_ang is not de/dq.
 
     Attributes:
         frame: name of the frame.
