@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from functools import cache
 
 import numpy as np
@@ -17,7 +18,8 @@ from wbc.shapes import Capsule, PlacedShape, Sphere
 TASK_ROBOTS = ("panda", "kinova", "talos")
 CONSTRAINT_ROBOTS = ("panda", "ur5", "talos")
 
-STARTS = 100
+#: Random starts of a check; WBC_STARTS=100 takes more time
+STARTS = int(os.environ.get("WBC_STARTS", "60"))
 
 
 @cache

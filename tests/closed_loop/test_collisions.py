@@ -1,6 +1,6 @@
 """Collision constraints in their loops, on three robots, and mutations that the loops notice.
 
-From 100 random starts for a capsule and two arms, else 40: every start is six things, three robots and 80 ticks.
+From 60 random starts for a capsule and two arms, else 40: every start is six things, three robots and 80 ticks.
 """
 
 from __future__ import annotations
