@@ -18,6 +18,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from bench.harness import machine
 from bench.pool import ROOT
+from bench.records import measure
 from bench.report import goal_sheet
 from bench.time_laws import least_time, states, ticks
 from bench.time_laws.goals import goals
@@ -74,22 +75,6 @@ def parts_of(sizes: dict[str, int], seed: int, repeats: int, processes: int) -> 
         # Last: it takes the longest, and a run that is ended in it has everything else
         "states": (states.chunks(n["states"]), states.random_states(seed, n["states"], processes)),
     }
-
-
-def measure(work: dict[str, tuple[int, Iterator[Record]]], progress: Progress) -> tuple[Parts, str | None]:
-    """(records of every part, the part in which Ctrl-C came)."""
-    found: Parts = {}
-    name = "nothing"
-    try:
-        for name, (total, records) in work.items():
-            found[name] = []
-            bar = progress.add_task(name, total=total)
-            for record in records:
-                found[name].append(record)
-                progress.advance(bar)
-    except KeyboardInterrupt:
-        return found, name
-    return found, None
 
 
 def markdown(parts: Parts, about: list[str]) -> str:

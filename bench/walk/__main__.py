@@ -16,6 +16,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 import wbc
 from bench.harness import machine as host
 from bench.pool import ROOT
+from bench.records import measure
 from bench.report import goal_sheet
 from bench.walk.courses import COURSES, Machine, courses, highest, machine, spins, trenches
 from bench.walk.tables import Parts, Record, goals, sheets
@@ -54,7 +55,7 @@ def main(given: list[str] | None = None) -> None:
     about = host()
     bars = (TextColumn("{task.description:10}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
     with Progress(*bars, console=errors) as progress:
-        parts, interrupted = measure({name: of(name, it) for name in names}, progress)
+        parts, interrupted = measure({name: (PARTS[name], of(name, it)) for name in names}, progress)
     lines = [
         f"{about['processor']}, Python {about['python']}; load {about['load']}.",
         f"Robot data {data.digest}; self-collision rows {'on' if chosen.collisions else 'off'}.",
@@ -74,22 +75,6 @@ def main(given: list[str] | None = None) -> None:
 def of(name: str, it: Machine) -> Iterator[Record]:
     """The records of a part, as they are measured."""
     return {"courses": courses, "spins": spins, "trenches": trenches, "highest": highest}[name](it)
-
-
-def measure(work: dict[str, Iterator[Record]], progress: Progress) -> tuple[Parts, str | None]:
-    """(records of every part, the part in which Ctrl-C came)."""
-    found: Parts = {}
-    name = "nothing"
-    try:
-        for name, records in work.items():
-            found[name] = []
-            bar = progress.add_task(name, total=PARTS[name])
-            for record in records:
-                found[name].append(record)
-                progress.advance(bar)
-    except KeyboardInterrupt:
-        return found, name
-    return found, None
 
 
 def write(folder: Path, parts: Parts, lines: list[str]) -> None:

@@ -101,7 +101,7 @@ def highest(it: Machine) -> Iterator[Record]:
         low, high, why, best = 0.0, FASTEST, "", {}
         asked = SLOWEST
         while high - low > CLOSE + 1e-9:
-            found = it.walk(structure, grid_path(points, asked * INCH), partial=False)
+            found = it.walk(structure, grid_path(points, asked * INCH))
             if found["arrived"] and found["kept"] >= KEPT:
                 low, best = asked, found
             else:

@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-import wbc
 from wbc.errors import UnknownNameError
 from wbc.robots import Walker
-from wbc.walking import Structure, cylinder
+from wbc.walking import Structure
 from wbc.walking.body_path import BodyPath, grid_path
 from wbc.walking.plan import HoldLost
 from wbc.walking.planner import plan_walk
@@ -16,21 +15,6 @@ from wbc.walking.walk import Tick, Walk
 from wbc.walking.walk_stack import WalkStack
 
 INCH = 0.0254
-
-
-@pytest.fixture(scope="module")
-def machine() -> Walker:
-    return wbc.robots.walker()
-
-
-@pytest.fixture(scope="module")
-def structure() -> Structure:
-    return cylinder(rigid=True)
-
-
-@pytest.fixture(scope="module")
-def stack(machine: Walker, structure: Structure) -> WalkStack:
-    return WalkStack(machine, structure, collisions=False)
 
 
 @pytest.fixture

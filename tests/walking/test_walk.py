@@ -8,9 +8,8 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-import wbc
 from wbc.robots import Walker
-from wbc.walking import Structure, cylinder
+from wbc.walking import Structure
 from wbc.walking.body_path import grid_path
 from wbc.walking.plan import Plan
 from wbc.walking.planner import plan_walk
@@ -19,21 +18,6 @@ from wbc.walking.walk_stack import WalkStack
 
 INCH = 0.0254
 PATHS = {"+A": [(13, 9), (13, 14)], "-T": [(16, 12), (11, 12)]}
-
-
-@pytest.fixture(scope="module")
-def machine() -> Walker:
-    return wbc.robots.walker()
-
-
-@pytest.fixture(scope="module")
-def structure() -> Structure:
-    return cylinder(rigid=True)
-
-
-@pytest.fixture(scope="module")
-def stack(machine: Walker, structure: Structure) -> WalkStack:
-    return WalkStack(machine, structure, collisions=False)
 
 
 def walked(

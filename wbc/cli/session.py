@@ -13,11 +13,11 @@ from typing import Any
 
 import typer
 from rich.markup import escape
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.progress import Progress
 from rich.table import Table
 
 from wbc import validation
-from wbc.cli.console import err, out
+from wbc.cli.console import err, out, progress_bar
 from wbc.controller import Controller
 from wbc.controller.recording import RecordingError
 from wbc.errors import WbcError
@@ -88,17 +88,7 @@ def perform(plan: Plan, output: Output) -> None:
     validation.one_of("log", output.log, FORMATS)
     folder = prepare(plan, output)
     stopper, console = Stopper(), err()
-    bar = Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TextColumn("{task.percentage:3.0f} %"),
-        TimeElapsedColumn(),
-        console=console,
-        transient=True,
-        disable=not console.is_terminal,
-        refresh_per_second=5,
-    )
-    with bar:
+    with progress_bar() as bar:
         stage = bar.add_task("compiling", total=None)
         log = _tracked(plan, bar, stage, stopper, folder / RECORDING if output.record else None)
         with stopper.listening():

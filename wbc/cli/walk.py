@@ -10,12 +10,11 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 from rich.markup import escape
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from wbc import robots
 from wbc.cli import walk_options as options
-from wbc.cli.console import err, out
+from wbc.cli.console import err, out, progress_bar
 from wbc.cli.session import INTERRUPTED, Stopper
 from wbc.errors import ShapeError
 from wbc.robots import Walker, WalkerData
@@ -119,7 +118,7 @@ def _free(
     request: WalkRequest, machine: Walker, folder: Path, backend: str, check: bool, pictures: bool, strict: bool
 ) -> None:
     stopper, console = Stopper(), err()
-    with _bar() as bar:
+    with progress_bar() as bar:
         stage = bar.add_task("planning", total=None)
 
         def told(what: str, part: float | None) -> None:
@@ -178,20 +177,6 @@ def _read_plan(path: Path) -> Plan:
         rows["complete"],
         rows["reached"],
         rows["reason"],
-    )
-
-
-def _bar() -> Progress:
-    console = err()
-    return Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TextColumn("{task.percentage:3.0f} %"),
-        TimeElapsedColumn(),
-        console=console,
-        transient=True,
-        disable=not console.is_terminal,
-        refresh_per_second=5,
     )
 
 
