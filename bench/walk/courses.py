@@ -115,7 +115,7 @@ def spins(it: Machine, rates: tuple[float, ...] = (0.05, 0.15)) -> Iterator[Reco
     structure = cylinder(rigid=True)
     for rate in rates:
         turns = [(13.0, 12.0, k * pi / 2) for k in range(13)]
-        yield {"rate": rate, **it.walk(structure, grid_path(turns, 1.0, rate))}
+        yield {"turn": rate, **it.walk(structure, grid_path(turns, 1.0, rate))}
 
 
 def trenches(it: Machine, most: int = 8) -> Iterator[Record]:

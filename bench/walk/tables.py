@@ -54,7 +54,7 @@ def _highest(records: list[Record]) -> Sheet:
 
 
 def _spins(records: list[Record]) -> Sheet:
-    rows = [(f"{r['rate']:g} rad/s, three turns", *_walk(r)) for r in records]
+    rows = [(f"{r['turn']:g} rad/s, three turns", *_walk(r)) for r in records]
     return Sheet("Turning on the spot", ("", *WALK), rows)
 
 
