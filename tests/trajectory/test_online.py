@@ -82,6 +82,39 @@ def test_streams_keep_every_limit(course, synchronisation):
     assert (judge.worst <= 1e-9).all(), judge.worst
 
 
+def crowded(rng, motion, k, memory):
+    if k % 300 == 0:
+        motion.target(rng.uniform(-0.35, 0.35, DOF), rng.uniform(-1.0, 1.0, DOF) * motion.current_limits.velocity)
+
+
+@pytest.mark.parametrize("course", [walk, crowded, driving, mixed])
+def test_ticks_that_are_known_to_be_clear_need_no_look(course):
+    """With a look at every tick the states are the same, and no joint is held back in a tick that was not looked at."""
+    rngs = np.random.default_rng(6), np.random.default_rng(6)
+    motions = [filtered(rng, lower=-0.3, upper=0.3) for rng in rngs]
+    eager, looked = motions[1], [0]
+    look = eager._walls.clear
+
+    def always():
+        looked[0] += 1
+        return min(look(), 1)
+
+    eager._walls.clear = always
+    memories, skipped, guarded = ({}, {}), 0, 0
+    for k in range(1500):
+        states = []
+        for rng, motion, memory in zip(rngs, motions, memories, strict=True):
+            course(rng, motion, k, memory)
+            skipped += motion is motions[0] and motion._clear > 1
+            states.append(motion.step())
+        np.testing.assert_array_equal(states[0], states[1])
+        assert motions[0].status == eager.status
+        guarded += eager.status == "guarded"
+    assert looked[0] == 1500
+    assert skipped > 10
+    assert guarded > 0 or course is not crowded, "no joint came near a wall"
+
+
 def test_jitter_near_rest_raises_nothing():
     """Targets that move by 1e-13 to 1e-9 around the state, which ruckig refuses in a quarter of the cases."""
     rng = np.random.default_rng(2)

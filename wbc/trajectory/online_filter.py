@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from math import isfinite
 from typing import Any, Literal
 
 import numpy as np
@@ -21,6 +20,7 @@ from wbc.validation import Array
 Status = Literal["moving", "reached", "guarded", "recovered"]
 
 _FLOAT = np.dtype(np.float64)
+_state_of = tuple.__new__
 
 #: Walls that are farther away than this many seconds are no targets for a velocity: ruckig ends at 7e3 s
 FAR = 1e3
@@ -93,7 +93,8 @@ class Online:
         self._shape = (self.dof,)
         self._place: list[float] = []
         self._goal: list[float] = []
-        self._now: tuple[list[float], list[float], list[float]] = ([], [], [])
+        self._clear = 0
+        self._cuts = slice(0, self.dof), slice(self.dof, 2 * self.dof), slice(2 * self.dof, None)
         self._aims: tuple[Array, Array, Array] = (np.zeros(0), np.zeros(0), np.zeros(0))
         self._plain = False
         self._kind: Literal["position", "velocity"] = "position"
@@ -169,25 +170,32 @@ class Online:
 
     def step(self) -> State:
         """The state one tick later."""
-        answer = self._answer
+        answer, walls = self._answer, self._walls
         try:
             done = self._ruckig.update(self._asked, answer) is self._done
-            p, v, a = answer.new_position, answer.new_velocity, answer.new_acceleration
-            self.status = "reached" if done else "moving"
         except self._refusal:
-            rows = self._recovered()
-            p, v, a = rows
-            self._put(rows)
+            p, v, a = self._recovered()
             self.status = "recovered"
-        else:
-            rows_now = np.array((p, v, a))
-            if self._walls.clear(rows_now) or not self._walls.guard(self._now, p, v, a):
-                answer.pass_to_input(self._asked)
-                self._now = (p, v, a)
-                return State(*rows_now)
             self._put([p, v, a])
+            walls.put(p, v, a)
+            return self._state()
+        p, v, a = answer.new_position, answer.new_velocity, answer.new_acceleration
+        walls.put(p, v, a)
+        self._clear = self._clear - 1 if self._clear > 1 else walls.clear()
+        if not self._clear and walls.guard(self._now(), p, v, a):
             self.status = "guarded"
-        return State(*np.array((p, v, a)))
+            self._put([p, v, a])
+            walls.put(p, v, a)
+            return self._state()
+        self.status = "reached" if done else "moving"
+        answer.pass_to_input(self._asked)
+        return self._state()
+
+    def _state(self) -> State:
+        """What was put between the walls; in parts of one new array, the least that arrays can cost."""
+        rows = self._walls.state.copy()
+        p, v, a = self._cuts
+        return _state_of(State, (rows[p], rows[v], rows[a]))
 
     def _only_place(self, position: Array) -> bool:
         """Take a target at rest after another one: all but the place stays. False for what has to be looked at.
@@ -197,13 +205,10 @@ class Online:
         if position.dtype is not _FLOAT or position.shape != self._shape:
             return False
         place: list[float] = position.tolist()
-        if not isfinite(sum(place)):
+        if not self._walls.contain(place):
             return False
-        self._place = place
-        self.clipped = not self._walls.contain(position)
-        if self.clipped:
-            place = self._walls.nearest(place)
-        self._asked.target_position = self._goal = place
+        self.clipped = False
+        self._asked.target_position = self._goal = self._place = place
         return True
 
     def _speed(self, name: str, value: Any) -> Array:
@@ -215,14 +220,20 @@ class Online:
 
     def _put(self, rows: list[list[float]]) -> None:
         """Make a state the one that the next tick starts from."""
-        self._now = (rows[0], rows[1], rows[2])
+        self._clear = 0
         self._asked.current_position, self._asked.current_velocity, self._asked.current_acceleration = rows
+
+    def _now(self) -> tuple[list[float], list[float], list[float]]:
+        """The state that the next tick starts from."""
+        asked = self._asked
+        return asked.current_position, asked.current_velocity, asked.current_acceleration
 
     def _take(self, limits: Limits) -> None:
         v, a, j = sizes_of(limits)
         self._limits = limits
         self._asked.max_acceleration, self._asked.max_jerk = a, j
         self._fastest = np.maximum(self._fastest, v)
+        self._clear = 0
         self._walls = Walls(limits.lower, limits.upper, self._fastest, a, j, self.dt)
 
     def _aim(self) -> None:
@@ -242,7 +253,7 @@ class Online:
         self.clipped = False
         # Towards a wall, a velocity is a way to the wall that is no faster: so the joint comes to rest there in time
         wall = np.where(pace > 0.0, self._walls.upper, self._walls.lower)
-        here = np.array(self._now[0])
+        here = np.array(self._asked.current_position)
         to_wall = (pace != 0.0) & np.isfinite(wall)
         to_wall[to_wall] = np.abs(wall - here)[to_wall] < FAR * np.abs(pace)[to_wall]
         place, speed = np.where(to_wall, wall, here), np.where(to_wall, 0.0, pace)
@@ -257,7 +268,7 @@ class Online:
         """The next state by courses of our own: to the aims, or where these are velocities, a stop about them."""
         _, acceleration_limit, jerk_limit = sizes_of(self._limits)
         pace, top, _ = self._aims
-        now = np.array(self._now)
+        now = np.array(self._now())
         if self._kind == "position":
             aim = np.stack([self._goal, pace, np.zeros(self.dof)])
             courses = plan(Task(now, aim, top, acceleration_limit, jerk_limit), "time")

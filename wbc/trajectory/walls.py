@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from struct import Struct
 from typing import Any
 
 import casadi as ca
@@ -13,6 +14,10 @@ from wbc.validation import Array
 
 #: Positions beyond their limits by less than this [rad or m] are rounding
 ROOM = 1e-9
+#: Accelerations beyond their limits by less than this share are rounding
+SHARE = 1e-12
+#: The most ticks for which a state is known to be clear
+TICKS = 1e6
 
 
 class Kernel:
@@ -41,7 +46,7 @@ class Walls:
 
     Attributes:
         lower, upper: n each, infinite where there is no limit.
-        closed: whether any limit is finite.
+        state: positions, velocities and accelerations that :meth:`clear` looks at, 3 n, as :meth:`put` wrote them.
     """
 
     def __init__(
@@ -50,8 +55,11 @@ class Walls:
         none = np.full(len(acceleration), np.inf)
         self.lower = -none if lower is None else lower
         self.upper = none if upper is None else upper
-        self.closed = bool(np.isfinite([self.lower, self.upper]).any())
         self._low, self._high = self.lower.tolist(), self.upper.tolist()
+        # Numbers that are none, or infinite, are within no pair of these
+        most = np.finfo(np.float64).max
+        within = np.clip([self.lower, self.upper], -most, most).T
+        self._bounds: list[list[float]] = within.tolist()
         self._acceleration, self._jerk, self._dt = acceleration.tolist(), jerk.tolist(), dt
         # A joint that is farther from its walls than its longest stop need not be looked at
         sizes = zip(fastest.tolist(), self._acceleration, self._acceleration, self._jerk, strict=True)
@@ -59,28 +67,39 @@ class Walls:
         short = (0.5 / acceleration).tolist(), (0.5 * acceleration / jerk).tolist(), (1.0 / jerk).tolist()
         near = (self.lower + far).tolist(), (self.upper - far).tolist()
         self._rows = list(zip(*near, self._low, self._high, self._acceleration, *short, strict=True))
-        self._place, self._state = np.zeros(len(far)), np.zeros((3, len(far)))
-        self._inside, self._room = Kernel(self._within(), self._place), Kernel(self._least_room(), self._state)
+        # Changes of these rooms in a tick are bounded, so a state that has enough of them is clear for a while
+        top = fastest + acceleration * acceleration / jerk
+        way = 3.0 * (top + acceleration * acceleration / jerk)
+        self._changes = (dt * top).tolist(), (dt * (top + way)).tolist()
+        self.state = np.zeros(3 * len(far))
+        self._room = memoryview(self.state.data)
+        self._pack = Struct(f"{len(self.state)}d").pack_into
+        self._ticks_clear = Kernel(self._ticks(), self.state)
 
-    def contain(self, place: Array) -> bool:
-        """Whether a position is within; not if a number of it is none."""
-        self._place[:] = place
-        return self._inside() >= 0.0
+    def contain(self, place: list[float]) -> bool:
+        """Whether a position is within; not if a number of it is none or infinite."""
+        for x, (low, high) in zip(place, self._bounds, strict=True):  # noqa: SIM110 (a generator takes twice as long)
+            if not low <= x <= high:
+                return False
+        return True
 
-    def clear(self, state: Array) -> bool:
-        """Whether every joint of a state, 3 x n, can stop within, by a bound; if not, :meth:`guard` looks closer."""
-        self._state[:] = state
-        return self._room() >= 0.0
+    def put(self, p: list[float], v: list[float], a: list[float]) -> None:
+        """Write :attr:`state`."""
+        self._pack(self._room, 0, *p, *v, *a)
 
-    def _within(self) -> ca.Function:
-        """Least distance from the walls."""
-        x = ca.SX.sym("x", len(self._rows))
-        return ca.Function("within", [x], [ca.fmin(ca.mmin(x - self.lower), ca.mmin(self.upper - x))])
+    def clear(self) -> int:
+        """For how many ticks, this one and those after it, every joint can surely stop within; 0: see :meth:`guard`.
 
-    def _least_room(self) -> ca.Function:
-        """Least room of a joint: what is left of the way to a wall after a stop, or the distance from where it counts.
+        So long as the joints keep the limits of acceleration and jerk, and of velocity but for the overshoot a^2/2j.
+        """
+        ticks = self._ticks_clear()
+        return 1 + int(ticks) if ticks >= 0.0 else 0
 
-        From w = |v| + a^2/2j, the highest speed to come, a stop is no longer than w (w/2A + A/2j + |a|/j).
+    def _ticks(self) -> ca.Function:
+        """Least room of a joint, in ticks: what is left of the way to a wall after a stop, or to where it counts.
+
+        From w = |v| + a^2/2j, the highest speed to come, a stop is no longer than w (w/2A + A/2j + |a|/j). In a tick,
+        with W = V + A^2/j at least w, its change is at most 3 (W + A^2/j) dt and that of the position W dt.
         """
         state = ca.SX.sym("state", 3 * len(self._rows))
         place, rate, push = ca.vertsplit(state, len(self._rows))
@@ -89,10 +108,10 @@ class Walls:
             size = ca.fabs(push[i])
             speed = ca.fabs(rate[i]) + 0.5 * soft * size * size
             way = speed * (speed * slow + ramp + size * soft) - ROOM
-            far = ca.fmin(place[i] - near_low, near_high - place[i])
-            left = ca.fmin(ca.fmin(place[i] - low - way, high - way - place[i]), most - size)
-            rooms.append(ca.fmax(far, left))
-        return ca.Function("room", [state], [ca.mmin(ca.vertcat(*rooms))])
+            far = ca.fmin(place[i] - near_low, near_high - place[i]) / self._changes[0][i]
+            left = ca.fmin(place[i] - low - way, high - way - place[i]) / self._changes[1][i]
+            rooms.append(ca.if_else(size > most * (1.0 + SHARE), -1.0, ca.fmax(far, left)))
+        return ca.Function("ticks", [state], [ca.fmin(ca.mmin(ca.vertcat(*rooms)), TICKS)])
 
     def nearest(self, place: list[float]) -> list[float]:
         """The nearest position within."""
@@ -101,7 +120,9 @@ class Walls:
             for x, low, high in zip(place, self._low, self._high, strict=True)
         ]
 
-    def guard(self, now: tuple[list[float], ...], p: list[float], v: list[float], a: list[float]) -> bool:
+    def guard(
+        self, now: tuple[list[float], list[float], list[float]], p: list[float], v: list[float], a: list[float]
+    ) -> bool:
         """Brake joints that could no longer stop within, in the next state (p, v, a); whether there were any."""
         changed = False
         for i, wanted in enumerate(zip(p, v, a, strict=True)):
