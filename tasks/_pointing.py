@@ -66,11 +66,3 @@ def shortest_turn(direction: ca.SX) -> ca.SX:
     factor = ca.if_else(on_axis, 0.0, ca.atan2(across, z) / across)
     half_turn = ca.if_else(ca.logic_and(on_axis, z < 0), np.pi, 0.0)
     return ca.vertcat(factor * y + half_turn, -factor * x)
-
-
-def turning(axes: ca.SX, here: ca.SX) -> ca.SX:
-    """Zero, with the angular velocity about the first two of three unit axes as its rate: (c.b2, -c.b1).
-
-    ``axes``: 3x3, columns b1, b2, b3; ``here``: the same held still, whose third column is c.
-    """
-    return ca.vertcat(ca.dot(here[:, 2], axes[:, 1]), -ca.dot(here[:, 2], axes[:, 0]))

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from wbc.symbolic import rotations as rot
 from wbc.symbolic.kinematics import WORLD
 from wbc.symbolic.tracer import Tracer
-from wbc.tasks._pointing import checked_around, checked_axis, row_axes, shortest_turn, turning
+from wbc.tasks._pointing import checked_around, checked_axis, row_axes, shortest_turn
 from wbc.tasks._stereographic import Triple
 from wbc.tasks.base import Input, Row, Task, Values
 from wbc.tasks.frames import frame_pose, require_motion
@@ -100,7 +100,8 @@ class AxisAlign(Task):
         axes = rotation @ rot.constant(row_axes(self.axis, self.around))
         here, direction = kin.held(axes), kin.held(target)
         swept = here[:, :2].T @ ca.cross(direction, target)
-        return shortest_turn(here.T @ direction) + turning(axes, here) - swept
+        turn = shortest_turn(here.T @ direction)
+        return turn + kin.across(self.frame, self.relative_to, axes, turn) - swept
 
     def jacobian(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
         """F' R' (w - w_b), the relative angular velocity across the axis."""

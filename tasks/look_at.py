@@ -13,7 +13,7 @@ from wbc import validation
 from wbc.symbolic import rotations as rot
 from wbc.symbolic.kinematics import WORLD
 from wbc.symbolic.tracer import Tracer
-from wbc.tasks._pointing import checked_around, checked_axis, row_axes, shortest_turn, turning
+from wbc.tasks._pointing import checked_around, checked_axis, row_axes, shortest_turn
 from wbc.tasks._stereographic import INNER, Triple, fade, square, triple
 from wbc.tasks.base import Input, Row, Task, Values
 from wbc.tasks.frames import frame_pose, require_motion
@@ -111,7 +111,8 @@ class LookAt(Task):
         distance = ca.sqrt(ca.fmax(square(sight), off * off))
         direction = here.T @ (sight / distance)
         swept = ca.cross(direction, here.T @ ((away - sight) / distance))
-        return shortest_turn(direction) + turning(axes, here) - swept[:2]
+        turn = shortest_turn(direction)
+        return turn + kin.across(self.frame, WORLD, axes, turn) - swept[:2]
 
     def jacobian(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
         """F' R' (w + d x dc/dt / r), with dc/dt as seen from the target."""

@@ -11,6 +11,7 @@ import wbc.robots
 from wbc.symbolic.curvature import Pull, curvature
 from wbc.symbolic.kinematics import Kinematics
 from wbc.symbolic.tracer import Tracer
+from wbc.tasks import AxisAlign
 
 FRAMES = {
     "panda": "panda_hand_tcp",
@@ -59,3 +60,52 @@ def test_an_expression_pulls_at_what_it_is_made_of() -> None:
     plain = ca.hessian(2.0 * kinematics.pose(FRAMES["panda"]).position[2], kinematics.q)[0]
     difference = ca.Function("d", [kinematics.q], [K - plain])
     assert np.abs(np.array(difference(robot.neutral))).max() < 1e-12
+
+
+@pytest.mark.parametrize(("name", "base"), [("panda", "world"), ("talos", "world"), ("talos", "torso_2_link")])
+@pytest.mark.parametrize("angle", [0.3, 1.5, 2.6])
+def test_an_axis_bends_like_its_angle_and_never_about_itself(name: str, base: str, angle: float) -> None:
+    """J'J and the curvature for the pull e are the second derivative of theta^2 / 2; a turn about the axis is flat.
+
+    Beyond 2.8 rad, where cot theta - 1/theta < -3, less of it would count.
+    """
+    robot = wbc.robots.load(name, shapes="none")
+    model, data, rng = robot.model, robot.model.createData(), np.random.default_rng(7)
+    q = pin.integrate(model, robot.neutral, 0.3 * rng.normal(size=robot.nv))
+
+    def axis(at: np.ndarray) -> np.ndarray:
+        pin.framesForwardKinematics(model, data, at)
+        turn = data.oMf[model.getFrameId(FRAMES[name])].rotation
+        return (turn if base == "world" else data.oMf[model.getFrameId(base)].rotation.T @ turn)[:, 2]
+
+    here = axis(q)
+    across = np.cross(here, rng.normal(size=3))
+    target = np.cos(angle) * here + np.sin(angle) * across / np.linalg.norm(across)
+
+    def cost(step: np.ndarray) -> float:
+        a = axis(pin.integrate(model, q, step))
+        return 0.5 * float(np.arctan2(np.linalg.norm(np.cross(a, target)), a @ target)) ** 2
+
+    h, unit = 1e-4, np.eye(robot.nv)
+    wanted = np.array(
+        [
+            [
+                (cost(h * (i + j)) - cost(h * (i - j)) - cost(h * (j - i)) + cost(-h * (i + j))) / (4 * h * h)
+                for j in unit
+            ]
+            for i in unit
+        ]
+    )
+    kinematics = Kinematics(model)
+    tracer, item = Tracer(kinematics), AxisAlign(FRAMES[name], relative_to=base)
+    error = item.error(robot, tracer, {"target": ca.SX(ca.DM(target)), "feedforward": ca.SX(3, 1)})
+    pull = ca.SX.sym("pull", 2)
+    J = item.jacobian(robot, tracer, {"target": ca.SX(ca.DM(target)), "feedforward": ca.SX(3, 1)})
+    parts = [tracer.expand(error), tracer.expand(J), curvature(kinematics, tracer.pulls(ca.dot(pull, error)))]
+    function = ca.Function("H", [kinematics.q, pull], parts)
+    e = np.array(function(q, [0.0, 0.0])[0]).ravel()
+    _, rows, K = (np.array(x) for x in function(q, e))
+    assert abs(np.linalg.norm(e) - angle) < 1e-9
+    assert np.abs(rows.T @ rows + K - wanted).max() < 1e-5
+    if name == "panda":
+        assert np.abs(K[6]).max() < 1e-12

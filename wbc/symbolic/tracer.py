@@ -13,7 +13,7 @@ moving obstacle) go through the same expression and give its partial derivative 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cache, partial
 
@@ -26,25 +26,7 @@ from wbc.symbolic.curvature import Pull
 from wbc.symbolic.gaps import Gap, gap_jacobian
 from wbc.symbolic.kinematics import WORLD, Kinematics, Pose
 from wbc.symbolic.manipulability import bend, manipulability
-
-
-@dataclass
-class _Symbol:
-    """A placeholder ``symbol`` and the ``value`` it stands for; its rate is ``motion @ jacobian @ v``.
-
-    The rate is kept as two factors because ``(partial @ motion) @ jacobian`` is much smaller than
-    ``partial @ (motion @ jacobian)``. Kinematics are built when they are needed, so that an item can be traced
-    (to count its rows, to make its cache key) without them. ``inner``: value and motion are in other placeholders.
-    ``pulls``: what a force along the rate, given as a 3-vector in the axes of ``jacobian``, does to the robot.
-    """
-
-    name: str
-    symbol: ca.SX
-    value: Callable[[], ca.SX]
-    motion: ca.SX
-    jacobian: Callable[[], ca.SX]
-    inner: bool = False
-    pulls: Callable[[ca.SX], tuple[Pull, ...]] = lambda force: ()
+from wbc.symbolic.placeholders import Placeholder, axis_bend, turning
 
 
 @dataclass
@@ -53,7 +35,7 @@ class Tracer:
 
     kinematics: Kinematics
     _poses: dict[str, Pose] = field(default_factory=dict)
-    _symbols: list[_Symbol] = field(default_factory=list)
+    _symbols: list[Placeholder] = field(default_factory=list)
     _com: ca.SX | None = None
 
     @property
@@ -82,7 +64,7 @@ class Tracer:
         else:
             known = Pose(ca.SX.sym(f"R_{frame}", 3, 3), ca.SX.sym(f"p_{frame}", 3))
             self._symbols += [
-                _Symbol(
+                Placeholder(
                     f"position {frame}",
                     known.position,
                     lambda: kinematics.pose(frame).position,
@@ -90,12 +72,13 @@ class Tracer:
                     lambda: kinematics.jacobian(frame)[:3, :],
                     pulls=lambda force: (Pull("force", frame, force),),
                 ),
-                _Symbol(
+                Placeholder(
                     f"rotation {frame}",
                     ca.vec(known.rotation),
                     lambda: ca.vec(kinematics.pose(frame).rotation),
                     rotation_rate(known.rotation),
                     lambda: kinematics.jacobian(frame)[3:, :],
+                    turns=True,
                     pulls=lambda torque: (Pull("torque", frame, torque),),
                 ),
             ]
@@ -116,7 +99,7 @@ class Tracer:
         if self._com is None:
             self._com, kinematics = ca.SX.sym("com", 3), self.kinematics
             self._symbols.append(
-                _Symbol(
+                Placeholder(
                     "centre of mass",
                     self._com,
                     lambda: kinematics.center_of_mass,
@@ -153,7 +136,7 @@ class Tracer:
 
         value = rot.log3(relative @ target.T)
         self._symbols.append(
-            _Symbol(
+            Placeholder(
                 f"turn {frame} {base}",
                 phi,
                 lambda: value,
@@ -171,6 +154,38 @@ class Tracer:
         turn = 0.5 * ca.vertcat(change[2, 1] - change[1, 2], change[0, 2] - change[2, 0], change[1, 0] - change[0, 1])
         return phi - rot.left_jacobian_inverse(-phi) @ turn
 
+    def across(self, frame: str, base: str, axes: ca.SX, turn: ca.SX) -> ca.SX:
+        """Zero, with the angular velocity of ``frame`` across an axis of it as its rate: (b1, b2)' R_b' (w - w_b).
+
+        What bends is the angle of the axis to a direction, for which ``turn`` stands, and not the rows: they turn with
+        the axis but not about it, see :func:`wbc.symbolic.placeholders.axis_bend`.
+
+        Args:
+            axes: 3x3, unit columns b1, b2, a, fixed in ``frame``, in the axes of ``base``.
+            turn: components along b1 and b2 of the shortest turn that takes the direction to a [rad].
+
+        Raises:
+            UnknownNameError: no such frame.
+        """
+        kinematics, symbol = self.kinematics, ca.SX.sym(f"across_{frame}_{base}", 2)
+        still = self.held(axes)
+        outer = still if base == WORLD else self.rotation(base) @ still
+
+        def spin() -> ca.SX:
+            own = kinematics.jacobian(frame)[3:, :]
+            return own if base == WORLD else own - kinematics.jacobian(base)[3:, :]
+
+        def pulls(torque: ca.SX) -> tuple[Pull, ...]:
+            bent = axis_bend(spin(), self.expand(outer[:, 2]), torque, self.expand(outer[:, :2] @ turn))
+            return (Pull("torque", frame, torque), Pull("torque", base, -torque), Pull("own", frame, bent))
+
+        zero = ca.SX.zeros(2)
+        across = Placeholder(
+            f"across {frame} {base}", symbol, lambda: zero, outer[:, :2].T, spin, inner=True, pulls=pulls
+        )
+        self._symbols.append(across)
+        return symbol
+
     def held(self, expression: ca.SX) -> ca.SX:
         """The value of an expression, which derivatives take for a constant: neither q nor inputs move it.
 
@@ -178,7 +193,7 @@ class Tracer:
         """
         symbol, nv = ca.SX.sym("held", expression.shape[0], expression.shape[1]), self.kinematics.nv
         self._symbols.append(
-            _Symbol(
+            Placeholder(
                 "held still",
                 ca.vec(symbol),
                 lambda: ca.vec(expression),
@@ -199,7 +214,7 @@ class Tracer:
         value = ca.vertcat(ca.SX(0, 1), *[gap.distance for gap in gaps])
         motion = ca.SX(ca.DM.eye(count))
         slope = partial(gap_jacobian, kinematics, tuple(gaps))
-        self._symbols.append(_Symbol("gaps", symbol, lambda: value, motion, slope, inner=True))
+        self._symbols.append(Placeholder("gaps", symbol, lambda: value, motion, slope, inner=True))
         return symbol
 
     def manipulability(self, frame: str, base: str, rows: tuple[int, ...], length: float) -> ca.SX:
@@ -217,7 +232,7 @@ class Tracer:
             return (Pull("own", frame, force * both()[0] * bend(kinematics, frame, base, length)),)
 
         text = f"manipulability {frame} {base} {rows} {length!r}"
-        slope = _Symbol(text, symbol, lambda: both()[0], ca.SX(1), lambda: both()[1], pulls=pulls)
+        slope = Placeholder(text, symbol, lambda: both()[0], ca.SX(1), lambda: both()[1], pulls=pulls)
         self._symbols.append(slope)
         return symbol
 
@@ -251,12 +266,15 @@ class Tracer:
         What depends on joint coordinates directly does not bend and gives none.
         """
         out: list[Pull] = []
+        works: list[tuple[Placeholder, ca.SX]] = []
         for known in self._symbols:
             partial = ca.jacobian(expression, known.symbol)
             if partial.nnz() and known.motion.nnz():
-                along = self.expand(ca.densify(partial @ known.motion)).T
-                out += known.pulls(along)
-        return out
+                work = ca.densify(partial @ known.motion).T
+                out += known.pulls(self.expand(work))
+                works.append((known, work))
+        bent = turning(works, self._symbols, self.expand, self.kinematics.nv)
+        return [*out, Pull("own", WORLD, bent)] if bent.nnz() else out
 
     def expand(self, expression: ca.SX) -> ca.SX:
         """The expression with every placeholder replaced by the kinematics that it stands for."""
