@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
 #: Inputs that every item has, or may have, without declaring them.
 RESERVED = ("gain", "weight", "enabled", "mask", "rate")
+#: Directions longer than this, and shorter than its inverse, are scaled as they are
+ORDINARY = 1e-9
 
 
 def size(robot: Robot, declared: Input) -> int:
@@ -34,6 +36,12 @@ def rate_size(robot: Robot, declared: Input) -> int:
     """How many numbers the input's time derivative has."""
     fixed = {"pose": 6, "rotation": 3, "configuration": robot.nv}
     return fixed.get(declared.kind, size(robot, declared))
+
+
+def is_plain(declared: Input) -> bool:
+    """Whether any finite numbers, a vector of them, will do."""
+    free = declared.low == -math.inf and declared.high == math.inf and not (declared.direction or declared.sensed)
+    return free and (declared.kind == "tangent" or (declared.kind == "vector" and declared.size > 0))
 
 
 def flat(robot: Robot, field: str, declared: Input, value: Any) -> Array:
@@ -52,9 +60,13 @@ def flat(robot: Robot, field: str, declared: Input, value: Any) -> Array:
     bounded = declared.low > -math.inf or declared.high < math.inf
     plain = not (bounded or declared.direction)
     ready = type(value) is np.ndarray and value.dtype == np.float64 and value.shape == (count,) and plain
-    # Set every tick, so without a numpy call: the sum of the magnitudes is finite only if all numbers are
+    # The sum of the magnitudes is finite only if all numbers are
     if ready and math.isfinite(sum(map(abs, value.tolist()))):
         return np.asarray(value)
+    if declared.direction and type(value) is np.ndarray and value.shape == (3,) and value.dtype == np.float64:
+        length = math.hypot(*value.tolist())
+        if ORDINARY < length < 1.0 / ORDINARY:
+            return np.asarray(value / length)
     shape = (count,) if count else ()
     numbers = np.atleast_1d(validation.real_array(field, value, shape, finite=declared.infinite is None))
     if declared.infinite is not None and not (np.isfinite(numbers) | (numbers == declared.infinite)).all():

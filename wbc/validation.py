@@ -128,7 +128,7 @@ def pose_numbers(field: str, value: Any) -> Array:
     matrix = value.homogeneous if isinstance(value, pin.SE3) else value
     if type(matrix) is np.ndarray and matrix.shape == (4, 4) and matrix.dtype == np.float64:
         # The columns of the upper three rows are those of the rotation, then the position
-        numbers: Array = np.ravel(matrix[:3], order="F")
+        numbers: Array = matrix[:3].ravel(order="F")
         *nine, x, y, z = numbers.tolist()
         finite = math.isfinite(x) and math.isfinite(y) and math.isfinite(z)
         if finite and _is_rotation(nine) and matrix[3].tolist() == [0.0, 0.0, 0.0, 1.0]:

@@ -37,7 +37,7 @@ class BodyPath:
 
     poses: Array
     spacing: float = SPACING
-    _steps: dict[int, tuple[pin.SE3, pin.Motion]] = field(default_factory=dict, init=False, repr=False)
+    _steps: dict[int, tuple[pin.SE3, pin.SE3, Array]] = field(default_factory=dict, init=False, repr=False)
 
     def __post_init__(self) -> None:
         poses = validation.real_array("BodyPath.poses", self.poses)
@@ -69,13 +69,11 @@ class BodyPath:
         k = min(int(place), len(self.poses) - 2)
         if k not in self._steps:
             first, last = pin.SE3(self.poses[k]), pin.SE3(self.poses[k + 1])
-            self._steps[k] = first, pin.log6(first.actInv(last))
-        first, step = self._steps[k]
-        pose = first * pin.exp6(step * (place - k))
-        rate = np.empty(6)
-        rate[:3], rate[3:] = pose.rotation @ step.linear, pose.rotation @ step.angular
-        rate /= self.spacing
-        return pose, rate
+            step = pin.log6(first.actInv(last))
+            self._steps[k] = first, last, np.array([step.linear, step.angular]) / self.spacing
+        first, last, twist = self._steps[k]
+        pose = pin.SE3.Interpolate(first, last, place - k)
+        return pose, (twist @ pose.rotation.T).ravel()
 
     def blended(self, samples: Array) -> Array:
         """Matrices at fractional samples, by straight lines between entries: for estimates; ``[..., 4, 4]``."""

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from math import sqrt
 
 import numpy as np
 import pinocchio as pin
+from scipy.linalg.lapack import dsyev
 
 from wbc.errors import RangeError
 from wbc.robots import Walker
@@ -16,43 +18,60 @@ from wbc.walking.structure import Structure
 AXIS_LENGTH = 0.05
 
 
+def _davenport() -> Array:
+    """The linear map from A ``[9]`` by rows to K ``[16]``, for quaternions (x, y, z, w)."""
+    out = np.zeros((4, 4, 3, 3))
+    for i in range(3):
+        out[3, 3, i, i] = 1.0
+        for j in range(3):
+            # K_vv = A + A' - tr(A) 1
+            out[i, j, i, j] += 1.0
+            out[i, j, j, i] += 1.0
+            out[i, i, j, j] -= 1.0
+        # K_vw = (A32 - A23, A13 - A31, A21 - A12)
+        k, m = (i + 1) % 3, (i + 2) % 3
+        out[i, 3, m, k] = out[3, i, m, k] = 1.0
+        out[i, 3, k, m] = out[3, i, k, m] = -1.0
+    return out.reshape(16, 9)
+
+
+DAVENPORT = _davenport()
+
+
 class ClosedChain:
     """The pose X = (R, t) of the body at which the holding hands fit their holds best:
 
         min  sum_k |R p_k + t - h_k|^2 + L^2 |R z_k - a_k|^2
 
     with p_k and z_k the hand's origin and z axis in the body's frame, h_k and a_k those of its hold, L =
-    :data:`AXIS_LENGTH`. The optimum is that of Wahba's problem, by one singular value decomposition (Markley, 1988).
+    :data:`AXIS_LENGTH`; holds that fix the roll add their x axes in the same way. This is Wahba's problem, solved by
+    Davenport's q method: with A = sum (h_k - mean h) p_k' + L^2 a_k z_k', tr(R' A) = q' K q for the quaternion q of R.
 
     Args:
         walker: its joints are what moves. structure: whose holds are meant.
 
     Attributes:
-        origins, rotations: of all hands in the structure, after the last :meth:`settle`: ``[arms, 3]`` [m] and
-            ``[arms, 3, 3]``.
+        origins, axes: of all hands in the structure, and their z axes, after the last :meth:`settle`: ``[arms, 3]``
+            [m] and ``[arms, 3]``.
     """
 
     def __init__(self, walker: Walker, structure: Structure) -> None:
         self.walker, self.structure = walker, structure
         model = walker.robot.model
         self._model, self._data = model, model.createData()
-        self._hands = [model.getFrameId(arm.hand) for arm in walker.arms]
         self._still = np.array(pin.neutral(model))
+        # Views of what Pinocchio computes: origins, z axes and x axes of the hands
+        frames = [self._data.oMf[model.getFrameId(arm.hand)] for arm in walker.arms]
+        self._rows = [*(f.translation for f in frames), *(f.rotation[:, k] for k in (2, 0) for f in frames)]
         count = len(walker.arms)
-        self.origins, self.rotations = np.zeros((count, 3)), np.zeros((count, 3, 3))
+        self.origins, self.axes = np.zeros((count, 3)), np.zeros((count, 3))
+        self._held: dict[int, int] | None = None
 
     def on(self, structure: Structure) -> ClosedChain:
         """The same robot, at the same place, on another structure."""
         out = ClosedChain(self.walker, structure)
-        out.origins, out.rotations = self.origins, self.rotations
+        out.origins, out.axes = self.origins, self.axes
         return out
-
-    def hands(self, q: Array) -> tuple[Array, Array]:
-        """Origins and rotations of all hands in the body's frame: ``[arms, 3]`` [m] and ``[arms, 3, 3]``."""
-        self._still[7:] = q[7:]
-        pin.framesForwardKinematics(self._model, self._data, self._still)
-        frames = [self._data.oMf[k] for k in self._hands]
-        return np.array([f.translation for f in frames]), np.array([f.rotation for f in frames])
 
     def settle(self, q: Array, held: Mapping[int, int]) -> tuple[Array, float]:
         """A configuration with the same joints and the body where the held hands put it.
@@ -67,33 +86,39 @@ class ClosedChain:
         Raises:
             RangeError: nothing is held, or by one hand that may roll: the body's pose is not determined.
         """
-        if not held or (len(held) == 1 and self.structure.free_rolls[next(iter(held.values()))]):
-            raise RangeError("held", dict(held), "the body's pose needs two hands, or one that cannot roll")
-        arms, holds = list(held), list(held.values())
-        place, turn = self.hands(q)
-        count = len(arms)
-        # Rows: origins, less their means, then axes; of the hands in the body, and of the holds
-        ours, theirs = np.empty((2 * count, 3)), np.empty((2 * count, 3))
-        ours[:count], ours[count:] = place[arms], AXIS_LENGTH * turn[arms, :, 2]
-        theirs[:count], theirs[count:] = self.structure.positions[holds], AXIS_LENGTH * self.structure.axes[holds]
-        middle, center = ours[:count].sum(axis=0) / count, theirs[:count].sum(axis=0) / count
-        ours[:count] -= middle
-        theirs[:count] -= center
-        attitude = theirs.T @ ours
-        for arm, hold in held.items():
-            if not self.structure.free_rolls[hold]:
-                attitude += AXIS_LENGTH**2 * np.outer(self.structure.references[hold], turn[arm][:, 0])
-        u, _, vt = np.linalg.svd(attitude)
-        rotation = u @ vt
-        if np.linalg.det(rotation) < 0.0:
-            rotation -= 2.0 * np.outer(u[:, 2], vt[2])
-        origin = center - rotation @ middle
+        if held != self._held:
+            self._take(held)
+        self._still[7:] = q[7:]
+        pin.framesForwardKinematics(self._model, self._data, self._still)
+        flat = np.concatenate(self._rows)
+        quaternion = dsyev(self._quadratic.dot(flat).reshape(4, 4))[1][:, 3]
         out = q.copy()
-        out[:3] = origin
         # The quaternion keeps its sign from tick to tick
-        quaternion = pin.Quaternion(rotation).coeffs()
-        out[3:7] = quaternion if quaternion @ q[3:7] >= 0.0 else -quaternion
-        gap = ours[:count] @ rotation.T - theirs[:count]
-        slip = float(np.sqrt((gap * gap).sum(axis=1).max()))
-        self.origins, self.rotations = place @ rotation.T + origin, rotation @ turn
-        return out, slip
+        out[3:7] = quaternion if quaternion.dot(q[3:7]) >= 0.0 else -quaternion
+        count = len(self.origins)
+        moved = flat.reshape(-1, 3).dot(pin.Quaternion(out[3:7]).matrix().T)
+        out[:3] = origin = self._center - self._mean.dot(moved[:count])
+        self.origins, self.axes = moved[:count] + origin, moved[count : 2 * count]
+        gap = self._mask * (self.origins - self._holds)
+        return out, sqrt(np.maximum.reduce(np.add.reduce(gap * gap, axis=1)))
+
+    def _take(self, held: Mapping[int, int]) -> None:
+        """What depends on the holds alone, until other ones are held."""
+        structure = self.structure
+        if not held or (len(held) == 1 and structure.free_rolls[next(iter(held.values()))]):
+            raise RangeError("held", dict(held), "the body's pose needs two hands, or one that cannot roll")
+        arms, holds, count = list(held), list(held.values()), len(self.origins)
+        rolled = [arm for arm, hold in held.items() if not structure.free_rolls[hold]]
+        self._holds = np.zeros((count, 3))
+        self._holds[arms] = structure.positions[holds]
+        self._mask = np.zeros((count, 1))
+        self._mask[arms] = 1.0
+        self._mean = self._mask[:, 0] / len(arms)
+        self._center = self._mean @ self._holds
+        weights = np.zeros((3 * count, 3))
+        weights[:count] = self._mask * (self._holds - self._center)
+        weights[[count + arm for arm in arms]] = AXIS_LENGTH**2 * structure.axes[holds]
+        weights[[2 * count + arm for arm in rolled]] = AXIS_LENGTH**2 * structure.references[[held[k] for k in rolled]]
+        # The weights of the origins sum to nothing, so their mean does not count in A = weights' ours
+        self._quadratic = np.einsum("abc,nb->anc", DAVENPORT.reshape(16, 3, 3), weights).reshape(16, -1)
+        self._held = dict(held)

@@ -58,6 +58,12 @@ class Grips:
         out: Array = self.postures[self.offset[grip] + inside]
         return out
 
+    def posture_at(self, grip: int, sample: int) -> Array:
+        """Of one grip at one sample, clipped to the grip ``[6]``."""
+        first = int(self.first[grip])
+        out: Array = self.postures[int(self.offset[grip]) + min(max(sample, first), int(self.last[grip])) - first]
+        return out
+
     def of_arm(self, arm: int) -> Ints:
         """Grips of an arm."""
         return np.nonzero(self.arm == arm)[0]

@@ -46,5 +46,5 @@ def plan_from_here(
 def way_to(walker: Walker, structure: Structure, plan: Plan, arm: int, chain: ClosedChain) -> SwingLaw:
     """From where a free hand is to where the plan has it at the beginning; the body stands there."""
     height = walker.data.lift_height  # type: ignore[union-attr]
-    way = between(chain.origins[arm], chain.rotations[arm][:, 2], structure, structure.index(plan.start[arm]), height)
+    way = between(chain.origins[arm], chain.axes[arm], structure, structure.index(plan.start[arm]), height)
     return SwingLaw(walker, arm, plan.path, way, np.zeros(FINE), 1.0)

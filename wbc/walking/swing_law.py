@@ -19,7 +19,7 @@ SPACING = 0.005
 
 @dataclass(frozen=True, eq=False)
 class Aim:
-    """What a swinging hand is to do: position, velocity, z axis, its rate, and the part of the way, 0 to 1."""
+    """What a swinging hand is to do: position, velocity, direction of the z axis, its rate, part of the way, 0 to 1."""
 
     position: Array
     velocity: Array
@@ -60,16 +60,14 @@ class SwingLaw:
         )
 
     @staticmethod
-    def of(swings: Swings, move: Asked) -> SwingLaw:
-        """The law of a planned move, as long as the plan says."""
-        planned = swings.duration(move)
+    def of(swings: Swings, move: Asked, planned: float) -> SwingLaw:
+        """The law of a planned move, as long as the plan says [s]."""
         samples = move.lift + (move.land - move.lift) * np.linspace(0.0, 1.0, FINE)
-        least = 0.0 if planned is None else planned - swings.extra
-        return SwingLaw(swings.walker, move.arm, swings.path, swings.curve([move]), samples, least)
+        return SwingLaw(swings.walker, move.arm, swings.path, swings.curve([move]), samples, planned - swings.extra)
 
     def at(self, time: float) -> Aim:
         """The aim at a time since lifting, clipped to the swing."""
         place = min(max(time / self.duration, 0.0), 1.0) * (len(self._times) - 1)
         low = min(int(place), len(self._times) - 2)
         row = self._rows[low] + (place - low) * (self._rows[low + 1] - self._rows[low])
-        return Aim(row[:3], row[3:6], row[6:9] / np.linalg.norm(row[6:9]), row[9:12], float(row[12]))
+        return Aim(row[:3], row[3:6], row[6:9], row[9:12], float(row[12]))

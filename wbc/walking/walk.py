@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable
 from dataclasses import replace
+from math import dist, sqrt
 from typing import Any
 
 import numpy as np
@@ -94,8 +95,9 @@ class Walk:
     def done(self) -> bool:
         """The body is at the end of the path, and no hand is on its way."""
         ended = self.path_time >= self.plan.path.duration - 1e-9 and self.swinging is None and not self._changing
-        end = self.plan.path.poses[-1][:3, 3]
-        return ended and self._next == len(self.plan.regrasps) and float(np.linalg.norm(self.q[:3] - end)) < ARRIVED
+        if not ended or self._next < len(self.plan.regrasps):
+            return False
+        return dist(self.q[:3], self.plan.path.poses[-1][:3, 3]) < ARRIVED
 
     def run(self, on_tick: Callable[[Tick], Any] | None = None) -> str:
         """Ticks until the walk is done or given up.
@@ -164,7 +166,7 @@ class Walk:
         self.time += self.dt
         if self.swinging is not None:
             self._land(self.swinging)
-        error = float(np.linalg.norm(self.q[:3] - command.translation))
+        error = dist(self.q[:3], command.translation)
         state = self._hands(), self._holds(), command, error, slip, step.status, cost
         return Tick(self.time, self.path_time, self.q, self.v, *state)
 
@@ -226,7 +228,7 @@ class Walk:
         lift, land = (round(x / self.plan.path.spacing) for x in (step.lift, step.land))
         move = Move(arm, source, target, lift, land, step.duration, step.delay)
         self._open(arm)
-        law = SwingLaw.of(self.swings, move)
+        law = SwingLaw.of(self.swings, move, step.duration)
         self.swinging = Swinging(arm, int(self.grips.hold[target]), target, law, self.data.latch_time)
         self._say("lift", step.arm, step.source)
 
@@ -242,7 +244,7 @@ class Walk:
         ends = [float(self.grips.last[self._grip[arm]]) * spacing for arm in self.held]
         room = max(min([path.duration, *ends]) - self.path_time, 0.0)
         # The command stops within the room: braking from pace p takes p^2 RAMP / 2 of path time
-        wanted = min(1.0, float(np.sqrt(2.0 * room / RAMP * 0.9)))
+        wanted = min(1.0, sqrt(2.0 * room / RAMP * 0.9))
         if self.swinging is not None:
             left = self.swinging.law.duration - self.swinging.clock + self.data.latch_time + 0.1
             if room < left:
@@ -259,11 +261,11 @@ class Walk:
         """Move the aim of the hand on, as fast as the hand follows, and tell the stack."""
         arm, pace = swinging.arm, 0.0
         place = self.chain.origins[arm]
-        swinging.place, swinging.axis = place, self.chain.rotations[arm][:, 2]
-        target = self.grips.posture(np.array(swinging.grip), np.array(round(self.path_time / self.plan.path.spacing)))
+        swinging.place, swinging.axis = place, self.chain.axes[arm]
+        target = self.grips.posture_at(swinging.grip, round(self.path_time / self.plan.path.spacing))
         # On the wrong side of theta5 = 0 the wrist cannot align the hand: it turns to its branch before the hand lands
-        wrist = self.q[self.walker.arms[arm].q][3:5]
-        turned = bool(np.abs(wrist - target[3:5]).max() < TURNED)
+        (_, _, _, fourth, fifth, _), off = self.q[self.walker.arms[arm].q].tolist(), target.tolist()
+        turned = abs(fourth - off[3]) < TURNED and abs(fifth - off[4]) < TURNED
         if swinging.state == "opening":
             swinging.latch -= self.dt
             if swinging.latch <= 1e-9:
@@ -275,9 +277,9 @@ class Walk:
             pace = swinging.pace + min(max(wanted - swinging.pace, -change), change)
             swinging.clock = min(swinging.clock + pace * self.dt, swinging.law.duration)
         swinging.pace = pace
-        aim = swinging.law.at(swinging.clock)
+        aim = swinging.aim = swinging.law.at(swinging.clock)
         gap = aim.position - place
-        far = float(np.linalg.norm(gap))
+        far = sqrt(gap.dot(gap))
         if far > BEHIND:
             # A hand that cannot follow must not pull at the body: its aim waits within reach of it
             aim = replace(aim, position=place + gap * (BEHIND / far))
@@ -288,7 +290,7 @@ class Walk:
         """Close a hand that has come to rest on its hold; it holds when the latch is through."""
         arm, hold, data = swinging.arm, swinging.hold, self.data
         if swinging.state == "open" and swinging.clock >= swinging.law.duration - 1e-9:
-            hand = self.chain.origins[arm], self.chain.rotations[arm][:, 2]
+            hand = self.chain.origins[arm], self.chain.axes[arm]
             if at_rest(swinging, hand, (self.structure.positions[hold], self.structure.axes[hold]), data, self.dt):
                 swinging.state, swinging.latch = "closing", data.latch_time
         elif swinging.state == "closing":
@@ -319,7 +321,7 @@ class Walk:
 
     def _stay(self, arm: int) -> None:
         """A hand in the air waits where it is."""
-        self.stack.rest(arm, self.chain.origins[arm], self.chain.rotations[arm][:, 2])
+        self.stack.rest(arm, self.chain.origins[arm], self.chain.axes[arm])
 
     def _renumber(self, rest: Structure) -> None:
         """Go on with a structure that has lost holds: rows of holds change, hands stay where they are."""

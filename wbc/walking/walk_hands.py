@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import dist, sqrt
+
 import numpy as np
 
 from wbc.robots import WalkerData
@@ -23,10 +25,10 @@ def hand_pace(swinging: Swinging, place: Array, turned: bool, early: float, pace
         place: of the hand [m]. turned: its wrist is on the branch that it lands with.
         early: path time until the hold can be held [s]. pace: of the body.
     """
-    aim = swinging.law.at(swinging.clock)
-    gap, speed = aim.position - place, float(np.linalg.norm(aim.velocity))
-    along = float(gap @ aim.velocity) / speed if speed > 1e-6 else 0.0
-    across = float(np.sqrt(max(float(gap @ gap) - along * along, 0.0)))
+    aim = swinging.aim
+    gap, speed = aim.position - place, sqrt(aim.velocity.dot(aim.velocity))
+    along = float(gap.dot(aim.velocity)) / speed if speed > 1e-6 else 0.0
+    across = sqrt(max(float(gap.dot(gap)) - along * along, 0.0))
     # A hand that is ahead must not be stopped: it could not
     wanted = min(max(1.5 - (max(along, 0.0) + across) / BEHIND, LEAST_PACE), 1.0)
     wait = early - pace * (swinging.law.duration - swinging.clock)
@@ -40,9 +42,9 @@ def at_rest(
 ) -> bool:
     """Whether a hand is on its hold and still, both given by place [m] and z axis, so that it may close."""
     (place, axis), (there, wanted) = hand, hold
-    off, speed = float(np.linalg.norm(place - there)), float(np.linalg.norm(place - swinging.place)) / dt
-    still = speed < data.close_speed and angle(axis, swinging.axis) / dt < data.close_rate
-    return still and off < data.close_distance and angle(axis, wanted) < data.close_angle
+    if dist(place, there) >= data.close_distance or dist(place, swinging.place) / dt >= data.close_speed:
+        return False
+    return angle(axis, swinging.axis) / dt < data.close_rate and angle(axis, wanted) < data.close_angle
 
 
 def angle(one: Array, other: Array) -> float:

@@ -56,16 +56,20 @@ class WalkStack:
         self._mask = np.full(walker.robot.nv - 6, RESTING)
         self._near, self._age = (-1, False), 0
         items: Any = self.controller
-        items["body"].gain, items["posture"].gain = BODY_GAIN, WRIST_GAIN
-        for arm in walker.arms:
-            items[f"{arm.name} swing"].gain, items[f"{arm.name} axis"].gain = SWING_GAIN, AXIS_GAIN
+        self._body, self._rest = items["body"], items["posture"]
+        self._holds, self._swings, self._axes = (
+            [items[f"{arm.name} {kind}"] for arm in walker.arms] for kind in ("hold", "swing", "axis")
+        )
+        self._body.gain, self._rest.gain = BODY_GAIN, WRIST_GAIN
+        for swing, axis in zip(self._swings, self._axes, strict=True):
+            swing.gain, axis.gain = SWING_GAIN, AXIS_GAIN
 
     def hold(self, arm: int, hold: int) -> None:
         """A closed hand: its hold is exact, nothing else is asked of it."""
         self._switch(arm, True)
-        self.controller[f"{self.walker.arms[arm].name} hold"].target = pin.SE3(self.structure.frames[hold])
+        self._holds[arm].target = pin.SE3(self.structure.frames[hold])
         self._mask[self._joints(arm)] = RESTING
-        self.controller["posture"].mask = self._mask
+        self._rest.mask = self._mask
 
     def release(self, arm: int) -> None:
         """An open hand, which follows aims."""
@@ -74,16 +78,14 @@ class WalkStack:
 
     def rest(self, arm: int, place: Array, axis: Array) -> None:
         """A free hand that stays where it is."""
-        name = self.walker.arms[arm].name
-        swing, aligned = self.controller[f"{name} swing"], self.controller[f"{name} axis"]
+        swing, aligned = self._swings[arm], self._axes[arm]
         swing.target, swing.feedforward = place, np.zeros(3)
         aligned.target, aligned.feedforward, aligned.weight = axis, np.zeros(3), AXIS
         self._near = (-1, False)
 
     def body(self, pose: pin.SE3, rate: Array) -> None:
         """The pose that the body goes to, and its rate in the structure's axes [m/s, rad/s]."""
-        item = self.controller["body"]
-        item.target, item.feedforward = pose, rate
+        self._body.target, self._body.feedforward = pose, rate
 
     def swing(self, arm: int, aim: Aim, pace: float, posture: Array, near: bool) -> None:
         """What a free hand follows.
@@ -92,14 +94,13 @@ class WalkStack:
             pace: part of full speed that the aim goes on with. posture: of the arm on its next hold.
             near: at a hold, where the axis of the hand counts and not the wrist's posture.
         """
-        name = self.walker.arms[arm].name
-        swing, axis = self.controller[f"{name} swing"], self.controller[f"{name} axis"]
+        swing, axis = self._swings[arm], self._axes[arm]
         swing.target, swing.feedforward = aim.position, aim.velocity * pace
         axis.target, axis.feedforward = aim.axis, aim.axis_rate * pace
         if self._near == (arm, near) and self._age < POSTURE_TICKS:
             self._age += 1
             return
-        joints, resting = self._joints(arm), self.controller["posture"]
+        joints, resting = self._joints(arm), self._rest
         if self._near != (arm, near):
             axis.weight = AXIS if near else FREE_AXIS
             self._mask[joints][3:5] = 1.0 if near else FREE_WRIST
@@ -113,7 +114,5 @@ class WalkStack:
         return slice(of.start - 6, of.stop - 6)
 
     def _switch(self, arm: int, held: bool) -> None:
-        name = self.walker.arms[arm].name
-        self.controller[f"{name} hold"].enabled = held
-        self.controller[f"{name} swing"].enabled = not held
-        self.controller[f"{name} axis"].enabled = not held
+        self._holds[arm].enabled = held
+        self._swings[arm].enabled = self._axes[arm].enabled = not held

@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from wbc.validation import Array
-from wbc.walking.swing_law import SwingLaw
+from wbc.walking.swing_law import Aim, SwingLaw
 
 Hand = Literal["closed", "opening", "open", "closing"]
 What = Literal["lift", "land", "failed", "vanished", "replanned", "refused"]
@@ -21,7 +21,8 @@ class Swinging:
 
     Attributes:
         arm: its row. hold: row of the hold that it goes to. grip: which it is to be.
-        law: the aims. clock: time on the law [s]. pace: part of full speed. latch: time until the latch is through [s].
+        law: the aims. clock: time on the law [s]. aim: the one at that time.
+        pace: part of full speed. latch: time until the latch is through [s].
         place, axis: of the hand one tick before, for speeds.
         counted: it is a move of the plan, not one that brings a free hand back to it.
     """
@@ -38,6 +39,10 @@ class Swinging:
     tries: int = 0
     place: Array = field(default_factory=lambda: np.zeros(3))
     axis: Array = field(default_factory=lambda: np.zeros(3))
+    aim: Aim = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.aim = self.law.at(self.clock)
 
 
 @dataclass(frozen=True, eq=False)
