@@ -39,7 +39,7 @@ format: $(READY)  ## apply ruff's fixes and format
 # tasks/ and robots/ install as wbc.tasks and wbc.robots; mypy gets the same picture as a tree of links.
 types: $(READY)  ## mypy --strict on the package
 	@rm -rf $(TYPES) && mkdir -p $(TYPES)/wbc
-	@ln -s $(CURDIR)/wbc/* $(CURDIR)/tasks $(CURDIR)/robots $(TYPES)/wbc/
+	@ln -sf $(CURDIR)/wbc/* $(CURDIR)/tasks $(CURDIR)/robots $(TYPES)/wbc/
 	cd $(TYPES) && $(abspath $(BIN))/mypy --config-file $(CURDIR)/pyproject.toml \
 		--cache-dir $(CURDIR)/.mypy_cache --strict -p wbc
 

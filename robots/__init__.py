@@ -6,6 +6,7 @@ from wbc.robot.dh import DHRow
 from wbc.robot.geometry import convex_parts, fit_shapes
 from wbc.robot.pairs_file import read_self_pairs, save_self_pairs
 from wbc.robots.catalogue import from_dh, load, names, table
+from wbc.robots.operator_arms import OperatorArm, operator_arm
 from wbc.robots.pairs import find_self_pairs
 from wbc.robots.walker_arms import Arm
 from wbc.robots.walker_data import TwoEndedData, WalkerData
@@ -16,6 +17,7 @@ __all__ = [
     "ConvexParts",
     "DHRow",
     "LinkPair",
+    "OperatorArm",
     "SelfPairs",
     "TwoEndedData",
     "Walker",
@@ -26,6 +28,7 @@ __all__ = [
     "from_dh",
     "load",
     "names",
+    "operator_arm",
     "read_self_pairs",
     "save_self_pairs",
     "table",

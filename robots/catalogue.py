@@ -18,6 +18,7 @@ from wbc.robot.loading import build, finish, looks_like_path, unknown
 from wbc.robot.recipe import Recipe, lock_mapping
 from wbc.robot.robot import Robot
 from wbc.robot.table import read_table
+from wbc.robots.operator_arms import OPERATOR_ARMS, operator_recipe
 from wbc.robots.walker_robot import MADE, as_made, made_here, recipe_of
 
 _FOLDER = pathlib.Path(__file__).parent
@@ -57,7 +58,7 @@ def load(
 
     Args:
         robot: a name of the table (:func:`names`), ``walker`` or ``two_ended_arm`` (see :func:`~wbc.robots.walker`), a
-            path of a URDF or MJCF file, a ``pin.Model``, or DH rows.
+            name of :func:`~wbc.robots.operator_arm`, a path of a URDF or MJCF file, a ``pin.Model``, or DH rows.
         base: ``fixed``, ``floating`` (free flyer: q has position and quaternion x, y, z, w), ``planar`` (x, y,
             cos, sin; any direction) or ``differential`` (planar, sideways velocity must stay 0, see
             ``Robot.locked_dofs``). Default: the table's, or the one that the model or MJCF file brings, or fixed.
@@ -139,8 +140,10 @@ def _find(robot: Any) -> tuple[Recipe, Any]:
         if recipe is not None:
             pairs = str(_FOLDER / recipe.pairs) if recipe.pairs else ""
             return replace(recipe, pairs=pairs), example_data_folder() / recipe.file
+        if robot in OPERATOR_ARMS:
+            return operator_recipe(robot)
         if not looks_like_path(robot):
-            raise unknown(robot, (*_by_name(), *MADE))
+            raise unknown(robot, (*_by_name(), *MADE, *OPERATOR_ARMS))
     if isinstance(robot, (str, os.PathLike)):
         return Recipe(pathlib.Path(robot).stem), robot
     return Recipe(str(robot.name) if isinstance(robot, pin.Model) else "dh"), robot

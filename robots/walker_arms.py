@@ -10,8 +10,8 @@ import numpy as np
 import pinocchio as pin
 
 from wbc.robot import DHRow
+from wbc.robots.link_tree import Link
 from wbc.robots.walker_data import TwoEndedData, WalkerData
-from wbc.robots.walker_model import Link
 
 #: Link and frame of the body
 BODY = "body"

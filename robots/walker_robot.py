@@ -18,9 +18,9 @@ from wbc.robot import Robot
 from wbc.robot.description import Description
 from wbc.robot.loading import finish
 from wbc.robot.recipe import LinkShape, Recipe
+from wbc.robots.link_tree import Link, build_model, write_urdf
 from wbc.robots.walker_arms import BODY, Arm, chain, puma_rows, reversed_chain, two_ended_rows
 from wbc.robots.walker_data import TwoEndedData, WalkerData
-from wbc.robots.walker_model import Link, build_model, write_urdf
 from wbc.robots.walker_shapes import body_shapes, link_pairs, puma_shapes, two_ended_shapes
 from wbc.shapes import Capsule, PlacedShape, Sphere
 

@@ -1,4 +1,4 @@
-"""Models of branching machines with a floating base, made joint by joint, and their description as URDF."""
+"""Models of branching machines, made joint by joint, and their description as URDF."""
 
 from __future__ import annotations
 
@@ -16,17 +16,20 @@ from wbc.robot import Robot
 from wbc.robot.description import ROOT
 from wbc.shapes import Capsule, Convex, PlacedShape, Sphere
 
+Z = (0.0, 0.0, 1.0)
+
 
 @dataclass(frozen=True, eq=False)
 class Link:
-    """A link and the joint that carries it: revolute about z of ``placement``, or welded.
+    """A link and the joint that carries it: revolute, sliding, or welded.
 
     Attributes:
         name: of the link; its frame is the joint's, turned by the coordinate.
         parent: the link below.
         placement: of the joint in the parent's frame.
         joint: its name; "" for a weld.
-        lower, upper: limits [rad]. velocity, acceleration: largest [rad/s, rad/s^2].
+        lower, upper: limits [rad or m]. velocity, acceleration: largest [per s, s^2].
+        axis: unit vector in the frame of ``placement``. sliding: along it, not about it.
     """
 
     name: str
@@ -37,17 +40,21 @@ class Link:
     upper: float = 0.0
     velocity: float = 0.0
     acceleration: float = 0.0
+    axis: tuple[float, float, float] = Z
+    sliding: bool = False
 
 
-def build_model(name: str, root: str, links: Iterable[Link]) -> pin.Model:
-    """The model on a free flyer that carries the link ``root``; frames have the names of the links and joints.
+def build_model(name: str, root: str, links: Iterable[Link], floating: bool = True) -> pin.Model:
+    """The model whose link ``root`` a free flyer carries, or the world; frames have the names of the links and joints.
 
     URDF's parser makes the same joints and frames out of :func:`urdf_text`.
     """
     model = pin.Model()
     model.name = name
-    index = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), ROOT)
-    model.addJointFrame(index)
+    index = 0
+    if floating:
+        index = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), ROOT)
+        model.addJointFrame(index)
     frames = {root: model.addFrame(pin.Frame(root, index, 0, pin.SE3.Identity(), pin.FrameType.BODY))}
     for link in links:
         below = model.frames[frames[link.parent]]
@@ -57,10 +64,17 @@ def build_model(name: str, root: str, links: Iterable[Link]) -> pin.Model:
             frames[link.name] = model.addFrame(frame)
             continue
         numbers = [np.array([x]) for x in (np.inf, link.velocity, link.lower, link.upper)]
-        index = model.addJoint(below.parentJoint, pin.JointModelRZ(), local, link.joint, *numbers)
+        index = model.addJoint(below.parentJoint, _joint(link), local, link.joint, *numbers)
         above = model.addJointFrame(index, frames[link.parent])
         frames[link.name] = model.addFrame(pin.Frame(link.name, index, above, pin.SE3.Identity(), pin.FrameType.BODY))
     return model
+
+
+def _joint(link: Link) -> pin.JointModel:
+    axis = np.array(link.axis)
+    if link.sliding:
+        return pin.JointModelPrismaticUnaligned(axis)
+    return pin.JointModelRZ() if link.axis == Z else pin.JointModelRevoluteUnaligned(axis)
 
 
 def write_urdf(path: str | os.PathLike[str], robot: Robot, root: str, links: Iterable[Link]) -> pathlib.Path:
@@ -87,13 +101,13 @@ def urdf_text(robot: Robot, root: str, links: Iterable[Link]) -> str:
     _add_link(tree, root, robot.shapes)
     for link in links:
         _add_link(tree, link.name, robot.shapes)
-        kind = "revolute" if link.joint else "fixed"
+        kind = ("prismatic" if link.sliding else "revolute") if link.joint else "fixed"
         joint = ElementTree.SubElement(tree, "joint", name=link.joint or f"{link.name}_weld", type=kind)
         ElementTree.SubElement(joint, "parent", link=link.parent)
         ElementTree.SubElement(joint, "child", link=link.name)
         _add_origin(joint, link.placement)
         if link.joint:
-            ElementTree.SubElement(joint, "axis", xyz="0 0 1")
+            ElementTree.SubElement(joint, "axis", xyz=" ".join(f"{x:g}" for x in link.axis))
             limits = {"lower": link.lower, "upper": link.upper, "velocity": link.velocity, "effort": 0.0}
             ElementTree.SubElement(joint, "limit", {k: repr(float(v)) for k, v in limits.items()})
     ElementTree.indent(tree)

@@ -1,0 +1,78 @@
+"""Arms that operators command by hand: chains, URDF, shapes, and loading by name."""
+
+from __future__ import annotations
+
+import pathlib
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import wbc
+from wbc import errors
+from wbc.robots import operator_arm
+from wbc.robots.operator_arms import OPERATOR_ARMS
+
+JOINTS = {"planar_rp": 2, "planar_3r": 3, "spherical_4r": 4, "spdm": 15, "spdm_on_ssrms": 22}
+
+
+@pytest.mark.parametrize("name", OPERATOR_ARMS)
+def test_loads_by_name_and_comes_back_out_of_its_urdf(name: str, tmp_path: pathlib.Path) -> None:
+    made, loaded = operator_arm(name), wbc.robots.load(name)
+    assert made.robot.nv == loaded.nv == JOINTS.get(name, 7)
+    assert made.robot.joint_names == loaded.joint_names
+    assert made.robot.shapes.keys() == loaded.shapes.keys()
+    assert made.origin == made.robot.notes["origin"]
+    read = wbc.robots.load(made.urdf(tmp_path / "arm.urdf"))
+    assert sorted(read.joint_names) == sorted(made.robot.joint_names)
+    rng = np.random.default_rng(4)
+    angle = {joint: rng.uniform(0.0, 1.0) for joint in made.robot.joint_names}
+    poses = []
+    for robot in (made.robot, read):
+        q = np.array([angle[joint] for joint in robot.joint_names])
+        data = robot.model.createData()
+        pin.framesForwardKinematics(robot.model, data, q)
+        poses.append(data.oMf[robot.model.getFrameId(made.robot.frames["tip"])].homogeneous)
+        for joint in robot.joint_names:
+            assert np.isfinite(robot.limits.velocity[robot.dofs(joint)]).all()
+    np.testing.assert_allclose(poses[0], poses[1], rtol=0, atol=1e-12)
+    for key in ("position_lower", "position_upper", "velocity"):
+        for joint in angle:
+            sides = [getattr(r.limits, key)[r.dofs(joint)] for r in (made.robot, read)]
+            np.testing.assert_allclose(sides[0], sides[1], rtol=1e-12)
+
+
+def test_the_elbow_is_the_end_of_the_first_boom() -> None:
+    robot = wbc.robots.load("ssrms")
+    data, q = robot.model.createData(), np.array([0.3, 0.4, -0.5, 1.2, 0.7, -0.6, 0.9])
+    pin.framesForwardKinematics(robot.model, data, q)
+    places = [data.oMf[robot.model.getFrameId(frame)].translation for frame in ("end3", "F4")]
+    np.testing.assert_array_equal(places[0], places[1])
+    J = pin.computeFrameJacobian(robot.model, data, q, robot.model.getFrameId("end3"), pin.LOCAL_WORLD_ALIGNED)
+    assert not J[:, 3:].any()
+
+
+def test_bad_names() -> None:
+    with pytest.raises(errors.UnknownNameError, match="ssrms"):
+        operator_arm("ssrm")
+    with pytest.raises(errors.UnknownNameError, match="spdm_arm"):
+        wbc.robots.load("spdm_arms")
+
+
+def test_a_loaded_one_drives_a_stack() -> None:
+    robot = wbc.robots.load("ssrms", acceleration=0.02)
+    stack = wbc.Stack(robot, dt=0.02).add(wbc.tasks.EndEffector("tip"), name="hand").add(wbc.tasks.JointLimits())
+    stack.add(wbc.tasks.PitchPlane("F3", "F4", "F5", axis="joint3"), name="plane", weight=0.1)
+    controller = stack.compile(backend="vm")
+    q = np.array([0.3, 0.4, -0.5, 1.2, 0.7, -0.6, 0.9])
+    controller.step(q)
+    goal = pin.SE3(controller["hand"].target)
+    goal.translation = goal.translation + [0.05, 0.0, 0.02]
+    controller["hand"].target = goal
+    for _ in range(400):
+        step = controller.step(q)
+        assert step.status == "solved"
+        q = pin.integrate(robot.model, q, step.v * 0.02)
+    data = robot.model.createData()
+    pin.framesForwardKinematics(robot.model, data, q)
+    assert np.abs(data.oMf[robot.model.getFrameId("tip")].translation - goal.translation).max() < 2e-3
