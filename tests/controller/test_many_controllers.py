@@ -135,8 +135,8 @@ def test_a_clone_reads_nothing_and_builds_nothing(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(artifact, "key", refuse)
     other = first.clone()
     assert small.command(other) == small.command(first)
-    libraries = [line.split()[-1] for line in Path("/proc/self/maps").read_text().splitlines() if "tick.so" in line]
-    assert libraries.count(first.tick._library._name) in range(1, 8), "one library, however many controllers"
+    maps = Path("/proc/self/maps").read_text()
+    assert maps.count(first.tick._library._name) in range(1, 8), "one library, however many controllers"
     assert other.tick._library._handle == first.tick._library._handle
 
 

@@ -358,4 +358,4 @@ def test_parts_are_all_that_a_tick_reads() -> None:
     """A buffer that is added to the tick must be added to the recording."""
     from wbc.controller.tick import Buffers
 
-    assert set(INPUTS) == set(Buffers.__annotations__) - {"report"}
+    assert set(INPUTS) == set(Buffers.__annotations__) - {"report", "state"}

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from wbc.controller.library import load_library
 from wbc.controller.report import INFINITE, ReportLayout
 from wbc.controller.tick import Assembly
 from wbc.errors import CompileError
@@ -44,9 +45,9 @@ class NativeTick(Assembly):
     The report's size in memory is checked against the layout, so that a library of another layout is refused.
     """
 
-    def __init__(self, library: pathlib.Path, layout: Layout) -> None:
+    def __init__(self, library: pathlib.Path | ctypes.PyDLL, layout: Layout) -> None:
         # Not CDLL: releasing the interpreter lock costs more than it can give a call of a few microseconds
-        self._library = ctypes.PyDLL(str(library))
+        self._library = library if isinstance(library, ctypes.PyDLL) else load_library(library)
         self._library.wbc_tick_size.restype = ctypes.c_longlong
         size = int(self._library.wbc_tick_size())
         raw = np.zeros(size // 8 + 8)
@@ -58,7 +59,7 @@ class NativeTick(Assembly):
         places = dict(zip(_FIELDS, (int(o) // 8 for o in offsets), strict=True))
         report = ReportLayout(layout)
         if places["H"] - places["report"] != report.size:
-            raise CompileError("library", str(library), "was built for another layout")
+            raise CompileError("library", self._library._name, "was built for another layout")
         nv, rows = layout.nv, layout.general_rows
         self._layout = layout
         self._wide = (nv + 7) // 8 * 8
@@ -77,6 +78,7 @@ class NativeTick(Assembly):
         self.enabled = view("enabled", rows)
         self.bound_enabled = view("bound_enabled", layout.bound_blocks * nv)
         self.report = view("report", report.size)
+        self.state = self._memory[places["q"] : places["report"] + report.size]
         self._H = view("H", nv * self._wide).reshape(nv, self._wide)
         self._g = view("g", nv)
         self._A = view("A", rows * nv).reshape(rows, nv)
@@ -94,9 +96,12 @@ class NativeTick(Assembly):
     @functools.cached_property
     def converge_many(self) -> Any:
         """Thousands of searches in one call, which are worth releasing the lock for."""
-        function = ctypes.CDLL(self._library._name).wbc_tick_converge_many
+        function = ctypes.CDLL(self._library._name, handle=self._library._handle).wbc_tick_converge_many
         function.restype = None
         return function
+
+    def twin(self) -> NativeTick:
+        return NativeTick(self._library, self._layout)
 
     def step(self) -> int:
         return int(self.step_function(self.pointer))

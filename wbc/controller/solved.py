@@ -48,6 +48,7 @@ class SolvedTick(Buffers):
         refused = self.assembly.check()
         if refused:
             return refused
+        self.v_in[:] = self.v_last
         return self.finish(self.assembly.qp())
 
     def finish(self, qp: QP) -> int:

@@ -7,10 +7,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from wbc.controller.report import INFINITE, ReportLayout
+from wbc.controller.tick import Assembly
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Block, Layout
 from wbc.validation import Array
@@ -92,11 +94,17 @@ class Certificate:
 class Context:
     """What all steps of a controller share: names and places."""
 
-    def __init__(self, stack: Declaration, layout: Layout) -> None:
-        self.stack, self.layout = stack, layout
+    def __init__(self, stack: Declaration, layout: Layout, start: int, assembly: Assembly | None) -> None:
+        self.stack, self.layout, self.assembly = stack, layout, assembly
         self.nv = layout.nv
         self.report = ReportLayout(layout)
-        self.flag_offset = 8 * self.report.flag
+        #: where the report begins in a step's copy of the tick's state, and where its flag is [bytes]
+        self.start = 8 * start
+        self.flag_offset = 8 * (start + self.report.flag)
+
+    def __getstate__(self) -> dict[str, Any]:
+        # the memory of a process; a step from a pickle tells everything but its explanation
+        return vars(self) | {"assembly": None}
 
     @cached_property
     def general(self) -> list[tuple[Block, int]]:
@@ -125,16 +133,16 @@ class Step:
         self._context = context
 
     def _part(self, name: str) -> Array:
-        where = self._context.report[name]
-        return np.frombuffer(self._data, dtype=np.float64, count=where.stop - where.start, offset=8 * where.start)
+        context, where = self._context, self._context.report[name]
+        return np.frombuffer(self._data, _FLOAT, where.stop - where.start, context.start + 8 * where.start)
 
     def _number(self, name: str) -> float:
-        return float(_DOUBLE(self._data, 8 * self._context.report[name].start)[0])
+        return float(_DOUBLE(self._data, self._context.start + 8 * self._context.report[name].start)[0])
 
     @property
     def v(self) -> Array:
         """The command: velocities [rad/s, m/s], nv, read-only."""
-        return np.frombuffer(self._data, _FLOAT, self._context.nv)
+        return np.frombuffer(self._data, _FLOAT, self._context.nv, self._context.start)
 
     @property
     def status(self) -> Status:

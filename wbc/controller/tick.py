@@ -19,6 +19,8 @@ class Buffers:
         weight: of each task row, scale included. enabled: 1 or 0 for each general row.
         bound_enabled: the same for each entry of each bound block.
         report: see :class:`wbc.controller.report.ReportLayout`.
+        state: all of these in one piece of memory, from q to the end of the report. In it ``v_in`` is, after a tick,
+            the velocity that the tick counted accelerations from.
     """
 
     q: Array
@@ -32,6 +34,7 @@ class Buffers:
     enabled: Array
     bound_enabled: Array
     report: Array
+    state: Array
 
     def share(self, other: Buffers) -> None:
         """Use the arrays of ``other``."""
@@ -60,3 +63,7 @@ class Assembly(Buffers, ABC):
     @abstractmethod
     def look_ahead(self) -> None:
         """Margins after the step, into the report."""
+
+    @abstractmethod
+    def twin(self) -> Assembly:
+        """Another one of the same code, with memory of its own."""

@@ -34,20 +34,31 @@ def _room(count: int) -> Array:
     return np.zeros(max(1, count))
 
 
+def _pieces(sizes: dict[str, int]) -> dict[str, Array]:
+    """Arrays of at least these sizes in one piece of memory, which is the item without a name."""
+    ends = np.cumsum([max(1, size) for size in sizes.values()])
+    memory = np.zeros(int(ends[-1]))
+    starts = np.concatenate(([0], ends[:-1]))
+    return {"": memory} | {name: memory[a:b] for name, a, b in zip(sizes, starts, ends, strict=True)}
+
+
 class VmAssembly(Assembly):
     """Buffers of a controller and the QP at their values; mirrors ``native/assemble.h``."""
 
     def __init__(self, program: Program, stack: Declaration, layout: Layout) -> None:
         nv, rows, tasks = layout.nv, layout.general_rows, layout.task_rows
         self._layout = layout
-        self._q, self._v, self._p = _room(layout.nq), _room(nv), _room(layout.parameters)
-        self.q, self.v_last, self.p = self._q[: layout.nq], self._v[:nv], self._p[: layout.parameters]
-        self.cap = np.zeros(1)
-        self.v_in, self.use_v, self.dt, self.plain = np.zeros(nv), np.zeros(1), np.zeros(1), np.zeros(1)
-        self.weight, self.enabled = np.ones(tasks), np.ones(rows)
-        self.bound_enabled = np.ones(layout.bound_blocks * nv)
+        self._given = (program, stack, layout)
         self.places = ReportLayout(layout)
-        self.report = np.zeros(self.places.size)
+        sizes = {"q": layout.nq, "v_last": nv, "p": layout.parameters, "dt": 1, "v_in": nv, "use_v": 1, "cap": 1}
+        sizes |= {"weight": tasks, "enabled": rows, "bound_enabled": layout.bound_blocks * nv, "plain": 1}
+        parts = _pieces(sizes | {"report": self.places.size})
+        self.state = parts.pop("")
+        self._q, self._v, self._p = parts["q"], parts["v_last"], parts["p"]
+        for name, size in sizes.items():
+            setattr(self, name, parts[name][:size])
+        self.report = parts["report"][: self.places.size]
+        self.weight[:], self.enabled[:], self.bound_enabled[:] = 1.0, 1.0, 1.0
         function = program.rows
         self._out = {n: _room(function.nnz_out(i)) for i, n in enumerate(ROWS_OUTPUTS)}
         arguments = [self._q, self._v, self._p, self.dt]
@@ -86,6 +97,9 @@ class VmAssembly(Assembly):
             return upper + np.triu(upper, 1).T
 
         return bend
+
+    def twin(self) -> VmAssembly:
+        return VmAssembly(*self._given)
 
     def check(self) -> int:
         """Refuse bad inputs, or take over a measured velocity; 0 or a negative flag."""

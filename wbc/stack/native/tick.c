@@ -28,6 +28,8 @@ EXPORT int wbc_tick_check(wbc_tick *t) {
 EXPORT int wbc_tick_step(wbc_tick *t) {
     const int bad = wbc_tick_check(t);
     if (bad) return bad;
+    /* What accelerations count from, for who looks at the tick afterwards */
+    memcpy(t->v_in, t->v_last, sizeof t->v_in);
     assemble(t, 1);
     const int flag = wbc_tick_solve(t);
     wbc_tick_certify(t);

@@ -1,0 +1,46 @@
+"""Compiled ticks loaded into this process, from copies that no other process can change."""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import hashlib
+import os
+import pathlib
+import tempfile
+import threading
+
+_loaded: dict[str, ctypes.PyDLL] = {}
+_lock = threading.Lock()
+
+
+def load_library(path: pathlib.Path) -> ctypes.PyDLL:
+    """The library at a path; one of the same contents is loaded once.
+
+    What is loaded is a copy that loses its name at once: pages of a library come from its file when they are first
+    used, and one that is truncated or written over in place would take the process with it. Where no copy can be
+    made, the file itself is loaded.
+
+    Raises:
+        OSError: it cannot be read, or it is no library.
+    """
+    content = path.read_bytes()
+    digest = hashlib.sha256(content).hexdigest()
+    with _lock:
+        if digest not in _loaded:
+            _loaded[digest] = _load_copy(content, path)
+        return _loaded[digest]
+
+
+def _load_copy(content: bytes, path: pathlib.Path) -> ctypes.PyDLL:
+    for folder in (path.parent.parent, pathlib.Path(tempfile.gettempdir())):
+        with contextlib.suppress(OSError):
+            # A name of its own: the loader takes two files of one name for the same
+            number, name = tempfile.mkstemp(prefix=".loading-", suffix=".so", dir=folder)
+            try:
+                with os.fdopen(number, "wb") as file:
+                    file.write(content)
+                return ctypes.PyDLL(name)
+            finally:
+                os.unlink(name)
+    return ctypes.PyDLL(str(path))
