@@ -144,6 +144,19 @@ def test_walk_arrives_within_its_limits() -> None:
     assert number("largest joint rate # of", text) <= 1.000001
 
 
+def test_conflict_names_the_culprit() -> None:
+    text = output("conflict")
+    assert number("Cheapest to relax: ball/panda_hand.0. by # mm/s", text) == pytest.approx(536, abs=1)
+    assert number("Cheapest to relax: grip/y by # mm/s", text) == pytest.approx(545, abs=1)
+    assert number("hand misses # mm/s of 100 mm/s", text) == pytest.approx(80.7, abs=0.1)
+    assert "The culprit: limits takes 80.4 mm/s from the hand, most of all limits/panda_joint3 upper" in text
+    # The page quotes what the example prints
+    page = (FOLDER.parent / "docs" / "explanations.md").read_text()
+    quoted = [line.strip() for line in page.split("## Three worked conflicts")[1].splitlines() if line[:4] == "    "]
+    assert len(quoted) == 10
+    assert [line for line in quoted if line not in text.splitlines()] == []
+
+
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda p: p.stem)
 def test_examples_are_short_and_use_public_names(path: Path) -> None:
     text = path.read_text()

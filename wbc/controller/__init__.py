@@ -3,6 +3,7 @@
 from wbc.controller.branches import Branches
 from wbc.controller.continuation import Branch
 from wbc.controller.controller import Controller
+from wbc.controller.explanation import Explanation
 from wbc.controller.recorder import Recorder
 from wbc.controller.recording import Recording
 from wbc.controller.replaying import Replay, replay, replayed
@@ -17,6 +18,7 @@ __all__ = [
     "Certificate",
     "Controller",
     "Ending",
+    "Explanation",
     "Recorder",
     "Recording",
     "Replay",

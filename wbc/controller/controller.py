@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from wbc import validation
+from wbc.controller.assembly import assembly_of
 from wbc.controller.deployment import Deployment
 from wbc.controller.handle import Handle
 from wbc.controller.native import NativeTick
@@ -20,7 +21,6 @@ from wbc.controller.solved import SolvedTick
 from wbc.controller.step import Context, Step
 from wbc.controller.table import describe
 from wbc.controller.tick import Assembly
-from wbc.controller.vm import VmAssembly
 from wbc.errors import BusyError, PicklingError, SolverError, UnknownNameError
 from wbc.qp.problem import QP
 from wbc.stack.artifact import Artifact
@@ -45,15 +45,13 @@ class Controller(Deployment):
         cached: the compiled stack was found in the cache.
     """
 
-    def __init__(
-        self, stack: Declaration, artifact: Artifact, solver: str, assembly: Assembly | None = None
-    ) -> None:
+    def __init__(self, stack: Declaration, artifact: Artifact, solver: str, assembly: Assembly | None = None) -> None:
         layout = artifact.layout
         self.stack, self.solver, self.cached = stack, solver, artifact.cached
         self.backend = "native" if artifact.library is not None else "vm"
         self._artifact, self.layout = artifact, layout
         self.row_costs: Array = 1.0 / layout.row_scales(stack) ** 2
-        self._assembly = _assembly(stack, artifact) if assembly is None else assembly
+        self._assembly = assembly_of(stack, artifact) if assembly is None else assembly
         self.tick: NativeTick | SolvedTick
         if isinstance(self._assembly, NativeTick) and solver == "daqp":
             self.tick = self._assembly
@@ -63,10 +61,9 @@ class Controller(Deployment):
         if isinstance(self.tick, NativeTick):
             self._call = functools.partial(self.tick.step_function, self.tick.pointer)
         self._q, self._v_in, self._use_v = self.tick.q, self.tick.v_in, self.tick.use_v
-        state = self.tick.state
-        self._context = Context(stack, layout, state.size - self.tick.report.size, self._assembly)
+        self._context = Context(stack, layout, self._assembly)
         # of all ways to copy some hundred numbers into something immutable, the fastest
-        self._snapshot = state.data.cast("B").tobytes
+        self._snapshot = self.tick.state.data.cast("B").tobytes
         self._q_shape, self._v_shape = (layout.nq,), (layout.nv,)
         self._busy, self._resets = False, 0
         self._recorder: Recorder | None = None
@@ -300,11 +297,3 @@ class Controller(Deployment):
         self.stack.robot.configuration("q", q)
         validation.real_array("v", v, (self.stack.robot.nv,))
         raise SolverError("step", BAD_V, "the tick refused its inputs")
-
-
-def _assembly(stack: Declaration, artifact: Artifact) -> Assembly:
-    if artifact.library is not None:
-        return NativeTick(artifact.library, artifact.layout)
-    if artifact.program is not None:
-        return VmAssembly(artifact.program, stack, artifact.layout)
-    raise SolverError("artifact", artifact, "has neither a library nor a program")

@@ -58,7 +58,7 @@ class NativeTick(Assembly):
         self._library.wbc_tick_layout(offsets)
         places = dict(zip(_FIELDS, (int(o) // 8 for o in offsets), strict=True))
         report = ReportLayout(layout)
-        if places["H"] - places["report"] != report.size:
+        if places["q"] - places["report"] != report.size:
             raise CompileError("library", self._library._name, "was built for another layout")
         nv, rows = layout.nv, layout.general_rows
         self._layout = layout
@@ -78,7 +78,7 @@ class NativeTick(Assembly):
         self.enabled = view("enabled", rows)
         self.bound_enabled = view("bound_enabled", layout.bound_blocks * nv)
         self.report = view("report", report.size)
-        self.state = self._memory[places["q"] : places["report"] + report.size]
+        self.state = self._memory[places["report"] : places["H"]]
         self._H = view("H", nv * self._wide).reshape(nv, self._wide)
         self._g = view("g", nv)
         self._A = view("A", rows * nv).reshape(rows, nv)

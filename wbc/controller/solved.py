@@ -53,7 +53,7 @@ class SolvedTick(Buffers):
 
     def finish(self, qp: QP) -> int:
         """Solve a QP of this layout and write the report; the flag."""
-        flag, v, answer = self._answer(qp)
+        flag, v, answer = self.answer(qp)
         slack = qp.violation(v)[self._nv :] if flag == RELAXED else np.zeros(self._units.size)
         slack = np.where(slack > 2.0 * TOLERANCE * self._units, slack, 0.0)
         if flag == RELAXED and not slack.any():
@@ -83,7 +83,7 @@ class SolvedTick(Buffers):
         self.report[self._places["owner_high"]][frozen & at_lower] = -1.0
         self.report[self._places["owner_low"]][frozen & ~at_lower] = -1.0
 
-    def _answer(self, qp: QP) -> tuple[int, Array, Relaxed | None]:
+    def answer(self, qp: QP) -> tuple[int, Array, Relaxed | None]:
         """Flag, command and, unless the tick brakes, what the solver answered."""
         n = self._nv
         if self.assembly.usable:

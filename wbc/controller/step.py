@@ -11,8 +11,10 @@ from typing import Any
 
 import numpy as np
 
+from wbc.controller.explanation import Explanation
 from wbc.controller.report import INFINITE, ReportLayout
 from wbc.controller.tick import Assembly
+from wbc.errors import SolverError
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Block, Layout
 from wbc.validation import Array
@@ -94,13 +96,11 @@ class Certificate:
 class Context:
     """What all steps of a controller share: names and places."""
 
-    def __init__(self, stack: Declaration, layout: Layout, start: int, assembly: Assembly | None) -> None:
+    def __init__(self, stack: Declaration, layout: Layout, assembly: Assembly | None) -> None:
         self.stack, self.layout, self.assembly = stack, layout, assembly
         self.nv = layout.nv
         self.report = ReportLayout(layout)
-        #: where the report begins in a step's copy of the tick's state, and where its flag is [bytes]
-        self.start = 8 * start
-        self.flag_offset = 8 * (start + self.report.flag)
+        self.flag_offset = 8 * self.report.flag
 
     def __getstate__(self) -> dict[str, Any]:
         # the memory of a process; a step from a pickle tells everything but its explanation
@@ -133,16 +133,16 @@ class Step:
         self._context = context
 
     def _part(self, name: str) -> Array:
-        context, where = self._context, self._context.report[name]
-        return np.frombuffer(self._data, _FLOAT, where.stop - where.start, context.start + 8 * where.start)
+        where = self._context.report[name]
+        return np.frombuffer(self._data, _FLOAT, where.stop - where.start, 8 * where.start)
 
     def _number(self, name: str) -> float:
-        return float(_DOUBLE(self._data, self._context.start + 8 * self._context.report[name].start)[0])
+        return float(_DOUBLE(self._data, 8 * self._context.report[name].start)[0])
 
     @property
     def v(self) -> Array:
         """The command: velocities [rad/s, m/s], nv, read-only."""
-        return np.frombuffer(self._data, _FLOAT, self._context.nv, self._context.start)
+        return np.frombuffer(self._data, _FLOAT, self._context.nv)
 
     @property
     def status(self) -> Status:
@@ -226,6 +226,29 @@ class Step:
             per_second = unit if unit.endswith("/s") else f"{unit or '1'}/s"
             out.append(Slack(block.entry.name, block.rows[row].label, float(slack[i]), per_second))
         return tuple(out)
+
+    @property
+    def answered_by(self) -> str:
+        """What gave the command."""
+        return ""
+
+    def explain(self) -> Explanation:
+        """Why the command is what it is, worked out now: conflicts by name, what binds, what each task lost to whom.
+
+        The tick is set up again from this step's copy of its inputs, so it may be long past. Costs some milliseconds
+        for an arm and tenths of a second for a humanoid. docs/explanations.md.
+
+        Raises:
+            SolverError: the step comes from a pickle, which holds no code to set its tick up with.
+        """
+        from wbc.controller.explaining import Explainer
+        from wbc.controller.past import Past
+
+        context = self._context
+        if context.assembly is None:
+            raise SolverError("step", None, "comes from a pickle; explain it in the process that made it")
+        past = Past(self._data, context.stack, context.layout, context.assembly)
+        return Explainer(past).explain(str(self.status), self.answered_by)
 
     def __repr__(self) -> str:
         text = f"Step({self.status}, |v| = {np.linalg.norm(self.v):.4g}"

@@ -19,8 +19,8 @@ class Buffers:
         weight: of each task row, scale included. enabled: 1 or 0 for each general row.
         bound_enabled: the same for each entry of each bound block.
         report: see :class:`wbc.controller.report.ReportLayout`.
-        state: all of these in one piece of memory, from q to the end of the report. In it ``v_in`` is, after a tick,
-            the velocity that the tick counted accelerations from.
+        state: all of these in one piece of memory that begins with the report. ``v_in`` in it is, after a tick, the
+            velocity that the tick counted accelerations from.
     """
 
     q: Array

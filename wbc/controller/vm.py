@@ -50,14 +50,22 @@ class VmAssembly(Assembly):
         self._layout = layout
         self._given = (program, stack, layout)
         self.places = ReportLayout(layout)
-        sizes = {"q": layout.nq, "v_last": nv, "p": layout.parameters, "dt": 1, "v_in": nv, "use_v": 1, "cap": 1}
+        sizes = {
+            "report": self.places.size,
+            "q": layout.nq,
+            "v_last": nv,
+            "p": layout.parameters,
+            "dt": 1,
+            "v_in": nv,
+            "use_v": 1,
+            "cap": 1,
+        }
         sizes |= {"weight": tasks, "enabled": rows, "bound_enabled": layout.bound_blocks * nv, "plain": 1}
-        parts = _pieces(sizes | {"report": self.places.size})
-        self.state = parts.pop("")
+        parts = _pieces(sizes)
+        self.state = parts[""]
         self._q, self._v, self._p = parts["q"], parts["v_last"], parts["p"]
         for name, size in sizes.items():
             setattr(self, name, parts[name][:size])
-        self.report = parts["report"][: self.places.size]
         self.weight[:], self.enabled[:], self.bound_enabled[:] = 1.0, 1.0, 1.0
         function = program.rows
         self._out = {n: _room(function.nnz_out(i)) for i, n in enumerate(ROWS_OUTPUTS)}

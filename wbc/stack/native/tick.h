@@ -65,7 +65,8 @@ typedef struct {
 } wbc_report;
 
 typedef struct {
-    /* inputs, written by the caller */
+    wbc_report report;
+    /* inputs, written by the caller; in one piece with the report, so that one copy holds a whole tick */
     double q[NQ + 1], v_last[NV], p[NP + 1], dt;
     double v_in[NV], use_v;      /* a measured velocity, taken in place of the last command where use_v is not 0 */
     double cap;                  /* iterations of the active-set solver a tick at most; 0: as many as it takes */
@@ -73,7 +74,6 @@ typedef struct {
     double enabled[MC + 1];      /* 1 or 0 for each general row */
     double bound_enabled[NB * NV + 1];
     double plain;                /* not 0: the linear model as it is, whatever CALM says */
-    wbc_report report;
     /* the QP */
     double H[NV * WIDE], g[WIDE], A[MC * NV + 1], low[M_ALL], high[M_ALL];
     double unusable;             /* not 0: numbers that are not finite, or bounds without an interval */

@@ -1,0 +1,119 @@
+"""From a step's copy of its tick to an :class:`Explanation`. Nothing here runs unless it is asked for."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from wbc.controller.explanation import Contradiction, Explanation, Give, Residue, Side
+from wbc.controller.losses import groups, losses, prices
+from wbc.controller.naming import Naming
+from wbc.controller.past import Past
+from wbc.qp.conflict import Conflict, Infeasibility, diagnose
+from wbc.qp.problem import QP
+from wbc.stack.layout import Block
+from wbc.validation import Array
+
+_NONE = Residue(np.inf, "", "")
+
+
+class Explainer:
+    """Explains one past tick."""
+
+    def __init__(self, past: Past) -> None:
+        self.past = past
+        self.naming = Naming(past)
+
+    def explain(self, status: str, answered_by: str) -> Explanation:
+        """The explanation; ``status`` and ``answered_by`` are the step's."""
+        past = self.past
+        v, multipliers = past.part("v"), past.part("multipliers")
+        broken = past.broken()
+        if broken:
+            return Explanation(status, answered_by, broken, (), (), (), (), (), (), _NONE, _NONE, _NONE)
+        found = self._infeasibility()
+        least = tuple(
+            Give(self._violated(row, v), float(amount * self.naming.units[row]))
+            for row, amount in enumerate(found.slack)
+            if amount > 1e-8
+        )
+        slack, nv = past.part("slack"), past.layout.nv
+        given = tuple(Give(self._violated(nv + int(k), v), float(slack[k])) for k in np.flatnonzero(slack))
+        binding = {int(i): self._binding(int(i), multipliers[i], v) for i in np.flatnonzero(multipliers)}
+        task_groups = groups(past)
+        missed = losses(past, task_groups, v, self._culprits(list(binding), multipliers))
+        _, answer = past.solve()
+        plain = answer is not None and answer.flag == "solved" and missed
+        costs = prices(past, task_groups, answer, binding) if plain and answer is not None else ()
+        return Explanation(
+            status,
+            answered_by,
+            (),
+            tuple(self._contradiction(conflict) for conflict in found.conflicts),
+            least if found.conflicts else (),
+            given,
+            tuple(binding.values()),
+            missed,
+            costs,
+            *self._residues(v, multipliers, status),
+        )
+
+    def _infeasibility(self) -> Infeasibility:
+        """Conflicts of the QP in v / dof_scale and rows per unit."""
+        qp, n, units = self.past.qp, self.past.layout.nv, self.naming.units
+        A = qp.A * units[:n] / units[n:, None]
+        return diagnose(QP(np.eye(n), np.zeros(n), qp.lower / units, qp.upper / units, A))
+
+    def _contradiction(self, conflict: Conflict) -> Contradiction:
+        sides = tuple(self.naming.side(*side) for side in conflict.sides)
+        units = np.array([self.naming.units[side.row] for side in conflict.sides])
+        enough = bool(np.isfinite(conflict.alone).any())
+        needed = conflict.alone if enough else conflict.within
+        alone = tuple(Give(s, float(a * u)) for s, a, u in zip(sides, needed, units, strict=True))
+        may = [k for k in range(len(sides)) if np.isfinite(needed[k]) and not sides[k].actuator]
+        cheapest = alone[min(may or range(len(sides)), key=lambda k: needed[k])]
+        return Contradiction(sides, tuple(g for g in alone if np.isfinite(g.amount)), enough, cheapest)
+
+    def _violated(self, row: int, v: Array) -> Side:
+        """The side of a row that v misses, or is nearer to missing."""
+        qp = self.past.qp
+        at = float(qp.rows_at(v)[row])
+        return self.naming.side(row, at - qp.upper[row] > qp.lower[row] - at)
+
+    def _binding(self, row: int, multiplier: float, v: Array) -> Side:
+        """The side that pushes; a bound that a relaxation holds may push the other way than its side."""
+        qp, at = self.past.qp, v[row] if row < self.past.layout.nv else 0.0
+        upper = multiplier > 0.0
+        if row < self.past.layout.nv:
+            upper = bool(abs(at - qp.upper[row]) < abs(at - qp.lower[row]))
+        elif not np.isfinite((qp.upper if upper else qp.lower)[row]):
+            upper = not upper
+        return self.naming.side(row, upper)
+
+    def _culprits(self, rows: list[int], multipliers: Array) -> list[Block]:
+        """Constraints that bind and tasks that are on."""
+        past = self.past
+        owners = [self.naming.owner(row, bool(multipliers[row] > 0.0)) for row in rows]
+        constraints = {b.entry.name: b for b in owners if b is not None}
+        tasks = [b for b in past.layout.of_form("task") if past.is_on(b)]
+        return [*constraints.values(), *tasks]
+
+    def _residues(self, v: Array, multipliers: Array, status: str) -> tuple[Residue, Residue, Residue]:
+        """Residuals of the command as it was given; none for commands that are no optimum."""
+        if status in ("braked", "capped"):
+            return _NONE, _NONE, _NONE
+        past, naming, nv = self.past, self.naming, self.past.layout.nv
+        qp = past.qp
+        slack = np.concatenate((np.zeros(nv), past.part("slack")))
+        beyond = np.maximum(qp.violation(v) - slack, 0.0)
+        gradient = np.abs(qp.H @ v + qp.g + multipliers[:nv] + qp.A.T @ multipliers[nv:]) / np.diag(qp.H)
+        at = qp.rows_at(v)
+        off = np.minimum(np.abs(at - qp.lower), np.abs(qp.upper - at))
+        off = np.where((multipliers != 0.0) & (slack == 0.0), off, 0.0)
+        robot = past.stack.robot
+        out = []
+        for values, named in ((beyond, True), (gradient, False), (off, True)):
+            row = int((values / naming.units[: values.size]).argmax())
+            where = self.naming.side(row, False).name if named else robot.dof_names[row]
+            unit = self.naming.side(row, False).unit if named else f"{robot.dof_units[row]}/s"
+            out.append(Residue(float(values[row]), unit, where if values[row] > 0.0 else ""))
+        return out[0], out[1], out[2]

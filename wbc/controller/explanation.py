@@ -1,0 +1,218 @@
+"""What an explanation of a tick says: data, and the same as text in SI units."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+def amount(value: float, unit: str) -> str:
+    """A number with its unit, lengths below a metre in millimetres or micrometres: ``31 mm/s``."""
+    prefix = ""
+    if (unit == "m" or unit.startswith("m/")) and np.isfinite(value) and 1e-7 <= abs(value) < 1.0:
+        value, prefix = (1e3 * value, "m") if abs(value) >= 1e-4 else (1e6 * value, "u")
+    return f"{value if abs(value) > 1e-13 else 0.0:.3g} {prefix}{unit}".rstrip()
+
+
+def listed(sides: tuple[Side, ...]) -> str:
+    """Sides as text, joint limits of one kind together."""
+    groups: dict[tuple[str, str], list[str]] = {}
+    for side in sides:
+        if side.kind:
+            bound = {"lower": "at least", "upper": "at most", "equal": "exactly"}[side.side]
+            groups.setdefault((side.item, side.kind), []).append(f"{side.row} {bound} {amount(side.value, side.unit)}")
+    plain = [str(side) for side in sides if not side.kind]
+    return ", ".join([*plain, *(f"{item} ({kind}: {', '.join(rows)})" for (item, kind), rows in groups.items())])
+
+
+@dataclass(frozen=True)
+class Side:
+    """One side of a row or bound.
+
+    Attributes:
+        item, row: names; the row of a bound is its degree of freedom.
+        side: ``lower``, ``upper`` or ``equal``.
+        value: the side, per second [unit]. unit: of the row's rate, such as m/s.
+        kind: what a joint limit is at this value: ``velocity``, ``acceleration`` or ``position``; else empty.
+        margin: h of a margin row before the tick, in its unit; None for others.
+        actuator: it belongs to the class that never gives way.
+    """
+
+    item: str
+    row: str
+    side: str
+    value: float
+    unit: str
+    kind: str = ""
+    margin: float | None = None
+    actuator: bool = False
+
+    @property
+    def name(self) -> str:
+        """``item/row``."""
+        return f"{self.item}/{self.row}"
+
+    def __str__(self) -> str:
+        relation = {"lower": "at least", "upper": "at most", "equal": "exactly"}[self.side]
+        text = f"{self.name} ({self.kind + ' limit: ' if self.kind else ''}{relation} {amount(self.value, self.unit)}"
+        if self.margin is not None:
+            text += f", {amount(self.margin, self.unit.removesuffix('/s'))} to spare"
+        return text + ")"
+
+
+@dataclass(frozen=True)
+class Give:
+    """By how much a side gives or would have to give [unit]; inf: no amount is enough."""
+
+    side: Side
+    amount: float
+
+    def __str__(self) -> str:
+        return f"{self.side.name} by {amount(self.amount, self.side.unit)}"
+
+
+@dataclass(frozen=True)
+class Contradiction:
+    """Sides that cannot all hold; without any one of them the others can.
+
+    Attributes:
+        sides: the members.
+        alone: what each would have to give if it alone gives and everything else in the stack holds; or, where no
+            single one of them ends all conflicts, only the other members.
+        enough: the first of these.
+        cheapest: the least of them among sides that may give way at all, a length of ``stack.length`` counted as one
+            radian; among all where none may.
+    """
+
+    sides: tuple[Side, ...]
+    alone: tuple[Give, ...]
+    enough: bool
+    cheapest: Give
+
+    def __str__(self) -> str:
+        members = listed(self.sides)
+        if len(self.sides) == 1:
+            text = f"This cannot hold within the bounds: {members}."
+        else:
+            text = f"These {len(self.sides)} cannot hold together, any {len(self.sides) - 1} of them can: {members}."
+        others = [str(g) for g in self.alone if g is not self.cheapest and not g.side.actuator]
+        text += f" Cheapest to relax{'' if self.enough else ' (there are other conflicts too)'}: {self.cheapest}"
+        return f"{text}, instead {' or '.join(others)}." if others else f"{text}."
+
+
+@dataclass(frozen=True)
+class Share:
+    """What a task would regain if one item were off [unit of the loss]."""
+
+    item: str
+    amount: float
+
+
+@dataclass(frozen=True)
+class Loss:
+    """How much slower than asked a task is served, its rows of one unit together.
+
+    Attributes:
+        task, unit: whose rows, and the unit of their rates.
+        asked: Euclidean norm of the rates asked for, gain e + de/dt. lost: norm of what is missing.
+        alone: norm of what would be missing with every other item off: out of reach, singular, slowed by its gain.
+        to: items that it would regain something without, the greatest first. They need not add up to ``lost``.
+    """
+
+    task: str
+    unit: str
+    asked: float
+    lost: float
+    alone: float
+    to: tuple[Share, ...]
+
+    def __str__(self) -> str:
+        text = f"{self.task} misses {amount(self.lost, self.unit)} of {amount(self.asked, self.unit)}"
+        if self.to:
+            parts = [f"{amount(share.amount, self.unit)} without {share.item}" for share in self.to]
+            text += "; it would regain " + ", ".join(parts)
+        if 0.01 * self.lost < self.alone <= 1.01 * self.lost:
+            text += f"; {amount(self.alone, self.unit)} would be missing with nothing else in the stack"
+        return text + "."
+
+
+@dataclass(frozen=True)
+class Price:
+    """What one unit of a binding side costs a task: the loss falls by ``amount`` per unit that the side gives.
+
+    ``amount`` is -d lost / d side [unit of the task's rate per unit of the side's rate]; negative where the task is
+    better off with the limit.
+    """
+
+    side: Side
+    task: str
+    amount: float
+    unit: str
+
+    def __str__(self) -> str:
+        return (
+            f"{self.side.name} {self.side.side} costs {self.task} {amount(self.amount, self.unit)} per {self.side.unit}"
+        )
+
+
+@dataclass(frozen=True)
+class Residue:
+    """The largest of the certificate's residuals of one kind, in physical units, and where it is."""
+
+    amount: float
+    unit: str
+    where: str
+
+    def __str__(self) -> str:
+        return f"{amount(self.amount, self.unit)} ({self.where})" if self.where else amount(self.amount, self.unit)
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """Why a tick's command is what it is; from :meth:`wbc.Step.explain`, ``str()`` is the text.
+
+    Attributes:
+        status: of the step. answered_by: what gave the answer, see :attr:`wbc.Step.answered_by`.
+        broken: items that are on and whose numbers are NaN, infinite or without an interval.
+        conflicts: minimal sets of sides that contradict each other; empty where all rows can hold.
+        least: the least sum of squared slack that lets everything hold, by row (metres as ``stack.length`` radians).
+        gave_way: what did give way in this tick, in the order of sacrifice.
+        binding: what pushes against the command.
+        losses: what each task misses, and to whom. prices: what one unit of each binding side costs each task.
+        primal: largest violation of a row that did not give way. dual: largest velocity by which one degree of freedom
+            alone would better the objective. complementarity: largest distance of a pushing row from its side.
+    """
+
+    status: str
+    answered_by: str
+    broken: tuple[str, ...]
+    conflicts: tuple[Contradiction, ...]
+    least: tuple[Give, ...]
+    gave_way: tuple[Give, ...]
+    binding: tuple[Side, ...]
+    losses: tuple[Loss, ...]
+    prices: tuple[Price, ...]
+    primal: Residue
+    dual: Residue
+    complementarity: Residue
+
+    def __str__(self) -> str:
+        lines = [f"{self.status} (by {self.answered_by})." if self.answered_by else f"{self.status}."]
+        if self.broken:
+            lines.append(f"Without usable numbers: {', '.join(self.broken)}.")
+        lines += [str(conflict) for conflict in self.conflicts]
+        if self.least:
+            lines.append("The least that ends all conflicts: " + ", ".join(str(g) for g in self.least) + ".")
+        if self.gave_way:
+            lines.append("What gave way here: " + ", ".join(str(g) for g in self.gave_way) + ".")
+        if self.binding:
+            lines.append(f"Binding: {listed(self.binding)}.")
+        lines += [str(loss) for loss in self.losses]
+        lines += [f"{price}." for price in self.prices]
+        if np.isfinite(self.dual.amount):
+            lines.append(
+                f"Residuals: rows {self.primal}, optimality {self.dual}, pushing rows off their side "
+                f"{self.complementarity}."
+            )
+        return "\n".join(lines)

@@ -1,0 +1,90 @@
+"""What the tasks of a past tick lost, to whom, and what one unit of each binding side costs them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from wbc.controller.explanation import Loss, Price, Share, Side
+from wbc.controller.past import Past
+from wbc.qp.problem import Solution
+from wbc.qp.relax import Relaxed
+from wbc.qp.sensitivity import Sensitivity
+from wbc.stack.layout import Block
+from wbc.validation import Array
+
+#: Losses and regained parts below this share of what was asked, and below this rate, are not told [rad/s, m/s]
+_SHARE, _LEAST = 1e-3, 1e-6
+
+
+class Group:
+    """Rows of one task that share a unit: J v - w is what they miss."""
+
+    def __init__(self, block: Block, unit: str, J: Array, wishes: Array) -> None:
+        self.block, self.J, self.wishes = block, J, wishes
+        self.unit = unit if unit.endswith("/s") else f"{unit or '1'}/s"
+
+    def lost(self, v: Array) -> float:
+        """Norm of what is missing at v."""
+        return float(np.linalg.norm(self.J @ v - self.wishes))
+
+    def slope(self, v: Array) -> Array:
+        """Derivative of :meth:`lost` along v."""
+        missing = self.J @ v - self.wishes
+        return np.asarray(missing @ self.J / np.linalg.norm(missing))
+
+
+def groups(past: Past) -> list[Group]:
+    """Rows that count of every task that is on, by unit."""
+    out = []
+    for block in past.layout.of_form("task"):
+        if not past.is_on(block):
+            continue
+        J, wishes = past.task_rows(block)
+        counts = past.tick.weight[block.span] > 0.0
+        for unit in dict.fromkeys(row.unit for row in block.rows):
+            mine = np.array([row.unit == unit for row in block.rows]) & counts
+            if mine.any():
+                out.append(Group(block, unit, J[mine], wishes[mine]))
+    return out
+
+
+def losses(past: Past, found: list[Group], v: Array, culprits: list[Block]) -> tuple[Loss, ...]:
+    """Every task that misses something, and what it would regain without each of the culprits."""
+    short = [g for g in found if g.lost(v) > max(_LEAST, _SHARE * float(np.linalg.norm(g.wishes)))]
+    if not short:
+        return ()
+    without: dict[str, Array] = {}
+    for block in culprits:
+        with past.without([block]):
+            without[block.entry.name] = past.solve()[0]
+    alone: dict[str, Array] = {}
+    for block in {g.block.entry.name: g.block for g in short}.values():
+        with past.without(past.others(block)):
+            alone[block.entry.name] = past.solve()[0]
+    out = []
+    for group in short:
+        name, lost, asked = group.block.entry.name, group.lost(v), float(np.linalg.norm(group.wishes))
+        regained = [Share(item, lost - group.lost(other)) for item, other in without.items() if item != name]
+        told = [share for share in regained if share.amount > max(_LEAST, _SHARE * asked)]
+        told.sort(key=lambda share: -share.amount)
+        out.append(Loss(name, group.unit, asked, lost, group.lost(alone[name]), tuple(told)))
+    return tuple(out)
+
+
+def prices(past: Past, found: list[Group], answer: Relaxed, sides: dict[int, Side]) -> tuple[Price, ...]:
+    """Of every binding side and every task that misses something, from the active set of a plain optimum."""
+    sensitivity = Sensitivity(past.qp, Solution(answer.x, answer.multipliers, "solved"))
+    out = []
+    for row, side in sides.items():
+        if row not in sensitivity.active:
+            continue
+        moved = sensitivity.to_bound(row) * (-1.0 if side.side == "lower" else 1.0)
+        for group in found:
+            if group.lost(answer.x) <= max(_LEAST, _SHARE * float(np.linalg.norm(group.wishes))):
+                continue
+            fall = -float(group.slope(answer.x) @ moved)
+            if side.side == "equal":
+                fall = abs(fall)
+            if abs(fall) > _SHARE:
+                out.append(Price(side, group.block.entry.name, fall, group.unit))
+    return tuple(out)

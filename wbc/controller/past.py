@@ -1,0 +1,114 @@
+"""A tick that is over, set up again from a step's copy of its state."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+
+import numpy as np
+
+from wbc.controller.report import ReportLayout
+from wbc.controller.solved import SolvedTick
+from wbc.controller.tick import Assembly
+from wbc.qp.relax import Relaxed
+from wbc.stack.declaration import Declaration
+from wbc.stack.layout import Block, Layout
+from wbc.tasks.mechanism import Mechanism
+from wbc.validation import Array
+
+
+class Past:
+    """Buffers as the tick found them, the QP that it solved, and the same with items switched off.
+
+    Attributes:
+        qp: what the tick solved. report: what it reported. usable: the numbers of the QP are finite.
+        owner_low, owner_high: bound block that sets each simple bound, -1 for none.
+    """
+
+    def __init__(self, data: bytes, stack: Declaration, layout: Layout, assembly: Assembly) -> None:
+        self.stack, self.layout = stack, layout
+        self.places = ReportLayout(layout)
+        self.tick = assembly.twin()
+        self.tick.state[:] = np.frombuffer(data)
+        self.tick.v_last[:] = self.tick.v_in
+        self.tick.use_v[0] = 0.0
+        self.report = self.tick.report.copy()
+        with np.errstate(all="ignore"):
+            self.qp = self.tick.qp()
+        self.usable = self.tick.usable
+        low, high = (self.tick.report[self.places[name]].astype(int) for name in ("owner_low", "owner_high"))
+        self.owner_low, self.owner_high = low, high
+        self._solver = SolvedTick(self.tick, stack, layout, "daqp")
+
+    def part(self, name: str) -> Array:
+        """A part of the report."""
+        return self.report[self.places[name]]
+
+    @contextmanager
+    def without(self, blocks: Iterable[Block]) -> Iterator[None]:
+        """Items off, and on again."""
+        tick, nv = self.tick, self.layout.nv
+        before = tick.weight.copy(), tick.enabled.copy(), tick.bound_enabled.copy()
+        for block in blocks:
+            if block.form == "task":
+                tick.weight[block.span] = 0.0
+            elif block.form == "bounds":
+                tick.bound_enabled[block.start * nv : (block.start + 1) * nv] = 0.0
+            else:
+                tick.enabled[block.span] = 0.0
+        yield
+        tick.weight[:], tick.enabled[:], tick.bound_enabled[:] = before
+
+    def solve(self) -> tuple[Array, Relaxed | None]:
+        """Command and answer for the buffers as they are; no answer where the tick brakes."""
+        _, v, answer = self._solver.answer(self.tick.qp())
+        return v, answer
+
+    def is_on(self, block: Block) -> bool:
+        """Any of an item's rows counts."""
+        if block.form == "task":
+            return bool(self.tick.weight[block.span].any())
+        if block.form == "bounds":
+            nv = self.layout.nv
+            return bool(self.tick.bound_enabled[block.start * nv : (block.start + 1) * nv].any())
+        return bool(self.tick.enabled[block.span].any())
+
+    def broken(self) -> tuple[str, ...]:
+        """Items that are on and whose numbers make the QP unusable."""
+        if self.usable:
+            return ()
+        blocks, found = [b for b in self.layout.blocks.values() if self.is_on(b)], []
+        for block in blocks:
+            with self.without(b for b in blocks if b is not block), np.errstate(all="ignore"):
+                self.tick.qp()
+                if not self.tick.usable:
+                    found.append(block.entry.name)
+        return tuple(found)
+
+    def others(self, block: Block) -> list[Block]:
+        """Every item but one and what the mechanism itself asks for."""
+        return [b for b in self.layout.blocks.values() if b is not block and not isinstance(b.entry.item, Mechanism)]
+
+    def task_rows(self, block: Block) -> tuple[Array, Array]:
+        """(J, w) of a task's rows that count, J v - w being what each misses; both up to the sign of a row.
+
+        A row's part of the plain QP is H = J'J and g = -J'w, from which both come back.
+        """
+        tick, weight, factor = self.tick, self.tick.weight.copy(), self.part("factor")
+        damping = self.stack.damping / self.layout.dof_scales(self.stack) ** 2
+        rows, wishes = np.zeros((len(block.rows), self.layout.nv)), np.zeros(len(block.rows))
+        tick.plain[0] = 1.0
+        for k in range(len(block.rows)):
+            share = factor[block.start + k]
+            if weight[block.start + k] == 0.0 or not share > 0.0:
+                continue
+            tick.weight[:] = 0.0
+            tick.weight[block.start + k] = 1.0
+            qp = tick.qp()
+            square = (qp.H - np.diag(damping)) / share
+            i = int(np.diag(square).argmax())
+            if square[i, i] > 0.0:
+                rows[k] = square[i] / np.sqrt(square[i, i])
+                wishes[k] = -qp.g[i] / share / rows[k, i]
+        tick.weight[:], tick.plain[0] = weight, 0.0
+        return rows, wishes
