@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from math import radians
 
 import numpy as np
@@ -13,12 +13,15 @@ from wbc.robots import Walker
 from wbc.validation import Array
 from wbc.walking.arm_kinematics import LIMIT_NAMES, ArmKinematics
 from wbc.walking.body_path import BodyPath
+from wbc.walking.slices import Slices, drained
 from wbc.walking.structure import Structure
 
 Ints = NDArray[np.int64]
 
 #: What the plan keeps of the limits for feedback: part of a rate, angle [rad] and reach [m]
 RATE_PART, ANGLE_ROOM, REACH_ROOM = 0.85, radians(2.0), 0.3 * 0.0254
+#: Postures of a slice, and how far samples may lie apart in the first look for holds in reach [m]
+ROWS, LOOSE = 4000, 0.1
 #: A grip of fewer samples is none
 SHORTEST = 3
 #: The hand's approach and the body's z axis enclose less than 60 degrees: arms do not reach round the body
@@ -30,7 +33,7 @@ class Grips:
     """All grips over a body path; grip g is of ``arm[g]`` on ``hold[g]`` (its row in the structure).
 
     Attributes:
-        arm, hold, branch: ``[grips]``; branch 0 is theta5 >= 0, 1 is theta5 < 0.
+        arm, hold, branch: ``[grips]``; hold -1 is gone; branch 0 is theta5 >= 0, 1 is theta5 < 0.
         first, last: samples of the path, both included, ``[grips]``.
         offset: grip g's postures are ``postures[offset[g] : offset[g] + last[g] - first[g] + 1]``.
         postures: ``[all samples, 6]`` [rad]; joint 6 is 0 where the roll is free.
@@ -65,39 +68,72 @@ class Grips:
         return out
 
     def of_arm(self, arm: int) -> Ints:
-        """Grips of an arm."""
-        return np.nonzero(self.arm == arm)[0]
+        """Grips of an arm, on holds that are there."""
+        return np.nonzero((self.arm == arm) & (self.hold >= 0))[0]
+
+    def renumbered(self, rows: Ints) -> Grips:
+        """The same grips when hold k has become row ``rows[k]`` of another structure, -1 where it is gone."""
+        return replace(self, hold=np.where(self.hold >= 0, rows[self.hold], -1))
 
 
 def find_grips(walker: Walker, structure: Structure, path: BodyPath) -> Grips:
     """Every grip over a path: in reach, all joints within their limits less a margin, and slow enough from sample to
     sample at the commanded speed.
     """
+    return drained(grip_slices(walker, structure, path))
+
+
+def grip_slices(walker: Walker, structure: Structure, path: BodyPath, only: Sequence[int] = ()) -> Slices[Grips]:
+    """As :func:`find_grips`, in slices of about :data:`ROWS` postures.
+
+    Args:
+        only: one row of a hold for each arm, where others do not matter.
+    """
     kinematics = ArmKinematics(walker.data)  # type: ignore[arg-type]
-    found = [grip for arm in range(len(walker.arms)) for grip in _of_arm(kinematics, walker, arm, structure, path)]
+    size, found = max(ROWS // len(path), 1), list[tuple[int, int, int, int, int, int, Array]]()
+    for arm in range(len(walker.arms)):
+        frames = path.poses @ walker.arms[arm].base.homogeneous
+        holds = np.array(only[arm : arm + 1], dtype=np.int64) if only else _near(kinematics, structure, frames)
+        for begin in range(0, len(holds), size):
+            found += _of_arm(kinematics, arm, frames, structure, holds[begin : begin + size], path.spacing)
+            yield None
+    found.sort(key=lambda row: (row[0], row[2], row[1], row[3]))
     columns = list(zip(*found, strict=True)) if found else [()] * 7
     postures = np.concatenate(columns[6]) if found else np.zeros((0, 6))
     lengths = np.array([len(rows) for rows in columns[6]], dtype=int)
     offset = np.concatenate([[0], np.cumsum(lengths)[:-1]]) if found else np.zeros(0)
     whole = [np.array(column, dtype=np.int64) for column in columns[:6]]
-    arm, hold, branch, first, last, ends = whole
-    return Grips(arm, hold, branch, first, last, offset.astype(np.int64), postures, ends)
+    arms, rows, branch, first, last, ends = whole
+    return Grips(arms, rows, branch, first, last, offset.astype(np.int64), postures, ends)
+
+
+def _near(kinematics: ArmKinematics, structure: Structure, frames: Array) -> Ints:
+    """Rows of the holds that an arm may reach from some of its base's frames."""
+    far = _length(kinematics) + LOOSE
+    # From the neck, where the arm begins to move
+    necks = frames[:, :3, 3] + frames[:, :3, 2] * kinematics.data.neck_length
+    # Samples that are LOOSE apart stand for those between them
+    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(necks, axis=0), axis=1))])
+    some = np.unique(np.searchsorted(way, np.arange(0.0, way[-1] + LOOSE, LOOSE), side="right") - 1)
+    square = ((structure.positions[None] - necks[some, None]) ** 2).sum(axis=2).min(axis=0)
+    return np.nonzero(square < far**2)[0]
+
+
+def _length(kinematics: ArmKinematics) -> float:
+    data = kinematics.data
+    return data.shoulder_offset + data.upper_arm_length + data.forearm_length + data.hand_length
 
 
 def _of_arm(
-    kinematics: ArmKinematics, walker: Walker, arm: int, structure: Structure, path: BodyPath
+    kinematics: ArmKinematics, arm: int, frames: Array, structure: Structure, among: Ints, spacing: float
 ) -> Iterator[tuple[int, int, int, int, int, int, Array]]:
-    """(arm, hold, branch, first, last, reason of the end, postures) of every grip of an arm."""
-    base = walker.arms[arm].base.homogeneous
-    frames = path.poses @ base
-    data = kinematics.data
-    far = data.shoulder_offset + data.upper_arm_length + data.forearm_length + data.hand_length
-    offset = structure.positions[None] - frames[:, None, :3, 3]
-    # From the neck, where the arm begins to move
-    neck = frames[:, None, :3, 2] * data.neck_length
-    samples, holds = np.nonzero(((offset - neck) ** 2).sum(axis=2) < far**2)
+    """(arm, hold, branch, first, last, reason of the end, postures) of every grip of an arm on some holds."""
+    offset = structure.positions[among][None] - frames[:, None, :3, 3]
+    neck = frames[:, None, :3, 2] * kinematics.data.neck_length
+    samples, holds = np.nonzero(((offset - neck) ** 2).sum(axis=2) < _length(kinematics) ** 2)
     turn = frames[samples, :3, :3]
     points = np.einsum("nji,nj->ni", turn, offset[samples, holds])
+    holds = among[holds]
     axes = np.einsum("nji,nj->ni", turn, structure.axes[holds])
     axes /= np.linalg.norm(axes, axis=1)[:, None]
     reach = kinematics.wrist_reach(kinematics.wrist_of(points, axes))
@@ -115,13 +151,13 @@ def _of_arm(
     neighbours = (holds[1:] == holds[:-1]) & (samples[1:] == samples[:-1] + 1)
     for branch in range(postures.shape[1]):
         q, fits = postures[:, branch], good[:, branch]
-        used = np.abs(q[1:] - q[:-1])[:, :5] / path.spacing / limit[:5]
+        used = np.abs(q[1:] - q[:-1])[:, :5] / spacing / limit[:5]
         joined = neighbours & fits[1:] & fits[:-1] & (used <= 1.0).all(axis=1)
         begins = np.nonzero(np.concatenate([[True], ~joined]))[0]
         for begin, end in zip(begins, np.concatenate([begins[1:], [len(q)]]) - 1, strict=True):
             if not fits[begin] or end - begin + 1 < SHORTEST:
                 continue
-            reason = _reason(samples, holds, margins[:, branch], used, neighbours, end, len(path))
+            reason = _reason(samples, holds, margins[:, branch], used, neighbours, end, len(frames))
             first, last = int(samples[begin]), int(samples[end])
             yield arm, int(holds[begin]), branch, first, last, reason, q[begin : end + 1]
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 import os
 import pathlib
-from dataclasses import asdict, dataclass, field
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 from wbc.errors import StructureFileError, WbcError
@@ -74,6 +75,22 @@ class Plan:
     def delay(self) -> float:
         """By which the body is late at the end [s]."""
         return sum(step.delay for step in self.regrasps)
+
+    def cut(self, arms: Sequence[str], count: int, reached: float) -> Plan:
+        """The plan up to its first ``count`` re-grasps and a path time [s], with the rest still to be planned.
+
+        Args:
+            arms: names in the order of :attr:`start`.
+        """
+        steps = self.regrasps[:count]
+        used = [sum(step.arm == arm for step in steps) for arm in arms]
+        chain = tuple(grips[: k + 1] for grips, k in zip(self.chain, used, strict=True))
+        return replace(self, regrasps=steps, complete=False, reached=reached, reason="being planned", chain=chain)
+
+    def then(self, rest: Plan) -> Plan:
+        """This plan, and another one over the same grips that begins with the stance that this one ends with."""
+        chain = tuple((*one, *other[1:]) for one, other in zip(self.chain, rest.chain, strict=True))
+        return replace(rest, start=self.start, regrasps=(*self.regrasps, *rest.regrasps), chain=chain)
 
     def rows(self) -> list[dict[str, Any]]:
         """One dictionary a re-grasp, as in the file."""

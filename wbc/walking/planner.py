@@ -15,8 +15,9 @@ from wbc.robots import Walker
 from wbc.validation import Array
 from wbc.walking.body_path import BodyPath
 from wbc.walking.detours import detours
-from wbc.walking.grips import Grips, find_grips
+from wbc.walking.grips import Grips, grip_slices
 from wbc.walking.plan import NoPlanError, Plan, Regrasp
+from wbc.walking.slices import Slices, drained
 from wbc.walking.stance_search import Found, StanceSearch
 from wbc.walking.structure import Structure
 
@@ -24,6 +25,7 @@ Objective = Literal["velocity", "destination"]
 
 #: Holds that hands begin on, postures that they have, and holds that they must not begin on, by arm
 Beginning = tuple[Mapping[str, str], Mapping[str, Array], Mapping[str, Collection[str]]]
+NOTHING: Beginning = ({}, {}, {})
 #: Delays of one swing that velocity mode allows one after the other [s]
 DELAYS = (0.0, 0.25, 0.5, 1.0, 2.0, float("inf"))
 #: Grips of an arm that a start may have, and stances that a search begins with
@@ -67,17 +69,18 @@ def plan_walk(
         UnknownNameError: another arm, hold or objective. ShapeError: a walker that is no body with PUMA arms.
         NoPlanError: there is no way, with where it ends, holds and limits.
     """
-    validation.one_of("objective", objective, ("velocity", "destination"))
-    if walker.robot.name == "two_ended_arm":
-        raise ShapeError("walker", walker.robot.name, "expected a body with arms")
-    deadline = None if time_budget is None else time.perf_counter() + time_budget
     beginning = start or {}, postures or {}, avoid or {}
-    plan = _best(walker, structure, path, beginning, objective, width, deadline)
+    deadline = None if time_budget is None else time.perf_counter() + time_budget
+    plan = drained(plan_slices(walker, structure, path, beginning, objective=objective, width=width, deadline=deadline))
     if not plan.complete and detour:
         for other in detours():
             if deadline is not None and time.perf_counter() > deadline:
                 break
-            changed = _best(walker, structure, other.along(path), beginning, "destination", width, deadline)
+            way = other.along(path)
+            asked = plan_slices(
+                walker, structure, way, beginning, objective="destination", width=width, deadline=deadline
+            )
+            changed = drained(asked)
             if changed.complete:
                 return changed
     if not plan.complete and not partial:
@@ -85,24 +88,42 @@ def plan_walk(
     return plan
 
 
-def _best(
+def plan_slices(
     walker: Walker,
     structure: Structure,
     path: BodyPath,
-    beginning: Beginning,
-    objective: Objective,
-    width: int | None,
-    deadline: float | None,
-) -> Plan:
-    """The best plan along one path, complete or not."""
-    grips = find_grips(walker, structure, path)
+    beginning: Beginning = NOTHING,
+    *,
+    objective: Objective = "velocity",
+    width: int | None = 16,
+    deadline: float | None = None,
+    grips: Grips | None = None,
+    stance: tuple[int, ...] | None = None,
+    sample: int = 0,
+) -> Slices[Plan]:
+    """The best plan along one path, complete or not, in slices of some milliseconds of work; the same every time.
+
+    Args:
+        beginning: start, postures and avoid of :func:`plan_walk`. deadline: of ``time.perf_counter``.
+        grips: of the path, if they are known. stance: grips that hold at the sample, instead of a beginning.
+        sample: of the path, from which on hands may be lifted.
+
+    Raises:
+        as :func:`plan_walk`, where no stance is possible at the beginning.
+    """
+    validation.one_of("objective", objective, ("velocity", "destination"))
+    if walker.robot.name == "two_ended_arm":
+        raise ShapeError("walker", walker.robot.name, "expected a body with arms")
+    if grips is None:
+        grips = yield from grip_slices(walker, structure, path)
     best: tuple[StanceSearch, Found] | None = None
     delays = DELAYS if objective == "velocity" else DELAYS[-1:]
     widths = (None,) if width is None else (width, WIDER * width)
     for delay, wide in product(delays, widths):
         search = StanceSearch(walker, structure, path, grips, longest_delay=delay, width=wide)
-        starts = _starts(walker, structure, search, grips, beginning)
-        found = search.run(starts, deadline=deadline)
+        starts = [stance] if stance else stances(walker, structure, search, beginning, sample)
+        yield None
+        found = yield from search.slices(starts, sample, deadline)
         if best is None or (found.complete, found.reached) > (best[1].complete, best[1].reached):
             best = search, found
         if found.complete or (deadline is not None and time.perf_counter() > deadline):
@@ -111,15 +132,15 @@ def _best(
     return _plan(walker, structure, path, grips, best[1])
 
 
-def _starts(
-    walker: Walker,
-    structure: Structure,
-    search: StanceSearch,
-    grips: Grips,
-    beginning: Beginning,
+def stances(
+    walker: Walker, structure: Structure, search: StanceSearch, beginning: Beginning, sample: int = 0
 ) -> list[tuple[int, ...]]:
-    """Stances to begin with, those that last longest first."""
-    start, postures, avoid = beginning
+    """Grips, one an arm, that hold from the beginning of the path to beyond a sample, those that last longest first.
+
+    Raises:
+        UnknownNameError: another arm or hold. NoPlanError: there are none.
+    """
+    (start, postures, avoid), grips = beginning, search.grips
     names = [arm.name for arm in walker.arms]
     for name in (*start, *postures, *avoid):
         validation.one_of("start", name, names)
@@ -144,7 +165,7 @@ def _starts(
     for stance in product(*choices):
         if len({int(grips.hold[g]) for g in stance}) == len(stance):
             until = search.until(stance, 0)
-            if until > 0:
+            if until > sample:
                 stances.append((-until, stance))
     if not stances:
         raise NoPlanError(

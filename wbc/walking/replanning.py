@@ -1,8 +1,8 @@
-"""A new plan on the way: from the hands that hold, and with free hands where they can be brought to."""
+"""Plans that are made while the walk goes on, slice by slice: a first one to begin with, the rest between ticks."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Generator, Mapping
 
 import numpy as np
 
@@ -10,33 +10,150 @@ from wbc.robots import Walker
 from wbc.validation import Array
 from wbc.walking.body_path import BodyPath
 from wbc.walking.closed_chain import ClosedChain
-from wbc.walking.plan import Plan
-from wbc.walking.planner import plan_walk
+from wbc.walking.grips import Grips, grip_slices
+from wbc.walking.plan import NoPlanError, Plan
+from wbc.walking.planner import Beginning, Objective, plan_slices, stances
+from wbc.walking.stance_search import StanceSearch
 from wbc.walking.structure import Structure
 from wbc.walking.swing_curve import between
 from wbc.walking.swing_law import SwingLaw
 from wbc.walking.swings import FINE
 
+#: Yields None or, first, a plan to begin with; returns the whole one
+PlanSlices = Generator[Plan | None, None, Plan]
+#: Path time that the body may go before the plan of its hands is made [s]; it takes RAMP / 2 to stop
+HEAD = 0.75
+#: A new plan begins with a body that stands for so many samples
+STANDING = 10
+#: How far the body goes back to where a hand may be lifted [m]
+BACK = (0.0, 0.05, 0.1, 0.2, 0.4)
 
-def plan_from_here(
-    walker: Walker, structure: Structure, path: BodyPath, held: Mapping[int, int], q: Array, chain: ClosedChain
-) -> Plan:
-    """A plan along a path that begins where the body stands.
+
+def plan_from_stance(
+    walker: Walker,
+    structure: Structure,
+    path: BodyPath,
+    start: Mapping[str, str],
+    *,
+    postures: Mapping[str, Array] | None = None,
+    objective: Objective = "velocity",
+) -> PlanSlices:
+    """A plan for a body that stands at the beginning of a path, all its hands on holds.
+
+    The first plan that is yielded, after some milliseconds, moves no hand: the body may go :data:`HEAD` seconds of path
+    time as far as its hands reach. From there on hands are moved in the plan that is returned.
 
     Args:
-        held: row of the arm -> row of the hold, of hands that hold. q: configuration. chain: where the hands are.
+        start, postures: as of :func:`wbc.walking.planner.plan_walk`; ``start`` has every arm.
+
+    Raises:
+        as ``plan_walk``, also where the way does not lead to the end.
+    """
+    beginning: Beginning = start, postures or {}, {}
+    rows = [structure.index(start[arm.name]) for arm in walker.arms]
+    grips = yield from grip_slices(walker, structure, path, rows)
+    search = StanceSearch(walker, structure, path, grips)
+    stance = stances(walker, structure, search, beginning)[0]
+    # The plan that follows keeps the branches
+    here = {arm.name: grips.posture_at(grip, 0) for arm, grip in zip(walker.arms, stance, strict=True)}
+    beginning = start, here, {}
+    yield None
+    until = search.until(stance, 0)
+    # The plan needs a stance that goes on behind it
+    head = min(round(HEAD / path.spacing), max(until - 1, 0))
+    yield _standing(path, grips, tuple(start[arm.name] for arm in walker.arms), stance, head)
+    plan = yield from plan_slices(walker, structure, path, beginning, objective=objective, sample=head)
+    return _complete(structure, plan)
+
+
+def plan_rest(
+    walker: Walker, structure: Structure, plan: Plan, kept: int, here: float, objective: Objective = "velocity"
+) -> PlanSlices:
+    """A plan along the same path that keeps the first re-grasps and makes the others anew.
+
+    The first plan that is yielded has the kept ones alone.
+
+    Args:
+        plan: whose grips know which holds are gone. kept: so many re-grasps. here: path time of the body [s].
 
     Raises:
         NoPlanError: there is none.
     """
+    grips, path = plan.grips, plan.path
+    assert grips is not None
+    landed = round(plan.regrasps[kept - 1].land / path.spacing) if kept else 0
+    names = [arm.name for arm in walker.arms]
+    stance = tuple(grips[-1] for grips in plan.cut(names, kept, 0.0).chain)
+    search, soonest = StanceSearch(walker, structure, path, grips), max(landed, round((here + HEAD) / path.spacing))
+    # The plan needs a stance that goes on behind it
+    sample = max(min(soonest, search.until(stance, landed) - 1), landed)
+    begun = plan.cut(names, kept, sample * path.spacing)
+    yield begun
+    rest = yield from plan_slices(
+        walker, structure, path, objective=objective, grips=grips, stance=stance, sample=sample
+    )
+    return begun.then(_complete(structure, rest))
+
+
+def plan_from_here(
+    walker: Walker,
+    structure: Structure,
+    path: BodyPath,
+    held: Mapping[int, int],
+    q: Array,
+    chain: ClosedChain,
+    behind: Array,
+) -> PlanSlices:
+    """A plan along a path that begins where the body stands. If there is none, the body goes back first where it came
+    from, up to :data:`BACK`: a hand at the edge of its reach cannot be lifted.
+
+    Args:
+        held: row of the arm -> row of the hold, of hands that hold. q: configuration. chain: where the hands are.
+        behind: poses that the body had, the last ones first ``[n, 4, 4]``.
+
+    Raises:
+        NoPlanError: there is none.
+    """
+    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(behind[:, :3, 3], axis=0), axis=1))])
+    here = np.repeat(path.poses[:1], STANDING, axis=0)
+    refused: NoPlanError | None = None
+    for back in BACK:
+        if back > way[-1]:
+            break
+        there = behind[: int(np.searchsorted(way, back))]
+        poses = np.concatenate([here, there, there[::-1], path.poses])
+        sample = 0 if not len(there) else STANDING + len(there)
+        try:
+            other = BodyPath(poses, path.spacing)
+            plan = yield from _from_here(walker, structure, other, held, q, chain, sample)
+            return plan
+        except NoPlanError as error:
+            refused = refused or error
+    assert refused is not None
+    raise refused
+
+
+def _from_here(
+    walker: Walker,
+    structure: Structure,
+    path: BodyPath,
+    held: Mapping[int, int],
+    q: Array,
+    chain: ClosedChain,
+    sample: int,
+) -> PlanSlices:
+    """Along one path, with free hands where they can be brought to."""
     arms, avoid = walker.arms, dict[str, set[str]]()
     start = {arms[arm].name: structure.ids[hold] for arm, hold in held.items()}
     postures = {arms[arm].name: q[arms[arm].q] for arm in held}
+    free = [arm for arm in range(len(arms)) if arm not in held]
+    grips = yield from grip_slices(walker, structure, path)
     while True:
-        asked = {"start": start, "postures": postures, "avoid": avoid}
-        plan = plan_walk(walker, structure, path, objective="destination", **asked)  # type: ignore[arg-type]
-        free = [arm for arm in range(len(arms)) if arm not in held]
-        far = [arm for arm in free if not way_to(walker, structure, plan, arm, chain).possible]
+        beginning: Beginning = start, postures, avoid
+        plan = yield from plan_slices(
+            walker, structure, path, beginning, objective="destination", grips=grips, sample=sample
+        )
+        far = [arm for arm in free if not way_to(walker, structure, _complete(structure, plan), arm, chain).possible]
         if not far:
             return plan
         for arm in far:
@@ -48,3 +165,15 @@ def way_to(walker: Walker, structure: Structure, plan: Plan, arm: int, chain: Cl
     height = walker.data.lift_height  # type: ignore[union-attr]
     way = between(chain.origins[arm], chain.axes[arm], structure, structure.index(plan.start[arm]), height)
     return SwingLaw(walker, arm, plan.path, way, np.zeros(FINE), 1.0)
+
+
+def _standing(path: BodyPath, grips: Grips, start: tuple[str, ...], stance: tuple[int, ...], sample: int) -> Plan:
+    """A plan without re-grasps up to a sample."""
+    reached = sample * path.spacing
+    return Plan(path, start, (), False, reached, "being planned", grips, tuple((grip,) for grip in stance))
+
+
+def _complete(structure: Structure, plan: Plan) -> Plan:
+    if not plan.complete:
+        raise NoPlanError("plan", structure.name, plan.reason)
+    return plan

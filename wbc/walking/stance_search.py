@@ -27,6 +27,7 @@ from wbc.robots import Walker
 from wbc.walking.arm_clearance import ArmClearance
 from wbc.walking.body_path import BodyPath
 from wbc.walking.grips import Grips, Ints
+from wbc.walking.slices import Slices, drained
 from wbc.walking.structure import Structure
 from wbc.walking.swings import Swings
 
@@ -36,6 +37,8 @@ Key = tuple[int, ...]
 INSIDE, HOVER, BENT = 3, 0.75, 0.08
 #: Ways to one stance that are looked at, and stances that are checked together, in widths
 WAYS, PARTS = 2, 2
+#: Stances, and moves or pairs of grips, of one slice of the search
+NODES, MOVES = 4, 32
 #: Delays are counted in steps of this [s], so that rounding decides nothing
 QUANTUM = 1e-6
 
@@ -124,6 +127,10 @@ class StanceSearch:
         Args:
             deadline: of ``time.perf_counter``; after it the best of what is known is returned.
         """
+        return drained(self.slices(starts, sample, deadline))
+
+    def slices(self, starts: Sequence[Sequence[int]], sample: int = 0, deadline: float | None = None) -> Slices[Found]:
+        """As :meth:`run`, in slices of at most :data:`NODES` stances looked at or :data:`MOVES` checked."""
         level: dict[Key, Node] = {tuple(int(g) for g in start): Node(sample, 0, None, None) for start in starts}
         levels = [level]
         while True:
@@ -134,16 +141,18 @@ class StanceSearch:
                 return self._result(levels, min(done)[1], True)
             if deadline is not None and time.perf_counter() > deadline:
                 break
-            level = self._next(level)
+            level = yield from self._next(level)
             if not level:
                 break
             levels.append(level)
         return self._result(levels, None, False)
 
-    def _next(self, level: dict[Key, Node]) -> dict[Key, Node]:
+    def _next(self, level: dict[Key, Node]) -> Slices[dict[Key, Node]]:
         """Stances with one more re-grasp; the promising ones first, until there are enough."""
         candidates: dict[Key, list[Node]] = {}
         for key, node in level.items():
+            if self.expanded % NODES == 0:
+                yield None
             self.expanded += 1
             for target, move in self._moves(key, node):
                 child = tuple(target if k == move.arm else g for k, g in enumerate(key))
@@ -156,7 +165,7 @@ class StanceSearch:
         size = PARTS * self.width if self.width else max(len(order), 1)
         for begin in range(0, len(order), size):
             part = order[begin : begin + size]
-            self._prepare(part)
+            yield from self._prepare(part)
             for key, nodes in part:
                 checked = [better for node in nodes if (better := self._checked(level, key, node)) is not None]
                 if checked:
@@ -166,11 +175,16 @@ class StanceSearch:
         best = sorted(kept.items(), key=lambda item: self._worth(*item))
         return dict(best[: self.width])
 
-    def _prepare(self, part: Sequence[tuple[Key, list[Node]]]) -> None:
+    def _prepare(self, part: Sequence[tuple[Key, list[Node]]]) -> Slices[None]:
         """What the check of some stances needs, computed together."""
         moves = [node.move for _, nodes in part for node in nodes if node.move is not None]
-        self.swings.prepare(moves)
-        self.clearance.prepare(pair for key, _ in part for pair in combinations(key, 2))
+        pairs = [pair for key, _ in part for pair in combinations(key, 2)]
+        for begin in range(0, len(moves), MOVES):
+            self.swings.prepare(moves[begin : begin + MOVES])
+            yield None
+        for begin in range(0, len(pairs), MOVES):
+            self.clearance.prepare(pairs[begin : begin + MOVES])
+            yield None
 
     def _moves(self, key: Key, node: Node) -> Iterator[tuple[int, Move]]:
         """Moves that estimates allow: (target, move)."""

@@ -1,0 +1,202 @@
+"""What the hands of a walk do: lift, swing, close, hold, or wait in the air."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+from math import sqrt
+
+import numpy as np
+import pinocchio as pin
+
+from wbc.errors import ShapeError
+from wbc.robots import Walker, WalkerData
+from wbc.validation import Array
+from wbc.walking.closed_chain import ClosedChain
+from wbc.walking.plan import HoldLost, Plan
+from wbc.walking.replanning import way_to
+from wbc.walking.stance_search import Move
+from wbc.walking.structure import Structure
+from wbc.walking.swing_law import SwingLaw
+from wbc.walking.swings import Swings
+from wbc.walking.walk_hands import BEHIND, HAND_RAMP, LANDING, LIFTING, TURNED, at_rest, hand_pace
+from wbc.walking.walk_stack import WalkStack
+from wbc.walking.walk_state import Event, Hand, Swinging, What
+
+#: A hold that could not be grasped so many times is taken as vanished
+TRIES = 3
+
+
+class Hands:
+    """The hands of a walking body: which hold, which one is on its way, and their part of the stack.
+
+    Attributes:
+        plan: the one that is carried out now; path times count from its beginning.
+        held: row of the arm -> row of the hold. swinging: the hand on its way. events: what happened so far.
+    """
+
+    def __init__(
+        self,
+        walker: Walker,
+        structure: Structure,
+        plan: Plan,
+        stack: WalkStack,
+        grasps: Callable[[str, str], bool] | None,
+    ) -> None:
+        if plan.grips is None or not isinstance(walker.data, WalkerData):
+            raise ShapeError("plan", plan, "expected a plan of the planner for a body with arms")
+        self.walker, self.structure, self.data, self.stack, self.dt = walker, structure, walker.data, stack, stack.dt
+        self.stack.structure = structure
+        self.chain = ClosedChain(walker, structure)
+        self.grasps = grasps or (lambda _arm, _hold: True)
+        self.time, self.path_time, self.pace = 0.0, 0.0, 0.0
+        self.events: list[Event] = []
+        self.swinging: Swinging | None = None
+        self.v = np.zeros(walker.robot.nv)
+        self._changing = False
+        self._follow(plan)
+        self.held = {arm: int(self.grips.hold[grip]) for arm, grip in enumerate(self._grip)}
+        self.q = self._start()
+        for arm, hold in self.held.items():
+            self.stack.hold(arm, hold)
+
+    def vanish(self, ids: Iterable[str]) -> None:
+        """Holds are gone."""
+        raise NotImplementedError
+
+    def _follow(self, plan: Plan) -> None:
+        """Take a plan from its beginning."""
+        self._next, self._used, self.path_time = 0, [0] * len(self.walker.arms), 0.0
+        self._grip = [chain[0] for chain in plan.chain]
+        self._go_on(plan)
+
+    def _go_on(self, plan: Plan) -> None:
+        """Take a plan that is what was done so far, and more; its grips may be numbered anew."""
+        if plan.grips is None:
+            raise ShapeError("plan", plan, "expected a plan of the planner")
+        self.plan, self.grips = plan, plan.grips
+        self.swings = Swings(self.walker, self.structure, plan.path, plan.grips)
+        for arm, chain in enumerate(plan.chain):
+            if self.swinging is None or self.swinging.arm != arm:
+                self._grip[arm] = chain[self._used[arm]]
+            else:
+                self.swinging.grip = chain[self._used[arm]]
+
+    def _start(self) -> Array:
+        """The first configuration: the body where the path begins, the arms on their grips."""
+        q = np.array(self.walker.robot.neutral)
+        first = pin.SE3(self.plan.path.poses[0])
+        q[:3], q[3:7] = first.translation, pin.Quaternion(first.rotation).coeffs()
+        for arm, grip in enumerate(self._grip):
+            q[self.walker.arms[arm].q] = self.grips.posture(np.array(grip), np.array(0))
+        return self.chain.settle(q, self.held)[0]
+
+    def _lift(self) -> None:
+        """Send a free hand to its hold, or open that of the next re-grasp when the body is where the plan lifts it."""
+        if self.swinging is not None or self._changing:
+            return
+        free = [arm for arm in range(len(self.walker.arms)) if arm not in self.held]
+        if free:
+            self._bring(free[0])
+            return
+        if self._next >= len(self.plan.regrasps) or self.path_time < self.plan.regrasps[self._next].lift - 1e-9:
+            return
+        if len(self.held) <= self.walker.min_holds:
+            raise HoldLost("hands", len(self.held), f"more than {self.walker.min_holds} must hold before one is lifted")
+        step = self.plan.regrasps[self._next]
+        arm = [a.name for a in self.walker.arms].index(step.arm)
+        self._used[arm] += 1
+        source, target = self.plan.chain[arm][self._used[arm] - 1 : self._used[arm] + 1]
+        lift, land = (round(x / self.plan.path.spacing) for x in (step.lift, step.land))
+        move = Move(arm, source, target, lift, land, step.duration, step.delay)
+        self._open(arm)
+        law = SwingLaw.of(self.swings, move, step.duration)
+        self.swinging = Swinging(arm, int(self.grips.hold[target]), target, law, self.data.latch_time)
+        self._say("lift", step.arm, step.source)
+
+    def _bring(self, arm: int) -> None:
+        """A hand that is in the air goes to where the plan begins, while the body stands still."""
+        hold = int(self.grips.hold[self._grip[arm]])
+        law = way_to(self.walker, self.structure, self.plan, arm, self.chain)
+        self.swinging = Swinging(arm, hold, self._grip[arm], law, 0.0, counted=False, state="open")
+
+    def _aim(self, swinging: Swinging) -> None:
+        """Move the aim of the hand on, as fast as the hand follows, and tell the stack."""
+        arm, pace = swinging.arm, 0.0
+        place = self.chain.origins[arm]
+        swinging.place, swinging.axis = place, self.chain.axes[arm]
+        target = self.grips.posture_at(swinging.grip, round(self.path_time / self.plan.path.spacing))
+        # On the wrong side of theta5 = 0 the wrist cannot align the hand: it turns to its branch before the hand lands
+        (_, _, _, fourth, fifth, _), off = self.q[self.walker.arms[arm].q].tolist(), target.tolist()
+        turned = abs(fourth - off[3]) < TURNED and abs(fifth - off[4]) < TURNED
+        if swinging.state == "opening":
+            swinging.latch -= self.dt
+            if swinging.latch <= 1e-9:
+                swinging.state = "open"
+        elif swinging.state == "open":
+            begins = float(self.grips.first[swinging.grip]) * self.plan.path.spacing
+            wanted = hand_pace(swinging, place, turned, begins - self.path_time, self.pace)
+            change = self.dt / HAND_RAMP
+            pace = swinging.pace + min(max(wanted - swinging.pace, -change), change)
+            swinging.clock = min(swinging.clock + pace * self.dt, swinging.law.duration)
+        swinging.pace = pace
+        aim = swinging.aim = swinging.law.at(swinging.clock)
+        gap = aim.position - place
+        far = sqrt(gap.dot(gap))
+        if far > BEHIND:
+            # A hand that cannot follow must not pull at the body: its aim waits within reach of it
+            aim = replace(aim, position=place + gap * (BEHIND / far))
+        near = (aim.part < LIFTING and swinging.counted) or (aim.part > LANDING and turned)
+        self.stack.swing(arm, aim, pace, target, near)
+
+    def _land(self, swinging: Swinging) -> None:
+        """Close a hand that has come to rest on its hold; it holds when the latch is through."""
+        arm, hold, data = swinging.arm, swinging.hold, self.data
+        if swinging.state == "open" and swinging.clock >= swinging.law.duration - 1e-9:
+            hand = self.chain.origins[arm], self.chain.axes[arm]
+            if at_rest(swinging, hand, (self.structure.positions[hold], self.structure.axes[hold]), data, self.dt):
+                swinging.state, swinging.latch = "closing", data.latch_time
+        elif swinging.state == "closing":
+            swinging.latch -= self.dt
+            if swinging.latch <= 1e-9:
+                self._grasp(swinging)
+
+    def _grasp(self, swinging: Swinging) -> None:
+        """The latch is through: the hand holds, or it has missed and tries again."""
+        arm, names = swinging.arm, (self.walker.arms[swinging.arm].name, self.structure.ids[swinging.hold])
+        if not self.grasps(*names):
+            swinging.tries += 1
+            swinging.state = "open"
+            self._say("failed", *names)
+            if swinging.tries >= TRIES:
+                self.vanish([names[1]])
+            return
+        self.held[arm], self._grip[arm] = swinging.hold, swinging.grip
+        self.stack.hold(arm, swinging.hold)
+        self.swinging = None
+        self._next += int(swinging.counted)
+        self._say("land", *names)
+
+    def _open(self, arm: int) -> None:
+        del self.held[arm]
+        self.stack.release(arm)
+        self._stay(arm)
+
+    def _stay(self, arm: int) -> None:
+        """A hand in the air waits where it is."""
+        self.stack.rest(arm, self.chain.origins[arm], self.chain.axes[arm])
+
+    def _say(self, what: What, arm: str, hold: str) -> None:
+        self.events.append(Event(self.time, what, arm, hold, self.path_time))
+
+    def _hands(self) -> tuple[Hand, ...]:
+        out: list[Hand] = ["closed" if arm in self.held else "open" for arm in range(len(self.walker.arms))]
+        if self.swinging is not None:
+            out[self.swinging.arm] = self.swinging.state
+        return tuple(out)
+
+    def _holds(self) -> tuple[int, ...]:
+        out = [self.held.get(arm, -1) for arm in range(len(self.walker.arms))]
+        if self.swinging is not None:
+            out[self.swinging.arm] = self.swinging.hold
+        return tuple(out)
