@@ -7,10 +7,12 @@ import pytest
 
 from wbc.errors import UnknownNameError
 from wbc.robots import Walker
-from wbc.walking import Structure
+from wbc.walking import Structure, remove_rows
 from wbc.walking.body_path import BodyPath, grid_path
-from wbc.walking.plan import HoldLost
+from wbc.walking.plan import HoldLost, NoPlanError
 from wbc.walking.planner import plan_walk
+from wbc.walking.replanning import HEAD, plan_from_stance
+from wbc.walking.slices import drained
 from wbc.walking.walk import Tick, Walk
 from wbc.walking.walk_stack import WalkStack
 
@@ -94,6 +96,64 @@ def test_turning_back(walk: Walk) -> None:
     walk.go(back)
     finish(walk)
     assert np.linalg.norm(walk.q[:3] - back.poses[-1][:3, 3]) < 0.002
+
+
+def test_what_a_vanished_hold_does_not_change_is_kept(walk: Walk) -> None:
+    to_first(walk, "lift", 0.3)
+    before, walked = walk.plan, walk.path_time
+    walk.vanish([before.regrasps[1].target])
+    while walk.path_time < walked + 0.3:
+        assert walk.tick().path_time > walked  # the body goes on
+    finish(walk)
+    assert walk.plan.regrasps[0] == before.regrasps[0]
+    assert before.regrasps[1].target not in [event.hold for event in walk.events if event.what == "land"]
+    assert [event.what for event in walk.events if event.what in ("vanished", "replanned")] == ["vanished", "replanned"]
+
+
+def test_holds_that_no_plan_needs_may_vanish(walk: Walk) -> None:
+    to_first(walk, "lift")
+    rows = walk.plan.rows()
+    walk.vanish(["13,1", "20,20"])
+    finish(walk)
+    assert walk.plan.rows() == rows
+    assert "replanned" not in [event.what for event in walk.events]
+
+
+def test_turning_back_with_a_hand_at_the_edge_of_its_reach(walk: Walk) -> None:
+    # One of the hands is too far ahead to be lifted: the body goes towards it first
+    while walk.time < 1.0:
+        walk.tick()
+    start = 9 + 4 * walk.path_time / 9.25
+    walk.go(grid_path([(13, start), (13, 8)], 4 * INCH))
+    finish(walk)
+    assert walk.q[2] == pytest.approx(-8 * 9.25 * INCH, abs=0.002)
+
+
+def test_a_walk_begins_before_its_plan_is_made(machine: Walker, structure: Structure, stack: WalkStack) -> None:
+    path = grid_path([(13, 9), (13, 13)], 4 * INCH)
+    whole = plan_walk(machine, structure, path)
+    start = dict(zip([arm.name for arm in machine.arms], whole.start, strict=True))
+    walk = Walk(machine, structure, plan_from_stance(machine, structure, path, start), stack=stack)
+    assert not walk.plan.complete
+    assert walk.plan.regrasps == ()
+    while not walk.plan.complete:
+        walk.tick()
+        assert walk.path_time <= HEAD + 1e-9
+    assert walk.path_time > 0.0
+    finish(walk)
+    assert path.duration / (walk.time - 0.5) >= 0.98
+    assert len(walk.plan.regrasps) <= len(whole.regrasps)
+    again = drained(plan_from_stance(machine, structure, path, start))
+    assert again.rows() == walk.plan.rows()
+
+
+def test_slices_find_out_too_that_there_is_no_plan(machine: Walker, structure: Structure, stack: WalkStack) -> None:
+    gap = remove_rows(structure, "10-23")
+    path = grid_path([(13, 7), (13, 12)], 4 * INCH)
+    whole = plan_walk(machine, gap, path, partial=True, objective="destination")
+    start = dict(zip([arm.name for arm in machine.arms], whole.start, strict=True))
+    with pytest.raises(NoPlanError, match="no hand can be moved in time after"):
+        drained(plan_from_stance(machine, gap, path, start, objective="destination"))
 
 
 def test_a_path_goes_on_where_the_body_stands(walk: Walk) -> None:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Mapping
+from collections.abc import Generator, Iterator, Mapping
+from itertools import product
 
 import numpy as np
 
 from wbc.robots import Walker
 from wbc.validation import Array
-from wbc.walking.body_path import BodyPath
+from wbc.walking.body_path import BodyPath, straight_path
 from wbc.walking.closed_chain import ClosedChain
 from wbc.walking.grips import Grips, grip_slices
 from wbc.walking.plan import NoPlanError, Plan
@@ -26,7 +27,9 @@ HEAD = 0.75
 #: A new plan begins with a body that stands for so many samples
 STANDING = 10
 #: How far the body goes back to where a hand may be lifted [m]
-BACK = (0.0, 0.05, 0.1, 0.2, 0.4)
+BACK = (0.05, 0.1, 0.2, 0.4)
+#: How far it goes towards a hold instead, at the height that it has [m], and how fast [m/s]
+TOWARDS, ASIDE = (0.15, 0.3), 0.05
 
 
 def plan_from_stance(
@@ -104,8 +107,9 @@ def plan_from_here(
     chain: ClosedChain,
     behind: Array,
 ) -> PlanSlices:
-    """A plan along a path that begins where the body stands. If there is none, the body goes back first where it came
-    from, up to :data:`BACK`: a hand at the edge of its reach cannot be lifted.
+    """A plan along a path that begins where the body stands. If there is none, the body first goes back where it came
+    from, by :data:`BACK`, or towards one of its holds, by :data:`TOWARDS`, and returns: a hand at the edge of its reach
+    cannot be lifted there.
 
     Args:
         held: row of the arm -> row of the hold, of hands that hold. q: configuration. chain: where the hands are.
@@ -114,23 +118,33 @@ def plan_from_here(
     Raises:
         NoPlanError: there is none.
     """
-    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(behind[:, :3, 3], axis=0), axis=1))])
     here = np.repeat(path.poses[:1], STANDING, axis=0)
     refused: NoPlanError | None = None
-    for back in BACK:
-        if back > way[-1]:
-            break
-        there = behind[: int(np.searchsorted(way, back))]
-        poses = np.concatenate([here, there, there[::-1], path.poses])
-        sample = 0 if not len(there) else STANDING + len(there)
+    for there in _asides(path.poses[0], behind, structure.positions[list(held.values())]):
+        other = BodyPath(np.concatenate([here, there, there[::-1], path.poses]), path.spacing)
+        sample = STANDING + len(there) if len(there) else 0
         try:
-            other = BodyPath(poses, path.spacing)
             plan = yield from _from_here(walker, structure, other, held, q, chain, sample)
             return plan
         except NoPlanError as error:
             refused = refused or error
     assert refused is not None
     raise refused
+
+
+def _asides(pose: Array, behind: Array, holds: Array) -> Iterator[Array]:
+    """Where the body may go first, poses ``[n, 4, 4]``; nowhere to begin with."""
+    yield behind[:0]
+    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(behind[:, :3, 3], axis=0), axis=1))])
+    for back in BACK:
+        if back < way[-1]:
+            yield behind[: int(np.searchsorted(way, back)) + 1]
+    for far, hold in product(TOWARDS, holds):
+        offset = hold - pose[:3, 3]
+        offset -= pose[:3, 2] * (pose[:3, 2] @ offset)
+        end = pose.copy()
+        end[:3, 3] += far * offset / max(float(np.linalg.norm(offset)), 1e-9)
+        yield straight_path([pose, end], ASIDE).poses
 
 
 def _from_here(
@@ -150,10 +164,9 @@ def _from_here(
     grips = yield from grip_slices(walker, structure, path)
     while True:
         beginning: Beginning = start, postures, avoid
-        plan = yield from plan_slices(
-            walker, structure, path, beginning, objective="destination", grips=grips, sample=sample
-        )
-        far = [arm for arm in free if not way_to(walker, structure, _complete(structure, plan), arm, chain).possible]
+        asked = plan_slices(walker, structure, path, beginning, objective="destination", grips=grips, sample=sample)
+        plan = _complete(structure, (yield from asked))
+        far = [arm for arm in free if not way_to(walker, structure, plan, arm, chain).possible]
         if not far:
             return plan
         for arm in far:

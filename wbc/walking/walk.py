@@ -31,6 +31,8 @@ ARRIVED = 0.002
 PATIENCE, SLACK = 4.0, 20.0
 #: Speed on the way to another path [m/s]
 JOINING = 0.05
+#: Poses behind the body that are kept, for going back
+TRAIL = 400
 #: Slices of planning between two ticks
 SLICES = 2
 
@@ -72,6 +74,7 @@ class Walk(Hands):
         stack = stack or WalkStack(walker, structure, dt, collisions=collisions, backend=backend)
         super().__init__(walker, structure, plan, stack, grasps)
         self._wanted: BodyPath | None = None
+        self._trail = np.zeros((0, 4, 4))
         self._quick = True
 
     @property
@@ -196,6 +199,7 @@ class Walk(Hands):
         if plan.path is self.plan.path:
             self._go_on(plan)
         else:
+            self._trail = self._behind()
             self._follow(plan)
         self._wanted, self._changing = None, False
 
@@ -213,9 +217,14 @@ class Walk(Hands):
             names = [arm.name for arm in self.walker.arms]
             start = {names[arm]: self.structure.ids[hold] for arm, hold in self.held.items()}
             postures = {arm.name: self.q[arm.q] for arm in self.walker.arms}
-            return plan_from_stance(self.walker, self.structure, way, start, postures=postures, objective="destination")
-        behind = np.concatenate([pose.homogeneous[None], path.poses[place::-1]])
-        return plan_from_here(self.walker, self.structure, way, self.held, self.q, self.chain, behind)
+            return plan_from_stance(self.walker, self.structure, way, start, postures=postures)
+        return plan_from_here(self.walker, self.structure, way, self.held, self.q, self.chain, self._behind())
+
+    def _behind(self) -> Array:
+        """Poses that the body had, the last one first ``[n, 4, 4]``."""
+        path, u = self.plan.path, self.path_time
+        here = path.at(u)[0].homogeneous[None]
+        return np.concatenate([here, path.poses[: int(u / path.spacing) + 1][::-1], self._trail])[:TRAIL]
 
     def _advance(self) -> tuple[pin.SE3, Array]:
         """Move the body's command on: as fast as asked, as slow as the grips of the holding hands need."""
