@@ -19,14 +19,15 @@ from bench.pool import ROOT
 from bench.records import measure
 from bench.report import goal_sheet
 from bench.walk.courses import COURSES, Machine, courses, highest, machine, spins, trenches
+from bench.walk.planning import planning
 from bench.walk.tables import Parts, Record, goals, sheets
 from wbc.errors import RangeError
 from wbc.robots import WalkerData
 from wbc.robots.walker_data import WALKER_DIGEST
 
 #: Parts of a run, and how many records each has
-PARTS = {"courses": 3 * len(COURSES), "spins": 2, "trenches": 9, "highest": len(COURSES)}
-QUICK = ("courses", "spins")
+PARTS = {"courses": 3 * len(COURSES), "spins": 2, "trenches": 9, "highest": len(COURSES), "planning": 3 * len(COURSES)}
+QUICK = ("courses", "spins", "planning")
 
 NOTES = """\
 A walk is planned (velocity mode; destination mode with detours for trenches) and carried out at 100 Hz by the \
@@ -74,7 +75,8 @@ def main(given: list[str] | None = None) -> None:
 
 def of(name: str, it: Machine) -> Iterator[Record]:
     """The records of a part, as they are measured."""
-    return {"courses": courses, "spins": spins, "trenches": trenches, "highest": highest}[name](it)
+    parts = {"courses": courses, "spins": spins, "trenches": trenches, "highest": highest, "planning": planning}
+    return parts[name](it)
 
 
 def write(folder: Path, parts: Parts, lines: list[str]) -> None:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from bench.goals import Goal
 from bench.sheet import Sheet
 
@@ -15,7 +17,13 @@ WALK = ("arrived", "part of the speed", "re-grasps", "body, mm", "slip, mm", "ti
 
 def sheets(parts: Parts) -> list[Sheet]:
     """A table a part."""
-    makers = {"courses": _courses, "highest": _highest, "spins": _spins, "trenches": _trenches}
+    makers = {
+        "courses": _courses,
+        "highest": _highest,
+        "spins": _spins,
+        "trenches": _trenches,
+        "planning": _planning,
+    }
     return [make(parts[name]) for name, make in makers.items() if parts.get(name)]
 
 
@@ -40,6 +48,25 @@ def goals(parts: Parts) -> list[Goal]:
     if trenches := parts.get("trenches"):
         wanted = [r for r in trenches if r["trench"] in ("4 rows", "5 rows")]
         out.append(Goal("trenches of 4 and 5 rows that are not crossed", sum(not r["arrived"] for r in wanted), 0, ""))
+    if planned := [r for r in parts.get("planning", ()) if r["arrived"]]:
+        firsts = [first for r in planned for first in r["first_ms"]]
+        fastest = [r for r in planned if r["speed"] == max(r["speed"] for r in planned)]
+        out += [
+            Goal("first command of a new plan, median", float(np.median(firsts)), 50.0, "ms"),
+            Goal("first command of a new plan, 99 %", float(np.percentile(firsts, 99)), 50.0, "ms"),
+            Goal("longest time of a tick while planning", max(r["longest_ms"] for r in planned), 50.0, "ms"),
+            Goal("99 % of ticks when all is planned", max(r["tick_p99_ms"] for r in planned), 2.0, "ms"),
+            Goal(
+                "re-grasps more than in the whole plan", sum(max(r["regrasps"] - r["whole"], 0) for r in planned), 0, ""
+            ),
+            Goal("courses on which 0.98 of the speed is not kept", sum(r["kept"] < 0.98 for r in planned), 0, ""),
+            Goal(
+                f"one over real time at {fastest[0]['speed']:g} in/s, with planner and log",
+                max(1 / r["real_time"] for r in fastest),
+                0.05,
+                "",
+            ),
+        ]
     return out
 
 
@@ -61,6 +88,46 @@ def _spins(records: list[Record]) -> Sheet:
 def _trenches(records: list[Record]) -> Sheet:
     rows = [(r["trench"], *_walk(r)) for r in records]
     return Sheet("Trenches at 1 in/s; the body may go lower and turn", ("", *WALK), rows)
+
+
+def _planning(records: list[Record]) -> Sheet:
+    columns = (
+        "",
+        "arrived",
+        "first command, ms",
+        "99 %",
+        "planned after, s",
+        "ticks while planning, 99 %, ms",
+        "longest",
+        "over 50 ms",
+        "ticks after, 99 %, ms",
+        "re-grasps",
+        "whole plan's",
+        "part of the speed",
+        "real time",
+    )
+    return Sheet("Plans in slices: a standing body is told to walk", columns, [_planned(r) for r in records])
+
+
+def _planned(r: Record) -> tuple[str, ...]:
+    name = f"{r['course']} at {r['speed']:g} in/s"
+    if "first_ms" not in r:
+        return (name, f"no: {r['reason']}", *["-"] * 11)
+    return (
+        name,
+        "yes" if r["arrived"] else f"no: {r['reason']}",
+        f"{np.median(r['first_ms']):.1f}",
+        f"{np.percentile(r['first_ms'], 99):.1f}",
+        f"{r['planned_s']:.2f}",
+        f"{r['planning_p99_ms']:.1f}",
+        f"{r['longest_ms']:.1f}",
+        str(r["stalls"]),
+        f"{r['tick_p99_ms']:.2f}",
+        str(r["regrasps"]),
+        str(r["whole"]),
+        f"{r['kept']:.3f}",
+        f"{r['real_time']:.1f}",
+    )
 
 
 def _walk(r: Record) -> tuple[str, ...]:
