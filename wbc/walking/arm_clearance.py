@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Iterable
+from itertools import groupby
 
 import numpy as np
+from numpy.typing import NDArray
 
 from wbc.robots import Walker
 from wbc.validation import Array
@@ -54,7 +57,7 @@ class ArmClearance:
         radii = np.array([neck, upper, fore, hand])
         self._least = radii[self._one] + radii[self._other] + walker.data.clearance + ROOM  # type: ignore[union-attr]
         self._points: dict[int, Array] = {}
-        self._conflicts: dict[tuple[int, int], Ints] = {}
+        self._conflicts: dict[tuple[int, int], list[int]] = {}
 
     def prepare(self, pairs: Iterable[tuple[int, int]]) -> None:
         """Look at pairs of grips together."""
@@ -62,14 +65,15 @@ class ArmClearance:
         spans = [self._common(*pair) for pair in todo]
         sizes = np.array([len(span) for span in spans], dtype=int)
         if not sizes.sum():
-            self._conflicts.update(dict.fromkeys(todo, np.zeros(0, dtype=np.int64)))
+            self._conflicts.update({pair: [] for pair in todo})
             return
         kept = [k for k in range(len(todo)) if sizes[k]]
+        self._fill({grip for k in kept for grip in todo[k]})
         sides = [np.concatenate([self._of(todo[k][side], spans[k]) for k in kept]) for side in (0, 1)]
-        near = np.split(self.between(*sides) < 0.0, np.cumsum(sizes[kept])[:-1])
-        self._conflicts.update(dict.fromkeys(todo, np.zeros(0, dtype=np.int64)))
+        near = np.split(self.near(*sides), np.cumsum(sizes[kept])[:-1])
+        self._conflicts.update({pair: [] for pair in todo})
         for k, flags in zip(kept, near, strict=True):
-            self._conflicts[todo[k]] = spans[k][flags]
+            self._conflicts[todo[k]] = spans[k][flags].tolist()
 
     def first_conflict(self, one: int, other: int, sample: int) -> int:
         """The first sample from ``sample`` on at which the arms are too near, NEVER if there is none."""
@@ -77,8 +81,8 @@ class ArmClearance:
         if pair not in self._conflicts:
             self.prepare([pair])
         found = self._conflicts[pair]
-        place = int(np.searchsorted(found, sample - EVERY + 1))
-        return int(found[place]) if place < len(found) else NEVER
+        place = bisect_left(found, sample - EVERY + 1)
+        return found[place] if place < len(found) else NEVER
 
     def points(self, arm: int, postures: Array) -> Array:
         """Named points of an arm in the body's frame, ``[..., 6, 3]``."""
@@ -93,6 +97,36 @@ class ArmClearance:
         out: Array = (segment_distances(a, b, c, d) - self._least).min(axis=1)
         return out
 
+    def near(self, one: Array, other: Array) -> NDArray[np.bool_]:
+        """Whether two arms given by their points are nearer than radii and clearance allow: ``[m]``."""
+        a, b = one[:, self._from], one[:, self._to]
+        c, d = other[:, self._from], other[:, self._to]
+        # Capsules whose middles are far apart need no closer look
+        halves = [0.5 * np.sqrt(((q - p) ** 2).sum(axis=2)) for p, q in ((a, b), (c, d))]
+        gap = (0.5 * (a + b))[:, self._one] - (0.5 * (c + d))[:, self._other]
+        reach = halves[0][:, self._one] + halves[1][:, self._other] + self._least
+        row, pair = np.nonzero((gap * gap).sum(axis=2) < reach * reach)
+        i, j = np.array(self._one)[pair], np.array(self._other)[pair]
+        close = segment_distances(a[row, i], b[row, i], c[row, j], d[row, j]) < self._least[pair]
+        out = np.zeros(len(one), dtype=np.bool_)
+        out[row[close]] = True
+        return out
+
+    def _fill(self, wanted: set[int]) -> None:
+        """Points of grips at samples that are multiples of EVERY, computed together."""
+        grips = self._grips
+        todo = sorted(wanted - self._points.keys(), key=lambda g: (int(grips.arm[g]), g))
+        for arm, mine in groupby(todo, key=lambda g: int(grips.arm[g])):
+            those = list(mine)
+            rows = []
+            for grip in those:
+                first, last, offset = (int(x[grip]) for x in (grips.first, grips.last, grips.offset))
+                start = -(-first // EVERY) * EVERY
+                rows.append(grips.postures[offset + start - first : offset + last - first + 1 : EVERY])
+            points = self.points(arm, np.concatenate(rows))
+            parts = np.split(points, np.cumsum([len(part) for part in rows])[:-1])
+            self._points.update(zip(those, parts, strict=True))
+
     def _common(self, one: int, other: int) -> Ints:
         """Samples, multiples of EVERY, that two grips share."""
         grips = self._grips
@@ -102,11 +136,7 @@ class ArmClearance:
 
     def _of(self, grip: int, samples: Ints) -> Array:
         """Points of a grip at samples that are multiples of EVERY."""
-        grips = self._grips
-        start = -(-int(grips.first[grip]) // EVERY)
-        if grip not in self._points:
-            every = np.arange(start * EVERY, grips.last[grip] + 1, EVERY)
-            self._points[grip] = self.points(int(grips.arm[grip]), grips.posture(np.array(grip), every))
+        start = -(-int(self._grips.first[grip]) // EVERY)
         out: Array = self._points[grip][samples // EVERY - start]
         return out
 

@@ -57,7 +57,8 @@ class Grips:
 
     def posture(self, grip: Ints, sample: Ints) -> Array:
         """Postures at samples, clipped to the grip, ``[..., 6]``."""
-        inside = np.clip(sample - self.first[grip], 0, self.last[grip] - self.first[grip])
+        first = self.first[grip]
+        inside = np.minimum(np.maximum(sample - first, 0), self.last[grip] - first)
         out: Array = self.postures[self.offset[grip] + inside]
         return out
 
