@@ -68,6 +68,24 @@ class Grips:
         out: Array = self.postures[int(self.offset[grip]) + min(max(sample, first), int(self.last[grip])) - first]
         return out
 
+    def wrist_at(self, grip: int, sample: float) -> tuple[float, float]:
+        """Joints 4 and 5 of one grip at a fractional sample, by straight lines, clipped to the grip [rad]."""
+        length = int(self.last[grip]) - int(self.first[grip])
+        inside = min(max(sample - int(self.first[grip]), 0.0), float(length))
+        low = min(int(inside), length - 1)
+        row, part = int(self.offset[grip]) + low, inside - low
+        (a, b), (c, d) = self.postures[row : row + 2, 3:5].tolist()
+        return a + part * (c - a), b + part * (d - b)
+
+    def between(self, grip: Ints, samples: Array) -> Array:
+        """Postures at fractional samples, by straight lines, clipped to the grip, ``[..., 6]``."""
+        inside = np.clip(samples - self.first[grip], 0.0, self.last[grip] - self.first[grip])
+        low = np.minimum(inside.astype(np.int64), np.maximum(self.last[grip] - self.first[grip] - 1, 0))
+        row = self.offset[grip] + low
+        first = self.postures[row]
+        out: Array = first + (inside - low)[..., None] * (self.postures[row + 1] - first)
+        return out
+
     def of_arm(self, arm: int) -> Ints:
         """Grips of an arm, on holds that are there."""
         return np.nonzero((self.arm == arm) & (self.hold >= 0))[0]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import replace
 from math import sqrt
 
 import numpy as np
@@ -19,7 +18,7 @@ from wbc.walking.stance_search import Move
 from wbc.walking.structure import Structure
 from wbc.walking.swing_law import SwingLaw
 from wbc.walking.swings import Swings
-from wbc.walking.walk_hands import BEHIND, HAND_RAMP, LANDING, LIFTING, TURNED, at_rest, hand_pace
+from wbc.walking.walk_hands import BEHIND, HAND_RAMP, LANDING, TURNED, at_rest, hand_pace
 from wbc.walking.walk_stack import WalkStack
 from wbc.walking.walk_state import Event, Hand, Swinging, What
 
@@ -81,6 +80,7 @@ class Hands:
                 self._grip[arm] = chain[self._used[arm]]
             else:
                 self.swinging.grip = chain[self._used[arm]]
+                self._grip[arm] = chain[self._used[arm] - int(self.swinging.counted)]
 
     def _start(self) -> Array:
         """The first configuration: the body where the path begins, the arms on their grips."""
@@ -108,27 +108,30 @@ class Hands:
         self._used[arm] += 1
         source, target = self.plan.chain[arm][self._used[arm] - 1 : self._used[arm] + 1]
         lift, land = (round(x / self.plan.path.spacing) for x in (step.lift, step.land))
-        move = Move(arm, source, target, lift, land, step.duration, step.delay)
+        move = Move(arm, source, target, lift, land, step.duration, step.delay, step.way)
         self._open(arm)
-        law = SwingLaw.of(self.swings, move, step.duration)
+        law = SwingLaw.of(self.swings, move)
         self.swinging = Swinging(arm, int(self.grips.hold[target]), target, law, self.data.latch_time)
+        self.swinging.bend = self._bend(self.swinging, 0.0)
         self._say("lift", step.arm, step.source)
 
     def _bring(self, arm: int) -> None:
         """A hand that is in the air goes to where the plan begins, while the body stands still."""
         hold = int(self.grips.hold[self._grip[arm]])
-        law = way_to(self.walker, self.structure, self.plan, arm, self.chain)
-        self.swinging = Swinging(arm, hold, self._grip[arm], law, 0.0, counted=False, state="open")
+        _, _, _, fourth, fifth, _ = self.q[self.walker.arms[arm].q].tolist()
+        law = way_to(self.walker, self.structure, self.plan, arm, self.chain, self.q)
+        self.swinging = Swinging(arm, hold, self._grip[arm], law, 0.0, False, state="open", wrist=(fourth, fifth))
+        self.swinging.bend = fourth, fifth
 
     def _aim(self, swinging: Swinging) -> None:
         """Move the aim of the hand on, as fast as the hand follows, and tell the stack."""
-        arm, pace = swinging.arm, 0.0
+        arm = swinging.arm
         place = self.chain.origins[arm]
         swinging.place, swinging.axis = place, self.chain.axes[arm]
-        target = self.grips.posture_at(swinging.grip, round(self.path_time / self.plan.path.spacing))
+        now, wrist = swinging.aim, swinging.bend
         # On the wrong side of theta5 = 0 the wrist cannot align the hand: it turns to its branch before the hand lands
-        (_, _, _, fourth, fifth, _), off = self.q[self.walker.arms[arm].q].tolist(), target.tolist()
-        turned = abs(fourth - off[3]) < TURNED and abs(fifth - off[4]) < TURNED
+        _, _, _, fourth, fifth, _ = self.q[self.walker.arms[arm].q].tolist()
+        turned = abs(fourth - wrist[0]) < TURNED and abs(fifth - wrist[1]) < TURNED
         if swinging.state == "opening":
             swinging.latch -= self.dt
             if swinging.latch <= 1e-9:
@@ -137,17 +140,32 @@ class Hands:
             begins = float(self.grips.first[swinging.grip]) * self.plan.path.spacing
             wanted = hand_pace(swinging, place, turned, begins - self.path_time, self.pace)
             change = self.dt / HAND_RAMP
-            pace = swinging.pace + min(max(wanted - swinging.pace, -change), change)
-            swinging.clock = min(swinging.clock + pace * self.dt, swinging.law.duration)
-        swinging.pace = pace
+            swinging.pace += min(max(wanted - swinging.pace, -change), change)
+            swinging.clock = min(swinging.clock + swinging.pace * self.dt, swinging.law.duration)
         aim = swinging.aim = swinging.law.at(swinging.clock)
-        gap = aim.position - place
+        bend = swinging.bend = self._bend(swinging, aim.blend)
+        # From where the hand is to be as the tick begins to where it is to be as it ends
+        speed = (aim.position - now.position) / self.dt
+        turning = (bend[0] - wrist[0]) / self.dt, (bend[1] - wrist[1]) / self.dt
+        gap = now.position - place
         far = sqrt(gap.dot(gap))
-        if far > BEHIND:
-            # A hand that cannot follow must not pull at the body: its aim waits within reach of it
-            aim = replace(aim, position=place + gap * (BEHIND / far))
-        near = (aim.part < LIFTING and swinging.counted) or (aim.part > LANDING and turned)
-        self.stack.swing(arm, aim, pace, target, near)
+        # A hand that cannot follow must not pull at the body: its aim waits within reach of it
+        target = now.position if far <= BEHIND else place + gap * (BEHIND / far)
+        near = aim.blend > LANDING and turned
+        self.stack.swing(arm, (target, speed), (wrist, turning), self.structure.axes[swinging.hold] if near else None)
+
+    def _bend(self, swinging: Swinging, blend: float) -> tuple[float, float]:
+        """Joints 4 and 5 of a swinging arm at a part of their way, where the body is now."""
+        sample = self.path_time / self.plan.path.spacing
+        first = swinging.wrist or self.grips.wrist_at(self._grip[swinging.arm], sample)
+        last = self.grips.wrist_at(swinging.grip, sample)
+        return first[0] + blend * (last[0] - first[0]), first[1] + blend * (last[1] - first[1])
+
+    def _leaving(self) -> int:
+        """The arm that is lifted next, if it can be: its grip is no end for the body. -1 for none."""
+        if self._changing or self.swinging is not None or self._next >= len(self.plan.regrasps):
+            return -1
+        return [arm.name for arm in self.walker.arms].index(self.plan.regrasps[self._next].arm)
 
     def _land(self, swinging: Swinging) -> None:
         """Close a hand that has come to rest on its hold; it holds when the latch is through."""

@@ -35,6 +35,7 @@ class Regrasp:
         margin: path time that the source could still have held at the lift [s].
         limit: what ends the grip on the target.
         until: path time until which the target can be held [s].
+        way: of the hand, see :data:`wbc.walking.swing_curve.WAYS`.
     """
 
     arm: str
@@ -48,6 +49,7 @@ class Regrasp:
     margin: float
     limit: str
     until: float
+    way: int = 0
 
 
 @dataclass(frozen=True, eq=False)

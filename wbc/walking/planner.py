@@ -192,6 +192,7 @@ def _plan(walker: Walker, structure: Structure, path: BodyPath, grips: Grips, fo
                 round(float(grips.last[move.source] - move.lift) * spacing, 9),
                 grips.reasons[grips.ends[move.target]],
                 round(float(grips.last[move.target]) * spacing, 9),
+                move.way,
             )
         )
     reason = ""

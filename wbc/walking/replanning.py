@@ -7,7 +7,8 @@ from itertools import product
 
 import numpy as np
 
-from wbc.robots import Walker
+from wbc.errors import ShapeError
+from wbc.robots import Walker, WalkerData
 from wbc.validation import Array
 from wbc.walking.body_path import BodyPath, straight_path
 from wbc.walking.closed_chain import ClosedChain
@@ -16,8 +17,9 @@ from wbc.walking.plan import NoPlanError, Plan
 from wbc.walking.planner import Beginning, Objective, plan_slices, stances
 from wbc.walking.stance_search import StanceSearch
 from wbc.walking.structure import Structure
-from wbc.walking.swing_curve import between
+from wbc.walking.swing_curve import Pivots, between
 from wbc.walking.swing_law import SwingLaw
+from wbc.walking.swing_path import blend
 from wbc.walking.swings import FINE
 
 #: Yields None or, first, a plan to begin with; returns the whole one
@@ -166,18 +168,26 @@ def _from_here(
         beginning: Beginning = start, postures, avoid
         asked = plan_slices(walker, structure, path, beginning, objective="destination", grips=grips, sample=sample)
         plan = _complete(structure, (yield from asked))
-        far = [arm for arm in free if not way_to(walker, structure, plan, arm, chain).possible]
+        far = [arm for arm in free if not way_to(walker, structure, plan, arm, chain, q).possible]
         if not far:
             return plan
         for arm in far:
             avoid.setdefault(arms[arm].name, set()).add(plan.start[arm])
 
 
-def way_to(walker: Walker, structure: Structure, plan: Plan, arm: int, chain: ClosedChain) -> SwingLaw:
+def way_to(walker: Walker, structure: Structure, plan: Plan, arm: int, chain: ClosedChain, q: Array) -> SwingLaw:
     """From where a free hand is to where the plan has it at the beginning; the body stands there."""
-    height = walker.data.lift_height  # type: ignore[union-attr]
-    way = between(chain.origins[arm], chain.axes[arm], structure, structure.index(plan.start[arm]), height)
-    return SwingLaw(walker, arm, plan.path, way, np.zeros(FINE), 1.0)
+    grips, data = plan.grips, walker.data
+    if grips is None or not isinstance(data, WalkerData):
+        raise ShapeError("plan", plan, "expected a plan of the planner for a body with arms")
+    grip, mine = plan.chain[arm][0], q[walker.arms[arm].q]
+    turn = grips.posture_at(grip, 0)[:1] - mine[:1]
+    pivots = Pivots((plan.path.poses[0] @ walker.arms[arm].base.homogeneous)[None], turn)
+    hold = structure.index(plan.start[arm])
+    way = between(chain.origins[arm], chain.axes[arm], structure, hold, pivots, data)
+    first, last = np.array(mine[3:5]), np.array(grips.wrist_at(grip, 0.0))
+    bent = first + blend(np.linspace(0.0, 1.0, FINE))[None, :, None] * (last - first)
+    return SwingLaw(walker, arm, plan.path, way, np.zeros(FINE), lambda _: bent, 1.0)
 
 
 def _standing(path: BodyPath, grips: Grips, start: tuple[str, ...], stance: tuple[int, ...], sample: int) -> Plan:

@@ -29,7 +29,7 @@ from wbc.walking.body_path import BodyPath
 from wbc.walking.grips import Grips, Ints
 from wbc.walking.slices import Slices, drained
 from wbc.walking.structure import Structure
-from wbc.walking.swings import Swings
+from wbc.walking.swings import Swing, Swings
 
 Key = tuple[int, ...]
 
@@ -52,6 +52,7 @@ class Move:
         lift, land: samples.
         duration: of the swing, latches and settling included [s].
         delay: by which the body is late after it, because it had to slow down [s].
+        way: of the hand, see :data:`wbc.walking.swing_curve.WAYS`.
     """
 
     arm: int
@@ -61,6 +62,7 @@ class Move:
     land: int
     duration: float
     delay: float
+    way: int = 0
 
 
 @dataclass(frozen=True)
@@ -113,8 +115,8 @@ class StanceSearch:
         width: int | None = 200,
     ) -> None:
         self.walker, self.path, self.grips = walker, path, grips
-        self.swings = Swings(walker, structure, path, grips)
         self.clearance = ArmClearance(walker, grips)
+        self.swings = Swings(walker, structure, path, grips, self.clearance)
         self.longest_delay, self.width = longest_delay, width
         self.expanded = 0
         # The end of the path is no limit of the arm
@@ -165,7 +167,7 @@ class StanceSearch:
         size = PARTS * self.width if self.width else max(len(order), 1)
         for begin in range(0, len(order), size):
             part = order[begin : begin + size]
-            yield from self._prepare(part)
+            yield from self._prepare(level, part)
             for key, nodes in part:
                 checked = [better for node in nodes if (better := self._checked(level, key, node)) is not None]
                 if checked:
@@ -175,16 +177,27 @@ class StanceSearch:
         best = sorted(kept.items(), key=lambda item: self._worth(*item))
         return dict(best[: self.width])
 
-    def _prepare(self, part: Sequence[tuple[Key, list[Node]]]) -> Slices[None]:
+    def _prepare(self, level: dict[Key, Node], part: Sequence[tuple[Key, list[Node]]]) -> Slices[None]:
         """What the check of some stances needs, computed together."""
-        moves = [node.move for _, nodes in part for node in nodes if node.move is not None]
         pairs = [pair for key, _ in part for pair in combinations(key, 2)]
-        for begin in range(0, len(moves), MOVES):
-            self.swings.prepare(moves[begin : begin + MOVES])
-            yield None
         for begin in range(0, len(pairs), MOVES):
             self.clearance.prepare(pairs[begin : begin + MOVES])
             yield None
+        found = [self._swing(level, key, node) for key, nodes in part for node in nodes]
+        swings = [swing for swing in found if swing is not None]
+        for begin in range(0, len(swings), MOVES):
+            self.swings.prepare(swings[begin : begin + MOVES])
+            yield None
+
+    def _swing(self, level: dict[Key, Node], key: Key, node: Node) -> Swing | None:
+        """The swing that leads to a stance; None where the arms are in each other's way when it lands."""
+        move, parent = node.move, node.parent
+        if move is None or parent is None:
+            return None
+        others = tuple(g for k, g in enumerate(key) if k != move.arm)
+        if min(self._conflict(move.target, g, move.land) for g in others) <= move.land:
+            return None
+        return Swing(move.arm, move.source, move.target, move.lift, self._room(others, level[parent].sample), others)
 
     def _moves(self, key: Key, node: Node) -> Iterator[tuple[int, Move]]:
         """Moves that estimates allow: (target, move)."""
@@ -225,14 +238,11 @@ class StanceSearch:
         move, parent = node.move, node.parent
         if move is None or parent is None:
             return node
-        duration = self.swings.duration(move)
-        if duration is None:
+        before, swing = level[parent], self._swing(level, key, node)
+        chosen = None if swing is None else self.swings.choose(swing)
+        if swing is None or chosen is None:
             return None
-        before = level[parent]
-        others = [g for k, g in enumerate(key) if k != move.arm]
-        if min(self._conflict(move.target, g, move.land) for g in others) <= move.land:
-            return None
-        room = self._room(others, before.sample)
+        duration, room = chosen.duration, swing.room
         land = max(move.lift + int(np.ceil(duration / self.path.spacing)), move.land if not move.delay else 0)
         late = max(land - room, 0) * self.path.spacing
         land = min(land, room)
@@ -241,7 +251,7 @@ class StanceSearch:
             return None
         if not self._bent(np.array([move.target]), np.array([land]))[0]:
             return None
-        better = Move(move.arm, move.source, move.target, move.lift, land, duration, late)
+        better = Move(move.arm, move.source, move.target, move.lift, land, duration, late, chosen.way)
         return Node(land, before.delay + round(late / QUANTUM), parent, better)
 
     def _bent(self, targets: Ints, samples: Ints) -> NDArray[np.bool_]:

@@ -1,30 +1,57 @@
-"""The way of a swinging hand: off its hold along the normal, across, and onto the next hold along its normal."""
+"""The way of a swinging hand: straight off its hold along the normal, across, and straight onto the next hold."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from wbc.robots import WalkerData
 from wbc.validation import Array
 from wbc.walking.grips import Ints
 from wbc.walking.structure import Structure
 
-#: Between these parts of the curve the hand turns from one normal to the other
-TURN_FROM, TURN_TO = 0.2, 0.8
+#: Parts of the curve, at its beginning and its end, in which the hand does not go across
+UPRIGHT = 0.1
+#: The rise is h (1 - (1 - 2x)^STEEP)
+STEEP = 4
+#: How far a hand may be across its hold [m] where it comes out of the distance at which it may be near the structure,
+#: and what it then has besides the clearance [m]
+ACROSS, SPARE = 0.0015, 0.0025
+#: Points at which the room above the structure is measured
+LOOKS = 9
+#: Ways that are tried, the first that is clear is taken: how much higher in the middle [m], and what part of the arc
+WAYS = ((0.0, 1.0), (0.0, 0.6), (0.0, 0.2), (0.1, 1.0), (0.1, 0.4), (0.0, 1.4))
+
+
+@dataclass(frozen=True, eq=False)
+class Pivots:
+    """Axes that m hands go round: those of the first joints of their arms, where the bodies are in the swings.
+
+    Attributes:
+        frames: of the arms' bases in the structure's frame ``[m, 4, 4]``. turn: about by how much joint 1 turns ``[m]``
+            [rad].
+    """
+
+    frames: Array
+    turn: Array
 
 
 @dataclass(frozen=True, eq=False)
 class Curves:
-    """m cubic Bezier curves in the structure's frame, over x in [0, 1]:
+    """m curves in the structure's frame, over x in [0, 1]:
 
-        p(x) = (1-x)^3 a + 3 (1-x)^2 x (a - c z_a) + 3 (1-x) x^2 (b - c z_b) + x^3 b
+        p = way(y) + (r ((1 - y) h_a + y h_b) + 4 y (1 - y) l) u
+        r = 1 - (1 - 2 x)^4,     u = -(1 - y) z_a - y z_b,     y = step((x - c) / (1 - 2 c))
 
-    from hold a to hold b with approach directions z_a and z_b: it leaves and arrives along them. Its middle is 3 c / 4
-    above the chord.
+    y, a fifth-degree step, is 0 over the first c of the curve and 1 over the last, so that the hand leaves and arrives
+    along the normals. way(y) is the part w of the way from the chord a b to an arc round the axis of the arm's first
+    joint, on which distance and angle change evenly: there joint 1 turns evenly, and the hand comes no nearer to it.
 
     Attributes:
-        begin, end: ``[m, 3]`` [m]. leave, arrive: approach directions there ``[m, 3]``. rise: c ``[m]`` [m].
+        begin, end: a and b ``[m, 3]`` [m]. leave, arrive: approach directions z_a and z_b ``[m, 3]``.
+        rise: h_a and h_b ``[m, 2]`` [m]. lift: l ``[m]`` [m].
+        pivots: the axes. part: w.
     """
 
     begin: Array
@@ -32,56 +59,89 @@ class Curves:
     leave: Array
     arrive: Array
     rise: Array
+    lift: Array
+    pivots: Pivots
+    part: float
 
-    def at(self, x: Array) -> tuple[Array, Array]:
-        """Positions and dp/dx at ``x`` ``[n]``: ``[m, n, 3]`` each."""
-        s = x[None, :, None]
-        a, d = self.begin[:, None], self.end[:, None]
-        b, c = a - (self.rise[:, None] * self.leave)[:, None], d - (self.rise[:, None] * self.arrive)[:, None]
-        r = 1.0 - s
-        place = r**3 * a + 3 * r * r * s * b + 3 * r * s * s * c + s**3 * d
-        return place, 3 * (r * r * (b - a) + 2 * r * s * (c - b) + s * s * (d - c))
+    def at(self, x: Array) -> Array:
+        """Positions at ``x`` ``[n]``: ``[m, n, 3]``."""
+        y = step((x - UPRIGHT) / (1 - 2 * UPRIGHT))
+        r = 1.0 - (1.0 - 2.0 * x) ** STEEP
+        height = r * (self.rise[:, :1] * (1.0 - y) + self.rise[:, 1:] * y) + 4.0 * y * (1.0 - y) * self.lift[:, None]
+        s = y[None, :, None]
+        up = self.leave[:, None] * (s - 1.0) - self.arrive[:, None] * s
+        chord = self.begin[:, None] * (1.0 - s) + self.end[:, None] * s
+        out: Array = chord + self.part * (self._arc(y) - chord) + height[..., None] * up
+        return out
 
-    def axes(self, x: Array) -> tuple[Array, Array]:
-        """Wanted z axes of the hand, and their derivatives along x, ``[m, n, 3]`` each.
+    def _arc(self, y: Array) -> Array:
+        """Positions on the arcs ``[m, n, 3]``."""
+        turn, origin = self.pivots.frames[:, :3, :3], self.pivots.frames[:, :3, 3]
+        first, last = (np.einsum("mji,mj->mi", turn, p - origin) for p in (self.begin, self.end))
+        angle = np.arctan2(first[:, 1], first[:, 0])
+        # The way round that joint 1 turns
+        change = np.arctan2(last[:, 1], last[:, 0]) - angle
+        change += 2 * np.pi * np.round((self.pivots.turn - change) / (2 * np.pi))
+        far = np.hypot(first[:, 0], first[:, 1]), np.hypot(last[:, 0], last[:, 1])
+        at = angle[:, None] + change[:, None] * y
+        distance = far[0][:, None] * (1.0 - y) + far[1][:, None] * y
+        height = first[:, 2:] * (1.0 - y) + last[:, 2:] * y
+        points = np.stack([distance * np.cos(at), distance * np.sin(at), height], axis=-1)
+        out: Array = np.einsum("mij,mnj->mni", turn, points) + origin[:, None]
+        return out
 
-        They keep to the normals at both ends and turn between them, with a smooth fifth-degree step.
-        """
-        part = np.clip((x - TURN_FROM) / (TURN_TO - TURN_FROM), 0.0, 1.0)
-        step = (part**3 * (10 - 15 * part + 6 * part**2))[None, :, None]
-        rate = (30 * part**2 * (1 - part) ** 2 / (TURN_TO - TURN_FROM))[None, :, None]
-        change = (self.arrive - self.leave)[:, None]
-        line = self.leave[:, None] + step * change
-        length = np.linalg.norm(line, axis=2, keepdims=True)
-        # Opposite normals meet at 0 in the middle: any axis will do there
-        axis = np.where(length > 1e-9, line / np.maximum(length, 1e-9), self.leave[:, None])
-        across = rate * change
-        along = (axis * across).sum(axis=2, keepdims=True)
-        return axis, (across - along * axis) / np.maximum(length, 1e-9)
+
+def step(part: Array) -> Array:
+    """From 0 to 1 with two derivatives 0 at both ends: s^3 (10 - 15 s + 6 s^2), s clipped to [0, 1]."""
+    s = np.clip(part, 0.0, 1.0)
+    out: Array = s**3 * (10.0 - 15.0 * s + 6.0 * s * s)
+    return out
 
 
-def curves(structure: Structure, begin: Ints, end: Ints, height: float, free: float) -> Curves:
-    """Curves between holds, given by rows of the structure.
-
-    They are ``height`` [m] above what lies between where the hand is farther than ``free`` [m] from both holds.
+def crossing_height(data: WalkerData) -> float:
+    """How high above the structure a hand is to cross [m]: its radius and the clearance, and not under the published
+    height.
     """
+    return max(data.lift_height, data.hand_radius + data.clearance) + SPARE
+
+
+def curves(structure: Structure, begin: Ints, end: Ints, pivots: Pivots, data: WalkerData, way: int = 0) -> Curves:
+    """Curves between holds, given by rows of the structure; ``way`` is one of :data:`WAYS`."""
+    more, part = WAYS[way]
     a, b = structure.positions[begin], structure.positions[end]
-    za, zb = structure.axes[begin], structure.axes[end]
-    middle, up = 0.5 * (a + b), -(za + zb)
-    up /= np.maximum(np.linalg.norm(up, axis=1), 1e-9)[:, None]
-    # What the middle of the chord lacks, clearance of obstacles included, is added where it helps: straight up
-    lack = np.maximum(height - structure.clearance(middle + height * up), 0.0)
-    # Across, the curve has come 3 x^2 - 2 x^3 of the span; there its height is 3 c x (1 - x)
-    part = np.clip(free / np.maximum(np.linalg.norm(b - a, axis=1), 1e-9), 0.0, 0.5)
-    grid = np.linspace(0.0, 0.5, 65)
-    x = np.interp(part, grid**2 * (3 - 2 * grid), grid)
-    return Curves(a, b, za, zb, (height + lack) / (3.0 * x * (1.0 - x)))
+    height = crossing_height(data)
+    none = np.zeros((len(a), 2))
+    flat = Curves(a, b, structure.axes[begin], structure.axes[end], none, none[:, 0], pivots, part)
+    flat = replace(flat, rise=np.repeat(_rise(flat, height)[:, None], 2, axis=1))
+    return replace(flat, lift=_lift(structure, flat, height) + more)
 
 
-def between(place: Array, axis: Array, structure: Structure, hold: int, height: float) -> Curves:
+def between(place: Array, axis: Array, structure: Structure, hold: int, pivots: Pivots, data: WalkerData) -> Curves:
     """The way of a hand that is in the air, at ``place`` with its z axis along ``axis``, to a hold."""
     end, arrive = structure.positions[[hold]], structure.axes[[hold]]
+    height = crossing_height(data)
     # It need not rise more than it lacks, but must come down along the hold's normal
-    above = float(structure.clearance(place))
-    rise = max(height - above, 0.5 * height) * 4.0 / 3.0
-    return Curves(place[None], end, axis[None], arrive, np.array([rise]))
+    lack = max(height - float(structure.clearance(place)), 0.0)
+    flat = Curves(place[None], end, axis[None], arrive, np.zeros((1, 2)), np.zeros(1), pivots, 1.0)
+    flat = replace(flat, rise=np.array([[lack, _rise(flat, height)[0]]]))
+    return replace(flat, lift=_lift(structure, flat, height))
+
+
+def _rise(flat: Curves, height: float) -> Array:
+    """h with which hands are at ``height`` [m] where they have come ACROSS."""
+    points, grid = flat.at(np.linspace(0.0, 1.0, 2 * LOOKS)), np.linspace(0.0, 0.5, 129)
+    spans = np.linalg.norm(np.diff(points, axis=1), axis=2).sum(axis=1)
+    part = np.clip(ACROSS / np.maximum(spans, 1e-9), 0.0, 0.5)
+    x = UPRIGHT + (1 - 2 * UPRIGHT) * np.interp(part, step(grid), grid)
+    out: Array = height / (1.0 - (1.0 - 2.0 * x) ** STEEP)
+    return out
+
+
+def _lift(structure: Structure, flat: Curves, height: float) -> Array:
+    """What curves lack between their ends, the chord of a round surface and obstacles included."""
+    y = np.linspace(0.0, 1.0, LOOKS + 2)[1:-1]
+    fine = np.linspace(0.0, 1.0, 257)
+    x = UPRIGHT + (1 - 2 * UPRIGHT) * np.interp(y, step(fine), fine)
+    lack = (height - structure.clearance(flat.at(x))) / (4.0 * y * (1.0 - y))
+    out: Array = np.maximum(lack.max(axis=1), 0.0)
+    return out

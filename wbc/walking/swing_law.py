@@ -8,10 +8,13 @@ import numpy as np
 
 from wbc.robots import Walker
 from wbc.validation import Array
+from wbc.walking.arm_kinematics import ArmKinematics
 from wbc.walking.body_path import BodyPath
+from wbc.walking.stance_search import Move
 from wbc.walking.swing_curve import Curves
+from wbc.walking.swing_path import Wrists, blend, grip_wrists
 from wbc.walking.swing_speed import speeds
-from wbc.walking.swings import FINE, Asked, Swings
+from wbc.walking.swings import FINE, Swings
 
 #: Rows of the table are this far apart [s]
 SPACING = 0.005
@@ -19,12 +22,13 @@ SPACING = 0.005
 
 @dataclass(frozen=True, eq=False)
 class Aim:
-    """What a swinging hand is to do: position, velocity, direction of the z axis, its rate, part of the way, 0 to 1."""
+    """What a swinging hand is to do: position [m], velocity [m/s], the part of the wrist's way, and that of the time,
+    0 to 1 each.
+    """
 
     position: Array
     velocity: Array
-    axis: Array
-    axis_rate: Array
+    blend: float
     part: float
 
 
@@ -35,39 +39,54 @@ class SwingLaw:
 
     Args:
         walker, arm, path: whose hand moves while the body is at ``samples`` ``[FINE]`` of the path.
-        way: one curve. least: duration that it takes at least [s].
+        way: one curve. wrists: of joints 4 and 5. least: duration that it takes at least [s].
+
+    Attributes:
+        possible: within reach and limits. duration: [s].
     """
 
     def __init__(
-        self, walker: Walker, arm: int, path: BodyPath, way: Curves, samples: Array, least: float = 0.0
+        self, walker: Walker, arm: int, path: BodyPath, way: Curves, samples: Array, wrists: Wrists, least: float = 0.0
     ) -> None:
         x = np.linspace(0.0, 1.0, FINE)
-        found = speeds(walker, np.array([arm]), path, way, samples[None])
+        kinematics = ArmKinematics(walker.data)  # type: ignore[arg-type]
+        found = speeds(kinematics, walker, np.array([arm]), path, way, samples[None], wrists)
         fastest = float(found.duration[0])
         self.possible = bool(found.possible[0])
         self.duration = max(fastest, least)
-        times = np.concatenate([[0.0], np.cumsum(found.time[0])]) * (self.duration / fastest)
+        slower = self.duration / fastest
+        times, rate = found.time[0] * slower, found.rate[0] / slower
         count = int(np.ceil(self.duration / SPACING)) + 1
         self._times = np.linspace(0.0, self.duration, count)
-        along = np.interp(self._times, times, x)
-        # dx/dt from the table itself, so that position and velocity agree
-        rate = np.gradient(along, self._times)
-        rate[0] = rate[-1] = 0.0
-        place, slope = way.at(along)
-        axis, turn = way.axes(along)
-        self._rows = np.concatenate(
-            [place[0], slope[0] * rate[:, None], axis[0], turn[0] * rate[:, None], along[:, None]], axis=1
-        )
+        # Between points of the law the acceleration is constant
+        low = np.clip(np.searchsorted(times, self._times, side="right") - 1, 0, FINE - 2)
+        since = self._times - times[low]
+        push = (rate[low + 1] - rate[low]) / (times[low + 1] - times[low])
+        along = np.clip(x[low] + since * (rate[low] + 0.5 * push * since), 0.0, 1.0)
+        place = way.at(along)[0]
+        # From the table itself, so that position and velocity agree
+        speed = np.gradient(place, self._times, axis=0)
+        speed[0] = speed[-1] = 0.0
+        self._rows = np.concatenate([place, speed, blend(along)[:, None]], axis=1)
 
     @staticmethod
-    def of(swings: Swings, move: Asked, planned: float) -> SwingLaw:
-        """The law of a planned move, as long as the plan says [s]."""
-        samples = move.lift + (move.land - move.lift) * np.linspace(0.0, 1.0, FINE)
-        return SwingLaw(swings.walker, move.arm, swings.path, swings.curve([move]), samples, planned - swings.extra)
+    def of(swings: Swings, move: Move) -> SwingLaw:
+        """The law of a planned move, as long as the plan says."""
+        source, target = np.array([move.source]), np.array([move.target])
+        # While the hand opens and closes the body moves on
+        # It comes when the next grip begins, if it does not hold the body up
+        whole = max(move.duration, 0.0 if move.delay else (move.land - move.lift) * swings.path.spacing)
+        least = whole - swings.extra
+        part = (swings.latch + np.linspace(0.0, 1.0, FINE) * least) / whole
+        samples = move.lift + (move.land - move.lift) * part
+        way = swings.curve(np.array([move.arm]), source, target, np.array([move.lift]), move.way)
+        wrists = grip_wrists(swings.grips, source, target, FINE)
+        return SwingLaw(swings.walker, move.arm, swings.path, way, samples, wrists, least)
 
     def at(self, time: float) -> Aim:
         """The aim at a time since lifting, clipped to the swing."""
-        place = min(max(time / self.duration, 0.0), 1.0) * (len(self._times) - 1)
+        part = min(max(time / self.duration, 0.0), 1.0)
+        place = part * (len(self._times) - 1)
         low = min(int(place), len(self._times) - 2)
         row = self._rows[low] + (place - low) * (self._rows[low + 1] - self._rows[low])
-        return Aim(row[:3], row[3:6], row[6:9], row[9:12], float(row[12]))
+        return Aim(row[:3], row[3:6], float(row[6]), part)

@@ -1,4 +1,4 @@
-"""How fast a hand can swing along its way while the body moves: the least time under the limits of the first joints."""
+"""How fast a hand can swing along its way while the body moves: the least time under the limits of joints 1 to 5."""
 
 from __future__ import annotations
 
@@ -13,15 +13,16 @@ from wbc.walking.arm_kinematics import ArmKinematics
 from wbc.walking.body_path import BodyPath
 from wbc.walking.grips import Ints
 from wbc.walking.swing_curve import Curves
+from wbc.walking.swing_path import Wrists, joint_paths
 
 #: Parts of joint rates and accelerations that a swing is planned with; the rest is for feedback
-RATE_PART, ACCELERATION_PART = 0.88, 0.75
-#: Fastest hand [m/s]: lifting and lowering are short
-FASTEST = 1.2
-#: Room of the wrist [m] within its reach, and about the axis of joint 1; and of joints 1 to 3 [rad]
-REACH_ROOM, AXIS_ROOM, ANGLE_ROOM = 0.8 * 0.0254, 7.5 * 0.0254, 0.03
+RATE_PART, ACCELERATION_PART = 0.96, 0.9
+#: Fastest hand [m/s]
+FASTEST = 2.0
 #: Derivatives smaller than this [rad] limit nothing
 LEAST = 1e-6
+#: The body's part of the rates is that over so many samples
+STEP = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,10 +30,10 @@ class Speeds:
     """Laws of m swings over n points, evenly over x in [0, 1] of their curves.
 
     Attributes:
-        possible: the wrist stays in reach and joints 1 to 3 within their limits ``[m]``.
-        angles: of joints 1 to 3 ``[m, n, 3]`` [rad].
-        rate: dx/dt ``[m, n]`` [1/s].
-        time: from point to point ``[m, n - 1]`` [s].
+        possible: the hand stays in reach and joints 1 to 5 within their limits ``[m]``.
+        angles: of joints 1 to 5 ``[m, n, 5]`` [rad].
+        rate: dx/dt ``[m, n]`` [1/s]; its square changes evenly from point to point.
+        time: at the points, from 0 ``[m, n]`` [s].
     """
 
     possible: NDArray[np.bool_]
@@ -43,62 +44,83 @@ class Speeds:
     @property
     def duration(self) -> Array:
         """Of each swing [s]."""
-        out: Array = self.time.sum(axis=1)
+        out: Array = self.time[:, -1]
         return out
 
 
-def speeds(walker: Walker, arms: Ints, path: BodyPath, way: Curves, samples: Array) -> Speeds:
+def speeds(
+    kinematics: ArmKinematics, walker: Walker, arms: Ints, path: BodyPath, way: Curves, samples: Array, wrists: Wrists
+) -> Speeds:
     """Least times along m curves, each for an arm of a body that is at fractional ``samples`` ``[m, n]`` of its path:
 
-        |q_k' x'| <= part rate_k,     |q_k' x'' + q_k'' x'^2| <= part acceleration_k,     |p' x'| <= fastest
+        |q_x x' + q_u u'| <= part rate,     |q_x x'' + q_xx x'^2| <= part acceleration,     |p_x x'| <= fastest
 
-    for the joints k = 1 to 3 that place the wrist, by one pass forwards and one backwards over x'^2.
+    for joints 1 to 5, by one pass forwards and one backwards over x'^2; q_u u' is what the body's motion asks of a hand
+    at rest.
     """
-    kinematics = ArmKinematics(walker.data)  # type: ignore[arg-type]
-    points = samples.shape[1]
+    count, points = samples.shape
     x = np.linspace(0.0, 1.0, points)
-    place, slope = way.at(x)
-    angles, possible = _wrist_angles(kinematics, walker, arms, path.blended(samples), place, way.axes(x)[0])
-    step = 1.0 / (points - 1)
-    first = np.gradient(angles, axis=1) / step
-    second = np.abs(np.gradient(first, axis=1) / step)
-    first = np.maximum(np.abs(first), LEAST)
-    rates = RATE_PART * np.array(kinematics.data.joint_rates)[:3]
-    accelerations = ACCELERATION_PART * np.array(kinematics.data.joint_accelerations)[:3]
-    top = (rates / first).min(axis=2) ** 2
-    top = np.minimum(top, (accelerations / np.maximum(second, LEAST)).min(axis=2))
-    square = np.minimum(top, (FASTEST / np.maximum(np.linalg.norm(slope, axis=2), LEAST)) ** 2)
-    square[:, 0] = square[:, -1] = 0.0
-
-    def push(i: int) -> Array:
-        # Where the curvature alone takes the whole acceleration, x' must still be able to change a little
-        left = (accelerations - second[:, i] * square[:, i, None]) / first[:, i]
-        out: Array = np.maximum(left.min(axis=1), 0.05)
-        return out
-
-    for i in range(points - 1):
-        square[:, i + 1] = np.minimum(square[:, i + 1], square[:, i] + 2 * step * push(i))
-    for i in range(points - 1, 0, -1):
-        square[:, i - 1] = np.minimum(square[:, i - 1], square[:, i] + 2 * step * push(i))
-    rate = np.sqrt(square)
-    return Speeds(possible, angles, rate, 2 * step / np.maximum(rate[:, 1:] + rate[:, :-1], 1e-6))
-
-
-def _wrist_angles(
-    kinematics: ArmKinematics, walker: Walker, arms: Ints, bodies: Array, place: Array, axis: Array
-) -> tuple[Array, NDArray[np.bool_]]:
-    """Angles of joints 1 to 3 ``[m, n, 3]`` with the hand at ``place`` along ``axis``, and whether that is possible."""
-    bases = np.array([arm.base.homogeneous for arm in walker.arms])[arms]
-    frames = bodies @ bases[:, None]
-    turn, origin = frames[..., :3, :3], frames[..., :3, 3]
-    points = np.einsum("mnji,mnj->mni", turn, place - origin)
-    axes = np.einsum("mnji,mnj->mni", turn, axis)
-    axes /= np.linalg.norm(axes, axis=2, keepdims=True)
-    wrists = kinematics.wrist_of(points, axes)
-    flat, _ = kinematics.inverse_axis(points.reshape(-1, 3), axes.reshape(-1, 3), limits=False)
-    angles = np.unwrap(flat[:, 0, :3].reshape(points.shape), axis=1)
-    limits = np.array(kinematics.data.position_limits)[:3]
-    possible = (kinematics.wrist_reach(wrists).min(axis=1) > REACH_ROOM) & (
-        np.hypot(wrists[..., 0], wrists[..., 1]).min(axis=1) > AXIS_ROOM
+    gap = 1.0 / (points - 1)
+    place, wrist = way.at(x), wrists(samples)
+    # The same hand on a body that is a little further
+    doubled = np.concatenate([samples, samples + STEP])
+    both, possible = joint_paths(
+        kinematics,
+        walker,
+        np.concatenate([arms, arms]),
+        path.blended(doubled),
+        np.concatenate([place, place]),
+        np.concatenate([wrist, wrist]),
     )
-    return angles, possible & (np.abs(angles).max(axis=1) < limits - ANGLE_ROOM).all(axis=1)
+    angles, further = both[:count], both[count:]
+    bias = (further - angles) / STEP
+    first = np.gradient(angles, gap, axis=1, edge_order=2)
+    first -= bias * np.gradient(samples, gap, axis=1)[..., None]
+    second = np.gradient(first, gap, axis=1)
+    limits = np.array(kinematics.data.joint_rates)[:5]
+    # Where the body goes the way of the hand, the hand may go faster
+    rates = np.maximum(RATE_PART * limits - np.sign(first) * bias / path.spacing, 0.1 * limits)
+    slope = np.linalg.norm(np.gradient(place, gap, axis=1), axis=2)
+    top = np.minimum((rates / np.maximum(np.abs(first), LEAST)).min(axis=2), FASTEST / np.maximum(slope, LEAST)) ** 2
+    top[:, 0] = top[:, -1] = 0.0
+    square = _squares(first, second, ACCELERATION_PART * np.array(kinematics.data.joint_accelerations)[:5], top, gap)
+    rate = np.sqrt(square)
+    time = np.zeros_like(samples)
+    np.cumsum(2 * gap / np.maximum(rate[:, 1:] + rate[:, :-1], 1e-6), axis=1, out=time[:, 1:])
+    return Speeds(possible[:count], angles, rate, time)
+
+
+def _squares(first: Array, second: Array, limits: Array, top: Array, gap: float) -> Array:
+    """The largest s = x'^2 ``[m, n]`` under ``top`` with |a u + b s| <= limit, where s changes by 2 gap u a point.
+
+    With c = b / a and e = limit / |a|, u lies between -e - c s and e - c s of every joint. The sets of s from which
+    the end can be reached are intervals [0, K]; they are made backwards, then s goes forwards as high as they allow
+    (reachability analysis of Pham and Pham, 2018).
+    """
+    a = np.where(np.abs(first) < LEAST, LEAST, first)
+    c, e = second / a, limits / np.abs(a)
+    step = 2 * gap
+    # Some u is left between all joints, and one with which s stays above 0
+    apart = c[..., None, :] - c[..., :, None]
+    room = (e[..., None, :] + e[..., :, None]) / np.maximum(apart, LEAST)
+    most = np.minimum(top, room.min(axis=(2, 3)))
+    fall = step * c - 1.0
+    most = np.minimum(most, (step * e / np.maximum(fall, LEAST)).min(axis=2))
+    for i in range(most.shape[1] - 2, -1, -1):
+        after = most[:, i + 1, None]
+        reach = (after + step * e[:, i]) / np.maximum(-fall[:, i], LEAST)
+        # The same limit where the step ends
+        reach = np.minimum(reach, step * e[:, i + 1] + after * np.maximum(1.0 + step * c[:, i + 1], 0.0))
+        most[:, i] = np.minimum(most[:, i], reach.min(axis=1))
+    out = np.zeros_like(most)
+    for i in range(most.shape[1] - 1):
+        here = out[:, i, None]
+        push = np.minimum(e[:, i] - c[:, i] * here, _over(e[:, i + 1] - c[:, i + 1] * here, 1.0 + step * c[:, i + 1]))
+        out[:, i + 1] = np.minimum(most[:, i + 1], np.maximum(out[:, i] + step * push.min(axis=1), 0.0))
+    return out
+
+
+def _over(top: Array, bottom: Array) -> Array:
+    """Quotients; infinite where the divisor is not positive, and so limits nothing."""
+    out: Array = np.where(bottom > LEAST, top / np.maximum(bottom, LEAST), np.inf)
+    return out

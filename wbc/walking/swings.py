@@ -1,106 +1,170 @@
-"""Durations of the swings of one plan: an estimate for many at once, and the least time along the way of each."""
+"""The swings of one plan: an estimate of their durations for many at once, and for each a way that is clear, with the
+least time along it.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from typing import Protocol
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wbc.robots import Walker
 from wbc.validation import Array
+from wbc.walking.arm_clearance import ArmClearance
+from wbc.walking.arm_kinematics import ArmKinematics
 from wbc.walking.body_path import BodyPath
 from wbc.walking.grips import Grips, Ints
 from wbc.walking.structure import Structure
-from wbc.walking.swing_curve import Curves, curves
+from wbc.walking.swing_clearance import SwingClearance
+from wbc.walking.swing_curve import WAYS, Curves, Pivots, curves
+from wbc.walking.swing_path import grip_wrists
 from wbc.walking.swing_speed import FASTEST, speeds
 
 #: Points of a way: enough for the search, and for carrying it out
 COARSE, FINE = 25, 97
+#: How often the law is made, each time with the body where the last one has it
+PASSES = 2
 #: Time to settle on the hold before the hand closes, besides the latch twice [s]
-SETTLE = 0.2
-#: Joints 4 and 5 turn to their posture on the next hold during the swing: at this part of their rates, plus [s]
-WRIST_PART, WRIST_TIME = 0.9, 0.25
-#: A swing is longer where theta5 changes its sign: near 0 the wrist turns without moving the hand's axis [s]
-FLIP_TIME = 0.7
-#: Part of a swing in which the wrist turns: the hand's axis counts near both holds
-WRIST_SHARE = 0.75
+SETTLE = 0.06
+#: No swing lasts so many samples, as far as the room of the others is told apart
+LONG = 60
+#: Samples after lifting at which the body is about where the swing is halfway
+HALFWAY = 14
 
 
-class Asked(Protocol):
-    """What of a move its swing depends on."""
+@dataclass(frozen=True)
+class Swing:
+    """A swing that is asked about.
 
-    @property
-    def arm(self) -> int: ...
-    @property
-    def source(self) -> int: ...
-    @property
-    def target(self) -> int: ...
-    @property
-    def lift(self) -> int: ...
-    @property
-    def land(self) -> int: ...
+    Attributes:
+        arm: row. source, target: grips. lift: sample of the body's path.
+        room: last sample that the other arms can hold; the body waits there for the hand.
+        others: grips of the other arms.
+    """
+
+    arm: int
+    source: int
+    target: int
+    lift: int
+    room: int
+    others: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """How a hand swings: which of the ways, and how long, latches and settling included [s]."""
+
+    way: int
+    duration: float
+
+
+@dataclass(frozen=True, eq=False)
+class _Track:
+    """A swing along one way: duration [s], points of the arm ``[n, 6, 3]``, samples ``[n]``."""
+
+    duration: float
+    points: Array
+    samples: Array
+
+
+#: arm, source, target, lift, last sample
+_Name = tuple[int, int, int, int, int]
 
 
 class Swings:
-    """Durations of swings between grips over one path; what was computed is kept."""
+    """Swings between grips over one path; what was computed is kept."""
 
-    def __init__(self, walker: Walker, structure: Structure, path: BodyPath, grips: Grips) -> None:
+    def __init__(
+        self, walker: Walker, structure: Structure, path: BodyPath, grips: Grips, arms: ArmClearance | None = None
+    ) -> None:
         self.walker, self.structure, self.path, self.grips = walker, structure, path, grips
-        self.height = walker.data.lift_height  # type: ignore[union-attr]
-        self.free = walker.data.exempt_distance  # type: ignore[union-attr]
-        self.extra = 2 * walker.data.latch_time + SETTLE  # type: ignore[union-attr]
-        self._rates = np.array(walker.data.joint_rates)  # type: ignore[union-attr]
-        self._known: dict[tuple[int, int, int, int, int], float | None] = {}
+        self.data = walker.data
+        self.latch: float = walker.data.latch_time  # type: ignore[union-attr]
+        self.extra = 2 * self.latch + SETTLE
+        self.kinematics = ArmKinematics(walker.data)  # type: ignore[arg-type]
+        self._arms = arms or ArmClearance(walker, grips)
+        self._clear = SwingClearance(walker, structure, grips, self._arms)
+        self._tracks: dict[tuple[_Name, int], _Track | None] = {}
+        self._apart: dict[tuple[_Name, int, int], bool] = {}
+        self._chosen: dict[Swing, Chosen | None] = {}
 
     def estimate(self, source: int, targets: Ints) -> Array:
         """Times no swing is shorter than, latches and settling included [s]: by way and fastest hand."""
         places, grips = self.structure.positions, self.grips
-        way = np.linalg.norm(places[grips.hold[targets]] - places[grips.hold[source]], axis=1) + self.height
+        way = np.linalg.norm(places[grips.hold[targets]] - places[grips.hold[source]], axis=1)
         out: Array = way / FASTEST + self.extra
         return out
 
-    def prepare(self, moves: Iterable[Asked]) -> None:
-        """Compute the durations of moves together."""
-        todo = list({_name(m): m for m in moves if _name(m) not in self._known}.values())
-        if todo:
-            self._compute(todo)
+    def prepare(self, swings: Iterable[Swing]) -> None:
+        """Find ways for swings together: the first that is possible and clear."""
+        left = list(dict.fromkeys(s for s in swings if s not in self._chosen))
+        for way in range(len(WAYS)):
+            if not left:
+                return
+            self._track(left, way)
+            self._check(left, way)
+            rest = []
+            for swing in left:
+                track = self._tracks[_name(swing), way]
+                if track is not None and all(self._apart[_name(swing), way, g] for g in swing.others):
+                    self._chosen[swing] = Chosen(way, track.duration)
+                else:
+                    rest.append(swing)
+            left = rest
+        self._chosen.update(dict.fromkeys(left))
 
-    def duration(self, move: Asked) -> float | None:
-        """Of a swing, latches and settling included [s]; None where it is not possible."""
-        if _name(move) not in self._known:
-            self.prepare([move])
-        return self._known[_name(move)]
+    def choose(self, swing: Swing) -> Chosen | None:
+        """The way of a swing; None where it is not possible, or none is clear."""
+        if swing not in self._chosen:
+            self.prepare([swing])
+        return self._chosen[swing]
 
-    def curve(self, moves: list[Asked]) -> Curves:
-        """Ways of the hands of moves."""
-        holds = self.grips.hold
-        begin, end = (holds[[getattr(m, name) for m in moves]] for name in ("source", "target"))
-        return curves(self.structure, begin, end, self.height, self.free)
+    def curve(self, arms: Ints, source: Ints, target: Ints, lift: Ints, way: int) -> Curves:
+        """Ways of the hands of arms from grips to grips, lifted at samples of the path; ``[m]`` each."""
+        grips, later = self.grips, np.minimum(lift + HALFWAY, len(self.path) - 1)
+        bases = np.array([arm.base.homogeneous for arm in self.walker.arms])[arms]
+        turn = grips.posture(target, later + HALFWAY)[:, 0] - grips.posture(source, lift)[:, 0]
+        pivots = Pivots(self.path.poses[later] @ bases, turn)
+        return curves(self.structure, grips.hold[source], grips.hold[target], pivots, self.data, way)  # type: ignore[arg-type]
 
-    def _compute(self, moves: list[Asked]) -> None:
-        way, arms = self.curve(moves), np.array([m.arm for m in moves], dtype=np.int64)
-        lift, land = (np.array([getattr(m, name) for m in moves], dtype=float) for name in ("lift", "land"))
-        part = np.linspace(0.0, 1.0, COARSE)
-        for _ in range(2):
-            found = speeds(self.walker, arms, self.path, way, lift[:, None] + (land - lift)[:, None] * part)
-            # The body moves on for as long as the swing takes, or is stopped before the landing sample
-            land = np.minimum(lift + found.duration / self.path.spacing, len(self.path) - 1.0)
-        wrist, flips = self._wrist(moves)
-        time = np.maximum(found.duration + FLIP_TIME * flips, wrist / WRIST_SHARE) + self.extra
-        for move, seconds, possible in zip(moves, time.tolist(), found.possible.tolist(), strict=True):
-            self._known[_name(move)] = seconds if possible else None
+    def _track(self, swings: Sequence[Swing], way: int) -> None:
+        """Angles, times and clearance of the structure along one of the ways."""
+        names = list(dict.fromkeys(_name(s) for s in swings if (_name(s), way) not in self._tracks))
+        if not names:
+            return
+        arms, source, target, lift, last = np.array(names, dtype=np.int64).T
+        curve = self.curve(arms, source, target, lift, way)
+        wrists = grip_wrists(self.grips, source, target, COARSE)
+        # The body moves on while the hand opens
+        begin = lift[:, None] + self.latch / self.path.spacing
+        times = np.linspace(0.0, 1.0, COARSE)
+        for _ in range(PASSES):
+            samples = np.minimum(begin + times / self.path.spacing, last[:, None])
+            found = speeds(self.kinematics, self.walker, arms, self.path, curve, samples, wrists)
+            times = found.time
+        postures = np.zeros((*found.angles.shape[:2], 6))
+        postures[..., :5] = found.angles
+        points = np.empty((*postures.shape[:2], 6, 3))
+        for arm in np.unique(arms):
+            points[arms == arm] = self._arms.points(int(arm), postures[arms == arm])
+        ends = np.stack([curve.begin, curve.end], axis=1)
+        possible = found.possible & self._clear.structure(points, self.path.blended(samples), ends)
+        for k, name in enumerate(names):
+            fine = _Track(float(found.duration[k]) + self.extra, points[k], samples[k]) if possible[k] else None
+            self._tracks[name, way] = fine
 
-    def _wrist(self, moves: list[Asked]) -> tuple[Array, NDArray[np.bool_]]:
-        """Time that joints 4 and 5 need from one posture to the other [s], and whether theta5 changes its sign."""
-        columns = [
-            np.array([getattr(m, name) for m in moves], dtype=np.int64) for name in ("source", "lift", "target", "land")
-        ]
-        source, target = self.grips.posture(columns[0], columns[1]), self.grips.posture(columns[2], columns[3])
-        time: Array = (np.abs(source - target) / self._rates)[:, 3:5].max(axis=1) / WRIST_PART + WRIST_TIME
-        return time, source[:, 4] * target[:, 4] < 0.0
+    def _check(self, swings: Sequence[Swing], way: int) -> None:
+        """Clearance of the other arms."""
+        asked = [(_name(s), way, g) for s in swings for g in s.others if self._tracks[_name(s), way] is not None]
+        todo = [key for key in dict.fromkeys(asked) if key not in self._apart]
+        tracks = [track for key in todo if (track := self._tracks[key[0], way]) is not None]
+        if not tracks:
+            return
+        points, samples = (np.array([getattr(t, name) for t in tracks]) for name in ("points", "samples"))
+        clear = self._clear.others(points, samples, np.array([key[2] for key in todo], dtype=np.int64))
+        self._apart.update(zip(todo, clear.tolist(), strict=True))
 
 
-def _name(move: Asked) -> tuple[int, int, int, int, int]:
-    return move.arm, move.source, move.target, move.lift, move.land
+def _name(swing: Swing) -> _Name:
+    return swing.arm, swing.source, swing.target, swing.lift, min(swing.room, swing.lift + LONG)

@@ -18,13 +18,14 @@ from wbc.walking.hands import Hands
 from wbc.walking.plan import HoldLost, NoPlanError, Plan
 from wbc.walking.replanning import PlanSlices, plan_from_here, plan_from_stance, plan_rest
 from wbc.walking.structure import Structure
+from wbc.walking.swings import SETTLE
 from wbc.walking.walk_stack import DT, WalkStack
 from wbc.walking.walk_state import Event, Hand, Tick
 
 __all__ = ["Event", "Hand", "Tick", "Walk"]
 
 #: From rest to the commanded speed [s]
-RAMP = 0.5
+RAMP = 0.25
 #: The walk is over when the body is this near to the end of the path [m]
 ARRIVED = 0.002
 #: A walk that takes this many times its path's duration and SLACK seconds more is given up
@@ -146,8 +147,7 @@ class Walk(Hands):
             raise HoldLost("hands", len(self.held), f"at least {self.walker.min_holds} must hold")
         self._think()
         self._lift()
-        command, rate = self._advance()
-        self.stack.body(command, rate)
+        command = self._advance()
         if self.swinging is not None:
             self._aim(self.swinging)
         begin = time.perf_counter()
@@ -226,25 +226,33 @@ class Walk(Hands):
         here = path.at(u)[0].homogeneous[None]
         return np.concatenate([here, path.poses[: int(u / path.spacing) + 1][::-1], self._trail])[:TRAIL]
 
-    def _advance(self) -> tuple[pin.SE3, Array]:
-        """Move the body's command on: as fast as asked, as slow as the grips of the holding hands need."""
+    def _advance(self) -> pin.SE3:
+        """Move the body's command on: as fast as asked, as slow as the grips of the holding hands need.
+
+        Returns:
+            Where the body is to be as the tick ends.
+        """
         path, spacing = self.plan.path, self.plan.path.spacing
-        ends = [float(self.grips.last[self._grip[arm]]) * spacing for arm in self.held]
+        leaving = self._leaving()
+        ends = [float(self.grips.last[self._grip[arm]]) * spacing for arm in self.held if arm != leaving]
         end = path.duration if self.plan.complete else self.plan.reached
         room = max(min([end, *ends]) - self.path_time, 0.0)
         # The command stops within the room: braking from pace p takes p^2 RAMP / 2 of path time
         wanted = min(1.0, sqrt(2.0 * room / RAMP * 0.9))
         if self.swinging is not None:
-            left = self.swinging.law.duration - self.swinging.clock + self.data.latch_time + 0.1
+            left = self.swinging.law.duration - self.swinging.clock + self.data.latch_time + SETTLE
             if room < left:
                 wanted = min(wanted, room / left)
         if self._changing or (self.swinging is not None and not self.swinging.counted):
             wanted = 0.0
         change = self.dt / RAMP
         self.pace = max(self.pace + min(max(wanted - self.pace, -change), change), 0.0)
+        pose = path.at(self.path_time)[0]
         self.path_time = min(self.path_time + self.pace * self.dt, path.duration)
-        pose, rate = path.at(self.path_time)
-        return pose, rate * self.pace
+        command = path.at(self.path_time)[0]
+        turn = pose.rotation @ pin.log3(pose.rotation.T @ command.rotation)
+        self.stack.body(pose, np.concatenate([command.translation - pose.translation, turn]) / self.dt)
+        return command
 
     def _renumber(self, rest: Structure) -> None:
         """Go on with a structure that has lost holds: rows of holds change, hands stay where they are."""

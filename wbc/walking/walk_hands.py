@@ -12,8 +12,10 @@ from wbc.walking.walk_state import Swinging
 
 #: A swing waits for a hand that is this far behind its aim [m]: full pace below half of it, least pace beyond
 BEHIND, LEAST_PACE = 0.02, 0.05
-#: Parts of the way before and after which a hand is near a hold; joints 4 and 5 this near to their posture [rad] there
-LIFTING, LANDING, TURNED = 0.2, 0.8, 0.5
+#: A hand is near its hold from this part of the wrist's way on; joints 4 and 5 are then this near to theirs [rad]
+LANDING, TURNED = 0.97, 0.5
+#: Part of the tolerances within which a hand closes: it is still moving a little as it does
+SURE = 0.7
 #: The pace of a hand changes from nothing to all in [s]
 HAND_RAMP = 0.2
 
@@ -34,7 +36,7 @@ def hand_pace(swinging: Swinging, place: Array, turned: bool, early: float, pace
     wait = early - pace * (swinging.law.duration - swinging.clock)
     if wait > 0.0:
         wanted /= 1.0 + 4.0 * wait
-    return 0.0 if aim.part > LANDING and not turned else wanted
+    return 0.0 if aim.blend > LANDING and not turned else wanted
 
 
 def at_rest(
@@ -42,9 +44,10 @@ def at_rest(
 ) -> bool:
     """Whether a hand is on its hold and still, both given by place [m] and z axis, so that it may close."""
     (place, axis), (there, wanted) = hand, hold
-    if dist(place, there) >= data.close_distance or dist(place, swinging.place) / dt >= data.close_speed:
+    if dist(place, there) >= SURE * data.close_distance or dist(place, swinging.place) / dt >= SURE * data.close_speed:
         return False
-    return angle(axis, swinging.axis) / dt < data.close_rate and angle(axis, wanted) < data.close_angle
+    turns = angle(axis, swinging.axis) / dt < SURE * data.close_rate
+    return turns and angle(axis, wanted) < SURE * data.close_angle
 
 
 def angle(one: Array, other: Array) -> float:

@@ -13,18 +13,19 @@ from wbc.controller.stack import Stack
 from wbc.robots import Walker
 from wbc.validation import Array
 from wbc.walking.structure import Structure
-from wbc.walking.swing_law import Aim
 
 #: Control period [s]
 DT = 0.01
 #: Weights: the body does not give way to a swing, a swing not to postures
 BODY, SWING, AXIS, WRIST = 1e4, 10.0, 3.0, 1e-3
 #: Gains [1/s] of body, swinging hand, its axis and the wrists; holds: 1 / (5 dt)
-BODY_GAIN, SWING_GAIN, AXIS_GAIN, WRIST_GAIN, HOLD_TICKS = 12.0, 15.0, 12.0, 4.0, 5
-#: On the way the wrist turns to its posture on the next hold; near holds its axis counts
-FREE_AXIS, FREE_WRIST, RESTING = 0.01, 40.0, 0.1
-#: The posture on the next hold changes little: it is told again after so many ticks
-POSTURE_TICKS = 5
+BODY_GAIN, SWING_GAIN, AXIS_GAIN, WRIST_GAIN, HOLD_TICKS = 12.0, 15.0, 12.0, 12.0, 5
+#: On the way the wrist follows its postures; near the next hold its axis counts
+FREE_AXIS, FREE_WRIST, RESTING = 1e-6, 40.0, 0.1
+
+
+#: Of joints 4 and 5
+Pair = tuple[float, float]
 
 
 class WalkStack:
@@ -54,7 +55,8 @@ class WalkStack:
         self.controller: Controller = stack.compile(backend=backend)
         self._posture = np.array(walker.robot.neutral)
         self._mask = np.full(walker.robot.nv - 6, RESTING)
-        self._near, self._age = (-1, False), 0
+        self._turning = np.zeros(walker.robot.nv)
+        self._near = (-1, False)
         items: Any = self.controller
         self._body, self._rest = items["body"], items["posture"]
         self._holds, self._swings, self._axes = (
@@ -69,6 +71,7 @@ class WalkStack:
         self._switch(arm, True)
         self._holds[arm].target = pin.SE3(self.structure.frames[hold])
         self._mask[self._joints(arm)] = RESTING
+        self._still(arm)
         self._rest.mask = self._mask
 
     def release(self, arm: int) -> None:
@@ -82,32 +85,38 @@ class WalkStack:
         swing.target, swing.feedforward = place, np.zeros(3)
         aligned.target, aligned.feedforward, aligned.weight = axis, np.zeros(3), AXIS
         self._near = (-1, False)
+        self._still(arm)
 
     def body(self, pose: pin.SE3, rate: Array) -> None:
         """The pose that the body goes to, and its rate in the structure's axes [m/s, rad/s]."""
         self._body.target, self._body.feedforward = pose, rate
 
-    def swing(self, arm: int, aim: Aim, pace: float, posture: Array, near: bool) -> None:
+    def swing(self, arm: int, hand: tuple[Array, Array], wrist: tuple[Pair, Pair], axis: Array | None) -> None:
         """What a free hand follows.
 
         Args:
-            pace: part of full speed that the aim goes on with. posture: of the arm on its next hold.
-            near: at a hold, where the axis of the hand counts and not the wrist's posture.
+            hand: its position [m] and velocity [m/s]. wrist: joints 4 and 5 [rad] and their rates [rad/s].
+            axis: that of the hand at its hold, which then counts and not the wrist; None on the way.
         """
-        swing, axis = self._swings[arm], self._axes[arm]
-        swing.target, swing.feedforward = aim.position, aim.velocity * pace
-        axis.target, axis.feedforward = aim.axis, aim.axis_rate * pace
-        if self._near == (arm, near) and self._age < POSTURE_TICKS:
-            self._age += 1
-            return
-        joints, resting = self._joints(arm), self._rest
+        near, resting = axis is not None, self._rest
+        swing, aligned = self._swings[arm], self._axes[arm]
+        swing.target, swing.feedforward = hand
+        if axis is not None:
+            aligned.target, aligned.feedforward = axis, np.zeros(3)
+        joints = self._joints(arm)
         if self._near != (arm, near):
-            axis.weight = AXIS if near else FREE_AXIS
+            aligned.weight = AXIS if near else FREE_AXIS
+            self._mask[joints][:3] = 0.0
             self._mask[joints][3:5] = 1.0 if near else FREE_WRIST
             resting.mask = self._mask
-        self._posture[7:][joints] = posture
-        resting.target = self._posture
-        self._near, self._age = (arm, near), 0
+            self._near = arm, near
+        self._posture[7:][joints][3:5], self._turning[6:][joints][3:5] = wrist
+        resting.target, resting.feedforward = self._posture, self._turning
+
+    def _still(self, arm: int) -> None:
+        """Joints 4 and 5 of an arm that does not swing have no rates of their own."""
+        self._turning[6:][self._joints(arm)] = 0.0
+        self._rest.feedforward = self._turning
 
     def _joints(self, arm: int) -> slice:
         of = self.walker.arms[arm].v

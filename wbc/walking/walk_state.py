@@ -24,6 +24,8 @@ class Swinging:
         law: the aims. clock: time on the law [s]. aim: the one at that time.
         pace: part of full speed. latch: time until the latch is through [s].
         place, axis: of the hand one tick before, for speeds.
+        wrist: joints 4 and 5 of a hand that was in the air when it was sent [rad]; None: those of the grip it leaves.
+        bend: joints 4 and 5 as they are to be now [rad].
         counted: it is a move of the plan, not one that brings a free hand back to it.
     """
 
@@ -34,11 +36,13 @@ class Swinging:
     latch: float
     counted: bool = True
     clock: float = 0.0
-    pace: float = 0.0
+    pace: float = 1.0
     state: Hand = "opening"
     tries: int = 0
     place: Array = field(default_factory=lambda: np.zeros(3))
     axis: Array = field(default_factory=lambda: np.zeros(3))
+    wrist: tuple[float, float] | None = None
+    bend: tuple[float, float] = (0.0, 0.0)
     aim: Aim = field(init=False)
 
     def __post_init__(self) -> None:

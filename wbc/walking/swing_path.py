@@ -1,0 +1,84 @@
+"""A swing as angles of joints 1 to 5: the hand on its curve, the wrist between its two postures."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wbc.robots import Walker
+from wbc.validation import Array
+from wbc.walking.arm_angles import sines, wrapped
+from wbc.walking.arm_kinematics import ArmKinematics
+from wbc.walking.grips import Grips, Ints
+
+#: Room of the wrist within its reach [m], and of joints 1 to 5 within their limits [rad]
+REACH_ROOM, ANGLE_ROOM = 0.3 * 0.0254, 0.02
+#: The wrist stays this far from the axis of joint 1, besides the shoulder's offset [m]
+AXIS_ROOM = 0.2
+
+#: Angles of joints 4 and 5 ``[m, n, 2]`` at fractional samples ``[m, n]`` of the body's path
+Wrists = Callable[[Array], Array]
+
+
+def blend(x: Array) -> Array:
+    """Part of the wrist's way at ``x`` in [0, 1] of the hand's: x^2 (3 - 2x)."""
+    out: Array = x * x * (3.0 - 2.0 * x)
+    return out
+
+
+def grip_wrists(grips: Grips, source: Ints, target: Ints, points: int) -> Wrists:
+    """Wrists that leave grips and come to others; both change as the body moves on."""
+    part = blend(np.linspace(0.0, 1.0, points))[None, :, None]
+
+    def wrists(samples: Array) -> Array:
+        first, last = (grips.between(g[:, None], samples)[..., 3:5] for g in (source, target))
+        out: Array = first + part * (last - first)
+        return out
+
+    return wrists
+
+
+def joint_paths(
+    kinematics: ArmKinematics, walker: Walker, arms: Ints, bodies: Array, place: Array, wrists: Array
+) -> tuple[Array, NDArray[np.bool_]]:
+    """Joints 1 to 5 ``[m, n, 5]`` [rad] with hands at ``place`` ``[m, n, 3]`` and wrists bent by ``wrists``.
+
+    Forearm and hand are one link from the elbow to the hand: A = WE + HW c5 along the forearm, B = HW c4 s5 across it
+    in the arm's plane, and HW s4 s5 out of the plane. So theta3 + atan2(B, A) is the angle at the elbow of an arm with
+    the lengths ES and hypot(A, B).
+
+    Args:
+        bodies: ``[m, n, 4, 4]``, affine. arms: rows ``[m]``.
+
+    Returns:
+        (angles, possible): whether the whole swing is within reach and limits, ``[m]``.
+    """
+    data = kinematics.data
+    bases = np.array([arm.base.homogeneous for arm in walker.arms])[arms]
+    frames = bodies @ bases[:, None]
+    turn, origin = frames[..., :3, :3], frames[..., :3, 3]
+    points = np.einsum("mnji,mnj->mni", turn, place - origin)
+    (s4, c4), (s5, c5) = sines(wrists[..., 0]), sines(wrists[..., 1])
+    hand = data.hand_length
+    along, across, out = data.forearm_length + hand * c5, hand * c4 * s5, data.shoulder_offset + hand * s4 * s5
+    es, reach, tilt = data.upper_arm_length, np.hypot(along, across), np.arctan2(across, along)
+    x, y, z = points[..., 0], points[..., 1], points[..., 2] - data.neck_length
+    square = x * x + y * y - out * out
+    r = np.sqrt(np.maximum(square, AXIS_ROOM**2))
+    distance = np.hypot(r, z)
+    bend = np.arccos(np.clip((distance**2 - es * es - reach * reach) / (2 * es * reach), -1.0, 1.0))
+    angles = np.empty((*r.shape, 5))
+    angles[..., 0] = np.unwrap(np.arctan2(y, x) - np.arctan2(out, r), axis=1)
+    angles[..., 0] += wrapped(angles[:, :1, 0]) - angles[:, :1, 0]
+    angles[..., 1] = np.arctan2(r, z) + np.arctan2(reach * np.sin(bend), es + reach * np.cos(bend))
+    angles[..., 2] = -bend - tilt
+    angles[..., 3:] = wrists
+    room = np.array(data.position_limits)[:5] - np.abs(angles)
+    lean = angles[..., 1] + angles[..., 2] / 2 - data.shoulder_limit
+    elbow = data.elbow_limit - angles[..., 2]
+    possible = (square.min(axis=1) > AXIS_ROOM**2) & ((es + reach - distance).min(axis=1) > REACH_ROOM)
+    # Limits of the published robot at the ends are kept as close as holding grips keep them
+    possible &= (room.min(axis=(1, 2)) > ANGLE_ROOM) & (np.minimum(lean, elbow).min(axis=1) > ANGLE_ROOM)
+    return angles, possible
