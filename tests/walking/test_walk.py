@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pathlib
 from collections.abc import Sequence
 from itertools import combinations
 
@@ -11,8 +12,10 @@ import pytest
 from wbc.robots import Walker
 from wbc.walking import Structure
 from wbc.walking.body_path import grid_path
+from wbc.walking.checker import check_walk
 from wbc.walking.plan import Plan
 from wbc.walking.planner import plan_walk
+from wbc.walking.run.recording import WalkRecorder
 from wbc.walking.walk import Tick, Walk
 from wbc.walking.walk_stack import WalkStack
 
@@ -25,13 +28,28 @@ def walked(
 ):
     plan = plan_walk(machine, structure, grid_path(points, speed * INCH))
     walk, ticks = Walk(machine, structure, plan, stack=stack), list[Tick]()
-    assert walk.run(ticks.append) == "arrived"
-    return plan, walk, ticks
+    recorder = WalkRecorder(walk)
+
+    def keep(tick: Tick) -> None:
+        ticks.append(tick)
+        recorder.tick(tick)
+
+    assert walk.run(keep) == "arrived"
+    return plan, walk, ticks, recorder.log()[0]
 
 
 @pytest.mark.parametrize("name", sorted(PATHS))
-def test_four_inches_a_second(machine: Walker, structure: Structure, stack: WalkStack, name: str) -> None:
-    plan, walk, ticks = walked(machine, structure, stack, PATHS[name], 4.0)
+def test_four_inches_a_second(
+    machine: Walker, structure: Structure, stack: WalkStack, name: str, tmp_path: pathlib.Path
+) -> None:
+    plan, walk, ticks, log = walked(machine, structure, stack, PATHS[name], 4.0)
+    # The checker knows nothing of the planner: clearances of links, surface and body, holds, rates, all of it
+    report = check_walk(log, machine.urdf(tmp_path / "robot.urdf"), structure)
+    assert report.ok, str(report)
+    # A swing takes as long as was planned: what the planner calls feasible the controller can do
+    lifts, lands = ([event.time for event in walk.events if event.what == what] for what in ("lift", "land"))
+    took = np.array(lands) - np.array(lifts)
+    assert took == pytest.approx([step.duration for step in plan.regrasps], abs=0.1)
     assert plan.complete
     assert plan.delay == 0.0
     assert len(plan.regrasps) >= 2

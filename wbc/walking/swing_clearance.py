@@ -62,7 +62,7 @@ class SwingClearance:
             rows = self._grips.arm[others] == arm
             held[rows] = self._arms.points(int(arm), postures[rows])
         gap = self._arms.between(points.reshape(-1, 6, 3), held.reshape(-1, 6, 3)).reshape(count, steps)
-        out: Flags = np.asarray(gap >= SWING_ROOM - ROOM).all(axis=1)
+        out: Flags = np.all(gap >= SWING_ROOM - ROOM, axis=1)
         return out
 
     def _near(self, hands: Array, holds: Array) -> Flags:

@@ -16,7 +16,7 @@ from wbc.walking.grips import Grips, Ints
 #: Room of the wrist within its reach [m], and of joints 1 to 5 within their limits [rad]
 REACH_ROOM, ANGLE_ROOM = 0.3 * 0.0254, 0.02
 #: The wrist stays this far from the axis of joint 1, besides the shoulder's offset [m]
-AXIS_ROOM = 0.2
+AXIS_ROOM = 0.08
 
 #: Angles of joints 4 and 5 ``[m, n, 2]`` at fractional samples ``[m, n]`` of the body's path
 Wrists = Callable[[Array], Array]

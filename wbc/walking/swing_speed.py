@@ -112,7 +112,7 @@ def _squares(first: Array, second: Array, limits: Array, top: Array, gap: float)
         # The same limit where the step ends
         reach = np.minimum(reach, step * e[:, i + 1] + after * np.maximum(1.0 + step * c[:, i + 1], 0.0))
         most[:, i] = np.minimum(most[:, i], reach.min(axis=1))
-    out = np.zeros_like(most)
+    out: Array = np.zeros_like(most)
     for i in range(most.shape[1] - 1):
         here = out[:, i, None]
         push = np.minimum(e[:, i] - c[:, i] * here, _over(e[:, i + 1] - c[:, i + 1] * here, 1.0 + step * c[:, i + 1]))
