@@ -14,12 +14,27 @@ from wbc import robots as robots
 from wbc import shapes as shapes
 from wbc import tasks as tasks
 from wbc import trajectory as trajectory
-from wbc.controller import Certificate, Controller, Recording, Replay, Solution, Solver, Stack, Status, Step, replay
+from wbc.controller import (
+    Certificate,
+    Controller,
+    Explanation,
+    Policy,
+    Recording,
+    Replay,
+    Solution,
+    Solver,
+    Stack,
+    Status,
+    Step,
+    replay,
+)
 from wbc.errors import WbcError
 
 __all__ = [
     "Certificate",
     "Controller",
+    "Explanation",
+    "Policy",
     "Recording",
     "Replay",
     "Solution",

@@ -4,6 +4,7 @@ from wbc.controller.branches import Branches
 from wbc.controller.continuation import Branch
 from wbc.controller.controller import Controller
 from wbc.controller.explanation import Explanation
+from wbc.controller.policy import Policy
 from wbc.controller.recorder import Recorder
 from wbc.controller.recording import Recording
 from wbc.controller.replaying import Replay, replay, replayed
@@ -19,6 +20,7 @@ __all__ = [
     "Controller",
     "Ending",
     "Explanation",
+    "Policy",
     "Recorder",
     "Recording",
     "Replay",

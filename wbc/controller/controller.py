@@ -12,6 +12,7 @@ import numpy as np
 from wbc import validation
 from wbc.controller.assembly import assembly_of
 from wbc.controller.deployment import Deployment
+from wbc.controller.fallback import Fallback
 from wbc.controller.handle import Handle
 from wbc.controller.native import NativeTick
 from wbc.controller.recorder import Recorder
@@ -52,11 +53,9 @@ class Controller(Deployment):
         self._artifact, self.layout = artifact, layout
         self.row_costs: Array = 1.0 / layout.row_scales(stack) ** 2
         self._assembly = assembly_of(stack, artifact) if assembly is None else assembly
-        self.tick: NativeTick | SolvedTick
-        if isinstance(self._assembly, NativeTick) and solver == "daqp":
-            self.tick = self._assembly
-        else:
-            self.tick = SolvedTick(self._assembly, stack, layout, solver)
+        native = self._assembly if isinstance(self._assembly, NativeTick) and solver == "daqp" else None
+        self.tick: NativeTick | SolvedTick = native or SolvedTick(self._assembly, stack, layout, solver)
+        self._fallback = Fallback(self.tick, self._assembly, stack, layout)
         self._call: Callable[[], int] = self.tick.step
         if isinstance(self.tick, NativeTick):
             self._call = functools.partial(self.tick.step_function, self.tick.pointer)
@@ -115,7 +114,7 @@ class Controller(Deployment):
             self._q[:] = q
             if self._sensors:
                 self._sense()
-            if self._call() < 0:
+            if (flag := self._call()) and self.finish(flag) < 0:
                 self._refuse(q, v)
             return Step(self._snapshot(), self._context)
         finally:
@@ -160,6 +159,7 @@ class Controller(Deployment):
         for name in ("q", "v_last", "p", "cap", "dt", "weight", "enabled", "bound_enabled"):
             getattr(out.tick, name)[:] = getattr(self.tick, name)
         out.tick.check()
+        out.policy = self.policy
         out._first, out._waiting, out._slow = dict(self._first), dict(self._waiting), self._slow
         return out
 
@@ -169,7 +169,7 @@ class Controller(Deployment):
 
     def again(self) -> Step:
         """A tick on the buffers as they are, which a replay has written."""
-        if self._call() < 0:
+        if (flag := self._call()) and self.finish(flag) < 0:
             self._refuse(self._q.copy(), self._v_in.copy())
         return Step(self._snapshot(), self._context)
 

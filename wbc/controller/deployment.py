@@ -1,4 +1,4 @@
-"""What a controller needs on a robot besides steps: a cap on its iterations, and itself as C."""
+"""What a controller needs on a robot besides steps: a policy, a cap on its iterations, and itself as C."""
 
 from __future__ import annotations
 
@@ -8,12 +8,15 @@ from typing import TYPE_CHECKING, cast
 
 from wbc import export, validation
 from wbc.controller.native import NativeTick
+from wbc.controller.policy import Policy
 from wbc.controller.solved import SolvedTick
 from wbc.controller.vectors import vectors
-from wbc.errors import RangeError, SolverError
+from wbc.errors import RangeError, ShapeError, SolverError
 
 if TYPE_CHECKING:
     from wbc.controller.controller import Controller
+    from wbc.controller.fallback import Fallback
+    from wbc.controller.recorder import Recorder
 
 #: How far an export's commands may be from those of the tick that it is [rad/s, m/s], and from those of another solver:
 #: the native tick refines answers whose error it cannot bound by a tenth of that
@@ -26,6 +29,29 @@ class Deployment:
     tick: NativeTick | SolvedTick
     solver: str
     backend: str
+    _fallback: Fallback
+    _recorder: Recorder | None
+
+    @property
+    def policy(self) -> Policy:
+        """What happens where rows conflict or an answer cannot be certified, see :class:`wbc.Policy`.
+
+        Raises:
+            ShapeError: no policy. SolverError: the controller records; a recording has one policy.
+        """
+        return self._fallback.policy
+
+    @policy.setter
+    def policy(self, policy: Policy) -> None:
+        if not isinstance(policy, Policy):
+            raise ShapeError("policy", policy, "expected a wbc.Policy")
+        if self._recorder is not None:
+            raise SolverError("policy", policy, "cannot change while the controller records")
+        self._fallback.policy = policy
+
+    def finish(self, flag: int) -> int:
+        """What the policy adds to a tick that ended with ``flag``; negative: refused."""
+        return self._fallback.finish(flag)
 
     @property
     def iteration_cap(self) -> int | None:

@@ -140,6 +140,8 @@ def _recorded(recorder: Recorder) -> int:
     given = b"".join(recorder._given)
     recorder._seen = UNKNOWN
     flag = recorder._call()
+    if flag:
+        flag = recorder._controller.finish(flag)
     if flag < 0:
         recorder._seen = seen
         return flag
@@ -164,6 +166,7 @@ def about(controller: Controller) -> dict[str, Any]:
         "dt": controller.stack.dt,
         "solver": controller.solver,
         "backend": controller.backend,
+        "policy": [controller.policy.conflict, list(controller.policy.chain)],
         "versions": {name: metadata.version(name) for name in PACKAGES},
         "machine": f"{platform.system()} {platform.machine()}",
     }

@@ -30,7 +30,7 @@ import numpy as np
 from wbc.errors import UnknownNameError, WbcError
 from wbc.validation import Array
 
-FORMAT = 1
+FORMAT = 2
 #: Bytes of a chunk, and the ticks that it has at least and at most
 CHUNK, FEWEST, MOST = 1 << 18, 16, 1024
 #: Head of a member, and the length of the end of the directory

@@ -10,6 +10,7 @@ import numpy as np
 
 from wbc import validation
 from wbc.controller.controller import Controller
+from wbc.controller.policy import Policy
 from wbc.controller.recorder import INPUTS, about, declaration_key
 from wbc.controller.recording import Recording, RecordingError
 from wbc.controller.stack import Stack
@@ -130,6 +131,8 @@ def compiled(
         reason = f"is of another stack: {told['robot']} with {told['items']}, not {stack.robot.name} with {items}"
         raise RecordingError("recording", told["declaration"], reason)
     controller = stack.compile(solver=told["solver"], backend=chosen)
+    conflict, chain = told["policy"]
+    controller.policy = Policy(conflict, tuple(chain))
     sizes = {name: getattr(controller.tick, name).size for name in INPUTS}
     expected = {name: told["sizes"][name] for name in INPUTS}
     if sizes != expected:

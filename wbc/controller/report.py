@@ -8,6 +8,11 @@ from wbc.stack.layout import Layout
 
 #: Flags of a tick
 SOLVED, RELAXED, BRAKED, CAPPED = 0, 1, 2, 3
+#: In the report in place of these: the first of the links of a chain that may have given the answer; braked at its end;
+#: braked because the policy wants it
+RECOVERED, CHAIN_BRAKED, POLICY_BRAKED = 4, 8, 9
+#: Added to what a tick returns, not to what it reports: the certificate fails, or a solver has found no answer
+UNSOUND = 4
 #: Refusals: nothing was changed
 BAD_Q, BAD_UNIT, BAD_V = -1, -2, -3
 
@@ -17,6 +22,10 @@ INFINITE = 1e30
 #: Violations up to this, in row units, are rounding; squared lengths of quaternions may be off by the other
 #: (both as in ``native/settings.h``)
 TOLERANCE, UNIT_TOLERANCE = 1e-9, 2.00001e-6
+
+#: A certificate fails where it bounds the error of v, or a violation, by more than this (a length of the characteristic
+#: one counts as 1 rad, as in ``native/settings.h``)
+SOUND = 1e-6
 
 
 class ReportLayout:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from wbc.controller.report import BRAKED, INFINITE, RELAXED, SOLVED, TOLERANCE, ReportLayout
+from wbc.controller.report import BRAKED, INFINITE, RELAXED, SOLVED, SOUND, TOLERANCE, UNSOUND, ReportLayout
 from wbc.controller.tick import Assembly, Buffers
 from wbc.qp.certificate import Certificate, certify
 from wbc.qp.problem import QP, Solution
@@ -16,6 +16,8 @@ from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Layout
 from wbc.validation import Array
 
+#: What an equality row in its unit may be missed by through the rounding of its own numbers
+_ROUNDING = 1e-12
 #: Of a tick that brakes
 _NONE = Certificate(INFINITE, INFINITE, INFINITE, INFINITE)
 
@@ -33,6 +35,7 @@ class SolvedTick(Buffers):
         self._orders = np.array(row_orders(layout), dtype=np.int_)
         self._units = np.array(row_units(stack, layout), dtype=np.float64)
         scales = layout.dof_scales(stack)
+        self._longest = max(1.0, scales.max(initial=1.0), self._units.max(initial=1.0))
         self._dof_scales = None if (scales == 1.0).all() else scales
 
     def reset(self) -> None:
@@ -52,7 +55,7 @@ class SolvedTick(Buffers):
         return self.finish(self.assembly.qp())
 
     def finish(self, qp: QP) -> int:
-        """Solve a QP of this layout and write the report; the flag."""
+        """Solve a QP of this layout and write the report; the flag, with ``UNSOUND`` where the certificate fails."""
         flag, v, answer = self.answer(qp)
         slack = qp.violation(v)[self._nv :] if flag == RELAXED else np.zeros(self._units.size)
         slack = np.where(slack > 2.0 * TOLERANCE * self._units, slack, 0.0)
@@ -63,7 +66,8 @@ class SolvedTick(Buffers):
         if answer is not None:
             multipliers = answer.multipliers
             self._name_frozen_bounds(qp, answer)
-            certificate = certify(QP(qp.H, qp.g, answer.lower, answer.upper, qp.A), Solution(v, multipliers, "solved"))
+            sides = self._met(qp, answer, v)
+            certificate = certify(QP(qp.H, qp.g, *sides, qp.A), Solution(v, multipliers, "solved"))
         for name in ("stationarity", "violation", "complementarity", "error_bound"):
             report[places[name]] = min(getattr(certificate, name), INFINITE)
         report[places["v"]] = v
@@ -73,7 +77,37 @@ class SolvedTick(Buffers):
         report[places["slack"]] = slack
         self.assembly.look_ahead()
         self.v_last[:] = v
-        return flag
+        if answer is None:
+            return BRAKED + UNSOUND if self.assembly.usable else BRAKED
+        sound = max(certificate.error_bound, certificate.violation) <= SOUND * self._longest
+        return flag if sound else flag + UNSOUND
+
+    def brake(self, qp: QP) -> None:
+        """Every joint comes to rest as fast as its bounds allow; the report says so."""
+        places, report, v = self._places, self.report, self.rest(qp)
+        for name in ("stationarity", "violation", "complementarity", "error_bound"):
+            report[places[name]] = INFINITE
+        report[places["v"]], report[places["flag"]] = v, BRAKED
+        report[places["iterations"]] = 0.0
+        report[places["multipliers"]], report[places["slack"]] = 0.0, 0.0
+        self.assembly.look_ahead()
+        self.v_last[:] = v
+
+    def rest(self, qp: QP) -> Array:
+        """The velocity within the simple bounds that is nearest to rest."""
+        return np.minimum(np.maximum(0.0, qp.lower[: self._nv]), qp.upper[: self._nv])
+
+    def _met(self, qp: QP, answer: Relaxed, v: Array) -> tuple[Array, Array]:
+        """Sides of the answer's problem without equality rows that v meets to rounding and that do not push.
+
+        Rows that depend on each other have no common point to the last digit, so no bound could be stated with all of
+        them. A minimiser over fewer rows that meets the others is the minimiser over all.
+        """
+        at = np.concatenate((v, qp.A @ v))
+        rounding = _ROUNDING * np.concatenate((np.zeros(self._nv), self._units))
+        met = (answer.lower == answer.upper) & (np.abs(at - answer.lower) <= rounding) & (answer.multipliers == 0.0)
+        met[: self._nv] = False
+        return np.where(met, -np.inf, answer.lower), np.where(met, np.inf, answer.upper)
 
     def _name_frozen_bounds(self, qp: QP, answer: Relaxed) -> None:
         """Of a bound that a relaxation holds, the other side is not what binds, whatever sign its multiplier has."""
@@ -85,15 +119,14 @@ class SolvedTick(Buffers):
 
     def answer(self, qp: QP) -> tuple[int, Array, Relaxed | None]:
         """Flag, command and, unless the tick brakes, what the solver answered."""
-        n = self._nv
         if self.assembly.usable:
             sides, crossed = self._uncrossed(qp)
             if crossed[self._orders == 0].any():
-                return BRAKED, np.clip(0.0, qp.lower[:n], qp.upper[:n]), None
+                return BRAKED, self.rest(qp), None
             answer = self._relaxation.solve(sides, self._orders, self._units, self._dof_scales)
             if answer.flag != "failed":
                 return RELAXED if crossed.any() or answer.flag == "relaxed" else SOLVED, answer.x, answer
-        return BRAKED, np.clip(0.0, qp.lower[:n], qp.upper[:n]), None
+        return BRAKED, self.rest(qp), None
 
     def _uncrossed(self, qp: QP) -> tuple[QP, NDArray[np.bool_]]:
         """Rows whose sides have crossed are met half-way; and which of them give way by more than rounding."""

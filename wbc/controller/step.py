@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from wbc.controller.explanation import Explanation
+from wbc.controller.policy import CHAIN
 from wbc.controller.report import INFINITE, ReportLayout
 from wbc.controller.tick import Assembly
 from wbc.errors import SolverError
@@ -29,6 +30,9 @@ class Status(StrEnum):
     RELAXED = "relaxed"
     #: No optimum was found: v brings every joint to rest as fast as its bounds allow
     BRAKED = "braked"
+    #: The first answer had no certificate; another way led to one that has, see :attr:`Step.answered_by`. Rows may have
+    #: given way, see :attr:`Step.relaxed`
+    RECOVERED = "recovered"
     #: :attr:`Controller.iteration_cap` ended the search: v is as near to what it had found as the rows allow, seen from
     #: braking
     CAPPED = "capped"
@@ -118,7 +122,10 @@ class Context:
 
 
 #: By the tick's flag
-STATUSES = (Status.SOLVED, Status.RELAXED, Status.BRAKED, Status.CAPPED)
+STATUSES: tuple[Status, ...] = (Status.SOLVED, Status.RELAXED, Status.BRAKED, Status.CAPPED)
+STATUSES += (*[Status.RECOVERED] * len(CHAIN), Status.BRAKED, Status.BRAKED)
+#: What gave the command, by the tick's flag
+_ANSWERED = ("", "", "", "", *CHAIN, "braking", "policy")
 _FLOAT = np.dtype(np.float64)
 _DOUBLE = struct.Struct("d").unpack_from
 
@@ -229,8 +236,10 @@ class Step:
 
     @property
     def answered_by(self) -> str:
-        """What gave the command."""
-        return ""
+        """What gave the command in place of the first answer: a link of :attr:`wbc.Policy.chain`; ``braking``, where
+        none had a certified answer; ``policy``, where that brakes in conflicts. Empty for a first answer.
+        """
+        return _ANSWERED[int(self._number("flag"))]
 
     def explain(self) -> Explanation:
         """Why the command is what it is, worked out now: conflicts by name, what binds, what each task lost to whom.

@@ -43,7 +43,8 @@ def vectors(controller: Controller, count: int, seed: int = 0) -> Array:
             other.tick.p[:] = start
             _vary(other, q, rng)
         step = other.step(q, v)
-        if (other.backend == "native" and other.solver == "daqp") or _certain(step):
+        first = not step.answered_by  # exported code has no chain
+        if first and ((other.backend == "native" and other.solver == "daqp") or _certain(step)):
             rows.append(np.concatenate([q, v, other.tick.p, [STATUSES.index(step.status)], step.v]))
         q, v = pin.integrate(model, q, step.v * controller.stack.dt), step.v.copy()
     width = other.layout.nq + 2 * other.layout.nv + other.layout.parameters + 1

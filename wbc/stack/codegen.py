@@ -66,6 +66,7 @@ def _header(stack: Declaration, layout: Layout, program: Program, functions: lis
                 "CALM": int(stack.calm),
                 "UNITS": len(units),
                 "LAST_ORDER": max(orders, default=0),
+                "LONGEST": max(1.0, *dofs, *scales),
                 "ACTIVE_MAX": layout.nv + soft_rows + 1,
                 "WORK_W": max(f.sz_w() for f in functions),
                 "WORK_IW": max(f.sz_iw() for f in functions),

@@ -50,7 +50,8 @@ int wbc_step(wbc_controller *c, const double *q, const double *v) {
         memcpy(t->v_in, v, NV * sizeof(double));
         t->use_v = 1.0;
     }
-    return wbc_tick_step(t);
+    const int flag = wbc_tick_step(t);
+    return flag < 0 ? flag : flag & ~WBC_UNSOUND;
 }
 
 const wbc_result *wbc_last(wbc_controller *c) { return (const wbc_result *)(void *)&inside(c)->report; }

@@ -42,6 +42,8 @@ int bend(const double **arg, double **res, long long *iw, double *w, int mem);
 #define UNIT_TOLERANCE 2.00001e-6
 /* Violations up to this, in row units, are rounding */
 #define TOLERANCE 1e-9
+/* A certificate fails beyond this bound on the error of v and on violations, in v / LONGEST and rows / LONGEST */
+#define SOUND 1e-6
 /* Violations of rows that the solver took into account, in row units: beyond this the row cannot hold */
 #define SEEN 1e-6
 

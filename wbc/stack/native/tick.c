@@ -25,6 +25,12 @@ EXPORT int wbc_tick_check(wbc_tick *t) {
     return bad;
 }
 
+static int unsound(const wbc_tick *t, int flag) {
+    if (flag == WBC_CAPPED) return 0;
+    if (flag == WBC_BRAKED) return t->unusable == 0.0;
+    return !(t->report.error_bound <= SOUND * LONGEST && t->report.violation <= SOUND * LONGEST);
+}
+
 EXPORT int wbc_tick_step(wbc_tick *t) {
     const int bad = wbc_tick_check(t);
     if (bad) return bad;
@@ -35,7 +41,7 @@ EXPORT int wbc_tick_step(wbc_tick *t) {
     wbc_tick_certify(t);
     wbc_tick_look_ahead(t);
     memcpy(t->v_last, t->report.v, NV * sizeof(double));
-    return flag;
+    return unsound(t, flag) ? flag + WBC_UNSOUND : flag;
 }
 
 EXPORT long long wbc_tick_size(void) { return (long long)sizeof(wbc_tick); }

@@ -21,6 +21,7 @@
  *   segment_half segment_row   half a segment's length, and a row whose entries are the joints that move it
  *   SENSED sensed_row sensed_count   items with sensed rows, their first such row, and how many there are
  *   sensed_distance sensed_line sensed_side   where their numbers are in p
+ *   LONGEST     the largest unit of velocities and rows, at least 1
  *   FAR         a distance of no pair [m]
  *   stop_at stop_q stop_low stop_high   the same for position limits, with the coordinate that is limited
  */
@@ -40,6 +41,8 @@
 #define WBC_RELAXED 1
 #define WBC_BRAKED 2
 #define WBC_CAPPED 3
+/* Added to what wbc_tick_step returns: the certificate fails, or there is no answer although all numbers are fit */
+#define WBC_UNSOUND 4
 #define WBC_BAD_Q (-1)
 #define WBC_BAD_UNIT (-2)
 #define WBC_BAD_V (-3)

@@ -1,0 +1,74 @@
+"""What must be true of every step, whatever was asked."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from wbc.controller import Controller, Status, Step
+from wbc.robot import Robot
+from wbc.validation import Array
+
+#: A certificate is good up to here, in rad/s and rows per characteristic length
+SOUND = 1e-6
+
+
+class Judge:
+    """Checks the steps of one controller; each check returns what is wrong, or an empty text."""
+
+    def __init__(self, controller: Controller) -> None:
+        robot = controller.stack.robot
+        self.limits = robot.limits
+        self.room = 1e-11 * np.maximum(1.0, np.where(np.isfinite(robot.limits.velocity), robot.limits.velocity, 1.0))
+        scales = [1.0, controller.stack.length]
+        self.longest = max(scales)
+
+    def step(self, step: Step, before: Array, dt: float) -> str:
+        """Numbers, actuator limits about the velocity before, and the certificate."""
+        v, limits = step.v, self.limits
+        if not np.isfinite(v).all() or np.isnan(np.frombuffer(step._data, count=step._context.report.size)).any():
+            return "NaN"
+        reach = limits.acceleration * dt
+        high = np.maximum(limits.velocity, before - reach) + self.room
+        low = np.minimum(-limits.velocity, before + reach) - self.room
+        if (v > high).any() or (v < low).any():
+            return "beyond a velocity limit"
+        if (np.abs(v - before) > reach + self.room).any():
+            return "beyond an acceleration limit"
+        if step.status in (Status.BRAKED, Status.CAPPED):
+            return ""
+        certificate = step.certificate
+        if not max(certificate.error_bound, certificate.violation) <= SOUND * self.longest:
+            return "a certificate that fails is not reported"
+        return ""
+
+
+class Outside:
+    """Joints that are outside their limits brake, return, and do not go further out again."""
+
+    def __init__(self, robot: Robot) -> None:
+        self.robot = robot
+        self.at = np.flatnonzero(robot.position_index >= 0)
+        self.q_at = robot.position_index[self.at]
+        self.turned = np.zeros(self.at.size, dtype=bool)
+        self.last = np.zeros(self.at.size)
+
+    def begin(self, q: Array) -> None:
+        """Another episode."""
+        self.turned[:] = False
+        self.last[:] = self._beyond(q)
+
+    def _beyond(self, q: Array) -> Array:
+        limits, x = self.robot.limits, q[self.q_at]
+        return np.asarray(
+            np.maximum(0.0, np.maximum(limits.position_lower[self.at] - x, x - limits.position_upper[self.at]))
+        )
+
+    def look(self, q: Array) -> str:
+        """After a step."""
+        beyond = self._beyond(q)
+        worse = beyond > self.last + 1e-9
+        bad = worse & self.turned
+        # too fast too near to a limit a joint may pass it; from the tick on in which it turns it may not
+        self.turned |= ~worse & (self.last > 1e-9)
+        self.last[:] = beyond
+        return "a violated position limit is violated more" if bad.any() else ""
