@@ -15,7 +15,7 @@ TYPES := build/types
 SOURCES := wbc tasks robots tests bench examples
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test lint format types docs bench bench-ik bench-time-laws lock clean
+.PHONY: help setup demo test lint format types docs bench bench-ik bench-time-laws soak lock clean
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 18
@@ -56,6 +56,9 @@ bench-ik: $(READY) $(PEERS_READY)  ## inverse kinematics on TRAC-IK's protocol, 
 
 bench-time-laws: $(READY)  ## laws of motion beside raw toppra and raw ruckig, 10^6 states; Ctrl-C keeps what it has
 	$(BIN)/python -m bench.time_laws --full
+
+soak: $(READY)  ## 10^6 random ticks on random stacks and under faults, minutes; counts every fall-back; Ctrl-C keeps the counts
+	$(BIN)/python -m bench.soak
 
 lock: $(READY)  ## write the versions in .venv to requirements/lock.txt
 	$(BIN)/python requirements/freeze.py > requirements/lock.txt.new

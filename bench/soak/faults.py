@@ -1,0 +1,139 @@
+"""Ticks under faults: a solver that may not search, a library that is lost, clocks that jump, states that lie."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import tempfile
+from collections import Counter
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+
+from bench.soak.episodes import Plant, episode
+from bench.soak.judge import Judge
+from bench.soak.machines import machine
+from bench.soak.stacks import DT, random_stack
+from wbc.controller import Controller
+from wbc.errors import RangeError
+from wbc.qp import daqp
+from wbc.validation import Array
+
+Given = tuple[Array, Array | None, float | None]
+
+
+class Stale:
+    """The state is measured once and repeated, whatever the robot does."""
+
+    def __call__(self, controller: Controller, q: Array, v: Array, tick: int, rng: np.random.Generator) -> Given:
+        if tick % 8 == 0:
+            self.q = q
+        return self.q, None, None
+
+
+class Frozen:
+    """One joint does not move; with odd ticks its measured velocity says so."""
+
+    def __call__(self, controller: Controller, q: Array, v: Array, tick: int, rng: np.random.Generator) -> Given:
+        robot = controller.stack.robot
+        if tick == 0:
+            self.at = int(rng.choice(np.flatnonzero(robot.position_index >= 0)))
+            self.value = q[robot.position_index[self.at]]
+        lying = q.copy()
+        lying[robot.position_index[self.at]] = self.value
+        measured = v.copy()
+        measured[self.at] = 0.0
+        return lying, measured if tick % 2 else None, None
+
+
+def jumping_clock(controller: Controller, q: Array, v: Array, tick: int, rng: np.random.Generator) -> Given:
+    """Steps of no time, negative and long ones are refused and change nothing; others vary as far as they may."""
+    for bad in (0.0, -DT, 100.0 * DT):
+        with contextlib.suppress(RangeError):
+            controller.step(q, dt=bad)
+            raise AssertionError(f"dt = {bad} s was taken")
+    return q, None, DT * float(rng.choice([0.25, 2.0]))
+
+
+def one_iteration(seed: int, k: int, backend: str) -> Counter[str]:
+    """The QP solver may take one iteration, in all its uses within a native tick or on the virtual machine."""
+    rng = np.random.default_rng([seed, 11, k])
+    before = daqp.SETTINGS["iter_limit"]
+    if backend == "vm":
+        daqp.SETTINGS["iter_limit"] = 1
+    try:
+        controller = random_stack(machine(rng), rng).compile(backend=backend)
+        if backend == "native":
+            controller.iteration_cap = 1
+        return episode(controller, Judge(controller), rng)
+    finally:
+        daqp.SETTINGS["iter_limit"] = before
+
+
+def plants(seed: int, k: int, backend: str) -> dict[str, Counter[str]]:
+    """What the state and the clock can do, on one stack."""
+    rng = np.random.default_rng([seed, 12, k])
+    controller = random_stack(machine(rng), rng).compile(backend=backend)
+    judge = Judge(controller)
+    kinds: dict[str, Plant] = {"stale state": Stale(), "frozen joint": Frozen(), "clock jumps": jumping_clock}
+    return {name: episode(controller, judge, rng, plant) for name, plant in kinds.items()}
+
+
+def lost_library(seed: int, k: int, harm: Callable[[Path], None]) -> Counter[str]:
+    """The compiled library is lost while it is in use: commands stay the same, copies and explanations work."""
+    rng = np.random.default_rng([seed, 13, k])
+    stack = random_stack(machine(rng), rng)
+    cache, counts = os.environ.get("WBC_CACHE"), Counter[str]()
+    with tempfile.TemporaryDirectory(prefix="wbc-soak-") as folder:
+        os.environ["WBC_CACHE"] = folder
+        try:
+            controller = stack.compile(backend="native")
+            (library,) = Path(folder).glob("*/tick.so")
+            counts += episode(controller, Judge(controller), np.random.default_rng(k))
+            twin = controller.clone()
+            library.parent.chmod(0o700)
+            library.chmod(0o600)
+            harm(library)
+            for each in (controller, twin, controller.clone()):
+                counts += episode(each, Judge(each), np.random.default_rng(k))
+            q = controller.stack.robot.neutral
+            commands = {each.reset(q) or each.step(q).v.tobytes() for each in (controller, controller.clone())}
+            if len(commands) != 1:
+                counts["wrong: commands differ after the library was lost"] += 1
+            controller.step(q).explain()
+        finally:
+            if cache is None:
+                del os.environ["WBC_CACHE"]
+            else:
+                os.environ["WBC_CACHE"] = cache
+    return counts
+
+
+def delete(library: Path) -> None:
+    """Remove the file."""
+    library.unlink()
+
+
+def corrupt(library: Path) -> None:
+    """Truncate the file in place and fill it with noise."""
+    with library.open("r+b") as file:
+        file.truncate(0)
+        file.write(np.random.default_rng(0).bytes(4096))
+
+
+def faults(seed: int, number: int, native: bool) -> Iterator[tuple[str, Counter[str]]]:
+    """Every fault on ``number`` stacks of each back end; libraries are lost on one."""
+    for backend in ("vm", "native") if native else ("vm",):
+        for k in range(number):
+            yield f"one iteration, {backend} {seed}/{k}", one_iteration(seed, k, backend)
+            for name, counts in plants(seed, k, backend).items():
+                yield f"{name}, {backend} {seed}/{k}", counts
+    if native:
+        yield f"library deleted {seed}", lost_library(seed, 0, delete)
+        yield f"library corrupted {seed}", lost_library(seed, 1, corrupt)
+
+
+def count(number: int, native: bool) -> int:
+    """How many records :func:`faults` gives."""
+    return 4 * number * (2 if native else 1) + (2 if native else 0)

@@ -1,0 +1,109 @@
+"""A short soak on the virtual machine: random stacks, known problems, faults; and that the judge sees what is wrong."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import numpy as np
+import pytest
+
+from bench.records import Parts
+from bench.soak.__main__ import failures, is_wrong, sheet
+from bench.soak.episodes import episode, stacks
+from bench.soak.faults import one_iteration, plants
+from bench.soak.judge import Judge, Outside
+from bench.soak.known import problems
+from bench.soak.machines import machine
+from bench.soak.stacks import random_stack
+from wbc.controller import Controller
+
+
+def wrong(counts: Counter[str]) -> dict[str, int]:
+    return {key: n for key, n in counts.items() if is_wrong(key)}
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+def test_random_stacks_give_safe_certified_commands() -> None:
+    found = list(stacks(3, 4, "vm", 40))
+    assert {name: wrong(counts) for name, counts in found if wrong(counts)} == {}
+    total = sum((counts for _, counts in found), Counter[str]())
+    assert total.total() == 4 * 40
+    assert total["solved"] > 20
+    assert total["relaxed"] > 20
+
+
+def test_known_problems_are_solved_as_the_referee_does() -> None:
+    for name, counts in problems(5, 2, "vm", 10):
+        assert wrong(counts) == {}, name
+        assert counts["solved"] == 10
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+def test_faults_are_survived() -> None:
+    counts = one_iteration(0, 0, "vm")
+    assert wrong(counts) == {}
+    assert sum(n for key, n in counts.items() if key.startswith(("recovered", "braked"))) > 0
+    for name, each in plants(0, 1, "vm").items():
+        assert wrong(each) == {}, name
+        assert each.total() == 20, name
+
+
+@pytest.fixture(scope="module")
+def controller() -> Controller:
+    rng = np.random.default_rng(2)
+    return random_stack(machine(rng), rng).compile(backend="vm")
+
+
+class Broken:
+    """A step of a controller with another command."""
+
+    def __init__(self, step: object, v: np.ndarray) -> None:
+        self._step, self.v = step, v
+
+    def __getattr__(self, name: str) -> object:
+        return getattr(self._step, name)
+
+
+def test_the_judge_sees_what_is_wrong(controller: Controller) -> None:
+    robot, judge = controller.stack.robot, Judge(controller)
+    controller.reset(robot.neutral)
+    step, still = controller.step(robot.neutral), np.zeros(robot.nv)
+    assert judge.step(step, still, 0.005) == ""
+    far = np.zeros(robot.nv)
+    for value, text in ((np.nan, "NaN"), (1e3, "beyond a velocity limit"), (np.inf, "NaN")):
+        far[0] = value
+        assert judge.step(Broken(step, far), still, 0.005) == text
+    far[0] = min(robot.limits.velocity[0], 1.1 * robot.limits.acceleration[0] * 0.005)
+    if far[0] > robot.limits.acceleration[0] * 0.005:
+        assert judge.step(Broken(step, far), still, 0.005) == "beyond an acceleration limit"
+    certificate = type(step.certificate)(0.0, 0.0, 0.0, 1e-3 * judge.longest)
+    worse = Broken(step, step.v)
+    worse.certificate, worse.status = certificate, "solved"
+    assert judge.step(worse, still, 0.005) == "a certificate that fails is not reported"
+
+
+def test_a_joint_that_turns_may_not_go_out_again() -> None:
+    robot = machine(np.random.default_rng(2))
+    watch, at = Outside(robot), int(np.flatnonzero(np.isfinite(robot.limits.position_upper))[0])
+    q = robot.neutral.copy()
+    k = robot.position_index[at]
+
+    def seen(beyond: float) -> str:
+        q[k] = robot.limits.position_upper[at] + beyond
+        return watch.look(q)
+
+    q[k] = robot.limits.position_upper[at] + 0.1
+    watch.begin(q)
+    assert [seen(x) for x in (0.12, 0.11, 0.05)] == ["", "", ""]
+    assert seen(0.06) == "a violated position limit is violated more"
+
+
+def test_exceptions_are_counted(controller: Controller) -> None:
+    def bad(controller: Controller, q: np.ndarray, v: np.ndarray, tick: int, rng: np.random.Generator) -> object:
+        return q, None, -1.0
+
+    counts = episode(controller, Judge(controller), np.random.default_rng(0), bad)
+    assert dict(counts) == {"raised: RangeError": 1}
+    parts: Parts = {"vm": [{"name": "one", "counts": counts}]}
+    assert failures(parts) == ["one: raised: RangeError (1)"]
+    assert sheet(parts).rows[0][-1] == "1"
