@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -19,6 +19,9 @@ from wbc.errors import SolverError
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Block, Layout
 from wbc.validation import Array
+
+if TYPE_CHECKING:
+    from wbc.controller.past import Past
 
 
 class Status(StrEnum):
@@ -251,13 +254,35 @@ class Step:
             SolverError: the step comes from a pickle, which holds no code to set its tick up with.
         """
         from wbc.controller.explaining import Explainer
+
+        return Explainer(self._past()).explain(str(self.status), self.answered_by)
+
+    def derivative(self, name: str, value: str | None = None) -> Array:
+        """dv/dx [nv, k], how the command moves with what the tick was given, as long as the same rows bind.
+
+            step.derivative("q")                  # tangent of the configuration [1/s, ...]
+            step.derivative("v")                  # the velocity that accelerations count from
+            step.derivative("hand", "target")     # a pose: six columns, (linear; angular) in the axes it is given in
+            step.derivative("hand", "weight")     # by the logarithm of the weight
+
+        Where a row is about to bind or to let go, the derivative is that of one side. docs/explanations.md.
+
+        Raises:
+            UnknownNameError: no such item or value.
+            SolverError: the step comes from a pickle, rows gave way, or there is no optimum.
+        """
+        from wbc.controller.derivative import derivative
+
+        return derivative(self._past(), name, value)
+
+    def _past(self) -> Past:
+        """The tick again, in memory of its own."""
         from wbc.controller.past import Past
 
         context = self._context
         if context.assembly is None:
-            raise SolverError("step", None, "comes from a pickle; explain it in the process that made it")
-        past = Past(self._data, context.stack, context.layout, context.assembly)
-        return Explainer(past).explain(str(self.status), self.answered_by)
+            raise SolverError("step", None, "comes from a pickle; ask in the process that made it")
+        return Past(self._data, context.stack, context.layout, context.assembly)
 
     def __repr__(self) -> str:
         text = f"Step({self.status}, |v| = {np.linalg.norm(self.v):.4g}"

@@ -1,0 +1,117 @@
+"""How the command of a past tick moves with what the tick was given: through its active set."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pinocchio as pin
+
+from wbc.controller.past import Past
+from wbc.errors import SolverError, UnknownNameError
+from wbc.qp.problem import QP, Solution
+from wbc.qp.sensitivity import Sensitivity
+from wbc.stack.layout import Block, Slot
+from wbc.validation import Array
+
+#: Displacement by which the QP's own numbers are differentiated
+_STEP = 1e-6
+
+
+def derivative(past: Past, name: str, value: str | None) -> Array:
+    """dv/dx [nv, k] at the tick, for x = q, v, or a run-time value of an item; see :meth:`wbc.Step.derivative`.
+
+        H dv + C_S' dlam = -(dH v + dg + dC_S' lam),      C_S dv = db_S - dC_S v
+
+    for the rows S that hold v. What stands on the right are central differences of the QP's numbers, which are smooth
+    where the solution's change of rows is not.
+
+    Raises:
+        UnknownNameError: no such item or value. SolverError: rows gave way, or the tick has no optimum.
+    """
+    moves, count = _moves(past, name, value)
+    answer = past.solve()[1] if past.usable else None
+    if answer is None or answer.flag != "solved":
+        raise SolverError("derivative", name, "only a command for which every row holds has a derivative")
+    n, size = past.layout.nv, past.qp.lower.size
+    sensitivity = Sensitivity(past.qp, Solution(answer.x, answer.multipliers, "solved"))
+    upper = np.where(answer.multipliers > 0.0, 1.0, 0.0)
+    force, offset = np.zeros((n, count)), np.zeros((size, count))
+    for k in range(count):
+        ends: list[QP] = []
+        for sign in (_STEP, -_STEP):
+            state = past.tick.state.copy()
+            moves(k, sign)
+            ends.append(past.tick.qp())
+            past.tick.state[:] = state
+        H, g, A = (_slope(ends, part) for part in ("H", "g", "A"))
+        force[:, k] = H @ answer.x + g + A.T @ answer.multipliers[n:]
+        with np.errstate(invalid="ignore"):
+            sides = np.where(upper > 0.0, _slope(ends, "upper"), _slope(ends, "lower"))
+        offset[:, k] = np.nan_to_num(sides) - np.concatenate((np.zeros(n), A @ answer.x))
+    return sensitivity.change(force, offset)
+
+
+def _slope(ends: list[QP], part: str) -> Array:
+    return np.asarray((getattr(ends[0], part) - getattr(ends[1], part)) / (2.0 * _STEP))
+
+
+def _moves(past: Past, name: str, value: str | None) -> tuple[Callable[[int, float], None], int]:
+    """What displaces the k-th entry of a value by a small number, and how many entries there are."""
+    tick, model, nv = past.tick, past.stack.robot.model, past.layout.nv
+
+    def move_q(k: int, by: float) -> None:
+        tick.q[:] = pin.integrate(model, tick.q, by * np.eye(nv)[k])
+
+    def move_v(k: int, by: float) -> None:
+        tick.v_last[k] += by
+
+    if value is None:
+        own = {"q": move_q, "v": move_v}
+        if name not in own:
+            raise UnknownNameError("derivative", name, own)
+        return own[name], nv
+    if name not in past.layout.blocks:
+        raise UnknownNameError("derivative", name, past.layout.blocks)
+    block = past.layout.blocks[name]
+    if value == "weight" and block.form == "task":
+        return _weight(past, block), 1
+    if value not in block.slots:
+        names = (*block.slots, "weight") if block.form == "task" else tuple(block.slots)
+        raise UnknownNameError(f"derivative.{name}", value, names)
+    return _input(past, block.slots[value])
+
+
+def _weight(past: Past, block: Block) -> Callable[[int, float], None]:
+    """The item's weight, by its logarithm: d/d(ln w)."""
+
+    def move(k: int, by: float) -> None:
+        past.tick.weight[block.span] *= np.exp(by)
+
+    return move
+
+
+def _input(past: Past, slot: Slot) -> tuple[Callable[[int, float], None], int]:
+    """An input along its tangent space: poses by a twist (linear; angular) in the axes that they are given in."""
+    numbers, kind = past.tick.p[slot.span], slot.input.kind
+
+    def move(k: int, by: float) -> None:
+        numbers[k] += by
+
+    def turn(k: int, by: float) -> None:
+        rotation = numbers[:9].reshape(3, 3, order="F")
+        numbers[:9] = (pin.exp3(by * np.eye(3)[k]) @ rotation).ravel(order="F")
+
+    def place(k: int, by: float) -> None:
+        if k < 3:
+            numbers[9 + k] += by
+        else:
+            turn(k - 3, by)
+
+    def along(k: int, by: float) -> None:
+        model = past.stack.robot.model
+        numbers[:] = pin.integrate(model, numbers.copy(), by * np.eye(model.nv)[k])
+
+    if kind == "configuration":
+        return along, past.layout.nv
+    return {"pose": (place, 6), "rotation": (turn, 3)}.get(kind, (move, slot.size))
