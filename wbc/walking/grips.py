@@ -147,47 +147,46 @@ def _of_arm(
     kinematics: ArmKinematics, arm: int, frames: Array, structure: Structure, among: Ints, spacing: float
 ) -> Iterator[tuple[int, int, int, int, int, int, Array]]:
     """(arm, hold, branch, first, last, reason of the end, postures) of every grip of an arm on some holds."""
-    offset = structure.positions[among][None] - frames[:, None, :3, 3]
-    neck = frames[:, None, :3, 2] * kinematics.data.neck_length
-    samples, holds = np.nonzero(((offset - neck) ** 2).sum(axis=2) < _length(kinematics) ** 2)
-    turn = frames[samples, :3, :3]
-    points = np.einsum("nji,nj->ni", turn, offset[samples, holds])
-    holds = among[holds]
-    axes = np.einsum("nji,nj->ni", turn, structure.axes[holds])
-    axes /= np.linalg.norm(axes, axis=1)[:, None]
-    reach = kinematics.wrist_reach(kinematics.wrist_of(points, axes))
-    near = (reach > REACH_ROOM) & (axes[:, 2] > LEAST_FACING)
-    samples, holds = samples[near], holds[near]
-    order = np.lexsort((samples, holds))
-    samples, holds = samples[order], holds[order]
+    # In the arm's frame, hold by hold and sample by sample ``[holds, samples, 3]``
+    turn, data, count = frames[:, :3, :3], kinematics.data, len(frames)
+    flat = turn.transpose(1, 0, 2).reshape(3, -1)
+    points = (structure.positions[among] @ flat).reshape(-1, count, 3)
+    points -= np.einsum("nj,nji->ni", frames[:, :3, 3], turn)
+    axes = (structure.axes[among] @ flat).reshape(-1, count, 3)
+    x, y, z = points[..., 0], points[..., 1], points[..., 2] - data.neck_length
+    near = (axes[..., 2] > LEAST_FACING) & (x * x + y * y + z * z < _length(kinematics) ** 2)
+    points, axes, (holds, samples) = points[near], axes[near], np.nonzero(near)
+    reached = kinematics.wrist_reach(kinematics.wrist_of(points, axes)) > REACH_ROOM
+    points, axes, holds, samples = points[reached], axes[reached], among[holds[reached]], samples[reached]
     if not len(samples):
         return
-    postures, solved = kinematics.inverse_axis(points[near][order], axes[near][order])
+    postures, solved = kinematics.inverse_axis(points, axes)
     margins = kinematics.margins(postures)
     margins[..., 5] = np.inf  # joint 6 turns the hand about its own axis, which is free
-    good = solved & (margins.min(axis=-1) > ANGLE_ROOM)
-    limit = RATE_PART * np.array(kinematics.data.joint_rates)
+    good = solved & np.logical_and.reduce([margins[..., k] > ANGLE_ROOM for k in range(margins.shape[-1])])
+    most = RATE_PART * spacing * np.array(data.joint_rates)[:5]
     neighbours = (holds[1:] == holds[:-1]) & (samples[1:] == samples[:-1] + 1)
     for branch in range(postures.shape[1]):
         q, fits = postures[:, branch], good[:, branch]
-        used = np.abs(q[1:] - q[:-1])[:, :5] / spacing / limit[:5]
-        joined = neighbours & fits[1:] & fits[:-1] & (used <= 1.0).all(axis=1)
+        slow = [np.abs(q[1:, k] - q[:-1, k]) <= most[k] for k in range(5)]
+        joined = np.logical_and.reduce([neighbours, fits[1:], fits[:-1], *slow])
         begins = np.nonzero(np.concatenate([[True], ~joined]))[0]
-        for begin, end in zip(begins, np.concatenate([begins[1:], [len(q)]]) - 1, strict=True):
-            if not fits[begin] or end - begin + 1 < SHORTEST:
-                continue
-            reason = _reason(samples, holds, margins[:, branch], used, neighbours, end, len(frames))
+        ends = np.concatenate([begins[1:], [len(q)]]) - 1
+        long = fits[begins] & (ends - begins + 1 >= SHORTEST)
+        for begin, end in zip(begins[long].tolist(), ends[long].tolist(), strict=True):
+            reason = _reason(samples, margins[:, branch], q, most, neighbours, end, count)
             first, last = int(samples[begin]), int(samples[end])
             yield arm, int(holds[begin]), branch, first, last, reason, q[begin : end + 1]
 
 
-def _reason(samples: Ints, holds: Ints, margins: Array, used: Array, neighbours: Array, end: int, count: int) -> int:
+def _reason(samples: Ints, margins: Array, q: Array, most: Array, neighbours: Array, end: int, count: int) -> int:
     """Why a grip ends after row ``end``: an index into ``Grips.reasons``."""
     names = len(LIMIT_NAMES)
     if samples[end] == count - 1:
         return names + 7
     if end + 1 == len(samples) or not neighbours[end]:
         return names
-    if (used[end] > 1.0).any():
-        return names + 1 + int(np.argmax(used[end]))
+    used = np.abs(q[end + 1, :5] - q[end, :5]) / most
+    if (used > 1.0).any():
+        return names + 1 + int(np.argmax(used))
     return int(np.argmin(margins[end + 1]))
