@@ -28,6 +28,7 @@ Beginning = tuple[Mapping[str, str], Mapping[str, Array], Mapping[str, Collectio
 NOTHING: Beginning = ({}, {}, {})
 #: Delays of one swing that velocity mode allows one after the other [s]
 DELAYS = (0.0, 0.25, 0.5, 1.0, 2.0, float("inf"))
+SOON = (0.0, 0.5, float("inf"))
 #: Grips of an arm that a start may have, and stances that a search begins with
 START_GRIPS, STARTS = 10, 24
 #: A search that fails is made again, so many times as wide
@@ -100,6 +101,7 @@ def plan_slices(
     grips: Grips | None = None,
     stance: tuple[int, ...] | None = None,
     sample: int = 0,
+    soon: bool = False,
 ) -> Slices[Plan]:
     """The best plan along one path, complete or not, in slices of some milliseconds of work; the same every time.
 
@@ -107,6 +109,7 @@ def plan_slices(
         beginning: start, postures and avoid of :func:`plan_walk`. deadline: of ``time.perf_counter``.
         grips: of the path, if they are known. stance: grips that hold at the sample, instead of a beginning.
         sample: of the path, from which on hands may be lifted.
+        soon: somebody waits: of fewer delays (:data:`SOON`), the wide searches after all narrow ones.
 
     Raises:
         as :func:`plan_walk`, where no stance is possible at the beginning.
@@ -117,9 +120,12 @@ def plan_slices(
     if grips is None:
         grips = yield from grip_slices(walker, structure, path)
     best: tuple[StanceSearch, Found] | None = None
-    delays = DELAYS if objective == "velocity" else DELAYS[-1:]
+    delays: tuple[float, ...] = DELAYS if objective == "velocity" else DELAYS[-1:]
     widths = (None,) if width is None else (width, WIDER * width)
-    for delay, wide in product(delays, widths):
+    if soon and objective == "velocity":
+        delays = SOON
+    tries = [(delay, wide) for wide in widths for delay in delays] if soon else product(delays, widths)
+    for delay, wide in tries:
         search = StanceSearch(walker, structure, path, grips, longest_delay=delay, width=wide)
         starts = [stance] if stance else stances(walker, structure, search, beginning, sample)
         yield None

@@ -67,7 +67,7 @@ def plan_from_stance(
     # The plan needs a stance that goes on behind it
     head = min(round(HEAD / path.spacing), max(until - 1, 0))
     yield _standing(path, grips, tuple(start[arm.name] for arm in walker.arms), stance, head)
-    plan = yield from plan_slices(walker, structure, path, beginning, objective=objective, sample=head)
+    plan = yield from plan_slices(walker, structure, path, beginning, objective=objective, sample=head, soon=True)
     return _complete(structure, plan)
 
 
@@ -95,7 +95,7 @@ def plan_rest(
     begun = plan.cut(names, kept, sample * path.spacing)
     yield begun
     rest = yield from plan_slices(
-        walker, structure, path, objective=objective, grips=grips, stance=stance, sample=sample
+        walker, structure, path, objective=objective, grips=grips, stance=stance, sample=sample, soon=True
     )
     return begun.then(_complete(structure, rest))
 

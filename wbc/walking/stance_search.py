@@ -38,7 +38,7 @@ INSIDE, HOVER, BENT = 3, 0.75, 0.08
 #: Ways to one stance that are looked at, and stances that are checked together, in widths
 WAYS, PARTS = 2, 2
 #: Stances, and moves or pairs of grips, of one slice of the search
-NODES, MOVES = 4, 32
+NODES, MOVES = 3, 16
 #: Delays are counted in steps of this [s], so that rounding decides nothing
 QUANTUM = 1e-6
 

@@ -35,7 +35,7 @@ JOINING = 0.05
 #: Poses behind the body that are kept, for going back
 TRAIL = 400
 #: Slices of planning between two ticks
-SLICES = 2
+SLICES = 3
 
 
 class Walk(Hands):
