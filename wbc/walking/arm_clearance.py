@@ -70,7 +70,7 @@ class ArmClearance:
         kept = [k for k in range(len(todo)) if sizes[k]]
         self._fill({grip for k in kept for grip in todo[k]})
         sides = [np.concatenate([self._of(todo[k][side], spans[k]) for k in kept]) for side in (0, 1)]
-        near = np.split(self.near(*sides), np.cumsum(sizes[kept])[:-1])
+        near = np.split(self.near(sides[0], sides[1]), np.cumsum(sizes[kept])[:-1])
         self._conflicts.update({pair: [] for pair in todo})
         for k, flags in zip(kept, near, strict=True):
             self._conflicts[todo[k]] = spans[k][flags].tolist()
@@ -97,17 +97,18 @@ class ArmClearance:
         out: Array = (segment_distances(a, b, c, d) - self._least).min(axis=1)
         return out
 
-    def near(self, one: Array, other: Array) -> NDArray[np.bool_]:
-        """Whether two arms given by their points are nearer than radii and clearance allow: ``[m]``."""
+    def near(self, one: Array, other: Array, less: float = 0.0) -> NDArray[np.bool_]:
+        """Whether arms given by their points are nearer than radii and clearance less ``less`` [m] allow: ``[m]``."""
+        least = self._least - less
         a, b = one[:, self._from], one[:, self._to]
         c, d = other[:, self._from], other[:, self._to]
         # Capsules whose middles are far apart need no closer look
         halves = [0.5 * np.sqrt(((q - p) ** 2).sum(axis=2)) for p, q in ((a, b), (c, d))]
         gap = (0.5 * (a + b))[:, self._one] - (0.5 * (c + d))[:, self._other]
-        reach = halves[0][:, self._one] + halves[1][:, self._other] + self._least
+        reach = halves[0][:, self._one] + halves[1][:, self._other] + least
         row, pair = np.nonzero((gap * gap).sum(axis=2) < reach * reach)
         i, j = np.array(self._one)[pair], np.array(self._other)[pair]
-        close = segment_distances(a[row, i], b[row, i], c[row, j], d[row, j]) < self._least[pair]
+        close = segment_distances(a[row, i], b[row, i], c[row, j], d[row, j]) < least[pair]
         out = np.zeros(len(one), dtype=np.bool_)
         out[row[close]] = True
         return out

@@ -81,7 +81,15 @@ class ArmKinematics:
         out[..., 2, 0], out[..., 2, 1] = -data.shoulder_offset * s1, data.shoulder_offset * c1
         out[..., 3, :] = out[..., 2, :] + data.upper_arm_length * np.stack([c1 * s2, s1 * s2, c2], axis=-1)
         out[..., 4, :] = self._wrist(array)
-        out[..., 5, :] = self.forward(array)[..., :3, 3]
+        # The hand's z axis: (c4 s5, s4 s5, c5) in frame 3
+        (s, c), (s4, c4) = sines(array[..., 1] + array[..., 2]), sines(array[..., 3])
+        s5, c5 = sines(array[..., 4])
+        outward, sideways = c * c4 * s5 + s * c5, s4 * s5
+        axis = out[..., 5, :]
+        axis[..., 0], axis[..., 1] = c1 * outward - s1 * sideways, s1 * outward + c1 * sideways
+        axis[..., 2] = c * c5 - s * c4 * s5
+        axis *= data.hand_length
+        axis += out[..., 4, :]
         return out
 
     @property

@@ -37,8 +37,8 @@ Key = tuple[int, ...]
 INSIDE, HOVER, BENT = 3, 0.75, 0.08
 #: Ways to one stance that are looked at, and stances that are checked together, in widths
 WAYS, PARTS = 2, 2
-#: Stances, and moves or pairs of grips, of one slice of the search
-NODES, MOVES = 3, 16
+#: Stances, and pairs of grips, of one slice of the search
+NODES, PAIRS = 3, 24
 #: Delays are counted in steps of this [s], so that rounding decides nothing
 QUANTUM = 1e-6
 
@@ -132,7 +132,7 @@ class StanceSearch:
         return drained(self.slices(starts, sample, deadline))
 
     def slices(self, starts: Sequence[Sequence[int]], sample: int = 0, deadline: float | None = None) -> Slices[Found]:
-        """As :meth:`run`, in slices of at most :data:`NODES` stances looked at or :data:`MOVES` checked."""
+        """As :meth:`run`, in slices of :data:`NODES` stances looked at, or :data:`PAIRS` of grips or swings."""
         level: dict[Key, Node] = {tuple(int(g) for g in start): Node(sample, 0, None, None) for start in starts}
         levels = [level]
         while True:
@@ -180,14 +180,12 @@ class StanceSearch:
     def _prepare(self, level: dict[Key, Node], part: Sequence[tuple[Key, list[Node]]]) -> Slices[None]:
         """What the check of some stances needs, computed together."""
         pairs = [pair for key, _ in part for pair in combinations(key, 2)]
-        for begin in range(0, len(pairs), MOVES):
-            self.clearance.prepare(pairs[begin : begin + MOVES])
+        for begin in range(0, len(pairs), PAIRS):
+            self.clearance.prepare(pairs[begin : begin + PAIRS])
             yield None
         found = [self._swing(level, key, node) for key, nodes in part for node in nodes]
         swings = [swing for swing in found if swing is not None]
-        for begin in range(0, len(swings), MOVES):
-            self.swings.prepare(swings[begin : begin + MOVES])
-            yield None
+        yield from self.swings.slices(swings)
 
     def _swing(self, level: dict[Key, Node], key: Key, node: Node) -> Swing | None:
         """The swing that leads to a stance; None where the arms are in each other's way when it lands."""

@@ -61,8 +61,8 @@ class SwingClearance:
         for arm in np.unique(self._grips.arm[others]):
             rows = self._grips.arm[others] == arm
             held[rows] = self._arms.points(int(arm), postures[rows])
-        gap = self._arms.between(points.reshape(-1, 6, 3), held.reshape(-1, 6, 3)).reshape(count, steps)
-        out: Flags = np.all(gap >= SWING_ROOM - ROOM, axis=1)
+        near = self._arms.near(points.reshape(-1, 6, 3), held.reshape(-1, 6, 3), ROOM - SWING_ROOM)
+        out: Flags = ~np.any(near.reshape(count, steps), axis=1)
         return out
 
     def _near(self, hands: Array, holds: Array) -> Flags:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import permutations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -97,30 +98,28 @@ def _squares(first: Array, second: Array, limits: Array, top: Array, gap: float)
     the end can be reached are intervals [0, K]; they are made backwards, then s goes forwards as high as they allow
     (reachability analysis of Pham and Pham, 2018).
     """
-    a = np.where(np.abs(first) < LEAST, LEAST, first)
-    c, e = second / a, limits / np.abs(a)
+    # Points, joints, swings: minima over the few joints are of long rows then
+    turned, bent = first.transpose(1, 2, 0), second.transpose(1, 2, 0)
+    a = np.where(np.abs(turned) < LEAST, LEAST, turned)
+    c, e = bent / a, limits[:, None] / np.abs(a)
     step = 2 * gap
     # Some u is left between all joints, and one with which s stays above 0
-    apart = c[..., None, :] - c[..., :, None]
-    room = (e[..., None, :] + e[..., :, None]) / np.maximum(apart, LEAST)
-    most = np.minimum(top, room.min(axis=(2, 3)))
-    fall = step * c - 1.0
-    most = np.minimum(most, (step * e / np.maximum(fall, LEAST)).min(axis=2))
-    for i in range(most.shape[1] - 2, -1, -1):
-        after = most[:, i + 1, None]
-        reach = (after + step * e[:, i]) / np.maximum(-fall[:, i], LEAST)
-        # The same limit where the step ends
-        reach = np.minimum(reach, step * e[:, i + 1] + after * np.maximum(1.0 + step * c[:, i + 1], 0.0))
-        most[:, i] = np.minimum(most[:, i], reach.min(axis=1))
-    out: Array = np.zeros_like(most)
-    for i in range(most.shape[1] - 1):
-        here = out[:, i, None]
-        push = np.minimum(e[:, i] - c[:, i] * here, _over(e[:, i + 1] - c[:, i + 1] * here, 1.0 + step * c[:, i + 1]))
-        out[:, i + 1] = np.minimum(most[:, i + 1], np.maximum(out[:, i] + step * push.min(axis=1), 0.0))
-    return out
-
-
-def _over(top: Array, bottom: Array) -> Array:
-    """Quotients; infinite where the divisor is not positive, and so limits nothing."""
-    out: Array = np.where(bottom > LEAST, top / np.maximum(bottom, LEAST), np.inf)
-    return out
+    most = top.T.copy()
+    for k, j in permutations(range(c.shape[1]), 2):
+        np.minimum(most, (e[:, j] + e[:, k]) / np.maximum(c[:, j] - c[:, k], LEAST), out=most)
+    rise, push = 1.0 + step * c, step * e
+    np.minimum(most, (push / np.maximum(step * c - 1.0, LEAST)).min(axis=1), out=most)
+    # From point to point by the limit where the step begins, and by the same where it ends
+    back, on = 1.0 / np.maximum(1.0 - step * c, LEAST), np.maximum(rise, 0.0)
+    for i in range(len(most) - 2, -1, -1):
+        after = most[i + 1]
+        reach = np.minimum((after + push[i]) * back[i], push[i + 1] + after * on[i + 1])
+        np.minimum(most[i], reach.min(axis=0), out=most[i])
+    out = np.zeros_like(most)
+    held, free = 1.0 / np.maximum(rise, LEAST), np.where(rise > LEAST, 0.0, np.inf)
+    for i in range(len(most) - 1):
+        here = out[i]
+        ends = (e[i + 1] - c[i + 1] * here) * held[i + 1] + free[i + 1]
+        u = np.minimum(e[i] - c[i] * here, ends).min(axis=0)
+        out[i + 1] = np.minimum(most[i + 1], np.maximum(here + step * u, 0.0))
+    return np.ascontiguousarray(out.T)

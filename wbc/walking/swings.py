@@ -15,6 +15,7 @@ from wbc.walking.arm_clearance import ArmClearance
 from wbc.walking.arm_kinematics import ArmKinematics
 from wbc.walking.body_path import BodyPath
 from wbc.walking.grips import Grips, Ints
+from wbc.walking.slices import Slices, drained
 from wbc.walking.structure import Structure
 from wbc.walking.swing_clearance import SwingClearance
 from wbc.walking.swing_curve import WAYS, Curves, Pivots, curves
@@ -27,6 +28,8 @@ COARSE, FINE = 25, 97
 PASSES = 2
 #: Time to settle on the hold before the hand closes, besides the latch twice [s]
 SETTLE = 0.06
+#: Swings that are computed together
+TOGETHER = 24
 #: No swing lasts so many samples, as far as the room of the others is told apart
 LONG = 60
 #: Samples after lifting at which the body is about where the swing is halfway
@@ -98,12 +101,19 @@ class Swings:
 
     def prepare(self, swings: Iterable[Swing]) -> None:
         """Find ways for swings together: the first that is possible and clear."""
+        drained(self.slices(swings))
+
+    def slices(self, swings: Iterable[Swing]) -> Slices[None]:
+        """As :meth:`prepare`, way by way."""
         left = list(dict.fromkeys(s for s in swings if s not in self._chosen))
         for way in range(len(WAYS)):
             if not left:
                 return
-            self._track(left, way)
-            self._check(left, way)
+            for begin in range(0, len(left), TOGETHER):
+                self._track(left[begin : begin + TOGETHER], way)
+                yield None
+                self._check(left[begin : begin + TOGETHER], way)
+                yield None
             rest = []
             for swing in left:
                 track = self._tracks[_name(swing), way]
