@@ -19,7 +19,9 @@ from wbc.tasks.frames import frame_pose, require_motion
 if TYPE_CHECKING:
     from wbc.robot import Robot
 
-KINDS = ("pose", "position", "orientation", "axis")
+KINDS = ("pose", "position", "orientation", "axis", "roll")
+#: Least square of the part of the x axis across the target's z axis that counts for ``roll``
+UPRIGHT = 1e-12
 
 
 @dataclass(frozen=True)
@@ -31,14 +33,17 @@ class Hold(Constraint):
         pose         both, in this order (6 x nv)
         axis         J = [J_lin; F'R' J_ang] (5 x nv), e = (p - p_target, F'R' theta n), F = (x, y) of the frame:
                      theta n is the shortest turn of the frame's z axis to the target's; the turn about z is free
+        roll         J = [J_lin; de/dq] (4 x nv), e = (p - p_target, atan2(x'Y, x'X)), x of the frame, X and Y of the
+                     target: the turn about the target's z axis is held, z itself may tilt by less than pi / 2
 
-    in world axes at the frame's origin, but for the last two rows of ``axis``. For the rotation, J_ang v = -gain e
-    turns R R_target' about its own axis, so de/dt = -gain e exactly although J_ang is not de/dq.
+    in world axes at the frame's origin, but for the last rows of ``axis`` and ``roll``. For the rotation,
+    J_ang v = -gain e turns R R_target' about its own axis, so de/dt = -gain e exactly although J_ang is not de/dq.
 
     Attributes:
         frame: name of the frame.
-        kind: ``"pose"``, ``"position"`` (the frame may turn about its origin), ``"orientation"`` or ``"axis"`` (the
-            frame may turn about its z axis: a hand round a bar, a pin in its hole).
+        kind: ``"pose"``, ``"position"`` (the frame may turn about its origin), ``"orientation"``, ``"axis"`` (the
+            frame may turn about its z axis: a hand round a bar, a pin in its hole) or ``"roll"`` (it may tilt, but not
+            turn about the target's z axis; ``AxisCone`` bounds the tilt: a keyed ball).
         gain: initial value of the input [1/s].
 
     Inputs:
@@ -56,7 +61,7 @@ class Hold(Constraint):
     initial_only: ClassVar[tuple[str, ...]] = ("gain",)
 
     frame: str
-    kind: Literal["pose", "position", "orientation", "axis"] = "pose"
+    kind: Literal["pose", "position", "orientation", "axis", "roll"] = "pose"
     gain: float = 10.0
 
     def __post_init__(self) -> None:
@@ -86,6 +91,7 @@ class Hold(Constraint):
         position = tuple(Row(axis, "m/s") for axis in ("x", "y", "z"))
         orientation = tuple(Row(axis, "rad/s") for axis in ("rx", "ry", "rz"))
         rows = {"pose": position + orientation, "position": position, "orientation": orientation}
+        rows["roll"] = (*position, Row("roll", "rad/s"))
         return rows.get(self.kind, position + orientation[:2])
 
     def velocity_rows(self, robot: Robot, kin: Tracer, inputs: Values, dt: ca.SX) -> Rows:
@@ -100,6 +106,13 @@ class Hold(Constraint):
             # As seen from the frame, its z axis turns away from where the target's is
             drift.append(shortest_turn(pose.rotation.T @ target.rotation[:, 2]))
             matrix.append((pose.rotation.T @ jacobian[3:, :])[:2, :])
+        elif self.kind == "roll":
+            x, frame = pose.rotation[:, 0], target.rotation
+            along, across = ca.dot(x, frame[:, 0]), ca.dot(x, frame[:, 1])
+            drift.append(ca.atan2(across, along))
+            # d atan2(b, a) = (a db - b da) / (a^2 + b^2), with dx = w x x; x along the target's z axis has no roll
+            turn = along * ca.cross(x, frame[:, 1]) - across * ca.cross(x, frame[:, 0])
+            matrix.append((turn.T @ jacobian[3:, :]) / ca.fmax(along * along + across * across, UPRIGHT))
         elif self.kind != "position":
             drift.append(rot.log3(pose.rotation @ target.rotation.T))
             matrix.append(jacobian[3:, :])

@@ -63,12 +63,39 @@ def test_velocity_that_meets_the_rows_shrinks_the_drift_exponentially(angle: flo
     assert (later - angle * axis) / step == pytest.approx(-gain * angle * axis, abs=2e-4)
 
 
+@pytest.mark.parametrize("tilt", [0.0, 1e-7, 0.05, 1.2])
+def test_roll_is_the_turn_about_the_target_s_axis(tilt: float) -> None:
+    """A tilted frame that moves by the rows keeps its roll; its rate is that of the angle, by finite differences."""
+    bot, rng = robot("panda"), np.random.default_rng(24)
+    hold, data = probe(Hold("panda_hand", "roll"), bot), bot.model.createData()
+    number = bot.model.getFrameId("panda_hand")
+
+    def roll(q: np.ndarray, target: pin.SE3) -> float:
+        pin.framesForwardKinematics(bot.model, data, q)
+        x = target.rotation.T @ data.oMf[number].rotation[:, 0]
+        return float(np.arctan2(x[1], x[0]))
+
+    for _ in range(5):
+        q, v = random_configuration(bot, rng), rng.normal(0.0, 1.0, bot.nv)
+        pin.framesForwardKinematics(bot.model, data, q)
+        lean = pin.exp3(tilt * np.array([0.6, 0.8, 0.0])) @ pin.exp3(np.array([0.0, 0.0, rng.uniform(-3, 3)]))
+        target = pin.SE3(data.oMf[number].rotation @ lean, rng.uniform(-1, 1, 3))
+        matrix, lower, upper = hold(q, target=target, gain=2.0)
+        assert matrix.shape[0] == 4
+        assert (lower == upper).all()
+        assert lower[3] == pytest.approx(-2.0 * roll(q, target), abs=1e-9)
+        step = 1e-6
+        change = [roll(pin.integrate(bot.model, q, sign * step * v), target) for sign in (-1.0, 1.0)]
+        assert matrix[3] @ v == pytest.approx((change[1] - change[0]) / (2 * step), abs=1e-6)
+
+
 def test_rows_and_order() -> None:
     bot = robot("panda")
     assert [r.label for r in Hold("panda_hand").rows(bot)] == ["x", "y", "z", "rx", "ry", "rz"]
     assert [r.unit for r in Hold("panda_hand").rows(bot)] == ["m/s"] * 3 + ["rad/s"] * 3
     assert [r.unit for r in Hold("panda_hand", "position").rows(bot)] == ["m/s"] * 3
     assert [r.unit for r in Hold("panda_hand", "orientation").rows(bot)] == ["rad/s"] * 3
+    assert [r.label for r in Hold("panda_hand", "roll").rows(bot)] == ["x", "y", "z", "roll"]
     assert Hold.order == Order.HOLD
 
 

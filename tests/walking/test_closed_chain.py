@@ -18,7 +18,7 @@ from wbc.walking.closed_chain import AXIS_LENGTH, ClosedChain
 @pytest.mark.parametrize("roll", ["free", "fixed"])
 @pytest.mark.parametrize("held", [{0: 3, 1: 5}, {2: 9, 0: 44}, {0: 100, 1: 130, 2: 77}])
 def test_the_body_is_where_its_hands_fit_best(held: dict[int, int], roll: str) -> None:
-    machine, whole = wbc.robots.walker(), cylinder()
+    machine, whole = wbc.robots.walker(), cylinder(rigid=True)
     structure = replace(whole, holds=tuple(replace(hold, roll=roll) for hold in whole.holds))
     model, generator = machine.robot.model, np.random.default_rng(0)
     data, chain = model.createData(), ClosedChain(machine, structure)

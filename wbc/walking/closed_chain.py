@@ -12,10 +12,14 @@ from scipy.linalg.lapack import dsyev
 from wbc.errors import RangeError
 from wbc.robots import Walker
 from wbc.validation import Array
+from wbc.walking.grip_rolls import allowed_x
+from wbc.walking.hand_tilt import LEAST_TILT
 from wbc.walking.structure import Structure
 
 #: Metres that a unit of misalignment of a hand's axis counts for: hands give way to turning before they slip
 AXIS_LENGTH = 0.05
+#: The same of a compliant hold: origins keep their place to 1e-7 m against it
+BALL_LENGTH = 1e-3
 
 
 def _davenport() -> Array:
@@ -44,15 +48,16 @@ class ClosedChain:
         min  sum_k |R p_k + t - h_k|^2 + L^2 |R z_k - a_k|^2
 
     with p_k and z_k the hand's origin and z axis in the body's frame, h_k and a_k those of its hold, L =
-    :data:`AXIS_LENGTH`; holds that fix the roll add their x axes in the same way. This is Wahba's problem, solved by
+    :data:`AXIS_LENGTH`; holds that fix the roll add their x axes in the same way. A compliant hold is a ball with a
+    weak spring, L = :data:`BALL_LENGTH`, which decides what the origins leave open. This is Wahba's problem, solved by
     Davenport's q method: with A = sum (h_k - mean h) p_k' + L^2 a_k z_k', tr(R' A) = q' K q for the quaternion q of R.
 
     Args:
         walker: its joints are what moves. structure: whose holds are meant.
 
     Attributes:
-        origins, axes: of all hands in the structure, and their z axes, after the last :meth:`settle`: ``[arms, 3]``
-            [m] and ``[arms, 3]``.
+        origins, axes, sides: of all hands in the structure, and their z and x axes, after the last :meth:`settle`:
+            ``[arms, 3]`` each, origins in m.
     """
 
     def __init__(self, walker: Walker, structure: Structure) -> None:
@@ -64,20 +69,21 @@ class ClosedChain:
         frames = [self._data.oMf[model.getFrameId(arm.hand)] for arm in walker.arms]
         self._rows = [*(f.translation for f in frames), *(f.rotation[:, k] for k in (2, 0) for f in frames)]
         count = len(walker.arms)
-        self.origins, self.axes = np.zeros((count, 3)), np.zeros((count, 3))
+        self.origins, self.axes, self.sides = np.zeros((3, count, 3))
         self._held: dict[int, int] | None = None
+        self._leans = False
 
     def on(self, structure: Structure) -> ClosedChain:
         """The same robot, at the same place, on another structure."""
         out = ClosedChain(self.walker, structure)
-        out.origins, out.axes = self.origins, self.axes
+        out.origins, out.axes, out.sides = self.origins, self.axes, self.sides
         return out
 
     def settle(self, q: Array, held: Mapping[int, int]) -> tuple[Array, float]:
         """A configuration with the same joints and the body where the held hands put it.
 
         Args:
-            q: its joints count; its body pose does not.
+            q: its joints count; its body pose only says which of the allowed rolls a hand has.
             held: row of the arm -> row of the hold.
 
         Returns:
@@ -86,11 +92,11 @@ class ClosedChain:
         Raises:
             RangeError: nothing is held, or by one hand that may roll: the body's pose is not determined.
         """
-        if held != self._held:
-            self._take(held)
         self._still[7:] = q[7:]
         pin.framesForwardKinematics(self._model, self._data, self._still)
         flat = np.concatenate(self._rows)
+        if held != self._held or self._leans:
+            self._take(held, flat.reshape(3, -1, 3).dot(pin.Quaternion(q[3:7]).matrix().T))
         quaternion = dsyev(self._quadratic.dot(flat).reshape(4, 4))[1][:, 3]
         out = q.copy()
         # The quaternion keeps its sign from tick to tick
@@ -99,11 +105,16 @@ class ClosedChain:
         moved = flat.reshape(-1, 3).dot(pin.Quaternion(out[3:7]).matrix().T)
         out[:3] = origin = self._center - self._mean.dot(moved[:count])
         self.origins, self.axes = moved[:count] + origin, moved[count : 2 * count]
+        self.sides = moved[2 * count :]
         gap = self._mask * (self.origins - self._holds)
         return out, sqrt(np.maximum.reduce(np.add.reduce(gap * gap, axis=1)))
 
-    def _take(self, held: Mapping[int, int]) -> None:
-        """What depends on the holds alone, until other ones are held."""
+    def _take(self, held: Mapping[int, int], hands: Array) -> None:
+        """What depends on the holds alone, until other ones are held.
+
+        ``hands`` ``[3, arms, 3]`` are origins, z and x axes of the hands on the body as it was. The x axis of a hand
+        that leans and must not roll goes with its z axis, so it is taken anew every time.
+        """
         structure = self.structure
         if not held or (len(held) == 1 and structure.free_rolls[next(iter(held.values()))]):
             raise RangeError("held", dict(held), "the body's pose needs two hands, or one that cannot roll")
@@ -117,8 +128,11 @@ class ClosedChain:
         self._center = self._mean @ self._holds
         weights = np.zeros((3 * count, 3))
         weights[:count] = self._mask * (self._holds - self._center)
-        weights[[count + arm for arm in arms]] = AXIS_LENGTH**2 * structure.axes[holds]
-        weights[[2 * count + arm for arm in rolled]] = AXIS_LENGTH**2 * structure.references[[held[k] for k in rolled]]
+        lengths = np.where(structure.tilts[holds] < LEAST_TILT, AXIS_LENGTH, BALL_LENGTH)
+        weights[[count + arm for arm in arms]] = lengths[:, None] ** 2 * structure.axes[holds]
+        for arm in rolled:
+            weights[2 * count + arm] = AXIS_LENGTH**2 * allowed_x(structure, held[arm], hands[2, arm], hands[1, arm])
+        self._leans = any(structure.tilts[held[arm]] >= LEAST_TILT for arm in rolled)
         # The weights of the origins sum to nothing, so their mean does not count in A = weights' ours
         self._quadratic = np.einsum("abc,nb->anc", DAVENPORT.reshape(16, 3, 3), weights).reshape(16, -1)
         self._held = dict(held)

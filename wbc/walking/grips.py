@@ -13,6 +13,8 @@ from wbc.robots import Walker
 from wbc.validation import Array
 from wbc.walking.arm_kinematics import LIMIT_NAMES, ArmKinematics
 from wbc.walking.body_path import BodyPath
+from wbc.walking.grip_rolls import ANY, hand_poses, turns
+from wbc.walking.hand_tilt import leaning
 from wbc.walking.slices import Slices, drained
 from wbc.walking.structure import Structure
 
@@ -24,6 +26,8 @@ RATE_PART, ANGLE_ROOM, REACH_ROOM = 0.85, radians(2.0), 0.3 * 0.0254
 ROWS, LOOSE = 4000, 0.1
 #: A grip of fewer samples is none
 SHORTEST = 3
+#: A hand leans on a compliant hold where the reach is less than this part of its room
+LEAN_FROM = 1.25
 #: The hand's approach and the body's z axis enclose less than 60 degrees: arms do not reach round the body
 LEAST_FACING = 0.5
 
@@ -38,6 +42,7 @@ class Grips:
         offset: grip g's postures are ``postures[offset[g] : offset[g] + last[g] - first[g] + 1]``.
         postures: ``[all samples, 6]`` [rad]; joint 6 is 0 where the roll is free.
         ends: why each ends: an index into :attr:`reasons`.
+        roll: ``[grips]``, number of the hold's allowed rolls; -1 where it is free.
     """
 
     arm: Ints
@@ -48,6 +53,7 @@ class Grips:
     offset: Ints
     postures: Array
     ends: Ints
+    roll: Ints
 
     #: What may end a grip
     reasons = (*LIMIT_NAMES, "reach", *(f"joint {k} rate" for k in range(1, 7)), "end of the path")
@@ -68,14 +74,14 @@ class Grips:
         out: Array = self.postures[int(self.offset[grip]) + min(max(sample, first), int(self.last[grip])) - first]
         return out
 
-    def wrist_at(self, grip: int, sample: float) -> tuple[float, float]:
-        """Joints 4 and 5 of one grip at a fractional sample, by straight lines, clipped to the grip [rad]."""
+    def wrist_at(self, grip: int, sample: float) -> tuple[float, float, float]:
+        """Joints 4 to 6 of one grip at a fractional sample, by straight lines, clipped to the grip [rad]."""
         length = int(self.last[grip]) - int(self.first[grip])
         inside = min(max(sample - int(self.first[grip]), 0.0), float(length))
         low = min(int(inside), length - 1)
         row, part = int(self.offset[grip]) + low, inside - low
-        (a, b), (c, d) = self.postures[row : row + 2, 3:5].tolist()
-        return a + part * (c - a), b + part * (d - b)
+        (a, b, c), (d, e, f) = self.postures[row : row + 2, 3:].tolist()
+        return a + part * (d - a), b + part * (e - b), c + part * (f - c)
 
     def between(self, grip: Ints, samples: Array) -> Array:
         """Postures at fractional samples, by straight lines, clipped to the grip, ``[..., 6]``."""
@@ -109,7 +115,7 @@ def grip_slices(walker: Walker, structure: Structure, path: BodyPath, only: Sequ
         only: one row of a hold for each arm, where others do not matter.
     """
     kinematics = ArmKinematics(walker.data)  # type: ignore[arg-type]
-    size, found = max(ROWS // len(path), 1), list[tuple[int, int, int, int, int, int, Array]]()
+    size, found = max(ROWS // len(path), 1), list[tuple[int, int, int, int, int, int, int, Array]]()
     for arm in range(len(walker.arms)):
         frames = path.poses @ walker.arms[arm].base.homogeneous
         holds = np.array(only[arm : arm + 1], dtype=np.int64) if only else _near(kinematics, structure, frames)
@@ -117,13 +123,13 @@ def grip_slices(walker: Walker, structure: Structure, path: BodyPath, only: Sequ
             found += _of_arm(kinematics, arm, frames, structure, holds[begin : begin + size], path.spacing)
             yield None
     found.sort(key=lambda row: (row[0], row[2], row[1], row[3]))
-    columns = list(zip(*found, strict=True)) if found else [()] * 7
-    postures = np.concatenate(columns[6]) if found else np.zeros((0, 6))
-    lengths = np.array([len(rows) for rows in columns[6]], dtype=int)
+    columns = list(zip(*found, strict=True)) if found else [()] * 8
+    postures = np.concatenate(columns[7]) if found else np.zeros((0, 6))
+    lengths = np.array([len(rows) for rows in columns[7]], dtype=int)
     offset = np.concatenate([[0], np.cumsum(lengths)[:-1]]) if found else np.zeros(0)
-    whole = [np.array(column, dtype=np.int64) for column in columns[:6]]
-    arms, rows, branch, first, last, ends = whole
-    return Grips(arms, rows, branch, first, last, offset.astype(np.int64), postures, ends)
+    whole = [np.array(column, dtype=np.int64) for column in columns[:7]]
+    arms, rows, branch, first, last, ends, rolls = whole
+    return Grips(arms, rows, branch, first, last, offset.astype(np.int64), postures, ends, rolls)
 
 
 def _near(kinematics: ArmKinematics, structure: Structure, frames: Array) -> Ints:
@@ -145,8 +151,8 @@ def _length(kinematics: ArmKinematics) -> float:
 
 def _of_arm(
     kinematics: ArmKinematics, arm: int, frames: Array, structure: Structure, among: Ints, spacing: float
-) -> Iterator[tuple[int, int, int, int, int, int, Array]]:
-    """(arm, hold, branch, first, last, reason of the end, postures) of every grip of an arm on some holds."""
+) -> Iterator[tuple[int, int, int, int, int, int, int, Array]]:
+    """(arm, hold, branch, first, last, reason of the end, roll, postures) of every grip of an arm on some holds."""
     # In the arm's frame, hold by hold and sample by sample ``[holds, samples, 3]``
     turn, data, count = frames[:, :3, :3], kinematics.data, len(frames)
     flat = turn.transpose(1, 0, 2).reshape(3, -1)
@@ -156,13 +162,14 @@ def _of_arm(
     x, y, z = points[..., 0], points[..., 1], points[..., 2] - data.neck_length
     near = (axes[..., 2] > LEAST_FACING) & (x * x + y * y + z * z < _length(kinematics) ** 2)
     points, axes, (holds, samples) = points[near], axes[near], np.nonzero(near)
+    axes = leaning(kinematics, points, axes, structure.tilts[among[holds]], LEAN_FROM * REACH_ROOM)
     reached = kinematics.wrist_reach(kinematics.wrist_of(points, axes)) > REACH_ROOM
     points, axes, holds, samples = points[reached], axes[reached], among[holds[reached]], samples[reached]
     if not len(samples):
         return
-    postures, solved = kinematics.inverse_axis(points, axes)
+    postures, solved = _postures(kinematics, structure, holds, points, axes, turn[samples])
     margins = kinematics.margins(postures)
-    margins[..., 5] = np.inf  # joint 6 turns the hand about its own axis, which is free
+    margins[..., 5] = np.inf  # joint 6 turns the hand about its own axis: free, or see grip_rolls
     good = solved & np.logical_and.reduce([margins[..., k] > ANGLE_ROOM for k in range(margins.shape[-1])])
     most = RATE_PART * spacing * np.array(data.joint_rates)[:5]
     neighbours = (holds[1:] == holds[:-1]) & (samples[1:] == samples[:-1] + 1)
@@ -176,7 +183,29 @@ def _of_arm(
         for begin, end in zip(begins[long].tolist(), ends[long].tolist(), strict=True):
             reason = _reason(samples, margins[:, branch], q, most, neighbours, end, count)
             first, last = int(samples[begin]), int(samples[end])
-            yield arm, int(holds[begin]), branch, first, last, reason, q[begin : end + 1]
+            hold, rows = int(holds[begin]), slice(begin, end + 1)
+            if structure.free_rolls[hold]:
+                yield arm, hold, branch, first, last, reason, ANY, q[rows]
+                continue
+            room, step = data.position_limits[5] - ANGLE_ROOM, RATE_PART * spacing * data.joint_rates[5]
+            for one in turns(q[rows][:, 5], structure.holds[hold].rolls, room, step, SHORTEST):
+                held = q[rows][one.first : one.last + 1].copy()
+                held[:, 5] = one.angles
+                why = {"limit": 5, "rate": len(LIMIT_NAMES) + 6}.get(one.ends, reason)
+                yield arm, hold, branch, first + one.first, first + one.last, why, one.roll, held
+
+
+def _postures(
+    kinematics: ArmKinematics, structure: Structure, holds: Ints, points: Array, axes: Array, turn: Array
+) -> tuple[Array, NDArray[np.bool_]]:
+    """Postures of both branches and whether they are possible; ``turn`` are rotations of the arm's base."""
+    free = np.array(structure.free_rolls)[holds]
+    if free.all():
+        return kinematics.inverse_axis(points, axes)
+    references = np.einsum("nji,nj->ni", turn, structure.references[holds])
+    postures, solved = kinematics.inverse(hand_poses(points, axes, references))
+    postures[free, :, 5] = 0.0
+    return postures, solved
 
 
 def _reason(samples: Ints, margins: Array, q: Array, most: Array, neighbours: Array, end: int, count: int) -> int:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from math import sqrt
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -12,15 +13,16 @@ from wbc.errors import ShapeError
 from wbc.robots import Walker, WalkerData
 from wbc.validation import Array
 from wbc.walking.closed_chain import ClosedChain
+from wbc.walking.grip_rolls import ANY, frame_on
 from wbc.walking.plan import HoldLost, Plan
 from wbc.walking.replanning import way_to
 from wbc.walking.stance_search import Move
 from wbc.walking.structure import Structure
 from wbc.walking.swing_law import SwingLaw
 from wbc.walking.swings import Swings
-from wbc.walking.walk_hands import BEHIND, HAND_RAMP, LANDING, TURNED, at_rest, hand_pace
+from wbc.walking.walk_hands import BEHIND, HAND_RAMP, LANDING, at_rest, hand_pace, turned
 from wbc.walking.walk_stack import WalkStack
-from wbc.walking.walk_state import Event, Hand, Swinging, What
+from wbc.walking.walk_state import Event, Hand, Swinging, What, Wrist
 
 #: A hold that could not be grasped so many times is taken as vanished
 TRIES = 3
@@ -57,7 +59,7 @@ class Hands:
         self.held = {arm: int(self.grips.hold[grip]) for arm, grip in enumerate(self._grip)}
         self.q = self._start()
         for arm, hold in self.held.items():
-            self.stack.hold(arm, hold)
+            self.stack.hold(arm, hold, int(self.grips.roll[self._grip[arm]]))
 
     def vanish(self, ids: Iterable[str]) -> None:
         """Holds are gone."""
@@ -111,34 +113,38 @@ class Hands:
         move = Move(arm, source, target, lift, land, step.duration, step.delay, step.way)
         self._open(arm)
         law = SwingLaw.of(self.swings, move)
-        self.swinging = Swinging(arm, int(self.grips.hold[target]), target, law, self.data.latch_time)
+        self.swinging = self._swing(arm, target, law, latch=self.data.latch_time)
         self.swinging.bend = self._bend(self.swinging, 0.0)
         self._say("lift", step.arm, step.source)
 
     def _bring(self, arm: int) -> None:
         """A hand that is in the air goes to where the plan begins, while the body stands still."""
-        hold = int(self.grips.hold[self._grip[arm]])
-        _, _, _, fourth, fifth, _ = self.q[self.walker.arms[arm].q].tolist()
+        _, _, _, a, b, c = self.q[self.walker.arms[arm].q].tolist()
         law = way_to(self.walker, self.structure, self.plan, arm, self.chain, self.q)
-        self.swinging = Swinging(arm, hold, self._grip[arm], law, 0.0, False, state="open", wrist=(fourth, fifth))
-        self.swinging.bend = fourth, fifth
+        self.swinging = self._swing(arm, self._grip[arm], law, latch=0.0, counted=False, state="open", wrist=(a, b, c))
+        self.swinging.bend = a, b, c
+
+    def _swing(self, arm: int, grip: int, law: SwingLaw, **more: Any) -> Swinging:
+        """A hand that begins to go to a grip."""
+        hold, roll = int(self.grips.hold[grip]), int(self.grips.roll[grip])
+        x = None if roll == ANY else frame_on(self.structure, hold, roll)[:3, 0]
+        return Swinging(arm, hold, grip, law, x=x, **more)
 
     def _aim(self, swinging: Swinging) -> None:
         """Move the aim of the hand on, as fast as the hand follows, and tell the stack."""
         arm = swinging.arm
         place = self.chain.origins[arm]
-        swinging.place, swinging.axis = place, self.chain.axes[arm]
+        swinging.place, swinging.axis, swinging.side = place, self.chain.axes[arm], self.chain.sides[arm]
         now, wrist = swinging.aim, swinging.bend
         # On the wrong side of theta5 = 0 the wrist cannot align the hand: it turns to its branch before the hand lands
-        _, _, _, fourth, fifth, _ = self.q[self.walker.arms[arm].q].tolist()
-        turned = abs(fourth - wrist[0]) < TURNED and abs(fifth - wrist[1]) < TURNED
+        at_branch = turned(swinging, self.q[self.walker.arms[arm].q].tolist()[3:])
         if swinging.state == "opening":
             swinging.latch -= self.dt
             if swinging.latch <= 1e-9:
                 swinging.state = "open"
         elif swinging.state == "open":
             begins = float(self.grips.first[swinging.grip]) * self.plan.path.spacing
-            wanted = hand_pace(swinging, place, turned, begins - self.path_time, self.pace)
+            wanted = hand_pace(swinging, place, at_branch, begins - self.path_time, self.pace)
             change = self.dt / HAND_RAMP
             swinging.pace += min(max(wanted - swinging.pace, -change), change)
             swinging.clock = min(swinging.clock + swinging.pace * self.dt, swinging.law.duration)
@@ -146,20 +152,22 @@ class Hands:
         bend = swinging.bend = self._bend(swinging, aim.blend)
         # From where the hand is to be as the tick begins to where it is to be as it ends
         speed = (aim.position - now.position) / self.dt
-        turning = (bend[0] - wrist[0]) / self.dt, (bend[1] - wrist[1]) / self.dt
+        turning = (bend[0] - wrist[0]) / self.dt, (bend[1] - wrist[1]) / self.dt, (bend[2] - wrist[2]) / self.dt
         gap = now.position - place
         far = sqrt(gap.dot(gap))
         # A hand that cannot follow must not pull at the body: its aim waits within reach of it
         target = now.position if far <= BEHIND else place + gap * (BEHIND / far)
-        near = aim.blend > LANDING and turned
-        self.stack.swing(arm, (target, speed), (wrist, turning), self.structure.axes[swinging.hold] if near else None)
+        near = aim.blend > LANDING and at_branch
+        at_hold = (self.structure.axes[swinging.hold], swinging.x) if near else None
+        self.stack.swing(arm, (target, speed), (wrist, turning), at_hold)
 
-    def _bend(self, swinging: Swinging, blend: float) -> tuple[float, float]:
-        """Joints 4 and 5 of a swinging arm at a part of their way, where the body is now."""
+    def _bend(self, swinging: Swinging, blend: float) -> Wrist:
+        """Joints 4 to 6 of a swinging arm at a part of their way, where the body is now."""
         sample = self.path_time / self.plan.path.spacing
         first = swinging.wrist or self.grips.wrist_at(self._grip[swinging.arm], sample)
         last = self.grips.wrist_at(swinging.grip, sample)
-        return first[0] + blend * (last[0] - first[0]), first[1] + blend * (last[1] - first[1])
+        (a, b, c), (d, e, f) = first, last
+        return a + blend * (d - a), b + blend * (e - b), c + blend * (f - c)
 
     def _leaving(self) -> int:
         """The arm that is lifted next, if it can be: its grip is no end for the body. -1 for none."""
@@ -171,8 +179,9 @@ class Hands:
         """Close a hand that has come to rest on its hold; it holds when the latch is through."""
         arm, hold, data = swinging.arm, swinging.hold, self.data
         if swinging.state == "open" and swinging.clock >= swinging.law.duration - 1e-9:
-            hand = self.chain.origins[arm], self.chain.axes[arm]
-            if at_rest(swinging, hand, (self.structure.positions[hold], self.structure.axes[hold]), data, self.dt):
+            hand = self.chain.origins[arm], self.chain.axes[arm], self.chain.sides[arm]
+            there = self.structure.positions[hold], self.structure.axes[hold]
+            if at_rest(swinging, hand, there, self.structure.tilts[hold], data, self.dt):
                 swinging.state, swinging.latch = "closing", data.latch_time
         elif swinging.state == "closing":
             swinging.latch -= self.dt
@@ -190,7 +199,7 @@ class Hands:
                 self.vanish([names[1]])
             return
         self.held[arm], self._grip[arm] = swinging.hold, swinging.grip
-        self.stack.hold(arm, swinging.hold)
+        self.stack.hold(arm, swinging.hold, int(self.grips.roll[swinging.grip]))
         self.swinging = None
         self._next += int(swinging.counted)
         self._say("land", *names)

@@ -33,7 +33,7 @@ SOON = (0.0, 0.5, float("inf"))
 START_GRIPS, STARTS = 10, 24
 #: A search that fails is made again, so many times as wide
 WIDER = 5
-#: Joints 1 to 5 of one branch differ by less than this from where they are [rad]; other branches by more
+#: Joints of one branch differ by less than this from where they are [rad]; other branches by more
 SAME_BRANCH = 0.3
 
 
@@ -157,8 +157,10 @@ def stances(
             row = structure.index(start[name])
             mine = [g for g in mine if grips.hold[g] == row]
             if name in postures:
-                here = np.array(postures[name])[:5]
-                mine = [g for g in mine if np.abs(grips.postures[grips.offset[g]][:5] - here).max() < SAME_BRANCH]
+                # Joint 6 counts where the hold fixes the roll
+                here, counts = np.array(postures[name]), 5 if structure.free_rolls[row] else 6
+                off = [np.abs(grips.posture_at(g, 0) - here)[:counts].max() for g in mine]
+                mine = [g for g, gap in zip(mine, off, strict=True) if gap < SAME_BRANCH]
             if not mine:
                 raise NoPlanError(f"start.{name}", start[name], "the arm cannot hold it at the beginning of the path")
         mine = [g for g in mine if structure.ids[grips.hold[g]] not in avoid.get(name, ())]

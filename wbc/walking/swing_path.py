@@ -1,4 +1,4 @@
-"""A swing as angles of joints 1 to 5: the hand on its curve, the wrist between its two postures."""
+"""A swing as angles of joints 1 to 6: the hand on its curve, the wrist between its two postures."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from wbc.robots import Walker
 from wbc.validation import Array
 from wbc.walking.arm_angles import sines, wrapped
 from wbc.walking.arm_kinematics import ArmKinematics
+from wbc.walking.grip_rolls import ANY
 from wbc.walking.grips import Grips, Ints
 
 #: Room of the wrist within its reach [m], and of joints 1 to 5 within their limits [rad]
@@ -18,7 +19,7 @@ REACH_ROOM, ANGLE_ROOM = 0.3 * 0.0254, 0.02
 #: The wrist stays this far from the axis of joint 1, besides the shoulder's offset [m]
 AXIS_ROOM = 0.08
 
-#: Angles of joints 4 and 5 ``[m, n, 2]`` at fractional samples ``[m, n]`` of the body's path
+#: Angles of joints 4 and 5, and 6 where the roll counts, ``[m, n, 2 or 3]`` at fractional samples ``[m, n]``
 Wrists = Callable[[Array], Array]
 
 
@@ -31,9 +32,10 @@ def blend(x: Array) -> Array:
 def grip_wrists(grips: Grips, source: Ints, target: Ints, points: int) -> Wrists:
     """Wrists that leave grips and come to others; both change as the body moves on."""
     part = blend(np.linspace(0.0, 1.0, points))[None, :, None]
+    end = 5 if (grips.roll[source] == ANY).all() and (grips.roll[target] == ANY).all() else 6
 
     def wrists(samples: Array) -> Array:
-        first, last = (grips.between(g[:, None], samples)[..., 3:5] for g in (source, target))
+        first, last = (grips.between(g[:, None], samples)[..., 3:end] for g in (source, target))
         out: Array = first + part * (last - first)
         return out
 
@@ -43,7 +45,7 @@ def grip_wrists(grips: Grips, source: Ints, target: Ints, points: int) -> Wrists
 def joint_paths(
     kinematics: ArmKinematics, walker: Walker, arms: Ints, bodies: Array, place: Array, wrists: Array
 ) -> tuple[Array, NDArray[np.bool_]]:
-    """Joints 1 to 5 ``[m, n, 5]`` [rad] with hands at ``place`` ``[m, n, 3]`` and wrists bent by ``wrists``.
+    """Joints 1 to 5 or 6 ``[m, n, 5 or 6]`` [rad] with hands at ``place`` ``[m, n, 3]`` and wrists bent by ``wrists``.
 
     Forearm and hand are one link from the elbow to the hand: A = WE + HW c5 along the forearm, B = HW c4 s5 across it
     in the arm's plane, and HW s4 s5 out of the plane. So theta3 + atan2(B, A) is the angle at the elbow of an arm with
@@ -69,13 +71,13 @@ def joint_paths(
     r = np.sqrt(np.maximum(square, AXIS_ROOM**2))
     distance = np.hypot(r, z)
     bend = np.arccos(np.clip((distance**2 - es * es - reach * reach) / (2 * es * reach), -1.0, 1.0))
-    angles = np.empty((*r.shape, 5))
+    angles = np.empty((*r.shape, 3 + wrists.shape[2]))
     angles[..., 0] = np.unwrap(np.arctan2(y, x) - np.arctan2(out, r), axis=1)
     angles[..., 0] += wrapped(angles[:, :1, 0]) - angles[:, :1, 0]
     angles[..., 1] = np.arctan2(r, z) + np.arctan2(reach * np.sin(bend), es + reach * np.cos(bend))
     angles[..., 2] = -bend - tilt
     angles[..., 3:] = wrists
-    room = np.array(data.position_limits)[:5] - np.abs(angles)
+    room = np.array(data.position_limits)[: angles.shape[2]] - np.abs(angles)
     lean = angles[..., 1] + angles[..., 2] / 2 - data.shoulder_limit
     elbow = data.elbow_limit - angles[..., 2]
     possible = (square.min(axis=1) > AXIS_ROOM**2) & ((es + reach - distance).min(axis=1) > REACH_ROOM)

@@ -32,7 +32,7 @@ class Speeds:
 
     Attributes:
         possible: the hand stays in reach and joints 1 to 5 within their limits ``[m]``.
-        angles: of joints 1 to 5 ``[m, n, 5]`` [rad].
+        angles: of joints 1 to 5, and 6 where the roll counts, ``[m, n, 5 or 6]`` [rad].
         rate: dx/dt ``[m, n]`` [1/s]; its square changes evenly from point to point.
         time: at the points, from 0 ``[m, n]`` [s].
     """
@@ -78,13 +78,15 @@ def speeds(
     first = np.gradient(angles, gap, axis=1, edge_order=2)
     first -= bias * np.gradient(samples, gap, axis=1)[..., None]
     second = np.gradient(first, gap, axis=1)
-    limits = np.array(kinematics.data.joint_rates)[:5]
+    limits, most = (
+        np.array(v)[: both.shape[2]] for v in (kinematics.data.joint_rates, kinematics.data.joint_accelerations)
+    )
     # Where the body goes the way of the hand, the hand may go faster
     rates = np.maximum(RATE_PART * limits - np.sign(first) * bias / path.spacing, 0.1 * limits)
     slope = np.linalg.norm(np.gradient(place, gap, axis=1), axis=2)
     top = np.minimum((rates / np.maximum(np.abs(first), LEAST)).min(axis=2), FASTEST / np.maximum(slope, LEAST)) ** 2
     top[:, 0] = top[:, -1] = 0.0
-    square = _squares(first, second, ACCELERATION_PART * np.array(kinematics.data.joint_accelerations)[:5], top, gap)
+    square = _squares(first, second, ACCELERATION_PART * most, top, gap)
     rate = np.sqrt(square)
     time = np.zeros_like(samples)
     np.cumsum(2 * gap / np.maximum(rate[:, 1:] + rate[:, :-1], 1e-6), axis=1, out=time[:, 1:])

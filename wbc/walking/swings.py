@@ -154,7 +154,7 @@ class Swings:
             found = speeds(self.kinematics, self.walker, arms, self.path, curve, samples, wrists)
             times = found.time
         postures = np.zeros((*found.angles.shape[:2], 6))
-        postures[..., :5] = found.angles
+        postures[..., :5] = found.angles[..., :5]
         points = np.empty((*postures.shape[:2], 6, 3))
         for arm in np.unique(arms):
             points[arms == arm] = self._arms.points(int(arm), postures[arms == arm])

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from math import dist, sqrt
+from collections.abc import Sequence
+from math import dist, hypot, sqrt
 
 import numpy as np
 
@@ -12,10 +13,12 @@ from wbc.walking.walk_state import Swinging
 
 #: A swing waits for a hand that is this far behind its aim [m]: full pace below half of it, least pace beyond
 BEHIND, LEAST_PACE = 0.02, 0.05
-#: A hand is near its hold from this part of the wrist's way on; joints 4 and 5 are then this near to theirs [rad]
+#: A hand is near its hold from this part of the wrist's way on; its joints are then this near to theirs [rad]
 LANDING, TURNED = 0.97, 0.5
 #: Part of the tolerances within which a hand closes: it is still moving a little as it does
 SURE = 0.7
+#: A hand closes on a compliant hold when it leans by less than this part of what it may
+CLOSING_TILT = 0.5
 #: The pace of a hand changes from nothing to all in [s]
 HAND_RAMP = 0.2
 
@@ -40,14 +43,34 @@ def hand_pace(swinging: Swinging, place: Array, turned: bool, early: float, pace
 
 
 def at_rest(
-    swinging: Swinging, hand: tuple[Array, Array], hold: tuple[Array, Array], data: WalkerData, dt: float
+    swinging: Swinging,
+    hand: tuple[Array, Array, Array],
+    hold: tuple[Array, Array],
+    tilt: float,
+    data: WalkerData,
+    dt: float,
 ) -> bool:
-    """Whether a hand is on its hold and still, both given by place [m] and z axis, so that it may close."""
-    (place, axis), (there, wanted) = hand, hold
+    """Whether a hand is on its hold and still, so that it may close.
+
+    Args:
+        hand: its place [m], z axis and x axis. hold: place and z axis. tilt: ``max_tilt`` of the hold [rad].
+    """
+    (place, axis, side), (there, wanted) = hand, hold
     if dist(place, there) >= SURE * data.close_distance or dist(place, swinging.place) / dt >= SURE * data.close_speed:
         return False
-    turns = angle(axis, swinging.axis) / dt < SURE * data.close_rate
-    return turns and angle(axis, wanted) < SURE * data.close_angle
+    turn = angle(axis, swinging.axis)
+    if swinging.x is not None:
+        turn = hypot(turn, angle(side, swinging.side))
+        if abs(np.arctan2(side @ np.cross(wanted, swinging.x), side @ swinging.x)) >= SURE * data.close_angle:
+            return False
+    leaned = max(SURE * data.close_angle, CLOSING_TILT * tilt)
+    return turn / dt < SURE * data.close_rate and angle(axis, wanted) < leaned
+
+
+def turned(swinging: Swinging, wrist: Sequence[float]) -> bool:
+    """Whether joints 4 and 5, and 6 where the roll counts, are near to where they are to be [rad]."""
+    last = 2 if swinging.x is None else 3
+    return all(abs(wrist[k] - swinging.bend[k]) < TURNED for k in range(last))
 
 
 def angle(one: Array, other: Array) -> float:

@@ -12,20 +12,19 @@ from wbc.controller.controller import Controller
 from wbc.controller.stack import Stack
 from wbc.robots import Walker
 from wbc.validation import Array
+from wbc.walking.grip_rolls import ANY
+from wbc.walking.hold_items import HoldItems
 from wbc.walking.structure import Structure
+from wbc.walking.walk_state import Wrist
 
 #: Control period [s]
 DT = 0.01
 #: Weights: the body does not give way to a swing, a swing not to postures
-BODY, SWING, AXIS, WRIST = 1e4, 10.0, 3.0, 1e-3
-#: Gains [1/s] of body, swinging hand, its axis and the wrists; holds: 1 / (5 dt)
-BODY_GAIN, SWING_GAIN, AXIS_GAIN, WRIST_GAIN, HOLD_TICKS = 12.0, 15.0, 12.0, 12.0, 5
+BODY, SWING, AXIS, WRIST, UPRIGHT = 1e4, 10.0, 3.0, 1e-3, 100.0
+#: Gains [1/s] of body, swinging hand, its axis and the wrists
+BODY_GAIN, SWING_GAIN, AXIS_GAIN, WRIST_GAIN = 12.0, 15.0, 12.0, 12.0
 #: On the way the wrist follows its postures; near the next hold its axis counts
 FREE_AXIS, FREE_WRIST, RESTING = 1e-6, 40.0, 0.1
-
-
-#: Of joints 4 and 5
-Pair = tuple[float, float]
 
 
 class WalkStack:
@@ -42,8 +41,8 @@ class WalkStack:
         self.walker, self.structure, self.dt = walker, structure, dt
         stack = Stack(walker.robot, dt=dt, calm=False)
         stack.add(tasks.EndEffector("body"), name="body", weight=BODY)
+        self._holds = HoldItems(stack, walker, structure, dt)
         for arm in walker.arms:
-            stack.add(tasks.Hold(arm.hand, kind="axis", gain=1.0 / (HOLD_TICKS * dt)), name=f"{arm.name} hold")
             stack.add(tasks.EndEffector(arm.hand, kind="position"), name=f"{arm.name} swing", weight=SWING)
             stack.add(tasks.AxisAlign(arm.hand), name=f"{arm.name} axis", weight=AXIS)
         stack.add(tasks.Posture(), name="posture", weight=WRIST)
@@ -59,24 +58,31 @@ class WalkStack:
         self._near = (-1, False)
         items: Any = self.controller
         self._body, self._rest = items["body"], items["posture"]
-        self._holds, self._swings, self._axes = (
-            [items[f"{arm.name} {kind}"] for arm in walker.arms] for kind in ("hold", "swing", "axis")
-        )
+        self._holds.of(self.controller)
+        self._swings, self._axes = ([items[f"{arm.name} {kind}"] for arm in walker.arms] for kind in ("swing", "axis"))
         self._body.gain, self._rest.gain = BODY_GAIN, WRIST_GAIN
         for swing, axis in zip(self._swings, self._axes, strict=True):
             swing.gain, axis.gain = SWING_GAIN, AXIS_GAIN
 
-    def hold(self, arm: int, hold: int) -> None:
-        """A closed hand: its hold is exact, nothing else is asked of it."""
-        self._switch(arm, True)
-        self._holds[arm].target = pin.SE3(self.structure.frames[hold])
+    def hold(self, arm: int, hold: int, roll: int = ANY) -> None:
+        """A closed hand, at one of the rolls of its hold: the hold is exact; a hand that may tilt prefers not to.
+
+        Raises:
+            RangeError: a hold of a kind that the stack was not compiled for.
+        """
+        tilts = self._holds.hold(arm, self.structure, hold, roll)
+        self._swings[arm].enabled, self._axes[arm].enabled = False, tilts
+        if tilts:
+            axis = self._axes[arm]
+            axis.target, axis.feedforward, axis.weight = self.structure.axes[hold], np.zeros(3), UPRIGHT
         self._mask[self._joints(arm)] = RESTING
         self._still(arm)
         self._rest.mask = self._mask
 
     def release(self, arm: int) -> None:
         """An open hand, which follows aims."""
-        self._switch(arm, False)
+        self._holds.release(arm)
+        self._swings[arm].enabled = self._axes[arm].enabled = True
         self._near = (-1, False)
 
     def rest(self, arm: int, place: Array, axis: Array) -> None:
@@ -91,37 +97,41 @@ class WalkStack:
         """The pose that the body goes to, and its rate in the structure's axes [m/s, rad/s]."""
         self._body.target, self._body.feedforward = pose, rate
 
-    def swing(self, arm: int, hand: tuple[Array, Array], wrist: tuple[Pair, Pair], axis: Array | None) -> None:
+    def swing(
+        self,
+        arm: int,
+        hand: tuple[Array, Array],
+        wrist: tuple[Wrist, Wrist],
+        at_hold: tuple[Array, Array | None] | None,
+    ) -> None:
         """What a free hand follows.
 
         Args:
-            hand: its position [m] and velocity [m/s]. wrist: joints 4 and 5 [rad] and their rates [rad/s].
-            axis: that of the hand at its hold, which then counts and not the wrist; None on the way.
+            hand: its position [m] and velocity [m/s]. wrist: joints 4 to 6 [rad] and their rates [rad/s].
+            at_hold: z axis of the hand at its hold, and its x axis if the roll counts: they then count and not the
+                wrist. None on the way.
         """
-        near, resting = axis is not None, self._rest
+        near, resting = at_hold is not None, self._rest
         swing, aligned = self._swings[arm], self._axes[arm]
         swing.target, swing.feedforward = hand
-        if axis is not None:
-            aligned.target, aligned.feedforward = axis, np.zeros(3)
+        if at_hold is not None:
+            aligned.target, aligned.feedforward = at_hold[0], np.zeros(3)
         joints = self._joints(arm)
         if self._near != (arm, near):
             aligned.weight = AXIS if near else FREE_AXIS
             self._mask[joints][:3] = 0.0
-            self._mask[joints][3:5] = 1.0 if near else FREE_WRIST
+            self._mask[joints][3:] = 1.0 if near else FREE_WRIST
+            self._holds.turn(arm, at_hold[1] if at_hold is not None else None)
             resting.mask = self._mask
             self._near = arm, near
-        self._posture[7:][joints][3:5], self._turning[6:][joints][3:5] = wrist
+        self._posture[7:][joints][3:], self._turning[6:][joints][3:] = wrist
         resting.target, resting.feedforward = self._posture, self._turning
 
     def _still(self, arm: int) -> None:
-        """Joints 4 and 5 of an arm that does not swing have no rates of their own."""
+        """Wrists of arms that do not swing have no rates of their own."""
         self._turning[6:][self._joints(arm)] = 0.0
         self._rest.feedforward = self._turning
 
     def _joints(self, arm: int) -> slice:
         of = self.walker.arms[arm].v
         return slice(of.start - 6, of.stop - 6)
-
-    def _switch(self, arm: int, held: bool) -> None:
-        self._holds[arm].enabled = held
-        self._swings[arm].enabled = self._axes[arm].enabled = not held

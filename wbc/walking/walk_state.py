@@ -12,6 +12,8 @@ from wbc.validation import Array
 from wbc.walking.swing_law import Aim, SwingLaw
 
 Hand = Literal["closed", "opening", "open", "closing"]
+#: Of joints 4 to 6
+Wrist = tuple[float, float, float]
 What = Literal["lift", "land", "failed", "vanished", "replanned", "refused"]
 
 
@@ -23,9 +25,10 @@ class Swinging:
         arm: its row. hold: row of the hold that it goes to. grip: which it is to be.
         law: the aims. clock: time on the law [s]. aim: the one at that time.
         pace: part of full speed. latch: time until the latch is through [s].
-        place, axis: of the hand one tick before, for speeds.
-        wrist: joints 4 and 5 of a hand that was in the air when it was sent [rad]; None: those of the grip it leaves.
-        bend: joints 4 and 5 as they are to be now [rad].
+        place, axis, side: of the hand one tick before and its z and x axes, for speeds.
+        x: the x axis that the hand has on its hold; None if it may roll there.
+        wrist: joints 4 to 6 of a hand that was in the air when it was sent [rad]; None: those of the grip it leaves.
+        bend: joints 4 to 6 as they are to be now [rad].
         counted: it is a move of the plan, not one that brings a free hand back to it.
     """
 
@@ -41,8 +44,10 @@ class Swinging:
     tries: int = 0
     place: Array = field(default_factory=lambda: np.zeros(3))
     axis: Array = field(default_factory=lambda: np.zeros(3))
-    wrist: tuple[float, float] | None = None
-    bend: tuple[float, float] = (0.0, 0.0)
+    side: Array = field(default_factory=lambda: np.zeros(3))
+    x: Array | None = None
+    wrist: Wrist | None = None
+    bend: Wrist = (0.0, 0.0, 0.0)
     aim: Aim = field(init=False)
 
     def __post_init__(self) -> None:

@@ -52,7 +52,8 @@ def estimate(
 ) -> Bodies:
     """min over the body's pose of the sum over holding hands of |p - P|^2 + LEVER^2 (|z - Z|^2 + |x - X|^2).
 
-    The z axes count for holds with max_tilt = 0, the x axes for those whose roll is not free. Gauss-Newton from the
+    The z axes count for holds with max_tilt = 0, the x axes for those whose roll is not free; where the hand may tilt
+    too, only what turns it: the part of x along the y axis that its roll has. Gauss-Newton from the
     logged pose ``position`` [s, 3], ``rotation`` [s, 3, 3].
 
     Args:
@@ -111,6 +112,10 @@ def _rows(
         # A turn w moves a vector r by w x r = -[r]x w
         jacobian[:, :, k, :, 3:] = -weight[..., None, None] * _cross(found[k])
         error[:, :, k] = weight[..., None] * (found[k] - wanted[k])
+    y = np.cross(wanted[1], wanted[2])
+    onto = np.where((table.max_tilt[hold] > 0.0)[..., None, None], y[..., :, None] * y[..., None, :], np.eye(3))
+    jacobian[:, :, 2] = onto @ jacobian[:, :, 2]
+    error[:, :, 2] = (onto @ error[:, :, 2, :, None])[..., 0]
     jacobian[:, :, 0, :, :3] = weights[0][..., None, None] * np.eye(3)
     return jacobian.reshape(count, -1, 6), error.reshape(count, -1)
 
