@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable
 from math import sqrt
 from typing import Any
@@ -28,7 +29,7 @@ from wbc.walking.walk_state import Event, Hand, Swinging, What, Wrist
 TRIES = 3
 
 
-class Hands:
+class Hands(ABC):
     """The hands of a walking body: which hold, which one is on its way, and their part of the stack.
 
     Attributes:
@@ -61,9 +62,9 @@ class Hands:
         for arm, hold in self.held.items():
             self.stack.hold(arm, hold, int(self.grips.roll[self._grip[arm]]))
 
+    @abstractmethod
     def vanish(self, ids: Iterable[str]) -> None:
         """Holds are gone."""
-        raise NotImplementedError
 
     def _follow(self, plan: Plan) -> None:
         """Take a plan from its beginning."""
