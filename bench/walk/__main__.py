@@ -19,6 +19,7 @@ from bench.pool import ROOT
 from bench.records import measure
 from bench.report import goal_sheet
 from bench.walk.courses import COURSES, Machine, courses, highest, machine, spins, trenches
+from bench.walk.layouts import layouts
 from bench.walk.planning import planning
 from bench.walk.tables import Parts, Record, goals, sheets
 from wbc.errors import RangeError
@@ -26,7 +27,16 @@ from wbc.robots import WalkerData
 from wbc.robots.walker_data import WALKER_DIGEST
 
 #: Parts of a run, and how many records each has
-PARTS = {"courses": 3 * len(COURSES), "spins": 2, "trenches": 9, "highest": len(COURSES), "planning": 3 * len(COURSES)}
+PARTS = {
+    "courses": 3 * len(COURSES),
+    "spins": 2,
+    "trenches": 9,
+    "highest": len(COURSES),
+    "planning": 3 * len(COURSES),
+    "layouts": 1000,
+}
+#: Layouts of a run that is not full, and those that are carried out
+FEW, WALKED = 30, 3
 QUICK = ("courses", "spins", "planning")
 
 NOTES = """\
@@ -41,6 +51,9 @@ def main(given: list[str] | None = None) -> None:
     parser = argparse.ArgumentParser(prog="wbc bench walk", description=__doc__)
     parser.add_argument("--full", action="store_true", help="every part")
     parser.add_argument("--parts", nargs="+", choices=[*PARTS], help="only these")
+    parser.add_argument("--layouts", type=int, help=f"how many, {PARTS['layouts']} in full runs, else {FEW}")
+    parser.add_argument("--walked", type=int, default=WALKED, help="layouts of these that are carried out")
+    parser.add_argument("--resume", action="store_true", help="keep the layouts that an interrupted run measured")
     parser.add_argument("--collisions", action="store_true", help="with self-collision rows in the controller")
     parser.add_argument("--output", type=Path, help="folder; by default bench for full runs, else build/bench")
     chosen = parser.parse_args(given)
@@ -49,6 +62,10 @@ def main(given: list[str] | None = None) -> None:
     data = WalkerData.read()
     if data.digest != WALKER_DIGEST:
         raise RangeError("walker.toml", data.digest, f"figures are reported for the data {WALKER_DIGEST} only")
+    count = chosen.layouts or (PARTS["layouts"] if chosen.full else FEW)
+    kept = folder / "walk_layouts.jsonl"
+    if not chosen.resume:
+        kept.unlink(missing_ok=True)
     it = machine(wbc.robots.walker(), chosen.collisions)
     console, errors = Console(), Console(stderr=True)
     if not console.is_terminal:
@@ -56,7 +73,11 @@ def main(given: list[str] | None = None) -> None:
     about = host()
     bars = (TextColumn("{task.description:10}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
     with Progress(*bars, console=errors) as progress:
-        parts, interrupted = measure({name: (PARTS[name], of(name, it)) for name in names}, progress)
+        sizes = {**PARTS, "layouts": count}
+        work = {name: (sizes[name], of(name, it)) for name in names if name != "layouts"}
+        if "layouts" in names:
+            work["layouts"] = count, layouts(it, count, chosen.walked, kept)
+        parts, interrupted = measure(work, progress)
     lines = [
         f"{about['processor']}, Python {about['python']}; load {about['load']}.",
         f"Robot data {data.digest}; self-collision rows {'on' if chosen.collisions else 'off'}.",

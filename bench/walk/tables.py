@@ -8,6 +8,7 @@ import numpy as np
 
 from bench.goals import Goal
 from bench.sheet import Sheet
+from bench.walk.layout_tables import layout_goals, layout_sheet
 
 Record = dict[str, Any]
 Parts = dict[str, list[Record]]
@@ -23,6 +24,7 @@ def sheets(parts: Parts) -> list[Sheet]:
         "spins": _spins,
         "trenches": _trenches,
         "planning": _planning,
+        "layouts": layout_sheet,
     }
     return [make(parts[name]) for name, make in makers.items() if parts.get(name)]
 
@@ -67,6 +69,8 @@ def goals(parts: Parts) -> list[Goal]:
                 "",
             ),
         ]
+    if layouts := parts.get("layouts"):
+        out += layout_goals(layouts)
     return out
 
 

@@ -1,54 +1,29 @@
-"""Other ways along a body path: lower, or turned about the approach direction, where the direct way is not possible."""
+"""Ways round, where the body cannot follow its path as it is: higher and lower and turned, then beside it too."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
-from math import ceil, radians
+import time
+from collections.abc import Iterator, Mapping
 
-import numpy as np
-import pinocchio as pin
-
-from wbc.validation import Array
+from wbc.robots import Walker
 from wbc.walking.body_path import BodyPath
-
-#: How much lower than the path [m], and turned by [rad], in the order of trying
-LOWER = tuple(k * 2 * 0.0254 for k in range(5))
-TURNED = tuple(radians(x) for x in (0.0, 30.0, -30.0, 60.0, 90.0, -15.0, 15.0, 45.0))
-#: How fast the body goes down [m/s] and turns [rad/s] at the beginning and at the end
-DOWN_SPEED, TURN_SPEED = 0.05, 0.1
+from wbc.walking.structure import Structure
+from wbc.walking.ways import ALONG, WIDE, BodyRoute, find_route
 
 
-@dataclass(frozen=True)
-class Detour:
-    """The body goes down and turns where the path begins, follows it so, and comes back where it ends.
+def ways_round(
+    walker: Walker,
+    structure: Structure,
+    path: BodyPath,
+    start: Mapping[int, int] | None = None,
+    deadline: float | None = None,
+) -> Iterator[BodyRoute]:
+    """Routes from a path's beginning to its end, those near the path first; the next one is looked for when asked for.
 
-    Attributes:
-        lower: along the body's z axis, into the structure [m]. turned: about it [rad].
+    Args:
+        start: arm -> hold (rows) of hands that hold at the beginning. deadline: of ``time.perf_counter``.
     """
-
-    lower: float
-    turned: float
-
-    def offset(self, part: float) -> Array:
-        """The change of the body's pose, in its own axes, 4 x 4; ``part`` from 0, none, to 1, all of it."""
-        turn = pin.utils.rotate("z", part * self.turned)
-        return np.array(pin.SE3(turn, np.array([0.0, 0.0, part * self.lower])).homogeneous)
-
-    def along(self, path: BodyPath) -> BodyPath:
-        """The path with the detour. Its middle is as long as the path; the spacing is the same."""
-        seconds = max(self.lower / DOWN_SPEED, abs(self.turned) / TURN_SPEED)
-        count = ceil(seconds / path.spacing - 1e-9)
-        parts = [k / count for k in range(count)]
-        into = [path.poses[0] @ self.offset(part) for part in parts]
-        back = [path.poses[-1] @ self.offset(part) for part in reversed(parts)]
-        return BodyPath(np.array([*into, *(path.poses @ self.offset(1.0)), *back]), path.spacing)
-
-    def __str__(self) -> str:
-        return f"{self.lower:.3f} m lower, turned by {np.degrees(self.turned):.0f} deg"
-
-
-def detours() -> Iterator[Detour]:
-    """All detours, those that change little first."""
-    every = [Detour(lower, turned) for lower in LOWER for turned in TURNED if lower or turned]
-    yield from sorted(every, key=lambda d: (d.lower / LOWER[-1] + abs(d.turned) / radians(90.0), d.lower, d.turned))
+    for mesh in (ALONG, WIDE):
+        if deadline is not None and time.perf_counter() > deadline:
+            return
+        yield find_route(walker, structure, path, mesh=mesh, start=start, deadline=deadline)

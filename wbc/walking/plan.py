@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 import pathlib
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
@@ -15,7 +15,15 @@ from wbc.walking.grips import Grips
 
 
 class NoPlanError(WbcError):
-    """No sequence of re-grasps leads to the end of the path; the message says where it ends, which holds and why."""
+    """No sequence of re-grasps leads to the end of the path; the message says where it ends, which holds and why.
+
+    Attributes:
+        separating: ids of the holds at which the way ends; empty where no arm reaches any.
+    """
+
+    def __init__(self, field: str, value: Any, reason: str, separating: Iterable[str] = ()) -> None:
+        super().__init__(field, value, reason)
+        self.separating = tuple(separating)
 
 
 class HoldLost(WbcError):
@@ -59,7 +67,7 @@ class Plan:
     Attributes:
         path: of the body. start: hold id an arm, in the order of arms. regrasps: in the order of time.
         complete: it leads to the end of the path. reached: path time that it leads to [s].
-        reason: why it is not complete; "" if it is.
+        reason: why it is not complete; "" if it is. separating: ids of the holds at which the way then ends.
         grips, chain: the table of grips, and for each arm the grips that it uses, first that of the start; for the
             controller, not in files.
     """
@@ -70,6 +78,7 @@ class Plan:
     complete: bool
     reached: float
     reason: str = ""
+    separating: tuple[str, ...] = ()
     grips: Grips | None = field(default=None, repr=False)
     chain: tuple[tuple[int, ...], ...] = field(default=(), repr=False)
 
@@ -106,6 +115,7 @@ class Plan:
             "complete": self.complete,
             "reached": self.reached,
             "reason": self.reason,
+            "separating": list(self.separating),
             "regrasps": self.rows(),
         }
         file.write_text(json.dumps(kept, indent=1) + "\n")

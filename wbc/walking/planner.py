@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Collection, Mapping
+from dataclasses import replace
 from itertools import combinations, product
 from typing import Literal
 
@@ -14,7 +15,7 @@ from wbc.errors import ShapeError
 from wbc.robots import Walker
 from wbc.validation import Array
 from wbc.walking.body_path import BodyPath
-from wbc.walking.detours import detours
+from wbc.walking.detours import ways_round
 from wbc.walking.grips import Grips, grip_slices
 from wbc.walking.plan import NoPlanError, Plan, Regrasp
 from wbc.walking.slices import Slices, drained
@@ -63,8 +64,8 @@ def plan_walk(
         width: stances kept for each number of re-grasps; None: all, which finds the fewest.
         time_budget: [s]; after it what is found is returned or refused.
         partial: return a plan that does not lead to the end instead of refusing.
-        detour: where the body cannot follow the path, try it lower and turned, see :mod:`wbc.walking.detours`; the
-            plan's path says what was found.
+        detour: where the body cannot follow the path, look for a way round: lower, turned, beside it, see
+            :mod:`wbc.walking.detours`; the plan's path says what was found.
 
     Raises:
         UnknownNameError: another arm, hold or objective. ShapeError: a walker that is no body with PUMA arms.
@@ -74,18 +75,20 @@ def plan_walk(
     deadline = None if time_budget is None else time.perf_counter() + time_budget
     plan = drained(plan_slices(walker, structure, path, beginning, objective=objective, width=width, deadline=deadline))
     if not plan.complete and detour:
-        for other in detours():
-            if deadline is not None and time.perf_counter() > deadline:
-                break
-            way = other.along(path)
+        rows = {arm.name: k for k, arm in enumerate(walker.arms)}
+        hands = {rows[name]: structure.index(hold) for name, hold in beginning[0].items()}
+        for route in ways_round(walker, structure, path, hands, deadline):
+            if route.path is None:
+                plan = replace(plan, reason=f"{plan.reason}; {route.text}", separating=route.separating)
+                continue
             asked = plan_slices(
-                walker, structure, way, beginning, objective="destination", width=width, deadline=deadline
+                walker, structure, route.path, beginning, objective="destination", width=width, deadline=deadline
             )
             changed = drained(asked)
             if changed.complete:
                 return changed
     if not plan.complete and not partial:
-        raise NoPlanError("plan", structure.name, plan.reason)
+        raise NoPlanError("plan", structure.name, plan.reason, plan.separating)
     return plan
 
 
@@ -162,11 +165,15 @@ def stances(
                 off = [np.abs(grips.posture_at(g, 0) - here)[:counts].max() for g in mine]
                 mine = [g for g, gap in zip(mine, off, strict=True) if gap < SAME_BRANCH]
             if not mine:
-                raise NoPlanError(f"start.{name}", start[name], "the arm cannot hold it at the beginning of the path")
+                raise NoPlanError(
+                    f"start.{name}", start[name], "the arm cannot hold it at the beginning of the path", [start[name]]
+                )
         mine = [g for g in mine if structure.ids[grips.hold[g]] not in avoid.get(name, ())]
         mine.sort(key=lambda g: (-int(grips.last[g]), int(grips.hold[g]), int(grips.branch[g])))
         if not mine:
-            raise NoPlanError("plan", name, "no hold is in reach at the beginning of the path")
+            raise NoPlanError(
+                "plan", name, "no hold is in reach at the beginning of the path", _at_first(structure, grips)
+            )
         choices.append(mine[:START_GRIPS])
     search.clearance.prepare((a, b) for one, other in combinations(choices, 2) for a, b in product(one, other))
     stances = []
@@ -177,9 +184,17 @@ def stances(
                 stances.append((-until, stance))
     if not stances:
         raise NoPlanError(
-            "plan", structure.name, "no stance is possible at the beginning: the arms are in each other's way"
+            "plan",
+            structure.name,
+            "no stance is possible at the beginning: the arms are in each other's way",
+            _at_first(structure, grips),
         )
     return [stance for _, stance in sorted(stances)[:STARTS]]
+
+
+def _at_first(structure: Structure, grips: Grips) -> list[str]:
+    """Holds that some arm can hold at the beginning of the path."""
+    return [structure.ids[k] for k in np.unique(grips.hold[grips.first == 0])]
 
 
 def _plan(walker: Walker, structure: Structure, path: BodyPath, grips: Grips, found: Found) -> Plan:
@@ -203,7 +218,7 @@ def _plan(walker: Walker, structure: Structure, path: BodyPath, grips: Grips, fo
                 move.way,
             )
         )
-    reason = ""
+    reason, separating = "", list[str]()
     if not found.complete:
         causes = [
             f"{walker.arms[grips.arm[g]].name} on {ids[grips.hold[g]]}: {grips.reasons[grips.ends[g]]}"
@@ -213,7 +228,8 @@ def _plan(walker: Walker, structure: Structure, path: BodyPath, grips: Grips, fo
             f"no hand can be moved in time after {found.reached * spacing:.2f} s of {path.duration:.2f} s "
             f"({'; '.join(causes)})"
         )
+        separating = sorted(ids[grips.hold[grip[-1]]] for grip in chain)
     start = tuple(ids[grips.hold[g]] for g in found.start)
-    return Plan(
-        path, start, tuple(steps), found.complete, found.reached * spacing, reason, grips, tuple(map(tuple, chain))
-    )
+    used = tuple(map(tuple, chain))
+    reached = found.reached * spacing
+    return Plan(path, start, tuple(steps), found.complete, reached, reason, tuple(separating), grips, used)

@@ -11,7 +11,7 @@ from wbc.errors import ShapeError
 from wbc.robots import Walker, WalkerData
 from wbc.walking.body_path import BodyPath
 from wbc.walking.plan import HoldLost, NoPlanError, Plan
-from wbc.walking.planner import plan_walk
+from wbc.walking.planner import Objective, plan_walk
 from wbc.walking.run.recording import TickColumns, WalkRecorder
 from wbc.walking.run.request import WalkRequest
 from wbc.walking.run_log import WalkLog
@@ -31,7 +31,7 @@ class WalkRun:
     """A walk as it was carried out, or refused.
 
     Attributes:
-        request, walker, structure: what walks where. path: where the body is asked to be.
+        request, walker, structure: what walks where. path: where the body is asked to be, or goes round.
         plan: None if no stance is possible where the walk begins.
         outcome, reason: how it ended; the reason is "" where all is well.
         log, ticks: None if nothing was carried out.
@@ -79,10 +79,11 @@ def perform_walk(
     report("planning", None)
     begin = time.perf_counter()
     try:
-        plan = plan_walk(walker, structure, path, objective=request.mode, partial=True)  # type: ignore[arg-type]
+        asked: Objective = "velocity" if request.mode == "velocity" else "destination"
+        plan = plan_walk(walker, structure, path, objective=asked, partial=True, detour=True)
     except NoPlanError as error:
         return WalkRun(request, walker, structure, path, None, "refused", str(error), plan_time=_since(begin))
-    planned = _since(begin)
+    planned, path = _since(begin), plan.path
     if not plan.complete:
         return WalkRun(request, walker, structure, path, plan, "refused", plan.reason, plan_time=planned)
     report("compiling", None)

@@ -1,0 +1,84 @@
+"""Ways round: routes of the body that the reference search confirms, and refusals that name holds."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from wbc.robots import Walker
+from wbc.walking import Structure, plane, remove_rows
+from wbc.walking.body_path import BodyPath, grid_path, straight_path
+from wbc.walking.plan import NoPlanError
+from wbc.walking.planner import plan_walk
+from wbc.walking.reference import Rules, fewest_along
+from wbc.walking.run.request import over_holds
+from wbc.walking.ways import Mesh, find_route
+from wbc.walking.ways.cell_graph import round_labels
+
+INCH = 0.0254
+#: One height, and as few poses as will do
+COARSE = Mesh(0.2, 0.25, 5, (0.0,), 24)
+
+
+def ends(path: BodyPath) -> np.ndarray:
+    return path.poses[[0, -1]]
+
+
+def confirm(machine: Walker, structure: Structure, path: BodyPath, every: int) -> None:
+    """Exact breadth-first search over all grips along the poses finds a way: arms clear, joints within their limits."""
+    assert fewest_along(machine, structure, path.poses[::every], Rules()) is not None
+
+
+def test_over_a_trench_the_body_turns_or_goes_down(machine: Walker, structure: Structure) -> None:
+    trench = remove_rows(structure, "12-15")
+    path = grid_path([(13, 9), (13, 18)], 2 * INCH)
+    route = find_route(machine, trench, path)
+    assert route.path is not None
+    assert route.separating == ()
+    np.testing.assert_allclose(ends(route.path), ends(path), atol=1e-9)
+    confirm(machine, trench, route.path, 20)
+    # All poses are over the line of the path, which is at x = 0; where the body turns and goes on, it does so in an arc
+    assert np.abs(route.path.poses[:, 0, 3]).max() < 0.01
+
+
+def test_round_a_hole_the_body_goes_beside_its_path(machine: Walker) -> None:
+    whole = plane(max_tilt=0.0)
+    gone = [f"{t},{a}" for t in range(1, 11) for a in range(10, 18)]
+    holes = whole.without(gone)
+    path = straight_path(over_holds(whole, ["8,6", "8,19"], 52 * INCH), 2 * INCH)
+    route = find_route(machine, holes, path, mesh=COARSE)
+    assert route.path is not None
+    np.testing.assert_allclose(ends(route.path), ends(path), atol=1e-9)
+    # At 52 in above the plane throughout, and far to the side
+    np.testing.assert_allclose(route.path.poses[:, 2, 3], 52 * INCH, atol=1e-6)
+    assert 0.5 < np.abs(route.path.poses[:, 1, 3] - path.poses[0, 1, 3]).max() <= 1.25 + 1e-9
+    confirm(machine, holes, route.path, 60)
+
+
+def test_two_islands_are_refused_with_the_holds_that_separate_them(machine: Walker, structure: Structure) -> None:
+    first = {f"{t},{a}" for t in range(12, 15) for a in range(4, 10)}
+    second = {f"{t},{a}" for t in range(12, 15) for a in range(20, 24)}
+    islands = structure.without([hold for hold in structure.ids if hold not in first | second])
+    path = grid_path([(13, 7), (13, 21.5)], 2 * INCH)
+    with pytest.raises(NoPlanError, match="beside the path there is no way beyond") as caught:
+        plan_walk(machine, islands, path, objective="destination", width=4, detour=True)
+    assert caught.value.separating
+    assert set(caught.value.separating) <= first
+
+
+def test_a_start_without_holds_is_refused_with_those_in_reach(machine: Walker, structure: Structure) -> None:
+    few = structure.without([hold for hold in structure.ids if hold not in ("13,6", "13,20", "14,20", "12,20")])
+    with pytest.raises(NoPlanError, match="no hold is in reach") as caught:
+        plan_walk(machine, few, grid_path([(13, 8), (13, 9)], 2 * INCH), detour=True)
+    assert set(caught.value.separating) <= {"13,6"}
+
+
+def test_connected_sets_go_on_after_a_full_turn() -> None:
+    flags = np.zeros((2, 1, 1, 6), dtype=bool)
+    flags[0, 0, 0, [0, 1, 3, 5]] = True
+    flags[1, 0, 0, [0, 5]] = True
+    numbers = round_labels(flags)
+    assert len(set(numbers[flags].tolist())) == 2
+    assert numbers[0, 0, 0, 0] == numbers[0, 0, 0, 5] == numbers[1, 0, 0, 5] == numbers[1, 0, 0, 0]
+    assert numbers[0, 0, 0, 3] not in (0, numbers[0, 0, 0, 0])
+    assert (numbers[~flags] == 0).all()
