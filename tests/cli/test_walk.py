@@ -16,12 +16,14 @@ from PIL import Image
 
 from tests.cli.test_commands import run
 from wbc import style
+from wbc.walking import detours
 from wbc.walking import run as walking_run
 from wbc.walking.run import perform
 from wbc.walking.run.folder import RunFolderError
 from wbc.walking.run.request import WalkRequest, over_holds
 from wbc.walking.run_log import WalkLog
 from wbc.walking.structures import plane
+from wbc.walking.ways import ALONG
 
 SHORT = ["--from", "13,9", "--to", "13,14"]
 
@@ -167,7 +169,8 @@ def test_a_folder_that_cannot_be_written(tmp_path: Path) -> None:
     assert issubclass(RunFolderError, Exception)
 
 
-def test_what_is_out_of_reach_is_refused_with_its_reason(tmp_path: Path) -> None:
+def test_what_is_out_of_reach_is_refused_with_its_reason(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(detours, "MESHES", (ALONG,))
     folder = tmp_path / "run"
     folder.mkdir()
     for name in ("summary.json", "run.npz", "still_7.png", "mine.txt"):
@@ -175,6 +178,7 @@ def test_what_is_out_of_reach_is_refused_with_its_reason(tmp_path: Path) -> None
     code, _, err = run("walk", *SHORT, "--remove-rows", "1-9,12-24", "--out", folder, "--force")
     assert code == 3
     assert "refused" in err
+    assert "no way beyond" in err
     told = json.loads((folder / "summary.json").read_text())
     assert told["outcome"] == "refused"
     assert told["reason"]

@@ -11,6 +11,10 @@ from wbc.walking.structure import Structure
 from wbc.walking.ways import ALONG, WIDE, BodyRoute, find_route
 
 
+#: Cells that are looked at, in the order of trying
+MESHES = (ALONG, WIDE)
+
+
 def ways_round(
     walker: Walker,
     structure: Structure,
@@ -23,7 +27,7 @@ def ways_round(
     Args:
         start: arm -> hold (rows) of hands that hold at the beginning. deadline: of ``time.perf_counter``.
     """
-    for mesh in (ALONG, WIDE):
+    for mesh in MESHES:
         if deadline is not None and time.perf_counter() > deadline:
             return
         yield find_route(walker, structure, path, mesh=mesh, start=start, deadline=deadline)

@@ -67,9 +67,10 @@ class Plan:
     Attributes:
         path: of the body. start: hold id an arm, in the order of arms. regrasps: in the order of time.
         complete: it leads to the end of the path. reached: path time that it leads to [s].
-        reason: why it is not complete; "" if it is. separating: ids of the holds at which the way then ends.
+        reason: why it is not complete; "" if it is.
         grips, chain: the table of grips, and for each arm the grips that it uses, first that of the start; for the
             controller, not in files.
+        separating: ids of the holds at which the way ends if it is not complete.
     """
 
     path: BodyPath
@@ -78,9 +79,9 @@ class Plan:
     complete: bool
     reached: float
     reason: str = ""
-    separating: tuple[str, ...] = ()
     grips: Grips | None = field(default=None, repr=False)
     chain: tuple[tuple[int, ...], ...] = field(default=(), repr=False)
+    separating: tuple[str, ...] = ()
 
     @property
     def delay(self) -> float:

@@ -232,4 +232,4 @@ def _plan(walker: Walker, structure: Structure, path: BodyPath, grips: Grips, fo
     start = tuple(ids[grips.hold[g]] for g in found.start)
     used = tuple(map(tuple, chain))
     reached = found.reached * spacing
-    return Plan(path, start, tuple(steps), found.complete, reached, reason, tuple(separating), grips, used)
+    return Plan(path, start, tuple(steps), found.complete, reached, reason, grips, used, tuple(separating))
