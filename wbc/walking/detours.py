@@ -10,7 +10,6 @@ from wbc.walking.body_path import BodyPath
 from wbc.walking.structure import Structure
 from wbc.walking.ways import ALONG, WIDE, BodyRoute, find_route
 
-
 #: Cells that are looked at, in the order of trying
 MESHES = (ALONG, WIDE)
 
