@@ -15,6 +15,7 @@ from wbc.controller.deployment import Deployment
 from wbc.controller.fallback import Fallback
 from wbc.controller.handle import Handle
 from wbc.controller.native import NativeTick
+from wbc.controller.ramps import Ramps
 from wbc.controller.recorder import Recorder
 from wbc.controller.recording import RecordingError
 from wbc.controller.report import BAD_V
@@ -64,7 +65,7 @@ class Controller(Deployment):
         # of all ways to copy some hundred numbers into something immutable, the fastest
         self._snapshot = self.tick.state.data.cast("B").tobytes
         self._q_shape, self._v_shape = (layout.nq,), (layout.nv,)
-        self._busy, self._resets = False, 0
+        self._busy, self._resets, self.ramps = False, 0, Ramps()
         self._recorder: Recorder | None = None
         #: inputs that follow the first configuration, with their items, and those of them that it still has to fill
         self._first: dict[Slot, str] = {}
@@ -134,9 +135,6 @@ class Controller(Deployment):
 
     def record(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Recorder:
         """Record every tick into a file from now on, until the recorder is closed; see :func:`wbc.replay`.
-
-            with controller.record("run.npz"):
-                ...
 
         Args:
             overwrite: a file that is there may be replaced.
@@ -290,7 +288,8 @@ class Controller(Deployment):
             self._initialise(self._waiting, configuration)
             self._waiting = {}
         self.tick.dt[0] = step
-        self._slow = dt is not None
+        self.ramps.advance(step)
+        self._slow = dt is not None or bool(self.ramps)
 
     def _refuse(self, q: Any, v: Any) -> None:
         """Say what was wrong with inputs that the tick refused."""

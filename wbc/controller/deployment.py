@@ -16,6 +16,8 @@ from wbc.errors import RangeError, ShapeError, SolverError
 if TYPE_CHECKING:
     from wbc.controller.controller import Controller
     from wbc.controller.fallback import Fallback
+    from wbc.controller.handle import Handle
+    from wbc.controller.ramps import Ramps
     from wbc.controller.recorder import Recorder
 
 #: How far an export's commands may be from those of the tick that it is [rad/s, m/s], and from those of another solver:
@@ -29,6 +31,8 @@ class Deployment:
     tick: NativeTick | SolvedTick
     solver: str
     backend: str
+    ramps: Ramps
+    _slow: bool
     _fallback: Fallback
     _recorder: Recorder | None
 
@@ -48,6 +52,11 @@ class Deployment:
         if self._recorder is not None:
             raise SolverError("policy", policy, "cannot change while the controller records")
         self._fallback.policy = policy
+
+    def start_ramp(self, handle: Handle, weight: float, seconds: float) -> None:
+        """See :meth:`Handle.ramp`."""
+        self.ramps.start(handle, weight, seconds)
+        self._slow = True
 
     def finish(self, flag: int) -> int:
         """What the policy adds to a tick that ended with ``flag``; negative: refused."""

@@ -73,7 +73,7 @@ class Handle:
         return (*given, *own, "enabled", "mask")
 
     def __dir__(self) -> list[str]:
-        return [*self.names, "names", "set"]
+        return [*self.names, "names", "ramp", "set"]
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("__"):
@@ -109,9 +109,30 @@ class Handle:
         elif name == "mask":
             super().__setattr__("_mask", self._checked_mask(field, value))
         elif name == "weight" and self._block.form == "task":
-            super().__setattr__("_weight", validation.scalar(field, value, low=0.0))
+            weight = validation.scalar(field, value, low=0.0)
+            self._controller.ramps.stop(self.item_name)
+            super().__setattr__("_weight", weight)
         else:
             raise UnknownValueError(field, name, self.names)
+        self.apply()
+
+    def ramp(self, weight: float, seconds: float) -> None:
+        """Let a task's weight change smoothly to ``weight`` over ``seconds`` of ticks: joining (from 0), leaving (to 0)
+        or changing rank without a jerk. ln w follows 3 s^2 - 2 s^3. Setting the weight ends it.
+
+        Raises:
+            UnknownNameError: not a task. RangeError, ShapeError: a negative weight or time.
+        """
+        if self._block.form != "task":
+            raise UnknownValueError(self._field("ramp"), "ramp", self.names)
+        last = validation.scalar(self._field("ramp.weight"), weight, low=0.0)
+        self._controller.start_ramp(
+            self, last, validation.scalar(self._field("ramp.seconds"), seconds, low=0.0, unit="s")
+        )
+
+    def put_weight(self, weight: float) -> None:
+        """A checked weight on its way along a ramp."""
+        super().__setattr__("_weight", weight)
         self.apply()
 
     def set(self, **values: Any) -> None:

@@ -14,7 +14,6 @@ from wbc.stack.layout import Layout
 from wbc.stack.motion import motion
 from wbc.stack.places import brakes, gain_places, margin_places, pull_scales, rate_places, stops
 from wbc.stack.program import Program, sparsity_rows
-from wbc.tasks.base import Constraint, Order
 
 
 def sources(stack: Declaration, layout: Layout, program: Program) -> dict[str, str]:
@@ -131,7 +130,7 @@ def unit_groups(stack: Declaration) -> list[tuple[int, int]]:
 
 def row_orders(layout: Layout) -> list[int]:
     """Class of each general row in the order of sacrifice."""
-    return [int(_order(b.entry.item)) for b in layout.of_form("margins", "rows") for _ in b.rows]
+    return [int(b.entry.order) for b in layout.of_form("margins", "rows") for _ in b.rows]
 
 
 def row_units(stack: Declaration, layout: Layout) -> list[float]:
@@ -143,12 +142,7 @@ def row_units(stack: Declaration, layout: Layout) -> list[float]:
 def bound_sequence(layout: Layout) -> list[int]:
     """Bound blocks in the order of sacrifice, then of the stack."""
     bounds = layout.of_form("bounds")
-    return sorted(range(len(bounds)), key=lambda k: _order(bounds[k].entry.item))
-
-
-def _order(item: object) -> Order:
-    assert isinstance(item, Constraint)
-    return item.order
+    return sorted(range(len(bounds)), key=lambda k: bounds[k].entry.order)
 
 
 def _table(kind: str, name: str, values: Iterable[float]) -> str:

@@ -10,7 +10,7 @@ from wbc import pickling, validation
 from wbc.errors import DuplicateNameError, LevelError, PicklingError, RangeError, ShapeError, UnknownNameError
 from wbc.robot import Robot
 from wbc.stack.parts import inner_items
-from wbc.tasks.base import Constraint, Item, Task
+from wbc.tasks.base import Constraint, Item, Order, Task
 from wbc.tasks.mechanism import Mechanism
 
 #: Default cost of velocity against a task row of weight 1, per (rad/s)^2: keeps the optimum unique.
@@ -29,6 +29,13 @@ class Entry:
     name: str
     level: int
     weight: float
+    hard: bool = True
+
+    @property
+    def order(self) -> Order:
+        """Class of a constraint in the order of sacrifice; that of a soft one is the last."""
+        assert isinstance(self.item, Constraint)
+        return self.item.order if self.hard else Order.SOFT
 
     @property
     def is_task(self) -> bool:
@@ -105,7 +112,9 @@ class Declaration:
         """Constraints in order."""
         return tuple(e for e in self._entries.values() if not e.is_task)
 
-    def add(self, item: Item, name: str | None = None, level: int = 0, weight: float = 1.0) -> Declaration:
+    def add(
+        self, item: Item, name: str | None = None, level: int = 0, weight: float = 1.0, hard: bool = True
+    ) -> Declaration:
         """Add an item; returns the stack, so that calls chain.
 
         Args:
@@ -114,6 +123,7 @@ class Declaration:
             level: only 0 in this version.
             weight: of a task against the others, >= 0; the cost of a row is weight * (rate error / scale)^2
                 with scale = characteristic length for rows in metres, else 1.
+            hard: of a constraint; False: its rows give way before those of any hard one, see the order of sacrifice.
 
         Raises:
             DuplicateNameError, LevelError, RangeError, ShapeError, UnknownNameError: bad input; the stack is unchanged.
@@ -134,8 +144,10 @@ class Declaration:
         number = validation.scalar("weight", weight, low=0.0)
         if isinstance(item, Constraint) and number != 1.0:
             raise RangeError("weight", weight, "a constraint is hard and has no weight")
+        if not validation.flag("hard", hard):
+            _require_soft(item)
         item.validate(self._robot)
-        self._entries[chosen] = Entry(item, chosen, level, number)
+        self._entries[chosen] = Entry(item, chosen, level, number, bool(hard))
         return self
 
     def __getitem__(self, name: str) -> Entry:
@@ -174,8 +186,22 @@ class Declaration:
             "length": self._length.hex(),
             "damping": self._damping.hex(),
             "calm": self._calm,
-            "items": [[e.name, e.item.declaration(self._robot)] for e in self.entries],
+            "items": [[e.name, e.item.declaration(self._robot), *([] if e.hard else ["soft"])] for e in self.entries],
         }
+
+
+def _require_soft(item: Item) -> None:
+    """Refuse what cannot be soft.
+
+    Raises:
+        RangeError: a task, simple bounds, or rows of the actuators or the mechanism.
+    """
+    if not isinstance(item, Constraint):
+        raise RangeError("hard", False, "a task is a wish: it has a weight")
+    if item.form == "bounds":
+        raise RangeError("hard", False, f"{type(item).__name__} bounds joints, and bounds never give way")
+    if item.order <= Order.POSITION:
+        raise RangeError("hard", False, f"{type(item).__name__} is what the robot can do, which never gives way")
 
 
 def _snake(name: str) -> str:

@@ -1,0 +1,62 @@
+"""Weights that change smoothly over some ticks, so that tasks join, leave and change rank without a jerk."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from wbc.controller.handle import Handle
+
+#: Share of the larger weight at which a weight of zero begins or ends
+_FLOOR = 1e-6
+
+
+@dataclass
+class Ramp:
+    """A weight on its way: ln w goes from its first to its last value like 3 s^2 - 2 s^3, s = time / seconds.
+
+    A weight of zero takes the place of 1e-6 of the other one on the way.
+    """
+
+    handle: Handle
+    first: float
+    last: float
+    seconds: float
+    time: float = 0.0
+
+    def at(self, time: float) -> float:
+        """The weight [time in s]."""
+        s = time / self.seconds if self.seconds > 0.0 else 1.0
+        if s >= 1.0 or self.first == self.last:
+            return self.last
+        floor = _FLOOR * max(self.first, self.last)
+        low, high = (math.log(max(weight, floor)) for weight in (self.first, self.last))
+        return math.exp(low + (high - low) * s * s * (3.0 - 2.0 * s))
+
+
+class Ramps:
+    """The ramps of one controller, one a task."""
+
+    def __init__(self) -> None:
+        self._running: dict[str, Ramp] = {}
+
+    def __bool__(self) -> bool:
+        return bool(self._running)
+
+    def start(self, handle: Handle, last: float, seconds: float) -> None:
+        """From the present weight on; takes the place of a ramp of the same task."""
+        self._running[handle.item_name] = Ramp(handle, handle.weight, last, seconds)
+
+    def stop(self, name: str) -> None:
+        """The weight stays as it is."""
+        self._running.pop(name, None)
+
+    def advance(self, seconds: float) -> None:
+        """The next tick's weights."""
+        for name, ramp in list(self._running.items()):
+            ramp.time += seconds
+            ramp.handle.put_weight(ramp.at(ramp.time))
+            if ramp.time >= ramp.seconds:
+                del self._running[name]
