@@ -33,12 +33,12 @@ class Status(StrEnum):
     RELAXED = "relaxed"
     #: No optimum was found: v brings every joint to rest as fast as its bounds allow
     BRAKED = "braked"
-    #: The first answer had no certificate; another way led to one that has, see :attr:`Step.answered_by`. Rows may have
-    #: given way, see :attr:`Step.relaxed`
-    RECOVERED = "recovered"
     #: :attr:`Controller.iteration_cap` ended the search: v is as near to what it had found as the rows allow, seen from
     #: braking
     CAPPED = "capped"
+    #: The first answer had no certificate; another way led to one that has, see :attr:`Step.answered_by`. Rows may have
+    #: given way, see :attr:`Step.relaxed`
+    RECOVERED = "recovered"
 
 
 @dataclass(frozen=True)
