@@ -132,7 +132,7 @@ def test_summary_figures_are_those_of_the_log(tmp_path: Path) -> None:
     error = np.linalg.norm(log.array("pose")[:, :3] - log.array("target")[:, :3], axis=1)
     assert values["position_error"]["max"] == pytest.approx(error.max())
     assert values["position_error"]["rms"] == pytest.approx(np.sqrt(np.mean(error**2)))
-    assert values["status"] == {"solved": 300, "relaxed": 0, "braked": 0, "capped": 0}
+    assert values["status"] == {"solved": 300, "relaxed": 0, "braked": 0, "capped": 0, "recovered": 0}
     assert values["tick"]["median"] == pytest.approx(np.median(log["tick"]))
     assert 0.0 < values["acceleration"]["share"] <= 1.0 + 1e-6
     turns = [
