@@ -21,6 +21,7 @@ FLOORS = {
     "wbc.robots": 2,
     "wbc.proximity": 2,
     "wbc.tasks": 3,
+    "wbc.analysis": 4,
     "wbc.stack": 4,
     "wbc.qp": 5,
     "wbc.export": 5,

@@ -1,0 +1,55 @@
+"""Verdicts and witnesses."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from wbc.analysis import ExactModel, JointRows, analyse, published_sets
+from wbc.analysis.numeric import NumericRows, rank
+from wbc.errors import RangeError, ShapeError, UnknownNameError
+
+VERDICTS = {
+    ("planar_3r", "middle"): "loose",
+    ("spherical_4r", "alpha"): "incomplete",
+    ("spherical_4r", "alpha, beta"): "loose",
+    ("spherical_4r", "elbow, beta"): "loose",
+    ("ssrms", "q1, q2"): "incomplete",
+    ("spdm_arm_simplified", "alpha, q1, q7"): "incomplete",
+    ("spdm_arm_simplified", "alpha, q1, q7, elbow"): "strict",
+    ("spdm_arm", "alpha, q1, q7, elbow"): "strict",
+}
+
+
+@pytest.mark.parametrize(("name", "chosen"), VERDICTS)
+def test_verdicts_and_their_witnesses(name: str, chosen: str) -> None:
+    sets = published_sets(name)
+    found = analyse(ExactModel(sets.robot, sets.symbols), sets.task, sets.sets[chosen])
+    assert found.verdict == VERDICTS[name, chosen]
+    assert (found.witness is None) == (found.verdict != "incomplete")
+    if found.witness is not None:
+        numeric, q = NumericRows(sets.robot), found.witness.q
+        J_T, J_R = numeric.value(sets.task, q), numeric.value((*sets.task, *sets.sets[chosen]), q)
+        assert rank(J_T) == J_T.shape[0]
+        assert rank(J_R) < sets.robot.nv
+        np.testing.assert_allclose(found.witness.task, np.linalg.svd(J_T, compute_uv=False), atol=1e-12)
+
+
+def test_a_robot_without_symbols_gives_the_same_verdict_and_both_algorithms_do() -> None:
+    sets = published_sets("spherical_4r")
+    model = ExactModel(sets.robot)
+    for algorithm in ("sub_determinants", "singular_vectors"):
+        assert analyse(model, sets.task, sets.sets["alpha, beta"], algorithm=algorithm).verdict == "loose"
+
+
+def test_bad_requests() -> None:
+    sets = published_sets("ssrms")
+    model = ExactModel(sets.robot)
+    with pytest.raises(UnknownNameError, match="sub_determinants"):
+        analyse(model, sets.task, sets.sets["q1"], algorithm="subdeterminants")
+    with pytest.raises(RangeError):
+        analyse(model, [JointRows("joint1")], [JointRows("joint2")])
+    with pytest.raises(ShapeError):
+        analyse(model, sets.task, [])
+    with pytest.raises(UnknownNameError):
+        published_sets("ssrm")

@@ -1,0 +1,50 @@
+"""``wbc analyse`` as a user types it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from typer.testing import CliRunner
+
+from wbc.cli.app import app
+
+
+def run(*arguments: str | Path) -> tuple[int, str, str]:
+    """(exit code, standard output, standard error) of ``wbc analyse ARGUMENTS``."""
+    result = CliRunner(env={"COLUMNS": "200"}).invoke(app, ["analyse", *map(str, arguments)])
+    if result.exception is not None and not isinstance(result.exception, SystemExit):
+        raise result.exception
+    return result.exit_code, result.stdout, result.stderr
+
+
+def test_published_set_on_screen_and_in_a_file(tmp_path: Path) -> None:
+    file = tmp_path / "loci.json"
+    code, out, _ = run("spherical_4r", "--set", "alpha", "--set", "alpha, beta", "--json", file)
+    assert code == 0
+    assert "alpha: 4 x 4, incomplete" in out
+    assert "det      L4 L3 c2 s4 (L3^2 + 2 L3 L4 c4 + L4^2)" in out
+    assert "alpha, beta: 5 x 4, loose" in out
+    assert "locus    q2 = +-pi/2" in out
+    assert "witness  q = " in out
+    data = json.loads(file.read_text())
+    assert [s["verdict"] for s in data["sets"]] == ["incomplete", "loose"]
+    assert data["sets"][1]["locus"] == ["q4 = 0", "q4 = pi"]
+    assert data["sets"][1]["latex"] == [r"q_{4} \in \{0, \pi\}"]
+
+
+def test_a_set_of_ones_own(tmp_path: Path) -> None:
+    code, out, _ = run("ssrms_simplified", "--lock", "joint1", "--latex")
+    assert code == 0
+    assert r"q_{6} = \pm\pi/2" in out
+    assert "joint1: 7 x 7, incomplete" in out
+
+
+def test_bad_input() -> None:
+    assert run("spherical_4r", "--set", "gamma")[0] == 2
+    assert run("spherical_4r", "--algorithm", "rsda")[0] == 2
+    assert run("panda")[0] == 2
+    code, _, err = run("ssrms", "--plane", "F3")
+    assert code == 2
+    assert "SHOULDER,WRIST" in err
+    assert "did you mean 'joint1'" in run("ssrms", "--lock", "joint")[2]

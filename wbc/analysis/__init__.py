@@ -1,0 +1,46 @@
+"""Rank analysis of task and constraint coordinates: symbolic Jacobians, loci, completeness. See docs/analysis.md."""
+
+from __future__ import annotations
+
+from wbc.analysis.branches import Branch
+from wbc.analysis.completeness import ALGORITHMS, Analysis, Witness, analyse
+from wbc.analysis.deficiency import Exact
+from wbc.analysis.determinants import Determinant, factored_determinant
+from wbc.analysis.half_angles import Relation, Value
+from wbc.analysis.jacobian import Cost, SymbolicJacobian, symbolic_jacobian
+from wbc.analysis.locus import Locus
+from wbc.analysis.model import ExactModel
+from wbc.analysis.notation import Notation
+from wbc.analysis.points import joint_roots
+from wbc.analysis.published import PublishedSets, published_sets
+from wbc.analysis.rows import BodyRows, JointRows, PitchPlaneRows, Rows
+from wbc.analysis.singular_vectors import singular_vector_locus
+from wbc.analysis.sub_determinants import sub_determinant_locus
+
+__all__ = [
+    "ALGORITHMS",
+    "Analysis",
+    "BodyRows",
+    "Branch",
+    "Cost",
+    "Determinant",
+    "Exact",
+    "ExactModel",
+    "JointRows",
+    "Locus",
+    "Notation",
+    "PitchPlaneRows",
+    "PublishedSets",
+    "Relation",
+    "Rows",
+    "SymbolicJacobian",
+    "Value",
+    "Witness",
+    "analyse",
+    "factored_determinant",
+    "joint_roots",
+    "published_sets",
+    "singular_vector_locus",
+    "sub_determinant_locus",
+    "symbolic_jacobian",
+]

@@ -1,0 +1,101 @@
+"""Forms in half angles as sums of cosines and sines of sums of joint angles: c345 in the place of eight products."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cache
+from math import comb
+from typing import TypeAlias
+
+from wbc.analysis.half_angles import HalfAngles, HalfPoly
+
+#: Multiples of q/2, one a joint; powers of the symbols and of the displacements of sliding joints
+Frequency: TypeAlias = tuple[int, ...]
+Powers: TypeAlias = tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Term:
+    """number * symbols^powers * cos or sin of sum of frequency_i q_i / 2."""
+
+    number: Fraction
+    powers: Powers
+    frequency: Frequency
+    sine: bool
+
+
+@cache
+def _expansion(sines: int, cosines: int) -> dict[int, Fraction]:
+    """Coefficients of (z - 1/z)^sines (z + 1/z)^cosines / 2^(sines + cosines) by powers of z."""
+    out: dict[int, Fraction] = {}
+    for i in range(sines + 1):
+        for j in range(cosines + 1):
+            power = sines - 2 * i + cosines - 2 * j
+            out[power] = out.get(power, Fraction(0)) + Fraction((-1) ** i * comb(sines, i) * comb(cosines, j))
+    return {p: a / 2 ** (sines + cosines) for p, a in out.items() if a}
+
+
+def fourier(half: HalfAngles, form: HalfPoly, degrees: tuple[int, ...]) -> list[Term]:
+    """The terms of a form of given degrees in (sin(q_i / 2), cos(q_i / 2)), sorted for display."""
+    sums: dict[tuple[Powers, Frequency], list[Fraction]] = {}
+    for powers, number in form.terms():
+        exponents = [int(e) for e in powers]
+        parts: dict[Frequency, Fraction] = {(): Fraction(int(number))}
+        sines, others = 0, list[int]()
+        for k in range(half.size):
+            e = exponents[k]
+            if k in half.ring.slides:
+                others.append(e)
+                table = {0: Fraction(1)}
+            else:
+                sines += e
+                table = _expansion(e, degrees[k] - e)
+            parts = {(*f, n): a * b for f, a in parts.items() for n, b in table.items()}
+        kind = (*others, *exponents[half.size :])
+        for frequency, value in parts.items():
+            pair = sums.setdefault((kind, frequency), [Fraction(0), Fraction(0)])
+            # 1 / i^sines: 1, -i, -1, i
+            pair[sines % 2] += value if sines % 4 in (0, 3) else -value
+    return _real(sums)
+
+
+def _real(sums: dict[tuple[Powers, Frequency], list[Fraction]]) -> list[Term]:
+    """Conjugate pairs C z^n + conj(C) z^-n as 2 Re C cos - 2 Im C sin."""
+    out: list[Term] = []
+    for (powers, frequency), (real, imaginary) in sums.items():
+        first = next((n for n in frequency if n), 0)
+        if first < 0 or not (real or imaginary):
+            continue
+        double = 2 if first else 1
+        if real:
+            out.append(Term(double * real, powers, frequency, False))
+        if imaginary and first:
+            out.append(Term(-double * imaginary, powers, frequency, True))
+    out.sort(key=lambda t: (tuple(-p for p in t.powers), sum(n != 0 for n in t.frequency), _last(t.frequency), t.sine))
+    return out
+
+
+def _last(frequency: Frequency) -> tuple[int, ...]:
+    return tuple(k for k, n in enumerate(frequency) if n)
+
+
+def dominated(half: HalfAngles, terms: list[Term]) -> bool:
+    """Whether one term without angles outweighs all others, so that the sum is never zero; symbols by their values.
+
+    False where joints slide: their terms have no bound.
+    """
+    values = [float(v) for v in half.ring.symbols.values()]
+    sliding = len(half.ring.slides)
+    constant = others = 0.0
+    for term in terms:
+        if any(term.powers[:sliding]):
+            return False
+        size = float(term.number)
+        for value, power in zip(values, term.powers[sliding:], strict=True):
+            size *= value**power
+        if any(term.frequency):
+            others += abs(size)
+        else:
+            constant += size
+    return abs(constant) > others * (1 + 1e-9)

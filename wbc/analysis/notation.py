@@ -1,0 +1,195 @@
+"""Factors, relations and branches as text and as LaTeX."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from fractions import Fraction
+from math import gcd, lcm
+
+from wbc.analysis.branches import Branch
+from wbc.analysis.fourier import Term, fourier
+from wbc.analysis.half_angles import HalfAngles, HalfPoly, Relation, Value
+
+_ANGLES = {
+    Fraction(0): ("0", "0"),
+    Fraction(1): ("pi/2", r"\pi/2"),
+    Fraction(-1): ("-pi/2", r"-\pi/2"),
+    None: ("pi", r"\pi"),
+}
+
+
+@dataclass(frozen=True)
+class Notation:
+    """How polynomials of one robot are written. ``latex``: for LaTeX, else plain text."""
+
+    half: HalfAngles
+    latex: bool = False
+
+    def label(self, joint: int) -> str:
+        """Of a joint: q4."""
+        coordinate = self.half.ring.coordinates[joint]
+        letter = "d" if coordinate.slides else "q"
+        return f"{letter}_{{{coordinate.label}}}" if self.latex else f"{letter}{coordinate.label}"
+
+    def value(self, value: Value) -> str:
+        """The place of a joint: -pi/2."""
+        if value.joint in self.half.ring.slides:
+            return str(value.value)
+        if value.value in _ANGLES:
+            return _ANGLES[value.value][self.latex]
+        return rf"2\arctan({value.value})" if self.latex else f"2 atan({value.value})"
+
+    def form(self, form: HalfPoly, degrees: tuple[int, ...], *, primitive: bool = True) -> str:
+        """A form in half angles by cosines and sines of sums of angles; ``primitive``: without a common number."""
+        terms = fourier(self.half, form, degrees)
+        if not terms:
+            return "0"
+        scale = 1 / self.scale(form, degrees) if primitive else Fraction(1)
+        groups: dict[tuple[Fraction, tuple[int, ...]], list[Term]] = {}
+        for term in terms:
+            groups.setdefault((abs(term.number), term.powers), []).append(term)
+        parts = [self._group(group, scale) for group in groups.values()]
+        text = "".join((" - " if negative else " + ") + part for negative, part in parts)
+        return f"-{text[3:]}" if parts[0][0] else text[3:]
+
+    def scale(self, form: HalfPoly, degrees: tuple[int, ...]) -> Fraction:
+        """The number that text without a common number is to be multiplied by to be the form."""
+        terms = fourier(self.half, form, degrees)
+        below = lcm(*(t.number.denominator for t in terms))
+        above = gcd(*(int(t.number * below) for t in terms))
+        return Fraction(above if terms[0].number > 0 else -above, below)
+
+    def relation(self, relation: Relation) -> str:
+        """The polynomial that is zero."""
+        return self.form(relation.poly, relation.degrees)
+
+    def solved(self, relation: Relation) -> str:
+        """The relation solved for one joint, where it is of first or second degree in its half angle; else "".
+
+        First degree, A sin(q/2) + B cos(q/2) = 0: tan(q/2) = -B/A. Second, A cos q + B sin q + C = 0:
+        q = atan2(B, A) +- acos(-C / sqrt(A^2 + B^2)).
+        """
+        turning = [k for k in relation.joints if k in self.half.ring.circles]
+        for degree in (1, 2):
+            chosen = [k for k in turning if relation.degrees[k] == degree]
+            if chosen and len(relation.joints) > 1:
+                best = min(chosen, key=lambda k: len(self._solve(relation, k)))
+                return self._solve(relation, best)
+        return ""
+
+    def _solve(self, relation: Relation, joint: int) -> str:
+        rest = tuple(0 if k == joint else e for k, e in enumerate(relation.degrees))
+        parts = coefficients(self.half, relation, joint)
+        q = self.label(joint)
+        if len(parts) == 2:
+            below, above = (self.form(p, rest, primitive=False) for p in (parts[1], -parts[0]))
+            half = rf"\tfrac{{1}}{{2}}{q}" if self.latex else f"{q}/2"
+            if self.latex:
+                return rf"\tan({half}) = \frac{{{above}}}{{{below}}}"
+            return f"tan({half}) = ({above}) / ({below})"
+        u2, tu, t2 = parts
+        a, b, c = (self.form(p, rest, primitive=False) for p in (u2 - t2, tu, u2 + t2))
+        cosine, sine = (rf"\cos {q}", rf"\sin {q}") if self.latex else (f"cos {q}", f"sin {q}")
+        terms = [f"({x}) {name}" for x, name in ((a, cosine), (b, sine)) if x != "0"] + ([f"({c})"] if c != "0" else [])
+        return " + ".join(terms) + " = 0"
+
+    def branch(self, branch: Branch) -> str:
+        """The conditions, joined."""
+        both = r" \wedge " if self.latex else " and "
+        parts = [f"{self.label(v.joint)} = {self.value(v)}" for v in branch.values]
+        parts += [f"{self.relation(r)} = 0" for r in branch.relations]
+        return both.join(parts) or ("\\text{everywhere}" if self.latex else "everywhere")
+
+    def branches(self, branches: Iterable[Branch]) -> list[str]:
+        """Branches with the values that a joint takes gathered: one line for q2 = -pi/2 and q2 = pi/2."""
+        return [self._gathered(choice, relations) for choice, relations in gathered(branches)]
+
+    def _gathered(self, choice: dict[int, tuple[Value, ...]], relations: tuple[Relation, ...]) -> str:
+        parts = []
+        for joint, values in sorted(choice.items()):
+            texts = [self.value(v) for v in values]
+            if [v.value for v in values] == [-1, 1]:
+                texts = [r"\pm\pi/2" if self.latex else "+-pi/2"]
+            many = (r"\in \{", r"\}") if self.latex else ("in {", "}")
+            said = f"= {texts[0]}" if len(texts) == 1 else f"{many[0]}{', '.join(texts)}{many[1]}"
+            parts.append(f"{self.label(joint)} {said}")
+        parts += [f"{self.relation(r)} = 0" for r in relations]
+        both = r" \wedge " if self.latex else " and "
+        return both.join(parts) or (r"\text{everywhere}" if self.latex else "everywhere")
+
+    def _group(self, group: list[Term], scale: Fraction) -> tuple[bool, str]:
+        """(whether it is negative, its text) of terms with one coefficient up to sign."""
+        number, powers = group[0].number * scale, group[0].powers
+        negative = number < 0
+        inner = ""
+        for term in group:
+            opposite = (term.number * scale < 0) != negative
+            inner += (" - " if opposite else " + ") + self._trig(term)
+        inner = inner[3:]
+        factors = [] if abs(number) == 1 else [self._number(abs(number))]
+        names = [self.label(k) for k in self.half.ring.slides] + list(self.half.ring.symbols)
+        for name, power in zip(names, powers, strict=True):
+            if power:
+                factors.append(name if power == 1 else f"{name}^{{{power}}}" if self.latex else f"{name}^{power}")
+        if inner != "1" or not factors:
+            factors.append(f"({inner})" if len(group) > 1 and factors else inner)
+        if len(group) > 1 and not factors[:-1] and negative:
+            factors[-1] = f"({inner})"
+        return negative, " ".join(factors)
+
+    def _number(self, number: Fraction) -> str:
+        if number.denominator == 1 or not self.latex:
+            return str(number)
+        return rf"\tfrac{{{number.numerator}}}{{{number.denominator}}}"
+
+    def _trig(self, term: Term) -> str:
+        """c345, or cos(q3 + q4/2) where a multiple other than 1 appears."""
+        turning = {k: n for k, n in enumerate(term.frequency) if n}
+        if not turning:
+            return "1"
+        labels = [self.half.ring.coordinates[k].label for k in turning]
+        if set(turning.values()) == {2} and all(len(label) == 1 for label in labels):
+            letter = "s" if term.sine else "c"
+            return f"{letter}_{{{''.join(labels)}}}" if self.latex else f"{letter}{''.join(labels)}"
+        text = ""
+        for k, n in turning.items():
+            times = Fraction(abs(n), 2)
+            whole = "" if times.numerator == 1 else f"{times.numerator} "
+            below = "" if times.denominator == 1 else f"/{times.denominator}"
+            text += (" - " if n < 0 else " + ") + f"{whole}{self.label(k)}{below}"
+        name = ("\\" if self.latex else "") + ("sin" if term.sine else "cos")
+        return f"{name}({text[3:]})"
+
+
+def coefficients(half: HalfAngles, relation: Relation, joint: int) -> list[HalfPoly]:
+    """Coefficients of cos(q/2)^d, cos(q/2)^(d-1) sin(q/2), ... of a relation in one joint's half angle."""
+    out: list[dict[tuple[int, ...], int]] = [{} for _ in range(relation.degrees[joint] + 1)]
+    for powers, number in relation.poly.terms():
+        plain = [int(e) for e in powers]
+        degree = plain[joint]
+        plain[joint] = 0
+        out[degree][tuple(plain)] = int(number)
+    return [half.ctx.from_dict(terms) for terms in out]
+
+
+def gathered(branches: Iterable[Branch]) -> list[tuple[dict[int, tuple[Value, ...]], tuple[Relation, ...]]]:
+    """Branches that differ in the value of one joint alone, put together as long as there are any."""
+    sets: list[tuple[dict[int, tuple[Value, ...]], tuple[Relation, ...]]]
+    sets = [({v.joint: (v,) for v in b.values}, b.relations) for b in branches]
+    merged = True
+    while merged:
+        merged = False
+        for i, (a, relations) in enumerate(sets):
+            for j in range(i + 1, len(sets)):
+                b, others = sets[j]
+                apart = [k for k in a if a.get(k) != b.get(k)]
+                if relations == others and a.keys() == b.keys() and len(apart) == 1:
+                    both = sorted((*a[apart[0]], *b[apart[0]]), key=lambda v: v.key)
+                    sets[i] = ({**a, apart[0]: tuple(both)}, relations)
+                    del sets[j]
+                    merged = True
+                    break
+            if merged:
+                break
+    return sets

@@ -1,0 +1,152 @@
+"""``wbc analyse``: rank analysis of published coordinate sets, or of locks and points of any robot."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.markup import escape
+
+from wbc import robots, validation
+from wbc.analysis import (
+    ALGORITHMS,
+    Analysis,
+    BodyRows,
+    ExactModel,
+    JointRows,
+    Notation,
+    PitchPlaneRows,
+    Rows,
+    analyse,
+    factored_determinant,
+    published_sets,
+)
+from wbc.analysis.published import ROBOTS
+from wbc.cli.console import out
+from wbc.cli.options import RobotName
+from wbc.cli.track import tip_frame
+from wbc.errors import RangeError, RobotFileError
+
+_WHAT, _OUTPUT = "What is analysed", "What it writes"
+
+Sets = Annotated[
+    list[str] | None,
+    typer.Option("--set", help="A published set, such as 'elbow, beta, gamma'; default: all.", rich_help_panel=_WHAT),
+]
+Locks = Annotated[list[str] | None, typer.Option("--lock", help="Joint held as a constraint.", rich_help_panel=_WHAT)]
+Points = Annotated[
+    list[str] | None, typer.Option("--point", help="Frame whose position is a constraint.", rich_help_panel=_WHAT)
+]
+Planes = Annotated[
+    list[str] | None,
+    typer.Option("--plane", help="SHOULDER,WRIST: frames of a pitch plane whose rate is one.", rich_help_panel=_WHAT),
+]
+Frame = Annotated[
+    str | None, typer.Option(help="Frame whose pose is the task. Default: the tip.", rich_help_panel=_WHAT)
+]
+Algorithm = Annotated[str, typer.Option(help=f"One of {', '.join(ALGORITHMS)}.", rich_help_panel=_WHAT)]
+Approximate = Annotated[
+    bool, typer.Option("--approximate", help="Rational rotations for inexact ones.", rich_help_panel=_WHAT)
+]
+Latex = Annotated[bool, typer.Option("--latex", help="Formulas as LaTeX.", rich_help_panel=_OUTPUT)]
+Json = Annotated[Path | None, typer.Option("--json", help="File for the results as data.", rich_help_panel=_OUTPUT)]
+
+
+def analyse_(
+    robot: RobotName,
+    chosen: Sets = None,
+    lock: Locks = None,
+    point: Points = None,
+    plane: Planes = None,
+    frame: Frame = None,
+    algorithm: Algorithm = "sub_determinants",
+    approximate: Approximate = False,
+    latex: Latex = False,
+    json_: Json = None,
+) -> None:
+    """Say where task and constraint coordinates lose rank, and whether they always suffice.
+
+    The published arms have sets by name; --lock, --point and --plane make one for any robot.
+    """
+    validation.one_of("algorithm", algorithm, ALGORITHMS)
+    own: list[Rows] = [JointRows(name) for name in lock or ()]
+    own += [BodyRows(name, rotation=()) for name in point or ()]
+    own += [_plane(text) for text in plane or ()]
+    task: tuple[Rows, ...]
+    if own or frame is not None or robot not in ROBOTS:
+        if not own or chosen:
+            raise RangeError("set", chosen, "give either --set of a published robot, or --lock, --point, --plane")
+        machine = robots.load(robot)
+        model = ExactModel(machine, approximate=approximate)
+        task, sets = (BodyRows(tip_frame(machine, frame)),), {", ".join(map(str, own)): tuple(own)}
+    else:
+        known = published_sets(robot)
+        model, task = ExactModel(known.robot, known.symbols), known.task
+        wanted = [validation.one_of("set", name, known.sets) for name in chosen or known.sets]
+        sets = {name: known.sets[name] for name in wanted}
+    for note in model.notes:
+        out().print(escape(note))
+    records = []
+    for name, rows in sets.items():
+        found = analyse(model, task, rows, algorithm=algorithm)
+        _show(name, found, latex)
+        records.append(_record(name, found))
+    if json_ is not None:
+        _write(json_, {"robot": robot, "algorithm": algorithm, "sets": records})
+
+
+def _plane(text: str) -> PitchPlaneRows:
+    parts = [part.strip() for part in text.split(",")]
+    if len(parts) != 2:
+        raise RangeError("plane", text, "expected SHOULDER,WRIST: two frames")
+    return PitchPlaneRows(parts[0], parts[1])
+
+
+def _show(name: str, found: Analysis, latex: bool) -> None:
+    console, notation = out(), Notation(found.exact.half, latex)
+    rows, joints = found.augmented.shape
+    console.print(f"[bold]{escape(name)}[/bold]: {rows} x {joints}, {found.verdict}, {found.seconds:.2f} s")
+    axes = ", ".join(dict.fromkeys(found.augmented.axes))
+    console.print(f"  cost     {found.augmented.cost}, task {found.task.cost}; axes {escape(axes)}", soft_wrap=True)
+    if rows == joints:
+        text = factored_determinant(found.exact, found.augmented).text(latex=latex)
+        console.print(f"  det      {escape(text)}", soft_wrap=True)
+    for line in notation.branches(found.locus.branches):
+        console.print(f"  locus    {escape(line)}", soft_wrap=True)
+    for relation in dict.fromkeys(r for b in found.locus.branches for r in b.relations):
+        solved = notation.solved(relation)
+        if solved:
+            console.print(f"  solved   {escape(solved)}", soft_wrap=True)
+    for line in notation.branches(found.locus.open):
+        console.print(f"  open     {escape(line)}", soft_wrap=True)
+    if found.witness is not None:
+        q = ", ".join(f"{x:.6g}" for x in found.witness.q)
+        console.print(f"  witness  q = {q}", soft_wrap=True)
+        task, every = found.witness.task[-1], found.witness.augmented[-1]
+        console.print(f"           smallest singular value: task {task:.3g}, with constraints {every:.1g}")
+
+
+def _record(name: str, found: Analysis) -> dict[str, Any]:
+    notation, tex = Notation(found.exact.half), Notation(found.exact.half, latex=True)
+    witness = found.witness
+    return {
+        "set": name,
+        "shape": list(found.augmented.shape),
+        "verdict": found.verdict,
+        "seconds": found.seconds,
+        "cost": str(found.augmented.cost),
+        "locus": [notation.branch(branch) for branch in found.locus.branches],
+        "latex": tex.branches(found.locus.branches),
+        "algorithmic": [notation.branch(branch) for branch in found.algorithmic],
+        "open": [notation.branch(branch) for branch in found.locus.open],
+        "witness": None if witness is None else {"q": witness.q.tolist(), "task": witness.task.tolist()},
+    }
+
+
+def _write(path: Path, data: dict[str, Any]) -> None:
+    try:
+        path.write_text(json.dumps(data, indent=2) + "\n", encoding="utf-8")
+    except OSError as error:
+        raise RobotFileError("json", str(path), f"cannot be written: {error.strerror}") from error
