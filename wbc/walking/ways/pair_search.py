@@ -77,7 +77,7 @@ class PairSearch:
     def __init__(self, walker: Walker, structure: Structure, cells: Cells, grips: CellGrips) -> None:
         self.cells, self.grips = cells, grips
         nothing = np.zeros(0, dtype=np.int64)
-        self._clearance = ArmClearance(walker, Grips(*(nothing,) * 6, np.zeros((0, 6)), nothing))
+        self._clearance = ArmClearance(walker, Grips(*(nothing,) * 6, np.zeros((0, 6)), nothing, nothing))
         self._swings = CellSwings(walker, structure, cells, grips)
         self._arms = len(walker.arms)
         self._by_arm = [grips.of_arm(arm) for arm in range(self._arms)]
