@@ -51,27 +51,29 @@ def goals(parts: Parts) -> list[Goal]:
         wanted = [r for r in trenches if r["trench"] in ("4 rows", "5 rows")]
         out.append(Goal("trenches of 4 and 5 rows that are not crossed", sum(not r["arrived"] for r in wanted), 0, ""))
     if planned := [r for r in parts.get("planning", ()) if r["arrived"]]:
-        firsts = [first for r in planned for first in r["first_ms"]]
-        fastest = [r for r in planned if r["speed"] == max(r["speed"] for r in planned)]
-        out += [
-            Goal("first command of a new plan, median", float(np.median(firsts)), 50.0, "ms"),
-            Goal("first command of a new plan, 99 %", float(np.percentile(firsts, 99)), 50.0, "ms"),
-            Goal("longest time of a tick while planning", max(r["longest_ms"] for r in planned), 50.0, "ms"),
-            Goal("99 % of ticks when all is planned", max(r["tick_p99_ms"] for r in planned), 2.0, "ms"),
-            Goal(
-                "re-grasps more than in the whole plan", sum(max(r["regrasps"] - r["whole"], 0) for r in planned), 0, ""
-            ),
-            Goal("courses on which 0.98 of the speed is not kept", sum(r["kept"] < 0.98 for r in planned), 0, ""),
-            Goal(
-                f"one over real time at {fastest[0]['speed']:g} in/s, with planner and log",
-                max(1 / r["real_time"] for r in fastest),
-                0.05,
-                "",
-            ),
-        ]
+        out += _planning_goals(planned)
     if layouts := parts.get("layouts"):
         out += layout_goals(layouts)
     return out
+
+
+def _planning_goals(planned: list[Record]) -> list[Goal]:
+    """Of walks that arrived; re-grasps and speeds of those whose whole plan is known."""
+    firsts = [first for r in planned for first in r["first_ms"]]
+    fastest = [r for r in planned if r["speed"] == max(r["speed"] for r in planned)]
+    whole = [r for r in planned if r["whole"] is not None]
+    more = sum(max(r["regrasps"] - r["whole"], 0) for r in whole)
+    slower = sum(r["kept"] < 0.98 for r in whole if r["speed"] < 6.0)
+    text = f"one over real time at {fastest[0]['speed']:g} in/s, with planner and log"
+    return [
+        Goal("first command of a new plan, median", float(np.median(firsts)), 50.0, "ms"),
+        Goal("first command of a new plan, 99 %", float(np.percentile(firsts, 99)), 50.0, "ms"),
+        Goal("longest tick, planning included", max(r["longest_ms"] for r in planned), 50.0, "ms"),
+        Goal("99 % of ticks when all is planned", max(r["tick_p99_ms"] for r in planned), 2.0, "ms"),
+        Goal("re-grasps of plans in slices more than in whole plans", more, 0, ""),
+        Goal("plans in slices with which 0.98 of 3 or 4 in/s is not kept", slower, 0, ""),
+        Goal(text, max(1 / r["real_time"] for r in fastest), 0.05, ""),
+    ]
 
 
 def _courses(records: list[Record]) -> Sheet:
@@ -115,8 +117,6 @@ def _planning(records: list[Record]) -> Sheet:
 
 def _planned(r: Record) -> tuple[str, ...]:
     name = f"{r['course']} at {r['speed']:g} in/s"
-    if "first_ms" not in r:
-        return (name, f"no: {r['reason']}", *["-"] * 11)
     return (
         name,
         "yes" if r["arrived"] else f"no: {r['reason']}",
@@ -128,7 +128,7 @@ def _planned(r: Record) -> tuple[str, ...]:
         str(r["stalls"]),
         f"{r['tick_p99_ms']:.2f}",
         str(r["regrasps"]),
-        str(r["whole"]),
+        "-" if r["whole"] is None else str(r["whole"]),
         f"{r['kept']:.3f}",
         f"{r['real_time']:.1f}",
     )
