@@ -25,7 +25,7 @@ from wbc.walking.swings import FINE
 #: Yields None or, first, a plan to begin with; returns the whole one
 PlanSlices = Generator[Plan | None, None, Plan]
 #: Path time that the body may go before the plan of its hands is made [s]; it takes RAMP / 2 to stop
-HEAD = 1.25
+HEAD = 1.0
 #: A new plan begins with a body that stands for so many samples
 STANDING = 10
 #: How far the body goes back to where a hand may be lifted [m]
