@@ -56,6 +56,7 @@ class Hands(ABC):
         self.swinging: Swinging | None = None
         self.v = np.zeros(walker.robot.nv)
         self._changing = False
+        self._landed = (-1, 0.0)
         self._follow(plan)
         self.held = {arm: int(self.grips.hold[grip]) for arm, grip in enumerate(self._grip)}
         self.q = self._start()
@@ -108,6 +109,8 @@ class Hands(ABC):
             raise HoldLost("hands", len(self.held), f"more than {self.walker.min_holds} must hold before one is lifted")
         step = self.plan.regrasps[self._next]
         arm = [a.name for a in self.walker.arms].index(step.arm)
+        if self._landed == (arm, self.time):
+            return  # A hand that goes on at once is closed for a tick
         self._used[arm] += 1
         source, target = self.plan.chain[arm][self._used[arm] - 1 : self._used[arm] + 1]
         lift, land = (round(x / self.plan.path.spacing) for x in (step.lift, step.land))
@@ -200,6 +203,7 @@ class Hands(ABC):
                 self.vanish([names[1]])
             return
         self.held[arm], self._grip[arm] = swinging.hold, swinging.grip
+        self._landed = arm, self.time
         self.stack.hold(arm, swinging.hold, int(self.grips.roll[swinging.grip]))
         self.swinging = None
         self._next += int(swinging.counted)

@@ -34,7 +34,7 @@ from wbc.walking.swings import Swing, Swings
 Key = tuple[int, ...]
 
 #: Hands land at least INSIDE samples inside a grip, wait for it at most HOVER [s], with |sin theta5| of at least BENT
-INSIDE, HOVER, BENT = 3, 0.75, 0.08
+INSIDE, HOVER, BENT = 1, 0.75, 0.08
 #: Ways to one stance that are looked at, and stances that are checked together, in widths
 WAYS, PARTS = 2, 2
 #: Stances, and pairs of grips, of one slice of the search

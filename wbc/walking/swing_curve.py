@@ -12,9 +12,9 @@ from wbc.walking.grips import Ints
 from wbc.walking.structure import Structure
 
 #: Parts of the curve, at its beginning and its end, in which the hand does not go across
-UPRIGHT = 0.1
+UPRIGHT = 0.12
 #: The rise is h (1 - (1 - 2x)^STEEP)
-STEEP = 4
+STEEP = 2
 #: How far a hand may be across its hold [m] where it comes out of the distance at which it may be near the structure,
 #: and what it then has besides the clearance [m]
 ACROSS, SPARE = 0.0015, 0.0025
@@ -42,7 +42,7 @@ class Curves:
     """m curves in the structure's frame, over x in [0, 1]:
 
         p = way(y) + (r ((1 - y) h_a + y h_b) + 4 y (1 - y) l) u
-        r = 1 - (1 - 2 x)^4,     u = -(1 - y) z_a - y z_b,     y = step((x - c) / (1 - 2 c))
+        r = 1 - (1 - 2 x)^2,     u = -(1 - y) z_a - y z_b,     y = step((x - c) / (1 - 2 c))
 
     y, a fifth-degree step, is 0 over the first c of the curve and 1 over the last, so that the hand leaves and arrives
     along the normals. way(y) is the part w of the way from the chord a b to an arc round the axis of the arm's first

@@ -27,7 +27,7 @@ COARSE, FINE = 25, 97
 #: How often the law is made, each time with the body where the last one has it
 PASSES = 2
 #: Time to settle on the hold before the hand closes, besides the latch twice [s]
-SETTLE = 0.06
+SETTLE = 0.04
 #: Swings that are computed together
 TOGETHER = 24
 #: No swing lasts so many samples, as far as the room of the others is told apart
