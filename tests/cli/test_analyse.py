@@ -23,7 +23,7 @@ def test_published_set_on_screen_and_in_a_file(tmp_path: Path) -> None:
     code, out, _ = run("spherical_4r", "--set", "alpha", "--set", "alpha, beta", "--json", file)
     assert code == 0
     assert "alpha: 4 x 4, incomplete" in out
-    assert "det      L4 L3 c2 s4 (L3^2 + 2 L3 L4 c4 + L4^2)" in out
+    assert "det      L3 L4 c2 s4 (L3^2 + 2 L3 L4 c4 + L4^2)" in out
     assert "alpha, beta: 5 x 4, loose" in out
     assert "locus    q2 = +-pi/2" in out
     assert "witness  q = " in out

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache
@@ -48,18 +48,18 @@ class BranchArithmetic:
     def __init__(self, half: HalfAngles) -> None:
         self.half = half
         self._bases: dict[tuple[Relation, ...], fmpz_mpoly_vec | None] = {}
-
-    def substitution(self, branch: Branch) -> Mapping[int, tuple[fmpq, fmpq]]:
-        """(cos, sin) of turning joints and (displacement, 0) of sliding ones that have a value."""
-        slides = self.half.ring.slides
-        return {
-            v.joint: (rational(v.value or Fraction(0)), fmpq(0)) if v.joint in slides else cosine_sine(v.value)
-            for v in branch.values
-        }
+        self._swaps: dict[tuple[Value, ...], dict[str | int, int | fmpq]] = {}
 
     def put(self, p: Poly, branch: Branch) -> Poly:
         """A trigonometric polynomial with the values of a branch put in."""
-        return self.half.ring.at(p, self.substitution(branch))
+        if branch.values not in self._swaps:
+            slides = self.half.ring.slides
+            numbers = {
+                v.joint: (rational(v.value or Fraction(0)), fmpq(0)) if v.joint in slides else cosine_sine(v.value)
+                for v in branch.values
+            }
+            self._swaps[branch.values] = self.half.ring.substitution(numbers)
+        return self.half.ring.at(p, self._swaps[branch.values])
 
     def vanishes(self, p: Poly, branch: Branch) -> bool:
         """Whether a polynomial is proved to be zero on the whole branch: it is in the ideal of the relations.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from itertools import islice
 
 from wbc.analysis.branches import Branch, BranchArithmetic, unique
 from wbc.analysis.fourier import dominated, fourier
@@ -60,7 +61,11 @@ class Exact:
 
     def cheapest(self, polys: Iterable[Poly]) -> tuple[Poly, Factors]:
         """Of the shortest polynomials the one whose zeros are said most simply: few relations, short ones."""
-        tried = [(p, self.half.factors(p)) for p, _ in zip(polys, range(CANDIDATES), strict=False)]
+        tried: list[tuple[Poly, Factors]] = []
+        for p in islice(polys, CANDIDATES):
+            tried.append((p, self.half.factors(p)))
+            if _effort(tried[-1][1]) <= (0, 1):
+                break
         return min(tried, key=lambda item: _effort(item[1]))
 
     def extended(self, branch: Branch, conditions: Iterable[Factor]) -> list[Branch]:

@@ -49,7 +49,9 @@ class Determinant:
         half = self.exact.half
         size, one = half.size, half.ctx.constant(1)
         powers = {(f.joint, f.value): n for f, n in self.factors.conditions if isinstance(f, Value)}
-        forms: list[tuple[HalfPoly, tuple[int, ...], int]] = [(g, (0,) * size, n) for g, n in self.factors.lengths]
+        forms: list[tuple[HalfPoly, tuple[int, ...], int]] = [
+            (g, (0,) * size, n) for g, n in sorted(self.factors.lengths, key=lambda item: str(item[0]))
+        ]
         for k in half.ring.circles:
             t = half.gens[k]
             for pair, form in (((Fraction(0), None), t), ((Fraction(-1), Fraction(1)), one - t * t)):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from math import gcd, lcm
@@ -40,12 +40,12 @@ class Notation:
             return _ANGLES[value.value][self.latex]
         return rf"2\arctan({value.value})" if self.latex else f"2 atan({value.value})"
 
-    def form(self, form: HalfPoly, degrees: tuple[int, ...], *, primitive: bool = True) -> str:
-        """A form in half angles by cosines and sines of sums of angles; ``primitive``: without a common number."""
+    def form(self, form: HalfPoly, degrees: tuple[int, ...], over: Fraction | None = None) -> str:
+        """A form in half angles by cosines and sines of sums of angles, over a number; None: over what is common."""
         terms = fourier(self.half, form, degrees)
         if not terms:
             return "0"
-        scale = 1 / self.scale(form, degrees) if primitive else Fraction(1)
+        scale = 1 / (self.scale(form, degrees) if over is None else over)
         groups: dict[tuple[Fraction, tuple[int, ...]], list[Term]] = {}
         for term in terms:
             groups.setdefault((abs(term.number), term.powers), []).append(term)
@@ -60,6 +60,13 @@ class Notation:
         above = gcd(*(int(t.number * below) for t in terms))
         return Fraction(above if terms[0].number > 0 else -above, below)
 
+    def _common(self, forms: Sequence[HalfPoly], degrees: tuple[int, ...]) -> Fraction:
+        """The number that several forms have in common, with the sign of the first."""
+        scales = [self.scale(p, degrees) for p in forms if len(p)]
+        below = lcm(*(s.denominator for s in scales))
+        above = gcd(*(int(s * below) for s in scales))
+        return Fraction(above if scales[0] > 0 else -above, below)
+
     def relation(self, relation: Relation) -> str:
         """The polynomial that is zero."""
         return self.form(relation.poly, relation.degrees)
@@ -67,8 +74,8 @@ class Notation:
     def solved(self, relation: Relation) -> str:
         """The relation solved for one joint, where it is of first or second degree in its half angle; else "".
 
-        First degree, A sin(q/2) + B cos(q/2) = 0: tan(q/2) = -B/A. Second, A cos q + B sin q + C = 0:
-        q = atan2(B, A) +- acos(-C / sqrt(A^2 + B^2)).
+        First degree, A sin(q/2) + B cos(q/2) = 0: tan(q/2) = -B/A. Second, A cos q + B sin q = C: for C = 0
+        tan q = -A/B, else q = atan2(B, A) +- acos(C / sqrt(A^2 + B^2)).
         """
         turning = [k for k in relation.joints if k in self.half.ring.circles]
         for degree in (1, 2):
@@ -83,16 +90,24 @@ class Notation:
         parts = coefficients(self.half, relation, joint)
         q = self.label(joint)
         if len(parts) == 2:
-            below, above = (self.form(p, rest, primitive=False) for p in (parts[1], -parts[0]))
             half = rf"\tfrac{{1}}{{2}}{q}" if self.latex else f"{q}/2"
-            if self.latex:
-                return rf"\tan({half}) = \frac{{{above}}}{{{below}}}"
-            return f"tan({half}) = ({above}) / ({below})"
+            return self._tangent(half, -parts[0], parts[1], rest)
         u2, tu, t2 = parts
-        a, b, c = (self.form(p, rest, primitive=False) for p in (u2 - t2, tu, u2 + t2))
-        cosine, sine = (rf"\cos {q}", rf"\sin {q}") if self.latex else (f"cos {q}", f"sin {q}")
-        terms = [f"({x}) {name}" for x, name in ((a, cosine), (b, sine)) if x != "0"] + ([f"({c})"] if c != "0" else [])
-        return " + ".join(terms) + " = 0"
+        a, b, c = u2 - t2, tu, u2 + t2
+        if not len(c) and len(b):
+            return self._tangent(q, -a, b, rest)
+        common = self._common((a, b, c), rest)
+        A, B, C = (self.form(p, rest, common) for p in (a, b, -c))
+        if self.latex:
+            root = rf"\sqrt{{({A})^2 + ({B})^2}}"
+            return rf"{q} = \operatorname{{atan2}}({B}, {A}) \pm \arccos\frac{{{C}}}{{{root}}}"
+        return f"{q} = atan2({B}, {A}) +- acos(({C}) / sqrt(({A})^2 + ({B})^2))"
+
+    def _tangent(self, angle: str, above: HalfPoly, below: HalfPoly, degrees: tuple[int, ...]) -> str:
+        """tan(angle) = above / below."""
+        common = self._common((below, above), degrees)
+        top, bottom = (self.form(p, degrees, common) for p in (above, below))
+        return rf"\tan({angle}) = \frac{{{top}}}{{{bottom}}}" if self.latex else f"tan({angle}) = ({top}) / ({bottom})"
 
     def branch(self, branch: Branch) -> str:
         """The conditions, joined."""

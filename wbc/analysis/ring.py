@@ -126,8 +126,8 @@ class TrigRing:
         turning = [k for k, (s, c, _) in self.circles.items() if degrees[s] or degrees[c]]
         return tuple(sorted(turning + [k for k, place in self.slides.items() if degrees[place]]))
 
-    def at(self, p: Poly, values: Mapping[int, tuple[fmpq, fmpq]]) -> Poly:
-        """The polynomial with (cos, sin) of some joints, or (displacement, anything), put in."""
+    def substitution(self, values: Mapping[int, tuple[fmpq, fmpq]]) -> dict[str | int, int | fmpq]:
+        """What :meth:`at` puts in: (cos, sin) of some joints, or (displacement, anything), by place."""
         swap: dict[str | int, int | fmpq] = {}
         for k, (first, second) in values.items():
             if k in self.slides:
@@ -135,7 +135,11 @@ class TrigRing:
             else:
                 s, c, _ = self.circles[k]
                 swap[c], swap[s] = first, second
-        return p.subs(swap) if swap and len(p) else p
+        return swap
+
+    def at(self, p: Poly, swap: dict[str | int, int | fmpq]) -> Poly:
+        """The polynomial with values put in."""
+        return p.subs(swap) if swap and len(p) and not p.is_constant() else p
 
     def value(self, p: Poly, q: Sequence[float]) -> float:
         """The number at a configuration; symbols take their values. ``q``: one number a coordinate of the ring."""
