@@ -87,7 +87,7 @@ class MissingShapeError(WbcError):
 
 
 class LevelError(WbcError):
-    """A level that this version does not implement; it is never turned into a weight."""
+    """A level that an item cannot have, or levels where there can be none; a level is never turned into a weight."""
 
 
 class SolverError(WbcError):

@@ -103,7 +103,7 @@ ADD: dict[str, tuple[Callable[[Stack], Any], type[WbcError], str, Any, str | Non
     "duplicate": (lambda s: s.add(Elbow("panda_link4"), name="posture"), DuplicateNameError, "name", "posture", None),
     "duplicate by class": (lambda s: s.add(Posture()), DuplicateNameError, "name", "posture", None),
     "empty name": (lambda s: s.add(Elbow("panda_link4"), name=""), ShapeError, "name", "", None),
-    "level": (lambda s: s.add(Elbow("panda_link4"), level=1), LevelError, "level", 1, "0"),
+    "level of bounds": (lambda s: s.add(JointLimits(), level=1), LevelError, "level", 1, "0"),
     "level below": (lambda s: s.add(Elbow("panda_link4"), level=-1), LevelError, "level", -1, "0"),
     "level flag": (lambda s: s.add(Elbow("panda_link4"), level=True), ShapeError, "level", True, None),
     "weight": (lambda s: s.add(Elbow("panda_link4"), weight=-0.1), RangeError, "weight", -0.1, None),

@@ -39,8 +39,8 @@ def fresh() -> Stack:
         pytest.param(
             lambda s: s.add(Damping(), name="posture"), DuplicateNameError, "name", "name=", id="another item's name"
         ),
-        pytest.param(lambda s: s.add(Damping(), level=1), LevelError, "level", "valid: 0", id="level 1"),
-        pytest.param(lambda s: s.add(Damping(), level=-1), LevelError, "level", "never", id="level -1"),
+        pytest.param(lambda s: s.add(JointLimits(), level=1), LevelError, "level", "valid: 0", id="level of bounds"),
+        pytest.param(lambda s: s.add(Damping(), level=-1), LevelError, "level", "0 or more", id="level -1"),
         pytest.param(lambda s: s.add(Damping(), level=0.0), ShapeError, "level", "integer", id="level 0.0"),
         pytest.param(lambda s: s.add(Damping(), level=True), ShapeError, "level", "integer", id="level True"),
         pytest.param(lambda s: s.add(Damping(), level="0"), ShapeError, "level", "integer", id="level a word"),

@@ -11,7 +11,7 @@ import numpy as np
 
 from wbc.controller.library import load_library
 from wbc.controller.report import INFINITE, ReportLayout
-from wbc.controller.tick import Assembly
+from wbc.controller.tick import Assembly, TaskRows
 from wbc.errors import CompileError
 from wbc.qp.problem import QP
 from wbc.stack.layout import Layout
@@ -36,6 +36,9 @@ _FIELDS = (
     "unusable",
     "plain",
     "cap",
+    "wish",
+    "free_low",
+    "free_high",
 )
 
 
@@ -84,6 +87,8 @@ class NativeTick(Assembly):
         self._A = view("A", rows * nv).reshape(rows, nv)
         self._low, self._high = view("low", nv + rows), view("high", nv + rows)
         self._unusable, self.plain = view("unusable", 1), view("plain", 1)
+        self._wish, self._factor = view("wish", layout.task_rows), self.report[report["factor"]]
+        self._sides = view("free_low", rows), view("free_high", rows)
         self.step_function = self._library.wbc_tick_step
 
     @functools.cached_property
@@ -133,6 +138,21 @@ class NativeTick(Assembly):
     def usable(self) -> bool:
         """Numbers of the last assembly are finite and every simple bound leaves an interval."""
         return bool(self._unusable[0] == 0.0)
+
+    def task_rows(self) -> TaskRows:
+        J = np.zeros((self._layout.task_rows, self._layout.nv))
+        self._library.wbc_tick_task_rows(self.pointer, ctypes.c_void_p(J.ctypes.data))
+        return TaskRows(J, self._wish.copy(), self._factor.copy())
+
+    def bent(self) -> Array | None:
+        out = np.zeros((self._layout.nv, self._layout.nv))
+        bends = self._library.wbc_tick_bent(self.pointer, ctypes.c_void_p(out.ctypes.data))
+        return out if bends else None
+
+    def row_sides(self) -> tuple[Array, Array]:
+        low, high = (side.copy() for side in self._sides)
+        low[low <= -INFINITE], high[high >= INFINITE] = -np.inf, np.inf
+        return low, high
 
     def qp(self) -> QP:
         self.assemble()

@@ -33,8 +33,10 @@ class Reach:
         self, stack: Declaration, layout: Layout, program: Program, bend: Callable[[Array], Array] | None
     ) -> None:
         self._bend = bend
-        self._gain_at = np.array(gain_places(layout), dtype=np.intp)
-        self._pull_scale = np.array(pull_scales(stack, layout, program))
+        #: curvature in the last QP, before anything made it positive definite; None for none
+        self.bent: Array | None = None
+        self._gain_at = np.array(gain_places(layout), dtype=np.intp)[: layout.leading]
+        self._pull_scale = np.array(pull_scales(stack, layout, program))[: layout.leading]
         self._dofs = layout.dof_scales(stack)
         self._damping = stack.damping / self._dofs**2
         places, self._brake_limit = brakes(stack, layout)
@@ -62,11 +64,12 @@ class Reach:
         """(H, g) of the QP that is solved.
 
         Args:
-            H: of the linear model. J: task rows. weight: of each, fading included.
+            H: of the linear model. J: task rows of the first level. weight: of each, fading included.
             equal: rows of the equalities, of unit length in v / dof scales.
         """
         counts = weight != 0.0
         error = np.where(counts, error, 0.0)
+        self.bent = None
         gain = p[self._gain_at]
         largest = float(gain[counts].max(initial=0.0))
         plain = -(J.T @ (weight * wish))
@@ -137,6 +140,7 @@ class Reach:
         bent = share * np.outer(free, free) * self._bend(pull)
         if not np.isfinite(bent).all():
             return None
+        self.bent = bent
         mixed = share * _cut_off(H, free) + (1.0 - share) * H + bent
         scale = np.outer(self._dofs, self._dofs)
         least = max(LEAST_PIVOT * float(np.abs(bent * scale).max()), least)

@@ -27,6 +27,19 @@ TOLERANCE, UNIT_TOLERANCE = 1e-9, 2.00001e-6
 #: one counts as 1 rad, as in ``native/settings.h``)
 SOUND = 1e-6
 
+#: What is reported of each level, and of the least velocity after them
+LEVEL_NUMBERS = (
+    "rank",
+    "free",
+    "singular",
+    "damping",
+    "disturbance",
+    "stationarity",
+    "complementarity",
+    "error",
+    "solved",
+)
+
 
 class ReportLayout:
     """Slices of the report of one layout."""
@@ -51,7 +64,16 @@ class ReportLayout:
             "owner_low": nv,
             "owner_high": nv,
         }
+        if layout.cascade:
+            sizes |= {
+                "missed": layout.task_rows + 1,
+                "share": layout.task_rows + 1,
+                "dropped": rows + 1,
+                "pushes": nv + rows + 1,
+                "levels": len(LEVEL_NUMBERS) * (len(layout.levels) + 1),
+            }
         padding = {"error": 1, "factor": 1, "margin": 1, "margin_factor": 1, "ahead": 1, "multipliers": 1, "slack": 1}
+        padding |= {"missed": 1, "share": 1, "dropped": 1, "pushes": 1}
         self.slices: dict[str, slice] = {}
         start = 0
         for name, size in sizes.items():

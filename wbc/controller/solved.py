@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from wbc.controller.levels import Levels
 from wbc.controller.report import BRAKED, INFINITE, RELAXED, SOLVED, SOUND, TOLERANCE, UNSOUND, ReportLayout
 from wbc.controller.tick import Assembly, Buffers
 from wbc.qp.certificate import Certificate, certify
@@ -37,9 +38,13 @@ class SolvedTick(Buffers):
         scales = layout.dof_scales(stack)
         self._longest = max(1.0, scales.max(initial=1.0), self._units.max(initial=1.0))
         self._dof_scales = None if (scales == 1.0).all() else scales
+        self._hard = np.array(layout.row_levels, dtype=np.int_) < 0
+        self._levels = Levels(assembly, stack, layout) if layout.cascade else None
 
     def reset(self) -> None:
         self._solver.reset()
+        if self._levels is not None:
+            self._levels.reset()
 
     def check(self) -> int:
         return self.assembly.check()
@@ -57,22 +62,32 @@ class SolvedTick(Buffers):
     def finish(self, qp: QP) -> int:
         """Solve a QP of this layout and write the report; the flag, with ``UNSOUND`` where the certificate fails."""
         flag, v, answer = self.answer(qp)
+        levels = None
+        if self._levels is not None:
+            v, levels = self._levels.below(qp, v, answer, self.report)
         slack = qp.violation(v)[self._nv :] if flag == RELAXED else np.zeros(self._units.size)
+        if self._levels is not None:
+            slack = self._levels.with_soft(qp, v, slack)
         slack = np.where(slack > 2.0 * TOLERANCE * self._units, slack, 0.0)
-        if flag == RELAXED and not slack.any():
+        if flag == RELAXED and not slack[self._hard].any():
             flag = SOLVED  # the rows contradict each other by rounding only
         places, report = self._places, self.report
         certificate, multipliers = _NONE, np.zeros(qp.lower.size)
         if answer is not None:
             multipliers = answer.multipliers
             self._name_frozen_bounds(qp, answer)
-            sides = self._met(qp, answer, v)
-            certificate = certify(QP(qp.H, qp.g, *sides, qp.A), Solution(v, multipliers, "solved"))
+            sides = QP(qp.H, qp.g, *self._met(qp, answer, v), qp.A)
+            if levels is None:
+                certificate = certify(sides, Solution(v, multipliers, "solved"))
+            else:
+                multipliers = levels.multipliers
+                certificate = Levels.certified(levels, float(sides.violation(v).max(initial=0.0)))
         for name in ("stationarity", "violation", "complementarity", "error_bound"):
             report[places[name]] = min(getattr(certificate, name), INFINITE)
         report[places["v"]] = v
         report[places["flag"]] = flag
-        report[places["iterations"]] = answer.iterations if answer is not None else 0
+        iterations = 0 if levels is None else levels.iterations
+        report[places["iterations"]] = iterations + (answer.iterations if answer is not None else 0)
         report[places["multipliers"]] = multipliers
         report[places["slack"]] = slack
         self.assembly.look_ahead()

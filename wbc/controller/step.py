@@ -13,6 +13,7 @@ import numpy as np
 
 from wbc.controller.explanation import Explanation
 from wbc.controller.policy import CHAIN
+from wbc.controller.level_report import LevelCertificate, certificates
 from wbc.controller.report import INFINITE, ReportLayout
 from wbc.controller.tick import Assembly
 from wbc.errors import SolverError
@@ -43,12 +44,16 @@ class Status(StrEnum):
 
 @dataclass(frozen=True)
 class Binding:
-    """A row that pushes: ``item`` and ``row`` names, ``side`` (lower, upper, equal), its multiplier."""
+    """A row that pushes: ``item`` and ``row`` names, ``side`` (lower, upper, equal), its multiplier.
+
+    ``level``: the first level whose optimum it pushes against, None for the least velocity after all levels.
+    """
 
     item: str
     row: str
     side: str
     multiplier: float
+    level: int | None = 0
 
     def __str__(self) -> str:
         return f"{self.item}/{self.row} {self.side}"
@@ -69,11 +74,12 @@ class Slack:
 
 @dataclass(frozen=True, eq=False)
 class Residual:
-    """Error of a task: ``values`` row by row, with ``units`` and ``labels``."""
+    """Error of a task: ``values`` row by row, with ``units`` and ``labels``, and the task's ``level``."""
 
     values: Array
     units: tuple[str, ...]
     labels: tuple[str, ...]
+    level: int = 0
 
     def norm(self, unit: str) -> float:
         """Euclidean norm of the rows in ``unit``."""
@@ -172,11 +178,21 @@ class Step:
         return Certificate(*(np.inf if value >= INFINITE else value for value in values))
 
     @property
+    def levels(self) -> tuple[LevelCertificate, ...]:
+        """What became of each strict level, and of the least velocity after them; empty where there is one level, and
+        for a braked or capped tick.
+        """
+        layout = self._context.layout
+        return certificates(layout, self._part) if layout.cascade else ()
+
+    @property
     def residuals(self) -> Mapping[str, Residual]:
         """Error of every task before the step, by name, with units."""
         error = self._part("error")
         return {
-            b.entry.name: Residual(error[b.span], tuple(r.unit for r in b.rows), tuple(r.label for r in b.rows))
+            b.entry.name: Residual(
+                error[b.span], tuple(r.unit for r in b.rows), tuple(r.label for r in b.rows), b.entry.level
+            )
             for b in self._context.layout.of_form("task")
         }
 
@@ -208,6 +224,7 @@ class Step:
         context, nv = self._context, self._context.layout.nv
         multipliers = self._part("multipliers")
         low, high = self._part("owner_low"), self._part("owner_high")
+        levels = self._pushes(multipliers.size)
         out = []
         for i in np.flatnonzero(multipliers):
             value = float(multipliers[i])
@@ -217,13 +234,21 @@ class Step:
                     side = "lower" if value > 0 else "upper"  # held by a relaxation, see the order of sacrifice
                 owner = int((high if side == "upper" else low)[i])
                 name = context.bounds[owner].entry.name if owner >= 0 else "bounds"
-                out.append(Binding(name, context.stack.robot.dof_names[i], side, value))
+                out.append(Binding(name, context.stack.robot.dof_names[i], side, value, levels[i]))
             else:
                 block, row = context.general[i - nv]
                 side = "lower" if block.form == "margins" else side
                 side = "equal" if getattr(block.entry.item, "equality", False) else side
-                out.append(Binding(block.entry.name, block.rows[row].label, side, value))
+                out.append(Binding(block.entry.name, block.rows[row].label, side, value, levels[i]))
         return tuple(out)
+
+    def _pushes(self, count: int) -> list[int | None]:
+        """The level that each row pushes against first."""
+        layout = self._context.layout
+        if not layout.cascade:
+            return [layout.levels[0]] * count
+        numbers = [*layout.levels, None]
+        return [numbers[int(place)] for place in self._part("pushes")]
 
     @property
     def relaxed(self) -> tuple[Slack, ...]:

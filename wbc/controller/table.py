@@ -34,7 +34,8 @@ def _row(controller: Controller, block: Block) -> tuple[str, ...]:
     handle = controller[block.entry.name]
     speed = "gain" if block.form == "task" else "rate"
     rate = f"{getattr(handle, speed):g} 1/s" if speed in block.slots else "-"
-    weight = f"{handle.weight:g}" if block.form == "task" else ("hard" if block.entry.hard else "soft")
+    kind_of_row = "minimised" if block.entry.level > 0 else "hard" if block.entry.hard else "soft"
+    weight = f"{handle.weight:g}" if block.form == "task" else kind_of_row
     units = ", ".join(dict.fromkeys(r.unit or "1" for r in block.rows))
     mask = handle.mask
     rows = f"{len(block.rows)}" if mask.all() else f"{int((mask > 0).sum())} of {len(block.rows)}"

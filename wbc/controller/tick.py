@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from dataclasses import dataclass
 
 from wbc.qp.problem import QP
 from wbc.validation import Array
@@ -42,6 +43,15 @@ class Buffers:
             setattr(self, name, getattr(other, name))
 
 
+@dataclass(frozen=True, eq=False)
+class TaskRows:
+    """Rows of all tasks in the last QP: J [rows, nv], wished rates and fading factors [rows]."""
+
+    J: Array
+    wish: Array
+    factor: Array
+
+
 class Assembly(Buffers, ABC):
     """Buffers and the QP at their values; ``plain``: not 0 for the linear model as it is, without curvature."""
 
@@ -58,7 +68,19 @@ class Assembly(Buffers, ABC):
 
     @abstractmethod
     def qp(self) -> QP:
-        """The QP at the buffers' values, before any relaxation."""
+        """The QP at the buffers' values, before any relaxation: of the first level, where there are several."""
+
+    @abstractmethod
+    def task_rows(self) -> TaskRows:
+        """Rows of all levels in the last QP."""
+
+    @abstractmethod
+    def bent(self) -> Array | None:
+        """Curvature in H of the last QP [nv, nv], before anything made H positive definite; None for none."""
+
+    @abstractmethod
+    def row_sides(self) -> tuple[Array, Array]:
+        """Sides of the general rows in the last QP, those that are minimised at a level included."""
 
     @abstractmethod
     def look_ahead(self) -> None:

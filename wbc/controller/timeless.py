@@ -10,7 +10,7 @@ import numpy as np
 from wbc import validation
 from wbc.controller.controller import Controller
 from wbc.controller.stack import Stack
-from wbc.errors import RangeError
+from wbc.errors import LevelError, RangeError
 from wbc.stack.artifact import compile_stack
 from wbc.stack.declaration import Declaration
 from wbc.tasks import Damping, JointLimits, Posture
@@ -28,7 +28,15 @@ FIRST = 1e8
 
 
 def timeless(stack: Declaration) -> Stack:
-    """The same items on joints that may move by :data:`LONGEST` a tick, without accelerations; always calm."""
+    """The same items on joints that may move by :data:`LONGEST` a tick, without accelerations; always calm.
+
+    Raises:
+        LevelError: the stack has strict levels.
+    """
+    levels = stack.levels
+    if len(levels) > 1 or any(e.level > 0 and not e.is_task for e in stack.entries):
+        reason = "inverse kinematics takes one level: goals come before wishes there; name them with goals="
+        raise LevelError("levels", levels, reason)
     scales = np.array([stack.length if u == "m" else 1.0 for u in stack.robot.dof_units])
     robot = stack.robot.with_limits(velocity=LONGEST / TICK * scales, acceleration=np.inf)
     # dt_range ends at twice the declared step

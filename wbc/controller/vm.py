@@ -8,7 +8,7 @@ import numpy as np
 
 from wbc.controller.reach import DEAD, Reach
 from wbc.controller.report import BAD_Q, BAD_UNIT, BAD_V, INFINITE, TOLERANCE, UNIT_TOLERANCE, ReportLayout
-from wbc.controller.tick import Assembly
+from wbc.controller.tick import Assembly, TaskRows
 from wbc.qp.problem import QP
 from wbc.stack.codegen import bound_sequence, unit_groups
 from wbc.stack.declaration import Declaration
@@ -87,6 +87,19 @@ class VmAssembly(Assembly):
         self._dof_scales = layout.dof_scales(stack)
         self._q_good = self.q.copy()
         self._usable = True
+        self._soft = np.array(layout.row_levels, dtype=np.int_) >= 0
+        self._sides = np.zeros(rows), np.zeros(rows)
+        self._bent: Array | None = None
+        self._last = TaskRows(self._J, np.zeros(tasks), np.zeros(tasks))
+
+    def task_rows(self) -> TaskRows:
+        return self._last
+
+    def bent(self) -> Array | None:
+        return self._bent
+
+    def row_sides(self) -> tuple[Array, Array]:
+        return self._sides
 
     def _bender(self, program: Program, arguments: list[Array]) -> Callable[[Array], Array] | None:
         """Weights of the task rows -> curvature, nv x nv."""
@@ -138,12 +151,15 @@ class VmAssembly(Assembly):
         J = self._J.copy()
         self._usable = self._drop_idle_rows(J, wish, factor)
         self.report[self.places["factor"]] = factor
-        weighted = (self.weight * factor)[:, None] * J
+        self._last = TaskRows(J, wish, factor)
+        first = slice(layout.leading)
+        J, weight, wish = J[first], (self.weight * factor)[first], wish[first]
+        weighted = weight[:, None] * J
         H = J.T @ weighted
         H = 0.5 * (H + H.T)
         H[np.diag_indices(layout.nv)] += self._damping
         g = -weighted.T @ wish
-        error = out["error"][: layout.task_rows]
+        error = out["error"][first]
         low, high = self._bounds()
         on = self.enabled != 0.0
         A = np.where(on[:, None], self._A, 0.0)
@@ -154,10 +170,13 @@ class VmAssembly(Assembly):
         high_rows = np.where(on, out["high"][: layout.general_rows], np.inf)
         self._usable &= bool(np.isfinite(A).all() and (low_rows < INFINITE).all() and (high_rows > -INFINITE).all())
         low_rows[low_rows <= -INFINITE], high_rows[high_rows >= INFINITE] = -np.inf, np.inf
-        if self._reach is not None and not self.plain[0] and self._usable and layout.task_rows:
+        self._sides = low_rows, high_rows
+        low_rows, high_rows = np.where(self._soft, -np.inf, low_rows), np.where(self._soft, np.inf, high_rows)
+        self._bent = None
+        if self._reach is not None and not self.plain[0] and self._usable and layout.leading:
             equal = _unit_equalities(low, high, low_rows, high_rows, A, self._dof_scales)
-            weight = self.weight * factor
             H, g = self._reach.change(H, J, weight, error, wish, self.q, self.p, equal, self.bound_enabled)
+            self._bent = self._reach.bent
         return QP(H, g, np.concatenate((low, low_rows)), np.concatenate((high, high_rows)), A)
 
     def _report_rows(self) -> None:

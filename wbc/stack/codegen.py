@@ -12,8 +12,11 @@ from wbc.shapes import FAR
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Layout
 from wbc.stack.motion import motion
-from wbc.stack.places import brakes, gain_places, margin_places, pull_scales, rate_places, stops
+from wbc.stack.places import brakes, gain_places, left_free, margin_places, pull_scales, rate_places, stops
 from wbc.stack.program import Program, sparsity_rows
+
+#: Numbers that a tick reports of each level, see ``native/tick.h``
+LEVEL_NUMBERS = 9
 
 
 def sources(stack: Declaration, layout: Layout, program: Program) -> dict[str, str]:
@@ -67,6 +70,8 @@ def _header(stack: Declaration, layout: Layout, program: Program, functions: lis
                 "LAST_ORDER": max(orders, default=0),
                 "LONGEST": max(1.0, *dofs, *scales),
                 "ACTIVE_MAX": layout.nv + soft_rows + 1,
+                "LEADING": layout.leading,
+                "LEVELS": len(layout.levels) if layout.cascade else 0,
                 "WORK_W": max(f.sz_w() for f in functions),
                 "WORK_IW": max(f.sz_iw() for f in functions),
             }.items()
@@ -98,9 +103,27 @@ def _header(stack: Declaration, layout: Layout, program: Program, functions: lis
         *(_table("int", name, values) for name, values in (program.balls.places() | program.sensed.places()).items()),
         _table("double", "row_reach", program.balls.reaches),
         _table("double", "segment_half", program.balls.halves),
-        *_blocks(j_start, j_col),
+        *(_levels(stack, layout) if layout.cascade else ()),
+        *_blocks(j_start[: layout.leading + 1], j_col),
     ]
     return "\n".join(lines) + "\n"
+
+
+def _levels(stack: Declaration, layout: Layout) -> list[str]:
+    """What strict levels need; see ``native/tick.h``."""
+    spans = [layout.level_rows(place) for place in range(len(layout.levels))]
+    most = max(span.stop - span.start for span in spans)
+    soft = [layout.row_levels.count(place) for place in range(len(spans))]
+    return [
+        f"#define LEVEL_NUMBERS {LEVEL_NUMBERS}",
+        f"#define LEVEL_MOST {max(most, layout.nv + layout.general_rows)}",
+        f"#define SOFT_MAX {max(soft)}",
+        f"#define LEFT_FREE {left_free(stack).hex()}",
+        f"#define DAMPING {stack.damping.hex()}",
+        _table("int", "level_start", [*(span.start for span in spans), layout.task_rows]),
+        _table("int", "row_level", layout.row_levels),
+        _table("double", "task_scale", layout.row_scales(stack)),
+    ]
 
 
 def unit_groups(stack: Declaration) -> list[tuple[int, int]]:

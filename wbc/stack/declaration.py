@@ -112,6 +112,11 @@ class Declaration:
         """Constraints in order."""
         return tuple(e for e in self._entries.values() if not e.is_task)
 
+    @property
+    def levels(self) -> tuple[int, ...]:
+        """Levels at which something is minimised, in order: those of tasks and of constraints at a level > 0."""
+        return tuple(sorted({e.level for e in self.entries if e.is_task or e.level > 0})) or (0,)
+
     def add(
         self, item: Item, name: str | None = None, level: int = 0, weight: float = 1.0, hard: bool = True
     ) -> Declaration:
@@ -120,9 +125,10 @@ class Declaration:
         Args:
             item: a task or constraint.
             name: how rows, errors and ``controller[name]`` call it; default: the class name in snake case.
-            level: only 0 in this version.
-            weight: of a task against the others, >= 0; the cost of a row is weight * (rate error / scale)^2
-                with scale = characteristic length for rows in metres, else 1.
+            level: of a task, an integer >= 0: lower numbers first, and later levels never disturb earlier ones,
+                see docs/levels.md. A constraint is hard at level 0; at a level k > 0 its violation is minimised there.
+            weight: of a task against the others of its level, >= 0; the cost of a row is
+                weight * (rate error / scale)^2 with scale = characteristic length for rows in metres, else 1.
             hard: of a constraint; False: its rows give way before those of any hard one, see the order of sacrifice.
 
         Raises:
@@ -137,15 +143,17 @@ class Declaration:
             raise DuplicateNameError("name", chosen, "an item of this name is in the stack; give another with name=")
         if isinstance(level, bool) or not isinstance(level, int):
             raise ShapeError("level", level, "expected an integer")
-        if level != 0:
-            raise LevelError(
-                "level", level, "strict levels are not implemented; a level is never turned into a weight", ("0",)
-            )
+        if level < 0:
+            raise LevelError("level", level, "expected an integer of 0 or more", ("0", "1", "2"))
+        if level > 0 and isinstance(item, Constraint):
+            _check_softened(level, item)
         number = validation.scalar("weight", weight, low=0.0)
         if isinstance(item, Constraint) and number != 1.0:
-            raise RangeError("weight", weight, "a constraint is hard and has no weight")
+            raise RangeError("weight", weight, "a constraint is hard or minimised at its level, and has no weight")
         if not validation.flag("hard", hard):
             _require_soft(item)
+            if level > 0:
+                raise RangeError("hard", hard, "a constraint at a level is minimised there, neither hard nor soft")
         item.validate(self._robot)
         self._entries[chosen] = Entry(item, chosen, level, number, bool(hard))
         return self
@@ -186,7 +194,9 @@ class Declaration:
             "length": self._length.hex(),
             "damping": self._damping.hex(),
             "calm": self._calm,
-            "items": [[e.name, e.item.declaration(self._robot), *([] if e.hard else ["soft"])] for e in self.entries],
+            "items": [
+                [e.name, e.level, e.item.declaration(self._robot), *([] if e.hard else ["soft"])] for e in self.entries
+            ],
         }
 
 
@@ -202,6 +212,17 @@ def _require_soft(item: Item) -> None:
         raise RangeError("hard", False, f"{type(item).__name__} bounds joints, and bounds never give way")
     if item.order <= Order.POSITION:
         raise RangeError("hard", False, f"{type(item).__name__} is what the robot can do, which never gives way")
+
+
+def _check_softened(level: int, item: Constraint) -> None:
+    """Only rows that may give way can be minimised at a level."""
+    if item.form == "bounds":
+        reason = f"{type(item).__name__} bounds velocities and is always hard; a level is for margins and rows"
+    elif item.order <= Order.POSITION:
+        reason = f"{type(item).__name__} is what the robot can do, which never gives way"
+    else:
+        return
+    raise LevelError("level", level, reason, ("0",))
 
 
 def _snake(name: str) -> str:

@@ -54,7 +54,14 @@ class Block:
 
 
 class Layout:
-    """Blocks in stack order and the sizes of all buffers."""
+    """Blocks, tasks by level and else in stack order, and the sizes of all buffers.
+
+    Attributes:
+        levels: numbers of the levels at which something is minimised, in order. cascade: they are strict levels, solved
+            one after the other; False: all is one problem.
+        leading: task rows of the first level, which come first.
+        row_levels: place in ``levels`` of each general row that is minimised there, -1 for hard rows.
+    """
 
     def __init__(self, stack: Declaration) -> None:
         robot = stack.robot
@@ -62,8 +69,12 @@ class Layout:
         self.parameters = 0
         self.task_rows = self.general_rows = self.bound_blocks = self.margin_rows = 0
         self.blocks: dict[str, Block] = {}
-        for entry in (*stack.tasks, *stack.constraints):
+        self.levels = stack.levels
+        self.row_levels: list[int] = []
+        for entry in (*sorted(stack.tasks, key=lambda e: e.level), *stack.constraints):
             self._add(stack, entry)
+        self.cascade = len(self.levels) > 1 or any(level >= 0 for level in self.row_levels)
+        self.leading = self.level_rows(0).stop
 
     def _add(self, stack: Declaration, entry: Entry) -> None:
         robot, item = stack.robot, entry.item
@@ -97,6 +108,8 @@ class Layout:
             start, self.bound_blocks = self.bound_blocks, self.bound_blocks + 1
         else:
             start, self.general_rows = self.general_rows, self.general_rows + len(rows)
+            level = self.levels.index(entry.level) if entry.level > 0 else -1
+            self.row_levels += [level] * len(rows)
             if form == "margins":
                 margin, self.margin_rows = self.margin_rows, self.margin_rows + len(rows)
         self.blocks[entry.name] = Block(entry, form, rows, start, margin, slots)
@@ -104,6 +117,14 @@ class Layout:
     def of_form(self, *forms: Form) -> list[Block]:
         """Blocks of the given forms, in row order."""
         return [b for b in self.blocks.values() if b.form in forms]
+
+    def level_rows(self, place: int) -> slice:
+        """Task rows of a level, by its place in ``levels``."""
+        level = self.levels[place]
+        spans = [b.span for b in self.of_form("task")]
+        levels = [b.entry.level for b in self.of_form("task")]
+        start = sum(s.stop - s.start for s, k in zip(spans, levels, strict=True) if k < level)
+        return slice(start, start + sum(s.stop - s.start for s, k in zip(spans, levels, strict=True) if k == level))
 
     def row_scales(self, stack: Declaration) -> np.ndarray:
         """Scale of each task row: the characteristic length for rows in metres, 1 for others."""

@@ -9,6 +9,19 @@ from wbc.stack.layout import Layout
 from wbc.stack.program import Program
 from wbc.tasks.base import Constraint
 
+#: What a direction that a level leaves to later ones may cost its rows at full joint speed, in their unit per second
+DISTURBANCE = 1e-6
+#: Full speed of joints without a limit [rad/s, or characteristic lengths per second]
+UNLIMITED = 10.0
+
+
+def left_free(stack: Declaration) -> float:
+    """Singular values below this are left to later levels: DISTURBANCE / (max(1, length) |full joint speeds|)."""
+    scales = np.array([stack.length if u == "m" else 1.0 for u in stack.robot.dof_units])
+    fastest = stack.robot.limits.velocity / scales
+    fastest = np.where(np.isfinite(fastest), fastest, UNLIMITED)
+    return DISTURBANCE / (max(1.0, stack.length) * max(float(np.linalg.norm(fastest)), 1e-3))
+
 
 def gain_places(layout: Layout) -> list[int]:
     """Where the gain of each task row is in the parameters."""

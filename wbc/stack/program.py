@@ -14,10 +14,10 @@ Outputs of ``rows(q, v, p, dt)`` (MT task rows, MC general rows, NB bound blocks
     bound_low, bound_high   nv x NB
 
 The tick forms H = sum w (factor J)'J + damping and g from these, so that the compiled expression stays
-small and the levels of later versions have their rows. ``ahead(q, v, p, dt)`` is h(q (+) v dt) with moving
+small and levels have their rows. ``ahead(q, v, p, dt)`` is h(q (+) v dt) with moving
 inputs advanced by their rates. ``bend(q, v, p, dt, pull)`` is the upper triangle of sum_k pull_k d2(e_k)/dq2, the
-curvature of the task errors for a weight ``pull`` on each row, as far as it comes from the robot's links; see
-:mod:`wbc.symbolic.curvature`.
+curvature of the errors of the first level's tasks for a weight ``pull`` on each row, as far as it comes from the
+robot's links; see :mod:`wbc.symbolic.curvature`.
 
 For a compiled tick the rows of :meth:`Constraint.ball_rows` are left to the loop in ``native/balls.h``: here they have
 no entries, and ``low`` and ``margin`` are 0. Sensed rows have no entries either (``native/sensed.h``). Both need:
@@ -161,7 +161,7 @@ class _Builder:
         error = self.column(block, "error", item.error(robot, tracer, inputs))
         own = item.jacobian(robot, tracer, inputs)
         jacobian = tracer.jacobian(error) if own is None else tracer.expand(ca.SX(own))
-        if self.stack.calm:
+        if self.stack.calm and block.span.stop <= self.layout.leading:
             self.pulls += tracer.pulls(ca.dot(self.pull[block.span], error))
         gain = self.p[block.slots["gain"].span]
         wish = tracer.expand(-gain * error - self.drift(block, error))

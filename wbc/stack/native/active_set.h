@@ -26,10 +26,9 @@ static void shift(wbc_tick *t) {
 }
 
 /* Put a row into the working set unless it depends on those that are in it; 1 if it went in */
-static int activate(wbc_tick *t, int i, int lower) {
-    DAQPWorkspace *work = &t->daqp;
-    const int kind = t->sense[i] & (IMMUTABLE | SOFT);
-    t->sense[i] = kind | ACTIVE | (lower ? LOWER : 0);
+static int activate(DAQPWorkspace *work, int i, int lower) {
+    const int kind = work->sense[i] & (IMMUTABLE | SOFT);
+    work->sense[i] = kind | ACTIVE | (lower ? LOWER : 0);
     add_constraint(work, i, lower ? -1.0 : 1.0);
     int ok = work->sing_ind == EMPTY_IND;
     for (int k = work->n_active > 2 ? work->n_active - 2 : 0; k < work->n_active; k++)
@@ -42,7 +41,7 @@ static int activate(wbc_tick *t, int i, int lower) {
             break;
         }
     work->sing_ind = EMPTY_IND;
-    t->sense[i] = kind;
+    work->sense[i] = kind;
     return 0;
 }
 
@@ -58,11 +57,10 @@ static int granted(wbc_tick *t) {
 }
 
 /* DAQP from the working set at hand, with its iterations counted; DAQP's exit flag */
-static int search(wbc_tick *t, int limit) {
-    DAQPWorkspace *work = &t->daqp;
+static int search(wbc_tick *t, DAQPWorkspace *work, int limit) {
     t->settings.iter_limit = limit;
     /* Where the cap ends the search before its first iterate, the optimum without rows stands for it */
-    if (t->cap > 0.0) memset(t->u, 0, sizeof t->u);
+    if (t->cap > 0.0) memset(work->u, 0, work->n * sizeof(double));
     const int flag = daqp_ldp(work);
     t->spent = t->cap > 0.0 && flag == EXIT_ITERLIMIT;
     t->report.iterations += work->iterations - t->spent;
@@ -85,11 +83,11 @@ static int active_set(wbc_tick *t, int warm, int checked, double angle, const do
     }
     /* Equalities first: the later, dependent ones are left out and checked afterwards */
     for (int i = 0; i < M_ALL; i++)
-        if ((t->sense[i] & IMMUTABLE) && !row_is_dead(t, i) && !activate(t, i, 0)) dependent = 1;
+        if ((t->sense[i] & IMMUTABLE) && !row_is_dead(t, i) && !activate(work, i, 0)) dependent = 1;
     if (warm)
         for (int i = 0; i < M_ALL; i++)
-            if ((t->keep[i] & ACTIVE) && !(t->sense[i] & IMMUTABLE)) activate(t, i, t->keep[i] & LOWER);
-    const int flag = search(t, limit);
+            if ((t->keep[i] & ACTIVE) && !(t->sense[i] & IMMUTABLE)) activate(work, i, t->keep[i] & LOWER);
+    const int flag = search(t, work, limit);
     if (flag < 0) return flag;
     ldp2qp_solution(work);
     for (int i = 0; base && i < NV; i++) t->x[i] += base[i];

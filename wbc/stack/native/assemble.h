@@ -118,12 +118,15 @@ static void assemble(wbc_tick *t, int screen) {
         }
         if (t->free_low[k] < -WBC_INF) t->free_low[k] = -WBC_INF;
         if (t->free_high[k] > WBC_INF) t->free_high[k] = WBC_INF;
-        t->low[NV + k] = t->free_low[k];
-        t->high[NV + k] = t->free_high[k];
+        t->low[NV + k] = MINIMISED(k) ? -WBC_INF : t->free_low[k];
+        t->high[NV + k] = MINIMISED(k) ? WBC_INF : t->free_high[k];
         for (int e = a_start[k]; e < a_end[k]; e++) t->A[k * NV + a_col[e]] = t->at[e];
     }
     t->prepared = t->curved = 0;
-    if (CALM && t->plain == 0.0 && MT > 0 && t->unusable == 0.0) reach(t);
+#if LEVELS > 0
+    memcpy(t->straight, t->H, sizeof t->H);
+#endif
+    if (CALM && t->plain == 0.0 && LEADING > 0 && t->unusable == 0.0) reach(t);
 }
 
 /* All rows of the QP */

@@ -163,12 +163,16 @@ static void refine(wbc_tick *t) {
     command(t);
 }
 
-EXPORT void wbc_tick_certify(wbc_tick *t) {
-    wbc_report *out = &t->report;
+static void tidy(wbc_report *out) {
     replace_nan(out->error, MT, HUGE_VAL);
     replace_nan(out->factor, MT, 0.0);
     replace_nan(out->margin, MH, -HUGE_VAL);
     replace_nan(out->margin_factor, MH, 0.0);
+}
+
+EXPORT void wbc_tick_certify(wbc_tick *t) {
+    wbc_report *out = &t->report;
+    tidy(out);
     if (out->flag == WBC_BRAKED || out->flag == WBC_CAPPED) {
         for (int i = 0; i < M_ALL; i++) out->lambda[i] = 0.0;
         out->stationarity = out->violation = out->complementarity = out->error_bound = WBC_INF;

@@ -28,7 +28,7 @@
 /* out = J' diag(weight) x */
 static void gather(const wbc_tick *t, const double *x, double *out) {
     for (int i = 0; i < WIDE; i++) out[i] = 0.0;
-    for (int k = 0; k < MT; k++) {
+    for (int k = 0; k < LEADING; k++) {
         const double f = t->weight[k] * t->report.factor[k];
         if (f == 0.0) continue;
         for (int e = j_start[k]; e < j_start[k + 1]; e++) out[j_col[e]] += f * x[k] * t->jt[e];
@@ -102,7 +102,7 @@ static int left_over(wbc_tick *t, const double *free, const double *error, const
         solve_with(t, slope, step);
     }
     for (int i = 0; i < NV; i++) step[i] *= free[i];
-    for (int k = 0; k < MT; k++) {
+    for (int k = 0; k < LEADING; k++) {
         const double f = t->weight[k] * t->report.factor[k];
         pull[k] = f == 0.0 ? 0.0 : f * (error[k] - along(t, k, step));
     }
@@ -142,7 +142,7 @@ static double least_pivot(const wbc_tick *t) {
 /* H += curvature of the errors that are left, with blocked joints cut off; how large it is, 0 for none to count */
 static double bend_errors(wbc_tick *t, const double *free, const double *error, const double *pull, double least) {
     double size = 0.0, whole = 0.0, largest = 0.0;
-    for (int k = 0; k < MT; k++) {
+    for (int k = 0; k < LEADING; k++) {
         size += fabs(pull[k]) * pull_scale[k];
         whole += fabs(t->weight[k] * t->report.factor[k] * error[k]) * pull_scale[k];
     }
@@ -153,6 +153,9 @@ static double bend_errors(wbc_tick *t, const double *free, const double *error, 
     double *res[1] = {t->bent};
     bend(arg, res, t->work_iw, t->work_w, 0);
     if (!all_finite(t->bent, NNZK)) return 0.0;
+#if LEVELS > 0
+    memset(t->curvature, 0, sizeof t->curvature);
+#endif
     for (int i = 0; i < NV; i++)
         for (int j = i + 1; j < NV; j++) t->H[i * WIDE + j] *= 1.0 - share * (1.0 - free[i] * free[j]);
     for (int e = 0; e < NNZK; e++) {
@@ -160,6 +163,9 @@ static double bend_errors(wbc_tick *t, const double *free, const double *error, 
         const double bent = share * free[i] * free[j] * t->bent[e];
         largest = larger(largest, fabs(bent) * dof_scale[i] * dof_scale[j]);
         t->H[i * WIDE + j] += bent;
+#if LEVELS > 0
+        t->curvature[i * NV + j] = t->curvature[j * NV + i] = bent;
+#endif
     }
     return largest;
 }
@@ -188,7 +194,7 @@ static void following(wbc_tick *t, const double *wanted, double *x) {
     double moved[MT + 1], rest[WIDE], change[WIDE];
     solve_with(t, wanted, x);
     for (int n = 0; n < CORRECTIONS; n++) {
-        for (int k = 0; k < MT; k++) moved[k] = along(t, k, x);
+        for (int k = 0; k < LEADING; k++) moved[k] = along(t, k, x);
         gather(t, moved, rest);
         for (int i = 0; i < NV; i++) rest[i] = wanted[i] - rest[i] - damping[i] * x[i];
         for (int i = NV; i < WIDE; i++) rest[i] = 0.0;
@@ -218,7 +224,7 @@ static double stoppable(wbc_tick *t, const double *free, const double *error, do
     int limited = 0;
     for (int i = 0; i < NV; i++) limited |= brake_at[i] >= 0 && t->bound_enabled[brake_at[i]] != 0.0;
     if (!limited) return largest;
-    for (int k = 0; k < MT; k++) {
+    for (int k = 0; k < LEADING; k++) {
         const double gain = t->p[gain_at[k]];
         square[k] = gain * gain * error[k];
     }
@@ -234,7 +240,7 @@ static double stoppable(wbc_tick *t, const double *free, const double *error, do
 /* The QP of the linear model becomes the one that is solved */
 static void reach(wbc_tick *t) {
     double error[MT + 1], slope[WIDE], free[NV], largest = 0.0;
-    for (int k = 0; k < MT; k++) {
+    for (int k = 0; k < LEADING; k++) {
         const int counts = t->weight[k] * t->report.factor[k] != 0.0;
         error[k] = counts ? t->report.error[k] : 0.0;
         if (!(fabs(error[k]) < TOO_FAR)) return;
@@ -260,7 +266,7 @@ static void reach(wbc_tick *t) {
     if (!t->curved && allowed >= largest) return;
     double wanted[MT + 1], drift[MT + 1];
     int moving = 0;
-    for (int k = 0; k < MT; k++) {
+    for (int k = 0; k < LEADING; k++) {
         const double gain = t->p[gain_at[k]];
         wanted[k] = smaller(gain, allowed) * error[k];
         drift[k] = -t->wish[k] - gain * error[k];
@@ -271,7 +277,7 @@ static void reach(wbc_tick *t) {
 #if NNZK > 0
     if (t->curved && moving) {
         double follow[WIDE], step[WIDE];
-        for (int k = 0; k < MT; k++) drift[k] = -drift[k];
+        for (int k = 0; k < LEADING; k++) drift[k] = -drift[k];
         gather(t, drift, follow);
         following(t, follow, step);
         product(t, step, follow);

@@ -47,6 +47,13 @@ int bend(const double **arg, double **res, long long *iw, double *w, int mem);
 /* Violations of rows that the solver took into account, in row units: beyond this the row cannot hold */
 #define SEEN 1e-6
 
+/* General rows that are minimised at a level are no part of the first level's QP */
+#if LEVELS > 0
+#define MINIMISED(k) (row_level[k] >= 0)
+#else
+#define MINIMISED(k) 0
+#endif
+
 INLINE double clamp(double x, double low, double high) { return x < low ? low : (x > high ? high : x); }
 
 /* Not fmin and fmax, which are calls; NaN in the first argument gives the second */

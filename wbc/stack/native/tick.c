@@ -1,6 +1,6 @@
 /* The entry points of one stack's tick */
 #include "assemble.h"
-#include "certify.h"
+#include "levels.h"
 
 static int refused(const wbc_tick *t) {
     for (int i = 0; i < NQ; i++)
@@ -37,8 +37,12 @@ EXPORT int wbc_tick_step(wbc_tick *t) {
     /* What accelerations count from, for who looks at the tick afterwards */
     memcpy(t->v_in, t->v_last, sizeof t->v_in);
     assemble(t, 1);
-    const int flag = wbc_tick_solve(t);
+    int flag = wbc_tick_solve(t);
+#if LEVELS > 0
+    flag = all_levels(t, flag);
+#else
     wbc_tick_certify(t);
+#endif
     wbc_tick_look_ahead(t);
     memcpy(t->v_last, t->report.v, NV * sizeof(double));
     return unsound(t, flag) ? flag + WBC_UNSOUND : flag;
@@ -49,16 +53,36 @@ EXPORT long long wbc_tick_size(void) { return (long long)sizeof(wbc_tick); }
 #define OFFSET(field) (long long)offsetof(wbc_tick, field)
 
 /* Where the caller finds q, v_last, v_in, use_v, p, dt, weight, enabled, bound_enabled, report, H, g, A, low, high,
- * unusable, plain, cap */
+ * unusable, plain, cap, wish, free_low, free_high */
 EXPORT void wbc_tick_layout(long long *out) {
     const long long offsets[] = {OFFSET(q), OFFSET(v_last), OFFSET(v_in), OFFSET(use_v), OFFSET(p), OFFSET(dt),
                                  OFFSET(weight), OFFSET(enabled), OFFSET(bound_enabled), OFFSET(report), OFFSET(H),
                                  OFFSET(g), OFFSET(A), OFFSET(low), OFFSET(high), OFFSET(unusable), OFFSET(plain),
-                                 OFFSET(cap)};
+                                 OFFSET(cap), OFFSET(wish), OFFSET(free_low), OFFSET(free_high)};
     memcpy(out, offsets, sizeof offsets);
 }
 
-EXPORT void wbc_tick_reset(wbc_tick *t) { t->warm = 0; }
+#if LEVELS > 0
+/* J of all task rows [MT, NV], for solvers in Python */
+EXPORT void wbc_tick_task_rows(const wbc_tick *t, double *J) {
+    memset(J, 0, MT * NV * sizeof(double));
+    for (int k = 0; k < MT; k++)
+        for (int e = j_start[k]; e < j_start[k + 1]; e++) J[k * NV + j_col[e]] = t->jt[e];
+}
+
+/* The curvature in H [NV, NV]; 0 for none */
+EXPORT int wbc_tick_bent(const wbc_tick *t, double *out) {
+    memcpy(out, t->curvature, sizeof t->curvature);
+    return t->curved;
+}
+#endif
+
+EXPORT void wbc_tick_reset(wbc_tick *t) {
+    t->warm = 0;
+#if LEVELS > 0
+    memset(t->levels.warm, 0, sizeof t->levels.warm);
+#endif
+}
 
 EXPORT void wbc_tick_init(wbc_tick *t) {
     memset(t, 0, sizeof *t);
@@ -90,6 +114,9 @@ EXPORT void wbc_tick_init(wbc_tick *t) {
     work->zldl = t->zldl;
     work->WS = t->WS;
     work->sing_ind = EMPTY_IND;
+#if LEVELS > 0
+    begin_level_solver(t);
+#endif
     for (int i = 0; i < MT; i++) t->weight[i] = 1.0;
     for (int k = 0; k < MC; k++) t->enabled[k] = 1.0;
     for (int i = 0; i < NB * NV; i++) t->bound_enabled[i] = 1.0;

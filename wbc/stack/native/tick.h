@@ -23,6 +23,12 @@
  *   sensed_distance sensed_line sensed_side   where their numbers are in p
  *   LONGEST     the largest unit of velocities and rows, at least 1
  *   FAR         a distance of no pair [m]
+ *   LEADING     task rows of the first level, which come first
+ *   LEVELS      strict levels, 0 where all is one problem; with them:
+ *   level_start row_level   their task rows, and the level of each general row that is minimised (-1: hard)
+ *   task_scale  the unit of each task row
+ *   LEVEL_NUMBERS LEVEL_MOST SOFT_MAX   numbers reported of each; rows and minimised general rows of one at most
+ *   LEFT_FREE DAMPING   singular values below it are left to later levels; damping of one that is 0
  *   stop_at stop_q stop_low stop_high   the same for position limits, with the coordinate that is limited
  */
 #ifndef WBC_TICK_H
@@ -65,7 +71,41 @@ typedef struct {
     double slack[MC + 1];     /* by how much a general row was relaxed, row units */
     double owner_low[NV];     /* bound block that sets each lower bound, -1 for none */
     double owner_high[NV];
+#if LEVELS > 0
+    double missed[MT + 1];    /* J v - wish of the task rows */
+    double share[MT + 1];     /* part of each that the levels before left free */
+    double dropped[MC + 1];   /* of equality rows that depend on others, how far they are off; else -1 */
+    double pushes[M_ALL + 1]; /* level against whose optimum a row pushes first, -1: none */
+    double levels[(LEVELS + 1) * LEVEL_NUMBERS]; /* rank, free, least singular value, cost of damping, disturbance,
+                               * stationarity, complementarity, error bound, 1 where it was solved; last the least v */
+#endif
 } wbc_report;
+
+#if LEVELS > 0
+/* What the levels of a tick work with; vectors are of v / dof_scale, rows per unit */
+typedef struct {
+    double x[NV], reached[(LEVELS + 1) * NV];   /* the point, and that of every level */
+    double low[M_ALL], high[M_ALL], given_low[M_ALL], given_high[M_ALL], general[MC * NV + 1];
+    int on[M_ALL], slot[M_ALL];                 /* rows that hold; slack of those that are minimised, -1 for the others */
+    double space[NV * NV];                      /* what is left: `width` orthonormal vectors */
+    double basis[NV * NV], direction[NV * NV];  /* the same turned: the `rank` that the level takes come first */
+    double row[LEVEL_MOST * NV], weight[LEVEL_MOST], wanted[NV], scale, soft_weight;
+    double column[NV * LEVEL_MOST], damped[NV], least; /* rows along the directions */
+    double H[NV * NV], inverse[NV * NV], right[NV], plain[NV], lambda[M_ALL], length[M_ALL];
+    double bent[NV * NV];                       /* curvature of the first level */
+    int bends, seen;                            /* whether there is any; directions that the rows take */
+    int width, rank, count, soft_count, order[LEVEL_MOST];
+    int keep[(LEVELS + 1) * M_ALL], warm[LEVELS + 1];
+    DAQPWorkspace daqp;
+    DAQPProblem problem;
+    double M[M_ALL * (NV + SOFT_MAX)], dupper[M_ALL], dlower[M_ALL], shift[NV + SOFT_MAX], scaling[M_ALL];
+    double z[NV + SOFT_MAX], old[NV + SOFT_MAX], u[NV + SOFT_MAX];
+    double lam[NV + SOFT_MAX + 2], lam_star[NV + SOFT_MAX + 2];
+    double factor[(NV + SOFT_MAX + 2) * (NV + SOFT_MAX + 3) / 2], pivot[NV + SOFT_MAX + 2];
+    double xldl[NV + SOFT_MAX + 2], zldl[NV + SOFT_MAX + 2];
+    int WS[NV + SOFT_MAX + 2], sense[M_ALL];
+} wbc_levels;
+#endif
 
 typedef struct {
     wbc_report report;
@@ -108,6 +148,11 @@ typedef struct {
     double x[WIDE], xold[NV], lam[ACTIVE_MAX], lam_star[ACTIVE_MAX], u[NV];
     double L[ACTIVE_MAX * (ACTIVE_MAX + 1) / 2], D[ACTIVE_MAX], xldl[ACTIVE_MAX], zldl[ACTIVE_MAX];
     int WS[ACTIVE_MAX], sense[M_ALL], keep[M_ALL];
+#if LEVELS > 0
+    double straight[NV * WIDE];  /* H without curvature */
+    double curvature[NV * NV];   /* and the curvature, before anything made H positive definite */
+    wbc_levels levels;
+#endif
 } wbc_tick;
 
 #endif
