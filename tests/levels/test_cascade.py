@@ -1,4 +1,4 @@
-"""Strict levels against an independent hierarchical solver, and what they do where levels agree, contradict or vanish."""
+"""Strict levels against an independent hierarchical solver; levels that agree, contradict or lose rank."""
 
 from __future__ import annotations
 

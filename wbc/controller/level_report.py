@@ -91,11 +91,11 @@ def _dropped(layout: Layout, part: Callable[[str], Array], place: int) -> tuple[
     if place == 0:
         off = part("dropped")
         for block in layout.of_form("margins", "rows"):
-            out += [_row(block, k, off[block.start + k]) for k in np.flatnonzero(off[block.span] >= 0.0)]
+            out += [_row(block, k, off[block.start + k]) for k in np.flatnonzero(off[block.span] >= 0.0).tolist()]
     share, missed = part("share"), part("missed")
     for block in layout.of_form("task"):
         if block.entry.level == layout.levels[place]:
-            gone = np.flatnonzero(share[block.span] <= GONE)
+            gone = np.flatnonzero(share[block.span] <= GONE).tolist()
             out += [_row(block, k, abs(missed[block.start + k])) for k in gone]
     return tuple(out)
 

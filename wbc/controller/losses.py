@@ -72,7 +72,11 @@ def losses(past: Past, found: list[Group], v: Array, culprits: list[Block]) -> t
 
 
 def prices(past: Past, found: list[Group], answer: Relaxed, sides: dict[int, Side]) -> tuple[Price, ...]:
-    """Of every binding side and every task that misses something, from the active set of a plain optimum."""
+    """Of every binding side and every task that misses something, from the active set of a plain optimum; none where
+    there are strict levels.
+    """
+    if past.layout.cascade:
+        return ()
     sensitivity = Sensitivity(past.qp, Solution(answer.x, answer.multipliers, "solved"))
     out = []
     for row, side in sides.items():

@@ -61,8 +61,9 @@ class Past:
 
     def solve(self) -> tuple[Array, Relaxed | None]:
         """Command and answer for the buffers as they are; no answer where the tick brakes."""
-        _, v, answer = self._solver.answer(self.tick.qp())
-        return v, answer
+        qp = self.tick.qp()
+        _, v, answer = self._solver.answer(qp)
+        return self._solver.below(qp, v, answer)[0], answer
 
     def is_on(self, block: Block) -> bool:
         """Any of an item's rows counts."""
@@ -94,6 +95,8 @@ class Past:
 
         A row's part of the plain QP is H = J'J and g = -J'w, from which both come back.
         """
+        if self.layout.cascade:
+            return self._level_rows(block)
         tick, weight, factor = self.tick, self.tick.weight.copy(), self.part("factor")
         damping = self.stack.damping / self.layout.dof_scales(self.stack) ** 2
         rows, wishes = np.zeros((len(block.rows), self.layout.nv)), np.zeros(len(block.rows))
@@ -112,3 +115,10 @@ class Past:
                 wishes[k] = -qp.g[i] / share / rows[k, i]
         tick.weight[:], tick.plain[0] = weight, 0.0
         return rows, wishes
+
+    def _level_rows(self, block: Block) -> tuple[Array, Array]:
+        """The same from the rows that levels have."""
+        self.tick.qp()
+        tasks, span = self.tick.task_rows(), block.span
+        counts = (self.tick.weight[span] > 0.0) & (tasks.factor[span] > 0.0)
+        return np.where(counts[:, None], tasks.J[span], 0.0), np.where(counts, tasks.wish[span], 0.0)

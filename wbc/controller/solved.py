@@ -9,6 +9,7 @@ from wbc.controller.levels import Levels
 from wbc.controller.report import BRAKED, INFINITE, RELAXED, SOLVED, SOUND, TOLERANCE, UNSOUND, ReportLayout
 from wbc.controller.tick import Assembly, Buffers
 from wbc.qp.certificate import Certificate, certify
+from wbc.qp.hierarchy import Answer
 from wbc.qp.problem import QP, Solution
 from wbc.qp.relax import Relaxation, Relaxed
 from wbc.qp.solvers import make_solver
@@ -62,9 +63,7 @@ class SolvedTick(Buffers):
     def finish(self, qp: QP) -> int:
         """Solve a QP of this layout and write the report; the flag, with ``UNSOUND`` where the certificate fails."""
         flag, v, answer = self.answer(qp)
-        levels = None
-        if self._levels is not None:
-            v, levels = self._levels.below(qp, v, answer, self.report)
+        v, levels = self.below(qp, v, answer)
         slack = qp.violation(v)[self._nv :] if flag == RELAXED else np.zeros(self._units.size)
         if self._levels is not None:
             slack = self._levels.with_soft(qp, v, slack)
@@ -123,6 +122,12 @@ class SolvedTick(Buffers):
         met = (answer.lower == answer.upper) & (np.abs(at - answer.lower) <= rounding) & (answer.multipliers == 0.0)
         met[: self._nv] = False
         return np.where(met, -np.inf, answer.lower), np.where(met, np.inf, answer.upper)
+
+    def below(self, qp: QP, v: Array, first: Relaxed | None) -> tuple[Array, Answer | None]:
+        """The command with all levels below the first, whose answer is v, and their answer; v where there are none."""
+        if self._levels is None:
+            return v, None
+        return self._levels.below(qp, v, first, self.report)
 
     def _name_frozen_bounds(self, qp: QP, answer: Relaxed) -> None:
         """Of a bound that a relaxation holds, the other side is not what binds, whatever sign its multiplier has."""

@@ -7,6 +7,7 @@ from importlib import resources
 
 from wbc.export.memory import bytes_of_tick
 from wbc.export.snapshot import Snapshot, numbers
+from wbc.stack.codegen import LEVEL_NUMBERS
 from wbc.stack.layout import Block, Slot
 
 _KINDS = {
@@ -21,7 +22,12 @@ _KINDS = {
 def header(snapshot: Snapshot) -> str:
     """Text of ``wbc_tick.h``."""
     template = (resources.files("wbc.export") / "c" / "wbc_tick.in.h").read_text()
-    parts = {"SIZES": _sizes(snapshot), "PLACES": _places(snapshot), "ROBOT": _robot(snapshot)}
+    parts = {
+        "SIZES": _sizes(snapshot),
+        "PLACES": _places(snapshot),
+        "ROBOT": _robot(snapshot),
+        "LEVELS": _levels(snapshot),
+    }
     for name, text in parts.items():
         template = template.replace(f"@{name}@", text)
     return template
@@ -42,6 +48,22 @@ def _sizes(snapshot: Snapshot) -> str:
         "DT": (repr(snapshot.stack.dt), f"time between commands [s]; wbc_set_dt takes {low:g} to {high:g}"),
     }
     return "\n".join(f"#define WBC_{name} {value} /* {text} */" for name, (value, text) in named.items())
+
+
+def _levels(snapshot: Snapshot) -> str:
+    """What a result has more where there are strict levels."""
+    layout = snapshot.layout
+    if not layout.cascade:
+        return ""
+    fields = {
+        "missed[WBC_TASK_ROWS + 1]": "rate of every task row less the rate that it asks for",
+        "share[WBC_TASK_ROWS + 1]": "part of every task row that the levels before left free, 0 to 1",
+        "dropped[WBC_ROWS + 1]": "of equality rows that depend on others, how far they are off; else -1",
+        "pushes[WBC_NV + WBC_ROWS + 1]": "level, by its place, that a row pushes against first, -1: none",
+        f"levels[{len(layout.levels) + 1}][{LEVEL_NUMBERS}]": "rank, free directions, least singular value, damping, "
+        "disturbance, stationarity, complementarity, error bound, solved; last the least velocity",
+    }
+    return "".join(f"    double {name}; /* {text} */\n" for name, text in fields.items())
 
 
 def _robot(snapshot: Snapshot) -> str:

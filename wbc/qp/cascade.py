@@ -180,7 +180,9 @@ class _Step:
 
     def solve(self, place: int) -> tuple[Achieved, Array, Array]:
         """(what was achieved, the space that is left, multipliers)."""
-        y, lam, solved = np.linalg.solve(self.H, self.right) if self.rank else np.zeros(0), self._none(), True
+        y, lam, solved = np.zeros(self.rank), self._none(), True
+        if self.rank:
+            y = np.asarray(np.linalg.solve(self.H, self.right))
         x = self.x + self.Z @ y
         if not self._holds(x):
             x, y, lam, solved = self._searched(place)

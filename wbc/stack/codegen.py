@@ -70,8 +70,6 @@ def _header(stack: Declaration, layout: Layout, program: Program, functions: lis
                 "LAST_ORDER": max(orders, default=0),
                 "LONGEST": max(1.0, *dofs, *scales),
                 "ACTIVE_MAX": layout.nv + soft_rows + 1,
-                "LEADING": layout.leading,
-                "LEVELS": len(layout.levels) if layout.cascade else 0,
                 "WORK_W": max(f.sz_w() for f in functions),
                 "WORK_IW": max(f.sz_iw() for f in functions),
             }.items()
@@ -103,7 +101,7 @@ def _header(stack: Declaration, layout: Layout, program: Program, functions: lis
         *(_table("int", name, values) for name, values in (program.balls.places() | program.sensed.places()).items()),
         _table("double", "row_reach", program.balls.reaches),
         _table("double", "segment_half", program.balls.halves),
-        *(_levels(stack, layout) if layout.cascade else ()),
+        *_levels(stack, layout),
         *_blocks(j_start[: layout.leading + 1], j_col),
     ]
     return "\n".join(lines) + "\n"
@@ -111,10 +109,14 @@ def _header(stack: Declaration, layout: Layout, program: Program, functions: lis
 
 def _levels(stack: Declaration, layout: Layout) -> list[str]:
     """What strict levels need; see ``native/tick.h``."""
+    if not layout.cascade:
+        return [f"#define LEADING {layout.leading}", "#define LEVELS 0"]
     spans = [layout.level_rows(place) for place in range(len(layout.levels))]
     most = max(span.stop - span.start for span in spans)
     soft = [layout.row_levels.count(place) for place in range(len(spans))]
     return [
+        f"#define LEADING {layout.leading}",
+        f"#define LEVELS {len(spans)}",
         f"#define LEVEL_NUMBERS {LEVEL_NUMBERS}",
         f"#define LEVEL_MOST {max(most, layout.nv + layout.general_rows)}",
         f"#define SOFT_MAX {max(soft)}",

@@ -66,7 +66,7 @@ typedef struct {
     double slack[WBC_ROWS + 1];                /* by how much a row is missed, in its unit / s */
     double owner_low[WBC_NV];                  /* number of the bound that sets each lower side of v, -1: none */
     double owner_high[WBC_NV];                 /* the same for the upper side */
-} wbc_result;
+@LEVELS@} wbc_result;
 
 /* Memory of one controller; its contents are private */
 typedef union {
