@@ -144,6 +144,14 @@ def test_walk_arrives_within_its_limits() -> None:
     assert number("largest joint rate # of", text) <= 1.000001
 
 
+def test_levels_cost_the_hand_nothing() -> None:
+    text = output("levels")
+    found = re.search(rf"{NUMBER} mm off with levels, {NUMBER} mm off with weights", text)
+    assert found
+    assert float(found[1]) < 1.0 < 10.0 < float(found[2])
+    assert all(float(x) < 1e-6 for x in re.findall(rf"disturbed {NUMBER}", text))
+
+
 def test_conflict_names_the_culprit() -> None:
     text = output("conflict")
     assert number("Cheapest to relax: ball/panda_hand.0. by # mm/s", text) == pytest.approx(536, abs=1)
