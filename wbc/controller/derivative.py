@@ -27,8 +27,10 @@ def derivative(past: Past, name: str, value: str | None) -> Array:
     where the solution's change of rows is not.
 
     Raises:
-        UnknownNameError: no such item or value. SolverError: rows gave way, or the tick has no optimum.
+        UnknownNameError: no such item or value. SolverError: rows gave way, no optimum, or strict levels.
     """
+    if past.layout.cascade:
+        raise SolverError("derivative", name, "strict levels have no derivative in this version")
     moves, count = _moves(past, name, value)
     answer = past.solve()[1] if past.usable else None
     if answer is None or answer.flag != "solved":

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from wbc.controller.explanation import Explanation
-from wbc.controller.policy import CHAIN
 from wbc.controller.level_report import LevelCertificate, certificates
+from wbc.controller.policy import CHAIN
 from wbc.controller.report import INFINITE, ReportLayout
 from wbc.controller.tick import Assembly
 from wbc.errors import SolverError

@@ -108,7 +108,7 @@ static void leave(wbc_tick *t, int place, int first) {
  * of earlier levels count in this one */
 static void judge(wbc_tick *t, const double *z, double *numbers, double *gain) {
     wbc_levels *s = &t->levels;
-    double force[NV] = {0}, total = 0.0, rounding = 0.0, inverse = 0.0, image = 0.0;
+    double force[NV] = {0}, size[NV] = {0}, inverse = 0.0, seen = 0.0, image = 0.0, most = 0.0;
     for (int i = 0; i < M_ALL; i++) {
         if (s->lambda[i] == 0.0) continue;
         double low, high;
@@ -118,23 +118,28 @@ static void judge(wbc_tick *t, const double *z, double *numbers, double *gain) {
         if (i < NV) force[i] += s->lambda[i];
         else add_to(force, s->general + (i - NV) * NV, s->lambda[i], NV);
     }
+    for (int i = 0; i < NV; i++) most = larger(most, fabs(s->wanted[i]));
     for (int j = 0; j < s->width; j++) {
-        double residual = inner(s->basis + j * NV, force, NV), size = 0.0;
+        double residual = inner(s->basis + j * NV, force, NV), terms = most;
         if (j < s->rank) {
             residual += inner(s->H + j * NV, z, s->rank) - s->right[j];
-            size = fabs(s->right[j]);
-            for (int k = 0; k < s->rank; k++) size += fabs(s->H[j * NV + k] * z[k]);
+            terms += fabs(s->right[j]);
+            for (int k = 0; k < s->rank; k++) terms += fabs(s->H[j * NV + k] * z[k]);
+            size[j] = fabs(residual) + (NV + 4) * EPS * terms;
         }
         numbers[5] = larger(numbers[5], fabs(residual));
-        total += residual * residual;
-        rounding += size * size;
     }
-    /* |H^-1| <= |R^-1|^2 */
-    for (int i = 0; i < s->rank; i++) inverse += inner(s->inverse + i * NV + i, s->inverse + i * NV + i, s->rank - i);
+    /* |H^-1 r| <= |R^-1| |R^-T r| */
+    for (int j = 0; j < s->rank; j++) {
+        double sum = 0.0;
+        for (int i = 0; i <= j; i++) sum += fabs(s->inverse[i * NV + j]) * size[i];
+        seen += sum * sum;
+        inverse += inner(s->inverse + j * NV + j, s->inverse + j * NV + j, s->rank - j);
+    }
     for (int r = 0; r < s->count; r++) image += s->weight[r] * inner(s->row + r * NV, s->row + r * NV, NV);
-    numbers[7] = inverse * (sqrt(total) + 2.0 * (NV + 4) * EPS * sqrt(rounding));
-    /* |T'W J| <= |W^(1/2) J|^2 */
-    *gain = inverse * image;
+    numbers[7] = sqrt(inverse * seen);
+    /* |H^-1 T'W J| <= |R^-1| |W^(1/2) J|, as R'R is at least T'W T */
+    *gain = sqrt(inverse * image);
 }
 
 /* Level `place`, from the point and the space of the one before; 0 where the cap ended its search */
@@ -167,10 +172,9 @@ static int one_level(wbc_tick *t, int place, double *error) {
     numbers[3] = price(s, z);
     memcpy(s->x, x, sizeof x);
     judge(t, z, numbers, &gain);
-    if (!solved) numbers[5] = WBC_INF;
+    if (!solved) numbers[5] = numbers[7] = WBC_INF;
     numbers[8] = solved;
-    numbers[7] += *error * (1.0 + gain);
-    *error = numbers[7];
+    *error = numbers[7] = smaller(numbers[7] + *error * (1.0 + gain), WBC_INF);
     pass_on(s);
     leave(t, place, s->rank);
     numbers[1] = s->width;
