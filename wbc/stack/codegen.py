@@ -39,12 +39,10 @@ def _header(stack: Declaration, layout: Layout, program: Program, functions: lis
     j_start, j_col = sparsity_rows(jt)
     a_start, a_end, a_col = program.sensed.entries(*program.balls.entries(*sparsity_rows(at)))
     orders, scales, sequence = row_orders(layout), row_units(stack, layout), bound_sequence(layout)
-    dofs = layout.dof_scales(stack)
-    units = unit_groups(stack)
+    dofs, units = layout.dof_scales(stack), unit_groups(stack)
     bent = ca.Sparsity(layout.nv, layout.nv) if program.bend is None else program.bend.sparsity_out(0)
     brake_at, brake_limit = brakes(stack, layout)
     stop_at, stop_low, stop_high = stops(stack, layout)
-    soft_rows = len(orders)
     lines = [
         "/* Sizes and tables of one stack; generated */",
         "#include <stddef.h>",
@@ -69,7 +67,7 @@ def _header(stack: Declaration, layout: Layout, program: Program, functions: lis
                 "UNITS": len(units),
                 "LAST_ORDER": max(orders, default=0),
                 "LONGEST": max(1.0, *dofs, *scales),
-                "ACTIVE_MAX": layout.nv + soft_rows + 1,
+                "ACTIVE_MAX": layout.nv + len(orders) + 1,
                 "WORK_W": max(f.sz_w() for f in functions),
                 "WORK_IW": max(f.sz_iw() for f in functions),
             }.items()
