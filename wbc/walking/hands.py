@@ -34,7 +34,9 @@ class Hands(ABC):
 
     Attributes:
         plan: the one that is carried out now; path times count from its beginning.
-        held: row of the arm -> row of the hold. swinging: the hand on its way. events: what happened so far.
+        held: row of the arm -> row of the hold. swinging: the hand on its way.
+        told: arm, state and hold of a hand that does what it is told, see :mod:`wbc.walking.arm_mode`.
+        events: what happened so far.
     """
 
     def __init__(
@@ -54,6 +56,7 @@ class Hands(ABC):
         self.time, self.path_time, self.pace = 0.0, 0.0, 0.0
         self.events: list[Event] = []
         self.swinging: Swinging | None = None
+        self.told: tuple[int, Hand, int] | None = None
         self.v = np.zeros(walker.robot.nv)
         self._changing = False
         self._landed = (-1, 0.0)
@@ -181,16 +184,20 @@ class Hands(ABC):
 
     def _land(self, swinging: Swinging) -> None:
         """Close a hand that has come to rest on its hold; it holds when the latch is through."""
-        arm, hold, data = swinging.arm, swinging.hold, self.data
+        arm, hold = swinging.arm, swinging.hold
         if swinging.state == "open" and swinging.clock >= swinging.law.duration - 1e-9:
-            hand = self.chain.origins[arm], self.chain.axes[arm], self.chain.sides[arm]
-            there = self.structure.positions[hold], self.structure.axes[hold]
-            if at_rest(swinging, hand, there, self.structure.tilts[hold], data, self.dt):
-                swinging.state, swinging.latch = "closing", data.latch_time
+            if self.rests(arm, hold, (swinging.place, swinging.axis, swinging.side), swinging.x):
+                swinging.state, swinging.latch = "closing", self.data.latch_time
         elif swinging.state == "closing":
             swinging.latch -= self.dt
             if swinging.latch <= 1e-9:
                 self._grasp(swinging)
+
+    def rests(self, arm: int, hold: int, before: tuple[Array, Array, Array], x: Array | None) -> bool:
+        """Whether a hand is on a hold and still; ``before`` as of :func:`at_rest`."""
+        hand = self.chain.origins[arm], self.chain.axes[arm], self.chain.sides[arm]
+        there = self.structure.positions[hold], self.structure.axes[hold]
+        return at_rest(before, hand, there, x, self.structure.tilts[hold], self.data, self.dt)
 
     def _grasp(self, swinging: Swinging) -> None:
         """The latch is through: the hand holds, or it has missed and tries again."""
@@ -225,10 +232,14 @@ class Hands(ABC):
         out: list[Hand] = ["closed" if arm in self.held else "open" for arm in range(len(self.walker.arms))]
         if self.swinging is not None:
             out[self.swinging.arm] = self.swinging.state
+        if self.told is not None:
+            out[self.told[0]] = self.told[1]
         return tuple(out)
 
     def _holds(self) -> tuple[int, ...]:
         out = [self.held.get(arm, -1) for arm in range(len(self.walker.arms))]
         if self.swinging is not None:
             out[self.swinging.arm] = self.swinging.hold
+        if self.told is not None:
+            out[self.told[0]] = self.told[2]
         return tuple(out)

@@ -145,8 +145,9 @@ class Walk(Hands):
         """
         if len(self.held) < self.walker.min_holds:
             raise HoldLost("hands", len(self.held), f"at least {self.walker.min_holds} must hold")
-        self._think()
-        self._lift()
+        if self.told is None:
+            self._think()
+            self._lift()
         command = self._advance()
         if self.swinging is not None:
             self._aim(self.swinging)
@@ -163,6 +164,29 @@ class Walk(Hands):
         error = dist(self.q[:3], command.translation)
         state = self._hands(), self._holds(), command, error, slip, step.status, cost
         return Tick(self.time, self.path_time, self.q, self.v, *state)
+
+    def open_hand(self, arm: int) -> None:
+        """A hand lets go, to do what it is told (arm mode); the body stands, and the rest is planned anew later."""
+        self._say("lift", self.walker.arms[arm].name, self.structure.ids[self.held[arm]])
+        self._open(arm)
+        self._quick = True
+        self._stop()
+
+    def close_hand(self, arm: int, hold: int, roll: int) -> bool:
+        """A hand that was told to go to a hold (its row) holds it at one of its rolls.
+
+        Returns:
+            Whether its latch closes.
+        """
+        names, self.told = (self.walker.arms[arm].name, self.structure.ids[hold]), None
+        if not self.grasps(*names):
+            self._say("failed", *names)
+            return False
+        self.held[arm] = hold
+        self.stack.hold(arm, hold, roll)
+        self._stop()
+        self._say("land", *names)
+        return True
 
     def _stop(self) -> None:
         """The body stops, and the rest of the way is planned from there."""

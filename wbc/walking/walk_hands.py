@@ -43,9 +43,10 @@ def hand_pace(swinging: Swinging, place: Array, turned: bool, early: float, pace
 
 
 def at_rest(
-    swinging: Swinging,
+    before: tuple[Array, Array, Array],
     hand: tuple[Array, Array, Array],
     hold: tuple[Array, Array],
+    x: Array | None,
     tilt: float,
     data: WalkerData,
     dt: float,
@@ -53,15 +54,16 @@ def at_rest(
     """Whether a hand is on its hold and still, so that it may close.
 
     Args:
-        hand: its place [m], z axis and x axis. hold: place and z axis. tilt: ``max_tilt`` of the hold [rad].
+        before, hand: its place [m], z axis and x axis a tick ago and now. hold: place and z axis.
+        x: the x axis that it is to have, None if it may roll. tilt: ``max_tilt`` of the hold [rad].
     """
     (place, axis, side), (there, wanted) = hand, hold
-    if dist(place, there) >= SURE * data.close_distance or dist(place, swinging.place) / dt >= SURE * data.close_speed:
+    if dist(place, there) >= SURE * data.close_distance or dist(place, before[0]) / dt >= SURE * data.close_speed:
         return False
-    turn = angle(axis, swinging.axis)
-    if swinging.x is not None:
-        turn = hypot(turn, angle(side, swinging.side))
-        if abs(np.arctan2(side @ np.cross(wanted, swinging.x), side @ swinging.x)) >= SURE * data.close_angle:
+    turn = angle(axis, before[1])
+    if x is not None:
+        turn = hypot(turn, angle(side, before[2]))
+        if abs(np.arctan2(side @ np.cross(wanted, x), side @ x)) >= SURE * data.close_angle:
             return False
     leaned = max(SURE * data.close_angle, CLOSING_TILT * tilt)
     return turn / dt < SURE * data.close_rate and angle(axis, wanted) < leaned

@@ -127,6 +127,23 @@ class WalkStack:
         self._posture[7:][joints][3:], self._turning[6:][joints][3:] = wrist
         resting.target, resting.feedforward = self._posture, self._turning
 
+    def joints(self, arm: int, posture: Array, rates: Array) -> None:
+        """A free hand follows the joints of its arm: ``[6]`` [rad] and their rates [rad/s]."""
+        self._swings[arm].enabled = self._axes[arm].enabled = False
+        mine = self._joints(arm)
+        self._mask[mine] = FREE_WRIST
+        self._posture[7:][mine], self._turning[6:][mine] = posture, rates
+        self._rest.mask, self._rest.target, self._rest.feedforward = self._mask, self._posture, self._turning
+        self._near = (-1, False)
+
+    def settle(self, arm: int, place: Array, axis: Array, x: Array | None) -> None:
+        """A hand that follows joints comes to rest at a place, with a z axis, and an x axis if its roll counts."""
+        self._swings[arm].enabled = self._axes[arm].enabled = True
+        self._holds.turn(arm, x)
+        self.rest(arm, place, axis)
+        self._mask[self._joints(arm)] = RESTING
+        self._rest.mask = self._mask
+
     def _still(self, arm: int) -> None:
         """Wrists of arms that do not swing have no rates of their own."""
         self._turning[6:][self._joints(arm)] = 0.0

@@ -1,0 +1,78 @@
+"""Arm mode: one hand moves as it is told, the body stands."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from wbc.errors import UnknownNameError
+from wbc.robots import Walker
+from wbc.walking import Structure
+from wbc.walking.arm_mode import ArmMode
+from wbc.walking.body_path import grid_path
+from wbc.walking.checker import Rules, check_walk
+from wbc.walking.hand_motion import ArmRefused
+from wbc.walking.planner import plan_walk
+from wbc.walking.run.recording import WalkRecorder
+from wbc.walking.walk import Tick, Walk
+from wbc.walking.walk_stack import WalkStack
+
+
+@pytest.fixture(scope="module")
+def stack(machine: Walker, structure: Structure) -> WalkStack:
+    return WalkStack(machine, structure, collisions=False, backend="vm")
+
+
+@pytest.fixture
+def walk(machine: Walker, structure: Structure, stack: WalkStack) -> Walk:
+    return Walk(machine, structure, plan_walk(machine, structure, grid_path([(13, 11), (13, 12)], 0.1)), stack=stack)
+
+
+def test_a_hand_goes_through_poses_to_a_hold_and_the_body_stands(walk: Walk, machine: Walker, tmp_path) -> None:  # type: ignore[no-untyped-def]
+    recorder, ticks = WalkRecorder(walk, 0, {}), list[Tick]()
+
+    def on_tick(tick: Tick) -> None:
+        ticks.append(tick)
+        recorder.tick(tick)
+
+    body, structure = walk.q[:7].copy(), walk.structure
+    mode = ArmMode(walk, "arm2", on_tick)
+    first, hold = mode.pose, structure.ids[walk.held[1]]
+    up = pin.SE3(first.rotation, first.translation - 0.15 * first.rotation[:, 2])
+    aside = pin.SE3(up.rotation @ pin.exp3(np.array([0.1, -0.1, 0.3])), up.translation + np.array([0.03, 0.0, 0.05]))
+    mode.through([up, aside])
+    assert np.abs((mode.pose.inverse() * aside).translation).max() < 0.001
+    assert np.abs(pin.log3(mode.pose.rotation.T @ aside.rotation)).max() < 0.002
+    mode.by_rate([0.0, 0.0, -0.05, 0.0, 0.0, 0.0], 0.5)
+    assert mode.pose.translation - aside.translation == pytest.approx([0.0, 0.0, -0.025], abs=0.001)
+    mode.to_hold(hold)
+    assert structure.ids[walk.held[1]] == hold
+    assert max(np.abs(tick.q[:3] - body[:3]).max() for tick in ticks) < 0.002
+    assert all(tick.status == "solved" for tick in ticks)
+    assert walk.run(on_tick) == "arrived"
+    log, _ = recorder.log()
+    report = check_walk(log, machine.urdf(tmp_path / "robot.urdf"), structure, Rules(sub_samples=1))
+    assert report.ok, str(report)
+
+
+def test_refusals_say_why_and_nothing_moves(walk: Walk) -> None:
+    mode = ArmMode(walk, "arm1")
+    here, q, structure = mode.pose, walk.q.copy(), walk.structure
+    far = pin.SE3(here.rotation, here.translation - np.array([0.0, 0.0, 3.0]))
+    into = pin.SE3(here.rotation, here.translation + 0.1 * here.rotation[:, 2])
+    with pytest.raises(ArmRefused, match=r"poses\[0\]: .*(out of reach|limit)"):
+        mode.through([far])
+    with pytest.raises(ArmRefused, match="too near to the structure"):
+        mode.through([into])
+    with pytest.raises(ArmRefused, match="another hand holds it"):
+        mode.to_hold(structure.ids[walk.held[1]])
+    with pytest.raises(UnknownNameError):
+        mode.to_hold("99,99")
+    with pytest.raises(UnknownNameError):
+        ArmMode(walk, "arm9")
+    assert (walk.q == q).all()
+    assert len(walk.held) == 3
+    walk.pace = 0.5
+    with pytest.raises(ArmRefused, match="the body moves"):
+        ArmMode(walk, "arm1")
