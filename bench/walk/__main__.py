@@ -18,10 +18,11 @@ from bench.harness import machine as host
 from bench.pool import ROOT
 from bench.records import measure
 from bench.report import goal_sheet
-from bench.walk.courses import COURSES, Machine, courses, highest, machine, spins, trenches
+from bench.walk.courses import COURSES, Machine, courses, highest, machine, spins
 from bench.walk.layouts import layouts
 from bench.walk.planning import planning
 from bench.walk.tables import Parts, Record, goals, sheets
+from bench.walk.trenches import COUNT, trenches
 from wbc.errors import RangeError
 from wbc.robots import WalkerData
 from wbc.robots.walker_data import WALKER_DIGEST
@@ -30,7 +31,7 @@ from wbc.robots.walker_data import WALKER_DIGEST
 PARTS = {
     "courses": 3 * len(COURSES),
     "spins": 2,
-    "trenches": 9,
+    "trenches": COUNT,
     "highest": len(COURSES),
     "planning": 3 * len(COURSES),
     "layouts": 1000,

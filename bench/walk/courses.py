@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from wbc.robots import Walker
-from wbc.walking import Structure, cylinder, remove_columns, remove_rows
+from wbc.walking import Structure, cylinder
 from wbc.walking.body_path import BodyPath, grid_path
 from wbc.walking.plan import NoPlanError, Plan
 from wbc.walking.planner import plan_walk
@@ -116,16 +116,3 @@ def spins(it: Machine, rates: tuple[float, ...] = (0.05, 0.15)) -> Iterator[Reco
     for rate in rates:
         turns = [(13.0, 12.0, k * pi / 2) for k in range(13)]
         yield {"turn": rate, **it.walk(structure, grid_path(turns, 1.0, rate))}
-
-
-def trenches(it: Machine, most: int = 8) -> Iterator[Record]:
-    """Rows and columns that are removed before a body that goes at 1 in/s; it may go lower and turn."""
-    whole = cylinder(rigid=True)
-    for rows in range(3, most + 1):
-        path = grid_path([(13.0, 6.0), (13.0, 14.0 + rows)], 1.0 * INCH)
-        found = it.walk(remove_rows(whole, f"12-{11 + rows}"), path, objective="destination", detour=True)
-        yield {"trench": f"{rows} rows", **found}
-    for columns in range(3, 6):
-        path = grid_path([(6.0, 12.0), (14.0 + columns, 12.0)], 1.0 * INCH)
-        found = it.walk(remove_columns(whole, f"12-{11 + columns}"), path, objective="destination", detour=True)
-        yield {"trench": f"{columns} columns", **found}

@@ -92,8 +92,8 @@ def _spins(records: list[Record]) -> Sheet:
 
 
 def _trenches(records: list[Record]) -> Sheet:
-    rows = [(r["trench"], *_walk(r)) for r in records]
-    return Sheet("Trenches at 1 in/s; the body may go lower and turn", ("", *WALK), rows)
+    rows = [(r["trench"], r["verdict"], *_walk(r)) for r in records]
+    return Sheet("Trenches at 1 in/s; the body may go lower, turn and go round", ("", "reference", *WALK), rows)
 
 
 def _planning(records: list[Record]) -> Sheet:
