@@ -49,8 +49,8 @@ def rewritten(source: Path, target: Path, **changes: Any) -> Path:
 
 def test_recordings_of_another_kind_are_refused(tmp_path: Path) -> None:
     run, other = recorded(tmp_path / "run.npz"), tmp_path / "other.npz"
-    with pytest.raises(RecordingError, match="of another format, this version reads 1"):
-        replay(rewritten(run, other, format=2))
+    with pytest.raises(RecordingError, match="of another format, this version reads 2"):
+        replay(rewritten(run, other, format=1))
     with pytest.raises(RecordingError, match="made by another version of wbc"):
         replay(rewritten(run, other, wbc="0.0.1"))
     with pytest.raises(RecordingError, match=r"is of another stack: .* not .*more"):

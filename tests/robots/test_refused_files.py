@@ -10,6 +10,7 @@ import pytest
 
 import wbc.robots
 from wbc.errors import BoundsError, RobotFileError, ShapeError, UnknownNameError, UnsupportedJointError, WbcError
+from wbc.robots.operator_arms import OPERATOR_ARMS
 
 LINKS = '<link name="a"/><link name="b"/>'
 JOINT = '<joint name="j" type="revolute"><parent link="a"/><child link="{child}"/>{limit}</joint>'
@@ -61,7 +62,8 @@ def test_unknown_names_list_the_nearest() -> None:
     with pytest.raises(UnknownNameError, match="did you mean 'panda'") as caught:
         wbc.robots.load("pandaa")
     assert caught.value.choices[0] == "panda"
-    assert set(caught.value.choices) == {recipe.name for recipe in wbc.robots.table()} | {"walker", "two_ended_arm"}
+    made = {"walker", "two_ended_arm", *OPERATOR_ARMS}
+    assert set(caught.value.choices) == {recipe.name for recipe in wbc.robots.table()} | made
     with pytest.raises(UnknownNameError, match="did you mean 'walker'"):
         wbc.robots.load("walkr")
     with pytest.raises(UnknownNameError, match="did you mean 'fit'"):

@@ -6,7 +6,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wbc.controller.levels import Levels
-from wbc.controller.report import BRAKED, INFINITE, RELAXED, SOLVED, SOUND, TOLERANCE, UNSOUND, ReportLayout
+from wbc.controller.report import (
+    BRAKED,
+    INFINITE,
+    KNOWN,
+    OPTIMAL,
+    RELAXED,
+    SOLVED,
+    SOUND,
+    TOLERANCE,
+    UNSOUND,
+    ReportLayout,
+)
 from wbc.controller.tick import Assembly, Buffers
 from wbc.qp.certificate import Certificate, certify
 from wbc.qp.hierarchy import Answer
@@ -93,7 +104,10 @@ class SolvedTick(Buffers):
         self.v_last[:] = v
         if answer is None:
             return BRAKED + UNSOUND if self.assembly.usable else BRAKED
-        sound = max(certificate.error_bound, certificate.violation) <= SOUND * self._longest
+        optimal = max(certificate.stationarity, certificate.complementarity) <= OPTIMAL
+        sound = (
+            optimal or certificate.error_bound <= KNOWN * self._longest
+        ) and certificate.violation <= SOUND * self._longest
         return flag if sound else flag + UNSOUND
 
     def brake(self, qp: QP) -> None:

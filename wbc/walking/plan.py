@@ -21,8 +21,10 @@ class NoPlanError(WbcError):
         separating: ids of the holds at which the way ends; empty where no arm reaches any.
     """
 
-    def __init__(self, field: str, value: Any, reason: str, separating: Iterable[str] = ()) -> None:
-        super().__init__(field, value, reason)
+    def __init__(
+        self, field: str, value: Any, reason: str, choices: Iterable[str] = (), *, separating: Iterable[str] = ()
+    ) -> None:
+        super().__init__(field, value, reason, tuple(choices))
         self.separating = tuple(separating)
 
 

@@ -88,7 +88,7 @@ def plan_walk(
             if changed.complete:
                 return changed
     if not plan.complete and not partial:
-        raise NoPlanError("plan", structure.name, plan.reason, plan.separating)
+        raise NoPlanError("plan", structure.name, plan.reason, separating=plan.separating)
     return plan
 
 
@@ -166,13 +166,16 @@ def stances(
                 mine = [g for g, gap in zip(mine, off, strict=True) if gap < SAME_BRANCH]
             if not mine:
                 raise NoPlanError(
-                    f"start.{name}", start[name], "the arm cannot hold it at the beginning of the path", [start[name]]
+                    f"start.{name}",
+                    start[name],
+                    "the arm cannot hold it at the beginning of the path",
+                    separating=[start[name]],
                 )
         mine = [g for g in mine if structure.ids[grips.hold[g]] not in avoid.get(name, ())]
         mine.sort(key=lambda g: (-int(grips.last[g]), int(grips.hold[g]), int(grips.branch[g])))
         if not mine:
             raise NoPlanError(
-                "plan", name, "no hold is in reach at the beginning of the path", _at_first(structure, grips)
+                "plan", name, "no hold is in reach at the beginning of the path", separating=_at_first(structure, grips)
             )
         choices.append(mine[:START_GRIPS])
     search.clearance.prepare((a, b) for one, other in combinations(choices, 2) for a, b in product(one, other))
@@ -187,7 +190,7 @@ def stances(
             "plan",
             structure.name,
             "no stance is possible at the beginning: the arms are in each other's way",
-            _at_first(structure, grips),
+            separating=_at_first(structure, grips),
         )
     return [stance for _, stance in sorted(stances)[:STARTS]]
 

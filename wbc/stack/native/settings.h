@@ -42,8 +42,12 @@ int bend(const double **arg, double **res, long long *iw, double *w, int mem);
 #define UNIT_TOLERANCE 2.00001e-6
 /* Violations up to this, in row units, are rounding */
 #define TOLERANCE 1e-9
-/* A certificate fails beyond this bound on the error of v and on violations, in v / LONGEST and rows / LONGEST */
+/* A certificate fails beyond SOUND, of violations / LONGEST, or where both the bound on the error of v is above KNOWN
+ * LONGEST and the optimality conditions are off by more than OPTIMAL: the bound is loose, or there is none, where only
+ * the damping holds a direction or active rows depend on each other */
 #define SOUND 1e-6
+#define KNOWN 1e-3
+#define OPTIMAL 1e-9
 /* Violations of rows that the solver took into account, in row units: beyond this the row cannot hold */
 #define SEEN 1e-6
 

@@ -28,7 +28,8 @@ EXPORT int wbc_tick_check(wbc_tick *t) {
 static int unsound(const wbc_tick *t, int flag) {
     if (flag == WBC_CAPPED) return 0;
     if (flag == WBC_BRAKED) return t->unusable == 0.0;
-    return !(t->report.error_bound <= SOUND * LONGEST && t->report.violation <= SOUND * LONGEST);
+    const int optimal = t->report.stationarity <= OPTIMAL && t->report.complementarity <= OPTIMAL;
+    return !((optimal || t->report.error_bound <= KNOWN * LONGEST) && t->report.violation <= SOUND * LONGEST);
 }
 
 EXPORT int wbc_tick_step(wbc_tick *t) {
