@@ -23,9 +23,9 @@ INFINITE = 1e30
 #: (both as in ``native/settings.h``)
 TOLERANCE, UNIT_TOLERANCE = 1e-9, 2.00001e-6
 
-#: A certificate fails where a violation is above the first, or where both the bound on the error of v is above the second
-#: (a length of the characteristic one counts as 1 rad) and the optimality conditions are off by more than the third; as
-#: in ``native/settings.h``
+#: A certificate fails where a violation is above the first, or where both the bound on the error of v is above the
+#: second (a length of the characteristic one counts as 1 rad) and the optimality conditions are off by more than the
+#: third; as in ``native/settings.h``
 SOUND, KNOWN, OPTIMAL = 1e-6, 1e-3, 1e-9
 
 #: What is reported of each level, and of the least velocity after them
