@@ -123,16 +123,12 @@ class Tracer:
         Raises:
             UnknownNameError: no such frame.
         """
-        relative, kinematics = self.rotation(frame), self.kinematics
+        relative = self.rotation(frame)
         phi = ca.SX.sym(f"phi_{frame}_{base}", 3)
         motion = rot.left_jacobian_inverse(phi)
         if base != WORLD:
             relative = self.rotation(base).T @ relative
             motion = motion @ self.rotation(base).T
-
-        def spin() -> ca.SX:
-            own = kinematics.jacobian(frame)[3:, :]
-            return own if base == WORLD else own - kinematics.jacobian(base)[3:, :]
 
         value = rot.log3(relative @ target.T)
         self._symbols.append(
@@ -141,7 +137,7 @@ class Tracer:
                 phi,
                 lambda: value,
                 motion,
-                spin,
+                partial(self._spin, frame, base),
                 inner=True,
                 pulls=lambda torque: (Pull("torque", frame, torque), Pull("torque", base, -torque)),
             )
@@ -167,13 +163,9 @@ class Tracer:
         Raises:
             UnknownNameError: no such frame.
         """
-        kinematics, symbol = self.kinematics, ca.SX.sym(f"across_{frame}_{base}", 2)
+        symbol, spin = ca.SX.sym(f"across_{frame}_{base}", 2), partial(self._spin, frame, base)
         still = self.held(axes)
         outer = still if base == WORLD else self.rotation(base) @ still
-
-        def spin() -> ca.SX:
-            own = kinematics.jacobian(frame)[3:, :]
-            return own if base == WORLD else own - kinematics.jacobian(base)[3:, :]
 
         def pulls(torque: ca.SX) -> tuple[Pull, ...]:
             bent = axis_bend(spin(), self.expand(outer[:, 2]), torque, self.expand(outer[:, :2] @ turn))
@@ -185,6 +177,11 @@ class Tracer:
         )
         self._symbols.append(across)
         return symbol
+
+    def _spin(self, frame: str, base: str) -> ca.SX:
+        """3 x nv: angular velocity of ``frame`` past ``base`` in world axes, by v."""
+        own = self.kinematics.jacobian(frame)[3:, :]
+        return own if base == WORLD else own - self.kinematics.jacobian(base)[3:, :]
 
     def held(self, expression: ca.SX) -> ca.SX:
         """The value of an expression, which derivatives take for a constant: neither q nor inputs move it.
