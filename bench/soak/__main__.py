@@ -6,45 +6,27 @@ Ctrl-C ends a run; what was counted until then is printed. The exit status is 1 
 from __future__ import annotations
 
 import argparse
-import logging
+import os
 import secrets
 import sys
-import warnings
 from collections import Counter
-from collections.abc import Iterator
+from pathlib import Path
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-from bench.records import Parts, Record, measure
+from bench.records import Parts
 from bench.sheet import Sheet
-from bench.soak.episodes import stacks
-from bench.soak.faults import count, faults
-from bench.soak.known import problems
+from bench.soak.jobs import Job, Kept, measure, parts_of
 
 #: Stacks and ticks a stack on the virtual machine; the same compiled; stacks with known problems and problems of each;
-#: stacks for the faults
-FULL = {"vm": 200, "vm ticks": 240, "native": 20, "native ticks": 47_600, "known": 40, "problems": 25, "faults": 10}
+#: stacks for the faults; stacks with strict levels on either back end, and ticks of each (ten times as many compiled)
+FULL = {
+    "vm": 200, "vm ticks": 240, "native": 20, "native ticks": 47_600, "known": 40, "problems": 25, "faults": 10,
+    "levels": 10, "levels ticks": 200,
+}  # fmt: skip
 
 STATUSES = ("solved", "relaxed", "recovered", "braked", "capped")
-
-
-def parts_of(seed: int, sizes: dict[str, int], native: bool) -> dict[str, tuple[int, Iterator[Record]]]:
-    """Part -> (number of records, the records as they come)."""
-    n = sizes
-    out = {
-        f"known {seed}": (n["known"], _records(problems(seed, n["known"], "vm", n["problems"]))),
-        f"faults {seed}": (count(n["faults"], native), _records(faults(seed, n["faults"], native))),
-        f"vm {seed}": (n["vm"], _records(stacks(seed, n["vm"], "vm", n["vm ticks"]))),
-    }
-    if native:
-        out[f"native {seed}"] = (n["native"], _records(stacks(seed, n["native"], "native", n["native ticks"])))
-    return out
-
-
-def _records(found: Iterator[tuple[str, Counter[str]]]) -> Iterator[Record]:
-    for name, counts in found:
-        yield {"name": name, "counts": counts}
 
 
 def is_wrong(key: str) -> bool:
@@ -59,11 +41,25 @@ def sheet(parts: Parts) -> Sheet:
         total = sum((record["counts"] for record in records), Counter[str]())
         ends = Counter({s: sum(n for key, n in total.items() if key.split()[0] == s) for s in STATUSES})
         ticks = sum(ends.values())
-        shares = [f"{ends[s]}" for s in STATUSES]
+        shares = [share(ends[s], ticks) for s in STATUSES]
         links = ", ".join(f"{key} {n}" for key, n in sorted(total.items()) if " by " in key)
         wrong = sum(n for key, n in total.items() if is_wrong(key))
         rows.append((part, f"{len(records)}", f"{ticks}", *shares, links or "-", f"{wrong}"))
     return Sheet("Ticks by how they ended", ("part", "runs", "ticks", *STATUSES, "links taken", "wrong"), rows)
+
+
+def conflicts(parts: Parts) -> Sheet:
+    """What gave way in the ticks of every part: several kinds may in one tick."""
+    totals = {part: sum((r["counts"] for r in records), Counter[str]()) for part, records in parts.items()}
+    mark = "gave way: "
+    kinds = sorted({key for total in totals.values() for key in total if key.startswith(mark)})
+    rows = [(part, *(str(total[kind]) for kind in kinds)) for part, total in totals.items()]
+    return Sheet("Ticks in which rows of a kind gave way", ("part", *(k.removeprefix(mark) for k in kinds)), rows)
+
+
+def share(count: int, ticks: int) -> str:
+    """A count, and what part of all ticks it is."""
+    return f"{count} ({100.0 * count / ticks:.3g} %)" if count else "0"
 
 
 def failures(parts: Parts) -> list[str]:
@@ -86,6 +82,10 @@ def arguments(given: list[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--scale", type=float, default=1.0, help="share of the ticks, stacks stay as many")
     parser.add_argument("--stacks", type=int, help="stacks of each kind at most")
     parser.add_argument("--vm", action="store_true", help="only the virtual machine: no compiler is needed")
+    parser.add_argument("--parts", nargs="+", help="only parts whose names begin so: known, faults, vm, native, levels")
+    parser.add_argument("--keep", type=Path, help="file of the jobs that are done: the same command goes on from there")
+    parser.add_argument("--processes", type=int, default=os.cpu_count() or 1)
+    parser.add_argument("--markdown", action="store_true", help="print the table as Markdown")
     return parser.parse_args(given)
 
 
@@ -93,7 +93,7 @@ def sizes_of(scale: float, most: int | None) -> dict[str, int]:
     """Sizes of a run."""
     sizes = {name: max(20, int(n * scale)) if "ticks" in name else n for name, n in FULL.items()}
     if most is not None:
-        sizes |= {name: min(sizes[name], most) for name in ("vm", "native", "known", "faults")}
+        sizes |= {name: min(sizes[name], most) for name in ("vm", "native", "known", "faults", "levels")}
     return sizes
 
 
@@ -101,19 +101,19 @@ def main(given: list[str] | None = None) -> int:
     """Run and print; the exit status."""
     chosen = arguments(given)
     seeds = {chosen.seed: 1.0} if chosen.seed is not None else {0: 1.0, secrets.randbelow(10**9): 0.1}
-    work: dict[str, tuple[int, Iterator[Record]]] = {}
-    for seed, share in seeds.items():
-        work |= parts_of(seed, sizes_of(chosen.scale * share, chosen.stacks), not chosen.vm)
+    work: dict[str, list[Job]] = {}
+    for seed, part in seeds.items():
+        work |= parts_of(seed, sizes_of(chosen.scale * part, chosen.stacks), not chosen.vm)
+    if chosen.parts:
+        work = {name: jobs for name, jobs in work.items() if name.startswith(tuple(chosen.parts))}
     console, errors = Console(), Console(stderr=True)
     if not console.is_terminal:
         console = Console(width=200)
     bars = (TextColumn("{task.description:18}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-    logging.getLogger("wbc").setLevel(logging.ERROR)
-    with Progress(*bars, TimeRemainingColumn(), console=errors) as progress, warnings.catch_warnings():
-        # targets at 50 m and weights of 1e3 do overflow inside NumPy now and then; what comes out is judged
-        warnings.simplefilter("ignore", RuntimeWarning)
-        parts, interrupted = measure(work, progress)
-    console.print(sheet(parts).rich())
+    with Progress(*bars, TimeRemainingColumn(), console=errors) as progress:
+        parts, interrupted = measure(work, Kept(chosen.keep), max(1, chosen.processes), progress)
+    for table in (sheet(parts), conflicts(parts)):
+        console.print(table.markdown() if chosen.markdown else table.rich(), markup=False, soft_wrap=chosen.markdown)
     if interrupted:
         console.print(f"Ended by Ctrl-C in: {interrupted}.", markup=False)
     bad = failures(parts)

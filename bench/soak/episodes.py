@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 
 import numpy as np
 import pinocchio as pin
 
 from bench.soak.judge import Judge, Outside
+from bench.soak.levels import with_levels
 from bench.soak.machines import configuration, machine
 from bench.soak.stacks import DT, provoke, random_stack
 from wbc.controller import Controller, Step
@@ -52,6 +53,7 @@ def episode(controller: Controller, judge: Judge, rng: np.random.Generator, plan
             return counts
         seconds = DT if dt is None else dt
         counts[label(step)] += 1
+        counts.update(f"gave way: {kind}" for kind in judge.gave_way(step))
         wrong = judge.step(step, before, seconds)
         v = step.v
         q = pin.integrate(robot.model, q, v * seconds)
@@ -62,15 +64,16 @@ def episode(controller: Controller, judge: Judge, rng: np.random.Generator, plan
     return counts
 
 
-def stacks(seed: int, number: int, backend: str, ticks: int) -> Iterator[tuple[str, Counter[str]]]:
-    """``number`` random stacks, each with ``ticks`` ticks: its description and its counts."""
-    for k in range(number):
-        rng = np.random.default_rng([seed, backend == "native", k])
-        controller = random_stack(machine(rng), rng).compile(backend=backend)
-        judge, counts, done = Judge(controller), Counter[str](), 0
-        while done < ticks:
-            found = episode(controller, judge, rng)
-            counts += found
-            done += LENGTH
-        items = " ".join(f"{e.name}" for e in controller.stack.entries)
-        yield f"{backend} {seed}/{k}: {controller.stack.robot.nv} dof, {items}", counts
+def stack(seed: int, k: int, backend: str, ticks: int, levels: bool = False) -> list[tuple[str, Counter[str]]]:
+    """A random stack, with random strict levels if asked for, with ``ticks`` ticks: its description and its counts."""
+    rng = np.random.default_rng([seed, backend == "native", k, *([1] if levels else [])])
+    chosen = random_stack(machine(rng), rng)
+    if levels:
+        chosen = with_levels(chosen, rng)
+    controller = chosen.compile(backend=backend)
+    judge, counts, done = Judge(controller), Counter[str](), 0
+    while done < ticks:
+        counts += episode(controller, judge, rng)
+        done += LENGTH
+    items = " ".join(f"{e.name}:{e.level}" if levels else e.name for e in controller.stack.entries)
+    return [(f"{backend} {seed}/{k}: {controller.stack.robot.nv} dof, {items}", counts)]

@@ -6,7 +6,7 @@ import contextlib
 import os
 import tempfile
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +21,8 @@ from wbc.qp import daqp
 from wbc.validation import Array
 
 Given = tuple[Array, Array | None, float | None]
+#: Names of runs with their counts
+Found = list[tuple[str, Counter[str]]]
 
 
 class Stale:
@@ -56,7 +58,7 @@ def jumping_clock(controller: Controller, q: Array, v: Array, tick: int, rng: np
     return q, None, DT * float(rng.choice([0.25, 2.0]))
 
 
-def one_iteration(seed: int, k: int, backend: str) -> Counter[str]:
+def one_iteration(seed: int, k: int, backend: str) -> Found:
     """The QP solver may take one iteration, in all its uses within a native tick or on the virtual machine."""
     rng = np.random.default_rng([seed, 11, k])
     before = daqp.SETTINGS["iter_limit"]
@@ -66,21 +68,21 @@ def one_iteration(seed: int, k: int, backend: str) -> Counter[str]:
         controller = random_stack(machine(rng), rng).compile(backend=backend)
         if backend == "native":
             controller.iteration_cap = 1
-        return episode(controller, Judge(controller), rng)
+        return [(f"one iteration, {backend} {seed}/{k}", episode(controller, Judge(controller), rng))]
     finally:
         daqp.SETTINGS["iter_limit"] = before
 
 
-def plants(seed: int, k: int, backend: str) -> dict[str, Counter[str]]:
+def plants(seed: int, k: int, backend: str) -> Found:
     """What the state and the clock can do, on one stack."""
     rng = np.random.default_rng([seed, 12, k])
     controller = random_stack(machine(rng), rng).compile(backend=backend)
     judge = Judge(controller)
     kinds: dict[str, Plant] = {"stale state": Stale(), "frozen joint": Frozen(), "clock jumps": jumping_clock}
-    return {name: episode(controller, judge, rng, plant) for name, plant in kinds.items()}
+    return [(f"{name}, {backend} {seed}/{k}", episode(controller, judge, rng, kinds[name])) for name in kinds]
 
 
-def lost_library(seed: int, k: int, harm: Callable[[Path], None]) -> Counter[str]:
+def lost_library(seed: int, k: int, harm: str) -> Found:
     """The compiled library is lost while it is in use: commands stay the same, copies and explanations work."""
     rng = np.random.default_rng([seed, 13, k])
     stack = random_stack(machine(rng), rng)
@@ -94,7 +96,7 @@ def lost_library(seed: int, k: int, harm: Callable[[Path], None]) -> Counter[str
             twin = controller.clone()
             library.parent.chmod(0o700)
             library.chmod(0o600)
-            harm(library)
+            HARM[harm](library)
             for each in (controller, twin, controller.clone()):
                 counts += episode(each, Judge(each), np.random.default_rng(k))
             q = controller.stack.robot.neutral
@@ -107,7 +109,7 @@ def lost_library(seed: int, k: int, harm: Callable[[Path], None]) -> Counter[str
                 del os.environ["WBC_CACHE"]
             else:
                 os.environ["WBC_CACHE"] = cache
-    return counts
+    return [(f"library lost ({harm}) {seed}", counts)]
 
 
 def delete(library: Path) -> None:
@@ -122,18 +124,4 @@ def corrupt(library: Path) -> None:
         file.write(np.random.default_rng(0).bytes(4096))
 
 
-def faults(seed: int, number: int, native: bool) -> Iterator[tuple[str, Counter[str]]]:
-    """Every fault on ``number`` stacks of each back end; libraries are lost on one."""
-    for backend in ("vm", "native") if native else ("vm",):
-        for k in range(number):
-            yield f"one iteration, {backend} {seed}/{k}", one_iteration(seed, k, backend)
-            for name, counts in plants(seed, k, backend).items():
-                yield f"{name}, {backend} {seed}/{k}", counts
-    if native:
-        yield f"library deleted {seed}", lost_library(seed, 0, delete)
-        yield f"library corrupted {seed}", lost_library(seed, 1, corrupt)
-
-
-def count(number: int, native: bool) -> int:
-    """How many records :func:`faults` gives."""
-    return 4 * number * (2 if native else 1) + (2 if native else 0)
+HARM: dict[str, Callable[[Path], None]] = {"delete": delete, "corrupt": corrupt}

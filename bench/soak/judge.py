@@ -21,6 +21,12 @@ class Judge:
         self.room = 1e-11 * np.maximum(1.0, np.where(np.isfinite(robot.limits.velocity), robot.limits.velocity, 1.0))
         scales = [1.0, controller.stack.length]
         self.longest = max(scales)
+        blocks = controller.layout.of_form("margins", "rows")
+        self.kinds = np.array([type(b.entry.item).__name__ for b in blocks for _ in b.rows])
+
+    def gave_way(self, step: Step) -> set[str]:
+        """Kinds of constraints with a row that gave way."""
+        return set(self.kinds[np.flatnonzero(step._part("slack"))].tolist())
 
     def step(self, step: Step, before: Array, dt: float) -> str:
         """Numbers, actuator limits about the velocity before, and the certificate."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
 
 import numpy as np
 import pinocchio as pin
@@ -76,26 +75,25 @@ def referee(qp: QP) -> Array | None:
     return np.asarray(found[0])
 
 
-def problems(seed: int, number: int, backend: str, states: int) -> Iterator[tuple[str, Counter[str]]]:
-    """Stacks with ``states`` problems each: how they ended; ``wrong: ...`` for what must not be."""
-    for k in range(number):
-        rng = np.random.default_rng([seed, 7, k])
-        controller = feasible_stack(machine(rng), rng).compile(backend=backend)
-        counts = Counter[str]()
-        for _ in range(states):
-            q, v = pose_problem(controller, rng)
-            step = controller.step(q)
-            counts[label(step)] += 1
-            # the buffers still hold the tick, but for the velocity that accelerations count from
-            controller.tick.v_last[:] = 0.0
-            qp = controller.qp()
-            if qp.violation(v).max() > 1e-9:
-                counts["wrong: the known velocity is not feasible"] += 1
-            elif step.status != "solved":
-                counts["wrong: degraded although a velocity meets all rows"] += 1
-            else:
-                best = referee(qp)
-                counts["referee gives up"] += best is None
-                if best is not None and np.abs(best - step.v).max() > SAME:
-                    counts["wrong: another optimum than the referee's"] += 1
-        yield f"known {seed}/{k}: {controller.stack.robot.nv} dof", counts
+def problems(seed: int, k: int, backend: str, states: int) -> list[tuple[str, Counter[str]]]:
+    """A stack with ``states`` problems: how they ended; ``wrong: ...`` for what must not be."""
+    rng = np.random.default_rng([seed, 7, k])
+    controller = feasible_stack(machine(rng), rng).compile(backend=backend)
+    counts = Counter[str]()
+    for _ in range(states):
+        q, v = pose_problem(controller, rng)
+        step = controller.step(q)
+        counts[label(step)] += 1
+        # the buffers still hold the tick, but for the velocity that accelerations count from
+        controller.tick.v_last[:] = 0.0
+        qp = controller.qp()
+        if qp.violation(v).max() > 1e-9:
+            counts["wrong: the known velocity is not feasible"] += 1
+        elif step.status != "solved":
+            counts["wrong: degraded although a velocity meets all rows"] += 1
+        else:
+            best = referee(qp)
+            counts["referee gives up"] += best is None
+            if best is not None and np.abs(best - step.v).max() > SAME:
+                counts["wrong: another optimum than the referee's"] += 1
+    return [(f"known {seed}/{k}: {controller.stack.robot.nv} dof", counts)]

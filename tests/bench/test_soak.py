@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections import Counter
+from pathlib import Path
 
 import numpy as np
 import pytest
+from rich.progress import Progress
 
 from bench.records import Parts
-from bench.soak.__main__ import failures, is_wrong, sheet
-from bench.soak.episodes import episode, stacks
+from bench.soak.__main__ import conflicts, failures, is_wrong, sheet
+from bench.soak.episodes import episode, stack
 from bench.soak.faults import one_iteration, plants
+from bench.soak.jobs import Kept, measure, parts_of
 from bench.soak.judge import Judge, Outside
 from bench.soak.known import problems
 from bench.soak.machines import machine
@@ -24,28 +27,44 @@ def wrong(counts: Counter[str]) -> dict[str, int]:
 
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")
 def test_random_stacks_give_safe_certified_commands() -> None:
-    found = list(stacks(3, 4, "vm", 40))
+    found = [run for k in range(4) for run in stack(3, k, "vm", 40)]
+    found += stack(3, 0, "vm", 40, levels=True)
     assert {name: wrong(counts) for name, counts in found if wrong(counts)} == {}
     total = sum((counts for _, counts in found), Counter[str]())
-    assert total.total() == 4 * 40
+    assert sum(n for key, n in total.items() if not key.startswith("gave way")) == 5 * 40
     assert total["solved"] > 20
     assert total["relaxed"] > 20
 
 
 def test_known_problems_are_solved_as_the_referee_does() -> None:
-    for name, counts in problems(5, 2, "vm", 10):
+    for name, counts in problems(5, 0, "vm", 10) + problems(5, 1, "vm", 10):
         assert wrong(counts) == {}, name
         assert counts["solved"] == 10
 
 
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")
 def test_faults_are_survived() -> None:
-    counts = one_iteration(0, 0, "vm")
+    ((_, counts),) = one_iteration(0, 0, "vm")
     assert wrong(counts) == {}
     assert sum(n for key, n in counts.items() if key.startswith(("recovered", "braked"))) > 0
-    for name, each in plants(0, 1, "vm").items():
+    for name, each in plants(0, 1, "vm"):
         assert wrong(each) == {}, name
-        assert each.total() == 20, name
+        assert sum(n for key, n in each.items() if not key.startswith("gave way")) == 20, name
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+def test_a_run_goes_on_from_the_jobs_that_are_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    sizes = {"vm": 1, "vm ticks": 20, "known": 1, "problems": 2, "faults": 0, "levels": 1, "levels ticks": 20}
+    path = tmp_path / "soak.jsonl"
+    first, interrupted = measure(parts_of(2, sizes, False), Kept(path), 1, Progress(disable=True))
+    assert interrupted is None
+    assert list(first) == ["known 2", "faults 2", "vm 2", "levels vm 2"]
+    monkeypatch.setattr("bench.soak.jobs._run", lambda jobs, pool: iter([(job, 1 / 0) for job in jobs]))
+    again, _ = measure(parts_of(2, sizes, False), Kept(path), 1, Progress(disable=True))
+    assert again == first
+    path.write_text('{"sources": "others"}\n')
+    with pytest.raises(ValueError, match="other sources"):
+        Kept(path)
 
 
 @pytest.fixture(scope="module")
@@ -104,6 +123,9 @@ def test_exceptions_are_counted(controller: Controller) -> None:
 
     counts = episode(controller, Judge(controller), np.random.default_rng(0), bad)
     assert dict(counts) == {"raised: RangeError": 1}
-    parts: Parts = {"vm": [{"name": "one", "counts": counts}]}
+    parts: Parts = {
+        "vm": [{"name": "one", "counts": counts}, {"name": "two", "counts": Counter({"gave way: Hold": 3})}]
+    }
+    assert conflicts(parts).rows == [("vm", "3")]
     assert failures(parts) == ["one: raised: RangeError (1)"]
     assert sheet(parts).rows[0][-1] == "1"

@@ -1,0 +1,144 @@
+"""What a soak does, cut into jobs that can run in any order, in any process, and be kept in a file."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import logging
+import warnings
+from collections import Counter
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from functools import partial
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+from rich.progress import Progress
+
+from bench.pool import ROOT
+from bench.records import Parts
+from bench.soak.episodes import stack
+from bench.soak.faults import lost_library, one_iteration, plants
+from bench.soak.known import problems
+
+#: Names of runs with their counts
+Found = list[tuple[str, Counter[str]]]
+#: () -> what was found
+Job = partial[Found]
+
+
+def parts_of(seed: int, sizes: dict[str, int], native: bool) -> dict[str, list[Job]]:
+    """Part -> its jobs."""
+    n = sizes
+    backends = ("vm", "native") if native else ("vm",)
+    broken = [partial(job, seed, k, b) for b in backends for k in range(n["faults"]) for job in (one_iteration, plants)]
+    if native:
+        broken += [partial(lost_library, seed, k, harm) for k, harm in enumerate(("delete", "corrupt"))]
+    out = {
+        f"known {seed}": [partial(problems, seed, k, "vm", n["problems"]) for k in range(n["known"])],
+        f"faults {seed}": broken,
+    }
+    for b in backends:
+        out[f"{b} {seed}"] = [partial(stack, seed, k, b, n[f"{b} ticks"]) for k in range(n[b])]
+    for b in backends:
+        ticks, name = n["levels ticks"] * (10 if b == "native" else 1), f"levels {b} {seed}"
+        out[name] = [partial(stack, seed, k, b, ticks, levels=True) for k in range(n["levels"])]
+    return out
+
+
+def key(job: Job) -> str:
+    """The same for the same job."""
+    return json.dumps([job.func.__name__, job.args, job.keywords])
+
+
+class Kept:
+    """Jobs that are done, a line each in a file that belongs to one version of the sources; nothing without a file.
+
+    Raises:
+        ValueError: the file belongs to other sources.
+    """
+
+    def __init__(self, path: Path | None) -> None:
+        self._path, self._done = path, dict[str, Found]()
+        if path is None:
+            return
+        version = json.dumps({"sources": _sources()})
+        if not path.exists():
+            path.write_text(version + "\n")
+        first, *lines = path.read_text().splitlines()
+        if first != version:
+            raise ValueError(f"{path} holds jobs of other sources; give another file")
+        for line in lines:
+            done = json.loads(line)
+            self._done[done["job"]] = [(name, Counter(counts)) for name, counts in done["found"]]
+
+    def get(self, job: Job) -> Found | None:
+        """What a job that is done found."""
+        return self._done.get(key(job))
+
+    def put(self, job: Job, found: Found) -> None:
+        """Keep it."""
+        if self._path is not None:
+            with self._path.open("a") as file:
+                file.write(json.dumps({"job": key(job), "found": found}) + "\n")
+
+
+def measure(work: dict[str, list[Job]], kept: Kept, processes: int, progress: Progress) -> tuple[Parts, str | None]:
+    """(records of every part, the part in which Ctrl-C came)."""
+    parts: Parts = {}
+    name = "nothing"
+    pool = ProcessPoolExecutor(processes, get_context("spawn"), _begin) if processes > 1 else None
+    try:
+        for name, jobs in work.items():
+            records = parts[name] = []
+            bar = progress.add_task(name, total=len(jobs))
+            for found in _each(jobs, kept, pool):
+                records += [{"name": run, "counts": counts} for run, counts in found]
+                progress.advance(bar)
+    except KeyboardInterrupt:
+        return parts, name
+    finally:
+        if pool is not None:
+            pool.shutdown(cancel_futures=True)
+    return parts, None
+
+
+def _each(jobs: list[Job], kept: Kept, pool: ProcessPoolExecutor | None) -> Iterator[Found]:
+    """What every job finds; those that are kept first."""
+    known = [kept.get(job) for job in jobs]
+    yield from (found for found in known if found is not None)
+    open_jobs = [job for job, found in zip(jobs, known, strict=True) if found is None]
+    for job, found in _run(open_jobs, pool):
+        kept.put(job, found)
+        yield found
+
+
+def _run(jobs: list[Job], pool: ProcessPoolExecutor | None) -> Iterator[tuple[Job, Found]]:
+    """Jobs as they end."""
+    if pool is None:
+        _begin()
+        for job in jobs:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", RuntimeWarning)
+                yield job, job()
+        return
+    waiting = {pool.submit(job): job for job in jobs}
+    for future in as_completed(waiting):
+        yield waiting[future], future.result()
+
+
+def _begin() -> None:
+    """Of a process: targets at 50 m and weights of 1e3 overflow inside NumPy now and then; what comes out is judged."""
+    logging.getLogger("wbc").setLevel(logging.ERROR)
+    warnings.simplefilter("ignore", RuntimeWarning)
+
+
+def _sources() -> str:
+    """Hash of all that decides what a job finds."""
+    digest: Any = hashlib.sha256()
+    for folder in ("wbc", "tasks", "robots", "bench/soak"):
+        for path in sorted((ROOT / folder).rglob("*.*")):
+            if path.suffix in (".py", ".h", ".c", ".toml"):
+                digest.update(path.relative_to(ROOT).as_posix().encode() + b"\0" + path.read_bytes())
+    return str(digest.hexdigest()[:16])
