@@ -1,0 +1,33 @@
+"""Layouts with 10 to 60 % of the holds removed at random: what the reference proves possible is planned."""
+
+from __future__ import annotations
+
+import pytest
+
+from bench.walk.courses import Machine
+from bench.walk.layout_tables import layout_goals
+from bench.walk.layouts import judged, layout
+from wbc.robots import Walker
+from wbc.walking import Structure
+from wbc.walking.reference import Reference
+from wbc.walking.walk_stack import WalkStack
+
+#: Layouts, and how many a test judges
+COUNT, AT_ONCE = 30, 3
+
+
+@pytest.fixture(scope="module")
+def reference(machine: Walker) -> Reference:
+    return Reference(machine)
+
+
+@pytest.mark.parametrize("first", range(0, COUNT, AT_ONCE))
+def test_every_possible_layout_is_planned(
+    machine: Walker, structure: Structure, stack: WalkStack, reference: Reference, first: int
+) -> None:
+    it = Machine(machine, stack)
+    asked = [layout(seed, structure) for seed in range(first, first + AT_ONCE)]
+    # The first of all is walked too, and judged by the checker
+    records = [judged(it, reference, one, walked=one.seed == 0) for one in asked]
+    assert [goal.text for goal in layout_goals(records) if not goal.met] == []
+    assert all(record["planned"] for record in records if record["verdict"] == "possible")
