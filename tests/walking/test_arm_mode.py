@@ -56,6 +56,16 @@ def test_a_hand_goes_through_poses_to_a_hold_and_the_body_stands(walk: Walk, mac
     assert report.ok, str(report)
 
 
+def test_a_walk_goes_on_from_a_hold_from_which_few_swings_lead_on(
+    machine: Walker, structure: Structure, stack: WalkStack
+) -> None:
+    walk = Walk(machine, structure, plan_walk(machine, structure, grid_path([(13, 11), (13, 14)], 0.1)), stack=stack)
+    ArmMode(walk, "arm2").to_hold("16,11")
+    assert walk.run() == "arrived"
+    assert walk.plan.regrasps
+    assert all(law.possible for law in walk.plan.laws)
+
+
 def test_refusals_say_why_and_nothing_moves(walk: Walk) -> None:
     mode = ArmMode(walk, "arm1")
     here, q, structure = mode.pose, walk.q.copy(), walk.structure

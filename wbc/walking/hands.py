@@ -17,10 +17,8 @@ from wbc.walking.closed_chain import ClosedChain
 from wbc.walking.grip_rolls import ANY, frame_on
 from wbc.walking.plan import HoldLost, Plan
 from wbc.walking.replanning import way_to
-from wbc.walking.stance_search import Move
 from wbc.walking.structure import Structure
 from wbc.walking.swing_law import SwingLaw
-from wbc.walking.swings import Swings
 from wbc.walking.walk_hands import BEHIND, HAND_RAMP, LANDING, at_rest, hand_pace, turned
 from wbc.walking.walk_stack import WalkStack
 from wbc.walking.walk_state import Event, Hand, Swinging, What, Wrist
@@ -81,7 +79,6 @@ class Hands(ABC):
         if plan.grips is None:
             raise ShapeError("plan", plan, "expected a plan of the planner")
         self.plan, self.grips = plan, plan.grips
-        self.swings = Swings(self.walker, self.structure, plan.path, plan.grips)
         for arm, chain in enumerate(plan.chain):
             if self.swinging is None or self.swinging.arm != arm:
                 self._grip[arm] = chain[self._used[arm]]
@@ -115,11 +112,8 @@ class Hands(ABC):
         if self._landed == (arm, self.time):
             return  # A hand that goes on at once is closed for a tick
         self._used[arm] += 1
-        source, target = self.plan.chain[arm][self._used[arm] - 1 : self._used[arm] + 1]
-        lift, land = (round(x / self.plan.path.spacing) for x in (step.lift, step.land))
-        move = Move(arm, source, target, lift, land, step.duration, step.delay, step.way)
         self._open(arm)
-        law = SwingLaw.of(self.swings, move)
+        law, target = self.plan.laws[self._next], self.plan.chain[arm][self._used[arm]]
         self.swinging = self._swing(arm, target, law, latch=self.data.latch_time)
         self.swinging.bend = self._bend(self.swinging, 0.0)
         self._say("lift", step.arm, step.source)

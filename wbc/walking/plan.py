@@ -12,6 +12,7 @@ from typing import Any
 from wbc.errors import StructureFileError, WbcError
 from wbc.walking.body_path import BodyPath
 from wbc.walking.grips import Grips
+from wbc.walking.swing_law import SwingLaw
 
 
 class NoPlanError(WbcError):
@@ -73,6 +74,7 @@ class Plan:
         grips, chain: the table of grips, and for each arm the grips that it uses, first that of the start; for the
             controller, not in files.
         separating: ids of the holds at which the way ends if it is not complete.
+        laws: of the swings, one a re-grasp; for the controller, not in files.
     """
 
     path: BodyPath
@@ -84,6 +86,7 @@ class Plan:
     grips: Grips | None = field(default=None, repr=False)
     chain: tuple[tuple[int, ...], ...] = field(default=(), repr=False)
     separating: tuple[str, ...] = ()
+    laws: tuple[SwingLaw, ...] = field(default=(), repr=False)
 
     @property
     def delay(self) -> float:
@@ -99,12 +102,14 @@ class Plan:
         steps = self.regrasps[:count]
         used = [sum(step.arm == arm for step in steps) for arm in arms]
         chain = tuple(grips[: k + 1] for grips, k in zip(self.chain, used, strict=True))
-        return replace(self, regrasps=steps, complete=False, reached=reached, reason="being planned", chain=chain)
+        begun = replace(self, regrasps=steps, chain=chain, laws=self.laws[:count])
+        return replace(begun, complete=False, reached=reached, reason="being planned")
 
     def then(self, rest: Plan) -> Plan:
         """This plan, and another one over the same grips that begins with the stance that this one ends with."""
         chain = tuple((*one, *other[1:]) for one, other in zip(self.chain, rest.chain, strict=True))
-        return replace(rest, start=self.start, regrasps=(*self.regrasps, *rest.regrasps), chain=chain)
+        steps, laws = (*self.regrasps, *rest.regrasps), (*self.laws, *rest.laws)
+        return replace(rest, start=self.start, regrasps=steps, chain=chain, laws=laws)
 
     def rows(self) -> list[dict[str, Any]]:
         """One dictionary a re-grasp, as in the file."""

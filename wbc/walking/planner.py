@@ -19,8 +19,10 @@ from wbc.walking.detours import ways_round
 from wbc.walking.grips import Grips, grip_slices
 from wbc.walking.plan import NoPlanError, Plan, Regrasp
 from wbc.walking.slices import Slices, drained
+from wbc.walking.sound_plans import sound_slices
 from wbc.walking.stance_search import Found, StanceSearch
 from wbc.walking.structure import Structure
+from wbc.walking.swing_law import SwingLaw
 
 Objective = Literal["velocity", "destination"]
 
@@ -122,7 +124,7 @@ def plan_slices(
         raise ShapeError("walker", walker.robot.name, "expected a body with arms")
     if grips is None:
         grips = yield from grip_slices(walker, structure, path)
-    best: tuple[StanceSearch, Found] | None = None
+    best: tuple[Found, tuple[SwingLaw, ...]] | None = None
     delays: tuple[float, ...] = DELAYS if objective == "velocity" else DELAYS[-1:]
     widths = (None,) if width is None else (width, WIDER * width)
     if soon and objective == "velocity":
@@ -132,13 +134,13 @@ def plan_slices(
         search = StanceSearch(walker, structure, path, grips, longest_delay=delay, width=wide)
         starts = [stance] if stance else stances(walker, structure, search, beginning, sample)
         yield None
-        found = yield from search.slices(starts, sample, deadline)
-        if best is None or (found.complete, found.reached) > (best[1].complete, best[1].reached):
-            best = search, found
+        found, laws = yield from sound_slices(search, starts, sample, deadline)
+        if best is None or (found.complete, found.reached) > (best[0].complete, best[0].reached):
+            best = found, laws
         if found.complete or (deadline is not None and time.perf_counter() > deadline):
             break
     assert best is not None
-    return _plan(walker, structure, path, grips, best[1])
+    return _plan(walker, structure, path, grips, *best)
 
 
 def stances(
@@ -200,7 +202,9 @@ def _at_first(structure: Structure, grips: Grips) -> list[str]:
     return [structure.ids[k] for k in np.unique(grips.hold[grips.first == 0])]
 
 
-def _plan(walker: Walker, structure: Structure, path: BodyPath, grips: Grips, found: Found) -> Plan:
+def _plan(
+    walker: Walker, structure: Structure, path: BodyPath, grips: Grips, found: Found, laws: tuple[SwingLaw, ...]
+) -> Plan:
     ids, spacing = structure.ids, path.spacing
     steps, chain = [], [[g] for g in found.start]
     for move in found.moves:
@@ -235,4 +239,4 @@ def _plan(walker: Walker, structure: Structure, path: BodyPath, grips: Grips, fo
     start = tuple(ids[grips.hold[g]] for g in found.start)
     used = tuple(map(tuple, chain))
     reached = found.reached * spacing
-    return Plan(path, start, tuple(steps), found.complete, reached, reason, grips, used, tuple(separating))
+    return Plan(path, start, tuple(steps), found.complete, reached, reason, grips, used, tuple(separating), laws)

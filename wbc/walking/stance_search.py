@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
@@ -266,6 +266,15 @@ class StanceSearch:
     def until(self, key: Sequence[int], sample: int) -> int:
         """Last sample that a stance can hold, from a sample on."""
         return self._room(key, sample)
+
+    def shortened(self, found: Found, count: int) -> Found:
+        """What was found up to so many moves."""
+        key = list(found.start)
+        for move in found.moves[:count]:
+            key[move.arm] = move.target
+        last, end = self.until(key, found.moves[count - 1].land if count else 0), len(self.path) - 1
+        stuck = tuple(g for g in key if self.grips.last[g] == last)
+        return replace(found, moves=found.moves[:count], complete=last >= end, reached=min(last, end), blocking=stuck)
 
     def _conflict(self, one: int, other: int, sample: int) -> int:
         return self.clearance.first_conflict(one, other, sample)

@@ -14,7 +14,7 @@ from wbc.walking.stance_search import Move
 from wbc.walking.swing_curve import Curves
 from wbc.walking.swing_path import Wrists, blend, grip_wrists
 from wbc.walking.swing_speed import speeds
-from wbc.walking.swings import FINE, Swings
+from wbc.walking.swings import COARSE, FINE, PASSES, Swings
 
 #: Rows of the table are this far apart [s]
 SPACING = 0.005
@@ -71,17 +71,22 @@ class SwingLaw:
 
     @staticmethod
     def of(swings: Swings, move: Move) -> SwingLaw:
-        """The law of a planned move, as long as the plan says."""
-        source, target = np.array([move.source]), np.array([move.target])
-        # While the hand opens and closes the body moves on
+        """The law of a planned move, as long as the plan says, with the body where it is at these times."""
+        arms, source, target = np.array([move.arm]), np.array([move.source]), np.array([move.target])
         # It comes when the next grip begins, if it does not hold the body up
         whole = max(move.duration, 0.0 if move.delay else (move.land - move.lift) * swings.path.spacing)
         least = whole - swings.extra
-        part = (swings.latch + np.linspace(0.0, 1.0, FINE) * least) / whole
-        samples = move.lift + (move.land - move.lift) * part
-        way = swings.curve(np.array([move.arm]), source, target, np.array([move.lift]), move.way)
+        way = swings.curve(arms, source, target, np.array([move.lift]), move.way)
+        part = np.linspace(0.0, 1.0, COARSE)
+        for _ in range(PASSES):
+            # While the hand opens and closes the body moves on
+            samples = (move.lift + (move.land - move.lift) * (swings.latch + part * least) / whole)[None]
+            wrists = grip_wrists(swings.grips, source, target, COARSE)
+            found = speeds(swings.kinematics, swings.walker, arms, swings.path, way, samples, wrists)
+            part = found.time[0] / found.duration[0]
+        fine = np.interp(np.linspace(0.0, 1.0, FINE), np.linspace(0.0, 1.0, COARSE), samples[0])
         wrists = grip_wrists(swings.grips, source, target, FINE)
-        return SwingLaw(swings.walker, move.arm, swings.path, way, samples, wrists, least)
+        return SwingLaw(swings.walker, move.arm, swings.path, way, fine, wrists, least)
 
     def at(self, time: float) -> Aim:
         """The aim at a time since lifting, clipped to the swing."""

@@ -91,6 +91,7 @@ class Swings:
         self._tracks: dict[tuple[_Name, int], _Track | None] = {}
         self._apart: dict[tuple[_Name, int, int], bool] = {}
         self._chosen: dict[Swing, Chosen | None] = {}
+        self._refused: set[tuple[int, int, int, int, int]] = set()
 
     def estimate(self, source: int, targets: Ints) -> Array:
         """Times no swing is shorter than, latches and settling included [s]: by way and fastest hand."""
@@ -117,6 +118,8 @@ class Swings:
             rest = []
             for swing in left:
                 track = self._tracks[_name(swing), way]
+                if (*_name(swing)[:4], way) in self._refused:
+                    track = None
                 if track is not None and all(self._apart[_name(swing), way, g] for g in swing.others):
                     self._chosen[swing] = Chosen(way, track.duration)
                 else:
@@ -129,6 +132,13 @@ class Swings:
         if swing not in self._chosen:
             self.prepare([swing])
         return self._chosen[swing]
+
+    def refuse(self, arm: int, source: int, target: int, lift: int, way: int) -> None:
+        """A swing along one of the ways is not possible after all."""
+        name = arm, source, target, lift
+        self._refused.add((*name, way))
+        for swing in [s for s in self._chosen if _name(s)[:4] == name]:
+            del self._chosen[swing]
 
     def curve(self, arms: Ints, source: Ints, target: Ints, lift: Ints, way: int) -> Curves:
         """Ways of the hands of arms from grips to grips, lifted at samples of the path; ``[m]`` each."""

@@ -1,0 +1,38 @@
+"""Swings of plans are computed once more as they will be carried out."""
+
+from __future__ import annotations
+
+import pytest
+
+from wbc.robots import Walker
+from wbc.walking import Structure
+from wbc.walking.body_path import grid_path
+from wbc.walking.planner import plan_walk
+from wbc.walking.stance_search import Move
+from wbc.walking.swing_law import SwingLaw
+from wbc.walking.swings import Swings
+
+
+def test_a_swing_that_turns_out_impossible_is_not_in_the_plan(
+    machine: Walker, structure: Structure, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = grid_path([(13, 9), (13, 13)], 0.1)
+    first = plan_walk(machine, structure, path)
+    assert all(law.possible for law in first.laws)
+    assert [law.duration + 0.24 for law in first.laws] == pytest.approx(
+        [max(step.duration, step.land - step.lift) for step in first.regrasps], abs=0.1
+    )
+    step, of = first.regrasps[0], SwingLaw.of
+
+    def barred(swings: Swings, move: Move) -> SwingLaw:
+        law, holds = of(swings, move), structure.ids
+        grips = swings.grips
+        if (holds[grips.hold[move.source]], holds[grips.hold[move.target]]) == (step.source, step.target):
+            object.__setattr__(law, "possible", False)
+        return law
+
+    monkeypatch.setattr(SwingLaw, "of", staticmethod(barred))
+    other = plan_walk(machine, structure, path)
+    assert other.complete
+    assert len(other.laws) == len(other.regrasps)
+    assert (step.source, step.target) not in [(one.source, one.target) for one in other.regrasps]

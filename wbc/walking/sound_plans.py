@@ -1,0 +1,37 @@
+"""Plans whose swings can be carried out: each is computed once more as it will be, with the body on its way."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from wbc.walking.slices import Slices
+from wbc.walking.stance_search import Found, StanceSearch
+from wbc.walking.swing_law import SwingLaw
+
+#: Searches again, each without a swing that turned out to be impossible
+AGAIN = 20
+
+
+def sound_slices(
+    search: StanceSearch, starts: Sequence[Sequence[int]], sample: int = 0, deadline: float | None = None
+) -> Slices[tuple[Found, tuple[SwingLaw, ...]]]:
+    """As :meth:`StanceSearch.slices`, and the laws of the moves.
+
+    The search has swings at fewer points, and with the body where a faster swing would have it. One that is not
+    possible as it would be carried out is refused, and the search made again; what was computed is kept. After
+    :data:`AGAIN` of them only the moves before the impossible one are left.
+    """
+    laws: list[SwingLaw] = []
+    for _ in range(AGAIN):
+        found = yield from search.slices(starts, sample, deadline)
+        laws = []
+        for move in found.moves:
+            yield None
+            law = SwingLaw.of(search.swings, move)
+            if not law.possible:
+                search.swings.refuse(move.arm, move.source, move.target, move.lift, move.way)
+                break
+            laws.append(law)
+        else:
+            return found, tuple(laws)
+    return search.shortened(found, len(laws)), tuple(laws)
