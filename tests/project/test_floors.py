@@ -27,6 +27,7 @@ FLOORS = {
     "wbc.export": 5,
     "wbc.controller": 6,
     "wbc.trajectory": 7,
+    "wbc.coordinates": 7,
     "wbc.track": 8,
     "wbc.walking": 8,
     "wbc.pages": 8,

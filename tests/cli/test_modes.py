@@ -1,0 +1,41 @@
+"""``wbc modes`` as a user types it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from typer.testing import CliRunner
+
+from wbc.cli.app import app
+
+PAGE = Path(__file__).parents[2] / "docs" / "coordinates.md"
+
+
+def run(*arguments: str) -> tuple[int, str, str]:
+    """(exit code, standard output, standard error) of ``wbc modes ARGUMENTS``."""
+    result = CliRunner(env={"COLUMNS": "200"}).invoke(app, ["modes", *arguments])
+    return result.exit_code, result.stdout, result.stderr
+
+
+def test_table_of_all_arms() -> None:
+    code, out, err = run()
+    assert code == 0
+    assert "ssrms" in out
+    assert "M7 carrier with held hands" in err
+
+
+def test_one_arm() -> None:
+    code, out, _ = run("spdm")
+    assert code == 0
+    assert "M6 two arms: arm1_xi | the rest" in out
+    assert "M7 carrier with held hands: no carrier" in out
+
+
+def test_the_page_has_the_table() -> None:
+    code, out, _ = run("--markdown")
+    assert code == 0
+    assert out.strip() in PAGE.read_text()
+
+
+def test_unknown_arm() -> None:
+    assert run("srms")[0] == 2

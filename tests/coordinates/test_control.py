@@ -1,0 +1,191 @@
+"""Pairs at run time: exact rows, switches without a jump, limits without chatter, places that are held."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from wbc.coordinates import (
+    BodyRows,
+    CoordinatePair,
+    JointRows,
+    OnPlane,
+    PairController,
+    PitchPlaneRows,
+    PlaneAngleRows,
+    PointRows,
+    mode_pairs,
+    parts,
+)
+from wbc.errors import NotFiniteError, RangeError, ShapeError, UnknownNameError
+from wbc.robots import operator_arm
+from wbc.tasks import WorkspaceBox
+
+STATE = np.array([0.3, 0.5, -0.7, 1.1])
+#: Sliding the tip about a plane, and what else an arm of four joints may hold
+ARM = parts("spherical_4r").robot.with_limits(acceleration=0.4, position_lower=-2.0, position_upper=2.0)
+TIP, ALPHA = BodyRows("tip", rotation=(), name="tip"), PitchPlaneRows("F3", "tip")
+BETA = parts("spherical_4r").arms[0].in_plane[0]
+PSI = PlaneAngleRows("F3", "F4", "tip", axis="joint3")
+TABLE = PointRows("tip", OnPlane((0.0, 0.0, 0.1), (0.0, 0.2, 1.0)), name="table")
+ACROSS = BodyRows("tip", expressed="world", translation=(0, 1), rotation=())
+PAIRS = (
+    CoordinatePair(TIP, ALPHA, "plane"),
+    CoordinatePair(TIP, BETA, "shoulder"),
+    CoordinatePair(ALPHA, TIP, "self"),
+    CoordinatePair(TIP, PSI, "angle"),
+    CoordinatePair(ACROSS, [TABLE, JointRows("joint2")], "wipe"),
+)
+
+
+@pytest.fixture(scope="module")
+def compiled() -> PairController:
+    return PairController(ARM, PAIRS, items=[WorkspaceBox("tip", upper=(1.6, 9.0, 9.0))])
+
+
+@pytest.fixture
+def control(compiled: PairController) -> PairController:
+    compiled.switch("plane", 0.0)
+    compiled.reset(STATE)
+    return compiled
+
+
+def place(q: np.ndarray, frame: str = "tip") -> np.ndarray:
+    data = ARM.model.createData()
+    pin.framesForwardKinematics(ARM.model, data, q)
+    return np.array(data.oMf[ARM.model.getFrameId(frame)].translation)
+
+
+def run(control: PairController, q: np.ndarray, ticks: int) -> tuple[np.ndarray, np.ndarray]:
+    """(configuration after the ticks, all rates)."""
+    rates = []
+    for _ in range(ticks):
+        step = control.step(q)
+        rates.append(step.v)
+        q = pin.integrate(ARM.model, q, step.v * control.dt)
+    return q, np.array(rates)
+
+
+def test_a_switch_keeps_rates_continuous_and_what_both_pairs_hold(control: PairController) -> None:
+    """From task and pitch plane to task and beta while the tip moves: no joint changes faster than its limit."""
+    control.command((0.1, 0.05, -0.04))
+    q, before = run(control, STATE, 60)
+    seconds = control.switch("shoulder", 0.4)
+    assert seconds >= 0.4
+    assert control.blending
+    where = place(q)
+    q, after = run(control, q, round(seconds / control.dt) + 20)
+    assert not control.blending
+    change = np.abs(np.diff(np.vstack((before[-1:], after)), axis=0)).max() / control.dt
+    assert change < 0.4
+    # The tip went on at the commanded rate all the time; the new constraint is exact in the end
+    moved = place(q) - where
+    np.testing.assert_allclose(moved, len(after) * control.dt * np.array((0.1, 0.05, -0.04)), atol=2e-3)
+    assert abs(control.rates(q)[BETA] @ control.controller.last_command) < 1e-4
+    # The same switch without a blend asks for more
+    J = np.vstack((control.rates(q)[TIP], control.rates(q)[ALPHA]))
+    assert np.abs(np.linalg.solve(J, (0.1, 0.05, -0.04, 0.0)) - after[-1]).max() > 0.005
+
+
+def test_self_motion_after_a_drive_holds_the_tip_where_it_stops(control: PairController) -> None:
+    control.command((0.1, 0.0, 0.0))
+    q, _ = run(control, STATE, 60)
+    seconds = control.switch("self", 0.5)
+    q, _ = run(control, q, round(seconds / control.dt) + 2)
+    control.command([0.05])
+    where = place(q)
+    elbow = place(q, "end3")
+    q, rates = run(control, q, 400)
+    assert np.abs(place(q) - where).max() < 1e-6
+    assert np.abs(place(q, "end3") - elbow).max() > 0.05
+    assert np.abs(rates[-1]).max() > 0.01
+
+
+def test_an_angle_is_held_without_drift_and_a_point_stays_on_its_plane(control: PairController) -> None:
+    control.switch("angle", 0.0)
+    control.command((-0.05, 0.05, 0.03))
+    q, _ = run(control, STATE, 200)
+    assert abs(PSI.task.angle(ARM, q) - PSI.task.angle(ARM, STATE)) < 1e-4
+    control.switch("wipe", 0.5)
+    control.command((0.0, 0.0))
+    q, _ = run(control, q, 300)
+    control.command((-0.04, 0.03))
+    begin = q
+    q, _ = run(control, q, 200)
+    assert abs(np.dot((0.0, 0.2, 1.0), place(q) - (0.0, 0.0, 0.1))) < 1e-5
+    assert abs(q[1] - begin[1]) < 1e-9
+    assert np.linalg.norm(place(q) - place(begin)) > 0.1
+
+
+def test_limits_switch_on_and_off_without_chatter(control: PairController) -> None:
+    """Into a wall and on: what is held stays exact, the task gives way, no rate changes its sign back and forth."""
+    control.command((0.12, 0.08, 0.0))
+    q, rates = run(control, STATE, 600)
+    assert place(q)[0] < 1.6 + 1e-6
+    assert place(q)[0] > 1.59
+    late = rates[300:]
+    turns = (np.diff(np.sign(np.where(np.abs(late) > 1e-7, late, 0.0)), axis=0) != 0).sum(axis=0)
+    assert turns.max() <= 4
+    assert abs(control.rates(q - control.dt * rates[-1])[ALPHA] @ rates[-1]) < 1e-9
+
+
+def test_prescribed_rates_of_constraints_are_exact(control: PairController) -> None:
+    control.command((0.05, 0.0, 0.0))
+    control.prescribe([0.04])
+    q, rates = run(control, STATE, 40)
+    assert abs(control.rates(q - control.dt * rates[-1])[ALPHA] @ rates[-1] - 0.04) < 1e-9
+
+
+def test_bad_input_changes_nothing(control: PairController) -> None:
+    control.command((0.1, 0.0, 0.0))
+    for bad, error in (((0.1, 0.0), ShapeError), ("fast", ShapeError), ((0.1, 0.0, np.nan), NotFiniteError)):
+        with pytest.raises(error):
+            control.command(bad)
+    with pytest.raises(UnknownNameError, match="did you mean 'plane'"):
+        control.switch("plan")
+    with pytest.raises(RangeError):
+        control.switch("self", -1.0)
+    assert control.active == "plane"
+    assert control.step(STATE).v @ control.step(STATE).v > 0.0
+
+
+def test_over_determined_commands_do_not_depend_on_the_unit_of_length() -> None:
+    """Pose commanded while elbow point and pitch plane are held: three points give one answer in metres and in
+    other units, plain rows do not.
+    """
+    robot = operator_arm("spdm_arm").robot
+    xi, elbow = BodyRows("tip", name="xi"), BodyRows("end3", rotation=(), name="elbow")
+    q = np.array([0.3, 0.4, -0.5, 1.2, 0.7, -0.6, 0.9])
+    found = {}
+    for metric in (None, 0.5):
+        for length in (1.0, 1000.0):
+            pair = CoordinatePair(xi, elbow, metric=metric)
+            control = PairController(robot, pair, limits=False, length=length, backend="vm")
+            control.reset(q)
+            control.command((0.01, 0.02, 0.0, 0.01, 0.0, 0.02))
+            found[metric, length] = control.step(q).v
+            assert np.abs(control.rates(q)[elbow] @ found[metric, length]).max() < 1e-9
+    np.testing.assert_allclose(found[0.5, 1.0], found[0.5, 1000.0], atol=1e-5)
+    assert np.abs(found[None, 1.0] - found[None, 1000.0]).max() > 1e-3
+
+
+def test_hands_stay_while_the_body_turns() -> None:
+    """15 joints: the body joint moves, both hands are held by their poses, within 2e-6 m after 4 s."""
+    robot = parts("spdm").robot
+    pair = next(p for p in mode_pairs("spdm", "M6") if p.name == "body_joint | hands")
+    control = PairController(robot, pair, limits=False, backend="vm")
+    arm = [0.3, 0.4, -0.5, 1.2, 0.7, -0.6, 0.9]
+    q = start = np.concatenate(([0.2], arm, arm))
+    control.reset(q)
+    control.command([0.02])
+    data = robot.model.createData()
+    places = []
+    for _ in range(200):
+        q = q + control.dt * control.step(q).v
+    for state in (start, q):
+        pin.framesForwardKinematics(robot.model, data, state)
+        places.append([data.oMf[robot.model.getFrameId(f"arm{k}_tip")].copy() for k in (1, 2)])
+    for before, after in zip(*places, strict=True):
+        assert np.linalg.norm(pin.log6(before.actInv(after)).vector) < 2e-6
+    assert abs(q[robot.dofs("body_joint").start] - start[robot.dofs("body_joint").start] - 0.08) < 1e-6

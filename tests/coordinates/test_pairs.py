@@ -1,0 +1,107 @@
+"""Pairs as declarations, and modes on every robot."""
+
+from __future__ import annotations
+
+import pickle
+from typing import Any
+
+import numpy as np
+import pytest
+
+from wbc import WbcError
+from wbc.analysis.numeric import NumericRows
+from wbc.coordinates import (
+    BodyRows,
+    CoordinatePair,
+    JointRows,
+    MissingPartError,
+    Mode,
+    PitchPlaneRows,
+    mode_pairs,
+    mode_table,
+    pair_stack,
+    parts,
+)
+from wbc.errors import DuplicateNameError, RangeError, ShapeError, UnknownNameError
+from wbc.robots import operator_arm
+from wbc.robots.operator_arms import OPERATOR_ARMS
+
+ROBOT = operator_arm("ssrms").robot
+XI, ALPHA, ROLL = BodyRows("tip", name="xi"), PitchPlaneRows("F3", "F5"), JointRows("joint1")
+ELBOW = BodyRows("end3", rotation=(), name="elbow")
+
+
+def test_a_pair_and_its_swap() -> None:
+    pair = CoordinatePair(XI, ALPHA, metric=2.0)
+    assert (pair.name, str(pair), pair.counts(ROBOT)) == ("xi | alpha", "xi | alpha", (6, 1))
+    assert not pair.over_determined(ROBOT)
+    back = pair.swapped()
+    assert (back.name, back.task, back.constraint, back.metric) == ("alpha | xi", (ALPHA,), (XI,), None)
+    assert CoordinatePair(ELBOW, [XI]).over_determined(ROBOT)
+    assert pickle.loads(pickle.dumps(pair)) == pair
+
+
+def test_one_stack_serves_several_pairs() -> None:
+    pair = CoordinatePair(XI, ALPHA)
+    made = pair_stack(ROBOT, [pair, pair.swapped(), CoordinatePair(XI, ROLL), CoordinatePair(XI, ALPHA, "m", 0.5)])
+    assert list(made.pairs) == ["xi | alpha", "alpha | xi", "xi | joint1", "m"]
+    assert set(made.follow.values()) == {"follow xi", "follow alpha", "follow xi by points at 0.5 m"}
+    assert set(made.keep.values()) == {"keep alpha", "keep xi", "keep joint1"}
+    assert "joint_limits" in made.stack
+
+
+@pytest.mark.parametrize(
+    ("make", "error"),
+    [
+        (lambda: CoordinatePair("tip", ALPHA), ShapeError),
+        (lambda: CoordinatePair((), ALPHA), ShapeError),
+        (lambda: CoordinatePair(XI, [ALPHA, XI]), DuplicateNameError),
+        (lambda: CoordinatePair(XI, ALPHA, metric=-1.0), RangeError),
+        (lambda: CoordinatePair(ELBOW, ALPHA, metric=1.0), RangeError),
+        (lambda: CoordinatePair(ELBOW, ALPHA).counts(ROBOT), RangeError),
+        (lambda: CoordinatePair(ROLL, [XI, ALPHA]).counts(ROBOT), RangeError),
+        (lambda: CoordinatePair(XI, JointRows("joint8")).counts(ROBOT), UnknownNameError),
+        (lambda: pair_stack(ROBOT, []), ShapeError),
+        (
+            lambda: pair_stack(ROBOT, [CoordinatePair(XI, c, "a") for c in (ROLL, ALPHA)]),
+            DuplicateNameError,
+        ),
+        (lambda: mode_pairs("ssrms", "M9"), UnknownNameError),
+        (lambda: mode_pairs("panda", "M1"), UnknownNameError),
+    ],
+)
+def test_bad_pairs(make: Any, error: type[WbcError]) -> None:
+    with pytest.raises(error):
+        make()
+
+
+def test_every_mode_is_there_or_says_what_is_missing() -> None:
+    """At a random configuration the rows of every pair determine all joints."""
+    table = mode_table()
+    assert list(table) == list(OPERATOR_ARMS)
+    every = {(name, mode.name): found for name, row in table.items() for mode, found in row.items()}
+    missing = {key: found for key, found in every.items() if isinstance(found, str)}
+    single = {name for name in OPERATOR_ARMS if not name.startswith("spdm") or "arm" in name}
+    tip = "joint beyond those that its tip takes"
+    assert missing == {
+        **{("planar_rp", m): tip for m in ("M1", "M2", "M4")},
+        **{(name, "M6"): "second arm" for name in single},
+        **{(name, "M7"): "carrier" for name in (*single, "spdm")},
+    }
+    for name, row in table.items():
+        robot = parts(name).robot
+        q, numeric = np.random.default_rng(1).uniform(-1.0, 1.0, robot.nv), NumericRows(robot)
+        for mode, found in row.items():
+            for pair in () if isinstance(found, str) else found:
+                n, p = pair.counts(robot)
+                sigma = np.linalg.svd(numeric.value(pair.rows, q), compute_uv=False)
+                assert sigma[-1] > 1e-3, (name, mode, pair.name)
+                spatial = mode is Mode.M3 and not name.startswith("planar")
+                assert (n + p > robot.nv) == (mode is Mode.M8 or spatial)
+
+
+def test_a_missing_part_is_named() -> None:
+    with pytest.raises(MissingPartError, match="M6 on ssrms") as caught:
+        mode_pairs("ssrms", "M6")
+    assert caught.value.part == "second arm"
+    assert mode_pairs("ssrms", Mode.M2) == mode_pairs("ssrms", "self-motion")

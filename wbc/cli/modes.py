@@ -1,0 +1,40 @@
+"""``wbc modes``: which pairs of coordinates an operator's arm can be commanded by."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+from rich.markup import escape
+from rich.table import Table
+
+from wbc import validation
+from wbc.cli.console import err, out
+from wbc.coordinates.modes import Mode, mode_table, table_text
+
+
+def modes(
+    robot: Annotated[str, typer.Argument(help="An arm of the table; default: all of them.")] = "",
+    markdown: Annotated[bool, typer.Option("--markdown", help="As the table of the documentation.")] = False,
+) -> None:
+    """Say in which modes the operators' arms can be commanded: how many pairs, or what is missing."""
+    table = mode_table()
+    if markdown:
+        out().print(table_text(table), soft_wrap=True, markup=False)
+        return
+    if not robot:
+        rows = Table(title="Pairs by mode", title_justify="left", header_style="bold", box=None, pad_edge=False)
+        rows.add_column("robot", style="bold", no_wrap=True)
+        for mode in Mode:
+            rows.add_column(mode.name)
+        for name, found in table.items():
+            rows.add_row(name, *("-" if isinstance(f, str) else str(len(f)) for f in found.values()))
+        out().print(rows)
+        err().print("; ".join(f"{mode.name} {mode.value}" for mode in Mode), soft_wrap=True)
+        return
+    for mode, pairs in table[validation.one_of("robot", robot, table)].items():
+        if isinstance(pairs, str):
+            out().print(f"[bold]{mode.name}[/bold] {mode.value}: no {escape(pairs)}", soft_wrap=True)
+            continue
+        names = "; ".join(escape(pair.name) for pair in pairs)
+        out().print(f"[bold]{mode.name}[/bold] {mode.value}: {names}", soft_wrap=True)

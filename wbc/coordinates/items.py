@@ -1,0 +1,148 @@
+"""Coordinates as items of a stack: followed in the least-squares sense, or kept exactly."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import casadi as ca
+import numpy as np
+
+from wbc import validation
+from wbc.analysis.rows import BodyRows
+from wbc.coordinates import expressions
+from wbc.coordinates.expressions import REFERENCE
+from wbc.coordinates.rows import Coordinate
+from wbc.errors import RangeError
+from wbc.robot import Robot
+from wbc.symbolic.tracer import Tracer
+from wbc.tasks.base import Constraint, Input, Order, Row, Rows, Task, Values
+from wbc.validation import Array
+
+
+@dataclass(frozen=True)
+class FollowRows(Task):
+    """Coordinates follow a commanded rate as well as they can: A(q) v = speed                 [m/s, rad/s]
+
+    With ``metric`` d, for all six rows of a frame, three points at a distance d along the frame's axes follow their
+    velocities instead, nine rows in m/s, so that the answer does not depend on the unit of length:
+
+        v_i = v + omega x d_i,    sum_i |v_i|^2 = e'We,  W = [3 I, -d [1]x; d [1]x, 2 d^2 I]  in the frame's axes
+
+    Inputs:
+        speed: one number a row of the coordinates. offset: their present error, which is taken back at ``gain``.
+
+    Source: E. Dupuis, PhD thesis, McGill University, 2001, appendix B, eqs. B.25 to B.33.
+    """
+
+    #: Made by pairs, so it is not in the table of items
+    abstract: ClassVar[bool] = True
+
+    coordinate: Coordinate
+    metric: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.metric is None:
+            return
+        d = validation.scalar("metric", self.metric, low=0.0, open_low=True, unit="m")
+        object.__setattr__(self, "metric", d)
+        one = self.coordinate
+        if not (isinstance(one, BodyRows) and len(one.translation + one.rotation) == 6):
+            raise RangeError("metric", str(self.coordinate), "three points stand for all six rows of a frame only")
+
+    def validate(self, robot: Robot) -> None:
+        """See :func:`expressions.check`."""
+        expressions.check(robot, "task", self.coordinate)
+
+    def inputs(self, robot: Robot) -> tuple[Input, ...]:
+        """``offset`` and ``speed``, see the class."""
+        given = expressions.labels(robot, self.coordinate)
+        zero, unit = np.zeros(len(given)), ", ".join(dict.fromkeys(r.unit for r in given))
+        rates = ", ".join(f"{u}/s" for u in unit.split(", "))
+        return (
+            Input("offset", unit=unit, size=len(given), default=zero, rate="speed"),
+            Input("speed", unit=rates, size=len(given), default=zero),
+        )
+
+    def rows(self, robot: Robot) -> tuple[Row, ...]:
+        """The coordinates' rows, or x, y, z of three points."""
+        if self.metric is None:
+            return expressions.labels(robot, self.coordinate)
+        return tuple(Row(f"{point}{axis}", "m") for point in "xyz" for axis in "xyz")
+
+    def error(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
+        """-offset, so that the rows ask for speed + gain offset."""
+        return ca.SX(-self._spread(kin) @ inputs["offset"])
+
+    def jacobian(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
+        """A(q)."""
+        return self._spread(kin) @ expressions.matrix(robot, kin, self.coordinate)
+
+    def _spread(self, kin: Tracer) -> ca.SX:
+        """From the rows to those that are served."""
+        if self.metric is None:
+            return ca.SX(1)
+        assert isinstance(self.coordinate, BodyRows)
+        # Where the frame's axes are as seen from those of the rows
+        turn = kin.rotation(self.coordinate.frame)
+        if self.coordinate.expressed is not None:
+            turn = kin.rotation(self.coordinate.expressed).T @ turn
+        order = [*self.coordinate.translation, *(3 + k for k in self.coordinate.rotation)]
+        whole = [ca.horzcat(ca.SX.eye(3), -ca.skew(self.metric * turn[:, k])) for k in range(3)]
+        return ca.SX(ca.vertcat(*whole)[:, order])
+
+
+@dataclass(frozen=True)
+class KeepRows(Constraint):
+    """Coordinates have a prescribed rate, exactly: A(q) v = speed - gain e                       [m/s, rad/s]
+
+    e is the drift from ``reference`` where the coordinates have one (see :mod:`wbc.coordinates.expressions`), so that
+    what is held does not wander; else 0.
+
+    Inputs:
+        speed: one number a row, 0 by default. gain: how fast drift decays [1/s], at most 1/dt.
+        reference: pose, coordinate or angle that is held. Default: the one at the first step. Not for pure rates.
+    """
+
+    #: Made by pairs, so it is not in the table of items
+    abstract: ClassVar[bool] = True
+    order: ClassVar[Order] = Order.HOLD
+    equality: ClassVar[bool] = True
+    initial_only: ClassVar[tuple[str, ...]] = ("gain",)
+
+    coordinate: Coordinate
+    gain: float = 10.0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "gain", validation.scalar("gain", self.gain, low=0.0, unit="1/s"))
+
+    def validate(self, robot: Robot) -> None:
+        """See :func:`expressions.check`."""
+        expressions.check(robot, "constraint", self.coordinate)
+
+    def inputs(self, robot: Robot) -> tuple[Input, ...]:
+        """``speed``, ``gain`` and, where there is one, ``reference``."""
+        given = expressions.labels(robot, self.coordinate)
+        rates = ", ".join(f"{u}/s" for u in dict.fromkeys(r.unit for r in given))
+        held = expressions.reference(robot, self.coordinate)
+        own = (
+            Input("speed", unit=rates, size=len(given), default=np.zeros(len(given))),
+            Input("gain", unit="1/s", default=self.gain, low=0.0),
+        )
+        return own if held is None else (*own, held)
+
+    def initial(self, robot: Robot, q: Array) -> dict[str, Any]:
+        """The reference at ``q``."""
+        if expressions.reference(robot, self.coordinate) is None:
+            return {}
+        return {REFERENCE: expressions.here(robot, self.coordinate, q)}
+
+    def rows(self, robot: Robot) -> tuple[Row, ...]:
+        """The coordinates' rows."""
+        return tuple(Row(r.label, f"{r.unit}/s") for r in expressions.labels(robot, self.coordinate))
+
+    def velocity_rows(self, robot: Robot, kin: Tracer, inputs: Values, dt: ca.SX) -> Rows:
+        """See the class."""
+        off = expressions.drift(robot, kin, self.coordinate, inputs.get(REFERENCE))
+        wanted = inputs["speed"] if off is None else inputs["speed"] - inputs["gain"] * off
+        return Rows(expressions.matrix(robot, kin, self.coordinate), wanted, wanted)
