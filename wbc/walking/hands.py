@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 from math import sqrt
 from typing import Any
 
@@ -15,7 +16,7 @@ from wbc.robots import Walker, WalkerData
 from wbc.validation import Array
 from wbc.walking.closed_chain import ClosedChain
 from wbc.walking.grip_rolls import ANY, frame_on
-from wbc.walking.plan import HoldLost, Plan
+from wbc.walking.plan import HoldLost, Plan, Regrasp
 from wbc.walking.replanning import way_to
 from wbc.walking.structure import Structure
 from wbc.walking.swing_law import SwingLaw
@@ -34,6 +35,10 @@ class Hands(ABC):
         plan: the one that is carried out now; path times count from its beginning.
         held: row of the arm -> row of the hold. swinging: the hand on its way.
         told: arm, state and hold of a hand that does what it is told, see :mod:`wbc.walking.arm_mode`.
+        halted: the body stands, and no hand is lifted.
+        leash: path time that the body does not pass, and how many re-grasps of the plan may be lifted; None: all of it.
+        steps: re-grasps that were begun, over the path time of the whole walk.
+        past: poses behind the beginning of the plan's path ``[n, 4, 4]``, at its spacing.
         events: what happened so far.
     """
 
@@ -57,6 +62,10 @@ class Hands(ABC):
         self.told: tuple[int, Hand, int] | None = None
         self.v = np.zeros(walker.robot.nv)
         self._changing = False
+        self.halted = False
+        self.leash: tuple[float, int] | None = None
+        self.steps: list[Regrasp] = []
+        self.past = np.zeros((0, 4, 4))
         self._landed = (-1, 0.0)
         self._follow(plan)
         self.held = {arm: int(self.grips.hold[grip]) for arm, grip in enumerate(self._grip)}
@@ -70,7 +79,10 @@ class Hands(ABC):
 
     def _follow(self, plan: Plan) -> None:
         """Take a plan from its beginning."""
-        self._next, self._used, self.path_time = 0, [0] * len(self.walker.arms), 0.0
+        if self.time > 0.0:
+            path = self.plan.path
+            self.past = np.concatenate([self.past, path.poses[: round(self.path_time / path.spacing)]])
+        self.next, self._used, self.path_time = 0, [0] * len(self.walker.arms), 0.0
         self._grip = [chain[0] for chain in plan.chain]
         self._go_on(plan)
 
@@ -103,26 +115,33 @@ class Hands(ABC):
         if free:
             self._bring(free[0])
             return
-        if self._next >= len(self.plan.regrasps) or self.path_time < self.plan.regrasps[self._next].lift - 1e-9:
+        last = len(self.plan.regrasps) if self.leash is None else min(self.leash[1], len(self.plan.regrasps))
+        if self.halted or self.next >= last:
+            return
+        if self.path_time < self.plan.regrasps[self.next].lift - 1e-9:
             return
         if len(self.held) <= self.walker.min_holds:
             raise HoldLost("hands", len(self.held), f"more than {self.walker.min_holds} must hold before one is lifted")
-        step = self.plan.regrasps[self._next]
+        step = self.plan.regrasps[self.next]
         arm = [a.name for a in self.walker.arms].index(step.arm)
         if self._landed == (arm, self.time):
             return  # A hand that goes on at once is closed for a tick
         self._used[arm] += 1
         self._open(arm)
-        law, target = self.plan.laws[self._next], self.plan.chain[arm][self._used[arm]]
+        law, target = self.plan.laws[self.next], self.plan.chain[arm][self._used[arm]]
         self.swinging = self._swing(arm, target, law, latch=self.data.latch_time)
         self.swinging.bend = self._bend(self.swinging, 0.0)
         self._say("lift", step.arm, step.source)
+        before = len(self.past) * self.plan.path.spacing
+        self.steps.append(replace(step, lift=step.lift + before, land=step.land + before, until=step.until + before))
 
     def _bring(self, arm: int) -> None:
         """A hand that is in the air goes to where the plan begins, while the body stands still."""
         _, _, _, a, b, c = self.q[self.walker.arms[arm].q].tolist()
         law = way_to(self.walker, self.structure, self.plan, arm, self.chain, self.q)
-        self.swinging = self._swing(arm, self._grip[arm], law, latch=0.0, counted=False, state="open", wrist=(a, b, c))
+        self.swinging = self._swing(
+            arm, self._grip[arm], law, latch=0.0, counted=False, waits=True, state="open", wrist=(a, b, c)
+        )
         self.swinging.bend = a, b, c
 
     def _swing(self, arm: int, grip: int, law: SwingLaw, **more: Any) -> Swinging:
@@ -172,9 +191,10 @@ class Hands(ABC):
 
     def _leaving(self) -> int:
         """The arm that is lifted next, if it can be: its grip is no end for the body. -1 for none."""
-        if self._changing or self.swinging is not None or self._next >= len(self.plan.regrasps):
+        last = len(self.plan.regrasps) if self.leash is None else min(self.leash[1], len(self.plan.regrasps))
+        if self._changing or self.halted or self.swinging is not None or self.next >= last:
             return -1
-        return [arm.name for arm in self.walker.arms].index(self.plan.regrasps[self._next].arm)
+        return [arm.name for arm in self.walker.arms].index(self.plan.regrasps[self.next].arm)
 
     def _land(self, swinging: Swinging) -> None:
         """Close a hand that has come to rest on its hold; it holds when the latch is through."""
@@ -207,7 +227,7 @@ class Hands(ABC):
         self._landed = arm, self.time
         self.stack.hold(arm, swinging.hold, int(self.grips.roll[swinging.grip]))
         self.swinging = None
-        self._next += int(swinging.counted)
+        self.next += int(swinging.counted)
         self._say("land", *names)
 
     def _open(self, arm: int) -> None:

@@ -47,6 +47,7 @@ class Regrasp:
         limit: what ends the grip on the target.
         until: path time until which the target can be held [s].
         way: of the hand, see :data:`wbc.walking.swing_curve.WAYS`.
+        roll: angle about the target's z axis from its x axis to the hand's [rad]; None where the hand may roll.
     """
 
     arm: str
@@ -61,6 +62,7 @@ class Regrasp:
     limit: str
     until: float
     way: int = 0
+    roll: float | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from itertools import combinations, product
 from typing import Literal
@@ -107,6 +107,7 @@ def plan_slices(
     stance: tuple[int, ...] | None = None,
     sample: int = 0,
     soon: bool = False,
+    tries: Sequence[tuple[float, int | None]] = (),
 ) -> Slices[Plan]:
     """The best plan along one path, complete or not, in slices of some milliseconds of work; the same every time.
 
@@ -115,6 +116,7 @@ def plan_slices(
         grips: of the path, if they are known. stance: grips that hold at the sample, instead of a beginning.
         sample: of the path, from which on hands may be lifted.
         soon: somebody waits: of fewer delays (:data:`SOON`), the wide searches after all narrow ones.
+        tries: delays and widths of the searches, one after the other, instead of what objective and width say.
 
     Raises:
         as :func:`plan_walk`, where no stance is possible at the beginning.
@@ -129,8 +131,8 @@ def plan_slices(
     widths = (None,) if width is None else (width, WIDER * width)
     if soon and objective == "velocity":
         delays = SOON
-    tries = [(delay, wide) for wide in widths for delay in delays] if soon else product(delays, widths)
-    for delay, wide in tries:
+    after = [(delay, wide) for wide in widths for delay in delays] if soon else product(delays, widths)
+    for delay, wide in tries or after:
         search = StanceSearch(walker, structure, path, grips, longest_delay=delay, width=wide)
         starts = [stance] if stance else stances(walker, structure, search, beginning, sample)
         yield None
@@ -202,6 +204,12 @@ def _at_first(structure: Structure, grips: Grips) -> list[str]:
     return [structure.ids[k] for k in np.unique(grips.hold[grips.first == 0])]
 
 
+def _roll(structure: Structure, grips: Grips, grip: int) -> float | None:
+    """Which of the allowed rolls a grip has [rad]; None where the hand may roll."""
+    rolls = structure.holds[grips.hold[grip]].rolls
+    return rolls[grips.roll[grip]] if rolls else None
+
+
 def _plan(
     walker: Walker, structure: Structure, path: BodyPath, grips: Grips, found: Found, laws: tuple[SwingLaw, ...]
 ) -> Plan:
@@ -223,6 +231,7 @@ def _plan(
                 grips.reasons[grips.ends[move.target]],
                 round(float(grips.last[move.target]) * spacing, 9),
                 move.way,
+                _roll(structure, grips, move.target),
             )
         )
     reason, separating = "", list[str]()

@@ -4,41 +4,33 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterable
-from dataclasses import replace
-from math import dist, sqrt
+from math import dist
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 from wbc.robots import Walker
-from wbc.validation import Array
-from wbc.walking.body_path import BodyPath, straight_path
-from wbc.walking.hands import Hands
+from wbc.walking.body_path import BodyPath, standing_path, straight_path
+from wbc.walking.moving_body import MovingBody
 from wbc.walking.plan import HoldLost, NoPlanError, Plan
 from wbc.walking.replanning import PlanSlices, plan_from_here, plan_from_stance, plan_rest
 from wbc.walking.structure import Structure
-from wbc.walking.swings import SETTLE
 from wbc.walking.walk_stack import DT, WalkStack
 from wbc.walking.walk_state import Event, Hand, Tick
 
 __all__ = ["Event", "Hand", "Tick", "Walk"]
 
-#: From rest to the commanded speed [s]
-RAMP = 0.25
 #: The walk is over when the body is this near to the end of the path [m]
 ARRIVED = 0.002
 #: A walk that takes this many times its path's duration and SLACK seconds more is given up
 PATIENCE, SLACK = 4.0, 20.0
 #: Speed on the way to another path [m/s]
 JOINING = 0.05
-#: Poses behind the body that are kept, for going back
-TRAIL = 400
 #: Slices of planning between two ticks
 SLICES = 3
 
 
-class Walk(Hands):
+class Walk(MovingBody):
     """A simulated walk. The simulator's only inputs are the joint rates that the controller returns; where the body is
     follows from the holds of its closed hands.
 
@@ -75,14 +67,13 @@ class Walk(Hands):
         stack = stack or WalkStack(walker, structure, dt, collisions=collisions, backend=backend)
         super().__init__(walker, structure, plan, stack, grasps)
         self._wanted: BodyPath | None = None
-        self._trail = np.zeros((0, 4, 4))
         self._quick = True
 
     @property
     def done(self) -> bool:
         """The body is at the end of the path, and no hand is on its way."""
         ended = self.path_time >= self.plan.path.duration - 1e-9 and self.swinging is None and not self._changing
-        if not ended or self._next < len(self.plan.regrasps):
+        if not ended or self.next < len(self.plan.regrasps):
             return False
         return dist(self.q[:3], self.plan.path.poses[-1][:3, 3]) < ARRIVED
 
@@ -124,7 +115,7 @@ class Walk(Hands):
             self.swinging = None
             open_now.append(-1)
         self._renumber(rest)
-        done = self._next + int(self.swinging is not None and self.swinging.counted)
+        done = self.next + int(self.swinging is not None and self.swinging.counted)
         lost = [k for k, step in enumerate(self.plan.regrasps) if k >= done and step.target in names]
         if open_now or self._planning is not None or (self.swinging is not None and not self.swinging.counted):
             self._stop()
@@ -134,6 +125,20 @@ class Walk(Hands):
     def go(self, path: BodyPath) -> None:
         """Follow another path: the body stops, goes straight to where the path begins, and on."""
         self._wanted, self._quick = path, True
+        self._stop()
+
+    @property
+    def busy(self) -> bool:
+        """It is planning by itself, or brings a hand to where a plan begins."""
+        return self._changing or self._planning is not None or (self.swinging is not None and self.swinging.waits)
+
+    def set_down(self) -> None:
+        """The body stops where it is, and a hand in the air goes to a hold that it can keep there."""
+        pose = self.plan.path.at(self.path_time)[0]
+        if self.swinging is not None:
+            self._stay(self.swinging.arm)
+            self.swinging = None
+        self._wanted, self._quick = standing_path(pose), False
         self._stop()
 
     def tick(self) -> Tick:
@@ -188,10 +193,6 @@ class Walk(Hands):
         self._say("land", *names)
         return True
 
-    def _stop(self) -> None:
-        """The body stops, and the rest of the way is planned from there."""
-        self._planning, self._changing = None, True
-
     def _think(self) -> None:
         """Some slices of planning, if there is anything to plan; a plan that is found is taken."""
         if self._changing and self._planning is None and self.pace == 0.0 and self.swinging is None:
@@ -223,7 +224,6 @@ class Walk(Hands):
         if plan.path is self.plan.path:
             self._go_on(plan)
         else:
-            self._trail = self._behind()
             self._follow(plan)
         self._wanted, self._changing = None, False
 
@@ -243,49 +243,3 @@ class Walk(Hands):
             postures = {arm.name: self.q[arm.q] for arm in self.walker.arms}
             return plan_from_stance(self.walker, self.structure, way, start, postures=postures)
         return plan_from_here(self.walker, self.structure, way, self.held, self.q, self.chain, self._behind())
-
-    def _behind(self) -> Array:
-        """Poses that the body had, the last one first ``[n, 4, 4]``."""
-        path, u = self.plan.path, self.path_time
-        here = path.at(u)[0].homogeneous[None]
-        return np.concatenate([here, path.poses[: int(u / path.spacing) + 1][::-1], self._trail])[:TRAIL]
-
-    def _advance(self) -> pin.SE3:
-        """Move the body's command on: as fast as asked, as slow as the grips of the holding hands need.
-
-        Returns:
-            Where the body is to be as the tick ends.
-        """
-        path, spacing = self.plan.path, self.plan.path.spacing
-        leaving = self._leaving()
-        ends = [float(self.grips.last[self._grip[arm]]) * spacing for arm in self.held if arm != leaving]
-        end = path.duration if self.plan.complete else self.plan.reached
-        room = max(min([end, *ends]) - self.path_time, 0.0)
-        # The command stops within the room: braking from pace p takes p^2 RAMP / 2 of path time
-        wanted = min(1.0, sqrt(2.0 * room / RAMP * 0.9))
-        if self.swinging is not None:
-            left = self.swinging.law.duration - self.swinging.clock + self.data.latch_time + SETTLE
-            if room < left:
-                wanted = min(wanted, room / left)
-        if self._changing or (self.swinging is not None and not self.swinging.counted):
-            wanted = 0.0
-        change = self.dt / RAMP
-        self.pace = max(self.pace + min(max(wanted - self.pace, -change), change), 0.0)
-        pose = path.at(self.path_time)[0]
-        self.path_time = min(self.path_time + self.pace * self.dt, path.duration)
-        command = path.at(self.path_time)[0]
-        turn = pose.rotation @ pin.log3(pose.rotation.T @ command.rotation)
-        self.stack.body(pose, np.concatenate([command.translation - pose.translation, turn]) / self.dt)
-        return command
-
-    def _renumber(self, rest: Structure) -> None:
-        """Go on with a structure that has lost holds: rows of holds change, hands stay where they are."""
-        old, self.structure = self.structure, rest
-        self.stack.structure = rest
-        self.chain = self.chain.on(rest)
-        there = set(rest.ids)
-        rows = np.array([rest.index(name) if name in there else -1 for name in old.ids], dtype=np.int64)
-        self.held = {arm: int(rows[hold]) for arm, hold in self.held.items()}
-        if self.swinging is not None:
-            self.swinging.hold = int(rows[self.swinging.hold])
-        self._go_on(replace(self.plan, grips=self.grips.renumbered(rows)))

@@ -29,7 +29,8 @@ class Swinging:
         x: the x axis that the hand has on its hold; None if it may roll there.
         wrist: joints 4 to 6 of a hand that was in the air when it was sent [rad]; None: those of the grip it leaves.
         bend: joints 4 to 6 as they are to be now [rad].
-        counted: it is a move of the plan, not one that brings a free hand back to it.
+        counted: it is a move of the plan, not one of an earlier plan, or one that brings a free hand to it.
+        waits: the body stands until the hand has landed.
     """
 
     arm: int
@@ -38,6 +39,7 @@ class Swinging:
     law: SwingLaw
     latch: float
     counted: bool = True
+    waits: bool = False
     clock: float = 0.0
     pace: float = 1.0
     state: Hand = "opening"

@@ -1,0 +1,155 @@
+"""Velocity mode: the body does what it is told, as long as hands can be planned for it."""
+
+from __future__ import annotations
+
+import pathlib
+from collections.abc import Sequence
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from wbc.errors import NotFiniteError, RangeError, ShapeError
+from wbc.robots import Walker
+from wbc.walking import Structure, plane, remove_rows
+from wbc.walking.checker import Rules, check_walk
+from wbc.walking.commands import CommandTable, read_commands
+from wbc.walking.drive import Drive, standing_plan
+from wbc.walking.number_table import NumberTableError
+from wbc.walking.plan import Plan
+from wbc.walking.run.recording import WalkRecorder
+from wbc.walking.steering import Steering
+from wbc.walking.structures import grid_pose
+from wbc.walking.walk import Tick, Walk
+from wbc.walking.walk_stack import WalkStack
+
+INCH = 0.0254
+HEIGHT = 52 * INCH
+
+
+@pytest.fixture(scope="module")
+def begin(machine: Walker, structure: Structure) -> Plan:
+    return standing_plan(machine, structure, grid_pose(13, 11, 100 * INCH + HEIGHT))
+
+
+def drive_on(drive: Drive, recorder: WalkRecorder, seconds: float, *rates: float) -> list[Tick]:
+    """Ticks with one command."""
+    out, end = list[Tick](), drive.walk.time + seconds
+    while drive.walk.time < end - 1e-9:
+        drive.steer(*rates)
+        out.append(drive.tick())
+        recorder.tick(out[-1])
+    return out
+
+
+def speeds(ticks: Sequence[Tick]) -> np.ndarray:
+    """(round, along) [m/s] from the first to the last tick of a body over row 13."""
+    way = ticks[-1].q[:3] - ticks[0].q[:3]
+    return np.array([way[0], -way[2]]) / (ticks[-1].time - ticks[0].time)
+
+
+def test_there_and_back_and_stop(
+    machine: Walker, structure: Structure, stack: WalkStack, begin: Plan, tmp_path: pathlib.Path
+) -> None:
+    walk = Walk(machine, structure, begin, stack=stack)
+    drive, recorder = Drive(walk), WalkRecorder(walk)
+    still = drive_on(drive, recorder, 0.5, 0.0, 0.0, 0.0)
+    there = drive_on(drive, recorder, 2.0, 0.0, 4 * INCH, 0.0)
+    back = drive_on(drive, recorder, 2.5, 0.0, -4 * INCH, 0.0)
+    last = drive_on(drive, recorder, 0.5, 0.0, 0.0, 0.0)
+    ticks = (*still, *there, *back, *last)
+    assert np.abs(still[-1].q - still[0].q).max() < 1e-6
+    # After a ramp it keeps the pace, and it turns when the hand in the air is down
+    assert speeds(there[75:])[1] == pytest.approx(4 * INCH, rel=0.02)
+    assert speeds(back[150:220])[1] == pytest.approx(-4 * INCH, rel=0.02)
+    assert np.abs(np.diff([tick.q[0] for tick in ticks])).max() < 1e-4
+    assert max(tick.body_error for tick in ticks) < 0.002
+    assert max(tick.slip for tick in ticks) < 0.001
+    assert np.abs(last[-1].q[:3] - last[-10].q[:3]).max() < 1e-5
+    assert sum(event.what == "lift" for event in walk.events) == len(walk.steps) >= 1
+    log, _ = recorder.log()
+    report = check_walk(log, machine.urdf(tmp_path / "robot.urdf"), structure, Rules(sub_samples=1))
+    assert report.ok, str(report)
+
+
+def test_it_slows_down_before_a_gap_and_says_why(machine: Walker, structure: Structure, stack: WalkStack) -> None:
+    gap = remove_rows(structure, "15-22")
+    begin = standing_plan(machine, gap, grid_pose(13, 13, 100 * INCH + HEIGHT))
+    walk = Walk(machine, gap, begin, stack=stack)
+    drive = Drive(walk)
+    drive.steer(0.0, 0.2, 0.0)
+    places = [walk.q[:3].copy()]
+    while not (drive.reason and walk.pace == 0.0 and walk.time > 1.0):
+        drive.tick()
+        places.append(walk.q[:3].copy())
+        assert walk.time < 20.0
+    off = np.array(places) - places[0]
+    assert np.abs(off[:, 0]).max() < 1e-4  # not aside
+    assert np.abs(np.hypot(*np.array(places)[:, :2].T) - 152 * INCH).max() < 0.052  # nor higher or lower than it may
+    assert -off[-1, 2] > 0.05
+    assert len(walk.held) >= 2
+    assert "no hand can be moved in time" in drive.reason
+    lifts = len(walk.steps)
+    drive.steer(0.0, 0.0, 0.0)
+    for _ in range(100):
+        drive.tick()
+    assert drive.standing
+    assert len(walk.held) == 3
+    assert len(walk.steps) == lifts
+
+
+def test_directions_and_rates() -> None:
+    rates, spacing = np.array([0.03, 0.05, 0.1, 0.01]), 0.05
+    for structure, pose in ((plane(), pin.SE3(np.diag([1.0, -1.0, -1.0]), np.array([2.0, 1.0, 1.3]))), (None, None)):
+        if structure is None or pose is None:
+            from wbc.walking import cylinder
+
+            structure, pose = cylinder(), grid_pose(14, 9, 4.0, 0.3)
+        steering = Steering.on(structure, pose)
+        first, second = steering.ahead(pose.homogeneous, np.repeat(rates[None], 2, axis=0), spacing)
+        assert steering.rates(first, second, spacing) == pytest.approx(rates, abs=1e-6)
+        assert steering.lower(second) == pytest.approx(2 * rates[3] * spacing, abs=1e-9)
+    along = Steering.on(structure, pose).ahead(pose.homogeneous, np.array([[0.0, 0.1, 0.0, 0.0]]), 1.0)[0]
+    assert along[:3, 3] - pose.translation == pytest.approx([0.0, 0.0, -0.1])  # +A is -z
+    more = Steering.on(structure, pose).ahead(pose.homogeneous, np.array([[0.1, 0.0, 0.0, 0.0]]), 1.0)[0]
+    aside = grid_pose(14 + np.degrees(0.1 / 4.0) / 5, 9, 4.0, 0.3)
+    assert more == pytest.approx(aside.homogeneous, abs=1e-9)  # round is +T
+
+
+def test_commands_from_files(tmp_path: pathlib.Path) -> None:
+    text = tmp_path / "commands.csv"
+    text.write_text("# a drive\nt, T, A, spin\n0, 0, 0.1, 0\n2, 0.05, 0, -0.02\n3, 0, 0, 0\n")
+    table = read_commands(text)
+    np.savez(tmp_path / "commands.npz", t=table.times, T=table.values[:, 0], A=table.values[:, 1], spin=[0, -0.02, 0])
+    for source in (table, read_commands(tmp_path / "commands.npz")):
+        assert source.rates(0.0) == pytest.approx([0.0, 0.1, 0.0])
+        assert source.rates(1.99) == pytest.approx([0.0, 0.1, 0.0])
+        assert source.rates(2.0) == pytest.approx([0.05, 0.0, -0.02])
+        assert source.rates(3.0) is None
+    for bad, told in (
+        ("t,T,A\n0,0,0\n", "expected the columns t, T, A, spin"),
+        ("t,T,A,spin\n0,0,x,0\n", "line 2.A"),
+        ("t,T,A,spin\n0,0,0\n", "line 2: expected 4 numbers"),
+        ("t,T,A,spin\n0,0,nan,0\n", "row 1.A: expected a finite number"),
+        ("t,T,A,spin\n", "there are no rows"),
+    ):
+        text.write_text(bad)
+        with pytest.raises(NumberTableError, match=told):
+            read_commands(text)
+    with pytest.raises(NumberTableError, match="cannot be read"):
+        read_commands(tmp_path / "none.csv")
+    np.savez(tmp_path / "commands.npz", t=[0.0, 1.0], T=[0.0, 1.0], A=[0.0, 1.0])
+    with pytest.raises(NumberTableError, match="spin"):
+        read_commands(tmp_path / "commands.npz")
+    with pytest.raises(RangeError, match="times that rise"):
+        CommandTable(np.array([0.0, 0.0]), np.zeros((2, 3)))
+
+
+def test_a_bad_command_changes_nothing(machine: Walker, structure: Structure, stack: WalkStack, begin: Plan) -> None:
+    drive = Drive(Walk(machine, structure, begin, stack=stack))
+    drive.steer(0.0, 0.05, 0.0)
+    with pytest.raises(NotFiniteError):
+        drive.steer(0.0, np.nan, 0.0)
+    with pytest.raises(ShapeError):
+        drive.steer("fast", 0.0, 0.0)  # type: ignore[arg-type]
+    assert drive.command == pytest.approx([0.0, 0.05, 0.0])

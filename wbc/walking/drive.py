@@ -1,0 +1,201 @@
+"""Velocity mode: the body moves as it is told, and hands are planned over the seconds ahead, again and again."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from typing import Any
+
+import numpy as np
+
+from wbc import validation
+from wbc.robots import Walker
+from wbc.walking.body_path import SPACING, TURN_RADIUS, BodyPath, standing_path
+from wbc.walking.courses import Course, course, course_slices, time_left
+from wbc.walking.plan import NoPlanError, Plan
+from wbc.walking.planner import plan_walk
+from wbc.walking.steering import Steering
+from wbc.walking.structure import Structure
+from wbc.walking.walk import Walk
+from wbc.walking.walk_state import Tick
+
+#: Path time over which hands are planned, which is left when it is planned on, and after which another command takes
+#: hold; a course that the present swing does not allow waits for it [s]
+HORIZON, LEFT, LEAD, AHEAD = 8.0, 6.0, 0.1, 1.0
+#: Slices of planning between two ticks
+SLICES = 2
+#: What is tried in turn where hands cannot be planned over the horizon: parts of the commanded rates, and how much
+#: lower than its height the body is to be, in its data's ``body_shift``
+WAYS = ((1.0, 0.0), (0.7, 0.0), (0.45, 0.0), (0.7, 1.0), (0.7, -1.0), (0.25, 0.0), (0.25, 1.0))
+#: A body that waits for a hand goes on so much later [s]
+SURE = 0.15
+#: Rates below these are none [m/s, m/s, rad/s]
+STILL = np.array([1e-4, 1e-4, 1e-4])
+#: A body that begins to be driven could go so far in every direction without moving a hand [m]
+ROUNDABOUT = 0.12
+
+
+class Drive:
+    """A walk by commanded rates: of the body's origin round and along the structure, and of turning about its normal.
+
+    Every command is answered by planning :data:`HORIZON` seconds ahead, in slices between ticks, while the body goes
+    on: what is planned keeps a swing that is under way. A plan that fails is made anew with the body slower, then
+    lower or higher by 2 in. Zero rates stop the body and every lift; a hand in the air comes down.
+
+    Args:
+        walk: whose body stands, as of :func:`standing_plan`.
+
+    Attributes:
+        command: rates that were asked for ``[3]`` [m/s, m/s, rad/s].
+        reason: why the body cannot follow the command as it is; "" if it can.
+    """
+
+    def __init__(self, walk: Walk) -> None:
+        self.walk, self.reason = walk, ""
+        pose = walk.plan.path.at(walk.path_time)[0]
+        self.steering = Steering.on(walk.structure, pose)
+        self.command = np.zeros(3)
+        self._asked = np.zeros(3)
+        self._way, self._settled, self._stuck, self._waited = 0, True, False, False
+        self._work: tuple[Course, Generator[Plan | None, None, Plan]] | None = None
+        walk.halted = True
+
+    def steer(self, across: float, along: float, spin: float) -> None:
+        """Ask for rates: of the body's origin round and along the structure [m/s], and spin about its normal [rad/s].
+
+        Raises:
+            ShapeError, NotFiniteError: no such numbers; the last command stays.
+        """
+        rates = validation.real_array("command", [across, along, spin], (3,))
+        self.command = np.where(np.abs(rates) < STILL, 0.0, rates)
+
+    @property
+    def standing(self) -> bool:
+        """The body stands as it is told, and no hand is on its way."""
+        return not self.command.any() and self.walk.pace == 0.0 and self.walk.swinging is None
+
+    def tick(self) -> Tick:
+        """One control period.
+
+        Raises:
+            HoldLost: too few hands hold. NoPlanError: a hand in the air that can be put nowhere.
+        """
+        walk = self.walk
+        if not self.command.any() or self._stuck:
+            self._halt()
+            self._stuck = self._stuck and not (walk.pace == 0.0 and walk.swinging is None and not walk.busy)
+        elif not walk.busy:
+            self._plan()
+        try:
+            return walk.tick()
+        except NoPlanError:
+            if len(walk.held) == len(walk.walker.arms):
+                raise
+            walk.set_down()
+            return walk.tick()
+
+    def _halt(self) -> None:
+        """The body stops, and a hand in the air comes down, where it was to go if that is in reach."""
+        walk = self.walk
+        self._drop()
+        walk.halted, self._asked = True, np.zeros(3)
+        swinging = walk.swinging
+        if walk.pace > 0.0 or swinging is None or walk.busy:
+            return
+        if walk.grips.first[swinging.grip] * walk.plan.path.spacing > walk.path_time:
+            walk.set_down()
+
+    def _plan(self) -> None:
+        """Some slices of planning, begun anew where the command has changed or the horizon comes near."""
+        if (self.command != self._asked).any():
+            self._way = 0
+            self._begin(LEAD, quick=True)
+        elif self._work is None and not self._settled:
+            self._begin(LEAD, quick=False)
+        elif self._work is None and self.walk.plan.path.duration - self.walk.path_time < LEFT and not self.reason:
+            self._way = max(self._way - 1, 0)
+            self._begin(AHEAD, quick=False)
+        for _ in range(SLICES):
+            if self._work is None:
+                return
+            begun, slices = self._work
+            try:
+                plan = next(slices)
+            except StopIteration as end:
+                self._drop()
+                self._take(begun, end.value)
+            except NoPlanError as error:
+                self._drop()
+                self.reason, swinging = str(error), self.walk.swinging
+                if swinging is not None and not self._waited:
+                    # The body may have to wait for the hand
+                    self._begin(LEAD, quick=True, wait=time_left(swinging, self.walk.data) + SURE)
+                else:
+                    self._stuck = True
+            else:
+                if plan is not None:
+                    self.walk.go_over(plan, begun.begins, begun.since)
+                    self.walk.halted = False
+                    self._work = Course(0.0, 0.0, 0, (), (), (), ()), slices
+                    self.walk.leash = None
+
+    def _begin(self, lead: float, quick: bool, wait: float = 0.0) -> None:
+        """Begin to plan along the command, behind what the body goes on with for ``lead`` [s].
+
+        Args:
+            wait: for so long the body stops on its way [s].
+        """
+        walk, steering = self.walk, self.steering
+        path = walk.plan.path
+        begun, spacing = course(walk, lead, not quick), path.spacing
+        part, lower = WAYS[self._way]
+        tail = [path.at(u)[0].homogeneous for u in np.arange(begun.begins, begun.splice + spacing / 2, spacing)]
+        rates = steering.rates(tail[-2], tail[-1], spacing) if walk.pace and len(tail) > 1 else np.zeros(4)
+        low, lower = steering.lower(tail[-1]), lower * walk.data.body_shift
+        rest = steering.ramp(rates, np.zeros(3), (low, low), round(wait / spacing), spacing)
+        rates = rest[-1] if len(rest) else rates
+        ahead = steering.ramp(rates, part * self.command, (low, lower), round(HORIZON / spacing), spacing)
+        ahead = steering.ahead(tail[-1], np.concatenate([rest, ahead]), spacing)
+        other = BodyPath(np.concatenate([tail, ahead]), spacing)
+        self._work = begun, course_slices(walk.walker, walk.structure, walk.plan, begun, other, quick)
+        self._asked, self._waited = self.command.copy(), wait > 0.0
+        walk.leash = begun.splice, begun.since + len(begun.kept)
+
+    def _take(self, begun: Course, plan: Plan) -> None:
+        """Go over to a plan that leads farther; where it does not lead over the horizon, something else is tried."""
+        walk = self.walk
+        old = _far(walk.plan, walk.path_time)
+        if plan.complete or _far(plan, walk.path_time - begun.begins) > old:
+            walk.go_over(plan, begun.begins, begun.since)
+            walk.halted = False
+        self.reason, self._settled = plan.reason, plan.complete or self._way + 1 == len(WAYS)
+        if not self._settled:
+            self._way += 1
+
+    def _drop(self) -> None:
+        self._work, self.walk.leash = None, None
+
+
+def _far(plan: Plan, here: float) -> float:
+    """How far a plan leads from a path time on [m], turns counted as on the path's own scale."""
+    path = plan.path
+    first, last = (round(u / path.spacing) for u in (here, path.duration if plan.complete else plan.reached))
+    poses = path.poses[first : last + 1]
+    shifts = np.linalg.norm(np.diff(poses[:, :3, 3], axis=0), axis=1)
+    turns = np.linalg.norm(np.diff(poses[:, :3, :2], axis=0), axis=(1, 2)) / np.sqrt(2.0)
+    return float((shifts + TURN_RADIUS * turns).sum())
+
+
+def standing_plan(walker: Walker, structure: Structure, pose: Any) -> Plan:
+    """A plan for a body that stands, on holds that it could keep while it goes a little in every direction.
+
+    Raises:
+        ShapeError, RotationError: no pose. NoPlanError: no stance is possible there.
+    """
+    here = validation.pose("pose", pose)
+    steering = Steering.on(structure, here)
+    legs = [(1, 0), (-2, 0), (1, 1), (0, -2), (0, 1)]
+    rates = np.concatenate([np.repeat([[*leg, 0, 0]], 10, axis=0) for leg in legs]) * ROUNDABOUT / (10 * SPACING)
+    round_about = BodyPath(np.concatenate([here.homogeneous[None], steering.ahead(here.homogeneous, rates, SPACING)]))
+    asked = plan_walk(walker, structure, round_about, objective="destination", partial=True)
+    start = dict(zip([arm.name for arm in walker.arms], asked.start, strict=True))
+    return plan_walk(walker, structure, standing_path(here), start=start)
