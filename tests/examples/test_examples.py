@@ -152,6 +152,17 @@ def test_levels_cost_the_hand_nothing() -> None:
     assert all(float(x) < 1e-6 for x in re.findall(rf"disturbed {NUMBER}", text))
 
 
+def test_space_arm_passes_where_single_pairs_fail() -> None:
+    text = output("space_arm")
+    for failing in ("joint2", "alpha"):
+        assert number(f"(?m)^{failing}: tip loses at most # m/s", text) > 0.1
+    assert number("alpha, beta: tip loses at most # m/s", text) < 1e-6
+    assert number("alpha, beta: .* to # rad", text) > 1.75
+    assert number("alpha, beta: .*acceleration at most # rad/s", text) <= 0.02 + 1e-6
+    assert "pair at the end beta" in text
+    check_picture(text)
+
+
 def test_conflict_names_the_culprit() -> None:
     text = output("conflict")
     assert number("Cheapest to relax: ball/panda_hand.0. by # mm/s", text) == pytest.approx(536, abs=1)
@@ -174,7 +185,7 @@ def test_examples_are_short_and_use_public_names(path: Path) -> None:
     assert ast.get_docstring(tree)
     modules = {a.name for n in ast.walk(tree) if isinstance(n, ast.Import) for a in n.names}
     modules |= {n.module or "" for n in ast.walk(tree) if isinstance(n, ast.ImportFrom)}
-    ours = {"wbc", "wbc.tasks", "wbc.track", "wbc.shapes", "wbc.trajectory", "wbc.walking.run"}
+    ours = {"wbc", "wbc.tasks", "wbc.track", "wbc.shapes", "wbc.trajectory", "wbc.walking.run", "wbc.coordinates"}
     assert modules <= {"itertools", "pathlib", "numpy", "pinocchio", "casadi"} | ours
     assert not [n.attr for n in ast.walk(tree) if isinstance(n, ast.Attribute) and n.attr.startswith("_")]
 

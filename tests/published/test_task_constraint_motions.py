@@ -13,7 +13,9 @@ import pinocchio as pin
 import pytest
 
 from wbc.coordinates import (
+    Adviser,
     BodyRows,
+    Conditioning,
     CoordinatePair,
     JointRows,
     PairController,
@@ -189,3 +191,48 @@ def test_a24_hands_held_while_the_carrier_moves() -> None:
     assert np.abs(np.delete(v, moved)).max() < 1e-12
     assert np.abs(v[moved]).min() > 1e-6
     assert pi > np.abs(v).max()
+
+
+def test_a12_advice_along_the_second_joint_of_the_spherical_shoulder() -> None:
+    assert FOUR.alpha is not None
+    assert FOUR.middle is not None
+    (beta,), robot = FOUR.in_plane, parts("spherical_4r").robot
+    pairs = [CoordinatePair(FOUR.tip, FOUR.alpha, "alpha"), CoordinatePair(FOUR.tip, beta, "beta")]
+    adviser = Adviser(robot, pairs, length=1.0, backend="vm")
+    for q2, first, second, best in (
+        (0.0, 0.424124, 0.0, "alpha"),
+        (0.5, 0.421499, 0.390733, "alpha"),
+        (1.2, 0.261023, 0.414274, "beta"),
+        (1.5, 0.050729, 0.414638, "beta"),
+        (pi / 2, 0.0, 0.414650, "beta"),
+    ):
+        q = np.array([0.3, q2, -0.7, 1.1])
+        np.testing.assert_allclose(adviser.sigmas(q), (first, second), atol=5e-6)
+        assert adviser.recommend(q) == best
+    rows = [(FOUR.tip,), (FOUR.tip, FOUR.alpha), (FOUR.tip, FOUR.middle), (FOUR.tip, beta)]
+    ranks = [np.linalg.matrix_rank(J, 1e-9) for J in Conditioning(robot, rows, backend="vm").matrices(q)]
+    assert ranks == [3, 3, 3, 4]
+
+
+@pytest.mark.parametrize(
+    ("name", "held", "least", "seen"),
+    [
+        ("spdm_arm_simplified", ("alpha", "joint1", "joint7", "elbow x", "elbow y", "elbow z"), 0.3, 0.4727),
+        ("spdm_arm", ("alpha", "joint1", "joint7", "elbow x", "elbow y", "elbow z"), 0.3, 0.3426),
+        ("ssrms", ("beta", "gamma", "elbow x", "elbow y", "elbow z"), 0.1, 0.1260),
+    ],
+)
+def test_a23_the_best_pair_keeps_what_the_task_has(name: str, held: tuple[str, ...], least: float, seen: float) -> None:
+    """Over 10^4 configurations; rows in metres and radians."""
+    arm = parts(name).arms[0]
+    groups = [(arm.tip,), *((arm.tip, one) for one in arm.candidates() if str(one) in held)]
+    assert len(groups) == 1 + len(held)
+    states = np.random.default_rng(7).uniform(-pi, pi, (10_000, 7))
+    task, *every = (
+        np.linalg.svd(J, compute_uv=False)[:, -1]
+        for J in Conditioning(parts(name).robot, groups, length=1.0, backend="vm").many(states)
+    )
+    regular = task > 1e-3
+    worst = (np.max(every, axis=0)[regular] / task[regular]).min()
+    assert worst > least
+    assert worst == pytest.approx(seen, abs=1e-3)

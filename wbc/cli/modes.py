@@ -12,6 +12,9 @@ from wbc import validation
 from wbc.cli.console import err, out
 from wbc.coordinates.modes import Mode, mode_table, table_text
 
+#: M1 to M8
+SHORT_NAMES = tuple(mode.name for mode in Mode)
+
 
 def modes(
     robot: Annotated[str, typer.Argument(help="An arm of the table; default: all of them.")] = "",

@@ -3,21 +3,37 @@
 from __future__ import annotations
 
 from wbc.analysis.rows import BodyRows, JointRows, PitchPlaneRows
+from wbc.coordinates.adviser import Advice, Adviser, Basis, Condition
 from wbc.coordinates.arm_parts import Arm, Parts, parts
+from wbc.coordinates.automatic import AutomaticPairs
+from wbc.coordinates.complete_sets import CompleteSet, smallest_complete_sets
+from wbc.coordinates.conditioning import Conditioning
 from wbc.coordinates.control import PairController
+from wbc.coordinates.determinant_places import ClosedForm, closed_form
 from wbc.coordinates.items import FollowRows, KeepRows
 from wbc.coordinates.modes import MissingPartError, Mode, mode_pairs, mode_table
 from wbc.coordinates.pair import CoordinatePair
 from wbc.coordinates.pair_stack import PairStack, pair_stack
+from wbc.coordinates.plots import DriveLog, plot_drives
 from wbc.coordinates.point_sets import OnCircle, OnCylinder, OnLine, OnPlane, OnSphere, PointSet
+from wbc.coordinates.restrictions import restriction_table
 from wbc.coordinates.rows import AxisRows, Coordinate, PlaneAngleRows, PointRows
 
 __all__ = [
+    "Advice",
+    "Adviser",
     "Arm",
+    "AutomaticPairs",
     "AxisRows",
+    "Basis",
     "BodyRows",
+    "ClosedForm",
+    "CompleteSet",
+    "Condition",
+    "Conditioning",
     "Coordinate",
     "CoordinatePair",
+    "DriveLog",
     "FollowRows",
     "JointRows",
     "KeepRows",
@@ -35,8 +51,12 @@ __all__ = [
     "PlaneAngleRows",
     "PointRows",
     "PointSet",
+    "closed_form",
     "mode_pairs",
     "mode_table",
     "pair_stack",
     "parts",
+    "plot_drives",
+    "restriction_table",
+    "smallest_complete_sets",
 ]

@@ -10,6 +10,7 @@ import numpy as np
 from wbc import validation
 from wbc.controller import Step
 from wbc.coordinates import expressions
+from wbc.coordinates.conditioning import checked_configuration
 from wbc.coordinates.pair import CoordinatePair
 from wbc.coordinates.pair_stack import PairStack, metric_of, pair_stack, row_count
 from wbc.coordinates.rows import Coordinate
@@ -62,6 +63,7 @@ class PairController:
         self.active = next(iter(self.declared.pairs))
         self._command: dict[Coordinate, Array] = {}
         self._fading: dict[Coordinate, Array] = {}
+        self._served: dict[Coordinate, Array] = {}
         self._time, self._seconds = 0.0, 0.0
         self._moving: set[Coordinate] = set()
         self._q: Array | None = None
@@ -90,7 +92,7 @@ class PairController:
         """
         q = self.robot.configuration("q", q)
         self.controller.reset(q, v)
-        self._command, self._fading, self._q = {}, {}, q
+        self._command, self._fading, self._served, self._q = {}, {}, {}, q
         self._activate()
         self._latch(self.pair.constraint, q)
 
@@ -133,7 +135,9 @@ class PairController:
             v, rows = self.controller.last_command, self.rates(self._q)
             for one in self.pair.rows:
                 if not (one in before and one in self.pair.constraint):
-                    self._fading[one] = rows[one] @ v - self._wanted(one)
+                    # A task that goes on lags by what it was asked for, not by how that has changed since
+                    asked = self._served.get(one) if one in alike else None
+                    self._fading[one] = rows[one] @ v - (self._wanted(one) if asked is None else asked)
             wanted = max(wanted, self._shortest(rows, v))
             kept = [one for one in self.pair.constraint if one in before]
             self._latch([one for one in self.pair.constraint if one not in kept], self._q)
@@ -158,15 +162,16 @@ class PairController:
         Raises:
             ShapeError, NotFiniteError, RotationError, RangeError: bad input.
         """
-        q = self.robot.configuration("q", q)
+        q = checked_configuration(self.robot, q)
         if self._q is None:
             self._latch(self.pair.constraint, q)
-        self._q = q
+        self._q = np.array(q)
         self._time += self.dt if dt is None else validation.scalar("dt", dt, low=0.0, unit="s")
         s = min(1.0, self._time / self._seconds) if self._seconds > 0.0 else 1.0
         left = 1.0 - s * s * (3.0 - 2.0 * s)
-        for one in self.pair.task:
-            self._item(one).speed = self._wanted(one) + left * self._fading.get(one, 0.0)
+        self._served = {one: self._wanted(one) + left * self._fading.get(one, 0.0) for one in self.pair.task}
+        for one, rate in self._served.items():
+            self._item(one).speed = rate
         for one in self.pair.constraint:
             rate = self._wanted(one) + left * self._fading.get(one, 0.0)
             handle = self.controller[self.declared.keep[one]]

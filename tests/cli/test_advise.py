@@ -1,0 +1,39 @@
+"""``wbc advise`` as a user types it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from typer.testing import CliRunner
+
+from wbc.cli.app import app
+
+
+def run(*arguments: str) -> tuple[int, str, str]:
+    """(exit code, standard output, standard error) of ``wbc advise ARGUMENTS``."""
+    result = CliRunner(env={"COLUMNS": "200"}).invoke(app, ["advise", *arguments])
+    return result.exit_code, result.stdout, result.stderr
+
+
+def test_advice_on_a_locus() -> None:
+    code, out, _ = run("spherical_4r", "--at", "0.3,1.5707963267948966,-0.7,1.1")
+    assert code == 0
+    lines = {line.split("  ")[0]: line for line in out.splitlines()}
+    assert "algorithmic" in lines["tip | alpha"]
+    assert "joint2 = 1.571" in lines["tip | alpha"]
+    assert "regular" in lines["tip | beta"]
+    assert out.splitlines()[-1] == "use: tip | beta"
+
+
+def test_the_page_has_the_written_restrictions() -> None:
+    code, out, _ = run("spherical_4r", "--restrictions")
+    assert code == 0
+    assert out.strip() in (Path(__file__).parents[2] / "docs" / "coordinates.md").read_text()
+
+
+def test_bad_input() -> None:
+    assert run("spherical_4r", "--at", "0.3")[0] == 2
+    assert run("spherical_4r", "--at", "a,b,c,d")[0] == 2
+    assert run("spherical_4r", "--mode", "M6")[0] == 2
+    assert run("srms")[0] == 2
+    assert run("spherical_4r", "--current", "alpha")[0] == 2

@@ -1,0 +1,169 @@
+"""Conditioning against numpy, advice against known loci, changes by themselves, the smallest complete sets."""
+
+from __future__ import annotations
+
+from math import pi
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from wbc.coordinates import (
+    Adviser,
+    AutomaticPairs,
+    Basis,
+    BodyRows,
+    Condition,
+    Conditioning,
+    CoordinatePair,
+    JointRows,
+    PairController,
+    closed_form,
+    mode_pairs,
+    parts,
+    smallest_complete_sets,
+)
+from wbc.errors import DuplicateNameError, RangeError, ShapeError, UnknownNameError
+
+STATES = np.random.default_rng(0).uniform(-pi, pi, (30, 7))
+STATE = np.array([0.3, 0.4, -0.5, 1.2, 0.7, -0.6, 0.9])
+FOUR = parts("spherical_4r")
+TIP, ALPHA, (BETA,) = FOUR.arms[0].tip, FOUR.arms[0].alpha, FOUR.arms[0].in_plane
+assert ALPHA is not None
+PAIRS = (CoordinatePair(TIP, ALPHA, "alpha"), CoordinatePair(TIP, BETA, "beta"))
+
+
+@pytest.fixture(scope="module")
+def adviser() -> Adviser:
+    return Adviser(FOUR.robot, PAIRS, length=1.0)
+
+
+@pytest.mark.parametrize("backend", ["native", "vm"])
+def test_singular_values_are_numpys_and_slopes_are_their_derivatives(backend: str) -> None:
+    """Wide, square and tall groups of the Space Station arm, to 1e-12, degenerate places included."""
+    arm, robot = parts("ssrms").arms[0], parts("ssrms").robot
+    assert arm.alpha is not None
+    assert arm.middle is not None
+    groups = [(arm.tip,), (arm.tip, arm.alpha), (arm.tip, arm.middle, *arm.in_plane), (arm.alpha,)]
+    made, h = Conditioning(robot, groups, backend=backend), 1e-6
+    assert made.compiled == (backend == "native")
+    flat = STATES[:5].copy()
+    flat[:, 3] = 0.0
+    for q in (*STATES, *flat):
+        wanted = [np.linalg.svd(J, compute_uv=False)[-1] for J in made.matrices(q)]
+        np.testing.assert_allclose(made.sigmas(q), wanted, atol=1e-12)
+    for many, one in zip(made.many(STATES[:3]), made.matrices(STATES[2]), strict=True):
+        np.testing.assert_allclose(many[2], one, atol=1e-14)
+    for q in STATES[:4]:
+        sigma, slopes, right = made.slopes(q)
+        np.testing.assert_allclose(sigma, made.sigmas(q), atol=1e-14)
+        steps = [(made.sigmas(q + h * e) - made.sigmas(q - h * e)) / (2 * h) for e in np.eye(7)]
+        np.testing.assert_allclose(slopes, np.transpose(steps), atol=1e-6)
+        for J, s, v in zip(made.matrices(q), sigma, right, strict=True):
+            assert np.linalg.norm(J @ v) == pytest.approx(s, abs=1e-12)
+
+
+def test_advice_near_and_on_loci(adviser: Adviser) -> None:
+    near, far = adviser.advise((0.3, 1.5, -0.7, 1.1))
+    assert (near.pair, near.basis, near.locus) == ("alpha", Basis.EXACT, "joint2 = 1.571")
+    assert near.distance == pytest.approx(pi / 2 - 1.5)
+    np.testing.assert_array_equal(near.direction, (0.0, 1.0, 0.0, 0.0))
+    assert far.ratio > 0.9
+    on, _ = adviser.advise((0.3, pi / 2, -0.7, 1.1))
+    assert on.condition is Condition.ALGORITHMIC
+    assert on.distance < 1e-9
+    stretched = adviser.advise((0.3, 0.5, -0.7, 0.0))
+    assert {a.condition for a in stretched} == {Condition.TASK}
+
+
+def test_estimates_say_so_and_are_right_to_first_order() -> None:
+    """Near a relation of three joints, which no single angle shows, the estimate is the distance to it."""
+    robot, (pair,) = parts("ssrms").robot, [p for p in mode_pairs("ssrms", "M1") if p.name == "xi | joint1"]
+    root = STATE.copy()
+    root[2] = -2.187788992  # (4.30) with q4 = 1.2, q5 = 0.7
+    adviser = Adviser(robot, [pair])
+    (on,) = adviser.advise(root)
+    assert on.distance < 1e-7
+    # Across the locus the way back is the whole way
+    (aside,) = adviser.advise(root - 0.02 * on.direction)
+    assert aside.basis is Basis.FIRST_ORDER
+    assert aside.distance == pytest.approx(0.02, rel=0.05)
+    assert aside.locus == ""
+
+
+def test_closed_forms() -> None:
+    robot = parts("ssrms").robot
+    pairs = {p.name: p for p in mode_pairs("ssrms", "M1")}
+    found = closed_form(robot, pairs["xi | joint2"])
+    assert found is not None
+    assert found.lines[:3] == ("q2 = +-pi/2", "q4 in {0, pi}", "q6 = +-pi/2")
+    assert sorted({p.joint for p in found.places}) == ["joint2", "joint4", "joint6"]
+    assert closed_form(robot, pairs["xi | elbow x"]) is None
+    first = closed_form(FOUR.robot, PAIRS[0])
+    assert first is not None
+    assert first.lines == ("q2 = +-pi/2", "q4 in {0, pi}")
+
+
+def test_recommendation_has_hysteresis(adviser: Adviser) -> None:
+    def at(q2: float) -> tuple[float, float, float, float]:
+        return (0.3, q2, -0.7, 1.1)
+
+    assert adviser.recommend(at(0.5)) == "alpha"
+    assert adviser.recommend(at(0.9)) == "beta"
+    assert adviser.recommend(at(0.9), "alpha") == "alpha"
+    assert adviser.recommend(at(1.2), "alpha") == "beta"
+    assert adviser.recommend(at(0.5), "beta") == "beta"
+    assert adviser.recommend(at(0.1), "beta") == "alpha"
+
+
+def test_pairs_change_by_themselves_through_a_locus(adviser: Adviser) -> None:
+    """The tip is driven so that joint 2 passes 90 degrees, where the pitch plane cannot be held."""
+    robot = FOUR.robot.with_limits(acceleration=0.6, position_lower=-3.0, position_upper=3.0)
+    control = PairController(robot, PAIRS, limits=True, length=1.0)
+    auto, q = AutomaticPairs(control, adviser, seconds=0.4), np.array((0.3, 0.9, -0.7, 1.1))
+    control.reset(q)
+    wanted = np.array((0.0, 0.3, 0.0, 0.02))
+    last, worst, off, passed = np.zeros(4), 0.0, 0.0, 0.0
+    for tick in range(160):
+        command = min(1.0, tick / 40) * control.rates(q)[TIP] @ wanted
+        auto.command(command)
+        v = auto.step(q).v
+        worst, last = max(worst, float(np.abs(v - last).max() / control.dt)), v
+        off = max(off, float(np.linalg.norm(control.rates(q)[TIP] @ v - command)))
+        q = pin.integrate(robot.model, q, control.dt * v)
+        passed = max(passed, q[1])
+    assert [name for _, name in auto.changes] == ["beta"]
+    assert passed > pi / 2
+    assert worst < 0.6 + 1e-6
+    # What the acceleration limit takes from a command of 0.4 m/s
+    assert off < 5e-3
+
+
+def test_smallest_complete_sets_are_the_published_ones() -> None:
+    arm = FOUR.arms[0]
+    assert arm.middle is not None
+    found = smallest_complete_sets(FOUR.robot, arm.tip, [ALPHA, BETA, arm.middle])
+    assert [[str(one) for one in s.constraint] for s in found] == [["alpha", "beta"], ["beta", "elbow"]]
+    assert {s.verdict for s in found} == {"loose"}
+    assert min(s.least for s in found) > 0.1
+    assert smallest_complete_sets(FOUR.robot, arm.tip, [ALPHA]) == ()
+
+
+def test_bad_input(adviser: Adviser) -> None:
+    with pytest.raises(ShapeError):
+        Adviser(FOUR.robot, [])
+    with pytest.raises(DuplicateNameError):
+        Adviser(FOUR.robot, [PAIRS[0], CoordinatePair(TIP, BETA, "alpha")])
+    with pytest.raises(RangeError):
+        Adviser(FOUR.robot, PAIRS, factor=0.5)
+    with pytest.raises(ShapeError):
+        adviser.advise((0.0, 1.0))
+    with pytest.raises(UnknownNameError, match="did you mean 'beta'"):
+        adviser.recommend((0.3, 0.5, -0.7, 1.1), "bta")
+    with pytest.raises(ShapeError):
+        Conditioning(FOUR.robot, [])
+    control = PairController(FOUR.robot, PAIRS[0], backend="vm")
+    with pytest.raises(RangeError, match="no such pair"):
+        AutomaticPairs(control, adviser)
+    with pytest.raises(RangeError, match="up to 7 joints"):
+        smallest_complete_sets(parts("spdm").robot, BodyRows("arm1_tip"), [JointRows("body_joint")])

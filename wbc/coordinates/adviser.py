@@ -1,0 +1,186 @@
+"""Which pair of coordinates is well conditioned here, how far the next locus is, and when to change."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Any
+
+import numpy as np
+
+from wbc import validation
+from wbc.coordinates.conditioning import Conditioning, checked_configuration
+from wbc.coordinates.determinant_places import ClosedForm, closed_form
+from wbc.coordinates.pair import CoordinatePair
+from wbc.errors import DuplicateNameError, ShapeError, UnknownNameError
+from wbc.robot import Robot
+from wbc.validation import Array
+
+#: Singular values below this count as lost, where nothing else is said [1]
+LEAST = 1e-2
+#: A change is recommended where another pair is better by this factor
+FACTOR = 1.5
+
+
+class Condition(StrEnum):
+    """What is wrong with a pair at a configuration."""
+
+    REGULAR = "regular"
+    #: Task and constraint have full rank each, but not together: another pair may do
+    ALGORITHMIC = "algorithmic"
+    #: The task itself has lost rank: no constraint helps
+    TASK = "task"
+    #: The constraint rows depend on each other
+    CONSTRAINT = "constraint"
+
+
+class Basis(StrEnum):
+    """Where a distance comes from."""
+
+    #: sigma / |d sigma / dq|: what it would be if sigma fell as it does here
+    FIRST_ORDER = "first-order estimate"
+    #: one joint at one angle, from the factors of the determinant
+    EXACT = "exact"
+
+
+@dataclass(frozen=True, eq=False)
+class Advice:
+    """One pair at one configuration.
+
+    Attributes:
+        pair: its name. sigma: least singular value of the scaled rows of task and constraint; task, constraint: of
+            either alone. condition: see :class:`Condition`.
+        distance: to the nearest locus, in the space of joints [rad, length for sliding ones]; basis: what it is.
+        direction: unit vector there [nv]. locus: the exact one as text, or empty.
+    """
+
+    pair: str
+    sigma: float
+    task: float
+    constraint: float
+    condition: Condition
+    distance: float
+    basis: Basis
+    direction: Array
+    locus: str
+
+    @property
+    def ratio(self) -> float:
+        """sigma over the task's own: how much the constraint costs."""
+        return self.sigma / self.task if self.task > 0.0 else 0.0
+
+
+class Adviser:
+    """Advice on some pairs of a robot.
+
+        adviser = Adviser(robot, mode_pairs("ssrms", "M1"))
+        for advice in adviser.advise(q): ...
+        name = adviser.recommend(q, current="xi | alpha")
+
+    Singular values are those of D_r [J_T; J_C] D_c, see :class:`Conditioning`. For over-determined pairs the matrix is
+    tall.
+
+    Args:
+        length: characteristic length [m]; default: the robot's. least: singular value below which a row is lost.
+        factor: how much better another pair must be for a change, > 1: the hysteresis.
+        exact: factor the determinants of square pairs, which takes some seconds when it is first needed.
+        backend: ``native``, ``vm`` (numpy), or ``auto``.
+
+    Raises:
+        ShapeError, DuplicateNameError, RangeError, UnknownNameError: bad pairs, numbers, names.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        pairs: Iterable[CoordinatePair],
+        *,
+        length: float | None = None,
+        least: float = LEAST,
+        factor: float = FACTOR,
+        exact: bool = True,
+        backend: str = "auto",
+    ) -> None:
+        given = list(pairs)
+        if not given or not all(isinstance(p, CoordinatePair) for p in given):
+            raise ShapeError("pairs", pairs, "expected one CoordinatePair or several")
+        self.pairs: dict[str, CoordinatePair] = {}
+        for pair in given:
+            pair.counts(robot)
+            if pair.name in self.pairs:
+                raise DuplicateNameError("pairs", pair.name, "two pairs of one name")
+            self.pairs[pair.name] = pair
+        self.robot = robot
+        self.least = validation.scalar("least", least, low=0.0)
+        self.factor = validation.scalar("factor", factor, low=1.0)
+        self._exact = validation.flag("exact", exact)
+        groups = dict.fromkeys(side for p in given for side in (p.rows, p.task, p.constraint))
+        self.conditioning = Conditioning(robot, list(groups), length=length, backend=backend)
+        places = {group: k for k, group in enumerate(groups)}
+        self._places = np.array([[places[side] for side in (p.rows, p.task, p.constraint)] for p in given])
+        self._names = list(self.pairs)
+
+    def sigmas(self, q: Any) -> Array:
+        """The least singular value of each pair, in their order: what a control loop asks for.
+
+        Raises:
+            ShapeError, NotFiniteError, RotationError: no configuration.
+        """
+        found = self.conditioning.sigmas(checked_configuration(self.robot, q))
+        return np.asarray(found[self._places[:, 0]])
+
+    def advise(self, q: Any) -> tuple[Advice, ...]:
+        """All about every pair, in their order.
+
+        Raises:
+            ShapeError, NotFiniteError, RotationError: no configuration.
+        """
+        q = self.robot.configuration("q", q)
+        sigmas, slopes, _ = self.conditioning.slopes(q)
+        out = []
+        for (whole, task, constraint), name in zip(self._places, self._names, strict=True):
+            values = float(sigmas[whole]), float(sigmas[task]), float(sigmas[constraint])
+            known = closed_form(self.robot, self.pairs[name]) if self._exact else None
+            found = self._nearest(q, values[0], slopes[whole], known)
+            sigma, alone, held = values
+            distance, basis, direction, locus = found
+            condition = self._condition(sigma, alone, held)
+            out.append(Advice(name, sigma, alone, held, condition, distance, basis, direction, locus))
+        return tuple(out)
+
+    def recommend(self, q: Any, current: str | None = None) -> str:
+        """The name of the pair to use: the best conditioned one, or the current one where none is better by the factor.
+
+        Raises:
+            UnknownNameError: no such pair. ShapeError, NotFiniteError, RotationError: no configuration.
+        """
+        if current is not None and current not in self.pairs:
+            raise UnknownNameError("current", current, self.pairs)
+        sigmas = self.sigmas(q)
+        best = int(np.argmax(sigmas))
+        if current is not None and sigmas[best] < self.factor * sigmas[self._names.index(current)]:
+            return current
+        return self._names[best]
+
+    def _condition(self, sigma: float, task: float, constraint: float) -> Condition:
+        if sigma >= self.least:
+            return Condition.REGULAR
+        if task < self.least:
+            return Condition.TASK
+        return Condition.CONSTRAINT if constraint < self.least else Condition.ALGORITHMIC
+
+    def _nearest(
+        self, q: Array, sigma: float, slope: Array, known: ClosedForm | None
+    ) -> tuple[float, Basis, Array, str]:
+        """(distance, basis, direction, text) of the locus that is nearest."""
+        steep = float(np.linalg.norm(slope))
+        guess = sigma / steep if steep > 0.0 else (0.0 if sigma == 0.0 else np.inf)
+        found = known.nearest(q) if known is not None else None
+        if found is not None and abs(found[1]) <= guess:
+            place, way = found
+            direction = np.zeros(self.robot.nv)
+            direction[place.dof] = np.sign(way)
+            return abs(way), Basis.EXACT, direction, str(place)
+        direction = -slope / steep if steep > 0.0 else np.zeros(self.robot.nv)
+        return guess, Basis.FIRST_ORDER, direction, ""

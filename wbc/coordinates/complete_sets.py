@@ -1,0 +1,125 @@
+"""The smallest sets of constraint coordinates that always suffice, by search over subsets.
+
+A set suffices if the rows of task and set together have rank m wherever the task has full rank. A subset is rejected
+by a witness, a configuration where the task keeps its rank and the rows do not. Witnesses are looked for where joints
+are at multiples of 90 degrees, at random places, and by Newton's method on sigma(q) = 0 from there; what is left is
+certified by :func:`wbc.analysis.analyse`, or stays "screened".
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from math import pi
+
+import numpy as np
+
+from wbc import validation
+from wbc.analysis import ExactModel, analyse
+from wbc.coordinates.conditioning import Conditioning
+from wbc.coordinates.determinant_places import LARGE
+from wbc.coordinates.rows import Coordinate, coordinates
+from wbc.errors import RangeError, WbcError
+from wbc.robot import Robot
+from wbc.validation import Array
+
+#: Singular values below this are zero, and the task must keep this one for a witness
+ZERO, KEPT = 1e-9, 1e-3
+#: Configurations of the screen, and how many of them Newton's method starts from
+STATES, STARTS, STEPS = 2000, 60, 30
+SCREENED = "screened"
+
+
+@dataclass(frozen=True, eq=False)
+class CompleteSet:
+    """A set of constraint coordinates that suffices.
+
+    Attributes:
+        constraint: the coordinates. verdict: ``strict`` or ``loose`` as :func:`wbc.analysis.analyse` has it, or
+            ``screened``: no witness was found, and nothing is proved.
+        least: smallest ratio of the least singular values, rows over task, that the screen met where the task has one
+            above 1e-3.
+    """
+
+    constraint: tuple[Coordinate, ...]
+    verdict: str
+    least: float
+
+
+def smallest_complete_sets(
+    robot: Robot,
+    task: Coordinate | Sequence[Coordinate],
+    candidates: Sequence[Coordinate],
+    *,
+    certify: bool = True,
+    seed: int = 0,
+) -> tuple[CompleteSet, ...]:
+    """All sets of the fewest candidates that suffice; empty if even all together do not.
+
+    Args:
+        certify: prove what the screen leaves, where the analysis takes the robot (seconds each).
+
+    Raises:
+        ShapeError, UnknownNameError, RangeError: bad rows; too few candidates for the joints.
+    """
+    wanted, given = coordinates("task", task), coordinates("candidates", candidates)
+    if validation.flag("certify", certify) and robot.nv > LARGE:
+        raise RangeError("certify", certify, f"exact analysis takes up to {LARGE} joints; say certify=False")
+    states = _states(robot, seed)
+    found: list[CompleteSet] = []
+    for size in range(1, len(given) + 1):
+        subsets = list(combinations(given, size))
+        screen = Conditioning(robot, [wanted, *((*wanted, *s) for s in subsets)], backend="auto")
+        every = screen.many(states)
+        task_sigma, *others = (np.linalg.svd(J, compute_uv=False)[:, -1] for J in every)
+        regular = task_sigma > KEPT
+        for k, (subset, sigma) in enumerate(zip(subsets, others, strict=True), start=1):
+            if (
+                every[k].shape[1] < robot.nv
+                or (sigma[regular] < ZERO).any()
+                or _hunted(screen, k, np.asarray(states[regular]), np.asarray(sigma[regular], dtype=np.float64))
+            ):
+                continue
+            ratio = float((sigma[regular] / task_sigma[regular]).min())
+            verdict = _certified(robot, wanted, subset) if certify else SCREENED
+            if verdict in ("strict", "loose", SCREENED):
+                found.append(CompleteSet(subset, verdict, ratio))
+        if found:
+            break
+    return tuple(found)
+
+
+def _states(robot: Robot, seed: int) -> Array:
+    """Half at random; half with some joints at multiples of 90 degrees."""
+    rng = np.random.default_rng(seed)
+    q = rng.uniform(-pi, pi, (STATES, robot.nq))
+    special = rng.integers(-1, 3, q.shape) * (pi / 2)
+    chosen = rng.random(q.shape) < rng.uniform(0.2, 0.9, (STATES, 1))
+    chosen[::2] = False
+    return np.where(chosen, special, q)
+
+
+def _hunted(screen: Conditioning, group: int, states: Array, sigma: Array) -> bool:
+    """Newton's method on sigma = 0 from the states where it is least; a zero with a regular task is a witness."""
+    order = np.argsort(sigma)
+    for start in states[np.concatenate((order[: STARTS // 2], order[:: max(1, len(order) // (STARTS // 2))]))]:
+        q = start.copy()
+        for _ in range(STEPS):
+            values, slopes, _ = screen.slopes(q)
+            steep = float(slopes[group] @ slopes[group])
+            if values[group] < ZERO or steep < 1e-16 or values[0] < KEPT:
+                break
+            step = -values[group] / steep * slopes[group]
+            q = q + step * min(1.0, 0.3 / float(np.linalg.norm(step)))
+        if values[group] < ZERO and values[0] > KEPT:
+            return True
+    return False
+
+
+def _certified(robot: Robot, task: tuple[Coordinate, ...], subset: tuple[Coordinate, ...]) -> str:
+    """The verdict of exact analysis; ``screened`` where it does not take the rows or the robot."""
+    try:
+        return analyse(ExactModel(robot), task, subset).verdict  # type: ignore[arg-type]
+    except WbcError:
+        return SCREENED

@@ -1,0 +1,129 @@
+"""Loci that are known in closed form: joints at which a square pair loses rank, whatever the others do.
+
+The determinant of a square pair is factored exactly, see :mod:`wbc.analysis`; each factor that is linear in
+tan(q_i / 2) puts one joint at one angle, and the distance to it is |q_i - angle|, up to whole turns.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cache
+
+from wbc.analysis import (
+    BodyRows,
+    Branch,
+    Exact,
+    ExactModel,
+    JointRows,
+    Notation,
+    PitchPlaneRows,
+    Relation,
+    Value,
+    factored_determinant,
+    symbolic_jacobian,
+)
+from wbc.analysis.points import univariate_roots
+from wbc.coordinates.pair import CoordinatePair
+from wbc.errors import WbcError
+from wbc.robot import Robot
+from wbc.validation import Array
+
+#: See :func:`closed_form`
+SMALL, LARGE = 4, 7
+
+
+@dataclass(frozen=True)
+class Place:
+    """A joint at an angle [rad], or a displacement [m], where a pair is singular.
+
+    Attributes:
+        dof: index into v. joint: its name. value: the angle. turning: whether whole turns are the same.
+    """
+
+    dof: int
+    joint: str
+    value: float
+    turning: bool
+
+    def way(self, q: Array) -> float:
+        """How far the joint is to go, with its sign; every joint has one coordinate."""
+        off = self.value - float(q[self.dof])
+        return math.remainder(off, 2.0 * math.pi) if self.turning else off
+
+    def __str__(self) -> str:
+        return f"{self.joint} = {self.value:.4g}"
+
+
+@dataclass(frozen=True)
+class ClosedForm:
+    """Where the determinant of a square pair vanishes.
+
+    Attributes:
+        places: joints at angles. lines: all conditions as rank analysis writes them, joints by their number.
+        always: the determinant is identically zero.
+    """
+
+    places: tuple[Place, ...]
+    lines: tuple[str, ...]
+    always: bool = False
+
+    def nearest(self, q: Array) -> tuple[Place, float] | None:
+        """The nearest place and the way to it, or None where there is none."""
+        found = [(place, place.way(q)) for place in self.places]
+        return min(found, key=lambda item: abs(item[1]), default=None)
+
+
+def closed_form(robot: Robot, pair: CoordinatePair) -> ClosedForm | None:
+    """The factors of a pair's determinant, once a robot and pair.
+
+    None where the pair is not square, where it has rows that rank analysis does not know, or where that refuses the
+    robot (floating bases, placements that are not by right angles). A part of a position in an arm of more than
+    :data:`SMALL` joints, or a robot of more than :data:`LARGE`, has a determinant too long to be of use.
+    """
+    rows = [one for one in pair.rows if isinstance(one, (BodyRows, JointRows, PitchPlaneRows))]
+    parted = any(isinstance(one, BodyRows) and len(one.translation) in (1, 2) for one in rows)
+    if len(rows) < len(pair.rows) or sum(pair.counts(robot)) != robot.nv or robot.nq != robot.nv:
+        return None
+    if robot.nv > LARGE or (parted and robot.nv > SMALL):
+        return None
+    return _factored(robot, tuple(rows))
+
+
+@cache
+def _factored(robot: Robot, rows: tuple[BodyRows | JointRows | PitchPlaneRows, ...]) -> ClosedForm | None:
+    exact = _exact(robot)
+    if exact is None:
+        return None
+    model, rings = exact
+    factors = factored_determinant(rings, symbolic_jacobian(model, rows)).factors
+    if factors.zero:
+        return ClosedForm((), ("everywhere",), always=True)
+    values = [f for f, _ in factors.conditions if isinstance(f, Value)]
+    relations = [f for f, _ in factors.conditions if isinstance(f, Relation) and _vanishes(rings, f)]
+    branches = [Branch(values=(v,)) for v in values] + [Branch(relations=(r,)) for r in relations]
+    lines = tuple(Notation(rings.half).branches(branches))
+    return ClosedForm(tuple(_place(robot, model, v) for v in values), lines)
+
+
+def _vanishes(rings: Exact, relation: Relation) -> bool:
+    """Whether a factor can be zero; of those in one joint it is known."""
+    return len(relation.joints) > 1 or bool(univariate_roots(rings.half, relation))
+
+
+@cache
+def _exact(robot: Robot) -> tuple[ExactModel, Exact] | None:
+    """The exact model of a robot; None for one that rank analysis refuses."""
+    try:
+        model = ExactModel(robot)
+    except WbcError:
+        return None
+    return model, Exact(model.ring)
+
+
+def _place(robot: Robot, model: ExactModel, value: Value) -> Place:
+    joint = model.ring.coordinates[value.joint]
+    if joint.slides:
+        return Place(joint.dof, robot.dof_names[joint.dof], float(value.value or 0), False)
+    angle = math.pi if value.value is None else 2.0 * math.atan(float(value.value))
+    return Place(joint.dof, robot.dof_names[joint.dof], angle, True)
