@@ -24,6 +24,7 @@ FLOORS = {
     "wbc.analysis": 4,
     "wbc.stack": 4,
     "wbc.qp": 5,
+    "wbc.resolvers": 5,
     "wbc.export": 5,
     "wbc.controller": 6,
     "wbc.trajectory": 7,
@@ -34,7 +35,7 @@ FLOORS = {
     "wbc.cli": 9,
 }
 #: Parts that may import only the listed floors, whatever stands below them
-ONLY = {"wbc.qp": {0}}
+ONLY = {"wbc.qp": {0}, "wbc.resolvers": {0}}
 #: The package's own __init__ collects names from every floor
 ROOF = "wbc"
 PACKAGE_FILES = sources("wbc", "tasks", "robots")

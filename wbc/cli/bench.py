@@ -16,7 +16,7 @@ from wbc.errors import WbcError
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 
 #: First argument -> the module that measures something else than the tick
-OTHERS = {"time-laws": "bench.time_laws", "ik": "bench.ik", "walk": "bench.walk"}
+OTHERS = {"time-laws": "bench.time_laws", "ik": "bench.ik", "walk": "bench.walk", "resolvers": "bench.resolvers"}
 
 
 class BenchError(WbcError):
@@ -33,6 +33,8 @@ def bench(context: typer.Context) -> None:
     wbc bench ik measures inverse kinematics on the protocol of TRAC-IK: wbc bench ik --full
 
     wbc bench walk plans and walks courses, turns and trenches: wbc bench walk --full
+
+    wbc bench resolvers drives the Space Station arm by classical rate resolution and by pairs
     """
     if not (ROOT / "bench" / "__main__.py").is_file():
         reason = "the benchmark is not installed with the package; run it from a clone of the repository"
