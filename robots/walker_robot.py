@@ -57,6 +57,11 @@ class Walker:
         names = [arm.name for arm in self.arms]
         return self.arms[names.index(validation.one_of("arm", name, names))]
 
+    @property
+    def tolerances(self) -> WalkerData:
+        """Clearance, latch and closing: those of its data; of the two-ended arm, which has none, those of the file."""
+        return self.data if isinstance(self.data, WalkerData) else WalkerData.read()
+
     def urdf(self, path: str | os.PathLike[str]) -> pathlib.Path:
         """Writes the robot as URDF without its floating base; returns the file. The root link is ``body``.
 

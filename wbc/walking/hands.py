@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from math import sqrt
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import pinocchio as pin
@@ -42,6 +42,9 @@ class Hands(ABC):
         events: what happened so far.
     """
 
+    #: Data of the machines that it is for
+    machine: ClassVar[type] = WalkerData
+
     def __init__(
         self,
         walker: Walker,
@@ -50,9 +53,10 @@ class Hands(ABC):
         stack: WalkStack,
         grasps: Callable[[str, str], bool] | None,
     ) -> None:
-        if plan.grips is None or not isinstance(walker.data, WalkerData):
-            raise ShapeError("plan", plan, "expected a plan of the planner for a body with arms")
-        self.walker, self.structure, self.data, self.stack, self.dt = walker, structure, walker.data, stack, stack.dt
+        if plan.grips is None or not isinstance(walker.data, self.machine):
+            raise ShapeError("plan", plan, f"expected a plan of the planner, of a machine with {self.machine.__name__}")
+        self.walker, self.structure, self.stack, self.dt = walker, structure, stack, stack.dt
+        self.data = walker.tolerances
         self.stack.structure = structure
         self.chain = ClosedChain(walker, structure)
         self.grasps = grasps or (lambda _arm, _hold: True)

@@ -70,7 +70,7 @@ class MovingBody(Hands):
             left = self.swinging.law.duration - self.swinging.clock + self.data.latch_time + SETTLE
             if room < left:
                 wanted = min(wanted, room / left)
-        if self._changing or self.halted or (self.swinging is not None and self.swinging.waits):
+        if self._stands():
             wanted = 0.0
         change = self.dt / RAMP
         self.pace = max(self.pace + min(max(wanted - self.pace, -change), change), 0.0)
@@ -80,6 +80,10 @@ class MovingBody(Hands):
         turn = pose.rotation @ pin.log3(pose.rotation.T @ command.rotation)
         self.stack.body(pose, np.concatenate([command.translation - pose.translation, turn]) / self.dt)
         return command
+
+    def _stands(self) -> bool:
+        """The body is to stop, or not to move on."""
+        return self._changing or self.halted or (self.swinging is not None and self.swinging.waits)
 
     def _stop(self) -> None:
         """The body stops, and the rest of the way is planned from there."""

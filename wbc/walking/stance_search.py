@@ -114,14 +114,18 @@ class StanceSearch:
         longest_delay: float = np.inf,
         width: int | None = 200,
     ) -> None:
-        self.walker, self.path, self.grips = walker, path, grips
-        self.clearance = ArmClearance(walker, grips)
-        self.swings = Swings(walker, structure, path, grips, self.clearance)
+        self.walker, self.structure, self.path, self.grips = walker, structure, path, grips
+        self._equip()
         self.longest_delay, self.width = longest_delay, width
         self.expanded = 0
         # The end of the path is no limit of the arm
         self._latest = np.where(grips.last == len(path) - 1, grips.last, grips.last - INSIDE)
         self._by_arm = [grips.of_arm(k) for k in range(len(walker.arms))]
+
+    def _equip(self) -> None:
+        """What the search asks about conflicts of grips, and about swings."""
+        self.clearance = ArmClearance(self.walker, self.grips)
+        self.swings = Swings(self.walker, self.structure, self.path, self.grips, self.clearance)
 
     def run(self, starts: Sequence[Sequence[int]], sample: int = 0, deadline: float | None = None) -> Found:
         """The fewest moves from one of some stances (one grip an arm each) at a sample.

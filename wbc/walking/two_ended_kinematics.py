@@ -48,15 +48,26 @@ class TwoEndedKinematics:
         Raises:
             ShapeError, NotFiniteError: not seven finite numbers a posture.
         """
+        return np.asarray(self.frames(q)[..., 7, :, :])
+
+    def frames(self, q: Any) -> Array:
+        """Frames 0 to 7 in the near hand's frame ``[..., 8, 4, 4]`` at joints 1 to 7, ``[..., 7]`` [rad].
+
+        Frame 0 stands at the near hand, its z axis along the arm; 3 is the robot's ``body``, where the first boom ends;
+        4 where the second one does; 7 the far hand.
+
+        Raises:
+            ShapeError, NotFiniteError: not seven finite numbers a posture.
+        """
         angles = vectors("q", q, (7,)) + OFFSETS
         data = self.data
         along = (0.0, 0.0, data.boom_length, data.boom_length, 0.0, 0.0, 0.0)
         ends = (data.roll_offset, data.yaw_offset, data.pitch_offset)
         offsets = (*ends, data.elbow_offset, *reversed(ends))
-        out = np.broadcast_to(np.diag([1.0, -1.0, -1.0, 1.0]), (*angles.shape[:-1], 4, 4))
+        out = [np.broadcast_to(np.diag([1.0, -1.0, -1.0, 1.0]), (*angles.shape[:-1], 4, 4))]
         for joint in range(7):
-            out = out @ _link_matrix(angles[..., joint], TWISTS[joint], along[joint], offsets[joint])
-        return np.asarray(out)
+            out.append(out[-1] @ _link_matrix(angles[..., joint], TWISTS[joint], along[joint], offsets[joint]))
+        return np.stack(out, axis=-3)
 
     def inverse(self, poses: Any, roll: Any = 0.0) -> tuple[Array, Flags]:
         """All postures with joint 1 at ``roll`` that put the far hand at ``poses`` ``[N, 4, 4]``.

@@ -66,7 +66,7 @@ class WalkRecorder:
             dt=walk.dt,
             seed=seed,
             robot=walker.robot.name,
-            robot_digest=walk.data.digest,
+            robot_digest=walker.data.digest,
             meta=meta,
         )
         self._time, self._q = walk.time, walk.q.copy()

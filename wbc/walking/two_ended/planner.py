@@ -1,0 +1,190 @@
+"""Plans for the two-ended arm: from a stance to a hold, or to where its elbow is over a place."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from wbc import validation
+from wbc.errors import RangeError, ShapeError
+from wbc.robots import Walker
+from wbc.validation import Array
+from wbc.walking.body_path import BodyPath
+from wbc.walking.grips import Grips
+from wbc.walking.plan import NoPlanError, Plan, Regrasp
+from wbc.walking.stance_search import Found
+from wbc.walking.structure import Structure
+from wbc.walking.two_ended.law import TurnLaw
+from wbc.walking.two_ended.postures import Grip, PairPostures
+from wbc.walking.two_ended.search import GAITS, TurnSearch
+from wbc.walking.two_ended.swing_path import Turn, TurnPaths
+
+#: Samples of a plan are this far apart [s]
+SPACING = 0.05
+#: The arm stands so many samples before and after each swing, while hands open and close
+STAND = 6
+#: Stances whose elbows are as near to a place as the nearest one, within this [m]
+SAME_PLACE = 0.05
+
+Goal = Callable[[Grip, Grip], bool]
+
+
+@dataclass(frozen=True, eq=False)
+class TwoEndedPlan(Plan):
+    """A plan of the two-ended arm, and what it was asked for.
+
+    Attributes:
+        to, gait: of :func:`plan_two_ended`.
+    """
+
+    to: str | Sequence[float] = ""
+    gait: str = "any"
+
+
+def plan_two_ended(
+    walker: Walker,
+    structure: Structure,
+    start: Mapping[str, str],
+    to: str | Sequence[float],
+    *,
+    gait: str = "any",
+    width: int | None = 200,
+) -> TwoEndedPlan:
+    """Which hand of the two-ended arm to move where, by the planner's search: the fewest swings, then the least time.
+
+    Args:
+        start: hold ids of ``arm1`` and ``arm2``.
+        to: id of a hold that a hand is to hold, or a place [m] that the elbow is to be as near to as it can be.
+        gait: ``inchworm``: hands keep their order along the way; ``turnaround``: each swing changes it; ``any``.
+        width: stances kept for each number of re-grasps; None: all.
+
+    Raises:
+        UnknownNameError: another arm, hold or gait. ShapeError: another machine, or a start without both hands.
+        RangeError: a hold on which a hand may roll or lean: it does not say where the arm is.
+        NoPlanError: there is no way.
+    """
+    validation.one_of("gait", gait, tuple(GAITS))
+    rows = _start(structure, start)
+    postures = PairPostures(walker, structure)
+    for hold in structure.holds:
+        if not hold.rolls or hold.max_tilt > 0.0:
+            raise RangeError("structure", hold.id, "one hand must fix the arm: no free roll, no tilt")
+    goal, there = _goal(postures, to)
+    paths = TurnPaths(postures)
+    here = structure.positions[list(rows)].mean(axis=0)
+    search = TurnSearch(walker, structure, paths, (structure.positions - here) @ _unit(there - here), goal, gait, width)
+    grips = search.grips
+    stances = [
+        (near, far)
+        for near in grips.of_arm(0)[grips.hold[grips.of_arm(0)] == rows[0]]
+        for far in grips.of_arm(1)[grips.hold[grips.of_arm(1)] == rows[1]]
+        if search.until((near, far), 0) > 0
+    ]
+    if not stances:
+        raise NoPlanError("start", dict(start), "the arm has no posture between these holds", separating=start.values())
+    found = search.run(stances)
+    if not found.complete:
+        raise _refused(structure, search, found, to)
+    return replace(_plan(walker, structure, paths, search, found), to=to, gait=gait)
+
+
+def _start(structure: Structure, start: Mapping[str, str]) -> tuple[int, int]:
+    for name in start:
+        validation.one_of("start", name, ("arm1", "arm2"))
+    if len(start) != 2:
+        raise ShapeError("start", dict(start), "expected the holds of arm1 and arm2")
+    near, far = (structure.index(start[name]) for name in ("arm1", "arm2"))
+    if near == far:
+        raise RangeError("start", dict(start), "two hands on one hold")
+    return near, far
+
+
+def _goal(postures: PairPostures, to: str | Sequence[float]) -> tuple[Goal, Array]:
+    """What an end is, and where."""
+    structure = postures.structure
+    if isinstance(to, str):
+        row = structure.index(to)
+        return (lambda near, far: row in (near.hold, far.hold)), structure.positions[row]
+    place = validation.real_array("to", to, (3,))
+    hands = [Grip(k, roll) for k, hold in enumerate(structure.holds) for roll in range(len(hold.rolls))]
+    far: dict[tuple[Grip, Grip], float] = {}
+    for pair in ((one, other) for one in hands for other in hands if one.hold != other.hold):
+        q = postures.between(*pair)
+        if q is not None:
+            elbow = (postures.frame(pair[0]) @ postures.kinematics.frames(q)[3])[:3, 3]
+            far[pair] = float(np.linalg.norm(elbow - place))
+    if not far:
+        raise NoPlanError("to", list(to), "the arm has no posture on any two holds")
+    least = min(far.values()) + SAME_PLACE
+    return (lambda near, other: far.get((near, other), np.inf) <= least), place
+
+
+def _unit(way: Array) -> Array:
+    length = float(np.linalg.norm(way))
+    return way / length if length > 0.0 else np.array([1.0, 0.0, 0.0])
+
+
+def _refused(structure: Structure, search: TurnSearch, found: Found, to: Any) -> NoPlanError:
+    last = list(found.start)
+    for move in found.moves:
+        last[move.arm] = move.target
+    names = [structure.ids[search.grips.hold[grip]] for grip in last]
+    return NoPlanError("to", to, f"no swing leads on from {' and '.join(names)}", separating=names)
+
+
+def _plan(walker: Walker, structure: Structure, paths: TurnPaths, search: TurnSearch, found: Found) -> TwoEndedPlan:
+    """The whole way: standing, swinging, standing."""
+    grips, postures = search.grips, paths.postures
+    hands = [Grip(int(grips.hold[g]), int(grips.roll[g])) for g in found.start]
+    first = postures.between(*hands)
+    assert first is not None
+    base = postures.frame(hands[0])
+    joints, poses = [np.repeat(first[None], STAND, axis=0)], []
+    poses.append(np.repeat((base @ postures.kinematics.frames(first)[3])[None], STAND, axis=0))
+    count, steps, laws, spans = STAND, list[Regrasp](), list[TurnLaw](), [[(hands[k], 0)] for k in range(2)]
+    for move in found.moves:
+        turn = Turn(move.arm, hands[move.arm], search.pairs.named(move.target), hands[1 - move.arm])
+        q = paths.timed(turn, SPACING)
+        q = np.concatenate([np.repeat(q[:1], STAND, axis=0), q, np.repeat(q[-1:], STAND, axis=0)])
+        joints.append(q)
+        frames = paths.frames(turn, q)
+        poses.append(frames[:, 3])
+        hand, mine = (frames[:, 0], q[:, 2::-1]) if move.arm == 0 else (frames[:, 7], q[:, 3:])
+        laws.append(TurnLaw(hand[:-STAND, :3, 3], mine[:-STAND], SPACING))
+        lift, land = count, count + len(q) - STAND
+        names = structure.ids[turn.source.hold], structure.ids[turn.target.hold]
+        spent, limit = round((land - lift) * SPACING, 6), "end of the path"
+        steps.append(
+            Regrasp(walker.arms[move.arm].name, *names, 0, lift * SPACING, land * SPACING, spent, 0.0, 0.0, limit, 0.0)
+        )
+        hands[move.arm] = turn.target
+        spans[move.arm].append((turn.target, land))
+        count += len(q)
+    whole = np.concatenate(joints)
+    path = BodyPath(np.concatenate(poses), SPACING)
+    table, chain = _grips(walker, whole, spans, steps)
+    start = tuple(structure.ids[grips.hold[g]] for g in found.start)
+    return TwoEndedPlan(path, start, tuple(steps), True, path.duration, "", table, chain, (), tuple(laws))
+
+
+def _grips(
+    walker: Walker, joints: Array, spans: list[list[tuple[Grip, int]]], steps: list[Regrasp]
+) -> tuple[Grips, tuple[tuple[int, ...], ...]]:
+    """Grips of the plan over its path, and those that each arm uses."""
+    rows, parts, chain, offset = list[list[int]](), list[Array](), list[tuple[int, ...]](), 0
+    for arm, mine in enumerate(spans):
+        columns = joints[:, 2::-1] if arm == 0 else joints[:, 3:]
+        lifts = [round(step.lift / SPACING) for step in steps if step.arm == walker.arms[arm].name]
+        ends = [lift + STAND // 2 for lift in lifts] + [len(joints) - 1]
+        chain.append(tuple(range(len(rows), len(rows) + len(mine))))
+        for (grip, first), last in zip(mine, ends, strict=True):
+            rows.append([arm, grip.hold, 0, first, last, offset, Grips.reasons.index("end of the path"), grip.roll])
+            part = np.zeros((last - first + 1, 4))
+            part[:, : columns.shape[1]] = columns[first : last + 1]
+            parts.append(part)
+            offset += len(part)
+    arms, holds, branch, firsts, lasts, offsets, ends_by, rolls = np.array(rows, dtype=np.int64).T
+    return Grips(arms, holds, branch, firsts, lasts, offsets, np.concatenate(parts), ends_by, rolls), tuple(chain)

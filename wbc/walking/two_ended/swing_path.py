@@ -1,0 +1,128 @@
+"""A swing of the two-ended arm as a path of all seven joints: one hand holds, the other one goes from hold to hold."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from wbc.trajectory import spline_path, time_optimal
+from wbc.validation import Array
+from wbc.walking.swing_curve import step
+from wbc.walking.two_ended.postures import Grip, PairPostures
+
+#: Points of a swing, heights at which it is computed, and parts at its ends in which the hand does not go across
+POINTS, HEIGHTS, UPRIGHT = 73, 17, 0.2
+#: How high hands go along the normals of their holds [m], the first that is clear is taken
+LIFTS = (1.0, 2.0, 4.0)
+#: Parts of joint rates and accelerations that a swing is planned with; the rest is for feedback
+RATE_PART, ACCELERATION_PART = 0.9, 0.5
+#: Intervals of the time law
+INTERVALS = 300
+#: From height to height no joint turns further [rad], else it is another branch
+SMOOTH = 0.5
+
+
+@dataclass(frozen=True)
+class Turn:
+    """A stance that changes: the arm (0 or 1) that swings, its grips before and after, and the grip of the other."""
+
+    arm: int
+    source: Grip
+    target: Grip
+    held: Grip
+
+
+class TurnPaths:
+    """Ways of swings, each made of the postures over the two holds, h above them, one after the other:
+
+        q(x) = (1 - y) a(h) + y b(h),    h = L (1 - (1 - 2x)^2),    y = step((x - c) / (1 - 2c))
+
+    a and b are in closed form with joint 1 at rest, so the hand leaves and arrives straight along the normals.
+    """
+
+    def __init__(self, postures: PairPostures) -> None:
+        self.postures = postures
+        self._known: dict[Turn, Array | None] = {}
+
+    def path(self, turn: Turn) -> Array | None:
+        """Joints 1 to 7 along the first way that is possible and clear ``[POINTS, 7]`` [rad]; None if none is."""
+        if turn not in self._known:
+            ways = (self._way(turn, lift) for lift in LIFTS)
+            self._known[turn] = next((way for way in ways if way is not None), None)
+        return self._known[turn]
+
+    def seconds(self, turn: Turn) -> float:
+        """A time that a swing takes about [s]: what its joints turn at full rate."""
+        way = self.path(turn)
+        data = self.postures.shapes.data
+        if way is None:
+            return np.inf
+        turned = float(np.abs(np.diff(way, axis=0)).max(axis=1).sum())
+        return turned / (RATE_PART * data.joint_rate) + 2.0 * data.acceleration_time
+
+    def timed(self, turn: Turn, spacing: float) -> Array:
+        """Joints in the least time under the limits, every ``spacing`` [s], from rest to rest ``[n, 7]`` [rad]."""
+        way, data = self.path(turn), self.postures.shapes.data
+        assert way is not None
+        fastest, hardest = RATE_PART * data.joint_rate, ACCELERATION_PART * data.joint_rate / data.acceleration_time
+        law = time_optimal(spline_path(way), velocity=fastest, acceleration=hardest, intervals=INTERVALS)
+        count = int(np.ceil(law.duration / spacing))
+        return np.asarray(law.at(np.linspace(0.0, law.duration, count + 1)).position)
+
+    def _way(self, turn: Turn, lift: float) -> Array | None:
+        before, after = self._pair(turn, turn.source), self._pair(turn, turn.target)
+        first, last = self.postures.between(*before), self.postures.between(*after)
+        if first is None or last is None:
+            return None
+        x = np.linspace(0.0, 1.0, POINTS)
+        height = 1.0 - (1.0 - 2.0 * x) ** 2
+        leaving, coming = self._over(turn, turn.source, first, lift), self._over(turn, turn.target, last, lift)
+        if leaving is None or coming is None:
+            return None
+        grid = np.linspace(0.0, 1.0, HEIGHTS)
+        a, b = (np.stack([np.interp(height, grid, q[:, k]) for k in range(7)], axis=1) for q in (leaving, coming))
+        y = step((x - UPRIGHT) / (1.0 - 2.0 * UPRIGHT))[:, None]
+        way: Array = (1.0 - y) * a + y * b
+        if np.abs(way).max() > self.postures.limit:
+            return None
+        return way if self._clear(turn, way) else None
+
+    def _pair(self, turn: Turn, grip: Grip) -> tuple[Grip, Grip]:
+        """Grips of the near and of the far hand."""
+        return (grip, turn.held) if turn.arm == 0 else (turn.held, grip)
+
+    def _over(self, turn: Turn, grip: Grip, q: Array, lift: float) -> Array | None:
+        """Postures with the swinging hand 0 to ``lift`` above a hold ``[HEIGHTS, 7]``, from ``q`` on."""
+        postures = self.postures
+        hand, held = postures.frame(grip), postures.frame(turn.held)
+        raised = np.repeat(hand[None], HEIGHTS, axis=0)
+        raised[:, :3, 3] -= np.linspace(0.0, lift, HEIGHTS)[:, None] * hand[:3, 2]
+        pose = np.linalg.inv(raised) @ held if turn.arm == 0 else np.linalg.inv(held) @ raised
+        found, valid = postures.kinematics.inverse(pose, q[0])
+        out = np.empty((HEIGHTS, 7))
+        last = q
+        for k in range(HEIGHTS):
+            near = postures.kinematics.unwound(found[k], last)
+            far = np.where(valid[k], np.abs(near - last).max(axis=1), np.inf)
+            best = int(np.argmin(far))
+            if far[best] > SMOOTH:
+                return None
+            out[k] = last = near[best]
+        return out
+
+    def _clear(self, turn: Turn, way: Array) -> bool:
+        postures = self.postures
+        near, far = (postures.frame(grip)[:3, 3] for grip in self._pair(turn, turn.source))
+        frames = self.frames(turn, way)
+        other = postures.frame(turn.target)[:3, 3]
+        ends = np.array([[near, other], [far, far]] if turn.arm == 0 else [[near, near], [far, other]])
+        return bool(postures.shapes.clear(frames, ends).all())
+
+    def frames(self, turn: Turn, q: Array) -> Array:
+        """Frames 0 to 7 in the structure at postures ``[n, 7]`` while the other hand holds: ``[n, 8, 4, 4]`` [m]."""
+        local = self.postures.kinematics.frames(q)
+        held = self.postures.frame(turn.held)
+        if turn.arm == 1:
+            return np.asarray(held @ local)
+        return np.asarray(held @ np.linalg.inv(local[:, 7])[:, None] @ local)
