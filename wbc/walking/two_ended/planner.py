@@ -156,10 +156,9 @@ def _plan(walker: Walker, structure: Structure, paths: TurnPaths, search: TurnSe
         laws.append(TurnLaw(hand[:-STAND, :3, 3], mine[:-STAND], SPACING))
         lift, land = count, count + len(q) - STAND
         names = structure.ids[turn.source.hold], structure.ids[turn.target.hold]
-        spent, limit = round((land - lift) * SPACING, 6), "end of the path"
-        steps.append(
-            Regrasp(walker.arms[move.arm].name, *names, 0, lift * SPACING, land * SPACING, spent, 0.0, 0.0, limit, 0.0)
-        )
+        spent, roll = round((land - lift) * SPACING, 6), structure.holds[turn.target.hold].rolls[turn.target.roll]
+        times = round(lift * SPACING, 9), round(land * SPACING, 9), spent, 0.0, 0.0
+        steps.append(Regrasp(walker.arms[move.arm].name, *names, 0, *times, "end of the path", 0.0, roll=roll))
         hands[move.arm] = turn.target
         spans[move.arm].append((turn.target, land))
         count += len(q)
