@@ -29,6 +29,7 @@ FLOORS = {
     "wbc.controller": 6,
     "wbc.trajectory": 7,
     "wbc.coordinates": 7,
+    "wbc.teleop": 8,
     "wbc.track": 8,
     "wbc.walking": 8,
     "wbc.pages": 8,

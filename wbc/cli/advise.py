@@ -12,6 +12,7 @@ from wbc.cli.console import err, out
 from wbc.cli.modes import SHORT_NAMES
 from wbc.coordinates import Adviser, mode_pairs, parts, restriction_table
 from wbc.errors import ShapeError
+from wbc.robot import Robot
 
 
 def advise(
@@ -28,7 +29,7 @@ def advise(
         return
     machine = parts(robot).robot
     adviser = Adviser(machine, mode_pairs(robot, mode), exact=exact)
-    q = _numbers(at, machine.nq) if at else machine.neutral.tolist()
+    q = configuration_of(machine, at)
     rows = Table(header_style="bold", box=None, pad_edge=False)
     for name in ("task | constraint", "sigma", "of the task", "condition", "distance", "to"):
         rows.add_column(name)
@@ -47,7 +48,15 @@ def advise(
     )
 
 
-def _numbers(text: str, count: int) -> list[float]:
+def configuration_of(robot: Robot, text: str) -> list[float]:
+    """Numbers with commas, one a coordinate; the neutral configuration for no text.
+
+    Raises:
+        ShapeError: something else.
+    """
+    if not text:
+        return [float(x) for x in robot.neutral]
+    count = robot.nq
     try:
         numbers = [float(part) for part in text.split(",")]
     except ValueError:

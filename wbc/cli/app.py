@@ -8,7 +8,7 @@ import typer
 from typer.core import TyperGroup
 
 from wbc import __version__
-from wbc.cli import advise, analyse, bench, demo, docs, export, ik, modes, replay, robots, track, walk
+from wbc.cli import advise, analyse, bench, demo, docs, drive, export, ik, modes, replay, robots, track, walk
 from wbc.cli.console import complain
 from wbc.errors import WbcError
 
@@ -67,5 +67,6 @@ app.command("ik")(ik.ik)
 app.command("analyse")(analyse.analyse_)
 app.command("advise")(advise.advise)
 app.command("modes")(modes.modes)
+app.command("drive")(drive.drive)
 app.command("bench", context_settings={"allow_extra_args": True, "ignore_unknown_options": True})(bench.bench)
 app.command("docs")(docs.docs)

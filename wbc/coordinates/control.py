@@ -147,6 +147,10 @@ class PairController:
         self._activate()
         return wanted
 
+    def units(self, rows: Iterable[Coordinate]) -> tuple[str, ...]:
+        """Unit of each row of some coordinates, of their integrals: m or rad."""
+        return tuple(row.unit for one in rows for row in expressions.labels(self.robot, one))
+
     def rates(self, q: Any) -> dict[Coordinate, Array]:
         """The matrix of every coordinate's rates at a configuration [rows, nv]."""
         every = np.asarray(self._rates(q).full())

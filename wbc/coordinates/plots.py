@@ -33,12 +33,12 @@ class DriveLog:
 
     def add(self, time: float, q: Array, v: Array, sigma: Array, miss: float, active: str) -> None:
         """One tick."""
-        for series, value in zip(
-            (self.time, self.q, self.v, self.sigma, self.miss, self.active),
-            (time, np.array(q), np.array(v), np.array(sigma), miss, active),
-            strict=True,
-        ):
-            series.append(value)  # type: ignore[attr-defined]
+        self.time.append(time)
+        self.q.append(np.array(q))
+        self.v.append(np.array(v))
+        self.sigma.append(np.array(sigma))
+        self.miss.append(miss)
+        self.active.append(active)
 
 
 def plot_drives(

@@ -1,0 +1,226 @@
+"""Sessions of an operator: orders from programs, files and keys; what is refused; what stays where it is."""
+
+from __future__ import annotations
+
+import os
+import pty
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from wbc.coordinates import BodyRows, CoordinatePair, JointRows, MissingPartError
+from wbc.errors import NotFiniteError, RangeError, ShapeError, UnknownNameError
+from wbc.teleop import Keyboard, Order, RateFile, RateFileError, Teleoperation, run_session
+from wbc.teleop.keyboard import HELD
+from wbc.teleop.session import STALE
+
+Q = np.array([0.3, 0.5, -0.7, 1.1])
+
+
+@pytest.fixture(scope="module")
+def compiled() -> Teleoperation:
+    return Teleoperation("spherical_4r", acceleration=0.5, seconds=0.5, advice=True)
+
+
+@pytest.fixture
+def session(compiled: Teleoperation) -> Teleoperation:
+    compiled.control.switch(compiled.names[0], 0.0)
+    compiled.reset(Q)
+    return compiled
+
+
+def place(session: Teleoperation, q: np.ndarray, frame: str = "tip") -> pin.SE3:
+    data = session.robot.model.createData()
+    pin.framesForwardKinematics(session.robot.model, data, q)
+    return data.oMf[session.robot.model.getFrameId(frame)].copy()
+
+
+def test_rates_hold_until_they_are_stale(session: Teleoperation) -> None:
+    q = Q
+    for _ in range(20):
+        seen = session.step(q, Order((0.05, 0.0, 0.0)))
+        q = q + 0.02 * seen.step.v
+    rate = session.control.rates(Q)[session.control.pair.task[0]]
+    np.testing.assert_allclose((rate @ seen.step.v), (0.05, 0.0, 0.0), atol=1e-2)
+    assert (seen.active, seen.blending, seen.stale) == ("tip | alpha", False, False)
+    assert seen.advised == "tip | alpha"
+    count = 0
+    while not (seen := session.step(q)).stale:
+        count += 1
+        q = q + 0.02 * seen.step.v
+    assert count == round(STALE / 0.02)
+    for _ in range(60):
+        q = q + 0.02 * session.step(q).step.v
+    assert np.abs(session.step(q).step.v).max() < 1e-9
+
+
+def test_a_file_drives_and_changes_pairs(session: Teleoperation, tmp_path: Path) -> None:
+    file = tmp_path / "orders.csv"
+    lines = ["time,pair,r1,r2,r3,r4,r5,r6", "0,tip | alpha,0.05", "", "1,alpha | tip", "2.0,,0.05", "5"]
+    file.write_text("\n".join(lines))
+    source, told = RateFile(file), []
+    log = run_session(session, source, Q, tell=lambda time, seen: told.append((time, seen.active)))
+    assert source.seconds == 5.0
+    assert len(log.time) == len(told) == 250
+    assert (log.active[49], log.active[51]) == ("tip | alpha", "alpha | tip")
+    assert set(log.status) == {"solved"}
+    held, last = (place(session, log.q[k]).translation for k in (80, 249))
+    assert np.abs(held - last).max() < 1e-6
+    assert np.abs(log.q[249] - log.q[100]).max() > 0.05
+    change = np.abs(np.diff(log.v, axis=0)).max() / 0.02
+    assert change < 0.5 + 1e-6
+    written = log.write(tmp_path / "out" / "log.csv", session.robot.dof_names).read_text().splitlines()
+    assert len(written) == 251
+    assert written[0].startswith("time,pair,status,q joint1")
+
+
+def test_keys_that_are_held_and_pairs_by_keys(session: Teleoperation) -> None:
+    keys, units = Keyboard(linear=0.04), ("m", "m", "m")
+    keys.feed("wd")
+    assert keys.order(0.0, session.names, "tip | alpha", units).rates == (0.04, -0.04, 0.0)
+    assert keys.order(HELD - 0.01, session.names, "tip | alpha", units).rates[0] == 0.04
+    assert keys.order(HELD, session.names, "tip | alpha", units).rates == (0.0, 0.0, 0.0)
+    keys.feed("+s")
+    assert keys.order(1.0, session.names, "tip | alpha", units).rates[0] == -0.05
+    keys.feed("u")
+    assert keys.order(1.1, session.names, "tip | alpha", units).rates[1:] == (0.0, 0.0)
+    keys.feed("nn")
+    order = keys.order(1.2, session.names, "tip | alpha", units)
+    assert (order.pair, order.rates) == (session.names[2], (0.0, 0.0, 0.0))
+    keys.feed("p")
+    assert keys.order(1.2, session.names, "tip | alpha", units).pair == session.names[-1]
+    keys.feed(" ")
+    assert keys.order(1.3, session.names, "tip | alpha", units).stop
+    keys.feed("+" * 50)
+    keys.order(1.4, session.names, "tip | alpha", units)
+    assert keys.factor == 4.0
+    keys.feed("wq")
+    with pytest.raises(StopIteration):
+        keys.order(1.5, session.names, "tip | alpha", units)
+
+
+def test_a_terminal_is_read_and_left_as_it_was(session: Teleoperation, monkeypatch: pytest.MonkeyPatch) -> None:
+    import termios
+
+    outer, inner = pty.openpty()
+    with os.fdopen(inner) as stdin:
+        monkeypatch.setattr(sys, "stdin", stdin)
+        before = termios.tcgetattr(inner)
+        with Keyboard().terminal() as keys:
+            assert termios.tcgetattr(inner) != before
+            os.write(outer, b"w")
+            log = run_session(session, _quit_after(keys, outer, 30), Q, realtime=True)
+        assert termios.tcgetattr(inner) == before
+    os.close(outer)
+    assert 29 <= len(log.time) < 40
+    assert np.abs(log.v[20]).max() > 1e-3
+    with Path(os.devnull).open() as nothing:
+        monkeypatch.setattr(sys, "stdin", nothing)
+        with pytest.raises(ShapeError, match="no terminal"), Keyboard().terminal():
+            pass
+
+
+def _quit_after(keys: Keyboard, terminal: int, ticks: int) -> Any:
+    class Source:
+        count = 0
+
+        def order(self, *given: Any) -> Order:
+            self.count += 1
+            if self.count == ticks:
+                os.write(terminal, b"q")
+            return keys.order(*given)
+
+    return Source()
+
+
+def test_stop_brings_everything_to_rest(session: Teleoperation) -> None:
+    q = Q
+    for _ in range(30):
+        q = q + 0.02 * session.step(q, Order((0.1, 0.0, 0.0))).step.v
+    for _ in range(60):
+        q = q + 0.02 * session.step(q, Order(stop=True)).step.v
+    assert np.abs(session.step(q).step.v).max() < 1e-9
+
+
+def test_pairs_change_by_themselves_where_that_is_wanted() -> None:
+    auto = Teleoperation("spherical_4r", ["M4"], automatic=True, acceleration=1.0, seconds=0.3, backend="vm")
+    q = np.array([0.3, 1.5, -0.7, 1.1])
+    auto.reset(q)
+    for _ in range(20):
+        seen = auto.step(q, Order((0.01, 0.0, 0.0)))
+        q = q + 0.02 * seen.step.v
+    assert seen.active == seen.advised
+    assert seen.active in ("tip | beta", "tip | joint1")
+
+
+def test_brakes_hold_all_but_one_chain() -> None:
+    """Of 15 joints those of the first arm move; then its hand is turned by one joint alone."""
+    pairs = (CoordinatePair(BodyRows("arm1_tip"), [JointRows(f"arm1_joint{k}") for k in (1,)] + _rest(), "arm 1"),)
+    session = Teleoperation("spdm", [], pairs=pairs, backend="vm")
+    arm = [0.3, 0.4, -0.5, 1.2, 0.7, -0.6, 0.9]
+    q = start = np.concatenate(([0.2], arm, arm))
+    session.reset(q)
+    for _ in range(25):
+        q = q + 0.02 * session.step(q, Order((0.01, 0.0, 0.0, 0.0, 0.01, 0.0))).step.v
+    moved = [k for k, name in enumerate(session.robot.dof_names) if abs(q[k] - start[k]) > 1e-9]
+    assert [session.robot.dof_names[k] for k in moved] == [f"arm1_joint{k}" for k in range(2, 8)]
+
+
+def _rest() -> list[JointRows]:
+    return [JointRows(f"arm2_joint{k}") for k in range(1, 8)] + [JointRows("body_joint")]
+
+
+def test_bad_orders_change_nothing(session: Teleoperation) -> None:
+    for order, error in (
+        (Order((0.0, 0.0, 0.0, 0.01)), RangeError),
+        (Order((0.5,)), RangeError),
+        (Order(pair="tip | alfa"), UnknownNameError),
+        (Order((0.0, 0.1), pair="alpha | tip"), RangeError),
+    ):
+        with pytest.raises(error):
+            session.step(Q, order)
+    assert session.control.active == "tip | alpha"
+    assert np.abs(session.step(Q).step.v).max() < 1e-12
+    for rates, error in (
+        ((0.0,) * 7, RangeError),
+        ((np.nan,), NotFiniteError),
+        ("fast", ShapeError),
+        (1.0, ShapeError),
+    ):
+        with pytest.raises(error):
+            Order(rates)  # type: ignore[arg-type]
+    with pytest.raises(ShapeError):
+        session.step(Q[:3])
+
+
+def test_bad_sessions_and_files(tmp_path: Path) -> None:
+    with pytest.raises(MissingPartError):
+        Teleoperation("spherical_4r", ["M7"])
+    with pytest.raises(UnknownNameError):
+        Teleoperation("srms")
+    with pytest.raises(ShapeError):
+        Teleoperation("ssrms", [])
+    both = CoordinatePair([BodyRows("tip"), JointRows("joint1")], JointRows("joint2"))
+    with pytest.raises(RangeError, match="at most 6"):
+        Teleoperation("ssrms", [], pairs=[both])
+    head = "time,pair,r1,r2,r3,r4,r5,r6\n"
+    for text in (
+        "",
+        "time,pair\n",
+        head,
+        head + "a,,1\n",
+        head + "0,,x\n",
+        head + "1\n1\n",
+        head + "-1\n",
+        head + "0,,nan\n",
+    ):
+        file = tmp_path / "bad.csv"
+        file.write_text(text)
+        with pytest.raises(RateFileError):
+            RateFile(file)
+    with pytest.raises(RateFileError, match="cannot be read"):
+        RateFile(tmp_path / "none.csv")

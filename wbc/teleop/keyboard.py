@@ -1,0 +1,116 @@
+"""Orders from a keyboard: keys that are held down, in a terminal."""
+
+from __future__ import annotations
+
+import os
+import select
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+
+from wbc import validation
+from wbc.errors import ShapeError
+from wbc.teleop.order import AT_ONCE, Order
+
+#: Key -> (row of the task, direction)
+AXES = {
+    "w": (0, 1.0),
+    "s": (0, -1.0),
+    "a": (1, 1.0),
+    "d": (1, -1.0),
+    "r": (2, 1.0),
+    "f": (2, -1.0),
+    "u": (3, 1.0),
+    "o": (3, -1.0),
+    "i": (4, 1.0),
+    "k": (4, -1.0),
+    "j": (5, 1.0),
+    "l": (5, -1.0),
+}
+NEXT, BEFORE, STOP, FASTER, SLOWER, QUIT = "n", "p", " ", "+", "-", "q"
+HELP = "w/s a/d r/f: rows 1 to 3, u/o i/k j/l: rows 4 to 6; n, p: next pair, the one before; space: stop; +, -; q: quit"
+#: A key counts as held for this long after it was seen: terminals repeat keys after up to half a second [s]
+HELD = 0.6
+#: Least and greatest factor of the rates
+FACTORS = (0.1, 4.0)
+
+
+class Keyboard:
+    """Keys as orders. ``feed`` takes what was typed; :meth:`terminal` reads it from this process's terminal.
+
+    Args:
+        linear, angular: rates of rows in metres and in radians [m/s, rad/s]. Keys of rows that a task has not do
+            nothing.
+    """
+
+    def __init__(self, linear: float = 0.02, angular: float = 0.01) -> None:
+        self._speeds = {
+            "m": validation.scalar("linear", linear, low=0.0, open_low=True, unit="m/s"),
+            "rad": validation.scalar("angular", angular, low=0.0, open_low=True, unit="rad/s"),
+        }
+        self.factor, self._typed = 1.0, ""
+        self._until = [-1.0] * AT_ONCE
+        self._sign = [0.0] * AT_ONCE
+        self._descriptor: int | None = None
+
+    def feed(self, text: str) -> None:
+        """Keys that were typed since the last order."""
+        self._typed += text
+
+    def order(self, time: float, names: Sequence[str], active: str, units: Sequence[str]) -> Order:
+        """What the keys say: axes that are held, another pair, or stop.
+
+        Raises:
+            StopIteration: quit was typed.
+        """
+        if self._descriptor is not None:
+            self.feed(_waiting(self._descriptor))
+        typed, self._typed = self._typed, ""
+        pair, stop = None, False
+        for key in typed:
+            if key == QUIT:
+                raise StopIteration
+            if key in AXES:
+                row, sign = AXES[key]
+                self._until[row], self._sign[row] = time + HELD, sign
+            elif key in (NEXT, BEFORE):
+                step = 1 if key == NEXT else -1
+                pair = names[(list(names).index(pair or active) + step) % len(names)]
+                self._until = [-1.0] * AT_ONCE
+            elif key in (FASTER, SLOWER):
+                self.factor = min(FACTORS[1], max(FACTORS[0], self.factor * (1.25 if key == FASTER else 0.8)))
+            elif key == STOP:
+                stop, self._until = True, [-1.0] * AT_ONCE
+        rates = [
+            self.factor * sign * self._speeds[unit] if time < until else 0.0
+            for sign, unit, until in zip(self._sign, units, self._until, strict=False)
+        ]
+        return Order(tuple(rates), pair=pair, stop=stop)
+
+    @contextmanager
+    def terminal(self) -> Iterator[Keyboard]:
+        """Read keys as they are typed, without echo, until the end of the block.
+
+        Raises:
+            ShapeError: standard input is no terminal.
+        """
+        if not sys.stdin.isatty():
+            raise ShapeError("keyboard", sys.stdin.name, "standard input is no terminal")
+        import termios
+        import tty
+
+        descriptor = sys.stdin.fileno()
+        before = termios.tcgetattr(descriptor)
+        tty.setcbreak(descriptor)
+        self._descriptor = descriptor
+        try:
+            yield self
+        finally:
+            self._descriptor = None
+            termios.tcsetattr(descriptor, termios.TCSADRAIN, before)
+
+
+def _waiting(descriptor: int) -> str:
+    """What can be read without waiting."""
+    ready, _, _ = select.select([descriptor], [], [], 0.0)
+    return os.read(descriptor, 1024).decode(errors="ignore") if ready else ""
