@@ -44,8 +44,10 @@ def sheet(parts: Parts) -> Sheet:
         shares = [share(ends[s], ticks) for s in STATUSES]
         links = ", ".join(f"{key} {n}" for key, n in sorted(total.items()) if " by " in key)
         wrong = sum(n for key, n in total.items() if is_wrong(key))
-        rows.append((part, f"{len(records)}", f"{ticks}", *shares, links or "-", f"{wrong}"))
-    return Sheet("Ticks by how they ended", ("part", "runs", "ticks", *STATUSES, "links taken", "wrong"), rows)
+        loose = f"{total['loose bound']}, {total['compared']}" if total["loose bound"] else "0"
+        rows.append((part, f"{len(records)}", f"{ticks}", *shares, links or "-", loose, f"{wrong}"))
+    names = ("part", "runs", "ticks", *STATUSES, "links taken", "bound > 1e-6, of these beside the referee", "wrong")
+    return Sheet("Ticks by how they ended", names, rows)
 
 
 def conflicts(parts: Parts) -> Sheet:

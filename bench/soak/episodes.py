@@ -75,5 +75,6 @@ def stack(seed: int, k: int, backend: str, ticks: int, levels: bool = False) -> 
     while done < ticks:
         counts += episode(controller, judge, rng)
         done += LENGTH
+    counts.update({"loose bound": judge.loose, "compared": judge.compared})
     items = " ".join(f"{e.name}:{e.level}" if levels else e.name for e in controller.stack.entries)
     return [(f"{backend} {seed}/{k}: {controller.stack.robot.nv} dof, {items}", counts)]

@@ -6,20 +6,19 @@ from collections import Counter
 
 import numpy as np
 import pinocchio as pin
-import quadprog
 
 from bench.soak.episodes import label
 from bench.soak.machines import configuration, machine
+from bench.soak.referee import SAME, referee
 from bench.soak.stacks import DT, pose, weight
 from wbc.controller import Controller, Stack
-from wbc.qp import QP
 from wbc.robot import Robot
 from wbc.shapes import Sphere
 from wbc.tasks import EndEffector, FrameVelocityLimit, Hold, JointLimits, Obstacle, Posture
 from wbc.validation import Array
 
-#: Gain of the holds [1/s]; largest difference from the referee [rad/s]
-GAIN, SAME = 2.0, 1e-6
+#: Gain of the holds [1/s]
+GAIN = 2.0
 
 
 def feasible_stack(robot: Robot, rng: np.random.Generator) -> Stack:
@@ -55,24 +54,6 @@ def pose_problem(controller: Controller, rng: np.random.Generator) -> tuple[Arra
     held.translation[:] += J[:3] @ v / GAIN
     controller["hold"].target, controller["hold"].enabled = held, True
     return q, v
-
-
-def referee(qp: QP) -> Array | None:
-    """The minimiser by quadprog; None where that gives up."""
-    C, equal = np.vstack((np.eye(qp.n), qp.A)), qp.lower == qp.upper
-    norms = np.linalg.norm(C, axis=1)
-    C, lower, upper = C / norms[:, None], qp.lower / norms, qp.upper / norms
-    low, high = ~equal & np.isfinite(lower), ~equal & np.isfinite(upper)
-    # equality rows that depend on each other are an orthonormal basis of what they say
-    U, S, V = np.linalg.svd(C[equal], full_matrices=False)
-    rank = int((S > 1e-9).sum())
-    normals = np.vstack((V[:rank], C[low], -C[high]))
-    sides = np.concatenate(((U.T @ lower[equal])[:rank] / S[:rank], lower[low], -upper[high]))
-    try:
-        found = quadprog.solve_qp(qp.H, -qp.g, normals.T, sides, rank)
-    except ValueError:
-        return None
-    return np.asarray(found[0])
 
 
 def problems(seed: int, k: int, backend: str, states: int) -> list[tuple[str, Counter[str]]]:
