@@ -14,9 +14,11 @@ SAME = 1e-6
 
 def referee(qp: QP) -> Array | None:
     """The minimiser by quadprog; None where that gives up."""
-    C, equal = np.vstack((np.eye(qp.n), qp.A)), qp.lower == qp.upper
+    C = np.vstack((np.eye(qp.n), qp.A))
     norms = np.linalg.norm(C, axis=1)
-    C, lower, upper = C / norms[:, None], qp.lower / norms, qp.upper / norms
+    on = norms > 0.0
+    C, lower, upper = C[on] / norms[on, None], qp.lower[on] / norms[on], qp.upper[on] / norms[on]
+    equal = lower == upper
     low, high = ~equal & np.isfinite(lower), ~equal & np.isfinite(upper)
     # equality rows that depend on each other are an orthonormal basis of what they say
     U, S, V = np.linalg.svd(C[equal], full_matrices=False)
