@@ -7,15 +7,18 @@ from collections.abc import Callable
 import numpy as np
 import pinocchio as pin
 
-from wbc.controller.past import Past
+from wbc.controller.past import Frozen, Past
 from wbc.errors import SolverError, UnknownNameError
 from wbc.qp.problem import QP, Solution
+from wbc.qp.relax import Relaxed
 from wbc.qp.sensitivity import Sensitivity
 from wbc.stack.layout import Block, Slot
 from wbc.validation import Array
 
 #: Displacement by which the QP's own numbers are differentiated
 _STEP = 1e-6
+
+Moves = Callable[[int, float], None]
 
 
 def derivative(past: Past, name: str, value: str | None) -> Array:
@@ -24,28 +27,30 @@ def derivative(past: Past, name: str, value: str | None) -> Array:
         H dv + C_S' dlam = -(dH v + dg + dC_S' lam),      C_S dv = db_S - dC_S v
 
     for the rows S that hold v. What stands on the right are central differences of the QP's numbers, which are smooth
-    where the solution's change of rows is not.
+    where the solution's change of rows is not. With strict levels they are differences of the levels
+    themselves, solved for the rows that push and the ranks of the tick.
 
     Raises:
-        UnknownNameError: no such item or value. SolverError: rows gave way, no optimum, or strict levels.
+        UnknownNameError: no such item or value. SolverError: rows gave way, no optimum, or a rank that changes here.
     """
-    if past.layout.cascade:
-        raise SolverError("derivative", name, "strict levels have no derivative in this version")
     moves, count = _moves(past, name, value)
-    answer = past.solve()[1] if past.usable else None
+    frozen = past.frozen()
+    if frozen is not None:
+        return _of_levels(past, frozen, moves, count)
+    answer = past.solve()[1] if past.usable and not past.layout.cascade else None
     if answer is None or answer.flag != "solved":
         raise SolverError("derivative", name, "only a command for which every row holds has a derivative")
+    return _of_one(past, answer, moves, count)
+
+
+def _of_one(past: Past, answer: Relaxed, moves: Moves, count: int) -> Array:
+    """Of one level, or of the first."""
     n, size = past.layout.nv, past.qp.lower.size
     sensitivity = Sensitivity(past.qp, Solution(answer.x, answer.multipliers, "solved"))
     upper = np.where(answer.multipliers > 0.0, 1.0, 0.0)
     force, offset = np.zeros((n, count)), np.zeros((size, count))
     for k in range(count):
-        ends: list[QP] = []
-        for sign in (_STEP, -_STEP):
-            state = past.tick.state.copy()
-            moves(k, sign)
-            ends.append(past.tick.qp())
-            past.tick.state[:] = state
+        ends = [_moved(past, moves, k, by) for by in (_STEP, -_STEP)]
         H, g, A = (_slope(ends, part) for part in ("H", "g", "A"))
         force[:, k] = H @ answer.x + g + A.T @ answer.multipliers[n:]
         with np.errstate(invalid="ignore"):
@@ -54,11 +59,36 @@ def derivative(past: Past, name: str, value: str | None) -> Array:
     return sensitivity.change(force, offset)
 
 
+def _of_levels(past: Past, frozen: Frozen, moves: Moves, count: int) -> Array:
+    """With strict levels: differences of their optimum, the rows that push at each and its rank being what they are."""
+    dofs = past.layout.dof_scales(past.stack)
+    first, out = _of_one(past, frozen.first, moves, count), np.zeros((past.layout.nv, count))
+    for k in range(count):
+        ends: list[Array] = []
+        for by in (_STEP, -_STEP):
+            state = past.tick.state.copy()
+            moves(k, by)
+            numbers = frozen.numbers(past.tick.qp(), frozen.first.x + by * first[:, k])
+            past.tick.state[:] = state
+            ends.append(frozen.optimum.at(numbers))
+        out[:, k] = dofs * (ends[0] - ends[1]) / (2.0 * _STEP)
+    return out
+
+
+def _moved(past: Past, moves: Moves, k: int, by: float) -> QP:
+    """The QP of displaced inputs."""
+    state = past.tick.state.copy()
+    moves(k, by)
+    qp = past.tick.qp()
+    past.tick.state[:] = state
+    return qp
+
+
 def _slope(ends: list[QP], part: str) -> Array:
     return np.asarray((getattr(ends[0], part) - getattr(ends[1], part)) / (2.0 * _STEP))
 
 
-def _moves(past: Past, name: str, value: str | None) -> tuple[Callable[[int, float], None], int]:
+def _moves(past: Past, name: str, value: str | None) -> tuple[Moves, int]:
     """What displaces the k-th entry of a value by a small number, and how many entries there are."""
     tick, model, nv = past.tick, past.stack.robot.model, past.layout.nv
 
@@ -84,7 +114,7 @@ def _moves(past: Past, name: str, value: str | None) -> tuple[Callable[[int, flo
     return _input(past, block.slots[value])
 
 
-def _weight(past: Past, block: Block) -> Callable[[int, float], None]:
+def _weight(past: Past, block: Block) -> Moves:
     """The item's weight, by its logarithm: d/d(ln w)."""
 
     def move(k: int, by: float) -> None:
@@ -93,7 +123,7 @@ def _weight(past: Past, block: Block) -> Callable[[int, float], None]:
     return move
 
 
-def _input(past: Past, slot: Slot) -> tuple[Callable[[int, float], None], int]:
+def _input(past: Past, slot: Slot) -> tuple[Moves, int]:
     """An input along its tangent space: poses by a twist (linear; angular) in the axes that they are given in."""
     numbers, kind = past.tick.p[slot.span], slot.input.kind
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from wbc.controller.explanation import Contradiction, Explanation, Give, Residue, Side
+from wbc.controller.level_report import certificates
 from wbc.controller.losses import groups, losses, prices
 from wbc.controller.naming import Naming
 from wbc.controller.past import Past
@@ -116,4 +117,9 @@ class Explainer:
             where = self.naming.side(row, False).name if named else robot.dof_names[row]
             unit = self.naming.side(row, False).unit if named else f"{robot.dof_units[row]}/s"
             out.append(Residue(float(values[row]), unit, where if values[row] > 0.0 else ""))
+        if past.layout.cascade:
+            worst = max(certificates(past.layout, past.part), key=lambda level: level.stationarity)
+            out[1] = Residue(
+                worst.stationarity, "rad/s", "least velocity" if worst.level is None else f"level {worst.level}"
+            )
         return out[0], out[1], out[2]

@@ -9,6 +9,8 @@ from wbc.controller.tick import Assembly
 from wbc.qp.cascade import Cascade
 from wbc.qp.certificate import Certificate
 from wbc.qp.hierarchy import Answer, Hierarchy, Level
+from wbc.qp.level_sensitivity import FrozenLevels
+from wbc.qp.level_step import NOISE, PUSHING
 from wbc.qp.problem import QP
 from wbc.qp.relax import Relaxed
 from wbc.stack.codegen import row_units
@@ -19,7 +21,11 @@ from wbc.validation import Array
 
 
 class Levels:
-    """The cascade of one layout, in the units of :mod:`wbc.qp.cascade`: v / dof scales, rows / their scales."""
+    """The cascade of one layout, in the units of :mod:`wbc.qp.cascade`: v / dof scales, rows / their scales.
+
+    Attributes:
+        sizes: these scales, of v and of general rows.
+    """
 
     def __init__(self, assembly: Assembly, stack: Declaration, layout: Layout) -> None:
         self._assembly, self._layout = assembly, layout
@@ -28,7 +34,7 @@ class Levels:
         self._row_levels = np.array(layout.row_levels, dtype=np.int_)
         self._damping = stack.damping
         self._cascade = Cascade(layout.nv, layout.general_rows, left_free(stack), stack.damping)
-        self._sizes = np.concatenate((self._dofs, self._units))
+        self.sizes = np.concatenate((self._dofs, self._units))
         self._places = ReportLayout(layout)
 
     def reset(self) -> None:
@@ -44,24 +50,37 @@ class Levels:
         if first is None:
             self._write(None, v, report)
             return v, None
-        nv, soft = self._layout.nv, self._row_levels >= 0
-        lower, upper = (
-            np.concatenate((ends[:nv], np.where(soft, own, ends[nv:])))
-            for ends, own in zip((first.lower, first.upper), self._assembly.row_sides(), strict=True)
-        )
-        levels, scales = self._levels(qp)
-        problem = Hierarchy(
-            v / self._dofs,
-            lower / self._sizes,
-            upper / self._sizes,
-            qp.A * self._dofs / self._units[:, None],
-            levels,
-        )
-        answer = self._cascade.solve(problem)
-        answer.multipliers *= np.append(scales, 1.0)[answer.pushes] / self._sizes
+        problem, scales = self.problem(qp, v, first.lower, first.upper)
+        nv, answer = self._layout.nv, self._cascade.solve(problem)
+        answer.multipliers *= np.append(scales, 1.0)[answer.pushes] / self.sizes
+        if first.flag == "solved":
+            self._held_by_equalities(problem, qp, first, answer)
         command = np.clip(answer.x * self._dofs, first.lower[:nv], first.upper[:nv])
         self._write(answer, command, report)
         return command, answer
+
+    def _held_by_equalities(self, problem: Hierarchy, qp: QP, first: Relaxed, answer: Answer) -> None:
+        """Multipliers of the equality rows that push against the first level: those of its QP, which has them all."""
+        push = np.abs(first.multipliers) * self.sizes
+        drive = max(float(np.abs(qp.g * self._dofs).max(initial=0.0)), float(push.max(initial=0.0)))
+        push[qp.n :] *= np.linalg.norm(problem.A, axis=1)
+        held = (qp.lower == qp.upper) & (push > max(PUSHING * drive, NOISE))
+        answer.multipliers[held], answer.pushes[held] = first.multipliers[held], 0
+
+    def problem(self, qp: QP, v: Array, lower: Array, upper: Array) -> tuple[Hierarchy, list[float]]:
+        """(all levels, from a command v of the first and sides of its rows; the weight of the heaviest row of each)."""
+        nv, soft = self._layout.nv, self._row_levels >= 0
+        low, high = (
+            np.concatenate((ends[:nv], np.where(soft, own, ends[nv:]))) / self.sizes
+            for ends, own in zip((lower, upper), self._assembly.row_sides(), strict=True)
+        )
+        levels, scales = self._levels(qp)
+        A = qp.A * self._dofs / self._units[:, None]
+        return Hierarchy(v / self._dofs, low, high, A, levels), scales
+
+    def frozen(self, qp: QP, v: Array, first: Relaxed, answer: Answer) -> FrozenLevels:
+        """The answer as a function of its numbers; arguments as :meth:`below` had and gave them."""
+        return FrozenLevels(self._cascade, self.problem(qp, v, first.lower, first.upper)[0], answer)
 
     def with_soft(self, qp: QP, v: Array, slack: Array) -> Array:
         """Slack of general rows with that of the rows that are minimised at a level."""

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from wbc.controller.explanation import Loss, Price, Share, Side
-from wbc.controller.past import Past
+from wbc.controller.past import Frozen, Past
 from wbc.qp.problem import Solution
 from wbc.qp.relax import Relaxed
 from wbc.qp.sensitivity import Sensitivity
@@ -72,23 +74,44 @@ def losses(past: Past, found: list[Group], v: Array, culprits: list[Block]) -> t
 
 
 def prices(past: Past, found: list[Group], answer: Relaxed, sides: dict[int, Side]) -> tuple[Price, ...]:
-    """Of every binding side and every task that misses something, from the active set of a plain optimum; none where
-    there are strict levels.
+    """Of every binding side and every task that misses something, from the active set of an optimum: of one QP, or of
+    all levels; none where a level has none.
     """
-    if past.layout.cascade:
+    frozen = past.frozen()
+    if past.layout.cascade and frozen is None:
         return ()
-    sensitivity = Sensitivity(past.qp, Solution(answer.x, answer.multipliers, "solved"))
+    v, slope = _of_one(past, answer) if frozen is None else _of_levels(past, frozen)
     out = []
     for row, side in sides.items():
-        if row not in sensitivity.active:
+        moved = slope(row)
+        if not moved.any():
             continue
-        moved = sensitivity.to_bound(row) * (-1.0 if side.side == "lower" else 1.0)
+        moved = moved * (-1.0 if side.side == "lower" else 1.0)
         for group in found:
-            if group.lost(answer.x) <= max(_LEAST, _SHARE * float(np.linalg.norm(group.wishes))):
+            if group.lost(v) <= max(_LEAST, _SHARE * float(np.linalg.norm(group.wishes))):
                 continue
-            fall = -float(group.slope(answer.x) @ moved)
+            fall = -float(group.slope(v) @ moved)
             if side.side == "equal":
                 fall = abs(fall)
             if abs(fall) > _SHARE:
                 out.append(Price(side, group.block.entry.name, fall, group.unit))
     return tuple(out)
+
+
+def _of_one(past: Past, answer: Relaxed) -> tuple[Array, Callable[[int], Array]]:
+    """(command, row -> dv / db of the side that holds it, zero where it holds nothing)."""
+    one = Sensitivity(past.qp, Solution(answer.x, answer.multipliers, "solved"))
+    return answer.x, one.to_bound
+
+
+def _of_levels(past: Past, frozen: Frozen) -> tuple[Array, Callable[[int], Array]]:
+    """The same with strict levels."""
+    first = Sensitivity(frozen.qp, Solution(frozen.first.x, frozen.first.multipliers, "solved"))
+    dofs, numbers = past.layout.dof_scales(past.stack), frozen.numbers(past.tick.qp(), frozen.first.x)
+
+    def slope(row: int) -> Array:
+        size = frozen.sizes[row]
+        start = first.to_bound(row) / dofs * size
+        return np.asarray(frozen.optimum.to_side(numbers, row, start) * dofs / size)
+
+    return frozen.answer.x * dofs, slope

@@ -2,19 +2,41 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 
 import numpy as np
 
 from wbc.controller.report import ReportLayout
 from wbc.controller.solved import SolvedTick
 from wbc.controller.tick import Assembly
+from wbc.qp.hierarchy import Answer, Hierarchy
+from wbc.qp.level_sensitivity import FrozenLevels
+from wbc.qp.problem import QP
 from wbc.qp.relax import Relaxed
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Block, Layout
 from wbc.tasks.mechanism import Mechanism
 from wbc.validation import Array
+
+
+@dataclass(frozen=True, eq=False)
+class Frozen:
+    """Strict levels of a tick that can be differentiated.
+
+    Attributes:
+        qp, first: the first level's QP and its answer. answer: of all levels. optimum: as a function of numbers.
+        numbers: (QP of the buffers, answer of its first level) -> the numbers of all levels, in units of ``sizes``.
+        sizes: of v, then of general rows.
+    """
+
+    qp: QP
+    first: Relaxed
+    answer: Answer
+    optimum: FrozenLevels
+    numbers: Callable[[QP, Array], Hierarchy]
+    sizes: Array
 
 
 class Past:
@@ -64,6 +86,24 @@ class Past:
         qp = self.tick.qp()
         _, v, answer = self._solver.answer(qp)
         return self._solver.below(qp, v, answer)[0], answer
+
+    def frozen(self) -> Frozen | None:
+        """The strict levels of the buffers as they are, as a function of their numbers; None where a row gave way, a
+        level was not solved, or there is one level only.
+        """
+        levels = self._solver.levels
+        if levels is None or not self.usable:
+            return None
+        qp = self.tick.qp()
+        _, v, first = self._solver.answer(qp)
+        answer = self._solver.below(qp, v, first)[1]
+        if first is None or first.flag != "solved" or answer is None or not all(x.solved for x in answer.levels):
+            return None
+        return Frozen(qp, first, answer, levels.frozen(qp, v, first, answer), self._hierarchy, levels.sizes)
+
+    def _hierarchy(self, qp: QP, v: Array) -> Hierarchy:
+        assert self._solver.levels is not None
+        return self._solver.levels.problem(qp, v, qp.lower, qp.upper)[0]
 
     def is_on(self, block: Block) -> bool:
         """Any of an item's rows counts."""

@@ -51,12 +51,13 @@ class SolvedTick(Buffers):
         self._longest = max(1.0, scales.max(initial=1.0), self._units.max(initial=1.0))
         self._dof_scales = None if (scales == 1.0).all() else scales
         self._hard = np.array(layout.row_levels, dtype=np.int_) < 0
-        self._levels = Levels(assembly, stack, layout) if layout.cascade else None
+        #: strict levels, None where there is one
+        self.levels = Levels(assembly, stack, layout) if layout.cascade else None
 
     def reset(self) -> None:
         self._solver.reset()
-        if self._levels is not None:
-            self._levels.reset()
+        if self.levels is not None:
+            self.levels.reset()
 
     def check(self) -> int:
         return self.assembly.check()
@@ -76,8 +77,8 @@ class SolvedTick(Buffers):
         flag, v, answer = self.answer(qp)
         v, levels = self.below(qp, v, answer)
         slack = qp.violation(v)[self._nv :] if flag == RELAXED else np.zeros(self._units.size)
-        if self._levels is not None:
-            slack = self._levels.with_soft(qp, v, slack)
+        if self.levels is not None:
+            slack = self.levels.with_soft(qp, v, slack)
         slack = np.where(slack > 2.0 * TOLERANCE * self._units, slack, 0.0)
         if flag == RELAXED and not slack[self._hard].any():
             flag = SOLVED  # the rows contradict each other by rounding only
@@ -139,9 +140,9 @@ class SolvedTick(Buffers):
 
     def below(self, qp: QP, v: Array, first: Relaxed | None) -> tuple[Array, Answer | None]:
         """The command with all levels below the first, whose answer is v, and their answer; v where there are none."""
-        if self._levels is None:
+        if self.levels is None:
             return v, None
-        return self._levels.below(qp, v, first, self.report)
+        return self.levels.below(qp, v, first, self.report)
 
     def _name_frozen_bounds(self, qp: QP, answer: Relaxed) -> None:
         """Of a bound that a relaxation holds, the other side is not what binds, whatever sign its multiplier has."""

@@ -51,7 +51,7 @@ class Cascade:
         x, iterations, error = problem.x, 0, 0.0
         multipliers, pushes = np.zeros(n + self.m), np.full(n + self.m, -1)
         achieved: list[Achieved] = []
-        for place, level in enumerate([*problem.levels, _rest(n)]):
+        for place, level in enumerate([*problem.levels, rest(n)]):
             last = place == len(problem.levels)
             step = LevelStep(self, level, rows, space, x, last)
             out, space, lam = step.solve(place)
@@ -89,8 +89,8 @@ class Cascade:
         return self._solvers[key]
 
 
-def _rest(n: int) -> Level:
-    """The least x of all that is left."""
+def rest(n: int) -> Level:
+    """What comes after all levels: the least x of all that is left."""
     return Level(np.zeros((0, n)), np.zeros(0), np.zeros(n), np.zeros(0, dtype=np.intp), 1.0)
 
 

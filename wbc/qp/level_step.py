@@ -153,8 +153,9 @@ class LevelStep:
         rows, soft = self.rows, self.x.size + self.level.soft
         low, high = np.where(rows.on, rows.lower, -np.inf), np.where(rows.on, rows.upper, np.inf)
         first, last = rows.given[0][soft], rows.given[1][soft]
-        middle, crossed = 0.5 * (first + last), first > last
-        low[soft], high[soft] = np.where(crossed, middle, first), np.where(crossed, middle, last)
+        crossed = first > last
+        first[crossed] = last[crossed] = 0.5 * (first[crossed] + last[crossed])
+        low[soft], high[soft] = first, last
         return low, high
 
     def _holds(self, x: Array) -> bool:

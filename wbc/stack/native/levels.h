@@ -76,6 +76,24 @@ static void begin_levels(wbc_tick *t) {
     for (int i = 0; i < M_ALL; i++) t->report.pushes[i] = -1.0;
 }
 
+/* Multipliers of the equality rows that push against the first level: those of its QP, which has them all */
+static void held_by_equalities(wbc_tick *t) {
+    wbc_report *out = &t->report;
+    double v[WIDE] = {0}, residual[WIDE], size[WIDE], drive = 0.0;
+    memcpy(v, out->v, sizeof out->v);
+    gradient(t, v, residual, size);
+    add_forces(t, v, residual, size);
+    for (int i = 0; i < NV; i++) drive = larger(drive, fabs(t->g[i]) * dof_scale[i]);
+    for (int i = 0; i < M_ALL; i++) drive = larger(drive, fabs(out->lambda[i]) * (i < NV ? dof_scale[i] : row_scale[i - NV]));
+    for (int i = 0; i < M_ALL; i++) {
+        const double *row = i < NV ? NULL : t->levels.general + (i - NV) * NV;
+        const double length = row ? sqrt(inner(row, row, NV)) : 1.0;
+        const double push = fabs(out->lambda[i]) * length * (i < NV ? dof_scale[i] : row_scale[i - NV]);
+        if (t->low[i] == t->high[i] && push > larger(PUSHING * drive, NOISE)) out->pushes[i] = 0.0;
+        else out->lambda[i] = 0.0;
+    }
+}
+
 /* Sides of rows that hold give way to x by rounding; rows that the level minimised hold from here on */
 static void pass_on(wbc_levels *s) {
     for (int i = 0; i < M_ALL; i++) {
@@ -225,6 +243,7 @@ static int all_levels(wbc_tick *t, int flag) {
     for (int i = 0; i < M_ALL; i++) out->lambda[i] = 0.0;
     if (going) {
         begin_levels(t);
+        if (flag == WBC_SOLVED) held_by_equalities(t);
         for (int place = 0; going && place <= LEVELS; place++) going = one_level(t, place, &error);
         sum_up(t);
         if (!going) {
