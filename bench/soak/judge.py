@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bench.soak.referee import SAME, referee
+from bench.soak.referee import SAME, distance
 from wbc.controller import Controller, Status, Step
 from wbc.robot import Robot
 from wbc.validation import Array
@@ -62,9 +62,9 @@ class Judge:
             return ""
         self.loose += 1
         if step.status == Status.SOLVED and not step.levels:
-            best = referee(step._past().qp)
-            self.compared += best is not None
-            if best is not None and np.abs(best - step.v).max() > SAME * self.longest:
+            off = distance(step._past().qp, step.v)
+            self.compared += off is not None
+            if off is not None and off > SAME * self.longest:
                 return "another optimum than the referee's"
         return ""
 
