@@ -17,6 +17,8 @@ from wbc.validation import Array
 
 #: Price of a squared slack of one unit, against the largest diagonal entry of H
 _PRICE = 1e6
+#: Damping of the search for slacks with strict levels, against the same
+_STEADY = 1e-3
 
 
 class ElasticTick(SolvedTick):
@@ -42,7 +44,11 @@ class ElasticTick(SolvedTick):
         dofs = np.ones(n) if self._dof_scales is None else self._dof_scales
         unit, soft = self._units, self._orders > 0
         H = sides.H * np.outer(dofs, dofs)
-        price = _PRICE * float(np.diag(H).max())
+        if self.levels is not None:
+            # the first level leaves directions to others, which begin anew within the sides that are found here
+            H[np.diag_indices(n)] += _STEADY * float(np.diag(H).max(initial=1.0))
+        # a slack counted in units of 1 / sqrt(_PRICE) costs what v does: the solver sees no other scale
+        price = float(np.diag(H).max())
         wide = np.zeros((n + m, n + m))
         wide[:n, :n] = H
         wide[range(n, n + m), range(n, n + m)] = price
@@ -53,7 +59,7 @@ class ElasticTick(SolvedTick):
             np.concatenate((sides.g * dofs, np.zeros(m))),
             np.concatenate((sides.lower[:n] / dofs, -free, sides.lower[n:] / unit)),
             np.concatenate((sides.upper[:n] / dofs, free, sides.upper[n:] / unit)),
-            np.hstack((sides.A * dofs / unit[:, None], np.eye(m))),
+            np.hstack((sides.A * dofs / unit[:, None], np.eye(m) / np.sqrt(_PRICE))),
         )
         found = self._wide.solve(problem, warm=False)
         if not found.solved:

@@ -9,7 +9,6 @@ from wbc.controller.tick import Assembly
 from wbc.qp.cascade import Cascade
 from wbc.qp.certificate import Certificate
 from wbc.qp.hierarchy import Answer, Hierarchy, Level
-from wbc.qp.level_sensitivity import FrozenLevels
 from wbc.qp.level_step import NOISE, PUSHING
 from wbc.qp.problem import QP
 from wbc.qp.relax import Relaxed
@@ -24,7 +23,7 @@ class Levels:
     """The cascade of one layout, in the units of :mod:`wbc.qp.cascade`: v / dof scales, rows / their scales.
 
     Attributes:
-        sizes: these scales, of v and of general rows.
+        cascade: what solves them. sizes: these scales, of v and of general rows.
     """
 
     def __init__(self, assembly: Assembly, stack: Declaration, layout: Layout) -> None:
@@ -33,13 +32,13 @@ class Levels:
         self._units = np.array(row_units(stack, layout), dtype=np.float64)
         self._row_levels = np.array(layout.row_levels, dtype=np.int_)
         self._damping = stack.damping
-        self._cascade = Cascade(layout.nv, layout.general_rows, left_free(stack), stack.damping)
+        self.cascade = Cascade(layout.nv, layout.general_rows, left_free(stack), stack.damping)
         self.sizes = np.concatenate((self._dofs, self._units))
         self._places = ReportLayout(layout)
 
     def reset(self) -> None:
         """Forget the active sets of the last tick."""
-        self._cascade.reset()
+        self.cascade.reset()
 
     def below(self, qp: QP, v: Array, first: Relaxed | None, report: Array) -> tuple[Array, Answer | None]:
         """The command and the answer of all levels, which is written to the report; v where the tick brakes.
@@ -51,7 +50,7 @@ class Levels:
             self._write(None, v, report)
             return v, None
         problem, scales = self.problem(qp, v, first.lower, first.upper)
-        nv, answer = self._layout.nv, self._cascade.solve(problem)
+        nv, answer = self._layout.nv, self.cascade.solve(problem)
         answer.multipliers *= np.append(scales, 1.0)[answer.pushes] / self.sizes
         if first.flag == "solved":
             self._held_by_equalities(problem, qp, first, answer)
@@ -77,10 +76,6 @@ class Levels:
         levels, scales = self._levels(qp)
         A = qp.A * self._dofs / self._units[:, None]
         return Hierarchy(v / self._dofs, low, high, A, levels), scales
-
-    def frozen(self, qp: QP, v: Array, first: Relaxed, answer: Answer) -> FrozenLevels:
-        """The answer as a function of its numbers; arguments as :meth:`below` had and gave them."""
-        return FrozenLevels(self._cascade, self.problem(qp, v, first.lower, first.upper)[0], answer)
 
     def with_soft(self, qp: QP, v: Array, slack: Array) -> Array:
         """Slack of general rows with that of the rows that are minimised at a level."""

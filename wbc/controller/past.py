@@ -99,7 +99,9 @@ class Past:
         answer = self._solver.below(qp, v, first)[1]
         if first is None or first.flag != "solved" or answer is None or not all(x.solved for x in answer.levels):
             return None
-        return Frozen(qp, first, answer, levels.frozen(qp, v, first, answer), self._hierarchy, levels.sizes)
+        problem = levels.problem(qp, v, first.lower, first.upper)[0]
+        optimum = FrozenLevels(levels.cascade, problem, answer)
+        return Frozen(qp, first, answer, optimum, self._hierarchy, levels.sizes)
 
     def _hierarchy(self, qp: QP, v: Array) -> Hierarchy:
         assert self._solver.levels is not None

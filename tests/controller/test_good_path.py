@@ -1,0 +1,32 @@
+"""A tick that is solved pays nothing for what explains, differentiates and replaces answers."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import pytest
+
+PROGRAM = """
+import sys
+from tests.stack import small
+controller = small.stack().compile(backend={backend!r})
+q = controller.stack.robot.neutral
+statuses = {{str(controller.step(q).status) for _ in range(50)}}
+assert statuses == {{"solved"}}, statuses
+asked_for = ("explaining", "explanation_text", "losses", "naming", "past", "derivative")
+loaded = {{name for name in sys.modules if name.startswith("wbc.")}}
+print(sorted(loaded & {{"wbc.controller." + name for name in asked_for}}), end=" ")
+print(sorted(loaded & {{"wbc.qp.conflict", "wbc.qp.sensitivity", "wbc.qp.level_sensitivity"}}), end=" ")
+print(controller._fallback._links)
+controller.step(q).explain()
+assert "wbc.controller.losses" in sys.modules
+"""
+
+
+@pytest.mark.parametrize("backend", ["vm", "native"])
+def test_nothing_of_it_is_even_loaded(backend: str) -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", PROGRAM.format(backend=backend)], capture_output=True, text=True, check=True
+    )
+    assert done.stdout == "[] [] {}\n"
