@@ -107,17 +107,18 @@ class LevelStep:
 
     def solve(self, place: int) -> tuple[Achieved, Array, Array]:
         """(what was achieved, the space that is left, multipliers)."""
-        y, lam, solved = np.zeros(self.rank), self._none(), True
+        y, force, lam, solved = np.zeros(self.rank), self._none(), self._none(), True
         if self.rank:
             y = np.asarray(np.linalg.solve(self.H, self.right))
         x = self.x + self.Z @ y
         if not self._holds(x):
-            x, y, lam, solved = self._searched(place)
+            x, y, force, solved = self._searched(place)
+            lam = self._pushing(force)
         free = self.rows.without(self.F, lam)
         residual = np.concatenate(
             (
-                self.H @ y - self.right + self.Z.T @ (self.rows.C.T @ lam),
-                self.F.T @ (self.rows.C.T @ lam),
+                self.H @ y - self.right + self.Z.T @ (self.rows.C.T @ force),
+                self.F.T @ (self.rows.C.T @ force),
             )
         )
         inverse = np.linalg.inv(np.linalg.cholesky(self.H)).T if self.rank else np.zeros((0, 0))
@@ -128,8 +129,8 @@ class LevelStep:
         terms = np.abs(self.H) @ np.abs(y) + np.abs(self.right) + np.abs(self.level.wanted).max(initial=0.0)
         size = np.abs(residual[: self.rank]) + (x.size + 4) * _EPS * terms
         at = self.rows.C @ x
-        side = np.where(lam > 0.0, self._sides()[1], self._sides()[0])
-        gap = np.abs(lam * np.where(lam != 0.0, at - side, 0.0))
+        side = np.where(force > 0.0, self._sides()[1], self._sides()[0])
+        gap = np.abs(force * np.where(force != 0.0, at - side, 0.0))
         gap[x.size + self.level.soft] = 0.0
         out = Achieved(
             x,
@@ -186,11 +187,15 @@ class LevelStep:
         found = self._proximal(place, QP(H, g, *ends, A))
         if found is None:
             return self.x, np.zeros(rank), self._none(), False
-        lam = found.multipliers[size:].copy()
-        drive = max(float(np.abs(self.right).max(initial=0.0)), float(np.abs(lam).max(initial=0.0)))
-        lam[np.abs(lam) * np.linalg.norm(A, axis=1) <= max(PUSHING * drive, NOISE)] = 0.0
         x = self.x + self.Z @ found.x[:rank] + self.F @ found.x[rank : rank + free]
-        return x, found.x[:rank], lam, True
+        return x, found.x[:rank], found.multipliers[size:].copy(), True
+
+    def _pushing(self, force: Array) -> Array:
+        """Multipliers of the rows that push; those of the others are rounding, or too small to tell from it."""
+        seen = np.linalg.norm(self.rows.C @ np.hstack((self.Z, self.F)), axis=1)
+        seen[self.x.size + self.level.soft] = np.hypot(seen[self.x.size + self.level.soft], 1.0)
+        drive = max(float(np.abs(self.right).max(initial=0.0)), float(np.abs(force).max(initial=0.0)))
+        return np.where(np.abs(force) * seen <= max(PUSHING * drive, NOISE), 0.0, force)
 
     def _proximal(self, place: int, qp: QP) -> Solution | None:
         """The QP with the cost of the free directions taken away again."""

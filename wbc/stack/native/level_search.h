@@ -108,7 +108,7 @@ static void level_point(const wbc_levels *s, double *z) {
     for (int j = s->rank; j < s->width; j++) z[j] = (s->u[j] - s->shift[j]) / sqrt(PROXIMAL);
 }
 
-/* The multipliers of the rows that push */
+/* The multipliers of all rows, for the certificate, and of those that push */
 static void level_multipliers(wbc_levels *s) {
     const DAQPWorkspace *work = &s->daqp;
     double drive = 0.0;
@@ -119,6 +119,7 @@ static void level_multipliers(wbc_levels *s) {
         s->lambda[i] = work->lam_star[a] * s->scaling[i];
         drive = larger(drive, fabs(s->lambda[i]));
     }
+    memcpy(s->force, s->lambda, sizeof s->force);
     for (int i = 0; i < M_ALL; i++)
         if (fabs(s->lambda[i]) * s->length[i] <= larger(PUSHING * drive, NOISE)) s->lambda[i] = 0.0;
 }

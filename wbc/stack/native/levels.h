@@ -128,13 +128,13 @@ static void judge(wbc_tick *t, const double *z, double *numbers, double *gain) {
     wbc_levels *s = &t->levels;
     double force[NV] = {0}, size[NV] = {0}, inverse = 0.0, seen = 0.0, image = 0.0, most = 0.0;
     for (int i = 0; i < M_ALL; i++) {
-        if (s->lambda[i] == 0.0) continue;
+        if (s->force[i] == 0.0) continue;
         double low, high;
         level_sides(s, i, &low, &high);
-        const double gap = row_of(s, i, s->x) - (s->lambda[i] > 0.0 ? high : low);
-        if (s->slot[i] < 0) numbers[6] = larger(numbers[6], fabs(s->lambda[i] * gap));
-        if (i < NV) force[i] += s->lambda[i];
-        else add_to(force, s->general + (i - NV) * NV, s->lambda[i], NV);
+        const double gap = row_of(s, i, s->x) - (s->force[i] > 0.0 ? high : low);
+        if (s->slot[i] < 0) numbers[6] = larger(numbers[6], fabs(s->force[i] * gap));
+        if (i < NV) force[i] += s->force[i];
+        else add_to(force, s->general + (i - NV) * NV, s->force[i], NV);
     }
     for (int i = 0; i < NV; i++) most = larger(most, fabs(s->wanted[i]));
     for (int j = 0; j < s->width; j++) {
@@ -174,7 +174,7 @@ static int one_level(wbc_tick *t, int place, double *error) {
     numbers[2] = s->least;
     level_quadratic(s, rest);
     if (s->bends) add_bent(s);
-    for (int i = 0; i < M_ALL; i++) s->lambda[i] = 0.0;
+    for (int i = 0; i < M_ALL; i++) s->lambda[i] = s->force[i] = 0.0;
     memcpy(x, s->x, sizeof x);
     int solved = invert_matrix(s->H, s->rank, s->inverse);
     if (solved) {

@@ -92,6 +92,7 @@ typedef struct {
     double row[LEVEL_MOST * NV], weight[LEVEL_MOST], wanted[NV], scale, soft_weight;
     double column[NV * LEVEL_MOST], damped[NV], least; /* rows along the directions */
     double H[NV * NV], inverse[NV * NV], right[NV], plain[NV], lambda[M_ALL], length[M_ALL];
+    double force[M_ALL];                        /* multipliers, those in it that do not count as pushing */
     double bent[NV * NV];                       /* curvature of the first level */
     int bends, seen;                            /* whether there is any; directions that the rows take */
     int width, rank, count, soft_count, order[LEVEL_MOST];
