@@ -200,8 +200,12 @@ def test_ctrl_c_leaves_what_there_is(tmp_path: Path, monkeypatch: pytest.MonkeyP
     folder = tmp_path / "run"
     code, out, _ = run("walk", *SHORT, "--out", folder)
     assert code == 130
-    assert len(WalkLog.load(folder)) == 61
-    assert json.loads((folder / "summary.json").read_text())["outcome"] == "interrupted"
+    told = json.loads((folder / "summary.json").read_text())
+    assert told["outcome"] == "interrupted"
+    # The body comes to rest within what was said before
+    assert 61 < len(WalkLog.load(folder)) < 120
+    assert 0.0 < told["abort"]["body"] <= told["abort"]["body_bound"] <= told["stopping"]["body"]
+    assert np.abs(WalkLog.load(folder).v[-2]).max() < 0.01
     assert "interrupted" in out
 
 

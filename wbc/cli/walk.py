@@ -16,6 +16,7 @@ from wbc import robots
 from wbc.cli import walk_options as options
 from wbc.cli.console import err, out, progress_bar
 from wbc.cli.session import INTERRUPTED, Stopper
+from wbc.cli.walk_modes import Perform, performance
 from wbc.errors import ShapeError
 from wbc.robots import Walker, WalkerData
 from wbc.track.summary import Figure
@@ -23,12 +24,14 @@ from wbc.walking.body_path import standing_path
 from wbc.walking.plan import Plan, differences, read_rows
 from wbc.walking.run.figures import figures_of, save_figures
 from wbc.walking.run.folder import make_folder, save_pictures, save_run
-from wbc.walking.run.perform import WalkRun, perform_walk
+from wbc.walking.run.perform import WalkRun
 from wbc.walking.run.published_run import perform_published, published_figures, save_published
 from wbc.walking.run.request import SPEED, WalkRequest
 
 #: Exit codes: the walk is not possible or did not arrive, and what a check of it violates
 REFUSED, VIOLATED = 3, 4
+#: Outcomes of a walk that did what it was to do
+WELL = ("arrived", "time", "key")
 
 
 def walk(
@@ -43,6 +46,12 @@ def walk(
     remove: options.Remove = 0.0,
     seed: options.Seed = 0,
     rigid: options.Rigid = False,
+    commands: options.Commands = "",
+    arm: options.ArmName = "",
+    do: options.Do = None,
+    free_start: options.FreeStart = False,
+    resume: options.Resume = "",
+    ask: options.Ask = False,
     planner: options.PlannerName = "free",
     change: options.Change = None,
     backend: options.Backend = "auto",
@@ -70,15 +79,19 @@ def walk(
         seed,
         planner,
         rigid,
+        commands,
+        arm,
+        tuple(do or ()),
+        free_start,
     )
     machine = robots.walker(data=changed_data(change or []))
-    request.path(request.build(), _body_data(machine))  # bad input shows before a folder is made
+    perform = performance(request, machine, resume, ask)  # bad input shows before a folder is made
     stamp = datetime.datetime.now().strftime("%Y%m%d-%H%M%S")
     folder = make_folder(output or Path("runs") / f"walk-{Path(structure).stem}-{stamp}", force)
     if planner == "published":
         _published(request, folder)
     else:
-        _free(request, machine, folder, backend, check or strict, pictures, strict)
+        _free(perform, machine, folder, backend, check or strict, pictures, strict)
 
 
 def plans(
@@ -115,7 +128,7 @@ def changed_data(changes: list[str]) -> WalkerData:
 
 
 def _free(
-    request: WalkRequest, machine: Walker, folder: Path, backend: str, check: bool, pictures: bool, strict: bool
+    perform: Perform, machine: Walker, folder: Path, backend: str, check: bool, pictures: bool, strict: bool
 ) -> None:
     stopper, console = Stopper(), err()
     with progress_bar() as bar:
@@ -125,7 +138,7 @@ def _free(
             bar.update(stage, description=what, total=None if part is None else 1.0, completed=part or 0.0)
 
         with stopper.listening():
-            run = perform_walk(request, machine, backend=backend, progress=told, stop=stopper)
+            run = perform(backend, told, stopper)
             told("checking and writing", None)
             files, report = save_run(run, folder, check)
             missing = list[str]()
@@ -147,7 +160,7 @@ def _end(run: WalkRun, interrupted: bool) -> None:
     """The exit code of a walk that did not arrive."""
     if interrupted:
         raise typer.Exit(INTERRUPTED)
-    if run.outcome != "arrived":
+    if run.outcome not in WELL:
         err().print(f"[bold red]{run.outcome}[/bold red]: {escape(run.reason)}", soft_wrap=True)
         raise typer.Exit(REFUSED)
 
@@ -161,11 +174,6 @@ def _published(request: WalkRequest, folder: Path) -> None:
     if not run.arrived:
         err().print(f"[bold red]stopped[/bold red]: {escape(run.reason)}", soft_wrap=True)
         raise typer.Exit(REFUSED)
-
-
-def _body_data(machine: Walker) -> WalkerData:
-    assert isinstance(machine.data, WalkerData)
-    return machine.data
 
 
 def _read_plan(path: Path) -> Plan:

@@ -15,7 +15,8 @@ StructureName = Annotated[str, typer.Option(help=f"{', '.join(BUILT_IN)}, or FIL
 Mode = Annotated[
     str,
     typer.Option(
-        help="velocity: least delay, then fewest re-grasps; destination: fewest re-grasps.", rich_help_panel=_SCENE
+        help="velocity: least delay, then fewest re-grasps; destination: fewest re-grasps; arm: one hand, --do.",
+        rich_help_panel=_SCENE,
     ),
 ]
 Speed = Annotated[
@@ -51,3 +52,31 @@ Strict = Annotated[bool, typer.Option(help="End with 4 if the checker finds a vi
 Pictures = Annotated[
     bool, typer.Option(help="Draw plots, stills, animation and the replay page.", rich_help_panel=_OUTPUT)
 ]
+Commands = Annotated[
+    str,
+    typer.Option(
+        help="Drive the body by rates: FILE (CSV or npz: t, T, A, spin) or keyboard; mode velocity.",
+        rich_help_panel=_SCENE,
+    ),
+]
+ArmName = Annotated[str, typer.Option("--arm", help="The arm of arm mode. Default: the first.", rich_help_panel=_SCENE)]
+Do = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--do",
+        help="Arm mode: 'hold ID', 'poses FILE' or 'rate vx,vy,vz,wx,wy,wz for SECONDS'; may be repeated.",
+        rich_help_panel=_SCENE,
+    ),
+]
+FreeStart = Annotated[
+    bool, typer.Option("--free-start", help="Begin with nothing held, the body fixed.", rich_help_panel=_SCENE)
+]
+Ask = Annotated[
+    bool,
+    typer.Option(
+        "--ask",
+        help="Propose every re-grasp: a line of input is empty for yes, or another hold.",
+        rich_help_panel=_HOW,
+    ),
+]
+Resume = Annotated[str, typer.Option(help="Go on with a run: its folder, or FOLDER@SECONDS.", rich_help_panel=_SCENE)]

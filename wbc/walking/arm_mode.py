@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
 from wbc import validation
+from wbc.errors import WbcError
 from wbc.validation import Array
 from wbc.walking.arm_clearance import ArmClearance
 from wbc.walking.grip_rolls import ANY, frame_on
 from wbc.walking.hand_motion import ArmRefused, Standing
 from wbc.walking.swing_clearance import SwingClearance
 from wbc.walking.walk import Walk
+from wbc.walking.walk_hands import HAND_STOP
 from wbc.walking.walk_state import Hand, Tick
 
 #: Speeds of a hand unless others are asked for [m/s, rad/s]
@@ -26,20 +27,33 @@ ABOVE = 4.5 * 0.0254
 REST = 200
 
 
+class ArmStopped(WbcError):
+    """A motion that was ended by whoever may stop it; the hand is in the air and stands."""
+
+
 class ArmMode:
     """One arm of a walk that stands.
 
     Args:
         walk: between its ticks; its body stands and no hand is on its way. arm: name. on_tick: what happens every tick.
+        stop: asked every tick of a motion: true ends it, within :data:`wbc.walking.walk_hands.HAND_STOP` seconds, and
+            raises :class:`ArmStopped`.
 
     Raises:
         UnknownNameError: no such arm. ArmRefused: the body moves, or the other hands do not hold.
     """
 
-    def __init__(self, walk: Walk, arm: str, on_tick: Callable[[Tick], Any] | None = None) -> None:
+    def __init__(
+        self,
+        walk: Walk,
+        arm: str,
+        on_tick: Callable[[Tick], Any] | None = None,
+        stop: Callable[[], bool] | None = None,
+    ) -> None:
         names = [a.name for a in walk.walker.arms]
         validation.one_of("arm", arm, names)
         self.walk, self.arm, self._on_tick = walk, names.index(arm), on_tick or (lambda tick: None)
+        self._stop = stop or (lambda: False)
         if walk.pace > 0.0 or walk.swinging is not None or (walk.told is not None and walk.told[0] != self.arm):
             raise ArmRefused("walk", walk.path_time, "the body moves, or a hand is on its way")
         others = [k for k in walk.held if k != self.arm]
@@ -138,11 +152,19 @@ class ArmMode:
             self._tick("opening", hold)
 
     def _follow(self, rows: Array) -> None:
-        """Joints tick by tick."""
-        for now, then in pairwise(rows):
-            self.walk.stack.joints(self.arm, now, (then - now) / self.walk.dt)
+        """Joints tick by tick; slower and slower from where a stop is asked for."""
+        walk, place, pace, stopped = self.walk, 0.0, 1.0, False
+        while place < len(rows) - 1 and pace > 1e-9:
+            stopped = stopped or self._stop()
+            pace -= walk.dt / HAND_STOP if stopped else 0.0
+            then = min(place + max(pace, 0.0), len(rows) - 1.0)
+            now, after = _between(rows, place), _between(rows, then)
+            walk.stack.joints(self.arm, now, (after - now) / walk.dt)
             self._tick("open")
-        self.walk.stack.joints(self.arm, rows[-1], np.zeros(6))
+            place = then
+        walk.stack.joints(self.arm, _between(rows, place), np.zeros(6))
+        if stopped:
+            raise ArmStopped("stop", walk.time, "the motion was stopped")
 
     def _close(self, row: int, number: int, frame: pin.SE3) -> None:
         """Come to rest on a hold at one of its rolls, and close."""
@@ -160,3 +182,10 @@ class ArmMode:
             self._tick("closing", row)
         if not walk.close_hand(self.arm, row, number):
             raise ArmRefused("hold", name, "the latch does not close")
+
+
+def _between(rows: Array, place: float) -> Array:
+    """A row at a fractional place."""
+    low = min(int(place), len(rows) - 2)
+    out: Array = rows[low] + (place - low) * (rows[low + 1] - rows[low])
+    return out

@@ -79,6 +79,20 @@ class ClosedChain:
         out.origins, out.axes, out.sides = self.origins, self.axes, self.sides
         return out
 
+    def place(self, q: Array) -> None:
+        """Where the hands are, of a body that is where a configuration has it."""
+        self._still[7:] = q[7:]
+        pin.framesForwardKinematics(self._model, self._data, self._still)
+        turn, count = pin.Quaternion(q[3:7]).matrix(), len(self.origins)
+        moved = np.concatenate(self._rows).reshape(-1, 3).dot(turn.T)
+        self.origins = moved[:count] + q[:3]
+        self.axes, self.sides = moved[count : 2 * count], moved[2 * count :]
+
+    def slip(self, held: Mapping[int, int]) -> float:
+        """Largest distance of a held hand from its hold [m]."""
+        gaps = [self.origins[arm] - self.structure.positions[hold] for arm, hold in held.items()]
+        return max((sqrt(gap.dot(gap)) for gap in gaps), default=0.0)
+
     def settle(self, q: Array, held: Mapping[int, int]) -> tuple[Array, float]:
         """A configuration with the same joints and the body where the held hands put it.
 

@@ -20,6 +20,8 @@ from wbc.walking.swing_clearance import SwingClearance
 PART, ROOM = 0.9, 0.01
 #: Motions that ask too much of a joint are made slower, by this factor and at most so often
 SLOWER, TRIES = 1.25, 12
+#: Width of the edge of that distance, and what the checker leaves of the clearance, less a half [m]
+EDGE, SLACK = 0.002, 5e-5
 #: A hand within this of a waypoint is there [m, rad]
 THERE = 1e-9
 
@@ -152,7 +154,7 @@ class Standing:
         points = self.arms.points(self.arm, rows)
         bodies = np.repeat(self.body.homogeneous[None, None], len(rows), axis=1)
         hands = points[[0, -1], 5] @ self.body.rotation.T + self.body.translation
-        if not self.clear.structure(points[None], bodies, hands[None])[0]:
+        if not self.clear.structure(points[None], bodies, hands[None])[0] or not self._leaves(points, hands):
             raise ArmRefused("poses", len(rows), "the arm would come too near to the structure")
         for other, arm in enumerate(self.walker.arms):
             if other == self.arm:
@@ -160,3 +162,14 @@ class Standing:
             held = np.repeat(self.arms.points(other, self.q[arm.q])[None], len(rows), axis=0)
             if self.arms.near(points, held).any():
                 raise ArmRefused("poses", len(rows), f"the arm would come too near to {arm.name}")
+
+    def _leaves(self, points: Array, ends: Array) -> bool:
+        """Whether the hand is clear of the structure where it comes out of the distance in which it may be near.
+
+        Swings are so by their shape, and :class:`SwingClearance` does not look there; this hand may go anywhere.
+        """
+        data, places = self._kinematics.data, points[:, 5] @ self.body.rotation.T + self.body.translation
+        far = np.linalg.norm(places[:, None] - ends, axis=2).min(axis=1) - data.exempt_distance
+        edge = (far > 0.0) & (far < EDGE)
+        room = self.clear.room(places[edge]) - data.hand_radius - data.clearance
+        return bool((room > -SLACK).all())

@@ -20,9 +20,9 @@ from wbc.walking.plan import HoldLost, Plan, Regrasp
 from wbc.walking.replanning import way_to
 from wbc.walking.structure import Structure
 from wbc.walking.swing_law import SwingLaw
-from wbc.walking.walk_hands import BEHIND, HAND_RAMP, LANDING, at_rest, hand_pace, turned
+from wbc.walking.walk_hands import BEHIND, HAND_RAMP, HAND_STOP, LANDING, at_rest, hand_pace, turned
 from wbc.walking.walk_stack import WalkStack
-from wbc.walking.walk_state import Event, Hand, Swinging, What, Wrist
+from wbc.walking.walk_state import Event, Hand, State, Swinging, What, Wrist
 
 #: A hold that could not be grasped so many times is taken as vanished
 TRIES = 3
@@ -35,7 +35,10 @@ class Hands(ABC):
         plan: the one that is carried out now; path times count from its beginning.
         held: row of the arm -> row of the hold. swinging: the hand on its way.
         told: arm, state and hold of a hand that does what it is told, see :mod:`wbc.walking.arm_mode`.
-        halted: the body stands, and no hand is lifted.
+        halted: the body stands, and no hand is lifted. aborted: no hand moves either.
+        fixed: fewer hands hold than the body needs, and have since the beginning: it is declared fixed.
+        opens: row of an arm that was opening at the beginning, and of its hold; None: none was.
+        approve: asked before every lift; the body waits at the lift until it says yes. None: nobody is asked.
         leash: path time that the body does not pass, and how many re-grasps of the plan may be lifted; None: all of it.
         steps: re-grasps that were begun, over the path time of the whole walk.
         past: poses behind the beginning of the plan's path ``[n, 4, 4]``, at its spacing.
@@ -52,6 +55,7 @@ class Hands(ABC):
         plan: Plan,
         stack: WalkStack,
         grasps: Callable[[str, str], bool] | None,
+        state: State | None = None,
     ) -> None:
         if plan.grips is None or not isinstance(walker.data, self.machine):
             raise ShapeError("plan", plan, f"expected a plan of the planner, of a machine with {self.machine.__name__}")
@@ -60,22 +64,36 @@ class Hands(ABC):
         self.stack.structure = structure
         self.chain = ClosedChain(walker, structure)
         self.grasps = grasps or (lambda _arm, _hold: True)
-        self.time, self.path_time, self.pace = 0.0, 0.0, 0.0
+        self.time, self.path_time, self.pace = 0.0 if state is None else state.time, 0.0, 0.0
         self.events: list[Event] = []
         self.swinging: Swinging | None = None
         self.told: tuple[int, Hand, int] | None = None
         self.v = np.zeros(walker.robot.nv)
         self._changing = False
-        self.halted = False
+        self.halted = self.aborted = False
+        self.approve: Callable[[Regrasp], bool] | None = None
         self.leash: tuple[float, int] | None = None
         self.steps: list[Regrasp] = []
         self.past = np.zeros((0, 4, 4))
         self._landed = (-1, 0.0)
-        self._follow(plan)
-        self.held = {arm: int(self.grips.hold[grip]) for arm, grip in enumerate(self._grip)}
-        self.q = self._start()
-        for arm, hold in self.held.items():
-            self.stack.hold(arm, hold, int(self.grips.roll[self._grip[arm]]))
+        self._begin(plan)
+        if state is None:
+            self.held = {arm: int(self.grips.hold[grip]) for arm, grip in enumerate(self._grip)}
+            self.q = self._start()
+        else:
+            self.held, self.q = dict(state.held), state.q.copy()
+        self.opens = None if state is None else state.opening
+        self.fixed = len(self.held) < walker.min_holds
+        if self.fixed:
+            self.chain.place(self.q)
+        else:
+            self.q = self.chain.settle(self.q, self.held)[0]
+        for arm in range(len(walker.arms)):
+            if arm in self.held:
+                self.stack.hold(arm, self.held[arm], int(self.grips.roll[self._grip[arm]]))
+            else:
+                self.stack.release(arm)
+                self._stay(arm)
 
     @abstractmethod
     def vanish(self, ids: Iterable[str]) -> None:
@@ -83,9 +101,12 @@ class Hands(ABC):
 
     def _follow(self, plan: Plan) -> None:
         """Take a plan from its beginning."""
-        if self.time > 0.0:
-            path = self.plan.path
-            self.past = np.concatenate([self.past, path.poses[: round(self.path_time / path.spacing)]])
+        path = self.plan.path
+        self.past = np.concatenate([self.past, path.poses[: round(self.path_time / path.spacing)]])
+        self._begin(plan)
+
+    def _begin(self, plan: Plan) -> None:
+        """From the beginning of a plan."""
         self.next, self._used, self.path_time = 0, [0] * len(self.walker.arms), 0.0
         self._grip = [chain[0] for chain in plan.chain]
         self._go_on(plan)
@@ -109,7 +130,7 @@ class Hands(ABC):
         q[:3], q[3:7] = first.translation, pin.Quaternion(first.rotation).coeffs()
         for arm, grip in enumerate(self._grip):
             q[self.walker.arms[arm].q] = self.grips.posture(np.array(grip), np.array(0))
-        return self.chain.settle(q, self.held)[0]
+        return q
 
     def _lift(self) -> None:
         """Send a free hand to its hold, or open that of the next re-grasp when the body is where the plan lifts it."""
@@ -127,6 +148,8 @@ class Hands(ABC):
         if len(self.held) <= self.walker.min_holds:
             raise HoldLost("hands", len(self.held), f"more than {self.walker.min_holds} must hold before one is lifted")
         step = self.plan.regrasps[self.next]
+        if self.approve is not None and not self.approve(step):
+            return
         arm = [a.name for a in self.walker.arms].index(step.arm)
         if self._landed == (arm, self.time):
             return  # A hand that goes on at once is closed for a tick
@@ -169,7 +192,7 @@ class Hands(ABC):
         elif swinging.state == "open":
             begins = float(self.grips.first[swinging.grip]) * self.plan.path.spacing
             wanted = hand_pace(swinging, place, at_branch, begins - self.path_time, self.pace)
-            change = self.dt / HAND_RAMP
+            wanted, change = (0.0, self.dt / HAND_STOP) if self.aborted else (wanted, self.dt / HAND_RAMP)
             swinging.pace += min(max(wanted - swinging.pace, -change), change)
             swinging.clock = min(swinging.clock + swinging.pace * self.dt, swinging.law.duration)
         aim = swinging.aim = swinging.law.at(swinging.clock)
@@ -228,6 +251,7 @@ class Hands(ABC):
                 self.vanish([names[1]])
             return
         self.held[arm], self._grip[arm] = swinging.hold, swinging.grip
+        self.fixed = self.fixed and len(self.held) < self.walker.min_holds
         self._landed = arm, self.time
         self.stack.hold(arm, swinging.hold, int(self.grips.roll[swinging.grip]))
         self.swinging = None

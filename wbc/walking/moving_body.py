@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
+from itertools import pairwise
 from math import sqrt
 
 import numpy as np
@@ -14,11 +16,14 @@ from wbc.walking.plan import Plan
 from wbc.walking.replanning import PlanSlices
 from wbc.walking.structure import Structure
 from wbc.walking.swings import SETTLE
+from wbc.walking.walk_hands import BEHIND, HAND_STOP
 
 #: From rest to the commanded speed [s]
 RAMP = 0.25
 #: Poses behind the body that are kept, for going back
 TRAIL = 400
+#: What a body or a hand may be off its way at the end of a stop [m], and parts of a way that is measured
+OFF, PARTS = 0.002, 9
 
 
 class MovingBody(Hands):
@@ -30,6 +35,53 @@ class MovingBody(Hands):
     def travelled(self) -> float:
         """Path time since the beginning of the walk, over all its plans [s]."""
         return len(self.past) * self.plan.path.spacing + self.path_time
+
+    @property
+    def still(self) -> bool:
+        """Neither the body nor a hand moves as it is told."""
+        swinging = self.swinging
+        return self.pace == 0.0 and (swinging is None or (swinging.state == "open" and swinging.pace == 0.0))
+
+    def abort(self) -> None:
+        """Stop: the body and the hand in the air slow down along their ways; nothing is lifted, nothing planned."""
+        self.aborted = True
+        if self.swinging is not None and self.swinging.state == "opening":
+            self.swinging.pace = 0.0
+
+    def carry_on(self) -> None:
+        """Go on after an abort."""
+        self.aborted = False
+
+    def stopping(self) -> tuple[float, float]:
+        """How far the body's origin and the hand in the air can travel after an abort now [m].
+
+        The ways that they are told to go while their paces fall from p to 0, which is p^2 RAMP / 2 of path time and
+        p^2 HAND_STOP / 2 of the swing's, and a tick; what they are behind now; and what they may be off at the end.
+        """
+        path, u = self.plan.path, self.path_time
+        left = 0.5 * self.pace**2 * RAMP + self.pace * self.dt
+        body = _length([path.at(x)[0].translation for x in np.linspace(u, u + left, PARTS)])
+        body += float(np.linalg.norm(self.q[:3] - path.at(u)[0].translation)) + OFF
+        swinging = self.swinging
+        if swinging is None:
+            return body, 0.0
+        pace = swinging.pace if swinging.state == "open" else 0.0
+        left = 0.5 * pace**2 * HAND_STOP + pace * self.dt
+        aims = [swinging.law.at(x).position for x in np.linspace(swinging.clock, swinging.clock + left, PARTS)]
+        gap = float(np.linalg.norm(swinging.aim.position - self.chain.origins[swinging.arm]))
+        return body, _length(aims) + gap + OFF
+
+    def _move(self) -> float:
+        """The robot moves by its joint rates for a tick, and by nothing else; the worst slip of a held hand [m]."""
+        joints = self.q.copy()
+        joints[7:] += self.v[6:] * self.dt
+        if not self.fixed:
+            self.q, slip = self.chain.settle(joints, self.held)
+            return slip
+        self.v[:6] = 0.0
+        self.q = joints
+        self.chain.place(joints)
+        return self.chain.slip(self.held)
 
     def go_over(self, plan: Plan, begins: float, since: int) -> None:
         """Take a plan over another path, which agrees with the present one about where the body is.
@@ -63,6 +115,8 @@ class MovingBody(Hands):
         ends = [float(self.grips.last[self._grip[arm]]) * spacing for arm in self.held if arm != leaving]
         end = path.duration if self.plan.complete else self.plan.reached
         end = end if self.leash is None else min(end, self.leash[0])
+        if self.approve is not None and self.swinging is None and self.next < len(self.plan.regrasps):
+            end = min(end, self.plan.regrasps[self.next].lift)
         room = max(min([end, *ends]) - self.path_time, 0.0)
         # The command stops within the room: braking from pace p takes p^2 RAMP / 2 of path time
         wanted = min(1.0, sqrt(2.0 * room / RAMP * 0.9))
@@ -83,7 +137,7 @@ class MovingBody(Hands):
 
     def _stands(self) -> bool:
         """The body is to stop, or not to move on."""
-        return self._changing or self.halted or (self.swinging is not None and self.swinging.waits)
+        return self._changing or self.halted or self.aborted or (self.swinging is not None and self.swinging.waits)
 
     def _stop(self) -> None:
         """The body stops, and the rest of the way is planned from there."""
@@ -106,3 +160,21 @@ class MovingBody(Hands):
         if self.swinging is not None:
             self.swinging.hold = int(rows[self.swinging.hold])
         self._go_on(replace(self.plan, grips=self.grips.renumbered(rows)))
+
+
+def longest_stop(plan: Plan, dt: float) -> tuple[float, float]:
+    """How far the body's origin and a swinging hand can travel after an abort anywhere in a plan, at most [m].
+
+    v (RAMP / 2 + dt) with the body's largest speed, and w (HAND_STOP / 2 + dt) with the hands', and what they may be
+    behind then and off at the end. Of a hand that is brought to where a plan begins, :meth:`MovingBody.stopping` knows.
+    """
+    path = plan.path
+    speed = float(np.linalg.norm(np.diff(path.poses[:, :3, 3], axis=0), axis=1).max()) / path.spacing
+    swing = max((law.top_speed for law in plan.laws), default=0.0)
+    hand = swing * (0.5 * HAND_STOP + dt) + BEHIND + OFF if plan.laws else 0.0
+    return speed * (0.5 * RAMP + dt) + 2.0 * OFF, hand
+
+
+def _length(points: Sequence[Array]) -> float:
+    """Of a way through points [m]."""
+    return float(sum(np.linalg.norm(b - a) for a, b in pairwise(points)))

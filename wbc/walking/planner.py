@@ -108,6 +108,7 @@ def plan_slices(
     sample: int = 0,
     soon: bool = False,
     tries: Sequence[tuple[float, int | None]] = (),
+    first: tuple[int, int] | None = None,
 ) -> Slices[Plan]:
     """The best plan along one path, complete or not, in slices of some milliseconds of work; the same every time.
 
@@ -117,6 +118,7 @@ def plan_slices(
         sample: of the path, from which on hands may be lifted.
         soon: somebody waits: of fewer delays (:data:`SOON`), the wide searches after all narrow ones.
         tries: delays and widths of the searches, one after the other, instead of what objective and width say.
+        first: row of an arm and of a hold: the first re-grasp, whether it is needed or not.
 
     Raises:
         as :func:`plan_walk`, where no stance is possible at the beginning.
@@ -133,7 +135,7 @@ def plan_slices(
         delays = SOON
     after = [(delay, wide) for wide in widths for delay in delays] if soon else product(delays, widths)
     for delay, wide in tries or after:
-        search = StanceSearch(walker, structure, path, grips, longest_delay=delay, width=wide)
+        search = StanceSearch(walker, structure, path, grips, longest_delay=delay, width=wide, first=first)
         starts = [stance] if stance else stances(walker, structure, search, beginning, sample)
         yield None
         found, laws = yield from sound_slices(search, starts, sample, deadline)

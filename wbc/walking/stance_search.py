@@ -102,6 +102,7 @@ class StanceSearch:
     Args:
         longest_delay: of one swing [s]; 0: the body never slows down.
         width: stances kept of each number of re-grasps, None: all.
+        first: row of an arm and of a hold: the first move, whether it is needed or not; None: any.
     """
 
     def __init__(
@@ -113,10 +114,11 @@ class StanceSearch:
         *,
         longest_delay: float = np.inf,
         width: int | None = 200,
+        first: tuple[int, int] | None = None,
     ) -> None:
         self.walker, self.structure, self.path, self.grips = walker, structure, path, grips
         self._equip()
-        self.longest_delay, self.width = longest_delay, width
+        self.longest_delay, self.width, self.first = longest_delay, width, first
         self.expanded = 0
         # The end of the path is no limit of the arm
         self._latest = np.where(grips.last == len(path) - 1, grips.last, grips.last - INSIDE)
@@ -143,7 +145,7 @@ class StanceSearch:
             done = [
                 (node.delay, key) for key, node in level.items() if self.until(key, node.sample) >= len(self.path) - 1
             ]
-            if done:
+            if done and not (self.first and len(levels) == 1):
                 return self._result(levels, min(done)[1], True)
             if deadline is not None and time.perf_counter() > deadline:
                 break
@@ -209,7 +211,10 @@ class StanceSearch:
             room = self._room(others, node.sample)
             end = min(int(grips.last[source]), min(self._conflict(source, g, node.sample) for g in others) - 1)
             targets = self._by_arm[arm]
-            targets = targets[(grips.last[targets] > grips.last[source]) & (grips.first[targets] < room)]
+            useful = grips.last[targets] > grips.last[source]
+            if self.first and node.parent is None:
+                useful = (grips.hold[targets] == self.first[1]) & (arm == self.first[0])
+            targets = targets[useful & (grips.first[targets] < room)]
             for g in others:
                 targets = targets[grips.hold[targets] != grips.hold[g]]
             if not len(targets) or node.sample > min(room, end):

@@ -53,6 +53,10 @@ class SwingClearance:
         out: Flags = (room >= 0.0).all(axis=(1, 2, 3))
         return out
 
+    def room(self, points: Array) -> Array:
+        """Distance of points of the structure's frame ``[n, 3]`` from the structure [m]."""
+        return self._structure.clearance(points)
+
     def others(self, points: Array, samples: Array, others: Ints) -> Flags:
         """Whether swinging arms stay clear of arms that hold: grips ``others`` ``[m]`` at ``samples`` ``[m, n]``."""
         count, steps = samples.shape

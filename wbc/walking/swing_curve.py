@@ -123,7 +123,8 @@ def between(place: Array, axis: Array, structure: Structure, hold: int, pivots: 
     # It need not rise more than it lacks, but must come down along the hold's normal
     lack = max(height - float(structure.clearance(place)), 0.0)
     flat = Curves(place[None], end, axis[None], arrive, np.zeros((1, 2)), np.zeros(1), pivots, 1.0)
-    flat = replace(flat, rise=np.array([[lack, _rise(flat, height)[0]]]))
+    rise = float(_rise(flat, height)[0])
+    flat = replace(flat, rise=np.array([[rise * lack / height, rise]]))
     return replace(flat, lift=_lift(structure, flat, height))
 
 

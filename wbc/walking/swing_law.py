@@ -69,6 +69,11 @@ class SwingLaw:
         speed[0] = speed[-1] = 0.0
         self._rows = np.concatenate([place, speed, blend(along)[:, None]], axis=1)
 
+    @property
+    def top_speed(self) -> float:
+        """Of the hand [m/s]."""
+        return float(np.linalg.norm(self._rows[:, 3:6], axis=1).max())
+
     @staticmethod
     def of(swings: Swings, move: Move) -> SwingLaw:
         """The law of a planned move, as long as the plan says, with the body where it is at these times."""

@@ -16,7 +16,7 @@ from wbc.walking.plan import HoldLost, NoPlanError, Plan
 from wbc.walking.replanning import PlanSlices, plan_from_here, plan_from_stance, plan_rest
 from wbc.walking.structure import Structure
 from wbc.walking.walk_stack import DT, WalkStack
-from wbc.walking.walk_state import Event, Hand, Tick
+from wbc.walking.walk_state import Event, Hand, State, Tick
 
 __all__ = ["Event", "Hand", "Tick", "Walk"]
 
@@ -40,6 +40,7 @@ class Walk(MovingBody):
             plan that is there, and plans on between its ticks.
         collisions, backend: see :class:`WalkStack`. stack: a compiled one, of the same walker.
         grasps: (arm, hold) -> whether the hand's latch closes; default: always.
+        state: where it begins; default: on the holds of the plan, all hands closed.
 
     Attributes:
         plan: the one that is carried out now; path times count from its beginning.
@@ -60,12 +61,13 @@ class Walk(MovingBody):
         backend: str = "auto",
         stack: WalkStack | None = None,
         grasps: Callable[[str, str], bool] | None = None,
+        state: State | None = None,
     ) -> None:
         self._planning: PlanSlices | None = None
         if not isinstance(plan, Plan):
             self._planning, plan = plan, next(first for first in plan if first is not None)
         stack = stack or WalkStack(walker, structure, dt, collisions=collisions, backend=backend)
-        super().__init__(walker, structure, plan, stack, grasps)
+        super().__init__(walker, structure, plan, stack, grasps, state)
         self._wanted: BodyPath | None = None
         self._quick = True
 
@@ -148,9 +150,9 @@ class Walk(MovingBody):
             HoldLost: fewer hands hold than the robot needs; the body's command is zero.
             NoPlanError: the walk has to be planned anew, and there is no plan.
         """
-        if len(self.held) < self.walker.min_holds:
+        if len(self.held) < self.walker.min_holds and not self.fixed:
             raise HoldLost("hands", len(self.held), f"at least {self.walker.min_holds} must hold")
-        if self.told is None:
+        if self.told is None and not self.aborted:
             self._think()
             self._lift()
         command = self._advance()
@@ -160,14 +162,12 @@ class Walk(MovingBody):
         step = self.stack.controller.step(self.q, self.v)
         cost = time.perf_counter() - begin
         self.v = np.array(step.v)
-        joints = self.q.copy()
-        joints[7:] += self.v[6:] * self.dt
-        self.q, slip = self.chain.settle(joints, self.held)
+        slip, fixed = self._move(), self.fixed
         self.time += self.dt
         if self.swinging is not None:
             self._land(self.swinging)
         error = dist(self.q[:3], command.translation)
-        state = self._hands(), self._holds(), command, error, slip, step.status, cost
+        state = self._hands(), self._holds(), command, error, slip, step.status, cost, fixed
         return Tick(self.time, self.path_time, self.q, self.v, *state)
 
     def open_hand(self, arm: int) -> None:
@@ -203,11 +203,11 @@ class Walk(MovingBody):
             for _ in range(SLICES):
                 found = next(self._planning)
                 if found is not None:
-                    self._take(found)
+                    self.take(found)
                     return
         except StopIteration as end:
             self._planning = None
-            self._take(end.value)
+            self.take(end.value)
             self._say("replanned", "", "")
         except NoPlanError:
             if not self._changing:
@@ -219,7 +219,7 @@ class Walk(MovingBody):
                 self._say("refused", "", "")
                 raise
 
-    def _take(self, plan: Plan) -> None:
+    def take(self, plan: Plan) -> None:
         """Go on with a plan, or begin one of another path."""
         if plan.path is self.plan.path:
             self._go_on(plan)

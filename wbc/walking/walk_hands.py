@@ -21,6 +21,8 @@ SURE = 0.7
 CLOSING_TILT = 0.5
 #: The pace of a hand changes from nothing to all in [s]
 HAND_RAMP = 0.2
+#: After an abort it goes to nothing in [s]: joints at their rates need 0.25 s
+HAND_STOP = 0.3
 
 
 def hand_pace(swinging: Swinging, place: Array, turned: bool, early: float, pace: float) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -57,6 +58,21 @@ class Swinging:
 
 
 @dataclass(frozen=True, eq=False)
+class State:
+    """Where a walk begins that does not begin on the holds of its plan.
+
+    Attributes:
+        q: configuration. held: row of the arm -> row of the hold. time: [s].
+        opening: row of an arm that opens, and of the hold that it leaves; None: none does.
+    """
+
+    q: Array
+    held: Mapping[int, int]
+    time: float = 0.0
+    opening: tuple[int, int] | None = None
+
+
+@dataclass(frozen=True, eq=False)
 class Tick:
     """What happened in one tick; arrays are the tick's own.
 
@@ -66,6 +82,7 @@ class Tick:
         command: pose that the body was to have. body_error: its distance from it [m].
         slip: of the worst held hand [m].
         status: of the controller. cost: of the controller's tick [s].
+        fixed: the body is declared fixed: fewer hands hold than it needs, and have since the beginning.
     """
 
     time: float
@@ -79,6 +96,7 @@ class Tick:
     slip: float
     status: str
     cost: float
+    fixed: bool = False
 
 
 @dataclass(frozen=True)

@@ -51,7 +51,7 @@ def figures_of(run: WalkRun, report: Report | None = None) -> list[Figure]:
         out += _speed(run, run.log)
         out += _errors(run.log, run.ticks)
         out += _machine(run, run.log)
-        out += _times(run, run.log, run.ticks)
+        out += [*run.more, *_times(run, run.log, run.ticks)]
     return out + (_checked(report) if report is not None else [])
 
 
@@ -106,7 +106,7 @@ def _speed(run: WalkRun, log: WalkLog) -> list[Figure]:
     out = [Figure("duration", "duration", float(log.t[-1]), f"{log.t[-1]:.2f} s, {len(log) - 1} ticks")]
     if not full.any():
         return out
-    if way > 1e-6:
+    if way > 1e-6 and run.plan.grips is not None:  # else the path is as it was walked
         asked, mean = way / run.plan.path.duration, float(speed[full].mean())
         text = f"{mean:.4f} m/s ({mean / 0.0254:.2f} in/s), {mean / asked:.3f} of the command"
         out.append(Figure("speed", "mean speed", {"mean": mean, "command": asked, "part": mean / asked}, text))

@@ -8,8 +8,9 @@ from collections.abc import Callable
 from wbc.errors import WbcError
 from wbc.walking.checker import Report, check_run
 from wbc.walking.run.animation import save_animation
+from wbc.walking.run.carrying_out import Progress
 from wbc.walking.run.figures import figures_of, save_figures
-from wbc.walking.run.perform import Progress, WalkRun
+from wbc.walking.run.perform import WalkRun
 from wbc.walking.run.plots import save_plots
 from wbc.walking.run.reach_map import save_reach_map
 from wbc.walking.run.replay_page import ReplayPageError, save_replay_page

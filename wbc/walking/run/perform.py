@@ -4,26 +4,23 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
-from typing import Literal
+from dataclasses import asdict, dataclass, replace
 
-from wbc.errors import ShapeError
+from wbc.errors import ShapeError, WbcError
 from wbc.robots import Walker, WalkerData
+from wbc.track.summary import Figure
 from wbc.walking.body_path import BodyPath
-from wbc.walking.plan import HoldLost, NoPlanError, Plan
+from wbc.walking.first_grasps import free_state, plan_from_state
+from wbc.walking.plan import NoPlanError, Plan, Regrasp
 from wbc.walking.planner import Objective, plan_walk
+from wbc.walking.run.carrying_out import CarryingOut, Outcome, Progress
 from wbc.walking.run.recording import TickColumns, WalkRecorder
 from wbc.walking.run.request import WalkRequest
 from wbc.walking.run_log import WalkLog
 from wbc.walking.structure import Structure
+from wbc.walking.veto import Veto
 from wbc.walking.walk import PATIENCE, SLACK, Walk
 from wbc.walking.walk_stack import WalkStack
-
-Outcome = Literal["arrived", "late", "interrupted", "hold lost", "refused"]
-#: (what is done, how much of it from 0 to 1 or None)
-Progress = Callable[[str, float | None], None]
-#: Ticks between two reports of progress
-STRIDE = 25
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,6 +32,7 @@ class WalkRun:
         plan: None if no stance is possible where the walk begins.
         outcome, reason: how it ended; the reason is "" where all is well.
         log, ticks: None if nothing was carried out.
+        more: figures of its mode, for the summary.
         plan_time, compile_time, walk_time: of the computer [s]; walking has controller, simulation and log.
     """
 
@@ -50,6 +48,7 @@ class WalkRun:
     plan_time: float = 0.0
     compile_time: float = 0.0
     walk_time: float = 0.0
+    more: tuple[Figure, ...] = ()
 
 
 def perform_walk(
@@ -60,13 +59,15 @@ def perform_walk(
     backend: str = "auto",
     progress: Progress | None = None,
     stop: Callable[[], bool] | None = None,
+    ask: Callable[[Regrasp, str], str] | None = None,
 ) -> WalkRun:
     """Plans and walks with our planner.
 
     Args:
         stack: a compiled one for the same walker and structure; None: compiles one.
         backend: as of ``Stack.compile``.
-        stop: asked before every tick; the log ends there.
+        stop: asked before every tick; the body then comes to rest, and the log ends there.
+        ask: (the next re-grasp, why the last answer was refused or "") -> "" for yes, or another hold.
 
     Raises:
         What the request's methods raise. ShapeError: no body with arms.
@@ -80,7 +81,11 @@ def perform_walk(
     begin = time.perf_counter()
     try:
         asked: Objective = "velocity" if request.mode == "velocity" else "destination"
-        plan = plan_walk(walker, structure, path, objective=asked, partial=True, detour=True)
+        if request.free_start:
+            state = free_state(walker, path.poses[0])
+            plan = plan_from_state(walker, structure, path, state)
+        else:
+            state, plan = None, plan_walk(walker, structure, path, objective=asked, partial=True, detour=True)
     except NoPlanError as error:
         return WalkRun(request, walker, structure, path, None, "refused", str(error), plan_time=_since(begin))
     planned, path = _since(begin), plan.path
@@ -91,36 +96,50 @@ def perform_walk(
     stack = stack or WalkStack(walker, structure, collisions=False, backend=backend)
     compiled = _since(begin)
     begin = time.perf_counter()
-    walk = Walk(walker, structure, plan, stack=stack)
+    walk = Walk(walker, structure, plan, stack=stack, state=state)
     recorder = WalkRecorder(walk, request.seed, {"request": asdict(request), "start": list(plan.start)})
-    outcome, reason = _walked(walk, recorder, report, stop or (lambda: False))
+    outcome, reason, more = _walked(walk, recorder, report, stop, ask)
+    run = WalkRun(request, walker, structure, path, plan, outcome, reason, None, None, planned, compiled, more=more)
     if not len(recorder):
-        return WalkRun(
-            request, walker, structure, path, plan, outcome, reason, plan_time=planned, compile_time=compiled
-        )
+        return run
     log, ticks = recorder.log()
-    return WalkRun(
-        request, walker, structure, path, plan, outcome, reason, log, ticks, planned, compiled, _since(begin)
-    )
+    return replace(run, log=log, ticks=ticks, walk_time=_since(begin))
 
 
-def _walked(walk: Walk, recorder: WalkRecorder, report: Progress, stop: Callable[[], bool]) -> tuple[Outcome, str]:
-    """Ticks until the walk is over; (how it ended, why)."""
+def _walked(
+    walk: Walk,
+    recorder: WalkRecorder,
+    report: Progress,
+    stop: Callable[[], bool] | None,
+    ask: Callable[[Regrasp, str], str] | None,
+) -> tuple[Outcome, str, tuple[Figure, ...]]:
+    """Ticks until the walk is over; (how it ended, why, figures)."""
     duration = walk.plan.path.duration
+    doing = CarryingOut(walk, recorder, progress=report, stop=stop)
+    veto = None if ask is None else Veto(walk)
     while not walk.done:
-        if stop():
-            return "interrupted", f"stopped at {walk.time:.2f} s"
+        if veto is not None and ask is not None:
+            _asked(veto, ask)
         if walk.time > PATIENCE * duration + SLACK:
-            return "late", f"not there after {walk.time:.0f} s, the path takes {duration:.0f} s"
+            reason = f"not there after {walk.time:.0f} s, the path takes {duration:.0f} s"
+            return "late", reason, doing.summary()
+        if not doing.step(walk.path_time / duration):
+            return doing.outcome or "interrupted", doing.reason, doing.summary()
+    return "arrived", "", doing.summary()
+
+
+def _asked(veto: Veto, ask: Callable[[Regrasp, str], str]) -> None:
+    """Answers to the proposal, until one is possible."""
+    refused = ""
+    while (step := veto.proposal) is not None:
+        answer = ask(step, refused)
+        if not answer:
+            veto.accept()
+            return
         try:
-            recorder.tick(walk.tick())
-        except HoldLost as error:
-            return "hold lost", str(error)
-        except NoPlanError as error:
-            return "refused", str(error)
-        if len(recorder) % STRIDE == 0:
-            report("walking", min(walk.path_time / duration, 1.0))
-    return "arrived", ""
+            veto.choose(answer)
+        except WbcError as error:
+            refused = str(error)
 
 
 def _since(begin: float) -> float:

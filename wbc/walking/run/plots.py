@@ -202,6 +202,9 @@ def _speed(plt: Any, run: WalkRun, log: WalkLog, ticks: TickColumns) -> Any:
     asked = np.linalg.norm(np.diff(poses[:, :3, 3], axis=0), axis=1) / spacing
     at = np.interp(time, log.t[1:], ticks.path_time)
     command = asked[np.clip((at / spacing).astype(int), 0, len(asked) - 1)]
+    if run.request.commands:
+        told = np.linalg.norm(log.command[:, :2], axis=1)
+        command = np.interp(time, log.t, told)
     figure, panel = plt.subplots(figsize=(9.2, 3.6), layout="constrained")
     panel.plot(time, command, color=style.GREY, ls=(0, (4, 2)), label="commanded")
     panel.plot(time, speed, color=style.BLUE, lw=1.8, label="achieved")

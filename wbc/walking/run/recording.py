@@ -13,7 +13,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from wbc.validation import Array
-from wbc.walking.run_log import CLOSED, HAND_STATES, OPEN, OPENING, WalkLog
+from wbc.walking.run_log import CLOSED, HAND_STATES, OPEN, OPENING, WalkLog, WalkLogError
 from wbc.walking.run_recorder import LogRecorder
 from wbc.walking.walk import Event, Tick, Walk
 
@@ -41,6 +41,24 @@ class TickColumns:
         file = pathlib.Path(path) / TICKS
         np.savez_compressed(file, allow_pickle=False, **{f.name: getattr(self, f.name) for f in fields(self)})
         return file
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> TickColumns:
+        """What :meth:`save` wrote.
+
+        Raises:
+            WalkLogError: no such file, or not such a one.
+        """
+        try:
+            with np.load(path, allow_pickle=False) as data:
+                return cls(*(data[f.name] for f in fields(cls)))
+        except (OSError, ValueError, KeyError) as error:
+            raise WalkLogError("ticks", str(path), f"no ticks of a walk: {error}") from error
+
+    def then(self, count: int, after: TickColumns) -> TickColumns:
+        """The first ticks of these, and others after them."""
+        pairs = ((getattr(self, f.name)[:count], getattr(after, f.name)) for f in fields(self))
+        return TickColumns(*(np.concatenate(pair) for pair in pairs))
 
 
 class WalkRecorder:
@@ -70,8 +88,11 @@ class WalkRecorder:
             meta=meta,
         )
         self._time, self._q = walk.time, walk.q.copy()
-        self._states = [CLOSED] * len(names)
-        self._holds = [walk.held[k] for k in range(len(names))]
+        self._states = [CLOSED if arm in walk.held else OPEN for arm in range(len(names))]
+        self._holds = [walk.held.get(k, -1) for k in range(len(names))]
+        if walk.opens is not None:
+            arm, hold = walk.opens
+            self._states[arm], self._holds[arm] = OPENING, hold
         self._seen = len(walk.events)
         self._command = pin.SE3ToXYZQUAT(walk.plan.path.at(walk.path_time)[0])
         self._rows: list[tuple[float, float, float, float, bool]] = []
@@ -79,15 +100,19 @@ class WalkRecorder:
     def __len__(self) -> int:
         return len(self._rows)
 
-    def tick(self, tick: Tick) -> None:
-        """Keeps the tick that was just made."""
+    def tick(self, tick: Tick, command: Array | None = None) -> None:
+        """Keeps the tick that was just made.
+
+        Args:
+            command: the twist that was commanded ``[6]``; None: the pose that the tick has.
+        """
         for event in self._walk.events[self._seen :]:
             self._happened(event)
         self._seen = len(self._walk.events)
-        self._command = pin.SE3ToXYZQUAT(tick.command)
+        self._command = pin.SE3ToXYZQUAT(tick.command) if command is None else command
         v = tick.v
-        self._append(v[6:], v[:6])
-        self._rows.append((tick.path_time, tick.body_error, tick.slip, tick.cost, tick.status == "solved"))
+        self._append(v[6:], v[:6], tick.fixed)
+        self._rows.append((self._walk.travelled, tick.body_error, tick.slip, tick.cost, tick.status == "solved"))
         self._time, self._q = tick.time, tick.q
         self._states = [HAND_STATES.index(state) for state in tick.hands]
         # Holds that vanish renumber the walk's structure; the log keeps the rows of the first one
@@ -102,7 +127,7 @@ class WalkRecorder:
         Raises:
             ShapeError: no tick was recorded.
         """
-        self._append(np.zeros(len(self._q) - 7), np.zeros(6))
+        self._append(np.zeros(len(self._q) - 7), np.zeros(6), self._walk.fixed)
         columns = [np.array(column) for column in zip(*self._rows, strict=True)] or [np.zeros(0)] * 5
         return self._recorder.log(), TickColumns(*columns)
 
@@ -117,6 +142,6 @@ class WalkRecorder:
             for arm in [arm for arm, hold in enumerate(self._holds) if hold == row]:
                 self._states[arm], self._holds[arm] = OPEN, -1
 
-    def _append(self, rates: Array, twist: Array) -> None:
+    def _append(self, rates: Array, twist: Array, fixed: bool) -> None:
         q = self._q
-        self._recorder.append(self._time, q[:7], q[7:], rates, twist, self._states, self._holds, self._command)
+        self._recorder.append(self._time, q[:7], q[7:], rates, twist, self._states, self._holds, self._command, fixed)

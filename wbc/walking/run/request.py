@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pathlib
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import radians
 
 import numpy as np
@@ -19,7 +19,7 @@ from wbc.walking.structure import Structure
 from wbc.walking.structure_file import read_structure
 from wbc.walking.structures import BUILT_IN, ROWS_A, ROWS_T, remove_columns, remove_fraction, remove_rows
 
-MODES = ("destination", "velocity")
+MODES = ("destination", "velocity", "arm")
 PLANNERS = ("free", "published")
 #: Where a walk begins and ends on a built-in structure when nothing is said
 ENDS = {
@@ -47,6 +47,9 @@ class WalkRequest:
         fraction, seed: part of the holds that is taken away at random.
         planner: ``free`` or ``published``.
         rigid: holds fix the tilt of a hand.
+        commands: a file of rates, or ``keyboard``, which drive the body in velocity mode instead of a path; "": none.
+        arm, tasks: of arm mode: its name, and what it does, see :mod:`wbc.walking.run.arm_run`.
+        free_start: nothing is held at the beginning, and the body is declared fixed until enough hands hold.
     """
 
     structure: str = "cylinder"
@@ -61,12 +64,22 @@ class WalkRequest:
     seed: int = 0
     planner: str = "free"
     rigid: bool = False
+    commands: str = ""
+    arm: str = ""
+    tasks: tuple[str, ...] = ()
+    free_start: bool = False
 
     def __post_init__(self) -> None:
         validation.one_of("mode", self.mode, MODES)
         validation.one_of("planner", self.planner, PLANNERS)
         for name in ("speed", "turn_rate"):
             validation.scalar(name, getattr(self, name), low=0.0, open_low=True)
+        if self.commands and self.mode != "velocity":
+            raise RangeError("commands", self.commands, "they are for the mode 'velocity'")
+        if (self.mode == "arm") != bool(self.tasks):
+            raise RangeError("do", self.tasks, "say what the hand is to do in the mode 'arm', and in no other")
+        if self.planner == "published" and (self.commands or self.tasks or self.free_start):
+            raise RangeError("planner", self.planner, "commands, arm mode and a free start are of the planner 'free'")
         if self.planner == "published" and self.structure != "cylinder":
             raise RangeError("planner", self.planner, "the published planner knows only the structure 'cylinder'")
 
@@ -108,6 +121,16 @@ class WalkRequest:
             return grid_path(points, self.speed, self.turn_rate, data.body_height)
         # Holds that were taken away still are places to be over
         return straight_path(over_holds(self._whole(), places, data.body_height), self.speed, self.turn_rate)
+
+    def beginning(self, structure: Structure, data: WalkerData) -> pin.SE3:
+        """Where the body is at first; where it is to go does not count.
+
+        Raises:
+            as :meth:`path`.
+        """
+        if self.structure in ENDS or self.points:
+            return pin.SE3(self.path(structure, data).poses[0])
+        return pin.SE3(replace(self, points=(self.start,)).path(structure, data).poses[0])
 
     def _whole(self) -> Structure:
         if self.structure in BUILT_IN:

@@ -1,0 +1,90 @@
+"""A walk goes on from states of its log, and from a state in which nothing is held."""
+
+from __future__ import annotations
+
+import pathlib
+
+import numpy as np
+import pytest
+
+from wbc.errors import RangeError
+from wbc.robots import Walker
+from wbc.walking import Structure
+from wbc.walking.body_path import grid_path
+from wbc.walking.checker import Rules, check_walk
+from wbc.walking.first_grasps import free_state, plan_from_state
+from wbc.walking.run.folder import save_run
+from wbc.walking.run.perform import WalkRun, perform_walk
+from wbc.walking.run.recording import WalkRecorder
+from wbc.walking.run.request import WalkRequest
+from wbc.walking.run.resume_run import perform_resume, resumed_state
+from wbc.walking.run_log import CLOSING, OPEN, OPENING, WalkLogError
+from wbc.walking.walk import Walk
+from wbc.walking.walk_stack import WalkStack
+
+INCH = 0.0254
+
+
+def test_first_grasps(machine: Walker, structure: Structure, stack: WalkStack, tmp_path: pathlib.Path) -> None:
+    path = grid_path([(13, 9), (13, 10)], 4 * INCH)
+    state = free_state(machine, path.poses[0])
+    walk = Walk(machine, structure, plan_from_state(machine, structure, path, state), stack=stack, state=state)
+    recorder, body = WalkRecorder(walk), state.q[:7].copy()
+    assert walk.held == {}
+    while not walk.done:
+        tick = walk.tick()
+        recorder.tick(tick)
+        if tick.fixed:
+            assert (tick.q[:7] == body).all()
+            assert (tick.v[:6] == 0.0).all()
+        assert walk.time < 30.0
+    lands = [event for event in walk.events if event.what == "land"]
+    log, _ = recorder.log()
+    assert log.body_fixed.sum() == round(lands[1].time / walk.dt)  # until the second hand holds
+    assert len(lands) == 3
+    report = check_walk(log, machine.urdf(tmp_path / "robot.urdf"), structure, Rules(sub_samples=1))
+    assert report.ok, str(report)
+
+
+@pytest.fixture(scope="module")
+def walked(machine: Walker, stack: WalkStack, tmp_path_factory: pytest.TempPathFactory) -> tuple[WalkRun, pathlib.Path]:
+    folder = tmp_path_factory.mktemp("run")
+    request = WalkRequest(start="13,9", points=("13,13",), rigid=True)
+    run = perform_walk(request, machine, stack=stack)
+    save_run(run, folder, check=False)
+    return run, folder
+
+
+@pytest.mark.parametrize("state", [OPENING, OPEN, CLOSING])
+def test_a_walk_goes_on_from_any_state(
+    walked: tuple[WalkRun, pathlib.Path], machine: Walker, stack: WalkStack, state: int, tmp_path: pathlib.Path
+) -> None:
+    run, folder = walked
+    assert run.log is not None
+    rows = np.flatnonzero((run.log.hand_state == state).any(axis=1))
+    row = int(rows[len(rows) // 2])
+    again = perform_resume(folder, machine, at=float(run.log.t[row]), stack=stack)
+    assert again.outcome == "arrived"
+    assert again.log is not None
+    assert (again.log.q[: row + 1] == run.log.q[: row + 1]).all()
+    np.testing.assert_allclose(np.diff(again.log.q, axis=0), again.log.v[:-1] * again.log.dt, atol=1e-9)
+    goal = run.path.poses[-1][:3, 3]
+    assert np.linalg.norm(again.log.pose_body_in_structure[-1, :3] - goal) < 0.002
+    assert again.ticks is not None
+    assert len(again.ticks.cost) == len(again.log) - 1
+    report = check_walk(again.log, machine.urdf(tmp_path / "robot.urdf"), again.structure, Rules(sub_samples=1))
+    assert report.ok, str(report)
+
+
+def test_what_cannot_be_resumed_is_named(
+    walked: tuple[WalkRun, pathlib.Path], machine: Walker, structure: Structure, tmp_path: pathlib.Path
+) -> None:
+    run, folder = walked
+    assert run.log is not None
+    with pytest.raises(RangeError, match=r"resume.at: expected a time from 0.01"):
+        perform_resume(folder, machine, at=1e3)
+    with pytest.raises(WalkLogError, match=r"there is no run\.npz"):
+        perform_resume(tmp_path, machine)
+    gone = [run.log.hold_id[hold] for hold in run.log.hand_hold[5][:2]]
+    with pytest.raises(RangeError, match="1 hands hold there, 2 must"):
+        resumed_state(run.log, 5, machine, structure.without(gone))

@@ -1,0 +1,110 @@
+"""The loop of every mode: ticks until it is over, an abort where somebody asks for it, and how far things then go."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Literal
+
+import numpy as np
+
+from wbc.track.summary import Figure
+from wbc.walking.moving_body import longest_stop
+from wbc.walking.plan import HoldLost, NoPlanError
+from wbc.walking.run.recording import WalkRecorder
+from wbc.walking.walk import Walk
+from wbc.walking.walk_state import Tick
+
+#: How a mode ended: where it was to go, too late, its time over, by key, aborted, or why it could not go on
+Outcome = Literal["arrived", "late", "time", "key", "interrupted", "hold lost", "refused"]
+#: (what is done, how much of it from 0 to 1 or None)
+Progress = Callable[[str, float | None], None]
+#: Ticks between two reports of progress
+STRIDE = 25
+#: Ticks that are made after a stop, in which everything comes to rest
+REST = 10
+
+
+class CarryingOut:
+    """Ticks of a walk, recorded.
+
+    Args:
+        tick: makes one; default: the walk's. stop: asked before every tick: true aborts.
+
+    Attributes:
+        outcome, reason: how it ended, "" while it goes on. figures: of an abort, for the summary.
+    """
+
+    def __init__(
+        self,
+        walk: Walk,
+        recorder: WalkRecorder,
+        *,
+        tick: Callable[[], Tick] | None = None,
+        progress: Progress | None = None,
+        stop: Callable[[], bool] | None = None,
+    ) -> None:
+        self.walk, self.recorder = walk, recorder
+        self._tick, self._stop = tick or walk.tick, stop or (lambda: False)
+        self._report = progress or (lambda what, part: None)
+        self.outcome: Outcome | None = None
+        self.reason = ""
+        self.figures: tuple[Figure, ...] = ()
+        self._most, self._seen = np.zeros(2), walk.plan
+        self._look()
+
+    def step(self, part: float | None = None, command: Any = None) -> bool:
+        """One tick; whether to go on.
+
+        Args:
+            part: of the whole that is done. command: as of ``WalkRecorder.tick``.
+        """
+        if self.walk.plan is not self._seen:
+            self._look()
+        if self._stop():
+            self._abort()
+            return False
+        try:
+            self.recorder.tick(self._tick(), command)
+        except HoldLost as error:
+            self.outcome, self.reason = "hold lost", str(error)
+        except NoPlanError as error:
+            self.outcome, self.reason = "refused", str(error)
+        if len(self.recorder) % STRIDE == 0:
+            self._report("walking", None if part is None else min(part, 1.0))
+        return self.outcome is None
+
+    def summary(self) -> tuple[Figure, ...]:
+        """How far things would have gone after an abort, at most, and how far they went after one."""
+        body, hand = self._most.tolist()
+        text = f"body at most {1e3 * body:.0f} mm, hand at most {1e3 * hand:.0f} mm"
+        return (Figure("stopping", "way after an abort", {"body": body, "hand": hand}, text), *self.figures)
+
+    def _look(self) -> None:
+        """Take a new plan into account."""
+        self._seen = self.walk.plan
+        self._most = np.maximum(self._most, longest_stop(self._seen, self.walk.dt))
+
+    def _abort(self) -> None:
+        """Bring everything to rest, and keep how far it went beside what was said before."""
+        walk = self.walk
+        self.outcome, self.reason = "interrupted", f"stopped at {walk.time:.2f} s"
+        bounds, swinging = walk.stopping(), walk.swinging
+        begin, hands, left = walk.q[:3].copy(), walk.chain.origins.copy(), REST
+        far = np.zeros(2)
+        walk.abort()
+        while left:
+            try:
+                self.recorder.tick(walk.tick())
+            except HoldLost:
+                break
+            far[0] = max(far[0], float(np.linalg.norm(walk.q[:3] - begin)))
+            if swinging is not None:
+                moved = walk.chain.origins[swinging.arm] - hands[swinging.arm]
+                far[1] = max(far[1], float(np.linalg.norm(moved)))
+            left -= int(walk.still)
+        value = {"body": far[0], "hand": far[1], "body_bound": bounds[0], "hand_bound": bounds[1]}
+        text = (
+            f"body {1e3 * far[0]:.1f} mm of {1e3 * bounds[0]:.1f} mm, hand {1e3 * far[1]:.1f} mm of "
+            f"{1e3 * bounds[1]:.1f} mm that were said before"
+        )
+        self.figures = (Figure("abort", "travelled after the abort", value, text),)
