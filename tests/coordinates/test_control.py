@@ -170,6 +170,26 @@ def test_over_determined_commands_do_not_depend_on_the_unit_of_length() -> None:
     assert np.abs(found[None, 1.0] - found[None, 1000.0]).max() > 1e-3
 
 
+def test_what_both_pairs_hold_is_exact_while_one_becomes_the_other() -> None:
+    """From the pitch plane's turn to beta's with the tip held: it stays, and joints change within their limits."""
+    pairs = [CoordinatePair(ALPHA, TIP, "a"), CoordinatePair(BETA, TIP, "b")]
+    control, q = PairController(ARM, pairs, backend="vm"), STATE
+    control.reset(q)
+    control.command([0.1])
+    q, before = run(control, q, 40)
+    seconds = control.switch("b", 0.3)
+    held, rates = place(q), [before[-1]]
+    for _ in range(round(seconds / control.dt) + 5):
+        control.command([-0.05])
+        step = control.step(q)
+        assert step.status == "solved"
+        assert step.certificate.violation < 1e-10
+        q, rates = pin.integrate(ARM.model, q, control.dt * step.v), [*rates, step.v]
+        assert np.abs(place(q) - held).max() < 1e-5
+    assert np.abs(np.diff(rates, axis=0)).max() / control.dt < 0.4 + 1e-9
+    assert control.rates(q)[BETA] @ rates[-1] == pytest.approx(-0.05, abs=1e-3)
+
+
 def test_hands_stay_while_the_body_turns() -> None:
     """15 joints: the body joint moves, both hands are held by their poses, within 2e-6 m after 4 s."""
     robot = parts("spdm").robot

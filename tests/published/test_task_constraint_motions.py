@@ -118,6 +118,32 @@ def test_a6_a_limit_that_is_reached_takes_from_the_task_and_not_from_the_constra
     assert [(b.item, b.side) for b in step.binding if b.item == "joint_limits"] == [("joint_limits", "lower")]
 
 
+@pytest.mark.parametrize("unit", [1.0, 1000.0])
+def test_a7_three_points_make_over_determined_answers_free_of_units(unit: float) -> None:
+    """sum |v + w x d_i|^2 = e'We with the eigenvalues of W; the least squares of a pose in metres or millimetres."""
+    control = PairController(
+        operator_arm("spdm_arm").robot, CoordinatePair(XI, ELBOW, metric=1.0), limits=False, length=unit, backend="vm"
+    )
+    command = np.array((0.01, 0.02, 0.0, 0.01, 0.0, 0.02))
+    v = rates(control, control.active, STATE, command)
+    matrices, data = control.rates(STATE), control.robot.model.createData()
+    pin.framesForwardKinematics(control.robot.model, data, STATE)
+    turn = data.oMf[control.robot.model.getFrameId("tip")].rotation
+    spread = np.vstack([np.hstack((np.eye(3), -pin.skew(turn[:, k]))) for k in range(3)])
+    one = np.ones(3)
+    own = np.block([[3 * np.eye(3), -pin.skew(one)], [pin.skew(one), 2 * np.eye(3)]])
+    both = np.kron(np.eye(2), turn)
+    np.testing.assert_allclose(spread.T @ spread, both @ own @ both.T, atol=1e-12)
+    eigenvalues = (0.6972244, 0.6972244, 2.0, 3.0, 4.3027756, 4.3027756)
+    np.testing.assert_allclose(np.linalg.eigvalsh(own), eigenvalues, atol=1e-7)
+    # The same least squares by elimination of the held rows
+    free = np.linalg.svd(matrices[ELBOW])[2][3:].T
+    wanted = free @ np.linalg.lstsq(spread @ matrices[XI] @ free, spread @ command, rcond=None)[0]
+    np.testing.assert_allclose(v, wanted, atol=1e-6)
+    plain = free @ np.linalg.lstsq(matrices[XI] @ free, command, rcond=None)[0]
+    assert np.abs(plain - wanted).max() > 1e-3
+
+
 def test_a9_self_motion_and_drive_of_the_spherical_shoulder(spherical: PairController) -> None:
     v = rates(spherical, "self", FOUR_STATE, [0.1])
     np.testing.assert_allclose(v, (0.1112519970, -0.0216294688, -0.0533370486, 0.0), atol=1e-9)
@@ -165,8 +191,9 @@ def test_a25_a_held_pose_does_not_drift(station: PairController) -> None:
     pin.framesForwardKinematics(model, data, STATE)
     held, q, farthest = data.oMf[tip].copy(), STATE, 0.0
     for k in range(5000):
-        v = station.step(q).v
-        q = q + 0.02 * v
+        step = station.step(q)
+        assert step.certificate.violation < 1e-10
+        q = q + 0.02 * step.v
         if k % 50 == 0:
             pin.framesForwardKinematics(model, data, q)
             farthest = max(farthest, float(np.linalg.norm(data.oMf[tip].translation - held.translation)))
@@ -227,12 +254,56 @@ def test_a23_the_best_pair_keeps_what_the_task_has(name: str, held: tuple[str, .
     arm = parts(name).arms[0]
     groups = [(arm.tip,), *((arm.tip, one) for one in arm.candidates() if str(one) in held)]
     assert len(groups) == 1 + len(held)
-    states = np.random.default_rng(7).uniform(-pi, pi, (10_000, 7))
-    task, *every = (
-        np.linalg.svd(J, compute_uv=False)[:, -1]
-        for J in Conditioning(parts(name).robot, groups, length=1.0, backend="vm").many(states)
-    )
-    regular = task > 1e-3
-    worst = (np.max(every, axis=0)[regular] / task[regular]).min()
+    made, worst = Conditioning(parts(name).robot, groups, length=1.0), np.inf
+    for q in np.random.default_rng(7).uniform(-pi, pi, (10_000, 7)):
+        task, *every = made.sigmas(q)
+        worst = min(worst, max(every) / task) if task > 1e-3 else worst
     assert worst > least
     assert worst == pytest.approx(seen, abs=1e-3)
+
+
+def test_a14_loci_of_the_spherical_shoulder() -> None:
+    """Ranks on the loci of (4.2) to (4.11), (4.10) as corrected; searches from random starts find no others."""
+    assert FOUR.alpha is not None
+    assert FOUR.middle is not None
+    (beta,), robot = FOUR.in_plane, parts("spherical_4r").robot
+    sets = {
+        "task": (FOUR.tip,),
+        "elbow": (FOUR.tip, FOUR.middle),
+        "alpha": (FOUR.tip, FOUR.alpha),
+        "alpha, beta": (FOUR.tip, FOUR.alpha, beta),
+        "elbow, beta": (FOUR.tip, FOUR.middle, beta),
+    }
+    made = Conditioning(robot, list(sets.values()), length=1.0)
+    # tan q3 of the second branch of (4.2): L3 c3 + L4 c34 = 0 at q4 = 1.1
+    across = np.arctan2(1.0 + 0.8 * np.cos(1.1), 0.8 * np.sin(1.1))
+    for q, wanted in (
+        ((0.3, 0.5, -0.7, 0.0), (2, 3, 3, 3, 4)),
+        ((0.3, 0.5, -0.7, pi), (2, 3, None, None, 4)),
+        ((0.3, pi / 2, -0.7, 1.1), (3, 3, 3, 4, 4)),
+        ((0.3, -pi / 2, across, 1.1), (2, 3, 3, 4, 4)),
+        ((0.3, 0.0, -0.7, 0.0), (2, 3, 3, 3, 3)),
+        ((0.3, 0.5, pi / 2, 0.0), (2, 3, 3, 3, 3)),
+        ((0.3, 0.5, -0.7, 1.1), (3, 4, 4, 4, 4)),
+    ):
+        ranks = [np.linalg.matrix_rank(J, 1e-9 * np.linalg.norm(J)) for J in made.matrices(np.array(q))]
+        assert [a for a, b in zip(ranks, wanted, strict=True) if b is not None] == [b for b in wanted if b is not None]
+    folded = [np.linalg.svd(J, compute_uv=False)[-1] for J in made.matrices(np.array([0.3, 0.5, -0.7, 1.1]))]
+    assert min(folded) > 0.1
+    for start in np.random.default_rng(3).uniform(-pi, pi, (20, 4)):
+        for k, name in enumerate(sets):
+            q = start.copy()
+            for _ in range(40):
+                sigma, slopes, _ = made.slopes(q)
+                steep = float(slopes[k] @ slopes[k])
+                if sigma[k] < 1e-9 or steep < 1e-12:
+                    break
+                step = -sigma[k] / steep * slopes[k]
+                q = q + step * min(1.0, 0.3 / float(np.linalg.norm(step)))
+            if sigma[k] >= 1e-9:
+                continue
+            flat = abs(np.sin(q[3])) < 1e-4
+            upright, reach = abs(np.cos(q[1])) < 1e-4, abs(np.cos(q[2]) + 0.8 * np.cos(q[2] + q[3])) < 1e-4
+            both = flat and (abs(np.sin(q[1])) < 1e-4 or abs(np.cos(q[2])) < 1e-4)
+            known = {"task": flat or (upright and reach), "alpha, beta": flat, "elbow, beta": both}
+            assert known.get(name, flat or upright), (name, q)

@@ -14,6 +14,7 @@ import casadi as ca
 import numpy as np
 
 from wbc import validation
+from wbc.controller.library import load_library
 from wbc.coordinates import expressions
 from wbc.coordinates.rows import Coordinate
 from wbc.errors import CompileError, ShapeError
@@ -131,7 +132,7 @@ class Conditioning:
                 raise
             toolchain.fall_back(str(error))
             return None
-        found = ctypes.PyDLL(str(folder / "least.so")).conditioning
+        found = load_library(folder / "least.so").conditioning
         found.restype = None
         return found
 
