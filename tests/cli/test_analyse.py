@@ -40,6 +40,20 @@ def test_a_set_of_ones_own(tmp_path: Path) -> None:
     assert "joint1: 7 x 7, incomplete" in out
 
 
+def test_certificate_on_screen_and_gone_on_with(tmp_path: Path) -> None:
+    arguments = ("spherical_4r", "--set", "elbow, beta", "--certify", "--resume", tmp_path / "states")
+    for _ in range(2):
+        code, out, _ = run(*arguments)
+        assert code == 0
+        assert "elbow, beta: 7 x 4, loose" in out
+        assert "certificate  complete outside the tube sigma_min(J_T) < 0.0077" in out
+        assert "undecided 0" in out
+    assert [p.name for p in (tmp_path / "states").iterdir()] == ["spherical_4r-elbow-beta.npz"]
+    code, out, _ = run("spherical_4r", "--screen", 1)
+    assert code == 0
+    assert "no set of 1 or fewer constraints is complete" in out
+
+
 def test_bad_input() -> None:
     assert run("spherical_4r", "--set", "gamma")[0] == 2
     assert run("spherical_4r", "--algorithm", "rsda")[0] == 2

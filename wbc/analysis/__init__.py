@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from wbc.analysis.boxes import Counts
 from wbc.analysis.branches import Branch
+from wbc.analysis.certificate import Certificate, certify
 from wbc.analysis.completeness import ALGORITHMS, Analysis, Witness, analyse
 from wbc.analysis.deficiency import Exact
 from wbc.analysis.determinants import Determinant, factored_determinant
@@ -12,34 +14,43 @@ from wbc.analysis.locus import Locus
 from wbc.analysis.model import ExactModel
 from wbc.analysis.notation import Notation
 from wbc.analysis.points import joint_roots
-from wbc.analysis.published import PublishedSets, published_sets
+from wbc.analysis.published import PublishedSets, candidate_rows, published_sets
 from wbc.analysis.rows import BodyRows, JointRows, PitchPlaneRows, Rows
+from wbc.analysis.screen import Screened, screen
 from wbc.analysis.singular_vectors import singular_vector_locus
 from wbc.analysis.sub_determinants import sub_determinant_locus
+from wbc.analysis.weakest import NumericWitness
 
 __all__ = [
     "ALGORITHMS",
     "Analysis",
     "BodyRows",
     "Branch",
+    "Certificate",
     "Cost",
+    "Counts",
     "Determinant",
     "Exact",
     "ExactModel",
     "JointRows",
     "Locus",
     "Notation",
+    "NumericWitness",
     "PitchPlaneRows",
     "PublishedSets",
     "Relation",
     "Rows",
+    "Screened",
     "SymbolicJacobian",
     "Value",
     "Witness",
     "analyse",
+    "candidate_rows",
+    "certify",
     "factored_determinant",
     "joint_roots",
     "published_sets",
+    "screen",
     "singular_vector_locus",
     "sub_determinant_locus",
     "symbolic_jacobian",

@@ -80,6 +80,25 @@ def published_sets(name: str) -> PublishedSets:
     return PublishedSets(robot, _SYMBOLS[name], (BodyRows("tip"),), sets)
 
 
+def candidate_rows(name: str) -> dict[str, Rows]:
+    """The constraints that the sets of a robot with a pitch plane are made of, and a lock of every joint.
+
+    Raises:
+        UnknownNameError: no published sets for it, or no pitch plane.
+    """
+    validation.one_of("robot", name, _PITCH)
+    joints = operator_arm(name).robot.nv
+    wrist = "F5" if joints == 7 else "tip"
+    out: dict[str, Rows] = {
+        "elbow": BodyRows("end3", rotation=(), name="elbow"),
+        "alpha": PitchPlaneRows("F3", wrist),
+        "beta": _in_plane("F3", "F2", _PITCH[name], "beta"),
+    }
+    if joints == 7:
+        out["gamma"] = _in_plane("F5", "F6", _PITCH[name], "gamma")
+    return out | {f"q{k}": JointRows(f"joint{k}", name=f"q{k}") for k in range(1, joints + 1)}
+
+
 def _in_plane(frame: str, body: str, pitch: int, name: str) -> BodyRows:
     """Angular velocity of a body about the pitch axis of a frame."""
     return BodyRows(body, expressed=frame, translation=(), rotation=(pitch,), name=name)

@@ -24,6 +24,7 @@ from wbc.analysis import (
     published_sets,
 )
 from wbc.analysis.published import ROBOTS
+from wbc.cli.certificates import Subdivision, certified, record, winner
 from wbc.cli.console import out
 from wbc.cli.options import RobotName
 from wbc.cli.track import tip_frame
@@ -50,6 +51,22 @@ Algorithm = Annotated[str, typer.Option(help=f"One of {', '.join(ALGORITHMS)}.",
 Approximate = Annotated[
     bool, typer.Option("--approximate", help="Rational rotations for inexact ones.", rich_help_panel=_WHAT)
 ]
+Full = Annotated[
+    bool,
+    typer.Option("--full", help="Of spdm the arm with all offsets, with --certify.", rich_help_panel=_WHAT),
+]
+Certify = Annotated[
+    bool, typer.Option("--certify", help="Prove it by subdivision of joint space as well.", rich_help_panel=_WHAT)
+]
+Screen = Annotated[
+    int | None,
+    typer.Option(help="Certify the best set of at most so many constraints instead.", rich_help_panel=_WHAT),
+]
+Minutes = Annotated[float, typer.Option(help="Of one certificate, at most.", rich_help_panel=_WHAT)]
+Resume = Annotated[
+    Path | None,
+    typer.Option(help="Folder to keep certificates in and go on from.", rich_help_panel=_OUTPUT),
+]
 Latex = Annotated[bool, typer.Option("--latex", help="Formulas as LaTeX.", rich_help_panel=_OUTPUT)]
 Json = Annotated[Path | None, typer.Option("--json", help="File for the results as data.", rich_help_panel=_OUTPUT)]
 
@@ -63,6 +80,11 @@ def analyse_(
     frame: Frame = None,
     algorithm: Algorithm = "sub_determinants",
     approximate: Approximate = False,
+    full: Full = False,
+    certify: Certify = False,
+    screen: Screen = None,
+    minutes: Minutes = 30.0,
+    resume: Resume = None,
     latex: Latex = False,
     json_: Json = None,
 ) -> None:
@@ -71,6 +93,9 @@ def analyse_(
     The published arms have sets by name; --lock, --point and --plane make one for any robot.
     """
     validation.one_of("algorithm", algorithm, ALGORITHMS)
+    if robot == "spdm" and not (lock or point or plane):
+        robot = "spdm_arm" if full else "spdm_arm_simplified"
+    how = Subdivision(minutes, resume) if certify or full or screen is not None else None
     own: list[Rows] = [JointRows(name) for name in lock or ()]
     own += [BodyRows(name, rotation=()) for name in point or ()]
     own += [_plane(text) for text in plane or ()]
@@ -86,13 +111,23 @@ def analyse_(
         model, task = ExactModel(known.robot, known.symbols), known.task
         wanted = [validation.one_of("set", name, known.sets) for name in chosen or known.sets]
         sets = {name: known.sets[name] for name in wanted}
+        if screen is not None:
+            best = winner(model, robot, task, screen)
+            sets = {} if best is None else {", ".join(best.names): best.rows}
     for note in model.notes:
         out().print(escape(note))
     records = []
     for name, rows in sets.items():
-        found = analyse(model, task, rows, algorithm=algorithm)
-        _show(name, found, latex)
-        records.append(_record(name, found))
+        entry: dict[str, Any] = {"set": name}
+        if screen is None:
+            found = analyse(model, task, rows, algorithm=algorithm)
+            _show(name, found, latex)
+            entry = _record(name, found)
+        if how is not None:
+            if screen is not None:
+                out().print(f"[bold]{escape(name)}[/bold]")
+            entry["certificate"] = record(certified(model, robot, name, task, rows, how))
+        records.append(entry)
     if json_ is not None:
         _write(json_, {"robot": robot, "algorithm": algorithm, "sets": records})
 

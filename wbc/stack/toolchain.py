@@ -147,6 +147,23 @@ def compile_rows(text: str, output: pathlib.Path) -> None:
         _run([cc, *flags, *ROWS_FLAGS, "-shared", "rows.c", "-lm", "-o", str(output)], place)
 
 
+def compile_library(files: dict[str, str], main: str, output: pathlib.Path) -> None:
+    """Compile hand-written files, of which ``main`` includes the others, to a shared library at ``output``.
+
+    Raises:
+        CompileError: as of :func:`compile_tick`.
+    """
+    cc = compiler()
+    if cc is None:
+        raise CompileError("compiler", None, "no C compiler found")
+    with tempfile.TemporaryDirectory(prefix="wbc-") as folder:
+        place = pathlib.Path(folder)
+        for name, text in files.items():
+            (place / name).write_text(text)
+        flags = [f for f in COMMON_FLAGS if not f.startswith(("-fvisibility", "-DCASADI_SYMBOL_EXPORT"))]
+        _run([cc, *flags, "-O3", "-shared", main, "-lm", "-o", str(output)], place)
+
+
 def _output(command: list[str]) -> str:
     """What a command prints; nothing where it cannot be started."""
     try:

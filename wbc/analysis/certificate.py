@@ -1,0 +1,181 @@
+"""``certify``: whether coordinates always suffice, proved on all of joint space by subdivision with bounds."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from wbc import validation
+from wbc.analysis.boxes import BoxSearch, Counts
+from wbc.analysis.jacobian import symbolic_jacobian
+from wbc.analysis.model import ExactModel
+from wbc.analysis.pieces import Pieces
+from wbc.analysis.rank_matrix import rank_matrices
+from wbc.analysis.rows import Rows, checked
+from wbc.analysis.symmetry import Symmetry, fundamental_box, symmetries
+from wbc.analysis.trig_form import TrigForm, trig_form, used_joints
+from wbc.analysis.weakest import NumericWitness, numeric_witness, peak, weakest
+from wbc.errors import RangeError
+from wbc.validation import Array
+
+#: Verdicts
+COMPLETE, INCOMPLETE, UNDECIDED = "complete", "incomplete", "undecided"
+#: Boxes narrower than this in the joint to be cut are left undecided [rad]
+SMALLEST = 1e-6
+#: Matrices that are tried on random boxes of this half width [rad], how many boxes, and parts of each at most
+_TRIED, _HALF, _SAMPLES, _BUDGET = 8, 0.3, 6, 400
+#: Boxes to begin with, at least
+_FIRST = 2048
+
+Progress = Callable[[float], None]
+
+
+@dataclass(frozen=True, eq=False)
+class Certificate:
+    """What subdivision proved.
+
+    Attributes:
+        verdict: ``complete`` (where sigma_min(J_T) >= eps, task and constraints together have full rank),
+            ``incomplete`` (see witness), ``undecided`` (see left).
+        eps: width of the tube. peak: the largest sigma_min(J_T) that was found; eps is stated as a part of it.
+        everywhere: no box needed the tube, so full rank holds at every configuration.
+        counts: boxes and parts of the volume. left: part of the volume that is not decided.
+        joints: that were subdivided, from 0. symmetries: that cut the volume. seconds: of all sittings, wall clock.
+    """
+
+    verdict: str
+    eps: float
+    peak: float
+    everywhere: bool
+    counts: Counts
+    left: float
+    joints: tuple[int, ...]
+    symmetries: int
+    seconds: float
+    witness: NumericWitness | None = None
+
+
+def certify(
+    model: ExactModel,
+    task: Sequence[Rows],
+    constraints: Sequence[Rows],
+    *,
+    part: float = 0.01,
+    minutes: float = 30.0,
+    workers: int | None = None,
+    state: str | os.PathLike[str] | None = None,
+    progress: Progress | None = None,
+) -> Certificate:
+    """Completeness outside a tube around the task's singularities, by branch and bound over joint space:
+
+        sigma_min(J_T(q)) >= eps  implies  rank J_R(q) = m,     eps = part * max sigma_min(J_T)
+
+    A box is done when first-order forms with bounded rests prove that a matrix with the rank deficiency of J_R has
+    full column rank on all of it, or that sigma_min(J_T) < eps on all of it; else it is cut. Rounding is covered by
+    padding. Joints that appear in neither matrix are not subdivided, symmetries cut the rest. A numeric search for a
+    witness goes first.
+
+    Args:
+        part: of the largest sigma_min(J_T), > 0 and < 1. minutes: after which the rest is left undecided.
+        workers: threads; None: one a core. state: file that keeps what is done, and from which a second call goes on.
+        progress: called with the decided part of the volume. A keyboard interrupt ends with what is known so far.
+
+    Source: bounds of eigenvalues of non-negative matrices for regularity of interval matrices: J. Rohn, "Systems of
+    linear interval equations", Linear Algebra and its Applications 126, 1989.
+
+    Raises:
+        RangeError: numbers out of range, matrices too large. UnsupportedJointError: entries in a sliding joint.
+        RobotFileError: a state of another problem. CompileError: no C compiler.
+    """
+    part, minutes = _checked(part, minutes)
+    wanted, added = checked("task", task), checked("constraints", constraints)
+    J_T, J_R = symbolic_jacobian(model, wanted), symbolic_jacobian(model, (*wanted, *added))
+    joints = model.robot.nv
+    if J_T.shape[0] > joints or J_R.shape[0] < joints:
+        raise RangeError("rows", J_R.shape[0], f"expected at least {joints} in all and at most {joints} in the task")
+    began = time.monotonic()
+    matrices = list(rank_matrices(model, (*wanted, *added)))
+    if any(not matrix for matrix in matrices):
+        return Certificate(COMPLETE, 0.0, 0.0, True, Counts(), 0.0, (), 1, time.monotonic() - began)
+    forms = [trig_form(model.ring, matrix) for matrix in matrices]
+    own, every = trig_form(model.ring, J_T.matrix), trig_form(model.ring, J_R.matrix)
+    rng = np.random.default_rng(0)
+    highest = peak(own, rng)
+    eps = part * highest
+
+    def witness_from(starts: Array) -> NumericWitness | None:
+        return numeric_witness(model, wanted, added, every, starts, eps)
+
+    witness = witness_from(weakest(own, [every], eps, rng)[0])
+    if witness is not None:
+        seconds = time.monotonic() - began
+        return Certificate(INCOMPLETE, eps, highest, False, Counts(), 1.0, (), 1, seconds, witness)
+    chosen = _chosen(forms, own, eps)
+    found = symmetries((chosen, own), used_joints((chosen, own)))
+    search, boxes = _begin(chosen, own, eps, found)
+    pieces = Pieces(search, boxes, Path(state) if state is not None else None, (chosen, own), eps)
+    finished = pieces.work(minutes, workers or os.cpu_count() or 1, progress)
+    counts = pieces.counts
+    verdict, left = COMPLETE, 0.0
+    if not finished or counts.undecided > 0:
+        verdict, left = UNDECIDED, max(0.0, 1.0 - counts.regular_part - counts.tube_part)
+        witness = witness_from(pieces.kept[:, :joints]) if len(pieces.kept) else None
+        verdict = verdict if witness is None else INCOMPLETE
+    tubed = counts.tube > 0
+    cut = used_joints((chosen, own)) if tubed else chosen.joints
+    everywhere = verdict == COMPLETE and not tubed
+    return Certificate(verdict, eps, highest, everywhere, counts, left, cut, len(found), pieces.seconds, witness)
+
+
+def _checked(part: float, minutes: float) -> tuple[float, float]:
+    part, minutes = validation.scalar("part", part), validation.scalar("minutes", minutes)
+    if not 0.0 < part < 1.0:
+        raise RangeError("part", part, "expected more than 0 and less than 1")
+    if minutes <= 0.0:
+        raise RangeError("minutes", minutes, "expected more than 0")
+    return part, minutes
+
+
+def _chosen(forms: Sequence[TrigForm], task: TrigForm, eps: float) -> TrigForm:
+    """Of the matrices with the fewest terms the one that needs the fewest boxes on a sample."""
+    few = sorted(forms, key=lambda form: form.terms)[:_TRIED]
+    size = task.waves.shape[1]
+    rng = np.random.default_rng(1)
+    centres = rng.uniform(-np.pi, np.pi, (_SAMPLES, size))
+
+    def boxes(form: TrigForm) -> float:
+        search = BoxSearch(form, task, eps, SMALLEST, 1.0)
+        half = np.where(np.isin(np.arange(size), used_joints((form, task))), _HALF, 0.0)
+        total = 0.0
+        for centre in centres:
+            counts, left, _ = search.run(np.concatenate((centre, half, [0.0]))[None], _BUDGET)
+            total += counts.boxes + len(left)
+        return total
+
+    return min(few, key=boxes)
+
+
+def _begin(augmented: TrigForm, task: TrigForm, eps: float, found: Sequence[Symmetry]) -> tuple[BoxSearch, Array]:
+    """The search, and joint space in boxes: halves along the joints of the augmented matrix in turn, shuffled."""
+    joints = used_joints((augmented, task))
+    centre, half = fundamental_box(found, joints)
+    box = np.concatenate((centre, half, [0.0]))
+    search = BoxSearch(augmented, task, eps, SMALLEST, float(np.prod(2.0 * half[list(joints)])))
+    boxes, size, turn = box[None], len(centre), 0
+    cut = augmented.joints or joints
+    while len(boxes) < _FIRST:
+        k = cut[turn % len(cut)]
+        turn += 1
+        low, high = boxes.copy(), boxes.copy()
+        low[:, size + k] /= 2.0
+        high[:, size + k] /= 2.0
+        low[:, k] -= low[:, size + k]
+        high[:, k] += high[:, size + k]
+        boxes = np.concatenate((low, high))
+    order = np.random.default_rng(2).permutation(len(boxes))
+    return search, boxes[order]

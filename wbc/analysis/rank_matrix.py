@@ -1,0 +1,101 @@
+"""Matrices that have full column rank where a stacked Jacobian has, with fewer columns and shorter entries."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from wbc.analysis.jacobian import symbolic_jacobian
+from wbc.analysis.model import ExactModel
+from wbc.analysis.ring import Matrix, Poly, TrigRing
+from wbc.analysis.rows import ALL, BodyRows, Rows
+from wbc.analysis.transforms import cross
+from wbc.symbolic.kinematics import WORLD
+
+
+def rank_matrices(model: ExactModel, rows: Sequence[Rows]) -> Iterator[Matrix]:
+    """Matrices M(q), each for all q: J has rank m where M has full column rank; no columns: J has it everywhere.
+
+    A whole twist (v; omega) of a body is taken in the axes of any frame and at its origin or that of a neighbour, which
+    is a regular change of its six rows. Then numbers are pivots, see :func:`reduced`.
+    """
+    whole = [r for r in rows if _whole_twist(r)]
+    rest = [r for r in rows if not _whole_twist(r)]
+    fixed = symbolic_jacobian(model, rest).matrix if rest else []
+    if not whole:
+        yield reduced(model.ring, fixed)
+        return
+    frames = model.distinct_frames()
+    for i, axes in enumerate(frames):
+        for point in frames[max(i - 1, 0) : i + 2]:
+            blocks = [row for r in whole for row in _twist(model, r, point, axes)]
+            yield reduced(model.ring, blocks + fixed)
+
+
+def _whole_twist(rows: Rows) -> bool:
+    return (
+        isinstance(rows, BodyRows)
+        and rows.base == WORLD
+        and sorted(rows.translation) == list(ALL)
+        and sorted(rows.rotation) == list(ALL)
+    )
+
+
+def _twist(model: ExactModel, rows: Rows, point: str, axes: str) -> Matrix:
+    """(v; omega) of the body, v at the origin of another frame."""
+    assert isinstance(rows, BodyRows)
+    ring = model.ring
+    joint, _ = model.frame(rows.frame)
+    origin = model.frame_in(axes, point).position
+    matrix = [[ring.zero] * model.robot.nv for _ in range(6)]
+    for j in model.support(joint):
+        axis = model.axis_in(axes, j)
+        if ring.coordinates[j - 1].slides:
+            column = [*axis, ring.zero, ring.zero, ring.zero]
+        else:
+            place = model.joint_in(axes, j).position
+            column = [*cross(axis, [a - b for a, b in zip(origin, place, strict=True)], ring), *axis]
+        for row, entry in zip(matrix, column, strict=True):
+            row[j - 1] = entry
+    return matrix
+
+
+def reduced(ring: TrigRing, matrix: Matrix) -> Matrix:
+    """What pivots that are numbers leave. Only those whose row or column has nothing but numbers are taken: no entry
+    becomes a product of two others.
+    """
+    left = [list(row) for row in matrix if any(len(p) for p in row)]
+    while left and left[0]:
+        places = [(i, j) for i, row in enumerate(left) for j, p in enumerate(row) if _pivot(left, i, j, p)]
+        if not places:
+            break
+        i, j = min(places, key=lambda place: _alone(left, *place))
+        row, number = left[i], left[i][j].leading_coefficient()
+        rest: Matrix = []
+        for k, other in enumerate(left):
+            if k == i:
+                continue
+            if len(other[j]):
+                ratio = other[j] / number
+                other = [ring.normal(a - ratio * b) if len(b) else a for a, b in zip(other, row, strict=True)]
+            rest.append(other[:j] + other[j + 1 :])
+        left = [row for row in rest if any(len(p) for p in row)]
+        if not left and rest and rest[0]:
+            return [rest[0]]
+    return left
+
+
+def _number(p: Poly) -> bool:
+    return len(p) == 0 or bool(p.is_constant())
+
+
+def _pivot(matrix: Matrix, i: int, j: int, p: Poly) -> bool:
+    if not len(p) or not p.is_constant():
+        return False
+    return all(map(_number, matrix[i])) or all(_number(row[j]) for row in matrix)
+
+
+def _alone(matrix: Matrix, i: int, j: int) -> tuple[bool, float]:
+    """Pivots alone in their row or column first, then large ones."""
+    alone = sum(len(p) > 0 for p in matrix[i]) == 1 or sum(len(row[j]) > 0 for row in matrix) == 1
+    number = matrix[i][j].leading_coefficient()
+    return not alone, -abs(int(number.p) / int(number.q))
