@@ -179,7 +179,8 @@ def _rims(panel: Any, places: Array, run: WalkRun) -> None:
 
     if run.plan is None:
         return
-    names = {*run.plan.start, *(step.target for step in run.plan.regrasps)}
+    # A hand that never held has no first hold
+    names = {*run.plan.start, *(step.target for step in run.plan.regrasps)} - {""}
     rows = [run.structure.index(name) for name in sorted(names)]
     rims = [Circle(tuple(places[row]), 0.092) for row in rows]
     panel.add_collection(PatchCollection(rims, facecolor="none", edgecolor=style.INK, lw=1.6, zorder=3))
