@@ -12,6 +12,7 @@ import numpy as np
 from wbc import validation
 from wbc.controller.assembly import assembly_of
 from wbc.controller.deployment import Deployment
+from wbc.controller.directions import Directions
 from wbc.controller.fallback import Fallback
 from wbc.controller.handle import Handle
 from wbc.controller.native import NativeTick
@@ -60,7 +61,7 @@ class Controller(Deployment):
         self._call: Callable[[], int] = self.tick.step
         if isinstance(self.tick, NativeTick):
             self._call = functools.partial(self.tick.step_function, self.tick.pointer)
-        self._q, self._v_in, self._use_v = self.tick.q, self.tick.v_in, self.tick.use_v
+        self._q, self._v_in, self._use_v = self.tick.q, self.tick.v_in[: layout.nv], self.tick.use_v
         self._context = Context(stack, layout, self._assembly)
         # of all ways to copy some hundred numbers into something immutable, the fastest
         self._snapshot = self.tick.state.data.cast("B").tobytes
@@ -71,6 +72,7 @@ class Controller(Deployment):
         self._first: dict[Slot, str] = {}
         self._waiting: dict[Slot, str] = {}
         self._handles = {name: Handle(self, block) for name, block in layout.blocks.items()}
+        self.directions = Directions(layout, self.tick, self._handles)
         #: sensors with the handles of their items
         self._sensors = [(self._sensor(name), self._handles[name]) for name in layout.blocks if self._is_sensed(name)]
         self.tick.dt[0] = stack.dt
@@ -194,7 +196,7 @@ class Controller(Deployment):
     @property
     def last_command(self) -> Array:
         """Velocity that the next step counts accelerations from, a copy."""
-        return self.tick.v_last.copy()
+        return self.tick.v_last[: self.layout.nv].copy()
 
     def __str__(self) -> str:
         return describe(self)
@@ -206,7 +208,7 @@ class Controller(Deployment):
         if configuration is not None:
             self._initialise(self._first, configuration)
         self._waiting = {} if configuration is not None else dict(self._first)
-        self.tick.v_last[:] = velocity
+        self.tick.v_last[: self.layout.nv] = velocity
         self.tick.reset()
         for sensor, _ in self._sensors:
             sensor.reset()
@@ -233,8 +235,6 @@ class Controller(Deployment):
     def pairs(self, name: str) -> tuple[tuple[str, str, float], ...]:
         """What the sensed rows of an item were about in the last tick: names of both bodies, distance [m]."""
         return next((sensor.pairs() for sensor, handle in self._sensors if handle.item_name == name), ())
-
-    # Sensors
 
     def _is_sensed(self, name: str) -> bool:
         item = self.stack[name].item

@@ -36,16 +36,16 @@ def derivative(past: Past, name: str, value: str | None) -> Array:
     moves, count = _moves(past, name, value)
     frozen = past.frozen()
     if frozen is not None:
-        return _of_levels(past, frozen, moves, count)
+        return _of_levels(past, frozen, moves, count)[: past.layout.nv]
     answer = past.solve()[1] if past.usable and not past.layout.cascade else None
     if answer is None or answer.flag != "solved":
         raise SolverError("derivative", name, "only a command for which every row holds has a derivative")
-    return _of_one(past, answer, moves, count)
+    return _of_one(past, answer, moves, count)[: past.layout.nv]
 
 
 def _of_one(past: Past, answer: Relaxed, moves: Moves, count: int) -> Array:
     """Of one level, or of the first."""
-    n, size = past.layout.nv, past.qp.lower.size
+    n, size = past.layout.variables, past.qp.lower.size
     sensitivity = Sensitivity(past.qp, Solution(answer.x, answer.multipliers, "solved"))
     upper = np.where(answer.multipliers > 0.0, 1.0, 0.0)
     force, offset = np.zeros((n, count)), np.zeros((size, count))
@@ -62,7 +62,7 @@ def _of_one(past: Past, answer: Relaxed, moves: Moves, count: int) -> Array:
 def _of_levels(past: Past, frozen: Frozen, moves: Moves, count: int) -> Array:
     """With strict levels: differences of their optimum, the rows that push at each and its rank being what they are."""
     dofs = past.layout.dof_scales(past.stack)
-    first, out = _of_one(past, frozen.first, moves, count), np.zeros((past.layout.nv, count))
+    first, out = _of_one(past, frozen.first, moves, count), np.zeros((past.layout.variables, count))
     for k in range(count):
         ends: list[Array] = []
         for by in (_STEP, -_STEP):

@@ -9,6 +9,7 @@ from wbc.controller.level_report import certificates
 from wbc.controller.losses import groups, losses, prices
 from wbc.controller.naming import Naming
 from wbc.controller.past import Past
+from wbc.controller.soft import scales
 from wbc.qp.conflict import Conflict, Infeasibility, diagnose
 from wbc.qp.problem import QP
 from wbc.stack.layout import Block
@@ -37,11 +38,12 @@ class Explainer:
             for row, amount in enumerate(found.slack)
             if amount > 1e-8
         )
-        slack, nv = past.part("slack"), past.layout.nv
+        slack, nv = past.part("slack"), past.layout.variables
         given = tuple(Give(self._violated(nv + int(k), v), float(slack[k])) for k in np.flatnonzero(slack))
-        binding = {int(i): self._binding(int(i), multipliers[i], v) for i in np.flatnonzero(multipliers)}
+        pushing = [int(i) for i in np.flatnonzero(multipliers)]
+        binding = {i: self._binding(i, multipliers[i], v) for i in pushing if not self.naming.keeps_direction(i)}
         task_groups = groups(past)
-        missed = losses(past, task_groups, v, self._culprits(list(binding), multipliers))
+        missed = losses(past, task_groups, v, self._culprits(pushing, multipliers))
         _, answer = past.solve()
         plain = answer is not None and answer.flag == "solved" and missed
         costs = prices(past, task_groups, answer, binding) if plain and answer is not None else ()
@@ -56,11 +58,12 @@ class Explainer:
             missed,
             costs,
             *self._residues(v, multipliers, status),
+            tuple((task, share) for task, share in scales(past.layout, v).items() if share < 1.0 - 1e-6),
         )
 
     def _infeasibility(self) -> Infeasibility:
         """Conflicts of the QP in v / dof_scale and rows per unit."""
-        qp, n, units = self.past.qp, self.past.layout.nv, self.naming.units
+        qp, n, units = self.past.qp, self.past.layout.variables, self.naming.units
         A = qp.A * units[:n] / units[n:, None]
         return diagnose(QP(np.eye(n), np.zeros(n), qp.lower / units, qp.upper / units, A))
 
@@ -82,9 +85,9 @@ class Explainer:
 
     def _binding(self, row: int, multiplier: float, v: Array) -> Side:
         """The side that pushes; a bound that a relaxation holds may push the other way than its side."""
-        qp, at = self.past.qp, v[row] if row < self.past.layout.nv else 0.0
+        qp, at = self.past.qp, v[row] if row < self.past.layout.variables else 0.0
         upper = multiplier > 0.0
-        if row < self.past.layout.nv:
+        if row < self.past.layout.variables:
             upper = bool(abs(at - qp.upper[row]) < abs(at - qp.lower[row]))
         elif not np.isfinite((qp.upper if upper else qp.lower)[row]):
             upper = not upper
@@ -102,7 +105,7 @@ class Explainer:
         """Residuals of the command as it was given; none for commands that are no optimum."""
         if status in ("braked", "capped"):
             return _NONE, _NONE, _NONE
-        past, naming, nv = self.past, self.naming, self.past.layout.nv
+        past, naming, nv = self.past, self.naming, self.past.layout.variables
         qp = past.qp
         slack = np.concatenate((np.zeros(nv), past.part("slack")))
         beyond = np.maximum(qp.violation(v) - slack, 0.0)
@@ -114,8 +117,9 @@ class Explainer:
         out = []
         for values, named in ((beyond, True), (gradient, False), (off, True)):
             row = int((values / naming.units[: values.size]).argmax())
-            where = self.naming.side(row, False).name if named else robot.dof_names[row]
-            unit = self.naming.side(row, False).unit if named else f"{robot.dof_units[row]}/s"
+            own = not named and row < robot.nv
+            where = robot.dof_names[row] if own else self.naming.side(row, False).name if named else "slack"
+            unit = f"{robot.dof_units[row]}/s" if own else self.naming.side(row, False).unit if named else "rad/s"
             out.append(Residue(float(values[row]), unit, where if values[row] > 0.0 else ""))
         if past.layout.cascade:
             worst = max(certificates(past.layout, past.part), key=lambda level: level.stationarity)

@@ -111,11 +111,12 @@ class Share:
 
 @dataclass(frozen=True)
 class Loss:
-    """How much slower than asked a task is served, its rows of one unit together.
+    """How much slower than asked a task is served, or a soft constraint violated, its rows of one unit together.
 
     Attributes:
         task, unit: whose rows, and the unit of their rates.
-        asked: Euclidean norm of the rates asked for, gain e + de/dt. lost: norm of what is missing.
+        asked: Euclidean norm of the rates asked for, gain e + de/dt. lost: norm of what is missing. Of a soft
+            constraint: 0, and norm of its violations.
         alone: norm of what would be missing with every other item off: out of reach, singular, slowed by its gain.
         to: items that it would regain something without, the greatest first. They need not add up to ``lost``.
     """
@@ -129,6 +130,8 @@ class Loss:
 
     def __str__(self) -> str:
         text = f"{self.task} misses {amount(self.lost, self.unit)} of {amount(self.asked, self.unit)}"
+        if self.asked == 0.0:
+            text = f"{self.task} gives up {amount(self.lost, self.unit)}"
         if self.to:
             parts = [f"{amount(share.amount, self.unit)} without {share.item}" for share in self.to]
             text += "; it would regain " + ", ".join(parts)
@@ -182,6 +185,7 @@ class Explanation:
         losses: what each task misses, and to whom. prices: what one unit of each binding side costs each task.
         primal: largest violation of a row that did not give way. dual: largest velocity by which one degree of freedom
             alone would better the objective. complementarity: largest distance of a pushing row from its side.
+        scales: lambda of each scaled task that is slowed down; the rows that keep its direction are not in ``binding``.
     """
 
     status: str
@@ -196,6 +200,7 @@ class Explanation:
     primal: Residue
     dual: Residue
     complementarity: Residue
+    scales: tuple[tuple[str, float], ...] = ()
 
     def __str__(self) -> str:
         lines = [f"{self.status} (by {self.answered_by})." if self.answered_by else f"{self.status}."]
@@ -208,6 +213,7 @@ class Explanation:
             lines.append("What gave way here: " + ", ".join(str(g) for g in self.gave_way) + ".")
         if self.binding:
             lines.append(f"Binding: {listed(self.binding)}.")
+        lines += [f"{task} keeps its direction at {share:.3g} of its rates." for task, share in self.scales]
         lines += [str(loss) for loss in self.losses]
         lines += [f"{price}." for price in self.prices]
         if np.isfinite(self.dual.amount):

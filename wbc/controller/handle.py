@@ -13,6 +13,7 @@ from wbc import validation
 from wbc.errors import RangeError, UnknownNameError
 from wbc.stack.layout import Block, Slot
 from wbc.tasks import inputs
+from wbc.tasks._direction import Direction
 from wbc.validation import Array
 
 _ARRAY, _FLOAT = np.ndarray, np.dtype(np.float64)
@@ -29,7 +30,7 @@ class Handle:
     """Run-time values of one item as attributes; reading gives copies, writing validates.
 
     Besides the item's own inputs: ``enabled``, ``mask`` (one number >= 0 a row of a task, 0 or 1 a row of a
-    constraint), for tasks ``weight`` and ``gain``, for margins ``rate`` [1/s].
+    constraint), for tasks ``weight`` and ``gain``, for margins ``rate`` [1/s], for soft constraints ``price``.
     """
 
     __slots__ = (
@@ -40,6 +41,7 @@ class Handle:
         "_mask",
         "_ordered",
         "_plain",
+        "_ramped",
         "_rate",
         "_robot",
         "_row_weights",
@@ -53,6 +55,7 @@ class Handle:
         put("_robot", controller.stack.robot)
         # the one input with a limit that the item does not know: rate dt <= 1
         put("_rate", block.slots.get("rate") if block.form == "margins" else None)
+        put("_ramped", None if isinstance(block.entry.item, Direction) else block.slots.get("price"))
         put("_fields", {name: f"{block.entry.name}.{name}" for name in block.slots})
         # inputs that may not exceed another, by the name of either
         pairs = [(slot, block.slots[slot.input.below]) for slot in block.slots.values() if slot.input.below]
@@ -101,7 +104,7 @@ class Handle:
             numbers = self._checked(slot, value)
             if name in self._ordered:
                 self._check_order({name: numbers})
-            self._controller.write(slot, numbers)
+            self._write(slot, numbers)
             return
         field = self._field(name)
         if name == "enabled":
@@ -117,23 +120,34 @@ class Handle:
         self.apply()
 
     def ramp(self, weight: float, seconds: float) -> None:
-        """Let a task's weight change smoothly to ``weight`` over ``seconds`` of ticks: joining (from 0), leaving (to 0)
-        or changing rank without a jerk. ln w follows 3 s^2 - 2 s^3. Setting the weight ends it.
+        """Let a task's weight, or a soft constraint's price, change smoothly to ``weight`` over ``seconds`` of ticks:
+        joining (from 0), leaving (to 0) or changing rank without a jerk. ln w follows 3 s^2 - 2 s^3. Setting the weight
+        or the price ends it.
 
         Raises:
-            UnknownNameError: not a task. RangeError, ShapeError: a negative weight or time.
+            UnknownNameError: neither a task nor soft. RangeError, ShapeError: a negative weight or time.
         """
-        if self._block.form != "task":
+        if self._block.form != "task" and self._ramped is None:
             raise UnknownValueError(self._field("ramp"), "ramp", self.names)
         last = validation.scalar(self._field("ramp.weight"), weight, low=0.0)
+        if self._ramped is not None:
+            last = float(self._checked(self._ramped, last)[0])
         self._controller.start_ramp(
             self, last, validation.scalar(self._field("ramp.seconds"), seconds, low=0.0, unit="s")
         )
 
-    def put_weight(self, weight: float) -> None:
-        """A checked weight on its way along a ramp."""
-        super().__setattr__("_weight", weight)
-        self.apply()
+    @property
+    def ramped(self) -> float:
+        """What a ramp changes: the weight of a task, the price of a soft constraint."""
+        return self._weight if self._ramped is None else float(self._controller.tick.p[self._ramped.start])
+
+    def put_ramped(self, value: float) -> None:
+        """A checked weight or price on its way along a ramp."""
+        if self._ramped is None:
+            super().__setattr__("_weight", value)
+            self.apply()
+        else:
+            self._controller.tick.p[self._ramped.start] = value
 
     def set(self, **values: Any) -> None:
         """Set several of the item's inputs at once: all are checked, bounds against each other, before any is written.
@@ -148,7 +162,12 @@ class Handle:
         numbers = {name: self.checked(name, value) for name, value in values.items()}
         self._check_order(numbers)
         for name, given in numbers.items():
-            self._controller.write(self._slot(name), given)
+            self._write(self._slot(name), given)
+
+    def _write(self, slot: Slot, numbers: Array) -> None:
+        if slot is self._ramped:
+            self._controller.ramps.stop(self.item_name)
+        self._controller.write(slot, numbers)
 
     def _check_order(self, numbers: Mapping[str, Array]) -> None:
         p = self._controller.tick.p
@@ -198,10 +217,11 @@ class Handle:
         if form == "task":
             tick.weight[block.span] = self._weight * on * self._row_weights * self._controller.row_costs[block.span]
         elif form == "bounds":
-            nv = self._controller.stack.robot.nv
-            tick.bound_enabled[block.start * nv : (block.start + 1) * nv] = on
+            start = block.start * self._controller.layout.variables
+            tick.bound_enabled[start : start + len(on)] = on
         else:
             tick.enabled[block.span] = on
+        self._controller.directions.follow(block.entry.name)
 
     def _checked_mask(self, field: str, value: Any) -> Array:
         raw = validation.real_array(field, value)

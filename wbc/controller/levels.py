@@ -32,7 +32,7 @@ class Levels:
         self._units = np.array(row_units(stack, layout), dtype=np.float64)
         self._row_levels = np.array(layout.row_levels, dtype=np.int_)
         self._damping = stack.damping
-        self.cascade = Cascade(layout.nv, layout.general_rows, left_free(stack), stack.damping)
+        self.cascade = Cascade(layout.variables, layout.general_rows, left_free(stack), stack.damping)
         self.sizes = np.concatenate((self._dofs, self._units))
         self._places = ReportLayout(layout)
 
@@ -50,7 +50,7 @@ class Levels:
             self._write(None, v, report)
             return v, None
         problem, scales = self.problem(qp, v, first.lower, first.upper)
-        nv, answer = self._layout.nv, self.cascade.solve(problem)
+        nv, answer = self._layout.variables, self.cascade.solve(problem)
         answer.multipliers *= np.append(scales, 1.0)[answer.pushes] / self.sizes
         if first.flag == "solved":
             self._held_by_equalities(problem, qp, first, answer)
@@ -68,7 +68,7 @@ class Levels:
 
     def problem(self, qp: QP, v: Array, lower: Array, upper: Array) -> tuple[Hierarchy, list[float]]:
         """(all levels, from a command v of the first and sides of its rows; the weight of the heaviest row of each)."""
-        nv, soft = self._layout.nv, self._row_levels >= 0
+        nv, soft = self._layout.variables, self._row_levels >= 0
         low, high = (
             np.concatenate((ends[:nv], np.where(soft, own, ends[nv:]))) / self.sizes
             for ends, own in zip((lower, upper), self._assembly.row_sides(), strict=True)

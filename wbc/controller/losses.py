@@ -12,6 +12,7 @@ from wbc.qp.problem import Solution
 from wbc.qp.relax import Relaxed
 from wbc.qp.sensitivity import Sensitivity
 from wbc.stack.layout import Block
+from wbc.tasks._direction import Direction
 from wbc.validation import Array
 
 #: Losses and regained parts below this share of what was asked, and below this rate, are not told [rad/s, m/s]
@@ -35,9 +36,28 @@ class Group:
         return np.asarray(missing @ self.J / np.linalg.norm(missing))
 
 
+class SoftGroup(Group):
+    """Rows of one soft constraint that share a unit: what they miss is how far A v is outside their sides."""
+
+    def __init__(self, block: Block, unit: str, A: Array, lower: Array, upper: Array) -> None:
+        super().__init__(block, unit, A, np.zeros(len(A)))
+        self._lower, self._upper = lower, upper
+
+    def _missing(self, v: Array) -> Array:
+        at = self.J @ v
+        return np.asarray(np.maximum(at - self._upper, 0.0) - np.maximum(self._lower - at, 0.0))
+
+    def lost(self, v: Array) -> float:
+        return float(np.linalg.norm(self._missing(v)))
+
+    def slope(self, v: Array) -> Array:
+        missing = self._missing(v)
+        return np.asarray(missing @ self.J / np.linalg.norm(missing))
+
+
 def groups(past: Past) -> list[Group]:
-    """Rows that count of every task that is on, by unit."""
-    out = []
+    """Rows that count of every task and of every soft constraint that is on, by unit."""
+    out: list[Group] = []
     for block in past.layout.of_form("task"):
         if not past.is_on(block):
             continue
@@ -47,6 +67,22 @@ def groups(past: Past) -> list[Group]:
             mine = np.array([row.unit == unit for row in block.rows]) & counts
             if mine.any():
                 out.append(Group(block, unit, J[mine], wishes[mine]))
+    return [*out, *_soft_groups(past)]
+
+
+def _soft_groups(past: Past) -> list[Group]:
+    """The same of soft constraints; what keeps the direction of a task asks for nothing of its own."""
+    out: list[Group] = []
+    nv, velocities = past.layout.variables, past.layout.nv
+    for block in past.layout.of_form("margins", "rows"):
+        if block.entry.price is None or isinstance(block.entry.item, Direction) or not past.is_on(block):
+            continue
+        A = past.qp.A[block.span].copy()
+        A[:, velocities:] = 0.0
+        lower, upper = past.qp.lower[nv:][block.span], past.qp.upper[nv:][block.span]
+        for unit in dict.fromkeys(row.unit for row in block.rows):
+            mine = np.array([row.unit == unit for row in block.rows])
+            out.append(SoftGroup(block, unit, A[mine], lower[mine], upper[mine]))
     return out
 
 
@@ -89,6 +125,8 @@ def prices(past: Past, found: list[Group], answer: Relaxed, sides: dict[int, Sid
         moved = moved * (-1.0 if side.side == "lower" else 1.0)
         for group in found:
             if group.lost(v) <= max(_LEAST, _SHARE * float(np.linalg.norm(group.wishes))):
+                continue
+            if group.block.entry.name == side.item:
                 continue
             fall = -float(group.slope(v) @ moved)
             if side.side == "equal":

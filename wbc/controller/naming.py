@@ -10,6 +10,7 @@ from wbc.controller.explanation import Side
 from wbc.controller.past import Past
 from wbc.stack.codegen import row_orders, row_units
 from wbc.stack.layout import Block
+from wbc.tasks._direction import Direction
 from wbc.tasks.base import Constraint, Order
 from wbc.tasks.joint_limits import JointLimits
 from wbc.validation import Array
@@ -19,7 +20,7 @@ class Naming:
     """Sides by their place in [1; A]: simple bounds first, then general rows."""
 
     def __init__(self, past: Past) -> None:
-        self._past, self._nv = past, past.layout.nv
+        self._past, self._nv = past, past.layout.variables
         self.orders = row_orders(past.layout)
         #: what counts as one radian a second: the characteristic length for metres [n + m]
         self.units: Array = np.concatenate((past.layout.dof_scales(past.stack), row_units(past.stack, past.layout)))
@@ -40,6 +41,10 @@ class Naming:
             return self.general[row - self._nv][0]
         number = int((self._past.owner_high if upper else self._past.owner_low)[row])
         return self.bounds[number] if number >= 0 else None
+
+    def keeps_direction(self, row: int) -> bool:
+        """Whether a general row is one of those that keep the direction of a scaled task."""
+        return row >= self._nv and isinstance(self.general[row - self._nv][0].entry.item, Direction)
 
     def side(self, row: int, upper: bool) -> Side:
         """A side by name, with its value in the QP."""

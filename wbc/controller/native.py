@@ -63,7 +63,7 @@ class NativeTick(Assembly):
         report = ReportLayout(layout)
         if places["q"] - places["report"] != report.size:
             raise CompileError("library", self._library._name, "was built for another layout")
-        nv, rows = layout.nv, layout.general_rows
+        nv, rows = layout.variables, layout.general_rows
         self._layout = layout
         self._wide = (nv + 7) // 8 * 8
 
@@ -140,12 +140,12 @@ class NativeTick(Assembly):
         return bool(self._unusable[0] == 0.0)
 
     def task_rows(self) -> TaskRows:
-        J = np.zeros((self._layout.task_rows, self._layout.nv))
+        J = np.zeros((self._layout.task_rows, self._layout.variables))
         self._library.wbc_tick_task_rows(self.pointer, ctypes.c_void_p(J.ctypes.data))
         return TaskRows(J, self._wish.copy(), self._factor.copy())
 
     def bent(self) -> Array | None:
-        out = np.zeros((self._layout.nv, self._layout.nv))
+        out = np.zeros((self._layout.variables, self._layout.variables))
         bends = self._library.wbc_tick_bent(self.pointer, ctypes.c_void_p(out.ctypes.data))
         return out if bends else None
 
@@ -156,7 +156,7 @@ class NativeTick(Assembly):
 
     def qp(self) -> QP:
         self.assemble()
-        nv = self._layout.nv
+        nv = self._layout.variables
         upper = np.triu(self._H[:, :nv])
         H = upper + np.triu(upper, 1).T
         low, high = self._low.copy(), self._high.copy()

@@ -17,6 +17,7 @@ from wbc.qp.problem import QP
 from wbc.qp.relax import Relaxed
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Block, Layout
+from wbc.tasks._direction import Direction
 from wbc.tasks.mechanism import Mechanism
 from wbc.validation import Array
 
@@ -69,17 +70,24 @@ class Past:
     @contextmanager
     def without(self, blocks: Iterable[Block]) -> Iterator[None]:
         """Items off, and on again."""
-        tick, nv = self.tick, self.layout.nv
+        tick, nv = self.tick, self.layout.variables
         before = tick.weight.copy(), tick.enabled.copy(), tick.bound_enabled.copy()
         for block in blocks:
             if block.form == "task":
                 tick.weight[block.span] = 0.0
+                for kept in self._kept_for(block):
+                    tick.enabled[kept.span] = 0.0
             elif block.form == "bounds":
                 tick.bound_enabled[block.start * nv : (block.start + 1) * nv] = 0.0
             else:
                 tick.enabled[block.span] = 0.0
         yield
         tick.weight[:], tick.enabled[:], tick.bound_enabled[:] = before
+
+    def _kept_for(self, task: Block) -> list[Block]:
+        """What keeps the direction of a scaled task."""
+        rows = self.layout.of_form("rows")
+        return [b for b in rows if isinstance(b.entry.item, Direction) and b.entry.item.of == task.entry.name]
 
     def solve(self) -> tuple[Array, Relaxed | None]:
         """Command and answer for the buffers as they are; no answer where the tick brakes."""
@@ -112,7 +120,7 @@ class Past:
         if block.form == "task":
             return bool(self.tick.weight[block.span].any())
         if block.form == "bounds":
-            nv = self.layout.nv
+            nv = self.layout.variables
             return bool(self.tick.bound_enabled[block.start * nv : (block.start + 1) * nv].any())
         return bool(self.tick.enabled[block.span].any())
 
@@ -141,7 +149,7 @@ class Past:
             return self._level_rows(block)
         tick, weight, factor = self.tick, self.tick.weight.copy(), self.part("factor")
         damping = self.stack.damping / self.layout.dof_scales(self.stack) ** 2
-        rows, wishes = np.zeros((len(block.rows), self.layout.nv)), np.zeros(len(block.rows))
+        rows, wishes = np.zeros((len(block.rows), self.layout.variables)), np.zeros(len(block.rows))
         tick.plain[0] = 1.0
         for k in range(len(block.rows)):
             share = factor[block.start + k]

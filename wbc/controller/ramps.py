@@ -1,4 +1,4 @@
-"""Weights that change smoothly over some ticks, so that tasks join, leave and change rank without a jerk."""
+"""Weights and prices that change smoothly over some ticks, so that tasks join, leave and change rank without a jerk."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class Ramps:
 
     def start(self, handle: Handle, last: float, seconds: float) -> None:
         """From the present weight on; takes the place of a ramp of the same task."""
-        self._running[handle.item_name] = Ramp(handle, handle.weight, last, seconds)
+        self._running[handle.item_name] = Ramp(handle, handle.ramped, last, seconds)
 
     def stop(self, name: str) -> None:
         """The weight stays as it is."""
@@ -57,6 +57,6 @@ class Ramps:
         """The next tick's weights."""
         for name, ramp in list(self._running.items()):
             ramp.time += seconds
-            ramp.handle.put_weight(ramp.at(ramp.time))
+            ramp.handle.put_ramped(ramp.at(ramp.time))
             if ramp.time >= ramp.seconds:
                 del self._running[name]

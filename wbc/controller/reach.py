@@ -43,7 +43,9 @@ class Reach:
         self._brake_at = np.array(places, dtype=np.intp)
         stop_at, self._stop_low, self._stop_high = stops(stack, layout)
         self._stop_at = np.array(stop_at, dtype=np.intp)
-        self._stop_q = np.maximum(stack.robot.position_index, 0)
+        self._stop_q = np.zeros(layout.variables, dtype=np.intp)
+        self._stop_q[: layout.nv] = np.maximum(stack.robot.position_index, 0)
+        self._dof_count = layout.nv
         margins = np.array(margin_places(layout), dtype=np.intp)
         self._margin_rows = np.flatnonzero(margins >= 0)
         self._margin_at = margins[self._margin_rows]
@@ -174,8 +176,9 @@ class Reach:
         limited = self._limited(bound_enabled)
         if not limited.any() or not len(self._margin_rows):
             return
-        limit = np.where(limited, BRAKING_MARGIN * self._brake_limit, np.inf)
-        rows = np.abs(A[self._margin_rows])
+        limited = limited[: self._dof_count]
+        limit = np.where(limited, BRAKING_MARGIN * self._brake_limit[: self._dof_count], np.inf)
+        rows = np.abs(A[self._margin_rows, : self._dof_count])
         a = np.where(rows != 0.0, rows, 0.0) @ np.where(limited, limit, 0.0)
         free = (rows[:, ~limited] != 0.0).any(axis=1)
         h = margin[self._margin_at]

@@ -55,10 +55,14 @@ class Recorder:
         self.count = 0
         self._controller, self._tick = controller, controller.tick
         views = {name: getattr(self._tick, name) for name in INPUTS}
-        sizes = {name: view.size for name, view in views.items()} | {"reset": 1, "v": controller.layout.nv, "flag": 1}
+        layout = controller.layout
+        sizes = {name: view.size for name, view in views.items()} | {"reset": 1, "v": layout.nv}
+        if layout.variables > layout.nv:
+            sizes["others"] = layout.variables - layout.nv
+        sizes["flag"] = 1
         self._given = [view.data.cast("B") for view in views.values() if view.size]
         # the report begins with the command and the flag
-        self._command = self._tick.report.data.cast("B")[: 8 * (controller.layout.nv + 1)]
+        self._command = self._tick.report.data.cast("B")[: 8 * (layout.variables + 1)]
         pickled, problem = _pickled(controller.stack)
         text = about(controller) | {"sizes": sizes, "not_pickled": problem}
         self._writer: Writer | None = Writer(self.path, text, pickled, overwrite)

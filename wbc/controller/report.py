@@ -46,7 +46,7 @@ class ReportLayout:
     """Slices of the report of one layout."""
 
     def __init__(self, layout: Layout) -> None:
-        nv, rows = layout.nv, layout.general_rows
+        nv, rows = layout.variables, layout.general_rows
         sizes = {
             "v": nv,
             "flag": 1,

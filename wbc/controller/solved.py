@@ -18,6 +18,7 @@ from wbc.controller.report import (
     UNSOUND,
     ReportLayout,
 )
+from wbc.controller.soft import SoftRows
 from wbc.controller.tick import Assembly, Buffers
 from wbc.qp.certificate import Certificate, certify
 from wbc.qp.hierarchy import Answer
@@ -41,16 +42,17 @@ class SolvedTick(Buffers):
     def __init__(self, assembly: Assembly, stack: Declaration, layout: Layout, solver: str) -> None:
         self.assembly = assembly
         self.share(assembly)
-        self._nv = layout.nv
+        self._nv = layout.variables
         self._places = ReportLayout(layout)
-        self._solver = make_solver(solver, layout.nv, layout.general_rows)
-        self._relaxation = Relaxation(layout.nv, layout.general_rows, self._solver)
+        self._solver = make_solver(solver, layout.variables, layout.general_rows)
+        self._relaxation = Relaxation(layout.variables, layout.general_rows, self._solver)
         self._orders = np.array(row_orders(layout), dtype=np.int_)
         self._units = np.array(row_units(stack, layout), dtype=np.float64)
         scales = layout.dof_scales(stack)
         self._longest = max(1.0, scales.max(initial=1.0), self._units.max(initial=1.0))
         self._dof_scales = None if (scales == 1.0).all() else scales
-        self._hard = np.array(layout.row_levels, dtype=np.int_) < 0
+        self._soft = SoftRows(stack, layout)
+        self._hard = (np.array(layout.row_levels, dtype=np.int_) < 0) & (self._soft.of < 0)
         #: strict levels, None where there is one
         self.levels = Levels(assembly, stack, layout) if layout.cascade else None
 
@@ -79,6 +81,7 @@ class SolvedTick(Buffers):
         slack = qp.violation(v)[self._nv :] if flag == RELAXED else np.zeros(self._units.size)
         if self.levels is not None:
             slack = self.levels.with_soft(qp, v, slack)
+        slack = self._soft.told(qp, v, self.assembly.row_sides(), slack) if answer is not None else slack
         slack = np.where(slack > 2.0 * TOLERANCE * self._units, slack, 0.0)
         if flag == RELAXED and not slack[self._hard].any():
             flag = SOLVED  # the rows contradict each other by rounding only

@@ -15,6 +15,7 @@ from wbc.controller.explanation import Explanation
 from wbc.controller.level_report import LevelCertificate, certificates
 from wbc.controller.policy import CHAIN
 from wbc.controller.report import INFINITE, ReportLayout
+from wbc.controller.soft import scales
 from wbc.controller.tick import Assembly
 from wbc.errors import SolverError
 from wbc.stack.declaration import Declaration
@@ -221,7 +222,7 @@ class Step:
     @property
     def binding(self) -> tuple[Binding, ...]:
         """Rows and bounds that push against the optimum."""
-        context, nv = self._context, self._context.layout.nv
+        context, nv = self._context, self._context.layout.variables
         multipliers = self._part("multipliers")
         low, high = self._part("owner_low"), self._part("owner_high")
         levels = self._pushes(multipliers.size)
@@ -261,6 +262,14 @@ class Step:
             per_second = unit if unit.endswith("/s") else f"{unit or '1'}/s"
             out.append(Slack(block.entry.name, block.rows[row].label, float(slack[i]), per_second))
         return tuple(out)
+
+    @property
+    def scales(self) -> Mapping[str, float]:
+        """lambda of every scaled task by name, in [0, 1]: it is followed at this share of the rates that it asks for;
+        0 where the tick brakes. docs/soft.md.
+        """
+        found = scales(self._context.layout, self._part("v"))
+        return dict.fromkeys(found, 0.0) if self.status is Status.BRAKED else found
 
     @property
     def answered_by(self) -> str:

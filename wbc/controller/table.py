@@ -35,6 +35,8 @@ def _row(controller: Controller, block: Block) -> tuple[str, ...]:
     speed = "gain" if block.form == "task" else "rate"
     rate = f"{getattr(handle, speed):g} 1/s" if speed in block.slots else "-"
     kind_of_row = "minimised" if block.entry.level > 0 else "hard" if block.entry.hard else "soft"
+    if "price" in block.slots:
+        kind_of_row = f"soft, {handle.price:g}"
     weight = f"{handle.weight:g}" if block.form == "task" else kind_of_row
     units = ", ".join(dict.fromkeys(r.unit or "1" for r in block.rows))
     mask = handle.mask

@@ -31,8 +31,12 @@ def timeless(stack: Declaration) -> Stack:
     """The same items on joints that may move by :data:`LONGEST` a tick, without accelerations; always calm.
 
     Raises:
-        LevelError: the stack has strict levels.
+        LevelError: the stack has strict levels. RangeError: it has soft constraints or scaled tasks.
     """
+    for entry in stack.entries:
+        if entry.price is not None:
+            reason = "inverse kinematics has no time, so no rate has a price or a scale; leave soft= and scaled= out"
+            raise RangeError(f"stack.{entry.name}", entry.price, reason)
     levels = stack.levels
     if len(levels) > 1 or any(e.level > 0 and not e.is_task for e in stack.entries):
         reason = "inverse kinematics takes one level: goals come before wishes there; name them with goals="

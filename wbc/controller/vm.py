@@ -46,7 +46,7 @@ class VmAssembly(Assembly):
     """Buffers of a controller and the QP at their values; mirrors ``native/assemble.h``."""
 
     def __init__(self, program: Program, stack: Declaration, layout: Layout) -> None:
-        nv, rows, tasks = layout.nv, layout.general_rows, layout.task_rows
+        nv, rows, tasks = layout.variables, layout.general_rows, layout.task_rows
         self._layout = layout
         self._given = (program, stack, layout)
         self.places = ReportLayout(layout)
@@ -63,7 +63,7 @@ class VmAssembly(Assembly):
         sizes |= {"weight": tasks, "enabled": rows, "bound_enabled": layout.bound_blocks * nv, "plain": 1}
         parts = _pieces(sizes)
         self.state = parts[""]
-        self._q, self._v, self._p = parts["q"], parts["v_last"], parts["p"]
+        self._q, self._v, self._p = parts["q"], parts["v_last"][: layout.nv], parts["p"]
         for name, size in sizes.items():
             setattr(self, name, parts[name][:size])
         self.weight[:], self.enabled[:], self.bound_enabled[:] = 1.0, 1.0, 1.0
@@ -72,7 +72,7 @@ class VmAssembly(Assembly):
         arguments = [self._q, self._v, self._p, self.dt]
         self._rows = _Call(function, arguments, list(self._out.values()))
         self._ahead = None
-        self._later, self._command = _room(layout.margin_rows), _room(nv)
+        self._later, self._command = _room(layout.margin_rows), _room(layout.nv)
         if program.ahead is not None:
             self._ahead = _Call(program.ahead, [self._q, self._command, self._p, self.dt], [self._later])
         self._pull = _room(tasks)
@@ -108,7 +108,7 @@ class VmAssembly(Assembly):
         entries = _room(program.bend.nnz_out(0))
         call = _Call(program.bend, [*arguments, self._pull], [entries])
         row, column = (np.array(i, dtype=np.intp) for i in program.bend.sparsity_out(0).get_triplet())
-        nv = self._layout.nv
+        nv = self._layout.variables
 
         def bend(pull: Array) -> Array:
             self._pull[: len(pull)] = pull
@@ -157,7 +157,7 @@ class VmAssembly(Assembly):
         weighted = weight[:, None] * J
         H = J.T @ weighted
         H = 0.5 * (H + H.T)
-        H[np.diag_indices(layout.nv)] += self._damping
+        H[np.diag_indices(layout.variables)] += self._damping
         g = -weighted.T @ wish
         error = out["error"][first]
         low, high = self._bounds()
@@ -198,7 +198,7 @@ class VmAssembly(Assembly):
 
     def _bounds(self) -> tuple[Array, Array]:
         """Bound blocks in the order of sacrifice, a later one clipped into what the earlier ones left."""
-        nv = self._layout.nv
+        nv = self._layout.variables
         low, high = np.full(nv, -np.inf), np.full(nv, np.inf)
         owner_low, owner_high = (self.report[self.places[n]] for n in ("owner_low", "owner_high"))
         owner_low[:] = owner_high[:] = -1.0
@@ -228,7 +228,7 @@ class VmAssembly(Assembly):
     def look_ahead(self) -> None:
         """Margins at q (+) v dt, into the report."""
         if self._ahead is not None:
-            self._command[:] = self.report[self.places["v"]]
+            self._command[:] = self.report[self.places["v"]][: self._layout.nv]
             self._ahead.run()
             later = self._later[: self._layout.margin_rows]
             self.report[self.places["ahead"]] = np.where(np.isnan(later), -np.inf, later)

@@ -39,6 +39,10 @@ def _sizes(snapshot: Snapshot) -> str:
     named = {
         "NQ": (layout.nq, "numbers of a configuration"),
         "NV": (layout.nv, "degrees of freedom: numbers of a velocity"),
+        "VARIABLES": (
+            layout.variables,
+            "of the QP: the velocities, slacks of soft rows, and 1 - lambda of scaled tasks",
+        ),
         "NP": (layout.parameters, "run-time inputs"),
         "TASK_ROWS": (layout.task_rows, "rows of tasks"),
         "ROWS": (layout.general_rows, "rows of constraints other than bounds on velocities"),
@@ -59,7 +63,7 @@ def _levels(snapshot: Snapshot) -> str:
         "missed[WBC_TASK_ROWS + 1]": "rate of every task row less the rate that it asks for",
         "share[WBC_TASK_ROWS + 1]": "part of every task row that the levels before left free, 0 to 1",
         "dropped[WBC_ROWS + 1]": "of equality rows that depend on others, how far they are off; else -1",
-        "pushes[WBC_NV + WBC_ROWS + 1]": "level, by its place, that a row pushes against first, -1: none",
+        "pushes[WBC_VARIABLES + WBC_ROWS + 1]": "level, by its place, that a row pushes against first, -1: none",
         f"levels[{len(layout.levels) + 1}][{LEVEL_NUMBERS}]": "rank, free directions, least singular value, damping, "
         "disturbance, stationarity, complementarity, error bound, solved; last the least velocity",
     }
@@ -91,7 +95,7 @@ def _places(snapshot: Snapshot) -> str:
         if block.form == "task":
             lines += [define(f"WBC_TASK_{name}", block.start), define(f"WBC_TASK_{name}_ROWS", count)]
         elif block.form == "bounds":
-            lines.append(define(f"WBC_BOUND_{name}", block.start * snapshot.layout.nv))
+            lines.append(define(f"WBC_BOUND_{name}", block.start * snapshot.layout.variables))
         else:
             lines += [define(f"WBC_ROW_{name}", block.start), define(f"WBC_ROW_{name}_ROWS", count)]
         if block.form == "margins":

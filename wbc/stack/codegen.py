@@ -12,8 +12,19 @@ from wbc.shapes import FAR
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Layout
 from wbc.stack.motion import motion
-from wbc.stack.places import brakes, gain_places, left_free, margin_places, pull_scales, rate_places, stops
-from wbc.stack.program import Program, sparsity_rows
+from wbc.stack.pattern import sparsity_rows
+from wbc.stack.places import (
+    brakes,
+    gain_places,
+    left_free,
+    margin_places,
+    pull_scales,
+    rate_places,
+    slack_places,
+    stops,
+    told_slacks,
+)
+from wbc.stack.program import Program
 
 #: Numbers that a tick reports of each level, see ``native/tick.h``
 LEVEL_NUMBERS = 9
@@ -40,7 +51,7 @@ def _header(stack: Declaration, layout: Layout, program: Program, functions: lis
     a_start, a_end, a_col = program.sensed.entries(*program.balls.entries(*sparsity_rows(at)))
     orders, scales, sequence = row_orders(layout), row_units(stack, layout), bound_sequence(layout)
     dofs, units = layout.dof_scales(stack), unit_groups(stack)
-    bent = ca.Sparsity(layout.nv, layout.nv) if program.bend is None else program.bend.sparsity_out(0)
+    bent = ca.Sparsity(layout.variables, layout.variables) if program.bend is None else program.bend.sparsity_out(0)
     brake_at, brake_limit = brakes(stack, layout)
     stop_at, stop_low, stop_high = stops(stack, layout)
     lines = [
@@ -50,7 +61,7 @@ def _header(stack: Declaration, layout: Layout, program: Program, functions: lis
             f"#define {name} {value}"
             for name, value in {
                 "NQ": layout.nq,
-                "NV": layout.nv,
+                "NV": layout.variables,
                 "NP": layout.parameters,
                 "MT": layout.task_rows,
                 "MC": layout.general_rows,
@@ -67,7 +78,7 @@ def _header(stack: Declaration, layout: Layout, program: Program, functions: lis
                 "UNITS": len(units),
                 "LAST_ORDER": max(orders, default=0),
                 "LONGEST": max(1.0, *dofs, *scales),
-                "ACTIVE_MAX": layout.nv + len(orders) + 1,
+                "ACTIVE_MAX": layout.variables + len(orders) + 1,
                 "WORK_W": max(f.sz_w() for f in functions),
                 "WORK_IW": max(f.sz_iw() for f in functions),
             }.items()
@@ -99,10 +110,21 @@ def _header(stack: Declaration, layout: Layout, program: Program, functions: lis
         *(_table("int", name, values) for name, values in (program.balls.places() | program.sensed.places()).items()),
         _table("double", "row_reach", program.balls.reaches),
         _table("double", "segment_half", program.balls.halves),
+        *_soft(stack, layout),
         *_levels(stack, layout),
         *_blocks(j_start[: layout.leading + 1], j_col),
     ]
     return "\n".join(lines) + "\n"
+
+
+def _soft(stack: Declaration, layout: Layout) -> list[str]:
+    """What soft rows need; see ``native/tick.h``."""
+    return [
+        f"#define DOFS {layout.nv}",
+        f"#define SLACKS {int(bool(layout.slack_rows))}",
+        _table("int", "slack_of", slack_places(stack, layout)),
+        _table("double", "slack_told", told_slacks(stack, layout)),
+    ]
 
 
 def _levels(stack: Declaration, layout: Layout) -> list[str]:
@@ -116,7 +138,7 @@ def _levels(stack: Declaration, layout: Layout) -> list[str]:
         f"#define LEADING {layout.leading}",
         f"#define LEVELS {len(spans)}",
         f"#define LEVEL_NUMBERS {LEVEL_NUMBERS}",
-        f"#define LEVEL_MOST {max(most, layout.nv + layout.general_rows)}",
+        f"#define LEVEL_MOST {max(most, layout.variables + layout.general_rows)}",
         f"#define SOFT_MAX {max(soft)}",
         f"#define LEFT_FREE {left_free(stack).hex()}",
         f"#define DAMPING {stack.damping.hex()}",

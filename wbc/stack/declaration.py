@@ -10,6 +10,7 @@ from wbc import pickling, validation
 from wbc.errors import DuplicateNameError, LevelError, PicklingError, RangeError, ShapeError, UnknownNameError
 from wbc.robot import Robot
 from wbc.stack.parts import inner_items
+from wbc.tasks._direction import DIRECTION_PRICE, Direction
 from wbc.tasks.base import Constraint, Item, Order, Task
 from wbc.tasks.mechanism import Mechanism
 
@@ -17,25 +18,29 @@ from wbc.tasks.mechanism import Mechanism
 #: It biases a posture task of weight w by the fraction damping / w.
 DAMPING = 1e-8
 
+#: Highest price of a soft constraint; beyond it a row is as good as hard
+HIGHEST_PRICE = 1e9
+
 #: The time step may vary from tick to tick within these factors of the declared one.
 DT_FACTORS = (0.25, 2.0)
 
 
 @dataclass(frozen=True, eq=False)
 class Entry:
-    """One item of a stack, with the name, level and weight it was added with."""
+    """One item of a stack, with the name, level and weight it was added with; ``price``: of a soft constraint."""
 
     item: Item
     name: str
     level: int
     weight: float
     hard: bool = True
+    price: float | None = None
 
     @property
     def order(self) -> Order:
         """Class of a constraint in the order of sacrifice; that of a soft one is the last."""
         assert isinstance(self.item, Constraint)
-        return self.item.order if self.hard else Order.SOFT
+        return self.item.order if self.hard and self.price is None else Order.SOFT
 
     @property
     def is_task(self) -> bool:
@@ -114,11 +119,21 @@ class Declaration:
 
     @property
     def levels(self) -> tuple[int, ...]:
-        """Levels at which something is minimised, in order: those of tasks and of constraints at a level > 0."""
-        return tuple(sorted({e.level for e in self.entries if e.is_task or e.level > 0})) or (0,)
+        """Levels at which something is minimised, in order: those of tasks, of soft constraints, and of all
+        constraints at a level > 0.
+        """
+        counts = {e.level for e in self.entries if e.is_task or e.level > 0 or e.price is not None}
+        return tuple(sorted(counts)) or (0,)
 
     def add(
-        self, item: Item, name: str | None = None, level: int = 0, weight: float = 1.0, hard: bool = True
+        self,
+        item: Item,
+        name: str | None = None,
+        level: int = 0,
+        weight: float = 1.0,
+        hard: bool = True,
+        soft: float | None = None,
+        scaled: bool = False,
     ) -> Declaration:
         """Add an item; returns the stack, so that calls chain.
 
@@ -130,17 +145,17 @@ class Declaration:
             weight: of a task against the others of its level, >= 0; the cost of a row is
                 weight * (rate error / scale)^2 with scale = characteristic length for rows in metres, else 1.
             hard: of a constraint; False: its rows give way before those of any hard one, see the order of sacrifice.
+            soft: of a constraint, its price >= 0: a row that is violated by x costs price * (x / scale)^2, as much as a
+                task row of that weight that misses its rate by x. The first value of the input ``price``.
+            scaled: of a task; it is slowed down and never turned aside: J v = lambda w with one lambda in [0, 1] for
+                the rates w that it asks for. Adds the item ``"<name> direction"``. docs/soft.md.
 
         Raises:
             DuplicateNameError, LevelError, RangeError, ShapeError, UnknownNameError: bad input; the stack is unchanged.
         """
         if not isinstance(item, (Task, Constraint)):
             raise ShapeError("item", item, "expected a task or a constraint instance")
-        chosen = _snake(type(item).__name__) if name is None else name
-        if not isinstance(chosen, str) or not chosen:
-            raise ShapeError("name", name, "expected a non-empty string")
-        if chosen in self._entries:
-            raise DuplicateNameError("name", chosen, "an item of this name is in the stack; give another with name=")
+        chosen = self._free_name(_snake(type(item).__name__) if name is None else name)
         if isinstance(level, bool) or not isinstance(level, int):
             raise ShapeError("level", level, "expected an integer")
         if level < 0:
@@ -149,14 +164,33 @@ class Declaration:
             _check_softened(level, item)
         number = validation.scalar("weight", weight, low=0.0)
         if isinstance(item, Constraint) and number != 1.0:
-            raise RangeError("weight", weight, "a constraint is hard or minimised at its level, and has no weight")
+            raise RangeError("weight", weight, "a constraint is hard, soft at a price, or minimised at its level")
         if not validation.flag("hard", hard):
-            _require_soft(item)
+            _require_soft(item, "hard", hard)
             if level > 0:
                 raise RangeError("hard", hard, "a constraint at a level is minimised there, neither hard nor soft")
+        price = None
+        if soft is not None:
+            price = validation.scalar("soft", soft, low=0.0, high=HIGHEST_PRICE)
+            _require_soft(item, "soft", soft)
+            if not hard:
+                raise RangeError("soft", soft, "hard=False is soft without a price; leave one of them out")
+        added = [Entry(item, chosen, level, number, bool(hard), price)]
+        if validation.flag("scaled", scaled):
+            if not isinstance(item, Task) or type(item).jacobian is not Task.jacobian:
+                raise RangeError("scaled", scaled, f"{type(item).__name__} asks for no velocity with a direction")
+            kept = self._free_name(f"{chosen} direction")
+            added.append(Entry(Direction(chosen, item), kept, level, 1.0, True, number * DIRECTION_PRICE))
         item.validate(self._robot)
-        self._entries[chosen] = Entry(item, chosen, level, number, bool(hard))
+        self._entries |= {entry.name: entry for entry in added}
         return self
+
+    def _free_name(self, name: object) -> str:
+        if not isinstance(name, str) or not name:
+            raise ShapeError("name", name, "expected a non-empty string")
+        if name in self._entries:
+            raise DuplicateNameError("name", name, "an item of this name is in the stack; give another with name=")
+        return name
 
     def __getitem__(self, name: str) -> Entry:
         try:
@@ -194,24 +228,35 @@ class Declaration:
             "length": self._length.hex(),
             "damping": self._damping.hex(),
             "calm": self._calm,
-            "items": [
-                [e.name, e.level, e.item.declaration(self._robot), *([] if e.hard else ["soft"])] for e in self.entries
-            ],
+            "items": [[e.name, e.level, e.item.declaration(self._robot), *_softness(e)] for e in self.entries],
         }
 
 
-def _require_soft(item: Item) -> None:
+def soft_rows(entry: Entry, robot: Robot) -> int:
+    """Rows of a constraint that have a slack at a price: the first ones."""
+    if entry.price is None:
+        return 0
+    count = len(entry.item.rows(robot))
+    return count - 1 if isinstance(entry.item, Direction) else count
+
+
+def _softness(entry: Entry) -> list[str]:
+    """What the compiled code knows of how soft an item is."""
+    return ["priced"] if entry.price is not None else [] if entry.hard else ["soft"]
+
+
+def _require_soft(item: Item, field: str, value: object) -> None:
     """Refuse what cannot be soft.
 
     Raises:
         RangeError: a task, simple bounds, or rows of the actuators or the mechanism.
     """
     if not isinstance(item, Constraint):
-        raise RangeError("hard", False, "a task is a wish: it has a weight")
+        raise RangeError(field, value, "a task is a wish: it has a weight")
     if item.form == "bounds":
-        raise RangeError("hard", False, f"{type(item).__name__} bounds joints, and bounds never give way")
+        raise RangeError(field, value, f"{type(item).__name__} bounds joints, and bounds never give way")
     if item.order <= Order.POSITION:
-        raise RangeError("hard", False, f"{type(item).__name__} is what the robot can do, which never gives way")
+        raise RangeError(field, value, f"{type(item).__name__} is what the robot can do, which never gives way")
 
 
 def _check_softened(level: int, item: Constraint) -> None:

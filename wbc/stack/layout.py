@@ -8,8 +8,9 @@ from functools import cached_property
 import numpy as np
 
 from wbc.errors import ShapeError
-from wbc.stack.declaration import Declaration, Entry
+from wbc.stack.declaration import HIGHEST_PRICE, Declaration, Entry, soft_rows
 from wbc.tasks import inputs
+from wbc.tasks._direction import Direction
 from wbc.tasks.base import Constraint, Form, Input, Row, Task
 
 
@@ -32,7 +33,8 @@ class Block:
     """An item's rows and inputs.
 
     ``start`` counts within the rows of the same form: task rows, general constraint rows, or, for
-    bounds, blocks of nv. ``margin_start`` counts margin rows only (-1: none).
+    bounds, blocks of nv. ``margin_start`` counts margin rows only (-1: none). ``variables`` are those of the QP that
+    the rows have for themselves, see :mod:`wbc.stack.soft`.
     """
 
     entry: Entry
@@ -41,6 +43,7 @@ class Block:
     start: int
     margin_start: int
     slots: dict[str, Slot]
+    variables: slice
 
     @property
     def span(self) -> slice:
@@ -61,22 +64,49 @@ class Layout:
             one after the other; False: all is one problem.
         leading: task rows of the first level, which come first.
         row_levels: place in ``levels`` of each general row that is minimised there, -1 for hard rows.
+        nv: degrees of freedom. variables: of the QP; what comes after the velocities are slacks of soft rows, and
+            shares of scaled tasks.
+        slack_rows: task row -> the slack that it minimises.
+        nothing: a place in the parameters that holds 0, where there are slacks.
     """
 
     def __init__(self, stack: Declaration) -> None:
         robot = stack.robot
         self.nq, self.nv = robot.nq, robot.nv
+        self.variables = self.nv
         self.parameters = 0
         self.task_rows = self.general_rows = self.bound_blocks = self.margin_rows = 0
         self.blocks: dict[str, Block] = {}
         self.levels = stack.levels
         self.row_levels: list[int] = []
-        for entry in (*sorted(stack.tasks, key=lambda e: e.level), *stack.constraints):
-            self._add(stack, entry)
+        self.slack_rows: dict[int, int] = {}
+        self._ends: list[int] = []
+        variables: dict[str, slice] = {}
+        for level in self.levels:
+            for entry in (e for e in stack.tasks if e.level == level):
+                self._add(stack, entry)
+            for entry in (e for e in stack.constraints if e.price is not None and e.level == level):
+                variables[entry.name] = self._slacks(stack, entry)
+            self._ends.append(self.task_rows)
+        for entry in stack.constraints:
+            self._add(stack, entry, variables.get(entry.name, slice(0, 0)))
+        self.nothing = -1
+        if self.slack_rows:
+            self.nothing, self.parameters = self.parameters, self.parameters + 1
         self.cascade = len(self.levels) > 1 or any(level >= 0 for level in self.row_levels)
         self.leading = self.level_rows(0).stop
 
-    def _add(self, stack: Declaration, entry: Entry) -> None:
+    def _slacks(self, stack: Declaration, entry: Entry) -> slice:
+        """Variables of a soft constraint; task rows at its level minimise those that are slacks."""
+        first, count = self.variables, soft_rows(entry, stack.robot)
+        for k in range(count):
+            self.slack_rows[self.task_rows + k] = first + k
+        self.task_rows += count
+        # of a kept direction, the last row is about a variable of its own
+        self.variables += len(entry.item.rows(stack.robot))
+        return slice(first, self.variables)
+
+    def _add(self, stack: Declaration, entry: Entry, variables: slice = slice(0, 0)) -> None:
         robot, item = stack.robot, entry.item
         rows = item.rows(robot)
         labels = [r.label for r in rows]
@@ -95,6 +125,9 @@ class Layout:
         elif isinstance(item, Task) and not any(i.name == "gain" for i in declared):
             default = item.default_gain if item.gain is None else item.gain
             declared.append(Input("gain", unit="1/s", default=default, low=0.0))
+        if entry.price is not None:
+            high = np.inf if isinstance(item, Direction) else HIGHEST_PRICE
+            declared.append(Input("price", default=entry.price, low=0.0, high=high))
         for declared_input in declared:
             if declared_input.name in slots:
                 raise ShapeError(f"{entry.name}.inputs", declared_input.name, "an input of this name is declared twice")
@@ -108,23 +141,19 @@ class Layout:
             start, self.bound_blocks = self.bound_blocks, self.bound_blocks + 1
         else:
             start, self.general_rows = self.general_rows, self.general_rows + len(rows)
-            level = self.levels.index(entry.level) if entry.level > 0 else -1
+            level = self.levels.index(entry.level) if entry.level > 0 and entry.price is None else -1
             self.row_levels += [level] * len(rows)
             if form == "margins":
                 margin, self.margin_rows = self.margin_rows, self.margin_rows + len(rows)
-        self.blocks[entry.name] = Block(entry, form, rows, start, margin, slots)
+        self.blocks[entry.name] = Block(entry, form, rows, start, margin, slots, variables)
 
     def of_form(self, *forms: Form) -> list[Block]:
         """Blocks of the given forms, in row order."""
         return [b for b in self.blocks.values() if b.form in forms]
 
     def level_rows(self, place: int) -> slice:
-        """Task rows of a level, by its place in ``levels``."""
-        level = self.levels[place]
-        spans = [b.span for b in self.of_form("task")]
-        levels = [b.entry.level for b in self.of_form("task")]
-        start = sum(s.stop - s.start for s, k in zip(spans, levels, strict=True) if k < level)
-        return slice(start, start + sum(s.stop - s.start for s, k in zip(spans, levels, strict=True) if k == level))
+        """Task rows of a level, by its place in ``levels``, those that minimise slacks included."""
+        return slice(self._ends[place - 1] if place else 0, self._ends[place])
 
     def row_scales(self, stack: Declaration) -> np.ndarray:
         """Scale of each task row: the characteristic length for rows in metres, 1 for others."""
@@ -136,5 +165,6 @@ class Layout:
         return scales
 
     def dof_scales(self, stack: Declaration) -> np.ndarray:
-        """Scale of each degree of freedom: the characteristic length for metres, 1 for radians."""
-        return np.array([stack.length if u == "m" else 1.0 for u in stack.robot.dof_units])
+        """Scale of each variable: the characteristic length for metres, 1 for radians and slacks."""
+        own = [stack.length if u == "m" else 1.0 for u in stack.robot.dof_units]
+        return np.array(own + [1.0] * (self.variables - self.nv))

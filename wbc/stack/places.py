@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import numpy as np
 
-from wbc.stack.declaration import Declaration
+from wbc.stack.declaration import Declaration, soft_rows
 from wbc.stack.layout import Layout
 from wbc.stack.program import Program
+from wbc.tasks._direction import Direction
 from wbc.tasks.base import Constraint
 
 #: What a direction that a level leaves to later ones may cost its rows at full joint speed, in their unit per second
 DISTURBANCE = 1e-6
 #: Full speed of joints without a limit [rad/s, or characteristic lengths per second]
 UNLIMITED = 10.0
+#: Violations of soft rows, and of rows that keep a direction, up to this are not told [rad/s, lengths per second]
+SOFT_TOLD, DIRECTION_TOLD = 2e-9, 1e-5
 
 
 def left_free(stack: Declaration) -> float:
@@ -25,30 +28,54 @@ def left_free(stack: Declaration) -> float:
 
 def gain_places(layout: Layout) -> list[int]:
     """Where the gain of each task row is in the parameters."""
-    return [b.slots["gain"].start for b in layout.of_form("task") for _ in b.rows]
+    places = [layout.nothing] * layout.task_rows
+    for block in layout.of_form("task"):
+        places[block.span] = [block.slots["gain"].start] * len(block.rows)
+    return places
+
+
+def slack_places(stack: Declaration, layout: Layout) -> list[int]:
+    """The variable that is the slack of each general row, -1 for rows without."""
+    places = [-1] * layout.general_rows
+    for block in layout.of_form("margins", "rows"):
+        for k in range(soft_rows(block.entry, stack.robot)):
+            places[block.start + k] = block.variables.start + k
+    return places
+
+
+def told_slacks(stack: Declaration, layout: Layout) -> list[float]:
+    """Violation of each soft row from which on a report tells it, per second: beyond rounding, and for kept directions
+    beyond what their finite price leaves.
+    """
+    out = [0.0] * layout.general_rows
+    for block in layout.of_form("margins", "rows"):
+        least = DIRECTION_TOLD if isinstance(block.entry.item, Direction) else SOFT_TOLD
+        for k, row in enumerate(block.rows):
+            out[block.start + k] = least * (stack.length if row.unit.split("/")[0] == "m" else 1.0)
+    return out
 
 
 def pull_scales(stack: Declaration, layout: Layout, program: Program) -> list[float]:
     """How much curvature a task row of unit weighted error may have: its lever for metres, else 1; 0 for rows that
     do not bend.
     """
-    rows = [r for b in layout.of_form("task") for r in b.rows]
-    if program.bend is None:
-        return [0.0] * len(rows)
-    bending = np.diff(program.bend.jac_sparsity(0, 4).colind()) > 0
-    scales = [2.0 * stack.length if r.unit.split("/")[0] == "m" else 1.0 for r in rows]
-    return [scale * float(bends) for scale, bends in zip(scales, bending, strict=True)]
+    scales = np.zeros(layout.task_rows)
+    if program.bend is not None:
+        for block in layout.of_form("task"):
+            scales[block.span] = [2.0 * stack.length if r.unit.split("/")[0] == "m" else 1.0 for r in block.rows]
+        scales *= np.diff(program.bend.jac_sparsity(0, 4).colind()) > 0
+    return scales.tolist()
 
 
 def brakes(stack: Declaration, layout: Layout) -> tuple[list[int], np.ndarray]:
     """(entry of ``bound_enabled``, -1 for none; limit) of what limits each degree of freedom's acceleration most."""
-    places, limits = [-1] * layout.nv, np.full(layout.nv, np.inf)
+    places, limits = [-1] * layout.variables, np.full(layout.variables, np.inf)
     for k, block in enumerate(layout.of_form("bounds")):
         item = block.entry.item
         assert isinstance(item, Constraint)
         for i, limit in enumerate(item.acceleration_limits(stack.robot)):
             if limit < limits[i]:
-                places[i], limits[i] = k * layout.nv + i, limit
+                places[i], limits[i] = k * layout.variables + i, limit
     return places, limits
 
 
@@ -68,13 +95,14 @@ def rate_places(layout: Layout) -> list[int]:
 
 def stops(stack: Declaration, layout: Layout) -> tuple[list[int], np.ndarray, np.ndarray]:
     """(entry of ``bound_enabled``, -1 for none; lower; upper) of the position limits of each degree of freedom."""
-    places = [-1] * layout.nv
-    lower, upper = np.full(layout.nv, -np.inf), np.full(layout.nv, np.inf)
+    places = [-1] * layout.variables
+    lower, upper = np.full(layout.variables, -np.inf), np.full(layout.variables, np.inf)
     for k, block in enumerate(layout.of_form("bounds")):
         item = block.entry.item
         assert isinstance(item, Constraint)
         below, above = item.position_limits(stack.robot)
         for i in np.flatnonzero(np.isfinite(below) | np.isfinite(above)):
-            places[i] = k * layout.nv + int(i)
-        lower, upper = np.maximum(lower, below), np.minimum(upper, above)
+            places[i] = k * layout.variables + int(i)
+        lower[: layout.nv] = np.maximum(lower[: layout.nv], below)
+        upper[: layout.nv] = np.minimum(upper[: layout.nv], above)
     return places, lower, upper

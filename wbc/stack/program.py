@@ -13,6 +13,7 @@ Outputs of ``rows(q, v, p, dt)`` (MT task rows, MC general rows, NB bound blocks
     margin_factor  MH  factor in [0, 1] by which a margin row is faded
     bound_low, bound_high   nv x NB
 
+nv counts the variables of the QP here, which may be more than the velocities, see :mod:`wbc.stack.soft`.
 The tick forms H = sum w (factor J)'J + damping and g from these, so that the compiled expression stays
 small and levels have their rows. ``ahead(q, v, p, dt)`` is h(q (+) v dt) with moving
 inputs advanced by their rates. ``bend(q, v, p, dt, pull)`` is the upper triangle of sum_k pull_k d2(e_k)/dq2, the
@@ -32,18 +33,20 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import casadi as ca
-import numpy as np
 
 from wbc.errors import ShapeError
 from wbc.stack.balls import Balls
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Block, Layout, Slot
+from wbc.stack.pattern import checked_function, shared_pattern
 from wbc.stack.sensed import Sensed
+from wbc.stack.soft import kept_direction, slacks, softened, unlimited, widened
 from wbc.symbolic import rotations as rot
 from wbc.symbolic.curvature import Pull, curvature
 from wbc.symbolic.kinematics import Kinematics, Pose
 from wbc.symbolic.tracer import Tracer, rotation_rate
-from wbc.tasks.base import Constraint, Rows, Task
+from wbc.tasks._direction import Direction
+from wbc.tasks.base import Bounds, Constraint, Rows, Task
 from wbc.tasks.inputs import as_value
 
 ROWS_OUTPUTS = (
@@ -89,6 +92,7 @@ class _Builder:
         self.dt = ca.SX.sym("dt")
         self.pull = ca.SX.sym("pull", layout.task_rows)
         self.pulls: list[Pull] = []
+        self.tasks: dict[str, tuple[ca.SX, ca.SX, ca.SX, ca.SX]] = {}
 
     @cached_property
     def later(self) -> ca.SX:
@@ -167,10 +171,21 @@ class _Builder:
         wish = tracer.expand(-gain * error - self.drift(block, error))
         fade = item.row_factor(robot, tracer, inputs)
         factor = ca.SX.ones(len(block.rows)) if fade is None else self.column(block, "row_factor", fade)
-        return tracer.expand(error), wish, tracer.expand(factor), jacobian
+        out = self.tasks[block.entry.name] = tracer.expand(error), wish, tracer.expand(factor), jacobian
+        return out
 
     def general(self, block: Block) -> tuple[Rows, ca.SX | None, ca.SX | None]:
-        """Rows of a constraint, its margins and their factors."""
+        """Rows of a constraint over all variables, its margins and their factors."""
+        item = block.entry.item
+        if isinstance(item, Direction):
+            rows, margin, factor = kept_direction(self.layout, block, *self.tasks[item.of][1:]), None, None
+        else:
+            rows, margin, factor = self.constraint(block)
+            rows = Rows(widened(self.layout, rows.matrix.T).T, rows.lower, rows.upper)
+        return softened(self.stack, block, rows, self.p), margin, factor
+
+    def constraint(self, block: Block) -> tuple[Rows, ca.SX | None, ca.SX | None]:
+        """Rows on v of a constraint, its margins and their factors."""
         item = block.entry.item
         assert isinstance(item, Constraint)
         robot, tracer, inputs = self.stack.robot, Tracer(self.kinematics), self.values(block)
@@ -197,7 +212,9 @@ class _Builder:
         matrix = tracer.jacobian(margin[: count - sensed, :])
         if sensed:
             empty = ca.SX(sensed, self.layout.nv)
-            matrix = ca.vertcat(matrix, empty if self.loops else self.sensed_matrix(block, sensed))
+            matrix = ca.vertcat(
+                matrix, empty if self.loops and block.entry.price is None else self.sensed_matrix(block, sensed)
+            )
         rows = Rows(matrix, low, ca.SX.inf(count))
         return rows, tracer.expand(margin), tracer.expand(factor)
 
@@ -219,7 +236,7 @@ class _Builder:
         here = ca.Function("h", [self.kinematics.q, self.p], [ca.densify(tracer.expand(margins))])
         margin = here(self.later, self.advanced(block))
         sensed = item.sensed_rows(self.stack.robot)
-        if sensed and not self.loops:
+        if sensed and not (self.loops and block.entry.price is None):
             closing = self.sensed_matrix(block, sensed) @ self.kinematics.v * self.dt
             margin = margin + ca.vertcat(ca.SX(len(block.rows) - sensed, 1), closing)
         return margin
@@ -233,8 +250,10 @@ def build(stack: Declaration, layout: Layout, loops: bool = False) -> Program:
     """
     b = _Builder(stack, layout, loops)
     balls, sensed = b.balls, Sensed.of(stack, layout) if loops else Sensed()
-    nv = layout.nv
-    tasks = [b.task(block) for block in layout.of_form("task")]
+    nv = layout.variables
+    tasks = [(block.start, *b.task(block)) for block in layout.of_form("task")]
+    tasks = [(start, e, w, f, widened(layout, shared_pattern(J.T))) for start, e, w, f, J in tasks]
+    tasks = sorted([*tasks, *slacks(layout)], key=lambda part: part[0])
     general = [b.general(block) for block in layout.of_form("margins", "rows")]
     bounds = []
     for block in layout.of_form("bounds"):
@@ -243,13 +262,12 @@ def build(stack: Declaration, layout: Layout, loops: bool = False) -> Program:
         tracer = Tracer(b.kinematics)
         got = item.bounds(stack.robot, tracer, b.values(block), b.dt)
         assert got is not None
-        bounds.append((b.column(block, "lower", got.lower), b.column(block, "upper", got.upper)))
+        wide = unlimited(layout, Bounds(b.column(block, "lower", got.lower), b.column(block, "upper", got.upper)))
+        bounds.append((wide.lower, wide.upper))
     empty = ca.SX(0, 1)
     outputs = [
-        ca.vertcat(empty, *[t[0] for t in tasks]),
-        ca.vertcat(empty, *[t[1] for t in tasks]),
-        ca.vertcat(empty, *[t[2] for t in tasks]),
-        ca.horzcat(ca.SX(nv, 0), *[_shared_pattern(t[3].T) for t in tasks]),
+        *[ca.vertcat(empty, *[t[k] for t in tasks]) for k in (1, 2, 3)],
+        ca.horzcat(ca.SX(nv, 0), *[t[4] for t in tasks]),
         ca.horzcat(ca.SX(nv, 0), *[r.matrix.T for r, _, _ in general]),
         ca.vertcat(empty, *[ca.densify(r.lower) for r, _, _ in general]),
         ca.vertcat(empty, *[ca.densify(r.upper) for r, _, _ in general]),
@@ -262,37 +280,16 @@ def build(stack: Declaration, layout: Layout, loops: bool = False) -> Program:
     inputs = [b.kinematics.q, b.kinematics.v, b.p, b.dt]
     segments = balls.segments(b.kinematics)
     more = [segments, ca.densify(b.kinematics.screws)] if balls or sensed else []
-    rows = _function("rows", inputs, outputs + more, [*ROWS_OUTPUTS, "segment", "screw"][: len(outputs + more)])
+    rows = checked_function("rows", inputs, outputs + more, [*ROWS_OUTPUTS, "segment", "screw"][: len(outputs + more)])
     ahead = None
     if layout.margin_rows:
         later = ca.vertcat(*[b.ahead(block) for block in layout.of_form("margins")])
         more = [ca.Function("segments", [b.kinematics.q], [segments])(b.later)] if balls else []
-        ahead = _function("ahead", inputs, [ca.densify(later), *more], ["ahead", "segment"][: 1 + len(more)])
+        ahead = checked_function("ahead", inputs, [ca.densify(later), *more], ["ahead", "segment"][: 1 + len(more)])
     bend = None
-    bent = ca.triu(curvature(b.kinematics, b.pulls)) if b.pulls else ca.SX(nv, nv)
+    bent = ca.SX(nv, nv)
+    if b.pulls:
+        bent = widened(layout, widened(layout, ca.triu(curvature(b.kinematics, b.pulls))).T).T
     if bent.nnz():
-        bend = _function("bend", [*inputs, b.pull], [bent], ["bend"])
+        bend = checked_function("bend", [*inputs, b.pull], [bent], ["bend"])
     return Program(rows, ahead, bend, balls, sensed)
-
-
-def _shared_pattern(transposed: ca.SX) -> ca.SX:
-    """Give all rows of a task the same columns, if that at most doubles the entries: they are then one dense block."""
-    rows = transposed.shape[1]
-    columns = sorted(set(transposed.sparsity().row()))
-    if rows < 2 or len(columns) * rows > 2 * transposed.nnz():
-        return transposed
-    return ca.project(transposed, ca.Sparsity.rowcol(columns, list(range(rows)), transposed.shape[0], rows))
-
-
-def _function(name: str, inputs: list[ca.SX], outputs: list[ca.SX], labels: list[str]) -> ca.Function:
-    free = ca.symvar(ca.veccat(*outputs))
-    known = {s.__hash__() for s in ca.symvar(ca.veccat(*inputs))}
-    stray = [s.name() for s in free if s.__hash__() not in known]
-    if stray:
-        raise ShapeError(f"stack.{name}", stray, "an item's expression contains symbols that are not its inputs")
-    return ca.Function(name, inputs, ca.cse(outputs), ["q", "v", "p", "dt", "pull"][: len(inputs)], labels)
-
-
-def sparsity_rows(transposed: ca.Sparsity) -> tuple[np.ndarray, np.ndarray]:
-    """(starts, columns) of the rows of J from the sparsity of its transpose (compressed columns)."""
-    return np.array(transposed.colind(), dtype=np.int64), np.array(transposed.row(), dtype=np.int64)

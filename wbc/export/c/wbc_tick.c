@@ -39,7 +39,7 @@ wbc_controller *wbc_init(wbc_memory *memory) {
 
 void wbc_reset(wbc_controller *c, const double *v) {
     wbc_tick *t = inside(c);
-    for (int i = 0; i < NV; i++) t->v_last[i] = v ? v[i] : 0.0;
+    for (int i = 0; i < DOFS; i++) t->v_last[i] = v ? v[i] : 0.0;
     wbc_tick_reset(t);
 }
 
@@ -47,7 +47,7 @@ int wbc_step(wbc_controller *c, const double *q, const double *v) {
     wbc_tick *t = inside(c);
     memcpy(t->q, q, NQ * sizeof(double));
     if (v) {
-        memcpy(t->v_in, v, NV * sizeof(double));
+        memcpy(t->v_in, v, DOFS * sizeof(double));
         t->use_v = 1.0;
     }
     const int flag = wbc_tick_step(t);

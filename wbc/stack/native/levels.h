@@ -234,7 +234,8 @@ static int all_levels(wbc_tick *t, int flag) {
     wbc_report *out = &t->report;
     double error = 0.0;
     int going = flag == WBC_SOLVED || flag == WBC_RELAXED;
-    if (going) tidy(out);
+    /* Rows of slacks are nearly dependent where they bind: the point that levels begin at is refined */
+    if (going && !SLACKS) tidy(out);
     else wbc_tick_certify(t);
     memset(out->levels, 0, sizeof out->levels);
     for (int k = 0; k < MT; k++) out->share[k] = 0.0;

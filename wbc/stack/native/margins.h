@@ -30,7 +30,7 @@ static void brake_for_margins(wbc_tick *t) {
         if (!(plain > 0.0)) continue;
         double a = 0.0;
         for (int e = a_start[k]; e < a_end[k]; e++)
-            if (t->at[e] != 0.0) a += fabs(t->at[e]) * limit[a_col[e]];
+            if (t->at[e] != 0.0 && a_col[e] < DOFS) a += fabs(t->at[e]) * limit[a_col[e]];
         /* also where a is 0 and nothing moves the margin */
         if (!(a > 0.0 && a < WBC_INF * 1e-6)) continue;
         const double closing = t->free_low[k] + plain, speed = stopping(h, a, larger(closing, 0.0), t->dt);

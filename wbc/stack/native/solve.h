@@ -39,7 +39,7 @@ static void partly(wbc_tick *t, const double *found, double share) {
     brake(t);
     for (int i = 0; i < NV; i++) way[i] = (isfinite(found[i]) ? clamp(found[i], t->low[i], t->high[i]) : 0.0) - t->x[i];
     for (int k = 0; k < MC; k++) {
-        if (MINIMISED(k)) continue;
+        if (MINIMISED(k) || slack_of[k] >= 0) continue;
         const double at = row_at(t, k, t->x), change = row_at(t, k, way), rounding = TOLERANCE * row_scale[k];
         const double down = t->free_low[k] - rounding - at, up = t->free_high[k] + rounding - at;
         if (change < 0.0 && change < down) share = smaller(share, smaller(down, 0.0) / change);

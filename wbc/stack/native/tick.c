@@ -32,6 +32,18 @@ static int unsound(const wbc_tick *t, int flag) {
     return !((optimal || t->report.error_bound <= KNOWN * LONGEST) && t->report.violation <= SOUND * LONGEST);
 }
 
+/* By how much soft rows are violated; the slack of those that give way by more than is worth telling */
+static void tell_soft_rows(wbc_tick *t) {
+    for (int k = 0; k < MC; k++) {
+        if (slack_of[k] < 0) continue;
+        double value = 0.0;
+        for (int e = a_start[k]; e < a_end[k]; e++)
+            if (a_col[e] != slack_of[k]) value += t->at[e] * t->report.v[a_col[e]];
+        const double missed = fmax(t->free_low[k] - value, value - t->free_high[k]);
+        t->report.slack[k] = t->report.flag != WBC_BRAKED && missed > slack_told[k] ? missed : 0.0;
+    }
+}
+
 EXPORT int wbc_tick_step(wbc_tick *t) {
     const int bad = wbc_tick_check(t);
     if (bad) return bad;
@@ -44,6 +56,7 @@ EXPORT int wbc_tick_step(wbc_tick *t) {
 #else
     wbc_tick_certify(t);
 #endif
+    if (SLACKS) tell_soft_rows(t);
     wbc_tick_look_ahead(t);
     memcpy(t->v_last, t->report.v, NV * sizeof(double));
     return unsound(t, flag) ? flag + WBC_UNSOUND : flag;

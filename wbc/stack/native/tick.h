@@ -1,7 +1,8 @@
 /* One control cycle: rows from CasADi, QP, solution, certificate. No allocation, no global state.
  *
  * The sizes and tables that this file uses are in "stack.h", which is generated for one stack:
- *   NQ NV NP    configuration, velocity, parameters
+ *   NQ NV NP    configuration, variables of the QP, parameters
+ *   DOFS        the first of the variables are velocities; the others are slacks and shares, see soft.py
  *   MT MC NB MH task rows, general constraint rows, bound blocks, margin rows (arrays have at least one entry)
  *   NNZJ NNZA   structural non-zeros of task rows and of general rows
  *   j_start j_col a_start a_end a_col   their positions, row by row
@@ -13,6 +14,8 @@
  *   pull_scale  how much curvature a row of unit error may have
  *   brake_at brake_limit   entry of bound_enabled that limits the acceleration of a velocity (-1: none), and the limit
  *   row_order   class of each general row in the order of sacrifice
+ *   SLACKS      whether there are soft rows
+ *   slack_of slack_told   variable that is its slack (-1: none), and the violation from which on that is told
  *   row_scale   its unit: the characteristic length for rows in metres
  *   BALLS SEGMENTS   items whose rows are distances between a ball and segments of links, and those segments
  *   ball_pose ball_velocity ball_margin ball_rate   where their inputs are in p
@@ -55,7 +58,7 @@
 
 /* What a tick reports, in this order, before the row-wise outputs. */
 typedef struct {
-    double v[NV];         /* the command */
+    double v[NV];         /* the command, and the other variables */
     double flag;          /* one of the flags above */
     double iterations;    /* of the active-set solver, all solves of the tick together */
     double stationarity;  /* largest entry of |H v + g + A' lambda|, per dof */

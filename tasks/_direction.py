@@ -1,0 +1,51 @@
+"""The direction of a task's command, kept: what ``stack.add(task, scaled=True)`` adds below the task."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
+
+import casadi as ca
+
+from wbc.symbolic.tracer import Tracer
+from wbc.tasks.base import Constraint, Row, Rows, Task, Values
+
+if TYPE_CHECKING:
+    from wbc.robot import Robot
+
+#: Price of a task's direction against the task's own weight: what is off the line is this many times as expensive as
+#: what is missing along it
+DIRECTION_PRICE = 1e6
+
+
+@dataclass(frozen=True)
+class Direction(Constraint):
+    """J v = lambda w with one number lambda in [0, 1], for the rates w = -gain e - de/dt that a task asks for.
+
+    The tick has the variable mu = 1 - lambda for it, and the rows
+
+        factor_i (J_i v + mu w_i) = factor_i w_i        for the task's rows i      [unit of e per second]
+        0 <= mu <= 1
+
+    of which the first are soft at the price 1e6 times the task's weight. Fading and the run-time mask are the task's.
+
+    Attributes:
+        of: the task's name in the stack. task: the task.
+    """
+
+    # made by the stack, so no part of the vocabulary
+    abstract: ClassVar[bool] = True
+    equality: ClassVar[bool] = True
+
+    of: str
+    task: Task
+
+    def rows(self, robot: Robot) -> tuple[Row, ...]:
+        """Those of the task, per second, and that of lambda."""
+        own = self.task.rows(robot)
+        rates = [Row(r.label, r.unit if r.unit.endswith("/s") else f"{r.unit or '1'}/s") for r in own]
+        return (*rates, Row("scale", ""))
+
+    def velocity_rows(self, robot: Robot, kin: Tracer, inputs: Values, dt: ca.SX) -> Rows | None:
+        """None: the rows are made from those that the task has in the same stack."""
+        return None
