@@ -22,10 +22,10 @@ DIRECTION_PRICE = 1e6
 class Direction(Constraint):
     """J v = lambda w with one number lambda in [0, 1], for the rates w = -gain e - de/dt that a task asks for.
 
-    The tick has the variable mu = 1 - lambda for it, and the rows
+    The tick has the variable nu = lambda |w| for it, and the rows
 
-        factor_i (J_i v + mu w_i) = factor_i w_i        for the task's rows i      [unit of e per second]
-        0 <= mu <= 1
+        factor_i (J_i v - nu w_i / |w|) = 0        for the task's rows i      [unit of e per second]
+        0 <= nu <= |w|
 
     of which the first are soft at the price 1e6 times the task's weight. Fading and the run-time mask are the task's.
 

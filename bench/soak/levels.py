@@ -6,13 +6,18 @@ import numpy as np
 
 import wbc
 from wbc.tasks import FrameVelocityLimit, Obstacle
+from wbc.tasks._direction import Direction
 
 #: Levels of tasks, and the share of margins and speed limits that are minimised at one
 DEPTH, SHARE = 3, 0.3
 
 
 def with_levels(stack: wbc.Stack, rng: np.random.Generator) -> wbc.Stack:
-    """The same items; every task at one of some levels, some constraints below the first."""
+    """The same items; every task at one of some levels, some constraints below the first.
+
+    None is scaled: what is asked for here, up to 5 km/s, makes forces of kept directions that hide those of other rows
+    at a level, and such ticks brake (docs/soft.md).
+    """
     out = wbc.Stack(stack.robot, dt=stack.dt, calm=stack.calm)
     for entry in stack.entries:
         level, item = 0, entry.item
@@ -20,5 +25,6 @@ def with_levels(stack: wbc.Stack, rng: np.random.Generator) -> wbc.Stack:
             level = int(rng.integers(DEPTH))
         elif isinstance(item, (FrameVelocityLimit, Obstacle)) and rng.random() < SHARE:
             level = int(rng.integers(1, DEPTH))
-        out.add(item, name=entry.name, level=level, weight=entry.weight)
+        if not isinstance(item, Direction):
+            out.add(item, name=entry.name, level=level, weight=entry.weight, soft=entry.price)
     return out

@@ -15,19 +15,19 @@ SAME = 1e-6
 
 
 def distance(qp: QP, x: Array) -> float | None:
-    """How far x is from the minimiser: quadprog's or, if that is further away than :data:`SAME`, the exact one of
+    """How far x, the first variables, is from the minimiser: quadprog's or, if that is further away than :data:`SAME`, the exact one of
     :func:`wbc.qp.reference.reference`, whose optimality conditions are verified with 60 digits. None: both give up.
 
     Where the smallest eigenvalue of H is 10^-12 of the largest, as weights of 1e-6 make it, quadprog is off by 1e-5.
     """
     best = referee(qp)
-    if best is not None and np.abs(best - x).max() <= SAME:
-        return float(np.abs(best - x).max())
+    if best is not None and np.abs(best[: x.size] - x).max() <= SAME:
+        return float(np.abs(best[: x.size] - x).max())
     try:
         best = reference(qp, make_solver("daqp", qp.n, qp.m).solve(qp, warm=False)).x
     except SolverError:
-        return None if best is None else float(np.abs(best - x).max())
-    return float(np.abs(best - x).max())
+        return None if best is None else float(np.abs(best[: x.size] - x).max())
+    return float(np.abs(best[: x.size] - x).max())
 
 
 def referee(qp: QP) -> Array | None:

@@ -21,6 +21,7 @@ from wbc.tasks import (
     Posture,
     WorkspaceBox,
 )
+from wbc.tasks._direction import Direction
 
 DT = 0.005
 
@@ -31,7 +32,7 @@ def weight(rng: np.random.Generator) -> float:
 
 
 def random_stack(robot: Robot, rng: np.random.Generator) -> wbc.Stack:
-    """Joint limits and a random choice of other items on random frames."""
+    """Joint limits and a random choice of other items on random frames, some soft at a price, some tasks scaled."""
     names = [frame.name for frame in robot.model.frames if str(frame.name).startswith("f")]
     stack = wbc.Stack(robot, dt=DT, calm=bool(rng.random() < 0.8))
 
@@ -41,25 +42,29 @@ def random_stack(robot: Robot, rng: np.random.Generator) -> wbc.Stack:
     def some(probability: float) -> bool:
         return bool(rng.random() < probability)
 
+    def price() -> float | None:
+        return weight(rng) if some(0.2) else None
+
     for k in range(int(rng.integers(1, 4))):
         kind = str(rng.choice(["pose", "position", "orientation"]))
-        stack.add(EndEffector(frame(), kind=kind), name=f"hand{k}", weight=weight(rng))
+        stack.add(EndEffector(frame(), kind=kind), name=f"hand{k}", weight=weight(rng), scaled=some(0.2))
     stack.add(Posture(), name="posture", weight=weight(rng))
     if some(0.3):
-        stack.add(Elbow(frame()), name="elbow", weight=weight(rng))
+        stack.add(Elbow(frame()), name="elbow", weight=weight(rng), scaled=some(0.2))
     if some(0.3):
         stack.add(Damping(), name="damping", weight=weight(rng))
     stack.add(JointLimits(return_rate=float(rng.uniform(0.0, 10.0))), name="limits")
     for k in range(int(rng.choice([0, 0, 1, 2]))):
-        stack.add(Hold(frame(), kind=str(rng.choice(["pose", "position", "orientation"]))), name=f"hold{k}")
+        kind = str(rng.choice(["pose", "position", "orientation"]))
+        stack.add(Hold(frame(), kind=kind), name=f"hold{k}", soft=price())
     for k in range(int(rng.choice([0, 1, 2]))):
-        stack.add(Obstacle(Sphere(float(rng.uniform(0.02, 0.3))), margin=0.01), name=f"ball{k}")
+        stack.add(Obstacle(Sphere(float(rng.uniform(0.02, 0.3))), margin=0.01), name=f"ball{k}", soft=price())
     if some(0.2):
         stack.add(Obstacle(HalfSpace()), name="floor")
     if some(0.3):
-        stack.add(FrameVelocityLimit(frame(), linear=float(rng.uniform(0.05, 1.0))), name="speed")
+        stack.add(FrameVelocityLimit(frame(), linear=float(rng.uniform(0.05, 1.0))), name="speed", soft=price())
     if some(0.2):
-        stack.add(WorkspaceBox(frame(), lower=(-0.5, -0.5, -0.5), upper=(0.5, 0.5, 0.5)), name="box")
+        stack.add(WorkspaceBox(frame(), lower=(-0.5, -0.5, -0.5), upper=(0.5, 0.5, 0.5)), name="box", soft=price())
     if some(0.1):
         stack.add(Fixed(str(rng.choice([n for n in robot.joint_names if n != "base"]))), name="fixed")
     return stack
@@ -84,5 +89,7 @@ def provoke(controller: Controller, rng: np.random.Generator) -> None:
         elif isinstance(item, Obstacle):
             handle.pose = pose(rng, 0.6)
             handle.velocity = np.concatenate((rng.normal(0.0, 0.5, 3), np.zeros(3)))
+        if entry.price is not None and not isinstance(item, Direction):
+            handle.price = weight(rng)
         if not isinstance(item, JointLimits):
             handle.enabled = bool(rng.random() < 0.8)

@@ -58,7 +58,11 @@ class Explainer:
             missed,
             costs,
             *self._residues(v, multipliers, status),
-            tuple((task, share) for task, share in scales(past.layout, v).items() if share < 1.0 - 1e-6),
+            tuple(
+                (task, share)
+                for task, share in scales(past.layout, v, past.part("error")).items()
+                if share < 1.0 - 1e-6
+            ),
         )
 
     def _infeasibility(self) -> Infeasibility:

@@ -42,7 +42,7 @@ class SolvedTick(Buffers):
     def __init__(self, assembly: Assembly, stack: Declaration, layout: Layout, solver: str) -> None:
         self.assembly = assembly
         self.share(assembly)
-        self._nv = layout.variables
+        self._nv, self._velocities = layout.variables, layout.nv
         self._places = ReportLayout(layout)
         self._solver = make_solver(solver, layout.variables, layout.general_rows)
         self._relaxation = Relaxation(layout.variables, layout.general_rows, self._solver)
@@ -92,7 +92,7 @@ class SolvedTick(Buffers):
             self._name_frozen_bounds(qp, answer)
             sides = QP(qp.H, qp.g, *self._met(qp, answer, v), qp.A)
             if levels is None:
-                certificate = certify(sides, Solution(v, multipliers, "solved"))
+                certificate = certify(sides, Solution(v, multipliers, "solved"), self._velocities)
             else:
                 multipliers = levels.multipliers
                 certificate = Levels.certified(levels, float(sides.violation(v).max(initial=0.0)))
@@ -163,6 +163,7 @@ class SolvedTick(Buffers):
                 return BRAKED, self.rest(qp), None
             answer = self._relaxation.solve(sides, self._orders, self._units, self._dof_scales)
             if answer.flag != "failed":
+                answer = self._soft.polished(qp, answer)
                 return RELAXED if crossed.any() or answer.flag == "relaxed" else SOLVED, answer.x, answer
         return BRAKED, self.rest(qp), None
 

@@ -268,7 +268,7 @@ class Step:
         """lambda of every scaled task by name, in [0, 1]: it is followed at this share of the rates that it asks for;
         0 where the tick brakes. docs/soft.md.
         """
-        found = scales(self._context.layout, self._part("v"))
+        found = scales(self._context.layout, self._part("v"), self._part("error"))
         return dict.fromkeys(found, 0.0) if self.status is Status.BRAKED else found
 
     @property

@@ -41,7 +41,7 @@ def _sizes(snapshot: Snapshot) -> str:
         "NV": (layout.nv, "degrees of freedom: numbers of a velocity"),
         "VARIABLES": (
             layout.variables,
-            "of the QP: the velocities, slacks of soft rows, and 1 - lambda of scaled tasks",
+            "of the QP: the velocities, slacks of soft rows, and speeds of scaled tasks",
         ),
         "NP": (layout.parameters, "run-time inputs"),
         "TASK_ROWS": (layout.task_rows, "rows of tasks"),

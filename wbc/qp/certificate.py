@@ -41,8 +41,10 @@ class Certificate:
     error_bound: float
 
 
-def certify(qp: QP, solution: Solution) -> Certificate:
+def certify(qp: QP, solution: Solution, count: int | None = None) -> Certificate:
     """The certificate of ``solution.x`` and ``solution.multipliers``; the flag is not read.
+
+    The bound is on the errors of the first ``count`` variables; None: of all.
 
     x* is the minimiser of the problem whose bounds are the given ones up to the rounding of one
     evaluation, 4 u (|b_i| + |C_i|_1 |x|_inf) with u = 2^-53.
@@ -57,12 +59,12 @@ def certify(qp: QP, solution: Solution) -> Certificate:
         float(stationarity.max(initial=0.0)),
         float(qp.violation(x).max(initial=0.0)),
         float(product.max(initial=0.0)),
-        error_bound(qp, solution),
+        error_bound(qp, solution, count),
     )
 
 
-def error_bound(qp: QP, solution: Solution) -> float:
-    """The bound on max |x_j - x*_j|, or inf."""
+def error_bound(qp: QP, solution: Solution, count: int | None = None) -> float:
+    """The bound on max |x_j - x*_j| over the first ``count`` variables, or inf."""
     factor = Factor(qp)
     if not factor.definite:
         return np.inf
@@ -98,7 +100,7 @@ def error_bound(qp: QP, solution: Solution) -> float:
     step = np.linalg.norm(factor.inverse.T @ force) + np.linalg.norm(np.abs(factor.inverse).T @ rounding) + rest
     reach = np.sqrt(np.einsum("ij,ij->i", factor.inverse, factor.inverse))
     total = np.abs(exact - x).astype(np.float64) + reach * float(step) * (1.0 + 2.0 * loss) / (1.0 - loss)
-    return float(total.max(initial=0.0))
+    return float(total[:count].max(initial=0.0))
 
 
 def _magnitudes(qp: QP, x: Array, lam: Array) -> Array:

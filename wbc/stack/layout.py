@@ -66,7 +66,8 @@ class Layout:
         row_levels: place in ``levels`` of each general row that is minimised there, -1 for hard rows.
         nv: degrees of freedom. variables: of the QP; what comes after the velocities are slacks of soft rows, and
             shares of scaled tasks.
-        slack_rows: task row -> the slack that it minimises.
+        slack_rows: task row -> the slack that it minimises. share_rows: task row -> the speed of a scaled task; such a
+            row counts for nothing, and its error is the speed that is asked for.
         nothing: a place in the parameters that holds 0, where there are slacks.
     """
 
@@ -80,6 +81,7 @@ class Layout:
         self.levels = stack.levels
         self.row_levels: list[int] = []
         self.slack_rows: dict[int, int] = {}
+        self.share_rows: dict[int, int] = {}
         self._ends: list[int] = []
         variables: dict[str, slice] = {}
         for level in self.levels:
@@ -102,8 +104,10 @@ class Layout:
         for k in range(count):
             self.slack_rows[self.task_rows + k] = first + k
         self.task_rows += count
-        # of a kept direction, the last row is about a variable of its own
-        self.variables += len(entry.item.rows(stack.robot))
+        self.variables += count
+        if isinstance(entry.item, Direction):
+            self.share_rows[self.task_rows] = self.variables
+            self.task_rows, self.variables = self.task_rows + 1, self.variables + 1
         return slice(first, self.variables)
 
     def _add(self, stack: Declaration, entry: Entry, variables: slice = slice(0, 0)) -> None:

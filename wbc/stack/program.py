@@ -40,7 +40,7 @@ from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Block, Layout, Slot
 from wbc.stack.pattern import checked_function, shared_pattern
 from wbc.stack.sensed import Sensed
-from wbc.stack.soft import kept_direction, slacks, softened, unlimited, widened
+from wbc.stack.soft import kept_direction, slacks, softened, speeds, unlimited, widened
 from wbc.symbolic import rotations as rot
 from wbc.symbolic.curvature import Pull, curvature
 from wbc.symbolic.kinematics import Kinematics, Pose
@@ -178,7 +178,7 @@ class _Builder:
         """Rows of a constraint over all variables, its margins and their factors."""
         item = block.entry.item
         if isinstance(item, Direction):
-            rows, margin, factor = kept_direction(self.layout, block, *self.tasks[item.of][1:]), None, None
+            rows, margin, factor = kept_direction(self.stack, self.layout, block, *self.tasks[item.of][1:]), None, None
         else:
             rows, margin, factor = self.constraint(block)
             rows = Rows(widened(self.layout, rows.matrix.T).T, rows.lower, rows.upper)
@@ -253,7 +253,7 @@ def build(stack: Declaration, layout: Layout, loops: bool = False) -> Program:
     nv = layout.variables
     tasks = [(block.start, *b.task(block)) for block in layout.of_form("task")]
     tasks = [(start, e, w, f, widened(layout, shared_pattern(J.T))) for start, e, w, f, J in tasks]
-    tasks = sorted([*tasks, *slacks(layout)], key=lambda part: part[0])
+    tasks = sorted([*tasks, *slacks(layout), *speeds(stack, layout, b.tasks)], key=lambda part: part[0])
     general = [b.general(block) for block in layout.of_form("margins", "rows")]
     bounds = []
     for block in layout.of_form("bounds"):
