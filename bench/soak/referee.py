@@ -15,8 +15,9 @@ SAME = 1e-6
 
 
 def distance(qp: QP, x: Array) -> float | None:
-    """How far x, the first variables, is from the minimiser: quadprog's or, if that is further away than :data:`SAME`, the exact one of
-    :func:`wbc.qp.reference.reference`, whose optimality conditions are verified with 60 digits. None: both give up.
+    """How far x, the first variables, is from the minimiser: quadprog's or, if that is further away than :data:`SAME`,
+    the exact one of :func:`wbc.qp.reference.reference`, whose optimality conditions are verified with 60 digits. None:
+    both give up.
 
     Where the smallest eigenvalue of H is 10^-12 of the largest, as weights of 1e-6 make it, quadprog is off by 1e-5.
     """
