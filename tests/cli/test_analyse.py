@@ -54,6 +54,19 @@ def test_certificate_on_screen_and_gone_on_with(tmp_path: Path) -> None:
     assert "no set of 1 or fewer constraints is complete" in out
 
 
+def test_pictures_of_a_locus(tmp_path: Path) -> None:
+    code, out, _ = run("spherical_4r", "--set", "alpha", "--plot", tmp_path)
+    assert code == 0
+    assert out.count("written") == 4
+    names = {"spherical_4r-alpha.txt", "spherical_4r-alpha.tex"}
+    names |= {"spherical_4r-alpha-locus.png", "spherical_4r-alpha-poses.png"}
+    assert {p.name for p in tmp_path.iterdir()} == names
+    assert "q2 = +-pi/2" in (tmp_path / "spherical_4r-alpha.txt").read_text()
+    assert r"q_{2} = \pm\pi/2" in (tmp_path / "spherical_4r-alpha.tex").read_text()
+    # A picture has something on it: many different bytes
+    assert all(p.stat().st_size > 10_000 for p in tmp_path.glob("*.png"))
+
+
 def test_bad_input() -> None:
     assert run("spherical_4r", "--set", "gamma")[0] == 2
     assert run("spherical_4r", "--algorithm", "rsda")[0] == 2

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -23,6 +24,7 @@ from wbc.analysis import (
     factored_determinant,
     published_sets,
 )
+from wbc.analysis.pictures import save_pictures
 from wbc.analysis.published import ROBOTS
 from wbc.cli.certificates import Subdivision, certified, record, winner
 from wbc.cli.console import out
@@ -67,6 +69,7 @@ Resume = Annotated[
     Path | None,
     typer.Option(help="Folder to keep certificates in and go on from.", rich_help_panel=_OUTPUT),
 ]
+Plot = Annotated[Path | None, typer.Option("--plot", help="Folder for pictures of the loci.", rich_help_panel=_OUTPUT)]
 Latex = Annotated[bool, typer.Option("--latex", help="Formulas as LaTeX.", rich_help_panel=_OUTPUT)]
 Json = Annotated[Path | None, typer.Option("--json", help="File for the results as data.", rich_help_panel=_OUTPUT)]
 
@@ -85,6 +88,7 @@ def analyse_(
     screen: Screen = None,
     minutes: Minutes = 30.0,
     resume: Resume = None,
+    plot: Plot = None,
     latex: Latex = False,
     json_: Json = None,
 ) -> None:
@@ -123,6 +127,8 @@ def analyse_(
             found = analyse(model, task, rows, algorithm=algorithm)
             _show(name, found, latex)
             entry = _record(name, found)
+            if plot is not None:
+                _pictures(model, found, plot, f"{robot} {name}")
         if how is not None:
             if screen is not None:
                 out().print(f"[bold]{escape(name)}[/bold]")
@@ -130,6 +136,11 @@ def analyse_(
         records.append(entry)
     if json_ is not None:
         _write(json_, {"robot": robot, "algorithm": algorithm, "sets": records})
+
+
+def _pictures(model: ExactModel, found: Analysis, folder: Path, name: str) -> None:
+    for file in save_pictures(model, found, folder, re.sub(r"\W+", "-", name)):
+        out().print(f"  written  {escape(str(file))}", soft_wrap=True)
 
 
 def _plane(text: str) -> PitchPlaneRows:
