@@ -21,6 +21,8 @@ from wbc.analysis import (
     Relation,
     SymbolicJacobian,
     analyse,
+    candidate_rows,
+    certify,
     factored_determinant,
     joint_roots,
     published_sets,
@@ -223,3 +225,11 @@ def test_a23_dexterous_arm_with_both_rolls() -> None:
         assert rank(numeric.value((*sets.task, *sets.sets["alpha, q1, q7"]), q)) == 6
     for name in ("spdm_arm_simplified", "spdm_arm"):
         assert run(name, "alpha, q1, q7, elbow").verdict == "strict"
+
+
+def test_dexterous_arm_with_all_offsets_by_subdivision() -> None:
+    """The published programs failed on it. Elbow and both rolls locked suffice at every configuration."""
+    sets, rows = published_sets("spdm_arm"), candidate_rows("spdm_arm")
+    found = certify(ExactModel(sets.robot), sets.task, [rows[name] for name in ("elbow", "q1", "q7")], workers=1)
+    assert (found.verdict, found.everywhere, found.joints) == ("complete", True, (2, 3, 4))
+    assert found.counts.regular_part == pytest.approx(1.0, abs=1e-9)
