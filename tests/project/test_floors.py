@@ -16,6 +16,7 @@ FLOORS = {
     "wbc.validation": 0,
     "wbc.shapes": 0,
     "wbc.style": 0,
+    "wbc.terminal": 0,
     "wbc.symbolic": 1,
     "wbc.robot": 2,
     "wbc.robots": 2,

@@ -17,6 +17,7 @@ from wbc.errors import NotFiniteError, RangeError, ShapeError, UnknownNameError
 from wbc.teleop import Keyboard, Order, RateFile, RateFileError, Teleoperation, run_session
 from wbc.teleop.keyboard import HELD
 from wbc.teleop.session import STALE
+from wbc.terminal import NoTerminalError
 
 Q = np.array([0.3, 0.5, -0.7, 1.1])
 
@@ -120,7 +121,7 @@ def test_a_terminal_is_read_and_left_as_it_was(session: Teleoperation, monkeypat
     assert np.abs(log.v[20]).max() > 1e-3
     with Path(os.devnull).open() as nothing:
         monkeypatch.setattr(sys, "stdin", nothing)
-        with pytest.raises(ShapeError, match="no terminal"), Keyboard().terminal():
+        with pytest.raises(NoTerminalError, match="no terminal"), Keyboard().terminal():
             pass
 
 

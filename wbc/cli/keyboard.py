@@ -2,18 +2,12 @@
 
 from __future__ import annotations
 
-import contextlib
-import os
-import select
-import sys
-import termios
 import time
-import tty
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 
 import numpy as np
 
-from wbc.errors import WbcError
+from wbc.terminal import END_OF_INPUT
 from wbc.validation import Array
 
 #: Rates that a key adds: speeds [m/s] and spin [rad/s]
@@ -28,12 +22,8 @@ KEYS = {
     "q": (0.0, 0.0, -SPIN),
 }
 #: Keys that stop the body, and that end the drive: x, Escape and the end of the input
-HALT, END = " ", "x\x1b\x04"
+HALT, END = " ", "x\x1b" + END_OF_INPUT
 HELP = "w s: along, d a: round, e q: turn, blank: stop, x: end"
-
-
-class NoTerminalError(WbcError):
-    """There is no terminal to read keys from."""
 
 
 class KeyCommands:
@@ -62,43 +52,3 @@ class KeyCommands:
             elif key in KEYS:
                 self._rates = np.round(self._rates + KEYS[key], 9)
         return None if self._over else self._rates.copy()
-
-
-def terminal() -> int:
-    """The descriptor of the standard input.
-
-    Raises:
-        NoTerminalError: it is no terminal.
-    """
-    if not sys.stdin.isatty():
-        raise NoTerminalError("commands", "keyboard", "the standard input is no terminal; give a file of commands")
-    return sys.stdin.fileno()
-
-
-@contextlib.contextmanager
-def terminal_keys(file: int | None = None) -> Iterator[Callable[[], str]]:
-    """Keys of a terminal as they are pressed, without waiting; it is as before afterwards.
-
-    Args:
-        file: descriptor of the terminal; default: the standard input.
-
-    Raises:
-        NoTerminalError: the standard input is none.
-    """
-    number = terminal() if file is None else file
-    before = termios.tcgetattr(number)
-
-    def read() -> str:
-        out = b""
-        while select.select([number], [], [], 0.0)[0]:
-            some = os.read(number, 64)
-            if not some:
-                return out.decode(errors="ignore") + END[-1]
-            out += some
-        return out.decode(errors="ignore")
-
-    try:
-        tty.setcbreak(number)
-        yield read
-    finally:
-        termios.tcsetattr(number, termios.TCSADRAIN, before)

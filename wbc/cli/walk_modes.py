@@ -8,9 +8,10 @@ from pathlib import Path
 
 from wbc import validation
 from wbc.cli.console import err
-from wbc.cli.keyboard import HELP, KeyCommands, terminal, terminal_keys
+from wbc.cli.keyboard import HELP, KeyCommands
 from wbc.errors import RangeError
 from wbc.robots import Walker, WalkerData
+from wbc.terminal import terminal, terminal_keys
 from wbc.walking.commands import read_commands
 from wbc.walking.plan import Regrasp
 from wbc.walking.run.arm_run import arm_task, perform_arm
@@ -44,7 +45,7 @@ def performance(request: WalkRequest, machine: Walker, resume: str, ask: bool) -
     else:
         request.path(structure, machine.data)
     if request.commands == "keyboard":
-        terminal()
+        terminal("commands")
         return lambda backend, told, stop: _driven_by_keys(request, machine, backend, stop)
     if request.commands:
         table = read_commands(request.commands)

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from enum import StrEnum
+from typing import TypeAlias
 
 from wbc import validation
 from wbc.analysis.rows import BodyRows, JointRows
@@ -43,18 +44,15 @@ class Mode(StrEnum):
 
 #: Short names, as operators say them
 SHORT = {mode.name: mode for mode in Mode}
+#: The pairs of a mode, or the part that a robot lacks
+Made: TypeAlias = "Sequence[CoordinatePair] | str"
+NOT_REDUNDANT = "joint beyond those that its tip takes"
 
 
 class MissingPartError(WbcError):
     """A mode that a robot has no rows for; ``part`` is what it lacks."""
 
-    def __init__(self, robot: str, mode: Mode, part: str) -> None:
-        self.part = part
-        super().__init__("mode", f"{mode.name} on {robot}", f"the robot has no {part}")
-
-
-class _Missing(Exception):
-    """Why a mode is not there."""
+    part = ""
 
 
 def mode(name: str | Mode) -> Mode:
@@ -78,10 +76,12 @@ def mode_pairs(robot: str, wanted: str | Mode) -> tuple[CoordinatePair, ...]:
             is missing.
     """
     chosen, found = mode(wanted), parts(robot)
-    try:
-        return tuple(_MAKERS[chosen](found))
-    except _Missing as missing:
-        raise MissingPartError(robot, chosen, str(missing)) from None
+    pairs = _MAKERS[chosen](found)
+    if isinstance(pairs, str):
+        error = MissingPartError("mode", f"{chosen.name} on {robot}", f"the robot has no {pairs}")
+        error.part = pairs
+        raise error
+    return tuple(pairs)
 
 
 def mode_table() -> dict[str, dict[Mode, tuple[CoordinatePair, ...] | str]]:
@@ -105,22 +105,24 @@ def _others(found: Parts, arm: Arm) -> tuple[Coordinate, ...]:
 
 
 def _redundant(arm: Arm) -> tuple[Coordinate, ...]:
-    if arm.redundancy != 1:
-        raise _Missing("joint beyond those that its tip takes")
-    return arm.candidates()
+    return arm.candidates() if arm.redundancy == 1 else ()
 
 
-def _end_effector(found: Parts) -> Sequence[CoordinatePair]:
+def _end_effector(found: Parts) -> Made:
     arm = found.arms[0]
-    return [CoordinatePair(arm.tip, (one, *_others(found, arm)), f"{arm.tip} | {one}") for one in _redundant(arm)]
+    return [
+        CoordinatePair(arm.tip, (one, *_others(found, arm)), f"{arm.tip} | {one}") for one in _redundant(arm)
+    ] or NOT_REDUNDANT
 
 
-def _self_motion(found: Parts) -> Sequence[CoordinatePair]:
+def _self_motion(found: Parts) -> Made:
     arm = found.arms[0]
-    return [CoordinatePair(one, (arm.tip, *_others(found, arm)), f"{one} | {arm.tip}") for one in _redundant(arm)]
+    return [
+        CoordinatePair(one, (arm.tip, *_others(found, arm)), f"{one} | {arm.tip}") for one in _redundant(arm)
+    ] or NOT_REDUNDANT
 
 
-def _intermediate(found: Parts) -> Sequence[CoordinatePair]:
+def _intermediate(found: Parts) -> Made:
     arm = found.arms[0]
     assert arm.middle is not None
     task = arm.middle
@@ -133,11 +135,11 @@ def _intermediate(found: Parts) -> Sequence[CoordinatePair]:
     return [CoordinatePair(task, (*plane, *arm.locks(arm.before_middle), *_others(found, arm)), f"{task} | {held}")]
 
 
-def _position(found: Parts) -> Sequence[CoordinatePair]:
+def _position(found: Parts) -> Made:
     arm = found.arms[0]
     if not arm.tip.rotation:
         if not arm.redundancy:
-            raise _Missing("joint beyond those that its tip takes")
+            return NOT_REDUNDANT
         return _end_effector(found)
     point = BodyRows(arm.tip.frame, rotation=(), name=f"{arm.prefix}tip")
     wrist = arm.locks(4)
@@ -148,7 +150,7 @@ def _position(found: Parts) -> Sequence[CoordinatePair]:
     ]
 
 
-def _joints(found: Parts) -> Sequence[CoordinatePair]:
+def _joints(found: Parts) -> Made:
     every = [lock for arm in found.everything for lock in arm.locks()]
     every += [] if found.body is None else [JointRows(found.body)]
     return [CoordinatePair(one, [o for o in every if o is not one], f"{one} | other joints") for one in every]
@@ -159,9 +161,9 @@ def _hands(found: Parts) -> tuple[Coordinate, ...]:
     return tuple(one for arm in found.arms for one in (arm.tip, arm.alpha) if one is not None)
 
 
-def _two_arms(found: Parts) -> Sequence[CoordinatePair]:
+def _two_arms(found: Parts) -> Made:
     if len(found.arms) < 2 or found.body is None:
-        raise _Missing("second arm")
+        return "second arm"
     body = JointRows(found.body)
     out = []
     for arm in found.arms:
@@ -174,25 +176,25 @@ def _two_arms(found: Parts) -> Sequence[CoordinatePair]:
     return out
 
 
-def _carried(found: Parts) -> Sequence[CoordinatePair]:
+def _carried(found: Parts) -> Made:
     carrier = found.carrier
     if carrier is None or found.body is None:
-        raise _Missing("carrier")
+        return "carrier"
     assert carrier.alpha is not None
     held = (*_hands(found), JointRows(found.body), carrier.alpha)
     return [CoordinatePair(carrier.tip, held, f"{carrier.tip} | hands")]
 
 
-def _over_determined(found: Parts) -> Sequence[CoordinatePair]:
+def _over_determined(found: Parts) -> Made:
     arm = found.arms[0]
     if arm.middle is None:
-        raise _Missing("point between base and tip")
+        return "point between base and tip"
     if not arm.redundancy:
         return [CoordinatePair(arm.tip, arm.locks(1)[:1], f"{arm.tip} | {arm.joints[1]}")]
     return [CoordinatePair(arm.middle, (arm.tip, *_others(found, arm)), f"{arm.middle} | {arm.tip}")]
 
 
-_MAKERS: dict[Mode, Callable[[Parts], Sequence[CoordinatePair]]] = {
+_MAKERS: dict[Mode, Callable[[Parts], Made]] = {
     Mode.M1: _end_effector,
     Mode.M2: _self_motion,
     Mode.M3: _intermediate,

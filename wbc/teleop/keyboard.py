@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import os
-import select
-import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 
 from wbc import validation
-from wbc.errors import ShapeError
 from wbc.teleop.order import AT_ONCE, Order
+from wbc.terminal import END_OF_INPUT, terminal_keys
 
 #: Key -> (row of the task, direction)
 AXES = {
@@ -51,7 +48,7 @@ class Keyboard:
         self.factor, self._typed = 1.0, ""
         self._until = [-1.0] * AT_ONCE
         self._sign = [0.0] * AT_ONCE
-        self._descriptor: int | None = None
+        self._read: Callable[[], str] | None = None
 
     def feed(self, text: str) -> None:
         """Keys that were typed since the last order."""
@@ -61,14 +58,14 @@ class Keyboard:
         """What the keys say: axes that are held, another pair, or stop.
 
         Raises:
-            StopIteration: quit was typed.
+            StopIteration: quit was typed, or the input ended.
         """
-        if self._descriptor is not None:
-            self.feed(_waiting(self._descriptor))
+        if self._read is not None:
+            self.feed(self._read())
         typed, self._typed = self._typed, ""
         pair, stop = None, False
         for key in typed:
-            if key == QUIT:
+            if key in (QUIT, END_OF_INPUT):
                 raise StopIteration
             if key in AXES:
                 row, sign = AXES[key]
@@ -92,25 +89,10 @@ class Keyboard:
         """Read keys as they are typed, without echo, until the end of the block.
 
         Raises:
-            ShapeError: standard input is no terminal.
+            NoTerminalError: standard input is no terminal.
         """
-        if not sys.stdin.isatty():
-            raise ShapeError("keyboard", sys.stdin.name, "standard input is no terminal")
-        import termios
-        import tty
-
-        descriptor = sys.stdin.fileno()
-        before = termios.tcgetattr(descriptor)
-        tty.setcbreak(descriptor)
-        self._descriptor = descriptor
-        try:
-            yield self
-        finally:
-            self._descriptor = None
-            termios.tcsetattr(descriptor, termios.TCSADRAIN, before)
-
-
-def _waiting(descriptor: int) -> str:
-    """What can be read without waiting."""
-    ready, _, _ = select.select([descriptor], [], [], 0.0)
-    return os.read(descriptor, 1024).decode(errors="ignore") if ready else ""
+        with terminal_keys() as self._read:
+            try:
+                yield self
+            finally:
+                self._read = None
