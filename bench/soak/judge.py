@@ -70,14 +70,18 @@ class Judge:
 
 
 class Outside:
-    """Joints that are outside their limits brake, return, and do not go further out again."""
+    """Joints that are outside a limit brake, return, and do not go further out there again.
+
+    Lower and upper limits are watched apart: a joint that enters faster than its acceleration can take away on the way
+    across leaves on the other side, whatever is commanded.
+    """
 
     def __init__(self, robot: Robot) -> None:
         self.robot = robot
         self.at = np.flatnonzero(robot.position_index >= 0)
         self.q_at = robot.position_index[self.at]
-        self.turned = np.zeros(self.at.size, dtype=bool)
-        self.last = np.zeros(self.at.size)
+        self.turned = np.zeros((2, self.at.size), dtype=bool)
+        self.last = np.zeros((2, self.at.size))
 
     def begin(self, q: Array) -> None:
         """Another episode."""
@@ -85,10 +89,10 @@ class Outside:
         self.last[:] = self._beyond(q)
 
     def _beyond(self, q: Array) -> Array:
+        """How far below the lower and above the upper limits."""
         limits, x = self.robot.limits, q[self.q_at]
-        return np.asarray(
-            np.maximum(0.0, np.maximum(limits.position_lower[self.at] - x, x - limits.position_upper[self.at]))
-        )
+        out = (limits.position_lower[self.at] - x, x - limits.position_upper[self.at])
+        return np.asarray(np.maximum(0.0, np.stack(out)))
 
     def look(self, q: Array) -> str:
         """After a step."""

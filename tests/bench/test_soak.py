@@ -126,6 +126,11 @@ def test_a_joint_that_turns_may_not_go_out_again() -> None:
     watch.begin(q)
     assert [seen(x) for x in (0.12, 0.11, 0.05)] == ["", "", ""]
     assert seen(0.06) == "a violated position limit is violated more"
+    # Across the range and out on the other side: too fast to be stopped
+    watch.begin(q)
+    span = robot.limits.position_upper[at] - robot.limits.position_lower[at]
+    assert [seen(x) for x in (0.05, -0.5 * span, -span - 0.05, -span - 0.06, -span - 0.055)] == [""] * 5
+    assert seen(-span - 0.07) == "a violated position limit is violated more"
 
 
 def test_exceptions_are_counted(controller: Controller) -> None:
