@@ -55,8 +55,10 @@ def test_a_hold_that_vanishes_before_the_hand_is_there(walk: Walk) -> None:
 
 
 def test_a_hold_that_vanishes_in_the_hand(walk: Walk) -> None:
-    for _ in range(60):
+    # On its way, before it lifts a hand
+    while walk.path_time < 0.04:
         walk.tick()
+    assert len(walk.held) == 3
     gone = walk.structure.ids[walk.held[0]]
     walk.vanish([gone])
     assert 0 not in walk.held

@@ -92,6 +92,13 @@ class Grips:
         out: Array = first + (inside - low)[..., None] * (self.postures[row + 1] - first)
         return out
 
+    def bent_from(self, angle: float) -> Ints:
+        """First samples at which the elbows are bent by an angle [rad] ``[grips]``; one behind the end for none."""
+        bent = np.append(self.postures[:, 2] <= -angle, True)
+        following = np.minimum.accumulate(np.where(bent, np.arange(len(bent)), len(bent))[::-1])[::-1]
+        out: Ints = np.minimum(following[self.offset] - self.offset + self.first, self.last + 1)
+        return out
+
     def of_arm(self, arm: int) -> Ints:
         """Grips of an arm, on holds that are there."""
         return np.nonzero((self.arm == arm) & (self.hold >= 0))[0]

@@ -20,6 +20,7 @@ from wbc.walking.plan import HoldLost, Plan, Regrasp
 from wbc.walking.replanning import way_to
 from wbc.walking.structure import Structure
 from wbc.walking.swing_law import SwingLaw
+from wbc.walking.swings import SETTLE
 from wbc.walking.walk_hands import BEHIND, HAND_RAMP, HAND_STOP, LANDING, at_rest, hand_pace, turned
 from wbc.walking.walk_stack import WalkStack
 from wbc.walking.walk_state import Event, Hand, State, Swinging, What, Wrist
@@ -64,7 +65,7 @@ class Hands(ABC):
         self.stack.structure = structure
         self.chain = ClosedChain(walker, structure)
         self.grasps = grasps or (lambda _arm, _hold: True)
-        self.time, self.path_time, self.pace = 0.0 if state is None else state.time, 0.0, 0.0
+        self.time, self.path_time, self.pace, self.wanted = 0.0 if state is None else state.time, 0.0, 0.0, 1.0
         self.events: list[Event] = []
         self.swinging: Swinging | None = None
         self.told: tuple[int, Hand, int] | None = None
@@ -190,8 +191,7 @@ class Hands(ABC):
             if swinging.latch <= 1e-9:
                 swinging.state = "open"
         elif swinging.state == "open":
-            begins = float(self.grips.first[swinging.grip]) * self.plan.path.spacing
-            wanted = hand_pace(swinging, place, at_branch, begins - self.path_time, self.pace)
+            wanted = hand_pace(swinging, place, at_branch, self._due(swinging) - self.path_time, self.wanted)
             wanted, change = (0.0, self.dt / HAND_STOP) if self.aborted else (wanted, self.dt / HAND_RAMP)
             swinging.pace += min(max(wanted - swinging.pace, -change), change)
             swinging.clock = min(swinging.clock + swinging.pace * self.dt, swinging.law.duration)
@@ -207,6 +207,23 @@ class Hands(ABC):
         near = aim.blend > LANDING and at_branch
         at_hold = (self.structure.axes[swinging.hold], swinging.x) if near else None
         self.stack.swing(arm, (target, speed), (wrist, turning), at_hold)
+
+    def _give_up(self) -> None:
+        """A hand whose hold is out of reach from where the body stopped stays in the air, until there is a plan."""
+        swinging = self.swinging
+        if swinging is None or not swinging.counted or swinging.state != "open":
+            return
+        if self.path_time < float(self.grips.first[swinging.grip]) * self.plan.path.spacing:
+            self._stay(swinging.arm)
+            self.swinging = None
+
+    def _due(self, swinging: Swinging) -> float:
+        """Path time at which a hand is to be on its hold [s]: the plan's; as soon as possible where the body stops."""
+        soonest = float(self.grips.first[swinging.grip]) * self.plan.path.spacing
+        if self._changing or self.halted or not swinging.counted:
+            return soonest
+        due = self.plan.regrasps[self.next].land - self.data.latch_time - SETTLE
+        return due if self.leash is None else max(min(due, self.leash[0]), soonest)
 
     def _bend(self, swinging: Swinging, blend: float) -> Wrist:
         """Joints 4 to 6 of a swinging arm at a part of their way, where the body is now."""

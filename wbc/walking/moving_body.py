@@ -18,8 +18,10 @@ from wbc.walking.structure import Structure
 from wbc.walking.swings import SETTLE
 from wbc.walking.walk_hands import BEHIND, HAND_STOP
 
-#: From rest to the commanded speed [s]
-RAMP = 0.25
+#: From rest to the commanded speed, and back where hands would lose their holds [s]
+RAMP, BRAKE = 0.5, 0.25
+#: A hand may land so much path time later than planned [s]
+LATE = 0.2
 #: Poses behind the body that are kept, for going back
 TRAIL = 400
 #: What a body or a hand may be off its way at the end of a stop [m], and parts of a way that is measured
@@ -55,11 +57,11 @@ class MovingBody(Hands):
     def stopping(self) -> tuple[float, float]:
         """How far the body's origin and the hand in the air can travel after an abort now [m].
 
-        The ways that they are told to go while their paces fall from p to 0, which is p^2 RAMP / 2 of path time and
+        The ways that they are told to go while their paces fall from p to 0, which is p^2 BRAKE / 2 of path time and
         p^2 HAND_STOP / 2 of the swing's, and a tick; what they are behind now; and what they may be off at the end.
         """
         path, u = self.plan.path, self.path_time
-        left = 0.5 * self.pace**2 * RAMP + self.pace * self.dt
+        left = 0.5 * self.pace**2 * BRAKE + self.pace * self.dt
         body = _length([path.at(x)[0].translation for x in np.linspace(u, u + left, PARTS)])
         body += float(np.linalg.norm(self.q[:3] - path.at(u)[0].translation)) + OFF
         swinging = self.swinging
@@ -117,17 +119,20 @@ class MovingBody(Hands):
         end = end if self.leash is None else min(end, self.leash[0])
         if self.approve is not None and self.swinging is None and self.next < len(self.plan.regrasps):
             end = min(end, self.plan.regrasps[self.next].lift)
-        room = max(min([end, *ends]) - self.path_time, 0.0)
-        # The command stops within the room: braking from pace p takes p^2 RAMP / 2 of path time
-        wanted = min(1.0, sqrt(2.0 * room / RAMP * 0.9))
+        room, left = (max(limit - self.path_time, 0.0) for limit in (min([end, *ends]), end))
+        # The command stops within the room: braking from pace p in a time T takes p^2 T / 2 of path time
+        wanted = min(1.0, sqrt(2.0 * room / BRAKE * 0.9), sqrt(2.0 * left / RAMP * 0.9))
         if self.swinging is not None:
-            left = self.swinging.law.duration - self.swinging.clock + self.data.latch_time + SETTLE
-            if room < left:
-                wanted = min(wanted, room / left)
+            needed = self.swinging.law.duration - self.swinging.clock + self.data.latch_time + SETTLE
+            if self.swinging.counted and not self._changing:
+                # A hand that is late makes the body late too: the next ones then swing where they were planned to
+                room = min(room, max(self.plan.regrasps[self.next].land + LATE - self.path_time, 0.0))
+            if room < needed:
+                wanted = min(wanted, room / needed)
         if self._stands():
             wanted = 0.0
-        change = self.dt / RAMP
-        self.pace = max(self.pace + min(max(wanted - self.pace, -change), change), 0.0)
+        self.wanted = wanted
+        self.pace = max(self.pace + min(max(wanted - self.pace, -self.dt / BRAKE), self.dt / RAMP), 0.0)
         pose = path.at(self.path_time)[0]
         self.path_time = min(self.path_time + self.pace * self.dt, path.duration)
         command = path.at(self.path_time)[0]
@@ -165,14 +170,14 @@ class MovingBody(Hands):
 def longest_stop(plan: Plan, dt: float) -> tuple[float, float]:
     """How far the body's origin and a swinging hand can travel after an abort anywhere in a plan, at most [m].
 
-    v (RAMP / 2 + dt) with the body's largest speed, and w (HAND_STOP / 2 + dt) with the hands', and what they may be
+    v (BRAKE / 2 + dt) with the body's largest speed, and w (HAND_STOP / 2 + dt) with the hands', and what they may be
     behind then and off at the end. Of a hand that is brought to where a plan begins, :meth:`MovingBody.stopping` knows.
     """
     path = plan.path
     speed = float(np.linalg.norm(np.diff(path.poses[:, :3, 3], axis=0), axis=1).max()) / path.spacing
     swing = max((law.top_speed for law in plan.laws), default=0.0)
     hand = swing * (0.5 * HAND_STOP + dt) + BEHIND + OFF if plan.laws else 0.0
-    return speed * (0.5 * RAMP + dt) + 2.0 * OFF, hand
+    return speed * (0.5 * BRAKE + dt) + 2.0 * OFF, hand
 
 
 def _length(points: Sequence[Array]) -> float:

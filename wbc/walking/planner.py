@@ -34,7 +34,7 @@ DELAYS = (0.0, 0.25, 0.5, 1.0, 2.0, float("inf"))
 SOON = (0.0, float("inf"))
 #: Grips of an arm that a start may have, and stances that a search begins with
 START_GRIPS, STARTS = 10, 24
-#: A search that fails is made again, so many times as wide
+#: Where all searches fail, the one with any delay is made again, so many times as wide
 WIDER = 5
 #: Joints of one branch differ by less than this from where they are [rad]; other branches by more
 SAME_BRANCH = 0.3
@@ -116,7 +116,7 @@ def plan_slices(
         beginning: start, postures and avoid of :func:`plan_walk`. deadline: of ``time.perf_counter``.
         grips: of the path, if they are known. stance: grips that hold at the sample, instead of a beginning.
         sample: of the path, from which on hands may be lifted.
-        soon: somebody waits: of fewer delays (:data:`SOON`), the wide searches after all narrow ones.
+        soon: somebody waits: fewer delays are tried (:data:`SOON`).
         tries: delays and widths of the searches, one after the other, instead of what objective and width say.
         first: row of an arm and of a hold: the first re-grasp, whether it is needed or not.
 
@@ -129,13 +129,15 @@ def plan_slices(
     if grips is None:
         grips = yield from grip_slices(walker, structure, path)
     best: tuple[Found, tuple[SwingLaw, ...]] | None = None
-    delays: tuple[float, ...] = DELAYS if objective == "velocity" else DELAYS[-1:]
-    widths = (None,) if width is None else (width, WIDER * width)
-    if soon and objective == "velocity":
-        delays = SOON
-    after = [(delay, wide) for wide in widths for delay in delays] if soon else product(delays, widths)
-    for delay, wide in tries or after:
-        search = StanceSearch(walker, structure, path, grips, longest_delay=delay, width=wide, first=first)
+    delays: tuple[float, ...] = DELAYS[-1:] if objective == "destination" else SOON if soon else DELAYS
+    usual: list[tuple[float, int | None]] = [(delay, width) for delay in delays]
+    if width is not None:
+        usual.append((delays[-1], WIDER * width))
+    search: StanceSearch | None = None
+    for delay, wide in tries or usual:
+        search = StanceSearch(
+            walker, structure, path, grips, longest_delay=delay, width=wide, known=search, first=first
+        )
         starts = [stance] if stance else stances(walker, structure, search, beginning, sample)
         yield None
         found, laws = yield from sound_slices(search, starts, sample, deadline)
@@ -190,7 +192,7 @@ def stances(
         if len({int(grips.hold[g]) for g in stance}) == len(stance):
             until = search.until(stance, 0)
             if until > sample:
-                stances.append((-until, stance))
+                stances.append((-until, search.order(stance), stance))
     if not stances:
         raise NoPlanError(
             "plan",
@@ -198,7 +200,7 @@ def stances(
             "no stance is possible at the beginning: the arms are in each other's way",
             separating=_at_first(structure, grips),
         )
-    return [stance for _, stance in sorted(stances)[:STARTS]]
+    return [stance for _, _, stance in sorted(stances)[:STARTS]]
 
 
 def _at_first(structure: Structure, grips: Grips) -> list[str]:

@@ -8,8 +8,8 @@ from wbc.walking.slices import Slices
 from wbc.walking.stance_search import Found, StanceSearch
 from wbc.walking.swing_law import SwingLaw
 
-#: Searches again, each without a swing that turned out to be impossible
-AGAIN = 20
+#: Searches again, each without a swing that turned out to be impossible or slower by more than SLOWER [s]
+AGAIN, SLOWER = 20, 0.08
 
 
 def sound_slices(
@@ -18,8 +18,8 @@ def sound_slices(
     """As :meth:`StanceSearch.slices`, and the laws of the moves.
 
     The search has swings at fewer points, and with the body where a faster swing would have it. One that is not
-    possible as it would be carried out is refused, and the search made again; what was computed is kept. After
-    :data:`AGAIN` of them only the moves before the impossible one are left.
+    possible as it would be carried out is refused, of one that is slower the time is corrected, and the search made
+    again; what was computed is kept. After :data:`AGAIN` of them only the moves before the last such one are left.
     """
     laws: list[SwingLaw] = []
     for _ in range(AGAIN):
@@ -28,8 +28,10 @@ def sound_slices(
         for move in found.moves:
             yield None
             law = SwingLaw.of(search.swings, move)
-            if not law.possible:
-                search.swings.refuse(move.arm, move.source, move.target, move.lift, move.way)
+            planned = max(move.duration, 0.0 if move.delay else (move.land - move.lift) * search.path.spacing)
+            needed = law.duration + search.swings.extra
+            if not law.possible or needed > planned + SLOWER:
+                search.swings.correct(move.arm, move.source, move.target, move.lift, move.way, needed, law.possible)
                 break
             laws.append(law)
         else:

@@ -17,8 +17,9 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import combinations
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,72 +29,26 @@ from wbc.walking.arm_clearance import ArmClearance
 from wbc.walking.body_path import BodyPath
 from wbc.walking.grips import Grips, Ints
 from wbc.walking.slices import Slices, drained
+from wbc.walking.stance_moves import Found, Key, Move, Node, Worth
 from wbc.walking.structure import Structure
-from wbc.walking.swings import Swing, Swings
+from wbc.walking.swings import SETTLE, Swing, Swings
 
-Key = tuple[int, ...]
+__all__ = ["Found", "Key", "Move", "Node", "StanceSearch"]
 
 #: Hands land at least INSIDE samples inside a grip, wait for it at most HOVER [s], with |sin theta5| of at least BENT
 INSIDE, HOVER, BENT = 1, 0.75, 0.08
+#: and the elbow bent by at least ELBOW [rad]: joints 2 and 3 of an arm that is nearly straight correct slowly
+ELBOW = 0.5
+#: Hands land so many samples before a grip of another one ends; the body would slow down before it
+SPARE = 2
+#: What a swing usually takes, and how much more than enough time for swings is worth something [s]
+USUAL, SLACK = 2.1, 0.5
 #: Ways to one stance that are looked at, and stances that are checked together, in widths
 WAYS, PARTS = 2, 2
 #: Stances, and pairs of grips, of one slice of the search
 NODES, PAIRS = 3, 24
 #: Delays are counted in steps of this [s], so that rounding decides nothing
 QUANTUM = 1e-6
-
-
-@dataclass(frozen=True)
-class Move:
-    """An arm's swing: from grip to grip, lifted and landed at samples of the path.
-
-    Attributes:
-        arm, source, target: row of the arm, and grips.
-        lift, land: samples.
-        duration: of the swing, latches and settling included [s].
-        delay: by which the body is late after it, because it had to slow down [s].
-        way: of the hand, see :data:`wbc.walking.swing_curve.WAYS`.
-    """
-
-    arm: int
-    source: int
-    target: int
-    lift: int
-    land: int
-    duration: float
-    delay: float
-    way: int = 0
-
-
-@dataclass(frozen=True)
-class Node:
-    """A stance: since when, by what move, and the delay until then in QUANTUM."""
-
-    sample: int
-    delay: int
-    parent: Key | None
-    move: Move | None
-
-
-@dataclass(frozen=True)
-class Found:
-    """Outcome of a search.
-
-    Attributes:
-        start: the stance that it begins with.
-        moves: the moves, or those of the stance that lasts longest.
-        complete: the last stance lasts to the end of the path.
-        reached: last sample that the last stance can hold.
-        expanded: stances looked at.
-        blocking: grips of the last stance whose end is ``reached``.
-    """
-
-    start: Key
-    moves: tuple[Move, ...]
-    complete: bool
-    reached: int
-    expanded: int
-    blocking: tuple[int, ...]
 
 
 class StanceSearch:
@@ -103,7 +58,13 @@ class StanceSearch:
         longest_delay: of one swing [s]; 0: the body never slows down.
         width: stances kept of each number of re-grasps, None: all.
         first: row of an arm and of a hold: the first move, whether it is needed or not; None: any.
+        known: a search over the same grips, whose swings and distances need not be computed again.
     """
+
+    #: Hands land so many samples before a grip of another one ends
+    spare: ClassVar[int] = SPARE
+    clearance: ArmClearance
+    swings: Swings
 
     def __init__(
         self,
@@ -115,14 +76,29 @@ class StanceSearch:
         longest_delay: float = np.inf,
         width: int | None = 200,
         first: tuple[int, int] | None = None,
+        known: StanceSearch | None = None,
     ) -> None:
         self.walker, self.structure, self.path, self.grips = walker, structure, path, grips
-        self._equip()
+        if known is None:
+            self._equip()
+        else:
+            self.clearance, self.swings = known.clearance, known.swings
+        self._usual, self._slack = round(USUAL / path.spacing), SLACK / path.spacing
         self.longest_delay, self.width, self.first = longest_delay, width, first
         self.expanded = 0
         # The end of the path is no limit of the arm
-        self._latest = np.where(grips.last == len(path) - 1, grips.last, grips.last - INSIDE)
+        lasting = grips.last == len(path) - 1
+        self._latest = np.where(lasting, grips.last, grips.last - INSIDE)
+        self._ends = np.where(lasting, grips.last, grips.last - self.spare)
+        # The hand is on its hold before it is latched
+        self._touch = round((walker.tolerances.latch_time + SETTLE) / path.spacing)
+        self._soonest = self._landings()
         self._by_arm = [grips.of_arm(k) for k in range(len(walker.arms))]
+
+    def _landings(self) -> Ints:
+        """First samples at which hands land on grips."""
+        out: Ints = np.maximum(self.grips.first + INSIDE, self.grips.bent_from(ELBOW) + self._touch)
+        return out
 
     def _equip(self) -> None:
         """What the search asks about conflicts of grips, and about swings."""
@@ -143,10 +119,12 @@ class StanceSearch:
         levels = [level]
         while True:
             done = [
-                (node.delay, key) for key, node in level.items() if self.until(key, node.sample) >= len(self.path) - 1
+                (node.delay, self.order(key), key)
+                for key, node in level.items()
+                if self.until(key, node.sample) >= len(self.path) - 1
             ]
             if done and not (self.first and len(levels) == 1):
-                return self._result(levels, min(done)[1], True)
+                return self._result(levels, min(done)[2], True)
             if deadline is not None and time.perf_counter() > deadline:
                 break
             level = yield from self._next(level)
@@ -219,9 +197,10 @@ class StanceSearch:
                 targets = targets[grips.hold[targets] != grips.hold[g]]
             if not len(targets) or node.sample > min(room, end):
                 continue
-            duration = self.swings.estimate(source, targets)
+            soonest = self._soonest[targets]
+            about = np.minimum(np.maximum(node.sample, soonest - self._usual), min(end, room))
+            duration = self.swings.estimate(source, targets, about, np.maximum(about + self._usual, soonest))
             count = np.ceil(duration / spacing).astype(np.int64)
-            soonest = grips.first[targets] + INSIDE
             lift = np.minimum(np.maximum(node.sample, soonest - count), min(end, room))
             land = np.maximum(lift + count, soonest)
             hovers = land - lift - count
@@ -250,10 +229,10 @@ class StanceSearch:
         if swing is None or chosen is None:
             return None
         duration, room = chosen.duration, swing.room
-        land = max(move.lift + int(np.ceil(duration / self.path.spacing)), move.land if not move.delay else 0)
+        first, last = int(self._soonest[move.target]), int(self._latest[move.target])
+        land = max(move.lift + int(np.ceil(duration / self.path.spacing)), first)
         late = max(land - room, 0) * self.path.spacing
         land = min(land, room)
-        first, last = self.grips.first[move.target] + INSIDE, self._latest[move.target]
         if late > self.longest_delay or not first <= land <= last:
             return None
         if not self._bent(np.array([move.target]), np.array([land]))[0]:
@@ -263,18 +242,19 @@ class StanceSearch:
 
     def _bent(self, targets: Ints, samples: Ints) -> NDArray[np.bool_]:
         """Whether the wrist is bent enough to land: joint 4 turns the hand's axis only then."""
-        out: NDArray[np.bool_] = np.abs(np.sin(self.grips.posture(targets, samples)[..., 4])) >= BENT
+        out: NDArray[np.bool_] = np.abs(np.sin(self.grips.posture(targets, samples - self._touch)[..., 4])) >= BENT
         return out
 
     def _room(self, others: Sequence[int], sample: int) -> int:
-        """Last sample that the grips of some arms can hold together."""
-        end = min(int(self.grips.last[g]) for g in others)
+        """Last sample that the grips of some arms can hold together, less what is spared."""
+        end = min(int(self._ends[g]) for g in others)
         pairs = [self._conflict(a, b, sample) - 1 for a, b in combinations(others, 2)]
         return min([end, *pairs])
 
     def until(self, key: Sequence[int], sample: int) -> int:
         """Last sample that a stance can hold, from a sample on."""
-        return self._room(key, sample)
+        pairs = [self._conflict(a, b, sample) - 1 for a, b in combinations(key, 2)]
+        return min([int(self.grips.last[g]) for g in key] + pairs)
 
     def shortened(self, found: Found, count: int) -> Found:
         """What was found up to so many moves."""
@@ -288,17 +268,30 @@ class StanceSearch:
     def _conflict(self, one: int, other: int, sample: int) -> int:
         return self.clearance.first_conflict(one, other, sample)
 
-    def _promise(self, key: Key, node: Node) -> tuple[float, int, Key]:
-        """Long grips and early landings first; ties by holds and arms."""
-        ends = sorted(int(self.grips.last[g]) for g in key)
-        worth = ends[0] + 0.5 * sum(ends[1:]) / max(len(ends) - 1, 1) - 0.5 * node.sample
-        return -worth + node.delay * QUANTUM / self.path.spacing, node.sample, key
+    def order(self, key: Sequence[int]) -> tuple[tuple[int, int], ...]:
+        """What breaks ties: holds and branches, whichever arms they are of."""
+        return tuple(sorted((int(self.grips.hold[g]), int(self.grips.branch[g])) for g in key))
 
-    def _worth(self, key: Key, node: Node) -> tuple[float, int, Key]:
+    def _promise(self, key: Key, node: Node) -> Worth:
+        """Long grips, and time for the swings that must follow, first.
+
+        With the ends e_1 <= e_2 <= ... of its grips a stance that begins at j has the slack
+        min_k (e_k - j - (k - 1) n), as hands swing one after the other for n samples. What is more than :data:`SLACK`
+        is worth nothing.
+        """
+        finish, usual = len(self.path) - 1, self._usual
+        ends = sorted(int(self.grips.last[g]) for g in key)
+        # A grip that lasts to the end of the path needs no other
+        ends = [end if end < finish else finish + usual for end in ends]
+        slack = min(end - node.sample - k * usual for k, end in enumerate(ends))
+        worth = sum(ends) / len(ends) + min(slack, self._slack)
+        return -worth + node.delay * QUANTUM / self.path.spacing, node.sample, self.order(key), key
+
+    def _worth(self, key: Key, node: Node) -> Worth:
         """As the promise, of a checked stance: arms that get in each other's way end it."""
         until = self.until(key, node.sample)
-        promise, sample, _ = self._promise(key, node)
-        return promise + 2.0 * (min(int(self.grips.last[g]) for g in key) - until), sample, key
+        promise, sample, order, _ = self._promise(key, node)
+        return promise + 2.0 * (min(int(self.grips.last[g]) for g in key) - until), sample, order, key
 
     def _result(self, levels: list[dict[Key, Node]], key: Key | None, complete: bool) -> Found:
         depth = len(levels) - 1

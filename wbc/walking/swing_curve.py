@@ -12,12 +12,12 @@ from wbc.walking.grips import Ints
 from wbc.walking.structure import Structure
 
 #: Parts of the curve, at its beginning and its end, in which the hand does not go across
-UPRIGHT = 0.12
+UPRIGHT = 0.1
 #: The rise is h (1 - (1 - 2x)^STEEP)
 STEEP = 2
 #: How far a hand may be across its hold [m] where it comes out of the distance at which it may be near the structure,
 #: and what it then has besides the clearance [m]
-ACROSS, SPARE = 0.0015, 0.0025
+ACROSS, SPARE = 0.0015, 0.003
 #: Points at which the room above the structure is measured
 LOOKS = 9
 #: Ways that are tried, the first that is clear is taken: how much higher in the middle [m], and what part of the arc
@@ -44,7 +44,7 @@ class Curves:
         p = way(y) + (r ((1 - y) h_a + y h_b) + 4 y (1 - y) l) u
         r = 1 - (1 - 2 x)^2,     u = -(1 - y) z_a - y z_b,     y = step((x - c) / (1 - 2 c))
 
-    y, a fifth-degree step, is 0 over the first c of the curve and 1 over the last, so that the hand leaves and arrives
+    y, a third-degree step, is 0 over the first c of the curve and 1 over the last, so that the hand leaves and arrives
     along the normals. way(y) is the part w of the way from the chord a b to an arc round the axis of the arm's first
     joint, on which distance and angle change evenly: there joint 1 turns evenly, and the hand comes no nearer to it.
 
@@ -92,9 +92,9 @@ class Curves:
 
 
 def step(part: Array) -> Array:
-    """From 0 to 1 with two derivatives 0 at both ends: s^3 (10 - 15 s + 6 s^2), s clipped to [0, 1]."""
+    """From 0 to 1 with the derivative 0 at both ends: s^2 (3 - 2 s), s clipped to [0, 1]."""
     s = np.clip(part, 0.0, 1.0)
-    out: Array = s**3 * (10.0 - 15.0 * s + 6.0 * s * s)
+    out: Array = s * s * (3.0 - 2.0 * s)
     return out
 
 

@@ -16,6 +16,8 @@ from wbc.walking.grips import Grips, Ints
 
 #: Room of the wrist within its reach [m], and of joints 1 to 5 within their limits [rad]
 REACH_ROOM, ANGLE_ROOM = 0.3 * 0.0254, 0.02
+#: The elbow of a swinging arm stays this far from its limit [rad]: a straight arm cannot follow what its body does
+ELBOW_ROOM = 0.2
 #: The wrist stays this far from the axis of joint 1, besides the shoulder's offset [m]
 AXIS_ROOM = 0.08
 
@@ -82,5 +84,7 @@ def joint_paths(
     elbow = data.elbow_limit - angles[..., 2]
     possible = (square.min(axis=1) > AXIS_ROOM**2) & ((es + reach - distance).min(axis=1) > REACH_ROOM)
     # Limits of the published robot at the ends are kept as close as holding grips keep them
-    possible &= (room.min(axis=(1, 2)) > ANGLE_ROOM) & (np.minimum(lean, elbow).min(axis=1) > ANGLE_ROOM)
+    possible &= (
+        (room.min(axis=(1, 2)) > ANGLE_ROOM) & (lean.min(axis=1) > ANGLE_ROOM) & (elbow.min(axis=1) > ELBOW_ROOM)
+    )
     return angles, possible

@@ -195,8 +195,10 @@ class Walk(MovingBody):
 
     def _think(self) -> None:
         """Some slices of planning, if there is anything to plan; a plan that is found is taken."""
-        if self._changing and self._planning is None and self.pace == 0.0 and self.swinging is None:
-            self._planning = self._replan()
+        if self._changing and self._planning is None and self.pace == 0.0:
+            self._give_up()
+            if self.swinging is None:
+                self._planning = self._replan()
         if self._planning is None:
             return
         try:

@@ -9,6 +9,7 @@ import numpy as np
 
 from wbc.robots import WalkerData
 from wbc.validation import Array
+from wbc.walking.walk_stack import SWING_GAIN
 from wbc.walking.walk_state import Swinging
 
 #: A swing waits for a hand that is this far behind its aim [m]: full pace below half of it, least pace beyond
@@ -60,7 +61,9 @@ def at_rest(
         x: the x axis that it is to have, None if it may roll. tilt: ``max_tilt`` of the hold [rad].
     """
     (place, axis, side), (there, wanted) = hand, hold
-    if dist(place, there) >= SURE * data.close_distance or dist(place, before[0]) / dt >= SURE * data.close_speed:
+    # A hand at the turning point of an overshoot is slow, but what is left brings it up to speed again
+    near, slow = SURE * data.close_distance, SURE * data.close_speed
+    if dist(place, there) >= min(near, slow / SWING_GAIN) or dist(place, before[0]) / dt >= slow:
         return False
     turn = angle(axis, before[1])
     if x is not None:

@@ -22,7 +22,7 @@ DT = 0.01
 #: Weights: the body does not give way to a swing, a swing not to postures
 BODY, SWING, AXIS, WRIST, UPRIGHT = 1e4, 10.0, 3.0, 1e-3, 100.0
 #: Gains [1/s] of body, swinging hand, its axis and the wrists
-BODY_GAIN, SWING_GAIN, AXIS_GAIN, WRIST_GAIN = 12.0, 15.0, 12.0, 12.0
+BODY_GAIN, SWING_GAIN, AXIS_GAIN, WRIST_GAIN = 12.0, 25.0, 20.0, 12.0
 #: On the way the wrist follows its postures; near the next hold its axis counts
 FREE_AXIS, FREE_WRIST, RESTING = 1e-6, 40.0, 0.1
 

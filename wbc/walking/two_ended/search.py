@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +15,7 @@ from wbc.walking.arm_clearance import NEVER
 from wbc.walking.body_path import BodyPath
 from wbc.walking.grips import Grips, Ints
 from wbc.walking.slices import Slices
-from wbc.walking.stance_search import QUANTUM, Key, Node, StanceSearch
+from wbc.walking.stance_search import INSIDE, QUANTUM, Key, Node, StanceSearch
 from wbc.walking.structure import Structure
 from wbc.walking.swings import Chosen, Swing
 from wbc.walking.two_ended.postures import Grip, PairPostures
@@ -73,7 +74,7 @@ class Turns:
         source, target, held = (self._pairs.named(g) for g in (swing.source, swing.target, swing.others[0]))
         return Turn(swing.arm, source, target, held)
 
-    def estimate(self, source: int, targets: Ints) -> Array:
+    def estimate(self, source: int, targets: Ints, lift: Ints, land: Ints) -> Array:
         """Times that no swing is shorter than."""
         return np.zeros(len(targets))
 
@@ -101,6 +102,8 @@ class TurnSearch(StanceSearch):
         towards: places of the holds along the way [m]. goal: whether grips of near and far hand are an end.
     """
 
+    spare: ClassVar[int] = 0
+
     def __init__(
         self,
         walker: Walker,
@@ -115,6 +118,11 @@ class TurnSearch(StanceSearch):
         self._goal, self._gait, self._towards, self._paths = goal, gait, towards, paths
         standing = BodyPath(np.repeat(np.eye(4)[None], count, axis=0), SAMPLE)
         super().__init__(walker, structure, standing, grips_along(structure, towards, count), width=width)
+
+    def _landings(self) -> Ints:
+        """Right behind the beginning of grips: no joint has to be bent."""
+        out: Ints = self.grips.first + INSIDE
+        return out
 
     def _equip(self) -> None:
         self.pairs = Pairs(self._paths.postures, self.grips, len(self.path) - 1, self._goal)

@@ -1,0 +1,62 @@
+"""What a search over stances is made of: moves, stances with their way, and what was found."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+Key = tuple[int, ...]
+#: Less is better; ties by sample, by holds, by grips
+Worth = tuple[float, int, tuple[tuple[int, int], ...], Key]
+
+
+@dataclass(frozen=True)
+class Move:
+    """An arm's swing: from grip to grip, lifted and landed at samples of the path.
+
+    Attributes:
+        arm, source, target: row of the arm, and grips.
+        lift, land: samples.
+        duration: of the swing, latches and settling included [s].
+        delay: by which the body is late after it, because it had to slow down [s].
+        way: of the hand, see :data:`wbc.walking.swing_curve.WAYS`.
+    """
+
+    arm: int
+    source: int
+    target: int
+    lift: int
+    land: int
+    duration: float
+    delay: float
+    way: int = 0
+
+
+@dataclass(frozen=True)
+class Node:
+    """A stance: since when, by what move, and the delay until then in QUANTUM."""
+
+    sample: int
+    delay: int
+    parent: Key | None
+    move: Move | None
+
+
+@dataclass(frozen=True)
+class Found:
+    """Outcome of a search.
+
+    Attributes:
+        start: the stance that it begins with.
+        moves: the moves, or those of the stance that lasts longest.
+        complete: the last stance lasts to the end of the path.
+        reached: last sample that the last stance can hold.
+        expanded: stances looked at.
+        blocking: grips of the last stance whose end is ``reached``.
+    """
+
+    start: Key
+    moves: tuple[Move, ...]
+    complete: bool
+    reached: int
+    expanded: int
+    blocking: tuple[int, ...]
