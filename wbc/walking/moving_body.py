@@ -24,7 +24,7 @@ RAMP, BRAKE = 0.5, 0.25
 LATE = 0.2
 #: Poses behind the body that are kept, for going back
 TRAIL = 400
-#: What a body or a hand may be off its way at the end of a stop [m], and parts of a way that is measured
+#: What a body may be off its way at the end of a stop [m], and parts of a way that is measured
 OFF, PARTS = 0.002, 9
 
 
@@ -58,7 +58,8 @@ class MovingBody(Hands):
         """How far the body's origin and the hand in the air can travel after an abort now [m].
 
         The ways that they are told to go while their paces fall from p to 0, which is p^2 BRAKE / 2 of path time and
-        p^2 HAND_STOP / 2 of the swing's, and a tick; what they are behind now; and what they may be off at the end.
+        p^2 HAND_STOP / 2 of the swing's, and a tick; what they are behind now; and what they may be off at the end: OFF
+        for a body, BEHIND for a hand, whose arm was planned for the swing at full pace and not for the stop.
         """
         path, u = self.plan.path, self.path_time
         left = 0.5 * self.pace**2 * BRAKE + self.pace * self.dt
@@ -71,7 +72,7 @@ class MovingBody(Hands):
         left = 0.5 * pace**2 * HAND_STOP + pace * self.dt
         aims = [swinging.law.at(x).position for x in np.linspace(swinging.clock, swinging.clock + left, PARTS)]
         gap = float(np.linalg.norm(swinging.aim.position - self.chain.origins[swinging.arm]))
-        return body, _length(aims) + gap + OFF
+        return body, _length(aims) + gap + BEHIND
 
     def _move(self) -> float:
         """The robot moves by its joint rates for a tick, and by nothing else; the worst slip of a held hand [m]."""
@@ -170,13 +171,14 @@ class MovingBody(Hands):
 def longest_stop(plan: Plan, dt: float) -> tuple[float, float]:
     """How far the body's origin and a swinging hand can travel after an abort anywhere in a plan, at most [m].
 
-    v (BRAKE / 2 + dt) with the body's largest speed, and w (HAND_STOP / 2 + dt) with the hands', and what they may be
-    behind then and off at the end. Of a hand that is brought to where a plan begins, :meth:`MovingBody.stopping` knows.
+    v (BRAKE / 2 + dt) with the body's largest speed, and w (HAND_STOP / 2 + dt) with the hands', what they may be
+    behind then, and what they may be off at the end. Of a hand that is brought to where a plan begins,
+    :meth:`MovingBody.stopping` knows.
     """
     path = plan.path
     speed = float(np.linalg.norm(np.diff(path.poses[:, :3, 3], axis=0), axis=1).max()) / path.spacing
     swing = max((law.top_speed for law in plan.laws), default=0.0)
-    hand = swing * (0.5 * HAND_STOP + dt) + BEHIND + OFF if plan.laws else 0.0
+    hand = swing * (0.5 * HAND_STOP + dt) + 2.0 * BEHIND if plan.laws else 0.0
     return speed * (0.5 * BRAKE + dt) + 2.0 * OFF, hand
 
 
