@@ -117,15 +117,23 @@ def _each(jobs: list[Job], kept: Kept, pool: ProcessPoolExecutor | None) -> Iter
 def _run(jobs: list[Job], pool: ProcessPoolExecutor | None) -> Iterator[tuple[Job, Found]]:
     """Jobs as they end."""
     if pool is None:
-        _begin()
-        for job in jobs:
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore", RuntimeWarning)
-                yield job, job()
+        yield from ((job, _alone(job)) for job in jobs)
         return
     waiting = {pool.submit(job): job for job in jobs}
     for future in as_completed(waiting):
         yield waiting[future], future.result()
+
+
+def _alone(job: Job) -> Found:
+    """In this process, whose log and warnings are as before afterwards."""
+    logger = logging.getLogger("wbc")
+    level = logger.level
+    try:
+        with warnings.catch_warnings():
+            _begin()
+            return job()
+    finally:
+        logger.setLevel(level)
 
 
 def _begin() -> None:
