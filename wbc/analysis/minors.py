@@ -26,20 +26,23 @@ def eliminated(ring: TrigRing, matrix: Matrix) -> tuple[Matrix, int]:
         if not places:
             break
         i, j = min(places, key=lambda place: _fill(left, *place))
-        pivot, row = left[i][j], left[i]
-        number = pivot.leading_coefficient()
-        rest = []
-        for k, other in enumerate(left):
-            if k == i:
-                continue
-            if len(other[j]):
-                ratio = other[j] / number
-                other = [ring.normal(a - ratio * b) if len(b) else a for a, b in zip(other, row, strict=True)]
-            rest.append(other[:j] + other[j + 1 :])
-        left = rest
+        left = [row for row in without(ring, left, i, j) if any(len(p) for p in row)]
         count += 1
-        left = [row for row in left if any(len(p) for p in row)]
     return left, count
+
+
+def without(ring: TrigRing, matrix: Matrix, i: int, j: int) -> Matrix:
+    """What elimination with a pivot that is a number leaves: M_kl - M_kj M_il / M_ij for k other than i, l than j."""
+    row, number = matrix[i], matrix[i][j].leading_coefficient()
+    rest: Matrix = []
+    for k, other in enumerate(matrix):
+        if k == i:
+            continue
+        if len(other[j]):
+            ratio = other[j] / number
+            other = [ring.normal(a - ratio * b) if len(b) else a for a, b in zip(other, row, strict=True)]
+        rest.append(other[:j] + other[j + 1 :])
+    return rest
 
 
 def _fill(matrix: Matrix, i: int, j: int) -> int:

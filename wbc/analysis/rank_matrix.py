@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from wbc.analysis.jacobian import symbolic_jacobian
+from wbc.analysis.minors import without
 from wbc.analysis.model import ExactModel
 from wbc.analysis.ring import Matrix, Poly, TrigRing
 from wbc.analysis.rows import ALL, BodyRows, Rows
@@ -69,15 +70,7 @@ def reduced(ring: TrigRing, matrix: Matrix) -> Matrix:
         if not places:
             break
         i, j = min(places, key=lambda place: _alone(left, *place))
-        row, number = left[i], left[i][j].leading_coefficient()
-        rest: Matrix = []
-        for k, other in enumerate(left):
-            if k == i:
-                continue
-            if len(other[j]):
-                ratio = other[j] / number
-                other = [ring.normal(a - ratio * b) if len(b) else a for a, b in zip(other, row, strict=True)]
-            rest.append(other[:j] + other[j + 1 :])
+        rest = without(ring, left, i, j)
         left = [row for row in rest if any(len(p) for p in row)]
         if not left and rest and rest[0]:
             return [rest[0]]
