@@ -12,51 +12,14 @@ from itertools import product
 from math import cos, pi, sin
 
 import numpy as np
-import pinocchio as pin
 import pytest
 
 from tests import models
-from wbc.robot import Robot
+from tests.published.arm_machine import STATE, Machine, rank
+from wbc.coordinates import parts
 from wbc.robots import operator_arm
 
-STATE = np.array([0.3, 0.4, -0.5, 1.2, 0.7, -0.6, 0.9])
 HALF = pi / 2
-
-
-class Machine:
-    """Jacobians, rows [v; omega] in world axes, and places."""
-
-    def __init__(self, robot: Robot) -> None:
-        self.robot, self.model, self.data = robot, robot.model, robot.model.createData()
-
-    def rows(self, frame: str, q: np.ndarray, upto: int | None = None) -> np.ndarray:
-        index = self.model.getFrameId(frame)
-        J = pin.computeFrameJacobian(self.model, self.data, q, index, pin.LOCAL_WORLD_ALIGNED)
-        return J if upto is None else J[:upto]
-
-    def place(self, frame: str, q: np.ndarray) -> np.ndarray:
-        pin.framesForwardKinematics(self.model, self.data, q)
-        return np.array(self.data.oMf[self.model.getFrameId(frame)].translation)
-
-    def turn(self, frame: str, q: np.ndarray) -> np.ndarray:
-        pin.framesForwardKinematics(self.model, self.data, q)
-        return np.array(self.data.oMf[self.model.getFrameId(frame)].rotation)
-
-    def alpha(self, q: np.ndarray, pitch: int, wrist: str = "F5") -> np.ndarray:
-        """Rate of the pitch plane about the common normal of shoulder pitch and wrist pitch; ``pitch``: axis of F3."""
-        axis = self.turn("F3", q)[:, pitch]
-        r = self.place(wrist, q) - self.place("F3", q)
-        r = r - axis * (axis @ r)
-        return r / np.linalg.norm(r) @ self.rows("F2", q)[3:]
-
-    def in_plane(self, frame: str, body: str, q: np.ndarray, pitch: int) -> np.ndarray:
-        """beta (F3, F2) and gamma (F5, F6): angular velocity of a body about the pitch axis."""
-        return self.turn(frame, q)[:, pitch] @ self.rows(body, q)[3:]
-
-
-def rank(J: np.ndarray) -> int:
-    sigma = np.linalg.svd(J, compute_uv=False)
-    return int((sigma > 1e-9 * sigma[0]).sum())
 
 
 def test_a1_two_coordinates_of_the_rp_arm_and_its_system_jacobian() -> None:
@@ -68,33 +31,44 @@ def test_a1_two_coordinates_of_the_rp_arm_and_its_system_jacobian() -> None:
 
     for q, largest in (((0.4, 0.3), 1.6401219467), ((2.0, 0.9), 2.1470910554)):
         np.testing.assert_allclose(np.linalg.svd(system(np.array(q)), compute_uv=False), (largest, 1.0), atol=1e-10)
-    rng = np.random.default_rng(0)
-    for q in rng.uniform((0.0, 0.0), (2 * pi, 1.0), (200, 2)):
-        J, s, c = system(q), sin(q[0]), cos(q[0])
-        assert abs(np.linalg.svd(J, compute_uv=False)[-1] - 1.0) < 1e-12
+    states = np.random.default_rng(0).uniform((0.0, 0.0), (2 * pi, 1.0), (10_000, 2))
+    every = np.array([system(q) for q in states])
+    sigma = np.linalg.svd(every, compute_uv=False)
+    assert np.abs(sigma[:, 1] - 1.0).max() < 1e-12
+    np.testing.assert_allclose(sigma[:, 0], np.sqrt(1.0 + (1.0 + states[:, 1]) ** 2), atol=1e-12)
+    for q, J in zip(states[:200], every, strict=False):
+        s, c = sin(q[0]), cos(q[0])
         charts = {(0, 2): -s * c, (1, 3): s * c, (0, 3): -s * s, (1, 2): c * c, (2, 3): -(1 + q[1]), (0, 1): 0.0}
         for rows, wanted in charts.items():
             assert abs(np.linalg.det(J[list(rows)]) - wanted) < 1e-12
 
 
 def test_a3_planar_arm_and_the_entry_that_is_missing_in_print() -> None:
-    """J_T in the frame of link 3; the printed (2, 2) entry lacks L3 and fails."""
-    arm, (l1, l2, l3) = Machine(operator_arm("planar_3r").robot), (1.0, 0.8, 0.5)
+    """J_T and the middle's rows in the frame of link 3; the printed (2, 2) entry of J_T lacks L3 and fails."""
+    arm, (l1, l2, l3) = Machine(parts("planar_3r").robot), (1.0, 0.8, 0.5)
     for q in np.random.default_rng(1).uniform(0.0, 2 * pi, (20, 3)):
         s23, c23, s3, c3 = sin(q[1] + q[2]), cos(q[1] + q[2]), sin(q[2]), cos(q[2])
         J = arm.turn("F3", q).T[:2] @ arm.rows("tip", q)[:3]
         right = np.array([[l1 * s23 + l2 * s3, l2 * s3, 0.0], [l1 * c23 + l2 * c3 + l3, l2 * c3 + l3, l3]])
         np.testing.assert_allclose(J, right, atol=1e-12)
         assert abs(J[1, 1] - l2 * c3) > 0.49
+        middle = np.array([[l1 * s23 + l2 * s3 / 2, l2 * s3 / 2, 0.0], [l1 * c23 + l2 * c3 / 2, l2 * c3 / 2, 0.0]])
+        np.testing.assert_allclose(arm.turn("F3", q).T[:2] @ arm.rows("middle", q)[:3], middle, atol=1e-12)
+        for frame in ("tip", "middle"):
+            steps = [(arm.place(frame, q + 1e-6 * e) - arm.place(frame, q - 1e-6 * e)) / 2e-6 for e in np.eye(3)]
+            np.testing.assert_allclose(arm.rows(frame, q)[:3], np.transpose(steps), atol=1e-6)
+        assert (rank(J), rank(np.vstack((J, middle)))) == (2, 3)
+        assert rank(np.vstack((J, middle))[1:]) == 3
     for q2, q3 in product((0.0, pi), repeat=2):
-        assert rank(arm.rows("tip", np.array([0.4, q2, q3]), 2)) == 1
+        q = np.array([0.4, q2, q3])
+        task = arm.rows("tip", q, 2)
+        assert (rank(task), rank(np.vstack((task, arm.rows("middle", q, 2))))) == (1, 2)
 
 
 def test_a4_planar_places() -> None:
-    arm, q = Machine(operator_arm("planar_3r").robot), np.array([0.3, 0.7, -0.4])
+    arm, q = Machine(parts("planar_3r").robot), np.array([0.3, 0.7, -0.4])
     np.testing.assert_allclose(arm.place("tip", q)[:2], (1.8002461413, 1.2510182312), atol=1e-10)
-    middle = 0.5 * (arm.place("F2", q) + arm.place("F3", q))
-    np.testing.assert_allclose(middle[:2], (1.1714574115, 0.6321086006), atol=1e-10)
+    np.testing.assert_allclose(arm.place("middle", q)[:2], (1.1714574115, 0.6321086006), atol=1e-10)
 
 
 def test_a8_spherical_shoulder() -> None:
@@ -103,8 +77,18 @@ def test_a8_spherical_shoulder() -> None:
     np.testing.assert_allclose(arm.place("end3", q), (0.6712121662, -0.5406867876, 0.5070818728), atol=1e-10)
     alpha = arm.alpha(q, 1, "tip")
     np.testing.assert_allclose(alpha, (0.8568085373, -0.2162946881, 0.0, 0.0), atol=1e-10)
+    # (4.5) to (4.7) and (4.9)
+    s, c, c34, s34 = np.sin(q), np.cos(q), cos(q[2] + q[3]), sin(q[2] + q[3])
+    r = arm.place("tip", q) - arm.place("F3", q)
+    np.testing.assert_allclose(arm.turn("F3", q).T @ r, (1.0 + 0.8 * c[3], 0.0, -0.8 * s[3]), atol=1e-12)
+    length = np.linalg.norm(r)
+    assert abs(length - 1.5381007101) < 1e-10
+    row = np.array([c[1] * (c[2] + 0.8 * c34), s[2] + 0.8 * s34, 0.0, 0.0]) / length
+    np.testing.assert_allclose(alpha, row, atol=1e-12)
+    np.testing.assert_allclose(arm.in_plane("F3", "F2", q, 1), (s[1], 0.0, 0.0, 0.0), atol=1e-12)
     J = arm.rows("tip", q, 3)
     assert abs(np.linalg.det(np.vstack((J, alpha))) - 0.9623687431) < 1e-10
+    assert abs(0.8 * s[3] * c[1] * length - 0.9623687431) < 1e-10
     assert abs(np.linalg.det(np.vstack((J, arm.in_plane("F3", "F2", q, 1)))) - 0.5132990839) < 1e-10
 
 
@@ -135,20 +119,24 @@ def test_a15_simplified_space_station_arm() -> None:
         wanted = c[1] * c[5] * L**3 * s[3] * np.sqrt(2 * (1 + c[3]))
         found = np.linalg.det(np.vstack((arm.rows("tip", q), arm.alpha(q, 1))))
         assert abs(found - wanted) < 1e-9 * L**3
-    for branch in range(4):
+    for branch, side in product(range(4), (HALF, -HALF)):
         q = rng.uniform(-1.0, 1.0, 7)
+        assert rank(arm.rows("tip", q)) == 6
         if branch == 0:
             q[3] = 0.0
         elif branch == 1:
-            q[1], q[5] = HALF, -HALF
+            q[1], q[5] = side, -HALF
         elif branch == 2:
-            q[1], q[3] = HALF, pi - 2 * q[2]
+            q[1], q[3] = side, pi - 2 * q[2]
         else:
-            q[5], q[3] = -HALF, pi - 2 * q[4]
+            q[5], q[3] = side, pi - 2 * q[4]
         assert rank(arm.rows("tip", q)) == 5
-    for joint in (1, 5):
+    # Folded, the centres of shoulder and wrist are one point
+    q[[3, 5]] = pi, 0.3
+    assert rank(arm.rows("tip", q)) == 4
+    for joint, side in product((1, 5), (HALF, -HALF)):
         q = rng.uniform(-1.0, 1.0, 7)
-        q[joint] = HALF
+        q[joint] = side
         J = arm.rows("tip", q)
         assert rank(J) == 6
         assert rank(np.vstack((J, arm.alpha(q, 1)))) == 6
@@ -163,12 +151,13 @@ def test_a16_elbow_and_both_in_plane_rates_complete_the_simplified_arm() -> None
         plane = [arm.in_plane("F3", "F2", q, 1), arm.in_plane("F5", "F6", q, 1)]
         return np.vstack((arm.rows("tip", q), arm.rows("end3", q, 3), *plane))
 
-    for q4, shoulder, wrist in product((0.0, pi), ((1, 0.0), (2, HALF)), ((5, pi), (4, -HALF))):
+    places = ((1, 0.0), (1, pi), (2, HALF), (2, -HALF)), ((5, 0.0), (5, pi), (4, HALF), (4, -HALF))
+    for q4, shoulder, wrist in product((0.0, pi), *places):
         q = rng.uniform(-1.0, 1.0, 7)
         q[3], q[shoulder[0]], q[wrist[0]] = q4, shoulder[1], wrist[1]
         assert rank(tall(q)) == 6
         assert rank(arm.rows("tip", q)) < 6
-    for q in rng.uniform(-pi, pi, (200, 7)):
+    for q in rng.uniform(-pi, pi, (1000, 7)):
         assert rank(tall(q)) == 7
 
 
@@ -191,22 +180,35 @@ def test_a17_space_station_arm() -> None:
 
 def test_a20_branches_of_the_space_station_arm() -> None:
     """(4.30), (4.31) and the corrected (4.32) are roots with a regular task; (4.32) as printed is not."""
-    arm, locks = Machine(operator_arm("ssrms").robot), np.eye(7)
-    cases = (
-        ({2: -2.187788992, 3: 1.2, 4: 0.7}, locks[0], 0.605769),
-        ({2: -0.55, 3: 1.2, 4: 0.7548913334}, locks[1], 0.593796),
-        ({2: -0.5, 3: 2.978321908, 4: 0.7}, None, 0.233673),
-    )
-    for changes, row, least in cases:
+    arm, locks, (L, D) = Machine(operator_arm("ssrms").robot), np.eye(7), (7.11, -0.7026)
+
+    def det(q: np.ndarray, row: np.ndarray | None) -> float:
+        return float(np.linalg.det(np.vstack((arm.rows("tip", q), arm.alpha(q, 1) if row is None else row))))
+
+    q3, q4, q5 = -0.5, 1.2, 0.7
+    roll = -q4 - np.arctan((L * (1 + cos(q4)) + D * sin(q5)) / (L * sin(q4) + D * cos(q5)))
+    argument = (L * (sin(-0.55) + sin(-0.55 + q4)) + D) / D
+    assert argument == pytest.approx(0.1651449657, abs=1e-9)
+    both, across = 2 * L + D * (sin(q3) + sin(q5)), D * (cos(q3) + cos(q5))
+    squares = D * D * (sin(q3) ** 2 - cos(q5) ** 2 + sin(q3) * sin(q5) - cos(q3) * cos(q5))
+    plane = np.arctan2(-across * both, -(2 * L * (L + D * (sin(q3) + sin(q5))) + squares))
+    assert np.tan(plane / 2) == pytest.approx(-both / across, rel=1e-12)
+    yaw = 0.55 - q4 + np.arccos(argument)
+    np.testing.assert_allclose((roll, yaw, plane), (-2.187788992, 0.7548913334, 2.978321908), atol=1e-9)
+    for changes, row, least in (
+        ((roll, q4, q5), locks[0], 0.605769),
+        ((roll + pi, q4, q5), locks[0], 0.601564),
+        ((-0.55, q4, yaw), locks[1], 0.593796),
+        ((q3, plane, q5), None, 0.233673),
+    ):
         q = STATE.copy()
-        for k, value in changes.items():
-            q[k] = value
-        J = arm.rows("tip", q)
-        assert abs(np.linalg.det(np.vstack((J, arm.alpha(q, 1) if row is None else row)))) < 1e-6
-        assert abs(np.linalg.svd(J, compute_uv=False)[-1] - least) < 1e-5
-    q = STATE.copy()
-    q[[2, 3, 4]] = -0.5, 0.162021849, 0.7
-    assert np.linalg.det(np.vstack((arm.rows("tip", q), arm.alpha(q, 1)))) == pytest.approx(86.5680895, rel=1e-8)
+        q[[2, 3, 4]] = changes
+        assert abs(det(q, row)) < 1e-10
+        assert np.linalg.svd(arm.rows("tip", q), compute_uv=False)[-1] == pytest.approx(least, abs=1e-6)
+    q[[2, 3, 4]] = q3, 0.162021849, q5
+    assert det(q, None) == pytest.approx(86.5680895, rel=1e-8)
+    rows = np.vstack((arm.rows("tip", q), arm.alpha(q, 1)))
+    assert np.linalg.svd(rows, compute_uv=False)[-1] == pytest.approx(0.20961, abs=1e-5)
 
 
 def test_a21_what_completes_the_space_station_arm() -> None:
@@ -247,12 +249,20 @@ def test_a22_dexterous_arm() -> None:
 
     for row, value in ((locks[0], 1.289576388549845), (locks[1], 0.256401285169675), (None, 1.207441981487824)):
         assert det(STATE, row) == pytest.approx(value, rel=1e-12)
-    folded = at(q4=3.022046029, q5=0.7)
-    assert abs(det(folded, None)) < 1e-8
-    assert abs(np.linalg.svd(arm.rows("tip", folded), compute_uv=False)[-1] - 0.083719) < 1e-5
-    assert abs(det(at(q3=-2.283400310, q4=1.2, q5=0.7), locks[0])) < 1e-8
-    assert abs(det(at(q3=-0.62, q4=1.3, q5=-0.921118910), locks[1])) < 1e-8
-    assert det(at(q3=-0.62, q4=1.3, q5=-0.438881090), locks[1]) == pytest.approx(0.069963545, rel=1e-6)
+    L, D = 1.0, 0.2
+    fold = np.arctan2(2 * D * sin(0.7) * (2 * L + D * cos(0.7)), -(4 * L * (L + D * cos(0.7)) + D * D * cos(1.4)))
+    roll = -1.2 - np.arctan((L * (1 + cos(1.2)) + D * cos(0.7)) / (L * sin(1.2) - D * sin(0.7)))
+    bend = np.arcsin(L * (sin(-0.62) + sin(-0.62 + 1.3)) / D)
+    yaw, printed = 0.62 - 1.3 - bend, 0.62 - 1.3 + bend
+    np.testing.assert_allclose((fold, roll), (3.022046029, -2.283400310), atol=1e-9)
+    np.testing.assert_allclose((yaw, printed), (-0.921118910, -0.438881090), atol=1e-9)
+    folded = at(q4=fold, q5=0.7)
+    assert abs(det(folded, None)) < 1e-12
+    assert abs(np.linalg.svd(arm.rows("tip", folded), compute_uv=False)[-1] - 0.083719) < 1e-6
+    assert abs(det(at(q3=roll, q4=1.2, q5=0.7), locks[0])) < 1e-12
+    assert abs(det(at(q3=-0.62, q4=1.3, q5=yaw), locks[1])) < 1e-12
+    assert abs(det(at(q3=-0.62, q4=1.3, q5=pi - 2 * 0.68 - yaw), locks[1])) < 1e-12
+    assert det(at(q3=-0.62, q4=1.3, q5=printed), locks[1]) == pytest.approx(0.069963545, rel=1e-6)
 
 
 def test_a23_dexterous_arm_with_both_rolls() -> None:
@@ -270,32 +280,6 @@ def test_a23_dexterous_arm_with_both_rolls() -> None:
         q[3], q[joint] = 0.0, value
         J = arm.rows("tip", q)
         assert (rank(J), rank(np.vstack((J, arm.rows("end3", q, 3))))) == (5, 6)
-
-
-def test_a24_trees() -> None:
-    """det J_R is the product of the arms', and of the carrier's; there the body joint moves no hand."""
-    rng = np.random.default_rng(8)
-    for name, count in (("spdm", 15), ("spdm_on_ssrms", 22)):
-        tree = operator_arm(name).robot
-        machine, single = Machine(tree), Machine(operator_arm("spdm_arm").robot)
-        q = rng.uniform(-1.0, 1.0, count)
-        rows, product_of = [], 1.0
-        for k in (1, 2):
-            joints = [tree.dofs(f"arm{k}_joint{i}").start for i in range(1, 8)]
-            lock = np.zeros(count)
-            lock[joints[0]] = 1.0
-            rows += [machine.rows(f"arm{k}_tip", q), lock[None]]
-            product_of *= np.linalg.det(np.vstack((single.rows("tip", q[joints]), np.eye(7)[:1])))
-        rows.append(np.eye(count)[None, tree.dofs("body_joint").start])
-        if name == "spdm_on_ssrms":
-            carrier = Machine(operator_arm("ssrms").robot)
-            joints = [tree.dofs(f"carrier_joint{i}").start for i in range(1, 8)]
-            lock = np.zeros((1, count))
-            lock[0, joints[0]] = 1.0
-            rows += [machine.rows("carrier_tip", q), lock]
-            product_of *= np.linalg.det(np.vstack((carrier.rows("tip", q[joints]), np.eye(7)[:1])))
-            assert not np.vstack((rows[0], rows[2]))[:, tree.dofs("body_joint").start].any()
-        assert abs(np.linalg.det(np.vstack(rows))) == pytest.approx(abs(product_of), rel=1e-9)
 
 
 def test_dimensions_are_those_of_the_models_joint_by_joint() -> None:

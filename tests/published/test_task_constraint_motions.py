@@ -6,28 +6,27 @@ The thesis prints symbols; the numbers are its formulas (the corrected ones) at 
 
 from __future__ import annotations
 
-from math import comb, pi
+from itertools import combinations
+from math import pi
 
 import numpy as np
 import pinocchio as pin
 import pytest
 
+from tests.published.arm_machine import STATE, rates
 from wbc.coordinates import (
-    Adviser,
     BodyRows,
-    Conditioning,
     CoordinatePair,
     JointRows,
     PairController,
     PitchPlaneRows,
-    mode_pairs,
+    expressions,
     parts,
 )
 from wbc.robots import operator_arm
 
 ALPHA, ROLL, YAW = PitchPlaneRows("F3", "F5"), JointRows("joint1"), JointRows("joint2")
 XI, ELBOW = BodyRows("tip", name="xi"), BodyRows("end3", rotation=(), name="elbow")
-STATE = np.array([0.3, 0.4, -0.5, 1.2, 0.7, -0.6, 0.9])
 PLANAR = parts("planar_3r")
 TIP2, MIDDLE = PLANAR.arms[0].tip, PLANAR.arms[0].middle
 assert MIDDLE is not None
@@ -63,23 +62,25 @@ def station() -> PairController:
     return PairController(operator_arm("ssrms").robot, pairs, limits=False, length=1.0)
 
 
-def rates(control: PairController, name: str, q: np.ndarray, command: object) -> np.ndarray:
-    """Joint rates of a pair at a configuration, from rest; what is held is exact."""
-    control.switch(name, 0.0)
-    control.reset(q)
-    control.command(command)
-    v = control.step(q).v
-    for one in control.pair.constraint:
-        assert np.abs(control.rates(q)[one] @ v).max() < 1e-10
-    return v
-
-
 def test_a2_counting() -> None:
-    """Coordinates of seven bodies; pairs with one and two constraints; square sub-matrices."""
-    coordinates = 7 * 6
-    left = coordinates - 6
-    assert (coordinates, 7 * left, 7 * comb(left, 2)) == (42, 252, 4410)
-    assert (comb(7, 6), comb(8, 6), comb(11, 7)) == (7, 28, 330)
+    """Coordinates of seven bodies; pairs with a body's pose and one or two of the rest; square sub-matrices."""
+    robot = operator_arm("ssrms").robot
+    bodies = [f"F{k}" for k in range(1, robot.model.njoints)]
+    every = [(body, row) for body in bodies for row in range(6)]
+    assert len(every) == 42
+    for count, wanted in ((1, 252), (2, 4410)):
+        pairs = 0
+        for body in bodies:
+            rest = [one for one in every if one[0] != body]
+            pairs += sum(1 for _ in combinations(rest, count))
+        assert pairs == wanted
+    # Of the rows that all those coordinates have, seven determine the joints wherever the arm is
+    whole = expressions.rate_function(robot, tuple(BodyRows(body) for body in bodies))
+    for q in (np.zeros(7), STATE, np.array([0.0, pi / 2, -pi / 2, pi, pi / 2, pi / 2, 0.0])):
+        matrix = np.asarray(whole(q).full())
+        assert (matrix.shape, np.linalg.matrix_rank(matrix, 1e-9)) == ((42, 7), 7)
+    counts = [sum(1 for _ in combinations(range(tall), wide)) for tall, wide in ((7, 6), (8, 6), (11, 7))]
+    assert counts == [7, 28, 330]
 
 
 def test_a4_tip_of_the_planar_arm_with_a_coordinate_of_the_middle(planar: PairController) -> None:
@@ -115,7 +116,10 @@ def test_a6_a_limit_that_is_reached_takes_from_the_task_and_not_from_the_constra
     np.testing.assert_allclose(step.v, (0.0, 0.0, -0.1129285), atol=1e-7)
     np.testing.assert_allclose(control.rates(PLANAR_STATE)[TIP2] @ step.v, (0.031882, -0.046602), atol=1e-6)
     assert abs(control.rates(PLANAR_STATE)[MIDDLE_X] @ step.v) < 1e-12
-    assert [(b.item, b.side) for b in step.binding if b.item == "joint_limits"] == [("joint_limits", "lower")]
+    (binding,) = [b for b in step.binding if b.item == "joint_limits"]
+    assert (binding.side, binding.row) == ("lower", "joint2")
+    # -mu / 2 of (B.21) to (B.23), whose mu is 0.0500165; metres count by the characteristic length
+    assert binding.multiplier == pytest.approx(-0.0500165 / 2 / robot.characteristic_length**2, rel=1e-5)
 
 
 @pytest.mark.parametrize("unit", [1.0, 1000.0])
@@ -199,111 +203,3 @@ def test_a25_a_held_pose_does_not_drift(station: PairController) -> None:
             farthest = max(farthest, float(np.linalg.norm(data.oMf[tip].translation - held.translation)))
     assert farthest < 1e-6
     assert np.abs(q - STATE).max() > 0.5
-
-
-def test_a24_hands_held_while_the_carrier_moves() -> None:
-    """Self-motion of 22 joints: both hands stay in space, the arm that is not commanded and the body joint at rest."""
-    robot = parts("spdm_on_ssrms").robot
-    pairs = (*mode_pairs("spdm_on_ssrms", "M7"), mode_pairs("spdm_on_ssrms", "M6")[0])
-    control = PairController(robot, pairs, limits=False, backend="vm")
-    q = np.concatenate((STATE, [0.1], STATE, STATE[::-1]))
-    command = (0.001, 0.0, 0.002, 0.0, 0.0005, 0.0)
-    v = rates(control, "carrier_xi | hands", q, command)
-    matrices = control.rates(q)
-    for k in (1, 2):
-        assert np.abs(matrices[BodyRows(f"arm{k}_tip")] @ v).max() < 1e-10
-    np.testing.assert_allclose(matrices[BodyRows("carrier_tip")] @ v, command, atol=1e-8)
-    v = rates(control, "arm1_xi | the rest", q, command)
-    moved = [robot.dofs(f"arm1_joint{k}").start for k in range(1, 8)]
-    assert np.abs(np.delete(v, moved)).max() < 1e-12
-    assert np.abs(v[moved]).min() > 1e-6
-    assert pi > np.abs(v).max()
-
-
-def test_a12_advice_along_the_second_joint_of_the_spherical_shoulder() -> None:
-    assert FOUR.alpha is not None
-    assert FOUR.middle is not None
-    (beta,), robot = FOUR.in_plane, parts("spherical_4r").robot
-    pairs = [CoordinatePair(FOUR.tip, FOUR.alpha, "alpha"), CoordinatePair(FOUR.tip, beta, "beta")]
-    adviser = Adviser(robot, pairs, length=1.0, backend="vm")
-    for q2, first, second, best in (
-        (0.0, 0.424124, 0.0, "alpha"),
-        (0.5, 0.421499, 0.390733, "alpha"),
-        (1.2, 0.261023, 0.414274, "beta"),
-        (1.5, 0.050729, 0.414638, "beta"),
-        (pi / 2, 0.0, 0.414650, "beta"),
-    ):
-        q = np.array([0.3, q2, -0.7, 1.1])
-        np.testing.assert_allclose(adviser.sigmas(q), (first, second), atol=5e-6)
-        assert adviser.recommend(q) == best
-    rows = [(FOUR.tip,), (FOUR.tip, FOUR.alpha), (FOUR.tip, FOUR.middle), (FOUR.tip, beta)]
-    ranks = [np.linalg.matrix_rank(J, 1e-9) for J in Conditioning(robot, rows, backend="vm").matrices(q)]
-    assert ranks == [3, 3, 3, 4]
-
-
-@pytest.mark.parametrize(
-    ("name", "held", "least", "seen"),
-    [
-        ("spdm_arm_simplified", ("alpha", "joint1", "joint7", "elbow x", "elbow y", "elbow z"), 0.3, 0.4727),
-        ("spdm_arm", ("alpha", "joint1", "joint7", "elbow x", "elbow y", "elbow z"), 0.3, 0.3426),
-        ("ssrms", ("beta", "gamma", "elbow x", "elbow y", "elbow z"), 0.1, 0.1260),
-    ],
-)
-def test_a23_the_best_pair_keeps_what_the_task_has(name: str, held: tuple[str, ...], least: float, seen: float) -> None:
-    """Over 10^4 configurations; rows in metres and radians."""
-    arm = parts(name).arms[0]
-    groups = [(arm.tip,), *((arm.tip, one) for one in arm.candidates() if str(one) in held)]
-    assert len(groups) == 1 + len(held)
-    made, worst = Conditioning(parts(name).robot, groups, length=1.0), np.inf
-    for q in np.random.default_rng(7).uniform(-pi, pi, (10_000, 7)):
-        task, *every = made.sigmas(q)
-        worst = min(worst, max(every) / task) if task > 1e-3 else worst
-    assert worst > least
-    assert worst == pytest.approx(seen, abs=1e-3)
-
-
-def test_a14_loci_of_the_spherical_shoulder() -> None:
-    """Ranks on the loci of (4.2) to (4.11), (4.10) as corrected; searches from random starts find no others."""
-    assert FOUR.alpha is not None
-    assert FOUR.middle is not None
-    (beta,), robot = FOUR.in_plane, parts("spherical_4r").robot
-    sets = {
-        "task": (FOUR.tip,),
-        "elbow": (FOUR.tip, FOUR.middle),
-        "alpha": (FOUR.tip, FOUR.alpha),
-        "alpha, beta": (FOUR.tip, FOUR.alpha, beta),
-        "elbow, beta": (FOUR.tip, FOUR.middle, beta),
-    }
-    made = Conditioning(robot, list(sets.values()), length=1.0)
-    # tan q3 of the second branch of (4.2): L3 c3 + L4 c34 = 0 at q4 = 1.1
-    across = np.arctan2(1.0 + 0.8 * np.cos(1.1), 0.8 * np.sin(1.1))
-    for q, wanted in (
-        ((0.3, 0.5, -0.7, 0.0), (2, 3, 3, 3, 4)),
-        ((0.3, 0.5, -0.7, pi), (2, 3, None, None, 4)),
-        ((0.3, pi / 2, -0.7, 1.1), (3, 3, 3, 4, 4)),
-        ((0.3, -pi / 2, across, 1.1), (2, 3, 3, 4, 4)),
-        ((0.3, 0.0, -0.7, 0.0), (2, 3, 3, 3, 3)),
-        ((0.3, 0.5, pi / 2, 0.0), (2, 3, 3, 3, 3)),
-        ((0.3, 0.5, -0.7, 1.1), (3, 4, 4, 4, 4)),
-    ):
-        ranks = [np.linalg.matrix_rank(J, 1e-9 * np.linalg.norm(J)) for J in made.matrices(np.array(q))]
-        assert [a for a, b in zip(ranks, wanted, strict=True) if b is not None] == [b for b in wanted if b is not None]
-    folded = [np.linalg.svd(J, compute_uv=False)[-1] for J in made.matrices(np.array([0.3, 0.5, -0.7, 1.1]))]
-    assert min(folded) > 0.1
-    for start in np.random.default_rng(3).uniform(-pi, pi, (20, 4)):
-        for k, name in enumerate(sets):
-            q = start.copy()
-            for _ in range(40):
-                sigma, slopes, _ = made.slopes(q)
-                steep = float(slopes[k] @ slopes[k])
-                if sigma[k] < 1e-9 or steep < 1e-12:
-                    break
-                step = -sigma[k] / steep * slopes[k]
-                q = q + step * min(1.0, 0.3 / float(np.linalg.norm(step)))
-            if sigma[k] >= 1e-9:
-                continue
-            flat = abs(np.sin(q[3])) < 1e-4
-            upright, reach = abs(np.cos(q[1])) < 1e-4, abs(np.cos(q[2]) + 0.8 * np.cos(q[2] + q[3])) < 1e-4
-            both = flat and (abs(np.sin(q[1])) < 1e-4 or abs(np.cos(q[2])) < 1e-4)
-            known = {"task": flat or (upright and reach), "alpha, beta": flat, "elbow, beta": both}
-            assert known.get(name, flat or upright), (name, q)
