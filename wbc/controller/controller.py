@@ -219,8 +219,20 @@ class Controller(Deployment):
         """Write validated numbers of an input; it no longer follows the first configuration."""
         self.tick.p[slot.span] = numbers
         if slot in self._first:
-            del self._first[slot]
-            self._waiting.pop(slot, None)
+            self._let_go(slot)
+
+    def write_pose(self, slot: Slot, matrix: Array) -> bool:
+        """Write a pose from its homogeneous matrix [4, 4]; False, and nothing written, where :meth:`write` has to."""
+        if not self._assembly.put_pose(slot.start, matrix):
+            return False
+        if slot in self._first:
+            self._let_go(slot)
+        return True
+
+    def _let_go(self, slot: Slot) -> None:
+        """An input was set, so it no longer follows the first configuration."""
+        del self._first[slot]
+        self._waiting.pop(slot, None)
 
     def require_value(self, slot: Slot, field: str) -> None:
         """Values that wait for the first configuration cannot be read before it."""

@@ -17,6 +17,7 @@ from wbc.tasks._direction import Direction
 from wbc.validation import Array
 
 _ARRAY, _FLOAT = np.ndarray, np.dtype(np.float64)
+_MATRIX, _SE3 = (4, 4), pin.SE3
 
 if TYPE_CHECKING:
     from wbc.controller.controller import Controller
@@ -41,6 +42,7 @@ class Handle:
         "_mask",
         "_ordered",
         "_plain",
+        "_poses",
         "_ramped",
         "_rate",
         "_robot",
@@ -63,6 +65,7 @@ class Handle:
         # inputs of any finite numbers, with their shapes
         plain = {name: slot.input for name, slot in block.slots.items() if name != "rate" and name not in self._ordered}
         put("_plain", {name: (inputs.size(self._robot, i),) for name, i in plain.items() if inputs.is_plain(i)})
+        put("_poses", {name for name, slot in block.slots.items() if slot.input.kind == "pose"})
         put("_enabled", True)
         put("_weight", block.entry.weight)
         put("_mask", np.ones(len(block.rows)))
@@ -94,11 +97,16 @@ class Handle:
     def __setattr__(self, name: str, value: Any) -> None:
         slot = self._block.slots.get(name)
         if slot is not None:
-            # Set every tick, so with one call: the square is finite only if all numbers are
-            ready = type(value) is _ARRAY and value.dtype is _FLOAT and value.shape == self._plain.get(name)
-            if ready and isfinite(value.dot(value)):
-                self._controller.write(slot, value)
-                return
+            # Set every tick, so with as few calls as can be
+            numbers = value.homogeneous if type(value) is _SE3 else value
+            if type(numbers) is _ARRAY and numbers.dtype is _FLOAT:
+                if name in self._poses:
+                    if numbers.shape == _MATRIX and self._controller.write_pose(slot, numbers):
+                        return
+                # the square is finite only if all numbers are
+                elif numbers.shape == self._plain.get(name) and isfinite(numbers.dot(numbers)):
+                    self._controller.write(slot, numbers)
+                    return
             if slot.input.sensed:
                 raise RangeError(self._field(name), value, "is measured in every tick and cannot be set")
             numbers = self._checked(slot, value)

@@ -39,6 +39,7 @@ _FIELDS = (
     "wish",
     "free_low",
     "free_high",
+    "given",
 )
 
 
@@ -89,7 +90,9 @@ class NativeTick(Assembly):
         self._unusable, self.plain = view("unusable", 1), view("plain", 1)
         self._wish, self._factor = view("wish", layout.task_rows), self.report[report["factor"]]
         self._sides = view("free_low", rows), view("free_high", rows)
+        self._given = view("given", 16).reshape(4, 4)
         self.step_function = self._library.wbc_tick_step
+        self._take_pose = functools.partial(self._library.wbc_tick_pose, self.pointer)
 
     @functools.cached_property
     def converge_function(self) -> Any:
@@ -110,6 +113,10 @@ class NativeTick(Assembly):
 
     def step(self) -> int:
         return int(self.step_function(self.pointer))
+
+    def put_pose(self, start: int, matrix: Array) -> bool:
+        self._given[:] = matrix
+        return bool(self._take_pose(start))
 
     def reset(self) -> None:
         self._library.wbc_tick_reset(self.pointer)

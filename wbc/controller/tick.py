@@ -86,6 +86,12 @@ class Assembly(Buffers, ABC):
     def look_ahead(self) -> None:
         """Margins after the step, into the report."""
 
+    def put_pose(self, start: int, matrix: Array) -> bool:
+        """Check a homogeneous matrix [4, 4] and write it to ``p`` from ``start`` on; False, nothing written,
+        where it is not a pose or that cannot be done quicker here than in Python.
+        """
+        return False
+
     @abstractmethod
     def twin(self) -> Assembly:
         """Another one of the same code, with memory of its own."""

@@ -1,6 +1,7 @@
 /* The entry points of one stack's tick */
 #include "assemble.h"
 #include "levels.h"
+#include "pose.h"
 
 static int refused(const wbc_tick *t) {
     for (int i = 0; i < NQ; i++)
@@ -67,12 +68,12 @@ EXPORT long long wbc_tick_size(void) { return (long long)sizeof(wbc_tick); }
 #define OFFSET(field) (long long)offsetof(wbc_tick, field)
 
 /* Where the caller finds q, v_last, v_in, use_v, p, dt, weight, enabled, bound_enabled, report, H, g, A, low, high,
- * unusable, plain, cap, wish, free_low, free_high */
+ * unusable, plain, cap, wish, free_low, free_high, given */
 EXPORT void wbc_tick_layout(long long *out) {
     const long long offsets[] = {OFFSET(q), OFFSET(v_last), OFFSET(v_in), OFFSET(use_v), OFFSET(p), OFFSET(dt),
                                  OFFSET(weight), OFFSET(enabled), OFFSET(bound_enabled), OFFSET(report), OFFSET(H),
                                  OFFSET(g), OFFSET(A), OFFSET(low), OFFSET(high), OFFSET(unusable), OFFSET(plain),
-                                 OFFSET(cap), OFFSET(wish), OFFSET(free_low), OFFSET(free_high)};
+                                 OFFSET(cap), OFFSET(wish), OFFSET(free_low), OFFSET(free_high), OFFSET(given)};
     memcpy(out, offsets, sizeof offsets);
 }
 

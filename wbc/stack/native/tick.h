@@ -131,6 +131,7 @@ typedef struct {
     int idle[MC + 1];            /* rows that no velocity within the bounds violates */
     int far[MC + 1];             /* rows of balls and sensed pairs that are left out of this tick */
     double segment[6 * SEGMENTS + 1], screw[6 * NV], segment_ahead[6 * SEGMENTS + 1];
+    double given[16];            /* a pose on its way into p: a homogeneous matrix, row by row */
     double q_good[NQ + 1];       /* q of the last tick that was not refused, put back by one that is */
     /* outputs of the generated rows */
     double wish[MT + 1], jt[NNZJ + 1], at[NNZA + 1], bound_low[NB * NV + 1], bound_high[NB * NV + 1];
