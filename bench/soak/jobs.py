@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import logging
 import warnings
@@ -12,11 +11,11 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
-from typing import Any
 
 from rich.progress import Progress
 
-from bench.pool import ROOT
+from bench import kept
+from bench.kept import sources
 from bench.records import Parts
 from bench.soak.episodes import stack
 from bench.soak.faults import lost_library, one_iteration, plants
@@ -53,38 +52,27 @@ def key(job: Job) -> str:
 
 
 class Kept:
-    """Jobs that are done, a line each in a file that belongs to one version of the sources; nothing without a file.
+    """Jobs that are done, see :class:`bench.kept.Kept`.
 
     Raises:
         ValueError: the file belongs to other sources.
     """
 
     def __init__(self, path: Path | None) -> None:
-        self._path, self._done = path, dict[str, Found]()
-        if path is None:
-            return
-        version = json.dumps({"sources": _sources()})
-        if not path.exists():
-            path.write_text(version + "\n")
-        first, *lines = path.read_text().splitlines()
-        if first != version:
-            raise ValueError(f"{path} holds jobs of other sources; give another file")
-        for line in lines:
-            done = json.loads(line)
-            self._done[done["job"]] = [(name, Counter(counts)) for name, counts in done["found"]]
+        version = {"sources": sources(("wbc", "tasks", "robots", "bench/soak"))} if path else {}
+        self._kept = kept.Kept(path, version)
 
     def get(self, job: Job) -> Found | None:
         """What a job that is done found."""
-        return self._done.get(key(job))
+        done = self._kept.get(key(job))
+        return None if done is None else [(name, Counter(counts)) for name, counts in done]
 
     def put(self, job: Job, found: Found) -> None:
         """Keep it."""
-        if self._path is not None:
-            with self._path.open("a") as file:
-                file.write(json.dumps({"job": key(job), "found": found}) + "\n")
+        self._kept.put(key(job), found)
 
 
-def measure(work: dict[str, list[Job]], kept: Kept, processes: int, progress: Progress) -> tuple[Parts, str | None]:
+def measure(work: dict[str, list[Job]], known: Kept, processes: int, progress: Progress) -> tuple[Parts, str | None]:
     """(records of every part, the part in which Ctrl-C came)."""
     parts: Parts = {}
     name = "nothing"
@@ -93,7 +81,7 @@ def measure(work: dict[str, list[Job]], kept: Kept, processes: int, progress: Pr
         for name, jobs in work.items():
             records = parts[name] = []
             bar = progress.add_task(name, total=len(jobs))
-            for found in _each(jobs, kept, pool):
+            for found in _each(jobs, known, pool):
                 records += [{"name": run, "counts": counts} for run, counts in found]
                 progress.advance(bar)
     except KeyboardInterrupt:
@@ -104,13 +92,13 @@ def measure(work: dict[str, list[Job]], kept: Kept, processes: int, progress: Pr
     return parts, None
 
 
-def _each(jobs: list[Job], kept: Kept, pool: ProcessPoolExecutor | None) -> Iterator[Found]:
+def _each(jobs: list[Job], known: Kept, pool: ProcessPoolExecutor | None) -> Iterator[Found]:
     """What every job finds; those that are kept first."""
-    known = [kept.get(job) for job in jobs]
-    yield from (found for found in known if found is not None)
-    open_jobs = [job for job, found in zip(jobs, known, strict=True) if found is None]
+    done = [known.get(job) for job in jobs]
+    yield from (found for found in done if found is not None)
+    open_jobs = [job for job, found in zip(jobs, done, strict=True) if found is None]
     for job, found in _run(open_jobs, pool):
-        kept.put(job, found)
+        known.put(job, found)
         yield found
 
 
@@ -140,13 +128,3 @@ def _begin() -> None:
     """Of a process: targets at 50 m and weights of 1e3 overflow inside NumPy now and then; what comes out is judged."""
     logging.getLogger("wbc").setLevel(logging.ERROR)
     warnings.simplefilter("ignore", RuntimeWarning)
-
-
-def _sources() -> str:
-    """Hash of all that decides what a job finds."""
-    digest: Any = hashlib.sha256()
-    for folder in ("wbc", "tasks", "robots", "bench/soak"):
-        for path in sorted((ROOT / folder).rglob("*.*")):
-            if path.suffix in (".py", ".h", ".c", ".toml"):
-                digest.update(path.relative_to(ROOT).as_posix().encode() + b"\0" + path.read_bytes())
-    return str(digest.hexdigest()[:16])

@@ -1,110 +1,109 @@
-"""``python -m bench.walk``: plan and walk, print, write walk.md and .json.
+"""``python -m bench.walk``: plan and walk, print, write walk.md and walk.json.
 
-Ctrl-C ends the measuring; what was measured until then is printed and written.
+Ctrl-C ends the measuring; what was measured until then is printed and written, and the same command with --resume goes
+on from there.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Iterator
 from pathlib import Path
 
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 import wbc
 from bench.harness import machine as host
+from bench.kept import Kept, sources
 from bench.pool import ROOT
-from bench.records import measure
+from bench.records import Parts, measure
 from bench.report import goal_sheet
-from bench.walk.courses import COURSES, Machine, courses, highest, machine, spins
-from bench.walk.layouts import layouts
-from bench.walk.planning import planning
-from bench.walk.tables import Parts, Record, goals, sheets
-from bench.walk.trenches import COUNT, trenches
+from bench.walk.machine import Machine
+from bench.walk.parts import QUICK, Sizes, goals, others, parts_of, records, sheets
 from wbc.errors import RangeError
 from wbc.robots import WalkerData
 from wbc.robots.walker_data import WALKER_DIGEST
 
-#: Parts of a run, and how many records each has
-PARTS = {
-    "courses": 3 * len(COURSES),
-    "spins": 2,
-    "trenches": COUNT,
-    "highest": len(COURSES),
-    "planning": 3 * len(COURSES),
-    "layouts": 1000,
-}
-#: Layouts of a run that is not full, and those that are carried out
-FEW, WALKED = 30, 3
-QUICK = ("courses", "spins", "planning")
+#: What decides what a run measures
+SOURCES = ("wbc", "tasks", "robots", "bench/walk")
 
 NOTES = """\
-A walk is planned (velocity mode; destination mode with detours for trenches) and carried out at 100 Hz by the \
-whole-body controller, whose joint rates are the simulator's only inputs. "Part of the speed" is the path's duration \
-over that of the walk less half a second for the ramps. "Real time" is simulated over processor time: planner, \
-controller, simulator; no rendering, one core, compilation left out. Ticks are the controller's alone."""
+A walk is planned whole (velocity mode; destination mode with ways round for trenches and layouts) and carried out at \
+100 Hz by the whole-body controller, whose joint rates are the simulator's only inputs. Speeds are means of the body's \
+origin, from 0.5 s after the start to 0.5 s before the end. "Real time" is simulated time over processor time of \
+controller, simulator and log, then of the planner too; no rendering, one core, compilation left out. Ticks are the \
+controller's alone, by the clock; the loop has hands, controller, simulator and log, by processor time. The checker \
+recomputes the walk from its log, URDF and structure."""
+
+
+def arguments(given: list[str] | None = None) -> argparse.Namespace:
+    """What is asked for."""
+    names, whole = [*parts_of(Sizes())], Sizes()
+    parser = argparse.ArgumentParser(prog="wbc bench walk", description=__doc__)
+    parser.add_argument("--quick", action="store_true", help=f"{QUICK.layouts} layouts, {QUICK.patches} patches")
+    parser.add_argument("--parts", nargs="+", choices=names, default=names, help="only these; default: all")
+    parser.add_argument("--layouts", type=int, help=f"how many; default: {whole.layouts}")
+    parser.add_argument("--walked", type=int, help=f"of these carried out; default: {whole.walked}")
+    parser.add_argument("--patches", type=int, help=f"how many; default: {whole.patches}")
+    parser.add_argument("--resume", action="store_true", help="keep what an earlier run measured with these sources")
+    parser.add_argument("--collisions", action="store_true", help="with self-collision rows in the controller")
+    parser.add_argument("--output", type=Path, default=ROOT / "build" / "bench", help="folder; default: build/bench")
+    chosen = parser.parse_args(given)
+    usual = QUICK if chosen.quick else whole
+    counts = [getattr(chosen, name) for name in ("layouts", "walked", "patches")]
+    if any(count is not None and count < 0 for count in counts):
+        parser.error("--layouts, --walked and --patches are at least 0")
+    known = (usual.layouts, usual.walked, usual.patches)
+    chosen.sizes = Sizes(*(size if count is None else count for count, size in zip(counts, known, strict=True)))
+    return chosen
 
 
 def main(given: list[str] | None = None) -> None:
-    """Parse the arguments and run."""
-    parser = argparse.ArgumentParser(prog="wbc bench walk", description=__doc__)
-    parser.add_argument("--full", action="store_true", help="every part")
-    parser.add_argument("--parts", nargs="+", choices=[*PARTS], help="only these")
-    parser.add_argument("--layouts", type=int, help=f"how many, {PARTS['layouts']} in full runs, else {FEW}")
-    parser.add_argument("--walked", type=int, default=WALKED, help="layouts of these that are carried out")
-    parser.add_argument("--resume", action="store_true", help="keep the layouts that an interrupted run measured")
-    parser.add_argument("--collisions", action="store_true", help="with self-collision rows in the controller")
-    parser.add_argument("--output", type=Path, help="folder; by default bench for full runs, else build/bench")
-    chosen = parser.parse_args(given)
-    folder = chosen.output or (ROOT / "bench" if chosen.full else ROOT / "build" / "bench")
-    names = chosen.parts or (list(PARTS) if chosen.full else list(QUICK))
+    """Parse the arguments and run.
+
+    Raises:
+        RangeError: the robot's data are not those that figures are reported for.
+    """
+    chosen = arguments(given)
     data = WalkerData.read()
     if data.digest != WALKER_DIGEST:
         raise RangeError("walker.toml", data.digest, f"figures are reported for the data {WALKER_DIGEST} only")
-    count = chosen.layouts or (PARTS["layouts"] if chosen.full else FEW)
-    kept = folder / "walk_layouts.jsonl"
+    path = chosen.output / "walk.jsonl"
     if not chosen.resume:
-        kept.unlink(missing_ok=True)
-    it = machine(wbc.robots.walker(), chosen.collisions)
+        path.unlink(missing_ok=True)
+    version = {"sources": sources(SOURCES), "data": data.digest, "collisions": chosen.collisions}
+    kept, about = Kept(path, version), host()
+    it = Machine(wbc.robots.walker(), collisions=chosen.collisions)
     console, errors = Console(), Console(stderr=True)
     if not console.is_terminal:
-        console = Console(width=170)
-    about = host()
+        console = Console(width=230)
     bars = (TextColumn("{task.description:10}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-    with Progress(*bars, console=errors) as progress:
-        sizes = {**PARTS, "layouts": count}
-        work = {name: (sizes[name], of(name, it)) for name in names if name != "layouts"}
-        if "layouts" in names:
-            work["layouts"] = count, layouts(it, count, chosen.walked, kept)
+    with Progress(*bars, TimeRemainingColumn(), console=errors) as progress:
+        jobs = {name: part.jobs(it) for name, part in parts_of(chosen.sizes).items() if name in chosen.parts}
+        work = {name: (len(mine), records(name, mine, kept)) for name, mine in jobs.items() if mine}
         parts, interrupted = measure(work, progress)
+    parts = others([*work], kept) | parts
     lines = [
-        f"{about['processor']}, Python {about['python']}; load {about['load']}.",
+        f"{about['processor']}, {about['cores']}, Python {about['python']}; load {about['load']}.",
         f"Robot data {data.digest}; self-collision rows {'on' if chosen.collisions else 'off'}.",
-        *NOTES.split("\n\n"),
+        NOTES,
     ]
     if interrupted:
         lines.insert(0, f"Ended by Ctrl-C in: {interrupted}.")
-    for sheet in (*sheets(parts), goal_sheet(goals(parts))):
+    for sheet in (*sheets(parts, chosen.sizes), goal_sheet(goals(parts, chosen.sizes))):
         console.print(sheet.rich())
         console.print()
     for text in lines:
         console.print(text, markup=False, highlight=False)
-    write(folder, parts, lines)
-    console.print(f"Written to {folder / 'walk.md'}", markup=False, highlight=False)
+    write(chosen.output, parts, chosen.sizes, lines)
+    console.print(f"Written to {chosen.output / 'walk.md'}", markup=False, highlight=False)
 
 
-def of(name: str, it: Machine) -> Iterator[Record]:
-    """The records of a part, as they are measured."""
-    parts = {"courses": courses, "spins": spins, "trenches": trenches, "highest": highest, "planning": planning}
-    return parts[name](it)
-
-
-def write(folder: Path, parts: Parts, lines: list[str]) -> None:
+def write(folder: Path, parts: Parts, sizes: Sizes, lines: list[str]) -> None:
     """walk.md and walk.json."""
     folder.mkdir(parents=True, exist_ok=True)
-    tables = [sheet.markdown() for sheet in (*sheets(parts), goal_sheet(goals(parts)))]
+    tables = [sheet.markdown() for sheet in (*sheets(parts, sizes), goal_sheet(goals(parts, sizes)))]
     (folder / "walk.md").write_text("\n\n".join([*tables, *lines]) + "\n")
     (folder / "walk.json").write_text(json.dumps({"about": lines, "parts": parts}, indent=1) + "\n")
 

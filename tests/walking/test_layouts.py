@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from bench.walk.courses import Machine
 from bench.walk.layout_tables import layout_goals
 from bench.walk.layouts import judged, layout
+from bench.walk.machine import Machine
 from wbc.robots import Walker
 from wbc.walking import Structure
 from wbc.walking.reference import Reference
@@ -26,8 +26,9 @@ def test_every_possible_layout_is_planned(
     machine: Walker, structure: Structure, stack: WalkStack, reference: Reference, first: int
 ) -> None:
     it = Machine(machine, stack)
+    it.reference = reference
     asked = [layout(seed, structure) for seed in range(first, first + AT_ONCE)]
     # The first of all is walked too, and judged by the checker
-    records = [judged(it, reference, one, walked=one.seed == 0) for one in asked]
+    records = [judged(it, one, walked=one.seed == 0) for one in asked]
     assert [goal.text for goal in layout_goals(records) if not goal.met] == []
     assert all(record["planned"] for record in records if record["verdict"] == "possible")

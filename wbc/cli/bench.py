@@ -32,7 +32,7 @@ def bench(context: typer.Context) -> None:
 
     wbc bench ik measures inverse kinematics on the protocol of TRAC-IK: wbc bench ik --full
 
-    wbc bench walk plans and walks courses, turns and trenches: wbc bench walk --full
+    wbc bench walk plans and walks courses, turns, trenches and layouts: wbc bench walk --quick
 
     wbc bench resolvers drives the Space Station arm by classical rate resolution and by pairs
     """

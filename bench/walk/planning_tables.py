@@ -1,0 +1,103 @@
+"""The tables of plans in slices and of patches, and what is asked of them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bench.goals import Goal
+from bench.sheet import Sheet
+from bench.walk.machine import Record
+from bench.walk.planning import STALL
+
+COLUMNS = (
+    "", "arrived", "first command, ms", "99 %", "slices", "of a slice, ms", "99 %", "longest", "planned after, s",
+    "ticks while planning, 99 %, ms", "longest", "over 50 ms", "ticks after, 99 %, ms", "re-grasps", "whole plan's",
+    "part of the speed", "real time",
+)  # fmt: skip
+
+
+def planning_sheet(records: list[Record]) -> Sheet:
+    """Times of first commands, slices and ticks."""
+    return Sheet("Plans in slices: a body is told to walk", COLUMNS, [_row(r) for r in records])
+
+
+def planning_goals(records: list[Record]) -> list[Goal]:
+    """First commands and stalls of all; re-grasps, speeds and real time of walks whose whole plan is known."""
+    firsts = [first for r in records for first in r["first_ms"]]
+    walks = [r for r in records if "slices_ms" in r]
+    whole = [r for r in walks if r["whole"] is not None and r["arrived"]]
+    out = [
+        Goal("first command of a new plan, median", float(np.median(firsts)), 1e3 * STALL, "ms"),
+        Goal("first command of a new plan, 99 %", float(np.percentile(firsts, 99)), 1e3 * STALL, "ms"),
+        Goal("longest tick, planning included", max(r["longest_ms"] for r in records), 1e3 * STALL, "ms"),
+        Goal("plans in slices that lead nowhere", sum(not r["arrived"] for r in records), 0, ""),
+    ]
+    if walks:
+        out.append(Goal("longest slice, processor time", max(max(r["slices_ms"]) for r in walks), 1e3 * STALL, "ms"))
+    if whole:
+        more = sum(max(r["regrasps"] - r["whole"], 0) for r in whole)
+        slow = sum(r["kept"] < 0.98 for r in whole)
+        out += [
+            Goal("re-grasps of plans in slices more than in whole plans", more, 0, ""),
+            Goal("plans in slices with which 0.98 of the speed is not kept", slow, 0, ""),
+            Goal("one over real time, planner in slices and log", max(1 / r["real_time"] for r in whole), 0.05, ""),
+        ]
+    return out
+
+
+def patch_sheet(records: list[Record]) -> Sheet:
+    """How many more re-grasps than the fewest, and how many patches."""
+    rows = []
+    for more, some in sorted(_by_difference(records).items()):
+        seeds = [r["seed"] for r in some]
+        shown = "all others" if more == "equal" else ", ".join(map(str, seeds))
+        rows.append((more, str(len(some)), shown))
+    times = [sum(r[key] for r in records) / len(records) for key in ("plan_s", "search_s")]
+    rows.append(("processor time of a plan, of a search, s", f"{times[0]:.2f}, {times[1]:.2f}", ""))
+    return Sheet(f"Re-grasps over {len(records)} patches of 8 x 8", ("planner beside breadth-first", "", "seeds"), rows)
+
+
+def patch_goals(records: list[Record]) -> list[Goal]:
+    """As many as breadth-first search."""
+    other = sum(r["planned"] != r["fewest"] for r in records)
+    return [Goal(f"patches of {len(records)} on which re-grasps are not the fewest", other, 0, "")]
+
+
+def _by_difference(records: list[Record]) -> dict[str, list[Record]]:
+    out: dict[str, list[Record]] = {}
+    for r in records:
+        planned, fewest = r["planned"], r["fewest"]
+        if planned == fewest:
+            name = "equal"
+        elif planned is None:
+            name = "refused, though there is a way"
+        elif fewest is None:
+            name = "planned, though the search finds no way"
+        else:
+            name = f"{planned - fewest:+d}"
+        out.setdefault(name, []).append(r)
+    return out
+
+
+def _row(r: Record) -> tuple[str, ...]:
+    firsts, arrived = r["first_ms"], "yes" if r["arrived"] else f"no: {r['reason']}"
+    head = arrived, f"{np.median(firsts):.1f}", f"{np.percentile(firsts, 99):.1f}"
+    ticks = f"{r['planning_p99_ms']:.1f}", f"{r['longest_ms']:.1f}", str(r["stalls"])
+    if "slices_ms" not in r:
+        return (f"under way, {r['asked']} other rates", *head, *["-"] * 5, *ticks, *["-"] * 5)
+    slices = r["slices_ms"]
+    return (
+        f"{r['course']} at {r['asked']:g} in/s",
+        *head,
+        str(len(slices)),
+        f"{np.median(slices):.1f}",
+        f"{np.percentile(slices, 99):.1f}",
+        f"{max(slices):.1f}",
+        f"{r['planned_s']:.2f}",
+        *ticks,
+        "-" if r["tick_p99_ms"] is None else f"{r['tick_p99_ms']:.2f}",
+        str(r["regrasps"]),
+        "-" if r["whole"] is None else str(r["whole"]),
+        f"{r['kept']:.3f}",
+        f"{r['real_time']:.1f}",
+    )
