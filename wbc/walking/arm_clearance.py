@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 from bisect import bisect_left
 from collections.abc import Iterable
 from itertools import groupby
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 
 from wbc.robots import Walker
 from wbc.validation import Array
+from wbc.walking import compiled
 from wbc.walking.arm_kinematics import ArmKinematics
 from wbc.walking.grips import Grips, Ints
 
@@ -48,7 +50,7 @@ class ArmClearance:
     def __init__(self, walker: Walker, grips: Grips) -> None:
         self._grips = grips
         self._kinematics = ArmKinematics(walker.data)  # type: ignore[arg-type]
-        self._bases = [arm.base for arm in walker.arms]
+        self._bases = np.array([arm.base.homogeneous for arm in walker.arms])
         neck, upper, fore, hand = self._kinematics.radii
         # Named points O N S E W H of an arm: capsules O-N, S-E, E-W, W-H. All pairs but that of the two necks
         self._from, self._to = [0, 2, 3, 4], [1, 3, 4, 5]
@@ -86,8 +88,17 @@ class ArmClearance:
 
     def points(self, arm: int, postures: Array) -> Array:
         """Named points of an arm in the body's frame, ``[..., 6, 3]``."""
-        base = self._bases[arm]
-        out: Array = self._kinematics.points(postures) @ base.rotation.T + base.translation
+        base, library = self._bases[arm], compiled.library()
+        if library is None:
+            return np.asarray(self._kinematics.points(postures) @ base[:3, :3].T + base[:3, 3])
+        out, rows = np.empty((*postures.shape[:-1], 6, 3)), compiled.packed(postures)
+        library.points_of(
+            ctypes.byref(compiled.arm(self._kinematics.data)),
+            compiled.at(base),
+            ctypes.c_long(rows.size // 6),
+            compiled.at(rows),
+            compiled.at(out),
+        )
         return out
 
     def between(self, one: Array, other: Array) -> Array:
@@ -99,7 +110,13 @@ class ArmClearance:
 
     def near(self, one: Array, other: Array, less: float = 0.0) -> NDArray[np.bool_]:
         """Whether arms given by their points are nearer than radii and clearance less ``less`` [m] allow: ``[m]``."""
-        least = self._least - less
+        least, library = self._least - less, compiled.library()
+        out = np.zeros(len(one), dtype=np.bool_)
+        if library is not None:
+            sides = [compiled.packed(side) for side in (one, other)]
+            places = [compiled.at(array) for array in (*sides, least, out)]
+            library.arms_near(ctypes.c_long(len(one)), *places)
+            return out
         a, b = one[:, self._from], one[:, self._to]
         c, d = other[:, self._from], other[:, self._to]
         # Capsules whose middles are far apart need no closer look
@@ -109,8 +126,30 @@ class ArmClearance:
         row, pair = np.nonzero((gap * gap).sum(axis=2) < reach * reach)
         i, j = np.array(self._one)[pair], np.array(self._other)[pair]
         close = segment_distances(a[row, i], b[row, i], c[row, j], d[row, j]) < least[pair]
-        out = np.zeros(len(one), dtype=np.bool_)
         out[row[close]] = True
+        return out
+
+    def stay_clear(self, points: Array, samples: Array, others: Ints, less: float) -> NDArray[np.bool_]:
+        """Whether moving arms stay clear of arms that hold.
+
+        Args:
+            points: of moving arms in the body's frame ``[m, n, 6, 3]``. samples: at which they are there ``[m, n]``.
+            others: grips that hold ``[m]``. less: as of :meth:`near`.
+        """
+        library, grips = compiled.library(), self._grips
+        out = np.zeros(len(others), dtype=np.bool_)
+        if library is None:
+            postures, held = grips.between(others[:, None], samples), np.empty_like(points)
+            for arm in np.unique(grips.arm[others]):
+                rows = grips.arm[others] == arm
+                held[rows] = self.points(int(arm), postures[rows])
+            near = self.near(points.reshape(-1, 6, 3), held.reshape(-1, 6, 3), less)
+            return np.asarray(~near.reshape(samples.shape).any(axis=1))
+        given = [compiled.packed(array) for array in (points, samples, self._bases[grips.arm[others]])]
+        places = [compiled.at(array) for array in (*given, others, self._least - less, out)]
+        sizes = (ctypes.c_long(size) for size in samples.shape)
+        arm = compiled.arm(self._kinematics.data)
+        library.swings_clear(ctypes.byref(arm), ctypes.byref(grips.table), *sizes, *places)
         return out
 
     def _fill(self, wanted: set[int]) -> None:

@@ -127,7 +127,7 @@ class ArmMode:
     def _standing(self) -> Standing:
         walk = self.walk
         arms = ArmClearance(walk.walker, walk.grips)
-        clear = SwingClearance(walk.walker, walk.structure, walk.grips, arms)
+        clear = SwingClearance(walk.walker, walk.structure, arms)
         body = pin.SE3(pin.Quaternion(walk.q[3:7]).matrix(), walk.q[:3].copy())
         return Standing(walk.walker, clear, arms, self.arm, body, walk.q.copy(), walk.dt)
 

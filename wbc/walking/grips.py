@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from math import radians
 
 import numpy as np
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 
 from wbc.robots import Walker
 from wbc.validation import Array
+from wbc.walking import compiled
 from wbc.walking.arm_kinematics import LIMIT_NAMES, ArmKinematics
 from wbc.walking.body_path import BodyPath
 from wbc.walking.grip_rolls import ANY, hand_poses, turns
@@ -60,6 +62,11 @@ class Grips:
 
     def __len__(self) -> int:
         return len(self.arm)
+
+    @cached_property
+    def table(self) -> compiled.Table:
+        """As the compiled code wants them; they must live as long."""
+        return compiled.Table(*(array.ctypes.data for array in (self.postures, self.offset, self.first, self.last)))
 
     def posture(self, grip: Ints, sample: Ints) -> Array:
         """Postures at samples, clipped to the grip, ``[..., 6]``."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from wbc.walking.slices import Slices
-from wbc.walking.stance_search import Found, StanceSearch
+from wbc.walking.stance_search import Found, Move, StanceSearch
 from wbc.walking.swing_law import SwingLaw
 
 #: Searches again, each without a swing that turned out to be impossible or slower by more than SLOWER [s]
@@ -21,17 +21,18 @@ def sound_slices(
     possible as it would be carried out is refused, of one that is slower the time is corrected, and the search made
     again; what was computed is kept. After :data:`AGAIN` of them only the moves before the last such one are left.
     """
-    laws: list[SwingLaw] = []
+    laws, known = list[SwingLaw](), dict[Move, SwingLaw]()
     for _ in range(AGAIN):
         found = yield from search.slices(starts, sample, deadline)
         laws = []
         for move in found.moves:
             yield None
-            law = SwingLaw.of(search.swings, move)
+            law = known.get(move) or SwingLaw.of(search.swings, move)
+            known[move] = law
             planned = max(move.duration, 0.0 if move.delay else (move.land - move.lift) * search.path.spacing)
             needed = law.duration + search.swings.extra
             if not law.possible or needed > planned + SLOWER:
-                search.swings.correct(move.arm, move.source, move.target, move.lift, move.way, needed, law.possible)
+                search.correct(move, needed, law.possible)
                 break
             laws.append(law)
         else:

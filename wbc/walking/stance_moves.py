@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 Key = tuple[int, ...]
-#: Less is better; ties by sample, by holds, by grips
-Worth = tuple[float, int, tuple[tuple[int, int], ...], Key]
 
 
 @dataclass(frozen=True)

@@ -16,9 +16,9 @@ to the end of the path needs the fewest; of equal stances the one that is earlie
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from itertools import combinations
+from itertools import combinations, islice
 from typing import ClassVar
 
 import numpy as np
@@ -29,7 +29,8 @@ from wbc.walking.arm_clearance import ArmClearance
 from wbc.walking.body_path import BodyPath
 from wbc.walking.grips import Grips, Ints
 from wbc.walking.slices import Slices, drained
-from wbc.walking.stance_moves import Found, Key, Move, Node, Worth
+from wbc.walking.stance_fan import QUANTUM, Fan, Outlook, following
+from wbc.walking.stance_moves import Found, Key, Move, Node
 from wbc.walking.structure import Structure
 from wbc.walking.swings import SETTLE, Swing, Swings
 
@@ -46,9 +47,9 @@ USUAL, SLACK = 2.1, 0.5
 #: Ways to one stance that are looked at, and stances that are checked together, in widths
 WAYS, PARTS = 2, 2
 #: Stances, and pairs of grips, of one slice of the search
-NODES, PAIRS = 3, 24
-#: Delays are counted in steps of this [s], so that rounding decides nothing
-QUANTUM = 1e-6
+NODES, PAIRS = 16, 24
+#: Arm, grips and sample of a swing that was looked at
+Asked = tuple[int, int, int, int]
 
 
 class StanceSearch:
@@ -83,7 +84,12 @@ class StanceSearch:
             self._equip()
         else:
             self.clearance, self.swings = known.clearance, known.swings
-        self._usual, self._slack = round(USUAL / path.spacing), SLACK / path.spacing
+        self._usual = round(USUAL / path.spacing)
+        codes = grips.hold * (1 + grips.branch.max(initial=0)) + grips.branch
+        more = SLACK / path.spacing
+        self._outlook = Outlook(grips.last, codes, len(path) - 1, self._usual, more, path.spacing)
+        # Levels of the last search, and swings (arm, source, target, lift) that each but the first asked for
+        self._levels, self._asked = list[dict[Key, Node]](), list[set[Asked]]()
         self.longest_delay, self.width, self.first = longest_delay, width, first
         self.expanded = 0
         # The end of the path is no limit of the arm
@@ -116,6 +122,8 @@ class StanceSearch:
     def slices(self, starts: Sequence[Sequence[int]], sample: int = 0, deadline: float | None = None) -> Slices[Found]:
         """As :meth:`run`, in slices of :data:`NODES` stances looked at, or :data:`PAIRS` of grips or swings."""
         level: dict[Key, Node] = {tuple(int(g) for g in start): Node(sample, 0, None, None) for start in starts}
+        if not self._levels or self._levels[0] != level:
+            self._levels, self._asked = [level], []
         levels = [level]
         while True:
             done = [
@@ -127,49 +135,67 @@ class StanceSearch:
                 return self._result(levels, min(done)[2], True)
             if deadline is not None and time.perf_counter() > deadline:
                 break
-            level = yield from self._next(level)
+            if len(levels) == len(self._levels):
+                following_level, asked = yield from self._next(level)
+                self._levels.append(following_level)
+                self._asked.append(asked)
+            level = self._levels[len(levels)]
             if not level:
                 break
             levels.append(level)
         return self._result(levels, None, False)
 
-    def _next(self, level: dict[Key, Node]) -> Slices[dict[Key, Node]]:
-        """Stances with one more re-grasp; the promising ones first, until there are enough."""
-        candidates: dict[Key, list[Node]] = {}
-        for key, node in level.items():
-            if self.expanded % NODES == 0:
-                yield None
-            self.expanded += 1
-            for target, move in self._moves(key, node):
-                child = tuple(target if k == move.arm else g for k, g in enumerate(key))
-                delay = node.delay + round(move.delay / QUANTUM)
-                candidates.setdefault(child, []).append(Node(move.land, delay, key, move))
-        most = WAYS if self.width else None
-        ranked = {key: sorted(nodes, key=lambda n: (n.sample, n.delay))[:most] for key, nodes in candidates.items()}
-        order = sorted(ranked.items(), key=lambda item: self._promise(item[0], item[1][0]))
+    def correct(self, move: Move, duration: float, possible: bool) -> None:
+        """A move takes another time [s], or is not possible; what was searched without looking at it is kept."""
+        self.swings.correct(move.arm, move.source, move.target, move.lift, move.way, duration, possible)
+        name = move.arm, move.source, move.target, move.lift
+        for depth, asked in enumerate(self._asked):
+            if name in asked:
+                self._levels, self._asked = self._levels[: depth + 1], self._asked[:depth]
+
+    def _next(self, level: dict[Key, Node]) -> Slices[tuple[dict[Key, Node], set[Asked]]]:
+        """Stances with one more re-grasp, the promising ones first, until there are enough; and swings looked at."""
+        whole, parts, asked = list(level.items()), list[Fan](), set[Asked]()
+        for begin in range(0, len(whole), NODES):
+            parts += self._moves(whole, range(begin, min(begin + NODES, len(whole))))
+            yield None
+        self.expanded += len(whole)
+        order = following(Fan.joined(parts), whole, self._outlook, WAYS if self.width else None) if parts else iter(())
         kept: dict[Key, Node] = {}
-        size = PARTS * self.width if self.width else max(len(order), 1)
-        for begin in range(0, len(order), size):
-            part = order[begin : begin + size]
-            yield from self._prepare(level, part)
-            for key, nodes in part:
-                checked = [better for node in nodes if (better := self._checked(level, key, node)) is not None]
+        while part := list(islice(order, PARTS * self.width if self.width else None)):
+            found = yield from self._prepare(level, part)
+            for (key, nodes), swings in zip(part, found, strict=True):
+                asked.update((s.arm, s.source, s.target, s.lift) for s in swings if s is not None)
+                pairs = zip(nodes, swings, strict=True)
+                checked = [better for one in pairs if (better := self._checked(level, *one)) is not None]
                 if checked:
                     kept[key] = min(checked, key=lambda n: (n.sample, n.delay))
             if self.width and len(kept) >= self.width:
                 break
-        best = sorted(kept.items(), key=lambda item: self._worth(*item))
-        return dict(best[: self.width])
+        return self._best(kept), asked
 
-    def _prepare(self, level: dict[Key, Node], part: Sequence[tuple[Key, list[Node]]]) -> Slices[None]:
-        """What the check of some stances needs, computed together."""
+    def _best(self, kept: dict[Key, Node]) -> dict[Key, Node]:
+        """The promising ones of checked stances: arms that get in each other's way end them."""
+        if not kept:
+            return {}
+        keys = np.array(list(kept), dtype=np.int64)
+        samples, delays = np.array([(node.sample, node.delay) for node in kept.values()], dtype=np.int64).T
+        until = np.array([self.until(key, node.sample) for key, node in kept.items()])
+        promise = self._outlook.promise(keys, samples, delays) + 2.0 * (self.grips.last[keys].min(axis=1) - until)
+        whole = list(kept.items())
+        return dict(whole[k] for k in self._outlook.order(keys, samples, promise).tolist()[: self.width])
+
+    def _prepare(
+        self, level: dict[Key, Node], part: Sequence[tuple[Key, list[Node]]]
+    ) -> Slices[list[list[Swing | None]]]:
+        """The swings that lead to some stances, and what their check needs, computed together."""
         pairs = [pair for key, _ in part for pair in combinations(key, 2)]
         for begin in range(0, len(pairs), PAIRS):
             self.clearance.prepare(pairs[begin : begin + PAIRS])
             yield None
-        found = [self._swing(level, key, node) for key, nodes in part for node in nodes]
-        swings = [swing for swing in found if swing is not None]
-        yield from self.swings.slices(swings)
+        found = [[self._swing(level, key, node) for node in nodes] for key, nodes in part]
+        yield from self.swings.slices(swing for swings in found for swing in swings if swing is not None)
+        return found
 
     def _swing(self, level: dict[Key, Node], key: Key, node: Node) -> Swing | None:
         """The swing that leads to a stance; None where the arms are in each other's way when it lands."""
@@ -181,50 +207,55 @@ class StanceSearch:
             return None
         return Swing(move.arm, move.source, move.target, move.lift, self._room(others, level[parent].sample), others)
 
-    def _moves(self, key: Key, node: Node) -> Iterator[tuple[int, Move]]:
-        """Moves that estimates allow: (target, move)."""
-        grips, spacing = self.grips, self.path.spacing
-        for arm, source in enumerate(key):
-            others = [g for k, g in enumerate(key) if k != arm]
-            room = self._room(others, node.sample)
-            end = min(int(grips.last[source]), min(self._conflict(source, g, node.sample) for g in others) - 1)
-            targets = self._by_arm[arm]
-            useful = grips.last[targets] > grips.last[source]
-            if self.first and node.parent is None:
-                useful = (grips.hold[targets] == self.first[1]) & (arm == self.first[0])
-            targets = targets[useful & (grips.first[targets] < room)]
-            for g in others:
-                targets = targets[grips.hold[targets] != grips.hold[g]]
-            if not len(targets) or node.sample > min(room, end):
+    def _moves(self, level: Sequence[tuple[Key, Node]], rows: range) -> list[Fan]:
+        """Moves that estimates allow from some stances of a level, arm by arm."""
+        grips, spacing, some = self.grips, self.path.spacing, [level[k] for k in rows]
+        keys, samples = np.array([key for key, _ in some]), np.array([node.sample for _, node in some])
+        rooms, ends = (np.array(x) for x in zip(*(self._limits(*one) for one in some), strict=True))
+        out, first = [], self.first if level[0][1].parent is None else None
+        for arm, targets in enumerate(self._by_arm):
+            room, end, source = rooms[:, arm], ends[:, arm], keys[:, arm]
+            useful = grips.last[targets] > grips.last[source][:, None]
+            if first:
+                useful = np.repeat(((grips.hold[targets] == first[1]) & (arm == first[0]))[None], len(some), axis=0)
+            useful &= (grips.first[targets] < room[:, None]) & (samples <= np.minimum(room, end))[:, None]
+            for other in np.delete(keys, arm, axis=1).T:
+                useful &= grips.hold[targets] != grips.hold[other][:, None]
+            row, column = np.nonzero(useful)
+            if not len(row):
                 continue
-            soonest = self._soonest[targets]
-            about = np.minimum(np.maximum(node.sample, soonest - self._usual), min(end, room))
-            duration = self.swings.estimate(source, targets, about, np.maximum(about + self._usual, soonest))
+            source, target, sample, room = source[row], targets[column], samples[row], room[row]
+            stop, soonest = np.minimum(end[row], room), self._soonest[target]
+            about = np.minimum(np.maximum(sample, soonest - self._usual), stop)
+            duration = self.swings.estimate(source, target, about, np.maximum(about + self._usual, soonest))
             count = np.ceil(duration / spacing).astype(np.int64)
-            lift = np.minimum(np.maximum(node.sample, soonest - count), min(end, room))
+            lift = np.minimum(np.maximum(sample, soonest - count), stop)
             land = np.maximum(lift + count, soonest)
-            hovers = land - lift - count
-            late = np.maximum(land - room, 0)
+            hovers, delay = (land - lift - count) * spacing, np.maximum(land - room, 0) * spacing
             land = np.minimum(land, room)
-            delay = late * spacing
-            fits = (land <= self._latest[targets]) & (land >= soonest) & (delay <= self.longest_delay)
-            fits &= (hovers * spacing <= HOVER) & self._bent(targets, land)
-            for target, begin, finish, need, lost in zip(
-                targets[fits].tolist(),
-                lift[fits].tolist(),
-                land[fits].tolist(),
-                duration[fits].tolist(),
-                delay[fits].tolist(),
-                strict=True,
-            ):
-                yield target, Move(arm, source, target, begin, finish, need, lost)
+            fits = (land <= self._latest[target]) & (land >= soonest) & (delay <= self.longest_delay)
+            fits &= (hovers <= HOVER) & self._bent(target, land)
+            fan = Fan(row + rows.start, np.full_like(row, arm), source, target, lift, land, duration, delay)
+            out.append(fan.of(np.nonzero(fits)[0]))
+        return out
 
-    def _checked(self, level: dict[Key, Node], key: Key, node: Node) -> Node | None:
+    def _limits(self, key: Key, node: Node) -> tuple[list[int], list[int]]:
+        """For each arm the last sample that the others can hold, less what is spared, and that it can hold itself."""
+        pairs = {pair: self._conflict(*pair, node.sample) - 1 for pair in combinations(key, 2)}
+        rooms, ends = [], []
+        for grip in key:
+            mine = [free for pair, free in pairs.items() if grip in pair]
+            rest = [free for pair, free in pairs.items() if grip not in pair]
+            rooms.append(min([*(int(self._ends[g]) for g in key if g != grip), *rest]))
+            ends.append(min([int(self.grips.last[grip]), *mine]))
+        return rooms, ends
+
+    def _checked(self, level: dict[Key, Node], node: Node, swing: Swing | None) -> Node | None:
         """The node with its swing computed along its way, None where it is not possible."""
         move, parent = node.move, node.parent
         if move is None or parent is None:
             return node
-        before, swing = level[parent], self._swing(level, key, node)
+        before = level[parent]
         chosen = None if swing is None else self.swings.choose(swing)
         if swing is None or chosen is None:
             return None
@@ -271,27 +302,6 @@ class StanceSearch:
     def order(self, key: Sequence[int]) -> tuple[tuple[int, int], ...]:
         """What breaks ties: holds and branches, whichever arms they are of."""
         return tuple(sorted((int(self.grips.hold[g]), int(self.grips.branch[g])) for g in key))
-
-    def _promise(self, key: Key, node: Node) -> Worth:
-        """Long grips, and time for the swings that must follow, first.
-
-        With the ends e_1 <= e_2 <= ... of its grips a stance that begins at j has the slack
-        min_k (e_k - j - (k - 1) n), as hands swing one after the other for n samples. What is more than :data:`SLACK`
-        is worth nothing.
-        """
-        finish, usual = len(self.path) - 1, self._usual
-        ends = sorted(int(self.grips.last[g]) for g in key)
-        # A grip that lasts to the end of the path needs no other
-        ends = [end if end < finish else finish + usual for end in ends]
-        slack = min(end - node.sample - k * usual for k, end in enumerate(ends))
-        worth = sum(ends) / len(ends) + min(slack, self._slack)
-        return -worth + node.delay * QUANTUM / self.path.spacing, node.sample, self.order(key), key
-
-    def _worth(self, key: Key, node: Node) -> Worth:
-        """As the promise, of a checked stance: arms that get in each other's way end it."""
-        until = self.until(key, node.sample)
-        promise, sample, order, _ = self._promise(key, node)
-        return promise + 2.0 * (min(int(self.grips.last[g]) for g in key) - until), sample, order, key
 
     def _result(self, levels: list[dict[Key, Node]], key: Key | None, complete: bool) -> Found:
         depth = len(levels) - 1

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import ctypes
+
 import numpy as np
 from numpy.typing import NDArray
 
 from wbc.robots import Walker
 from wbc.validation import Array
+from wbc.walking import compiled
 from wbc.walking.arm_clearance import ROOM, ArmClearance
-from wbc.walking.grips import Grips, Ints
+from wbc.walking.grips import Ints
 from wbc.walking.structure import Structure
+from wbc.walking.surface import CylinderSurface
 
 #: Parts of upper arm, forearm and hand at which their distance from the structure is measured
 ALONG = (0.25, 0.5, 0.75, 1.0)
@@ -25,11 +29,12 @@ class SwingClearance:
     """Checks of swings, given by the arm's points O N S E W H in the body's frame at the points of its way.
 
     Args:
-        walker: its capsules and clearance. grips: those of the arms that hold. arms: for points and distances of arms.
+        walker: its capsules and clearance. arms: for points and distances of arms, those that hold too.
     """
 
-    def __init__(self, walker: Walker, structure: Structure, grips: Grips, arms: ArmClearance) -> None:
-        self._structure, self._grips, self._arms, self._data = structure, grips, arms, walker.data
+    def __init__(self, walker: Walker, structure: Structure, arms: ArmClearance) -> None:
+        self._structure, self._arms, self._data = structure, arms, walker.data
+        self._surface = _plain(structure)
 
     def structure(self, points: Array, bodies: Array, holds: Array) -> Flags:
         """Whether upper arms, forearms and hands are clear of the structure; a hand near a hold may touch.
@@ -41,17 +46,34 @@ class SwingClearance:
         Returns:
             ``[m]``.
         """
-        data = self._data
+        data, library = self._data, compiled.library()
+        radii = np.array([data.upper_arm_radius, data.forearm_radius, data.hand_radius])  # type: ignore[union-attr]
+        least = radii + data.clearance + ROOM_BELOW  # type: ignore[union-attr]
+        touching = data.exempt_distance + 2 * ROOM_BELOW  # type: ignore[union-attr]
+        if library is not None and self._surface is not None:
+            out = np.empty(len(points), dtype=np.bool_)
+            given = [compiled.packed(array) for array in (points, bodies, holds, ALONG, least)]
+            where = [compiled.at(array) for array in given]
+            library.stay_above(
+                self._surface,
+                *(ctypes.c_long(size) for size in points.shape[:2]),
+                *where[:4],
+                ctypes.c_long(len(ALONG)),
+                where[4],
+                ctypes.c_double(touching),
+                compiled.at(out),
+            )
+            return out
         turn, origin = bodies[..., :3, :3], bodies[..., :3, 3]
         placed = np.einsum("mnij,mnkj->mnki", turn, points[:, :, 2:]) + origin[:, :, None]
         part = np.array(ALONG)[:, None]
         start, end = placed[:, :, :3, None], placed[:, :, 1:, None]
         along = start + part * (end - start)
-        radii = np.array([data.upper_arm_radius, data.forearm_radius, data.hand_radius])  # type: ignore[union-attr]
-        room = self._structure.clearance(along) - radii[:, None] - data.clearance - ROOM_BELOW  # type: ignore[union-attr]
-        room[:, :, 2] = np.where(self._near(placed[:, :, 3], holds)[..., None], np.inf, room[:, :, 2])
-        out: Flags = (room >= 0.0).all(axis=(1, 2, 3))
-        return out
+        room = self._structure.clearance(along) - least[:, None]
+        # As high as it is far, less what it is across, which the curve keeps small
+        gap = np.linalg.norm(placed[:, :, 3, None] - holds[:, None], axis=-1).min(axis=-1)
+        room[:, :, 2] = np.where((gap <= touching)[..., None], np.inf, room[:, :, 2])
+        return np.asarray((room >= 0.0).all(axis=(1, 2, 3)))
 
     def room(self, points: Array) -> Array:
         """Distance of points of the structure's frame ``[n, 3]`` from the structure [m]."""
@@ -59,19 +81,13 @@ class SwingClearance:
 
     def others(self, points: Array, samples: Array, others: Ints) -> Flags:
         """Whether swinging arms stay clear of arms that hold: grips ``others`` ``[m]`` at ``samples`` ``[m, n]``."""
-        count, steps = samples.shape
-        postures = self._grips.between(others[:, None], samples)
-        held = np.empty_like(points)
-        for arm in np.unique(self._grips.arm[others]):
-            rows = self._grips.arm[others] == arm
-            held[rows] = self._arms.points(int(arm), postures[rows])
-        near = self._arms.near(points.reshape(-1, 6, 3), held.reshape(-1, 6, 3), ROOM - SWING_ROOM)
-        out: Flags = ~np.any(near.reshape(count, steps), axis=1)
-        return out
+        return self._arms.stay_clear(points, samples, others, ROOM - SWING_ROOM)
 
-    def _near(self, hands: Array, holds: Array) -> Flags:
-        """Whether hands ``[m, n, 3]`` are so near to their holds that they may touch what these stand on."""
-        gap = np.linalg.norm(hands[:, :, None] - holds[:, None], axis=-1).min(axis=-1)
-        # As high as it is far, less what it is across, which the curve keeps small
-        out: Flags = gap <= self._data.exempt_distance + 2 * ROOM_BELOW  # type: ignore[union-attr]
-        return out
+
+def _plain(structure: Structure) -> ctypes.Array[ctypes.c_double] | None:
+    """The surface as the compiled code wants it; None where there is more than a surface, or none."""
+    surface = structure.surface
+    if surface is None or structure.obstacles:
+        return None
+    radius = surface.radius if isinstance(surface, CylinderSurface) else 0.0
+    return compiled.doubles([*surface.pose.translation, *surface.pose.rotation[:, 2], radius])

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import ctypes
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from wbc.robots import WalkerData
 from wbc.validation import Array
+from wbc.walking import compiled
 from wbc.walking.grips import Ints
 from wbc.walking.structure import Structure
 
@@ -66,13 +68,24 @@ class Curves:
     def at(self, x: Array) -> Array:
         """Positions at ``x`` ``[n]``: ``[m, n, 3]``."""
         y = step((x - UPRIGHT) / (1 - 2 * UPRIGHT))
-        r = 1.0 - (1.0 - 2.0 * x) ** STEEP
+        r, library = 1.0 - (1.0 - 2.0 * x) ** STEEP, compiled.library()
+        if library is not None:
+            out = np.empty((len(self.begin), len(x), 3))
+            ends = self.begin, self.end, self.leave, self.arrive, self.rise, self.lift
+            before = [compiled.packed(a) for a in (*ends, self.pivots.frames, self.pivots.turn)]
+            after = [compiled.packed(a) for a in (y, r)]
+            library.curves_at(
+                *(ctypes.c_long(size) for size in out.shape[:2]),
+                *map(compiled.at, before),
+                ctypes.c_double(self.part),
+                *(compiled.at(a) for a in (*after, out)),
+            )
+            return out
         height = r * (self.rise[:, :1] * (1.0 - y) + self.rise[:, 1:] * y) + 4.0 * y * (1.0 - y) * self.lift[:, None]
         s = y[None, :, None]
         up = self.leave[:, None] * (s - 1.0) - self.arrive[:, None] * s
         chord = self.begin[:, None] * (1.0 - s) + self.end[:, None] * s
-        out: Array = chord + self.part * (self._arc(y) - chord) + height[..., None] * up
-        return out
+        return np.asarray(chord + self.part * (self._arc(y) - chord) + height[..., None] * up)
 
     def _arc(self, y: Array) -> Array:
         """Positions on the arcs ``[m, n, 3]``."""
@@ -130,19 +143,23 @@ def between(place: Array, axis: Array, structure: Structure, hold: int, pivots: 
 
 def _rise(flat: Curves, height: float) -> Array:
     """h with which hands are at ``height`` [m] where they have come ACROSS."""
-    points, grid = flat.at(np.linspace(0.0, 1.0, 2 * LOOKS)), np.linspace(0.0, 0.5, 129)
-    spans = np.linalg.norm(np.diff(points, axis=1), axis=2).sum(axis=1)
+    points = flat.at(_SPAN)
+    spans = np.sqrt((np.diff(points, axis=1) ** 2).sum(axis=2)).sum(axis=1)
     part = np.clip(ACROSS / np.maximum(spans, 1e-9), 0.0, 0.5)
-    x = UPRIGHT + (1 - 2 * UPRIGHT) * np.interp(part, step(grid), grid)
+    x = UPRIGHT + (1 - 2 * UPRIGHT) * np.interp(part, _HALF_STEPS, _HALF)
     out: Array = height / (1.0 - (1.0 - 2.0 * x) ** STEEP)
     return out
 
 
 def _lift(structure: Structure, flat: Curves, height: float) -> Array:
     """What curves lack between their ends, the chord of a round surface and obstacles included."""
-    y = np.linspace(0.0, 1.0, LOOKS + 2)[1:-1]
-    fine = np.linspace(0.0, 1.0, 257)
-    x = UPRIGHT + (1 - 2 * UPRIGHT) * np.interp(y, step(fine), fine)
-    lack = (height - structure.clearance(flat.at(x))) / (4.0 * y * (1.0 - y))
+    lack = (height - structure.clearance(flat.at(_LOOK))) / (4.0 * _ACROSS * (1.0 - _ACROSS))
     out: Array = np.maximum(lack.max(axis=1), 0.0)
     return out
+
+
+#: Places on curves at which their length is measured; steps over half a curve; where hands are looked at, and how far
+#: across they are there
+_SPAN, _HALF, _ACROSS = np.linspace(0.0, 1.0, 2 * LOOKS), np.linspace(0.0, 0.5, 129), np.linspace(0, 1, LOOKS + 2)[1:-1]
+_HALF_STEPS, _WHOLE = step(_HALF), np.linspace(0.0, 1.0, 257)
+_LOOK = UPRIGHT + (1 - 2 * UPRIGHT) * np.interp(_ACROSS, step(_WHOLE), _WHOLE)

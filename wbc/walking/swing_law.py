@@ -14,7 +14,8 @@ from wbc.walking.stance_search import Move
 from wbc.walking.swing_curve import Curves
 from wbc.walking.swing_path import Wrists, blend, grip_wrists
 from wbc.walking.swing_speed import speeds
-from wbc.walking.swings import COARSE, FINE, PASSES, Swings
+from wbc.walking.swing_tracks import PASSES
+from wbc.walking.swings import COARSE, FINE, Swings
 
 #: Rows of the table are this far apart [s]
 SPACING = 0.005

@@ -7,7 +7,6 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from wbc.robots import Walker
 from wbc.validation import Array
 from wbc.walking.arm_angles import sines, wrapped
 from wbc.walking.arm_kinematics import ArmKinematics
@@ -34,7 +33,7 @@ def blend(x: Array) -> Array:
 def grip_wrists(grips: Grips, source: Ints, target: Ints, points: int) -> Wrists:
     """Wrists that leave grips and come to others; both change as the body moves on."""
     part = blend(np.linspace(0.0, 1.0, points))[None, :, None]
-    end = 5 if (grips.roll[source] == ANY).all() and (grips.roll[target] == ANY).all() else 6
+    end = wrist_end(grips, source, target)
 
     def wrists(samples: Array) -> Array:
         first, last = (grips.between(g[:, None], samples)[..., 3:end] for g in (source, target))
@@ -44,8 +43,13 @@ def grip_wrists(grips: Grips, source: Ints, target: Ints, points: int) -> Wrists
     return wrists
 
 
+def wrist_end(grips: Grips, source: Ints, target: Ints) -> int:
+    """Joints before this one count: 5, and 6 where some hold fixes the roll."""
+    return 5 if (grips.roll[source] == ANY).all() and (grips.roll[target] == ANY).all() else 6
+
+
 def joint_paths(
-    kinematics: ArmKinematics, walker: Walker, arms: Ints, bodies: Array, place: Array, wrists: Array
+    kinematics: ArmKinematics, frames: Array, place: Array, wrists: Array
 ) -> tuple[Array, NDArray[np.bool_]]:
     """Joints 1 to 5 or 6 ``[m, n, 5 or 6]`` [rad] with hands at ``place`` ``[m, n, 3]`` and wrists bent by ``wrists``.
 
@@ -54,14 +58,12 @@ def joint_paths(
     the lengths ES and hypot(A, B).
 
     Args:
-        bodies: ``[m, n, 4, 4]``, affine. arms: rows ``[m]``.
+        frames: of the arms' bases ``[m, n, 4, 4]``, affine.
 
     Returns:
         (angles, possible): whether the whole swing is within reach and limits, ``[m]``.
     """
     data = kinematics.data
-    bases = np.array([arm.base.homogeneous for arm in walker.arms])[arms]
-    frames = bodies @ bases[:, None]
     turn, origin = frames[..., :3, :3], frames[..., :3, 3]
     points = np.einsum("mnji,mnj->mni", turn, place - origin)
     (s4, c4), (s5, c5) = sines(wrists[..., 0]), sines(wrists[..., 1])

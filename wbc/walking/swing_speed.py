@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 from dataclasses import dataclass
 from itertools import permutations
 
@@ -10,11 +11,12 @@ from numpy.typing import NDArray
 
 from wbc.robots import Walker
 from wbc.validation import Array
+from wbc.walking import compiled
 from wbc.walking.arm_kinematics import ArmKinematics
 from wbc.walking.body_path import BodyPath
 from wbc.walking.grips import Ints
 from wbc.walking.swing_curve import Curves
-from wbc.walking.swing_path import Wrists, joint_paths
+from wbc.walking.swing_path import ANGLE_ROOM, AXIS_ROOM, ELBOW_ROOM, REACH_ROOM, Wrists, joint_paths
 
 #: Parts of joint rates and accelerations that a swing is planned with; the rest is for feedback
 RATE_PART, ACCELERATION_PART = 0.96, 0.9
@@ -24,6 +26,10 @@ FASTEST = 2.0
 LEAST = 1e-6
 #: The body's part of the rates is that over so many samples
 STEP = 0.5
+#: Rules of native/speeds.h
+RULES = compiled.doubles(
+    (RATE_PART, ACCELERATION_PART, FASTEST, LEAST, STEP, REACH_ROOM, ANGLE_ROOM, ELBOW_ROOM, AXIS_ROOM)
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,17 +65,50 @@ def speeds(
     for joints 1 to 5, by one pass forwards and one backwards over x'^2; q_u u' is what the body's motion asks of a hand
     at rest.
     """
+    place, wrist = way.at(np.linspace(0.0, 1.0, samples.shape[1])), wrists(samples)
+    bases = np.array([arm.base.homogeneous for arm in walker.arms])[arms]
+    found = _compiled(kinematics, bases, path, place, samples, wrist)
+    return found or _numpy(kinematics, bases, path, place, samples, wrist)
+
+
+def _compiled(
+    kinematics: ArmKinematics, bases: Array, path: BodyPath, place: Array, samples: Array, wrist: Array
+) -> Speeds | None:
+    """By the compiled code; None where there is none."""
+    library = compiled.library()
+    if library is None:
+        return None
+    count, points, bends = wrist.shape
+    angles = np.empty((count, points, 3 + bends))
+    rate, time, possible = np.empty((count, points)), np.empty((count, points)), np.empty(count, dtype=np.bool_)
+    given = [compiled.packed(array) for array in (bases, path.poses, place, wrist, samples)]
+    where = [compiled.at(array) for array in given]
+    library.swing_speeds(
+        ctypes.byref(compiled.arm(kinematics.data)),
+        RULES,
+        ctypes.c_long(count),
+        ctypes.c_long(points),
+        ctypes.c_int(bends),
+        *where[:2],
+        ctypes.c_long(len(path)),
+        ctypes.c_double(path.spacing),
+        *where[2:],
+        *(compiled.at(array) for array in (possible, angles, rate, time)),
+    )
+    return Speeds(possible, angles, rate, time)
+
+
+def _numpy(
+    kinematics: ArmKinematics, bases: Array, path: BodyPath, place: Array, samples: Array, wrist: Array
+) -> Speeds:
+    """What the compiled code does."""
     count, points = samples.shape
-    x = np.linspace(0.0, 1.0, points)
     gap = 1.0 / (points - 1)
-    place, wrist = way.at(x), wrists(samples)
     # The same hand on a body that is a little further
     doubled = np.concatenate([samples, samples + STEP])
     both, possible = joint_paths(
         kinematics,
-        walker,
-        np.concatenate([arms, arms]),
-        path.blended(doubled),
+        path.blended(doubled) @ np.concatenate([bases, bases])[:, None],
         np.concatenate([place, place]),
         np.concatenate([wrist, wrist]),
     )

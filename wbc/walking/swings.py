@@ -19,15 +19,12 @@ from wbc.walking.slices import Slices, drained
 from wbc.walking.structure import Structure
 from wbc.walking.swing_clearance import SwingClearance
 from wbc.walking.swing_curve import WAYS, Curves, Pivots, curves
-from wbc.walking.swing_path import grip_wrists
-from wbc.walking.swing_speed import speeds
+from wbc.walking.swing_tracks import Asked, tracks
 
 #: Points of a way: enough for the search, and for carrying it out
 COARSE, FINE = 25, 97
 #: A law at FINE points takes so many times as long as one at COARSE points, at most
 FINER = 1.04
-#: How often the law is made, each time with the body where the last one has it
-PASSES = 2
 #: Time to settle on the hold before the hand closes, besides the latch twice [s]
 SETTLE = 0.06
 #: Swings that are computed together
@@ -92,21 +89,21 @@ class Swings:
         self.kinematics = ArmKinematics(walker.data)  # type: ignore[arg-type]
         self._rates = np.array(self.kinematics.data.joint_rates)[:5]
         self._arms = arms or ArmClearance(walker, grips)
-        self._clear = SwingClearance(walker, structure, grips, self._arms)
+        self._clear = SwingClearance(walker, structure, self._arms)
         self._tracks: dict[tuple[_Name, int], _Track | None] = {}
         self._apart: dict[tuple[_Name, int, int], bool] = {}
         self._chosen: dict[Swing, Chosen | None] = {}
         self._known: dict[tuple[int, int, int, int, int], float | None] = {}
 
-    def estimate(self, source: int, targets: Ints, lift: Ints, land: Ints) -> Array:
-        """About how long swings from a grip take, lifted and landed at about these samples; latches included [s].
+    def estimate(self, sources: Ints, targets: Ints, lift: Ints, land: Ints) -> Array:
+        """About how long swings from grips take, lifted and landed at about these samples; latches included [s].
 
         c + r max_k |dq_k| / rate_k + w |way|, fitted to swings of the published courses at 1 to 6 in/s: of ten,
         eight last 0.12 s less to 0.17 s more.
         """
         places, grips = self.structure.positions, self.grips
-        way = np.linalg.norm(places[grips.hold[targets]] - places[grips.hold[source]], axis=1)
-        turn = np.abs(grips.posture(targets, land) - grips.posture(np.full(len(targets), source), lift))[:, :5]
+        way = np.linalg.norm(places[grips.hold[targets]] - places[grips.hold[sources]], axis=1)
+        turn = np.abs(grips.posture(targets, land) - grips.posture(sources, lift))[:, :5]
         constant, turning, going = ESTIMATE
         out: Array = constant + turning * (turn / self._rates).max(axis=1) + going * way
         return np.round(out, 6)
@@ -163,27 +160,18 @@ class Swings:
         names = list(dict.fromkeys(_name(s) for s in swings if (_name(s), way) not in self._tracks))
         if not names:
             return
-        arms, source, target, lift, last = np.array(names, dtype=np.int64).T
+        arms, source, target, lift, last = np.ascontiguousarray(np.array(names, dtype=np.int64).T)
         curve = self.curve(arms, source, target, lift, way)
-        wrists = grip_wrists(self.grips, source, target, COARSE)
         # The body moves on while the hand opens
-        begin = lift[:, None] + self.latch / self.path.spacing
-        times = np.linspace(0.0, 1.0, COARSE)
-        for _ in range(PASSES):
-            samples = np.minimum(begin + times / self.path.spacing, last[:, None])
-            found = speeds(self.kinematics, self.walker, arms, self.path, curve, samples, wrists)
-            times = found.time
-        postures = np.zeros((*found.angles.shape[:2], 6))
-        postures[..., :5] = found.angles[..., :5]
-        points = np.empty((*postures.shape[:2], 6, 3))
-        for arm in np.unique(arms):
-            points[arms == arm] = self._arms.points(int(arm), postures[arms == arm])
+        asked = Asked(arms, source, target, lift + self.latch / self.path.spacing, last)
+        found = tracks(self.walker, self._arms, self.path, self.grips, curve, asked, COARSE)
         ends = np.stack([curve.begin, curve.end], axis=1)
-        possible = found.possible & self._clear.structure(points, self.path.blended(samples), ends)
+        bodies = self.path.blended(found.samples)
+        possible = found.possible & self._clear.structure(found.points, bodies, ends)
         for k, name in enumerate(names):
             duration = FINER * float(found.duration[k]) + self.extra
-            fine = _Track(duration, points[k], samples[k]) if possible[k] else None
-            self._tracks[name, way] = fine
+            track = _Track(duration, found.points[k], found.samples[k])
+            self._tracks[name, way] = track if possible[k] else None
 
     def _check(self, swings: Sequence[Swing], way: int) -> None:
         """Clearance of the other arms."""

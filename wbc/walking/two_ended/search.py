@@ -15,7 +15,8 @@ from wbc.walking.arm_clearance import NEVER
 from wbc.walking.body_path import BodyPath
 from wbc.walking.grips import Grips, Ints
 from wbc.walking.slices import Slices
-from wbc.walking.stance_search import INSIDE, QUANTUM, Key, Node, StanceSearch
+from wbc.walking.stance_fan import QUANTUM
+from wbc.walking.stance_search import INSIDE, Key, Node, StanceSearch
 from wbc.walking.structure import Structure
 from wbc.walking.swings import Chosen, Swing
 from wbc.walking.two_ended.postures import Grip, PairPostures
@@ -74,7 +75,7 @@ class Turns:
         source, target, held = (self._pairs.named(g) for g in (swing.source, swing.target, swing.others[0]))
         return Turn(swing.arm, source, target, held)
 
-    def estimate(self, source: int, targets: Ints, lift: Ints, land: Ints) -> Array:
+    def estimate(self, sources: Ints, targets: Ints, lift: Ints, land: Ints) -> Array:
         """Times that no swing is shorter than."""
         return np.zeros(len(targets))
 
@@ -130,9 +131,9 @@ class TurnSearch(StanceSearch):
         self.clearance = self.pairs  # type: ignore[assignment]
         self.swings = Turns(self._paths, self.pairs, self._towards, self._gait)  # type: ignore[assignment]
 
-    def _checked(self, level: dict[Key, Node], key: Key, node: Node) -> Node | None:
+    def _checked(self, level: dict[Key, Node], node: Node, swing: Swing | None) -> Node | None:
         """With the time that the swing takes, as nothing else is late."""
-        found = super()._checked(level, key, node)
+        found = super()._checked(level, node, swing)
         if found is None or found.move is None or found.parent is None:
             return found
         return replace(found, delay=level[found.parent].delay + round(found.move.duration / QUANTUM))

@@ -1,0 +1,125 @@
+"""The planner's compiled inner loops do what its numpy does."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from wbc.robots import Walker
+from wbc.walking import Structure, compiled, plane
+from wbc.walking.arm_clearance import ArmClearance
+from wbc.walking.body_path import BodyPath, grid_path
+from wbc.walking.grips import Grips, find_grips
+from wbc.walking.plan import Plan
+from wbc.walking.planner import plan_walk
+from wbc.walking.swing_clearance import SwingClearance
+from wbc.walking.swing_curve import WAYS
+from wbc.walking.swing_speed import speeds
+from wbc.walking.swing_tracks import Asked, Tracks, tracks
+from wbc.walking.swings import Swings
+
+Both = Callable[[Callable[[], Any]], tuple[Any, Any]]
+COUNT, N = 120, 25
+
+
+@pytest.fixture(scope="module")
+def path() -> BodyPath:
+    return grid_path([(12, 9), (13.5, 11, 0.3)], 0.15)
+
+
+@pytest.fixture(scope="module")
+def grips(machine: Walker, structure: Structure, path: BodyPath) -> Grips:
+    return find_grips(machine, structure, path)
+
+
+@pytest.fixture
+def both(monkeypatch: pytest.MonkeyPatch) -> Both:
+    """A result by compiled code, and by numpy."""
+
+    def results(work: Callable[[], Any]) -> tuple[Any, Any]:
+        assert compiled.library() is not None
+        first = work()
+        with monkeypatch.context() as patch:
+            patch.setattr(compiled, "library", lambda: None)
+            return first, work()
+
+    return results
+
+
+def drawn(grips: Grips, path: BodyPath) -> tuple[Asked, Any, Any]:
+    """Swings of one arm each between grips at random."""
+    rng = np.random.default_rng(4)
+    source, target = (rng.integers(0, len(grips), 20 * COUNT) for _ in range(2))
+    fits = (grips.arm[source] == grips.arm[target]) & (grips.hold[source] != grips.hold[target])
+    source, target = source[fits][:COUNT], target[fits][:COUNT]
+    lift = rng.integers(0, len(path), len(source))
+    last = np.minimum(lift + rng.integers(5, 60, len(source)), len(path) - 1)
+    return Asked(grips.arm[source], source, target, lift + 2.0, last), lift, rng.integers(0, len(grips), len(source))
+
+
+def test_swings_are_the_same(machine: Walker, structure: Structure, path: BodyPath, grips: Grips, both: Both) -> None:
+    swings, arms = Swings(machine, structure, path, grips), ArmClearance(machine, grips)
+    asked, lift, others = drawn(grips, path)
+    found = set()
+    for way in range(len(WAYS)):
+        curve = swings.curve(asked.arms, asked.source, asked.target, lift, way)
+        fast, slow = both(lambda c=curve: c.at(np.linspace(0.0, 1.0, 40)))
+        np.testing.assert_allclose(fast, slow, rtol=0.0, atol=1e-12)
+        one: Tracks
+        other: Tracks
+        one, other = both(lambda c=curve: tracks(machine, arms, path, grips, c, asked, N))
+        assert one.possible.tolist() == other.possible.tolist()
+        fits = one.possible
+        for name in ("duration", "samples", "points"):
+            np.testing.assert_allclose(getattr(one, name)[fits], getattr(other, name)[fits], rtol=1e-9, atol=1e-9)
+        for what in (structure, plane()):
+            clear = SwingClearance(machine, what, arms)
+            ends = np.stack([curve.begin, curve.end], axis=1)
+            bodies = path.blended(one.samples)
+            fast, slow = both(lambda c=clear, b=bodies, e=ends, p=one.points: c.structure(p, b, e))
+            assert fast.tolist() == slow.tolist()
+            found |= {("structure", x) for x in fast.tolist()}
+        fast, slow = both(lambda c=clear, t=one: c.others(t.points, t.samples, others))
+        assert fast.tolist() == slow.tolist()
+        found |= {("others", x) for x in fast.tolist()} | {("possible", x) for x in fits.tolist()}
+    # Every check has said yes and no
+    assert len(found) == 6
+
+
+def test_laws_and_arms_are_the_same(
+    machine: Walker, structure: Structure, path: BodyPath, grips: Grips, both: Both
+) -> None:
+    swings, arms = Swings(machine, structure, path, grips), ArmClearance(machine, grips)
+    asked, lift, _ = drawn(grips, path)
+    curve = swings.curve(asked.arms, asked.source, asked.target, lift, 0)
+    samples = np.minimum(lift[:, None] + np.linspace(0.0, 30.0, N), len(path) - 1.0)
+    for bends in (2, 3):
+        wrists = np.linspace(-0.4, 0.9, N)[:, None] + 0.1 * np.arange(bends)
+        bent = np.repeat(wrists[None], len(lift), axis=0)
+        one, other = both(
+            lambda b=bent: speeds(swings.kinematics, machine, asked.arms, path, curve, samples, lambda _: b)
+        )
+        assert one.possible.tolist() == other.possible.tolist()
+        fits = one.possible
+        assert set(fits.tolist()) == {True, False}
+        for name in ("angles", "rate", "time"):
+            np.testing.assert_allclose(getattr(one, name)[fits], getattr(other, name)[fits], rtol=1e-9, atol=1e-9)
+    postures = grips.postures[np.random.default_rng(1).integers(0, len(grips.postures), 4000)]
+    points = [both(lambda k=k, q=q: arms.points(k, q)) for k, q in enumerate(np.split(postures, 2))]
+    for fast, slow in points:
+        np.testing.assert_allclose(fast, slow, rtol=0.0, atol=1e-14)
+    fast, slow = both(lambda: arms.near(points[0][0], points[1][0]))
+    assert fast.tolist() == slow.tolist()
+    assert set(fast.tolist()) == {True, False}
+
+
+def test_plans_are_the_same(machine: Walker, structure: Structure, both: Both) -> None:
+    way = grid_path([(13, 9), (13.5, 12)], 0.15)
+    one: Plan
+    other: Plan
+    one, other = both(lambda: plan_walk(machine, structure, way))
+    assert (one.start, one.regrasps) == (other.start, other.regrasps)
+    assert one.regrasps

@@ -1,0 +1,93 @@
+"""Swings as the search has them: the law of each with the body on its way, and the points of its arm."""
+
+from __future__ import annotations
+
+import ctypes
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wbc.robots import Walker
+from wbc.validation import Array
+from wbc.walking import compiled
+from wbc.walking.arm_clearance import ArmClearance
+from wbc.walking.arm_kinematics import ArmKinematics
+from wbc.walking.body_path import BodyPath
+from wbc.walking.grips import Grips, Ints
+from wbc.walking.swing_curve import Curves
+from wbc.walking.swing_path import blend, grip_wrists, wrist_end
+from wbc.walking.swing_speed import RULES, speeds
+
+#: How often the law is made, each time with the body where the last one has it
+PASSES = 2
+
+
+@dataclass(frozen=True, eq=False)
+class Tracks:
+    """m swings over n points: within reach and limits ``[m]``, duration ``[m]`` [s], samples of the path ``[m, n]``,
+    and points of the arms in the body's frame ``[m, n, 6, 3]``.
+    """
+
+    possible: NDArray[np.bool_]
+    duration: Array
+    samples: Array
+    points: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Asked:
+    """Swings of arms between grips; the body is at sample ``begin`` at first and ``last`` at most; ``[m]`` each."""
+
+    arms: Ints
+    source: Ints
+    target: Ints
+    begin: Array
+    last: Ints
+
+
+def tracks(
+    walker: Walker, arms: ArmClearance, path: BodyPath, grips: Grips, way: Curves, asked: Asked, n: int
+) -> Tracks:
+    """Swings along curves, at n points of each."""
+    library = compiled.library()
+    if library is None:
+        return _numpy(walker, arms, path, grips, way, asked, n)
+    x, m = np.linspace(0.0, 1.0, n), len(asked.arms)
+    out = Tracks(np.empty(m, dtype=np.bool_), np.empty(m), np.empty((m, n)), np.empty((m, n, 6, 3)))
+    bases = np.array([arm.base.homogeneous for arm in walker.arms])[asked.arms]
+    given = [compiled.packed(array) for array in (bases, path.poses, way.at(x), blend(x))]
+    where = [compiled.at(array) for array in (*given, asked.source, asked.target, asked.begin, asked.last)]
+    library.swing_tracks(
+        ctypes.byref(compiled.arm(walker.data)),
+        RULES,
+        ctypes.byref(grips.table),
+        ctypes.c_long(m),
+        ctypes.c_long(n),
+        ctypes.c_int(wrist_end(grips, asked.source, asked.target) - 3),
+        ctypes.c_long(PASSES),
+        *where[:2],
+        ctypes.c_long(len(path)),
+        ctypes.c_double(path.spacing),
+        *where[2:],
+        *(compiled.at(array) for array in (out.possible, out.duration, out.samples, out.points)),
+    )
+    return out
+
+
+def _numpy(
+    walker: Walker, arms: ArmClearance, path: BodyPath, grips: Grips, way: Curves, asked: Asked, n: int
+) -> Tracks:
+    """What the compiled code does."""
+    times, kinematics = np.linspace(0.0, 1.0, n), ArmKinematics(walker.data)  # type: ignore[arg-type]
+    wrists = grip_wrists(grips, asked.source, asked.target, n)
+    for _ in range(PASSES):
+        samples = np.minimum(asked.begin[:, None] + times / path.spacing, asked.last[:, None])
+        found = speeds(kinematics, walker, asked.arms, path, way, samples, wrists)
+        times = found.time
+    postures = np.zeros((*found.angles.shape[:2], 6))
+    postures[..., :5] = found.angles[..., :5]
+    points = np.empty((*postures.shape[:2], 6, 3))
+    for arm in np.unique(asked.arms):
+        points[asked.arms == arm] = arms.points(int(arm), postures[asked.arms == arm])
+    return Tracks(found.possible, found.duration, samples, points)
