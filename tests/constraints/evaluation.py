@@ -11,7 +11,8 @@ import pinocchio as pin
 
 from wbc.robot import Robot
 from wbc.symbolic.kinematics import Kinematics, Pose
-from wbc.symbolic.tracer import Tracer, rotation_rate
+from wbc.symbolic.rotations import rotation_rate
+from wbc.symbolic.tracer import Tracer
 from wbc.tasks.base import Constraint, Input
 
 SIZES = {"pose": 12, "rotation": 9}

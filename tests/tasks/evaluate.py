@@ -12,7 +12,8 @@ import pinocchio as pin
 
 from wbc.robot import Robot
 from wbc.symbolic.kinematics import Kinematics
-from wbc.symbolic.tracer import Tracer, rotation_rate
+from wbc.symbolic.rotations import rotation_rate
+from wbc.symbolic.tracer import Tracer
 from wbc.tasks import Constraint, Input, Item, Task
 from wbc.tasks import inputs as run_time
 

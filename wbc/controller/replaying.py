@@ -10,11 +10,12 @@ import numpy as np
 
 from wbc import validation
 from wbc.controller.controller import Controller
+from wbc.controller.outcome import STATUSES
 from wbc.controller.policy import Policy
 from wbc.controller.recorder import INPUTS, about, declaration_key
 from wbc.controller.recording import Recording, RecordingError
 from wbc.controller.stack import Stack
-from wbc.controller.step import STATUSES, Step
+from wbc.controller.step import Step
 from wbc.controller.unpickle import load_stack
 from wbc.validation import Array
 

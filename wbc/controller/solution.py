@@ -8,7 +8,8 @@ from enum import StrEnum
 
 import numpy as np
 
-from wbc.controller.step import Binding, Residual, Step
+from wbc.controller.outcome import Binding, Residual
+from wbc.controller.step import Step
 from wbc.validation import Array
 
 

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pinocchio as pin
 
-from wbc.controller.step import STATUSES, Status, Step
+from wbc.controller.outcome import STATUSES, Status
+from wbc.controller.step import Step
 from wbc.robot import Robot
 from wbc.stack.layout import Slot
 from wbc.tasks.base import Task

@@ -44,7 +44,7 @@ from wbc.stack.soft import kept_direction, slacks, softened, speeds, unlimited, 
 from wbc.symbolic import rotations as rot
 from wbc.symbolic.curvature import Pull, curvature
 from wbc.symbolic.kinematics import Kinematics, Pose
-from wbc.symbolic.tracer import Tracer, rotation_rate
+from wbc.symbolic.tracer import Tracer
 from wbc.tasks._direction import Direction
 from wbc.tasks.base import Bounds, Constraint, Rows, Task
 from wbc.tasks.inputs import as_value
@@ -110,9 +110,9 @@ class _Builder:
         speed = self.p[block.slots[slot.input.rate].span]
         part = self.p[slot.span]
         if slot.input.kind == "pose":
-            return ca.vertcat(rotation_rate(ca.reshape(part[:9], 3, 3)) @ speed[3:], speed[:3])
+            return ca.vertcat(rot.rotation_rate(ca.reshape(part[:9], 3, 3)) @ speed[3:], speed[:3])
         if slot.input.kind == "rotation":
-            return rotation_rate(ca.reshape(part, 3, 3)) @ speed
+            return rot.rotation_rate(ca.reshape(part, 3, 3)) @ speed
         if slot.input.kind == "configuration":
             return self.kinematics.tangent_map_at(part) @ speed
         return speed

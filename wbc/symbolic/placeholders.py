@@ -8,6 +8,8 @@ from dataclasses import dataclass
 import casadi as ca
 
 from wbc.symbolic.curvature import Pull
+from wbc.symbolic.kinematics import Kinematics, Pose
+from wbc.symbolic.rotations import rotation_rate
 
 
 @dataclass
@@ -29,6 +31,30 @@ class Placeholder:
     inner: bool = False
     turns: bool = False
     pulls: Callable[[ca.SX], tuple[Pull, ...]] = lambda force: ()
+
+
+def of_frame(kinematics: Kinematics, frame: str, pose: Pose) -> list[Placeholder]:
+    """The two that stand for a named frame: its position, moved by the linear rows of its Jacobian, and its rotation,
+    moved by the angular rows. ``pose``: their symbols.
+    """
+    position = Placeholder(
+        f"position {frame}",
+        pose.position,
+        lambda: kinematics.pose(frame).position,
+        ca.SX.eye(3),
+        lambda: kinematics.jacobian(frame)[:3, :],
+        pulls=lambda force: (Pull("force", frame, force),),
+    )
+    rotation = Placeholder(
+        f"rotation {frame}",
+        ca.vec(pose.rotation),
+        lambda: ca.vec(kinematics.pose(frame).rotation),
+        rotation_rate(pose.rotation),
+        lambda: kinematics.jacobian(frame)[3:, :],
+        turns=True,
+        pulls=lambda torque: (Pull("torque", frame, torque),),
+    )
+    return [position, rotation]
 
 
 def turning(

@@ -33,6 +33,14 @@ def skew(w: ca.SX) -> ca.SX:
     return ca.skew(w)
 
 
+def rotation_rate(rotation: ca.SX) -> ca.SX:
+    """9x3 map from an angular velocity in the outer axes to d vec(R)/dt = vec([w]x R), columns first."""
+    out = []
+    for axis in _EYE:
+        out.append(ca.vec(ca.skew(ca.SX(ca.sparsify(ca.DM(axis)))) @ rotation))
+    return ca.horzcat(*out)
+
+
 def from_axis_angle(axis: ArrayLike, cos: ca.SX, sin: ca.SX) -> ca.SX:
     """R = aa' + cos(t) (1 - aa') + sin(t) [a]x for a constant unit axis a (Rodrigues)."""
     return _axis_angle(tuple(np.array(axis, dtype=float).tolist()))(cos, sin)

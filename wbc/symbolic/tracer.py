@@ -18,7 +18,6 @@ from dataclasses import dataclass, field
 from functools import cache, partial
 
 import casadi as ca
-import numpy as np
 
 from wbc.errors import UnknownNameError
 from wbc.symbolic import rotations as rot
@@ -26,7 +25,7 @@ from wbc.symbolic.curvature import Pull
 from wbc.symbolic.gaps import Gap, gap_jacobian
 from wbc.symbolic.kinematics import WORLD, Kinematics, Pose
 from wbc.symbolic.manipulability import bend, manipulability
-from wbc.symbolic.placeholders import Placeholder, axis_bend, turning
+from wbc.symbolic.placeholders import Placeholder, axis_bend, of_frame, turning
 
 
 @dataclass
@@ -63,25 +62,7 @@ class Tracer:
             known = kinematics.pose(frame)
         else:
             known = Pose(ca.SX.sym(f"R_{frame}", 3, 3), ca.SX.sym(f"p_{frame}", 3))
-            self._symbols += [
-                Placeholder(
-                    f"position {frame}",
-                    known.position,
-                    lambda: kinematics.pose(frame).position,
-                    _eye(),
-                    lambda: kinematics.jacobian(frame)[:3, :],
-                    pulls=lambda force: (Pull("force", frame, force),),
-                ),
-                Placeholder(
-                    f"rotation {frame}",
-                    ca.vec(known.rotation),
-                    lambda: ca.vec(kinematics.pose(frame).rotation),
-                    rotation_rate(known.rotation),
-                    lambda: kinematics.jacobian(frame)[3:, :],
-                    turns=True,
-                    pulls=lambda torque: (Pull("torque", frame, torque),),
-                ),
-            ]
+            self._symbols += of_frame(kinematics, frame, known)
         self._poses[frame] = known
         return known
 
@@ -103,7 +84,7 @@ class Tracer:
                     "centre of mass",
                     self._com,
                     lambda: kinematics.center_of_mass,
-                    _eye(),
+                    ca.SX.eye(3),
                     lambda: kinematics.center_of_mass_jacobian,
                     pulls=lambda force: (Pull("mass", WORLD, force),),
                 )
@@ -299,15 +280,3 @@ class Tracer:
             [s.symbol for s in inner], [ca.densify(s.value()) for s in inner], [expression]
         )
         return out
-
-
-def _eye() -> ca.SX:
-    return ca.SX(ca.DM.eye(3))
-
-
-def rotation_rate(rotation: ca.SX) -> ca.SX:
-    """9x3 map from an angular velocity in the outer axes to d vec(R)/dt = vec([w]x R), columns first."""
-    out = []
-    for axis in np.eye(3):
-        out.append(ca.vec(ca.skew(ca.SX(ca.sparsify(ca.DM(axis)))) @ rotation))
-    return ca.horzcat(*out)
