@@ -18,7 +18,6 @@ from __future__ import annotations
 import gc
 import importlib
 import json
-import os
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -27,6 +26,7 @@ from typing import Any
 
 from bench.contender import Contender
 from bench.problems import Case, load
+from bench.worker_process import begin
 
 #: Contender -> module and the callable that builds it
 CONTENDERS = {
@@ -188,12 +188,7 @@ def serve(name: str, contender: Contender) -> None:
 def main() -> None:
     """Build, say how long that took, then serve."""
     name, folder, *core = sys.argv[1:]
-    if core:
-        os.sched_setaffinity(0, {int(core[0])})
-    # Packages print to standard output at will; the protocol keeps a copy of it to itself.
-    protocol = os.dup(1)
-    os.dup2(2, 1)
-    sys.stdout = os.fdopen(protocol, "w")
+    begin(core)
     contender = opened(name, Path(folder))
     print(json.dumps({"ready": name, "facts": contender.facts}), flush=True)
     serve(name, contender)

@@ -6,7 +6,6 @@ import functools
 import hashlib
 import pathlib
 import tomllib
-from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from math import pi
 from typing import Any, ClassVar, Self
@@ -28,7 +27,7 @@ _SIGNED = ("elbow_limit", "shoulder_limit", "initial_posture", "elbow_offset")
 
 
 class _Numbers:
-    """What both data classes do: check their numbers, and hash them."""
+    """What both data classes do: read their numbers, check and hash them."""
 
     #: Numbers in a tuple
     joints: ClassVar[int]
@@ -71,7 +70,12 @@ class _Numbers:
         return f"{type(self).__name__} {self.digest}{what}"
 
     @classmethod
-    def _of(cls, path: Any, changes: Mapping[str, Any]) -> Self:
+    def read(cls, path: Any = FILE, **changes: Any) -> Self:
+        """The data of a file, with some fields changed (SI).
+
+        Raises:
+            UnknownNameError: no such field. RobotFileError: a file that cannot be read or lacks a number.
+        """
         known = [f.name for f in fields(cls)]  # type: ignore[arg-type]
         values = {k: v for group in cls.groups for k, v in _read(pathlib.Path(path))[group].items()}
         for key in values:
@@ -147,15 +151,6 @@ class WalkerData(_Numbers):
         """Largest accelerations: rate / ``acceleration_time`` [rad/s^2]."""
         return tuple(rate / self.acceleration_time for rate in self.joint_rates)
 
-    @classmethod
-    def read(cls, path: Any = FILE, **changes: Any) -> WalkerData:
-        """The data of a file, with some fields changed (SI).
-
-        Raises:
-            UnknownNameError: no such field. RobotFileError: a file that cannot be read or lacks a number.
-        """
-        return cls._of(path, changes)
-
 
 @dataclass(frozen=True)
 class TwoEndedData(_Numbers):
@@ -179,15 +174,6 @@ class TwoEndedData(_Numbers):
     boom_radius: float
     wrist_radius: float
     acceleration_time: float
-
-    @classmethod
-    def read(cls, path: Any = FILE, **changes: Any) -> TwoEndedData:
-        """The data of a file, with some fields changed (SI).
-
-        Raises:
-            UnknownNameError: no such field. RobotFileError: a file that cannot be read or lacks a number.
-        """
-        return cls._of(path, changes)
 
 
 def _exact(value: Any) -> str:

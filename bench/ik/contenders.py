@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from bench.problems import Array
+from bench.worker_process import begin
 
 #: pose [4, 4] -> q of Pinocchio, seconds
 Solve = Callable[[Array], tuple[Array, float]]
@@ -129,12 +130,7 @@ def wbc_batch(given: dict, poses: Array) -> dict:
 def main() -> None:
     """Answer each line of standard input: {"do": "solve", "first": i, "end": k} or {"do": "batch"}."""
     name, folder, *core = sys.argv[1:]
-    if core:
-        os.sched_setaffinity(0, {int(core[0])})
-    # Packages print to standard output at will; the protocol keeps a copy of it to itself
-    protocol = os.dup(1)
-    os.dup2(2, 1)
-    sys.stdout = os.fdopen(protocol, "w")
+    begin(core)
     given = json.loads((Path(folder) / "given.json").read_text())
     poses = np.load(Path(folder) / "poses.npy")
     solve = CONTENDERS[name](given, given["budget"], given["tolerance"])

@@ -29,7 +29,7 @@ from wbc.analysis.published import ROBOTS
 from wbc.cli.certificates import Subdivision, certified, record, winner
 from wbc.cli.console import out
 from wbc.cli.options import RobotName
-from wbc.cli.track import tip_frame
+from wbc.cli.planning import tip_frame
 from wbc.errors import RangeError, RobotFileError
 
 _WHAT, _OUTPUT = "What is analysed", "What it writes"

@@ -8,10 +8,8 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from wbc import robots, validation
 from wbc.cli import options
-from wbc.cli.track import configuration, feet, given_obstacles, plane_command, scene, tip_frame
-from wbc.track.setup import Plan
+from wbc.cli.planning import given_obstacles, planned
 
 _WHAT, _CONTROL = "What it writes", "How it is controlled"
 
@@ -58,34 +56,19 @@ def export(
     The stack is that of [bold]wbc track[/bold]: a hand that follows a target, a posture, joint limits, obstacles. Other
     stacks: controller.export in Python.
     """
-    machine = robots.load(robot)
-    frequency = validation.scalar("rate", rate, low=0.0, open_low=True, unit="Hz")
-    tip = tip_frame(machine, frame)
-    first = machine.neutral if start is None else configuration(machine, start)
-    # A plan has a path; its stack does not depend on it
-    way, _, label = scene(machine, tip, first, "circle", None, None)
-    plan = Plan(
-        machine,
-        tip,
-        way,
-        label,
-        first,
-        dt=1.0 / frequency,
-        obstacles=given_obstacles(sphere, floor),
-        margin=margin,
-        plane=plane_command(machine, plane, 0.0),
-        holds=tuple(hold) if hold else feet(machine),
-        gain=gain,
+    obstacles = given_obstacles(sphere, floor)
+    plan = planned(
+        robot, frame, start, hold, obstacles, plane=(plane, 0.0), rate=rate, margin=margin, gain=gain, backend=backend
     )
-    controller = plan.stack().compile(backend=backend)
-    controller.reset(first)
-    controller.tick.q[:] = first
+    controller = plan.stack().compile(backend=plan.backend)
+    controller.reset(plan.start)
+    controller.tick.q[:] = plan.start
     controller.tick.check()
     for name, obstacle in plan.obstacles.items():
         controller[name].velocity = np.concatenate([obstacle.velocity, np.zeros(3)])
     if iteration_cap:
         controller.iteration_cap = iteration_cap
-    place = Path(f"{machine.name}_tick") if output is None else output
+    place = Path(f"{plan.robot.name}_tick") if output is None else output
     source: bool | Path = solver_source if solver_archive is None else solver_archive
     controller.export(place, overwrite=force, solver_source=source, states=states)
-    typer.echo(f"{place}: {machine.name}, {controller.layout.nv} degrees of freedom; try `make -C {place} run`")
+    typer.echo(f"{place}: {plan.robot.name}, {controller.layout.nv} degrees of freedom; try `make -C {place} run`")

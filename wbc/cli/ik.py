@@ -9,14 +9,13 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
-from wbc import robots
 from wbc.cli import options
 from wbc.cli.answers import Answer, check_output, report, save
+from wbc.cli.planning import given_obstacles, planned
 from wbc.cli.targets import Target, given_targets
-from wbc.cli.track import configuration, feet, given_obstacles, scene, tip_frame
 from wbc.controller import Solution, Solver
 from wbc.errors import InfeasibleError, RangeError
-from wbc.track.setup import Moving, Plan
+from wbc.track.setup import Moving
 from wbc.validation import Array
 
 #: Exit code where not every target was reached
@@ -78,32 +77,18 @@ def ik(
     Example: [bold]wbc ik ur5 --target 0.4,0.2,0.5,1,0,0,0 --floor -0.1 --branches --out q.csv[/bold]
     """
     check_output(out, force)
-    machine = robots.load(robot)
     wanted = given_targets(target, targets)
-    tip = tip_frame(machine, frame)
-    first = machine.neutral if start is None else configuration(machine, start)
-    way, _, label = scene(machine, tip, first, "circle", None, None)
-    # A plan has a path; its stack does not depend on it
-    plan = Plan(
-        machine,
-        tip,
-        way,
-        label,
-        first,
-        obstacles=_standing(given_obstacles(sphere, floor)),
-        margin=margin,
-        holds=tuple(hold) if hold else feet(machine),
-    )
+    plan = planned(robot, frame, start, hold, _standing(given_obstacles(sphere, floor)), margin=margin)
     solver = plan.stack().solver(goals=("hand",), backend=backend)
     given: dict[str, Any] = {"seed": seed, "budget": budget, "tolerance": tolerance}
     if restarts is not None:
         given["restarts"] = restarts
     answers = []
     for number, one in enumerate(wanted, 1):
-        answers += _answers(solver, first, number, one, branches, given)
-    report(machine, tip, answers)
+        answers += _answers(solver, plan.start, number, one, branches, given)
+    report(plan.robot, plan.frame, answers)
     if out is not None:
-        save(out, machine, answers)
+        save(out, plan.robot, answers)
     if not all(answer.solved for answer in answers):
         raise typer.Exit(UNSOLVED)
 

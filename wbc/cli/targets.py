@@ -12,7 +12,7 @@ import numpy as np
 import pinocchio as pin
 
 from wbc import validation
-from wbc.cli.track import comma_numbers
+from wbc.cli.planning import comma_numbers
 from wbc.errors import RotationError, ShapeError, UnknownNameError, WbcError, nearest
 from wbc.track.path_file import PathFileError
 
