@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import ast
+import functools
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -16,8 +18,14 @@ def sources(*folders: str) -> list[Path]:
     return sorted(p for f in folders for p in (ROOT / f).rglob("*.py") if "__pycache__" not in p.parts)
 
 
+@functools.cache
+def nodes(path: Path) -> tuple[ast.AST, ...]:
+    """Every node of the parsed file, the module first; all rules read the same."""
+    return tuple(ast.walk(ast.parse(path.read_text())))
+
+
 def relative(path: Path) -> str:
-    """Path inside the repository, for test ids and messages."""
+    """Path inside the repository, for messages."""
     return path.relative_to(ROOT).as_posix()
 
 
