@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from wbc.robots import Walker
-from wbc.walking import Structure, compiled, plane
+from wbc.walking import Structure, compiled, cylinder, plane
 from wbc.walking.arm_clearance import ArmClearance
 from wbc.walking.body_path import BodyPath, grid_path
 from wbc.walking.grips import Grips, find_grips
@@ -123,3 +123,27 @@ def test_plans_are_the_same(machine: Walker, structure: Structure, both: Both) -
     one, other = both(lambda: plan_walk(machine, structure, way))
     assert (one.start, one.regrasps) == (other.start, other.regrasps)
     assert one.regrasps
+
+
+@pytest.mark.parametrize("rigid", [True, False])
+def test_grips_and_their_conflicts_are_the_same(machine: Walker, path: BodyPath, both: Both, rigid: bool) -> None:
+    structure = cylinder(rigid=rigid)
+    one: Grips
+    other: Grips
+    one, other = both(lambda: find_grips(machine, structure, path))
+    for name in ("arm", "hold", "branch", "first", "last", "offset", "ends", "roll"):
+        assert getattr(one, name).tolist() == getattr(other, name).tolist()
+    np.testing.assert_allclose(one.postures, other.postures, rtol=0.0, atol=1e-10)
+    # Grips end for several reasons
+    assert len(set(one.ends.tolist())) > 3
+    pairs = np.random.default_rng(2).integers(0, len(one), (300, 2)).tolist()
+    pairs = [(a, b) for a, b in pairs if one.arm[a] != one.arm[b]]
+
+    def conflicts() -> list[int]:
+        arms = ArmClearance(machine, one)
+        arms.prepare(pairs)
+        return [arms.first_conflict(a, b, sample) for a, b in pairs for sample in (0, 40)]
+
+    fast, slow = both(conflicts)
+    assert fast == slow
+    assert len(set(fast)) > 3

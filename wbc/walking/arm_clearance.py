@@ -5,7 +5,6 @@ from __future__ import annotations
 import ctypes
 from bisect import bisect_left
 from collections.abc import Iterable
-from itertools import groupby
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,24 +57,46 @@ class ArmClearance:
         self._one, self._other = [i for i, _ in pairs], [j for _, j in pairs]
         radii = np.array([neck, upper, fore, hand])
         self._least = radii[self._one] + radii[self._other] + walker.data.clearance + ROOM  # type: ignore[union-attr]
-        self._points: dict[int, Array] = {}
         self._conflicts: dict[tuple[int, int], list[int]] = {}
 
     def prepare(self, pairs: Iterable[tuple[int, int]]) -> None:
         """Look at pairs of grips together."""
         todo = sorted({_pair(a, b) for a, b in pairs} - self._conflicts.keys())
-        spans = [self._common(*pair) for pair in todo]
-        sizes = np.array([len(span) for span in spans], dtype=int)
-        if not sizes.sum():
-            self._conflicts.update({pair: [] for pair in todo})
+        if not todo:
             return
-        kept = [k for k in range(len(todo)) if sizes[k]]
-        self._fill({grip for k in kept for grip in todo[k]})
-        sides = [np.concatenate([self._of(todo[k][side], spans[k]) for k in kept]) for side in (0, 1)]
-        near = np.split(self.near(sides[0], sides[1]), np.cumsum(sizes[kept])[:-1])
-        self._conflicts.update({pair: [] for pair in todo})
-        for k, flags in zip(kept, near, strict=True):
-            self._conflicts[todo[k]] = spans[k][flags].tolist()
+        # Samples, multiples of EVERY, that two grips share
+        table, grips = np.array(todo, dtype=np.int64), self._grips
+        first = -(-grips.first[table].max(axis=1) // EVERY) * EVERY
+        count = np.maximum((grips.last[table].min(axis=1) - first) // EVERY + 1, 0)
+        near = self._near_along(table, first, count)
+        ends = np.cumsum(count)
+        for pair, start, size, end in zip(todo, first.tolist(), count.tolist(), ends.tolist(), strict=True):
+            self._conflicts[pair] = (start + EVERY * np.nonzero(near[end - size : end])[0]).tolist()
+
+    def _near_along(self, pairs: Ints, first: Ints, count: Ints) -> NDArray[np.bool_]:
+        """Whether pairs of grips are too near to each other, at ``count`` samples of each one after the other."""
+        grips, library = self._grips, compiled.library()
+        out = np.empty(int(count.sum()), dtype=np.bool_)
+        if library is not None:
+            bases = compiled.packed(self._bases[grips.arm[pairs]])
+            library.grips_near(
+                ctypes.byref(compiled.arm(self._kinematics.data)),
+                ctypes.byref(grips.table),
+                ctypes.c_long(len(pairs)),
+                *(compiled.at(array) for array in (pairs, bases)),
+                ctypes.c_long(EVERY),
+                *(compiled.at(array) for array in (first, count, self._least, out)),
+            )
+            return out
+        which = np.repeat(np.arange(len(pairs)), count)
+        samples = first[which] + EVERY * (np.arange(len(which)) - (np.cumsum(count) - count)[which])
+        sides = []
+        for grip in pairs[which].T:
+            postures, points = grips.posture(grip, samples), np.empty((len(grip), 6, 3))
+            for arm in np.unique(grips.arm[grip]):
+                points[grips.arm[grip] == arm] = self.points(int(arm), postures[grips.arm[grip] == arm])
+            sides.append(points)
+        return self.near(sides[0], sides[1])
 
     def first_conflict(self, one: int, other: int, sample: int) -> int:
         """The first sample from ``sample`` on at which the arms are too near, NEVER if there is none."""
@@ -150,34 +171,6 @@ class ArmClearance:
         sizes = (ctypes.c_long(size) for size in samples.shape)
         arm = compiled.arm(self._kinematics.data)
         library.swings_clear(ctypes.byref(arm), ctypes.byref(grips.table), *sizes, *places)
-        return out
-
-    def _fill(self, wanted: set[int]) -> None:
-        """Points of grips at samples that are multiples of EVERY, computed together."""
-        grips = self._grips
-        todo = sorted(wanted - self._points.keys(), key=lambda g: (int(grips.arm[g]), g))
-        for arm, mine in groupby(todo, key=lambda g: int(grips.arm[g])):
-            those = list(mine)
-            rows = []
-            for grip in those:
-                first, last, offset = (int(x[grip]) for x in (grips.first, grips.last, grips.offset))
-                start = -(-first // EVERY) * EVERY
-                rows.append(grips.postures[offset + start - first : offset + last - first + 1 : EVERY])
-            points = self.points(arm, np.concatenate(rows))
-            parts = np.split(points, np.cumsum([len(part) for part in rows])[:-1])
-            self._points.update(zip(those, parts, strict=True))
-
-    def _common(self, one: int, other: int) -> Ints:
-        """Samples, multiples of EVERY, that two grips share."""
-        grips = self._grips
-        first = max(int(grips.first[one]), int(grips.first[other]))
-        last = min(int(grips.last[one]), int(grips.last[other]))
-        return np.arange(-(-first // EVERY) * EVERY, last + 1, EVERY, dtype=np.int64)
-
-    def _of(self, grip: int, samples: Ints) -> Array:
-        """Points of a grip at samples that are multiples of EVERY."""
-        start = -(-int(self._grips.first[grip]) // EVERY)
-        out: Array = self._points[grip][samples // EVERY - start]
         return out
 
 

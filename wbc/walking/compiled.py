@@ -17,7 +17,7 @@ from wbc.robots import WalkerData
 from wbc.stack import cache, toolchain
 
 _SOURCES = Path(__file__).parent / "native"
-_FILES = ("arm.h", "curve.h", "near.h", "speeds.h", "surface.h", "planner.c")
+_FILES = ("arm.h", "surface.h", "curve.h", "grips.h", "near.h", "speeds.h", "planner.c")
 
 
 class Arm(ctypes.Structure):
@@ -44,7 +44,11 @@ def arm(data: WalkerData) -> Arm:
     return Arm(*lengths, *sixes, data.elbow_limit, data.shoulder_limit)
 
 
-def doubles(numbers: Sequence[float]) -> ctypes.Array[ctypes.c_double]:
+#: Numbers in a row
+Numbers = ctypes.Array[ctypes.c_double]
+
+
+def doubles(numbers: Sequence[float]) -> Numbers:
     """Numbers in a row, as the compiled code wants them."""
     return (ctypes.c_double * len(numbers))(*numbers)
 
@@ -52,7 +56,8 @@ def doubles(numbers: Sequence[float]) -> ctypes.Array[ctypes.c_double]:
 def at(array: NDArray[Any]) -> ctypes.c_void_p:
     """Where the numbers of an array lie; it must be contiguous and outlive the call."""
     assert array.flags.c_contiguous
-    return ctypes.c_void_p(array.ctypes.data)
+    # Half as long as array.ctypes.data
+    return ctypes.c_void_p(array.__array_interface__["data"][0])
 
 
 def packed(array: Any) -> NDArray[np.float64]:

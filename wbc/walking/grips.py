@@ -16,6 +16,7 @@ from wbc.walking import compiled
 from wbc.walking.arm_kinematics import LIMIT_NAMES, ArmKinematics
 from wbc.walking.body_path import BodyPath
 from wbc.walking.grip_rolls import ANY, hand_poses, turns
+from wbc.walking.grip_stretches import Keeping, stretches
 from wbc.walking.hand_tilt import leaning
 from wbc.walking.slices import Slices, drained
 from wbc.walking.structure import Structure
@@ -25,13 +26,14 @@ Ints = NDArray[np.int64]
 #: What the plan keeps of the limits for feedback: part of a rate, angle [rad] and reach [m]
 RATE_PART, ANGLE_ROOM, REACH_ROOM = 0.85, radians(2.0), 0.3 * 0.0254
 #: Postures of a slice, and how far samples may lie apart in the first look for holds in reach [m]
-ROWS, LOOSE = 4000, 0.1
+ROWS, LOOSE = 12000, 0.1
 #: A grip of fewer samples is none
 SHORTEST = 3
 #: A hand leans on a compliant hold where the reach is less than this part of its room
 LEAN_FROM = 1.25
 #: The hand's approach and the body's z axis enclose less than 60 degrees: arms do not reach round the body
 LEAST_FACING = 0.5
+KEEPING = Keeping(RATE_PART, ANGLE_ROOM, REACH_ROOM, LEAST_FACING, SHORTEST, LEAN_FROM * REACH_ROOM)
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,7 +136,12 @@ def grip_slices(walker: Walker, structure: Structure, path: BodyPath, only: Sequ
         frames = path.poses @ walker.arms[arm].base.homogeneous
         holds = np.array(only[arm : arm + 1], dtype=np.int64) if only else _near(kinematics, structure, frames)
         for begin in range(0, len(holds), size):
-            found += _of_arm(kinematics, arm, frames, structure, holds[begin : begin + size], path.spacing)
+            some = holds[begin : begin + size]
+            quick = stretches(kinematics, frames, structure, some, path.spacing, KEEPING)
+            if quick is None:
+                found += _of_arm(kinematics, arm, frames, structure, some, path.spacing)
+            else:
+                found += [(arm, *stretch[:-1], ANY, stretch[-1]) for stretch in quick]
             yield None
     found.sort(key=lambda row: (row[0], row[2], row[1], row[3]))
     columns = list(zip(*found, strict=True)) if found else [()] * 8

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from bisect import insort
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from itertools import combinations, product
@@ -20,7 +21,7 @@ from wbc.walking.grips import Grips, grip_slices
 from wbc.walking.plan import NoPlanError, Plan, Regrasp
 from wbc.walking.slices import Slices, drained
 from wbc.walking.sound_plans import sound_slices
-from wbc.walking.stance_search import Found, StanceSearch
+from wbc.walking.stance_search import PAIRS, Found, StanceSearch
 from wbc.walking.structure import Structure
 from wbc.walking.swing_law import SwingLaw
 
@@ -138,7 +139,7 @@ def plan_slices(
         search = StanceSearch(
             walker, structure, path, grips, longest_delay=delay, width=wide, known=search, first=first
         )
-        starts = [stance] if stance else stances(walker, structure, search, beginning, sample)
+        starts = [stance] if stance else (yield from stance_slices(walker, structure, search, beginning, sample))
         yield None
         found, laws = yield from sound_slices(search, starts, sample, deadline)
         if best is None or (found.complete, found.reached) > (best[0].complete, best[0].reached):
@@ -152,6 +153,13 @@ def plan_slices(
 def stances(
     walker: Walker, structure: Structure, search: StanceSearch, beginning: Beginning, sample: int = 0
 ) -> list[tuple[int, ...]]:
+    """As :func:`stance_slices`, at once."""
+    return drained(stance_slices(walker, structure, search, beginning, sample))
+
+
+def stance_slices(
+    walker: Walker, structure: Structure, search: StanceSearch, beginning: Beginning, sample: int = 0
+) -> Slices[list[tuple[int, ...]]]:
     """Grips, one an arm, that hold from the beginning of the path to beyond a sample, those that last longest first.
 
     Raises:
@@ -186,21 +194,31 @@ def stances(
                 "plan", name, "no hold is in reach at the beginning of the path", separating=_at_first(structure, grips)
             )
         choices.append(mine[:START_GRIPS])
-    search.clearance.prepare((a, b) for one, other in combinations(choices, 2) for a, b in product(one, other))
-    stances = []
-    for stance in product(*choices):
-        if len({int(grips.hold[g]) for g in stance}) == len(stance):
-            until = search.until(stance, 0)
-            if until > sample:
-                stances.append((-until, search.order(stance), stance))
-    if not stances:
+    pairs = [(a, b) for one, other in combinations(choices, 2) for a, b in product(one, other)]
+    for begin in range(0, len(pairs), PAIRS):
+        search.clearance.prepare(pairs[begin : begin + PAIRS])
+        yield None
+    every = np.array(list(product(*choices)), dtype=np.int64)
+    holds, bounds = np.sort(grips.hold[every], axis=1), grips.last[every].min(axis=1)
+    every = every[np.argsort(np.where((np.diff(holds, axis=1) > 0).all(axis=1), -bounds, 1), kind="stable")]
+    found = list[tuple[int, tuple[tuple[int, int], ...], tuple[int, ...]]]()
+    for stance in map(tuple, every.tolist()):
+        # No stance lasts longer than its grips
+        if len({int(grips.hold[g]) for g in stance}) < len(stance) or (
+            len(found) >= STARTS and min(int(grips.last[g]) for g in stance) < -found[STARTS - 1][0]
+        ):
+            break
+        until = search.until(stance, 0)
+        if until > sample:
+            insort(found, (-until, search.order(stance), stance))
+    if not found:
         raise NoPlanError(
             "plan",
             structure.name,
             "no stance is possible at the beginning: the arms are in each other's way",
             separating=_at_first(structure, grips),
         )
-    return [stance for _, _, stance in sorted(stances)[:STARTS]]
+    return [stance for _, _, stance in found[:STARTS]]
 
 
 def _at_first(structure: Structure, grips: Grips) -> list[str]:

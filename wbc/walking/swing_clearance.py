@@ -12,8 +12,8 @@ from wbc.validation import Array
 from wbc.walking import compiled
 from wbc.walking.arm_clearance import ROOM, ArmClearance
 from wbc.walking.grips import Ints
+from wbc.walking.plain_surface import plain_surface
 from wbc.walking.structure import Structure
-from wbc.walking.surface import CylinderSurface
 
 #: Parts of upper arm, forearm and hand at which their distance from the structure is measured
 ALONG = (0.25, 0.5, 0.75, 1.0)
@@ -34,7 +34,6 @@ class SwingClearance:
 
     def __init__(self, walker: Walker, structure: Structure, arms: ArmClearance) -> None:
         self._structure, self._arms, self._data = structure, arms, walker.data
-        self._surface = _plain(structure)
 
     def structure(self, points: Array, bodies: Array, holds: Array) -> Flags:
         """Whether upper arms, forearms and hands are clear of the structure; a hand near a hold may touch.
@@ -50,12 +49,13 @@ class SwingClearance:
         radii = np.array([data.upper_arm_radius, data.forearm_radius, data.hand_radius])  # type: ignore[union-attr]
         least = radii + data.clearance + ROOM_BELOW  # type: ignore[union-attr]
         touching = data.exempt_distance + 2 * ROOM_BELOW  # type: ignore[union-attr]
-        if library is not None and self._surface is not None:
+        surface = plain_surface(self._structure)
+        if library is not None and surface is not None:
             out = np.empty(len(points), dtype=np.bool_)
             given = [compiled.packed(array) for array in (points, bodies, holds, ALONG, least)]
             where = [compiled.at(array) for array in given]
             library.stay_above(
-                self._surface,
+                surface,
                 *(ctypes.c_long(size) for size in points.shape[:2]),
                 *where[:4],
                 ctypes.c_long(len(ALONG)),
@@ -82,12 +82,3 @@ class SwingClearance:
     def others(self, points: Array, samples: Array, others: Ints) -> Flags:
         """Whether swinging arms stay clear of arms that hold: grips ``others`` ``[m]`` at ``samples`` ``[m, n]``."""
         return self._arms.stay_clear(points, samples, others, ROOM - SWING_ROOM)
-
-
-def _plain(structure: Structure) -> ctypes.Array[ctypes.c_double] | None:
-    """The surface as the compiled code wants it; None where there is more than a surface, or none."""
-    surface = structure.surface
-    if surface is None or structure.obstacles:
-        return None
-    radius = surface.radius if isinstance(surface, CylinderSurface) else 0.0
-    return compiled.doubles([*surface.pose.translation, *surface.pose.rotation[:, 2], radius])

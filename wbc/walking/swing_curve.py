@@ -11,6 +11,7 @@ from wbc.robots import WalkerData
 from wbc.validation import Array
 from wbc.walking import compiled
 from wbc.walking.grips import Ints
+from wbc.walking.plain_surface import plain_surface
 from wbc.walking.structure import Structure
 
 #: Parts of the curve, at its beginning and its end, in which the hand does not go across
@@ -123,8 +124,11 @@ def curves(structure: Structure, begin: Ints, end: Ints, pivots: Pivots, data: W
     more, part = WAYS[way]
     a, b = structure.positions[begin], structure.positions[end]
     height = crossing_height(data)
-    none = np.zeros((len(a), 2))
+    none, surface = np.zeros((len(a), 2)), plain_surface(structure)
     flat = Curves(a, b, structure.axes[begin], structure.axes[end], none, none[:, 0], pivots, part)
+    if surface is not None:
+        rise, lift = _raised(surface, flat, height)
+        return replace(flat, rise=rise, lift=lift + more)
     flat = replace(flat, rise=np.repeat(_rise(flat, height)[:, None], 2, axis=1))
     return replace(flat, lift=_lift(structure, flat, height) + more)
 
@@ -139,6 +143,29 @@ def between(place: Array, axis: Array, structure: Structure, hold: int, pivots: 
     rise = float(_rise(flat, height)[0])
     flat = replace(flat, rise=np.array([[rise * lack / height, rise]]))
     return replace(flat, lift=_lift(structure, flat, height))
+
+
+def _raised(surface: compiled.Numbers, flat: Curves, height: float) -> tuple[Array, Array]:
+    """Rise and lift of curves over a surface, by compiled code."""
+    library, count = compiled.library(), len(flat.begin)
+    assert library is not None
+    rise, lift = np.empty((count, 2)), np.empty(count)
+    ends = flat.begin, flat.end, flat.leave, flat.arrive, flat.pivots.frames, flat.pivots.turn
+    given = [compiled.packed(a) for a in ends]
+    library.raise_curves(
+        surface,
+        ctypes.c_long(count),
+        *map(compiled.at, given),
+        *(ctypes.c_double(number) for number in (flat.part, height, ACROSS, UPRIGHT)),
+        ctypes.c_long(len(_SPAN)),
+        compiled.at(_SPAN_ACROSS),
+        ctypes.c_long(LOOKS),
+        compiled.at(_ACROSS),
+        compiled.at(_LOOK_RAISED),
+        ctypes.c_long(len(_HALF)),
+        *(compiled.at(a) for a in (_HALF_STEPS, _HALF, rise, lift)),
+    )
+    return rise, lift
 
 
 def _rise(flat: Curves, height: float) -> Array:
@@ -163,3 +190,5 @@ def _lift(structure: Structure, flat: Curves, height: float) -> Array:
 _SPAN, _HALF, _ACROSS = np.linspace(0.0, 1.0, 2 * LOOKS), np.linspace(0.0, 0.5, 129), np.linspace(0, 1, LOOKS + 2)[1:-1]
 _HALF_STEPS, _WHOLE = step(_HALF), np.linspace(0.0, 1.0, 257)
 _LOOK = UPRIGHT + (1 - 2 * UPRIGHT) * np.interp(_ACROSS, step(_WHOLE), _WHOLE)
+_SPAN_ACROSS = step((_SPAN - UPRIGHT) / (1 - 2 * UPRIGHT))
+_LOOK_RAISED = 1.0 - (1.0 - 2.0 * _LOOK) ** STEEP

@@ -76,7 +76,8 @@ static double wrapped(double angle)
 /* Base, neck, shoulder, elbow, wrist and hand of an arm at six angles, in the frame that `base` is given in. */
 static void arm_points(const Arm *arm, const Frame *base, const double *q, double out[POINTS][3])
 {
-    const double s1 = sin(q[0]), c1 = cos(q[0]), s2 = sin(q[1]), c2 = cos(q[1]), s = sin(q[1] + q[2]), c = cos(q[1] + q[2]);
+    const double s1 = sin(q[0]), c1 = cos(q[0]), s2 = sin(q[1]), c2 = cos(q[1]);
+    const double s = sin(q[1] + q[2]), c = cos(q[1] + q[2]);
     const double s4 = sin(q[3]), c4 = cos(q[3]), s5 = sin(q[4]), c5 = cos(q[4]);
     const double r = s2 * arm->upper + s * arm->fore;
     const double outward = c * c4 * s5 + s * c5, sideways = s4 * s5;

@@ -1,5 +1,6 @@
 /* What the planner asks thousands of times: laws of swings, points of arms, and whether arms are near each other. */
 #include "curve.h"
+#include "grips.h"
 #include "near.h"
 #include "speeds.h"
 #include "surface.h"
@@ -37,8 +38,9 @@ int swing_speeds(const Arm *arm, const Rules *rules, long m, long n, int bends, 
         double here[MOST][JOINTS], further[MOST][JOINTS], first[MOST][JOINTS], second[MOST][JOINTS], most[MOST];
         double walked[MOST], slope[MOST][3], allowed[JOINTS], square[MOST];
         /* The same hand on a body that is a little further */
-        possible[s] = (unsigned char)joint_path(arm, rules, bases + 16 * s, path, count, n, bends, hand, bent, at, 0.0, here);
-        joint_path(arm, rules, bases + 16 * s, path, count, n, bends, hand, bent, at, rules->step, further);
+        const double *base = bases + 16 * s;
+        possible[s] = (unsigned char)joint_path(arm, rules, base, path, count, n, bends, hand, bent, at, 0.0, here);
+        joint_path(arm, rules, base, path, count, n, bends, hand, bent, at, rules->step, further);
         gradient(at, n, 1, gap, 0, walked, 1);
         for (int k = 0; k < 3; ++k)
             gradient(hand + k, n, 3, gap, 0, &slope[0][k], 3);
@@ -60,8 +62,8 @@ int swing_speeds(const Arm *arm, const Rules *rules, long m, long n, int bends, 
             }
             most[i] = i == 0 || i == n - 1 ? 0.0 : top * top;
         }
-        squares((const double (*)[JOINTS])first, (const double (*)[JOINTS])second, allowed, joints, n, gap, rules->least,
-                most, square);
+        squares((const double (*)[JOINTS])first, (const double (*)[JOINTS])second, allowed, joints, n, gap,
+                rules->least, most, square);
         for (long i = 0; i < n; ++i) {
             memcpy(angles + (s * n + i) * joints, here[i], sizeof(double) * (size_t)joints);
             rate[s * n + i] = sqrt(square[i]);
@@ -103,6 +105,26 @@ void swings_clear(const Arm *arm, const Grips *grips, long m, long n, const doub
             arm_points(arm, &base, posture, held);
             if (near((const double (*)[3])(points + 3 * POINTS * (s * n + i)), (const double (*)[3])held, least))
                 out[s] = 0;
+        }
+    }
+}
+
+/* Whether the arms of m pairs of grips (m x 2) are near each other at the samples that they share and that are
+   multiples of `every`; one flag after the other, `first` and `count` of each pair. `bases` (4 x 4) of the grips' arms,
+   m x 2. */
+void grips_near(const Arm *arm, const Grips *grips, long m, const long *pairs, const double *bases, long every,
+                const long *first, const long *count, const double *least, unsigned char *out)
+{
+    for (long s = 0; s < m; ++s) {
+        const Frame base[2] = { frame_of(bases + 32 * s), frame_of(bases + 32 * s + 16) };
+        for (long i = 0; i < count[s]; ++i) {
+            double points[2][POINTS][3];
+            for (int side = 0; side < 2; ++side) {
+                const long grip = pairs[2 * s + side], since = first[s] + every * i - grips->first[grip];
+                const long row = grips->offset[grip] + since;
+                arm_points(arm, base + side, grips->postures + JOINTS * row, points[side]);
+            }
+            *out++ = (unsigned char)near((const double (*)[3])points[0], (const double (*)[3])points[1], least);
         }
     }
 }

@@ -51,11 +51,12 @@ static int joint_path(const Arm *arm, const Rules *rules, const double *base, co
             p[k] = frame.row[0][k] * offset[0] + frame.row[1][k] * offset[1] + frame.row[2][k] * offset[2];
         const double *w = wrists + bends * i, s4 = sin(w[0]), c4 = cos(w[0]), s5 = sin(w[1]), c5 = cos(w[1]);
         /* Forearm and bent hand are one link from the elbow */
-        const double along = arm->fore + arm->hand * c5, across = arm->hand * c4 * s5, out = arm->offset + arm->hand * s4 * s5;
+        const double along = arm->fore + arm->hand * c5, across = arm->hand * c4 * s5;
+        const double out = arm->offset + arm->hand * s4 * s5;
         const double reach = hypot(along, across), tilt = atan2(across, along), z = p[2] - arm->neck;
         const double square = p[0] * p[0] + p[1] * p[1] - out * out;
         const double r = sqrt(larger(square, rules->axis_room * rules->axis_room)), distance = hypot(r, z);
-        const double cosine = (distance * distance - arm->upper * arm->upper - reach * reach) / (2.0 * arm->upper * reach);
+        const double es = arm->upper, cosine = (distance * distance - es * es - reach * reach) / (2.0 * es * reach);
         const double bend = acos(larger(smaller(cosine, 1.0), -1.0));
         q[0] = atan2(p[1], p[0]) - atan2(out, r);
         q[1] = atan2(r, z) + atan2(reach * sin(bend), arm->upper + reach * cos(bend));
@@ -119,7 +120,8 @@ static void squares(const double (*first)[JOINTS], const double (*second)[JOINTS
     for (long i = 0; i < n - 1; ++i) {
         double u = NO_LIMIT;
         for (int k = 0; k < joints; ++k) {
-            const double rise = 1.0 + step * c[i + 1][k], end = (e[i + 1][k] - c[i + 1][k] * out[i]) / larger(rise, least);
+            const double rise = 1.0 + step * c[i + 1][k];
+            const double end = (e[i + 1][k] - c[i + 1][k] * out[i]) / larger(rise, least);
             u = smaller(u, e[i][k] - c[i][k] * out[i]);
             if (rise > least)
                 u = smaller(u, end);
