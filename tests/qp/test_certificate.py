@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from wbc.qp import QP, Solution, certify, make_solver
+from wbc.qp.polish import polish
 from wbc.qp.reference import reference
 from wbc.qp.samples import SIZES, WEIGHTS, whole_body
 
@@ -37,10 +38,12 @@ def test_bound_is_never_exceeded(shape, weight):
         answer = solver.solve(qp)
         assert answer.solved
         exact = reference(qp, answer)
+        # the reference itself is rounded to double
+        last = 0.5 * np.spacing(np.abs(exact.x)).max()
         assert certify(qp, answer).error_bound < 1e-6
         for candidate in disturbed(rng, answer)[:: 1 if shape[0] < 20 else 3]:
             bound = certify(qp, candidate).error_bound
-            assert np.abs(candidate.x - exact.x).max() <= bound
+            assert np.abs(candidate.x - exact.x).max() <= bound + last
             stated += np.isfinite(bound)
     assert stated > 3 * COUNT[shape[0]]
 
@@ -83,3 +86,29 @@ def test_residuals_are_those_of_the_definition():
     assert found.stationarity == pytest.approx(0.25)
     assert found.violation == pytest.approx(0.25)
     assert found.complementarity == pytest.approx(0.75 * 0.25)
+
+
+def priced(rng: np.random.Generator, n: int, rows: int, price: float) -> QP:
+    """n joints with a damping of 1e-8, a task of weight 1, and soft rows which the joints cannot meet."""
+    J, A = rng.normal(size=(2, n)), rng.normal(size=(rows, n))
+    H = np.eye(n + rows)
+    H[:n, :n] = J.T @ J + 1e-8 * np.eye(n)
+    g = np.concatenate((J.T @ rng.normal(size=2), np.zeros(rows)))
+    side = rng.normal(0.0, 1.0, rows)
+    reach = np.concatenate((rng.uniform(0.1, 1.0, n), np.full(rows, np.inf)))
+    whole = np.hstack((A, np.eye(rows) / np.sqrt(price)))
+    return QP.checked(H, g, np.concatenate((-reach, side)), np.concatenate((reach, side)), whole)
+
+
+def test_rows_at_a_price_of_1e7_beside_a_damping_of_1e_8_have_a_certificate():
+    rng, strongest = np.random.default_rng(5), 0.0
+    for _ in range(12):
+        qp = priced(rng, 8, 3, 1e7)
+        guess = polish(qp, make_solver("osqp", qp.n, qp.m).solve(qp, warm=False)).solution
+        exact = reference(qp, guess)
+        strongest = max(strongest, np.abs(exact.multipliers).max())
+        assert certify(qp, exact, 8).error_bound < 1e-3
+        for candidate in disturbed(rng, exact):
+            error = np.abs(candidate.x - exact.x)[:8].max()
+            assert error <= certify(qp, candidate, 8).error_bound + 0.5 * np.spacing(np.abs(exact.x[:8])).max()
+    assert strongest > 1e6

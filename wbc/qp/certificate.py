@@ -7,20 +7,27 @@ problem with g - s in place of g, s = H xh + g + C' lam. For two minimisers over
 
     |R (xh - x*)| <= |R^-T s|      and      |x_j - x*_j| <= |delta_j| + |row_j R^-1| |R^-T s|.
 
-No singular value of the rows and no guess of the true active set enters.
+No singular value of the rows and no guess of the true active set enters. Both minimisers meet the equality rows E,
+so that only the parts of R^-T s and of row_j R^-1 count that are orthogonal to those rows seen through R; and any
+multipliers of the right sign certify: lam is fitted to xh in long double first. Where prices of 10^9 stand beside
+damping of 10^-8, the rounding of lam to double alone would be worth 0.1 rad/s.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from wbc.qp.factor import ROUNDOFF, WIDE_ROUNDOFF, ActiveRows, Factor, sides
+from wbc.qp.factor import ROUNDOFF, WIDE_ROUNDOFF, ActiveRows, Factor, Wide, sides
 from wbc.qp.problem import QP, Solution
 from wbc.validation import Array
 
 _CORRECTIONS = 4
+#: Fits of the multipliers, and roundings of an entry in a Householder factorisation (Higham 2002, lemma 19.3)
+_FITS, _TILT = 2, 12.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,8 +82,7 @@ def error_bound(qp: QP, solution: Solution, count: int | None = None) -> float:
         return np.inf
     x, lam = solution.x, solution.multipliers
     side = sides(qp, factor, solution)
-    right = (side == 2) | (lam * side > 0.0)
-    clean = np.where((side != 0) & right, lam, 0.0)
+    clean = np.where(_right(side, lam), lam, 0.0)
     size = np.concatenate((np.ones(qp.n), np.abs(qp.A).sum(axis=1))) * np.abs(x).max(initial=0.0)
 
     exact = x.astype(np.longdouble)
@@ -93,14 +99,55 @@ def error_bound(qp: QP, solution: Solution, count: int | None = None) -> float:
     if bool((np.minimum(low, high) < -room).any()) or bool((off > room)[clean != 0.0].any()):
         return np.inf
 
-    force = factor.stationarity(qp, exact, clean).astype(np.float64)
-    rounding = WIDE_ROUNDOFF * (qp.n + qp.m + 3) * _magnitudes(qp, x, clean)
+    side[off > room] = 0  # active rows that depend on others and are missed take no force
+    force, rounding = _forces(qp, factor, rows, side, exact, clean)
     left = off[rows.index].astype(np.float64) + WIDE_ROUNDOFF * (qp.n + 2) * size[rows.index]
     rest = float(np.linalg.norm(left)) * rows.inverse_norm()
-    step = np.linalg.norm(factor.inverse.T @ force) + np.linalg.norm(np.abs(factor.inverse).T @ rounding) + rest
-    reach = np.sqrt(np.einsum("ij,ij->i", factor.inverse, factor.inverse))
-    total = np.abs(exact - x).astype(np.float64) + reach * float(step) * (1.0 + 2.0 * loss) / (1.0 - loss)
+    inverse, tilt = _within_equalities(factor, rows, side)
+    whole = np.abs(factor.inverse.T) @ (np.abs(force) + rounding)
+    step = np.linalg.norm(inverse.T @ force) + np.linalg.norm(np.abs(inverse).T @ rounding)
+    step = float(step) + tilt * float(np.linalg.norm(whole)) + rest
+    reach = np.linalg.norm(inverse, axis=1) + tilt * np.linalg.norm(factor.inverse, axis=1)
+    total = np.abs(exact - x).astype(np.float64) + reach * step * (1.0 + 2.0 * loss) / (1.0 - loss)
     return float(total[:count].max(initial=0.0))
+
+
+def _right(side: NDArray[np.int8], lam: Any) -> NDArray[np.bool_]:
+    """Which rows have a multiplier that they may have."""
+    out: NDArray[np.bool_] = (side == 2) | (lam * side > 0.0)
+    return out & (side != 0)
+
+
+def _forces(
+    qp: QP, factor: Factor, rows: ActiveRows, side: NDArray[np.int8], x: Wide, multipliers: Array
+) -> tuple[Array, Array]:
+    """Stationarity at x with the multipliers that fit it best, and a bound on the rounding in it [n], [n]."""
+    lam, still = multipliers.astype(np.longdouble), np.zeros(rows.index.size)
+    for _ in range(_FITS):
+        force = factor.stationarity(qp, x, lam).astype(np.float64)
+        fitted = lam.copy()
+        fitted[rows.index] -= rows.solve(factor.inverse.T @ force, still)[1]
+        lam = np.where(_right(side, fitted), fitted, 0.0)
+    force = factor.stationarity(qp, x, lam).astype(np.float64)
+    sizes = _magnitudes(qp, x.astype(np.float64), lam.astype(np.float64))
+    rounding = WIDE_ROUNDOFF * (qp.n + qp.m + 3) * sizes
+    # the multiplier of an active bound takes all of its residual, whatever that is, if it keeps its sign
+    own, at = lam[: qp.n] - force, side[: qp.n]
+    taken = _right(at, np.where(np.abs(own) > rounding, own, 0.0))
+    return np.where(taken, 0.0, force), np.where(taken, 0.0, rounding)
+
+
+def _within_equalities(factor: Factor, rows: ActiveRows, side: NDArray[np.int8]) -> tuple[Array, float]:
+    """R^-1 (I - Q Q'), Q a basis of the equality rows seen through R, and by how much its plane may be tilted."""
+    count = int((side[rows.index] == 2).sum())
+    inverse, Q, T = factor.inverse, rows.Q[:, :count], rows.T[:count, :count]
+    if count == 0:
+        return inverse, 0.0
+    for _ in range(2):
+        inverse = inverse - (inverse @ Q) @ Q.T
+    lengths = factor.norms[rows.index[:count]]
+    steepest = float(np.linalg.norm(np.linalg.solve(T.T, np.diag(lengths))))
+    return inverse, _TILT * factor.R.shape[0] * ROUNDOFF * steepest
 
 
 def _magnitudes(qp: QP, x: Array, lam: Array) -> Array:
