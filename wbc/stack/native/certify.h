@@ -2,28 +2,12 @@
 #ifndef WBC_CERTIFY_H
 #define WBC_CERTIFY_H
 
-#include "solve.h"
+#include "wide.h"
 
 /* No output is NaN: an error without a value is reported as inf, a margin as -inf */
 static void replace_nan(double *x, int count, double by) {
     for (int i = 0; i < count; i++)
         if (x[i] != x[i]) x[i] = by;
-}
-
-/* Length of the correction, in the metric of H, that the residual of the active rows asks for */
-static double active_residual(wbc_tick *t) {
-    DAQPWorkspace *work = &t->daqp;
-    double total = 0.0, z[ACTIVE_MAX];
-    for (int a = 0, at = 0; a < work->n_active; a++) {
-        const int i = work->WS[a];
-        const double value = i < NV ? t->report.v[i] : row_at(t, i - NV, t->report.v);
-        double r = (value - (t->sense[i] & LOWER ? t->low[i] : t->high[i])) * t->scaling[i];
-        for (int b = 0; b < a; b++) r -= work->L[at++] * z[b];
-        at++;
-        z[a] = r;
-        total += r * r / work->D[a];
-    }
-    return sqrt(total);
 }
 
 /* |v - v*| <= |R^-1| |R^-T size|, with 1 / |R^-1|^2 >= the smallest entry of the purely diagonal part of H */
@@ -134,33 +118,25 @@ static void examine(wbc_tick *t) {
 }
 
 /* One Newton step on the active set, with y = R v:   dy + M' mu = -R^-T residual,   M dy = side - M y.
- * Needs what `constrained` leaves: R^-1, M, and the factors of M M'. */
+ * Needs what `constrained` leaves: R^-1, M, and the factors of M M'; without active rows R^-1. */
 static void refine(wbc_tick *t) {
     DAQPWorkspace *work = &t->daqp;
     double dy[WIDE] = {0}, mu[ACTIVE_MAX];
     for (int i = 0; i < NV; i++) axpy(dy, t->inverse + i * WIDE, -t->scratch[i], i);
-    for (int a = 0, at = 0; a < work->n_active; a++) {
-        const int i = work->WS[a];
-        double value = i < NV ? t->report.v[i] : row_at(t, i - NV, t->report.v);
-        double r = (value - (t->sense[i] & LOWER ? t->low[i] : t->high[i])) * t->scaling[i];
-        if (i < NV) r += t->scaling[i] * dot(t->inverse + i * WIDE, dy, i);
-        for (int j = 0; i >= NV && j < NV; j++) r += t->M[(i - NV) * NV + j] * dy[j];
-        for (int b = 0; b < a; b++) r -= work->L[at++] * mu[b];
-        at++;
-        mu[a] = r;
-    }
-    for (int a = work->n_active - 1; a >= 0; a--) {
-        mu[a] /= work->D[a];
-        for (int b = a + 1; b < work->n_active; b++) mu[a] -= work->L[b * (b + 1) / 2 + a] * mu[b];
-    }
+    for (int a = 0; a < work->n_active; a++) mu[a] = side_gap(t, work->WS[a]) + seen_through(t, work->WS[a], dy);
+    solve_gram(t, work->n_active, mu);
     for (int a = 0; a < work->n_active; a++) {
-        const int i = work->WS[a];
-        if (i < NV) axpy(dy, t->inverse + i * WIDE, -mu[a] * t->scaling[i], i);
-        for (int j = 0; i >= NV && j < NV; j++) dy[j] -= mu[a] * t->M[(i - NV) * NV + j];
-        work->lam_star[a] += mu[a] * t->scaling[i];
+        push_back(t, work->WS[a], -mu[a], dy);
+        work->lam_star[a] += mu[a] * t->scaling[work->WS[a]];
     }
     for (int i = 0; i < NV; i++) t->x[i] = t->report.v[i] + dot(t->inverse + i * WIDE, dy, i);
     command(t);
+}
+
+/* The same with the bound in wide arithmetic where it is not good enough */
+static void examine_closely(wbc_tick *t) {
+    examine(t);
+    if (t->report.error_bound > GOOD_BOUND) t->report.error_bound = smaller(wide_bound(t), t->report.error_bound);
 }
 
 static void tidy(wbc_report *out) {
@@ -178,19 +154,18 @@ EXPORT void wbc_tick_certify(wbc_tick *t) {
         out->stationarity = out->violation = out->complementarity = out->error_bound = WBC_INF;
         return;
     }
-    examine(t);
-    /* Soft rows that are nearly dependent take more than one step */
-    for (int step = 0; step < (SLACKS ? 4 : 1) && out->error_bound > GOOD_BOUND && t->factored; step++) {
+    examine_closely(t);
+    for (int step = 0; step < REFINEMENTS && out->error_bound > GOOD_BOUND && (t->factored || t->alone); step++) {
         const double bound = out->error_bound;
         double v[NV], multipliers[ACTIVE_MAX];
         memcpy(v, out->v, sizeof v);
         memcpy(multipliers, t->daqp.lam_star, sizeof multipliers);
         refine(t);
-        examine(t);
+        examine_closely(t);
         if (!(out->error_bound < bound)) {
             memcpy(out->v, v, sizeof v);
             memcpy(t->daqp.lam_star, multipliers, sizeof multipliers);
-            examine(t);
+            examine_closely(t);
             break;
         }
     }

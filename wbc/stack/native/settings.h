@@ -36,8 +36,9 @@ int bend(const double **arg, double **res, long long *iw, double *w, int mem);
 #define PUSHING 1e-6
 /* The cheap error bound is good enough up to here [rad/s] */
 #define QUICK_BOUND 1e-8
-/* Above this [rad/s] the solution is refined once more */
+/* Above this [rad/s] the bound is found in wide arithmetic, and the solution refined; how often at most */
 #define GOOD_BOUND 1e-7
+#define REFINEMENTS 4
 /* Squared length of a quaternion or of a (cos, sin) pair minus 1: its length may be off by 1e-6 */
 #define UNIT_TOLERANCE 2.00001e-6
 /* Violations up to this, in row units, are rounding */

@@ -73,13 +73,14 @@ static void command(wbc_tick *t) {
 EXPORT int wbc_tick_solve(wbc_tick *t) {
     int flag = uncross(t) ? WBC_RELAXED : WBC_SOLVED;
     t->report.iterations = 0.0;
-    t->factored = t->spent = 0;
+    t->factored = t->spent = t->alone = 0;
     find_idle_rows(t);
     if (t->unusable != 0.0 || !(t->prepared || factor(t))) {
         brake(t);
         flag = WBC_BRAKED;
     } else if (unconstrained(t)) {
         t->warm = 0;
+        t->alone = 1;
     } else {
         int exit_flag = constrained(t, TIGHT);
         const int first = t->spent;
