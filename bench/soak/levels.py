@@ -13,12 +13,9 @@ DEPTH, SHARE = 3, 0.3
 
 
 def with_levels(stack: wbc.Stack, rng: np.random.Generator) -> wbc.Stack:
-    """The same items; every task at one of some levels, some constraints below the first.
-
-    None is scaled: what is asked for here, up to 5 km/s, makes forces of kept directions that hide those of other rows
-    at a level, and such ticks brake (docs/soft.md).
-    """
+    """The same items; every task at one of some levels, some constraints below the first."""
     out = wbc.Stack(stack.robot, dt=stack.dt, calm=stack.calm)
+    scaled = {e.item.of for e in stack.entries if isinstance(e.item, Direction)}
     for entry in stack.entries:
         level, item = 0, entry.item
         if entry.is_task:
@@ -26,5 +23,5 @@ def with_levels(stack: wbc.Stack, rng: np.random.Generator) -> wbc.Stack:
         elif isinstance(item, (FrameVelocityLimit, Obstacle)) and rng.random() < SHARE:
             level = int(rng.integers(1, DEPTH))
         if not isinstance(item, Direction):
-            out.add(item, name=entry.name, level=level, weight=entry.weight, soft=entry.price)
+            out.add(item, name=entry.name, level=level, weight=entry.weight, soft=entry.price, scaled=entry.name in scaled)
     return out
