@@ -23,5 +23,7 @@ def with_levels(stack: wbc.Stack, rng: np.random.Generator) -> wbc.Stack:
         elif isinstance(item, (FrameVelocityLimit, Obstacle)) and rng.random() < SHARE:
             level = int(rng.integers(1, DEPTH))
         if not isinstance(item, Direction):
-            out.add(item, name=entry.name, level=level, weight=entry.weight, soft=entry.price, scaled=entry.name in scaled)
+            out.add(
+                item, name=entry.name, level=level, weight=entry.weight, soft=entry.price, scaled=entry.name in scaled
+            )
     return out

@@ -105,8 +105,8 @@ def error_bound(qp: QP, solution: Solution, count: int | None = None) -> float:
     rest = float(np.linalg.norm(left)) * rows.inverse_norm()
     inverse, tilt = _within_equalities(factor, rows, side)
     whole = np.abs(factor.inverse.T) @ (np.abs(force) + rounding)
-    step = np.linalg.norm(inverse.T @ force) + np.linalg.norm(np.abs(inverse).T @ rounding)
-    step = float(step) + tilt * float(np.linalg.norm(whole)) + rest
+    step = float(np.linalg.norm(inverse.T @ force)) + float(np.linalg.norm(np.abs(inverse).T @ rounding))
+    step += tilt * float(np.linalg.norm(whole)) + rest
     reach = np.linalg.norm(inverse, axis=1) + tilt * np.linalg.norm(factor.inverse, axis=1)
     total = np.abs(exact - x).astype(np.float64) + reach * step * (1.0 + 2.0 * loss) / (1.0 - loss)
     return float(total[:count].max(initial=0.0))
@@ -115,7 +115,7 @@ def error_bound(qp: QP, solution: Solution, count: int | None = None) -> float:
 def _right(side: NDArray[np.int8], lam: Any) -> NDArray[np.bool_]:
     """Which rows have a multiplier that they may have."""
     out: NDArray[np.bool_] = (side == 2) | (lam * side > 0.0)
-    return out & (side != 0)
+    return out
 
 
 def _forces(
