@@ -85,7 +85,7 @@ def main(given: list[str] | None = None) -> None:
         parts, interrupted = measure(work, progress)
     parts = others([*work], kept) | parts
     lines = [
-        f"{about['processor']}, {about['cores']}, Python {about['python']}; load {about['load']}.",
+        f"{about['processor']}, Python {about['python']}; load {about['load']}.",
         f"Robot data {data.digest}; self-collision rows {'on' if chosen.collisions else 'off'}.",
         NOTES,
     ]
