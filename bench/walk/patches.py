@@ -9,6 +9,7 @@ from math import pi, radians
 import numpy as np
 
 from bench.walk.machine import INCH, Job, Machine, Record
+from wbc.validation import Array
 from wbc.walking import Structure
 from wbc.walking.body_path import BodyPath, grid_path
 from wbc.walking.plan import NoPlanError
@@ -17,7 +18,7 @@ from wbc.walking.reference import Rules, fewest_along
 
 #: What the planner keeps of limits and reach
 ROOM = Rules(angle_room=radians(2.0), reach_room=0.3 * INCH)
-#: Poses of a way that the exact search looks at: one of so many
+#: Poses of a way that the exact search looks at: one of so many, and the last
 EVERY = 10
 
 
@@ -36,6 +37,12 @@ def patch(seed: int, structure: Structure) -> tuple[BodyPath, Structure]:
     return way, structure.without([hold for hold in structure.ids if hold not in kept])
 
 
+def looked_at(way: BodyPath) -> Array:
+    """Poses at which the exact search looks ``[n, 4, 4]``."""
+    out: Array = way.poses[np.unique(np.append(np.arange(0, len(way), EVERY), len(way) - 1))]
+    return out
+
+
 def compared(it: Machine, seed: int) -> Record:
     """Re-grasps of the plan and of breadth-first search, None where there is no way."""
     way, holds = patch(seed, it.structure)
@@ -46,7 +53,7 @@ def compared(it: Machine, seed: int) -> Record:
     except NoPlanError as error:
         planned, reason = None, str(error)
     middle = time.process_time()
-    fewest = fewest_along(it.walker, holds, way.poses[::EVERY], ROOM)
+    fewest = fewest_along(it.walker, holds, looked_at(way), ROOM)
     return {
         "seed": seed,
         "holds": len(holds),

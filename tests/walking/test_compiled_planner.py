@@ -57,7 +57,9 @@ def drawn(grips: Grips, path: BodyPath) -> tuple[Asked, Any, Any]:
     source, target = source[fits][:COUNT], target[fits][:COUNT]
     lift = rng.integers(0, len(path), len(source))
     last = np.minimum(lift + rng.integers(5, 60, len(source)), len(path) - 1)
-    return Asked(grips.arm[source], source, target, lift + 2.0, last), lift, rng.integers(0, len(grips), len(source))
+    least = rng.uniform(0.0, 3.0, len(source))
+    asked = Asked(grips.arm[source], source, target, lift + 2.0, last, least)
+    return asked, lift, rng.integers(0, len(grips), len(source))
 
 
 def test_swings_are_the_same(machine: Walker, structure: Structure, path: BodyPath, grips: Grips, both: Both) -> None:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import functools
 import time
 from bisect import insort
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from itertools import combinations, product
+from math import inf
 from typing import Literal
 
 import numpy as np
@@ -21,7 +23,7 @@ from wbc.walking.grips import Grips, grip_slices
 from wbc.walking.plan import NoPlanError, Plan, Regrasp
 from wbc.walking.slices import Slices, drained
 from wbc.walking.sound_plans import sound_slices
-from wbc.walking.stance_search import PAIRS, Found, StanceSearch
+from wbc.walking.stance_search import HOVER, PAIRS, Found, StanceSearch
 from wbc.walking.structure import Structure
 from wbc.walking.swing_law import SwingLaw
 
@@ -33,8 +35,8 @@ NOTHING: Beginning = ({}, {}, {})
 #: Delays of one swing that velocity mode allows one after the other [s]
 DELAYS = (0.0, 0.25, 0.5, 1.0, 2.0, float("inf"))
 SOON = (0.0, float("inf"))
-#: Grips of an arm that a start may have, and stances that a search begins with
-START_GRIPS, STARTS = 10, 24
+#: Grips of an arm that a start may have, and stances that a search begins with; the same of a thorough one
+STARTS, ALL_STARTS = (10, 24), (24, 200)
 #: Where all searches fail, the one with any delay is made again, so many times as wide
 WIDER = 5
 #: Joints of one branch differ by less than this from where they are [rad]; other branches by more
@@ -76,7 +78,10 @@ def plan_walk(
     """
     beginning = start or {}, postures or {}, avoid or {}
     deadline = None if time_budget is None else time.perf_counter() + time_budget
-    plan = drained(plan_slices(walker, structure, path, beginning, objective=objective, width=width, deadline=deadline))
+    search = functools.partial(
+        plan_slices, walker, structure, width=width, deadline=deadline, thorough=time_budget is None
+    )
+    plan = drained(search(path, beginning, objective=objective))
     if not plan.complete and detour:
         rows = {arm.name: k for k, arm in enumerate(walker.arms)}
         hands = {rows[name]: structure.index(hold) for name, hold in beginning[0].items()}
@@ -84,10 +89,7 @@ def plan_walk(
             if route.path is None:
                 plan = replace(plan, reason=f"{plan.reason}; {route.text}", separating=route.separating)
                 continue
-            asked = plan_slices(
-                walker, structure, route.path, beginning, objective="destination", width=width, deadline=deadline
-            )
-            changed = drained(asked)
+            changed = drained(search(route.path, beginning, objective="destination"))
             if changed.complete:
                 return changed
     if not plan.complete and not partial:
@@ -108,6 +110,7 @@ def plan_slices(
     stance: tuple[int, ...] | None = None,
     sample: int = 0,
     soon: bool = False,
+    thorough: bool = False,
     tries: Sequence[tuple[float, int | None]] = (),
     first: tuple[int, int] | None = None,
 ) -> Slices[Plan]:
@@ -118,6 +121,7 @@ def plan_slices(
         grips: of the path, if they are known. stance: grips that hold at the sample, instead of a beginning.
         sample: of the path, from which on hands may be lifted.
         soon: somebody waits: fewer delays are tried (:data:`SOON`).
+        thorough: to a destination, begin on more holds, and let hands wait in the air for as long as it takes.
         tries: delays and widths of the searches, one after the other, instead of what objective and width say.
         first: row of an arm and of a hold: the first re-grasp, whether it is needed or not.
 
@@ -135,11 +139,21 @@ def plan_slices(
     if width is not None:
         usual.append((delays[-1], WIDER * width))
     search: StanceSearch | None = None
+    thorough = thorough and objective == "destination"
+    wait, most = (inf, ALL_STARTS) if thorough else (HOVER, STARTS)
     for delay, wide in tries or usual:
         search = StanceSearch(
-            walker, structure, path, grips, longest_delay=delay, width=wide, known=search, first=first
+            walker,
+            structure,
+            path,
+            grips,
+            longest_delay=delay,
+            longest_wait=wait,
+            width=wide,
+            known=search,
+            first=first,
         )
-        starts = [stance] if stance else (yield from stance_slices(walker, structure, search, beginning, sample))
+        starts = [stance] if stance else (yield from stance_slices(walker, structure, search, beginning, sample, most))
         yield None
         found, laws = yield from sound_slices(search, starts, sample, deadline)
         if best is None or (found.complete, found.reached) > (best[0].complete, best[0].reached):
@@ -158,9 +172,17 @@ def stances(
 
 
 def stance_slices(
-    walker: Walker, structure: Structure, search: StanceSearch, beginning: Beginning, sample: int = 0
+    walker: Walker,
+    structure: Structure,
+    search: StanceSearch,
+    beginning: Beginning,
+    sample: int = 0,
+    most: tuple[int, int] = STARTS,
 ) -> Slices[list[tuple[int, ...]]]:
     """Grips, one an arm, that hold from the beginning of the path to beyond a sample, those that last longest first.
+
+    Args:
+        most: grips of an arm that are looked at, and stances.
 
     Raises:
         UnknownNameError: another arm or hold. NoPlanError: there are none.
@@ -193,7 +215,7 @@ def stance_slices(
             raise NoPlanError(
                 "plan", name, "no hold is in reach at the beginning of the path", separating=_at_first(structure, grips)
             )
-        choices.append(mine[:START_GRIPS])
+        choices.append(mine[: most[0]])
     pairs = [(a, b) for one, other in combinations(choices, 2) for a, b in product(one, other)]
     for begin in range(0, len(pairs), PAIRS):
         search.clearance.prepare(pairs[begin : begin + PAIRS])
@@ -205,7 +227,7 @@ def stance_slices(
     for stance in map(tuple, every.tolist()):
         # No stance lasts longer than its grips
         if len({int(grips.hold[g]) for g in stance}) < len(stance) or (
-            len(found) >= STARTS and min(int(grips.last[g]) for g in stance) < -found[STARTS - 1][0]
+            len(found) >= most[1] and min(int(grips.last[g]) for g in stance) < -found[most[1] - 1][0]
         ):
             break
         until = search.until(stance, 0)
@@ -218,7 +240,7 @@ def stance_slices(
             "no stance is possible at the beginning: the arms are in each other's way",
             separating=_at_first(structure, grips),
         )
-    return [stance for _, _, stance in found[:STARTS]]
+    return [stance for _, _, stance in found[: most[1]]]
 
 
 def _at_first(structure: Structure, grips: Grips) -> list[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 Key = tuple[int, ...]
@@ -58,3 +59,15 @@ class Found:
     reached: int
     expanded: int
     blocking: tuple[int, ...]
+
+
+def way_to(levels: Sequence[Mapping[Key, Node]], key: Key) -> tuple[Key, tuple[Move, ...]]:
+    """The stance of the first level, and the moves from it, that lead to one of the last."""
+    moves: list[Move] = []
+    for level in levels[:0:-1]:
+        node = level[key]
+        if node.move is None or node.parent is None:
+            break
+        moves.append(node.move)
+        key = node.parent
+    return key, tuple(reversed(moves))

@@ -30,7 +30,8 @@ from wbc.walking.body_path import BodyPath
 from wbc.walking.grips import Grips, Ints
 from wbc.walking.slices import Slices, drained
 from wbc.walking.stance_fan import QUANTUM, Fan, Outlook, following
-from wbc.walking.stance_moves import Found, Key, Move, Node
+from wbc.walking.stance_moves import Found, Key, Move, Node, way_to
+from wbc.walking.stance_rooms import StanceRooms
 from wbc.walking.structure import Structure
 from wbc.walking.swings import SETTLE, Swing, Swings
 
@@ -57,12 +58,12 @@ class StanceSearch:
 
     Args:
         longest_delay: of one swing [s]; 0: the body never slows down.
+        longest_wait: for which a hand may be in the air longer than it needs, until its next grip begins [s].
         width: stances kept of each number of re-grasps, None: all.
         first: row of an arm and of a hold: the first move, whether it is needed or not; None: any.
         known: a search over the same grips, whose swings and distances need not be computed again.
     """
 
-    #: Hands land so many samples before a grip of another one ends
     spare: ClassVar[int] = SPARE
     clearance: ArmClearance
     swings: Swings
@@ -75,6 +76,7 @@ class StanceSearch:
         grips: Grips,
         *,
         longest_delay: float = np.inf,
+        longest_wait: float = HOVER,
         width: int | None = 200,
         first: tuple[int, int] | None = None,
         known: StanceSearch | None = None,
@@ -86,16 +88,15 @@ class StanceSearch:
             self.clearance, self.swings = known.clearance, known.swings
         self._usual = round(USUAL / path.spacing)
         codes = grips.hold * (1 + grips.branch.max(initial=0)) + grips.branch
-        more = SLACK / path.spacing
-        self._outlook = Outlook(grips.last, codes, len(path) - 1, self._usual, more, path.spacing)
+        self._outlook = Outlook(grips.last, codes, len(path) - 1, self._usual, SLACK / path.spacing, path.spacing)
         # Levels of the last search, and swings (arm, source, target, lift) that each but the first asked for
         self._levels, self._asked = list[dict[Key, Node]](), list[set[Asked]]()
-        self.longest_delay, self.width, self.first = longest_delay, width, first
+        self.longest_delay, self.longest_wait, self.width, self.first = longest_delay, longest_wait, width, first
         self.expanded = 0
         # The end of the path is no limit of the arm
         lasting = grips.last == len(path) - 1
         self._latest = np.where(lasting, grips.last, grips.last - INSIDE)
-        self._ends = np.where(lasting, grips.last, grips.last - self.spare)
+        self.rooms = StanceRooms(self.clearance, grips.last, np.where(lasting, grips.last, grips.last - self.spare))
         # The hand is on its hold before it is latched
         self._touch = round((walker.tolerances.latch_time + SETTLE) / path.spacing)
         self._soonest = self._landings()
@@ -203,15 +204,18 @@ class StanceSearch:
         if move is None or parent is None:
             return None
         others = tuple(g for k, g in enumerate(key) if k != move.arm)
-        if min(self._conflict(move.target, g, move.land) for g in others) <= move.land:
+        if min(self.clearance.first_conflict(move.target, g, move.land) for g in others) <= move.land:
             return None
-        return Swing(move.arm, move.source, move.target, move.lift, self._room(others, level[parent].sample), others)
+        room, soonest = self.rooms.among(others, level[parent].sample), int(self._soonest[move.target])
+        return Swing(move.arm, move.source, move.target, move.lift, room, others, soonest)
 
     def _moves(self, level: Sequence[tuple[Key, Node]], rows: range) -> list[Fan]:
         """Moves that estimates allow from some stances of a level, arm by arm."""
         grips, spacing, some = self.grips, self.path.spacing, [level[k] for k in rows]
         keys, samples = np.array([key for key, _ in some]), np.array([node.sample for _, node in some])
-        rooms, ends = (np.array(x) for x in zip(*(self._limits(*one) for one in some), strict=True))
+        rooms, ends = (
+            np.array(x) for x in zip(*(self.rooms.limits(key, node.sample) for key, node in some), strict=True)
+        )
         out, first = [], self.first if level[0][1].parent is None else None
         for arm, targets in enumerate(self._by_arm):
             room, end, source = rooms[:, arm], ends[:, arm], keys[:, arm]
@@ -234,21 +238,10 @@ class StanceSearch:
             hovers, delay = (land - lift - count) * spacing, np.maximum(land - room, 0) * spacing
             land = np.minimum(land, room)
             fits = (land <= self._latest[target]) & (land >= soonest) & (delay <= self.longest_delay)
-            fits &= (hovers <= HOVER) & self._bent(target, land)
+            fits &= (hovers <= self.longest_wait) & self._bent(target, land)
             fan = Fan(row + rows.start, np.full_like(row, arm), source, target, lift, land, duration, delay)
             out.append(fan.of(np.nonzero(fits)[0]))
         return out
-
-    def _limits(self, key: Key, node: Node) -> tuple[list[int], list[int]]:
-        """For each arm the last sample that the others can hold, less what is spared, and that it can hold itself."""
-        pairs = {pair: self._conflict(*pair, node.sample) - 1 for pair in combinations(key, 2)}
-        rooms, ends = [], []
-        for grip in key:
-            mine = [free for pair, free in pairs.items() if grip in pair]
-            rest = [free for pair, free in pairs.items() if grip not in pair]
-            rooms.append(min([*(int(self._ends[g]) for g in key if g != grip), *rest]))
-            ends.append(min([int(self.grips.last[grip]), *mine]))
-        return rooms, ends
 
     def _checked(self, level: dict[Key, Node], node: Node, swing: Swing | None) -> Node | None:
         """The node with its swing computed along its way, None where it is not possible."""
@@ -276,16 +269,9 @@ class StanceSearch:
         out: NDArray[np.bool_] = np.abs(np.sin(self.grips.posture(targets, samples - self._touch)[..., 4])) >= BENT
         return out
 
-    def _room(self, others: Sequence[int], sample: int) -> int:
-        """Last sample that the grips of some arms can hold together, less what is spared."""
-        end = min(int(self._ends[g]) for g in others)
-        pairs = [self._conflict(a, b, sample) - 1 for a, b in combinations(others, 2)]
-        return min([end, *pairs])
-
     def until(self, key: Sequence[int], sample: int) -> int:
         """Last sample that a stance can hold, from a sample on."""
-        pairs = [self._conflict(a, b, sample) - 1 for a, b in combinations(key, 2)]
-        return min([int(self.grips.last[g]) for g in key] + pairs)
+        return self.rooms.until(key, sample)
 
     def shortened(self, found: Found, count: int) -> Found:
         """What was found up to so many moves."""
@@ -295,9 +281,6 @@ class StanceSearch:
         last, end = self.until(key, found.moves[count - 1].land if count else 0), len(self.path) - 1
         stuck = tuple(g for g in key if self.grips.last[g] == last)
         return replace(found, moves=found.moves[:count], complete=last >= end, reached=min(last, end), blocking=stuck)
-
-    def _conflict(self, one: int, other: int, sample: int) -> int:
-        return self.clearance.first_conflict(one, other, sample)
 
     def order(self, key: Sequence[int]) -> tuple[tuple[int, int], ...]:
         """What breaks ties: holds and branches, whichever arms they are of."""
@@ -313,11 +296,5 @@ class StanceSearch:
             depth = -depth
         last = self.until(key, levels[depth][key].sample)
         blocking = tuple(g for g in key if self.grips.last[g] == last)
-        moves: list[Move] = []
-        for level in levels[depth:0:-1]:
-            node = level[key]
-            if node.move is None or node.parent is None:
-                break
-            moves.append(node.move)
-            key = node.parent
-        return Found(key, tuple(reversed(moves)), complete, min(last, len(self.path) - 1), self.expanded, blocking)
+        start, moves = way_to(levels[: depth + 1], key)
+        return Found(start, moves, complete, min(last, len(self.path) - 1), self.expanded, blocking)

@@ -37,13 +37,16 @@ class Tracks:
 
 @dataclass(frozen=True, eq=False)
 class Asked:
-    """Swings of arms between grips; the body is at sample ``begin`` at first and ``last`` at most; ``[m]`` each."""
+    """Swings of arms between grips, ``[m]`` each: the body is at sample ``begin`` at first and ``last`` at most, and
+    they take ``least`` [s] if their law takes less.
+    """
 
     arms: Ints
     source: Ints
     target: Ints
     begin: Array
     last: Ints
+    least: Array
 
 
 def tracks(
@@ -57,7 +60,7 @@ def tracks(
     out = Tracks(np.empty(m, dtype=np.bool_), np.empty(m), np.empty((m, n)), np.empty((m, n, 6, 3)))
     bases = np.array([arm.base.homogeneous for arm in walker.arms])[asked.arms]
     given = [compiled.packed(array) for array in (bases, path.poses, way.at(x), blend(x))]
-    where = [compiled.at(array) for array in (*given, asked.source, asked.target, asked.begin, asked.last)]
+    where = [compiled.at(array) for array in (*given, asked.source, asked.target, asked.begin, asked.last, asked.least)]
     library.swing_tracks(
         ctypes.byref(compiled.arm(walker.data)),
         RULES,
@@ -85,9 +88,18 @@ def _numpy(
         samples = np.minimum(asked.begin[:, None] + times / path.spacing, asked.last[:, None])
         found = speeds(kinematics, walker, asked.arms, path, way, samples, wrists)
         times = found.time
-    postures = np.zeros((*found.angles.shape[:2], 6))
-    postures[..., :5] = found.angles[..., :5]
+    duration, angles, possible = found.duration, found.angles, found.possible
+    waits = duration < asked.least
+    if waits.any():
+        times = times * (asked.least / duration)[:, None]
+        longer = np.minimum(asked.begin[:, None] + times / path.spacing, asked.last[:, None])
+        samples = np.where(waits[:, None], longer, samples)
+        again = speeds(kinematics, walker, asked.arms, path, way, samples, wrists)
+        angles = np.where(waits[:, None, None], again.angles, angles)
+        possible = np.where(waits, again.possible, possible)
+    postures = np.zeros((*angles.shape[:2], 6))
+    postures[..., :5] = angles[..., :5]
     points = np.empty((*postures.shape[:2], 6, 3))
     for arm in np.unique(asked.arms):
         points[asked.arms == arm] = arms.points(int(arm), postures[asked.arms == arm])
-    return Tracks(found.possible, found.duration, samples, points)
+    return Tracks(possible, duration, samples, points)

@@ -45,6 +45,7 @@ class Swing:
         arm: row. source, target: grips. lift: sample of the body's path.
         room: last sample that the other arms can hold; the body waits there for the hand.
         others: grips of the other arms.
+        soonest: sample at which the hand may land; a faster one takes until then.
     """
 
     arm: int
@@ -53,6 +54,7 @@ class Swing:
     lift: int
     room: int
     others: tuple[int, ...]
+    soonest: int
 
 
 @dataclass(frozen=True)
@@ -72,8 +74,8 @@ class _Track:
     samples: Array
 
 
-#: arm, source, target, lift, last sample
-_Name = tuple[int, int, int, int, int]
+#: arm, source, target, lift, last and soonest sample
+_Name = tuple[int, int, int, int, int, int]
 
 
 class Swings:
@@ -160,10 +162,11 @@ class Swings:
         names = list(dict.fromkeys(_name(s) for s in swings if (_name(s), way) not in self._tracks))
         if not names:
             return
-        arms, source, target, lift, last = np.ascontiguousarray(np.array(names, dtype=np.int64).T)
+        arms, source, target, lift, last, soonest = np.ascontiguousarray(np.array(names, dtype=np.int64).T)
         curve = self.curve(arms, source, target, lift, way)
         # The body moves on while the hand opens
-        asked = Asked(arms, source, target, lift + self.latch / self.path.spacing, last)
+        begin, least = lift + self.latch / self.path.spacing, (soonest - lift) * self.path.spacing - self.extra
+        asked = Asked(arms, source, target, begin, last, least)
         found = tracks(self.walker, self._arms, self.path, self.grips, curve, asked, COARSE)
         ends = np.stack([curve.begin, curve.end], axis=1)
         bodies = self.path.blended(found.samples)
@@ -186,4 +189,5 @@ class Swings:
 
 
 def _name(swing: Swing) -> _Name:
-    return swing.arm, swing.source, swing.target, swing.lift, min(swing.room, swing.lift + LONG)
+    last = min(swing.room, max(swing.lift + LONG, swing.soonest))
+    return swing.arm, swing.source, swing.target, swing.lift, last, swing.soonest

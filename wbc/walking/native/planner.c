@@ -130,12 +130,14 @@ void grips_near(const Arm *arm, const Grips *grips, long m, const long *pairs, c
 }
 
 /* Swings as the search has them: laws of m swings over n points, made `passes` times, each time with the body where the
-   last law has it: at begin + time / spacing, and at most at `last`. Wrists go from grips `source` to grips `target` by
-   the parts `blend`. `samples` m x n, `points` m x n x 6 x 3 of the arms in the body's frame; the rest as above. */
+   last law has it: at begin + time / spacing, and at most at `last`; and once more where a swing is to take longer, at
+   least `least`, so that the hand comes when the next grip begins. `duration` is the law's. Wrists go from grips
+   `source` to grips `target` by the parts `blend`. `samples` m x n, `points` m x n x 6 x 3 of the arms in the body's
+   frame; the rest as above. */
 int swing_tracks(const Arm *arm, const Rules *rules, const Grips *grips, long m, long n, int bends, long passes,
                  const double *bases, const double *path, long count, double spacing, const double *place,
                  const double *blend, const long *source, const long *target, const double *begin, const long *last,
-                 unsigned char *possible, double *duration, double *samples, double *points)
+                 const double *least, unsigned char *possible, double *duration, double *samples, double *points)
 {
     double wrists[3 * MOST], angles[JOINTS * MOST], rate[MOST], time[MOST];
     if (n > MOST || n < 3 || bends > 3)
@@ -145,7 +147,9 @@ int swing_tracks(const Arm *arm, const Rules *rules, const Grips *grips, long m,
         const Frame base = frame_of(bases + 16 * s);
         for (long i = 0; i < n; ++i)
             time[i] = (double)i / (double)(n - 1);
-        for (long pass = 0; pass < passes; ++pass) {
+        for (long pass = 0; pass < passes || (pass == passes && duration[s] < least[s]); ++pass) {
+            for (long i = 0; i < n && pass == passes; ++i)
+                time[i] *= least[s] / duration[s];
             for (long i = 0; i < n; ++i) {
                 double first[3], second[3];
                 at[i] = smaller(begin[s] + time[i] / spacing, (double)last[s]);
@@ -156,8 +160,9 @@ int swing_tracks(const Arm *arm, const Rules *rules, const Grips *grips, long m,
             }
             swing_speeds(arm, rules, 1, n, bends, bases + 16 * s, path, count, spacing, place + 3 * n * s, wrists, at,
                          possible + s, angles, rate, time);
+            if (pass < passes)
+                duration[s] = time[n - 1];
         }
-        duration[s] = time[n - 1];
         for (long i = 0; i < n; ++i) {
             double q[JOINTS] = { 0.0 };
             memcpy(q, angles + (3 + bends) * i, sizeof(double) * 5);
