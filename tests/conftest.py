@@ -11,8 +11,10 @@ os.environ.setdefault("MPLBACKEND", "Agg")
 # One thread a process: pytest-xdist already fills the cores, and sums keep their order.
 for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(variable, "1")
-# The same arithmetic, compiled in a fraction of the time: hundreds of stacks are compiled, and none of them is timed
-os.environ.setdefault("WBC_TICK_FLAGS", "-O1")
+# The same arithmetic, compiled in a fraction of the time: hundreds of stacks are compiled, and none of them is timed;
+# tests/controller/test_optimised.py compares it with what users get
+os.environ.setdefault("WBC_TICK_FLAGS", "-O0")
+os.environ.setdefault("WBC_ROWS_FLAGS", "-O0")
 # Compiled ticks of the tests stay out of the user's cache, and survive from run to run.
 os.environ.setdefault("XDG_CACHE_HOME", str(Path(__file__).parents[1] / "build" / "test-cache"))
 

@@ -17,10 +17,11 @@ from wbc.errors import CompileError
 
 log = logging.getLogger("wbc")
 
-#: Flags of the generated rows: straight-line code, on which higher levels cost minutes and gain nothing
-ROWS_FLAGS = ("-O1",)
+#: Flags of the generated rows: straight-line code, on which higher levels cost minutes and gain nothing.
+#: ``WBC_ROWS_FLAGS`` replaces them: at -O0 they compile in half the time, to the same arithmetic
+ROWS_FLAGS = tuple(os.environ.get("WBC_ROWS_FLAGS", "-O1").split())
 #: Flags of the hand-written cycle: its loops have constant bounds and are worth unrolling. ``WBC_TICK_FLAGS`` replaces
-#: them: at -O1 it compiles in half the time, to the same arithmetic
+#: them, as above
 TICK_FLAGS = tuple(os.environ.get("WBC_TICK_FLAGS", "-O3").split())
 #: No fast-math and no contraction, so that the compiled tick is the arithmetic that was written
 COMMON_FLAGS = (

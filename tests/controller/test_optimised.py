@@ -1,0 +1,37 @@
+"""The other tests compile without optimisation; optimised as for users, a tick gives the same bits."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.controller.stacks import controller, near_limits, quarrel, robot
+from wbc.controller import Controller
+from wbc.stack import toolchain
+
+
+def optimised(rows: str, tick: str) -> Controller:
+    """A stack whose rows contradict each other, compiled with these flags."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(toolchain, "ROWS_FLAGS", (rows,))
+        patch.setattr(toolchain, "TICK_FLAGS", (tick,))
+        toolchain.identity.cache_clear()
+        out = controller("conflicts", backend="native")
+    toolchain.identity.cache_clear()
+    return out
+
+
+def test_answers_are_the_same_bits() -> None:
+    plain, quick = optimised("-O0", "-O0"), optimised("-O1", "-O3")
+    statuses = set()
+    for k in range(60):
+        q = near_limits(robot("panda"), np.random.default_rng(k))
+        steps = []
+        for one in (plain, quick):
+            one.reset(q)
+            quarrel(one, np.random.default_rng(1000 + k))
+            steps.append(one.step(q))
+        assert steps[0]._data == steps[1]._data
+        statuses.add(str(steps[0].status))
+    assert {"solved", "relaxed"} <= statuses
+    assert plain.tick._library._name != quick.tick._library._name
