@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.analysis.jacobians import jacobians
 from wbc.analysis import (
     BodyRows,
     ExactModel,
@@ -18,7 +19,7 @@ from wbc.analysis import (
     symbolic_jacobian,
 )
 from wbc.analysis.boxes import BoxSearch
-from wbc.analysis.numeric import NumericRows, rank
+from wbc.analysis.numeric import rank
 from wbc.analysis.rank_matrix import rank_matrices
 from wbc.analysis.symmetry import fundamental_box, symmetries
 from wbc.analysis.trig_form import TrigForm, trig_form, used_joints
@@ -48,9 +49,7 @@ def test_verdicts_are_those_of_the_exact_method(name: str, chosen: str) -> None:
         assert found.counts.regular_part + found.counts.tube_part == pytest.approx(1.0, abs=1e-9)
         return
     assert found.witness is not None
-    numeric = NumericRows(sets.robot)
-    J_T = numeric.value(sets.task, found.witness.q)
-    J_R = numeric.value((*sets.task, *sets.sets[chosen]), found.witness.q)
+    J_T, J_R = jacobians(name, chosen, found.witness.q)
     assert np.linalg.svd(J_T, compute_uv=False)[-1] >= found.eps
     assert rank(J_R) < sets.robot.nv
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from tests.analysis.jacobians import jacobians
 from wbc.analysis import ExactModel, JointRows, analyse, published_sets
-from wbc.analysis.numeric import NumericRows, rank
+from wbc.analysis.numeric import rank
 from wbc.errors import RangeError, ShapeError, UnknownNameError
 
 VERDICTS = {
@@ -28,8 +29,7 @@ def test_verdicts_and_their_witnesses(name: str, chosen: str) -> None:
     assert found.verdict == VERDICTS[name, chosen]
     assert (found.witness is None) == (found.verdict != "incomplete")
     if found.witness is not None:
-        numeric, q = NumericRows(sets.robot), found.witness.q
-        J_T, J_R = numeric.value(sets.task, q), numeric.value((*sets.task, *sets.sets[chosen]), q)
+        J_T, J_R = jacobians(name, chosen, found.witness.q)
         assert rank(J_T) == J_T.shape[0]
         assert rank(J_R) < sets.robot.nv
         np.testing.assert_allclose(found.witness.task, np.linalg.svd(J_T, compute_uv=False), atol=1e-12)
