@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import hashlib
-import pathlib
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
-from wbc.errors import CompileError
-from wbc.stack import cache, toolchain
+from wbc.stack.compiled_function import compiled
 from wbc.validation import Array
 
 #: States of one call of the compiled loop
@@ -26,9 +23,9 @@ class ManyStates:
 
     def __init__(self, function: ca.Function) -> None:
         self.size = int(function.size1_out(0))
-        library = _library(function) if toolchain.available() else None
-        self.compiled = library is not None
-        loop = library if library is not None else function.map(CHUNK)
+        loop = function.map(CHUNK)
+        library = compiled(loop)
+        self.compiled, loop = library is not loop, library
         # CasADi keeps columns, numpy rows: the same memory
         self._inputs = [np.zeros((CHUNK, function.size1_in(k))) for k in range(function.n_in())]
         self._output = np.zeros((CHUNK, self.size))
@@ -52,21 +49,3 @@ class ManyStates:
             self._run()
             out[begin : begin + here] = self._output[:here]
         return out
-
-
-def _library(function: ca.Function) -> ca.Function | None:
-    """The loop as compiled code; None where the compiler fails, which the log says."""
-    loop = function.map(CHUNK)
-    name = hashlib.sha256(f"{function.serialize()}\n{CHUNK}\n{toolchain.identity()}".encode()).hexdigest()
-
-    def fill(folder: pathlib.Path) -> None:
-        generator = ca.CodeGenerator("many.c", {"with_header": False})
-        generator.add(loop)
-        toolchain.compile_rows(generator.dump(), folder / "many.so")
-
-    try:
-        folder, _ = cache.fetch(name, fill, library=True)
-    except CompileError as error:
-        toolchain.fall_back(str(error))
-        return None
-    return ca.external(loop.name(), str(folder / "many.so"))

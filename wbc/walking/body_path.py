@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -55,7 +56,7 @@ class BodyPath:
     def __len__(self) -> int:
         return len(self.poses)
 
-    @property
+    @functools.cached_property
     def duration(self) -> float:
         """u at the last sample [s]."""
         return (len(self.poses) - 1) * self.spacing
@@ -65,15 +66,29 @@ class BodyPath:
 
         Between samples the pose moves with constant twist. u is clipped to the path.
         """
+        k, part = self.place(u)
+        first, last, twist = self._step(k)
+        pose = pin.SE3.Interpolate(first, last, part)
+        return pose, (twist @ pose.rotation.T).ravel()
+
+    def place(self, u: float) -> tuple[int, float]:
+        """The sample before u, clipped to the path, and the part of the way to the next one."""
         place = min(max(u / self.spacing, 0.0), len(self.poses) - 1.0)
         k = min(int(place), len(self.poses) - 2)
+        return k, place - k
+
+    @functools.cached_property
+    def numbers(self) -> Array:
+        """Samples as rotation by columns and position ``[samples, 12]`` [m]."""
+        return np.ascontiguousarray(self.poses[:, :3].transpose(0, 2, 1).reshape(-1, 12))
+
+    def _step(self, k: int) -> tuple[pin.SE3, pin.SE3, Array]:
+        """Sample k, the next one, and the rate (linear; angular) between them ``[2, 3]`` [m/s, rad/s]."""
         if k not in self._steps:
             first, last = pin.SE3(self.poses[k]), pin.SE3(self.poses[k + 1])
             step = pin.log6(first.actInv(last))
             self._steps[k] = first, last, np.array([step.linear, step.angular]) / self.spacing
-        first, last, twist = self._steps[k]
-        pose = pin.SE3.Interpolate(first, last, place - k)
-        return pose, (twist @ pose.rotation.T).ravel()
+        return self._steps[k]
 
     def blended(self, samples: Array) -> Array:
         """Matrices at fractional samples, by straight lines between entries: for estimates; ``[..., 4, 4]``."""

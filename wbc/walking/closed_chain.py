@@ -7,11 +7,12 @@ from math import sqrt
 
 import numpy as np
 import pinocchio as pin
-from scipy.linalg.lapack import dsyev
 
 from wbc.errors import RangeError
 from wbc.robots import Walker
+from wbc.stack.single import SingleState
 from wbc.validation import Array
+from wbc.walking.chain_function import chain_function
 from wbc.walking.grip_rolls import allowed_x
 from wbc.walking.hand_tilt import LEAST_TILT
 from wbc.walking.structure import Structure
@@ -20,26 +21,6 @@ from wbc.walking.structure import Structure
 AXIS_LENGTH = 0.05
 #: The same of a compliant hold: origins keep their place to 1e-7 m against it
 BALL_LENGTH = 1e-3
-
-
-def _davenport() -> Array:
-    """The linear map from A ``[9]`` by rows to K ``[16]``, for quaternions (x, y, z, w)."""
-    out = np.zeros((4, 4, 3, 3))
-    for i in range(3):
-        out[3, 3, i, i] = 1.0
-        for j in range(3):
-            # K_vv = A + A' - tr(A) 1
-            out[i, j, i, j] += 1.0
-            out[i, j, j, i] += 1.0
-            out[i, i, j, j] -= 1.0
-        # K_vw = (A32 - A23, A13 - A31, A21 - A12)
-        k, m = (i + 1) % 3, (i + 2) % 3
-        out[i, 3, m, k] = out[3, i, m, k] = 1.0
-        out[i, 3, k, m] = out[3, i, k, m] = -1.0
-    return out.reshape(16, 9)
-
-
-DAVENPORT = _davenport()
 
 
 class ClosedChain:
@@ -70,6 +51,9 @@ class ClosedChain:
         self._rows = [*(f.translation for f in frames), *(f.rotation[:, k] for k in (2, 0) for f in frames)]
         count = len(walker.arms)
         self.origins, self.axes, self.sides = np.zeros((3, count, 3))
+        self._fit = SingleState(chain_function(walker))
+        self._q, self._v, self._dt, *self._fitted = self._fit.inputs
+        self._none = np.zeros(model.nv)
         self._held: dict[int, int] | None = None
         self._leans = False
 
@@ -81,12 +65,8 @@ class ClosedChain:
 
     def place(self, q: Array) -> None:
         """Where the hands are, of a body that is where a configuration has it."""
-        self._still[7:] = q[7:]
-        pin.framesForwardKinematics(self._model, self._data, self._still)
-        turn, count = pin.Quaternion(q[3:7]).matrix(), len(self.origins)
-        moved = np.concatenate(self._rows).reshape(-1, 3).dot(turn.T)
-        self.origins = moved[:count] + q[:3]
-        self.axes, self.sides = moved[count : 2 * count], moved[2 * count :]
+        origins, self.axes, self.sides = self._hands(q)
+        self.origins = origins + q[:3]
 
     def slip(self, held: Mapping[int, int]) -> float:
         """Largest distance of a held hand from its hold [m]."""
@@ -106,47 +86,55 @@ class ClosedChain:
         Raises:
             RangeError: nothing is held, or by one hand that may roll: the body's pose is not determined.
         """
-        self._still[7:] = q[7:]
-        pin.framesForwardKinematics(self._model, self._data, self._still)
-        flat = np.concatenate(self._rows)
-        if held != self._held or self._leans:
-            self._take(held, flat.reshape(3, -1, 3).dot(pin.Quaternion(q[3:7]).matrix().T))
-        quaternion = dsyev(self._quadratic.dot(flat).reshape(4, 4))[1][:, 3]
-        out = q.copy()
-        # The quaternion keeps its sign from tick to tick
-        out[3:7] = quaternion if quaternion.dot(q[3:7]) >= 0.0 else -quaternion
-        count = len(self.origins)
-        moved = flat.reshape(-1, 3).dot(pin.Quaternion(out[3:7]).matrix().T)
-        out[:3] = origin = self._center - self._mean.dot(moved[:count])
-        self.origins, self.axes = moved[:count] + origin, moved[count : 2 * count]
-        self.sides = moved[2 * count :]
-        gap = self._mask * (self.origins - self._holds)
-        return out, sqrt(np.maximum.reduce(np.add.reduce(gap * gap, axis=1)))
+        return self.move(q, self._none, 0.0, held)
 
-    def _take(self, held: Mapping[int, int], hands: Array) -> None:
+    def move(self, q: Array, v: Array, dt: float, held: Mapping[int, int]) -> tuple[Array, float]:
+        """As :meth:`settle`, with the joints moved on for a time by their rates: q + v dt.
+
+        Args:
+            q: before. v: rates; those of the body do not count. dt: [s].
+        """
+        if held != self._held or self._leans:
+            self._take(held, q)
+        self._q[:], self._v[:], self._dt[0] = q, v, dt
+        self._fit.run()
+        found, nq, count = self._fit.output.copy(), len(q), len(self.origins)
+        moved = found[nq + 1 :].reshape(-1, 3)
+        self.origins, self.axes, self.sides = moved[:count], moved[count : 2 * count], moved[2 * count :]
+        return found[:nq], found.item(nq)
+
+    def _take(self, held: Mapping[int, int], q: Array) -> None:
         """What depends on the holds alone, until other ones are held.
 
-        ``hands`` ``[3, arms, 3]`` are origins, z and x axes of the hands on the body as it was. The x axis of a hand
-        that leans and must not roll goes with its z axis, so it is taken anew every time.
+        The x axis of a hand that leans and must not roll goes with its z axis, so it is taken anew every time, from the
+        hands on the body as it was.
         """
         structure = self.structure
         if not held or (len(held) == 1 and structure.free_rolls[next(iter(held.values()))]):
             raise RangeError("held", dict(held), "the body's pose needs two hands, or one that cannot roll")
         arms, holds, count = list(held), list(held.values()), len(self.origins)
         rolled = [arm for arm, hold in held.items() if not structure.free_rolls[hold]]
-        self._holds = np.zeros((count, 3))
-        self._holds[arms] = structure.positions[holds]
-        self._mask = np.zeros((count, 1))
-        self._mask[arms] = 1.0
-        self._mean = self._mask[:, 0] / len(arms)
-        self._center = self._mean @ self._holds
+        theirs, mask = np.zeros((count, 3)), np.zeros((count, 1))
+        theirs[arms], mask[arms] = structure.positions[holds], 1.0
+        mean = mask[:, 0] / len(arms)
+        centre = mean @ theirs
         weights = np.zeros((3 * count, 3))
-        weights[:count] = self._mask * (self._holds - self._center)
+        weights[:count] = mask * (theirs - centre)
         lengths = np.where(structure.tilts[holds] < LEAST_TILT, AXIS_LENGTH, BALL_LENGTH)
         weights[[count + arm for arm in arms]] = lengths[:, None] ** 2 * structure.axes[holds]
+        if rolled:
+            _, axes, sides = self._hands(q)
         for arm in rolled:
-            weights[2 * count + arm] = AXIS_LENGTH**2 * allowed_x(structure, held[arm], hands[2, arm], hands[1, arm])
+            weights[2 * count + arm] = AXIS_LENGTH**2 * allowed_x(structure, held[arm], sides[arm], axes[arm])
         self._leans = any(structure.tilts[held[arm]] >= LEAST_TILT for arm in rolled)
         # The weights of the origins sum to nothing, so their mean does not count in A = weights' ours
-        self._quadratic = np.einsum("abc,nb->anc", DAVENPORT.reshape(16, 3, 3), weights).reshape(16, -1)
+        for numbers, given in zip(self._fitted, (weights, mean, centre, mask, theirs), strict=True):
+            numbers[:] = given.ravel()
         self._held = dict(held)
+
+    def _hands(self, q: Array) -> Array:
+        """Origins, z axes and x axes of the hands ``[3, arms, 3]``, turned as a configuration has the body."""
+        self._still[7:] = q[7:]
+        pin.framesForwardKinematics(self._model, self._data, self._still)
+        out: Array = np.concatenate(self._rows).reshape(3, -1, 3).dot(pin.Quaternion(q[3:7]).matrix().T)
+        return out

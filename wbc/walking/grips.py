@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import radians
 
@@ -58,6 +58,8 @@ class Grips:
     postures: Array
     ends: Ints
     roll: Ints
+    _ends: dict[float, list[float]] = field(default_factory=dict, init=False, repr=False)
+    _wrists: dict[int, tuple[int, int, Array]] = field(default_factory=dict, init=False, repr=False)
 
     #: What may end a grip
     reasons = (*LIMIT_NAMES, "reach", *(f"joint {k} rate" for k in range(1, 7)), "end of the path")
@@ -85,12 +87,26 @@ class Grips:
 
     def wrist_at(self, grip: int, sample: float) -> tuple[float, float, float]:
         """Joints 4 to 6 of one grip at a fractional sample, by straight lines, clipped to the grip [rad]."""
-        length = int(self.last[grip]) - int(self.first[grip])
-        inside = min(max(sample - int(self.first[grip]), 0.0), float(length))
-        low = min(int(inside), length - 1)
-        row, part = int(self.offset[grip]) + low, inside - low
-        (a, b, c), (d, e, f) = self.postures[row : row + 2, 3:].tolist()
+        first, last, rows = self.wrists(grip)
+        inside = min(max(sample, first), last) - first
+        low = min(int(inside), last - first - 1)
+        ((a, b, c), (d, e, f)), part = rows[low : low + 2].tolist(), inside - low
         return a + part * (d - a), b + part * (e - b), c + part * (f - c)
+
+    def wrists(self, grip: int) -> tuple[int, int, Array]:
+        """First and last sample of one grip, and joints 4 to 6 from the one to the other ``[samples, 3]`` [rad]."""
+        known = self._wrists.get(grip)
+        if known is None:
+            first, last, offset = int(self.first[grip]), int(self.last[grip]), int(self.offset[grip])
+            rows = self.postures[offset : offset + last - first + 1, 3:].copy()
+            known = self._wrists[grip] = first, last, rows
+        return known
+
+    def ends_at(self, spacing: float) -> list[float]:
+        """Path times of the last samples of all grips [s], of a path with this spacing; the list is kept."""
+        if spacing not in self._ends:
+            self._ends[spacing] = (self.last * spacing).tolist()
+        return self._ends[spacing]
 
     def between(self, grip: Ints, samples: Array) -> Array:
         """Postures at fractional samples, by straight lines, clipped to the grip, ``[..., 6]``."""

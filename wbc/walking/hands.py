@@ -5,7 +5,6 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable
 from dataclasses import replace
-from math import sqrt
 from typing import Any, ClassVar
 
 import numpy as np
@@ -14,14 +13,16 @@ import pinocchio as pin
 from wbc.errors import ShapeError
 from wbc.robots import Walker, WalkerData
 from wbc.validation import Array
+from wbc.walking.body_command import BodyCommand
 from wbc.walking.closed_chain import ClosedChain
 from wbc.walking.grip_rolls import ANY, frame_on
+from wbc.walking.hand_command import HandCommand
 from wbc.walking.plan import HoldLost, Plan, Regrasp
 from wbc.walking.replanning import way_to
 from wbc.walking.structure import Structure
 from wbc.walking.swing_law import SwingLaw
 from wbc.walking.swings import SETTLE
-from wbc.walking.walk_hands import BEHIND, HAND_RAMP, HAND_STOP, LANDING, at_rest, hand_pace, turned
+from wbc.walking.walk_hands import HAND_RAMP, HAND_STOP, LANDING, at_rest, hand_pace, turned
 from wbc.walking.walk_stack import WalkStack
 from wbc.walking.walk_state import Event, Hand, State, Swinging, What, Wrist
 
@@ -63,7 +64,8 @@ class Hands(ABC):
         self.walker, self.structure, self.stack, self.dt = walker, structure, stack, stack.dt
         self.data = walker.tolerances
         self.stack.structure = structure
-        self.chain = ClosedChain(walker, structure)
+        self.chain, self.command = ClosedChain(walker, structure), BodyCommand(self.dt)
+        self._hand, self._arms = HandCommand(self.dt), range(len(walker.arms))
         self.grasps = grasps or (lambda _arm, _hold: True)
         self.time, self.path_time, self.pace, self.wanted = 0.0 if state is None else state.time, 0.0, 0.0, 1.0
         self.events: list[Event] = []
@@ -158,7 +160,7 @@ class Hands(ABC):
         self._open(arm)
         law, target = self.plan.laws[self.next], self.plan.chain[arm][self._used[arm]]
         self.swinging = self._swing(arm, target, law, latch=self.data.latch_time)
-        self.swinging.bend = self._bend(self.swinging, 0.0)
+        self.swinging.bend = self._bend(arm)
         self._say("lift", step.arm, step.source)
         before = len(self.past) * self.plan.path.spacing
         self.steps.append(replace(step, lift=step.lift + before, land=step.land + before, until=step.until + before))
@@ -183,7 +185,6 @@ class Hands(ABC):
         arm = swinging.arm
         place = self.chain.origins[arm]
         swinging.place, swinging.axis, swinging.side = place, self.chain.axes[arm], self.chain.sides[arm]
-        now, wrist = swinging.aim, swinging.bend
         # On the wrong side of theta5 = 0 the wrist cannot align the hand: it turns to its branch before the hand lands
         at_branch = turned(swinging, self.q[self.walker.arms[arm].q].tolist()[3:])
         if swinging.state == "opening":
@@ -195,18 +196,10 @@ class Hands(ABC):
             wanted, change = (0.0, self.dt / HAND_STOP) if self.aborted else (wanted, self.dt / HAND_RAMP)
             swinging.pace += min(max(wanted - swinging.pace, -change), change)
             swinging.clock = min(swinging.clock + swinging.pace * self.dt, swinging.law.duration)
-        aim = swinging.aim = swinging.law.at(swinging.clock)
-        bend = swinging.bend = self._bend(swinging, aim.blend)
-        # From where the hand is to be as the tick begins to where it is to be as it ends
-        speed = (aim.position - now.position) / self.dt
-        turning = (bend[0] - wrist[0]) / self.dt, (bend[1] - wrist[1]) / self.dt, (bend[2] - wrist[2]) / self.dt
-        gap = now.position - place
-        far = sqrt(gap.dot(gap))
-        # A hand that cannot follow must not pull at the body: its aim waits within reach of it
-        target = now.position if far <= BEHIND else place + gap * (BEHIND / far)
-        near = aim.blend > LANDING and at_branch
-        at_hold = (self.structure.axes[swinging.hold], swinging.x) if near else None
-        self.stack.swing(arm, (target, speed), (wrist, turning), at_hold)
+        sample = self.path_time / self.plan.path.spacing
+        followed = self._hand.go(swinging, place, self.grips, self._grip[arm], sample)
+        near = swinging.aim.blend > LANDING and at_branch
+        self.stack.swing(arm, followed, (self.structure.axes[swinging.hold], swinging.x) if near else None)
 
     def _give_up(self) -> None:
         """A hand whose hold is out of reach from where the body stopped stays in the air, until there is a plan."""
@@ -225,13 +218,9 @@ class Hands(ABC):
         due = self.plan.regrasps[self.next].land - self.data.latch_time - SETTLE
         return due if self.leash is None else max(min(due, self.leash[0]), soonest)
 
-    def _bend(self, swinging: Swinging, blend: float) -> Wrist:
-        """Joints 4 to 6 of a swinging arm at a part of their way, where the body is now."""
-        sample = self.path_time / self.plan.path.spacing
-        first = swinging.wrist or self.grips.wrist_at(self._grip[swinging.arm], sample)
-        last = self.grips.wrist_at(swinging.grip, sample)
-        (a, b, c), (d, e, f) = first, last
-        return a + blend * (d - a), b + blend * (e - b), c + blend * (f - c)
+    def _bend(self, arm: int) -> Wrist:
+        """Joints 4 to 6 of an arm as its grip has them where the body is now."""
+        return self.grips.wrist_at(self._grip[arm], self.path_time / self.plan.path.spacing)
 
     def _leaving(self) -> int:
         """The arm that is lifted next, if it can be: its grip is no end for the body. -1 for none."""
@@ -288,7 +277,8 @@ class Hands(ABC):
         self.events.append(Event(self.time, what, arm, hold, self.path_time))
 
     def _hands(self) -> tuple[Hand, ...]:
-        out: list[Hand] = ["closed" if arm in self.held else "open" for arm in range(len(self.walker.arms))]
+        held = self.held
+        out: list[Hand] = ["closed" if arm in held else "open" for arm in self._arms]
         if self.swinging is not None:
             out[self.swinging.arm] = self.swinging.state
         if self.told is not None:
@@ -296,7 +286,8 @@ class Hands(ABC):
         return tuple(out)
 
     def _holds(self) -> tuple[int, ...]:
-        out = [self.held.get(arm, -1) for arm in range(len(self.walker.arms))]
+        held = self.held
+        out = [held.get(arm, -1) for arm in self._arms]
         if self.swinging is not None:
             out[self.swinging.arm] = self.swinging.hold
         if self.told is not None:

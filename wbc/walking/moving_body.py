@@ -8,7 +8,6 @@ from itertools import pairwise
 from math import sqrt
 
 import numpy as np
-import pinocchio as pin
 
 from wbc.validation import Array
 from wbc.walking.hands import Hands
@@ -76,11 +75,11 @@ class MovingBody(Hands):
 
     def _move(self) -> float:
         """The robot moves by its joint rates for a tick, and by nothing else; the worst slip of a held hand [m]."""
+        if not self.fixed:
+            self.q, slip = self.chain.move(self.q, self.v, self.dt, self.held)
+            return slip
         joints = self.q.copy()
         joints[7:] += self.v[6:] * self.dt
-        if not self.fixed:
-            self.q, slip = self.chain.settle(joints, self.held)
-            return slip
         self.v[:6] = 0.0
         self.q = joints
         self.chain.place(joints)
@@ -107,39 +106,37 @@ class MovingBody(Hands):
         self.path_time -= begins
         self._go_on(plan)
 
-    def _advance(self) -> pin.SE3:
+    def _advance(self) -> Array:
         """Move the body's command on: as fast as asked, as slow as the grips of the holding hands need.
 
         Returns:
-            Where the body is to be as the tick ends.
+            Where the body is to be as the tick ends: position [m] and quaternion x, y, z, w.
         """
-        path, spacing = self.plan.path, self.plan.path.spacing
-        leaving = self._leaving()
-        ends = [float(self.grips.last[self._grip[arm]]) * spacing for arm in self.held if arm != leaving]
-        end = path.duration if self.plan.complete else self.plan.reached
+        plan, path, grips = self.plan, self.plan.path, self._grip
+        leaving, lasts = self._leaving(), self.grips.ends_at(path.spacing)
+        end = path.duration if plan.complete else plan.reached
         end = end if self.leash is None else min(end, self.leash[0])
-        if self.approve is not None and self.swinging is None and self.next < len(self.plan.regrasps):
-            end = min(end, self.plan.regrasps[self.next].lift)
-        room, left = (max(limit - self.path_time, 0.0) for limit in (min([end, *ends]), end))
+        if self.approve is not None and self.swinging is None and self.next < len(plan.regrasps):
+            end = min(end, plan.regrasps[self.next].lift)
+        soonest = min([end, *[lasts[grips[arm]] for arm in self.held if arm != leaving]])
+        room, left = max(soonest - self.path_time, 0.0), max(end - self.path_time, 0.0)
         # The command stops within the room: braking from pace p in a time T takes p^2 T / 2 of path time
         wanted = min(1.0, sqrt(2.0 * room / BRAKE * 0.9), sqrt(2.0 * left / RAMP * 0.9))
         if self.swinging is not None:
             needed = self.swinging.law.duration - self.swinging.clock + self.data.latch_time + SETTLE
             if self.swinging.counted and not self._changing:
                 # A hand that is late makes the body late too: the next ones then swing where they were planned to
-                room = min(room, max(self.plan.regrasps[self.next].land + LATE - self.path_time, 0.0))
+                room = min(room, max(plan.regrasps[self.next].land + LATE - self.path_time, 0.0))
             if room < needed:
                 wanted = min(wanted, room / needed)
         if self._stands():
             wanted = 0.0
         self.wanted = wanted
         self.pace = max(self.pace + min(max(wanted - self.pace, -self.dt / BRAKE), self.dt / RAMP), 0.0)
-        pose = path.at(self.path_time)[0]
-        self.path_time = min(self.path_time + self.pace * self.dt, path.duration)
-        command = path.at(self.path_time)[0]
-        turn = pose.rotation @ pin.log3(pose.rotation.T @ command.rotation)
-        self.stack.body(pose, np.concatenate([command.translation - pose.translation, turn]) / self.dt)
-        return command
+        begin = self.path_time
+        self.path_time = min(begin + self.pace * self.dt, path.duration)
+        self.stack.body(self.command.go(path, begin, self.path_time))
+        return self.command.pose
 
     def _stands(self) -> bool:
         """The body is to stop, or not to move on."""

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from wbc import __version__, validation
 from wbc.errors import RangeError, ShapeError, UnknownNameError
+from wbc.validation import Array
 from wbc.walking.hold import FIXED, FREE
 from wbc.walking.run_log import WalkLog
 from wbc.walking.structure import Structure
@@ -108,9 +109,7 @@ class LogRecorder:
             ShapeError: arrays of another length; the tick is then not recorded.
         """
         k = self._count
-        if k == len(self._reals):
-            self._reals = np.concatenate([self._reals, np.zeros_like(self._reals)])
-            self._whole = np.concatenate([self._whole, np.zeros_like(self._whole)])
+        self._make_room(1)
         numbers = pin.SE3ToXYZQUAT(pose) if isinstance(pose, pin.SE3) else pose
         given = () if command is None else command
         lengths = (len(numbers), len(q), len(v), len(twist), len(states), len(holds))
@@ -125,6 +124,40 @@ class LogRecorder:
         np.concatenate(((t,), numbers, q, v, twist, given), out=row)
         self._whole[k] = (*states, *holds, _KINDS[len(given)], bool(body_fixed))
         self._count = k + 1
+
+    def extend(
+        self,
+        t: Array,
+        pose: Array,
+        q: Array,
+        v: Array,
+        twist: Array,
+        states: NDArray[Any],
+        holds: NDArray[Any],
+        command: Array,
+        body_fixed: NDArray[Any],
+    ) -> None:
+        """n ticks at once: what :meth:`append` takes, by rows; every tick has a command, a twist or a pose.
+
+        Raises:
+            ShapeError: arrays of another shape; no tick is then recorded.
+        """
+        n, width = len(t), command.shape[-1]
+        found = tuple(np.shape(rows) for rows in (t, pose, q, v, twist, states, holds, command, body_fixed))
+        wanted = ((n,), *((n, length) for length in self._lengths), (n, width), (n,))
+        if found != wanted or width not in (6, 7):
+            raise ShapeError("ticks", found, f"expected {wanted}, a command of 6 or 7 numbers")
+        self._make_room(n)
+        rows = slice(self._count, self._count + n)
+        np.concatenate((t[:, None], pose, q, v, twist, command), axis=1, out=self._reals[rows, : self._least + width])
+        self._whole[rows] = np.column_stack((states, holds, np.full(n, _KINDS[width]), body_fixed))
+        self._count += n
+
+    def _make_room(self, count: int) -> None:
+        """Arrays that are full double."""
+        while self._count + count > len(self._reals):
+            self._reals = np.concatenate([self._reals, np.zeros_like(self._reals)])
+            self._whole = np.concatenate([self._whole, np.zeros_like(self._whole)])
 
     def vanish(self, t: float, hold: str) -> None:
         """A hold is gone from time ``t`` [s] on.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,8 +21,7 @@ from wbc.walking.swings import COARSE, FINE, Swings
 SPACING = 0.005
 
 
-@dataclass(frozen=True, eq=False)
-class Aim:
+class Aim(NamedTuple):
     """What a swinging hand is to do: position [m], velocity [m/s], the part of the wrist's way, and that of the time,
     0 to 1 each.
     """
@@ -96,8 +95,15 @@ class SwingLaw:
 
     def at(self, time: float) -> Aim:
         """The aim at a time since lifting, clipped to the swing."""
-        part = min(max(time / self.duration, 0.0), 1.0)
-        place = part * (len(self._times) - 1)
-        low = min(int(place), len(self._times) - 2)
-        row = self._rows[low] + (place - low) * (self._rows[low + 1] - self._rows[low])
+        rows, between, part = self.rows_at(time)
+        row = rows[:7] + between * (rows[7:] - rows[:7])
         return Aim(row[:3], row[3:6], float(row[6]), part)
+
+    def rows_at(self, time: float) -> tuple[Array, float, float]:
+        """The rows before and after a time, clipped to the swing: position, velocity and part of the wrist's way of
+        each ``[14]``; the part of the way between them, and of the whole time.
+        """
+        part = min(max(time / self.duration, 0.0), 1.0)
+        place = part * (len(self._rows) - 1)
+        low = min(int(place), len(self._rows) - 2)
+        return self._rows[low : low + 2].reshape(14), place - low, part

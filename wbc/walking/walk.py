@@ -161,12 +161,12 @@ class Walk(MovingBody):
         begin = time.perf_counter()
         step = self.stack.controller.step(self.q, self.v)
         cost = time.perf_counter() - begin
-        self.v = np.array(step.v)
+        self.v = step.v.copy()
         slip, fixed = self._move(), self.fixed
         self.time += self.dt
         if self.swinging is not None:
             self._land(self.swinging)
-        error = dist(self.q[:3], command.translation)
+        error = dist(self.q[:3], command[:3])
         state = self._hands(), self._holds(), command, error, slip, step.status, cost, fixed
         return Tick(self.time, self.path_time, self.q, self.v, *state)
 

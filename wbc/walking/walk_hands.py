@@ -34,9 +34,11 @@ def hand_pace(swinging: Swinging, place: Array, turned: bool, early: float, pace
         early: path time until the hold can be held [s]. pace: of the body.
     """
     aim = swinging.aim
-    gap, speed = aim.position - place, sqrt(aim.velocity.dot(aim.velocity))
-    along = float(gap.dot(aim.velocity)) / speed if speed > 1e-6 else 0.0
-    across = sqrt(max(float(gap.dot(gap)) - along * along, 0.0))
+    # In plain floats: three numbers are too few for numpy to be quick
+    (a, b, c), (x, y, z), (u, v, w) = aim.position.tolist(), place.tolist(), aim.velocity.tolist()
+    x, y, z, speed = a - x, b - y, c - z, sqrt(u * u + v * v + w * w)
+    along = (x * u + y * v + z * w) / speed if speed > 1e-6 else 0.0
+    across = sqrt(max(x * x + y * y + z * z - along * along, 0.0))
     # A hand that is ahead must not be stopped: it could not
     wanted = min(max(1.5 - (max(along, 0.0) + across) / BEHIND, LEAST_PACE), 1.0)
     wait = early - pace * (swinging.law.duration - swinging.clock)
@@ -76,8 +78,8 @@ def at_rest(
 
 def turned(swinging: Swinging, wrist: Sequence[float]) -> bool:
     """Whether joints 4 and 5, and 6 where the roll counts, are near to where they are to be [rad]."""
-    last = 2 if swinging.x is None else 3
-    return all(abs(wrist[k] - swinging.bend[k]) < TURNED for k in range(last))
+    (a, b, c), (d, e, f) = wrist, swinging.bend
+    return abs(a - d) < TURNED and abs(b - e) < TURNED and (swinging.x is None or abs(c - f) < TURNED)
 
 
 def angle(one: Array, other: Array) -> float:

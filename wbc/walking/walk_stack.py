@@ -5,17 +5,16 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 from wbc import tasks
 from wbc.controller.controller import Controller
+from wbc.controller.input_group import InputGroup
 from wbc.controller.stack import Stack
-from wbc.robots import Walker
+from wbc.robots import Arm, Walker
 from wbc.validation import Array
 from wbc.walking.grip_rolls import ANY
 from wbc.walking.hold_items import HoldItems
 from wbc.walking.structure import Structure
-from wbc.walking.walk_state import Wrist
 
 #: Control period [s]
 DT = 0.01
@@ -57,10 +56,12 @@ class WalkStack:
         self._turning = np.zeros(walker.robot.nv)
         self._near = (-1, False)
         items: Any = self.controller
-        self._body, self._rest = items["body"], items["posture"]
+        self._body = InputGroup(self.controller, [("body", "target", None), ("body", "feedforward", None)])
+        self._rest = items["posture"]
         self._holds.of(self.controller)
         self._swings, self._axes = ([items[f"{arm.name} {kind}"] for arm in walker.arms] for kind in ("swing", "axis"))
-        self._body.gain, self._rest.gain = BODY_GAIN, WRIST_GAIN
+        items["body"].gain, self._rest.gain = BODY_GAIN, WRIST_GAIN
+        self._hands = [self._hand(arm) for arm in walker.arms]
         for swing, axis in zip(self._swings, self._axes, strict=True):
             swing.gain, axis.gain = SWING_GAIN, AXIS_GAIN
 
@@ -83,58 +84,52 @@ class WalkStack:
         """An open hand, which follows aims."""
         self._holds.release(arm)
         self._swings[arm].enabled = self._axes[arm].enabled = True
-        self._near = (-1, False)
+        self._catch_up()
 
     def rest(self, arm: int, place: Array, axis: Array) -> None:
         """A free hand that stays where it is."""
         swing, aligned = self._swings[arm], self._axes[arm]
         swing.target, swing.feedforward = place, np.zeros(3)
         aligned.target, aligned.feedforward, aligned.weight = axis, np.zeros(3), AXIS
-        self._near = (-1, False)
         self._still(arm)
 
-    def body(self, pose: pin.SE3, rate: Array) -> None:
-        """The pose that the body goes to, and its rate in the structure's axes [m/s, rad/s]."""
-        self._body.target, self._body.feedforward = pose, rate
+    def body(self, aim: Array) -> None:
+        """The pose that the body goes to, rotation by columns and position, and its rate in the structure's axes
+        (linear; angular) ``[18]`` [m, m/s, rad/s].
+        """
+        self._body.write(aim)
 
-    def swing(
-        self,
-        arm: int,
-        hand: tuple[Array, Array],
-        wrist: tuple[Wrist, Wrist],
-        at_hold: tuple[Array, Array | None] | None,
-    ) -> None:
+    def swing(self, arm: int, followed: Array, at_hold: tuple[Array, Array | None] | None) -> None:
         """What a free hand follows.
 
         Args:
-            hand: its position [m] and velocity [m/s]. wrist: joints 4 to 6 [rad] and their rates [rad/s].
+            followed: its position [m] and velocity [m/s], joints 4 to 6 [rad] and their rates [rad/s] ``[12]``.
             at_hold: z axis of the hand at its hold, and its x axis if the roll counts: they then count and not the
                 wrist. None on the way.
         """
-        near, resting = at_hold is not None, self._rest
-        swing, aligned = self._swings[arm], self._axes[arm]
-        swing.target, swing.feedforward = hand
-        if at_hold is not None:
-            aligned.target, aligned.feedforward = at_hold[0], np.zeros(3)
-        joints = self._joints(arm)
+        near = at_hold is not None
         if self._near != (arm, near):
+            self._catch_up()
+            aligned, resting, joints = self._axes[arm], self._rest, self._joints(arm)
+            self._posture[7:][joints][3:], self._turning[6:][joints][3:] = followed[6:9], followed[9:]
+            if at_hold is not None:
+                aligned.target, aligned.feedforward = at_hold[0], np.zeros(3)
             aligned.weight = AXIS if near else FREE_AXIS
             self._mask[joints][:3] = 0.0
             self._mask[joints][3:] = 1.0 if near else FREE_WRIST
             self._holds.turn(arm, at_hold[1] if at_hold is not None else None)
-            resting.mask = self._mask
+            resting.target, resting.feedforward, resting.mask = self._posture, self._turning, self._mask
             self._near = arm, near
-        self._posture[7:][joints][3:], self._turning[6:][joints][3:] = wrist
-        resting.target, resting.feedforward = self._posture, self._turning
+        self._hands[arm].write(followed)
 
     def joints(self, arm: int, posture: Array, rates: Array) -> None:
         """A free hand follows the joints of its arm: ``[6]`` [rad] and their rates [rad/s]."""
         self._swings[arm].enabled = self._axes[arm].enabled = False
         mine = self._joints(arm)
+        self._catch_up()
         self._mask[mine] = FREE_WRIST
         self._posture[7:][mine], self._turning[6:][mine] = posture, rates
         self._rest.mask, self._rest.target, self._rest.feedforward = self._mask, self._posture, self._turning
-        self._near = (-1, False)
 
     def settle(self, arm: int, place: Array, axis: Array, x: Array | None) -> None:
         """A hand that follows joints comes to rest at a place, with a z axis, and an x axis if its roll counts."""
@@ -146,9 +141,26 @@ class WalkStack:
 
     def _still(self, arm: int) -> None:
         """Wrists of arms that do not swing have no rates of their own."""
+        self._catch_up()
         self._turning[6:][self._joints(arm)] = 0.0
         self._rest.feedforward = self._turning
+
+    def _catch_up(self) -> None:
+        """Postures and rates become what was written last: of a swinging hand only joints 4 to 6 are, tick by tick."""
+        arm = self._near[0]
+        followed = None if arm < 0 else self._hands[arm].written
+        if followed is not None:
+            joints = self._joints(arm)
+            self._posture[7:][joints][3:], self._turning[6:][joints][3:] = followed[6:9], followed[9:]
+        self._near = (-1, False)
 
     def _joints(self, arm: int) -> slice:
         of = self.walker.arms[arm].v
         return slice(of.start - 6, of.stop - 6)
+
+    def _hand(self, arm: Arm) -> InputGroup:
+        """What a swinging hand follows: its place and velocity, joints 4 to 6 and their rates."""
+        name = f"{arm.name} swing"
+        wrist, turning = slice(arm.q.start + 3, arm.q.stop), slice(arm.v.start + 3, arm.v.stop)
+        posture = ("posture", "target", wrist), ("posture", "feedforward", turning)
+        return InputGroup(self.controller, [(name, "target", None), (name, "feedforward", None), *posture])

@@ -72,14 +72,15 @@ class State:
     opening: tuple[int, int] | None = None
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False, slots=True)
 class Tick:
     """What happened in one tick; arrays are the tick's own.
 
     Attributes:
         time: [s]. path_time: u [s]. q, v: configuration after it, and what the controller returned.
         hands: state of each hand. holds: row of the hold that each hand is at or goes to, -1 for none.
-        command: pose that the body was to have. body_error: its distance from it [m].
+        target: pose that the body was to have: position [m] and quaternion x, y, z, w.
+        body_error: its distance from it [m].
         slip: of the worst held hand [m].
         status: of the controller. cost: of the controller's tick [s].
         fixed: the body is declared fixed: fewer hands hold than it needs, and have since the beginning.
@@ -91,12 +92,17 @@ class Tick:
     v: Array
     hands: tuple[Hand, ...]
     holds: tuple[int, ...]
-    command: pin.SE3
+    target: Array
     body_error: float
     slip: float
     status: str
     cost: float
     fixed: bool = False
+
+    @property
+    def command(self) -> pin.SE3:
+        """:attr:`target` as a pose."""
+        return pin.XYZQUATToSE3(self.target)
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,7 @@ import os
 import pathlib
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
+from itertools import groupby
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,10 @@ from wbc.walking.walk import Event, Tick, Walk
 
 #: Name of the file in a run's folder
 TICKS = "ticks.npz"
+#: A row of the log: t, q, v, command
+_Kept = tuple[float, Array, Array, Array]
+#: States and holds of the hands, and whether the body is fixed
+_Hands = tuple[list[int], list[int], bool]
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,8 +99,13 @@ class WalkRecorder:
             arm, hold = walk.opens
             self._states[arm], self._holds[arm] = OPENING, hold
         self._seen = len(walk.events)
-        self._command = pin.SE3ToXYZQUAT(walk.plan.path.at(walk.path_time)[0])
+        self._command = np.array(pin.SE3ToXYZQUAT(walk.plan.path.at(walk.path_time)[0]))
+        # Ticks as they come; they are put together by :meth:`log`, which takes a tenth of the time
+        self._kept: list[_Kept] = []
+        # Hands that change, with the row from which on
+        self._hands: list[tuple[int, _Hands]] = [(0, (self._states, self._holds, walk.fixed))]
         self._rows: list[tuple[float, float, float, float, bool]] = []
+        self._last: tuple[Any, Any, Any] = ((), (), None)
 
     def __len__(self) -> int:
         return len(self._rows)
@@ -106,20 +116,19 @@ class WalkRecorder:
         Args:
             command: the twist that was commanded ``[6]``; None: the pose that the tick has.
         """
-        for event in self._walk.events[self._seen :]:
-            self._happened(event)
-        self._seen = len(self._walk.events)
-        self._command = pin.SE3ToXYZQUAT(tick.command) if command is None else command
-        v = tick.v
-        self._append(v[6:], v[:6], tick.fixed)
-        self._rows.append((self._walk.travelled, tick.body_error, tick.slip, tick.cost, tick.status == "solved"))
+        walk = self._walk
+        if len(walk.events) > self._seen:
+            for event in walk.events[self._seen :]:
+                self._happened(event)
+            self._seen = len(walk.events)
+        self._command = tick.target if command is None else command
+        self._keep(tick.v, tick.fixed)
+        self._rows.append((walk.travelled, tick.body_error, tick.slip, tick.cost, tick.status == "solved"))
         self._time, self._q = tick.time, tick.q
-        self._states = [HAND_STATES.index(state) for state in tick.hands]
-        # Holds that vanish renumber the walk's structure; the log keeps the rows of the first one
-        ids = self._walk.structure.ids
-        now = [self._structure.index(ids[hold]) if hold >= 0 else -1 for hold in tick.holds]
-        leaving = [state == OPENING for state in self._states]
-        self._holds = [old if leaves else new for old, new, leaves in zip(self._holds, now, leaving, strict=True)]
+        found = tick.hands, tick.holds, walk.structure
+        if found != self._last:
+            self._take(tick)
+            self._last = found
 
     def log(self) -> tuple[WalkLog, TickColumns]:
         """What was recorded so far; afterwards nothing more can be.
@@ -127,12 +136,25 @@ class WalkRecorder:
         Raises:
             ShapeError: no tick was recorded.
         """
-        self._append(np.zeros(len(self._q) - 7), np.zeros(6), self._walk.fixed)
+        rest = np.zeros(self._walk.walker.robot.nv)
+        self._keep(rest, self._walk.fixed)
+        rows, hands = zip(*self._hands, strict=True)
+        lasting = np.diff([*rows, len(self._kept)])
+        states, holds, fixed = (np.repeat(np.array(column), lasting, axis=0) for column in zip(*hands, strict=True))
+        begin = 0
+        # Commands may be twists first and poses after an abort
+        for _, same in groupby(self._kept, key=lambda kept: len(kept[3])):
+            times, *numbers = zip(*same, strict=True)
+            q, v, command = (np.concatenate(column).reshape(len(times), -1) for column in numbers)
+            part = slice(begin, begin := begin + len(times))
+            now = states[part], holds[part], command, fixed[part]
+            self._recorder.extend(np.array(times), q[:, :7], q[:, 7:], v[:, 6:], v[:, :6], *now)
         columns = [np.array(column) for column in zip(*self._rows, strict=True)] or [np.zeros(0)] * 5
         return self._recorder.log(), TickColumns(*columns)
 
     def _happened(self, event: Event) -> None:
         """A hand that is lifted opens from its hold; one whose hold vanishes is open at once."""
+        self._states, self._holds, self._last = [*self._states], [*self._holds], ((), (), None)
         if event.what == "lift":
             arm = self._arms[event.arm]
             self._states[arm], self._holds[arm] = OPENING, self._structure.index(event.hold)
@@ -142,6 +164,18 @@ class WalkRecorder:
             for arm in [arm for arm, hold in enumerate(self._holds) if hold == row]:
                 self._states[arm], self._holds[arm] = OPEN, -1
 
-    def _append(self, rates: Array, twist: Array, fixed: bool) -> None:
-        q = self._q
-        self._recorder.append(self._time, q[:7], q[7:], rates, twist, self._states, self._holds, self._command, fixed)
+    def _keep(self, v: Array, fixed: bool) -> None:
+        """The row of the log that is now, with its rates."""
+        states, holds, was = self._hands[-1][1]
+        if states is not self._states or holds is not self._holds or was != fixed:
+            self._hands.append((len(self._kept), (self._states, self._holds, fixed)))
+        self._kept.append((self._time, self._q, v, self._command))
+
+    def _take(self, tick: Tick) -> None:
+        """What hands do and where, after a tick."""
+        self._states = [HAND_STATES.index(state) for state in tick.hands]
+        # Holds that vanish renumber the walk's structure; the log keeps the rows of the first one
+        ids = self._walk.structure.ids
+        now = [self._structure.index(ids[hold]) if hold >= 0 else -1 for hold in tick.holds]
+        leaving = [state == OPENING for state in self._states]
+        self._holds = [old if leaves else new for old, new, leaves in zip(self._holds, now, leaving, strict=True)]

@@ -141,7 +141,7 @@ class TwoEndedWalk(Walk):
         """A hand that is on its way goes on to its hold, as the arm moves as one."""
         return self.halted or (self._changing and self.swinging is None)
 
-    def _bend(self, swinging: Swinging, blend: float) -> Wrist:
+    def _bend(self, arm: int) -> Wrist:
         """Nothing: all joints of the arm follow the law."""
         return 0.0, 0.0, 0.0
 
