@@ -110,6 +110,8 @@ def test_an_arm_does_what_it_is_told(tmp_path: Path) -> None:
     assert [told[f"task_{k}"]["reason"] for k in (1, 2)] == ["time", "reached"], (out, err)  # type: ignore[index]
     assert code == 0, err
     assert told["body_moved"] < 0.002  # type: ignore[operator]
+    assert told["stopping"]["body"] == 0.002  # type: ignore[index]
+    assert 0.02 < told["stopping"]["hand"] < 0.1  # type: ignore[index]
     log = WalkLog.load(tmp_path)
     assert log.hold_id[log.hand_hold[-1, 1]] == "15,12"
 

@@ -9,7 +9,7 @@ import pytest
 from wbc.errors import UnknownNameError
 from wbc.robots import Walker
 from wbc.walking import Structure
-from wbc.walking.arm_mode import ArmMode
+from wbc.walking.arm_mode import ArmMode, ArmStopped
 from wbc.walking.body_path import grid_path
 from wbc.walking.checker import Rules, check_walk
 from wbc.walking.hand_motion import ArmRefused
@@ -54,6 +54,22 @@ def test_a_hand_goes_through_poses_to_a_hold_and_the_body_stands(walk: Walk, mac
     log, _ = recorder.log()
     report = check_walk(log, machine.urdf(tmp_path / "robot.urdf"), structure, Rules(sub_samples=1))
     assert report.ok, str(report)
+
+
+def test_a_motion_that_is_stopped_goes_no_farther_than_was_said(walk: Walk) -> None:
+    asked = iter([*[False] * 40, True])
+    mode, body = ArmMode(walk, "arm2", stop=lambda: next(asked)), walk.q[:3].copy()
+    first = mode.pose
+    up = pin.SE3(first.rotation, first.translation - 0.15 * first.rotation[:, 2])
+    with pytest.raises(ArmStopped, match="the motion was stopped"):
+        mode.through([up], speed=0.4)
+    assert mode.stopped is not None
+    far, said = mode.stopped
+    assert 0.01 < far[1] <= said[1] <= mode.farthest[1] < 0.2
+    assert far[0] <= said[0] <= mode.farthest[0] == 0.002
+    assert np.abs(walk.q[:3] - body).max() < 0.002
+    assert np.abs(walk.v).max() < 0.01
+    assert 1 not in walk.held
 
 
 def test_a_walk_goes_on_from_a_hold_from_which_few_swings_lead_on(

@@ -12,10 +12,10 @@ from wbc.robots import Walker
 from wbc.walking import Structure
 from wbc.walking.body_path import grid_path
 from wbc.walking.checker import Rules, check_walk
-from wbc.walking.moving_body import longest_stop
 from wbc.walking.plan import Plan
 from wbc.walking.planner import plan_walk
 from wbc.walking.run.recording import WalkRecorder
+from wbc.walking.stopping import longest_stop
 from wbc.walking.veto import HoldRefusedError, Veto
 from wbc.walking.walk import Walk
 from wbc.walking.walk_stack import WalkStack
@@ -57,11 +57,14 @@ def test_nothing_goes_farther_after_an_abort_than_was_said(
     assert report.ok, str(report)
 
 
-def test_a_body_waits_for_the_answer(machine: Walker, structure: Structure, stack: WalkStack, plan: Plan) -> None:
+def test_a_body_waits_for_the_answer(
+    machine: Walker, structure: Structure, stack: WalkStack, plan: Plan, tmp_path: pathlib.Path
+) -> None:
     walk = Walk(machine, structure, plan, stack=stack)
+    recorder = WalkRecorder(walk)
     veto, first = Veto(walk), plan.regrasps[0]
     for _ in range(round((first.lift + 1.0) / walk.dt)):
-        walk.tick()
+        recorder.tick(walk.tick())
     assert veto.proposal == first
     assert walk.pace == 0.0
     assert walk.path_time == pytest.approx(first.lift, abs=0.06)
@@ -88,9 +91,11 @@ def test_a_body_waits_for_the_answer(machine: Walker, structure: Structure, stac
     assert (chosen.arm, chosen.target) == (first.arm, name)
     while not walk.done:
         veto.accept()
-        walk.tick()
+        recorder.tick(walk.tick())
         assert walk.time < 40.0
     assert walk.steps[0].target == name
     assert veto.proposal is None
     with pytest.raises(HoldRefusedError, match="no re-grasp is proposed"):
         veto.choose("13,13")
+    report = check_walk(recorder.log()[0], machine.urdf(tmp_path / "robot.urdf"), structure, Rules(sub_samples=1))
+    assert report.ok, str(report)

@@ -10,12 +10,15 @@ import pytest
 from wbc.errors import RangeError
 from wbc.robots import Walker
 from wbc.walking import Structure
-from wbc.walking.body_path import grid_path
+from wbc.walking.body_path import BodyPath, grid_path
 from wbc.walking.checker import Rules, check_walk
 from wbc.walking.first_grasps import free_state, plan_from_state
+from wbc.walking.plan import Plan
+from wbc.walking.planner import plan_walk
+from wbc.walking.run import perform
 from wbc.walking.run.folder import save_run
 from wbc.walking.run.perform import WalkRun, perform_walk
-from wbc.walking.run.recording import WalkRecorder
+from wbc.walking.run.recording import WalkRecorder, path_of
 from wbc.walking.run.request import WalkRequest
 from wbc.walking.run.resume_run import perform_resume, resumed_state
 from wbc.walking.run_log import CLOSING, OPEN, OPENING, WalkLogError
@@ -74,6 +77,28 @@ def test_a_walk_goes_on_from_any_state(
     assert len(again.ticks.cost) == len(again.log) - 1
     report = check_walk(again.log, machine.urdf(tmp_path / "robot.urdf"), again.structure, Rules(sub_samples=1))
     assert report.ok, str(report)
+
+
+def test_a_walk_that_went_round_goes_on_round(
+    machine: Walker, stack: WalkStack, tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    request = WalkRequest(start="13,10", points=("13,12",), rigid=True)
+    round_about = grid_path([(13, 10), (13.5, 11), (13, 12)], 4 * INCH)
+
+    def found(walker: Walker, structure: Structure, path: BodyPath, **more: object) -> Plan:
+        return plan_walk(walker, structure, round_about, objective="destination")
+
+    monkeypatch.setattr(perform, "plan_walk", found)
+    run = perform.perform_walk(request, machine, stack=stack)
+    save_run(run, tmp_path, check=False)
+    again = perform_resume(tmp_path, machine, at=1.0, stack=stack)
+    assert again.outcome == "arrived"
+    assert again.log is not None
+    corner = round_about.poses[:, :3, 3][np.abs(round_about.poses[:, 0, 3] - round_about.poses[0, 0, 3]).argmax()]
+    off = np.linalg.norm(again.log.pose_body_in_structure[:, :3] - corner, axis=1)
+    assert off.min() < 0.01, "it passes where the way round has its corner"
+    with pytest.raises(WalkLogError, match="no path of a body"):
+        path_of({"spacing": 0.05, "poses": [[1.0, 2.0]]})
 
 
 def test_what_cannot_be_resumed_is_named(

@@ -14,6 +14,7 @@ from wbc.validation import Array
 from wbc.walking.arm_clearance import ArmClearance
 from wbc.walking.grip_rolls import ANY, frame_on
 from wbc.walking.hand_motion import ArmRefused, Standing
+from wbc.walking.stopping import OFF, hand_stop, longest_hand_stop
 from wbc.walking.swing_clearance import SwingClearance
 from wbc.walking.walk import Walk
 from wbc.walking.walk_hands import HAND_STOP
@@ -23,8 +24,8 @@ from wbc.walking.walk_state import Hand, Tick
 SPEED, TURN_RATE = 0.1, 0.5
 #: A hand is this far above a hold before it goes on to it [m]
 ABOVE = 4.5 * 0.0254
-#: Ticks that a hand has to come to rest on a hold
-REST = 200
+#: Ticks that a hand has to come to rest on a hold, and those that are made after a stop
+REST, STILL = 200, 10
 
 
 class ArmStopped(WbcError):
@@ -38,6 +39,10 @@ class ArmMode:
         walk: between its ticks; its body stands and no hand is on its way. arm: name. on_tick: what happens every tick.
         stop: asked every tick of a motion: true ends it, within :data:`wbc.walking.walk_hands.HAND_STOP` seconds, and
             raises :class:`ArmStopped`.
+
+    Attributes:
+        farthest: how far body and hand can travel after a stop at any instant of the motions so far [m].
+        stopped: how far they travelled in a motion that was stopped, and what had been said before [m]; None: none was.
 
     Raises:
         UnknownNameError: no such arm. ArmRefused: the body moves, or the other hands do not hold.
@@ -54,6 +59,8 @@ class ArmMode:
         validation.one_of("arm", arm, names)
         self.walk, self.arm, self._on_tick = walk, names.index(arm), on_tick or (lambda tick: None)
         self._stop = stop or (lambda: False)
+        self.farthest: tuple[float, float] = (0.0, 0.0)
+        self.stopped: tuple[tuple[float, float], tuple[float, float]] | None = None
         if walk.pace > 0.0 or walk.swinging is not None or (walk.told is not None and walk.told[0] != self.arm):
             raise ArmRefused("walk", walk.path_time, "the body moves, or a hand is on its way")
         others = [k for k in walk.held if k != self.arm]
@@ -153,18 +160,44 @@ class ArmMode:
 
     def _follow(self, rows: Array) -> None:
         """Joints tick by tick; slower and slower from where a stop is asked for."""
-        walk, place, pace, stopped = self.walk, 0.0, 1.0, False
-        while place < len(rows) - 1 and pace > 1e-9:
-            stopped = stopped or self._stop()
-            pace -= walk.dt / HAND_STOP if stopped else 0.0
-            then = min(place + max(pace, 0.0), len(rows) - 1.0)
-            now, after = _between(rows, place), _between(rows, then)
-            walk.stack.joints(self.arm, now, (after - now) / walk.dt)
-            self._tick("open")
-            place = then
+        walk, place = self.walk, 0.0
+        places = self._places(rows)
+        body, hand = self.farthest
+        self.farthest = max(body, OFF), max(hand, longest_hand_stop(places, walk.dt, walk.dt))
+        while place < len(rows) - 1:
+            if self._stop():
+                self._come_to_rest(rows, places, place)
+                raise ArmStopped("stop", walk.time, "the motion was stopped")
+            place = self._go(rows, place, 1.0)
         walk.stack.joints(self.arm, _between(rows, place), np.zeros(6))
-        if stopped:
-            raise ArmStopped("stop", walk.time, "the motion was stopped")
+
+    def _go(self, rows: Array, place: float, pace: float) -> float:
+        """A tick along rows; the place where it ends."""
+        walk, then = self.walk, min(place + pace, len(rows) - 1.0)
+        now, after = _between(rows, place), _between(rows, then)
+        walk.stack.joints(self.arm, now, (after - now) / walk.dt)
+        self._tick("open")
+        return then
+
+    def _come_to_rest(self, rows: Array, places: Array, place: float) -> None:
+        """The pace falls to nothing; how far body and hand go is kept beside what is said before."""
+        walk = self.walk
+        begin, hand = walk.q[:3].copy(), walk.chain.origins[self.arm].copy()
+        gap = float(np.linalg.norm(_between(places, place) - hand))
+        said = OFF, float(hand_stop(places, walk.dt, np.array(place * walk.dt), 1.0, walk.dt, gap))
+        far = np.zeros(2)
+        for pace in (*np.arange(1.0 - walk.dt / HAND_STOP, 0.0, -walk.dt / HAND_STOP).tolist(), *[0.0] * STILL):
+            place = self._go(rows, place, pace)
+            moved = walk.q[:3] - begin, walk.chain.origins[self.arm] - hand
+            far = np.maximum(far, [float(np.linalg.norm(way)) for way in moved])
+        self.stopped = (float(far[0]), float(far[1])), said
+
+    def _places(self, rows: Array) -> Array:
+        """Of the hand at rows of joints ``[n, 3]`` [m], on the body that stands."""
+        walk = self.walk
+        hands = ArmClearance(walk.walker, walk.grips).points(self.arm, rows)[:, 5]
+        out: Array = hands @ pin.Quaternion(walk.q[3:7]).matrix().T + walk.q[:3]
+        return out
 
     def _close(self, row: int, number: int, frame: pin.SE3) -> None:
         """Come to rest on a hold at one of its rolls, and close."""

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
-from itertools import pairwise
 from math import sqrt
 
 import numpy as np
@@ -13,18 +11,16 @@ from wbc.validation import Array
 from wbc.walking.hands import Hands
 from wbc.walking.plan import Plan
 from wbc.walking.replanning import PlanSlices
+from wbc.walking.stopping import BRAKE, body_stop, hand_stop
 from wbc.walking.structure import Structure
 from wbc.walking.swings import SETTLE
-from wbc.walking.walk_hands import BEHIND, HAND_STOP
 
-#: From rest to the commanded speed, and back where hands would lose their holds [s]
-RAMP, BRAKE = 0.5, 0.25
+#: From rest to the commanded speed [s]; back, where hands would lose their holds, in BRAKE
+RAMP = 0.5
 #: A hand may land so much path time later than planned [s]
 LATE = 0.2
 #: Poses behind the body that are kept, for going back
 TRAIL = 400
-#: What a body may be off its way at the end of a stop [m], and parts of a way that is measured
-OFF, PARTS = 0.002, 9
 
 
 class MovingBody(Hands):
@@ -56,22 +52,17 @@ class MovingBody(Hands):
     def stopping(self) -> tuple[float, float]:
         """How far the body's origin and the hand in the air can travel after an abort now [m].
 
-        The ways that they are told to go while their paces fall from p to 0, which is p^2 BRAKE / 2 of path time and
-        p^2 HAND_STOP / 2 of the swing's, and a tick; what they are behind now; and what they may be off at the end: OFF
-        for a body, BEHIND for a hand, whose arm was planned for the swing at full pace and not for the stop.
+        What :mod:`wbc.walking.stopping` says of the places and paces that they have now.
         """
         path, u = self.plan.path, self.path_time
-        left = 0.5 * self.pace**2 * BRAKE + self.pace * self.dt
-        body = _length([path.at(x)[0].translation for x in np.linspace(u, u + left, PARTS)])
-        body += float(np.linalg.norm(self.q[:3] - path.at(u)[0].translation)) + OFF
+        off = float(np.linalg.norm(self.q[:3] - path.at(u)[0].translation))
+        body = float(body_stop(path.poses[:, :3, 3], path.spacing, np.array(u), self.pace, self.dt, off))
         swinging = self.swinging
         if swinging is None:
             return body, 0.0
-        pace = swinging.pace if swinging.state == "open" else 0.0
-        left = 0.5 * pace**2 * HAND_STOP + pace * self.dt
-        aims = [swinging.law.at(x).position for x in np.linspace(swinging.clock, swinging.clock + left, PARTS)]
+        law, pace = swinging.law, swinging.pace if swinging.state == "open" else 0.0
         gap = float(np.linalg.norm(swinging.aim.position - self.chain.origins[swinging.arm]))
-        return body, _length(aims) + gap + BEHIND
+        return body, float(hand_stop(law.places, law.spacing, np.array(swinging.clock), pace, self.dt, gap))
 
     def _move(self) -> float:
         """The robot moves by its joint rates for a tick, and by nothing else; the worst slip of a held hand [m]."""
@@ -163,22 +154,3 @@ class MovingBody(Hands):
         if self.swinging is not None:
             self.swinging.hold = int(rows[self.swinging.hold])
         self._go_on(replace(self.plan, grips=self.grips.renumbered(rows)))
-
-
-def longest_stop(plan: Plan, dt: float) -> tuple[float, float]:
-    """How far the body's origin and a swinging hand can travel after an abort anywhere in a plan, at most [m].
-
-    v (BRAKE / 2 + dt) with the body's largest speed, and w (HAND_STOP / 2 + dt) with the hands', what they may be
-    behind then, and what they may be off at the end. Of a hand that is brought to where a plan begins,
-    :meth:`MovingBody.stopping` knows.
-    """
-    path = plan.path
-    speed = float(np.linalg.norm(np.diff(path.poses[:, :3, 3], axis=0), axis=1).max()) / path.spacing
-    swing = max((law.top_speed for law in plan.laws), default=0.0)
-    hand = swing * (0.5 * HAND_STOP + dt) + 2.0 * BEHIND if plan.laws else 0.0
-    return speed * (0.5 * BRAKE + dt) + 2.0 * OFF, hand
-
-
-def _length(points: Sequence[Array]) -> float:
-    """Of a way through points [m]."""
-    return float(sum(np.linalg.norm(b - a) for a, b in pairwise(points)))

@@ -70,9 +70,14 @@ class SwingLaw:
         self._rows = np.concatenate([place, speed, blend(along)[:, None]], axis=1)
 
     @property
-    def top_speed(self) -> float:
-        """Of the hand [m/s]."""
-        return float(np.linalg.norm(self._rows[:, 3:6], axis=1).max())
+    def places(self) -> Array:
+        """Of the hand at the rows ``[n, 3]`` [m]."""
+        return self._rows[:, :3]
+
+    @property
+    def spacing(self) -> float:
+        """From row to row [s]."""
+        return self.duration / (len(self._rows) - 1)
 
     @staticmethod
     def of(swings: Swings, move: Move) -> SwingLaw:

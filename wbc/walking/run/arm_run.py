@@ -30,7 +30,7 @@ from wbc.walking.hold import frame_of
 from wbc.walking.number_table import read_numbers
 from wbc.walking.plan import HoldLost, NoPlanError
 from wbc.walking.run.as_walked import as_walked
-from wbc.walking.run.carrying_out import CarryingOut, Progress
+from wbc.walking.run.carrying_out import CarryingOut, Progress, farthest, travelled
 from wbc.walking.run.perform import WalkRun
 from wbc.walking.run.recording import WalkRecorder
 from wbc.walking.run.request import WalkRequest
@@ -150,6 +150,7 @@ def perform_arm(
     places = log.pose_body_in_structure[log.t <= last.time, :3]
     moved = float(np.linalg.norm(places - body, axis=1).max())
     more = (*_told(stops), Figure("body_moved", "body moved", moved, f"at most {1e3 * moved:.3f} mm"))
+    more = (*more, farthest(*mode.farthest), *([] if mode.stopped is None else [travelled(*mode.stopped)]))
     outcome = doing.outcome or ended[last.reason]
     return replace(run, outcome=outcome, compile_time=compiled, walk_time=time.perf_counter() - begin, more=more)  # type: ignore[arg-type]
 

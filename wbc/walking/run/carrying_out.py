@@ -8,9 +8,9 @@ from typing import Any, Literal
 import numpy as np
 
 from wbc.track.summary import Figure
-from wbc.walking.moving_body import longest_stop
 from wbc.walking.plan import HoldLost, NoPlanError
 from wbc.walking.run.recording import WalkRecorder
+from wbc.walking.stopping import longest_stop
 from wbc.walking.walk import Walk
 from wbc.walking.walk_state import Tick
 
@@ -75,9 +75,7 @@ class CarryingOut:
 
     def summary(self) -> tuple[Figure, ...]:
         """How far things would have gone after an abort, at most, and how far they went after one."""
-        body, hand = self._most.tolist()
-        text = f"body at most {1e3 * body:.0f} mm, hand at most {1e3 * hand:.0f} mm"
-        return (Figure("stopping", "way after an abort", {"body": body, "hand": hand}, text), *self.figures)
+        return (farthest(*self._most.tolist()), *self.figures)
 
     def _look(self) -> None:
         """Take a new plan into account."""
@@ -102,9 +100,20 @@ class CarryingOut:
                 moved = walk.chain.origins[swinging.arm] - hands[swinging.arm]
                 far[1] = max(far[1], float(np.linalg.norm(moved)))
             left -= int(walk.still)
-        value = {"body": far[0], "hand": far[1], "body_bound": bounds[0], "hand_bound": bounds[1]}
-        text = (
-            f"body {1e3 * far[0]:.1f} mm of {1e3 * bounds[0]:.1f} mm, hand {1e3 * far[1]:.1f} mm of "
-            f"{1e3 * bounds[1]:.1f} mm that were said before"
-        )
-        self.figures = (Figure("abort", "travelled after the abort", value, text),)
+        self.figures = (travelled((float(far[0]), float(far[1])), bounds),)
+
+
+def farthest(body: float, hand: float) -> Figure:
+    """How far a body and a hand go after an abort, at most [m]."""
+    text = f"body at most {1e3 * body:.0f} mm, hand at most {1e3 * hand:.0f} mm"
+    return Figure("stopping", "way after an abort", {"body": body, "hand": hand}, text)
+
+
+def travelled(far: tuple[float, float], bounds: tuple[float, float]) -> Figure:
+    """How far a body and a hand went after an abort [m], beside what had been said before."""
+    value = {"body": far[0], "hand": far[1], "body_bound": bounds[0], "hand_bound": bounds[1]}
+    text = (
+        f"body {1e3 * far[0]:.1f} mm of {1e3 * bounds[0]:.1f} mm, hand {1e3 * far[1]:.1f} mm of "
+        f"{1e3 * bounds[1]:.1f} mm that were said before"
+    )
+    return Figure("abort", "travelled after the abort", value, text)

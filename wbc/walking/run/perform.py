@@ -14,7 +14,7 @@ from wbc.walking.first_grasps import free_state, plan_from_state
 from wbc.walking.plan import NoPlanError, Plan, Regrasp
 from wbc.walking.planner import Objective, plan_walk
 from wbc.walking.run.carrying_out import CarryingOut, Outcome, Progress
-from wbc.walking.run.recording import TickColumns, WalkRecorder
+from wbc.walking.run.recording import TickColumns, WalkRecorder, way_of
 from wbc.walking.run.request import WalkRequest
 from wbc.walking.run_log import WalkLog
 from wbc.walking.structure import Structure
@@ -88,6 +88,8 @@ def perform_walk(
             state, plan = None, plan_walk(walker, structure, path, objective=asked, partial=True, detour=True)
     except NoPlanError as error:
         return WalkRun(request, walker, structure, path, None, "refused", str(error), plan_time=_since(begin))
+    # A way round that was found goes with the log, so that the walk can be resumed on it
+    way = {} if plan.path is path else {"way": way_of(plan.path)}
     planned, path = _since(begin), plan.path
     if not plan.complete:
         return WalkRun(request, walker, structure, path, plan, "refused", plan.reason, plan_time=planned)
@@ -97,7 +99,7 @@ def perform_walk(
     compiled = _since(begin)
     begin = time.perf_counter()
     walk = Walk(walker, structure, plan, stack=stack, state=state)
-    recorder = WalkRecorder(walk, request.seed, {"request": asdict(request), "start": list(plan.start)})
+    recorder = WalkRecorder(walk, request.seed, {"request": asdict(request), "start": list(plan.start), **way})
     outcome, reason, more = _walked(walk, recorder, report, stop, ask)
     run = WalkRun(request, walker, structure, path, plan, outcome, reason, None, None, planned, compiled, more=more)
     if not len(recorder):

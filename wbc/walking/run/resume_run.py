@@ -23,7 +23,7 @@ from wbc.walking.run.as_walked import as_walked
 from wbc.walking.run.carrying_out import CarryingOut, Progress
 from wbc.walking.run.parts import configuration
 from wbc.walking.run.perform import WalkRun
-from wbc.walking.run.recording import TICKS, TickColumns, WalkRecorder
+from wbc.walking.run.recording import TICKS, TickColumns, WalkRecorder, path_of
 from wbc.walking.run.request import WalkRequest
 from wbc.walking.run_log import CLOSED, OPENING, WalkLog, WalkLogError
 from wbc.walking.structure import Structure
@@ -100,7 +100,8 @@ def perform_resume(
     """Reads a run's folder, begins at rest in the state that its log has at a time, plans and walks to the end.
 
     Args:
-        at: [s]; None: the last state. points: where to go, as of ``WalkRequest``; (): where the run was to go.
+        at: [s]; None: the last state. points: where to go, as of ``WalkRequest``; (): where the run was to go, by the
+            way that it had found.
         Others: as of :func:`wbc.walking.run.perform_walk`.
 
     Raises:
@@ -119,7 +120,8 @@ def perform_resume(
     here = old.present(np.arange(len(old.hold_id)), float(old.t[row]))
     structure = whole.without([name for name, there in zip(old.hold_id, here, strict=True) if not there])
     state = resumed_state(old, row, walker, structure)
-    path = _rest(pin.XYZQUATToSE3(old.pose_body_in_structure[row]), request.path(structure, walker.data), request)
+    whole_way = request.path(structure, walker.data) if points or "way" not in old.meta else path_of(old.meta["way"])
+    path = _rest(pin.XYZQUATToSE3(old.pose_body_in_structure[row]), whole_way, request)
     report("planning", None)
     begin = time.perf_counter()
     try:

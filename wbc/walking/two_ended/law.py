@@ -18,6 +18,16 @@ class TurnLaw(SwingLaw):
         self.possible, self.duration = True, (len(hands) - 1) * spacing
         self._spacing, self._hands, self._joints = spacing, hands, joints
 
+    @property
+    def places(self) -> Array:
+        """Of the hand at the rows ``[n, 3]`` [m]."""
+        return self._hands
+
+    @property
+    def spacing(self) -> float:
+        """From row to row [s]."""
+        return self._spacing
+
     def at(self, time: float) -> Aim:
         """The aim at a time since lifting, clipped to the swing."""
         row, part = self._place(time)
