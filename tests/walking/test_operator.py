@@ -15,7 +15,6 @@ from wbc.walking.checker import Rules, check_walk
 from wbc.walking.plan import Plan
 from wbc.walking.planner import plan_walk
 from wbc.walking.run.recording import WalkRecorder
-from wbc.walking.stopping import longest_stop
 from wbc.walking.veto import HoldRefusedError, Veto
 from wbc.walking.walk import Walk
 from wbc.walking.walk_stack import WalkStack
@@ -33,7 +32,7 @@ def test_nothing_goes_farther_after_an_abort_than_was_said(
 ) -> None:
     walk, rng = Walk(machine, structure, plan, stack=stack), np.random.default_rng(5)
     recorder = WalkRecorder(walk)
-    most, swung = longest_stop(plan, walk.dt), 0
+    most, swung = walk.stops.longest(plan), 0
     for _ in range(12):
         for _ in range(int(rng.integers(20, 90))):
             if not walk.done:

@@ -18,7 +18,7 @@ from wbc.cli.console import err, out, progress_bar
 from wbc.cli.session import INTERRUPTED, Stopper
 from wbc.cli.walk_modes import Perform, performance
 from wbc.errors import ShapeError
-from wbc.robots import Walker, WalkerData
+from wbc.robots import TwoEndedData, Walker, WalkerData
 from wbc.track.summary import Figure
 from wbc.walking.body_path import standing_path
 from wbc.walking.plan import Plan, differences, read_rows
@@ -26,7 +26,7 @@ from wbc.walking.run.figures import figures_of, save_figures
 from wbc.walking.run.folder import make_folder, save_pictures, save_run
 from wbc.walking.run.perform import WalkRun
 from wbc.walking.run.published_run import perform_published, published_figures, save_published
-from wbc.walking.run.request import SPEED, WalkRequest
+from wbc.walking.run.request import GRAPPLES, SPEED, WalkRequest
 
 #: Exit codes: the walk is not possible or did not arrive, and what a check of it violates
 REFUSED, VIOLATED = 3, 4
@@ -35,7 +35,9 @@ WELL = ("arrived", "time", "key")
 
 
 def walk(
-    structure: options.StructureName = "cylinder",
+    structure: options.StructureName = "",
+    robot: options.RobotName = "three-armed",
+    gait: options.Gait = "any",
     mode: options.Mode = "velocity",
     speed: options.Speed = SPEED,
     turn_rate: options.TurnRate = 0.05,
@@ -61,11 +63,13 @@ def walk(
     strict: options.Strict = False,
     pictures: options.Pictures = True,
 ) -> None:
-    """Walk on a structure of holds with three arms, and leave log, plan, check, plots, pictures and a replay page.
+    """Walk on a structure of holds with three arms, or end over end, and leave log, plan, check, pictures and a page.
 
     Ends with 3 if the walk is not possible or does not arrive. Ctrl-C ends it early; what was done until then is
     written all the same.
     """
+    two_ended = robot == "two-ended"
+    structure = structure or (GRAPPLES if two_ended else "cylinder")
     request = WalkRequest(
         structure,
         mode,
@@ -83,8 +87,10 @@ def walk(
         arm,
         tuple(do or ()),
         free_start,
+        robot,
+        gait,
     )
-    machine = robots.walker(data=changed_data(change or []))
+    machine = robots.walker(data=changed_data(change or [], two_ended), two_ended=two_ended)
     perform = performance(request, machine, resume, ask)  # bad input shows before a folder is made
     stamp = datetime.datetime.now().strftime("%Y%m%d-%H%M%S")
     folder = make_folder(output or Path("runs") / f"walk-{Path(structure).stem}-{stamp}", force)
@@ -108,8 +114,8 @@ def plans(
     out().print(f"the same {len(first.regrasps)} re-grasps")
 
 
-def changed_data(changes: list[str]) -> WalkerData:
-    """The walker's data with fields changed, from NAME=VALUE.
+def changed_data(changes: list[str], two_ended: bool = False) -> WalkerData | TwoEndedData:
+    """The machine's data with fields changed, from NAME=VALUE.
 
     Raises:
         ShapeError: no such text. UnknownNameError: no such field. What the data raise.
@@ -124,7 +130,7 @@ def changed_data(changes: list[str]) -> WalkerData:
         if not sign:
             raise ShapeError("set", text, "expected NAME=NUMBER or NAME=[NUMBER, ...]")
         values[name] = tuple(read) if isinstance(read, list) else read
-    return WalkerData.read(**values)
+    return TwoEndedData.read(**values) if two_ended else WalkerData.read(**values)
 
 
 def _free(

@@ -20,6 +20,7 @@ from wbc.walking.run.drive_run import perform_drive
 from wbc.walking.run.perform import WalkRun, perform_walk
 from wbc.walking.run.request import WalkRequest
 from wbc.walking.run.resume_run import perform_resume
+from wbc.walking.run.two_ended_run import perform_two_ended, two_ended_goal
 
 #: (back end, progress, whether to stop) -> what was done
 Perform = Callable[[str, Progress, Callable[[], bool]], WalkRun]
@@ -34,9 +35,12 @@ def performance(request: WalkRequest, machine: Walker, resume: str, ask: bool) -
     Raises:
         what the modes raise for bad input.
     """
-    assert isinstance(machine.data, WalkerData)
-    if ask and (request.commands or request.tasks or resume):
+    two_ended = request.robot == "two-ended"
+    if ask and (request.commands or request.tasks or resume or two_ended):
         raise RangeError("ask", ask, "only walks along a path ask")
+    if two_ended:
+        return _two_ended(request, machine, resume)
+    assert isinstance(machine.data, WalkerData)
     if resume:
         return _resumed(request, machine, resume)
     structure = request.build()
@@ -62,6 +66,13 @@ def performance(request: WalkRequest, machine: Walker, resume: str, ask: bool) -
     return lambda backend, told, stop: perform_walk(
         request, machine, backend=backend, progress=told, stop=stop, ask=answer
     )
+
+
+def _two_ended(request: WalkRequest, machine: Walker, resume: str) -> Perform:
+    if resume:
+        raise RangeError("resume", resume, "runs of the two-ended arm are not resumed")
+    two_ended_goal(request, request.build())
+    return lambda backend, told, stop: perform_two_ended(request, machine, backend=backend, progress=told, stop=stop)
 
 
 def _resumed(request: WalkRequest, machine: Walker, resume: str) -> Perform:

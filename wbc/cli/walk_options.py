@@ -11,7 +11,18 @@ from wbc.walking.structures import BUILT_IN
 
 _SCENE, _HOW, _OUTPUT = "What it does", "How it is done", "What it writes"
 
-StructureName = Annotated[str, typer.Option(help=f"{', '.join(BUILT_IN)}, or FILE.csv.", rich_help_panel=_SCENE)]
+RobotName = Annotated[
+    str, typer.Option("--robot", help="three-armed, or two-ended: end over end, --gait.", rich_help_panel=_SCENE)
+]
+Gait = Annotated[str, typer.Option(help="Of the two-ended arm: inchworm, turnaround or any.", rich_help_panel=_SCENE)]
+StructureName = Annotated[
+    str,
+    typer.Option(
+        help=f"{', '.join(BUILT_IN)}, grapples, or FILE.csv. Default: cylinder; of the two-ended arm grapples.",
+        show_default=False,
+        rich_help_panel=_SCENE,
+    ),
+]
 Mode = Annotated[
     str,
     typer.Option(
@@ -27,11 +38,18 @@ From = Annotated[
     str,
     typer.Option(
         "--from",
-        help="Place that the body begins over: T,A or T,A,DEGREES on the cylinder, else a hold's id.",
+        help="Place that the body begins over: T,A or T,A,DEGREES on the cylinder, else a hold's id; "
+        "of the two-ended arm its two holds, 'ID1 ID2'.",
         rich_help_panel=_SCENE,
     ),
 ]
-To = Annotated[list[str] | None, typer.Option(help="Place that it goes to; may be repeated.", rich_help_panel=_SCENE)]
+To = Annotated[
+    list[str] | None,
+    typer.Option(
+        help="Place that it goes to; may be repeated. Of the two-ended arm one hold, or x,y,z of its elbow.",
+        rich_help_panel=_SCENE,
+    ),
+]
 RemoveRows = Annotated[str, typer.Option(help="Take away holds T,A by A, such as 12-14.", rich_help_panel=_SCENE)]
 RemoveColumns = Annotated[str, typer.Option(help="Take away holds T,A by T.", rich_help_panel=_SCENE)]
 Remove = Annotated[float, typer.Option(help="Take away this part of the holds at random.", rich_help_panel=_SCENE)]

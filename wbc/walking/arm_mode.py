@@ -14,7 +14,7 @@ from wbc.validation import Array
 from wbc.walking.arm_clearance import ArmClearance
 from wbc.walking.grip_rolls import ANY, frame_on
 from wbc.walking.hand_motion import ArmRefused, Standing
-from wbc.walking.stopping import OFF, hand_stop, longest_hand_stop
+from wbc.walking.stopping import OFF
 from wbc.walking.swing_clearance import SwingClearance
 from wbc.walking.walk import Walk
 from wbc.walking.walk_hands import HAND_STOP
@@ -163,7 +163,7 @@ class ArmMode:
         walk, place = self.walk, 0.0
         places = self._places(rows)
         body, hand = self.farthest
-        self.farthest = max(body, OFF), max(hand, longest_hand_stop(places, walk.dt, walk.dt))
+        self.farthest = max(body, OFF), max(hand, walk.stops.longest_of_hand(places, walk.dt))
         while place < len(rows) - 1:
             if self._stop():
                 self._come_to_rest(rows, places, place)
@@ -184,7 +184,7 @@ class ArmMode:
         walk = self.walk
         begin, hand = walk.q[:3].copy(), walk.chain.origins[self.arm].copy()
         gap = float(np.linalg.norm(_between(places, place) - hand))
-        said = OFF, float(hand_stop(places, walk.dt, np.array(place * walk.dt), 1.0, walk.dt, gap))
+        said = OFF, float(walk.stops.of_hand(places, walk.dt, np.array(place * walk.dt), 1.0, gap))
         far = np.zeros(2)
         for pace in (*np.arange(1.0 - walk.dt / HAND_STOP, 0.0, -walk.dt / HAND_STOP).tolist(), *[0.0] * STILL):
             place = self._go(rows, place, pace)

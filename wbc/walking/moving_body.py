@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cached_property
 from math import sqrt
 
 import numpy as np
@@ -11,11 +12,11 @@ from wbc.validation import Array
 from wbc.walking.hands import Hands
 from wbc.walking.plan import Plan
 from wbc.walking.replanning import PlanSlices
-from wbc.walking.stopping import BRAKE, body_stop, hand_stop
+from wbc.walking.stopping import Stops
 from wbc.walking.structure import Structure
 from wbc.walking.swings import SETTLE
 
-#: From rest to the commanded speed [s]; back, where hands would lose their holds, in BRAKE
+#: From rest to the commanded speed [s]; back, where hands would lose their holds, as of :class:`Stops`
 RAMP = 0.5
 #: A hand may land so much path time later than planned [s]
 LATE = 0.2
@@ -27,6 +28,11 @@ class MovingBody(Hands):
     """The body's command goes on along the path, as fast as asked and as slow as the hands need."""
 
     _planning: PlanSlices | None = None
+
+    @cached_property
+    def stops(self) -> Stops:
+        """How fast body and hand come to rest."""
+        return Stops(self.dt)
 
     @property
     def travelled(self) -> float:
@@ -56,13 +62,13 @@ class MovingBody(Hands):
         """
         path, u = self.plan.path, self.path_time
         off = float(np.linalg.norm(self.q[:3] - path.at(u)[0].translation))
-        body = float(body_stop(path.poses[:, :3, 3], path.spacing, np.array(u), self.pace, self.dt, off))
+        body = float(self.stops.of_body(path.poses[:, :3, 3], path.spacing, np.array(u), self.pace, off))
         swinging = self.swinging
         if swinging is None:
             return body, 0.0
         law, pace = swinging.law, swinging.pace if swinging.state == "open" else 0.0
         gap = float(np.linalg.norm(swinging.aim.position - self.chain.origins[swinging.arm]))
-        return body, float(hand_stop(law.places, law.spacing, np.array(swinging.clock), pace, self.dt, gap))
+        return body, float(self.stops.of_hand(law.places, law.spacing, np.array(swinging.clock), pace, gap))
 
     def _move(self) -> float:
         """The robot moves by its joint rates for a tick, and by nothing else; the worst slip of a held hand [m]."""
@@ -103,7 +109,7 @@ class MovingBody(Hands):
         Returns:
             Where the body is to be as the tick ends: position [m] and quaternion x, y, z, w.
         """
-        plan, path, grips = self.plan, self.plan.path, self._grip
+        plan, path, grips, brake = self.plan, self.plan.path, self._grip, self.stops.brake
         leaving, lasts = self._leaving(), self.grips.ends_at(path.spacing)
         end = path.duration if plan.complete else plan.reached
         end = end if self.leash is None else min(end, self.leash[0])
@@ -112,7 +118,7 @@ class MovingBody(Hands):
         soonest = min([end, *[lasts[grips[arm]] for arm in self.held if arm != leaving]])
         room, left = max(soonest - self.path_time, 0.0), max(end - self.path_time, 0.0)
         # The command stops within the room: braking from pace p in a time T takes p^2 T / 2 of path time
-        wanted = min(1.0, sqrt(2.0 * room / BRAKE * 0.9), sqrt(2.0 * left / RAMP * 0.9))
+        wanted = min(1.0, sqrt(2.0 * room / brake * 0.9), sqrt(2.0 * left / RAMP * 0.9))
         if self.swinging is not None:
             needed = self.swinging.law.duration - self.swinging.clock + self.data.latch_time + SETTLE
             if self.swinging.counted and not self._changing:
@@ -123,7 +129,7 @@ class MovingBody(Hands):
         if self._stands():
             wanted = 0.0
         self.wanted = wanted
-        self.pace = max(self.pace + min(max(wanted - self.pace, -self.dt / BRAKE), self.dt / RAMP), 0.0)
+        self.pace = max(self.pace + min(max(wanted - self.pace, -self.dt / brake), self.dt / RAMP), 0.0)
         begin = self.path_time
         self.path_time = min(begin + self.pace * self.dt, path.duration)
         self.stack.body(self.command.go(path, begin, self.path_time))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from wbc.validation import Array
@@ -14,38 +16,47 @@ BRAKE = 0.25
 OFF = 0.002
 
 
-def body_stop(places: Array, spacing: float, at: Array, pace: float, dt: float, behind: float) -> Array:
-    """Of a body's origin [m]: its way while the pace p falls to 0, which is p^2 BRAKE / 2 of path time, and a tick;
-    what it is behind now; and :data:`OFF`.
+@dataclass(frozen=True)
+class Stops:
+    """Of a machine whose body comes to rest from full pace in T, and whose hand in T': 0 <= pace <= 1, in proportion.
 
-    Args:
-        places: of the body ``[n, 3]`` [m], ``spacing`` [s] of path time apart. at: path times of the abort [s].
-        behind: [m].
+    Attributes:
+        dt: control period [s]. brake, hand: T and T' [s].
     """
-    return _way(places, spacing, at, 0.5 * pace**2 * BRAKE + pace * dt) + behind + OFF
 
+    dt: float
+    brake: float = BRAKE
+    hand: float = HAND_STOP
 
-def hand_stop(places: Array, spacing: float, at: Array, pace: float, dt: float, behind: float) -> Array:
-    """Of a hand [m]: as :func:`body_stop` with HAND_STOP for BRAKE, and at the end :data:`BEHIND`, as the arm was
-    planned for the way at full pace and not for the stop.
-    """
-    return _way(places, spacing, at, 0.5 * pace**2 * HAND_STOP + pace * dt) + behind + BEHIND
+    def of_body(self, places: Array, spacing: float, at: Array, pace: float, behind: float) -> Array:
+        """How far a body's origin travels [m]: its way while the pace p falls to 0, which is p^2 T / 2 of path time,
+        and a tick; what it is behind now; and :data:`OFF`.
 
+        Args:
+            places: of the body ``[n, 3]`` [m], ``spacing`` [s] of path time apart. at: path times of the abort [s].
+            behind: [m].
+        """
+        return _way(places, spacing, at, 0.5 * pace**2 * self.brake + pace * self.dt) + behind + OFF
 
-def longest_stop(plan: Plan, dt: float) -> tuple[float, float]:
-    """The most that :func:`body_stop` and :func:`hand_stop` say anywhere in a plan [m], at full pace.
+    def of_hand(self, places: Array, spacing: float, at: Array, pace: float, behind: float) -> Array:
+        """How far a hand travels [m]: as :meth:`of_body` with T' for T, and at the end :data:`BEHIND`, as the arm was
+        planned for the way at full pace and not for the stop.
+        """
+        return _way(places, spacing, at, 0.5 * pace**2 * self.hand + pace * self.dt) + behind + BEHIND
 
-    The body may be :data:`OFF` behind, a hand :data:`BEHIND`. Of a hand that is brought to where a plan begins,
-    ``MovingBody.stopping`` knows.
-    """
-    path = plan.path
-    body = body_stop(path.poses[:, :3, 3], path.spacing, _times(path.poses, path.spacing), 1.0, dt, OFF)
-    return float(body.max()), max((longest_hand_stop(law.places, law.spacing, dt) for law in plan.laws), default=0.0)
+    def longest(self, plan: Plan) -> tuple[float, float]:
+        """The most that body and hand travel after an abort anywhere in a plan [m], at full pace.
 
+        The body may be :data:`OFF` behind, a hand :data:`BEHIND`. Of a hand that is brought to where a plan begins,
+        ``MovingBody.stopping`` knows.
+        """
+        path = plan.path
+        body = self.of_body(path.poses[:, :3, 3], path.spacing, _times(path.poses, path.spacing), 1.0, OFF)
+        return float(body.max()), max((self.longest_of_hand(law.places, law.spacing) for law in plan.laws), default=0.0)
 
-def longest_hand_stop(places: Array, spacing: float, dt: float) -> float:
-    """The most that :func:`hand_stop` says anywhere on a hand's way [m], at full pace and :data:`BEHIND` behind."""
-    return float(hand_stop(places, spacing, _times(places, spacing), 1.0, dt, BEHIND).max())
+    def longest_of_hand(self, places: Array, spacing: float) -> float:
+        """The most that :meth:`of_hand` says anywhere on a hand's way [m], at full pace and :data:`BEHIND` behind."""
+        return float(self.of_hand(places, spacing, _times(places, spacing), 1.0, BEHIND).max())
 
 
 def _times(places: Array, spacing: float) -> Array:

@@ -44,7 +44,7 @@ def save_animation(
         size: width and height [pixels]; default: :data:`SIZE`. progress: is told what part is done.
     """
     turn = surroundings.upright(log).rotation
-    rows = surroundings.near_rows(run.structure, log, SHOWN)
+    rows = surroundings.near_rows(run.structure, log, SHOWN * surroundings.scale(run.walker))
     still = [
         render.Mesh(surroundings.surface_triangles(run.structure, rows) @ turn.T, surroundings.SURFACE),
         render.Mesh(surroundings.stud_triangles(run.structure, rows) @ turn.T, surroundings.HOLD),

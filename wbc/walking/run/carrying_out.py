@@ -10,7 +10,6 @@ import numpy as np
 from wbc.track.summary import Figure
 from wbc.walking.plan import HoldLost, NoPlanError
 from wbc.walking.run.recording import WalkRecorder
-from wbc.walking.stopping import longest_stop
 from wbc.walking.walk import Walk
 from wbc.walking.walk_state import Tick
 
@@ -80,7 +79,7 @@ class CarryingOut:
     def _look(self) -> None:
         """Take a new plan into account."""
         self._seen = self.walk.plan
-        self._most = np.maximum(self._most, longest_stop(self._seen, self.walk.dt))
+        self._most = np.maximum(self._most, self.walk.stops.longest(self._seen))
 
     def _abort(self) -> None:
         """Bring everything to rest, and keep how far it went beside what was said before."""

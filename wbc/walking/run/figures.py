@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from wbc.robots import WalkerData
 from wbc.track.summary import Figure, save_summary
 from wbc.validation import Array
 from wbc.walking.checker import Report
@@ -129,11 +130,11 @@ def _machine(run: WalkRun, log: WalkLog) -> list[Figure]:
     limits = run.walker.robot.limits
     part = np.abs(log.v) / limits.velocity[6:]
     k = int(part.max(axis=0).argmax())
-    least = float(np.nanmin(np.abs(wrist_angles(run, log))))
-    return [
-        Figure("rate", "largest joint rate", float(part.max()), f"{part.max():.6f} of its limit, {log.joints[k]}"),
-        Figure("theta5", "smallest |theta5| held", least, f"{np.degrees(least):.2f} deg"),
-    ]
+    out = [Figure("rate", "largest joint rate", float(part.max()), f"{part.max():.6f} of its limit, {log.joints[k]}")]
+    if isinstance(run.walker.data, WalkerData):
+        least = float(np.nanmin(np.abs(wrist_angles(run, log))))
+        out.append(Figure("theta5", "smallest |theta5| held", least, f"{np.degrees(least):.2f} deg"))
+    return out
 
 
 def _times(run: WalkRun, log: WalkLog, ticks: TickColumns) -> list[Figure]:

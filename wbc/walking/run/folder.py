@@ -6,7 +6,8 @@ import pathlib
 from collections.abc import Callable
 
 from wbc.errors import WbcError
-from wbc.walking.checker import Report, check_run
+from wbc.robots import TwoEndedData, Walker, WalkerData
+from wbc.walking.checker import Report, Rules, check_run
 from wbc.walking.run.animation import save_animation
 from wbc.walking.run.carrying_out import Progress
 from wbc.walking.run.figures import figures_of, save_figures
@@ -16,6 +17,7 @@ from wbc.walking.run.reach_map import save_reach_map
 from wbc.walking.run.replay_page import ReplayPageError, save_replay_page
 from wbc.walking.run.stills import save_stills
 from wbc.walking.structure_file import save_structure
+from wbc.walking.two_ended import touching_distance
 
 PLAN, STRUCTURE, URDF = "plan.json", "structure.csv", "robot.urdf"
 #: All files of a run, which the next one in the same folder does not leave behind
@@ -63,11 +65,18 @@ def save_run(run: WalkRun, folder: pathlib.Path, check: bool = True) -> tuple[li
     report = None
     if run.log is not None and run.ticks is not None:
         files += [run.log.save(folder), run.ticks.save(folder)]
-        report = check_run(folder) if check else None
+        report = check_run(folder, rules_of(run.walker)) if check else None
         if report is not None:
             files.append(folder / "check.txt")
             files[-1].write_text(f"{report}\n")
     return [*files, *save_figures(figures_of(run, report), folder)], report
+
+
+def rules_of(walker: Walker) -> Rules:
+    """What the checker goes by: tips of the two-ended arm are thicker than hands."""
+    if isinstance(walker.data, TwoEndedData):
+        return Rules(exempt_distance=touching_distance(walker))
+    return Rules()
 
 
 def save_pictures(
@@ -80,8 +89,9 @@ def save_pictures(
     """
     told, asked = progress or (lambda what, part: None), stop or (lambda: False)
     files, missing = list[pathlib.Path](), list[str]()
-    told("reach map", None)
-    files.append(save_reach_map(run, folder))
+    if isinstance(run.walker.data, WalkerData):
+        told("reach map", None)
+        files.append(save_reach_map(run, folder))
     log, ticks = run.log, run.ticks
     if log is None or ticks is None or asked():
         return files, missing

@@ -100,7 +100,7 @@ def perform_walk(
     begin = time.perf_counter()
     walk = Walk(walker, structure, plan, stack=stack, state=state)
     recorder = WalkRecorder(walk, request.seed, {"request": asdict(request), "start": list(plan.start), **way})
-    outcome, reason, more = _walked(walk, recorder, report, stop, ask)
+    outcome, reason, more = walked(walk, recorder, report, stop, ask)
     run = WalkRun(request, walker, structure, path, plan, outcome, reason, None, None, planned, compiled, more=more)
     if not len(recorder):
         return run
@@ -108,14 +108,14 @@ def perform_walk(
     return replace(run, log=log, ticks=ticks, walk_time=_since(begin))
 
 
-def _walked(
+def walked(
     walk: Walk,
     recorder: WalkRecorder,
     report: Progress,
     stop: Callable[[], bool] | None,
     ask: Callable[[Regrasp, str], str] | None,
 ) -> tuple[Outcome, str, tuple[Figure, ...]]:
-    """Ticks until the walk is over; (how it ended, why, figures)."""
+    """Ticks until a walk is over; (how it ended, why, figures). Arguments as of :func:`perform_walk`."""
     duration = walk.plan.path.duration
     doing = CarryingOut(walk, recorder, progress=report, stop=stop)
     veto = None if ask is None else Veto(walk)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wbc import style
+from wbc.robots import TwoEndedData
 from wbc.walking.run.figures import body_speed, wrist_angles
 from wbc.walking.run.perform import WalkRun
 from wbc.walking.run.recording import TickColumns
@@ -21,7 +22,10 @@ Draw = Callable[[Any, WalkRun, WalkLog, TickColumns], Any]
 
 
 def save_plots(run: WalkRun, log: WalkLog, ticks: TickColumns, folder: pathlib.Path) -> list[pathlib.Path]:
-    """Writes holds, margins, joints, rates, drift, wrists, speed and tick_time, PNG each; returns the files."""
+    """Writes holds, margins, joints, rates, drift, wrists, speed and tick_time, PNG each; returns the files.
+
+    Of the two-ended arm no margins and wrists: its hands hold until they swing, and it has no theta5.
+    """
     draws: dict[str, Draw] = {
         "holds": _holds,
         "margins": _margins,
@@ -32,6 +36,8 @@ def save_plots(run: WalkRun, log: WalkLog, ticks: TickColumns, folder: pathlib.P
         "speed": _speed,
         "tick_time": _tick_time,
     }
+    if isinstance(run.walker.data, TwoEndedData):
+        del draws["margins"], draws["wrists"]
     files = []
     with style.pyplot() as plt:
         for name, draw in draws.items():

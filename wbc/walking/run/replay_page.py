@@ -69,7 +69,7 @@ def _recorded(server: Any, run: WalkRun, log: WalkLog, stop: Callable[[], bool] 
     scene, parts, turn = server.scene, parts_of(run.walker), surroundings.upright(log)
     # The structure as it stands in the pictures: up is away from it
     scene.set_up_direction("+z")
-    _look(server, log, turn)
+    _look(server, log, turn, DISTANCE * surroundings.scale(run.walker))
     scene.add_frame("/walk", show_axes=False, wxyz=_wxyz(turn.rotation), position=turn.translation)
     _add_structure(scene, run, log)
     handles = [_add_part(scene, k, part) for k, part in enumerate(parts)]
@@ -85,16 +85,16 @@ def _recorded(server: Any, run: WalkRun, log: WalkLog, stop: Callable[[], bool] 
     return str(serializer.as_html())
 
 
-def _look(server: Any, log: WalkLog, turn: pin.SE3) -> None:
+def _look(server: Any, log: WalkLog, turn: pin.SE3, distance: float) -> None:
     middle = turn.rotation @ log.pose_body_in_structure[:, :3].mean(axis=0) + turn.translation - [0.0, 0.0, 0.6]
     flat = np.cos(ELEVATION)
     direction = np.array([flat * np.cos(AZIMUTH), flat * np.sin(AZIMUTH), np.sin(ELEVATION)])
-    server.initial_camera.position = middle + DISTANCE * direction
+    server.initial_camera.position = middle + distance * direction
     server.initial_camera.look_at = middle
 
 
 def _add_structure(scene: Any, run: WalkRun, log: WalkLog) -> None:
-    rows = surroundings.near_rows(run.structure, log, SHOWN)
+    rows = surroundings.near_rows(run.structure, log, SHOWN * surroundings.scale(run.walker))
     for name, triangles, colour in (
         ("surface", surroundings.surface_triangles(run.structure, rows), surroundings.SURFACE),
         ("holds", surroundings.stud_triangles(run.structure, rows), surroundings.HOLD),

@@ -18,15 +18,21 @@ from wbc.walking.body_path import BodyPath, grid_path, straight_path
 from wbc.walking.structure import Structure
 from wbc.walking.structure_file import read_structure
 from wbc.walking.structures import BUILT_IN, ROWS_A, ROWS_T, remove_columns, remove_fraction, remove_rows
+from wbc.walking.two_ended import grapple_row
+from wbc.walking.two_ended.search import GAITS
 
 MODES = ("destination", "velocity", "arm")
 PLANNERS = ("free", "published")
+ROBOTS = ("three-armed", "two-ended")
+#: A row of holds for the two-ended arm
+GRAPPLES = "grapples"
 #: Where a walk begins and ends on a built-in structure when nothing is said
 ENDS = {
     "cylinder": ("13,6", "13,18"),
     "plane": ("8,6", "8,17"),
     "truss": ("L2,6", "L2,18"),
     "module": ("15,4", "15,14"),
+    "grapples": ("1 2", "6"),
 }
 #: 4 in/s
 SPEED = 0.1016
@@ -37,7 +43,7 @@ class WalkRequest:
     """A walk as it is asked for.
 
     Attributes:
-        structure: ``cylinder``, ``plane``, ``truss``, ``module`` or a structure file.
+        structure: ``cylinder``, ``plane``, ``truss``, ``module``, ``grapples`` or a structure file.
         mode: ``velocity``: at the speed, fewest delays first; ``destination``: fewest re-grasps first.
         speed: of the body's origin in the structure's frame [m/s]. turn_rate: largest [rad/s].
         start, points: places that the body is over at the beginning and then. On the cylinder ``T,A`` or
@@ -50,6 +56,9 @@ class WalkRequest:
         commands: a file of rates, or ``keyboard``, which drive the body in velocity mode instead of a path; "": none.
         arm, tasks: of arm mode: its name, and what it does, see :mod:`wbc.walking.run.arm_run`.
         free_start: nothing is held at the beginning, and the body is declared fixed until enough hands hold.
+        robot: ``three-armed`` or ``two-ended``. The latter goes from two holds, ``ID1 ID2``, to a hold or a place
+            ``x,y,z`` [m], in destination mode.
+        gait: of the two-ended arm: ``any``, ``inchworm`` or ``turnaround``.
     """
 
     structure: str = "cylinder"
@@ -68,6 +77,8 @@ class WalkRequest:
     arm: str = ""
     tasks: tuple[str, ...] = ()
     free_start: bool = False
+    robot: str = "three-armed"
+    gait: str = "any"
 
     def __post_init__(self) -> None:
         validation.one_of("mode", self.mode, MODES)
@@ -80,6 +91,13 @@ class WalkRequest:
             raise RangeError("do", self.tasks, "say what the hand is to do in the mode 'arm', and in no other")
         if self.planner == "published" and (self.commands or self.tasks or self.free_start):
             raise RangeError("planner", self.planner, "commands, arm mode and a free start are of the planner 'free'")
+        validation.one_of("robot", self.robot, ROBOTS)
+        validation.one_of("gait", self.gait, tuple(GAITS))
+        two_ended = self.robot == "two-ended"
+        if two_ended and (self.commands or self.tasks or self.free_start or self.planner == "published"):
+            raise RangeError("robot", self.robot, "the two-ended arm goes to a hold or a place, by the planner 'free'")
+        if self.gait != "any" and not two_ended:
+            raise RangeError("gait", self.gait, "gaits are of the robot 'two-ended'")
         if self.planner == "published" and self.structure != "cylinder":
             raise RangeError("planner", self.planner, "the published planner knows only the structure 'cylinder'")
 
@@ -133,6 +151,10 @@ class WalkRequest:
         return pin.SE3(replace(self, points=(self.start,)).path(structure, data).poses[0])
 
     def _whole(self) -> Structure:
+        if self.structure == GRAPPLES:
+            if self.rigid:
+                raise RangeError("rigid", self.rigid, "these holds fix the tilt of a hand anyway")
+            return grapple_row()
         if self.structure in BUILT_IN:
             make: Callable[..., Structure] = BUILT_IN[self.structure]  # type: ignore[assignment]
             return make(max_tilt=0.0) if self.rigid else make()
@@ -140,7 +162,7 @@ class WalkRequest:
             raise RangeError("rigid", self.rigid, "a file says itself what its holds allow")
         if "/" in self.structure or self.structure.lower().endswith(".csv") or pathlib.Path(self.structure).is_file():
             return read_structure(self.structure)
-        validation.one_of("structure", self.structure, (*BUILT_IN, "FILE.csv"))
+        validation.one_of("structure", self.structure, (*BUILT_IN, GRAPPLES, "FILE.csv"))
         raise RangeError("structure", self.structure, "no such file")
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from wbc.robots import TwoEndedData, Walker
 from wbc.shapes import PlacedShape
 from wbc.style import BLUE, ORANGE, PURPLE, TEAL
 from wbc.track import solids
@@ -24,8 +25,15 @@ BODY: Colour = (0.93, 0.935, 0.945)
 ARMS = (BLUE, ORANGE, TEAL, PURPLE)
 #: A hold is drawn as a stud [m]: radius, height above the surface, and how many corners
 STUD, TALL, CORNERS = 0.035, 0.02, 10
+#: The two-ended arm is so much longer than an arm of the walker
+TWO_ENDED = 6.0
 #: What is shown of the surface beyond the holds [m], how far under them it lies, and the side of a patch
 EDGE, UNDER, PATCH = 0.18, 0.004, 0.12
+
+
+def scale(walker: Walker) -> float:
+    """How many times larger than those of bodies with arms the pictures of a machine are."""
+    return TWO_ENDED if isinstance(walker.data, TwoEndedData) else 1.0
 
 
 def arm_colour(arm: int) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
@@ -14,9 +15,11 @@ from wbc.validation import Array
 from wbc.walking.body_path import BodyPath
 from wbc.walking.plan import NoPlanError
 from wbc.walking.replanning import PlanSlices
+from wbc.walking.stopping import Stops
 from wbc.walking.structure import Structure
 from wbc.walking.two_ended.law import TurnLaw
 from wbc.walking.two_ended.planner import TwoEndedPlan, plan_two_ended
+from wbc.walking.two_ended.swing_path import ACCELERATION_PART, RATE_PART
 from wbc.walking.walk import Walk
 from wbc.walking.walk_stack import AXIS, DT, FREE_AXIS, FREE_WRIST, WalkStack
 from wbc.walking.walk_state import Swinging, Wrist
@@ -138,8 +141,27 @@ class TwoEndedWalk(Walk):
         self._turns.turn(arm, (now.position, speed), (before, rates / self.dt), at_hold)
 
     def _stands(self) -> bool:
-        """A hand that is on its way goes on to its hold, as the arm moves as one."""
-        return self.halted or (self._changing and self.swinging is None)
+        """A hand that is on its way goes on to its hold, as the arm moves as one; after an abort all of it stops."""
+        return self.halted or self.aborted or (self._changing and self.swinging is None)
+
+    @property
+    def still(self) -> bool:
+        """The arm does not move as it is told."""
+        return self.pace == 0.0
+
+    @cached_property
+    def stops(self) -> Stops:
+        """Laws leave half the accelerations for a stop; the hand comes to rest with the body."""
+        data = self.walker.data
+        assert isinstance(data, TwoEndedData)
+        ramp = RATE_PART / (1.0 - ACCELERATION_PART) * data.acceleration_time
+        return Stops(self.dt, ramp, ramp)
+
+    def stopping(self) -> tuple[float, float]:
+        """As of ``MovingBody.stopping``; the hand's time is the path's."""
+        if self.swinging is not None:
+            self.swinging.pace = self.pace
+        return super().stopping()
 
     def _bend(self, arm: int) -> Wrist:
         """Nothing: all joints of the arm follow the law."""
