@@ -9,8 +9,10 @@ import numpy as np
 
 from wbc import validation
 from wbc.robots import Walker
+from wbc.validation import Array
 from wbc.walking.body_path import SPACING, TURN_RADIUS, BodyPath, standing_path
 from wbc.walking.courses import Course, course, course_slices, time_left
+from wbc.walking.leeway import PARTS, displaced, displacement, towards, undisplaced
 from wbc.walking.plan import NoPlanError, Plan
 from wbc.walking.planner import plan_walk
 from wbc.walking.steering import Steering
@@ -24,8 +26,13 @@ HORIZON, LEFT, LEAD, AHEAD = 8.0, 6.0, 0.1, 1.0
 #: Slices of planning between two ticks
 SLICES = 2
 #: What is tried in turn where hands cannot be planned over the horizon: parts of the commanded rates, and how much
-#: lower than its height the body is to be, in its data's ``body_shift``
-WAYS = ((1.0, 0.0), (0.7, 0.0), (0.45, 0.0), (0.7, 1.0), (0.7, -1.0), (0.25, 0.0), (0.25, 1.0))
+#: the body is lower and aside, in its data's ``body_shift``, and tilted about its way and across it, in ``body_tilt``
+WAYS = (
+    *((part, (0.0, 0.0, 0.0, 0.0)) for part in (1.0, 0.7, 0.45)),
+    *((0.7, (low, side, 0.0, 0.0)) for low, side in ((1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0))),
+    *((0.7, (0.0, 0.0, roll, pitch)) for roll, pitch in ((0.0, 1.0), (0.0, -1.0), (1.0, 0.0), (-1.0, 0.0))),
+    *((0.25, (low, 0.0, 0.0, 0.0)) for low in (0.0, 1.0)),
+)
 #: A body that waits for a hand goes on so much later [s]
 SURE = 0.15
 #: Rates below these are none [m/s, m/s, rad/s]
@@ -38,8 +45,9 @@ class Drive:
     """A walk by commanded rates: of the body's origin round and along the structure, and of turning about its normal.
 
     Every command is answered by planning :data:`HORIZON` seconds ahead, in slices between ticks, while the body goes
-    on: what is planned keeps a swing that is under way. A plan that fails is made anew with the body slower, then
-    lower or higher by 2 in. Zero rates stop the body and every lift; a hand in the air comes down.
+    on: what is planned keeps a swing that is under way. A plan that fails is made anew with the body slower, then lower
+    or higher by 2 in, aside by 2 in, or tilted by 3 degrees. Zero rates stop the body and every lift; a hand in the air
+    comes down.
 
     Args:
         walk: whose body stands, as of :func:`standing_plan`.
@@ -55,8 +63,11 @@ class Drive:
         self.steering = Steering.on(walk.structure, pose)
         self.command = np.zeros(3)
         self._asked = np.zeros(3)
-        self._way, self._settled, self._stuck, self._waited = 0, True, False, False
+        self._order, self._settled, self._stuck, self._waited = list(range(len(WAYS))), True, False, False
         self._work: tuple[Course, Generator[Plan | None, None, Plan]] | None = None
+        # Displacements of the paths that were planned last, sample by sample, and the last one that the body had
+        self._displaced: list[tuple[BodyPath, Array]] = []
+        self._last = np.zeros(PARTS)
         walk.halted = True
 
     def steer(self, across: float, along: float, spin: float) -> None:
@@ -107,12 +118,13 @@ class Drive:
     def _plan(self) -> None:
         """Some slices of planning, begun anew where the command has changed or the horizon comes near."""
         if (self.command != self._asked).any():
-            self._way = 0
+            self._order = list(range(len(WAYS)))
             self._begin(LEAD, quick=True)
         elif self._work is None and not self._settled:
             self._begin(LEAD, quick=False)
         elif self._work is None and self.walk.plan.path.duration - self.walk.path_time < LEFT and not self.reason:
-            self._way = max(self._way - 1, 0)
+            # The least deviation first, then the one that has led on
+            self._order = list(dict.fromkeys([0, self._order[0], *range(len(WAYS))]))
             self._begin(AHEAD, quick=False)
         for _ in range(SLICES):
             if self._work is None:
@@ -147,18 +159,33 @@ class Drive:
         walk, steering = self.walk, self.steering
         path = walk.plan.path
         begun, spacing = course(walk, lead, not quick), path.spacing
-        part, lower = WAYS[self._way]
-        tail = [path.at(u)[0].homogeneous for u in np.arange(begun.begins, begun.splice + spacing / 2, spacing)]
-        rates = steering.rates(tail[-2], tail[-1], spacing) if walk.pace and len(tail) > 1 else np.zeros(4)
-        low, lower = steering.lower(tail[-1]), lower * walk.data.body_shift
-        rest = steering.ramp(rates, np.zeros(3), (low, low), round(wait / spacing), spacing)
-        rates = rest[-1] if len(rest) else rates
-        ahead = steering.ramp(rates, part * self.command, (low, lower), round(HORIZON / spacing), spacing)
-        ahead = steering.ahead(tail[-1], np.concatenate([rest, ahead]), spacing)
-        other = BodyPath(np.concatenate([tail, ahead]), spacing)
+        times = np.arange(begun.begins, begun.splice + spacing / 2, spacing)
+        tail, off = [path.at(u)[0].homogeneous for u in times], [self._displacement(path, u) for u in times]
+        bare = [undisplaced(*pair) for pair in zip(tail, off, strict=True)]
+        rates = steering.rates(bare[-2], bare[-1], spacing) if walk.pace and len(bare) > 1 else np.zeros(4)
+        part, much = WAYS[self._order[0]]
+        rest = steering.ramp(rates, np.zeros(3), round(wait / spacing), spacing)
+        ahead = steering.ramp(rest[-1] if len(rest) else rates, part * self.command, round(HORIZON / spacing), spacing)
+        led = steering.ahead(bare[-1], np.concatenate([rest, ahead]), spacing)
+        way = (bare[-1][:3, :3].T @ (led[-1] - led[len(rest)])[:3, 3])[:2]
+        shift, tilt = walk.data.body_shift, walk.data.body_tilt
+        wanted = displacement(way, *(m * most for m, most in zip(much, (shift, shift, tilt, tilt), strict=True)))
+        still = np.repeat(off[-1][None], len(rest), axis=0)
+        more = np.concatenate([still, towards(off[-1], wanted, len(ahead), spacing)])
+        poses = [displaced(*pair) for pair in zip(led, more, strict=True)]
+        other = BodyPath(np.concatenate([tail, poses]), spacing)
+        kept = [pair for pair in self._displaced if pair[0] is path]
+        self._displaced = [*kept, (other, np.concatenate([off, more]))]
         self._work = begun, course_slices(walk.walker, walk.structure, walk.plan, begun, other, quick)
         self._asked, self._waited = self.command.copy(), wait > 0.0
         walk.leash = begun.splice, begun.since + len(begun.kept)
+
+    def _displacement(self, path: BodyPath, u: float) -> Array:
+        """Of the body at a path time, from where its command has it; on a way of another origin it stays."""
+        for known, rows in self._displaced:
+            if known is path:
+                self._last = rows[min(round(u / path.spacing), len(rows) - 1)]
+        return self._last
 
     def _take(self, begun: Course, plan: Plan) -> None:
         """Go over to a plan that leads farther; where it does not lead over the horizon, something else is tried."""
@@ -167,9 +194,9 @@ class Drive:
         if plan.complete or _far(plan, walk.path_time - begun.begins) > old:
             walk.go_over(plan, begun.begins, begun.since)
             walk.halted = False
-        self.reason, self._settled = plan.reason, plan.complete or self._way + 1 == len(WAYS)
+        self.reason, self._settled = plan.reason, plan.complete or len(self._order) == 1
         if not self._settled:
-            self._way += 1
+            del self._order[0]
 
     def _drop(self) -> None:
         self._work, self.walk.leash = None, None

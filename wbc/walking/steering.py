@@ -17,8 +17,6 @@ from wbc.walking.surface import CylinderSurface, PlaneSurface
 ROUND, ALONG, SPIN, NEARER = range(4)
 #: Commands take hold as fast as this [m/s^2, m/s^2, rad/s^2]
 ACCELERATIONS = np.array([0.25, 0.25, 0.25])
-#: A body goes back to its height as fast as this [m/s]
-HEIGHT_SPEED = 0.05
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,18 +90,15 @@ class Steering:
             return self.height + float(self.normal @ pose[:3, 3])
         return self.height - self._far(pose[:3, 3])
 
-    def ramp(self, begin: Array, command: Array, lower: tuple[float, float], count: int, spacing: float) -> Array:
-        """Rates ``[n, 4]`` from those that a body has to commanded ones, by :data:`ACCELERATIONS`.
-
-        Args:
-            begin: ``[4]``. command: ``[3]``. lower: by how much it is below its height, and is to be [m].
+    def ramp(self, begin: Array, command: Array, count: int, spacing: float) -> Array:
+        """Rates ``[count, 4]`` from those that a body has, ``[4]``, to commanded ones ``[3]``, by
+        :data:`ACCELERATIONS`; the height stays.
         """
-        out, now, low = np.zeros((count, 4)), begin[:3].copy(), lower[0]
+        out, now = np.zeros((count, 4)), begin[:3].copy()
         for k in range(count):
             most = ACCELERATIONS * spacing
             now = now + np.clip(command - now, -most, most)
-            step = float(np.clip(lower[1] - low, -HEIGHT_SPEED * spacing, HEIGHT_SPEED * spacing))
-            out[k, :3], out[k, NEARER], low = now, step / spacing, low + step
+            out[k, :3] = now
         return out
 
     def _across(self, place: Array) -> Array:
