@@ -12,6 +12,8 @@ from wbc.walking.body_path import BodyPath, grid_path
 from wbc.walking.plan import HoldLost, NoPlanError
 from wbc.walking.planner import plan_walk
 from wbc.walking.replanning import HEAD, plan_from_stance
+from wbc.walking.run.carrying_out import CarryingOut
+from wbc.walking.run.recording import WalkRecorder
 from wbc.walking.slices import drained
 from wbc.walking.walk import Tick, Walk
 from wbc.walking.walk_stack import WalkStack
@@ -72,6 +74,18 @@ def test_too_few_hands_stop_the_walk(walk: Walk) -> None:
     walk.vanish(held[:1])
     with pytest.raises(HoldLost, match="at least 2 must hold"):
         walk.tick()
+
+
+def test_a_walk_that_loses_its_holds_says_so_and_stands(walk: Walk) -> None:
+    doing = CarryingOut(walk, WalkRecorder(walk))
+    while walk.swinging is None:
+        assert doing.step()
+    walk.vanish([walk.structure.ids[next(iter(walk.held.values()))]])
+    before = walk.q.copy()
+    assert not doing.step()
+    assert doing.outcome == "hold lost"
+    assert "at least 2 must hold" in doing.reason
+    assert (walk.q == before).all()
 
 
 def test_names_that_are_none_change_nothing(walk: Walk) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+import wbc.walking.drive as driving
 from wbc.errors import NotFiniteError, RangeError, ShapeError
 from wbc.robots import Walker
 from wbc.walking import Structure, plane, remove_rows
@@ -70,6 +71,26 @@ def test_there_and_back_and_stop(
     log, _ = recorder.log()
     report = check_walk(log, machine.urdf(tmp_path / "robot.urdf"), structure, Rules(sub_samples=1))
     assert report.ok, str(report)
+
+
+def test_a_body_goes_aside_and_tilts_as_far_as_it_may_and_comes_back(
+    machine: Walker, structure: Structure, stack: WalkStack, begin: Plan, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    walk = Walk(machine, structure, begin, stack=stack)
+    drive, recorder = Drive(walk), WalkRecorder(walk)
+    with monkeypatch.context() as patch:
+        patch.setattr(driving, "WAYS", ((1.0, (0.0, 1.0, 0.0, 1.0)),))
+        away = drive_on(drive, recorder, 2.2, 0.0, 0.08, 0.0)
+    back = drive_on(drive, recorder, 2.2, 0.0, 0.081, 0.0)
+    first = pin.XYZQUATToSE3(away[0].q[:7])
+    tilts = [np.linalg.norm(pin.log3(first.rotation.T @ pin.XYZQUATToSE3(t.q[:7]).rotation)) for t in (*away, *back)]
+    aside = np.array([abs(tick.q[0] - away[0].q[0]) for tick in (*away, *back)])
+    assert tilts[len(away) - 1] == pytest.approx(np.radians(3.0), abs=1e-3)
+    assert aside[len(away) - 1] == pytest.approx(2 * INCH, abs=1e-3)
+    assert max(tilts) < np.radians(3.0) + 1e-3
+    assert aside.max() < 2 * INCH + 1e-3
+    assert tilts[-1] < 1e-3
+    assert aside[-1] < 1e-3
 
 
 def test_it_slows_down_before_a_gap_and_says_why(machine: Walker, structure: Structure, stack: WalkStack) -> None:
