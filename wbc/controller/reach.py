@@ -9,13 +9,15 @@ from numpy.typing import NDArray
 
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Layout
-from wbc.stack.places import brakes, gain_places, margin_places, pull_scales, rate_places, stops
+from wbc.stack.places import brakes, gain_places, kept_rows, margin_places, pull_scales, rate_places, stops
 from wbc.stack.program import Program
 from wbc.validation import Array
 
 #: As in ``native/reach.h``
 TRUSTED, AT_LIMIT, PUSHED, NEGLIGIBLE, LEAST_PIVOT, BRAKING = 2.0, 0.02, 0.01, 0.05, 1e-4, 1.0
 REMOVED, TOO_FAR, CORRECTIONS = 0.02, 1e50, 2
+#: As in ``native/settings.h``
+FIRM = 1e4
 #: As in ``native/margins.h``
 BRAKING_MARGIN = 0.25
 #: Squared length of a row that v cannot move, as in ``native/settings.h``
@@ -47,6 +49,7 @@ class Reach:
         self._stop_q[: layout.nv] = np.maximum(stack.robot.position_index, 0)
         self._dof_count = layout.nv
         margins = np.array(margin_places(layout), dtype=np.intp)
+        self._kept = np.array(kept_rows(layout), dtype=np.intp)
         self._margin_rows = np.flatnonzero(margins >= 0)
         self._margin_at = margins[self._margin_rows]
         self._rate_at = np.array(rate_places(layout), dtype=np.intp)[self._margin_rows]
@@ -61,13 +64,14 @@ class Reach:
         q: Array,
         p: Array,
         equal: Array,
+        keepers: tuple[Array, NDArray[np.intp], Array],
         bound_enabled: Array,
     ) -> tuple[Array, Array]:
         """(H, g) of the QP that is solved.
 
         Args:
             H: of the linear model. J: task rows of the first level. weight: of each, fading included.
-            equal: rows of the equalities, of unit length in v / dof scales.
+            equal: rows of the equalities, of unit length in v / dof scales. keepers: see :meth:`keepers`.
         """
         counts = weight != 0.0
         error = np.where(counts, error, 0.0)
@@ -82,7 +86,7 @@ class Reach:
         metric = _cut_off(self._strengthened(H, equal), free)
         if not _is_definite(metric):
             return H, plain
-        curved = self._curved(H, metric, J, weight, error, slope, free)
+        curved = self._curved(H, metric, J, weight, error, slope, free, keepers)
         if curved is not None:
             H, metric = curved, self._strengthened(curved, equal)
             if not _is_definite(metric):
@@ -98,6 +102,17 @@ class Reach:
         if drift[counts].any():
             g -= H @ self._following(metric, J, weight, -(J.T @ (weight * drift)))
         return H, g
+
+    def keepers(self, A: Array, equal: NDArray[np.bool_], factor: Array) -> tuple[Array, NDArray[np.intp], Array]:
+        """Rows that keep directions, of unit length in v / dof scales; the task rows; how these are in them.
+
+        Args:
+            A: general rows. equal: which are equalities. factor: fading of the task rows.
+        """
+        length = np.sqrt(np.einsum("ij,ij->i", A * self._dofs, A * self._dofs))
+        on = np.flatnonzero((self._kept >= 0) & equal & (length**2 > DEAD))
+        kept = self._kept[on]
+        return A[on] / length[on, None], kept, factor[kept] / length[on]
 
     def _free(self, q: Array, slope: Array, bound_enabled: Array) -> Array:
         """1 for joints that may move, 0 for those that their tasks push against a position limit."""
@@ -120,18 +135,24 @@ class Reach:
         error: Array,
         slope: Array,
         free: Array,
+        keepers: tuple[Array, NDArray[np.intp], Array],
     ) -> Array | None:
         """H with the curvature of the errors that one step leaves, None where there is none to count."""
         if self._bend is None:
             return None
         # what blocked joints are asked for is not asked of the others
         slope = free * slope
-        step = np.linalg.solve(metric, slope)
-        length = float(np.abs(step / self._dofs).max())
+        rows, kept, share = keepers
+        stiffness = FIRM * float((np.diag(H) * self._dofs**2).max(initial=0.0))
+        firm = metric + _cut_off((stiffness - stiffness / FIRM) * rows.T @ rows, free)
+        step = np.linalg.solve(firm, slope)
+        length = float(np.abs(step / self._dofs)[: self._dof_count].max())
         if length > TRUSTED:
             more = float(np.abs(slope * self._dofs).max()) / TRUSTED * (1.0 - TRUSTED / length)
-            step = np.linalg.solve(metric + np.diag(more / self._dofs**2), slope)
-        pull = weight * (error - J @ (free * step))
+            step = np.linalg.solve(firm + np.diag(more / self._dofs**2), slope)
+        step = free * step
+        pull = weight * (error - J @ step)
+        pull[kept] -= share * stiffness * (rows @ step)
         size, whole = (float((np.abs(x) * self._pull_scale).sum()) for x in (pull, weight * error))
         pivots = np.diag(np.linalg.cholesky(metric)) * self._dofs
         least = float((pivots**2).min())

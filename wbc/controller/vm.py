@@ -175,7 +175,8 @@ class VmAssembly(Assembly):
         self._bent = None
         if self._reach is not None and not self.plain[0] and self._usable and layout.leading:
             equal = _unit_equalities(low, high, low_rows, high_rows, A, self._dof_scales)
-            H, g = self._reach.change(H, J, weight, error, wish, self.q, self.p, equal, self.bound_enabled)
+            keepers = self._reach.keepers(A, low_rows == high_rows, factor)
+            H, g = self._reach.change(H, J, weight, error, wish, self.q, self.p, equal, keepers, self.bound_enabled)
             self._bent = self._reach.bent
         return QP(H, g, np.concatenate((low, low_rows)), np.concatenate((high, high_rows)), A)
 

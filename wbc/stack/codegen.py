@@ -16,6 +16,7 @@ from wbc.stack.pattern import sparsity_rows
 from wbc.stack.places import (
     brakes,
     gain_places,
+    kept_rows,
     left_free,
     margin_places,
     pull_scales,
@@ -122,6 +123,8 @@ def _soft(stack: Declaration, layout: Layout) -> list[str]:
     return [
         f"#define DOFS {layout.nv}",
         f"#define SLACKS {int(bool(layout.slack_rows))}",
+        f"#define KEPT {int(max(kept_rows(layout), default=-1) >= 0)}",
+        _table("int", "kept_of", kept_rows(layout)),
         _table("int", "slack_of", slack_places(stack, layout)),
         _table("double", "slack_told", told_slacks(stack, layout)),
     ]

@@ -43,6 +43,17 @@ def slack_places(stack: Declaration, layout: Layout) -> list[int]:
     return places
 
 
+def kept_rows(layout: Layout) -> list[int]:
+    """The task row of the first level whose direction each general row keeps, -1 for rows that keep none."""
+    rows = [-1] * layout.general_rows
+    for block in layout.of_form("rows"):
+        if isinstance(block.entry.item, Direction):
+            task = layout.blocks[block.entry.item.of].span
+            for k, row in enumerate(range(task.start, task.stop)):
+                rows[block.start + k] = row if row < layout.leading else -1
+    return rows
+
+
 def told_slacks(stack: Declaration, layout: Layout) -> list[float]:
     """Violation of each soft row from which on a report tells it, per second: beyond rounding, and for kept directions
     beyond what their finite price leaves.

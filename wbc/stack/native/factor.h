@@ -35,7 +35,7 @@ static void strengthen(wbc_tick *t) {
             square += a * a;
         }
         if (square <= DEAD) continue;
-        t->strength[k] = t->stiffness / square;
+        t->strength[k] = t->stiffness / square * (t->firm && kept_of[k] >= 0 ? FIRM : 1.0);
         for (int e = a_start[k]; e < a_end[k]; e++) {
             const double f = t->strength[k] * t->at[e];
             for (int c = e; c < a_end[k]; c++) t->R[a_col[e] * WIDE + a_col[c]] += f * t->at[c];

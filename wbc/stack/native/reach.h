@@ -3,7 +3,7 @@
 #ifndef WBC_REACH_H
 #define WBC_REACH_H
 
-#include "factor.h"
+#include "kept.h"
 
 /* A step up to here [rad, or characteristic lengths] is what the Jacobians say */
 #define TRUSTED 2.0
@@ -52,7 +52,7 @@ static void solve_with(const wbc_tick *t, const double *b, double *x) {
 
 static double largest_step(const double *x) {
     double largest = 0.0;
-    for (int i = 0; i < NV; i++) largest = larger(largest, fabs(x[i]) / dof_scale[i]);
+    for (int i = 0; i < DOFS; i++) largest = larger(largest, fabs(x[i]) / dof_scale[i]);
     return largest;
 }
 
@@ -86,27 +86,37 @@ static int cut_off(wbc_tick *t, const double *free, double more) {
 
 #if NNZK > 0
 
-/* Weighted errors that the step of the linear model leaves, kept to TRUSTED where that asks for more. R is the
- * metric without curvature, before and after. */
-static int left_over(wbc_tick *t, const double *free, const double *error, const double *whole, double *pull) {
-    double step[WIDE], slope[WIDE] = {0};
-    /* What blocked joints are asked for is not asked of the others */
-    for (int i = 0; i < NV; i++) slope[i] = free[i] * whole[i];
+/* The step of the linear model, kept to TRUSTED where it asks for more, in R, which it changes then; 0 for none */
+static int trusted_step(wbc_tick *t, const double *free, const double *slope, double *step, int *changed) {
     solve_with(t, slope, step);
     const double length = largest_step(step);
-    const int bounded = length > TRUSTED;
-    if (bounded) {
+    if (length > TRUSTED) {
         double steepest = 0.0;
         for (int i = 0; i < NV; i++) steepest = larger(steepest, fabs(slope[i]) * dof_scale[i]);
+        *changed = 1;
         if (!cut_off(t, free, steepest / TRUSTED * (1.0 - TRUSTED / length))) return 0;
         solve_with(t, slope, step);
     }
     for (int i = 0; i < NV; i++) step[i] *= free[i];
+    return 1;
+}
+
+/* Weighted errors that this step leaves. R is the metric without curvature, before and after. */
+static int left_over(wbc_tick *t, const double *free, const double *error, const double *whole, double *pull) {
+    double step[WIDE], slope[WIDE] = {0};
+    int changed = KEPT;
+    /* What blocked joints are asked for is not asked of the others */
+    for (int i = 0; i < NV; i++) slope[i] = free[i] * whole[i];
+    t->firm = KEPT;
+    const int found = (!KEPT || cut_off(t, free, 0.0)) && trusted_step(t, free, slope, step, &changed);
+    t->firm = 0;
+    if (!found) return 0;
     for (int k = 0; k < LEADING; k++) {
         const double f = t->weight[k] * t->report.factor[k];
         pull[k] = f == 0.0 ? 0.0 : f * (error[k] - along(t, k, step));
     }
-    return !bounded || cut_off(t, free, 0.0);
+    if (KEPT) without_kept(t, step, pull);
+    return !changed || cut_off(t, free, 0.0);
 }
 
 /* What makes a symmetric matrix positive definite, a diagonal: the modified factorisation of Gill and Murray */

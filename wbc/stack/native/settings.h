@@ -29,6 +29,8 @@ int bend(const double **arg, double **res, long long *iw, double *w, int mem);
 #define DEAD 1e-20
 /* Weight of the proximal term |v - base|^2 against slack^2 in the relaxation */
 #define RHO 1e-6
+/* How much more than other equality rows those that keep a direction count while curvature is looked for */
+#define FIRM 1e4
 /* Proximal steps of a relaxation at most, and the change of a row at which they end */
 #define PROXIMAL_STEPS 12
 #define SETTLED 1e-11

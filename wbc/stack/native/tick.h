@@ -15,6 +15,7 @@
  *   brake_at brake_limit   entry of bound_enabled that limits the acceleration of a velocity (-1: none), and the limit
  *   row_order   class of each general row in the order of sacrifice
  *   SLACKS      whether there are soft rows
+ *   KEPT kept_of   whether tasks of the first level keep directions; the row of such a task for each row that does (-1)
  *   slack_of slack_told   variable that is its slack (-1: none), and the violation from which on that is told
  *   row_scale   its unit: the characteristic length for rows in metres
  *   BALLS SEGMENTS   items whose rows are distances between a ball and segments of links, and those segments
@@ -126,6 +127,7 @@ typedef struct {
     double unusable;             /* not 0: numbers that are not finite, or bounds without an interval */
     int prepared;                /* R is the factor of H, and y its right side */
     int curved;                  /* H contains curvature */
+    int firm;                    /* rows that keep directions are firm in R */
     double stiffness;            /* what fixed variables add to the Hessian, in units of dof_scale */
     double bent[NNZK + 1];       /* curvature */
     int idle[MC + 1];            /* rows that no velocity within the bounds violates */
