@@ -142,7 +142,7 @@ class Reach:
             return None
         # what blocked joints are asked for is not asked of the others
         slope = free * slope
-        rows, kept, share = keepers
+        rows, kept, parts = keepers
         stiffness = FIRM * float((np.diag(H) * self._dofs**2).max(initial=0.0))
         firm = metric + _cut_off((stiffness - stiffness / FIRM) * rows.T @ rows, free)
         step = np.linalg.solve(firm, slope)
@@ -152,7 +152,7 @@ class Reach:
             step = np.linalg.solve(firm + np.diag(more / self._dofs**2), slope)
         step = free * step
         pull = weight * (error - J @ step)
-        pull[kept] -= share * stiffness * (rows @ step)
+        pull[kept] -= parts * stiffness * (rows @ step)
         size, whole = (float((np.abs(x) * self._pull_scale).sum()) for x in (pull, weight * error))
         pivots = np.diag(np.linalg.cholesky(metric)) * self._dofs
         least = float((pivots**2).min())
