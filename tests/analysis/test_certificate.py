@@ -18,6 +18,7 @@ from wbc.analysis import (
     screen,
     symbolic_jacobian,
 )
+from wbc.analysis.block_proofs import block_proofs
 from wbc.analysis.boxes import BoxSearch
 from wbc.analysis.numeric import rank
 from wbc.analysis.rank_matrix import rank_matrices
@@ -91,7 +92,9 @@ def test_boxes_that_are_proved_have_full_rank_and_those_in_the_tube_lie_in_it() 
     full = trig_form(model.ring, symbolic_jacobian(model, sets.task).matrix)
     never = TrigForm((1, 1), np.zeros((0, 7)), np.zeros((1, 0)), np.zeros((1, 0)))
     eps, seen = 0.4, {"regular": 0, "tube": 0}
-    ranks, tubes = BoxSearch(matrix, None, 0.0, 1e-6, 1.0), BoxSearch(never, full, eps, 1e-6, 1.0)
+    proofs = (*block_proofs(model, rows, matrix.joints), (matrix,))
+    assert [[form.joints for form in proof] for proof in proofs[:2]] == [[(4, 5), (1, 2)], [(1, 2), (4, 5)]]
+    ranks, tubes = BoxSearch(proofs, None, 0.0, 1e-6, 1.0), BoxSearch(((never,),), full, eps, 1e-6, 1.0)
     for half in (0.2, 0.05, 0.02):
         for _ in range(40):
             centre = rng.uniform(-np.pi, np.pi, 7)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import functools
 import hashlib
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
@@ -29,6 +30,10 @@ class _Form(ctypes.Structure):
     _fields_ = [(name, ctypes.c_int) for name in ("rows", "cols", "joints", "waves", "terms")] + [
         (name, ctypes.c_void_p) for name in ("w", "start", "wave", "a", "b")
     ]
+
+
+class _Proofs(ctypes.Structure):
+    _fields_ = [("proofs", ctypes.c_int), ("ends", ctypes.c_void_p), ("forms", ctypes.c_void_p)]
 
 
 class _Totals(ctypes.Structure):
@@ -66,17 +71,22 @@ class BoxSearch:
     A box is a row: centre, half widths, and 1 where it is known to be outside the tube.
 
     Args:
-        augmented: M. task: J, or None with ``eps`` = 0. smallest: width at which a box is left [rad]. volume: of all.
+        proofs: ways to prove full rank of M: forms that must all have it, such as (M,). task: J, or None with ``eps``
+            = 0. smallest: width at which a box is left [rad]. volume: of all.
 
     Raises:
         RangeError: a matrix larger than the compiled code allows. CompileError: no C compiler, or it fails.
     """
 
-    def __init__(self, augmented: TrigForm, task: TrigForm | None, eps: float, smallest: float, volume: float) -> None:
-        self.joints = augmented.waves.shape[1]
-        self._keep: list[NDArray[Any]] = []
-        self._augmented = self._form(augmented)
-        self._task = self._form(task if task is not None else augmented)
+    def __init__(
+        self, proofs: Sequence[Sequence[TrigForm]], task: TrigForm | None, eps: float, smallest: float, volume: float
+    ) -> None:
+        forms = [form for proof in proofs for form in proof]
+        self.joints = forms[0].waves.shape[1]
+        self._keep: list[NDArray[Any]] = [np.cumsum([len(proof) for proof in proofs]).astype(np.int32)]
+        self._forms = (_Form * len(forms))(*map(self._form, forms))
+        self._proofs = _Proofs(len(proofs), self._keep[0].ctypes.data, ctypes.addressof(self._forms))
+        self._task = self._form(task if task is not None else forms[0])
         self._numbers = eps if task is not None else 0.0, smallest, volume
         self._run = _library().subdivide
 
@@ -88,7 +98,7 @@ class BoxSearch:
         kept, totals = np.empty((_KEPT, width)), _Totals(pending=len(boxes))
         eps, smallest, volume = self._numbers
         self._run(
-            ctypes.byref(self._augmented),
+            ctypes.byref(self._proofs),
             ctypes.byref(self._task),
             ctypes.c_double(eps),
             ctypes.c_double(smallest),

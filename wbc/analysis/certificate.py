@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from wbc import validation
+from wbc.analysis.block_proofs import block_proofs
 from wbc.analysis.boxes import BoxSearch, Counts
 from wbc.analysis.jacobian import symbolic_jacobian
 from wbc.analysis.model import ExactModel
@@ -30,7 +31,7 @@ SMALLEST = 1e-6
 #: Matrices that are tried on random boxes of this half width [rad], how many boxes, and parts of each at most
 _TRIED, _HALF, _SAMPLES, _BUDGET = 8, 0.3, 6, 400
 #: Boxes to begin with, at least
-_FIRST = 2048
+_FIRST = 256
 
 Progress = Callable[[float], None]
 
@@ -117,8 +118,10 @@ def certify(
         return Certificate(INCOMPLETE, eps, highest, False, Counts(), 1.0, (), 1, seconds, witness)
     chosen = _chosen(forms, own, eps)
     found = symmetries((chosen, own), used_joints((chosen, own)))
-    search, boxes = _begin(chosen, own, eps, found)
-    pieces = Pieces(search, boxes, Path(state) if state is not None else None, (chosen, own), eps)
+    proofs = (*block_proofs(model, (*wanted, *added), chosen.joints), (chosen,))
+    search, boxes = _begin(proofs, own, eps, found)
+    forms = [form for proof in proofs for form in proof]
+    pieces = Pieces(search, boxes, Path(state) if state is not None else None, (*forms, own), eps)
     finished = pieces.work(minutes, workers or os.cpu_count() or 1, progress)
     counts = pieces.counts
     verdict, left = COMPLETE, 0.0
@@ -149,7 +152,7 @@ def _chosen(forms: Sequence[TrigForm], task: TrigForm, eps: float) -> TrigForm:
     centres = rng.uniform(-np.pi, np.pi, (_SAMPLES, size))
 
     def boxes(form: TrigForm) -> float:
-        search = BoxSearch(form, task, eps, SMALLEST, 1.0)
+        search = BoxSearch(((form,),), task, eps, SMALLEST, 1.0)
         half = np.where(np.isin(np.arange(size), used_joints((form, task))), _HALF, 0.0)
         total = 0.0
         for centre in centres:
@@ -160,12 +163,15 @@ def _chosen(forms: Sequence[TrigForm], task: TrigForm, eps: float) -> TrigForm:
     return min(few, key=boxes)
 
 
-def _begin(augmented: TrigForm, task: TrigForm, eps: float, found: Sequence[Symmetry]) -> tuple[BoxSearch, Array]:
+def _begin(
+    proofs: Sequence[Sequence[TrigForm]], task: TrigForm, eps: float, found: Sequence[Symmetry]
+) -> tuple[BoxSearch, Array]:
     """The search, and joint space in boxes: halves along the joints of the augmented matrix in turn, shuffled."""
+    augmented = proofs[-1][0]
     joints = used_joints((augmented, task))
     centre, half = fundamental_box(found, joints)
     box = np.concatenate((centre, half, [0.0]))
-    search = BoxSearch(augmented, task, eps, SMALLEST, float(np.prod(2.0 * half[list(joints)])))
+    search = BoxSearch(proofs, task, eps, SMALLEST, float(np.prod(2.0 * half[list(joints)])))
     boxes, size, turn = box[None], len(centre), 0
     cut = augmented.joints or joints
     while len(boxes) < _FIRST:

@@ -4,41 +4,42 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
+from wbc.analysis.equivalent_rows import split_twists, whole_twist
 from wbc.analysis.jacobian import symbolic_jacobian
 from wbc.analysis.minors import without
 from wbc.analysis.model import ExactModel
 from wbc.analysis.ring import Matrix, Poly, TrigRing
-from wbc.analysis.rows import ALL, BodyRows, Rows
+from wbc.analysis.rows import BodyRows, Rows
 from wbc.analysis.transforms import cross
-from wbc.symbolic.kinematics import WORLD
+
+
+def equivalent_matrices(model: ExactModel, rows: Sequence[Rows]) -> Iterator[Matrix]:
+    """Matrices of the rank of the rows at every configuration, their columns the joints.
+
+    A whole twist (v; omega) of a body is taken in the axes of any frame and at its origin or that of a neighbour, which
+    is a regular change of its six rows, or split at a point of another body, see :func:`split_twists`.
+    """
+    whole = [r for r in rows if whole_twist(r)]
+    rest = [r for r in rows if not whole_twist(r)]
+    fixed = symbolic_jacobian(model, rest).matrix if rest else []
+    if not whole:
+        yield fixed
+        return
+    frames = model.distinct_frames()
+    for i, axes in enumerate(frames):
+        for point in frames[max(i - 1, 0) : i + 2]:
+            yield [row for r in whole for row in _twist(model, r, point, axes)] + fixed
+    for equivalent in split_twists(model, rows):
+        yield symbolic_jacobian(model, equivalent).matrix
 
 
 def rank_matrices(model: ExactModel, rows: Sequence[Rows]) -> Iterator[Matrix]:
     """Matrices M(q), each for all q: J has rank m where M has full column rank; no columns: J has it everywhere.
 
-    A whole twist (v; omega) of a body is taken in the axes of any frame and at its origin or that of a neighbour, which
-    is a regular change of its six rows. Then numbers are pivots, see :func:`reduced`.
+    They are what pivots that are numbers leave of the equivalents, see :func:`reduced`.
     """
-    whole = [r for r in rows if _whole_twist(r)]
-    rest = [r for r in rows if not _whole_twist(r)]
-    fixed = symbolic_jacobian(model, rest).matrix if rest else []
-    if not whole:
-        yield reduced(model.ring, fixed)
-        return
-    frames = model.distinct_frames()
-    for i, axes in enumerate(frames):
-        for point in frames[max(i - 1, 0) : i + 2]:
-            blocks = [row for r in whole for row in _twist(model, r, point, axes)]
-            yield reduced(model.ring, blocks + fixed)
-
-
-def _whole_twist(rows: Rows) -> bool:
-    return (
-        isinstance(rows, BodyRows)
-        and rows.base == WORLD
-        and sorted(rows.translation) == list(ALL)
-        and sorted(rows.rotation) == list(ALL)
-    )
+    for matrix in equivalent_matrices(model, rows):
+        yield reduced(model.ring, matrix)
 
 
 def _twist(model: ExactModel, rows: Rows, point: str, axes: str) -> Matrix:

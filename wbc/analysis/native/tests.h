@@ -194,18 +194,59 @@ static int dominating(int n, int width, double A[][MOST_ROWS], double B[][MOST_R
     return 1;
 }
 
-/* Upper bound of the smallest singular value of J (rows <= cols) on the box. In the bases of J at the centre
-   J = [S + A, B; c', g'] with the smallest one last; with y' = c' (S + A)^-1 the vector (-y, 1), no shorter than 1,
-   times J is (0, g - y'B). `centre_value`: the singular
-   value at the centre, `least`: a lower bound on the box, by the Frobenius norm of the spread. */
+/* The bound of `tube` with the first `strong` singular values eliminated, and which joints it is due to; INFINITY
+   where they cannot be. In the bases of J at the centre J = [S + A, B; c', g'] with the smallest singular value last
+   and the weak ones, which only lie in B and g, between; with y' = c' (S + A)^-1 the vector (-y, 0, 1), no shorter
+   than 1, times J is (0, g - y'B). */
+static double eliminated(int strong, int n, int m, const Local *local, double *cut, Workspace *work)
+{
+    const Bases *b = &work->bases;
+    const Spread *s = &work->spread;
+    const int last = n - 1, width = m - strong;
+    const double pad = 1e-13 * b->sigma[0];
+    double size = 0.0, rest = 0.0;
+    for (int i = 0; i < strong; ++i) {
+        const double sigma = fmax(b->sigma[i], 1e-6 * b->sigma[0]);
+        for (int j = 0; j < strong; ++j)
+            work->A[i][j] = (s->total[j][i] + fabs(work->middle[j][i] - (i == j ? sigma : 0.0)) + pad) / sigma;
+        for (int c = 0; c < width; ++c)
+            work->B[i][c] = (s->total[strong + c][i] + fabs(work->middle[strong + c][i]) + pad) / sigma;
+    }
+    if (!dominating(strong, width, work->A, work->B, work->x))
+        return INFINITY;
+    for (int c = 0; c < width; ++c) {
+        double sum = s->total[strong + c][last] + fabs(work->middle[strong + c][last]) + pad;
+        for (int j = 0; j < strong; ++j)
+            sum += (s->total[j][last] + fabs(work->middle[j][last]) + pad) * work->x[j][c];
+        size += sum * sum;
+        rest += s->rest[strong + c][last];
+    }
+    memset(cut, 0, sizeof(double) * MOST_JOINTS);
+    for (int k = 0; k < local->count; ++k) {
+        const double (*part)[MOST_ROWS] = s->part[local->used[k]];
+        for (int c = 0; c < width; ++c) {
+            double sum = part[strong + c][last];
+            for (int j = 0; j < strong; ++j)
+                sum += part[j][last] * work->x[j][c] + s->total[j][last] * part[strong + c][j] / b->sigma[j];
+            cut[local->used[k]] += sum;
+        }
+    }
+    share(local, rest, cut);
+    return sqrt(size) * (1.0 + 1e-6);
+}
+
+/* Upper bound of the smallest singular value of J (rows <= cols) on the box, the best with all other singular values
+   eliminated or fewer of them: those that are small as well are better left alone. `centre_value`: the singular value
+   at the centre, `least`: a lower bound on the box, by the Frobenius norm of the spread. `cut` is of the bound that is
+   returned. */
 static double tube(const Form *f, const double *centre, const double *half, double *cut, double *centre_value,
                    double *least, Workspace *work)
 {
     Local *local = &work->local;
     Bases *b = &work->bases;
     Spread *s = &work->spread;
-    const int n = f->rows, m = f->cols, last = n - 1, width = m - last;
-    double plain = 0.0, better = 0.0, rest = 0.0, moved = 0.0;
+    const int n = f->rows, m = f->cols, last = n - 1;
+    double best = INFINITY, moved = 0.0;
     form_local(f, centre, half, local);
     /* of the transpose: its left bases are those of the joints, completed beyond the rank of the first n - 1 rows */
     bases(local->value, m, n, 1, m, n - 1, b);
@@ -218,40 +259,15 @@ static double tube(const Form *f, const double *centre, const double *half, doub
         for (int j = 0; j < n; ++j)
             moved += s->total[i][j] * s->total[i][j];
     *least = b->sigma[last] - sqrt(moved) * (1.0 + ROOM) - 1e-12 * b->sigma[0];
-    for (int i = 0; i < last; ++i) {
-        const double size = fmax(b->sigma[i], 1e-6 * b->sigma[0]);
-        for (int j = 0; j < last; ++j)
-            work->A[i][j] = (s->total[j][i] + fabs(work->middle[j][i] - (i == j ? size : 0.0)) + 1e-13 * b->sigma[0]) / size;
-        for (int c = 0; c < width; ++c)
-            work->B[i][c] = (s->total[last + c][i] + fabs(work->middle[last + c][i]) + 1e-13 * b->sigma[0]) / size;
-    }
-    for (int j = 0; j < m; ++j) {
-        const double size = s->total[j][last] + fabs(work->middle[j][last]) + 1e-13 * b->sigma[0];
-        plain += size * size;
-    }
-    const int found = dominating(last, width, work->A, work->B, work->x);
-    for (int c = 0; c < width; ++c) {
-        double size = s->total[last + c][last] + fabs(work->middle[last + c][last]) + 1e-13 * b->sigma[0];
-        for (int j = 0; found && j < last; ++j)
-            size += (s->total[j][last] + fabs(work->middle[j][last]) + 1e-13 * b->sigma[0]) * work->x[j][c];
-        better += size * size;
-    }
-    plain = sqrt(plain);
-    better = found ? sqrt(better) : INFINITY;
-    for (int k = 0; k < local->count; ++k) {
-        double (*part)[MOST_ROWS] = s->part[local->used[k]];
-        for (int c = 0; c < width; ++c) {
-            double sum = part[last + c][last];
-            for (int j = 0; j < last; ++j)
-                sum += found ? part[j][last] * work->x[j][c] + s->total[j][last] * part[last + c][j] / b->sigma[j]
-                             : part[j][last] / width;
-            cut[local->used[k]] += sum;
+    for (int strong = last; strong >= 0; --strong) {
+        double trial[MOST_JOINTS];
+        const double bound = eliminated(strong, n, m, local, trial, work);
+        if (bound < best) {
+            best = bound;
+            memcpy(cut, trial, sizeof trial);
         }
     }
-    for (int c = 0; c < width; ++c)
-        rest += s->rest[last + c][last];
-    share(local, rest, cut);
-    return fmin(plain, better) * (1.0 + 1e-6);
+    return best;
 }
 
 #endif
