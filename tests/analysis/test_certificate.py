@@ -83,6 +83,23 @@ def test_going_on_from_a_file(tmp_path: Path) -> None:
         certify(model, sets.task, rows, state=file)
 
 
+def test_an_interrupt_keeps_what_is_known_and_a_second_call_goes_on(tmp_path: Path) -> None:
+    sets = published_sets("spherical_4r")
+    model, rows, file = ExactModel(sets.robot), sets.sets["elbow, beta"], tmp_path / "state.npz"
+
+    def interrupted(part: float) -> None:
+        raise KeyboardInterrupt
+
+    cut = certify(model, sets.task, rows, workers=1, state=file, progress=interrupted)
+    assert cut.verdict == "undecided"
+    assert 0.0 < cut.left < 1.0
+    assert file.exists()
+    whole = certify(model, sets.task, rows, workers=1, state=file)
+    assert whole.verdict == "complete"
+    assert whole.counts.boxes > cut.counts.boxes
+    assert whole.counts.regular_part + whole.counts.tube_part == pytest.approx(1.0, abs=1e-9)
+
+
 def test_boxes_that_are_proved_have_full_rank_and_those_in_the_tube_lie_in_it() -> None:
     """Sampled, on the Space Station arm: both claims hold at random configurations of each box."""
     sets = published_sets("ssrms")

@@ -7,7 +7,8 @@ import pytest
 
 from tests.analysis.jacobians import jacobians
 from wbc.analysis import ExactModel, JointRows, analyse, published_sets
-from wbc.analysis.numeric import rank
+from wbc.analysis.equivalent_rows import split_twists
+from wbc.analysis.numeric import NumericRows, rank
 from wbc.errors import RangeError, ShapeError, UnknownNameError
 
 VERDICTS = {
@@ -53,3 +54,29 @@ def test_bad_requests() -> None:
         analyse(model, sets.task, [])
     with pytest.raises(UnknownNameError):
         published_sets("ssrm")
+
+
+def test_rows_and_their_splits_lose_rank_together() -> None:
+    """On the Space Station arm, at random configurations and on the locus of (4.33)."""
+    sets = published_sets("ssrms")
+    model, rng = ExactModel(sets.robot, sets.symbols), np.random.default_rng(0)
+    rows = (*sets.task, *sets.sets["elbow, beta, gamma"])
+    splits = list(split_twists(model, rows))
+    assert len(splits) == 8
+    places = rng.uniform(-np.pi, np.pi, (4, 7))
+    places[2:, 2:5] = [(np.pi / 2, 0.0, np.pi / 2), (-np.pi / 2, np.pi, np.pi / 2)]
+    for q, expected in zip(places, (7, 7, 6, 6), strict=True):
+        assert rank(NumericRows(sets.robot).value(rows, q)) == expected
+        assert {rank(NumericRows(sets.robot).value(split, q)) for split in splits} == {expected}
+
+
+def test_singular_vectors_end_on_the_space_station_arm() -> None:
+    """11 x 7: the published program never converged on it."""
+    sets = published_sets("ssrms")
+    found = analyse(
+        ExactModel(sets.robot, sets.symbols),
+        sets.task,
+        sets.sets["elbow, beta, gamma"],
+        algorithm="singular_vectors",
+    )
+    assert (found.verdict, len(found.locus.branches)) == ("loose", 8)

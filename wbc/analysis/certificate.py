@@ -78,8 +78,8 @@ def certify(
 
     A box is done when first-order forms with bounded rests prove that a matrix with the rank deficiency of J_R has
     full column rank on all of it, or that sigma_min(J_T) < eps on all of it; else it is cut. Rounding is covered by
-    padding. Joints that appear in neither matrix are not subdivided, symmetries cut the rest. A numeric search for a
-    witness goes first.
+    padding. The matrix is taken whole and in two blocks (:func:`block_proofs`). Joints that appear in neither matrix
+    are not subdivided, symmetries cut the rest. A numeric search for a witness goes first.
 
     Args:
         part: of the largest sigma_min(J_T), > 0 and < 1. minutes: after which the rest is left undecided.
@@ -119,9 +119,7 @@ def certify(
     chosen = _chosen(forms, own, eps)
     found = symmetries((chosen, own), used_joints((chosen, own)))
     proofs = (*block_proofs(model, (*wanted, *added), chosen.joints), (chosen,))
-    search, boxes = _begin(proofs, own, eps, found)
-    forms = [form for proof in proofs for form in proof]
-    pieces = Pieces(search, boxes, Path(state) if state is not None else None, (*forms, own), eps)
+    pieces = _pieces(proofs, own, eps, found, None if state is None else Path(state))
     finished = pieces.work(minutes, workers or os.cpu_count() or 1, progress)
     counts = pieces.counts
     verdict, left = COMPLETE, 0.0
@@ -163,10 +161,10 @@ def _chosen(forms: Sequence[TrigForm], task: TrigForm, eps: float) -> TrigForm:
     return min(few, key=boxes)
 
 
-def _begin(
-    proofs: Sequence[Sequence[TrigForm]], task: TrigForm, eps: float, found: Sequence[Symmetry]
-) -> tuple[BoxSearch, Array]:
-    """The search, and joint space in boxes: halves along the joints of the augmented matrix in turn, shuffled."""
+def _pieces(
+    proofs: Sequence[Sequence[TrigForm]], task: TrigForm, eps: float, found: Sequence[Symmetry], file: Path | None
+) -> Pieces:
+    """Joint space in boxes to be searched: halves along the joints of the augmented matrix in turn, shuffled."""
     augmented = proofs[-1][0]
     joints = used_joints((augmented, task))
     centre, half = fundamental_box(found, joints)
@@ -184,4 +182,4 @@ def _begin(
         high[:, k] += high[:, size + k]
         boxes = np.concatenate((low, high))
     order = np.random.default_rng(2).permutation(len(boxes))
-    return search, boxes[order]
+    return Pieces(search, boxes[order], file, (*(form for proof in proofs for form in proof), task), eps)

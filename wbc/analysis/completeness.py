@@ -11,6 +11,7 @@ import numpy as np
 from wbc import validation
 from wbc.analysis.branches import Branch
 from wbc.analysis.deficiency import Exact
+from wbc.analysis.equivalent_rows import split_twists
 from wbc.analysis.jacobian import SymbolicJacobian, symbolic_jacobian
 from wbc.analysis.locus import Locus
 from wbc.analysis.model import ExactModel
@@ -94,7 +95,7 @@ def analyse(
     joints = model.robot.nv
     if J_T.shape[0] > joints or J_R.shape[0] < joints:
         raise RangeError("rows", J_R.shape[0], f"expected at least {joints} in all and at most {joints} in the task")
-    locus = ALGORITHMS[algorithm](exact, J_R.matrix)
+    locus = ALGORITHMS[algorithm](exact, _shortest(model, (*wanted, *added), J_R))
     algorithmic = tuple(b for b in locus.branches if not exact.deficient(J_T.matrix, b))
     doubtful = [b for b in locus.open if not exact.deficient(J_T.matrix, b)]
     witness = _witness(model, exact, wanted, added, algorithmic)
@@ -104,6 +105,12 @@ def analyse(
     elif algorithmic or doubtful:
         verdict = UNDECIDED
     return Analysis(exact, J_T, J_R, locus, algorithmic, verdict, witness, time.process_time() - began)
+
+
+def _shortest(model: ExactModel, rows: tuple[Rows, ...], stacked: SymbolicJacobian) -> Matrix:
+    """Of the rows and their equivalents with a twist split at a point the matrix with the fewest terms."""
+    splits = (symbolic_jacobian(model, split).matrix for split in split_twists(model, rows))
+    return min((stacked.matrix, *splits), key=lambda matrix: sum(len(p) for row in matrix for p in row))
 
 
 def _witness(
