@@ -127,7 +127,9 @@ def test_limits_switch_on_and_off_without_chatter(control: PairController) -> No
     late = rates[300:]
     turns = (np.diff(np.sign(np.where(np.abs(late) > 1e-7, late, 0.0)), axis=0) != 0).sum(axis=0)
     assert turns.max() <= 4
-    assert abs(control.rates(q - control.dt * rates[-1])[ALPHA] @ rates[-1]) < 1e-9
+    # But for what takes its drift back
+    assert abs(control.rates(q - control.dt * rates[-1])[ALPHA] @ rates[-1]) < 1e-5
+    assert control.step(q).certificate.violation < 1e-10
 
 
 def test_prescribed_rates_of_constraints_are_exact(control: PairController) -> None:

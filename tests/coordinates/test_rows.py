@@ -110,11 +110,16 @@ def test_drift_vanishes_at_its_reference_and_has_the_rates_as_derivative(rows: A
         np.testing.assert_allclose(rates(rows, q) @ direction, slope, atol=2e-8)
 
 
-def test_what_has_no_integral_has_no_drift() -> None:
+def test_what_has_no_integral_is_told_its_drift() -> None:
     moving = BodyRows("tip", expressed="F5", translation=(0,), rotation=())
     for rows in (BETA, PitchPlaneRows("F3", "F5"), AxisRows("F6", (0.0, 0.0, 1.0)), moving):
         assert expressions.drift(ROBOT, Tracer(Kinematics(ROBOT.model)), rows, None) is None
-        assert [i.name for i in KeepRows(rows).inputs(ROBOT)] == ["speed", "gain"]
+        assert [i.name for i in KeepRows(rows).inputs(ROBOT)] == ["speed", "gain", "drift"]
+        assert expressions.rate_only(ROBOT, rows).all()
+    for rows in (BodyRows("tip"), JointRows("joint1"), PlaneAngleRows("F3", "F4", "F5")):
+        assert not expressions.rate_only(ROBOT, rows).any()
+    part = BodyRows("tip", expressed="world", rotation=(0, 1))
+    assert expressions.rate_only(ROBOT, part).tolist() == [False] * 3 + [True] * 2
 
 
 def test_three_points_stand_for_a_pose() -> None:
@@ -150,6 +155,7 @@ def test_three_points_stand_for_a_pose() -> None:
         (lambda: KeepRows(PitchPlaneRows("F3", "F3")).validate(ROBOT), RangeError),
         (lambda: KeepRows(PlaneAngleRows("F3", "F4", "F9")).validate(ROBOT), UnknownNameError),
         (lambda: KeepRows(JointRows("joint1"), gain=-1.0), RangeError),
+        (lambda: KeepRows(JointRows("joint1"), pull=0.0), RangeError),
         (lambda: AxisRows("F3", (0.0, 0.0, 0.0)), RangeError),
         (lambda: PointRows("tip", "plane"), ShapeError),
         (lambda: OnSphere((0, 0, 0), 0.0), RangeError),

@@ -10,15 +10,13 @@ from typing import Any
 import numpy as np
 
 from wbc import validation
-from wbc.coordinates.conditioning import Conditioning, checked_configuration
+from wbc.coordinates.conditioning import LEAST, Conditioning, checked_configuration
 from wbc.coordinates.determinant_places import ClosedForm, closed_form
 from wbc.coordinates.pair import CoordinatePair
 from wbc.errors import DuplicateNameError, ShapeError, UnknownNameError
 from wbc.robot import Robot
 from wbc.validation import Array
 
-#: Singular values below this count as lost, where nothing else is said [1]
-LEAST = 1e-2
 #: A change is recommended where another pair is better by this factor
 FACTOR = 1.5
 

@@ -24,6 +24,9 @@ from wbc.symbolic.kinematics import Kinematics
 from wbc.symbolic.tracer import Tracer
 from wbc.validation import Array
 
+#: Singular values below this count as lost, where nothing else is said [1]
+LEAST = 1e-2
+
 
 def checked_configuration(robot: Robot, q: Any) -> Array:
     """A configuration that was checked; arrays of plain coordinates in some tens of microseconds less.

@@ -11,8 +11,10 @@ from wbc import validation
 from wbc.controller import Step
 from wbc.coordinates import expressions
 from wbc.coordinates.conditioning import checked_configuration
+from wbc.coordinates.easing import Easing
+from wbc.coordinates.integrals import RateIntegrals
 from wbc.coordinates.pair import CoordinatePair
-from wbc.coordinates.pair_stack import PairStack, metric_of, pair_stack, row_count
+from wbc.coordinates.pair_stack import EASE, PairStack, metric_of, pair_stack, row_count
 from wbc.coordinates.rows import Coordinate
 from wbc.errors import UnknownNameError
 from wbc.robot import Robot
@@ -21,6 +23,8 @@ from wbc.validation import Array
 
 #: A blend's acceleration is at most this part of a joint's limit
 ROOM = 0.8
+#: Commanded rows that are rates only lag their integral by this at most [m, rad]; what limits take is not made up for
+LAG = 5e-4
 
 
 class PairController:
@@ -33,10 +37,14 @@ class PairController:
         control.switch("second")
 
     **Held rows** have rate zero, or the one given to :meth:`prescribe`, exactly; drift from where they came to rest is
-    taken back. **A switch** gives every row of the new pair that was not at rest the rate that it has now, and lets
-    the difference to what is commanded fade like 1 - 3 s^2 + 2 s^3, s = time / seconds: where the new pair is regular
-    the joint rates are continuous, and what both pairs hold stays exact. The time is the one asked for, or longer
-    where a joint's acceleration limit needs it.
+    taken back, for rates without an integral (alpha, beta, gamma) the drift along the way that the robot went. Of
+    those, commanded ones follow their integral, too. **Near a locus** of the active pair the task gives way, see
+    :class:`wbc.coordinates.easing.Easing`.
+
+    **A switch** gives every row of the new pair that was not at rest the rate that it has now, and lets the difference
+    to what is commanded fade like 1 - 3 s^2 + 2 s^3, s = time / seconds: where the new pair is regular the joint rates
+    are continuous, and what both pairs hold stays exact. The time is the one asked for, or longer where a joint's
+    acceleration limit needs it.
 
     Attributes:
         declared: the pairs' stack. controller: its compiled controller.
@@ -66,6 +74,8 @@ class PairController:
         self._served: dict[Coordinate, Array] = {}
         self._time, self._seconds = 0.0, 0.0
         self._moving: set[Coordinate] = set()
+        self._integrals = RateIntegrals(robot, self.declared.coordinates)
+        self._easing = Easing(robot, self.declared.stack.length)
         self._q: Array | None = None
         self._activate()
 
@@ -93,6 +103,7 @@ class PairController:
         q = self.robot.configuration("q", q)
         self.controller.reset(q, v)
         self._command, self._fading, self._served, self._q = {}, {}, {}, q
+        self._integrals.forget()
         self._activate()
         self._latch(self.pair.constraint, q)
 
@@ -141,6 +152,7 @@ class PairController:
             wanted = max(wanted, self._shortest(rows, v))
             kept = [one for one in self.pair.constraint if one in before]
             self._latch([one for one in self.pair.constraint if one not in kept], self._q)
+        self._integrals.restart(self.pair.task)
         self._time, self._seconds = 0.0, wanted
         if wanted == 0.0:
             self._fading = {}
@@ -170,22 +182,43 @@ class PairController:
         if self._q is None:
             self._latch(self.pair.constraint, q)
         self._q = np.array(q)
-        self._time += self.dt if dt is None else validation.scalar("dt", dt, low=0.0, unit="s")
+        period = self.dt if dt is None else validation.scalar("dt", dt, low=0.0, unit="s")
+        self._time += period
+        sigma, matrices = self._easing.rates(self.pair, q)
+        self._integrals.advance(q, matrices)
         s = min(1.0, self._time / self._seconds) if self._seconds > 0.0 else 1.0
         left = 1.0 - s * s * (3.0 - 2.0 * s)
         self._served = {one: self._wanted(one) + left * self._fading.get(one, 0.0) for one in self.pair.task}
         for one, rate in self._served.items():
-            self._item(one).speed = rate
+            self._follow(one, rate)
         for one in self.pair.constraint:
             rate = self._wanted(one) + left * self._fading.get(one, 0.0)
-            handle = self.controller[self.declared.keep[one]]
-            handle.speed = rate
-            if rate.any() or one in self._moving:
-                self._latch([one], q)
-            self._moving = self._moving | {one} if rate.any() else self._moving - {one}
+            self._keep(one, rate, q)
+            self._integrals.plan(one, rate, period, matrices[one])
+        for one, rate in self._served.items():
+            self._integrals.plan(one, rate, period, matrices[one])
         if s >= 1.0:
             self._fading = {}
+        self.controller[EASE].weight = self._easing.weight(sigma)
         return self.controller.step(q, v, dt)
+
+    def _follow(self, one: Coordinate, rate: Array) -> None:
+        """A task coordinate goes at a rate; what it is behind its integral, it makes up for."""
+        item = self._item(one)
+        item.speed = rate
+        if one in self._integrals.masks and not self._tall:
+            self._integrals.cap(one, LAG)
+            item.offset = -self._integrals.off(one)
+
+    def _keep(self, one: Coordinate, rate: Array, q: Array) -> None:
+        """A constraint coordinate goes at a rate; at rest its drift is taken back."""
+        handle = self.controller[self.declared.keep[one]]
+        handle.speed = rate
+        if rate.any() or one in self._moving:
+            self._latch([one], q)
+        self._moving = self._moving | {one} if rate.any() else self._moving - {one}
+        if one in self._integrals.masks:
+            handle.drift = self._integrals.off(one)
 
     def _item(self, one: Coordinate) -> Any:
         return self.controller[self.declared.follow[one, metric_of(self.pair, one)]]
@@ -205,6 +238,7 @@ class PairController:
 
     def _activate(self) -> None:
         """Switch the items of the active pair on and all others off."""
+        self._tall = self.pair.over_determined(self.robot)
         wishes = {self.declared.follow[one, metric_of(self.pair, one)] for one in self.pair.task}
         kept = {self.declared.keep[one] for one in self.pair.constraint}
         for name in (*self.declared.follow.values(), *self.declared.keep.values()):
@@ -212,6 +246,7 @@ class PairController:
 
     def _latch(self, rows: Iterable[Coordinate], q: Array) -> None:
         """What is held from now on is held where it is."""
+        self._integrals.restart(rows)
         for one in rows:
             if expressions.reference(self.robot, one) is not None:
                 value = expressions.here(self.robot, one, q)

@@ -11,6 +11,7 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
+from numpy.typing import NDArray
 
 from wbc.analysis.rows import BodyRows, JointRows, PitchPlaneRows
 from wbc.coordinates.rows import AxisRows, Coordinate, PlaneAngleRows, PointRows
@@ -24,6 +25,7 @@ from wbc.tasks.frames import frame_pose, require_motion
 from wbc.validation import Array
 
 REFERENCE = "reference"
+DRIFT = "drift"
 
 
 def check(robot: Robot, field: str, rows: Coordinate) -> None:
@@ -96,6 +98,15 @@ def reference(robot: Robot, rows: Coordinate) -> Input | None:
         single = place.stop - place.start == 1
         return Input(REFERENCE, unit=robot.dof_units[place.start]) if single else None
     return Input(REFERENCE, unit="rad") if isinstance(rows, PlaneAngleRows) else None
+
+
+def rate_only(robot: Robot, rows: Coordinate) -> NDArray[np.bool_]:
+    """Which rows have no drift of their own: their integral depends on the way."""
+    if isinstance(rows, BodyRows):
+        moved, turned = _corrected(robot, rows)
+        return np.array([not moved] * len(rows.translation) + [not turned] * len(rows.rotation))
+    known = isinstance(rows, PointRows) or reference(robot, rows) is not None
+    return np.full(len(labels(robot, rows)), not known)
 
 
 def drift(robot: Robot, kin: Tracer, rows: Coordinate, value: Any) -> ca.SX | None:

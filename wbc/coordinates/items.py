@@ -11,13 +11,16 @@ import numpy as np
 from wbc import validation
 from wbc.analysis.rows import BodyRows
 from wbc.coordinates import expressions
-from wbc.coordinates.expressions import REFERENCE
+from wbc.coordinates.expressions import DRIFT, REFERENCE
 from wbc.coordinates.rows import Coordinate
 from wbc.errors import RangeError
 from wbc.robot import Robot
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks.base import Constraint, Input, Order, Row, Rows, Task, Values
 from wbc.validation import Array
+
+#: Fastest return of what is held [m/s, rad/s]
+PULL = 0.05
 
 
 @dataclass(frozen=True)
@@ -97,11 +100,16 @@ class KeepRows(Constraint):
     """Coordinates have a prescribed rate, exactly: A(q) v = speed - gain e                       [m/s, rad/s]
 
     e is the drift from ``reference`` where the coordinates have one (see :mod:`wbc.coordinates.expressions`), so that
-    what is held does not wander; else 0.
+    what is held does not wander, and ``drift`` in rows that are rates only. gain e counts up to ``pull``: what is far
+    off, after a push or beside a locus, comes back at that speed.
 
     Inputs:
         speed: one number a row, 0 by default. gain: how fast drift decays [1/s], at most 1/dt.
         reference: pose, coordinate or angle that is held. Default: the one at the first step. Not for pure rates.
+        drift: e of rows that are rates only, one number a row (:class:`wbc.coordinates.integrals.RateIntegrals`).
+
+    Attributes:
+        coordinate: what is held. gain: first value of the input. pull: fastest return [m/s, rad/s].
     """
 
     #: Made by pairs, so it is not in the table of items
@@ -112,23 +120,29 @@ class KeepRows(Constraint):
 
     coordinate: Coordinate
     gain: float = 10.0
+    pull: float = PULL
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "gain", validation.scalar("gain", self.gain, low=0.0, unit="1/s"))
+        fastest = validation.scalar("pull", self.pull, low=0.0, open_low=True, unit="m/s, rad/s")
+        object.__setattr__(self, "pull", fastest)
 
     def validate(self, robot: Robot) -> None:
         """See :func:`expressions.check`."""
         expressions.check(robot, "constraint", self.coordinate)
 
     def inputs(self, robot: Robot) -> tuple[Input, ...]:
-        """``speed``, ``gain`` and, where there is one, ``reference``."""
+        """``speed``, ``gain`` and, where there are such, ``reference`` and ``drift``."""
         given = expressions.labels(robot, self.coordinate)
         rates = ", ".join(f"{u}/s" for u in dict.fromkeys(r.unit for r in given))
         held = expressions.reference(robot, self.coordinate)
-        own = (
+        own: tuple[Input, ...] = (
             Input("speed", unit=rates, size=len(given), default=np.zeros(len(given))),
             Input("gain", unit="1/s", default=self.gain, low=0.0),
         )
+        if expressions.rate_only(robot, self.coordinate).any():
+            units = ", ".join(dict.fromkeys(r.unit for r in given))
+            own = (*own, Input(DRIFT, unit=units, size=len(given), default=np.zeros(len(given))))
         return own if held is None else (*own, held)
 
     def initial(self, robot: Robot, q: Array) -> dict[str, Any]:
@@ -144,5 +158,8 @@ class KeepRows(Constraint):
     def velocity_rows(self, robot: Robot, kin: Tracer, inputs: Values, dt: ca.SX) -> Rows:
         """See the class."""
         off = expressions.drift(robot, kin, self.coordinate, inputs.get(REFERENCE))
-        wanted = inputs["speed"] if off is None else inputs["speed"] - inputs["gain"] * off
+        off = ca.SX(0) if off is None else off
+        if DRIFT in inputs:
+            off = off + inputs[DRIFT]
+        wanted = inputs["speed"] - ca.fmax(-self.pull, ca.fmin(self.pull, inputs["gain"] * off))
         return Rows(expressions.matrix(robot, kin, self.coordinate), wanted, wanted)

@@ -12,10 +12,12 @@ from wbc.coordinates.pair import CoordinatePair, is_pose
 from wbc.coordinates.rows import Coordinate
 from wbc.errors import DuplicateNameError, ShapeError
 from wbc.robot import Robot
-from wbc.tasks import Item, JointLimits
+from wbc.tasks import Damping, Item, JointLimits
 
 #: Cost of joint speed against a task row of weight 1, less than that of other stacks: operators' rates are to be met
 DAMPING = 1e-11
+#: Name of the item that lets the task give way near a locus, see :class:`wbc.coordinates.easing.Easing`
+EASE = "ease near a locus"
 #: Part of the drift of what is held that one step takes back
 SHARE = 0.5
 
@@ -51,7 +53,8 @@ def pair_stack(
     Args:
         dt: time between commands [s].
         items: further constraints (obstacles, boxes) or wishes. limits: keep the joint limits, in the order of
-            sacrifice before what is held.
+            sacrifice before what is held; False: those of the rates only, without which a step beside a locus would
+            leave what it is linear for.
         gain: how fast drift of what is held decays [1/s]; default: half of it in one step.
         length: characteristic length [m], as of :class:`wbc.Stack`.
 
@@ -84,10 +87,10 @@ def pair_stack(
             if one not in keep:
                 keep[one] = f"keep {labels[one]}"
                 stack.add(KeepRows(one, SHARE / dt if gain is None else gain), name=keep[one])
+    stack.add(Damping(), name=EASE)
     for item in items:
         stack.add(item)
-    if limits:
-        stack.add(JointLimits())
+    stack.add(JointLimits() if limits else JointLimits(position=False, acceleration=False))
     return PairStack(stack, named, every, follow, keep)
 
 
