@@ -12,8 +12,8 @@ from wbc.walking import Structure
 from wbc.walking.reference import Reference
 from wbc.walking.walk_stack import WalkStack
 
-#: Layouts, and how many a test judges
-COUNT, AT_ONCE = 30, 3
+#: Layouts, and how many a test judges; `wbc bench walk` judges 1000
+COUNT, AT_ONCE = 12, 3
 
 
 @pytest.fixture(scope="module")
