@@ -15,7 +15,10 @@ from typing import Any
 from wbc.errors import PicklingError
 from wbc.stack.declaration import Declaration
 
-_PLACES = ("wbc.tasks.", "wbc.robot.", "wbc.shapes", "wbc.stack.declaration", "wbc.controller.stack")
+_PLACES = (
+    *("wbc.tasks.", "wbc.robot.", "wbc.shapes", "wbc.stack.declaration", "wbc.controller.stack"),
+    *("wbc.coordinates.items", "wbc.coordinates.rows", "wbc.coordinates.point_sets", "wbc.analysis.rows"),
+)
 _OTHERS = {
     ("numpy", "ndarray"),
     ("numpy", "dtype"),
