@@ -7,8 +7,10 @@ import pytest
 from wbc.robots import Walker
 from wbc.walking import Structure
 from wbc.walking.body_path import grid_path
+from wbc.walking.drive import standing_plan
 from wbc.walking.planner import plan_walk
 from wbc.walking.stance_search import Move
+from wbc.walking.structures import grid_pose, remove_fraction
 from wbc.walking.swing_law import SwingLaw
 from wbc.walking.swings import Swings
 
@@ -36,3 +38,10 @@ def test_a_swing_that_turns_out_impossible_is_not_in_the_plan(
     assert other.complete
     assert len(other.laws) == len(other.regrasps)
     assert (step.source, step.target) not in [(one.source, one.target) for one in other.regrasps]
+
+
+def test_a_corrected_time_counts_only_where_the_way_is_possible(machine: Walker, structure: Structure) -> None:
+    """The same swing with other room to land has no way here, though its time was corrected before."""
+    sparse = remove_fraction(structure, 0.74, 0)
+    plan = standing_plan(machine, sparse, grid_pose(13, 8, 152 * 0.0254))
+    assert not plan.regrasps

@@ -128,9 +128,10 @@ class Swings:
             rest = []
             for swing in left:
                 track = self._tracks[_name(swing), way]
-                duration = self._known.get((*_name(swing)[:4], way), track.duration if track is not None else None)
-                if duration is not None and all(self._apart[_name(swing), way, g] for g in swing.others):
-                    self._chosen[swing] = Chosen(way, duration)
+                # A time that was corrected in other room tells nothing where there is no way in this one
+                known = None if track is None else self._known.get((*_name(swing)[:4], way), track.duration)
+                if known is not None and all(self._apart[_name(swing), way, g] for g in swing.others):
+                    self._chosen[swing] = Chosen(way, known)
                 else:
                     rest.append(swing)
             left = rest

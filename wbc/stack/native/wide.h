@@ -13,7 +13,7 @@ typedef long double wide;
 
 /* M_i y, where M are the rows as the solver sees them: through R, and of length one */
 static double seen_through(const wbc_tick *t, int i, const double *y) {
-    if (i < NV) return t->scaling[i] * dot(t->inverse + i * WIDE, y, i);
+    if (MC == 0 || i < NV) return t->scaling[i] * dot(t->inverse + i * WIDE, y, i);
     double sum = 0.0;
     for (int j = 0; j < NV; j++) sum += t->M[(i - NV) * NV + j] * y[j];
     return sum;
@@ -22,7 +22,7 @@ static double seen_through(const wbc_tick *t, int i, const double *y) {
 /* y += f M_i' */
 static void push_back(const wbc_tick *t, int i, double f, double *y) {
     if (i < NV) axpy(y, t->inverse + i * WIDE, f * t->scaling[i], i);
-    for (int j = 0; i >= NV && j < NV; j++) y[j] += f * t->M[(i - NV) * NV + j];
+    for (int j = 0; MC > 0 && i >= NV && j < NV; j++) y[j] += f * t->M[(i - NV) * NV + j];
 }
 
 /* r = (M M')^-1 r for the first `count` active rows, from DAQP's factors L D L' */
