@@ -13,7 +13,7 @@ from wbc.walking.reference import Reference
 from wbc.walking.walk_stack import WalkStack
 
 #: Layouts, and how many a test judges; `wbc bench walk` judges 1000
-COUNT, AT_ONCE = 12, 3
+COUNT, AT_ONCE = 30, 3
 
 
 @pytest.fixture(scope="module")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from math import radians
 
 import numpy as np
@@ -67,7 +66,7 @@ class Grips:
     def __len__(self) -> int:
         return len(self.arm)
 
-    @cached_property
+    @property
     def table(self) -> compiled.Table:
         """As the compiled code wants them; they must live as long."""
         return compiled.Table(*(array.ctypes.data for array in (self.postures, self.offset, self.first, self.last)))
