@@ -9,7 +9,9 @@ import pytest
 
 from tests.published.arm_machine import STATE, Machine
 from wbc.coordinates import Coordinate, CoordinatePair, PairController, expressions, parts
+from wbc.coordinates.conditioning import Conditioning
 from wbc.coordinates.easing import Easing
+from wbc.coordinates.rate_matrices import RateMatrices
 
 PARTS = parts("ssrms")
 ROBOT, ARM = PARTS.robot, PARTS.arms[0]
@@ -96,11 +98,24 @@ def test_a_stretched_arm_comes_to_rest(control: PairController) -> None:
     assert np.abs(v).max() < 0.01
 
 
-def test_easing_is_nothing_where_a_pair_is_regular() -> None:
-    easing = Easing(ROBOT, ROBOT.characteristic_length)
-    sigma, matrices = easing.rates(CoordinatePair(XI, ALPHA), STATE)
-    assert sigma > 0.01
-    assert easing.weight(sigma) == 0.0
-    assert {str(one): J.shape for one, J in matrices.items()} == {"xi": (6, 7), "alpha": (1, 7)}
-    assert easing.weight(0.0) == pytest.approx(0.005**2)
-    assert easing.weight(0.005) == pytest.approx((0.005 * 0.75) ** 2)
+def test_easing_is_that_of_the_least_singular_value() -> None:
+    """A bound answers in place of singular values along a way past loci; at each place it is what they are."""
+    pairs = [CoordinatePair(XI, ALPHA), CoordinatePair(ALPHA, XI, "back"), CoordinatePair(XI, [ALPHA, BETA], "tall")]
+    exact = Conditioning(ROBOT, [pair.rows for pair in pairs], backend="vm")
+    compiled, plain = (RateMatrices(ROBOT, (XI, ALPHA, BETA), native=native) for native in (True, False))
+    easings = [Easing(ROBOT, ROBOT.characteristic_length, compiled) for _ in pairs]
+    eased = []
+    for x in np.linspace(0.0, 1.0, 301):
+        q = STATE + x * np.array((0.2, 1.2, 0.3, -1.3 * STATE[3], 0.1, 0.2, 0.1))
+        every = compiled.whole(q)
+        np.testing.assert_allclose(every, plain.whole(q), rtol=0.0, atol=1e-13)
+        for pair, easing, sigma in zip(pairs, easings, exact.sigmas(q), strict=True):
+            found = easing.at(pair, every)
+            assert found == pytest.approx(easing.weight(sigma), rel=1e-6, abs=1e-15)
+            eased.append(found > 0.0)
+    assert 10 < sum(eased) < 400
+    # One that looks at another pair in between answers as one that does not
+    for pair, easing in zip(pairs, easings, strict=True):
+        assert easings[0].at(pair, every) == easing.at(pair, every)
+    assert easings[0].weight(0.0) == pytest.approx(0.005**2)
+    assert easings[0].weight(0.005) == pytest.approx((0.005 * 0.75) ** 2)

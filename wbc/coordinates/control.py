@@ -15,6 +15,7 @@ from wbc.coordinates.easing import Easing
 from wbc.coordinates.integrals import RateIntegrals
 from wbc.coordinates.pair import CoordinatePair
 from wbc.coordinates.pair_stack import EASE, PairStack, metric_of, pair_stack, row_count
+from wbc.coordinates.rate_matrices import RateMatrices
 from wbc.coordinates.rows import Coordinate
 from wbc.errors import UnknownNameError
 from wbc.robot import Robot
@@ -66,7 +67,7 @@ class PairController:
         self.declared: PairStack = pair_stack(robot, pairs, dt, items=items, limits=limits, gain=gain, length=length)
         self.robot, self.dt = robot, self.declared.stack.dt
         self.controller = self.declared.stack.compile(backend=backend)
-        self._rates = expressions.rate_function(robot, self.declared.coordinates)
+        self._rates = RateMatrices(robot, self.declared.coordinates, native=self.controller.backend == "native")
         self._sizes = {one: row_count(robot, [one]) for one in self.declared.coordinates}
         self.active = next(iter(self.declared.pairs))
         self._command: dict[Coordinate, Array] = {}
@@ -75,7 +76,7 @@ class PairController:
         self._time, self._seconds = 0.0, 0.0
         self._moving: set[Coordinate] = set()
         self._integrals = RateIntegrals(robot, self.declared.coordinates)
-        self._easing = Easing(robot, self.declared.stack.length)
+        self._easing = Easing(robot, self.declared.stack.length, self._rates)
         self._q: Array | None = None
         self._activate()
 
@@ -164,13 +165,13 @@ class PairController:
         return tuple(row.unit for one in rows for row in expressions.labels(self.robot, one))
 
     def rates(self, q: Any) -> dict[Coordinate, Array]:
-        """The matrix of every coordinate's rates at a configuration [rows, nv]."""
-        every = np.asarray(self._rates(q).full())
-        out, start = {}, 0
-        for one, size in self._sizes.items():
-            out[one] = every[start : start + size]
-            start += size
-        return out
+        """The matrix of every coordinate's rates at a configuration [rows, nv].
+
+        Raises:
+            ShapeError, NotFiniteError, RotationError: no configuration.
+        """
+        whole = self._rates.whole(self.robot.configuration("q", q))
+        return self._rates.split(whole, self._rates.places)
 
     def step(self, q: Any, v: Any = None, dt: Any = None) -> Step:
         """One cycle: the velocity for the next dt seconds, see :meth:`wbc.Controller.step`.
@@ -184,7 +185,8 @@ class PairController:
         self._q = np.array(q)
         period = self.dt if dt is None else validation.scalar("dt", dt, low=0.0, unit="s")
         self._time += period
-        sigma, matrices = self._easing.rates(self.pair, q)
+        every = self._rates.whole(q)
+        matrices = self._rates.split(every, self.pair.rows)
         self._integrals.advance(q, matrices)
         s = min(1.0, self._time / self._seconds) if self._seconds > 0.0 else 1.0
         left = 1.0 - s * s * (3.0 - 2.0 * s)
@@ -199,7 +201,10 @@ class PairController:
             self._integrals.plan(one, rate, period, matrices[one])
         if s >= 1.0:
             self._fading = {}
-        self.controller[EASE].weight = self._easing.weight(sigma)
+        ease, weight = self.controller[EASE], self._easing.at(self.pair, every)
+        # Writing a weight costs more than a look at it
+        if ease.weight != weight:
+            ease.weight = weight
         return self.controller.step(q, v, dt)
 
     def _follow(self, one: Coordinate, rate: Array) -> None:

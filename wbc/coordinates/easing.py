@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
-
-import casadi as ca
 import numpy as np
 
-from wbc.coordinates import expressions
 from wbc.coordinates.conditioning import LEAST
 from wbc.coordinates.pair import CoordinatePair
-from wbc.coordinates.rows import Coordinate
+from wbc.coordinates.rate_matrices import RateMatrices
 from wbc.robot import Robot
 from wbc.validation import Array
+
+#: A bound this many times LEAST is above it, whatever rounding did
+CLEAR = 1.001
 
 
 class Easing:
@@ -29,25 +28,31 @@ class Easing:
     manipulator control", for damping that depends on the distance to a singularity.
     """
 
-    def __init__(self, robot: Robot, length: float) -> None:
-        self._robot, self._length = robot, robot.characteristic_length
-        self._most = 0.5 * LEAST * min(1.0, robot.characteristic_length / length)
-        self._dofs = np.array([self._length if unit == "m" else 1.0 for unit in robot.dof_units])
-        self._known: dict[CoordinatePair, tuple[ca.Function, Array, tuple[slice, ...]]] = {}
+    def __init__(self, robot: Robot, length: float, rates: RateMatrices) -> None:
+        own = robot.characteristic_length
+        self._places = rates.places
+        self._most = 0.5 * LEAST * min(1.0, own / length)
+        rows = np.array([1.0 / own if unit == "m" else 1.0 for unit in rates.units])
+        self._scales = rows[:, None] * np.array([own if unit == "m" else 1.0 for unit in robot.dof_units])
+        #: The pair, the matrix of all coordinates and the room of the singular value looked at last
+        self._pair: CoordinatePair | None = None
+        self._matrix, self._room = np.zeros_like(self._scales), 0.0
 
-    def rates(self, pair: CoordinatePair, q: Array) -> tuple[float, dict[Coordinate, Array]]:
-        """(the least singular value of a pair, the matrix of each of its coordinates) at a configuration, unchecked."""
-        if pair not in self._known:
-            rows = [expressions.labels(self._robot, one) for one in pair.rows]
-            scale = np.array([1.0 / self._length if row.unit == "m" else 1.0 for some in rows for row in some])
-            ends = np.cumsum([0, *map(len, rows)]).tolist()
-            places = tuple(slice(a, b) for a, b in pairwise(ends))
-            function = expressions.rate_function(self._robot, pair.rows)
-            self._known[pair] = function, scale[:, None] * self._dofs, places
-        function, scales, places = self._known[pair]
-        J = np.asarray(function(q).full())
-        sigma = float(np.linalg.svd(scales * J, compute_uv=False)[-1])
-        return sigma, {one: J[place] for one, place in zip(pair.rows, places, strict=True)}
+    def at(self, pair: CoordinatePair, every: Array) -> float:
+        """lambda^2 where the rates of all coordinates have the matrix ``every``.
+
+        Singular values are computed only where they may be below LEAST: from one matrix to another none changes by
+        more than the Frobenius norm of the difference (H. Weyl, 1912), that of all coordinates' rows for any pair's.
+        """
+        if pair is self._pair:
+            change = (self._scales * (every - self._matrix)).ravel()
+            if np.sqrt(change.dot(change)) < self._room:
+                return 0.0
+        M = self._scales * every
+        found = np.linalg.svd(np.vstack([M[self._places[one]] for one in pair.rows]), compute_uv=False)
+        sigma = float(found[-1])
+        self._pair, self._matrix, self._room = pair, every, sigma - CLEAR * LEAST
+        return self.weight(sigma)
 
     def weight(self, sigma: float) -> float:
         """lambda^2."""
