@@ -67,6 +67,34 @@ def test_pictures_of_a_locus(tmp_path: Path) -> None:
     assert all(p.stat().st_size > 10_000 for p in tmp_path.glob("*.png"))
 
 
+def test_a_whole_tree_by_blocks(tmp_path: Path) -> None:
+    file = tmp_path / "tree.json"
+    code, out, _ = run("spdm_on_ssrms", "--set", "arms alpha", "--json", file)
+    assert code == 0
+    assert "arms alpha: 26 x 22, incomplete" in out
+    assert "block    arm2_joint1 ... arm2_joint7: 7 x 7, loses rank" in out
+    assert "block    body_joint: 1 x 1, strict" in out
+    assert "carrier_joint1 ... carrier_joint7 loses rank" in out
+    (found,) = json.loads(file.read_text())["sets"]
+    assert [b["shape"] for b in found["blocks"]] == [[11, 7], [1, 1], [7, 7], [7, 7]]
+    assert len(found["blocks"][0]["locus"]) == 8
+    assert len(found["witness"]["q"]) == 22
+    for option in ("--certify", "--approximate", "--full"):
+        code, _, err = run("spdm_on_ssrms", option)
+        assert code == 2
+        assert "not for a tree" in err
+    code, _, err = run("spdm_on_ssrms", "--set", "elbow, beta")
+    assert code == 2
+    assert "did you mean 'elbow, " in err
+
+
+def test_a_screen_takes_no_constraints_of_ones_own() -> None:
+    for own in (("--lock", "joint1"), ("--point", "end3"), ("--plane", "F3,F5"), ("--set", "q1")):
+        code, _, err = run("ssrms", "--screen", 2, *own)
+        assert code == 2
+        assert "screen: " in err
+
+
 def test_bad_input() -> None:
     assert run("spherical_4r", "--set", "gamma")[0] == 2
     assert run("spherical_4r", "--algorithm", "rsda")[0] == 2

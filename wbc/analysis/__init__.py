@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from wbc.analysis.blocks import BlockAnalysis, TreeAnalysis, analyse_blocks
 from wbc.analysis.boxes import Counts
 from wbc.analysis.branches import Branch
 from wbc.analysis.certificate import Certificate, certify
@@ -19,11 +20,13 @@ from wbc.analysis.rows import BodyRows, JointRows, PitchPlaneRows, Rows
 from wbc.analysis.screen import Screened, screen
 from wbc.analysis.singular_vectors import singular_vector_locus
 from wbc.analysis.sub_determinants import sub_determinant_locus
+from wbc.analysis.tree_joints import JointBlock, joint_blocks
 from wbc.analysis.weakest import NumericWitness
 
 __all__ = [
     "ALGORITHMS",
     "Analysis",
+    "BlockAnalysis",
     "BodyRows",
     "Branch",
     "Certificate",
@@ -32,6 +35,7 @@ __all__ = [
     "Determinant",
     "Exact",
     "ExactModel",
+    "JointBlock",
     "JointRows",
     "Locus",
     "Notation",
@@ -42,12 +46,15 @@ __all__ = [
     "Rows",
     "Screened",
     "SymbolicJacobian",
+    "TreeAnalysis",
     "Value",
     "Witness",
     "analyse",
+    "analyse_blocks",
     "candidate_rows",
     "certify",
     "factored_determinant",
+    "joint_blocks",
     "joint_roots",
     "published_sets",
     "screen",

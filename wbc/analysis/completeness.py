@@ -22,6 +22,7 @@ from wbc.analysis.rows import Rows, checked
 from wbc.analysis.singular_vectors import singular_vector_locus
 from wbc.analysis.sub_determinants import sub_determinant_locus
 from wbc.errors import RangeError
+from wbc.robot import Robot
 from wbc.validation import Array
 
 ALGORITHMS: dict[str, Callable[[Exact, Matrix], Locus]] = {
@@ -87,24 +88,66 @@ def analyse(
     Raises:
         UnknownNameError: algorithm, frame or joint. RangeError: fewer rows than joints, or more task rows than joints.
     """
-    validation.one_of("algorithm", algorithm, ALGORITHMS)
     began = time.process_time()
     wanted, added = checked("task", task), checked("constraints", constraints)
-    exact = Exact(model.ring)
-    J_T, J_R = symbolic_jacobian(model, wanted), symbolic_jacobian(model, (*wanted, *added))
-    joints = model.robot.nv
-    if J_T.shape[0] > joints or J_R.shape[0] < joints:
+    rows = (*wanted, *added)
+    found = loci(model, wanted, rows, algorithm)
+    witness = find_witness(model.robot, found, wanted, rows, model.configuration)
+    verdict = found.verdict(witness)
+    return Analysis(
+        found.exact,
+        symbolic_jacobian(model, wanted),
+        found.augmented,
+        found.locus,
+        found.algorithmic,
+        verdict,
+        witness,
+        time.process_time() - began,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Loci:
+    """Where rows lose rank, and where the task does not.
+
+    Attributes:
+        exact: arithmetic of the robot. augmented: all rows. locus: where they have less than full rank.
+        algorithmic: branches on which the task is not known to be deficient. doubtful: those among the open ones.
+    """
+
+    exact: Exact
+    augmented: SymbolicJacobian
+    locus: Locus
+    algorithmic: tuple[Branch, ...]
+    doubtful: tuple[Branch, ...]
+
+    def verdict(self, witness: Witness | None) -> str:
+        """In the words of :class:`Analysis`."""
+        if witness is not None:
+            return INCOMPLETE
+        if self.algorithmic or self.doubtful:
+            return UNDECIDED
+        return LOOSE if self.locus.branches else STRICT
+
+
+def loci(model: ExactModel, task: Sequence[Rows], rows: Sequence[Rows], algorithm: str) -> Loci:
+    """The locus of rows; ``task``: some of them, none if their rank depends on other joints than the model's.
+
+    Raises:
+        UnknownNameError, RangeError: see :func:`analyse`.
+    """
+    validation.one_of("algorithm", algorithm, ALGORITHMS)
+    exact, joints = Exact(model.ring), model.robot.nv
+    J_T = symbolic_jacobian(model, task).matrix if task else []
+    J_R = symbolic_jacobian(model, rows)
+    if len(J_T) > joints or J_R.shape[0] < joints:
         raise RangeError("rows", J_R.shape[0], f"expected at least {joints} in all and at most {joints} in the task")
-    locus = ALGORITHMS[algorithm](exact, _shortest(model, (*wanted, *added), J_R))
-    algorithmic = tuple(b for b in locus.branches if not exact.deficient(J_T.matrix, b))
-    doubtful = [b for b in locus.open if not exact.deficient(J_T.matrix, b)]
-    witness = _witness(model, exact, wanted, added, algorithmic)
-    verdict = STRICT if not locus.branches else LOOSE
-    if witness is not None:
-        verdict = INCOMPLETE
-    elif algorithmic or doubtful:
-        verdict = UNDECIDED
-    return Analysis(exact, J_T, J_R, locus, algorithmic, verdict, witness, time.process_time() - began)
+    locus = ALGORITHMS[algorithm](exact, _shortest(model, tuple(rows), J_R))
+
+    def kept(branches: Sequence[Branch]) -> tuple[Branch, ...]:
+        return tuple(b for b in branches if not J_T or not exact.deficient(J_T, b))
+
+    return Loci(exact, J_R, locus, kept(locus.branches), kept(locus.open))
 
 
 def _shortest(model: ExactModel, rows: tuple[Rows, ...], stacked: SymbolicJacobian) -> Matrix:
@@ -113,20 +156,24 @@ def _shortest(model: ExactModel, rows: tuple[Rows, ...], stacked: SymbolicJacobi
     return min((stacked.matrix, *splits), key=lambda matrix: sum(len(p) for row in matrix for p in row))
 
 
-def _witness(
-    model: ExactModel, exact: Exact, task: tuple[Rows, ...], constraints: tuple[Rows, ...], branches: Sequence[Branch]
+def find_witness(
+    robot: Robot, found: Loci, task: Sequence[Rows], rows: Sequence[Rows], configuration: Callable[[Array], Array]
 ) -> Witness | None:
-    """The best of random points on the first branch that has one: its task is farthest from a loss of rank."""
-    numeric, rng = NumericRows(model.robot), np.random.default_rng(0)
-    for branch in branches:
+    """The best of random points on the first branch that has one: its task is farthest from a loss of rank.
+
+    Args:
+        configuration: of the robot, from a number for each joint of the arithmetic that found the branches.
+    """
+    numeric, rng = NumericRows(robot), np.random.default_rng(0)
+    for branch in found.algorithmic:
         best: Witness | None = None
         for _ in range(TRIES):
-            point = real_point(exact.half, branch, rng)
+            point = real_point(found.exact.half, branch, rng)
             if point is None:
                 continue
-            q = model.configuration(point)
-            J_T, J_R = numeric.value(task, q), numeric.value((*task, *constraints), q)
-            if rank(J_T) < J_T.shape[0] or rank(J_R) == model.robot.nv:
+            q = configuration(point)
+            J_T, J_R = numeric.value(task, q), numeric.value(rows, q)
+            if rank(J_T) < J_T.shape[0] or rank(J_R) == robot.nv:
                 continue
             sigma, every = singular_values(J_T), singular_values(J_R)
             if best is None or sigma[-1] > best.task[-1]:

@@ -21,7 +21,7 @@ class ExactModel:
 
     Attributes:
         robot: the robot. ring: polynomials of its joint variables; joint i of the text is number i in v, from 1.
-        notes: what was not taken exactly as written: rotations that were approximated.
+        approximate: whether rotations may be. notes: those that were.
     """
 
     def __init__(self, robot: Robot, symbols: Mapping[str, float] | None = None, *, approximate: bool = False) -> None:
@@ -38,7 +38,7 @@ class ExactModel:
         """
         if not isinstance(robot, Robot):
             raise ShapeError("robot", robot, "expected a Robot")
-        self.robot, self.notes = robot, list[str]()
+        self.robot, self.approximate, self.notes = robot, approximate, list[str]()
         model = robot.model
         axes = [self._axis(j, approximate) for j in range(1, model.njoints)]
         coordinates = [
@@ -51,7 +51,6 @@ class ExactModel:
             exact_placement(self.ring, model.jointPlacements[j], f"joint {model.names[j]!r}", approximate, self.notes)
             for j in range(1, model.njoints)
         ]
-        self._approximate = approximate
         self._frames: dict[str, tuple[int, Transform]] = {WORLD: (0, identity(self.ring))}
         self._seen: dict[tuple[str, int], Transform] = {}
 
@@ -64,7 +63,7 @@ class ExactModel:
         self.robot.check_frame("frame", name)
         if name not in self._frames:
             frame = self.robot.model.frames[frame_index(self.robot.model, name)]
-            place = exact_placement(self.ring, frame.placement, f"frame {name!r}", self._approximate, self.notes)
+            place = exact_placement(self.ring, frame.placement, f"frame {name!r}", self.approximate, self.notes)
             self._frames[name] = int(frame.parentJoint), place
         return self._frames[name]
 

@@ -30,6 +30,8 @@ from wbc.cli.certificates import Subdivision, certified, record, winner
 from wbc.cli.console import out
 from wbc.cli.options import RobotName
 from wbc.cli.planning import tip_frame
+from wbc.cli.trees import analyse_tree
+from wbc.coordinates import TREES
 from wbc.errors import RangeError, RobotFileError
 
 _WHAT, _OUTPUT = "What is analysed", "What it writes"
@@ -94,15 +96,21 @@ def analyse_(
 ) -> None:
     """Say where task and constraint coordinates lose rank, and whether they always suffice.
 
-    The published arms have sets by name; --lock, --point and --plane make one for any robot.
+    The published arms have sets by name, and spdm_on_ssrms sets of all 22 joints, decided by blocks; --lock, --point
+    and --plane make one for any robot.
     """
     validation.one_of("algorithm", algorithm, ALGORITHMS)
     if robot == "spdm" and not (lock or point or plane):
         robot = "spdm_arm" if full else "spdm_arm_simplified"
     how = Subdivision(minutes, resume) if certify or full or screen is not None else None
-    own: list[Rows] = [JointRows(name) for name in lock or ()]
-    own += [BodyRows(name, rotation=()) for name in point or ()]
-    own += [_plane(text) for text in plane or ()]
+    own = _own(lock, point, plane)
+    if screen is not None and (own or chosen):
+        raise RangeError("screen", screen, "finds the constraints by itself: without --set, --lock, --point, --plane")
+    if robot in TREES and not own and frame is None:
+        refused = {"approximate": approximate, "certify": how is not None, "resume": resume, "plot": plot}
+        found_sets = analyse_tree(robot, chosen or (), algorithm, latex, refused)
+        _write(json_, {"robot": robot, "algorithm": algorithm, "sets": found_sets})
+        return
     task: tuple[Rows, ...]
     if own or frame is not None or robot not in ROBOTS:
         if not own or chosen:
@@ -134,13 +142,19 @@ def analyse_(
                 out().print(f"[bold]{escape(name)}[/bold]")
             entry["certificate"] = record(certified(model, robot, name, task, rows, how))
         records.append(entry)
-    if json_ is not None:
-        _write(json_, {"robot": robot, "algorithm": algorithm, "sets": records})
+    _write(json_, {"robot": robot, "algorithm": algorithm, "sets": records})
 
 
 def _pictures(model: ExactModel, found: Analysis, folder: Path, name: str) -> None:
     for file in save_pictures(model, found, folder, re.sub(r"\W+", "-", name)):
         out().print(f"  written  {escape(str(file))}", soft_wrap=True)
+
+
+def _own(lock: list[str] | None, point: list[str] | None, plane: list[str] | None) -> list[Rows]:
+    """Constraints of one's own."""
+    own: list[Rows] = [JointRows(name) for name in lock or ()]
+    own += [BodyRows(name, rotation=()) for name in point or ()]
+    return own + [_plane(text) for text in plane or ()]
 
 
 def _plane(text: str) -> PitchPlaneRows:
@@ -191,7 +205,9 @@ def _record(name: str, found: Analysis) -> dict[str, Any]:
     }
 
 
-def _write(path: Path, data: dict[str, Any]) -> None:
+def _write(path: Path | None, data: dict[str, Any]) -> None:
+    if path is None:
+        return
     try:
         path.write_text(json.dumps(data, indent=2) + "\n", encoding="utf-8")
     except OSError as error:

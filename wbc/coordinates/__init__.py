@@ -16,10 +16,12 @@ from wbc.coordinates.pair import CoordinatePair
 from wbc.coordinates.pair_stack import PairStack, pair_stack
 from wbc.coordinates.plots import DriveLog, plot_drives
 from wbc.coordinates.point_sets import OnCircle, OnCylinder, OnLine, OnPlane, OnSphere, PointSet
+from wbc.coordinates.published_trees import TREES, TreeSet, TreeSets, tree_sets
 from wbc.coordinates.restrictions import restriction_table
 from wbc.coordinates.rows import AxisRows, Coordinate, PlaneAngleRows, PointRows
 
 __all__ = [
+    "TREES",
     "Advice",
     "Adviser",
     "Arm",
@@ -51,6 +53,8 @@ __all__ = [
     "PlaneAngleRows",
     "PointRows",
     "PointSet",
+    "TreeSet",
+    "TreeSets",
     "closed_form",
     "mode_pairs",
     "mode_table",
@@ -59,4 +63,5 @@ __all__ = [
     "plot_drives",
     "restriction_table",
     "smallest_complete_sets",
+    "tree_sets",
 ]
