@@ -31,9 +31,27 @@ def test_the_page_has_the_written_restrictions() -> None:
     assert out.strip() in (Path(__file__).parents[2] / "docs" / "coordinates.md").read_text()
 
 
+def test_a_survey_of_random_configurations() -> None:
+    code, out, _ = run("spherical_4r", "--survey", "40")
+    assert code == 0
+    first, least, where, parts, spent = out.splitlines()
+    assert first.startswith("best of 7 pairs at 40 configurations")
+    assert "adviser of 5 pairs" in spent
+    # Advice at that configuration says the same
+    ratio, name = least.split()[1][:-1], least.split(": ")[1].split(", task")[0]
+    _, advice, _ = run("spherical_4r", where.strip(), "--no-exact")
+    lines = {line.split("  ")[0]: line.split("  ")[1:] for line in advice.splitlines()}
+    ratios = [float([x for x in rest if x.strip()][1]) for row, rest in lines.items() if row.startswith("tip |")]
+    assert abs(max(ratios) - float(ratio)) < 2e-3
+    assert name in lines
+    quantiles = [float(part.split()[-1]) for part in parts.split(",")]
+    assert float(ratio) <= quantiles[0] < quantiles[1] < quantiles[2] <= 1.0
+
+
 def test_bad_input() -> None:
     assert run("spherical_4r", "--at", "0.3")[0] == 2
     assert run("spherical_4r", "--at", "a,b,c,d")[0] == 2
     assert run("spherical_4r", "--mode", "M6")[0] == 2
     assert run("srms")[0] == 2
+    assert run("spherical_4r", "--survey", "-3")[0] == 2
     assert run("spherical_4r", "--current", "alpha")[0] == 2

@@ -22,6 +22,7 @@ from wbc.coordinates import (
     mode_pairs,
     parts,
     smallest_complete_sets,
+    survey_pairs,
 )
 from wbc.errors import DuplicateNameError, RangeError, ShapeError, UnknownNameError
 
@@ -167,3 +168,22 @@ def test_bad_input(adviser: Adviser) -> None:
         AutomaticPairs(control, adviser)
     with pytest.raises(RangeError, match="up to 7 joints"):
         smallest_complete_sets(parts("spdm").robot, BodyRows("arm1_tip"), [JointRows("body_joint")])
+
+
+def test_a_survey_is_of_singular_values_at_configurations_within_limits() -> None:
+    robot = FOUR.robot.with_limits(position_lower=-1.0, position_upper=2.0)
+    found = survey_pairs(robot, PAIRS, 50, seed=3)
+    assert found.states.shape == (50, 4)
+    assert found.states.min() < -0.9
+    assert found.states.max() > 1.9
+    assert np.abs(found.states - 0.5).max() <= 1.5
+    exact = Conditioning(robot, [(TIP,), *(pair.rows for pair in PAIRS)], backend="vm")
+    for q, ratio, task, name in zip(found.states, found.ratios, found.tasks, found.best, strict=True):
+        alone, *both = exact.sigmas(q)
+        assert task == pytest.approx(alone, rel=1e-9)
+        assert ratio == pytest.approx(max(both) / alone, rel=1e-9)
+        assert name == ("alpha", "beta")[int(np.argmax(both))]
+    assert found.ratios[found.worst] == found.quantile(0.0)
+    for bad in (0, -1, True, 1.5):
+        with pytest.raises(RangeError, match="count"):
+            survey_pairs(robot, PAIRS, bad)  # type: ignore[arg-type]

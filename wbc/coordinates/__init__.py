@@ -14,6 +14,7 @@ from wbc.coordinates.items import FollowRows, KeepRows
 from wbc.coordinates.modes import MissingPartError, Mode, mode_pairs, mode_table
 from wbc.coordinates.pair import CoordinatePair
 from wbc.coordinates.pair_stack import PairStack, pair_stack
+from wbc.coordinates.pair_survey import PairSurvey, advice_time, survey_pairs
 from wbc.coordinates.plots import DriveLog, plot_drives
 from wbc.coordinates.point_sets import OnCircle, OnCylinder, OnLine, OnPlane, OnSphere, PointSet
 from wbc.coordinates.published_trees import TREES, TreeSet, TreeSets, tree_sets
@@ -48,6 +49,7 @@ __all__ = [
     "OnSphere",
     "PairController",
     "PairStack",
+    "PairSurvey",
     "Parts",
     "PitchPlaneRows",
     "PlaneAngleRows",
@@ -55,6 +57,7 @@ __all__ = [
     "PointSet",
     "TreeSet",
     "TreeSets",
+    "advice_time",
     "closed_form",
     "mode_pairs",
     "mode_table",
@@ -63,5 +66,6 @@ __all__ = [
     "plot_drives",
     "restriction_table",
     "smallest_complete_sets",
+    "survey_pairs",
     "tree_sets",
 ]

@@ -128,6 +128,15 @@ class Adviser:
         found = self.conditioning.sigmas(checked_configuration(self.robot, q))
         return np.asarray(found[self._places[:, 0]])
 
+    def singular_values(self, q: Any) -> tuple[Array, Array]:
+        """(the least singular value of each pair, that of its task alone), in their order.
+
+        Raises:
+            ShapeError, NotFiniteError, RotationError: no configuration.
+        """
+        found = self.conditioning.sigmas(checked_configuration(self.robot, q))
+        return found[self._places[:, 0]], found[self._places[:, 1]]
+
     def advise(self, q: Any) -> tuple[Advice, ...]:
         """All about every pair, in their order.
 
