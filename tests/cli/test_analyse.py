@@ -69,8 +69,10 @@ def test_pictures_of_a_locus(tmp_path: Path) -> None:
 
 def test_a_whole_tree_by_blocks(tmp_path: Path) -> None:
     file = tmp_path / "tree.json"
-    code, out, _ = run("spdm_on_ssrms", "--set", "arms alpha", "--json", file)
+    code, out, _ = run("spdm_on_ssrms", "--set", "arms alpha", "--json", file, "--plot", tmp_path / "pictures")
     assert code == 0
+    # locus and poses of the carrier and of each arm; the body's joint never loses rank
+    assert len([p for p in (tmp_path / "pictures").glob("*.png") if p.stat().st_size > 10_000]) == 6
     assert "arms alpha: 26 x 22, incomplete" in out
     assert "block    arm2_joint1 ... arm2_joint7: 7 x 7, loses rank" in out
     assert "block    body_joint: 1 x 1, strict" in out

@@ -11,25 +11,28 @@ import pinocchio as pin
 
 from wbc import style
 from wbc.analysis.branches import Branch
-from wbc.analysis.completeness import Analysis
+from wbc.analysis.completeness import Analysis, Loci
+from wbc.analysis.level_surface import zero_surface
 from wbc.analysis.model import ExactModel
 from wbc.analysis.notation import Notation
-from wbc.analysis.points import angle, real_point
+from wbc.analysis.points import angle, form_grid, real_point
 from wbc.errors import RobotFileError
 from wbc.validation import Array
 
-#: Random points that are drawn of a branch, and tries for the one pose
+#: Random points that are drawn of a curve, and tries for the one pose
 _POINTS, _TRIES = 1500, 20
+#: Points of the grid along each joint in which surfaces and curves are found
+_GRID, _FINE = 33, 241
 #: Lines of a locus that are drawn, at most
 _MOST = 6
 
 
-def save_pictures(model: ExactModel, found: Analysis, folder: Path, name: str) -> list[Path]:
+def save_pictures(model: ExactModel, found: Analysis | Loci, folder: Path, name: str) -> list[Path]:
     """Writes ``name``-locus.png, ``name``-poses.png, ``name``.tex and ``name``.txt; returns the files.
 
-    The locus is drawn in at most three joints, those of relations first: planes for the values of one joint, random
-    points for other branches; branches with conditions on further joints are named only. An empty locus has only the
-    text files.
+    The locus is drawn in at most three joints, those of relations first: planes for the values of one joint, surfaces
+    (in two joints curves) for one relation, random points for what has several conditions; branches with conditions on
+    further joints are named only. An empty locus has only the text files.
 
     Raises:
         RobotFileError: the folder cannot be written.
@@ -55,7 +58,7 @@ def save_pictures(model: ExactModel, found: Analysis, folder: Path, name: str) -
     return files
 
 
-def _groups(found: Analysis) -> list[tuple[str, list[Branch]]]:
+def _groups(found: Analysis | Loci) -> list[tuple[str, list[Branch]]]:
     """Lines of the text and the branches of each: those with conditions on the same joints."""
     kinds: dict[tuple[object, ...], list[Branch]] = {}
     for branch in found.locus.branches:
@@ -65,7 +68,7 @@ def _groups(found: Analysis) -> list[tuple[str, list[Branch]]]:
     return [("; ".join(notation.branches(branches)), branches) for branches in list(kinds.values())[:_MOST]]
 
 
-def _joints(found: Analysis) -> list[int]:
+def _joints(found: Analysis | Loci) -> list[int]:
     """The joints that most branches have conditions on, at most three, at least two."""
     branches = found.locus.branches
     # Relations first: planes of one value are the same in whatever joints stand beside it
@@ -78,14 +81,14 @@ def _joints(found: Analysis) -> list[int]:
     return sorted(chosen)
 
 
-def _points(found: Analysis, branches: list[Branch], count: int) -> Array:
+def _points(found: Analysis | Loci, branches: list[Branch], count: int) -> Array:
     rng = np.random.default_rng(0)
     tries = (real_point(found.exact.half, b, rng) for b in branches for _ in range(count))
     points = [p for p in tries if p is not None]
     return np.array(points).reshape(-1, found.exact.half.size)
 
 
-def _locus(plt: Any, model: ExactModel, found: Analysis, groups: list[tuple[str, list[Branch]]]) -> Any:
+def _locus(plt: Any, model: ExactModel, found: Analysis | Loci, groups: list[tuple[str, list[Branch]]]) -> Any:
     joints = _joints(found)
     notation = Notation(found.exact.half)
     solid = len(joints) == 3
@@ -102,6 +105,11 @@ def _locus(plt: Any, model: ExactModel, found: Analysis, groups: list[tuple[str,
         restricted |= {k for b in branches for r in b.relations for k in r.joints}
         if not restricted <= {*joints}:
             axes.scatter(*([] for _ in joints), color="none", label=f"not shown: {text}")
+            continue
+        if all(len(b.relations) == 1 and not b.values for b in branches):
+            for branch in branches:
+                (_surface if solid else _curve)(axes, found, branch, joints, colour)
+            axes.scatter(*([] for _ in joints), color=colour, label=text)
             continue
         points = _points(found, branches, _POINTS)
         axes.scatter(*(points[:, k] for k in joints), s=4, color=colour, label=text)
@@ -123,7 +131,30 @@ def _plane(axes: Any, across: int, at: float, colour: str) -> None:
     axes.plot_surface(*sides, color=colour, alpha=0.3, edgecolor=colour)
 
 
-def _poses(plt: Any, model: ExactModel, found: Analysis, groups: list[tuple[str, list[Branch]]]) -> Any:
+def _relation(found: Analysis | Loci, branch: Branch, joints: list[int], ticks: Array) -> Array:
+    """The relation of a branch on a grid of some joints; it has no others."""
+    grid = np.meshgrid(*[ticks] * len(joints), indexing="ij")
+    q = [np.zeros_like(grid[0])] * found.exact.half.size
+    for k, values in zip(joints, grid, strict=True):
+        q[k] = values
+    return form_grid(found.exact.half, branch.relations[0], q)
+
+
+def _surface(axes: Any, found: Analysis | Loci, branch: Branch, joints: list[int], colour: str) -> None:
+    ticks = np.linspace(-np.pi, np.pi, _GRID)
+    triangles = zero_surface(_relation(found, branch, joints, ticks), ticks)
+    if len(triangles):
+        vertices = triangles.reshape(-1, 3)
+        rows = np.arange(len(vertices)).reshape(-1, 3)
+        axes.plot_trisurf(*vertices[:, :2].T, vertices[:, 2], triangles=rows, color=colour, alpha=0.55)
+
+
+def _curve(axes: Any, found: Analysis | Loci, branch: Branch, joints: list[int], colour: str) -> None:
+    ticks = np.linspace(-np.pi, np.pi, _FINE)
+    axes.contour(ticks, ticks, _relation(found, branch, joints, ticks).T, levels=[0.0], colors=[colour])
+
+
+def _poses(plt: Any, model: ExactModel, found: Analysis | Loci, groups: list[tuple[str, list[Branch]]]) -> Any:
     columns = min(3, len(groups))
     figure = plt.figure(figsize=(4.6 * columns, 4.6 * -(-len(groups) // columns)))
     for place, (text, branches) in enumerate(groups, start=1):
@@ -132,20 +163,31 @@ def _poses(plt: Any, model: ExactModel, found: Analysis, groups: list[tuple[str,
         axes.set_title(text if len(text) < 46 else text[:43] + "...", fontsize=9)
         if not len(points):
             continue
-        chain = _chain(model, points[0])
-        axes.plot(*chain.T, "-o", color=style.BLUE, markersize=4)
-        axes.plot(*chain[-1:].T, "o", color=style.RED)
-        middle, size = (chain.max(0) + chain.min(0)) / 2, max(float(np.ptp(chain, axis=0).max()), 1e-3) / 2
+        links, joints, tips = _links(model, points[0])
+        # NaN ends a line
+        lines = np.concatenate([links, np.full((len(links), 1, 3), np.nan)], axis=1).reshape(-1, 3)
+        axes.plot(*lines.T, color=style.BLUE)
+        axes.plot(*joints.T, "o", color=style.BLUE, markersize=4)
+        axes.plot(*tips.T, "o", color=style.RED)
+        ends = links.reshape(-1, 3)
+        middle, size = (ends.max(0) + ends.min(0)) / 2, max(float(np.ptp(ends, axis=0).max()), 1e-3) / 2
         for letter, at in zip("xyz", middle, strict=True):
             getattr(axes, f"set_{letter}lim")(at - size, at + size)
             getattr(axes, f"set_{letter}label")(f"{letter} [m]", fontsize=8)
     return figure
 
 
-def _chain(model: ExactModel, point: Array) -> Array:
-    """Origins of the joints in order, and of the last frame [m]."""
-    robot = model.robot
-    data = robot.model.createData()
-    pin.framesForwardKinematics(robot.model, data, model.configuration(point))
-    joints = [data.oMi[j].translation for j in range(robot.model.njoints)]
-    return np.array([*joints, data.oMf[robot.model.nframes - 1].translation])
+def _links(model: ExactModel, point: Array) -> tuple[Array, Array, Array]:
+    """Lines between frames and those before them ``[m, 2, 3]``, origins of joints, and last frames of each arm [m].
+
+    Lines are of all that moves: an arm whose carrier is locked stands alone, with a carrier come the arms on it.
+    """
+    robot = model.robot.model
+    data = robot.createData()
+    pin.framesForwardKinematics(robot, data, model.configuration(point))
+    places = np.array([pose.translation for pose in data.oMf])
+    moving = [k for k, f in enumerate(robot.frames) if f.parentJoint > 0]
+    links = np.array([(places[robot.frames[k].parentFrame], places[k]) for k in moving])
+    last = {f.parentJoint: k for k, f in enumerate(robot.frames)}
+    ends = [last[j] for j in range(robot.njoints) if j in last and not len(robot.children[j])]
+    return links, np.array([data.oMi[j].translation for j in range(1, robot.njoints)]), places[ends]

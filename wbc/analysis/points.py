@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from math import atan, cos, pi, sin
 from typing import Any
 
@@ -25,9 +26,8 @@ def angle(value: Value, half: HalfAngles) -> float:
     return pi if value.value is None else 2.0 * atan(value.value)
 
 
-def _sum(half: HalfAngles, form: HalfPoly, degrees: tuple[int, ...], q: Array) -> tuple[float, float]:
-    """(value, largest term) of a form in sin(q/2), cos(q/2) of given degrees."""
-    total = largest = 0.0
+def _terms(half: HalfAngles, form: HalfPoly, degrees: tuple[int, ...], q: Any, sine: Any, cosine: Any) -> Iterator[Any]:
+    """Terms of a form in sin(q/2), cos(q/2) of given degrees, at numbers or at arrays of one shape."""
     symbols = [float(v) for v in half.ring.symbols.values()]
     for powers, number in form.terms():
         term = float(int(number))
@@ -36,12 +36,24 @@ def _sum(half: HalfAngles, form: HalfPoly, degrees: tuple[int, ...], q: Array) -
             if k >= half.size:
                 term *= symbols[k - half.size] ** n
             elif k in half.ring.slides:
-                term *= float(q[k]) ** n
+                term = term * q[k] ** n
             elif degrees[k]:
-                term *= sin(q[k] / 2) ** n * cos(q[k] / 2) ** (degrees[k] - n)
+                term = term * sine(q[k] / 2) ** n * cosine(q[k] / 2) ** (degrees[k] - n)
+        yield term
+
+
+def _sum(half: HalfAngles, form: HalfPoly, degrees: tuple[int, ...], q: Array) -> tuple[float, float]:
+    """(value, largest term) of a form in sin(q/2), cos(q/2) of given degrees."""
+    total = largest = 0.0
+    for term in _terms(half, form, degrees, q, sin, cos):
         total += term
         largest = max(largest, abs(term))
     return total, largest
+
+
+def form_grid(half: HalfAngles, relation: Relation, q: Sequence[Array]) -> Array:
+    """A relation at many configurations, one array a joint, all of one shape; 0 on the branch."""
+    return np.asarray(sum(_terms(half, relation.poly, relation.degrees, q, np.sin, np.cos)))
 
 
 def form_value(half: HalfAngles, relation: Relation, q: Array) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import json
 import re
 from pathlib import Path
@@ -24,6 +25,7 @@ from wbc.analysis import (
     factored_determinant,
     published_sets,
 )
+from wbc.analysis.completeness import Loci
 from wbc.analysis.pictures import save_pictures
 from wbc.analysis.published import ROBOTS
 from wbc.cli.certificates import Subdivision, certified, record, winner
@@ -107,8 +109,9 @@ def analyse_(
     if screen is not None and (own or chosen):
         raise RangeError("screen", screen, "finds the constraints by itself: without --set, --lock, --point, --plane")
     if robot in TREES and not own and frame is None:
-        refused = {"approximate": approximate, "certify": how is not None, "resume": resume, "plot": plot}
-        found_sets = analyse_tree(robot, chosen or (), algorithm, latex, refused)
+        refused = {"approximate": approximate, "certify": how is not None, "resume": resume}
+        pictures = None if plot is None else functools.partial(_pictures, plot)
+        found_sets = analyse_tree(robot, chosen or (), algorithm, latex, refused, pictures)
         _write(json_, {"robot": robot, "algorithm": algorithm, "sets": found_sets})
         return
     task: tuple[Rows, ...]
@@ -136,7 +139,7 @@ def analyse_(
             _show(name, found, latex)
             entry = _record(name, found)
             if plot is not None:
-                _pictures(model, found, plot, f"{robot} {name}")
+                _pictures(plot, model, found, f"{robot} {name}")
         if how is not None:
             if screen is not None:
                 out().print(f"[bold]{escape(name)}[/bold]")
@@ -145,7 +148,7 @@ def analyse_(
     _write(json_, {"robot": robot, "algorithm": algorithm, "sets": records})
 
 
-def _pictures(model: ExactModel, found: Analysis, folder: Path, name: str) -> None:
+def _pictures(folder: Path, model: ExactModel, found: Analysis | Loci, name: str) -> None:
     for file in save_pictures(model, found, folder, re.sub(r"\W+", "-", name)):
         out().print(f"  written  {escape(str(file))}", soft_wrap=True)
 

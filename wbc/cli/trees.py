@@ -2,22 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from rich.markup import escape
 
 from wbc import validation
 from wbc.analysis import BlockAnalysis, ExactModel, Notation, TreeAnalysis, analyse_blocks
+from wbc.analysis.completeness import Loci
 from wbc.cli.console import out
 from wbc.coordinates import tree_sets
 from wbc.errors import RangeError
 
 
-def analyse_tree(robot: str, chosen: Sequence[str], algorithm: str, latex: bool, refused: Any) -> list[dict[str, Any]]:
+def analyse_tree(
+    robot: str,
+    chosen: Sequence[str],
+    algorithm: str,
+    latex: bool,
+    refused: Any,
+    pictures: Callable[[ExactModel, Loci, str], None] | None = None,
+) -> list[dict[str, Any]]:
     """Sets of a tree by name, all of them by default, printed and as data.
 
     Args:
+        pictures: called with every block's robot, loci and name.
         refused: option -> whether it was given, of those that have no meaning for blocks.
 
     Raises:
@@ -34,6 +43,9 @@ def analyse_tree(robot: str, chosen: Sequence[str], algorithm: str, latex: bool,
         one = known.sets[name]
         found = analyse_blocks(model, one.task, one.constraints, algorithm=algorithm)
         _show(name, found, latex)
+        if pictures is not None:
+            for part in found.blocks:
+                pictures(part.model, part.loci, f"{robot} {name} {part.block}")
         records.append(_record(name, found))
     return records
 
