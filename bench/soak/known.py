@@ -43,6 +43,8 @@ def pose_problem(controller: Controller, rng: np.random.Generator) -> tuple[Arra
     controller["hand"].target = pose(rng)
     controller["ball"].pose = pin.SE3(np.eye(3), np.array([50.0, 0.0, 0.0]))
     controller["hold"].enabled = False
+    # The bounds are those of the configuration in the buffers, which is that of the last step until the next one
+    controller.tick.q[:] = q
     bounds = controller.qp()
     low, high = np.maximum(bounds.lower[: robot.nv], -1.0), np.minimum(bounds.upper[: robot.nv], 1.0)
     v: Array = low + (high - low) * rng.uniform(0.25, 0.75, robot.nv)
