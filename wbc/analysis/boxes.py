@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ctypes
 import functools
-import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -15,7 +14,7 @@ from numpy.typing import NDArray
 
 from wbc.analysis.trig_form import TrigForm
 from wbc.errors import RangeError
-from wbc.stack import cache, toolchain
+from wbc.stack.kernel import kernel
 from wbc.validation import Array
 
 _SOURCES = Path(__file__).parent / "native"
@@ -135,13 +134,6 @@ class BoxSearch:
 @functools.cache
 def _library() -> ctypes.CDLL:
     """The compiled code, from the cache."""
-    texts = {name: (_SOURCES / name).read_text(encoding="utf-8") for name in _FILES}
-    name = hashlib.sha256("\n".join((*texts.values(), toolchain.identity())).encode()).hexdigest()
-
-    def fill(folder: Path) -> None:
-        toolchain.compile_library(texts, _FILES[-1], folder / "subdivide.so")
-
-    folder, _ = cache.fetch(name, fill, library=True)
-    library = ctypes.CDLL(str(folder / "subdivide.so"))
+    library = ctypes.CDLL(str(kernel(_SOURCES, _FILES)))
     library.subdivide.restype = ctypes.c_int
     return library

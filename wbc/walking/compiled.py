@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ctypes
 import functools
-import hashlib
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -14,7 +13,8 @@ from numpy.typing import NDArray
 
 from wbc.errors import CompileError
 from wbc.robots import WalkerData
-from wbc.stack import cache, toolchain
+from wbc.stack import toolchain
+from wbc.stack.kernel import kernel
 
 _SOURCES = Path(__file__).parent / "native"
 _FILES = ("arm.h", "surface.h", "curve.h", "grips.h", "near.h", "speeds.h", "planner.c")
@@ -70,16 +70,10 @@ def library() -> ctypes.PyDLL | None:
     """The compiled code, from the cache; None where there is no compiler, or it fails, which the log says."""
     if not toolchain.available():
         return None
-    texts = {name: (_SOURCES / name).read_text(encoding="utf-8") for name in _FILES}
-    name = hashlib.sha256("\n".join((*texts.values(), toolchain.identity())).encode()).hexdigest()
-
-    def fill(folder: Path) -> None:
-        toolchain.compile_library(texts, _FILES[-1], folder / "planner.so")
-
     try:
-        folder, _ = cache.fetch(name, fill, library=True)
+        path = kernel(_SOURCES, _FILES)
     except CompileError as error:
         toolchain.fall_back(str(error))
         return None
     # Not CDLL: a call takes microseconds, giving up the interpreter's lock would cost as much
-    return ctypes.PyDLL(str(folder / "planner.so"))
+    return ctypes.PyDLL(str(path))

@@ -1,0 +1,26 @@
+"""C of a package's own, next to its modules, as a library in the cache."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from pathlib import Path
+
+from wbc.stack import cache, toolchain
+
+
+def kernel(sources: Path, files: Sequence[str]) -> Path:
+    """The library of C files in a folder, the last of which is compiled; named in the cache by what they say.
+
+    Raises:
+        CompileError: there is no compiler, or it fails.
+    """
+    texts = {name: (sources / name).read_text(encoding="utf-8") for name in files}
+    name = hashlib.sha256("\n".join((*texts.values(), toolchain.identity())).encode()).hexdigest()
+    library = Path(files[-1]).with_suffix(".so").name
+
+    def fill(folder: Path) -> None:
+        toolchain.compile_library(texts, files[-1], folder / library)
+
+    folder, _ = cache.fetch(name, fill, library=True)
+    return folder / library
