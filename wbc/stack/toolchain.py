@@ -9,6 +9,7 @@ import pathlib
 import shutil
 import subprocess
 import tempfile
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 
 import casadi as ca
@@ -137,18 +138,12 @@ def compile_rows(text: str, output: pathlib.Path) -> None:
     Raises:
         CompileError: as of :func:`compile_tick`.
     """
-    cc = compiler()
-    if cc is None:
-        raise CompileError("compiler", None, "no C compiler found")
-    with tempfile.TemporaryDirectory(prefix="wbc-") as folder:
-        place = pathlib.Path(folder)
-        (place / "rows.c").write_text(text)
-        # What generated code exports must be seen by who loads the library
-        flags = [f for f in COMMON_FLAGS if not f.startswith(("-fvisibility", "-DCASADI_SYMBOL_EXPORT"))]
-        _run([cc, *flags, *ROWS_FLAGS, "-shared", "rows.c", "-lm", "-o", str(output)], place)
+    compile_library({"rows.c": text}, "rows.c", output, ROWS_FLAGS)
 
 
-def compile_library(files: dict[str, str], main: str, output: pathlib.Path) -> None:
+def compile_library(
+    files: dict[str, str], main: str, output: pathlib.Path, optimisation: Sequence[str] = ("-O3",)
+) -> None:
     """Compile hand-written files, of which ``main`` includes the others, to a shared library at ``output``.
 
     Raises:
@@ -161,8 +156,9 @@ def compile_library(files: dict[str, str], main: str, output: pathlib.Path) -> N
         place = pathlib.Path(folder)
         for name, text in files.items():
             (place / name).write_text(text)
+        # What it exports must be seen by who loads the library
         flags = [f for f in COMMON_FLAGS if not f.startswith(("-fvisibility", "-DCASADI_SYMBOL_EXPORT"))]
-        _run([cc, *flags, "-O3", "-shared", main, "-lm", "-o", str(output)], place)
+        _run([cc, *flags, *optimisation, "-shared", main, "-lm", "-o", str(output)], place)
 
 
 def _output(command: list[str]) -> str:

@@ -158,33 +158,10 @@ def _clearance(plt: Any, log: Log) -> Any:
 
 def _tick_time(plt: Any, log: Log) -> Any:
     """Histogram of the time that controller.step took."""
-    micro = 1e6 * log["tick"]
-    edges = np.geomspace(max(0.8 * micro.min(), 1e-2), 1.25 * micro.max(), 70)
-    figure, panel = plt.subplots(figsize=(9.2, 3.4), layout="constrained")
-    panel.hist(micro, bins=edges, color=style.TEAL, alpha=0.85)
-    panel.set_xscale("log")
-    for axis in (panel.xaxis.set_major_formatter, panel.xaxis.set_minor_formatter):
-        axis(lambda x, _: f"{x:g}")
-    panel.set_yscale("log")
-    for name, value, colour in (
-        ("median", float(np.median(micro)), style.INK),
-        ("p99", float(np.quantile(micro, 0.99)), style.RED),
-    ):
-        panel.axvline(value, color=colour, lw=1.4)
-        panel.annotate(
-            f"{name} {value:.1f} us",
-            (value, 1.0),
-            (4, -2),
-            ("data", "axes fraction"),
-            "offset points",
-            va="top",
-            color=colour,
-        )
-    panel.set_xlabel("time of controller.step [us]")
-    panel.set_ylabel("ticks")
-    title = f"Tick time, {len(micro)} ticks, {log.meta['solver']} ({log.meta['backend']})"
-    panel.set_title(title, fontsize=13)
-    return figure
+    tick = log["tick"]
+    return style.tick_histogram(
+        plt, tick, f"Tick time, {len(tick)} ticks, {log.meta['solver']} ({log.meta['backend']})"
+    )
 
 
 def _mark(panel: Any, log: Log) -> None:

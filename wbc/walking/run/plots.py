@@ -226,27 +226,4 @@ def _speed(plt: Any, run: WalkRun, log: WalkLog, ticks: TickColumns) -> Any:
 
 def _tick_time(plt: Any, run: WalkRun, log: WalkLog, ticks: TickColumns) -> Any:
     """Histogram of the controller's tick."""
-    micro = 1e6 * ticks.cost
-    edges = np.geomspace(max(0.8 * micro.min(), 1e-2), 1.25 * micro.max(), 70)
-    figure, panel = plt.subplots(figsize=(9.2, 3.4), layout="constrained")
-    panel.hist(micro, bins=edges, color=style.TEAL, alpha=0.85)
-    panel.set_xscale("log")
-    panel.set_yscale("log")
-    panel.xaxis.set_major_formatter(lambda x, _: f"{x:g}")
-    panel.xaxis.set_minor_formatter(lambda x, _: f"{x:g}" if f"{x:g}"[0] in "25" else "")
-    for part, colour in ((50, style.INK), (99, style.RED)):
-        value = float(np.percentile(micro, part))
-        panel.axvline(value, color=colour, lw=1.4)
-        panel.annotate(
-            f"p{part} {value:.0f} us",
-            (value, 1.0),
-            (4, -2),
-            ("data", "axes fraction"),
-            "offset points",
-            va="top",
-            color=colour,
-        )
-    panel.set_xlabel("time of controller.step [us]")
-    panel.set_ylabel("ticks")
-    panel.set_title(f"Tick time, {len(micro)} ticks", fontsize=13)
-    return figure
+    return style.tick_histogram(plt, ticks.cost, f"Tick time, {len(ticks.cost)} ticks")
