@@ -35,6 +35,9 @@ origin, from 0.5 s after the start to 0.5 s before the end. "Real time" is simul
 controller, simulator and log, then of the planner too; no rendering, one core, compilation left out. Ticks are the \
 controller's alone, by the clock; the loop has hands, controller, simulator and log, by processor time. The checker \
 recomputes the walk from its log, URDF and structure."""
+LOADED = """\
+Before the first walk, once in a process: {:.2f} s of processor time for the structure, the controller and the \
+compiled expressions of the loop, which belong to the robot and are in no figure."""
 
 
 def arguments(given: list[str] | None = None) -> argparse.Namespace:
@@ -89,6 +92,8 @@ def main(given: list[str] | None = None) -> None:
         f"Robot data {data.digest}; self-collision rows {'on' if chosen.collisions else 'off'}.",
         NOTES,
     ]
+    if it.loading is not None:
+        lines.append(LOADED.format(it.loading))
     if interrupted:
         lines.insert(0, f"Ended by Ctrl-C in: {interrupted}.")
     for sheet in (*sheets(parts, chosen.sizes), goal_sheet(goals(parts, chosen.sizes))):

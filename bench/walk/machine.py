@@ -21,6 +21,7 @@ from wbc.walking.checker import check_walk
 from wbc.walking.plan import HoldLost, NoPlanError, Plan
 from wbc.walking.planner import plan_walk
 from wbc.walking.reference import Reference
+from wbc.walking.run.compiling import compiled_stack, keep
 from wbc.walking.run.figures import RAMP, body_speed
 from wbc.walking.run.recording import TickColumns, WalkRecorder
 from wbc.walking.run_log import WalkLog
@@ -45,7 +46,13 @@ class Job:
 
 
 class Machine:
-    """What all parts share: the robot, its compiled stack, the reference's tables; each made when first asked for."""
+    """What all parts share: the robot, its compiled stack, the reference's tables; each made when first asked for.
+
+    Attributes:
+        loading: processor time of :meth:`load` [s]; None: nothing was loaded.
+    """
+
+    loading: float | None = None
 
     def __init__(self, walker: Walker, stack: WalkStack | None = None, collisions: bool = False) -> None:
         self.walker, self.collisions = walker, collisions
@@ -60,7 +67,15 @@ class Machine:
     @cached_property
     def stack(self) -> WalkStack:
         """Compiled for the cylinder."""
-        return WalkStack(self.walker, self.structure, collisions=self.collisions)
+        return compiled_stack(self.walker, self.structure, collisions=self.collisions)
+
+    def load(self) -> None:
+        """What belongs to the robot and the cylinder and not to a walk, once."""
+        if self.loading is None:
+            cpu = time.process_time()
+            assert self.stack is not None
+            keep()
+            self.loading = time.process_time() - cpu
 
     @cached_property
     def reference(self) -> Reference:
@@ -69,6 +84,7 @@ class Machine:
 
     def planned(self, structure: Structure, path: BodyPath, **asked: Any) -> tuple[Plan | None, Record]:
         """A plan, None where it is refused, and what is to be said of it."""
+        self.load()
         cpu = time.process_time()
         try:
             plan = plan_walk(self.walker, structure, path, **asked)

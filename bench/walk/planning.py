@@ -37,6 +37,7 @@ def planned(it: Machine, name: str, speed: float) -> Record:
     """One course at a speed [in/s], by a body that stands on the first holds of the whole plan, to whose re-grasps
     those of the plan in slices are compared.
     """
+    it.load()
     begin, end = COURSES[name]
     structure, path = it.structure, grid_path([begin, end], speed * INCH)
     whole = plan_walk(it.walker, structure, path, partial=True)
@@ -55,6 +56,7 @@ def planned(it: Machine, name: str, speed: float) -> Record:
 
 def driven(it: Machine) -> Record:
     """A body under way that is told other rates: until the first command of the new way, and ticks from then on."""
+    it.load()
     walk = Walk(
         it.walker, it.structure, standing_plan(it.walker, it.structure, grid_pose(13, 12, RADIUS)), stack=it.stack
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import json
 from pathlib import Path
 
@@ -18,9 +19,14 @@ from bench.walk.machine import Job, Machine, Record
 from bench.walk.parts import records
 from wbc.errors import RangeError
 from wbc.walking import cylinder
+from wbc.walking.aim_function import aim_function
+from wbc.walking.chain_function import chain_function
 from wbc.walking.reference import Verdict
 from wbc.walking.reference.verdict import Kind
+from wbc.walking.run.compiling import compiled_stack
+from wbc.walking.run_recorder import versions
 from wbc.walking.walk_stack import WalkStack
+from wbc.walking.way_function import way_function
 
 #: A course of a few seconds
 SHORT = ((13, 12), (13, 13))
@@ -86,6 +92,23 @@ def test_where_no_speed_is_kept_the_bisection_ends(course: Record) -> None:
     found = courses.highest(lambda speed: {"planned": False, "reason": "no way"}, 6.0, 12.0, 0.1)
     assert found["highest"] == 0.0
     assert found["limit"] == "no way"
+
+
+def test_what_belongs_to_the_robot_is_loaded_once(it: Machine) -> None:
+    def parts() -> list[object]:
+        return [chain_function(it.walker), way_function(), aim_function(), versions()]
+
+    gc.unfreeze()
+    try:
+        compiled_stack(it.walker, it.structure, "vm")
+        assert [*map(id, parts())] == [*map(id, parts())]
+        other = Machine(it.walker, it.stack)
+        assert other.loading is None
+        other.load()
+        assert other.loading is not None
+        assert gc.get_freeze_count() > len(gc.get_objects())
+    finally:
+        gc.unfreeze()
 
 
 def test_a_turn_keeps_its_rate(it: Machine) -> None:

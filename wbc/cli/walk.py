@@ -22,6 +22,7 @@ from wbc.robots import TwoEndedData, Walker, WalkerData
 from wbc.track.summary import Figure
 from wbc.walking.body_path import standing_path
 from wbc.walking.plan import Plan, differences, read_rows
+from wbc.walking.run.compiling import keep
 from wbc.walking.run.figures import figures_of, save_figures
 from wbc.walking.run.folder import make_folder, save_pictures, save_run
 from wbc.walking.run.perform import WalkRun
@@ -144,6 +145,7 @@ def _free(
             bar.update(stage, description=what, total=None if part is None else 1.0, completed=part or 0.0)
 
         with stopper.listening():
+            keep()  # a full collection would look at all modules of the program in the middle of a tick
             run = perform(backend, told, stopper)
             told("checking and writing", None)
             files, report = save_run(run, folder, check)

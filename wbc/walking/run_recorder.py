@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 from collections.abc import Mapping, Sequence
 from importlib.metadata import PackageNotFoundError, version
@@ -71,7 +72,7 @@ class LogRecorder:
             "structure_digest": structure.digest,
             "dt": validation.scalar("dt", dt, low=0.0, open_low=True, unit="s"),
             "seed": seed,
-            "versions": versions(),
+            "versions": dict(versions()),
         }
         # One row a tick: t, pose, q, v, twist, command; and state, hold of every arm, kind of the command, fixed
         ends = np.cumsum([0, 1, 7, m, m, 6, 7])
@@ -218,7 +219,8 @@ class LogRecorder:
         return found[0] if found else -1
 
 
-def versions() -> dict[str, str]:
+@functools.cache
+def versions() -> Mapping[str, str]:
     """Versions of this package and of :data:`PACKAGES`."""
     out = {"wbc": __version__}
     for name in PACKAGES:

@@ -31,6 +31,7 @@ from wbc.walking.number_table import read_numbers
 from wbc.walking.plan import HoldLost, NoPlanError
 from wbc.walking.run.as_walked import as_walked
 from wbc.walking.run.carrying_out import CarryingOut, Progress, farthest, travelled
+from wbc.walking.run.compiling import compiled_stack
 from wbc.walking.run.perform import WalkRun
 from wbc.walking.run.recording import WalkRecorder
 from wbc.walking.run.request import WalkRequest
@@ -130,7 +131,7 @@ def perform_arm(
         return WalkRun(request, walker, structure, standing_path(pose), None, "refused", str(error))
     planned, begin = time.perf_counter() - begin, time.perf_counter()
     report("compiling", None)
-    stack = stack or WalkStack(walker, structure, collisions=False, backend=backend)
+    stack = stack or compiled_stack(walker, structure, backend)
     compiled, begin = time.perf_counter() - begin, time.perf_counter()
     walk = Walk(walker, structure, plan, stack=stack)
     recorder = WalkRecorder(walk, request.seed, {"request": asdict(request), "start": list(plan.start)})

@@ -20,6 +20,7 @@ from wbc.walking.drive import Drive, standing_plan
 from wbc.walking.plan import NoPlanError
 from wbc.walking.run.as_walked import as_walked
 from wbc.walking.run.carrying_out import CarryingOut, Progress
+from wbc.walking.run.compiling import compiled_stack
 from wbc.walking.run.perform import WalkRun
 from wbc.walking.run.recording import WalkRecorder
 from wbc.walking.run.request import WalkRequest
@@ -65,7 +66,7 @@ def perform_drive(
         return WalkRun(request, walker, structure, path, None, "refused", str(error))
     planned = time.perf_counter() - begin
     report("compiling", None)
-    stack = stack or WalkStack(walker, structure, collisions=False, backend=backend)
+    stack = stack or compiled_stack(walker, structure, backend)
     compiled, begin = time.perf_counter() - begin - planned, time.perf_counter()
     walk = Walk(walker, structure, plan, stack=stack)
     drive = Drive(walk)

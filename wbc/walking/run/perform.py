@@ -14,6 +14,7 @@ from wbc.walking.first_grasps import free_state, plan_from_state
 from wbc.walking.plan import NoPlanError, Plan, Regrasp
 from wbc.walking.planner import Objective, plan_walk
 from wbc.walking.run.carrying_out import CarryingOut, Outcome, Progress
+from wbc.walking.run.compiling import compiled_stack
 from wbc.walking.run.recording import TickColumns, WalkRecorder, way_of
 from wbc.walking.run.request import WalkRequest
 from wbc.walking.run_log import WalkLog
@@ -95,7 +96,7 @@ def perform_walk(
         return WalkRun(request, walker, structure, path, plan, "refused", plan.reason, plan_time=planned)
     report("compiling", None)
     begin = time.perf_counter()
-    stack = stack or WalkStack(walker, structure, collisions=False, backend=backend)
+    stack = stack or compiled_stack(walker, structure, backend)
     compiled = _since(begin)
     begin = time.perf_counter()
     walk = Walk(walker, structure, plan, stack=stack, state=state)

@@ -21,6 +21,7 @@ from wbc.walking.first_grasps import plan_from_state
 from wbc.walking.plan import NoPlanError
 from wbc.walking.run.as_walked import as_walked
 from wbc.walking.run.carrying_out import CarryingOut, Progress
+from wbc.walking.run.compiling import compiled_stack
 from wbc.walking.run.parts import configuration
 from wbc.walking.run.perform import WalkRun
 from wbc.walking.run.recording import TICKS, TickColumns, WalkRecorder, path_of
@@ -130,7 +131,7 @@ def perform_resume(
         return WalkRun(request, walker, whole, path, None, "refused", str(error))
     planned, begin = time.perf_counter() - begin, time.perf_counter()
     report("compiling", None)
-    stack = stack or WalkStack(walker, structure, collisions=False, backend=backend)
+    stack = stack or compiled_stack(walker, structure, backend)
     compiled, begin = time.perf_counter() - begin, time.perf_counter()
     walk = Walk(walker, structure, plan, stack=stack, state=state)
     recorder = WalkRecorder(walk, request.seed, {"request": asdict(request)})
