@@ -18,12 +18,13 @@ from wbc.walking.planner import plan_walk
 from wbc.walking.run import perform
 from wbc.walking.run.folder import save_run
 from wbc.walking.run.perform import WalkRun, perform_walk
-from wbc.walking.run.recording import WalkRecorder, path_of
+from wbc.walking.run.recording import WalkRecorder
 from wbc.walking.run.request import WalkRequest
 from wbc.walking.run.resume_run import perform_resume, resumed_state
 from wbc.walking.run_log import CLOSING, OPEN, OPENING, WalkLogError
 from wbc.walking.walk import Walk
 from wbc.walking.walk_stack import WalkStack
+from wbc.walking.way_data import path_of
 
 INCH = 0.0254
 

@@ -7,7 +7,6 @@ import json
 from pathlib import Path
 from typing import Annotated, Any
 
-import numpy as np
 import typer
 from rich.markup import escape
 from rich.table import Table
@@ -20,8 +19,7 @@ from wbc.cli.walk_modes import Perform, performance
 from wbc.errors import ShapeError
 from wbc.robots import TwoEndedData, Walker, WalkerData
 from wbc.track.summary import Figure
-from wbc.walking.body_path import standing_path
-from wbc.walking.plan import Plan, differences, read_rows
+from wbc.walking.plan import differences, read_plan
 from wbc.walking.run.compiling import keep
 from wbc.walking.run.figures import figures_of, save_figures
 from wbc.walking.run.folder import make_folder, save_pictures, save_run
@@ -56,6 +54,7 @@ def walk(
     resume: options.Resume = "",
     ask: options.Ask = False,
     planner: options.PlannerName = "free",
+    plan: options.PlanFile = "",
     change: options.Change = None,
     backend: options.Backend = "auto",
     output: options.RunFolder = None,
@@ -90,6 +89,7 @@ def walk(
         free_start,
         robot,
         gait,
+        plan,
     )
     machine = robots.walker(data=changed_data(change or [], two_ended), two_ended=two_ended)
     perform = performance(request, machine, resume, ask)  # bad input shows before a folder is made
@@ -106,7 +106,7 @@ def plans(
     other: Annotated[Path, typer.Argument(help="Another one.")],
 ) -> None:
     """Show what two plans do differently, one line each; exit code 1 if there is anything."""
-    first, second = (_read_plan(path) for path in (one, other))
+    first, second = (read_plan(path) for path in (one, other))
     lines = differences(first, second)
     for line in lines:
         out().print(line, markup=False, soft_wrap=True)
@@ -182,18 +182,6 @@ def _published(request: WalkRequest, folder: Path) -> None:
     if not run.arrived:
         err().print(f"[bold red]stopped[/bold red]: {escape(run.reason)}", soft_wrap=True)
         raise typer.Exit(REFUSED)
-
-
-def _read_plan(path: Path) -> Plan:
-    rows = read_rows(path)
-    return Plan(
-        standing_path(np.eye(4)),
-        rows["start"],
-        tuple(rows["regrasps"]),
-        rows["complete"],
-        rows["reached"],
-        rows["reason"],
-    )
 
 
 def _report(title: str, figures: list[Figure], folder: Path, files: list[Path]) -> None:

@@ -13,7 +13,7 @@ from wbc.errors import RangeError
 from wbc.robots import Walker, WalkerData
 from wbc.terminal import terminal, terminal_keys
 from wbc.walking.commands import read_commands
-from wbc.walking.plan import Regrasp
+from wbc.walking.plan import Regrasp, read_plan
 from wbc.walking.run.arm_run import arm_task, perform_arm
 from wbc.walking.run.carrying_out import Progress
 from wbc.walking.run.drive_run import perform_drive
@@ -36,6 +36,8 @@ def performance(request: WalkRequest, machine: Walker, resume: str, ask: bool) -
         what the modes raise for bad input.
     """
     two_ended = request.robot == "two-ended"
+    if request.plan and resume:
+        raise RangeError("plan", request.plan, "a resumed run is planned anew")
     if ask and (request.commands or request.tasks or resume or two_ended):
         raise RangeError("ask", ask, "only walks along a path ask")
     if two_ended:
@@ -46,6 +48,9 @@ def performance(request: WalkRequest, machine: Walker, resume: str, ask: bool) -
     structure = request.build()
     if request.commands or request.tasks:
         request.beginning(structure, machine.data)
+    elif request.plan:
+        for step in read_plan(request.plan).regrasps:
+            structure.index(step.target)
     else:
         request.path(structure, machine.data)
     if request.commands == "keyboard":

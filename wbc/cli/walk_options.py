@@ -56,6 +56,9 @@ Remove = Annotated[float, typer.Option(help="Take away this part of the holds at
 Seed = Annotated[int, typer.Option(help="Of the random choice.", rich_help_panel=_SCENE)]
 Rigid = Annotated[bool, typer.Option(help="Holds fix the tilt of a hand.", rich_help_panel=_SCENE)]
 PlannerName = Annotated[str, typer.Option(help="free or published.", rich_help_panel=_HOW)]
+PlanFile = Annotated[
+    str, typer.Option("--plan", help="Carry out a plan.json as it is, instead of planning.", rich_help_panel=_HOW)
+]
 Change = Annotated[
     list[str] | None,
     typer.Option("--set", help="NAME=VALUE of the walker's data, in SI; may be repeated.", rich_help_panel=_HOW),

@@ -7,12 +7,14 @@ import os
 import pathlib
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass, field, replace
+from math import isfinite
 from typing import Any
 
 from wbc.errors import StructureFileError, WbcError
 from wbc.walking.body_path import BodyPath
 from wbc.walking.grips import Grips
 from wbc.walking.swing_law import SwingLaw
+from wbc.walking.way_data import path_of, way_of
 
 
 class NoPlanError(WbcError):
@@ -128,23 +130,42 @@ class Plan:
             "separating": list(self.separating),
             "regrasps": self.rows(),
         }
-        file.write_text(json.dumps(kept, indent=1) + "\n")
+        # The way of the body on one line, behind what is to be read
+        text = json.dumps(kept, indent=1).removesuffix("\n}")
+        file.write_text(f'{text},\n "way": {json.dumps(way_of(self.path))}\n}}\n')
         return file
 
 
-def read_rows(path: str | os.PathLike[str]) -> dict[str, Any]:
-    """What :meth:`Plan.save` wrote.
+def read_plan(path: str | os.PathLike[str]) -> Plan:
+    """What :meth:`Plan.save` wrote; without grips and laws, which :func:`wbc.walking.followed_plan.follow_plan` adds.
 
     Raises:
         StructureFileError: not such a file.
     """
     try:
         kept = json.loads(pathlib.Path(path).read_text())
-        kept["regrasps"] = [Regrasp(**row) for row in kept["regrasps"]]
-        kept["start"] = tuple(kept["start"])
-    except (OSError, ValueError, KeyError, TypeError) as error:
+        steps = tuple(_step(row) for row in kept["regrasps"])
+        start, separating = tuple(map(str, kept["start"])), tuple(kept["separating"])
+        whole, reached, reason = bool(kept["complete"]), float(kept["reached"]), str(kept["reason"])
+        way = path_of(kept["way"])
+    except (OSError, ValueError, KeyError, TypeError, WbcError) as error:
         raise StructureFileError("plan", str(path), f"not a plan: {error}") from error
-    return dict(kept)
+    return Plan(way, start, steps, whole, reached, reason, separating=separating)
+
+
+def _step(row: dict[str, Any]) -> Regrasp:
+    """A re-grasp of a file.
+
+    Raises:
+        TypeError, ValueError: a field that is missing, unknown, or has a value that it cannot have.
+    """
+    step = Regrasp(**row)
+    for name, value in asdict(step).items():
+        texts = name in ("arm", "source", "target", "limit")
+        number = 0.0 if texts or (name == "roll" and value is None) else value
+        if texts != isinstance(value, str) or not isfinite(number):
+            raise ValueError(f"re-grasp {row}: {name}")
+    return step
 
 
 def differences(one: Plan, other: Plan) -> list[str]:

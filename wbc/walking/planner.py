@@ -161,7 +161,7 @@ def plan_slices(
         if found.complete or (deadline is not None and time.perf_counter() > deadline):
             break
     assert best is not None
-    return _plan(walker, structure, path, grips, *best)
+    return plan_found(walker, structure, path, grips, *best)
 
 
 def stances(
@@ -254,9 +254,10 @@ def _roll(structure: Structure, grips: Grips, grip: int) -> float | None:
     return rolls[grips.roll[grip]] if rolls else None
 
 
-def _plan(
+def plan_found(
     walker: Walker, structure: Structure, path: BodyPath, grips: Grips, found: Found, laws: tuple[SwingLaw, ...]
 ) -> Plan:
+    """The plan of what a search found, and of the laws of its moves."""
     ids, spacing = structure.ids, path.spacing
     steps, chain = [], [[g] for g in found.start]
     for move in found.moves:

@@ -99,7 +99,7 @@ class StanceSearch:
         self.rooms = StanceRooms(self.clearance, grips.last, np.where(lasting, grips.last, grips.last - self.spare))
         # The hand is on its hold before it is latched
         self._touch = round((walker.tolerances.latch_time + SETTLE) / path.spacing)
-        self._soonest = self._landings()
+        self.soonest = self._landings()
         self._by_arm = [grips.of_arm(k) for k in range(len(walker.arms))]
 
     def _landings(self) -> Ints:
@@ -206,7 +206,7 @@ class StanceSearch:
         others = tuple(g for k, g in enumerate(key) if k != move.arm)
         if min(self.clearance.first_conflict(move.target, g, move.land) for g in others) <= move.land:
             return None
-        room, soonest = self.rooms.among(others, level[parent].sample), int(self._soonest[move.target])
+        room, soonest = self.rooms.among(others, level[parent].sample), int(self.soonest[move.target])
         return Swing(move.arm, move.source, move.target, move.lift, room, others, soonest)
 
     def _moves(self, level: Sequence[tuple[Key, Node]], rows: range) -> list[Fan]:
@@ -229,7 +229,7 @@ class StanceSearch:
             if not len(row):
                 continue
             source, target, sample, room = source[row], targets[column], samples[row], room[row]
-            stop, soonest = np.minimum(end[row], room), self._soonest[target]
+            stop, soonest = np.minimum(end[row], room), self.soonest[target]
             about = np.minimum(np.maximum(sample, soonest - self._usual), stop)
             duration = self.swings.estimate(source, target, about, np.maximum(about + self._usual, soonest))
             count = np.ceil(duration / spacing).astype(np.int64)
@@ -253,7 +253,7 @@ class StanceSearch:
         if swing is None or chosen is None:
             return None
         duration, room = chosen.duration, swing.room
-        first, last = int(self._soonest[move.target]), int(self._latest[move.target])
+        first, last = int(self.soonest[move.target]), int(self._latest[move.target])
         land = max(move.lift + int(np.ceil(duration / self.path.spacing)), first)
         late = max(land - room, 0) * self.path.spacing
         land = min(land, room)

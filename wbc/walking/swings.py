@@ -143,6 +143,13 @@ class Swings:
             self.prepare([swing])
         return self._chosen[swing]
 
+    def clear(self, swing: Swing, way: int) -> bool:
+        """Whether a swing along one of the ways is possible, and clear of the structure and of the other arms."""
+        self._track([swing], way)
+        self._check([swing], way)
+        name = _name(swing)
+        return self._tracks[name, way] is not None and all(self._apart[name, way, g] for g in swing.others)
+
     def correct(self, arm: int, source: int, target: int, lift: int, way: int, duration: float, possible: bool) -> None:
         """A swing along one of the ways takes another time [s], or is not possible after all."""
         name = arm, source, target, lift

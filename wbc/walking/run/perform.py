@@ -11,17 +11,19 @@ from wbc.robots import Walker, WalkerData
 from wbc.track.summary import Figure
 from wbc.walking.body_path import BodyPath
 from wbc.walking.first_grasps import free_state, plan_from_state
-from wbc.walking.plan import NoPlanError, Plan, Regrasp
+from wbc.walking.followed_plan import follow_plan
+from wbc.walking.plan import NoPlanError, Plan, Regrasp, read_plan
 from wbc.walking.planner import Objective, plan_walk
 from wbc.walking.run.carrying_out import CarryingOut, Outcome, Progress
 from wbc.walking.run.compiling import compiled_stack
-from wbc.walking.run.recording import TickColumns, WalkRecorder, way_of
+from wbc.walking.run.recording import TickColumns, WalkRecorder
 from wbc.walking.run.request import WalkRequest
 from wbc.walking.run_log import WalkLog
 from wbc.walking.structure import Structure
 from wbc.walking.veto import Veto
 from wbc.walking.walk import PATIENCE, SLACK, Walk
 from wbc.walking.walk_stack import WalkStack
+from wbc.walking.way_data import way_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,13 +73,15 @@ def perform_walk(
         ask: (the next re-grasp, why the last answer was refused or "") -> "" for yes, or another hold.
 
     Raises:
-        What the request's methods raise. ShapeError: no body with arms.
+        What the request's methods, ``read_plan`` and ``follow_plan`` raise for bad input. ShapeError: no body with
+            arms.
     """
     report = progress or (lambda what, part: None)
     if not isinstance(walker.data, WalkerData):
         raise ShapeError("walker", walker.robot.name, "expected a body with arms")
     structure = request.build()
-    path = request.path(structure, walker.data)
+    asked_plan = read_plan(request.plan) if request.plan else None
+    path = request.path(structure, walker.data) if asked_plan is None else asked_plan.path
     report("planning", None)
     begin = time.perf_counter()
     try:
@@ -85,12 +89,14 @@ def perform_walk(
         if request.free_start:
             state = free_state(walker, path.poses[0])
             plan = plan_from_state(walker, structure, path, state)
+        elif asked_plan is not None:
+            state, plan = None, follow_plan(walker, structure, asked_plan)
         else:
             state, plan = None, plan_walk(walker, structure, path, objective=asked, partial=True, detour=True)
     except NoPlanError as error:
         return WalkRun(request, walker, structure, path, None, "refused", str(error), plan_time=_since(begin))
-    # A way round that was found goes with the log, so that the walk can be resumed on it
-    way = {} if plan.path is path else {"way": way_of(plan.path)}
+    # A way round that was found, or that of a file, goes with the log, so that the walk can be resumed on it
+    way = {} if plan.path is path and asked_plan is None else {"way": way_of(plan.path)}
     planned, path = _since(begin), plan.path
     if not plan.complete:
         return WalkRun(request, walker, structure, path, plan, "refused", plan.reason, plan_time=planned)

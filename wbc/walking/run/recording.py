@@ -13,9 +13,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wbc.errors import WbcError
 from wbc.validation import Array
-from wbc.walking.body_path import BodyPath
 from wbc.walking.run_log import CLOSED, HAND_STATES, OPEN, OPENING, WalkLog, WalkLogError
 from wbc.walking.run_recorder import LogRecorder
 from wbc.walking.walk import Event, Tick, Walk
@@ -66,25 +64,6 @@ class TickColumns:
         """The first ticks of these, and others after them."""
         pairs = ((getattr(self, f.name)[:count], getattr(after, f.name)) for f in fields(self))
         return TickColumns(*(np.concatenate(pair) for pair in pairs))
-
-
-def way_of(path: BodyPath) -> dict[str, Any]:
-    """A body's path as plain data for a log: its spacing [s] and its poses, each with position and quaternion."""
-    poses = [pin.SE3ToXYZQUAT(pin.SE3(pose)).tolist() for pose in path.poses]
-    return {"spacing": path.spacing, "poses": poses}
-
-
-def path_of(way: Any) -> BodyPath:
-    """The path of :func:`way_of`.
-
-    Raises:
-        WalkLogError: it is none.
-    """
-    try:
-        rows = np.asarray(way["poses"], dtype=float).reshape(-1, 7)
-        return BodyPath(np.array([pin.XYZQUATToSE3(row).homogeneous for row in rows]), way["spacing"])
-    except (KeyError, TypeError, ValueError, WbcError) as error:
-        raise WalkLogError("way", type(way).__name__, f"no path of a body: {error}") from error
 
 
 class WalkRecorder:

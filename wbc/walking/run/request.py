@@ -59,6 +59,7 @@ class WalkRequest:
         robot: ``three-armed`` or ``two-ended``. The latter goes from two holds, ``ID1 ID2``, to a hold or a place
             ``x,y,z`` [m], in destination mode.
         gait: of the two-ended arm: ``any``, ``inchworm`` or ``turnaround``.
+        plan: a file of a plan, which is carried out as it is along its own way; "": plan.
     """
 
     structure: str = "cylinder"
@@ -79,6 +80,7 @@ class WalkRequest:
     free_start: bool = False
     robot: str = "three-armed"
     gait: str = "any"
+    plan: str = ""
 
     def __post_init__(self) -> None:
         validation.one_of("mode", self.mode, MODES)
@@ -94,6 +96,8 @@ class WalkRequest:
         validation.one_of("robot", self.robot, ROBOTS)
         validation.one_of("gait", self.gait, tuple(GAITS))
         two_ended = self.robot == "two-ended"
+        if self.plan and (two_ended or self.commands or self.tasks or self.free_start or self.planner == "published"):
+            raise RangeError("plan", self.plan, "plans of files are of three arms that hold, and of the planner 'free'")
         if two_ended and (self.commands or self.tasks or self.free_start or self.planner == "published"):
             raise RangeError("robot", self.robot, "the two-ended arm goes to a hold or a place, by the planner 'free'")
         if self.gait != "any" and not two_ended:

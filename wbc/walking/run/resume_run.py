@@ -24,7 +24,7 @@ from wbc.walking.run.carrying_out import CarryingOut, Progress
 from wbc.walking.run.compiling import compiled_stack
 from wbc.walking.run.parts import configuration
 from wbc.walking.run.perform import WalkRun
-from wbc.walking.run.recording import TICKS, TickColumns, WalkRecorder, path_of
+from wbc.walking.run.recording import TICKS, TickColumns, WalkRecorder
 from wbc.walking.run.request import WalkRequest
 from wbc.walking.run_log import CLOSED, OPENING, WalkLog, WalkLogError
 from wbc.walking.structure import Structure
@@ -32,6 +32,7 @@ from wbc.walking.structure_file import read_structure
 from wbc.walking.walk import PATIENCE, SLACK, Walk
 from wbc.walking.walk_stack import WalkStack
 from wbc.walking.walk_state import State
+from wbc.walking.way_data import path_of
 
 STRUCTURE = "structure.csv"
 
