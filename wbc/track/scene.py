@@ -86,8 +86,13 @@ class Scene:
         self._pale: list[list[render.Mesh]] = []
         self._key: list[tuple[Colour, str]] = []
 
-    def add_robot(self, q: Array, pale: bool = False) -> None:
-        """The robot at a configuration; ``pale``: at another time, without links that stand where they stood before."""
+    def add_robot(self, q: Array, pale: bool = False, pieces: Sequence[tuple[Solid, pin.SE3, Colour]] = ()) -> None:
+        """The robot at a configuration.
+
+        Args:
+            pale: at another time, without links that stand where they stood before.
+            pieces: what is drawn with it, (shape, pose in the world, colour).
+        """
         model, data = self._robot.model, self._robot.model.createData()
         pin.framesForwardKinematics(model, data, self._robot.configuration("q", q))
         meshes = []
@@ -100,6 +105,7 @@ class Scene:
             plain = DARK if int(model.frames[index].parentJoint) in self._dark else WHITE
             colour = self._colours.get(link, plain)
             meshes.append(render.Mesh(triangles @ pose.rotation.T + pose.translation, colour))
+        meshes += [_surface(shape, place, colour) for shape, place, colour in pieces]
         if pale:
             self._pale.append(meshes)
         else:

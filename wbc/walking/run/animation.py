@@ -13,7 +13,8 @@ from wbc.track import render
 from wbc.validation import Array
 from wbc.walking.run import surroundings
 from wbc.walking.run.capsule_picture import Capsules, Ground
-from wbc.walking.run.parts import PALE_HAND, Part, configuration, part_poses, parts_of
+from wbc.walking.run.joining_pieces import Part
+from wbc.walking.run.parts import PALE_HAND, configuration, part_poses, parts_of
 from wbc.walking.run.perform import WalkRun
 from wbc.walking.run.stills import AZIMUTH, ELEVATION, SHOWN, held_by
 from wbc.walking.run.surroundings import arm_colour, mixed

@@ -2,35 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import pinocchio as pin
 
-from wbc.robots import Walker, WalkerData
-from wbc.shapes import Capsule, Solid
+from wbc.robots import Walker
 from wbc.validation import Array
+from wbc.walking.run.joining_pieces import Part, joining_pieces
 from wbc.walking.run.surroundings import BODY, Colour, arm_colour, mixed
 from wbc.walking.run_log import WalkLog
 
 #: Part of white in the colour of an arm, and of its hand
 PALE_ARM, PALE_HAND = 0.6, 0.05
-
-
-@dataclass(frozen=True, eq=False)
-class Part:
-    """A shape that a link carries.
-
-    Attributes:
-        link: frame of the robot. shape, placement: in it. colour: of the picture.
-        shoulder: it joins a neck and an upper arm, which no shape of the robot does.
-    """
-
-    link: str
-    shape: Solid
-    placement: pin.SE3
-    colour: Colour
-    shoulder: bool = False
 
 
 def link_colours(walker: Walker) -> dict[str, Colour]:
@@ -50,13 +32,7 @@ def parts_of(walker: Walker) -> list[Part]:
         for link, shapes in walker.robot.shapes.items()
         for placed in shapes
     ]
-    if isinstance(walker.data, WalkerData):
-        neck, across = walker.data.neck_length, walker.data.shoulder_offset
-        turn = pin.utils.rotate("x", -np.pi / 2)
-        place = pin.SE3(turn, np.array([0.0, -across / 2, neck]))
-        piece = Capsule(walker.data.upper_arm_radius, across)
-        out += [Part(arm.links[0], piece, place, colours[arm.links[0]], True) for arm in walker.arms]
-    return out
+    return out + joining_pieces(walker, colours)
 
 
 def part_poses(walker: Walker, parts: list[Part], q: Array) -> list[pin.SE3]:

@@ -19,7 +19,8 @@ from wbc.track import solids
 from wbc.track.scene import simplified
 from wbc.validation import Array
 from wbc.walking.run import surroundings
-from wbc.walking.run.parts import PALE_HAND, Part, configuration, part_poses, parts_of
+from wbc.walking.run.joining_pieces import Part
+from wbc.walking.run.parts import PALE_HAND, configuration, part_poses, parts_of
 from wbc.walking.run.perform import WalkRun
 from wbc.walking.run.stills import AZIMUTH, ELEVATION, held_by
 from wbc.walking.run_log import WalkLog

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from wbc.track.scene import Scene
 from wbc.walking.run import surroundings
-from wbc.walking.run.parts import configuration, link_colours, part_poses, parts_of
+from wbc.walking.run.joining_pieces import joining_pieces
+from wbc.walking.run.parts import configuration, link_colours, part_poses
 from wbc.walking.run.perform import WalkRun
 from wbc.walking.run_log import CLOSED, OPENING, WalkLog
 
@@ -19,7 +20,7 @@ from wbc.walking.run_log import CLOSED, OPENING, WalkLog
 AZIMUTH, ELEVATION = np.radians(-58.0), np.radians(30.0)
 #: Holds that are shown lie within this of the body's way [m]
 SHOWN = 1.6
-#: Stills of instants, and width and height of pictures [pixels]
+#: Stills of instants at most, and width and height of pictures [pixels]
 COUNT, SIZE = 3, (960, 640)
 
 
@@ -37,7 +38,8 @@ def save_stills(
     """
     files = [save_overview(run, log, folder / "walk.png", size)]
     swings = swing_rows(log)
-    for number, k in enumerate(swings[np.linspace(0, len(swings) - 1, COUNT).round().astype(int)], start=1):
+    chosen = np.unique(np.linspace(0, len(swings) - 1, COUNT).round().astype(int))
+    for number, k in enumerate(swings[chosen], start=1):
         if stop is not None and stop():
             break
         scene = new_scene(run)
@@ -66,13 +68,12 @@ def new_scene(run: WalkRun) -> Scene:
 
 
 def add_machine(scene: Scene, run: WalkRun, log: WalkLog, row: int, pale: bool = False) -> None:
-    """The machine at a row of the log, with the pieces that join necks and upper arms."""
+    """The machine at a row of the log, with the pieces that join its shapes."""
     q = configuration(run.walker, log, row)
     q[:7] = pin.SE3ToXYZQUAT(surroundings.upright(log) * pin.XYZQUATToSE3(q[:7]))
-    scene.add_robot(q, pale)
-    pieces = [part for part in parts_of(run.walker) if part.shoulder and not pale]
-    for piece, pose in zip(pieces, part_poses(run.walker, pieces, q), strict=True):
-        scene.add_shape(piece.shape, pose, colour=piece.colour)
+    parts = joining_pieces(run.walker, link_colours(run.walker))
+    poses = part_poses(run.walker, parts, q)
+    scene.add_robot(q, pale, [(part.shape, pose, part.colour) for part, pose in zip(parts, poses, strict=True)])
 
 
 def add_structure(scene: Scene, run: WalkRun, log: WalkLog, held: dict[int, int]) -> None:
