@@ -15,15 +15,18 @@ from wbc.coordinates import (
     BodyRows,
     Condition,
     Conditioning,
+    Coordinate,
     CoordinatePair,
     JointRows,
     PairController,
     closed_form,
+    expressions,
     mode_pairs,
     parts,
     smallest_complete_sets,
     survey_pairs,
 )
+from wbc.coordinates.singular import LeastSingular
 from wbc.errors import DuplicateNameError, RangeError, ShapeError, UnknownNameError
 
 STATES = np.random.default_rng(0).uniform(-pi, pi, (30, 7))
@@ -62,6 +65,68 @@ def test_singular_values_are_numpys_and_slopes_are_their_derivatives(backend: st
         np.testing.assert_allclose(slopes, np.transpose(steps), atol=1e-6)
         for J, s, v in zip(made.matrices(q), sigma, right, strict=True):
             assert np.linalg.norm(J @ v) == pytest.approx(s, abs=1e-12)
+
+
+@pytest.mark.parametrize("backend", ["native", "vm"])
+def test_braked_joints_are_left_out_and_metres_count_by_the_arm(backend: str) -> None:
+    """15 and 22 joints: numpy's singular values of the rows and columns that brakes leave, slopes by differences."""
+    for name in ("spdm", "spdm_on_ssrms")[: 1 if backend == "native" else 2]:
+        arm, robot = parts(name).arms[1], parts(name).robot
+        assert arm.middle is not None
+        assert arm.alpha is not None
+        moving = [k for k, n in enumerate(robot.dof_names) if n.startswith("arm2_")]
+        brakes = [n for n in robot.dof_names if not n.startswith("arm2_")]
+        groups: list[tuple[Coordinate, ...]] = [(arm.tip, arm.alpha), (arm.tip, arm.middle), (arm.tip,)]
+        made = Conditioning(robot, groups, brakes=[brakes, brakes, ()], backend=backend)
+        length = parts("spdm_arm").robot.characteristic_length
+        q = np.random.default_rng(5).uniform(-1.5, 1.5, robot.nq)
+        sigmas = made.sigmas(q)
+        for group, sigma, columns in zip(groups, sigmas, (moving, moving, slice(None)), strict=True):
+            J = np.asarray(expressions.rate_function(robot, group)(q).full())[:, columns]
+            units = [row.unit for one in group for row in expressions.labels(robot, one)]
+            J = J * [[1.0 / length if unit == "m" else 1.0] for unit in units]
+            assert sigma == pytest.approx(np.linalg.svd(J, compute_uv=False)[-1], rel=1e-9)
+        assert made.chosen([2, 0])(q).tolist() == [sigmas[2], sigmas[0]]
+        _, slopes, right = made.slopes(q)
+        assert np.abs(np.delete(right[0], moving)).max() == 0.0
+        h = 1e-6 * np.eye(robot.nv)[[moving[1], moving[3]]]
+        found = [(made.sigmas(q + d) - made.sigmas(q - d))[:2] / 2e-6 for d in h]
+        np.testing.assert_allclose(slopes[:2, [moving[1], moving[3]]], np.transpose(found), atol=1e-6)
+
+
+def test_singular_values_of_matrices_that_fall_apart() -> None:
+    """Entries alone in their row and column, empty rows and columns, wide and tall: numpy's least singular value."""
+    least, rng = LeastSingular(), np.random.default_rng(2)
+    assert least.compiled
+    for rows, columns in ((3, 3), (3, 8), (8, 3), (6, 7), (1, 5), (5, 1), (26, 22), (15, 15)):
+        M = rng.normal(size=(rows, columns))
+        for change in range(5):
+            if change == 1:
+                M[0], M[:, 0] = 0.0, 0.0
+                M[0, 0] = -0.3
+            elif change == 2:
+                M[-1, :-1] = 0.0
+            elif change == 3:
+                M[:, -1] = 0.0
+            elif change == 4:
+                M[-1] = 0.0
+            wanted = np.linalg.svd(M, compute_uv=False)[-1]
+            assert least(M) == pytest.approx(wanted, rel=1e-12, abs=1e-14)
+            assert LeastSingular(native=False)(M) == pytest.approx(wanted, abs=1e-14)
+
+
+def test_a_free_body_joint_helps_where_the_arm_by_itself_is_singular() -> None:
+    """15 joints: the best of M1 keeps 0.3 of what the task has; the pairs that lock the body joint do not."""
+    robot, pairs = parts("spdm").robot, mode_pairs("spdm", "M1")
+    found = survey_pairs(robot, pairs, 1500)
+    assert found.quantile(0.0) > 0.45
+    fixed = [k for k, pair in enumerate(pairs) if JointRows("body_joint") in pair.constraint]
+    assert (len(pairs), len(fixed)) == (14, 9)
+    # Stretched, with the yaw joint at 90 degrees: near a singularity of the arm by itself
+    stretched = np.array([0.2, 0.3, pi / 2, -0.5, 0.0, 0.7, -0.6, 0.9, *STATE])
+    sigmas, task = Adviser(robot, pairs, backend="vm").singular_values(stretched)
+    assert sigmas[fixed].max() < 0.1 * task[0]
+    assert sigmas.max() > 0.8 * task[0] > 0.1
 
 
 def test_advice_near_and_on_loci(adviser: Adviser) -> None:
@@ -163,6 +228,11 @@ def test_bad_input(adviser: Adviser) -> None:
         adviser.recommend((0.3, 0.5, -0.7, 1.1), "bta")
     with pytest.raises(ShapeError):
         Conditioning(FOUR.robot, [])
+    for brakes in ([], [FOUR.arms[0].joints]):
+        with pytest.raises(ShapeError, match="brakes"):
+            Conditioning(FOUR.robot, [(TIP,)], brakes=brakes)
+    with pytest.raises(UnknownNameError, match="joint1"):
+        Conditioning(FOUR.robot, [(TIP,)], brakes=[["joint"]])
     control = PairController(FOUR.robot, PAIRS[0], backend="vm")
     with pytest.raises(RangeError, match="no such pair"):
         AutomaticPairs(control, adviser)

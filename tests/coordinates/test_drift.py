@@ -111,11 +111,11 @@ def test_easing_is_that_of_the_least_singular_value() -> None:
         np.testing.assert_allclose(every, plain.whole(q), rtol=0.0, atol=1e-13)
         for pair, easing, sigma in zip(pairs, easings, exact.sigmas(q), strict=True):
             found = easing.at(pair, every)
-            assert found == pytest.approx(easing.weight(sigma), rel=1e-6, abs=1e-15)
+            assert found == pytest.approx(easing.weight(pair, sigma), rel=1e-6, abs=1e-15)
             eased.append(found > 0.0)
     assert 10 < sum(eased) < 400
     # One that looks at another pair in between answers as one that does not
     for pair, easing in zip(pairs, easings, strict=True):
         assert easings[0].at(pair, every) == easing.at(pair, every)
-    assert easings[0].weight(0.0) == pytest.approx(0.005**2)
-    assert easings[0].weight(0.005) == pytest.approx((0.005 * 0.75) ** 2)
+    assert easings[0].weight(pairs[0], 0.0) == pytest.approx(0.005**2)
+    assert easings[0].weight(pairs[0], 0.005) == pytest.approx((0.005 * 0.75) ** 2)

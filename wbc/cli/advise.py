@@ -67,7 +67,8 @@ def print_survey(robot: str, mode: str, count: int) -> None:
     found = survey_pairs(machine, pairs, count)
     k = found.worst
     out().print(
-        f"best of {len(pairs)} pairs at {count} configurations: least singular value over that of the task alone"
+        f"best of {len(pairs)} pairs at {count} configurations: least singular value over that of the task alone",
+        soft_wrap=True,
     )
     goal = f" (goal {GOALS[robot]:g})" if robot in GOALS else ""
     out().print(

@@ -5,14 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
 from wbc import validation
+from wbc.coordinates.chains import Braked, braked
 from wbc.coordinates.conditioning import LEAST, Conditioning, checked_configuration
 from wbc.coordinates.determinant_places import ClosedForm, closed_form
 from wbc.coordinates.pair import CoordinatePair
+from wbc.coordinates.rows import Coordinate
 from wbc.errors import DuplicateNameError, ShapeError, UnknownNameError
 from wbc.robot import Robot
 from wbc.validation import Array
@@ -69,6 +71,16 @@ class Advice:
         return self.sigma / self.task if self.task > 0.0 else 0.0
 
 
+#: Coordinates, and joints that are locked
+_Group: TypeAlias = tuple[tuple[Coordinate, ...], tuple[str, ...]]
+
+
+def _groups(some: Braked) -> tuple[_Group, _Group, _Group]:
+    """Of a pair, of its task alone, of its constraint; the task's for a constraint of brakes."""
+    task = some.task, ()
+    return (some.task + some.held, some.joints), task, (some.held, some.joints) if some.held else task
+
+
 class Adviser:
     """Advice on some pairs of a robot.
 
@@ -76,8 +88,9 @@ class Adviser:
         for advice in adviser.advise(q): ...
         name = adviser.recommend(q, current="xi | alpha")
 
-    Singular values are those of D_r [J_T; J_C] D_c, see :class:`Conditioning`. For over-determined pairs the matrix is
-    tall.
+    Singular values are those of D_r [J_T; J_C] D_c, see :class:`Conditioning`, without the rows and columns of joints
+    that the constraint locks on other arms than the task's, see :func:`braked`: the rank that is lost is the same. For
+    over-determined pairs the matrix is tall.
 
     Args:
         length: characteristic length [m]; default: the robot's. least: singular value below which a row is lost.
@@ -113,11 +126,15 @@ class Adviser:
         self.least = validation.scalar("least", least, low=0.0)
         self.factor = validation.scalar("factor", factor, low=1.0)
         self._exact = validation.flag("exact", exact)
-        groups = dict.fromkeys(side for p in given for side in (p.rows, p.task, p.constraint))
-        self.conditioning = Conditioning(robot, list(groups), length=length, backend=backend)
-        places = {group: k for k, group in enumerate(groups)}
-        self._places = np.array([[places[side] for side in (p.rows, p.task, p.constraint)] for p in given])
+        groups: dict[_Group, int] = {}
+        self._braked = [braked(robot, pair) for pair in given]
+        self._places = np.array([[groups.setdefault(g, len(groups)) for g in _groups(some)] for some in self._braked])
+        self.conditioning = Conditioning(
+            robot, [g[0] for g in groups], brakes=[g[1] for g in groups], length=length, backend=backend
+        )
         self._names = list(self.pairs)
+        self._wholes = self.conditioning.chosen(self._places[:, 0].tolist())
+        self._wholes_and_tasks = self.conditioning.chosen(self._places[:, :2].ravel().tolist())
 
     def sigmas(self, q: Any) -> Array:
         """The least singular value of each pair, in their order: what a control loop asks for.
@@ -125,8 +142,7 @@ class Adviser:
         Raises:
             ShapeError, NotFiniteError, RotationError: no configuration.
         """
-        found = self.conditioning.sigmas(checked_configuration(self.robot, q))
-        return np.asarray(found[self._places[:, 0]])
+        return self._wholes(checked_configuration(self.robot, q))
 
     def singular_values(self, q: Any) -> tuple[Array, Array]:
         """(the least singular value of each pair, that of its task alone), in their order.
@@ -134,8 +150,8 @@ class Adviser:
         Raises:
             ShapeError, NotFiniteError, RotationError: no configuration.
         """
-        found = self.conditioning.sigmas(checked_configuration(self.robot, q))
-        return found[self._places[:, 0]], found[self._places[:, 1]]
+        both = self._wholes_and_tasks(checked_configuration(self.robot, q)).reshape(-1, 2)
+        return both[:, 0], both[:, 1]
 
     def advise(self, q: Any) -> tuple[Advice, ...]:
         """All about every pair, in their order.
@@ -146,12 +162,12 @@ class Adviser:
         q = self.robot.configuration("q", q)
         sigmas, slopes, _ = self.conditioning.slopes(q)
         out = []
-        for (whole, task, constraint), name in zip(self._places, self._names, strict=True):
-            values = float(sigmas[whole]), float(sigmas[task]), float(sigmas[constraint])
+        for (whole, task, constraint), name, some in zip(self._places, self._names, self._braked, strict=True):
+            sigma, alone = float(sigmas[whole]), float(sigmas[task])
+            # Brakes by themselves do not depend on each other
+            held = float(sigmas[constraint]) if some.held else 1.0
             known = closed_form(self.robot, self.pairs[name]) if self._exact else None
-            found = self._nearest(q, values[0], slopes[whole], known)
-            sigma, alone, held = values
-            distance, basis, direction, locus = found
+            distance, basis, direction, locus = self._nearest(q, sigma, slopes[whole], known)
             condition = self._condition(sigma, alone, held)
             out.append(Advice(name, sigma, alone, held, condition, distance, basis, direction, locus))
         return tuple(out)

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import ctypes
-import hashlib
-import pathlib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from importlib import resources
 from math import isfinite
 from typing import Any
@@ -16,10 +14,13 @@ import numpy as np
 from wbc import validation
 from wbc.controller.library import load_library
 from wbc.coordinates import expressions
+from wbc.coordinates.chains import free_joints
 from wbc.coordinates.rows import Coordinate
+from wbc.coordinates.scales import scales
 from wbc.errors import CompileError, ShapeError
 from wbc.robot import Robot
-from wbc.stack import cache, toolchain
+from wbc.stack import toolchain
+from wbc.stack.compiled_function import generated_library
 from wbc.symbolic.kinematics import Kinematics
 from wbc.symbolic.tracer import Tracer
 from wbc.validation import Array
@@ -42,13 +43,17 @@ def checked_configuration(robot: Robot, q: Any) -> Array:
 
 
 class Conditioning:
-    """sigma_min of D_r J_g(q) D_c for groups g of coordinates, J_g their rates, with
+    """sigma_min of D_r J_g(q) D_c for groups g of coordinates, J_g their rates without the columns of braked joints,
 
         D_r = 1 / length for rows in metres, D_c = length for sliding joints, else 1;
         d sigma / dq = u' (dJ / dq) v,    u, v the singular vectors                        [per rad, or m]
 
+    Args:
+        brakes: names of the joints that stand still in each group; default: none.
+        length: one for all rows [m]; default: of the arm that a row belongs to, see :func:`scales`.
+
     Attributes:
-        groups: the coordinates of each. length: characteristic length [m]. compiled: as C, else by numpy.
+        groups: the coordinates of each. compiled: as C, else by numpy.
     """
 
     def __init__(
@@ -56,6 +61,7 @@ class Conditioning:
         robot: Robot,
         groups: Sequence[Sequence[Coordinate]],
         *,
+        brakes: Sequence[Sequence[str]] | None = None,
         length: float | None = None,
         backend: str = "auto",
     ) -> None:
@@ -63,17 +69,18 @@ class Conditioning:
         self.robot, self.groups = robot, tuple(tuple(g) for g in groups)
         if not self.groups or not all(self.groups):
             raise ShapeError("groups", groups, "expected one group of coordinates or several")
-        chosen = robot.characteristic_length if length is None else length
-        self.length = validation.scalar("length", chosen, low=0.0, open_low=True, unit="m")
+        if length is not None:
+            length = validation.scalar("length", length, low=0.0, open_low=True, unit="m")
         every = tuple(dict.fromkeys(one for group in self.groups for one in group))
         labels = [expressions.labels(robot, one) for one in every]
         starts = dict(zip(every, np.cumsum([0, *map(len, labels)]).tolist(), strict=False))
         sizes = dict(zip(every, map(len, labels), strict=True))
         self._rows = [[starts[one] + k for one in group for k in range(sizes[one])] for group in self.groups]
-        units = [row.unit for some in labels for row in some]
-        self._row_scale = np.array([1.0 / self.length if unit == "m" else 1.0 for unit in units])
-        self._dof_scale = np.array([self.length if unit == "m" else 1.0 for unit in robot.dof_units])
-        self._rates, self._slope = _functions(robot, every, len(units))
+        self._columns = [free_joints(robot, names) for names in ([()] * len(self.groups) if brakes is None else brakes)]
+        if len(self._columns) != len(self.groups) or not all(self._columns):
+            raise ShapeError("brakes", brakes, "expected names of joints for each group, not of all joints")
+        self._row_scale, self._dof_scale = scales(robot, every, length)
+        self._rates, self._slope = _functions(robot, every, len(self._row_scale))
         self._native = self._load(backend) if backend != "vm" else None
         if backend == "native" and self._native is None:
             raise CompileError("backend", backend, f"cannot compile: {', '.join(toolchain.missing())}")
@@ -90,52 +97,68 @@ class Conditioning:
         self._q[:] = q
         if self._native is None:
             return np.array([np.linalg.svd(J, compute_uv=False)[-1] for J in self.matrices(q)])
-        self._native(self._pointers[0], self._pointers[1], None, None)
+        at, sigma, _, _ = self._pointers
+        self._native(at, None, sigma, None, None)
         return self._sigma.copy()
+
+    def chosen(self, groups: Sequence[int]) -> Callable[[Array], Array]:
+        """:meth:`sigmas` of some groups alone, given by their numbers, in that order."""
+        order = np.array(groups, dtype=np.intp)
+        if self._native is None:
+            return lambda q: self.sigmas(q)[order]
+        native, (at, sigma, _, _) = self._native, self._pointers
+        wanted = np.zeros(len(self.groups), dtype=np.uint8)
+        wanted[order] = 1
+        # The array lives as long as the function that points into it
+        flags = wanted.ctypes.data_as(ctypes.c_void_p)
+
+        def some(q: Array) -> Array:
+            self._q[:] = q
+            native(at, flags, sigma, None, None)
+            return self._sigma[order]
+
+        return some
 
     def slopes(self, q: Array) -> tuple[Array, Array, Array]:
         """(least singular values, their derivatives along q [groups, nv], right singular vectors [groups, nv])."""
         self._q[:] = q
         if self._native is not None:
-            self._native(*self._pointers)
+            at, *out = self._pointers
+            self._native(at, None, *out)
             return self._sigma.copy(), self._slopes.copy(), self._right.copy()
-        for g, (rows, J) in enumerate(zip(self._rows, self.matrices(q), strict=True)):
+        self._right[:] = 0.0
+        for g, (rows, columns, J) in enumerate(zip(self._rows, self._columns, self.matrices(q), strict=True)):
             u, sigma, v = np.linalg.svd(J, full_matrices=False)
-            left = np.zeros(len(self._row_scale))
+            left, right = np.zeros(len(self._row_scale)), self._right[g]
             left[rows] = u[:, -1] * self._row_scale[rows]
-            self._sigma[g], self._right[g] = sigma[-1], v[-1]
-            self._slopes[g] = np.asarray(self._slope(q, left, v[-1] * self._dof_scale).full()).ravel()
+            self._sigma[g], right[columns] = sigma[-1], v[-1]
+            self._slopes[g] = np.asarray(self._slope(q, left, right * self._dof_scale).full()).ravel()
         return self._sigma.copy(), self._slopes.copy(), self._right.copy()
 
     def matrices(self, q: Array) -> list[Array]:
         """The scaled matrix of each group, for checks."""
         every = self._row_scale[:, None] * np.asarray(self._rates(q).full()) * self._dof_scale
-        return [every[rows] for rows in self._rows]
+        return [every[np.ix_(rows, columns)] for rows, columns in zip(self._rows, self._columns, strict=True)]
 
     def many(self, states: Array) -> list[Array]:
-        """The scaled matrices of each group at many configurations [states, rows, nv]."""
+        """The scaled matrices of each group at many configurations [states, rows, joints that are not braked]."""
         rates = self._rates.map(len(states))(states.T).full()
         every = rates.reshape(len(self._row_scale), len(states), self.robot.nv).swapaxes(0, 1)
         every = self._row_scale[:, None] * every * self._dof_scale
-        return [every[:, rows] for rows in self._rows]
+        return [every[:, rows][:, :, columns] for rows, columns in zip(self._rows, self._columns, strict=True)]
 
     def _load(self, backend: str) -> ctypes._NamedFuncPointer | None:
         if not toolchain.available():
             return None
         text = self._source()
-        name = hashlib.sha256(f"{text}\n{toolchain.identity()}".encode()).hexdigest()
-
-        def fill(folder: pathlib.Path) -> None:
-            toolchain.compile_rows(text, folder / "least.so")
-
         try:
-            folder, _ = cache.fetch(name, fill, library=True)
+            library = generated_library(text, lambda: text)
         except CompileError as error:
             if backend == "native":
                 raise
             toolchain.fall_back(str(error))
             return None
-        found = load_library(folder / "least.so").conditioning
+        found = load_library(library).conditioning
         found.restype = None
         return found
 
@@ -144,8 +167,7 @@ class Conditioning:
         functions = (self._rates, self._slope)
         for function in functions:
             generator.add(function)
-        starts = np.cumsum([0, *map(len, self._rows)]).tolist()
-        most = max(self.robot.nv, *map(len, self._rows))
+        most = max(map(len, self._rows))
         sizes = {
             "NV": self.robot.nv,
             "ROWS": len(self._row_scale),
@@ -157,13 +179,24 @@ class Conditioning:
         }
         tables = [
             *(f"#define {name} {value}" for name, value in sizes.items()),
-            f"static const int group_start[] = {{{', '.join(map(str, starts))}}};",
-            f"static const int group_row[] = {{{', '.join(str(r) for rows in self._rows for r in rows)}}};",
+            *_table("row", self._rows),
+            *_table("column", self._columns),
             f"static const double row_scale[] = {{{', '.join(x.hex() for x in self._row_scale.tolist())}}};",
             f"static const double dof_scale[] = {{{', '.join(x.hex() for x in self._dof_scale.tolist())}}};",
         ]
-        own = (resources.files("wbc.coordinates") / "native" / "least.c").read_text()
-        return "\n".join((str(generator.dump()), *tables, own))
+        own = resources.files("wbc.coordinates") / "native"
+        texts = ((own / name).read_text() for name in ("singular.c", "least.c"))
+        return "\n".join((str(generator.dump()), *tables, *texts))
+
+
+def _table(name: str, lists: Sequence[Sequence[int]]) -> tuple[str, str]:
+    """C arrays of numbers that each group has some of, and where those of a group begin."""
+    starts = np.cumsum([0, *map(len, lists)]).tolist()
+    numbers = [str(k) for some in lists for k in some]
+    return (
+        f"static const int {name}_start[] = {{{', '.join(map(str, starts))}}};",
+        f"static const int group_{name}[] = {{{', '.join(numbers)}}};",
+    )
 
 
 def _functions(robot: Robot, every: tuple[Coordinate, ...], count: int) -> tuple[ca.Function, ca.Function]:

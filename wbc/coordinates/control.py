@@ -67,7 +67,8 @@ class PairController:
         self.declared: PairStack = pair_stack(robot, pairs, dt, items=items, limits=limits, gain=gain, length=length)
         self.robot, self.dt = robot, self.declared.stack.dt
         self.controller = self.declared.stack.compile(backend=backend)
-        self._rates = RateMatrices(robot, self.declared.coordinates, native=self.controller.backend == "native")
+        native = self.controller.backend == "native"
+        self._rates = RateMatrices(robot, self.declared.coordinates, native=native)
         self._sizes = {one: row_count(robot, [one]) for one in self.declared.coordinates}
         self.active = next(iter(self.declared.pairs))
         self._command: dict[Coordinate, Array] = {}
@@ -76,7 +77,7 @@ class PairController:
         self._time, self._seconds = 0.0, 0.0
         self._moving: set[Coordinate] = set()
         self._integrals = RateIntegrals(robot, self.declared.coordinates)
-        self._easing = Easing(robot, self.declared.stack.length, self._rates)
+        self._easing = Easing(robot, self.declared.stack.length, self._rates, native=native)
         self._q: Array | None = None
         self._activate()
 

@@ -2,7 +2,7 @@
 
 | mode | commanded | held |
 |---|---|---|
-| M1 | tip of the first arm | one scalar constraint; all other joints of a tree |
+| M1 | tip of the first arm | one scalar constraint, or two with the body joint free; other joints of a tree |
 | M2 | that constraint: self-motion | the tip |
 | M3 | a point on the way to the tip, as far as it can go | joints beyond it, pitch plane |
 | M4 | position of the tip | joints of the wrist, and a scalar constraint where one is left |
@@ -110,9 +110,22 @@ def _redundant(arm: Arm) -> tuple[Coordinate, ...]:
 
 def _end_effector(found: Parts) -> Made:
     arm = found.arms[0]
-    return [
-        CoordinatePair(arm.tip, (one, *_others(found, arm)), f"{arm.tip} | {one}") for one in _redundant(arm)
-    ] or NOT_REDUNDANT
+    pairs = [CoordinatePair(arm.tip, (one, *_others(found, arm)), f"{arm.tip} | {one}") for one in _redundant(arm)]
+    return [*pairs, *_free_body(found, arm)] or NOT_REDUNDANT
+
+
+def _free_body(found: Parts, arm: Arm) -> list[CoordinatePair]:
+    """Pairs for where the arm by itself is singular: the body joint moves, two coordinates of the arm are held.
+
+    The five were chosen by a search over all twos of alpha, beta, gamma and locks; how well they do is measured in
+    docs/coordinates.md.
+    """
+    if found.body is None or found.carrier is not None or arm.alpha is None:
+        return []
+    others = tuple(lock for other in found.arms if other is not arm for lock in other.locks())
+    held: list[tuple[Coordinate, Coordinate]] = [(arm.alpha, JointRows(arm.joints[k])) for k in (1, 4)]
+    held += [(JointRows(arm.joints[i]), JointRows(arm.joints[k])) for i, k in ((0, 4), (1, 2), (2, 4))]
+    return [CoordinatePair(arm.tip, (a, b, *others), f"{arm.tip} | {a}, {b}; {found.body} free") for a, b in held]
 
 
 def _self_motion(found: Parts) -> Made:

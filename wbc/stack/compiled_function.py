@@ -1,14 +1,17 @@
-"""A CasADi function as compiled code in the cache."""
+"""Generated code in the cache: a CasADi function, or any text made of such."""
 
 from __future__ import annotations
 
 import hashlib
 import pathlib
+from collections.abc import Callable
 
 import casadi as ca
 
 from wbc.errors import CompileError
 from wbc.stack import cache, toolchain
+
+_LIBRARY = "function.so"
 
 
 def compiled(function: ca.Function) -> ca.Function:
@@ -19,16 +22,29 @@ def compiled(function: ca.Function) -> ca.Function:
     """
     if not toolchain.available():
         return function
-    name = hashlib.sha256(f"{function.serialize()}\n{toolchain.identity()}".encode()).hexdigest()
 
-    def fill(folder: pathlib.Path) -> None:
+    def text() -> str:
         generator = ca.CodeGenerator("function.c", {"with_header": False})
         generator.add(function)
-        toolchain.compile_rows(generator.dump(), folder / "function.so")
+        return str(generator.dump())
 
     try:
-        folder, _ = cache.fetch(name, fill, library=True)
+        return ca.external(function.name(), str(generated_library(function.serialize(), text)))
     except CompileError as error:
         toolchain.fall_back(str(error))
         return function
-    return ca.external(function.name(), str(folder / "function.so"))
+
+
+def generated_library(meaning: str, text: Callable[[], str]) -> pathlib.Path:
+    """The library of a C text that is made where it is not in the cache, named there by what the text stands for.
+
+    Raises:
+        CompileError: there is no compiler, or it fails.
+    """
+    name = hashlib.sha256(f"{meaning}\n{toolchain.identity()}".encode()).hexdigest()
+
+    def fill(folder: pathlib.Path) -> None:
+        toolchain.compile_rows(text(), folder / _LIBRARY)
+
+    folder, _ = cache.fetch(name, fill, library=True)
+    return folder / _LIBRARY
