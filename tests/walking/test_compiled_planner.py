@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -19,7 +20,7 @@ from wbc.walking.swing_clearance import SwingClearance
 from wbc.walking.swing_curve import WAYS
 from wbc.walking.swing_speed import speeds
 from wbc.walking.swing_tracks import Asked, Tracks, tracks
-from wbc.walking.swings import Swings
+from wbc.walking.swings import Chosen, Swing, Swings
 
 Both = Callable[[Callable[[], Any]], tuple[Any, Any]]
 COUNT, N = 120, 25
@@ -89,6 +90,40 @@ def test_swings_are_the_same(machine: Walker, structure: Structure, path: BodyPa
         found |= {("others", x) for x in fast.tolist()} | {("possible", x) for x in fits.tolist()}
     # Every check has said yes and no
     assert len(found) == 6
+
+
+def test_chosen_ways_are_the_same(machine: Walker, structure: Structure, path: BodyPath, both: Both) -> None:
+    """Also of hands that must not roll, and where swings were corrected."""
+    rolls = [replace(hold, roll=("free", 4)[k % 2]) for k, hold in enumerate(structure.holds)]
+    some = replace(structure, holds=tuple(rolls))
+    grips = find_grips(machine, some, path)
+    asked, lift, others = drawn(grips, path)
+    columns = zip(asked.arms, asked.source, asked.target, lift, asked.last, strict=True)
+    swings = [
+        Swing(*map(int, row[:4]), int(row[4]) + 60, (int(other),), int(row[3]) + 20 * (k % 4))
+        for k, (row, other) in enumerate(zip(columns, others, strict=True))
+    ]
+
+    def chosen() -> list[Chosen | None]:
+        search = Swings(machine, some, path, grips)
+        search.prepare(swings)
+        first = [search.choose(swing) for swing in swings]
+        for swing, found in zip(swings[::2], first[::2], strict=True):
+            if found is not None:
+                name = swing.arm, swing.source, swing.target, swing.lift
+                search.correct(*name, found.way, 4.0, found.duration < 2.5)
+        search.prepare(swings)
+        return first + [search.choose(swing) for swing in swings]
+
+    one: list[Chosen | None]
+    other: list[Chosen | None]
+    one, other = both(chosen)
+    assert [c and c.way for c in one] == [c and c.way for c in other]
+    times = [[c.duration for c in many if c] for many in (one, other)]
+    np.testing.assert_allclose(times[0], times[1], rtol=1e-9, atol=1e-9)
+    assert len({c.way for c in one if c}) > 1
+    assert None in one
+    assert 4.0 in times[0]
 
 
 def test_laws_and_arms_are_the_same(

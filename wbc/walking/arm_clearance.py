@@ -44,6 +44,9 @@ class ArmClearance:
 
     Args:
         walker: its capsules and clearance. grips: over one path.
+
+    Attributes:
+        least: distances of all pairs of links but that of the necks, of arms that hold ``[15]`` [m].
     """
 
     def __init__(self, walker: Walker, grips: Grips) -> None:
@@ -56,12 +59,13 @@ class ArmClearance:
         pairs = [(i, j) for i in range(4) for j in range(4) if i or j]
         self._one, self._other = [i for i, _ in pairs], [j for _, j in pairs]
         radii = np.array([neck, upper, fore, hand])
-        self._least = radii[self._one] + radii[self._other] + walker.data.clearance + ROOM  # type: ignore[union-attr]
+        self.least = radii[self._one] + radii[self._other] + walker.data.clearance + ROOM  # type: ignore[union-attr]
         self._conflicts: dict[tuple[int, int], list[int]] = {}
 
     def prepare(self, pairs: Iterable[tuple[int, int]]) -> None:
         """Look at pairs of grips together."""
-        todo = sorted({_pair(a, b) for a, b in pairs} - self._conflicts.keys())
+        known = self._conflicts
+        todo = sorted({pair for a, b in pairs if (pair := _pair(a, b)) not in known})
         if not todo:
             return
         # Samples, multiples of EVERY, that two grips share
@@ -85,7 +89,7 @@ class ArmClearance:
                 ctypes.c_long(len(pairs)),
                 *(compiled.at(array) for array in (pairs, bases)),
                 ctypes.c_long(EVERY),
-                *(compiled.at(array) for array in (first, count, self._least, out)),
+                *(compiled.at(array) for array in (first, count, self.least, out)),
             )
             return out
         which = np.repeat(np.arange(len(pairs)), count)
@@ -126,12 +130,12 @@ class ArmClearance:
         """Least distance beyond radii and clearance of two arms given by their points ``[m, 6, 3]``: ``[m]``."""
         a, b = one[:, self._from][:, self._one], one[:, self._to][:, self._one]
         c, d = other[:, self._from][:, self._other], other[:, self._to][:, self._other]
-        out: Array = (segment_distances(a, b, c, d) - self._least).min(axis=1)
+        out: Array = (segment_distances(a, b, c, d) - self.least).min(axis=1)
         return out
 
     def near(self, one: Array, other: Array, less: float = 0.0) -> NDArray[np.bool_]:
         """Whether arms given by their points are nearer than radii and clearance less ``less`` [m] allow: ``[m]``."""
-        least, library = self._least - less, compiled.library()
+        least, library = self.least - less, compiled.library()
         out = np.zeros(len(one), dtype=np.bool_)
         if library is not None:
             sides = [compiled.packed(side) for side in (one, other)]
@@ -167,7 +171,7 @@ class ArmClearance:
             near = self.near(points.reshape(-1, 6, 3), held.reshape(-1, 6, 3), less)
             return np.asarray(~near.reshape(samples.shape).any(axis=1))
         given = [compiled.packed(array) for array in (points, samples, self._bases[grips.arm[others]])]
-        places = [compiled.at(array) for array in (*given, others, self._least - less, out)]
+        places = [compiled.at(array) for array in (*given, others, self.least - less, out)]
         sizes = (ctypes.c_long(size) for size in samples.shape)
         arm = compiled.arm(self._kinematics.data)
         library.swings_clear(ctypes.byref(arm), ctypes.byref(grips.table), *sizes, *places)

@@ -17,7 +17,7 @@ from wbc.stack import toolchain
 from wbc.stack.kernel import kernel
 
 _SOURCES = Path(__file__).parent / "native"
-_FILES = ("arm.h", "surface.h", "curve.h", "grips.h", "near.h", "speeds.h", "planner.c")
+_FILES = ("arm.h", "surface.h", "curve.h", "grips.h", "near.h", "speeds.h", "tracks.h", "ways.h", "planner.c")
 
 
 class Arm(ctypes.Structure):
@@ -31,7 +31,7 @@ class Arm(ctypes.Structure):
 
 
 class Table(ctypes.Structure):
-    """Grips of native/planner.c."""
+    """Grips of native/tracks.h."""
 
     _fields_ = [(name, ctypes.c_void_p) for name in ("postures", "offset", "first", "last")]
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 Key = tuple[int, ...]
 
 
-@dataclass(frozen=True)
-class Move:
+class Move(NamedTuple):
     """An arm's swing: from grip to grip, lifted and landed at samples of the path.
 
     Attributes:
@@ -30,8 +30,7 @@ class Move:
     way: int = 0
 
 
-@dataclass(frozen=True)
-class Node:
+class Node(NamedTuple):
     """A stance: since when, by what move, and the delay until then in QUANTUM."""
 
     sample: int

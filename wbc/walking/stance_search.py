@@ -19,6 +19,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import combinations, islice
+from math import sin
 from typing import ClassVar
 
 import numpy as np
@@ -113,10 +114,8 @@ class StanceSearch:
         self.swings = Swings(self.walker, self.structure, self.path, self.grips, self.clearance)
 
     def run(self, starts: Sequence[Sequence[int]], sample: int = 0, deadline: float | None = None) -> Found:
-        """The fewest moves from one of some stances (one grip an arm each) at a sample.
-
-        Args:
-            deadline: of ``time.perf_counter``; after it the best of what is known is returned.
+        """The fewest moves from one of some stances (one grip an arm each) at a sample; after the deadline, of
+        ``time.perf_counter``, the best of what is known.
         """
         return drained(self.slices(starts, sample, deadline))
 
@@ -149,9 +148,8 @@ class StanceSearch:
     def correct(self, move: Move, duration: float, possible: bool) -> None:
         """A move takes another time [s], or is not possible; what was searched without looking at it is kept."""
         self.swings.correct(move.arm, move.source, move.target, move.lift, move.way, duration, possible)
-        name = move.arm, move.source, move.target, move.lift
         for depth, asked in enumerate(self._asked):
-            if name in asked:
+            if (move.arm, move.source, move.target, move.lift) in asked:
                 self._levels, self._asked = self._levels[: depth + 1], self._asked[:depth]
 
     def _next(self, level: dict[Key, Node]) -> Slices[tuple[dict[Key, Node], set[Asked]]]:
@@ -257,9 +255,7 @@ class StanceSearch:
         land = max(move.lift + int(np.ceil(duration / self.path.spacing)), first)
         late = max(land - room, 0) * self.path.spacing
         land = min(land, room)
-        if late > self.longest_delay or not first <= land <= last:
-            return None
-        if not self._bent(np.array([move.target]), np.array([land]))[0]:
+        if late > self.longest_delay or not first <= land <= last or not self._bent_at(move.target, land):
             return None
         better = Move(move.arm, move.source, move.target, move.lift, land, duration, late, chosen.way)
         return Node(land, before.delay + round(late / QUANTUM), parent, better)
@@ -268,6 +264,10 @@ class StanceSearch:
         """Whether the wrist is bent enough to land: joint 4 turns the hand's axis only then."""
         out: NDArray[np.bool_] = np.abs(np.sin(self.grips.posture(targets, samples - self._touch)[..., 4])) >= BENT
         return out
+
+    def _bent_at(self, target: int, sample: int) -> bool:
+        """The same of one."""
+        return abs(sin(self.grips.posture_at(target, sample - self._touch).item(4))) >= BENT
 
     def until(self, key: Sequence[int], sample: int) -> int:
         """Last sample that a stance can hold, from a sample on."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,10 +31,18 @@ class SwingClearance:
 
     Args:
         walker: its capsules and clearance. arms: for points and distances of arms, those that hold too.
+
+    Attributes:
+        least: distance of upper arm, forearm and hand from the structure ``[3]`` [m]. touching: a hand that is so near
+            to one of its holds may touch [m].
     """
 
     def __init__(self, walker: Walker, structure: Structure, arms: ArmClearance) -> None:
-        self._structure, self._arms, self._data = structure, arms, walker.data
+        self._structure, self._arms = structure, arms
+        data: Any = walker.data
+        radii = np.array([data.upper_arm_radius, data.forearm_radius, data.hand_radius])
+        self.least: Array = radii + data.clearance + ROOM_BELOW
+        self.touching: float = data.exempt_distance + 2 * ROOM_BELOW
 
     def structure(self, points: Array, bodies: Array, holds: Array) -> Flags:
         """Whether upper arms, forearms and hands are clear of the structure; a hand near a hold may touch.
@@ -45,10 +54,7 @@ class SwingClearance:
         Returns:
             ``[m]``.
         """
-        data, library = self._data, compiled.library()
-        radii = np.array([data.upper_arm_radius, data.forearm_radius, data.hand_radius])  # type: ignore[union-attr]
-        least = radii + data.clearance + ROOM_BELOW  # type: ignore[union-attr]
-        touching = data.exempt_distance + 2 * ROOM_BELOW  # type: ignore[union-attr]
+        least, touching, library = self.least, self.touching, compiled.library()
         surface = plain_surface(self._structure)
         if library is not None and surface is not None:
             out = np.empty(len(points), dtype=np.bool_)
@@ -82,3 +88,9 @@ class SwingClearance:
     def others(self, points: Array, samples: Array, others: Ints) -> Flags:
         """Whether swinging arms stay clear of arms that hold: grips ``others`` ``[m]`` at ``samples`` ``[m, n]``."""
         return self._arms.stay_clear(points, samples, others, ROOM - SWING_ROOM)
+
+    @property
+    def apart(self) -> Array:
+        """Distances of all pairs of links but that of the necks, of a swinging arm and one that holds ``[15]`` [m]."""
+        out: Array = self._arms.least - (ROOM - SWING_ROOM)
+        return out

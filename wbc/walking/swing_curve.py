@@ -192,3 +192,6 @@ _HALF_STEPS, _WHOLE = step(_HALF), np.linspace(0.0, 1.0, 257)
 _LOOK = UPRIGHT + (1 - 2 * UPRIGHT) * np.interp(_ACROSS, step(_WHOLE), _WHOLE)
 _SPAN_ACROSS = step((_SPAN - UPRIGHT) / (1 - 2 * UPRIGHT))
 _LOOK_RAISED = 1.0 - (1.0 - 2.0 * _LOOK) ** STEEP
+#: What raising curves needs, as the compiled code wants it: where their length is measured, where hands are looked at,
+#: how far they are raised there, and the steps over half a curve
+RAISING = _SPAN_ACROSS, _ACROSS, _LOOK_RAISED, _HALF_STEPS, _HALF

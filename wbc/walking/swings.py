@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,6 +21,7 @@ from wbc.walking.structure import Structure
 from wbc.walking.swing_clearance import SwingClearance
 from wbc.walking.swing_curve import WAYS, Curves, Pivots, curves
 from wbc.walking.swing_tracks import Asked, tracks
+from wbc.walking.swing_ways import Name, SwingWays
 
 #: Points of a way: enough for the search, and for carrying it out
 COARSE, FINE = 25, 97
@@ -27,8 +29,8 @@ COARSE, FINE = 25, 97
 FINER = 1.04
 #: Time to settle on the hold before the hand closes, besides the latch twice [s]
 SETTLE = 0.06
-#: Swings that are computed together
-TOGETHER = 24
+#: Swings that are computed together, way by way and with all ways at once
+TOGETHER, QUICKLY = 24, 12
 #: No swing lasts so many samples, as far as the room of the others is told apart
 LONG = 60
 #: Parts of the estimate: of every swing [s], of the slowest joint's least time, of the way [s/m]
@@ -37,8 +39,7 @@ ESTIMATE = (1.11, 0.64, 0.59)
 HALFWAY = 14
 
 
-@dataclass(frozen=True)
-class Swing:
+class Swing(NamedTuple):
     """A swing that is asked about.
 
     Attributes:
@@ -57,8 +58,7 @@ class Swing:
     soonest: int
 
 
-@dataclass(frozen=True)
-class Chosen:
+class Chosen(NamedTuple):
     """How a hand swings: which of the ways, and how long, latches and settling included [s]."""
 
     way: int
@@ -72,10 +72,6 @@ class _Track:
     duration: float
     points: Array
     samples: Array
-
-
-#: arm, source, target, lift, last and soonest sample
-_Name = tuple[int, int, int, int, int, int]
 
 
 class Swings:
@@ -92,8 +88,12 @@ class Swings:
         self._rates = np.array(self.kinematics.data.joint_rates)[:5]
         self._arms = arms or ArmClearance(walker, grips)
         self._clear = SwingClearance(walker, structure, self._arms)
-        self._tracks: dict[tuple[_Name, int], _Track | None] = {}
-        self._apart: dict[tuple[_Name, int, int], bool] = {}
+        self._ways: SwingWays | None = None
+        if SwingWays.possible(structure):
+            times = self.extra, self.latch
+            self._ways = SwingWays(walker, structure, path, grips, self._clear, COARSE, HALFWAY, *times)
+        self._tracks: dict[tuple[Name, int], _Track | None] = {}
+        self._apart: dict[tuple[Name, int, int], bool] = {}
         self._chosen: dict[Swing, Chosen | None] = {}
         self._known: dict[tuple[int, int, int, int, int], float | None] = {}
 
@@ -117,6 +117,10 @@ class Swings:
     def slices(self, swings: Iterable[Swing]) -> Slices[None]:
         """As :meth:`prepare`, way by way."""
         left = list(dict.fromkeys(s for s in swings if s not in self._chosen))
+        for begin in range(0, len(left) if self._ways is not None else 0, QUICKLY):
+            self._choose(left[begin : begin + QUICKLY])
+            yield None
+        left = [swing for swing in left if swing not in self._chosen]
         for way in range(len(WAYS)):
             if not left:
                 return
@@ -136,6 +140,17 @@ class Swings:
                     rest.append(swing)
             left = rest
         self._chosen.update(dict.fromkeys(left))
+
+    def _choose(self, swings: Sequence[Swing]) -> None:
+        """As :meth:`slices`, all ways at once, by compiled code."""
+        assert self._ways is not None
+        names, others = [_name(swing) for swing in swings], [swing.others for swing in swings]
+        barred = np.zeros((len(swings), len(WAYS)), dtype=np.bool_)
+        for row, name in enumerate(names) if self._known else ():
+            barred[row] = [self._known.get((*name[:4], way), 0.0) is None for way in range(len(WAYS))]
+        for swing, name, way, law in zip(swings, names, *self._ways.choose(names, others, barred), strict=True):
+            known = self._known.get((*name[:4], way))
+            self._chosen[swing] = None if way < 0 else Chosen(way, FINER * law + self.extra if known is None else known)
 
     def choose(self, swing: Swing) -> Chosen | None:
         """The way of a swing; None where it is not possible, or none is clear."""
@@ -196,6 +211,6 @@ class Swings:
         self._apart.update(zip(todo, clear.tolist(), strict=True))
 
 
-def _name(swing: Swing) -> _Name:
+def _name(swing: Swing) -> Name:
     last = min(swing.room, max(swing.lift + LONG, swing.soonest))
     return swing.arm, swing.source, swing.target, swing.lift, last, swing.soonest

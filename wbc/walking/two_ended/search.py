@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
@@ -136,11 +135,14 @@ class TurnSearch(StanceSearch):
         found = super()._checked(level, node, swing)
         if found is None or found.move is None or found.parent is None:
             return found
-        return replace(found, delay=level[found.parent].delay + round(found.move.duration / QUANTUM))
+        return found._replace(delay=level[found.parent].delay + round(found.move.duration / QUANTUM))
 
     def _bent(self, targets: Ints, samples: Ints) -> NDArray[np.bool_]:
         """Hands land with all seven joints, none of which has to be bent."""
         return np.ones(len(targets), dtype=bool)
+
+    def _bent_at(self, target: int, sample: int) -> bool:
+        return True
 
 
 def grips_along(structure: Structure, towards: Array, count: int) -> Grips:
