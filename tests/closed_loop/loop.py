@@ -11,6 +11,7 @@ import pinocchio as pin
 
 import wbc
 from tests.closed_loop.eyes import Array, Eyes
+from tests.optimised import ticks
 from tests.tasks.robots import FRAMES, Frames
 from wbc.controller import Controller
 from wbc.robot import Robot
@@ -39,7 +40,8 @@ class Loop:
         for key, item in items.items():
             stack.add(item, name=key)
         self.robot, self.dt, self.eyes = robot, dt, Eyes(robot)
-        self.controller: Controller = stack.compile(backend=backend)
+        with ticks():  # thousands of ticks a check
+            self.controller: Controller = stack.compile(backend=backend)
         self._names = [entry.name for entry in stack.entries]
         self.known = name
         self._settle()

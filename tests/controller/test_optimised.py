@@ -3,22 +3,16 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 
 from tests.controller.stacks import controller, near_limits, quarrel, robot
+from tests.optimised import ticks
 from wbc.controller import Controller
-from wbc.stack import toolchain
 
 
 def optimised(rows: str, tick: str) -> Controller:
     """A stack whose rows contradict each other, compiled with these flags."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(toolchain, "ROWS_FLAGS", (rows,))
-        patch.setattr(toolchain, "TICK_FLAGS", (tick,))
-        toolchain.identity.cache_clear()
-        out = controller("conflicts", backend="native")
-    toolchain.identity.cache_clear()
-    return out
+    with ticks(tick, rows):
+        return controller("conflicts", backend="native")
 
 
 def test_answers_are_the_same_bits() -> None:
