@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import gc
 import os
 from pathlib import Path
 
+import pytest
 from hypothesis import HealthCheck, settings
 
 os.environ.setdefault("MPLBACKEND", "Agg")
@@ -17,6 +19,16 @@ os.environ.setdefault("WBC_TICK_FLAGS", "-O0")
 os.environ.setdefault("WBC_ROWS_FLAGS", "-O0")
 # Compiled ticks of the tests stay out of the user's cache, and survive from run to run.
 os.environ.setdefault("XDG_CACHE_HOME", str(Path(__file__).parents[1] / "build" / "test-cache"))
+
+# Thousands of tests are collected, and live to the end: searching them for garbage again and again takes a sixth of the
+# time of the collection, and a part of every later search
+gc.disable()
+
+
+def pytest_collection_finish(session: pytest.Session) -> None:
+    gc.freeze()
+    gc.enable()
+
 
 settings.register_profile(
     "wbc",

@@ -14,7 +14,6 @@ import pytest
 
 from wbc.stack import toolchain
 
-
 _ask = toolchain.identity.__wrapped__
 
 
