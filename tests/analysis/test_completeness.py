@@ -68,15 +68,3 @@ def test_rows_and_their_splits_lose_rank_together() -> None:
     for q, expected in zip(places, (7, 7, 6, 6), strict=True):
         assert rank(NumericRows(sets.robot).value(rows, q)) == expected
         assert {rank(NumericRows(sets.robot).value(split, q)) for split in splits} == {expected}
-
-
-def test_singular_vectors_end_on_the_space_station_arm() -> None:
-    """11 x 7: the published program never converged on it."""
-    sets = published_sets("ssrms")
-    found = analyse(
-        ExactModel(sets.robot, sets.symbols),
-        sets.task,
-        sets.sets["elbow, beta, gamma"],
-        algorithm="singular_vectors",
-    )
-    assert (found.verdict, len(found.locus.branches)) == ("loose", 8)

@@ -9,6 +9,7 @@ import pytest
 
 from wbc.analysis import (
     Branch,
+    Budget,
     Exact,
     ExactModel,
     Notation,
@@ -65,7 +66,7 @@ def test_rank_by_singular_values_on_and_off_the_branches(name: str, chosen: str)
 
 def test_a_locus_that_the_budget_cuts_short_says_so() -> None:
     exact, model, rows = problem("ssrms_simplified", "elbow, beta, gamma")
-    found = sub_determinant_locus(exact, symbolic_jacobian(model, rows).matrix, budget=3)
+    found = sub_determinant_locus(exact, symbolic_jacobian(model, rows).matrix, Budget(3))
     assert found.open
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from wbc.analysis.blocks import BlockAnalysis, TreeAnalysis, analyse_blocks
 from wbc.analysis.boxes import Counts
 from wbc.analysis.branches import Branch
+from wbc.analysis.budget import Budget
 from wbc.analysis.certificate import Certificate, certify
 from wbc.analysis.completeness import ALGORITHMS, Analysis, Witness, analyse
 from wbc.analysis.deficiency import Exact
@@ -29,6 +30,7 @@ __all__ = [
     "BlockAnalysis",
     "BodyRows",
     "Branch",
+    "Budget",
     "Certificate",
     "Cost",
     "Counts",

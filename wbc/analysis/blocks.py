@@ -76,14 +76,14 @@ def analyse_blocks(
     wanted, added = checked("task", task), checked("constraints", constraints)
     rows = (*wanted, *added)
     blocks = joint_blocks(model.robot, rows)
-    parted = _parted(model, wanted, blocks)
+    parted = parted_task(model, wanted, blocks)
     analysed = tuple(_analysed(model, block, wanted if parted else (), algorithm) for block in blocks)
     verdicts = {one.verdict for one in analysed}
     witness: Witness | None = None
     lost: JointBlock | None = None
     for one in analysed:
         if one.verdict == UNDECIDED and witness is None:
-            witness = find_witness(model.robot, one.loci, wanted, rows, _lift(model, one))
+            witness = find_witness(model.robot, one.loci, wanted, rows, lift(model, one.model))
             lost = None if witness is None else one.block
     verdict = next(v for v in (UNDECIDED, LOOSE, STRICT) if v in verdicts)
     if witness is not None:
@@ -92,7 +92,7 @@ def analyse_blocks(
     return TreeAnalysis((shape[0], shape[1]), analysed, parted, verdict, witness, lost, time.process_time() - began)
 
 
-def _parted(model: ExactModel, task: tuple[Rows, ...], blocks: Sequence[JointBlock]) -> bool:
+def parted_task(model: ExactModel, task: tuple[Rows, ...], blocks: Sequence[JointBlock]) -> bool:
     """Whether each row of the task, less what the task itself knows of carriers, lies in one block."""
     tree = TreeJoints(model.robot)
     known = tree.known(task)
@@ -101,12 +101,12 @@ def _parted(model: ExactModel, task: tuple[Rows, ...], blocks: Sequence[JointBlo
 
 
 def _analysed(model: ExactModel, block: JointBlock, task: tuple[Rows, ...], algorithm: str) -> BlockAnalysis:
-    alone = _alone(model, block)
+    alone = block_model(model, block)
     found = loci(alone, [r for r in block.rows if any(r is t for t in task)], block.rows, algorithm)
     return BlockAnalysis(block, alone, found, found.verdict(None))
 
 
-def _alone(model: ExactModel, block: JointBlock) -> ExactModel:
+def block_model(model: ExactModel, block: JointBlock) -> ExactModel:
     """The robot with every joint but those of a block locked at zero."""
     whole = model.robot.model
     locked = [j for j in range(1, whole.njoints) if str(whole.names[j]) not in block.joints]
@@ -115,10 +115,10 @@ def _alone(model: ExactModel, block: JointBlock) -> ExactModel:
     return ExactModel(reduced, symbols, approximate=model.approximate)
 
 
-def _lift(model: ExactModel, one: BlockAnalysis) -> Callable[[Array], Array]:
+def lift(model: ExactModel, part: ExactModel) -> Callable[[Array], Array]:
     """Configurations of the whole robot from points of a block: the other joints are anywhere."""
     rng = np.random.default_rng(1)
-    places = [model.robot.dofs(str(name)).start for name in one.model.robot.model.names[1:]]
+    places = [model.robot.dofs(str(name)).start for name in part.robot.model.names[1:]]
 
     def lifted(point: Array) -> Array:
         values = rng.uniform(-np.pi, np.pi, model.robot.nv)

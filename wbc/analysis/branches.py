@@ -32,6 +32,11 @@ class Branch:
         """Number of conditions."""
         return len(self.values) + len(self.relations)
 
+    @property
+    def terms(self) -> int:
+        """Terms of the relations."""
+        return sum(len(relation.poly) for relation in self.relations)
+
 
 @cache
 def cosine_sine(t: Fraction | None) -> tuple[fmpq, fmpq]:

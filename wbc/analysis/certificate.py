@@ -17,6 +17,7 @@ from wbc.analysis.jacobian import symbolic_jacobian
 from wbc.analysis.model import ExactModel
 from wbc.analysis.pieces import Pieces
 from wbc.analysis.rank_matrix import rank_matrices
+from wbc.analysis.ring import Matrix
 from wbc.analysis.rows import Rows, checked
 from wbc.analysis.symmetry import Symmetry, fundamental_box, symmetries
 from wbc.analysis.trig_form import TrigForm, trig_form, used_joints
@@ -76,6 +77,8 @@ def certify(
 
         sigma_min(J_T(q)) >= eps  implies  rank J_R(q) = m,     eps = part * max sigma_min(J_T)
 
+    Without a task there is no tube: full rank everywhere, or a witness where it is lost.
+
     A box is done when first-order forms with bounded rests prove that a matrix with the rank deficiency of J_R has
     full column rank on all of it, or that sigma_min(J_T) < eps on all of it; else it is cut. Rounding is covered by
     padding. The matrix is taken whole and in two blocks (:func:`block_proofs`). Joints that appear in neither matrix
@@ -94,19 +97,16 @@ def certify(
         RobotFileError: a state of another problem. CompileError: no C compiler.
     """
     part, minutes = _checked(part, minutes)
-    wanted, added = checked("task", task), checked("constraints", constraints)
-    J_T, J_R = symbolic_jacobian(model, wanted), symbolic_jacobian(model, (*wanted, *added))
-    joints = model.robot.nv
-    if J_T.shape[0] > joints or J_R.shape[0] < joints:
-        raise RangeError("rows", J_R.shape[0], f"expected at least {joints} in all and at most {joints} in the task")
+    wanted, added = checked("task", task) if task else (), checked("constraints", constraints)
+    J_T, J_R = _matrices(model, wanted, added)
     began = time.monotonic()
     matrices = list(rank_matrices(model, (*wanted, *added)))
     if any(not matrix for matrix in matrices):
         return Certificate(COMPLETE, 0.0, 0.0, True, Counts(), 0.0, (), 1, time.monotonic() - began)
     forms = [trig_form(model.ring, matrix) for matrix in matrices]
-    own, every = trig_form(model.ring, J_T.matrix), trig_form(model.ring, J_R.matrix)
+    own, every = trig_form(model.ring, J_T) if wanted else None, trig_form(model.ring, J_R)
     rng = np.random.default_rng(0)
-    highest = peak(own, rng)
+    highest = 0.0 if own is None else peak(own, rng)
     eps = part * highest
 
     def witness_from(starts: Array) -> NumericWitness | None:
@@ -117,7 +117,8 @@ def certify(
         seconds = time.monotonic() - began
         return Certificate(INCOMPLETE, eps, highest, False, Counts(), 1.0, (), 1, seconds, witness)
     chosen = _chosen(forms, own, eps)
-    found = symmetries((chosen, own), used_joints((chosen, own)))
+    both = _both(chosen, own)
+    found = symmetries(both, used_joints(both))
     proofs = (*block_proofs(model, (*wanted, *added), chosen.joints), (chosen,))
     pieces = _pieces(proofs, own, eps, found, None if state is None else Path(state))
     finished = pieces.work(minutes, workers or os.cpu_count() or 1, progress)
@@ -125,12 +126,22 @@ def certify(
     verdict, left = COMPLETE, 0.0
     if not finished or counts.undecided > 0:
         verdict, left = UNDECIDED, max(0.0, 1.0 - counts.regular_part - counts.tube_part)
-        witness = witness_from(pieces.kept[:, :joints]) if len(pieces.kept) else None
+        witness = witness_from(pieces.kept[:, : model.robot.nv]) if len(pieces.kept) else None
         verdict = verdict if witness is None else INCOMPLETE
     tubed = counts.tube > 0
-    cut = used_joints((chosen, own)) if tubed else chosen.joints
+    cut = used_joints(both) if tubed else chosen.joints
     everywhere = verdict == COMPLETE and not tubed
     return Certificate(verdict, eps, highest, everywhere, counts, left, cut, len(found), pieces.seconds, witness)
+
+
+def _matrices(model: ExactModel, task: tuple[Rows, ...], constraints: tuple[Rows, ...]) -> tuple[Matrix, Matrix]:
+    """J_T, of no rows where there is no task, and J_R."""
+    J_T = symbolic_jacobian(model, task).matrix if task else []
+    J_R = symbolic_jacobian(model, (*task, *constraints)).matrix
+    joints = model.robot.nv
+    if len(J_T) > joints or len(J_R) < joints:
+        raise RangeError("rows", len(J_R), f"expected at least {joints} in all and at most {joints} in the task")
+    return J_T, J_R
 
 
 def _checked(part: float, minutes: float) -> tuple[float, float]:
@@ -142,16 +153,20 @@ def _checked(part: float, minutes: float) -> tuple[float, float]:
     return part, minutes
 
 
-def _chosen(forms: Sequence[TrigForm], task: TrigForm, eps: float) -> TrigForm:
+def _both(augmented: TrigForm, task: TrigForm | None) -> tuple[TrigForm, ...]:
+    return (augmented,) if task is None else (augmented, task)
+
+
+def _chosen(forms: Sequence[TrigForm], task: TrigForm | None, eps: float) -> TrigForm:
     """Of the matrices with the fewest terms the one that needs the fewest boxes on a sample."""
     few = sorted(forms, key=lambda form: form.terms)[:_TRIED]
-    size = task.waves.shape[1]
+    size = forms[0].waves.shape[1]
     rng = np.random.default_rng(1)
     centres = rng.uniform(-np.pi, np.pi, (_SAMPLES, size))
 
     def boxes(form: TrigForm) -> float:
         search = BoxSearch(((form,),), task, eps, SMALLEST, 1.0)
-        half = np.where(np.isin(np.arange(size), used_joints((form, task))), _HALF, 0.0)
+        half = np.where(np.isin(np.arange(size), used_joints(_both(form, task))), _HALF, 0.0)
         total = 0.0
         for centre in centres:
             counts, left, _ = search.run(np.concatenate((centre, half, [0.0]))[None], _BUDGET)
@@ -162,11 +177,15 @@ def _chosen(forms: Sequence[TrigForm], task: TrigForm, eps: float) -> TrigForm:
 
 
 def _pieces(
-    proofs: Sequence[Sequence[TrigForm]], task: TrigForm, eps: float, found: Sequence[Symmetry], file: Path | None
+    proofs: Sequence[Sequence[TrigForm]],
+    task: TrigForm | None,
+    eps: float,
+    found: Sequence[Symmetry],
+    file: Path | None,
 ) -> Pieces:
     """Joint space in boxes to be searched: halves along the joints of the augmented matrix in turn, shuffled."""
     augmented = proofs[-1][0]
-    joints = used_joints((augmented, task))
+    joints = used_joints(_both(augmented, task))
     centre, half = fundamental_box(found, joints)
     box = np.concatenate((centre, half, [0.0]))
     search = BoxSearch(proofs, task, eps, SMALLEST, float(np.prod(2.0 * half[list(joints)])))
@@ -181,5 +200,6 @@ def _pieces(
         low[:, k] -= low[:, size + k]
         high[:, k] += high[:, size + k]
         boxes = np.concatenate((low, high))
+    forms = [form for proof in proofs for form in proof]
     order = np.random.default_rng(2).permutation(len(boxes))
-    return Pieces(search, boxes[order], file, (*(form for proof in proofs for form in proof), task), eps)
+    return Pieces(search, boxes[order], file, (*forms, *_both(augmented, task)[1:]), eps)

@@ -10,6 +10,7 @@ import numpy as np
 
 from wbc import validation
 from wbc.analysis.branches import Branch
+from wbc.analysis.budget import Budget
 from wbc.analysis.deficiency import Exact
 from wbc.analysis.equivalent_rows import split_twists
 from wbc.analysis.jacobian import SymbolicJacobian, symbolic_jacobian
@@ -25,7 +26,7 @@ from wbc.errors import RangeError
 from wbc.robot import Robot
 from wbc.validation import Array
 
-ALGORITHMS: dict[str, Callable[[Exact, Matrix], Locus]] = {
+ALGORITHMS: dict[str, Callable[[Exact, Matrix, Budget | None], Locus]] = {
     "sub_determinants": sub_determinant_locus,
     "singular_vectors": singular_vector_locus,
 }
@@ -73,7 +74,12 @@ class Analysis:
 
 
 def analyse(
-    model: ExactModel, task: Sequence[Rows], constraints: Sequence[Rows], *, algorithm: str = "sub_determinants"
+    model: ExactModel,
+    task: Sequence[Rows],
+    constraints: Sequence[Rows],
+    *,
+    algorithm: str = "sub_determinants",
+    budget: Budget | None = None,
 ) -> Analysis:
     """Completeness of task and constraint coordinates: { q : rank J_R < m } within { q : rank J_T < n }.
 
@@ -81,7 +87,8 @@ def analyse(
     and J_T full rank, some rows of the constraints complete the task; so one locus stands for all pairs.
 
     A witness is looked for on every branch where the task is not deficient, and checked with singular values of the
-    robot's Jacobians, computed apart from the polynomials.
+    robot's Jacobians, computed apart from the polynomials. Where the budget is spent, or a keyboard interrupt comes,
+    what is known so far is the answer, with the branches that were not decided in ``locus.open``.
 
     Source: E. Dupuis, PhD thesis, McGill University, 2001, section 3.1.
 
@@ -91,7 +98,7 @@ def analyse(
     began = time.process_time()
     wanted, added = checked("task", task), checked("constraints", constraints)
     rows = (*wanted, *added)
-    found = loci(model, wanted, rows, algorithm)
+    found = loci(model, wanted, rows, algorithm, budget)
     witness = find_witness(model.robot, found, wanted, rows, model.configuration)
     verdict = found.verdict(witness)
     return Analysis(
@@ -130,7 +137,9 @@ class Loci:
         return LOOSE if self.locus.branches else STRICT
 
 
-def loci(model: ExactModel, task: Sequence[Rows], rows: Sequence[Rows], algorithm: str) -> Loci:
+def loci(
+    model: ExactModel, task: Sequence[Rows], rows: Sequence[Rows], algorithm: str, budget: Budget | None = None
+) -> Loci:
     """The locus of rows; ``task``: some of them, none if their rank depends on other joints than the model's.
 
     Raises:
@@ -142,7 +151,7 @@ def loci(model: ExactModel, task: Sequence[Rows], rows: Sequence[Rows], algorith
     J_R = symbolic_jacobian(model, rows)
     if len(J_T) > joints or J_R.shape[0] < joints:
         raise RangeError("rows", J_R.shape[0], f"expected at least {joints} in all and at most {joints} in the task")
-    locus = ALGORITHMS[algorithm](exact, _shortest(model, tuple(rows), J_R))
+    locus = ALGORITHMS[algorithm](exact, _shortest(model, tuple(rows), J_R), budget)
 
     def kept(branches: Sequence[Branch]) -> tuple[Branch, ...]:
         return tuple(b for b in branches if not J_T or not exact.deficient(J_T, b))

@@ -13,8 +13,8 @@ def transposed(matrix: Matrix) -> Matrix:
     return [list(column) for column in zip(*matrix, strict=True)]
 
 
-def eliminated(ring: TrigRing, matrix: Matrix) -> tuple[Matrix, int]:
-    """Pivots that are numbers, eliminated: (what is left, how many).
+def eliminated(ring: TrigRing, matrix: Matrix, columns: int | None = None) -> tuple[Matrix, int]:
+    """Pivots that are numbers, eliminated: (what is left, how many). Those of the first ``columns``, or of all.
 
     The rank of the matrix is that of what is left plus the number of pivots, at every configuration, since a number
     is never zero. Among the pivots of a step the one with the fewest other entries in its row and column is taken.
@@ -22,7 +22,8 @@ def eliminated(ring: TrigRing, matrix: Matrix) -> tuple[Matrix, int]:
     left = [list(row) for row in matrix]
     count = 0
     while left and left[0]:
-        places = [(i, j) for i, row in enumerate(left) for j, p in enumerate(row) if len(p) and p.is_constant()]
+        first = None if columns is None else columns - count
+        places = [(i, j) for i, row in enumerate(left) for j, p in enumerate(row[:first]) if len(p) and p.is_constant()]
         if not places:
             break
         i, j = min(places, key=lambda place: _fill(left, *place))

@@ -60,11 +60,16 @@ def peak(task: TrigForm, rng: np.random.Generator) -> float:
 
 
 def weakest(
-    task: TrigForm, constraints: Sequence[TrigForm], eps: float, rng: np.random.Generator
+    task: TrigForm | None, constraints: Sequence[TrigForm], eps: float, rng: np.random.Generator
 ) -> tuple[Array, Array]:
-    """(configurations, sigma_min(J_R) / sigma_min(J_T)) where the ratio is least, sigma_min(J_T) >= eps."""
+    """(configurations, sigma_min(J_R) / sigma_min(J_T)) where the ratio is least, sigma_min(J_T) >= eps.
+
+    Without a task sigma_min(J_R) alone.
+    """
 
     def cost(q: Array) -> Array:
+        if task is None:
+            return least(np.concatenate([form.value(q) for form in constraints], axis=1))
         rows = task.value(q)
         own = least(rows)
         together = np.concatenate([rows, *(form.value(q) for form in constraints)], axis=1)
@@ -72,7 +77,7 @@ def weakest(
             return np.where(own < eps, np.inf, 0.0)
         return np.where(own < eps, np.inf, least(together) / np.maximum(own, 1e-300))
 
-    return descended(cost, task.waves.shape[1], rng)
+    return descended(cost, constraints[0].waves.shape[1], rng)
 
 
 def numeric_witness(
@@ -85,14 +90,14 @@ def numeric_witness(
 ) -> NumericWitness | None:
     """The first configuration, found from starts, where J_R v = 0 for some |v| = 1 and sigma_min(J_T) >= eps.
 
-    Both are checked by Pinocchio's Jacobians.
+    Without a task the second does not count. Both are checked by Pinocchio's Jacobians.
     """
     numeric = NumericRows(model.robot)
     for point in _null_points(augmented, starts):
         q = model.configuration(np.remainder(point + np.pi, 2 * np.pi) - np.pi)
-        J_T, J_R = numeric.value(task, q), numeric.value((*task, *constraints), q)
-        sigma = singular_values(J_T)
-        if rank(J_R) < model.robot.nv and sigma[-1] >= eps:
+        J_R = numeric.value((*task, *constraints), q)
+        sigma = singular_values(numeric.value(task, q)) if task else np.empty(0)
+        if rank(J_R) < model.robot.nv and (not task or sigma[-1] >= eps):
             return NumericWitness(q, sigma, singular_values(J_R))
     return None
 

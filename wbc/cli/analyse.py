@@ -16,6 +16,7 @@ from wbc.analysis import (
     ALGORITHMS,
     Analysis,
     BodyRows,
+    Budget,
     ExactModel,
     JointRows,
     Notation,
@@ -68,7 +69,7 @@ Screen = Annotated[
     int | None,
     typer.Option(help="Certify the best set of at most so many constraints instead.", rich_help_panel=_WHAT),
 ]
-Minutes = Annotated[float, typer.Option(help="Of one certificate, at most.", rich_help_panel=_WHAT)]
+Minutes = Annotated[float, typer.Option(help="Of one search or certificate, at most.", rich_help_panel=_WHAT)]
 Resume = Annotated[
     Path | None,
     typer.Option(help="Folder to keep certificates in and go on from.", rich_help_panel=_OUTPUT),
@@ -135,7 +136,7 @@ def analyse_(
     for name, rows in sets.items():
         entry: dict[str, Any] = {"set": name}
         if screen is None:
-            found = analyse(model, task, rows, algorithm=algorithm)
+            found = analyse(model, task, rows, algorithm=algorithm, budget=Budget(minutes=minutes))
             _show(name, found, latex)
             entry = _record(name, found)
             if plot is not None:
