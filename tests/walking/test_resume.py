@@ -6,6 +6,8 @@ import pathlib
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from wbc.errors import RangeError
 from wbc.robots import Walker
@@ -21,7 +23,7 @@ from wbc.walking.run.perform import WalkRun, perform_walk
 from wbc.walking.run.recording import WalkRecorder
 from wbc.walking.run.request import WalkRequest
 from wbc.walking.run.resume_run import perform_resume, resumed_state
-from wbc.walking.run_log import CLOSING, OPEN, OPENING, WalkLogError
+from wbc.walking.run_log import CLOSED, CLOSING, OPEN, OPENING, WalkLog, WalkLogError
 from wbc.walking.walk import Walk
 from wbc.walking.walk_stack import WalkStack
 from wbc.walking.way_data import path_of
@@ -78,6 +80,44 @@ def test_a_walk_goes_on_from_any_state(
     assert len(again.ticks.cost) == len(again.log) - 1
     report = check_walk(again.log, machine.urdf(tmp_path / "robot.urdf"), again.structure, Rules(sub_samples=1))
     assert report.ok, str(report)
+
+
+@pytest.fixture(scope="module")
+def walks(
+    machine: Walker, stack: WalkStack, tmp_path_factory: pytest.TempPathFactory
+) -> list[tuple[WalkLog, pathlib.Path]]:
+    """A walk whose hands hold at the beginning, and one that begins with nothing held."""
+    out = []
+    for free in (False, True):
+        folder = tmp_path_factory.mktemp("walks")
+        request = WalkRequest(start="13,9", points=("13,12",), rigid=True, free_start=free)
+        run = perform_walk(request, machine, stack=stack)
+        save_run(run, folder, check=False)
+        assert run.log is not None
+        out.append((run.log, folder))
+    return out
+
+
+@settings(max_examples=8, deadline=None, derandomize=True)
+@given(free=st.booleans(), part=st.floats(0.0, 1.0))
+def test_a_walk_goes_on_from_any_instant(
+    walks: list[tuple[WalkLog, pathlib.Path]], machine: Walker, stack: WalkStack, free: bool, part: float
+) -> None:
+    log, folder = walks[free]
+    row = 1 + round(part * (len(log) - 2))
+    again = perform_resume(folder, machine, at=float(log.t[row]), stack=stack)
+    assert again.outcome == "arrived", again.reason
+    assert again.log is not None
+    assert again.ticks is not None
+    assert again.ticks.solved.all()
+    assert again.ticks.slip.max() < 0.001
+    assert (again.log.q[: row + 1] == log.q[: row + 1]).all()
+    # Positions follow from the rates alone, over the seam too; two hands hold wherever the body is not declared fixed
+    np.testing.assert_allclose(np.diff(again.log.q, axis=0), again.log.v[:-1] * again.log.dt, atol=1e-9)
+    holding = (again.log.hand_state == CLOSED).sum(axis=1)
+    assert (holding[~again.log.body_fixed] >= 2).all()
+    end = again.log.pose_body_in_structure[-1, :3]
+    assert np.linalg.norm(end - log.pose_body_in_structure[-1, :3]) < 0.002
 
 
 def test_a_walk_that_went_round_goes_on_round(

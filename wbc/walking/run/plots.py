@@ -153,7 +153,9 @@ def _grid(plt: Any, run: WalkRun, log: WalkLog, values: Any, low: Any, high: Any
         for edge, end in ((bottom, bottom - pad), (top, top + pad)):
             panel.axhspan(*sorted((edge, end)), color=style.RED, alpha=0.12, lw=0)
             panel.axhline(edge, color=style.RED, lw=1.0)
-        panel.set_title(f"joint {number + 1}", fontsize=10)
+        # Joints of the two-ended arm are counted from tip to tip, its halves from the elbow
+        names = dict.fromkeys(log.joints[joint].rpartition("joint")[2] for _, joint in members)
+        panel.set_title(f"joint {', '.join(names)}", fontsize=10)
         panel.set_ylabel(unit)
         panel.margins(x=0.01)
     for panel in axes.flat[-columns:]:
