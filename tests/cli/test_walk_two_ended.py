@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from tests.cli.test_commands import run
+from tests.cli.test_walk import SMALL
 from wbc import robots
 from wbc.robots import TwoEndedData, Walker
 from wbc.walking.run.folder import save_run
@@ -28,7 +29,7 @@ def quick() -> Walker:
 
 @pytest.fixture(scope="module")
 def stack(quick: Walker) -> TwoEndedStack:
-    return TwoEndedStack(quick, grapple_row(), collisions=False, backend="vm")
+    return TwoEndedStack(quick, grapple_row(), 0.0125, collisions=False, backend="vm")
 
 
 @pytest.fixture(scope="module")
@@ -51,7 +52,9 @@ def test_a_run_has_a_folder_and_the_checker_is_content(walked: WalkRun, tmp_path
     assert {"run.npz", "robot.urdf", "structure.csv", "check.txt"} <= {file.name for file in files}
 
 
-def test_it_is_plotted_and_drawn(walked: WalkRun, tmp_path: Path) -> None:
+def test_it_is_plotted_and_drawn(walked: WalkRun, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name, value in SMALL.items():
+        monkeypatch.setattr(name, value)
     assert walked.log is not None
     assert walked.ticks is not None
     plots = {file.name for file in save_plots(walked, walked.log, walked.ticks, tmp_path)}
@@ -61,7 +64,7 @@ def test_it_is_plotted_and_drawn(walked: WalkRun, tmp_path: Path) -> None:
 
 
 def test_an_abort_in_a_swing_goes_no_farther_than_was_said(quick: Walker, stack: TwoEndedStack) -> None:
-    request, asked = WalkRequest("grapples", points=("3",), robot="two-ended"), iter([*[False] * 500, True])
+    request, asked = WalkRequest("grapples", points=("3",), robot="two-ended"), iter([*[False] * 400, True])
     done = perform_two_ended(request, quick, stack=stack, stop=lambda: next(asked))
     assert done.outcome == "interrupted"
     assert done.log is not None

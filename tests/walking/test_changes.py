@@ -72,8 +72,15 @@ def test_too_few_hands_stop_the_walk(walk: Walk) -> None:
     to_first(walk, "lift", 0.3)
     held = [walk.structure.ids[hold] for hold in walk.held.values()]
     walk.vanish(held[:1])
+    before = walk.q.copy()
     with pytest.raises(HoldLost, match="at least 2 must hold"):
         walk.tick()
+    # Zero command: nothing moves, and it stays so
+    assert not walk.v.any()
+    assert walk.pace == 0.0
+    with pytest.raises(HoldLost):
+        walk.tick()
+    assert (walk.q == before).all()
 
 
 def test_a_walk_that_loses_its_holds_says_so_and_stands(walk: Walk) -> None:
@@ -86,6 +93,32 @@ def test_a_walk_that_loses_its_holds_says_so_and_stands(walk: Walk) -> None:
     assert doing.outcome == "hold lost"
     assert "at least 2 must hold" in doing.reason
     assert (walk.q == before).all()
+
+
+def test_a_hold_that_vanishes_while_a_hand_closes_on_it(walk: Walk) -> None:
+    while walk.swinging is None or walk.swinging.state != "closing":
+        walk.tick()
+    walk.vanish([walk.structure.ids[walk.swinging.hold]])
+    assert walk.swinging is None
+    finish(walk)
+
+
+def test_a_hand_that_can_grasp_nothing_says_so(machine: Walker, structure: Structure, stack: WalkStack) -> None:
+    plan = plan_walk(machine, structure, grid_path([(13, 9), (13, 13)], 4 * INCH))
+    kept = {*plan.start, *(step.target for step in plan.regrasps)}
+    few = structure.without([hold for hold in structure.ids if hold not in kept])
+    walk = Walk(machine, few, plan_walk(machine, few, plan.path), stack=stack, grasps=lambda arm, _hold: arm != broken)
+    broken = walk.plan.regrasps[0].arm
+    doing = CarryingOut(walk, WalkRecorder(walk))
+    while not walk.done and doing.step():
+        assert walk.time < 40.0
+    # A hold is tried three times, and taken as vanished; then the arm has none left in reach
+    assert doing.outcome == "refused"
+    assert broken in doing.reason, doing.reason
+    failed = [event.hold for event in walk.events if event.what == "failed"]
+    assert len(failed) >= 3
+    assert failed == [hold for hold in dict.fromkeys(failed) for _ in range(3)]
+    assert not set(failed) & set(walk.structure.ids)
 
 
 def test_names_that_are_none_change_nothing(walk: Walk) -> None:

@@ -15,7 +15,7 @@ from wbc.robots import TwoEndedData, Walker
 from wbc.shapes import Box
 from wbc.walking import Hold, Obstacle, Structure, cylinder
 from wbc.walking.checker import Rules, check_walk
-from wbc.walking.plan import NoPlanError
+from wbc.walking.plan import HoldLost, NoPlanError
 from wbc.walking.run.recording import WalkRecorder
 from wbc.walking.two_ended import (
     TwoEndedPlan,
@@ -137,6 +137,14 @@ def test_holds_that_vanish_are_gone_round(quick: Walker, row: Structure, stack: 
     walk.vanish([plan.regrasps[0].target])
     with pytest.raises(NoPlanError, match="one hand is in the air"):
         walk.run()
+    # Nor may the only hold of the other one vanish
+    walk = TwoEndedWalk(quick, row, plan, stack=stack)
+    while walk.swinging is None:
+        walk.tick()
+    walk.vanish([walk.structure.ids[hold] for hold in walk.held.values()])
+    with pytest.raises(HoldLost, match="at least 1 must hold"):
+        walk.tick()
+    assert not walk.v.any()
 
 
 def test_bad_questions_are_refused(quick: Walker, row: Structure) -> None:

@@ -147,10 +147,11 @@ class Walk(MovingBody):
         """One control period: hands, body, controller, robot.
 
         Raises:
-            HoldLost: fewer hands hold than the robot needs; the body's command is zero.
+            HoldLost: fewer hands hold than the robot needs; all rates are zero, and the robot stays as it is.
             NoPlanError: the walk has to be planned anew, and there is no plan.
         """
         if len(self.held) < self.walker.min_holds and not self.fixed:
+            self.v, self.pace = np.zeros(len(self.v)), 0.0
             raise HoldLost("hands", len(self.held), f"at least {self.walker.min_holds} must hold")
         if self.told is None and not self.aborted:
             self._think()
