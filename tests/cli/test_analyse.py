@@ -90,6 +90,20 @@ def test_a_whole_tree_by_blocks(tmp_path: Path) -> None:
     assert "did you mean 'elbow, " in err
 
 
+def test_both_arms_of_the_dexterous_manipulator(tmp_path: Path) -> None:
+    """`spdm` is one arm, as in the source; with --tree it is all 15 joints."""
+    file = tmp_path / "tree.json"
+    code, out, _ = run("spdm", "--tree", "--json", file)
+    assert code == 0
+    assert "alpha, q1, q7, elbow: 25 x 15, strict" in out
+    assert "alpha: 15 x 15, incomplete" in out
+    full, _ = json.loads(file.read_text())["sets"]
+    assert sorted(b["shape"] for b in full["blocks"]) == [[1, 1], [12, 7], [12, 7]]
+    code, _, err = run("ssrms", "--tree")
+    assert code == 2
+    assert "one of spdm, spdm_on_ssrms" in err
+
+
 def test_a_screen_takes_no_constraints_of_ones_own() -> None:
     for own in (("--lock", "joint1"), ("--point", "end3"), ("--plane", "F3,F5"), ("--set", "q1")):
         code, _, err = run("ssrms", "--screen", 2, *own)

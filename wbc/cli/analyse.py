@@ -62,6 +62,10 @@ Full = Annotated[
     bool,
     typer.Option("--full", help="Of spdm the arm with all offsets, with --certify.", rich_help_panel=_WHAT),
 ]
+Tree = Annotated[
+    bool,
+    typer.Option("--tree", help="Of spdm all 15 joints, decided by blocks, instead of one arm.", rich_help_panel=_WHAT),
+]
 Certify = Annotated[
     bool, typer.Option("--certify", help="Prove it by subdivision of joint space as well.", rich_help_panel=_WHAT)
 ]
@@ -89,6 +93,7 @@ def analyse_(
     algorithm: Algorithm = "sub_determinants",
     approximate: Approximate = False,
     full: Full = False,
+    tree: Tree = False,
     certify: Certify = False,
     screen: Screen = None,
     minutes: Minutes = 30.0,
@@ -99,12 +104,11 @@ def analyse_(
 ) -> None:
     """Say where task and constraint coordinates lose rank, and whether they always suffice.
 
-    The published arms have sets by name, and spdm_on_ssrms sets of all 22 joints, decided by blocks; --lock, --point
-    and --plane make one for any robot.
+    The published arms have sets by name; spdm_on_ssrms, and spdm with --tree, have sets of all their joints, decided by
+    blocks. --lock, --point and --plane make a set for any robot.
     """
     validation.one_of("algorithm", algorithm, ALGORITHMS)
-    if robot == "spdm" and not (lock or point or plane):
-        robot = "spdm_arm" if full else "spdm_arm_simplified"
+    robot = _meant(robot, tree, full, bool(lock or point or plane))
     how = Subdivision(minutes, resume) if certify or full or screen is not None else None
     own = _own(lock, point, plane)
     if screen is not None and (own or chosen):
@@ -147,6 +151,15 @@ def analyse_(
             entry["certificate"] = record(certified(model, robot, name, task, rows, how))
         records.append(entry)
     _write(json_, {"robot": robot, "algorithm": algorithm, "sets": records})
+
+
+def _meant(robot: str, tree: bool, full: bool, own: bool) -> str:
+    """`spdm` is one arm of it, as in the source, but with --tree or constraints of one's own."""
+    if tree and robot not in TREES:
+        raise RangeError("tree", robot, f"a tree of arms is one of {', '.join(TREES)}")
+    if robot != "spdm" or own or tree:
+        return robot
+    return "spdm_arm" if full else "spdm_arm_simplified"
 
 
 def _pictures(folder: Path, model: ExactModel, found: Analysis | Loci, name: str) -> None:

@@ -11,6 +11,7 @@ from rich.markup import escape
 
 from wbc.cli.advise import configuration_of
 from wbc.cli.console import err, out
+from wbc.cli.options import Backend
 from wbc.coordinates import parts
 from wbc.errors import RangeError
 from wbc.teleop import Keyboard, RateFile, Seen, SessionLog, Teleoperation, run_session
@@ -26,13 +27,14 @@ def drive(
     automatic: Annotated[bool, typer.Option("--automatic", help="Change pairs as the adviser says.")] = False,
     realtime: Annotated[bool, typer.Option("--realtime", help="Wait for the clock with a file, too.")] = False,
     log: Annotated[Path | None, typer.Option(help="Write what happened to this CSV file.")] = None,
+    backend: Backend = "auto",
 ) -> None:
     """Drive an arm by rates: the pair of coordinates that is chosen, at most six rates at a time, 50 times a second."""
     if keys == (rates is not None):
         raise RangeError("rates", rates, "give either --rates FILE or --keys")
     q = configuration_of(parts(robot).robot, at)
     source = RateFile(rates) if rates is not None else None
-    session = Teleoperation(robot, mode or ("M1", "M2"), automatic=automatic)
+    session = Teleoperation(robot, mode or ("M1", "M2"), automatic=automatic, backend=backend)
     last = [""]
 
     def tell(time: float, seen: Seen) -> None:

@@ -7,30 +7,37 @@ tan(q_i / 2) puts one joint at one angle, and the distance to it is |q_i - angle
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
+from typing import TypeAlias
 
 from wbc.analysis import (
     BodyRows,
     Branch,
     Exact,
     ExactModel,
+    JointBlock,
     JointRows,
     Notation,
     PitchPlaneRows,
     Relation,
     Value,
     factored_determinant,
+    joint_blocks,
     symbolic_jacobian,
 )
+from wbc.analysis.blocks import block_model
 from wbc.analysis.points import univariate_roots
 from wbc.coordinates.pair import CoordinatePair
-from wbc.errors import WbcError
+from wbc.errors import RangeError, WbcError
 from wbc.robot import Robot
 from wbc.validation import Array
 
 #: See :func:`closed_form`
 SMALL, LARGE = 4, 7
+#: What rank analysis knows
+_Known: TypeAlias = BodyRows | JointRows | PitchPlaneRows
 
 
 @dataclass(frozen=True)
@@ -79,24 +86,36 @@ def closed_form(robot: Robot, pair: CoordinatePair) -> ClosedForm | None:
 
     None where the pair is not square, where it has rows that rank analysis does not know, or where that refuses the
     robot (floating bases, placements that are not by right angles). A part of a position in an arm of more than
-    :data:`SMALL` joints, or a robot of more than :data:`LARGE`, has a determinant too long to be of use.
+    :data:`SMALL` joints, or more than :data:`LARGE` joints, has a determinant too long to be of use. Of a tree it is
+    the determinant of the one arm that is not locked, whose joints count from 1.
     """
     rows = [one for one in pair.rows if isinstance(one, (BodyRows, JointRows, PitchPlaneRows))]
     parted = any(isinstance(one, BodyRows) and len(one.translation) in (1, 2) for one in rows)
     if len(rows) < len(pair.rows) or sum(pair.counts(robot)) != robot.nv or robot.nq != robot.nv:
         return None
-    if robot.nv > LARGE or (parted and robot.nv > SMALL):
+    if parted and robot.nv > SMALL:
         return None
-    return _factored(robot, tuple(rows))
+    block = JointBlock(tuple(robot.dof_names), tuple(rows)) if robot.nv <= LARGE else _arm(robot, rows)
+    return None if block is None else _factored(robot, block)
+
+
+def _arm(robot: Robot, rows: Sequence[_Known]) -> JointBlock | None:
+    """The one block of a tree that is not the lock of a joint; None where there are none or several, or a large one."""
+    try:
+        blocks = joint_blocks(robot, rows)
+    except RangeError:
+        return None
+    moving = [one for one in blocks if not isinstance(one.rows[0], JointRows) or len(one.joints) > 1]
+    return moving[0] if len(moving) == 1 and len(moving[0].joints) <= LARGE else None
 
 
 @cache
-def _factored(robot: Robot, rows: tuple[BodyRows | JointRows | PitchPlaneRows, ...]) -> ClosedForm | None:
-    exact = _exact(robot)
+def _factored(robot: Robot, block: JointBlock) -> ClosedForm | None:
+    exact = _exact(robot, block.joints)
     if exact is None:
         return None
     model, rings = exact
-    factors = factored_determinant(rings, symbolic_jacobian(model, rows)).factors
+    factors = factored_determinant(rings, symbolic_jacobian(model, block.rows)).factors
     if factors.zero:
         return ClosedForm((), ("everywhere",), always=True)
     values = [f for f, _ in factors.conditions if isinstance(f, Value)]
@@ -112,10 +131,10 @@ def _vanishes(rings: Exact, relation: Relation) -> bool:
 
 
 @cache
-def _exact(robot: Robot) -> tuple[ExactModel, Exact] | None:
-    """The exact model of a robot; None for one that rank analysis refuses."""
+def _exact(robot: Robot, joints: tuple[str, ...]) -> tuple[ExactModel, Exact] | None:
+    """The exact model of some joints of a robot, the others at zero; None for one that rank analysis refuses."""
     try:
-        model = ExactModel(robot)
+        model = block_model(ExactModel(robot), JointBlock(joints, ()))
     except WbcError:
         return None
     return model, Exact(model.ring)
@@ -123,7 +142,7 @@ def _exact(robot: Robot) -> tuple[ExactModel, Exact] | None:
 
 def _place(robot: Robot, model: ExactModel, value: Value) -> Place:
     joint = model.ring.coordinates[value.joint]
-    if joint.slides:
-        return Place(joint.dof, robot.dof_names[joint.dof], float(value.value or 0), False)
+    name = model.robot.dof_names[joint.dof]
     angle = math.pi if value.value is None else 2.0 * math.atan(float(value.value))
-    return Place(joint.dof, robot.dof_names[joint.dof], angle, True)
+    place = float(value.value or 0) if joint.slides else angle
+    return Place(robot.dof_names.index(name), name, place, not joint.slides)
