@@ -45,9 +45,9 @@ class Says:
 
 @pytest.fixture(scope="module")
 def it() -> Machine:
-    """The walker, on a controller that needs no compiler."""
+    """The walker, on a controller that other tests compile, too."""
     walker = wbc.robots.walker()
-    return Machine(walker, WalkStack(walker, cylinder(rigid=True), collisions=False, backend="vm"))
+    return Machine(walker, WalkStack(walker, cylinder(rigid=True), collisions=False))
 
 
 @pytest.fixture(scope="module")

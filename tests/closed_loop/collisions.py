@@ -16,7 +16,7 @@ import pinocchio as pin
 
 from tests.closed_loop.constraints import bend, random_unit
 from tests.closed_loop.eyes import Array, Gaps, Standing, length
-from tests.closed_loop.loop import Loop, Run, backend_of
+from tests.closed_loop.loop import Loop, Run
 from tests.closed_loop.machines import anywhere, machine
 from tests.tasks.robots import FRAMES, Frames
 from wbc.robot import Robot
@@ -196,4 +196,4 @@ def one_row_a_pair() -> Loop:
 def loop_of(name: str, mutations: dict[str, type[Constraint]] | None = None) -> Loop:
     """The stack of all collision constraints on a robot."""
     robot = collision_machine(name)
-    return Loop(robot, collision_items(name, robot, mutations), DT, name, backend_of(mutations))
+    return Loop(robot, collision_items(name, robot, mutations), DT, name)

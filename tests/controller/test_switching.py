@@ -99,7 +99,7 @@ def motion(name: str) -> Motion:
     stack.add(EndEffector(FRAMES[name].tip, kind="position", gain=3.0), name="reach")
     stack.add(Posture(gain=3.0), name="rest", weight=1e-2)
     stack.add(JointLimits(), name="actuators")
-    return Motion(machine, stack.compile(backend="vm"))
+    return Motion(machine, stack.compile())
 
 
 def scene(where: str, name: str) -> tuple[Motion, np.random.Generator]:

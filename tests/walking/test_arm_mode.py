@@ -19,11 +19,6 @@ from wbc.walking.walk import Tick, Walk
 from wbc.walking.walk_stack import WalkStack
 
 
-@pytest.fixture(scope="module")
-def stack(machine: Walker, structure: Structure) -> WalkStack:
-    return WalkStack(machine, structure, collisions=False, backend="vm")
-
-
 @pytest.fixture
 def walk(machine: Walker, structure: Structure, stack: WalkStack) -> Walk:
     return Walk(machine, structure, plan_walk(machine, structure, grid_path([(13, 11), (13, 12)], 0.1)), stack=stack)

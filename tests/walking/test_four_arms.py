@@ -23,7 +23,7 @@ def test_four_arms_walk(structure: Structure, tmp_path: pathlib.Path) -> None:
     assert plan.complete
     assert len(plan.start) == len(set(plan.start)) == 4
     assert plan.regrasps
-    walk = Walk(machine, structure, plan, stack=WalkStack(machine, structure, collisions=False, backend="vm"))
+    walk = Walk(machine, structure, plan, stack=WalkStack(machine, structure, collisions=False))
     recorder = WalkRecorder(walk)
     assert walk.run(recorder.tick) == "arrived"
     report = check_walk(recorder.log()[0], machine.urdf(tmp_path / "robot.urdf"), structure)

@@ -158,7 +158,7 @@ def test_ball_holds_fix_the_hands_places_exactly(
 def test_a_walk_over_holds_of_all_kinds(machine: Walker, structure: Structure, tmp_path) -> None:  # type: ignore[no-untyped-def]
     sums = [sum(int(n) for n in hold.id.split(",")) % 3 for hold in structure.holds]
     mixed = declared(structure, *([("fixed", 0.0), (4, 0.05), ("free", 0.05)][k] for k in sums))
-    stack = WalkStack(machine, mixed, collisions=False, backend="vm")
+    stack = WalkStack(machine, mixed, collisions=False)
     walk = Walk(machine, mixed, plan_walk(machine, mixed, grid_path([(13, 10), (13, 14)], 5 * INCH)), stack=stack)
     recorder, ticks = WalkRecorder(walk, 0, {}), list[Tick]()
 
