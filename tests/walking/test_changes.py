@@ -196,6 +196,22 @@ def test_a_walk_begins_before_its_plan_is_made(machine: Walker, structure: Struc
     assert again.rows() == walk.plan.rows()
 
 
+def test_a_plan_in_slices_is_there_before_the_body_has_to_wait(
+    machine: Walker, structure: Structure, stack: WalkStack
+) -> None:
+    """Along +A at 6 in/s, where hands are late from the first lift on: no delay would do, and not just any is taken."""
+    path = grid_path([(13, 6), (13, 18)], 6 * INCH)
+    whole = plan_walk(machine, structure, path)
+    start = dict(zip([arm.name for arm in machine.arms], whole.start, strict=True))
+    walk, pace = Walk(machine, structure, plan_from_stance(machine, structure, path, start), stack=stack), 0.0
+    while not walk.plan.complete:
+        walk.tick()
+        assert walk.pace == pytest.approx(min(pace + walk.dt / 0.5, 1.0))
+        pace = walk.pace
+    assert len(walk.plan.regrasps) == len(whole.regrasps)
+    assert walk.plan.delay <= whole.delay + 0.25
+
+
 def test_slices_find_out_too_that_there_is_no_plan(machine: Walker, structure: Structure, stack: WalkStack) -> None:
     gap = remove_rows(structure, "10-23")
     path = grid_path([(13, 7), (13, 12)], 4 * INCH)

@@ -73,6 +73,34 @@ def test_there_and_back_and_stop(
     assert report.ok, str(report)
 
 
+def test_a_hand_that_could_not_hold_on_the_new_way_lands_first(
+    machine: Walker, structure: Structure, stack: WalkStack
+) -> None:
+    walk = Walk(
+        machine, structure, standing_plan(machine, structure, grid_pose(13, 12, 100 * INCH + HEIGHT)), stack=stack
+    )
+    drive = Drive(walk)
+    drive.steer(0.1, 0.0, 0.0)
+    while walk.swinging is None or walk.swinging.clock < 0.3:
+        drive.tick()
+    path, arm, hold = walk.plan.path, walk.swinging.arm, walk.swinging.hold
+    drive.steer(-0.1, 0.0, 0.0)
+    reasons = []
+    for _ in range(4):
+        drive.tick()
+        reasons.append(drive.reason)
+    # There is a plan at once all the same
+    assert "cannot hold it on the new way" in " ".join(reasons)
+    assert walk.plan.path is not path
+    while walk.swinging is not None:
+        drive.tick()
+    assert walk.held[arm] == hold
+    turned, place = walk.time, walk.q[0]
+    while walk.time < turned + 2.0:
+        drive.tick()
+    assert walk.q[0] < place - 0.05
+
+
 def test_a_body_goes_aside_and_tilts_as_far_as_it_may_and_comes_back(
     machine: Walker, structure: Structure, stack: WalkStack, begin: Plan, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -14,7 +14,7 @@ from wbc.walking.body_path import BodyPath
 from wbc.walking.grips import Grips, grip_slices
 from wbc.walking.plan import NoPlanError, Plan, Regrasp
 from wbc.walking.planner import plan_slices
-from wbc.walking.replanning import HEAD
+from wbc.walking.replanning import ONWARD
 from wbc.walking.stance_search import StanceSearch
 from wbc.walking.structure import Structure
 from wbc.walking.swing_law import SwingLaw
@@ -87,7 +87,7 @@ def course_slices(
 
     Args:
         now: the plan of which the course is. quick: yield, after some milliseconds, a plan that lifts no hand, with
-            which the body goes over to the new path; hands are lifted :data:`wbc.walking.replanning.HEAD` later.
+            which the body goes over to the new path; hands are lifted :data:`wbc.walking.replanning.ONWARD` later.
 
     Raises:
         NoPlanError: a hand cannot be where it is, or is to come down.
@@ -106,7 +106,7 @@ def course_slices(
         search = StanceSearch(walker, structure, path, few)
         until = search.until([grips[-1] for grips in chain], max(samples[-1] for samples in lands))
         # The plan needs a stance that goes on behind it
-        sample = max(min(sample + round(HEAD / path.spacing), until - 1), sample)
+        sample = max(min(sample + round(ONWARD / path.spacing), until - 1), sample)
         start = tuple(structure.ids[few.hold[grips[0]]] for grips in chain)
         yield Plan(path, start, (), False, sample * path.spacing, "being planned", few, chain)
     grips = yield from grip_slices(walker, structure, path)

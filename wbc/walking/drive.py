@@ -117,12 +117,13 @@ class Drive:
 
     def _plan(self) -> None:
         """Some slices of planning, begun anew where the command has changed or the horizon comes near."""
+        walk = self.walk
         if (self.command != self._asked).any():
             self._order = list(range(len(WAYS)))
             self._begin(LEAD, quick=True)
         elif self._work is None and not self._settled:
             self._begin(LEAD, quick=False)
-        elif self._work is None and self.walk.plan.path.duration - self.walk.path_time < LEFT and not self.reason:
+        elif self._work is None and walk.plan.path.duration - walk.path_time < LEFT and not self.reason:
             # The least deviation first, then the one that has led on
             self._order = list(dict.fromkeys([0, self._order[0], *range(len(WAYS))]))
             self._begin(AHEAD, quick=False)
@@ -137,18 +138,19 @@ class Drive:
                 self._take(begun, end.value)
             except NoPlanError as error:
                 self._drop()
-                self.reason, swinging = str(error), self.walk.swinging
+                self.reason, swinging = str(error), walk.swinging
                 if swinging is not None and not self._waited:
-                    # The body may have to wait for the hand
-                    self._begin(LEAD, quick=True, wait=time_left(swinging, self.walk.data) + SURE)
+                    # The body may have to wait for the hand, where it can land
+                    there = float(walk.grips.first[swinging.grip]) * walk.plan.path.spacing - walk.path_time
+                    self._begin(max(there, 0.0) + LEAD, quick=True, wait=time_left(swinging, walk.data) + SURE)
                 else:
                     self._stuck = True
             else:
                 if plan is not None:
-                    self.walk.go_over(plan, begun.begins, begun.since)
-                    self.walk.halted = False
+                    walk.go_over(plan, begun.begins, begun.since)
+                    walk.halted = False
                     self._work = Course(0.0, 0.0, 0, (), (), (), ()), slices
-                    self.walk.leash = None
+                    walk.leash = None
 
     def _begin(self, lead: float, quick: bool, wait: float = 0.0) -> None:
         """Begin to plan along the command, behind what the body goes on with for ``lead`` [s].

@@ -28,13 +28,13 @@ def displacement(way: Array, lower: float, aside: float, roll: float, pitch: flo
 
 def displaced(pose: Array, by: Array) -> Array:
     """A pose ``[4, 4]`` with a displacement in its own axes."""
-    out: Array = pose @ _matrix(by)
+    out: Array = pose @ _matrix(by) if by.any() else pose
     return out
 
 
 def undisplaced(pose: Array, by: Array) -> Array:
     """The pose ``[4, 4]`` that has become this one by a displacement."""
-    out: Array = pose @ np.linalg.inv(_matrix(by))
+    out: Array = pose @ np.linalg.inv(_matrix(by)) if by.any() else pose
     return out
 
 

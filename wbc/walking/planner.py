@@ -34,7 +34,7 @@ Beginning = tuple[Mapping[str, str], Mapping[str, Array], Mapping[str, Collectio
 NOTHING: Beginning = ({}, {}, {})
 #: Delays of one swing that velocity mode allows one after the other [s]
 DELAYS = (0.0, 0.25, 0.5, 1.0, 2.0, float("inf"))
-SOON = (0.0, float("inf"))
+SOON = (0.0, 0.25, float("inf"))
 #: Grips of an arm that a start may have, and stances that a search begins with; the same of a thorough one
 STARTS, ALL_STARTS = (10, 24), (24, 200)
 #: Where all searches fail, the one with any delay is made again, so many times as wide

@@ -24,8 +24,9 @@ from wbc.walking.swings import FINE
 
 #: Yields None or, first, a plan to begin with; returns the whole one
 PlanSlices = Generator[Plan | None, None, Plan]
-#: Path time that the body may go before the plan of its hands is made [s]; it takes RAMP / 2 to stop
-HEAD = 1.0
+#: Path time that the body may go before the plan of its hands is made [s], from rest and under way; it takes RAMP / 2
+#: to stop. The fewer seconds, the better the plan: hands that have to be lifted soon are lifted late
+HEAD, ONWARD = 0.55, 1.0
 #: A new plan begins with a body that stands for so many samples
 STANDING = 10
 #: How far the body goes back to where a hand may be lifted [m]
@@ -89,7 +90,7 @@ def plan_rest(
     landed = round(plan.regrasps[kept - 1].land / path.spacing) if kept else 0
     names = [arm.name for arm in walker.arms]
     stance = tuple(grips[-1] for grips in plan.cut(names, kept, 0.0).chain)
-    search, soonest = StanceSearch(walker, structure, path, grips), max(landed, round((here + HEAD) / path.spacing))
+    search, soonest = StanceSearch(walker, structure, path, grips), max(landed, round((here + ONWARD) / path.spacing))
     # The plan needs a stance that goes on behind it
     sample = max(min(soonest, search.until(stance, landed) - 1), landed)
     begun = plan.cut(names, kept, sample * path.spacing)

@@ -26,9 +26,10 @@ def sound_slices(
         found = yield from search.slices(starts, sample, deadline)
         laws = []
         for move in found.moves:
-            yield None
-            law = known.get(move) or SwingLaw.of(search.swings, move)
-            known[move] = law
+            law = known.get(move)
+            if law is None:
+                yield None
+                law = known[move] = SwingLaw.of(search.swings, move)
             planned = max(move.duration, 0.0 if move.delay else (move.land - move.lift) * search.path.spacing)
             needed = law.duration + search.swings.extra
             if not law.possible or needed > planned + SLOWER:

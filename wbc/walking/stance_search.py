@@ -49,7 +49,7 @@ USUAL, SLACK = 2.1, 0.5
 #: Ways to one stance that are looked at, and stances that are checked together, in widths
 WAYS, PARTS = 2, 2
 #: Stances, and pairs of grips, of one slice of the search
-NODES, PAIRS = 16, 24
+NODES, PAIRS = 16, 96
 #: Arm, grips and sample of a swing that was looked at
 Asked = tuple[int, int, int, int]
 

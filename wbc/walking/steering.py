@@ -55,19 +55,19 @@ class Steering:
 
     def ahead(self, pose: Array, rates: Array, spacing: float) -> Array:
         """Poses ``[n, 4, 4]`` that a body at ``pose`` has after each of n steps with rates ``[n, 4]``."""
-        out, here = np.empty((len(rates), 4, 4)), np.array(pose)
-        for k, (across, along, spin, nearer) in enumerate(rates * spacing):
-            turn, shift = np.eye(3), self.axis * along
-            if self.origin is None:
-                shift = shift + np.cross(self.normal, self.axis) * across + self.normal * nearer
-            else:
-                off = self._across(here[:3, 3])
-                turn = pin.exp3(self.axis * (across / np.linalg.norm(off)))
-                shift = shift + (turn @ off - off) - turn @ off * (nearer / np.linalg.norm(off))
-            here = here.copy()
-            here[:3, 3] += shift
-            here[:3, :3] = turn @ here[:3, :3] @ pin.utils.rotate("z", spin)
-            out[k] = here
+        steps, out = rates * spacing, np.repeat(np.array(pose)[None], len(rates), axis=0)
+        across, along, spin, nearer = np.cumsum(steps, axis=0).T
+        # All turns are about the same two lines, one on either side
+        out[:, :3, :3] = out[:, :3, :3] @ _turns(np.array([0.0, 0.0, 1.0]), spin)
+        out[:, :3, 3] += along[:, None] * self.axis
+        if self.origin is None:
+            out[:, :3, 3] += across[:, None] * np.cross(self.normal, self.axis) + nearer[:, None] * self.normal
+            return out
+        off = self._across(np.array(pose)[:3, 3])
+        far = float(np.linalg.norm(off)) - np.concatenate([[0.0], nearer])
+        turns = _turns(self.axis, np.cumsum(steps[:, ROUND] / far[:-1]))
+        out[:, :3, :3] = turns @ out[:, :3, :3]
+        out[:, :3, 3] += (far[1:] / far[0])[:, None] * (turns @ off) - off
         return out
 
     def rates(self, first: Array, second: Array, spacing: float) -> Array:
@@ -94,11 +94,8 @@ class Steering:
         """Rates ``[count, 4]`` from those that a body has, ``[4]``, to commanded ones ``[3]``, by
         :data:`ACCELERATIONS`; the height stays.
         """
-        out, now = np.zeros((count, 4)), begin[:3].copy()
-        for k in range(count):
-            most = ACCELERATIONS * spacing
-            now = now + np.clip(command - now, -most, most)
-            out[k, :3] = now
+        most, out = np.arange(1, count + 1)[:, None] * ACCELERATIONS * spacing, np.zeros((count, 4))
+        out[:, :3] = begin[:3] + np.clip(command - begin[:3], -most, most)
         return out
 
     def _across(self, place: Array) -> Array:
@@ -108,3 +105,10 @@ class Steering:
 
     def _far(self, place: Array) -> float:
         return float(np.linalg.norm(self._across(place)))
+
+
+def _turns(axis: Array, angles: Array) -> Array:
+    """Rotations about a unit vector ``[n, 3, 3]``: 1 + sin K + (1 - cos) K^2."""
+    k = pin.skew(axis)
+    out: Array = np.eye(3) + np.sin(angles)[:, None, None] * k + (1.0 - np.cos(angles))[:, None, None] * (k @ k)
+    return out
