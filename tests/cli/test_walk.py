@@ -16,6 +16,8 @@ from PIL import Image
 
 from tests.cli.test_commands import run
 from wbc import style
+from wbc.robots import WalkerData
+from wbc.robots.walker_data import WALKER_DIGEST
 from wbc.walking import detours
 from wbc.walking import run as walking_run
 from wbc.walking.run import perform
@@ -150,6 +152,7 @@ def test_plans_are_compared(walked: Any, tmp_path: Path) -> None:
         (["--remove", "1.5"], "fraction"),
         (["--structure", "plane", "--planner", "published"], "cylinder"),
         (["--set", "hand_radius"], "NAME=NUMBER"),
+        (["--set", "hand_radius=0.06", "--planner", "published"], "numbers of its own"),
         (["--set", "hand_radus=0.1"], "did you mean 'hand_radius'"),
     ],
 )
@@ -175,13 +178,17 @@ def test_what_is_out_of_reach_is_refused_with_its_reason(tmp_path: Path, monkeyp
     folder.mkdir()
     for name in ("summary.json", "run.npz", "still_7.png", "mine.txt"):
         (folder / name).touch()
-    code, _, err = run("walk", *SHORT, "--remove-rows", "1-9,12-24", "--out", folder, "--force")
+    changed = ["--set", "hand_radius=0.06"]
+    code, _, err = run("walk", *SHORT, *changed, "--remove-rows", "1-9,12-24", "--out", folder, "--force")
     assert code == 3
     assert "refused" in err
     assert "no way beyond" in err
     told = json.loads((folder / "summary.json").read_text())
     assert told["outcome"] == "refused"
     assert told["reason"]
+    # What the run went by, and what of it is not the file's
+    assert told["robot"] == WalkerData.read(hand_radius=0.06).digest != WALKER_DIGEST
+    assert "changed: hand_radius = 0.06" in " ".join((folder / "summary.txt").read_text().split())
     assert (folder / "reach_map.png").exists()
     # Of an earlier run nothing is left, of others everything
     assert {"run.npz", "still_7.png", "mine.txt"} & {path.name for path in folder.iterdir()} == {"mine.txt"}
@@ -216,6 +223,8 @@ def test_the_published_planner_walks(tmp_path: Path) -> None:
     data = np.load(folder / "published.npz")
     assert data["bodies"].shape[1:] == (4, 4)
     assert "published" in out
+    assert "Calibration" in out
+    assert len(json.loads((folder / "summary.json").read_text())["robot"]) == 12
 
 
 def test_bodies_stand_over_holds() -> None:

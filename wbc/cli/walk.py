@@ -16,7 +16,7 @@ from wbc.cli import walk_options as options
 from wbc.cli.console import err, out, progress_bar
 from wbc.cli.session import INTERRUPTED, Stopper
 from wbc.cli.walk_modes import Perform, performance
-from wbc.errors import ShapeError
+from wbc.errors import RangeError, ShapeError
 from wbc.robots import TwoEndedData, Walker, WalkerData
 from wbc.track.summary import Figure
 from wbc.walking.plan import differences, read_plan
@@ -91,6 +91,10 @@ def walk(
         gait,
         plan,
     )
+    if change and planner == "published":
+        raise RangeError(
+            "set", change, "the published planner has numbers of its own, wbc.walking.published.Calibration"
+        )
     machine = robots.walker(data=changed_data(change or [], two_ended), two_ended=two_ended)
     perform = performance(request, machine, resume, ask)  # bad input shows before a folder is made
     stamp = datetime.datetime.now().strftime("%Y%m%d-%H%M%S")

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+import hashlib
+import json
+from dataclasses import asdict, dataclass, fields
 from typing import Literal
 
 import numpy as np
@@ -46,6 +48,12 @@ class Calibration:
     grasp_angle: float = 0.1
     grasp_speed: float = 10.0 * INCH
     grasp_rate: float = 1.0
+
+    @property
+    def digest(self) -> str:
+        """Hash of all numbers; every run prints it."""
+        text = json.dumps(asdict(self), sort_keys=True)
+        return hashlib.sha256(text.encode()).hexdigest()[:12]
 
     def __post_init__(self) -> None:
         for field in fields(self):

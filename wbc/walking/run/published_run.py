@@ -10,7 +10,7 @@ import numpy as np
 from wbc import style
 from wbc.errors import RangeError
 from wbc.track.summary import Figure
-from wbc.walking.published import Log, Outcome, PublishedWalker
+from wbc.walking.published import Calibration, Log, Outcome, PublishedWalker
 from wbc.walking.run.plots import spans
 from wbc.walking.run.request import WalkRequest, grid_point
 from wbc.walking.run.surroundings import arm_colour
@@ -81,6 +81,7 @@ def published_figures(run: PublishedRun) -> list[Figure]:
         Figure("outcome", "outcome", "arrived" if run.arrived else "stopped", told),
         Figure("reason", "", run.reason, ""),
         Figure("planner", "planner", "published", "published, ideal tracking, wrist reach only"),
+        Figure("robot", "robot", Calibration().digest, f"published walker, Calibration {Calibration().digest}"),
         Figure(
             "structure",
             "structure",
