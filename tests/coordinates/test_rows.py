@@ -29,85 +29,113 @@ from wbc.coordinates import (
     expressions,
 )
 from wbc.errors import NotFiniteError, RangeError, ShapeError, UnknownNameError
+from wbc.robot import Robot
 from wbc.robots import operator_arm
 from wbc.symbolic.kinematics import Kinematics, Pose
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks import PlaneReference
 
 ROBOT = operator_arm("ssrms").robot
+TREE = operator_arm("spdm").robot
 STATES = np.random.default_rng(0).uniform(-1.0, 1.0, (3, 7))
 BETA = BodyRows("F2", expressed="F3", translation=(), rotation=(1,), name="beta")
-RATES: tuple[Coordinate, ...] = (
-    BodyRows("tip"),
-    BodyRows("tip", base="F3", expressed="F5"),
-    BodyRows("tip", base="F2", expressed="F2", translation=(0, 2), rotation=()),
-    BodyRows("end3", rotation=()),
-    BodyRows("F6", translation=()),
-    BETA,
-    JointRows("joint4"),
-)
-HELD: tuple[Coordinate, ...] = (
-    *RATES[:5],
-    JointRows("joint4"),
-    PlaneAngleRows("F3", "F4", "F5", axis="joint3", reference=PlaneReference((0.0, 0.0, 1.0), (1.0, 0.0, 0.0))),
-    PlaneAngleRows("F3", "F4", "F5"),
-    PointRows("tip", OnPlane((0.0, 0.0, 1.0), (0.0, 1.0, 2.0))),
-    PointRows("tip", OnSphere((1.0, 0.0, 1.0), 2.0), base="F2"),
-    PointRows("end3", OnCylinder((1.0, 0.0, 1.0), (0.0, 1.0, 2.0), 2.0)),
-    PointRows("tip", OnLine((1.0, 0.0, 1.0), (0.0, 1.0, 2.0))),
-    PointRows("tip", OnCircle((1.0, 0.0, 1.0), (0.0, 1.0, 2.0), 2.0)),
-)
 
 
-def rates(rows: Coordinate, q: np.ndarray) -> np.ndarray:
-    return np.asarray(expressions.rate_function(ROBOT, (rows,))(q).full())
+def rate_rows(arm: str) -> tuple[Coordinate, ...]:
+    """Declarations that rank analysis knows, of an arm by the prefix of its names."""
+    return (
+        BodyRows(f"{arm}tip"),
+        BodyRows(f"{arm}tip", base=f"{arm}F3", expressed=f"{arm}F5"),
+        BodyRows(f"{arm}tip", base=f"{arm}F2", expressed=f"{arm}F2", translation=(0, 2), rotation=()),
+        BodyRows(f"{arm}end3", rotation=()),
+        BodyRows(f"{arm}F6", translation=()),
+        BodyRows(f"{arm}F2", expressed=f"{arm}F3", translation=(), rotation=(1,), name="beta"),
+        JointRows(f"{arm}joint4"),
+    )
 
 
-def drift_function(rows: Coordinate, q0: np.ndarray) -> ca.Function:
+def held_rows(arm: str) -> tuple[Coordinate, ...]:
+    """Declarations whose drift is known."""
+    return (
+        *rate_rows(arm)[:5],
+        JointRows(f"{arm}joint4"),
+        PlaneAngleRows(
+            f"{arm}F3",
+            f"{arm}F4",
+            f"{arm}F5",
+            axis=f"{arm}joint3",
+            reference=PlaneReference((0.0, 0.0, 1.0), (1.0, 0.0, 0.0)),
+        ),
+        PlaneAngleRows(f"{arm}F3", f"{arm}F4", f"{arm}F5"),
+        PointRows(f"{arm}tip", OnPlane((0.0, 0.0, 1.0), (0.0, 1.0, 2.0))),
+        PointRows(f"{arm}tip", OnSphere((1.0, 0.0, 1.0), 2.0), base=f"{arm}F2"),
+        PointRows(f"{arm}end3", OnCylinder((1.0, 0.0, 1.0), (0.0, 1.0, 2.0), 2.0)),
+        PointRows(f"{arm}tip", OnLine((1.0, 0.0, 1.0), (0.0, 1.0, 2.0))),
+        PointRows(f"{arm}tip", OnCircle((1.0, 0.0, 1.0), (0.0, 1.0, 2.0), 2.0)),
+    )
+
+
+#: Of an arm by itself, and of one of two that a body carries
+RATES = [(robot, rows) for robot, arm in ((ROBOT, ""), (TREE, "arm2_")) for rows in rate_rows(arm)]
+HELD = [(robot, rows) for robot, arm in ((ROBOT, ""), (TREE, "arm2_")) for rows in held_rows(arm)]
+
+
+def rates(rows: Coordinate, q: np.ndarray, robot: Robot = ROBOT) -> np.ndarray:
+    return np.asarray(expressions.rate_function(robot, (rows,))(q).full())
+
+
+def states(robot: Robot) -> np.ndarray:
+    return np.random.default_rng(0).uniform(-1.0, 1.0, (3, robot.nv))
+
+
+def drift_function(rows: Coordinate, q0: np.ndarray, robot: Robot) -> ca.Function:
     """q -> e, with the reference of q0."""
-    kin = Tracer(Kinematics(ROBOT.model))
+    kin = Tracer(Kinematics(robot.model))
     given: Any = None
-    if expressions.reference(ROBOT, rows) is not None:
-        given = expressions.here(ROBOT, rows, q0)
+    if expressions.reference(robot, rows) is not None:
+        given = expressions.here(robot, rows, q0)
         given = ca.SX(given) if isinstance(given, float) else Pose(ca.SX(given.rotation), ca.SX(given.translation))
-    off = expressions.drift(ROBOT, kin, rows, given)
+    off = expressions.drift(robot, kin, rows, given)
     assert off is not None
     return ca.Function("drift", [kin.q], [kin.expand(off)])
 
 
-@pytest.mark.parametrize("rows", RATES, ids=str)
-def test_rates_are_pinocchios(rows: Any) -> None:
-    for q in STATES:
-        np.testing.assert_allclose(rates(rows, q), NumericRows(ROBOT).value([rows], q), atol=1e-11)
+@pytest.mark.parametrize(("robot", "rows"), RATES, ids=str)
+def test_rates_are_pinocchios(robot: Robot, rows: Any) -> None:
+    for q in states(robot):
+        np.testing.assert_allclose(rates(rows, q, robot), NumericRows(robot).value([rows], q), atol=1e-11)
 
 
-def test_rate_of_the_pitch_plane_has_its_factor() -> None:
+@pytest.mark.parametrize(("robot", "arm", "pitch"), [(ROBOT, "", 1), (TREE, "arm2_", 2)], ids=str)
+def test_rate_of_the_pitch_plane_has_its_factor(robot: Robot, arm: str, pitch: int) -> None:
     """The rank analysis leaves 1/|r| out; a rate in rad/s does not."""
-    rows, q = PitchPlaneRows("F3", "F5"), STATES[0]
-    data = ROBOT.model.createData()
-    pin.framesForwardKinematics(ROBOT.model, data, q)
-    shoulder, wrist = (data.oMf[ROBOT.model.getFrameId(name)] for name in ("F3", "F5"))
-    axis, span = shoulder.rotation[:, 1], wrist.translation - shoulder.translation
+    rows, q = PitchPlaneRows(f"{arm}F3", f"{arm}F5"), states(robot)[0]
+    data = robot.model.createData()
+    pin.framesForwardKinematics(robot.model, data, q)
+    shoulder, wrist = (data.oMf[robot.model.getFrameId(f"{arm}{name}")] for name in ("F3", "F5"))
+    axis, span = shoulder.rotation[:, pitch], wrist.translation - shoulder.translation
     length = np.linalg.norm(span - axis * (axis @ span))
-    np.testing.assert_allclose(length * rates(rows, q), NumericRows(ROBOT).value([rows], q), atol=1e-11)
+    np.testing.assert_allclose(length * rates(rows, q, robot), NumericRows(robot).value([rows], q), atol=1e-11)
 
 
-def test_rate_about_an_axis_is_a_part_of_the_angular_velocity() -> None:
-    for attached, base in (("world", "world"), ("F3", "world"), ("F5", "F2")):
-        whole = NumericRows(ROBOT).value([BodyRows("F6", base=base, expressed=attached, translation=())], STATES[1])
-        found = rates(AxisRows("F6", (1.0, 2.0, -2.0), attached=attached, base=base), STATES[1])
+@pytest.mark.parametrize(("robot", "arm"), [(ROBOT, ""), (TREE, "arm2_")], ids=str)
+def test_rate_about_an_axis_is_a_part_of_the_angular_velocity(robot: Robot, arm: str) -> None:
+    q, frame = states(robot)[1], f"{arm}F6"
+    for attached, base in (("world", "world"), (f"{arm}F3", "world"), (f"{arm}F5", f"{arm}F2")):
+        whole = NumericRows(robot).value([BodyRows(frame, base=base, expressed=attached, translation=())], q)
+        found = rates(AxisRows(frame, (1.0, 2.0, -2.0), attached=attached, base=base), q, robot)
         np.testing.assert_allclose(found, np.array([[1.0, 2.0, -2.0]]) / 3.0 @ whole, atol=1e-12)
 
 
-@pytest.mark.parametrize("rows", HELD, ids=lambda r: f"{type(r).__name__} {r}")
-def test_drift_vanishes_at_its_reference_and_has_the_rates_as_derivative(rows: Any) -> None:
-    q, h = STATES[2], 1e-6
-    off = drift_function(rows, q)
+@pytest.mark.parametrize(("robot", "rows"), HELD, ids=lambda r: f"{type(r).__name__} {r}")
+def test_drift_vanishes_at_its_reference_and_has_the_rates_as_derivative(robot: Robot, rows: Any) -> None:
+    q, h = states(robot)[2], 1e-6
+    off = drift_function(rows, q, robot)
     if not isinstance(rows, PointRows):
         assert np.abs(off(q).full()).max() < 1e-12
-    for direction in np.random.default_rng(1).uniform(-1.0, 1.0, (3, 7)):
+    for direction in np.random.default_rng(1).uniform(-1.0, 1.0, (3, robot.nv)):
         slope = (off(q + h * direction) - off(q - h * direction)).full().ravel() / (2 * h)
-        np.testing.assert_allclose(rates(rows, q) @ direction, slope, atol=2e-8)
+        np.testing.assert_allclose(rates(rows, q, robot) @ direction, slope, atol=2e-8)
 
 
 def test_what_has_no_integral_is_told_its_drift() -> None:
