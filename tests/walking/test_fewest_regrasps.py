@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from bench.walk.patches import ROOM, looked_at, patch
 from wbc.robots import Walker
 from wbc.walking import Structure
+from wbc.walking.fewer_regrasps import least_regrasps
+from wbc.walking.grips import Grips
 from wbc.walking.planner import plan_walk
 from wbc.walking.reference import fewest_along
 
 #: Ways by their seed, and the fewest re-grasps of each; at 16 and 74 the last pose counts, at 61 a hand has to wait in
-#: the air, and at 76 a hand begins on a hold that it cannot keep for long
-FEWEST = {0: 1, 1: 0, 3: 1, 6: 3, 7: 2, 16: 2, 61: 2, 74: 1, 76: 2}
+#: the air, at 76 a hand begins on a hold that it cannot keep for long, and at 144 on one that is no promising start
+FEWEST = {0: 1, 1: 0, 3: 1, 6: 3, 7: 2, 16: 2, 61: 2, 74: 1, 76: 2, 144: 2}
 
 
 @pytest.mark.parametrize("seed", sorted(FEWEST))
@@ -20,3 +23,19 @@ def test_as_few_regrasps_as_an_exact_search(machine: Walker, structure: Structur
     way, holds = patch(seed, structure)
     plan = plan_walk(machine, holds, way, objective="destination", time_budget=None)
     assert len(plan.regrasps) == fewest_along(machine, holds, looked_at(way), ROOM) == FEWEST[seed]
+    # What each arm needs at least for itself is never more than what the plan has for it
+    grips = plan.grips
+    assert grips is not None
+    least = least_regrasps(grips, len(way) - 1)
+    for chain in plan.chain:
+        assert (least[list(chain)] <= np.arange(len(chain))[::-1]).all()
+        assert least[chain[-1]] == 0
+
+
+def test_how_many_regrasps_an_arm_needs_at_least() -> None:
+    first, last = np.array([0, 0, 2, 4, 0, 3, 9]), np.array([3, 2, 5, 9, 2, 1, 9])
+    arm, hold = np.array([0, 0, 0, 0, 1, 1, 1]), np.array([0, 1, 2, 3, 0, 1, -1])
+    none = np.zeros(7, dtype=np.int64)
+    grips = Grips(arm, hold, none, first, last, none, np.zeros((1, 6)), none, none)
+    # A hand may wait in the air; a hold that is gone helps nobody, but the hand that has it keeps it to the end
+    assert least_regrasps(grips, 9).tolist() == [1, 1, 1, 0, 8, 8, 0]

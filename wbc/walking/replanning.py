@@ -10,11 +10,12 @@ import numpy as np
 from wbc.errors import ShapeError
 from wbc.robots import Walker, WalkerData
 from wbc.validation import Array
+from wbc.walking.beginnings import Beginning, stances
 from wbc.walking.body_path import BodyPath, straight_path
 from wbc.walking.closed_chain import ClosedChain
 from wbc.walking.grips import Grips, grip_slices
 from wbc.walking.plan import NoPlanError, Plan
-from wbc.walking.planner import Beginning, Objective, plan_slices, stances
+from wbc.walking.planner import Objective, plan_slices
 from wbc.walking.stance_search import StanceSearch
 from wbc.walking.structure import Structure
 from wbc.walking.swing_curve import Pivots, between
