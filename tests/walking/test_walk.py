@@ -13,9 +13,11 @@ from wbc.robots import Walker
 from wbc.walking import Structure
 from wbc.walking.body_path import grid_path
 from wbc.walking.checker import check_walk
-from wbc.walking.plan import Plan
+from wbc.walking.plan import NoPlanError, Plan
 from wbc.walking.planner import plan_walk
+from wbc.walking.run.perform import perform_walk
 from wbc.walking.run.recording import WalkRecorder
+from wbc.walking.run.request import WalkRequest
 from wbc.walking.walk import Tick, Walk
 from wbc.walking.walk_stack import WalkStack
 
@@ -98,3 +100,29 @@ def check(plan: Plan, machine: Walker) -> None:
         assert held[step.arm] == step.source
         held[step.arm], free = step.target, step.land
         assert all(a != b for a, b in combinations(held.values(), 2))
+
+
+def test_a_budget_ends_the_search_with_what_is_found(machine: Walker, structure: Structure) -> None:
+    path = grid_path(PATHS["+A"], 4 * INCH)
+    whole, enough = plan_walk(machine, structure, path), plan_walk(machine, structure, path, time_budget=600.0)
+    assert enough.rows() == whole.rows()
+    none = plan_walk(machine, structure, path, time_budget=0.0, partial=True)
+    assert not none.complete
+    assert none.reached < path.duration
+    assert len(none.regrasps) < len(whole.regrasps)
+    with pytest.raises(NoPlanError, match="no hand can be moved in time"):
+        plan_walk(machine, structure, path, time_budget=0.0)
+
+
+def test_a_walk_that_takes_too_long_is_given_up_and_says_so(
+    machine: Walker, structure: Structure, stack: WalkStack, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("wbc.walking.walk", "wbc.walking.run.perform"):
+        monkeypatch.setattr(f"{name}.PATIENCE", 0.0)
+        monkeypatch.setattr(f"{name}.SLACK", 0.3)
+    walk = Walk(machine, structure, plan_walk(machine, structure, grid_path([(13, 12), (13, 13)], 0.1)), stack=stack)
+    assert walk.run() == "late"
+    run = perform_walk(WalkRequest(start="13,12", points=("13,13",), rigid=True), machine, stack=stack)
+    assert run.outcome == "late"
+    assert "not there after" in run.reason
+    assert run.log is not None
