@@ -81,8 +81,8 @@ def test_a_whole_tree_by_blocks(tmp_path: Path) -> None:
     assert [b["shape"] for b in found["blocks"]] == [[11, 7], [1, 1], [7, 7], [7, 7]]
     assert len(found["blocks"][0]["locus"]) == 8
     assert len(found["witness"]["q"]) == 22
-    for option in ("--certify", "--approximate", "--full"):
-        code, _, err = run("spdm_on_ssrms", option)
+    for option in (("--screen", 2), ("--approximate",), ("--full",)):
+        code, _, err = run("spdm_on_ssrms", *option)
         assert code == 2
         assert "not for a tree" in err
     code, _, err = run("spdm_on_ssrms", "--set", "elbow, beta")
@@ -102,6 +102,22 @@ def test_both_arms_of_the_dexterous_manipulator(tmp_path: Path) -> None:
     code, _, err = run("ssrms", "--tree")
     assert code == 2
     assert "one of spdm, spdm_on_ssrms" in err
+
+
+def test_a_whole_tree_is_certified_by_blocks(tmp_path: Path) -> None:
+    """22 joints; the arms are alike and share a certificate."""
+    file, states = tmp_path / "tree.json", tmp_path / "states"
+    options = ("--set", "elbow, q1, q2, q7", "--certify", "--resume", states, "--json", file)
+    code, out, _ = run("spdm_on_ssrms", *options)
+    assert code == 0
+    assert "certificate  complete everywhere, by blocks" in out
+    (found,) = json.loads(file.read_text())["sets"]
+    assert found["verdict"] == "strict"
+    proof = found["certificate"]
+    assert (proof["verdict"], proof["everywhere"], proof["left"], proof["witness"]) == ("complete", True, 0.0, None)
+    assert [b["everywhere"] for b in proof["blocks"]] == [True] * 4
+    assert [b["boxes"] > 0 for b in proof["blocks"]] == [True, False, True, True]
+    assert len(list(states.iterdir())) == 2
 
 
 def test_a_screen_takes_no_constraints_of_ones_own() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from wbc.analysis.block_certificates import TreeCertificate, certify_blocks
 from wbc.analysis.blocks import BlockAnalysis, TreeAnalysis, analyse_blocks
 from wbc.analysis.boxes import Counts
 from wbc.analysis.branches import Branch
@@ -49,12 +50,14 @@ __all__ = [
     "Screened",
     "SymbolicJacobian",
     "TreeAnalysis",
+    "TreeCertificate",
     "Value",
     "Witness",
     "analyse",
     "analyse_blocks",
     "candidate_rows",
     "certify",
+    "certify_blocks",
     "factored_determinant",
     "joint_blocks",
     "joint_roots",

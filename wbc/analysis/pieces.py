@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import hashlib
 import os
+import signal
+import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from contextlib import contextmanager
 from dataclasses import astuple
 from pathlib import Path
 from typing import TypeAlias
@@ -50,9 +53,9 @@ class Pieces:
         running: dict[Future[_Done], Array] = {}
         saved = began
         stop = False
-        with ThreadPoolExecutor(workers) as pool:
+        with _interrupts() as asked, ThreadPoolExecutor(workers) as pool:
             try:
-                while (self._waiting or running) and not stop:
+                while (self._waiting or running) and not stop and not asked:
                     while self._waiting and len(running) < 2 * workers:
                         piece = self._take()
                         running[pool.submit(self._search.run, piece, _BUDGET)] = piece
@@ -67,10 +70,10 @@ class Pieces:
                         progress(self.counts.regular_part + self.counts.tube_part + self.counts.undecided_part)
             except KeyboardInterrupt:
                 stop = True
-        while running:
-            self._collect(running)
-        self.seconds = spent + time.monotonic() - began
-        self._save([])
+            while running:
+                self._collect(running)
+            self.seconds = spent + time.monotonic() - began
+            self._save([])
         return not self._waiting
 
     def _take(self) -> Array:
@@ -117,6 +120,23 @@ class Pieces:
             raise RobotFileError("state", str(path), "belongs to another robot, set or tube")
         self._waiting = [boxes] if len(boxes) else []
         self.kept, self.counts, self.seconds = kept, counts, seconds
+
+
+@contextmanager
+def _interrupts() -> Iterator[list[int]]:
+    """Keyboard interrupts, noted only: between two lines of the bookkeeping one would lose boxes.
+
+    Elsewhere than in the main thread none arrive.
+    """
+    asked: list[int] = []
+    if threading.current_thread() is not threading.main_thread():
+        yield asked
+        return
+    before = signal.signal(signal.SIGINT, lambda number, _: asked.append(number))
+    try:
+        yield asked
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def _name(forms: Sequence[TrigForm], boxes: Array, eps: float) -> str:

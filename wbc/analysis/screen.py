@@ -12,7 +12,7 @@ from wbc.analysis.jacobian import symbolic_jacobian
 from wbc.analysis.model import ExactModel
 from wbc.analysis.rows import Rows, checked
 from wbc.analysis.trig_form import TrigForm, trig_form
-from wbc.analysis.weakest import NumericWitness, least, numeric_witness, peak, weakest
+from wbc.analysis.weakest import NumericWitness, joint_values, least, numeric_witness, peak, weakest
 from wbc.errors import RangeError
 from wbc.validation import Array
 
@@ -79,7 +79,7 @@ def screen(
             q, ratio = weakest(own, parts, eps, rng)
             witness = _witness(model, wanted, rows, q, eps)
             if witness is not None:
-                known.append(_joints(model, witness))
+                known.append(joint_values(model, witness.q))
             else:
                 found.append(Screened(names, rows, float(ratio[0]), q[0]))
         left = [s for s in found if not _fails(own, [forms[name] for name in s.names], known)]
@@ -93,16 +93,6 @@ def _witness(
 ) -> NumericWitness | None:
     every = trig_form(model.ring, symbolic_jacobian(model, (*task, *rows)).matrix)
     return numeric_witness(model, task, rows, every, starts, eps)
-
-
-def _joints(model: ExactModel, witness: NumericWitness) -> Array:
-    """One number a joint, as the forms take them."""
-    out = np.empty(model.robot.nv)
-    for k, joint in enumerate(model.ring.coordinates):
-        two = int(model.robot.model.nqs[joint.dof + 1]) == 2
-        pair = witness.q[joint.index : joint.index + 2]
-        out[k] = np.arctan2(pair[1], pair[0]) if two else witness.q[joint.index]
-    return out
 
 
 def _fails(task: TrigForm, parts: Sequence[TrigForm], known: Sequence[Array]) -> bool:

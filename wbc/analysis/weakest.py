@@ -37,13 +37,24 @@ def least(matrices: Array) -> Array:
     return np.asarray(np.linalg.svd(matrices, compute_uv=False)[:, -1])
 
 
-def descended(cost: Callable[[Array], Array], joints: int, rng: np.random.Generator) -> tuple[Array, Array]:
+def joint_values(model: ExactModel, q: Array) -> Array:
+    """One number a joint, as the forms take them, of a configuration of the robot [nq]."""
+    out = np.empty(model.robot.nv)
+    for k, joint in enumerate(model.ring.coordinates):
+        two = int(model.robot.model.nqs[joint.dof + 1]) == 2
+        out[k] = np.arctan2(q[joint.index + 1], q[joint.index]) if two else q[joint.index]
+    return out
+
+
+def descended(
+    cost: Callable[[Array], Array], joints: int, rng: np.random.Generator, starts: int = STARTS, steps: int = STEPS
+) -> tuple[Array, Array]:
     """(configurations, costs) after random starts and random steps that shrink where they fail; least cost first."""
-    q = rng.uniform(-np.pi, np.pi, (STARTS, joints))
+    q = rng.uniform(-np.pi, np.pi, (starts, joints))
     value = cost(q)
     best = np.argsort(value)[:FOLLOWED]
     q, value, step = q[best], value[best], np.full(FOLLOWED, 0.3)
-    for _ in range(STEPS):
+    for _ in range(steps):
         tried = q + rng.normal(size=q.shape) * step[:, None]
         there = cost(tried)
         better = there < value

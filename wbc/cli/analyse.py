@@ -114,9 +114,9 @@ def analyse_(
     if screen is not None and (own or chosen):
         raise RangeError("screen", screen, "finds the constraints by itself: without --set, --lock, --point, --plane")
     if robot in TREES and not own and frame is None:
-        refused = {"approximate": approximate, "certify": how is not None, "resume": resume}
+        refused = {"approximate": approximate, "full": full, "screen": screen}
         pictures = None if plot is None else functools.partial(_pictures, plot)
-        found_sets = analyse_tree(robot, chosen or (), algorithm, latex, refused, pictures)
+        found_sets = analyse_tree(robot, chosen or (), algorithm, latex, refused, pictures, how)
         _write(json_, {"robot": robot, "algorithm": algorithm, "sets": found_sets})
         return
     task: tuple[Rows, ...]

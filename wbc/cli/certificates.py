@@ -9,9 +9,23 @@ from pathlib import Path
 from typing import Any
 
 from rich.markup import escape
+from rich.progress import TaskID
 
-from wbc.analysis import Certificate, ExactModel, Rows, Screened, candidate_rows, certify, screen
+from wbc.analysis import (
+    Certificate,
+    ExactModel,
+    JointBlock,
+    NumericWitness,
+    Rows,
+    Screened,
+    TreeCertificate,
+    candidate_rows,
+    certify,
+    certify_blocks,
+    screen,
+)
 from wbc.cli.console import out, progress_bar
+from wbc.coordinates.published_trees import TreeSet
 from wbc.errors import RobotFileError
 
 
@@ -57,21 +71,55 @@ def certified(
     return found
 
 
+def certified_tree(model: ExactModel, robot: str, name: str, one: TreeSet, how: Subdivision) -> TreeCertificate:
+    """The certificate of one set of a tree, each block with its own progress bar, printed."""
+    with progress_bar() as bar:
+        shown: dict[str, TaskID] = {}
+
+        def told(block: JointBlock, part: float) -> None:
+            if str(block) not in shown:
+                shown[str(block)] = bar.add_task(f"{name}, {block}, decided", total=1.0)
+            bar.update(shown[str(block)], completed=part)
+
+        state = how.state(robot, name)
+        found = certify_blocks(model, one.task, one.constraints, minutes=how.minutes, state=state, progress=told)
+    console = out()
+    where = {True: " everywhere", False: " outside the tubes of the blocks"}[found.everywhere]
+    said = {"complete": where, "undecided": f": {found.left:.3g} of the volume is left", "incomplete": ""}
+    console.print(f"  certificate  {found.verdict}{said[found.verdict]}, by blocks; {found.seconds:.1f} s")
+    for block, own in found.blocks:
+        console.print(f"  block    {escape(str(block))}", soft_wrap=True)
+        for line in lines(own):
+            console.print(f"    {escape(line)}", soft_wrap=True)
+    if found.witness is not None:
+        for line in _witness(found.witness):
+            console.print(f"  {escape(line)}", soft_wrap=True)
+        console.print(f"  {escape(str(found.lost))} loses rank; the tube is sigma_min(J_T) < {found.eps:.4g}")
+    return found
+
+
+def _witness(found: NumericWitness) -> list[str]:
+    q = ", ".join(f"{x:.9g}" for x in found.q)
+    task = f"task {found.task[-1]:.4g}, " if len(found.task) else ""
+    return [
+        f"witness q = {q}",
+        f"             smallest singular value: {task}with constraints {found.augmented[-1]:.1g}",
+    ]
+
+
 def lines(found: Certificate) -> list[str]:
     """A certificate as text."""
     tube = f"sigma_min(J_T) < {found.eps:.4g} ({found.eps / found.peak:.3g} of its maximum)" if found.peak else ""
     if found.verdict == "incomplete" and found.witness is not None:
-        q = ", ".join(f"{x:.9g}" for x in found.witness.q)
-        task, every = found.witness.task[-1], found.witness.augmented[-1]
-        return [
-            f"certificate  incomplete outside the tube {tube}: witness q = {q}",
-            f"             smallest singular value: task {task:.4g}, with constraints {every:.1g}",
-        ]
+        first, second = _witness(found.witness)
+        outside = f" outside the tube {tube}" if found.peak else ""
+        return [f"certificate  incomplete{outside}: {first}", second]
     if found.verdict == "complete":
         where = "everywhere" if found.everywhere else f"outside the tube {tube}"
         said = [f"certificate  complete {where}"]
     else:
-        said = [f"certificate  undecided: {found.left:.3g} of the volume is left; the rest is complete outside {tube}"]
+        rest = f"complete outside {tube}" if found.peak else "complete"
+        said = [f"certificate  undecided: {found.left:.3g} of the volume is left; the rest is {rest}"]
     counts = found.counts
     joints = ", ".join(f"q{k + 1}" for k in found.joints) or "none"
     said.append(
@@ -94,6 +142,21 @@ def record(found: Certificate) -> dict[str, Any]:
         "joints": [f"q{k + 1}" for k in found.joints],
         "symmetries": found.symmetries,
         "seconds": found.seconds,
+        "witness": None if witness is None else {"q": witness.q.tolist(), "task": witness.task.tolist()},
+    }
+
+
+def record_tree(found: TreeCertificate) -> dict[str, Any]:
+    """A certificate of a tree as data."""
+    witness = found.witness
+    return {
+        "verdict": found.verdict,
+        "everywhere": found.everywhere,
+        "left": found.left,
+        "eps": found.eps,
+        "seconds": found.seconds,
+        "blocks": [{"block": str(block), **record(own)} for block, own in found.blocks],
+        "lost": None if found.lost is None else str(found.lost),
         "witness": None if witness is None else {"q": witness.q.tolist(), "task": witness.task.tolist()},
     }
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from rich.markup import escape
@@ -10,6 +10,7 @@ from rich.markup import escape
 from wbc import validation
 from wbc.analysis import BlockAnalysis, ExactModel, Notation, TreeAnalysis, analyse_blocks
 from wbc.analysis.completeness import Loci
+from wbc.cli.certificates import Subdivision, certified_tree, record_tree
 from wbc.cli.console import out
 from wbc.coordinates import tree_sets
 from wbc.errors import RangeError
@@ -20,13 +21,15 @@ def analyse_tree(
     chosen: Sequence[str],
     algorithm: str,
     latex: bool,
-    refused: Any,
+    refused: Mapping[str, object],
     pictures: Callable[[ExactModel, Loci, str], None] | None = None,
+    how: Subdivision | None = None,
 ) -> list[dict[str, Any]]:
     """Sets of a tree by name, all of them by default, printed and as data.
 
     Args:
         pictures: called with every block's robot, loci and name.
+        how: to certify each set as well, block by block.
         refused: option -> whether it was given, of those that have no meaning for blocks.
 
     Raises:
@@ -47,6 +50,8 @@ def analyse_tree(
             for part in found.blocks:
                 pictures(part.model, part.loci, f"{robot} {name} {part.block}")
         records.append(_record(name, found))
+        if how is not None:
+            records[-1]["certificate"] = record_tree(certified_tree(model, robot, name, one, how))
     return records
 
 

@@ -1,0 +1,69 @@
+"""``wbc analyse --certify --resume`` as a process that is interrupted, and what goes on from its file."""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from wbc.cli.app import app
+
+#: The command, with every piece of the subdivision slowed so that there is time to interrupt it
+CHILD = """
+import sys, time
+from pathlib import Path
+from wbc.analysis.boxes import BoxSearch
+from wbc.cli.app import app
+
+run = BoxSearch.run
+
+def slow(self, boxes, budget):
+    if budget > 1000:
+        Path(sys.argv[1]).touch()
+        time.sleep(0.3)
+    return run(self, boxes, budget)
+
+BoxSearch.run = slow
+app(sys.argv[2:])
+"""
+
+
+def test_a_certificate_interrupted_as_a_process_is_gone_on_with(tmp_path: Path) -> None:
+    """SIGINT while boxes are looked at: what is known is told and kept, and the rest is done by the next call."""
+    begun, states = tmp_path / "begun", tmp_path / "states"
+    command = ["analyse", "spherical_4r", "--set", "elbow, beta", "--certify", "--resume", str(states), "--json"]
+    cut, whole = tmp_path / "cut.json", tmp_path / "whole.json"
+    child = subprocess.Popen(
+        [sys.executable, "-c", CHILD, str(begun), *command, str(cut)], stdout=subprocess.PIPE, text=True
+    )
+    until = time.monotonic() + 60.0
+    while not begun.exists():
+        assert child.poll() is None
+        assert time.monotonic() < until
+        time.sleep(0.02)
+    child.send_signal(signal.SIGINT)
+    told, _ = child.communicate(timeout=60.0)
+    assert child.returncode == 0
+    assert "certificate  undecided" in told
+    first = json.loads(cut.read_text())["sets"][0]["certificate"]
+    assert first["verdict"] == "undecided"
+    assert 0.0 < first["left"] < 1.0
+    (kept,) = states.iterdir()
+    assert CliRunner().invoke(app, [*command, str(whole)]).exit_code == 0
+    assert (
+        CliRunner()
+        .invoke(app, ["analyse", "spherical_4r", "--set", "elbow, beta", "--certify", "--json", str(cut)])
+        .exit_code
+        == 0
+    )
+    resumed, fresh = (json.loads(file.read_text())["sets"][0]["certificate"] for file in (whole, cut))
+    assert resumed["verdict"] == fresh["verdict"] == "complete"
+    assert resumed["left"] == fresh["left"] == 0.0
+    assert resumed["boxes"] == pytest.approx(fresh["boxes"])
+    assert kept.exists()
