@@ -16,10 +16,10 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from tests.constraints.evaluation import Probe, probe, random_configuration
 from tests.constraints.items import tip
 from tests.constraints.robots import robot
 from tests.constraints.test_obstacle import coal_distance, random_pose
+from tests.evaluation import Probe, probe, random_configuration
 from wbc.robot import Robot
 from wbc.shapes import HalfSpace, Sphere
 from wbc.symbolic import rotations as rot

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.constraints.evaluation import probe, random_configuration
 from tests.constraints.robots import NAMES, robot
+from tests.evaluation import probe, random_configuration
 from wbc.errors import DuplicateNameError, ShapeError, UnknownNameError
 from wbc.tasks.base import Order
 from wbc.tasks.fixed import Fixed

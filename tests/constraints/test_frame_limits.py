@@ -11,8 +11,8 @@ import pinocchio as pin
 import pytest
 
 import wbc
+from tests.evaluation import Numbers, numbers
 from tests.refusals import assert_refused
-from tests.tasks.evaluate import Numbers, numbers
 from tests.tasks.robots import FRAMES, placement, random_configuration, robot
 from wbc.controller import Controller
 from wbc.errors import BoundsError, NotFiniteError, RangeError, RotationError, ShapeError, UnknownNameError, WbcError

@@ -6,9 +6,9 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from tests.constraints.evaluation import probe, random_configuration
 from tests.constraints.items import tip
 from tests.constraints.robots import NAMES, robot
+from tests.evaluation import probe, random_configuration
 from wbc.errors import RangeError, UnknownNameError
 from wbc.tasks.base import Order
 from wbc.tasks.hold import Hold

@@ -7,8 +7,8 @@ import dataclasses
 import numpy as np
 import pytest
 
-from tests.constraints.evaluation import probe, random_configuration
 from tests.constraints.robots import NAMES, robot
+from tests.evaluation import probe, random_configuration
 from wbc.errors import DuplicateNameError, NotFiniteError, RangeError, ShapeError, UnknownNameError
 from wbc.tasks.base import Order
 from wbc.tasks.joint_limits import JointLimits

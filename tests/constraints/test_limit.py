@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 import wbc
+from tests.evaluation import numbers
 from tests.refusals import assert_refused
 from tests.stack import small
-from tests.tasks.evaluate import numbers
 from tests.tasks.robots import FRAMES, random_configuration, robot
 from wbc.errors import (
     BoundsError,

@@ -7,8 +7,8 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from tests.constraints.evaluation import numeric_jacobian, probe, random_configuration
 from tests.constraints.robots import NAMES, robot
+from tests.evaluation import numeric_jacobian, probe, random_configuration
 from wbc.errors import DuplicateNameError, MissingShapeError, NotFiniteError, RangeError, ShapeError, UnknownNameError
 from wbc.robot import Robot
 from wbc.shapes import Box, Capsule, Convex, Cylinder, HalfSpace, PlacedShape, Shape, Sphere

@@ -14,9 +14,8 @@ import pinocchio as pin
 import coal
 import pytest
 
-from tests.constraints.evaluation import probe, random_configuration
 from tests.constraints.test_obstacle import coal_distance, coal_pose, coal_shape, random_pose
-from tests.tasks.evaluate import numbers
+from tests.evaluation import numbers, probe, random_configuration
 from tests.tasks.robots import robot as registered
 from tests.tasks.test_registry import check_derivatives
 from wbc.robot import Robot

@@ -10,8 +10,8 @@ import pinocchio as pin
 import pytest
 
 import wbc
+from tests.evaluation import numbers
 from tests.refusals import assert_refused
-from tests.tasks.evaluate import numbers
 from tests.tasks.items_coordination import contact
 from tests.wheels import (
     CENTAURO_RADIUS,

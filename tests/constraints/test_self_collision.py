@@ -11,8 +11,8 @@ import pytest
 
 from tests.closed_loop.collisions import ROCK
 from tests.closed_loop.eyes import Gaps
-from tests.constraints.evaluation import probe, random_configuration
 from tests.constraints.robots import NAMES, robot
+from tests.evaluation import probe, random_configuration
 from wbc.controller import Controller, Stack, Status
 from wbc.errors import (
     DuplicateNameError,

@@ -17,7 +17,7 @@ import pytest
 
 import wbc
 from tests.closed_loop.machines import anywhere, near
-from tests.tasks.evaluate import numbers, sample
+from tests.evaluation import numbers, sample
 from tests.tasks.items import FACTORIES
 from tests.tasks.robots import FRAMES, robot
 from wbc.controller import Controller, Step

@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from tests.constraints.evaluation import random_configuration
+from tests.evaluation import random_configuration
 from tests.models import spherical_seven
 from tests.proximity.world import NAMES, all_pairs, place, robot, sensor, set_pose
 from wbc.proximity import Body, choice, distances

@@ -7,7 +7,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from tests.constraints.evaluation import random_configuration
+from tests.evaluation import random_configuration
 from tests.models import Y, arm
 from tests.proximity.world import Referee, buffers, coal_shape, link_bodies, place, robot, set_pose, things
 from wbc.errors import RangeError

@@ -6,7 +6,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from tests.constraints.evaluation import random_configuration
+from tests.evaluation import random_configuration
 from tests.proximity.world import NAMES, Referee, all_pairs, place, robot, rows_of, sensor, set_pose
 from wbc.proximity import Body, PairSensor
 from wbc.shapes import Box, Cylinder

@@ -12,10 +12,10 @@ import pinocchio as pin
 import pytest
 
 import wbc
+from tests.evaluation import numbers, sample, slope
 from tests.models import X, Z, arm
 from tests.models import robot as bare
 from tests.refusals import assert_refused
-from tests.tasks.evaluate import numbers, sample, slope
 from tests.tasks.robots import FRAMES, NAMES, placement, random_configuration, robot
 from wbc.errors import DuplicateNameError, NotFiniteError, RangeError, ShapeError, UnknownNameError, WbcError
 from wbc.robot import Robot

@@ -10,7 +10,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from tests.tasks.evaluate import numbers
+from tests.evaluation import numbers
 from tests.tasks.robots import placement, random_configuration, robot
 from wbc.errors import (
     BoundsError,

@@ -12,8 +12,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import wbc
+from tests.evaluation import later, numbers, sample, slope
 from tests.refusals import assert_refused
-from tests.tasks.evaluate import later, numbers, sample, slope
 from tests.tasks.items_pointing import FACTORIES, axes, line_of_sight
 from tests.tasks.robots import FRAMES, NAMES, placement, random_configuration, robot
 from wbc.controller import Controller

@@ -13,7 +13,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from tests.tasks.evaluate import Numbers, later, numbers, sample, slope
+from tests.evaluation import Numbers, later, numbers, sample, slope
 from tests.tasks.items import FACTORIES
 from tests.tasks.items_coordination import RATES as COORDINATION
 from tests.tasks.items_pointing import RATES as POINTING

@@ -10,7 +10,7 @@ import pinocchio as pin
 import pytest
 from scipy.spatial.transform import Rotation
 
-from tests.tasks.evaluate import numbers, slope
+from tests.evaluation import numbers, slope
 from tests.tasks.robots import FRAMES, NAMES, placement, random_configuration, robot
 from wbc.robot import Robot
 from wbc.symbolic import Kinematics, Tracer

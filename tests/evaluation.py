@@ -1,0 +1,166 @@
+"""Numbers from one item on one robot, without the stack; random run-time inputs, those of later times, and slopes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import pinocchio as pin
+
+from wbc.robot import Robot
+from wbc.symbolic.kinematics import Kinematics
+from wbc.symbolic.rotations import rotation_rate
+from wbc.symbolic.tracer import Tracer
+from wbc.tasks import Constraint, Input, Item, Task
+from wbc.tasks import inputs as run_time
+
+
+@dataclass(frozen=True, eq=False)
+class Numbers:
+    """Outputs of an item by name: value, jacobian, drift (tasks and margins); matrix, lower, upper; lower, upper."""
+
+    robot: Robot
+    item: Item
+    function: ca.Function
+
+    def flat(self, values: dict[str, Any]) -> np.ndarray:
+        """The inputs' values as one vector."""
+        declared = self.item.inputs(self.robot)
+        return np.concatenate([np.zeros(0), *[run_time.flat(self.robot, d.name, d, values[d.name]) for d in declared]])
+
+    def __call__(
+        self, q: np.ndarray, values: dict[str, Any], v: np.ndarray | None = None, dt: float = 0.005
+    ) -> dict[str, np.ndarray]:
+        """All outputs; columns as vectors."""
+        speed = np.zeros(self.robot.nv) if v is None else v
+        out = self.function(q, speed, self.flat(values), dt)
+        arrays = dict(zip(self.function.name_out(), [np.array(o) for o in out], strict=True))
+        return {name: a if name in ("jacobian", "matrix") else a[:, 0] for name, a in arrays.items()}
+
+
+def numbers(item: Item, robot: Robot) -> Numbers:
+    """Validate an item and make its expressions a function, interpreted."""
+    item.validate(robot)
+    kinematics, dt = Kinematics(robot.model), ca.SX.sym("dt")
+    tracer = Tracer(kinematics)
+    symbols = run_time.symbols(robot, item.inputs(robot))
+    outputs: dict[str, ca.SX] = {}
+    if isinstance(item, Task) or (isinstance(item, Constraint) and item.form == "margins"):
+        value = item.error(robot, tracer, symbols.values) if isinstance(item, Task) else None
+        value = item.margins(robot, tracer, symbols.values) if value is None else value
+        own = item.jacobian(robot, tracer, symbols.values) if isinstance(item, Task) else None
+        outputs["value"] = tracer.expand(value)
+        outputs["jacobian"] = tracer.jacobian(value) if own is None else tracer.expand(own)
+        outputs["drift"] = tracer.expand(drift(robot, kinematics, item, symbols, value))
+    elif item.form == "rows":
+        rows = item.velocity_rows(robot, tracer, symbols.values, dt)
+        outputs = {name: tracer.expand(ca.SX(getattr(rows, name))) for name in ("matrix", "lower", "upper")}
+    else:
+        bounds = item.bounds(robot, tracer, symbols.values, dt)
+        outputs = {name: tracer.expand(getattr(bounds, name)) for name in ("lower", "upper")}
+    for name, output in outputs.items():
+        assert output.shape[0] == len(item.rows(robot)), name
+    arguments = [kinematics.q, kinematics.v, symbols.vector, dt]
+    dense = ca.cse([ca.densify(o) for o in outputs.values()])
+    return Numbers(robot, item, ca.Function("item", arguments, dense, ["q", "v", "p", "dt"], list(outputs)))
+
+
+@dataclass(frozen=True, eq=False)
+class Probe:
+    """An item's outputs in their order, of run-time values that are named or else the defaults."""
+
+    numbers: Numbers
+
+    def __call__(
+        self, q: np.ndarray, v: np.ndarray | None = None, dt: float = 0.005, **values: Any
+    ) -> tuple[np.ndarray, ...]:
+        """Of a constraint (margins, Jacobian, drift), (matrix, lower, upper) or (lower, upper)."""
+        declared = {i.name: i.default for i in self.numbers.item.inputs(self.numbers.robot)}
+        assert values.keys() <= declared.keys(), f"no such inputs: {sorted(values.keys() - declared.keys())}"
+        return tuple(self.numbers(q, declared | values, v, dt).values())
+
+
+def probe(item: Item, robot: Robot) -> Probe:
+    """An item on a robot, interpreted."""
+    return Probe(numbers(item, robot))
+
+
+def drift(robot: Robot, kinematics: Kinematics, item: Item, symbols: run_time.Symbols, value: ca.SX) -> ca.SX:
+    """Partial time derivative through the inputs that have a rate."""
+    total = ca.SX(value.numel(), 1)
+    for d in item.inputs(robot):
+        if d.rate is None:
+            continue
+        part, speed = symbols.flat[d.name], symbols.flat[d.rate]
+        if d.kind == "pose":
+            change = ca.vertcat(rotation_rate(ca.reshape(part[:9], 3, 3)) @ speed[3:], speed[:3])
+        elif d.kind == "rotation":
+            change = rotation_rate(ca.reshape(part, 3, 3)) @ speed
+        elif d.kind == "configuration":
+            change = kinematics.tangent_map_at(part) @ speed
+        else:
+            change = speed
+        total = total + ca.jacobian(value, part) @ change
+    return total
+
+
+def sample(robot: Robot, declared: Input, rng: np.random.Generator) -> Any:
+    """A random value of an input, as the user writes it."""
+    turn, place = pin.exp3(rng.uniform(-1.8, 1.8, 3)), rng.uniform(-1.0, 1.0, 3)
+    if declared.kind == "pose":
+        return pin.SE3(turn, place)
+    if declared.kind == "rotation":
+        return turn
+    if declared.kind == "configuration":
+        return pin.integrate(robot.model, robot.neutral, rng.uniform(-1.0, 1.0, robot.nv))
+    if declared.direction:
+        return place / np.linalg.norm(place)
+    count = run_time.size(robot, declared)
+    drawn = rng.uniform(max(declared.low, -1.0), min(declared.high, 1.0), count)
+    return float(drawn[0]) if declared.kind == "vector" and declared.size == 0 else drawn
+
+
+def later(robot: Robot, item: Item, values: dict[str, Any], time: float) -> dict[str, Any]:
+    """The values after ``time`` at the rates that they hold, moved by Pinocchio and not by our expressions."""
+    out = dict(values)
+    for d in item.inputs(robot):
+        if d.rate is None:
+            continue
+        value, speed = values[d.name], np.asarray(values[d.rate], dtype=float) * time
+        if d.kind == "pose":
+            out[d.name] = pin.SE3(pin.exp3(speed[3:]) @ value.rotation, value.translation + speed[:3])
+        elif d.kind == "rotation":
+            out[d.name] = pin.exp3(speed) @ value
+        elif d.kind == "configuration":
+            out[d.name] = pin.integrate(robot.model, value, speed)
+        else:
+            out[d.name] = value + (float(speed) if np.ndim(value) == 0 else speed)
+    return out
+
+
+def slope(value: Callable[[float], np.ndarray], step: float = 1e-4) -> np.ndarray:
+    """Derivative at 0, central difference of fourth order."""
+    return (value(-2 * step) - 8 * value(-step) + 8 * value(step) - value(2 * step)) / (12 * step)
+
+
+def random_configuration(robot: Robot, rng: np.random.Generator) -> np.ndarray:
+    """A configuration within the position limits; bases within a metre of the origin."""
+    spread = np.where(robot.position_index >= 0, 0.0, 1.0)
+    q = pin.integrate(robot.model, robot.neutral, spread * rng.uniform(-1.0, 1.0, robot.nv))
+    for i, k in enumerate(robot.position_index):
+        if k >= 0:
+            lower, upper = robot.limits.position_lower[i], robot.limits.position_upper[i]
+            q[k] = rng.uniform(max(lower, -3.0), min(upper, 3.0))
+    return q
+
+
+def numeric_jacobian(robot: Robot, q: np.ndarray, value: Any, step: float = 1e-4) -> np.ndarray:
+    """Derivative along the tangent space by a central difference of fourth order, rows x nv."""
+    columns = []
+    for direction in np.eye(robot.nv):
+        at = [value(pin.integrate(robot.model, q, k * step * direction)) for k in (-2, -1, 1, 2)]
+        columns.append((at[0] - 8 * at[1] + 8 * at[2] - at[3]) / (12 * step))
+    return np.column_stack(columns)
