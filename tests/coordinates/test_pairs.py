@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import copy
 import pickle
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -39,6 +41,16 @@ def test_a_pair_and_its_swap() -> None:
     assert (back.name, back.task, back.constraint, back.metric) == ("alpha | xi", (ALPHA,), (XI,), None)
     assert CoordinatePair(ELBOW, [XI]).over_determined(ROBOT)
     assert pickle.loads(pickle.dumps(pair)) == pair
+
+
+@pytest.mark.parametrize("one", [XI, ALPHA, ROLL, CoordinatePair(XI, ALPHA)], ids=str)
+def test_kept_hashes_are_those_of_the_fields_and_stay_at_home(one: Any) -> None:
+    """Equal declarations have one hash, names apart; copies of other processes do not bring theirs along."""
+    other = replace(one, name="another") if one is not XI else BodyRows("tip")
+    assert hash(one) == hash(other) == hash(one)
+    assert {one: 1}[other] == 1
+    assert b"_kept_hash" not in pickle.dumps(one)
+    assert copy.copy(one).__dict__ == {k: v for k, v in one.__dict__.items() if k != "_kept_hash"}
 
 
 def test_one_stack_serves_several_pairs() -> None:

@@ -6,12 +6,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
+from wbc.analysis.kept_hash import keeps_hash
 from wbc.errors import RangeError, ShapeError
 from wbc.symbolic.kinematics import WORLD
 
 ALL = (0, 1, 2)
 
 
+@keeps_hash
 @dataclass(frozen=True)
 class BodyRows:
     """Components of a frame's velocity (v; omega) relative to a body.
@@ -44,6 +46,7 @@ class BodyRows:
         return self.name or self.frame
 
 
+@keeps_hash
 @dataclass(frozen=True)
 class JointRows:
     """The rate of a joint: a row of the identity. With zero command the joint is locked.
@@ -59,6 +62,7 @@ class JointRows:
         return self.name or self.joint
 
 
+@keeps_hash
 @dataclass(frozen=True)
 class PitchPlaneRows:
     """Rate of the pitch plane about the common normal r of two parallel pitch axes, without its factor 1/|r|:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from wbc import validation
+from wbc.analysis.kept_hash import keeps_hash
 from wbc.analysis.rows import BodyRows
 from wbc.coordinates import expressions
 from wbc.coordinates.rows import Coordinate, coordinates
@@ -13,6 +14,7 @@ from wbc.errors import DuplicateNameError, RangeError, ShapeError
 from wbc.robot import Robot
 
 
+@keeps_hash
 @dataclass(frozen=True)
 class CoordinatePair:
     """Task coordinates are commanded, constraint coordinates are held or have prescribed rates:

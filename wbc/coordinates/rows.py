@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any, TypeAlias
 
 from wbc import validation
+from wbc.analysis.kept_hash import keeps_hash
 from wbc.analysis.rows import BodyRows, JointRows, PitchPlaneRows
 from wbc.coordinates.point_sets import PointSet, Triple
 from wbc.errors import ShapeError
@@ -17,6 +18,7 @@ from wbc.tasks import PitchPlane, PlaneReference
 UPRIGHT = PlaneReference()
 
 
+@keeps_hash
 @dataclass(frozen=True)
 class AxisRows:
     """Rotation rate of a frame's body about an axis: a.(omega - omega_base)                          [rad/s]
@@ -42,6 +44,7 @@ class AxisRows:
         return self.name or f"{self.frame} about an axis"
 
 
+@keeps_hash
 @dataclass(frozen=True)
 class PlaneAngleRows:
     """The angle psi of a pitch plane against a stereographic reference, see :class:`wbc.tasks.PitchPlane`      [rad]
@@ -71,6 +74,7 @@ class PlaneAngleRows:
         return self.name
 
 
+@keeps_hash
 @dataclass(frozen=True)
 class PointRows:
     """A point on a curve or surface: f(x) = 0 for the origin x of a frame, seen from a base frame      [m]
