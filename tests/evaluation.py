@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import casadi as ca
@@ -26,10 +27,15 @@ class Numbers:
     item: Item
     function: ca.Function
 
+    @cached_property
+    def declared(self) -> tuple[Input, ...]:
+        """The inputs, asked for once."""
+        return tuple(self.item.inputs(self.robot))
+
     def flat(self, values: dict[str, Any]) -> np.ndarray:
         """The inputs' values as one vector."""
-        declared = self.item.inputs(self.robot)
-        return np.concatenate([np.zeros(0), *[run_time.flat(self.robot, d.name, d, values[d.name]) for d in declared]])
+        parts = [run_time.flat(self.robot, d.name, d, values[d.name]) for d in self.declared]
+        return np.concatenate([np.zeros(0), *parts])
 
     def __call__(
         self, q: np.ndarray, values: dict[str, Any], v: np.ndarray | None = None, dt: float = 0.005
@@ -78,9 +84,9 @@ class Probe:
         self, q: np.ndarray, v: np.ndarray | None = None, dt: float = 0.005, **values: Any
     ) -> tuple[np.ndarray, ...]:
         """Of a constraint (margins, Jacobian, drift), (matrix, lower, upper) or (lower, upper)."""
-        declared = {i.name: i.default for i in self.numbers.item.inputs(self.numbers.robot)}
-        assert values.keys() <= declared.keys(), f"no such inputs: {sorted(values.keys() - declared.keys())}"
-        return tuple(self.numbers(q, declared | values, v, dt).values())
+        defaults = {d.name: d.default for d in self.numbers.declared}
+        assert values.keys() <= defaults.keys(), f"no such inputs: {sorted(values.keys() - defaults.keys())}"
+        return tuple(self.numbers(q, defaults | values, v, dt).values())
 
 
 def probe(item: Item, robot: Robot) -> Probe:
