@@ -10,10 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
-from wbc.analysis.blocks import block_model, lift, parted_task
+from wbc.analysis.blocks import block_model, lift, parted_task, problem
 from wbc.analysis.certificate import COMPLETE, INCOMPLETE, UNDECIDED, Certificate, certify
 from wbc.analysis.completeness import TRIES
-from wbc.analysis.jacobian import symbolic_jacobian
 from wbc.analysis.model import ExactModel
 from wbc.analysis.numeric import NumericRows, rank, singular_values
 from wbc.analysis.rows import Rows, checked
@@ -90,7 +89,7 @@ def certify_blocks(
         alone = block_model(model, block)
         own = [r for r in block.rows if parted and any(r is t for t in wanted)]
         rest = [r for r in block.rows if not any(r is t for t in own)] or own
-        key = _problem(alone, own, rest)
+        key = problem(alone, own, rest)
         if key not in known:
             left = (minutes - (time.monotonic() - began) / 60.0) / (len(blocks) - number)
             told = None if progress is None else _told(progress, block)
@@ -110,12 +109,6 @@ def certify_blocks(
     return TreeCertificate(
         verdict, parted, certificates, everywhere, undecided, eps, witness, lost, time.monotonic() - began
     )
-
-
-def _problem(alone: ExactModel, task: Sequence[Rows], rest: Sequence[Rows]) -> tuple[object, ...]:
-    """What a certificate depends on: blocks that are alike, two arms on one body, share one."""
-    J = symbolic_jacobian(alone, (*task, *rest))
-    return tuple(alone.robot.model.nqs), len(task), tuple(str(p) for r in J.matrix for p in r)
 
 
 def _told(progress: Callable[[JointBlock, float], None], block: JointBlock) -> Callable[[float], None]:

@@ -10,6 +10,7 @@ import numpy as np
 import pinocchio as pin
 
 from wbc.analysis.completeness import INCOMPLETE, LOOSE, STRICT, UNDECIDED, Loci, Witness, find_witness, loci
+from wbc.analysis.jacobian import symbolic_jacobian
 from wbc.analysis.model import ExactModel
 from wbc.analysis.numeric import NumericRows
 from wbc.analysis.rows import Rows, checked
@@ -77,7 +78,8 @@ def analyse_blocks(
     rows = (*wanted, *added)
     blocks = joint_blocks(model.robot, rows)
     parted = parted_task(model, wanted, blocks)
-    analysed = tuple(_analysed(model, block, wanted if parted else (), algorithm) for block in blocks)
+    known: dict[tuple[object, ...], Loci] = {}
+    analysed = tuple(_analysed(model, block, wanted if parted else (), algorithm, known) for block in blocks)
     verdicts = {one.verdict for one in analysed}
     witness: Witness | None = None
     lost: JointBlock | None = None
@@ -100,10 +102,25 @@ def parted_task(model: ExactModel, task: tuple[Rows, ...], blocks: Sequence[Join
     return all(any(tree.joints_of(declared, known) <= run for run in runs) for declared in task)
 
 
-def _analysed(model: ExactModel, block: JointBlock, task: tuple[Rows, ...], algorithm: str) -> BlockAnalysis:
+def _analysed(
+    model: ExactModel,
+    block: JointBlock,
+    task: tuple[Rows, ...],
+    algorithm: str,
+    known: dict[tuple[object, ...], Loci],
+) -> BlockAnalysis:
     alone = block_model(model, block)
-    found = loci(alone, [r for r in block.rows if any(r is t for t in task)], block.rows, algorithm)
-    return BlockAnalysis(block, alone, found, found.verdict(None))
+    own = [r for r in block.rows if any(r is t for t in task)]
+    key = problem(alone, own, [r for r in block.rows if not any(r is t for t in own)])
+    if key not in known:
+        known[key] = loci(alone, own, block.rows, algorithm)
+    return BlockAnalysis(block, alone, known[key], known[key].verdict(None))
+
+
+def problem(alone: ExactModel, task: Sequence[Rows], rest: Sequence[Rows]) -> tuple[object, ...]:
+    """What loci and certificates depend on: blocks that are alike, two arms on one body, share theirs."""
+    J = symbolic_jacobian(alone, (*task, *rest))
+    return tuple(alone.robot.model.nqs), len(task), tuple(str(p) for r in J.matrix for p in r)
 
 
 def block_model(model: ExactModel, block: JointBlock) -> ExactModel:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 from wbc.analysis.branches import Branch
+from wbc.analysis.deficiency import Exact
 
 
 @dataclass(frozen=True)
@@ -18,3 +20,15 @@ class Locus:
 
     branches: tuple[Branch, ...]
     open: tuple[Branch, ...] = ()
+
+
+class Located(Protocol):
+    """What pictures need of an analysis: a locus, and the arithmetic that it is written in."""
+
+    @property
+    def exact(self) -> Exact:
+        """Arithmetic of the robot."""
+
+    @property
+    def locus(self) -> Locus:
+        """Where the rows lose rank."""

@@ -11,8 +11,8 @@ import pinocchio as pin
 
 from wbc import style
 from wbc.analysis.branches import Branch
-from wbc.analysis.completeness import Analysis, Loci
 from wbc.analysis.level_surface import zero_surface
+from wbc.analysis.locus import Located
 from wbc.analysis.model import ExactModel
 from wbc.analysis.notation import Notation
 from wbc.analysis.points import angle, form_grid, real_point
@@ -27,7 +27,7 @@ _GRID, _FINE = 33, 241
 _MOST = 6
 
 
-def save_pictures(model: ExactModel, found: Analysis | Loci, folder: Path, name: str) -> list[Path]:
+def save_pictures(model: ExactModel, found: Located, folder: Path, name: str) -> list[Path]:
     """Writes ``name``-locus.png, ``name``-poses.png, ``name``.tex and ``name``.txt; returns the files.
 
     The locus is drawn in at most three joints, those of relations first: planes for the values of one joint, surfaces
@@ -58,7 +58,7 @@ def save_pictures(model: ExactModel, found: Analysis | Loci, folder: Path, name:
     return files
 
 
-def _groups(found: Analysis | Loci) -> list[tuple[str, list[Branch]]]:
+def _groups(found: Located) -> list[tuple[str, list[Branch]]]:
     """Lines of the text and the branches of each: those with conditions on the same joints."""
     kinds: dict[tuple[object, ...], list[Branch]] = {}
     for branch in found.locus.branches:
@@ -68,7 +68,7 @@ def _groups(found: Analysis | Loci) -> list[tuple[str, list[Branch]]]:
     return [("; ".join(notation.branches(branches)), branches) for branches in list(kinds.values())[:_MOST]]
 
 
-def _joints(found: Analysis | Loci) -> list[int]:
+def _joints(found: Located) -> list[int]:
     """The joints that most branches have conditions on, at most three, at least two."""
     branches = found.locus.branches
     # Relations first: planes of one value are the same in whatever joints stand beside it
@@ -81,14 +81,14 @@ def _joints(found: Analysis | Loci) -> list[int]:
     return sorted(chosen)
 
 
-def _points(found: Analysis | Loci, branches: list[Branch], count: int) -> Array:
+def _points(found: Located, branches: list[Branch], count: int) -> Array:
     rng = np.random.default_rng(0)
     tries = (real_point(found.exact.half, b, rng) for b in branches for _ in range(count))
     points = [p for p in tries if p is not None]
     return np.array(points).reshape(-1, found.exact.half.size)
 
 
-def _locus(plt: Any, model: ExactModel, found: Analysis | Loci, groups: list[tuple[str, list[Branch]]]) -> Any:
+def _locus(plt: Any, model: ExactModel, found: Located, groups: list[tuple[str, list[Branch]]]) -> Any:
     joints = _joints(found)
     notation = Notation(found.exact.half)
     solid = len(joints) == 3
@@ -131,7 +131,7 @@ def _plane(axes: Any, across: int, at: float, colour: str) -> None:
     axes.plot_surface(*sides, color=colour, alpha=0.3, edgecolor=colour)
 
 
-def _relation(found: Analysis | Loci, branch: Branch, joints: list[int], ticks: Array) -> Array:
+def _relation(found: Located, branch: Branch, joints: list[int], ticks: Array) -> Array:
     """The relation of a branch on a grid of some joints; it has no others."""
     grid = np.meshgrid(*[ticks] * len(joints), indexing="ij")
     q = [np.zeros_like(grid[0])] * found.exact.half.size
@@ -140,7 +140,7 @@ def _relation(found: Analysis | Loci, branch: Branch, joints: list[int], ticks: 
     return form_grid(found.exact.half, branch.relations[0], q)
 
 
-def _surface(axes: Any, found: Analysis | Loci, branch: Branch, joints: list[int], colour: str) -> None:
+def _surface(axes: Any, found: Located, branch: Branch, joints: list[int], colour: str) -> None:
     ticks = np.linspace(-np.pi, np.pi, _GRID)
     triangles = zero_surface(_relation(found, branch, joints, ticks), ticks)
     if len(triangles):
@@ -149,12 +149,12 @@ def _surface(axes: Any, found: Analysis | Loci, branch: Branch, joints: list[int
         axes.plot_trisurf(*vertices[:, :2].T, vertices[:, 2], triangles=rows, color=colour, alpha=0.55)
 
 
-def _curve(axes: Any, found: Analysis | Loci, branch: Branch, joints: list[int], colour: str) -> None:
+def _curve(axes: Any, found: Located, branch: Branch, joints: list[int], colour: str) -> None:
     ticks = np.linspace(-np.pi, np.pi, _FINE)
     axes.contour(ticks, ticks, _relation(found, branch, joints, ticks).T, levels=[0.0], colors=[colour])
 
 
-def _poses(plt: Any, model: ExactModel, found: Analysis | Loci, groups: list[tuple[str, list[Branch]]]) -> Any:
+def _poses(plt: Any, model: ExactModel, found: Located, groups: list[tuple[str, list[Branch]]]) -> Any:
     columns = min(3, len(groups))
     figure = plt.figure(figsize=(4.6 * columns, 4.6 * -(-len(groups) // columns)))
     for place, (text, branches) in enumerate(groups, start=1):

@@ -26,7 +26,7 @@ from wbc.analysis import (
     factored_determinant,
     published_sets,
 )
-from wbc.analysis.completeness import Loci
+from wbc.analysis.locus import Located
 from wbc.analysis.pictures import save_pictures
 from wbc.analysis.published import ROBOTS
 from wbc.cli.certificates import Subdivision, certified, record, winner
@@ -162,7 +162,7 @@ def _meant(robot: str, tree: bool, full: bool, own: bool) -> str:
     return "spdm_arm" if full else "spdm_arm_simplified"
 
 
-def _pictures(folder: Path, model: ExactModel, found: Analysis | Loci, name: str) -> None:
+def _pictures(folder: Path, model: ExactModel, found: Located, name: str) -> None:
     for file in save_pictures(model, found, folder, re.sub(r"\W+", "-", name)):
         out().print(f"  written  {escape(str(file))}", soft_wrap=True)
 

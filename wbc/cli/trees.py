@@ -9,7 +9,7 @@ from rich.markup import escape
 
 from wbc import validation
 from wbc.analysis import BlockAnalysis, ExactModel, Notation, TreeAnalysis, analyse_blocks
-from wbc.analysis.completeness import Loci
+from wbc.analysis.locus import Located
 from wbc.cli.certificates import Subdivision, certified_tree, record_tree
 from wbc.cli.console import out
 from wbc.coordinates import tree_sets
@@ -22,7 +22,7 @@ def analyse_tree(
     algorithm: str,
     latex: bool,
     refused: Mapping[str, object],
-    pictures: Callable[[ExactModel, Loci, str], None] | None = None,
+    pictures: Callable[[ExactModel, Located, str], None] | None = None,
     how: Subdivision | None = None,
 ) -> list[dict[str, Any]]:
     """Sets of a tree by name, all of them by default, printed and as data.
