@@ -111,6 +111,12 @@ class ArmClearance:
         place = bisect_left(found, sample - EVERY + 1)
         return found[place] if place < len(found) else NEVER
 
+    def free_from(self, one: int, other: int, sample: int) -> int:
+        """The first sample from ``sample`` on at which the arms are far enough from each other."""
+        while (conflict := self.first_conflict(one, other, sample)) <= sample:
+            sample = conflict + EVERY
+        return sample
+
     def points(self, arm: int, postures: Array) -> Array:
         """Named points of an arm in the body's frame, ``[..., 6, 3]``."""
         base, library = self._bases[arm], compiled.library()

@@ -72,7 +72,9 @@ def plan_walk(
     search = functools.partial(
         plan_slices, walker, structure, width=width, deadline=deadline, thorough=time_budget is None
     )
-    plan = drained(search(path, beginning, objective=objective))
+    # Where a way round is looked for, the widest searches come last
+    narrow = [(delay, width) for delay in (DELAYS if objective == "velocity" else DELAYS[-1:])] if detour else ()
+    plan = drained(search(path, beginning, objective=objective, tries=narrow))
     if not plan.complete and detour:
         rows = {arm.name: k for k, arm in enumerate(walker.arms)}
         hands = {rows[name]: structure.index(hold) for name, hold in beginning[0].items()}

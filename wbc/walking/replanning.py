@@ -186,7 +186,11 @@ def way_to(walker: Walker, structure: Structure, plan: Plan, arm: int, chain: Cl
     turn = grips.posture_at(grip, 0)[:1] - mine[:1]
     pivots = Pivots((plan.path.poses[0] @ walker.arms[arm].base.homogeneous)[None], turn)
     hold = structure.index(plan.start[arm])
-    way = between(chain.origins[arm], chain.axes[arm], structure, hold, pivots, data)
+    places, axes = (
+        (now[arm][None], there[[hold]])
+        for now, there in ((chain.origins, structure.positions), (chain.axes, structure.axes))
+    )
+    way = between(structure, places, axes, np.array([[True, False]]), pivots, data)
     first, last = np.array(mine[3:]), np.array(grips.wrist_at(grip, 0.0))
     bent = first + blend(np.linspace(0.0, 1.0, FINE))[None, :, None] * (last - first)
     return SwingLaw(walker, arm, plan.path, way, np.zeros(FINE), lambda _: bent, 1.0)

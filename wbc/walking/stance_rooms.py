@@ -39,6 +39,12 @@ class StanceRooms:
             ends.append(min([int(self._last[grip]), *mine]))
         return rooms, ends
 
+    def clear_from(self, grip: int, others: Sequence[int], sample: int) -> int:
+        """The first sample from a sample on at which an arm is not in the way of others."""
+        while (after := max(self._clearance.free_from(grip, other, sample) for other in others)) > sample:
+            sample = after
+        return sample
+
     def _free(self, grips: Sequence[int], sample: int) -> list[int]:
         """Last samples before pairs get in each other's way."""
         return [self._clearance.first_conflict(*pair, sample) - 1 for pair in combinations(grips, 2)]

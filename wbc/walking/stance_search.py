@@ -124,13 +124,9 @@ class StanceSearch:
         level: dict[Key, Node] = {tuple(int(g) for g in start): Node(sample, 0, None, None) for start in starts}
         if not self._levels or self._levels[0] != level:
             self._levels, self._asked = [level], []
-        levels = [level]
+        levels, end = [level], len(self.path) - 1
         while True:
-            done = [
-                (node.delay, self.order(key), key)
-                for key, node in level.items()
-                if self.until(key, node.sample) >= len(self.path) - 1
-            ]
+            done = [(n.delay, self.order(k), k) for k, n in level.items() if self.until(k, n.sample) >= end]
             if done and not (self.first and len(levels) == 1):
                 return self._result(levels, min(done)[2], True)
             if deadline is not None and time.perf_counter() > deadline:
@@ -165,8 +161,9 @@ class StanceSearch:
             found = yield from self._prepare(level, part)
             for (key, nodes), swings in zip(part, found, strict=True):
                 asked.update((s.arm, s.source, s.target, s.lift) for s in swings if s is not None)
-                pairs = zip(nodes, swings, strict=True)
-                checked = [better for one in pairs if (better := self._checked(level, *one)) is not None]
+                checked = [
+                    b for one in zip(nodes, swings, strict=True) if (b := self._checked(level, *one)) is not None
+                ]
                 if checked:
                     kept[key] = min(checked, key=lambda n: (n.sample, n.delay))
             if self.width and len(kept) >= self.width:
@@ -202,9 +199,13 @@ class StanceSearch:
         if move is None or parent is None:
             return None
         others = tuple(g for k, g in enumerate(key) if k != move.arm)
-        if min(self.clearance.first_conflict(move.target, g, move.land) for g in others) <= move.land:
-            return None
         room, soonest = self.rooms.among(others, level[parent].sample), int(self.soonest[move.target])
+        free = self.rooms.clear_from(move.target, others, move.land)
+        if free > move.land:
+            # Only a hand that may wait long lands when the others are out of its way
+            soonest = free + self._touch
+            if self.longest_wait <= HOVER or soonest > min(room, int(self._latest[move.target])):
+                return None
         return Swing(move.arm, move.source, move.target, move.lift, room, others, soonest)
 
     def _moves(self, level: Sequence[tuple[Key, Node]], rows: range) -> list[Fan]:
@@ -250,8 +251,7 @@ class StanceSearch:
         chosen = None if swing is None else self.swings.choose(swing)
         if swing is None or chosen is None:
             return None
-        duration, room = chosen.duration, swing.room
-        first, last = int(self.soonest[move.target]), int(self._latest[move.target])
+        duration, room, first, last = chosen.duration, swing.room, swing.soonest, int(self._latest[move.target])
         land = max(move.lift + int(np.ceil(duration / self.path.spacing)), first)
         late = max(land - room, 0) * self.path.spacing
         land = min(land, room)

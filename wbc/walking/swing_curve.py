@@ -133,15 +133,25 @@ def curves(structure: Structure, begin: Ints, end: Ints, pivots: Pivots, data: W
     return replace(flat, lift=_lift(structure, flat, height) + more)
 
 
-def between(place: Array, axis: Array, structure: Structure, hold: int, pivots: Pivots, data: WalkerData) -> Curves:
-    """The way of a hand that is in the air, at ``place`` with its z axis along ``axis``, to a hold."""
-    end, arrive = structure.positions[[hold]], structure.axes[[hold]]
-    height = crossing_height(data)
-    # It need not rise more than it lacks, but must come down along the hold's normal
-    lack = max(height - float(structure.clearance(place)), 0.0)
-    flat = Curves(place[None], end, axis[None], arrive, np.zeros((1, 2)), np.zeros(1), pivots, 1.0)
-    rise = float(_rise(flat, height)[0])
-    flat = replace(flat, rise=np.array([[rise * lack / height, rise]]))
+def between(
+    structure: Structure,
+    ends: tuple[Array, Array],
+    axes: tuple[Array, Array],
+    free: Array,
+    pivots: Pivots,
+    data: WalkerData,
+) -> Curves:
+    """Ways of hands of which one end or both are in the air.
+
+    Args:
+        ends, axes: places and z axes of the hands at the beginning and the end, ``[m, 3]`` each. free: which are in
+            the air ``[m, 2]``.
+    """
+    height, flat = crossing_height(data), Curves(*ends, *axes, np.zeros(free.shape), np.zeros(len(free)), pivots, 1.0)
+    # From the air it need not rise more than it lacks, but must come down along the hold's normal
+    lack = np.stack([np.maximum(height - structure.clearance(end), 0.0) for end in ends], axis=1)
+    rise = _rise(flat, height)[:, None]
+    flat = replace(flat, rise=np.where(free, rise * lack / height, rise))
     return replace(flat, lift=_lift(structure, flat, height))
 
 

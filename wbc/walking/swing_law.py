@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from typing import NamedTuple
 
 import numpy as np
@@ -10,8 +11,9 @@ from wbc.robots import Walker
 from wbc.validation import Array
 from wbc.walking.arm_kinematics import ArmKinematics
 from wbc.walking.body_path import BodyPath
+from wbc.walking.grips import Ints
 from wbc.walking.stance_search import Move
-from wbc.walking.swing_curve import Curves
+from wbc.walking.swing_curve import WAYS, Curves
 from wbc.walking.swing_path import Wrists, blend, grip_wrists
 from wbc.walking.swing_speed import speeds
 from wbc.walking.swing_tracks import PASSES
@@ -86,6 +88,8 @@ class SwingLaw:
         # It comes when the next grip begins, if it does not hold the body up
         whole = max(move.duration, 0.0 if move.delay else (move.land - move.lift) * swings.path.spacing)
         least = whole - swings.extra
+        if move.way >= len(WAYS):
+            return SwingLaw._waiting(swings, move, (arms, source, target), least)
         way = swings.curve(arms, source, target, np.array([move.lift]), move.way)
         part = np.linspace(0.0, 1.0, COARSE)
         for _ in range(PASSES):
@@ -97,6 +101,28 @@ class SwingLaw:
         fine = np.interp(np.linspace(0.0, 1.0, FINE), np.linspace(0.0, 1.0, COARSE), samples[0])
         wrists = grip_wrists(swings.grips, source, target, FINE)
         return SwingLaw(swings.walker, move.arm, swings.path, way, fine, wrists, least)
+
+    @staticmethod
+    def _waiting(swings: Swings, move: Move, ends: tuple[Ints, Ints, Ints], whole: float) -> SwingLaw:
+        """The law of a move whose hand waits: of the way off the hold, the ride, and the way onto the next one."""
+        spacing, begin = swings.path.spacing, np.array([move.lift + swings.latch / swings.path.spacing])
+        found = swings.waiting(ends, (begin, begin + whole / spacing), move.way, FINE)
+        away, onto = (
+            SwingLaw(swings.walker, move.arm, swings.path, half.way, half.samples[0], half.wrists)
+            for half in (found.away, found.onto)
+        )
+        rides, since = slice(1, FINE - 1), (found.samples[0] - begin) * spacing
+        times = np.concatenate([away._times, since[rides], whole - onto.duration + onto._times])
+        place = np.concatenate([away.places, found.places[0, rides], onto.places])
+        parts = np.concatenate([0.5 * away._rows[:, 6], np.full(FINE - 2, 0.5), 0.5 + 0.5 * onto._rows[:, 6]])
+        out = copy(away)
+        out.possible, out.duration = bool(found.possible[0]), whole
+        out._times = np.linspace(0.0, whole, int(np.ceil(whole / SPACING)) + 1)
+        rows = np.column_stack([place, place, parts])
+        out._rows = np.stack([np.interp(out._times, times, column) for column in rows.T], axis=1)
+        out._rows[:, 3:6] = np.gradient(out.places, out._times, axis=0)
+        out._rows[[0, -1], 3:6] = 0.0
+        return out
 
     def at(self, time: float) -> Aim:
         """The aim at a time since lifting, clipped to the swing."""

@@ -30,9 +30,11 @@ def blend(x: Array) -> Array:
     return out
 
 
-def grip_wrists(grips: Grips, source: Ints, target: Ints, points: int) -> Wrists:
-    """Wrists that leave grips and come to others; both change as the body moves on."""
-    part = blend(np.linspace(0.0, 1.0, points))[None, :, None]
+def grip_wrists(
+    grips: Grips, source: Ints, target: Ints, points: int, parts: tuple[float, float] = (0.0, 1.0)
+) -> Wrists:
+    """Wrists that leave grips and come to others, from part to part of their way; both change as the body moves on."""
+    part = (parts[0] + (parts[1] - parts[0]) * blend(np.linspace(0.0, 1.0, points)))[None, :, None]
     end = wrist_end(grips, source, target)
 
     def wrists(samples: Array) -> Array:

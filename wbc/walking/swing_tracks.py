@@ -15,6 +15,7 @@ from wbc.walking.arm_clearance import ArmClearance
 from wbc.walking.arm_kinematics import ArmKinematics
 from wbc.walking.body_path import BodyPath
 from wbc.walking.grips import Grips, Ints
+from wbc.walking.parked_swings import Parked
 from wbc.walking.swing_curve import Curves
 from wbc.walking.swing_path import blend, grip_wrists, wrist_end
 from wbc.walking.swing_speed import RULES, speeds
@@ -33,6 +34,12 @@ class Tracks:
     duration: Array
     samples: Array
     points: Array
+
+    @staticmethod
+    def of(swings: Parked, rows: Ints, arms: ArmClearance) -> Tracks:
+        """Of swings of arms (rows) that wait, their three parts one after the other."""
+        samples = np.concatenate([swings.away.samples, swings.samples, swings.onto.samples], axis=1)
+        return Tracks(swings.possible, swings.duration, samples, _points(swings.angles, rows, arms))
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,9 +104,14 @@ def _numpy(
         again = speeds(kinematics, walker, asked.arms, path, way, samples, wrists)
         angles = np.where(waits[:, None, None], again.angles, angles)
         possible = np.where(waits, again.possible, possible)
+    return Tracks(possible, duration, samples, _points(angles, asked.arms, arms))
+
+
+def _points(angles: Array, rows: Ints, arms: ArmClearance) -> Array:
+    """Points of arms (rows) at joints 1 to 5 or 6 ``[m, n, 5 or 6]``, in the body's frame ``[m, n, 6, 3]``."""
     postures = np.zeros((*angles.shape[:2], 6))
     postures[..., :5] = angles[..., :5]
-    points = np.empty((*postures.shape[:2], 6, 3))
-    for arm in np.unique(asked.arms):
-        points[asked.arms == arm] = arms.points(int(arm), postures[asked.arms == arm])
-    return Tracks(possible, duration, samples, points)
+    out = np.empty((*postures.shape[:2], 6, 3))
+    for arm in np.unique(rows):
+        out[rows == arm] = arms.points(int(arm), postures[rows == arm])
+    return out

@@ -16,11 +16,13 @@ from wbc.walking.arm_clearance import ArmClearance
 from wbc.walking.arm_kinematics import ArmKinematics
 from wbc.walking.body_path import BodyPath
 from wbc.walking.grips import Grips, Ints
+from wbc.walking.parked_swings import PARKS, Parked, parked
+from wbc.walking.parked_swings import Asked as Parking
 from wbc.walking.slices import Slices, drained
 from wbc.walking.structure import Structure
 from wbc.walking.swing_clearance import SwingClearance
 from wbc.walking.swing_curve import WAYS, Curves, Pivots, curves
-from wbc.walking.swing_tracks import Asked, tracks
+from wbc.walking.swing_tracks import Asked, Tracks, tracks
 from wbc.walking.swing_ways import Name, SwingWays
 
 #: Points of a way: enough for the search, and for carrying it out
@@ -29,6 +31,8 @@ COARSE, FINE = 25, 97
 FINER = 1.04
 #: Time to settle on the hold before the hand closes, besides the latch twice [s]
 SETTLE = 0.06
+#: Hands that have to be in the air so much longer than they need may wait where they go with the body [s]
+LONG_WAIT = 1.0
 #: Swings that are computed together, way by way and with all ways at once
 TOGETHER, QUICKLY = 24, 12
 #: No swing lasts so many samples, as far as the room of the others is told apart
@@ -117,13 +121,18 @@ class Swings:
     def slices(self, swings: Iterable[Swing]) -> Slices[None]:
         """As :meth:`prepare`, way by way."""
         left = list(dict.fromkeys(s for s in swings if s not in self._chosen))
-        for begin in range(0, len(left) if self._ways is not None else 0, QUICKLY):
+        quick = self._ways is not None
+        for begin in range(0, len(left) if quick else 0, QUICKLY):
             self._choose(left[begin : begin + QUICKLY])
             yield None
-        left = [swing for swing in left if swing not in self._chosen]
-        for way in range(len(WAYS)):
+        left = [swing for swing in left if self._chosen.get(swing) is None]
+        for way in range(len(WAYS) if quick else 0, len(WAYS) + len(PARKS)):
             if not left:
                 return
+            if way == len(WAYS):
+                soon = [s for s in left if (s.soonest - s.lift) * self.path.spacing < self.extra + LONG_WAIT]
+                self._chosen.update(dict.fromkeys(soon))
+                left = [s for s in left if s not in self._chosen]
             for begin in range(0, len(left), TOGETHER):
                 self._track(left[begin : begin + TOGETHER], way)
                 yield None
@@ -186,18 +195,27 @@ class Swings:
         if not names:
             return
         arms, source, target, lift, last, soonest = np.ascontiguousarray(np.array(names, dtype=np.int64).T)
-        curve = self.curve(arms, source, target, lift, way)
         # The body moves on while the hand opens
         begin, least = lift + self.latch / self.path.spacing, (soonest - lift) * self.path.spacing - self.extra
-        asked = Asked(arms, source, target, begin, last, least)
-        found = tracks(self.walker, self._arms, self.path, self.grips, curve, asked, COARSE)
-        ends = np.stack([curve.begin, curve.end], axis=1)
+        if way < len(WAYS):
+            curve = self.curve(arms, source, target, lift, way)
+            asked = Asked(arms, source, target, begin, last, least)
+            found = tracks(self.walker, self._arms, self.path, self.grips, curve, asked, COARSE)
+        else:
+            whole = begin, begin + least / self.path.spacing
+            found = Tracks.of(self.waiting((arms, source, target), whole, way, COARSE), arms, self._arms)
+        ends = self.structure.positions[self.grips.hold[np.stack([source, target], axis=1)]]
         bodies = self.path.blended(found.samples)
         possible = found.possible & self._clear.structure(found.points, bodies, ends)
         for k, name in enumerate(names):
             duration = FINER * float(found.duration[k]) + self.extra
             track = _Track(duration, found.points[k], found.samples[k])
             self._tracks[name, way] = track if possible[k] else None
+
+    def waiting(self, ends: tuple[Ints, Ints, Ints], times: tuple[Array, Array], way: int, n: int) -> Parked:
+        """Swings of arms from grips to grips, between samples, that wait in the air."""
+        asked = Parking(*ends, *times)
+        return parked(self.walker, self.structure, self.path, self.grips, asked, way - len(WAYS), n)
 
     def _check(self, swings: Sequence[Swing], way: int) -> None:
         """Clearance of the other arms."""

@@ -11,6 +11,7 @@ import time
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import combinations, product
+from math import radians
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +30,8 @@ from wbc.walking.ways.cells import Cells, Ints
 STRIDE, LIMIT = 0.1, 2_000
 #: Landings at fewer cells than WIDE come later, by so many stations
 WIDE, NARROW = 4, 4.0
+#: Hands that land this near to another, as the body sees them, could not be lifted past each other again [rad]
+APART = radians(10.0)
 #: Grips of an arm that a start may have; nodes that differ only in the hold that the free hand left
 START_GRIPS, LEFTS = 6, 2
 
@@ -75,7 +78,7 @@ class PairSearch:
     """A search over the cells about one path; what was computed is kept."""
 
     def __init__(self, walker: Walker, structure: Structure, cells: Cells, grips: CellGrips) -> None:
-        self.cells, self.grips = cells, grips
+        self.cells, self.grips, self._structure = cells, grips, structure
         nothing = np.zeros(0, dtype=np.int64)
         self._clearance = ArmClearance(walker, Grips(*(nothing,) * 6, np.zeros((0, 6)), nothing, nothing))
         self._swings = CellSwings(walker, structure, cells, grips)
@@ -195,7 +198,18 @@ class PairSearch:
         cells: Ints = node.cells[self.grips.lands[grip, node.cells]]
         for g in node.pair:
             cells = cells[self.together(g, grip)[cells]]
+        cells = cells[self._in_order((*node.pair, grip), cells)]
         return cells[self._swings.possible(cells, node.left, grip)] if len(cells) else cells
+
+    def _in_order(self, stance: tuple[int, ...], cells: Ints) -> Flags:
+        """Cells at which hands lie about the body's z axis in the order of their arms, at least APART."""
+        grips, frames = self.grips, self.cells.frames[cells]
+        arms = sorted(stance, key=lambda g: int(grips.arm[g]))
+        places = self._structure.positions[grips.hold[arms]]
+        x, y = (np.einsum("nj,nmj->mn", frames[:, :3, k], places - frames[:, None, :3, 3]) for k in (0, 1))
+        angles = np.arctan2(y, x)
+        gaps = (np.roll(angles, -1, axis=0) - angles) % (2.0 * np.pi)
+        return np.asarray((gaps.min(axis=0) > APART) & (gaps.sum(axis=0) < 3.0 * np.pi))
 
     def _part(self, pair: tuple[int, int]) -> NDArray[np.int32]:
         """Numbers of the connected sets of cells of two grips, 0 where they do not hold together."""
