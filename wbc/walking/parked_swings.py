@@ -26,8 +26,11 @@ from wbc.walking.swing_speed import Speeds, speeds
 PARKS = (0.0, radians(40.0), radians(-40.0))
 #: How far from that axis, and how far below the arm's base [m]: hands of a body 44 in up are then clear
 RADIUS, DEPTH = 20.0 * 0.0254, 36.0 * 0.0254
+#: Part of the wrist's way that it has made while the hand waits: with more, a hand turns onto its next axis too early,
+#: with less, too late, where it is near the surface
+HALFWAY = 0.65
 #: How often a way is made, each time with the body where the last law has it; how long it takes at first [s]
-PASSES, GUESS = 2, 1.0
+PASSES, GUESS = 4, 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +92,7 @@ def parked(
     samples = first[:, None] + np.linspace(0.0, 1.0, n) * np.maximum(last - first, 0.0)[:, None]
     frames = _frames(walker, path, asked, samples)
     places = frames[..., :3, :3] @ _park(park) + frames[..., :3, 3]
-    wrists = grip_wrists(grips, asked.source, asked.target, n, (0.5, 0.5))
+    wrists = grip_wrists(grips, asked.source, asked.target, n, (HALFWAY, HALFWAY))
     kinematics = ArmKinematics(walker.data)  # type: ignore[arg-type]
     angles, possible = joint_paths(kinematics, frames, places, wrists(samples))
     possible &= away.law.possible & onto.law.possible & (first <= last)
@@ -103,7 +106,7 @@ def _half(
     """The ways from the holds, or onto them."""
     arms, kinematics = asked.arms, ArmKinematics(walker.data)  # type: ignore[arg-type]
     hold = grips.hold[asked.source if leaves else asked.target]
-    wrists = grip_wrists(grips, asked.source, asked.target, n, (0.0, 0.5) if leaves else (0.5, 1.0))
+    wrists = grip_wrists(grips, asked.source, asked.target, n, (0.0, HALFWAY) if leaves else (HALFWAY, 1.0))
     time = np.repeat(np.linspace(0.0, GUESS, n)[None], len(arms), axis=0)
     for _ in range(PASSES):
         since = time if leaves else time - time[:, -1:]

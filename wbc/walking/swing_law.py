@@ -12,6 +12,7 @@ from wbc.validation import Array
 from wbc.walking.arm_kinematics import ArmKinematics
 from wbc.walking.body_path import BodyPath
 from wbc.walking.grips import Ints
+from wbc.walking.parked_swings import HALFWAY
 from wbc.walking.stance_search import Move
 from wbc.walking.swing_curve import WAYS, Curves
 from wbc.walking.swing_path import Wrists, blend, grip_wrists
@@ -114,11 +115,11 @@ class SwingLaw:
         rides, since = slice(1, FINE - 1), (found.samples[0] - begin) * spacing
         times = np.concatenate([away._times, since[rides], whole - onto.duration + onto._times])
         place = np.concatenate([away.places, found.places[0, rides], onto.places])
-        parts = np.concatenate([0.5 * away._rows[:, 6], np.full(FINE - 2, 0.5), 0.5 + 0.5 * onto._rows[:, 6]])
+        parts = HALFWAY * away._rows[:, 6], np.full(FINE - 2, HALFWAY), HALFWAY + (1 - HALFWAY) * onto._rows[:, 6]
         out = copy(away)
         out.possible, out.duration = bool(found.possible[0]), whole
         out._times = np.linspace(0.0, whole, int(np.ceil(whole / SPACING)) + 1)
-        rows = np.column_stack([place, place, parts])
+        rows = np.column_stack([place, place, np.concatenate(parts)])
         out._rows = np.stack([np.interp(out._times, times, column) for column in rows.T], axis=1)
         out._rows[:, 3:6] = np.gradient(out.places, out._times, axis=0)
         out._rows[[0, -1], 3:6] = 0.0

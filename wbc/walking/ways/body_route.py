@@ -21,6 +21,8 @@ from wbc.walking.ways.pair_search import Node, PairSearch
 
 #: How fast the body goes down [m/s] and turns [rad/s]
 DOWN_SPEED, TURN_SPEED = 0.05, 0.1
+#: Half of the time over which its velocity changes [s]
+CORNER = 0.3
 #: Least speed beside the path [m/s]
 SLOW = 0.01
 #: What a cell off the path costs for each m beside, m lower and rad turned; a step along the path costs 1
@@ -114,7 +116,21 @@ def as_path(cells: Cells, chain: list[int], path: BodyPath) -> BodyPath:
         count = max(ceil(seconds / path.spacing - 1e-9), 1)
         step = pin.log6(first.actInv(last))
         out.append(np.array([(first * pin.exp6(step * (k / count))).homogeneous for k in range(1, count + 1)]))
-    return BodyPath(np.concatenate(out), path.spacing)
+    return BodyPath(_rounded(np.concatenate(out), round(CORNER / path.spacing)), path.spacing)
+
+
+def _rounded(poses: Array, most: int) -> Array:
+    """Means over each pose and up to ``most`` before and as many after it: velocities change over that long; the ends
+    stay.
+    """
+    rows = np.arange(len(poses))
+    half = np.minimum(np.minimum(rows, rows[::-1]), most)
+    total = np.concatenate([np.zeros((1, 4, 4)), np.cumsum(poses, axis=0)])
+    out: Array = (total[rows + half + 1] - total[rows - half]) / (2 * half + 1)[:, None, None]
+    u, _, v = np.linalg.svd(out[:, :3, :3])
+    out[:, :3, :3] = u @ v
+    out[[0, -1]] = poses[[0, -1]]
+    return out
 
 
 def _pace(path: BodyPath) -> float:
