@@ -8,10 +8,12 @@ import pytest
 from wbc.robots import Walker
 from wbc.walking import Structure, plane, remove_rows
 from wbc.walking.body_path import BodyPath, grid_path, straight_path
+from wbc.walking.parked_swings import DEPTH, RADIUS
 from wbc.walking.plan import NoPlanError
 from wbc.walking.planner import plan_walk
 from wbc.walking.reference import Rules, fewest_along
 from wbc.walking.run.request import over_holds
+from wbc.walking.swing_curve import WAYS
 from wbc.walking.ways import Mesh, find_route
 from wbc.walking.ways.cell_graph import round_labels
 
@@ -39,6 +41,36 @@ def test_over_a_trench_the_body_turns_or_goes_down(machine: Walker, structure: S
     confirm(machine, trench, route.path, 20)
     # All poses are over the line of the path, which is at x = 0; where the body turns and goes on, it does so in an arc
     assert np.abs(route.path.poses[:, 0, 3]).max() < 0.01
+
+
+def test_over_a_wide_trench_hands_wait_where_they_go_with_the_body(machine: Walker, structure: Structure) -> None:
+    trench = remove_rows(structure, "12-17")
+    path = grid_path([(13, 6), (13, 20)], 1.5 * INCH, height=52 * INCH)
+    plan = plan_walk(machine, trench, path, objective="destination", detour=True)
+    assert plan.complete
+    np.testing.assert_allclose(ends(plan.path), ends(path), atol=1e-9)
+    waits = [one for one in zip(plan.regrasps, plan.laws, strict=True) if one[0].way >= len(WAYS)]
+    assert waits
+    latch = machine.tolerances.latch_time
+    for step, law in waits:
+        assert law.possible
+        base = next(arm.base.homogeneous for arm in machine.arms if arm.name == step.arm)
+        rides = np.linspace(0.45, 0.55, 5) * law.duration
+        frames = plan.path.blended((step.lift + latch + rides) / plan.path.spacing) @ base
+        places = np.array([law.at(time).position for time in rides]) - frames[:, :3, 3]
+        hands = np.einsum("nji,nj->ni", frames[:, :3, :3], places)
+        np.testing.assert_allclose(np.hypot(hands[:, 0], hands[:, 1]), RADIUS, atol=2e-3)
+        np.testing.assert_allclose(hands[:, 2], DEPTH, atol=2e-3)
+
+
+def test_a_way_round_changes_its_velocity_gradually(machine: Walker, structure: Structure) -> None:
+    path = grid_path([(13, 9), (13, 18)], 2 * INCH)
+    route = find_route(machine, remove_rows(structure, "12-15"), path)
+    assert route.path is not None
+    velocities = np.diff(route.path.poses[:, :3, 3], axis=0) / route.path.spacing
+    # At first and last it is as fast as the path at once; in between it takes at least 0.3 s
+    change = np.linalg.norm(np.diff(velocities, axis=0), axis=1)[1:-1]
+    assert change.max() < 0.4 * np.linalg.norm(velocities, axis=1).max()
 
 
 def test_round_a_hole_the_body_goes_beside_its_path(machine: Walker) -> None:

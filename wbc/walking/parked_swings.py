@@ -29,6 +29,8 @@ RADIUS, DEPTH = 20.0 * 0.0254, 36.0 * 0.0254
 #: Part of the wrist's way that it has made while the hand waits: with more, a hand turns onto its next axis too early,
 #: with less, too late, where it is near the surface
 HALFWAY = 0.65
+#: It comes down so many times slower than it could, upright when it is near the surface
+SLOWLY = 1.5
 #: How often a way is made, each time with the body where the last law has it; how long it takes at first [s]
 PASSES, GUESS = 4, 1.0
 
@@ -79,7 +81,7 @@ class Parked:
     @property
     def duration(self) -> Array:
         """Without the wait ``[m]`` [s]."""
-        out: Array = self.away.law.duration + self.onto.law.duration
+        out: Array = self.away.law.duration + SLOWLY * self.onto.law.duration
         return out
 
 
@@ -122,7 +124,7 @@ def _half(
         free = np.repeat([[not leaves, leaves]], len(arms), axis=0)
         way = between(structure, ends, axes, free, pivots, walker.data)  # type: ignore[arg-type]
         law = speeds(kinematics, walker, arms, path, way, samples, wrists)
-        time = law.time
+        time = law.time if leaves else SLOWLY * law.time
     return Half(way, samples, wrists, law)
 
 

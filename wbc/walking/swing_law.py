@@ -12,7 +12,7 @@ from wbc.validation import Array
 from wbc.walking.arm_kinematics import ArmKinematics
 from wbc.walking.body_path import BodyPath
 from wbc.walking.grips import Ints
-from wbc.walking.parked_swings import HALFWAY
+from wbc.walking.parked_swings import HALFWAY, SLOWLY
 from wbc.walking.stance_search import Move
 from wbc.walking.swing_curve import WAYS, Curves
 from wbc.walking.swing_path import Wrists, blend, grip_wrists
@@ -108,9 +108,10 @@ class SwingLaw:
         """The law of a move whose hand waits: of the way off the hold, the ride, and the way onto the next one."""
         spacing, begin = swings.path.spacing, np.array([move.lift + swings.latch / swings.path.spacing])
         found = swings.waiting(ends, (begin, begin + whole / spacing), move.way, FINE)
+        slow = SLOWLY * float(found.onto.law.duration[0])
         away, onto = (
-            SwingLaw(swings.walker, move.arm, swings.path, half.way, half.samples[0], half.wrists)
-            for half in (found.away, found.onto)
+            SwingLaw(swings.walker, move.arm, swings.path, half.way, half.samples[0], half.wrists, least)
+            for half, least in ((found.away, 0.0), (found.onto, slow))
         )
         rides, since = slice(1, FINE - 1), (found.samples[0] - begin) * spacing
         times = np.concatenate([away._times, since[rides], whole - onto.duration + onto._times])
