@@ -130,9 +130,8 @@ class Swings:
             if not left:
                 return
             if way == len(WAYS):
-                soon = [s for s in left if (s.soonest - s.lift) * self.path.spacing < self.extra + LONG_WAIT]
-                self._chosen.update(dict.fromkeys(soon))
-                left = [s for s in left if s not in self._chosen]
+                self._chosen.update(dict.fromkeys(left))
+                left = [s for s in left if (s.soonest - s.lift) * self.path.spacing >= self.extra + LONG_WAIT]
             for begin in range(0, len(left), TOGETHER):
                 self._track(left[begin : begin + TOGETHER], way)
                 yield None
