@@ -102,7 +102,10 @@ def _law(
         raise _refused(step, k, f"the other hands hold until {room * spacing:.2f} s of the path")
     if min(search.clearance.first_conflict(move.target, g, move.land) for g in others) <= move.land:
         raise _refused(step, k, "the arms are in each other's way where it lands")
-    swing = Swing(move.arm, move.source, move.target, move.lift, room, others, int(search.soonest[move.target]))
+    # A hand that waits comes as it lands
+    waits = (move.land - move.lift) * spacing > move.duration + spacing
+    soonest = move.land if waits else int(search.soonest[move.target])
+    swing = Swing(move.arm, move.source, move.target, move.lift, room, others, soonest)
     if not search.swings.clear(swing, move.way):
         raise _refused(step, k, "the hand's way is out of reach, or another arm or the structure is in it")
     law = SwingLaw.of(search.swings, move)

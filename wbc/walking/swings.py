@@ -31,8 +31,8 @@ COARSE, FINE = 25, 97
 FINER = 1.04
 #: Time to settle on the hold before the hand closes, besides the latch twice [s]
 SETTLE = 0.06
-#: Hands that have to be in the air so much longer than they need may wait where they go with the body [s]
-LONG_WAIT = 1.0
+#: Hands that are on their way for so long, latches not counted, may wait where they go with the body [s]
+LONG_WAIT = 3.0
 #: Swings that are computed together, way by way and with all ways at once
 TOGETHER, QUICKLY = 24, 12
 #: No swing lasts so many samples, as far as the room of the others is told apart
