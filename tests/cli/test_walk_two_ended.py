@@ -29,7 +29,7 @@ def quick() -> Walker:
 
 @pytest.fixture(scope="module")
 def stack(quick: Walker) -> TwoEndedStack:
-    return TwoEndedStack(quick, grapple_row(), 0.0125, collisions=False, backend="vm")
+    return TwoEndedStack(quick, grapple_row(), 0.0125, collisions=False)
 
 
 @pytest.fixture(scope="module")
