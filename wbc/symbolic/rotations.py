@@ -20,10 +20,19 @@ def constant(matrix: ArrayLike) -> ca.SX:
     array = np.array(matrix, dtype=float)
     for special in (0.0, 1.0, -1.0):
         array[np.abs(array - special) < SNAP] = special
-    rows, columns = array.shape if array.ndim == 2 else (array.size, 1)
+    shape = array.shape if array.ndim == 2 else (array.size, 1)
+    # A copy: an SX can be changed in place
+    # +: a copy, as an SX can be changed in place
+    return +_constant(shape, array.tobytes())
+
+
+@lru_cache(maxsize=4096)
+def _constant(shape: tuple[int, int], entries: bytes) -> ca.SX:
+    """Kept, because a robot's placements are asked for once an item."""
+    array = np.frombuffer(entries).reshape(shape)
     if not array.any():
-        return ca.SX(rows, columns)
-    if array.shape == (3, 3) and np.array_equal(array, _EYE):
+        return ca.SX(*shape)
+    if shape == (3, 3) and np.array_equal(array, _EYE):
         return ca.SX.eye(3)
     return ca.SX(ca.sparsify(ca.DM(array)))
 
