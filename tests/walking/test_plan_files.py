@@ -121,8 +121,15 @@ def test_files_that_are_no_plans_are_refused(file: Path, tmp_path: Path) -> None
 
 def test_from_the_command_line(file: Path, made: Plan, tmp_path: Path) -> None:
     bare = ["--rigid", "--no-pictures", "--no-check"]
-    code, _, err = run("walk", "--plan", file, *bare, "--out", tmp_path / "run")
+    code, shown, err = run("walk", "--plan", file, *bare, "--least-time", "--out", tmp_path / "run")
     assert code == 0, err
+    least = json.loads((tmp_path / "run" / "summary.json").read_text())["least_time"]
+    assert least["least"] < 0.7 * made.path.duration
+    joint, part = max(least["binding"].items(), key=lambda item: item[1])
+    assert f"{least['least']:.2f} s ({least['factor']:.2f} of the plan; {joint} binds {100 * part:.0f} %)" in shown
+    code, _, err = run("walk", "--resume", tmp_path / "run", *bare, "--least-time", "--out", tmp_path / "other")
+    assert code == 2
+    assert "least-time" in err
     assert differences(made, read_plan(tmp_path / "run" / "plan.json")) == []
     code, _, err = run("walk", "--plan", file, *bare, "--remove-rows", "9-12", "--out", tmp_path / "other")
     assert code == 2

@@ -62,6 +62,7 @@ def walk(
     check: options.Check = True,
     strict: options.Strict = False,
     pictures: options.Pictures = True,
+    least_time: options.LeastTime = False,
 ) -> None:
     """Walk on a structure of holds with three arms, or end over end, and leave log, plan, check, pictures and a page.
 
@@ -92,11 +93,9 @@ def walk(
         plan,
     )
     if change and planner == "published":
-        raise RangeError(
-            "set", change, "the published planner has numbers of its own, wbc.walking.published.Calibration"
-        )
+        raise RangeError("set", change, "the published planner has numbers of its own, walking.published.Calibration")
     machine = robots.walker(data=changed_data(change or [], two_ended), two_ended=two_ended)
-    perform = performance(request, machine, resume, ask)  # bad input shows before a folder is made
+    perform = performance(request, machine, resume, ask, least_time)  # bad input shows before a folder is made
     stamp = datetime.datetime.now().strftime("%Y%m%d-%H%M%S")
     folder = make_folder(output or Path("runs") / f"walk-{Path(structure).stem}-{stamp}", force)
     if planner == "published":

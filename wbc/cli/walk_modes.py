@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 from wbc import validation
@@ -17,6 +18,7 @@ from wbc.walking.plan import Regrasp, read_plan
 from wbc.walking.run.arm_run import arm_task, perform_arm
 from wbc.walking.run.carrying_out import Progress
 from wbc.walking.run.drive_run import perform_drive
+from wbc.walking.run.figures import least_time_figure
 from wbc.walking.run.perform import WalkRun, perform_walk
 from wbc.walking.run.request import WalkRequest
 from wbc.walking.run.resume_run import perform_resume
@@ -26,15 +28,20 @@ from wbc.walking.run.two_ended_run import perform_two_ended, two_ended_goal
 Perform = Callable[[str, Progress, Callable[[], bool]], WalkRun]
 
 
-def performance(request: WalkRequest, machine: Walker, resume: str, ask: bool) -> Perform:
+def performance(
+    request: WalkRequest, machine: Walker, resume: str = "", ask: bool = False, least_time: bool = False
+) -> Perform:
     """The run of a mode, not begun yet.
 
     Args:
         resume: a run's folder, perhaps with @SECONDS; "": none. ask: whether re-grasps are proposed.
+        least_time: whether the least time of the plan is among the figures.
 
     Raises:
         what the modes raise for bad input.
     """
+    if least_time:
+        return _with_least_time(request, performance(request, machine, resume, ask), resume)
     two_ended = request.robot == "two-ended"
     if request.plan and resume:
         raise RangeError("plan", request.plan, "a resumed run is planned anew")
@@ -71,6 +78,22 @@ def performance(request: WalkRequest, machine: Walker, resume: str, ask: bool) -
     return lambda backend, told, stop: perform_walk(
         request, machine, backend=backend, progress=told, stop=stop, ask=answer
     )
+
+
+def _with_least_time(request: WalkRequest, perform: Perform, resume: str) -> Perform:
+    """The same run, with the least time of its plan among its figures; without it where there is no whole plan."""
+    other = request.robot == "two-ended" or request.planner == "published" or request.free_start
+    if other or request.commands or request.tasks or resume:
+        raise RangeError("least-time", True, "it is of a plan of three arms that hold, by the planner 'free'")
+
+    def both(backend: str, told: Progress, stop: Callable[[], bool]) -> WalkRun:
+        run = perform(backend, told, stop)
+        if run.plan is None or not run.plan.complete:
+            return run
+        told("least time", None)
+        return replace(run, more=(*run.more, least_time_figure(run.walker, run.plan)))
+
+    return both
 
 
 def _two_ended(request: WalkRequest, machine: Walker, resume: str) -> Perform:

@@ -64,6 +64,10 @@ Change = Annotated[
     typer.Option("--set", help="NAME=VALUE of the walker's data, in SI; may be repeated.", rich_help_panel=_HOW),
 ]
 Backend = Annotated[str, typer.Option(help="auto, native or vm.", rich_help_panel=_HOW)]
+LeastTime = Annotated[
+    bool,
+    typer.Option("--least-time", help="Least time of the plan's joint path, by toppra.", rich_help_panel=_OUTPUT),
+]
 RunFolder = Annotated[
     Path | None, typer.Option("--out", help="Run folder. Default: runs/walk-STRUCTURE-TIME.", rich_help_panel=_OUTPUT)
 ]

@@ -7,10 +7,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from wbc.robots import WalkerData
+from wbc.robots import Walker, WalkerData
 from wbc.track.summary import Figure, save_summary
 from wbc.validation import Array
 from wbc.walking.checker import Report
+from wbc.walking.plan import Plan
 from wbc.walking.run.perform import WalkRun
 from wbc.walking.run.recording import TickColumns
 from wbc.walking.run_log import CLOSED, OPENING, WalkLog
@@ -63,6 +64,22 @@ def save_figures(figures: Sequence[Figure], folder: pathlib.Path) -> list[pathli
     text = folder / "summary.txt"
     text.write_text("\n".join(lines) + "\n")
     return [save_summary(list(figures), folder), text]
+
+
+def least_time_figure(walker: Walker, plan: Plan) -> Figure:
+    """The least time of a whole plan, and what binds longest.
+
+    Raises:
+        as :func:`wbc.walking.plan_time.least_plan_time`.
+    """
+    # toppra is imported for those who ask
+    from wbc.walking.plan_time import least_plan_time
+
+    found = least_plan_time(walker, plan)
+    name, part = next(iter(found.binding.items()))
+    text = f"{found.least:.2f} s ({found.factor:.2f} of the plan; {name} binds {100 * part:.0f} %)"
+    value = {"least": found.least, "planned": found.planned, "factor": found.factor, "binding": found.binding}
+    return Figure("least_time", "least time by toppra", value, text)
 
 
 def body_speed(log: WalkLog) -> tuple[Array, Array, Array]:
