@@ -9,6 +9,7 @@ import numpy as np
 from wbc import validation
 from wbc.errors import ShapeError
 from wbc.robots import Walker, WalkerData
+from wbc.walking.eased_swings import EasedLaw
 from wbc.walking.grips import Grips, Ints, find_grips
 from wbc.walking.plan import NoPlanError, Plan, Regrasp
 from wbc.walking.planner import plan_found
@@ -113,7 +114,7 @@ def _law(
     late = move.duration - move.delay > (move.land - move.lift) * spacing + 1e-6
     if late or not law.possible or law.duration + search.swings.extra > planned + SLOWER:
         raise _refused(step, k, f"the hand cannot be there in {planned:.2f} s")
-    return law
+    return EasedLaw.along(search.swings, move, others) or law
 
 
 def _lasting(grips: Grips, mine: Ints, until: int) -> int:

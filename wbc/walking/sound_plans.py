@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from wbc.walking.eased_swings import eased_slices
 from wbc.walking.slices import Slices
 from wbc.walking.stance_search import Found, Move, StanceSearch
 from wbc.walking.swing_law import SwingLaw
@@ -20,6 +21,7 @@ def sound_slices(
     The search has swings at fewer points, and with the body where a faster swing would have it. One that is not
     possible as it would be carried out is refused, of one that is slower the time is corrected, and the search made
     again; what was computed is kept. After :data:`AGAIN` of them only the moves before the last such one are left.
+    Hands that have time to spare take it (:mod:`wbc.walking.eased_swings`).
     """
     laws, known = list[SwingLaw](), dict[Move, SwingLaw]()
     for _ in range(AGAIN):
@@ -37,5 +39,5 @@ def sound_slices(
                 break
             laws.append(law)
         else:
-            return found, tuple(laws)
-    return search.shortened(found, len(laws)), tuple(laws)
+            return (yield from eased_slices(search, found, laws, sample))
+    return (yield from eased_slices(search, search.shortened(found, len(laws)), laws, sample))

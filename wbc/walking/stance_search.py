@@ -96,7 +96,7 @@ class StanceSearch:
         self.expanded = 0
         # The end of the path is no limit of the arm
         lasting = grips.last == len(path) - 1
-        self._latest = np.where(lasting, grips.last, grips.last - INSIDE)
+        self.latest = np.where(lasting, grips.last, grips.last - INSIDE)
         self.rooms = StanceRooms(self.clearance, grips.last, np.where(lasting, grips.last, grips.last - self.spare))
         # The hand is on its hold before it is latched
         self._touch = round((walker.tolerances.latch_time + SETTLE) / path.spacing)
@@ -236,7 +236,7 @@ class StanceSearch:
             land = np.maximum(lift + count, soonest)
             hovers, delay = (land - lift - count) * spacing, np.maximum(land - room, 0) * spacing
             land = np.minimum(land, room)
-            fits = (land <= self._latest[target]) & (land >= soonest) & (delay <= self.longest_delay)
+            fits = (land <= self.latest[target]) & (land >= soonest) & (delay <= self.longest_delay)
             fits &= (hovers <= self.longest_wait) & self._bent(target, land)
             fan = Fan(row + rows.start, np.full_like(row, arm), source, target, lift, land, duration, delay)
             out.append(fan.of(np.nonzero(fits)[0]))
@@ -251,11 +251,11 @@ class StanceSearch:
         chosen = None if swing is None else self.swings.choose(swing)
         if swing is None or chosen is None:
             return None
-        duration, room, first, last = chosen.duration, swing.room, swing.soonest, int(self._latest[move.target])
+        duration, room, first, last = chosen.duration, swing.room, swing.soonest, int(self.latest[move.target])
         land = max(move.lift + int(np.ceil(duration / self.path.spacing)), first)
         late = max(land - room, 0) * self.path.spacing
         land = min(land, room)
-        if late > self.longest_delay or not first <= land <= last or not self._bent_at(move.target, land):
+        if late > self.longest_delay or not first <= land <= last or not self.bent_at(move.target, land):
             return None
         better = Move(move.arm, move.source, move.target, move.lift, land, duration, late, chosen.way)
         return Node(land, before.delay + round(late / QUANTUM), parent, better)
@@ -265,7 +265,7 @@ class StanceSearch:
         out: NDArray[np.bool_] = np.abs(np.sin(self.grips.posture(targets, samples - self._touch)[..., 4])) >= BENT
         return out
 
-    def _bent_at(self, target: int, sample: int) -> bool:
+    def bent_at(self, target: int, sample: int) -> bool:
         """The same of one."""
         return abs(sin(self.grips.posture_at(target, sample - self._touch).item(4))) >= BENT
 

@@ -45,8 +45,11 @@ class SwingLaw:
         way: one curve. wrists: of joints 4 and 5. least: duration that it takes at least [s].
 
     Attributes:
-        possible: within reach and limits. duration: [s].
+        possible: within reach and limits. duration: [s]. fastest: the least time of this law [s].
+        jerk_limited: whether its acceleration does not jump, see :mod:`wbc.walking.eased_swings`.
     """
+
+    jerk_limited = False
 
     def __init__(
         self, walker: Walker, arm: int, path: BodyPath, way: Curves, samples: Array, wrists: Wrists, least: float = 0.0
@@ -54,21 +57,25 @@ class SwingLaw:
         x = np.linspace(0.0, 1.0, FINE)
         kinematics = ArmKinematics(walker.data)  # type: ignore[arg-type]
         found = speeds(kinematics, walker, np.array([arm]), path, way, samples[None], wrists)
-        fastest = float(found.duration[0])
+        self.fastest = fastest = float(found.duration[0])
         self.possible = bool(found.possible[0])
         self.duration = max(fastest, least)
         slower = self.duration / fastest
         times, rate = found.time[0] * slower, found.rate[0] / slower
         count = int(np.ceil(self.duration / SPACING)) + 1
-        self._times = np.linspace(0.0, self.duration, count)
+        rows = np.linspace(0.0, self.duration, count)
         # Between points of the law the acceleration is constant
-        low = np.clip(np.searchsorted(times, self._times, side="right") - 1, 0, FINE - 2)
-        since = self._times - times[low]
+        low = np.clip(np.searchsorted(times, rows, side="right") - 1, 0, FINE - 2)
+        since = rows - times[low]
         push = (rate[low + 1] - rate[low]) / (times[low + 1] - times[low])
         along = np.clip(x[low] + since * (rate[low] + 0.5 * push * since), 0.0, 1.0)
+        self._tabulate(way, rows, along)
+
+    def _tabulate(self, way: Curves, times: Array, along: Array) -> None:
+        """The table: at even times parts of the way."""
         place = way.at(along)[0]
         # From the table itself, so that position and velocity agree
-        speed = np.gradient(place, self._times, axis=0)
+        speed = np.gradient(place, times, axis=0)
         speed[0] = speed[-1] = 0.0
         self._rows = np.concatenate([place, speed, blend(along)[:, None]], axis=1)
 

@@ -98,10 +98,29 @@ def _compiled(
     return Speeds(possible, angles, rate, time)
 
 
-def _numpy(
+@dataclass(frozen=True, eq=False)
+class SwingJoints:
+    """Joints 1 to 5, and 6 where the roll counts, of m swings over n points, evenly over x in [0, 1].
+
+    Attributes:
+        possible: within reach and limits ``[m]``.
+        angles: ``[m, n, 5 or 6]`` [rad]. first, second: derivatives by x of a body that stands. bias: by the sample, of
+            a hand that stands; all ``[m, n, 5 or 6]``.
+    """
+
+    possible: NDArray[np.bool_]
+    angles: Array
+    first: Array
+    second: Array
+    bias: Array
+
+
+def swing_joints(
     kinematics: ArmKinematics, bases: Array, path: BodyPath, place: Array, samples: Array, wrist: Array
-) -> Speeds:
-    """What the compiled code does."""
+) -> SwingJoints:
+    """Joints of arms with bases ``[m, 4, 4]`` in the body, hands at ``place`` ``[m, n, 3]`` [m] and wrists bent by
+    ``wrist`` ``[m, n, 2 or 3]`` [rad], while the body is at ``samples`` ``[m, n]`` of its path; by differences.
+    """
     count, points = samples.shape
     gap = 1.0 / (points - 1)
     # The same hand on a body that is a little further
@@ -116,9 +135,18 @@ def _numpy(
     bias = (further - angles) / STEP
     first = np.gradient(angles, gap, axis=1, edge_order=2)
     first -= bias * np.gradient(samples, gap, axis=1)[..., None]
-    second = np.gradient(first, gap, axis=1)
+    return SwingJoints(possible[:count], angles, first, np.gradient(first, gap, axis=1), bias)
+
+
+def _numpy(
+    kinematics: ArmKinematics, bases: Array, path: BodyPath, place: Array, samples: Array, wrist: Array
+) -> Speeds:
+    """What the compiled code does."""
+    joints = swing_joints(kinematics, bases, path, place, samples, wrist)
+    first, second, bias = joints.first, joints.second, joints.bias
+    gap = 1.0 / (samples.shape[1] - 1)
     limits, most = (
-        np.array(v)[: both.shape[2]] for v in (kinematics.data.joint_rates, kinematics.data.joint_accelerations)
+        np.array(v)[: first.shape[2]] for v in (kinematics.data.joint_rates, kinematics.data.joint_accelerations)
     )
     # Where the body goes the way of the hand, the hand may go faster
     rates = np.maximum(RATE_PART * limits - np.sign(first) * bias / path.spacing, 0.1 * limits)
@@ -129,7 +157,7 @@ def _numpy(
     rate = np.sqrt(square)
     time = np.zeros_like(samples)
     np.cumsum(2 * gap / np.maximum(rate[:, 1:] + rate[:, :-1], 1e-6), axis=1, out=time[:, 1:])
-    return Speeds(possible[:count], angles, rate, time)
+    return Speeds(joints.possible, joints.angles, rate, time)
 
 
 def _squares(first: Array, second: Array, limits: Array, top: Array, gap: float) -> Array:

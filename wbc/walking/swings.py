@@ -19,6 +19,7 @@ from wbc.walking.grips import Grips, Ints
 from wbc.walking.parked_swings import PARKS, Parked, parked
 from wbc.walking.parked_swings import Asked as Parking
 from wbc.walking.slices import Slices, drained
+from wbc.walking.stance_moves import Move
 from wbc.walking.structure import Structure
 from wbc.walking.swing_clearance import SwingClearance
 from wbc.walking.swing_curve import WAYS, Curves, Pivots, curves
@@ -172,6 +173,24 @@ class Swings:
         self._check([swing], way)
         name = _name(swing)
         return self._tracks[name, way] is not None and all(self._apart[name, way, g] for g in swing.others)
+
+    def clear_along(self, move: Move, others: Sequence[int], way: Curves, angles: Array, samples: Array) -> bool:
+        """Whether the arm of a move is clear as :meth:`clear` says, at angles ``[1, n, 5 or 6]`` [rad] and samples of
+        the path ``[1, n]``.
+
+        Args:
+            others: grips of the other arms.
+        """
+        postures = np.zeros((*samples.shape, 6))
+        postures[..., :5] = angles[..., :5]
+        points, ends = self._arms.points(move.arm, postures), np.stack([way.begin, way.end], axis=1)
+        if not self._clear.structure(points, self.path.blended(samples), ends)[0]:
+            return False
+        count = len(others)
+        grips = np.array(others, dtype=np.int64)
+        return bool(
+            self._clear.others(np.repeat(points, count, axis=0), np.repeat(samples, count, axis=0), grips).all()
+        )
 
     def correct(self, arm: int, source: int, target: int, lift: int, way: int, duration: float, possible: bool) -> None:
         """A swing along one of the ways takes another time [s], or is not possible after all."""

@@ -15,6 +15,8 @@ from wbc.walking.plan import Plan
 from wbc.walking.run.perform import WalkRun
 from wbc.walking.run.recording import TickColumns
 from wbc.walking.run_log import CLOSED, OPENING, WalkLog
+from wbc.walking.swing_law import SwingLaw
+from wbc.walking.swing_profile import JERK
 
 #: Time over which speeds are means [s]
 WINDOW = 0.1
@@ -111,8 +113,18 @@ def _plan(run: WalkRun) -> list[Figure]:
     value = {"regrasps": len(plan.regrasps), "delay": plan.delay, "complete": plan.complete, "reached": plan.reached}
     return [
         Figure("plan", "plan", value, text),
+        *_eased(plan.laws),
         Figure("plan_time", "planned in", run.plan_time, f"{run.plan_time:.2f} s"),
     ]
+
+
+def _eased(laws: Sequence[SwingLaw]) -> list[Figure]:
+    """How many swings are jerk-limited, and the largest jerk of their laws, in ways per s^3."""
+    jerks = [JERK / law.duration**3 for law in laws if law.jerk_limited]
+    if not jerks:
+        return []
+    text = f"{len(jerks)} of {len(laws)}, at most {max(jerks):.1f} of their way per s^3"
+    return [Figure("jerk_limited", "jerk-limited swings", {"swings": len(jerks), "jerk": max(jerks)}, text)]
 
 
 def _speed(run: WalkRun, log: WalkLog) -> list[Figure]:

@@ -141,7 +141,7 @@ class TurnSearch(StanceSearch):
         """Hands land with all seven joints, none of which has to be bent."""
         return np.ones(len(targets), dtype=bool)
 
-    def _bent_at(self, target: int, sample: int) -> bool:
+    def bent_at(self, target: int, sample: int) -> bool:
         return True
 
 
