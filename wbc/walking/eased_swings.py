@@ -10,7 +10,7 @@ import numpy as np
 from wbc.validation import Array
 from wbc.walking.slices import Slices
 from wbc.walking.stance_search import Found, Move, StanceSearch
-from wbc.walking.swing_curve import Curves
+from wbc.walking.swing_curve import WAYS, Curves
 from wbc.walking.swing_law import SPACING, SwingLaw
 from wbc.walking.swing_path import grip_wrists
 from wbc.walking.swing_profile import POINTS, profile, profile_at
@@ -42,7 +42,7 @@ class EasedLaw(SwingLaw):
         Args:
             others: grips of the other arms.
         """
-        return None if move.delay else _tried(swings, move, others)[0]
+        return None if move.delay or move.way >= len(WAYS) else _tried(swings, move, others)[0]
 
 
 def eased_slices(
@@ -61,7 +61,7 @@ def eased_slices(
         until = moves[k + 1].lift if k + 1 < len(moves) else found.reached
         last = min(until - kept, search.rooms.among(others, sample))
         longest = (max(last, move.land) - move.lift) * search.path.spacing - search.swings.extra
-        if not move.delay and longest > EVEN * laws[k].fastest:
+        if not move.delay and move.way < len(WAYS) and longest > EVEN * laws[k].fastest:
             yield None
             best = _eased_move(search, move, others, last)
             if best is not None:
@@ -82,7 +82,7 @@ def _eased_move(search: StanceSearch, move: Move, others: Sequence[int], last: i
             return None
         if not search.bent_at(move.target, land):
             return None
-        move = move._replace(land=land, duration=(land - move.lift) * spacing)
+        move = move._replace(land=land)
     return None
 
 

@@ -204,7 +204,7 @@ class StanceSearch:
         if free > move.land:
             # Only a hand that may wait long lands when the others are out of its way
             soonest = free + self._touch
-            if self.longest_wait <= HOVER or soonest > min(room, int(self._latest[move.target])):
+            if self.longest_wait <= HOVER or soonest > min(room, int(self.latest[move.target])):
                 return None
         return Swing(move.arm, move.source, move.target, move.lift, room, others, soonest)
 

@@ -73,7 +73,7 @@ class SwingLaw:
 
     def _tabulate(self, way: Curves, times: Array, along: Array) -> None:
         """The table: at even times parts of the way."""
-        place = way.at(along)[0]
+        self._times, place = times, way.at(along)[0]
         # From the table itself, so that position and velocity agree
         speed = np.gradient(place, times, axis=0)
         speed[0] = speed[-1] = 0.0
