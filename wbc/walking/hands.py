@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable
 from dataclasses import replace
+from math import dist
 from typing import Any, ClassVar
 
 import numpy as np
@@ -17,6 +18,7 @@ from wbc.walking.body_command import BodyCommand
 from wbc.walking.closed_chain import ClosedChain
 from wbc.walking.grip_rolls import ANY, frame_on
 from wbc.walking.hand_command import HandCommand
+from wbc.walking.hand_landing import UPRIGHT, HandLanding
 from wbc.walking.plan import HoldLost, Plan, Regrasp
 from wbc.walking.replanning import way_to
 from wbc.walking.structure import Structure
@@ -65,7 +67,7 @@ class Hands(ABC):
         self.data = walker.tolerances
         self.stack.structure = structure
         self.chain, self.command = ClosedChain(walker, structure), BodyCommand(self.dt)
-        self._hand, self._arms = HandCommand(self.dt), range(len(walker.arms))
+        self._hand, self._landing, self._arms = HandCommand(self.dt), HandLanding(self.dt), range(len(walker.arms))
         self.grasps = grasps or (lambda _arm, _hold: True)
         self.time, self.path_time, self.pace, self.wanted = 0.0 if state is None else state.time, 0.0, 0.0, 1.0
         self.events: list[Event] = []
@@ -198,8 +200,9 @@ class Hands(ABC):
             swinging.clock = min(swinging.clock + swinging.pace * self.dt, swinging.law.duration)
         sample = self.path_time / self.plan.path.spacing
         followed = self._hand.go(swinging, place, self.grips, self._grip[arm], sample)
-        near = swinging.aim.blend > LANDING and at_branch
-        self.stack.swing(arm, followed, (self.structure.axes[swinging.hold], swinging.x) if near else None)
+        hold = self.structure.positions[swinging.hold], self.structure.axes[swinging.hold]
+        near = swinging.aim.blend > LANDING and at_branch and dist(swinging.aim.position, hold[0]) < UPRIGHT
+        self.stack.swing(arm, followed, self._landing.go(swinging, hold, near))
 
     def _give_up(self) -> None:
         """A hand whose hold is out of reach from where the body stopped stays in the air, until there is a plan."""

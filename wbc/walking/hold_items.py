@@ -90,11 +90,13 @@ class HoldItems:
             self._cones[arm].enabled = False
         self.turn(arm, None)
 
-    def turn(self, arm: int, x: Array | None) -> None:
-        """An open hand turns its x axis to a direction in the structure; None: its roll does not count."""
+    def turn(self, arm: int, x: Array | None, rate: Array | None = None) -> None:
+        """An open hand turns its x axis to a direction in the structure, which changes at a rate [1/s]; None: its roll
+        does not count.
+        """
         if not self._turned:
             return
         item = self._turned[arm]
         item.enabled = x is not None
         if x is not None:
-            item.target, item.feedforward = x, np.zeros(3)
+            item.target, item.feedforward = x, np.zeros(3) if rate is None else rate

@@ -15,6 +15,7 @@ from wbc.validation import Array
 from wbc.walking.grip_rolls import ANY
 from wbc.walking.hold_items import HoldItems
 from wbc.walking.structure import Structure
+from wbc.walking.walk_state import Axes
 
 #: Control period [s]
 DT = 0.01
@@ -99,27 +100,27 @@ class WalkStack:
         """
         self._body.write(aim)
 
-    def swing(self, arm: int, followed: Array, at_hold: tuple[Array, Array | None] | None) -> None:
+    def swing(self, arm: int, followed: Array, at_hold: Axes | None) -> None:
         """What a free hand follows.
 
         Args:
             followed: its position [m] and velocity [m/s], joints 4 to 6 [rad] and their rates [rad/s] ``[12]``.
-            at_hold: z axis of the hand at its hold, and its x axis if the roll counts: they then count and not the
-                wrist. None on the way.
+            at_hold: axes of a hand near its hold: they then count and not the wrist. None on the way.
         """
         near = at_hold is not None
         if self._near != (arm, near):
             self._catch_up()
             aligned, resting, joints = self._axes[arm], self._rest, self._joints(arm)
             self._posture[7:][joints][3:], self._turning[6:][joints][3:] = followed[6:9], followed[9:]
-            if at_hold is not None:
-                aligned.target, aligned.feedforward = at_hold[0], np.zeros(3)
             aligned.weight = AXIS if near else FREE_AXIS
             self._mask[joints][:3] = 0.0
             self._mask[joints][3:] = 1.0 if near else FREE_WRIST
-            self._holds.turn(arm, at_hold[1] if at_hold is not None else None)
+            self._holds.turn(arm, None)
             resting.target, resting.feedforward, resting.mask = self._posture, self._turning, self._mask
             self._near = arm, near
+        if at_hold is not None:
+            self._axes[arm].target, self._axes[arm].feedforward = at_hold.z, at_hold.z_rate
+            self._holds.turn(arm, at_hold.x, at_hold.x_rate)
         self._hands[arm].write(followed)
 
     def joints(self, arm: int, posture: Array, rates: Array) -> None:

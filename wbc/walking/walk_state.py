@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -16,6 +16,15 @@ Hand = Literal["closed", "opening", "open", "closing"]
 #: Of joints 4 to 6
 Wrist = tuple[float, float, float]
 What = Literal["lift", "land", "failed", "vanished", "replanned", "refused"]
+
+
+class Axes(NamedTuple):
+    """z axis of a hand and its rate [1/s], its x axis and the rate of that; None where the roll does not count."""
+
+    z: Array
+    z_rate: Array
+    x: Array | None
+    x_rate: Array | None
 
 
 @dataclass(eq=False)
