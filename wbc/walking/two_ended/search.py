@@ -58,6 +58,10 @@ class Pairs:
             return sample
         return NEVER if self._goal(*hands) else max(self._last, sample)
 
+    def free_from(self, one: int, other: int, sample: int) -> int:
+        """The first sample from ``sample`` on at which two grips go together; those that do not never do."""
+        return sample if self.first_conflict(one, other, sample) > sample else NEVER
+
 
 class Turns:
     """Swings between grips, as the search asks for them: as :class:`wbc.walking.swings.Swings`.
