@@ -69,12 +69,11 @@ clean:  ## remove environments, builds and caches
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 # An environment is ready when everything in it is installed; a change of the pins makes it again in place.
-# Modules are compiled when they are first imported: most of what the wheels hold never is.
 $(READY): requirements/lock.txt pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' \
 		|| { echo "Python 3.11 or newer is needed; say which: make PYTHON=/path/to/python3.11"; exit 1; }
 	$(call make_venv,$(VENV))
-	$(BIN)/python -m pip install --quiet --no-deps --no-compile --requirement requirements/lock.txt
+	$(BIN)/python -m pip install --quiet --no-deps --requirement requirements/lock.txt
 	$(BIN)/python -m pip install --quiet --no-deps --no-build-isolation --editable .
 	@touch $@
 
