@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,10 +13,12 @@ from wbc.trajectory.certificate import Check
 from wbc.trajectory.checks import Force, at_rest
 from wbc.trajectory.limits import Limits
 from wbc.trajectory.path import Path
-from wbc.trajectory.reachability import Program
 from wbc.trajectory.rows import Grid, Rows, accelerations, squared_speed
 from wbc.trajectory.timing import Timing
 from wbc.validation import Array
+
+if TYPE_CHECKING:
+    from wbc.trajectory.reachability import Program
 
 #: Intervals: at least so many in all, so many for each piece of a path, and on each piece
 LEAST, PER_PIECE, LEAST_ON_PIECE = 500, 125, 8
@@ -85,6 +88,9 @@ class Task:
         """Path speeds at the places of a grid over one smooth section."""
         rows = self._rows(grid, shrunk)
         _limited(grid, rows)
+        # toppra brings matplotlib with it, which takes longer than all else that a command loads
+        from wbc.trajectory.reachability import Program
+
         program = Program(grid.s, rows, self._squared(grid, shrunk))
         found = program.fastest(start, end)
         if found.speed is not None:
