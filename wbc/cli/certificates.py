@@ -129,9 +129,13 @@ def lines(found: Certificate) -> list[str]:
     return said
 
 
+def _witness_record(found: NumericWitness | None) -> dict[str, Any] | None:
+    """A witness as data, if there is one."""
+    return None if found is None else {"q": found.q.tolist(), "task": found.task.tolist()}
+
+
 def record(found: Certificate) -> dict[str, Any]:
     """A certificate as data."""
-    witness = found.witness
     return {
         "verdict": found.verdict,
         "eps": found.eps,
@@ -142,13 +146,12 @@ def record(found: Certificate) -> dict[str, Any]:
         "joints": [f"q{k + 1}" for k in found.joints],
         "symmetries": found.symmetries,
         "seconds": found.seconds,
-        "witness": None if witness is None else {"q": witness.q.tolist(), "task": witness.task.tolist()},
+        "witness": _witness_record(found.witness),
     }
 
 
 def record_tree(found: TreeCertificate) -> dict[str, Any]:
     """A certificate of a tree as data."""
-    witness = found.witness
     return {
         "verdict": found.verdict,
         "everywhere": found.everywhere,
@@ -157,7 +160,7 @@ def record_tree(found: TreeCertificate) -> dict[str, Any]:
         "seconds": found.seconds,
         "blocks": [{"block": str(block), **record(own)} for block, own in found.blocks],
         "lost": None if found.lost is None else str(found.lost),
-        "witness": None if witness is None else {"q": witness.q.tolist(), "task": witness.task.tolist()},
+        "witness": _witness_record(found.witness),
     }
 
 
