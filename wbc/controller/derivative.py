@@ -45,8 +45,9 @@ def derivative(past: Past, name: str, value: str | None) -> Array:
 
 def _of_one(past: Past, answer: Relaxed, moves: Moves, count: int) -> Array:
     """Of one level, or of the first."""
-    n, size = past.layout.variables, past.qp.lower.size
-    sensitivity = Sensitivity(past.qp, Solution(answer.x, answer.multipliers, "solved"))
+    wide, variables = past.qp.with_slacks(), past.layout.variables
+    n, size = wide.n, wide.lower.size
+    sensitivity = Sensitivity(wide, Solution(answer.x, answer.multipliers, "solved"))
     upper = np.where(answer.multipliers > 0.0, 1.0, 0.0)
     force, offset = np.zeros((n, count)), np.zeros((size, count))
     for k in range(count):
@@ -56,7 +57,7 @@ def _of_one(past: Past, answer: Relaxed, moves: Moves, count: int) -> Array:
         with np.errstate(invalid="ignore"):
             sides = np.where(upper > 0.0, _slope(ends, "upper"), _slope(ends, "lower"))
         offset[:, k] = np.nan_to_num(sides) - np.concatenate((np.zeros(n), A @ answer.x))
-    return sensitivity.change(force, offset)
+    return sensitivity.change(force, offset)[:variables]
 
 
 def _of_levels(past: Past, frozen: Frozen, moves: Moves, count: int) -> Array:
@@ -79,7 +80,7 @@ def _moved(past: Past, moves: Moves, k: int, by: float) -> QP:
     """The QP of displaced inputs."""
     state = past.tick.state.copy()
     moves(k, by)
-    qp = past.tick.qp()
+    qp = past.tick.qp().with_slacks()
     past.tick.state[:] = state
     return qp
 

@@ -30,7 +30,7 @@ class ElasticTick(SolvedTick):
 
     def __init__(self, assembly: Assembly, stack: Declaration, layout: Layout) -> None:
         super().__init__(assembly, stack, layout, "daqp")
-        self._wide = Prepared(Daqp(layout.variables + layout.general_rows, layout.general_rows))
+        self._wide = Prepared(Daqp(layout.with_slacks + layout.general_rows, layout.general_rows))
 
     def answer(self, qp: QP) -> tuple[int, Array, Relaxed | None]:
         """See the class; brakes where rows of the actuators cannot hold."""

@@ -67,7 +67,7 @@ class Explainer:
 
     def _infeasibility(self) -> Infeasibility:
         """Conflicts of the QP in v / dof_scale and rows per unit."""
-        qp, n, units = self.past.qp, self.past.layout.variables, self.naming.units
+        qp, n, units = self.past.qp.hard(), self.past.layout.variables, self.naming.units
         A = qp.A * units[:n] / units[n:, None]
         return diagnose(QP(np.eye(n), np.zeros(n), qp.lower / units, qp.upper / units, A))
 

@@ -31,6 +31,7 @@ class Levels:
         self._dofs, self._scales = layout.dof_scales(stack), layout.row_scales(stack)
         self._units = np.array(row_units(stack, layout), dtype=np.float64)
         self._row_levels = np.array(layout.row_levels, dtype=np.int_)
+        self._price_at = np.array(layout.price_at, dtype=np.intp)
         self._damping = stack.damping
         self.cascade = Cascade(layout.variables, layout.general_rows, left_free(stack), stack.damping)
         self.sizes = np.concatenate((self._dofs, self._units))
@@ -104,7 +105,9 @@ class Levels:
         for place in range(len(layout.levels)):
             span = layout.level_rows(place)
             soft = np.flatnonzero(self._row_levels == place)
-            scale = max(float(weight[span][counts[span]].max(initial=0.0)), float(soft.size > 0)) or 1.0
+            prices = np.where(self._price_at[soft] >= 0, self._assembly.p[self._price_at[soft]], 1.0)
+            soft, prices = soft[prices > 0.0], prices[prices > 0.0]
+            scale = max(float(weight[span][counts[span]].max(initial=0.0)), float(prices.max(initial=0.0))) or 1.0
             relative = np.where(counts[span], weight[span] / scale, 0.0)
             wanted = rows[span].T @ (relative * wish[span])
             bent = None
@@ -114,7 +117,7 @@ class Levels:
                 curvature = self._assembly.bent()
                 if curvature is not None:
                     bent = change, curvature * np.outer(dofs, dofs) / scale
-            out.append(Level(rows[span], relative, wanted, soft, 1.0 / scale, bent))
+            out.append(Level(rows[span], relative, wanted, soft, prices / scale, bent))
             scales.append(scale)
         return out, scales
 

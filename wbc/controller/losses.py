@@ -73,12 +73,11 @@ def groups(past: Past) -> list[Group]:
 def _soft_groups(past: Past) -> list[Group]:
     """The same of soft constraints; what keeps the direction of a task asks for nothing of its own."""
     out: list[Group] = []
-    nv, velocities = past.layout.variables, past.layout.nv
+    nv = past.layout.variables
     for block in past.layout.of_form("margins", "rows"):
         if block.entry.price is None or isinstance(block.entry.item, Direction) or not past.is_on(block):
             continue
-        A = past.qp.A[block.span].copy()
-        A[:, velocities:] = 0.0
+        A = past.qp.A[block.span]
         lower, upper = past.qp.lower[nv:][block.span], past.qp.upper[nv:][block.span]
         for unit in dict.fromkeys(row.unit for row in block.rows):
             mine = np.array([row.unit == unit for row in block.rows])
@@ -138,8 +137,13 @@ def prices(past: Past, found: list[Group], answer: Relaxed, sides: dict[int, Sid
 
 def _of_one(past: Past, answer: Relaxed) -> tuple[Array, Callable[[int], Array]]:
     """(command, row -> dv / db of the side that holds it, zero where it holds nothing)."""
-    one = Sensitivity(past.qp, Solution(answer.x, answer.multipliers, "solved"))
-    return answer.x, one.to_bound
+    wide, n = past.qp.with_slacks(), past.qp.n
+    one = Sensitivity(wide, Solution(answer.x, answer.multipliers, "solved"))
+
+    def slope(row: int) -> Array:
+        return one.to_bound(row if row < n else row + wide.n - n)[:n]
+
+    return answer.x[:n], slope
 
 
 def _of_levels(past: Past, frozen: Frozen) -> tuple[Array, Callable[[int], Array]]:

@@ -40,6 +40,7 @@ _FIELDS = (
     "free_low",
     "free_high",
     "given",
+    "give",
 )
 
 
@@ -91,6 +92,7 @@ class NativeTick(Assembly):
         self._wish, self._factor = view("wish", layout.task_rows), self.report[report["factor"]]
         self._sides = view("free_low", rows), view("free_high", rows)
         self._given = view("given", 16).reshape(4, 4)
+        self._give = view("give", rows)
         self.step_function = self._library.wbc_tick_step
         self._take_pose = functools.partial(self._library.wbc_tick_pose, self.pointer)
 
@@ -168,4 +170,4 @@ class NativeTick(Assembly):
         H = upper + np.triu(upper, 1).T
         low, high = self._low.copy(), self._high.copy()
         low[low <= -INFINITE], high[high >= INFINITE] = -np.inf, np.inf
-        return QP(H, self._g.copy(), low, high, self._A.copy())
+        return QP(H, self._g.copy(), low, high, self._A.copy(), self._give.copy())

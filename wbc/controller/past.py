@@ -90,10 +90,10 @@ class Past:
         return [b for b in rows if isinstance(b.entry.item, Direction) and b.entry.item.of == task.entry.name]
 
     def solve(self) -> tuple[Array, Relaxed | None]:
-        """Command and answer for the buffers as they are; no answer where the tick brakes."""
+        """Command, and the answer to the QP with slacks, for the buffers as they are; no answer where the tick brakes."""
         qp = self.tick.qp()
-        _, v, answer = self._solver.answer(qp)
-        return self._solver.below(qp, v, answer)[0], answer
+        _, x, answer = self._solver.answer(qp.with_slacks())
+        return self._solver.below(qp, x[: qp.n], answer)[0], answer
 
     def frozen(self) -> Frozen | None:
         """The strict levels of the buffers as they are, as a function of their numbers; None where a row gave way, a
@@ -103,7 +103,7 @@ class Past:
         if levels is None or not self.usable:
             return None
         qp = self.tick.qp()
-        _, v, first = self._solver.answer(qp)
+        _, v, first = self._solver.answer(qp.with_slacks())
         answer = self._solver.below(qp, v, first)[1]
         if first is None or first.flag != "solved" or answer is None or not all(x.solved for x in answer.levels):
             return None

@@ -11,7 +11,7 @@ from wbc.qp.problem import QP, Solution
 from wbc.qp.relax import Relaxed
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Layout
-from wbc.stack.places import slack_places, told_slacks
+from wbc.stack.places import told_slacks
 from wbc.tasks._direction import Direction
 from wbc.validation import Array
 
@@ -20,11 +20,10 @@ ASKED = 1e-9
 
 
 class SoftRows:
-    """Soft rows of one layout; ``of`` is the variable that is the slack of each general row, -1 for rows without."""
+    """Soft rows of one layout."""
 
     def __init__(self, stack: Declaration, layout: Layout) -> None:
-        self.of = np.array(slack_places(stack, layout), dtype=np.intp)
-        self._rows = np.flatnonzero(self.of >= 0)
+        self._rows = np.flatnonzero(np.array(layout.price_at, dtype=np.intp) >= 0)
         self._told = np.array(told_slacks(stack, layout))[self._rows]
 
     def told(self, qp: QP, v: Array, sides: tuple[Array, Array], slack: Array) -> Array:
@@ -32,7 +31,7 @@ class SoftRows:
         rows = self._rows
         if not rows.size:
             return slack
-        at = qp.A[rows] @ v - qp.A[rows, self.of[rows]] * v[self.of[rows]]
+        at = qp.A[rows] @ v
         missed = np.maximum(sides[0][rows] - at, at - sides[1][rows])
         out = slack.copy()
         out[rows] = np.where(missed > self._told, missed, 0.0)

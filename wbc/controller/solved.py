@@ -44,15 +44,16 @@ class SolvedTick(Buffers):
         self.share(assembly)
         self._nv, self._velocities = layout.variables, layout.nv
         self._places = ReportLayout(layout)
-        self._solver = make_solver(solver, layout.variables, layout.general_rows)
-        self._relaxation = Relaxation(layout.variables, layout.general_rows, self._solver)
+        self._solver = make_solver(solver, layout.with_slacks, layout.general_rows)
+        self._relaxation = Relaxation(layout.with_slacks, layout.general_rows, self._solver)
         self._orders = np.array(row_orders(layout), dtype=np.int_)
         self._units = np.array(row_units(stack, layout), dtype=np.float64)
         scales = layout.dof_scales(stack)
         self._longest = max(1.0, scales.max(initial=1.0), self._units.max(initial=1.0))
-        self._dof_scales = None if (scales == 1.0).all() else scales
+        wide = np.concatenate((scales, np.ones(layout.with_slacks - layout.variables)))
+        self._dof_scales = None if (scales == 1.0).all() else wide
         self._soft = SoftRows(stack, layout)
-        self._hard = (np.array(layout.row_levels, dtype=np.int_) < 0) & (self._soft.of < 0)
+        self._hard = (np.array(layout.row_levels) < 0) & (np.array(layout.price_at) < 0)
         #: strict levels, None where there is one
         self.levels = Levels(assembly, stack, layout) if layout.cascade else None
 
@@ -76,8 +77,9 @@ class SolvedTick(Buffers):
 
     def finish(self, qp: QP) -> int:
         """Solve a QP of this layout and write the report; the flag, with ``UNSOUND`` where the certificate fails."""
-        flag, v, answer = self.answer(qp)
-        v, levels = self.below(qp, v, answer)
+        wide = qp.with_slacks()
+        flag, x, answer = self.answer(wide)
+        v, levels = self.below(qp, x[: self._nv], answer)
         slack = qp.violation(v)[self._nv :] if flag == RELAXED else np.zeros(self._units.size)
         if self.levels is not None:
             slack = self.levels.with_soft(qp, v, slack)
@@ -88,13 +90,14 @@ class SolvedTick(Buffers):
         places, report = self._places, self.report
         certificate, multipliers = _NONE, np.zeros(qp.lower.size)
         if answer is not None:
-            multipliers = answer.multipliers
             self._name_frozen_bounds(qp, answer)
-            sides = QP(qp.H, qp.g, *self._met(qp, answer, v), qp.A)
             if levels is None:
-                certificate = certify(sides, Solution(v, multipliers, "solved"), self._velocities)
+                multipliers = qp.rows_of(answer.multipliers)
+                sides = QP(wide.H, wide.g, *self._met(wide, answer, x), wide.A)
+                certificate = certify(sides, Solution(x, answer.multipliers, "solved"), self._velocities)
             else:
                 multipliers = levels.multipliers
+                sides = QP(qp.H, qp.g, *self._met(qp, answer, v), qp.A)
                 certificate = Levels.certified(levels, float(sides.violation(v).max(initial=0.0)))
         for name in ("stationarity", "violation", "complementarity", "error_bound"):
             report[places[name]] = min(getattr(certificate, name), INFINITE)
@@ -136,9 +139,9 @@ class SolvedTick(Buffers):
         them. A minimiser over fewer rows that meets the others is the minimiser over all.
         """
         at = np.concatenate((v, qp.A @ v))
-        rounding = _ROUNDING * np.concatenate((np.zeros(self._nv), self._units))
+        rounding = _ROUNDING * np.concatenate((np.zeros(qp.n), self._units))
         met = (answer.lower == answer.upper) & (np.abs(at - answer.lower) <= rounding) & (answer.multipliers == 0.0)
-        met[: self._nv] = False
+        met[: qp.n] = False
         return np.where(met, -np.inf, answer.lower), np.where(met, np.inf, answer.upper)
 
     def below(self, qp: QP, v: Array, first: Relaxed | None) -> tuple[Array, Answer | None]:
@@ -156,7 +159,7 @@ class SolvedTick(Buffers):
         self.report[self._places["owner_low"]][frozen & ~at_lower] = -1.0
 
     def answer(self, qp: QP) -> tuple[int, Array, Relaxed | None]:
-        """Flag, command and, unless the tick brakes, what the solver answered."""
+        """Flag, point and, unless the tick brakes, what the solver answered to a QP whose soft rows have slacks."""
         if self.assembly.usable:
             sides, crossed = self._uncrossed(qp)
             if crossed[self._orders == 0].any():
@@ -169,7 +172,7 @@ class SolvedTick(Buffers):
 
     def _uncrossed(self, qp: QP) -> tuple[QP, NDArray[np.bool_]]:
         """Rows whose sides have crossed are met half-way; and which of them give way by more than rounding."""
-        n = self._nv
+        n = qp.n
         gap = qp.lower[n:] - qp.upper[n:]
         if not (gap > 0.0).any():
             return qp, np.zeros(gap.size, dtype=np.bool_)

@@ -10,7 +10,7 @@ from wbc.controller.reach import DEAD, Reach
 from wbc.controller.report import BAD_Q, BAD_UNIT, BAD_V, INFINITE, TOLERANCE, UNIT_TOLERANCE, ReportLayout
 from wbc.controller.tick import Assembly, TaskRows
 from wbc.qp.problem import QP
-from wbc.stack.codegen import bound_sequence, unit_groups
+from wbc.stack.codegen import bound_sequence, row_units, unit_groups
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Layout
 from wbc.stack.program import ROWS_OUTPUTS, Program
@@ -89,6 +89,9 @@ class VmAssembly(Assembly):
         self._usable = True
         self._soft = np.array(layout.row_levels, dtype=np.int_) >= 0
         self._sides = np.zeros(rows), np.zeros(rows)
+        self._price_at = np.array(layout.price_at, dtype=np.intp)
+        self._priced = self._price_at >= 0
+        self._row_units = np.array(row_units(stack, layout), dtype=np.float64)
         self._bent: Array | None = None
         self._last = TaskRows(self._J, np.zeros(tasks), np.zeros(tasks))
 
@@ -161,7 +164,8 @@ class VmAssembly(Assembly):
         g = -weighted.T @ wish
         error = out["error"][first]
         low, high = self._bounds()
-        on = self.enabled != 0.0
+        price = np.where(self._priced, self.p[self._price_at], 1.0)
+        on = (self.enabled != 0.0) & (price > 0.0)
         A = np.where(on[:, None], self._A, 0.0)
         if self._reach is not None:
             sides, margin = out["low"][: layout.general_rows], out["margin"][: layout.margin_rows]
@@ -175,10 +179,12 @@ class VmAssembly(Assembly):
         self._bent = None
         if self._reach is not None and not self.plain[0] and self._usable and layout.leading:
             equal = _unit_equalities(low, high, low_rows, high_rows, A, self._dof_scales)
-            keepers = self._reach.keepers(A, low_rows == high_rows, factor)
+            keepers = self._reach.keepers(A, self._sides[0] == self._sides[1], factor)
             H, g = self._reach.change(H, J, weight, error, wish, self.q, self.p, equal, keepers, self.bound_enabled)
             self._bent = self._reach.bent
-        return QP(H, g, np.concatenate((low, low_rows)), np.concatenate((high, high_rows)), A)
+        give = np.where(price > 0.0, self._row_units**2 / np.where(price > 0.0, price, 1.0), 1.0)
+        give = np.where(self._priced & ~self._soft, give, 0.0)
+        return QP(H, g, np.concatenate((low, low_rows)), np.concatenate((high, high_rows)), A, give)
 
     def _report_rows(self) -> None:
         """Errors and margins into the report; no output is NaN."""

@@ -91,7 +91,7 @@ class Cascade:
 
 def rest(n: int) -> Level:
     """What comes after all levels: the least x of all that is left."""
-    return Level(np.zeros((0, n)), np.zeros(0), np.zeros(n), np.zeros(0, dtype=np.intp), 1.0)
+    return Level(np.zeros((0, n)), np.zeros(0), np.zeros(n), np.zeros(0, dtype=np.intp), np.zeros(0))
 
 
 def _equalities(problem: Hierarchy, rows: Rows) -> tuple[Array, NDArray[np.bool_]]:

@@ -15,11 +15,11 @@ from wbc.validation import Array
 
 @dataclass(eq=False, slots=True)
 class Level:
-    """One level:   minimise 1/2 |W^(1/2) (rows x - b)|^2 + weight_soft / 2 |s|^2   over what earlier levels leave.
+    """One level:   minimise 1/2 |W^(1/2) (rows x - b)|^2 + 1/2 s' diag(soft_weight) s   over what earlier levels leave.
 
     Attributes:
         rows: [m, n]. weight: W, at most 1 [m]. wanted: rows' W b [n].
-        soft: general rows whose violation s is minimised here, and which hold from then on. soft_weight: of s^2.
+        soft: general rows whose violation s is minimised here, and which hold from then on. soft_weight: of each s^2.
         bent: None, or two matrices [n, n]: what is added to rows' W rows and makes it positive definite, and the
             curvature in it; the directions in which that is large are taken as well, and nothing else is damped.
     """
@@ -28,7 +28,7 @@ class Level:
     weight: Array
     wanted: Array
     soft: NDArray[np.intp]
-    soft_weight: float
+    soft_weight: Array
     bent: tuple[Array, Array] | None = None
 
 

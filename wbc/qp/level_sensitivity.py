@@ -65,7 +65,8 @@ class FrozenLevels:
             push = np.flatnonzero(self._places == place)
             soft = np.isin(push, n + level.soft)
             gap = sides[push] - rows.C[push] @ x
-            z = _optimum(step, rows.C[push], gap, soft)
+            weight = level.soft_weight[np.searchsorted(level.soft, push[soft] - n)]
+            z = _optimum(step, rows.C[push], gap, soft, weight)
             x = x + step.Z @ z[: step.rank] + step.F @ z[step.rank :]
             space = complement(rows.C[push], step.F)
         return np.asarray(x)
@@ -86,7 +87,7 @@ class FrozenLevels:
         return np.asarray(0.5 * (ends[0] - ends[1]))
 
 
-def _optimum(step: LevelStep, C: Array, gap: Array, soft: NDArray[np.bool_]) -> Array:
+def _optimum(step: LevelStep, C: Array, gap: Array, soft: NDArray[np.bool_], weight: Array) -> Array:
     """z = (y_c, y_f) of a level with rows that push: hard ones close their gap, soft ones are weighed."""
     width = step.rank + step.F.shape[1]
     z = np.zeros(width)
@@ -96,8 +97,8 @@ def _optimum(step: LevelStep, C: Array, gap: Array, soft: NDArray[np.bool_]) -> 
     local = np.hstack((C @ step.Z, C @ step.F))
     H, right = np.zeros((width, width)), np.zeros(width)
     H[: step.rank, : step.rank], right[: step.rank] = step.H, step.right
-    H += step.level.soft_weight * local[soft].T @ local[soft]
-    right += step.level.soft_weight * local[soft].T @ gap[soft]
+    H += local[soft].T @ (weight[:, None] * local[soft])
+    right += local[soft].T @ (weight * gap[soft])
     hard = local[~soft]
     if hard.size:
         z = np.linalg.lstsq(hard, gap[~soft], rcond=None)[0]

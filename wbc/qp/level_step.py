@@ -174,8 +174,9 @@ class LevelStep:
         low[still], high[still] = -np.inf, np.inf
         size = rank + free + soft.size
         A = np.hstack((moved, np.zeros((moved.shape[0], soft.size))))
-        A[self.x.size + soft, rank + free + np.arange(soft.size)] = 1.0
-        H = np.diag(np.concatenate((np.zeros(rank), np.full(free, PROXIMAL), np.full(soft.size, level.soft_weight))))
+        # slacks at the cost s^2 / 2, whatever the weight
+        A[self.x.size + soft, rank + free + np.arange(soft.size)] = 1.0 / np.sqrt(level.soft_weight)
+        H = np.diag(np.concatenate((np.zeros(rank), np.full(free, PROXIMAL), np.ones(soft.size))))
         H[:rank, :rank] = self.H
         base = rows.C @ self.x
         ends = (

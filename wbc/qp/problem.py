@@ -32,6 +32,8 @@ class QP:
         g: [n].
         lower, upper: [n + m], simple bounds first; +-inf where there is none.
         A: rows [m, n].
+        give: of soft rows, by how much they give way per multiplier: lower <= A x - give lam <= upper, at the cost
+            give lam^2 / 2; 0 for hard rows, any number for rows without sides [m]. None: all rows are hard.
     """
 
     H: Array
@@ -39,6 +41,7 @@ class QP:
     lower: Array
     upper: Array
     A: Array
+    give: Array | None = None
 
     @property
     def n(self) -> int:
@@ -89,7 +92,37 @@ class QP:
 
     def copy(self) -> QP:
         """Independent copies of all arrays."""
-        return QP(self.H.copy(), self.g.copy(), self.lower.copy(), self.upper.copy(), self.A.copy())
+        give = None if self.give is None else self.give.copy()
+        return QP(self.H.copy(), self.g.copy(), self.lower.copy(), self.upper.copy(), self.A.copy(), give)
+
+    def with_slacks(self) -> QP:
+        """The same problem with hard rows only: each soft row has a variable s at the cost s^2 / 2, after the others.
+
+        lower <= a x + sqrt(give) s <= upper. Its place among the rows, and its multiplier, stay.
+        """
+        if self.give is None or not self.give.any():
+            return QP(self.H, self.g, self.lower, self.upper, self.A)
+        soft, n = np.flatnonzero(self.give), self.n
+        wide = n + soft.size
+        H, A, free = np.eye(wide), np.zeros((self.m, wide)), np.full(soft.size, np.inf)
+        H[:n, :n], A[:, :n] = self.H, self.A
+        A[soft, n + np.arange(soft.size)] = np.sqrt(self.give[soft])
+        lower, upper = (
+            np.concatenate((ends[:n], sign * free, ends[n:])) for ends, sign in ((self.lower, -1.0), (self.upper, 1.0))
+        )
+        return QP(H, np.concatenate((self.g, np.zeros(soft.size))), lower, upper, A)
+
+    def hard(self) -> QP:
+        """The same without the sides of soft rows."""
+        if self.give is None:
+            return self
+        open_ends = np.concatenate((np.zeros(self.n, dtype=np.bool_), self.give > 0.0))
+        lower, upper = np.where(open_ends, -np.inf, self.lower), np.where(open_ends, np.inf, self.upper)
+        return QP(self.H, self.g, lower, upper, self.A)
+
+    def rows_of(self, wide: Array) -> Array:
+        """Of numbers of [1; A] of :meth:`with_slacks` those that this problem has."""
+        return np.concatenate((wide[: self.n], wide[wide.size - self.m :]))
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -21,7 +21,6 @@ from wbc.stack.places import (
     margin_places,
     pull_scales,
     rate_places,
-    slack_places,
     stops,
     told_slacks,
 )
@@ -29,6 +28,8 @@ from wbc.stack.program import Program
 
 #: Numbers that a tick reports of each level, see ``native/tick.h``
 LEVEL_NUMBERS = 9
+#: Class of rows that have a price in the order of sacrifice: they give way at it, and before any other
+PRICED = 99
 
 
 def sources(stack: Declaration, layout: Layout, program: Program) -> dict[str, str]:
@@ -77,7 +78,7 @@ def _header(stack: Declaration, layout: Layout, program: Program, functions: lis
                 "NNZK": bent.nnz(),
                 "CALM": int(stack.calm),
                 "UNITS": len(units),
-                "LAST_ORDER": max(orders, default=0),
+                "LAST_ORDER": max((o for o in orders if o < PRICED), default=0),
                 "LONGEST": max(1.0, *dofs, *scales),
                 "ACTIVE_MAX": layout.variables + len(orders) + 1,
                 "WORK_W": max(f.sz_w() for f in functions),
@@ -122,10 +123,11 @@ def _soft(stack: Declaration, layout: Layout) -> list[str]:
     """What soft rows need; see ``native/tick.h``."""
     return [
         f"#define DOFS {layout.nv}",
-        f"#define SLACKS {int(bool(layout.slack_rows))}",
+        f"#define SOFT_ROWS {0 if layout.cascade else sum(at >= 0 for at in layout.price_at)}",
+        f"#define PRICES {int(any(at >= 0 for at in layout.price_at))}",
         f"#define KEPT {int(max(kept_rows(layout), default=-1) >= 0)}",
         _table("int", "kept_of", kept_rows(layout)),
-        _table("int", "slack_of", slack_places(stack, layout)),
+        _table("int", "price_at", layout.price_at),
         _table("double", "slack_told", told_slacks(stack, layout)),
     ]
 
@@ -178,7 +180,8 @@ def unit_groups(stack: Declaration) -> list[tuple[int, int]]:
 
 def row_orders(layout: Layout) -> list[int]:
     """Class of each general row in the order of sacrifice."""
-    return [int(b.entry.order) for b in layout.of_form("margins", "rows") for _ in b.rows]
+    classes = [int(b.entry.order) for b in layout.of_form("margins", "rows") for _ in b.rows]
+    return [PRICED if at >= 0 else order for order, at in zip(classes, layout.price_at, strict=True)]
 
 
 def row_units(stack: Declaration, layout: Layout) -> list[float]:

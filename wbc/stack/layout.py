@@ -33,8 +33,8 @@ class Block:
     """An item's rows and inputs.
 
     ``start`` counts within the rows of the same form: task rows, general constraint rows, or, for
-    bounds, blocks of nv. ``margin_start`` counts margin rows only (-1: none). ``variables`` are those of the QP that
-    the rows have for themselves, see :mod:`wbc.stack.soft`.
+    bounds, blocks of nv. ``margin_start`` counts margin rows only (-1: none). ``share`` is the variable of the QP that
+    says how much of its command a scaled task is given (-1: none), see :mod:`wbc.stack.soft`.
     """
 
     entry: Entry
@@ -43,7 +43,7 @@ class Block:
     start: int
     margin_start: int
     slots: dict[str, Slot]
-    variables: slice
+    share: int = -1
 
     @property
     def span(self) -> slice:
@@ -63,12 +63,12 @@ class Layout:
         levels: numbers of the levels at which something is minimised, in order. cascade: they are strict levels, solved
             one after the other; False: all is one problem.
         leading: task rows of the first level, which come first.
-        row_levels: place in ``levels`` of each general row that is minimised there, -1 for hard rows.
-        nv: degrees of freedom. variables: of the QP; what comes after the velocities are slacks of soft rows, and
-            shares of scaled tasks.
-        slack_rows: task row -> the slack that it minimises. share_rows: task row -> the speed of a scaled task; such a
-            row counts for nothing, and its error is the speed that is asked for.
-        nothing: a place in the parameters that holds 0, where there are slacks.
+        row_levels: place in ``levels`` of each general row that is minimised there, -1 for the others.
+        price_at: place in the parameters of the price of each general row that is soft, -1 for the others.
+        nv: degrees of freedom. variables: of the QP; what comes after the velocities are shares of scaled tasks.
+        share_rows: task row -> the share of a scaled task; such a row counts for nothing, and its error is the speed
+            that is asked for.
+        nothing: a place in the parameters that holds 0, where there are shares.
     """
 
     def __init__(self, stack: Declaration) -> None:
@@ -80,37 +80,26 @@ class Layout:
         self.blocks: dict[str, Block] = {}
         self.levels = stack.levels
         self.row_levels: list[int] = []
-        self.slack_rows: dict[int, int] = {}
+        self.price_at: list[int] = []
         self.share_rows: dict[int, int] = {}
         self._ends: list[int] = []
-        variables: dict[str, slice] = {}
+        self.cascade = len(self.levels) > 1 or any(e.level > 0 and e.price is None for e in stack.constraints)
+        shares: dict[str, int] = {}
         for level in self.levels:
             for entry in (e for e in stack.tasks if e.level == level):
                 self._add(stack, entry)
-            for entry in (e for e in stack.constraints if e.price is not None and e.level == level):
-                variables[entry.name] = self._slacks(stack, entry)
+            for entry in (e for e in stack.constraints if isinstance(e.item, Direction) and e.level == level):
+                shares[entry.name] = self.share_rows[self.task_rows] = self.variables
+                self.task_rows, self.variables = self.task_rows + 1, self.variables + 1
             self._ends.append(self.task_rows)
         for entry in stack.constraints:
-            self._add(stack, entry, variables.get(entry.name, slice(0, 0)))
+            self._add(stack, entry, shares.get(entry.name, -1))
         self.nothing = -1
-        if self.slack_rows:
+        if self.share_rows:
             self.nothing, self.parameters = self.parameters, self.parameters + 1
-        self.cascade = len(self.levels) > 1 or any(level >= 0 for level in self.row_levels)
         self.leading = self.level_rows(0).stop
 
-    def _slacks(self, stack: Declaration, entry: Entry) -> slice:
-        """Variables of a soft constraint; task rows at its level minimise those that are slacks."""
-        first, count = self.variables, soft_rows(entry, stack.robot)
-        for k in range(count):
-            self.slack_rows[self.task_rows + k] = first + k
-        self.task_rows += count
-        self.variables += count
-        if isinstance(entry.item, Direction):
-            self.share_rows[self.task_rows] = self.variables
-            self.task_rows, self.variables = self.task_rows + 1, self.variables + 1
-        return slice(first, self.variables)
-
-    def _add(self, stack: Declaration, entry: Entry, variables: slice = slice(0, 0)) -> None:
+    def _add(self, stack: Declaration, entry: Entry, share: int = -1) -> None:
         robot, item = stack.robot, entry.item
         rows = item.rows(robot)
         labels = [r.label for r in rows]
@@ -146,17 +135,25 @@ class Layout:
         else:
             start, self.general_rows = self.general_rows, self.general_rows + len(rows)
             level = self.levels.index(entry.level) if entry.level > 0 and entry.price is None else -1
-            self.row_levels += [level] * len(rows)
+            own = self.levels.index(entry.level) if self.cascade and entry.price is not None else level
+            soft = soft_rows(entry, robot)
+            self.row_levels += [own] * soft + [level] * (len(rows) - soft)
+            self.price_at += [slots["price"].start if k < soft else -1 for k in range(len(rows))]
             if form == "margins":
                 margin, self.margin_rows = self.margin_rows, self.margin_rows + len(rows)
-        self.blocks[entry.name] = Block(entry, form, rows, start, margin, slots, variables)
+        self.blocks[entry.name] = Block(entry, form, rows, start, margin, slots, share)
+
+    @property
+    def with_slacks(self) -> int:
+        """Variables of a QP that has one more for each soft row, see :meth:`wbc.qp.problem.QP.with_slacks`."""
+        return self.variables + (0 if self.cascade else sum(at >= 0 for at in self.price_at))
 
     def of_form(self, *forms: Form) -> list[Block]:
         """Blocks of the given forms, in row order."""
         return [b for b in self.blocks.values() if b.form in forms]
 
     def level_rows(self, place: int) -> slice:
-        """Task rows of a level, by its place in ``levels``, those that minimise slacks included."""
+        """Task rows of a level, by its place in ``levels``."""
         return slice(self._ends[place - 1] if place else 0, self._ends[place])
 
     def row_scales(self, stack: Declaration) -> np.ndarray:
@@ -169,6 +166,6 @@ class Layout:
         return scales
 
     def dof_scales(self, stack: Declaration) -> np.ndarray:
-        """Scale of each variable: the characteristic length for metres, 1 for radians and slacks."""
+        """Scale of each variable: the characteristic length for metres, 1 for radians and shares."""
         own = [stack.length if u == "m" else 1.0 for u in stack.robot.dof_units]
         return np.array(own + [1.0] * (self.variables - self.nv))

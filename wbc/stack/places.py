@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from wbc.stack.declaration import Declaration, soft_rows
+from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Layout
 from wbc.stack.program import Program
 from wbc.tasks._direction import Direction
@@ -31,15 +31,6 @@ def gain_places(layout: Layout) -> list[int]:
     places = [layout.nothing] * layout.task_rows
     for block in layout.of_form("task"):
         places[block.span] = [block.slots["gain"].start] * len(block.rows)
-    return places
-
-
-def slack_places(stack: Declaration, layout: Layout) -> list[int]:
-    """The variable that is the slack of each general row, -1 for rows without."""
-    places = [-1] * layout.general_rows
-    for block in layout.of_form("margins", "rows"):
-        for k in range(soft_rows(block.entry, stack.robot)):
-            places[block.start + k] = block.variables.start + k
     return places
 
 

@@ -40,7 +40,7 @@ from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Block, Layout, Slot
 from wbc.stack.pattern import checked_function, shared_pattern
 from wbc.stack.sensed import Sensed
-from wbc.stack.soft import kept_direction, slacks, softened, speeds, unlimited, widened
+from wbc.stack.soft import kept_direction, speeds, unlimited, widened
 from wbc.symbolic import rotations as rot
 from wbc.symbolic.curvature import Pull, curvature
 from wbc.symbolic.kinematics import Kinematics, Pose
@@ -182,7 +182,7 @@ class _Builder:
         else:
             rows, margin, factor = self.constraint(block)
             rows = Rows(widened(self.layout, rows.matrix.T).T, rows.lower, rows.upper)
-        return softened(self.stack, block, rows, self.p), margin, factor
+        return rows, margin, factor
 
     def constraint(self, block: Block) -> tuple[Rows, ca.SX | None, ca.SX | None]:
         """Rows on v of a constraint, its margins and their factors."""
@@ -213,7 +213,7 @@ class _Builder:
         if sensed:
             empty = ca.SX(sensed, self.layout.nv)
             matrix = ca.vertcat(
-                matrix, empty if self.loops and block.entry.price is None else self.sensed_matrix(block, sensed)
+                matrix, empty if self.loops else self.sensed_matrix(block, sensed)
             )
         rows = Rows(matrix, low, ca.SX.inf(count))
         return rows, tracer.expand(margin), tracer.expand(factor)
@@ -236,7 +236,7 @@ class _Builder:
         here = ca.Function("h", [self.kinematics.q, self.p], [ca.densify(tracer.expand(margins))])
         margin = here(self.later, self.advanced(block))
         sensed = item.sensed_rows(self.stack.robot)
-        if sensed and not (self.loops and block.entry.price is None):
+        if sensed and not self.loops:
             closing = self.sensed_matrix(block, sensed) @ self.kinematics.v * self.dt
             margin = margin + ca.vertcat(ca.SX(len(block.rows) - sensed, 1), closing)
         return margin
@@ -253,7 +253,7 @@ def build(stack: Declaration, layout: Layout, loops: bool = False) -> Program:
     nv = layout.variables
     tasks = [(block.start, *b.task(block)) for block in layout.of_form("task")]
     tasks = [(start, e, w, f, widened(layout, shared_pattern(J.T))) for start, e, w, f, J in tasks]
-    tasks = sorted([*tasks, *slacks(layout), *speeds(stack, layout, b.tasks)], key=lambda part: part[0])
+    tasks = sorted([*tasks, *speeds(stack, layout, b.tasks)], key=lambda part: part[0])
     general = [b.general(block) for block in layout.of_form("margins", "rows")]
     bounds = []
     for block in layout.of_form("bounds"):

@@ -25,7 +25,7 @@ class Sensed:
         for block in layout.of_form("margins"):
             assert isinstance(block.entry.item, Constraint)
             count = block.entry.item.sensed_rows(stack.robot)
-            if count and block.entry.price is None:
+            if count:
                 out.append((block, count))
         return cls(tuple(out), layout.nv)
 

@@ -1,11 +1,12 @@
-"""Variables of the QP besides the velocities: slacks of soft rows, and nu = lambda |w| of tasks that keep a direction.
+"""Soft rows, and the variable nu = lambda |w| of a task that keeps its direction.
 
-A row of a soft constraint with the price p, in its unit with the scale r (the characteristic length for metres), is
+A row lower <= a v <= upper of a soft constraint with the price p, in its unit with the scale r (the characteristic
+length for metres), has no bound: a violation x costs p (x / r)^2. It gives way by ``give`` = r^2 / p per multiplier,
 
-    lower <= a v + r / sqrt(p) s <= upper            s in the QP at the cost s^2
+    lower <= a v - give lambda <= upper,
 
-so that a violation x = r |s| / sqrt(p) costs p (x / r)^2. The cost is a task row of the constraint's level, so that
-nothing else in a tick knows of slacks. At the price 0 the row is left out.
+which is all that a solver needs to know of it; at the price 0 the row is left out. With strict levels soft rows are
+minimised at their level, like a constraint that was added to it.
 """
 
 from __future__ import annotations
@@ -13,23 +14,13 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 
-from wbc.stack.declaration import Declaration, soft_rows
+from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Block, Layout
 from wbc.tasks._direction import Direction
 from wbc.tasks.base import Bounds, Rows
 
 #: Speed that a task asks for which asks for nothing [rad/s, lengths per second]
 LEAST = 1e-12
-
-
-def slacks(layout: Layout) -> list[tuple[int, ca.SX, ca.SX, ca.SX, ca.SX]]:
-    """(task row; error, wish, factor, J transposed) of what minimises each slack."""
-    out = []
-    for row, variable in layout.slack_rows.items():
-        unit = ca.SX(layout.variables, 1)
-        unit[variable] = 1.0
-        out.append((row, ca.SX.zeros(1), ca.SX.zeros(1), ca.SX.ones(1), unit))
-    return out
 
 
 def speeds(
@@ -67,22 +58,6 @@ def unlimited(layout: Layout, bounds: Bounds) -> Bounds:
     return Bounds(ca.vertcat(bounds.lower, -free), ca.vertcat(bounds.upper, free))
 
 
-def softened(stack: Declaration, block: Block, rows: Rows, p: ca.SX) -> Rows:
-    """Rows of a constraint over all variables, with their slacks where it is soft."""
-    if block.entry.price is None:
-        return rows
-    matrix = ca.SX(rows.matrix)
-    price, lower, upper = p[block.slots["price"].span], [], []
-    on = price > 0.0
-    for k, row in enumerate(block.rows):
-        if k < soft_rows(block.entry, stack.robot):
-            scale = stack.length if row.unit.split("/")[0] == "m" else 1.0
-            matrix[k, block.variables.start + k] = scale / ca.sqrt(ca.if_else(on, price, 1.0))
-        lower.append(ca.if_else(on, rows.lower[k], -np.inf))
-        upper.append(ca.if_else(on, rows.upper[k], np.inf))
-    return Rows(matrix, ca.vertcat(*lower), ca.vertcat(*upper))
-
-
 def kept_direction(
     stack: Declaration, layout: Layout, block: Block, wish: ca.SX, factor: ca.SX, jacobian: ca.SX
 ) -> Rows:
@@ -92,7 +67,7 @@ def kept_direction(
     asked = speed(factor * wish / layout.row_scales(stack)[layout.blocks[block.entry.item.of].span])
     matrix = ca.SX(count + 1, layout.variables)
     matrix[:count, : layout.nv] = ca.diag(factor) @ jacobian
-    matrix[:count, block.variables.stop - 1] = -factor * wish / asked
-    matrix[count, block.variables.stop - 1] = 1.0
+    matrix[:count, block.share] = -factor * wish / asked
+    matrix[count, block.share] = 1.0
     ends = ca.SX.zeros(count)
     return Rows(matrix, ca.vertcat(ends, 0.0), ca.vertcat(ends, asked))

@@ -25,6 +25,16 @@ static void shift(wbc_tick *t) {
     }
 }
 
+/* By how much a soft row gives way per multiplier of the search */
+INLINE double looseness(const wbc_tick *t, int k) {
+#if SOFT_ROWS > 0
+    return HELD(t, k) ? t->loose[k] : t->give[k];
+#else
+    (void)t, (void)k;
+    return 0.0;
+#endif
+}
+
 /* Put a row into the working set unless it depends on those that are in it; 1 if it went in */
 static int activate(DAQPWorkspace *work, int i, int lower) {
     const int kind = work->sense[i] & (IMMUTABLE | SOFT);
@@ -67,6 +77,26 @@ static int search(wbc_tick *t, DAQPWorkspace *work, int limit) {
     return flag;
 }
 
+/* Rows whose multiplier may have any sign: equalities, and soft rows that are held */
+static int stays(const wbc_tick *t, int i) {
+    return t->low[i] == t->high[i] || (i >= NV && HELD(t, i - NV) && SOFTENED(t, i - NV));
+}
+
+/* Rows that every answer meets exactly */
+static int is_equality(const wbc_tick *t, int i) {
+    return t->low[i] == t->high[i] && !(i >= NV && SOFTENED(t, i - NV));
+}
+
+/* Whether a row that stays is met at its lower side */
+static int below(const wbc_tick *t, int i) {
+#if SOFT_ROWS > 0
+    return t->held[i - NV] & LOWER;
+#else
+    (void)t, (void)i;
+    return 0;
+#endif
+}
+
 /* Solve with the factorisation at hand. `warm`: start from the active set in `keep`. Rows of classes from
  * `checked` on may be violated where the solver cannot move them, rows that depend on others by `angle` |row| |v|.
  * `base`: the point that v is counted from, or NULL. DAQP's exit flag. */
@@ -79,11 +109,13 @@ static int active_set(wbc_tick *t, int warm, int checked, double angle, const do
     for (int i = 0; i < M_ALL; i++) {
         const int soft = t->sense[i] & SOFT;
         t->sense[i] = row_is_dead(t, i) ? IMMUTABLE : soft;
-        if (t->low[i] == t->high[i] && !row_is_dead(t, i)) t->sense[i] |= IMMUTABLE;
+        if (stays(t, i) && !row_is_dead(t, i)) t->sense[i] |= IMMUTABLE;
     }
     /* Equalities first: the later, dependent ones are left out and checked afterwards */
     for (int i = 0; i < M_ALL; i++)
-        if ((t->sense[i] & IMMUTABLE) && !row_is_dead(t, i) && !activate(work, i, 0)) dependent = 1;
+        if ((t->sense[i] & (IMMUTABLE | SOFT)) == IMMUTABLE && !row_is_dead(t, i) && !activate(work, i, 0)) dependent = 1;
+    for (int i = NV; i < M_ALL; i++)
+        if ((t->sense[i] & (IMMUTABLE | SOFT)) == (IMMUTABLE | SOFT) && !row_is_dead(t, i)) activate(work, i, below(t, i));
     if (warm)
         for (int i = 0; i < M_ALL; i++)
             if ((t->keep[i] & ACTIVE) && !(t->sense[i] & IMMUTABLE)) activate(work, i, t->keep[i] & LOWER);
@@ -117,7 +149,7 @@ static int within_bounds(const wbc_tick *t) {
     for (int k = 0; k < MC; k++) {
         const double low = t->low[NV + k], high = t->high[NV + k];
         if (t->idle[k]) continue;
-        if (low == high) return 0;
+        if (low == high || HELD(t, k)) return 0;
         const double sum = row_at(t, k, t->x);
         if (sum < low || sum > high) return 0;
     }
@@ -132,6 +164,34 @@ static int unconstrained(wbc_tick *t) {
     return within_bounds(t);
 }
 
+/* The active set of the QP whose factor is at hand, from the last one where that is of use */
+static int from_last(wbc_tick *t, double angle) {
+    for (int i = 0; i < M_ALL; i++) t->sense[i] = 0;
+#if SOFT_ROWS > 0
+    memcpy(t->soft_scaling, t->scaling, sizeof t->scaling);
+    for (int k = 0; k < MC; k++) {
+        if (!SOFTENED(t, k) || t->idle[k]) continue;
+        t->sense[NV + k] = SOFT;
+        t->soft_scaling[NV + k] *= sqrt(looseness(t, k));
+    }
+    t->daqp.scaling = t->soft_scaling;
+    t->settings.rho_soft = 1.0;
+#endif
+    int flag = active_set(t, t->warm, LAST_ORDER + 1, angle, NULL);
+    if (flag < 0 && t->warm && !t->spent) {
+        for (int i = 0; i < M_ALL; i++) t->sense[i] &= SOFT;
+        flag = active_set(t, 0, LAST_ORDER + 1, angle, NULL);
+    }
+#if SOFT_ROWS > 0
+    t->daqp.scaling = t->scaling;
+    t->settings.rho_soft = RHO;
+    /* Multipliers came back in the scaling that says how soft a row is */
+    for (int a = 0; flag >= 0 && a < t->daqp.n_active; a++)
+        t->daqp.lam_star[a] *= t->scaling[t->daqp.WS[a]] / t->soft_scaling[t->daqp.WS[a]];
+#endif
+    return flag;
+}
+
 static int constrained(wbc_tick *t, double angle) {
     if (!t->factored) {
         invert(t);
@@ -140,10 +200,7 @@ static int constrained(wbc_tick *t, double angle) {
         t->factored = 1;
     }
     shift(t);
-    for (int i = 0; i < M_ALL; i++) t->sense[i] = 0;
-    int flag = active_set(t, t->warm, LAST_ORDER + 1, angle, NULL);
-    if (flag < 0 && t->warm) flag = active_set(t, 0, LAST_ORDER + 1, angle, NULL);
-    return flag;
+    return from_last(t, angle);
 }
 
 #endif

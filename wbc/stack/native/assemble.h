@@ -108,8 +108,10 @@ static void assemble(wbc_tick *t, int screen) {
             continue;
         }
         double *row = t->at + a_start[k];
-        const int on = t->enabled[k] != 0.0, count = a_end[k] - a_start[k];
-        if (!on) {
+        const int priced = price_at[k] >= 0, count = a_end[k] - a_start[k];
+        const double price = priced ? t->p[price_at[k]] : 1.0;
+        t->give[k] = priced && !MINIMISED(k) ? (price > 0.0 ? row_scale[k] * row_scale[k] / price : 1.0) : 0.0;
+        if (t->enabled[k] == 0.0 || price == 0.0) {
             memset(row, 0, count * sizeof(double));
             t->free_low[k] = -WBC_INF;
             t->free_high[k] = WBC_INF;
@@ -123,6 +125,9 @@ static void assemble(wbc_tick *t, int screen) {
         for (int e = a_start[k]; e < a_end[k]; e++) t->A[k * NV + a_col[e]] = t->at[e];
     }
     t->prepared = t->curved = 0;
+#if SOFT_ROWS > 0
+    t->settled = 0;
+#endif
 #if LEVELS > 0
     memcpy(t->straight, t->H, sizeof t->H);
 #endif

@@ -70,14 +70,15 @@ static void add_forces(wbc_tick *t, const double *v, double *residual, double *s
         if (i < NV || MC == 0) continue; /* the second for compilers that look for rows where there are none */
         const double value = row_at(t, k, v);
         double lambda = work->lam_star[a];
-        if (t->strength[k] > 0.0) lambda += t->strength[k] * (value - t->low[i]);
+        if (t->strength[k] > 0.0) lambda += t->strength[k] * (value - met_side(t, k));
         out->lambda[i] = lambda;
         for (int e = a_start[k]; e < a_end[k]; e++) {
             const double part = t->at[e] * lambda;
             residual[a_col[e]] += part;
             size[a_col[e]] += fabs(part);
         }
-        const double gap = fabs(lambda * (value - (t->sense[i] & LOWER ? t->low[i] : t->high[i])));
+        const double given = t->give[k] * lambda;
+        const double gap = fabs(lambda * (value - given - (t->sense[i] & LOWER ? t->low[i] : t->high[i])));
         if (gap > out->complementarity) out->complementarity = gap;
     }
     /* Any multiplier of the right sign certifies: that of an active bound is what the other forces leave, which takes
@@ -102,6 +103,7 @@ static void examine(wbc_tick *t) {
     out->violation = 0.0;
     for (int k = 0; k < MC; k++) {
         if (t->low[NV + k] <= -WBC_INF && t->high[NV + k] >= WBC_INF) continue;
+        if (SOFTENED(t, k) && (HELD(t, k) || t->sense[NV + k] & ACTIVE)) continue;
         const double value = row_at(t, k, v);
         const double below = t->low[NV + k] - value, above = value - t->high[NV + k];
         if (below > out->violation) out->violation = below;
@@ -123,7 +125,7 @@ static void refine(wbc_tick *t) {
     DAQPWorkspace *work = &t->daqp;
     double dy[WIDE] = {0}, mu[ACTIVE_MAX];
     for (int i = 0; i < NV; i++) axpy(dy, t->inverse + i * WIDE, -t->scratch[i], i);
-    for (int a = 0; a < work->n_active; a++) mu[a] = side_gap(t, work->WS[a]) + seen_through(t, work->WS[a], dy);
+    for (int a = 0; a < work->n_active; a++) mu[a] = side_gap(t, a) + seen_through(t, work->WS[a], dy);
     solve_gram(t, work->n_active, mu);
     for (int a = 0; a < work->n_active; a++) {
         push_back(t, work->WS[a], -mu[a], dy);

@@ -21,6 +21,26 @@ INLINE double dot(const double *x, const double *y, int from) {
 /* Equality rows a'v = b, fixed variables among them, enter the Hessian as well, H + rho a a' / |a|^2 and
  * g - rho b a / |a|^2 with v counted in its own units: a constant where they hold, so the optimum is the same, but seen through R they are then as
  * independent as they are in v. */
+INLINE double met_side(const wbc_tick *t, int k) {
+#if SOFT_ROWS > 0
+    if (t->held[k] & LOWER) return t->low[NV + k];
+    if (t->held[k]) return t->high[NV + k];
+#endif
+    return t->low[NV + k];
+}
+
+/* Rows that the factor has: equalities, and soft rows that are held */
+INLINE int strengthens(const wbc_tick *t, int k) {
+#if SOFT_ROWS > 0
+    if (t->settled && t->give[k] > 0.0) return t->held[k] && !t->melted[k];
+#endif
+#if KEPT && LEVELS > 0
+    /* A level minimises what keeps its task's direction: only the search for curvature has it */
+    if (t->firm && kept_of[k] >= 0) return t->free_low[k] == t->free_high[k];
+#endif
+    return t->low[NV + k] == t->high[NV + k];
+}
+
 static void strengthen(wbc_tick *t) {
     t->stiffness = 0.0;
     for (int i = 0; i < NV; i++) t->stiffness = larger(t->stiffness, t->H[i * WIDE + i] * dof_scale[i] * dof_scale[i]);
@@ -28,7 +48,7 @@ static void strengthen(wbc_tick *t) {
         if (t->low[i] == t->high[i]) t->R[i * WIDE + i] += t->stiffness / (dof_scale[i] * dof_scale[i]);
     for (int k = 0; k < MC; k++) {
         t->strength[k] = 0.0;
-        if (t->low[NV + k] != t->high[NV + k]) continue;
+        if (!strengthens(t, k)) continue;
         double square = 0.0;
         for (int e = a_start[k]; e < a_end[k]; e++) {
             const double a = t->at[e] * dof_scale[a_col[e]];
@@ -36,6 +56,12 @@ static void strengthen(wbc_tick *t) {
         }
         if (square <= DEAD) continue;
         t->strength[k] = t->stiffness / square * (t->firm && kept_of[k] >= 0 ? FIRM : 1.0);
+#if SOFT_ROWS > 0
+        if (t->settled && t->give[k] > 0.0) {
+            t->strength[k] = smaller(larger(MODEST * t->strength[k], SHARE / t->give[k]), 0.5 / t->give[k]);
+            t->loose[k] = 1.0 / (1.0 / t->give[k] - t->strength[k]);
+        }
+#endif
         for (int e = a_start[k]; e < a_end[k]; e++) {
             const double f = t->strength[k] * t->at[e];
             for (int c = e; c < a_end[k]; c++) t->R[a_col[e] * WIDE + a_col[c]] += f * t->at[c];
@@ -50,7 +76,7 @@ static void right_side(wbc_tick *t) {
         if (t->low[i] == t->high[i]) t->y[i] += t->stiffness / (dof_scale[i] * dof_scale[i]) * t->low[i];
     for (int k = 0; k < MC; k++)
         for (int e = a_start[k]; t->strength[k] != 0.0 && e < a_end[k]; e++)
-            t->y[a_col[e]] += t->strength[k] * t->at[e] * t->low[NV + k];
+            t->y[a_col[e]] += t->strength[k] * t->at[e] * met_side(t, k);
 }
 
 /* Eight rows of R from the rows above them. `from` is a constant after unrolling: the row stays in registers. */

@@ -13,9 +13,14 @@ static void unit_row(const wbc_tick *t, int k, double *out) {
     for (int e = j_start[k]; f != 0.0 && e < j_start[k + 1]; e++) out[j_col[e]] = f * t->jt[e] * dof_scale[j_col[e]];
 }
 
+/* The weight of a row that is minimised, in its unit; 0 where it is switched off */
+static double row_price(const wbc_tick *t, int k) { return price_at[k] >= 0 ? t->p[price_at[k]] : 1.0; }
+
 /* The weight of the heaviest row of a level: the others count beside it */
 static double heaviest(const wbc_tick *t, int place) {
-    double most = t->levels.soft_count > 0;
+    double most = 0.0;
+    for (int k = 0; k < MC; k++)
+        if (row_level[k] == place && !t->far[k]) most = larger(most, row_price(t, k));
     for (int k = level_start[place]; k < level_start[place + 1]; k++)
         if (t->report.factor[k] > 0.0) most = larger(most, t->weight[k] * task_scale[k] * task_scale[k]);
     return most > 0.0 ? most : 1.0;
@@ -24,13 +29,13 @@ static double heaviest(const wbc_tick *t, int place) {
 /* Rows, weights and what is wanted of level `place`, the least velocity where that is LEVELS */
 static void load_level(wbc_tick *t, int place) {
     wbc_levels *s = &t->levels;
-    s->count = s->soft_count = 0;
-    for (int i = 0; i < M_ALL; i++) s->slot[i] = i >= NV && row_level[i - NV] == place && !t->far[i - NV] ? s->soft_count++ : -1;
+    s->count = 0;
+    for (int i = 0; i < M_ALL; i++) s->soft[i] = i >= NV && row_level[i - NV] == place && !t->far[i - NV] && row_price(t, i - NV) > 0.0;
     for (int i = 0; i < NV; i++) s->wanted[i] = 0.0;
     s->scale = 1.0;
     if (place == LEVELS) return;
     s->scale = heaviest(t, place);
-    s->soft_weight = 1.0 / s->scale;
+    for (int i = NV; i < M_ALL; i++) s->give[i] = s->soft[i] ? s->scale / row_price(t, i - NV) : 0.0;
     for (int k = level_start[place]; k < level_start[place + 1]; k++, s->count++) {
         double *row = s->row + s->count * NV;
         unit_row(t, k, row);

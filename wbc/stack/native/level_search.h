@@ -21,12 +21,12 @@ INLINE double row_of(const wbc_levels *s, int i, const double *x) {
 
 /* Sides of a row for this level; those that cross are met half-way */
 INLINE void level_sides(const wbc_levels *s, int i, double *low, double *high) {
-    *low = s->slot[i] >= 0 ? s->given_low[i] : s->low[i];
-    *high = s->slot[i] >= 0 ? s->given_high[i] : s->high[i];
+    *low = s->soft[i] ? s->given_low[i] : s->low[i];
+    *high = s->soft[i] ? s->given_high[i] : s->high[i];
     if (*low > *high) *low = *high = 0.5 * (*low + *high);
 }
 
-INLINE int counts(const wbc_levels *s, int i) { return s->on[i] || s->slot[i] >= 0; }
+INLINE int counts(const wbc_levels *s, int i) { return s->on[i] || s->soft[i]; }
 
 /* Whether all rows hold at x, as far as rounding goes */
 static int level_holds(const wbc_levels *s, const double *x) {
@@ -42,29 +42,27 @@ static int level_holds(const wbc_levels *s, const double *x) {
 
 /* Rows as DAQP takes them */
 static void level_rows(wbc_levels *s) {
-    const int size = s->width + s->soft_count;
     for (int i = 0; i < M_ALL; i++) {
-        double e[NV], *out = s->M + i * size;
-        s->scaling[i] = s->length[i] = 0.0;
+        double e[NV], *out = s->M + i * s->width;
+        s->scaling[i] = s->soft_scaling[i] = s->length[i] = 0.0;
         if (!counts(s, i)) continue;
         for (int j = 0; j < s->width; j++) e[j] = row_of(s, i, s->basis + j * NV);
         const double square = inner(e, e, s->width);
         if (square <= UNMOVED * UNMOVED) continue;
-        s->length[i] = sqrt(square + (s->slot[i] >= 0));
-        for (int j = 0; j < size; j++) out[j] = 0.0;
+        s->length[i] = sqrt(square + s->soft[i]);
+        for (int j = 0; j < s->width; j++) out[j] = 0.0;
         for (int k = 0; k < s->rank; k++)
             for (int j = k; j < s->rank; j++) out[j] += e[k] * s->inverse[k * NV + j];
         for (int j = s->rank; j < s->width; j++) out[j] = e[j] / sqrt(PROXIMAL);
-        if (s->slot[i] >= 0) out[s->width + s->slot[i]] = 1.0 / sqrt(s->soft_weight);
-        s->scaling[i] = 1.0 / sqrt(inner(out, out, size));
-        for (int j = 0; j < size; j++) out[j] *= s->scaling[i];
+        s->scaling[i] = 1.0 / sqrt(inner(out, out, s->width));
+        s->soft_scaling[i] = s->soft[i] ? s->scaling[i] * sqrt(s->give[i]) : s->scaling[i];
+        for (int j = 0; j < s->width; j++) out[j] *= s->scaling[i];
     }
 }
 
 /* Sides of the distance problem, whose free directions are drawn to `z` */
 static void level_shift(wbc_levels *s, const double *z) {
-    const int size = s->width + s->soft_count;
-    for (int j = 0; j < size; j++) s->shift[j] = 0.0;
+    for (int j = 0; j < s->width; j++) s->shift[j] = 0.0;
     for (int k = 0; k < s->rank; k++)
         for (int j = k; j < s->rank; j++) s->shift[j] -= s->inverse[k * NV + j] * s->right[k];
     for (int j = s->rank; j < s->width; j++) s->shift[j] = -sqrt(PROXIMAL) * z[j];
@@ -72,7 +70,7 @@ static void level_shift(wbc_levels *s, const double *z) {
         double low, high;
         if (s->scaling[i] == 0.0) continue;
         level_sides(s, i, &low, &high);
-        const double at = row_of(s, i, s->x), sum = inner(s->M + i * size, s->shift, size);
+        const double at = row_of(s, i, s->x), sum = inner(s->M + i * s->width, s->shift, s->width);
         s->dupper[i] = (high - at) * s->scaling[i] + sum;
         s->dlower[i] = (low - at) * s->scaling[i] + sum;
     }
@@ -85,18 +83,21 @@ static int level_active_set(wbc_tick *t, const int *keep) {
     const int limit = granted(t);
     if (limit == 0) return EXIT_ITERLIMIT;
     reset_daqp_workspace(work);
+    t->settings.rho_soft = 1.0;
     for (int i = 0; i < M_ALL; i++) {
         double low, high;
         level_sides(s, i, &low, &high);
         const int dead = s->scaling[i] == 0.0 || (low <= -WBC_INF && high >= WBC_INF);
-        s->sense[i] = dead || low == high ? IMMUTABLE : 0;
+        s->sense[i] = (dead || low == high ? IMMUTABLE : 0) | (s->soft[i] ? SOFT : 0);
         if (dead) s->scaling[i] = 0.0;
     }
     for (int i = 0; i < M_ALL; i++)
         if ((s->sense[i] & IMMUTABLE) && s->scaling[i] != 0.0) activate(work, i, 0);
     for (int i = 0; keep && i < M_ALL; i++)
         if ((keep[i] & ACTIVE) && !(s->sense[i] & IMMUTABLE)) activate(work, i, keep[i] & LOWER);
-    return search(t, work, limit);
+    const int flag = search(t, work, limit);
+    t->settings.rho_soft = RHO;
+    return flag;
 }
 
 /* z = R^-1 (u - shift): the coordinates that the active set answers */
@@ -129,7 +130,7 @@ static int level_search(wbc_tick *t, int place, double *z) {
     wbc_levels *s = &t->levels;
     double next[NV];
     int found = 0, *keep = s->keep + place * M_ALL;
-    s->problem.n = s->daqp.n = s->width + s->soft_count;
+    s->problem.n = s->daqp.n = s->width;
     level_rows(s);
     for (int j = 0; j < NV; j++) z[j] = 0.0;
     for (int step = 0; step < LEVEL_STEPS; step++) {
@@ -162,7 +163,7 @@ static void begin_level_solver(wbc_tick *t) {
     work->dupper = s->dupper;
     work->dlower = s->dlower;
     work->v = s->shift;
-    work->scaling = s->scaling;
+    work->scaling = s->soft_scaling;
     work->sense = s->sense;
     work->x = s->z;
     work->xold = s->old;

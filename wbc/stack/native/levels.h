@@ -132,7 +132,7 @@ static void judge(wbc_tick *t, const double *z, double *numbers, double *gain) {
         double low, high;
         level_sides(s, i, &low, &high);
         const double gap = row_of(s, i, s->x) - (s->force[i] > 0.0 ? high : low);
-        if (s->slot[i] < 0) numbers[6] = larger(numbers[6], fabs(s->force[i] * gap));
+        if (!s->soft[i]) numbers[6] = larger(numbers[6], fabs(s->force[i] * gap));
         if (i < NV) force[i] += s->force[i];
         else add_to(force, s->general + (i - NV) * NV, s->force[i], NV);
     }
@@ -234,8 +234,7 @@ static int all_levels(wbc_tick *t, int flag) {
     wbc_report *out = &t->report;
     double error = 0.0;
     int going = flag == WBC_SOLVED || flag == WBC_RELAXED;
-    /* Rows of slacks are nearly dependent where they bind: the point that levels begin at is refined */
-    if (going && !SLACKS) tidy(out);
+    if (going) tidy(out);
     else wbc_tick_certify(t);
     memset(out->levels, 0, sizeof out->levels);
     for (int k = 0; k < MT; k++) out->share[k] = 0.0;

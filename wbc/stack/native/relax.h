@@ -2,7 +2,7 @@
 #ifndef WBC_RELAX_H
 #define WBC_RELAX_H
 
-#include "active_set.h"
+#include "soft.h"
 
 /* Whether a row of a class misses its sides at x by more than rounding */
 static int gives_way(const wbc_tick *t, int k) {
@@ -131,29 +131,26 @@ static int optimum_of_the_rest(wbc_tick *t) {
     memcpy(low, t->low, sizeof low);
     memcpy(high, t->high, sizeof high);
     /* The sides have moved, and with them what the equality rows contribute */
-    if (!factor(t)) return -1;
-    solve_transposed(t, t->y);
-    int flag = constrained(t, LOOSE);
-    if (flag >= 0) return flag;
+    t->prepared = 0;
+    int flag = optimum(t, LOOSE);
+    if (flag >= 0 || t->spent) return flag;
     for (int i = 0; i < NV; i++) {
         if (low[i] == high[i]) continue;
         t->low[i] -= TOLERANCE * dof_scale[i];
         t->high[i] += TOLERANCE * dof_scale[i];
     }
-    flag = constrained(t, LOOSE);
+    t->prepared = 0;
+    flag = optimum(t, LOOSE);
     memcpy(t->low, low, sizeof low);
     memcpy(t->high, high, sizeof high);
-    if (flag >= 0) return flag;
+    if (flag >= 0 || t->spent) return flag;
     /* Joints that frozen rows speak of stay where the classes met; the others still serve the tasks */
     for (int k = 0; k < MC; k++)
         for (int e = a_start[k]; t->low[NV + k] == t->high[NV + k] && e < a_end[k]; e++)
             if (t->at[e] != 0.0) t->low[a_col[e]] = t->high[a_col[e]] = met[a_col[e]];
-    if (factor(t)) {
-        t->factored = 0;
-        solve_transposed(t, t->y);
-        flag = constrained(t, LOOSE);
-        if (flag >= 0) return flag;
-    }
+    t->prepared = 0;
+    flag = optimum(t, LOOSE);
+    if (flag >= 0 || t->spent) return flag;
     memcpy(t->low, low, sizeof low);
     memcpy(t->high, high, sizeof high);
     memcpy(t->x, met, sizeof met);

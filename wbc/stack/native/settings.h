@@ -31,6 +31,10 @@ int bend(const double **arg, double **res, long long *iw, double *w, int mem);
 #define RHO 1e-6
 /* How much more than other equality rows those that keep a direction count while curvature is looked for */
 #define FIRM 1e4
+/* Soft rows that are held are part of H where they count at most this often as much as it; of the price of others, as
+ * much as that, or at least a share, is in the factor */
+#define MODEST 1e0
+#define SHARE 1e-7
 /* Proximal steps of a relaxation at most, and the change of a row at which they end */
 #define PROXIMAL_STEPS 12
 #define SETTLED 1e-11
@@ -59,6 +63,15 @@ int bend(const double **arg, double **res, long long *iw, double *w, int mem);
 #define MINIMISED(k) (row_level[k] >= 0)
 #else
 #define MINIMISED(k) 0
+#endif
+
+/* Rows of the first level's QP that give way at a price */
+#if SOFT_ROWS > 0
+#define SOFTENED(t, k) ((t)->give[k] > 0.0)
+#define HELD(t, k) ((t)->held[k] != 0)
+#else
+#define SOFTENED(t, k) 0
+#define HELD(t, k) 0
 #endif
 
 INLINE double clamp(double x, double low, double high) { return x < low ? low : (x > high ? high : x); }

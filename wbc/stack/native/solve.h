@@ -39,7 +39,7 @@ static void partly(wbc_tick *t, const double *found, double share) {
     brake(t);
     for (int i = 0; i < NV; i++) way[i] = (isfinite(found[i]) ? clamp(found[i], t->low[i], t->high[i]) : 0.0) - t->x[i];
     for (int k = 0; k < MC; k++) {
-        if (MINIMISED(k) || slack_of[k] >= 0) continue;
+        if (MINIMISED(k) || price_at[k] >= 0) continue;
         const double at = row_at(t, k, t->x), change = row_at(t, k, way), rounding = TOLERANCE * row_scale[k];
         const double down = t->free_low[k] - rounding - at, up = t->free_high[k] + rounding - at;
         if (change < 0.0 && change < down) share = smaller(share, smaller(down, 0.0) / change);
@@ -75,14 +75,11 @@ EXPORT int wbc_tick_solve(wbc_tick *t) {
     t->report.iterations = 0.0;
     t->factored = t->spent = t->alone = 0;
     find_idle_rows(t);
-    if (t->unusable != 0.0 || !(t->prepared || factor(t))) {
+    if (t->unusable != 0.0) {
         brake(t);
         flag = WBC_BRAKED;
-    } else if (unconstrained(t)) {
-        t->warm = 0;
-        t->alone = 1;
     } else {
-        int exit_flag = constrained(t, TIGHT);
+        int exit_flag = optimum(t, TIGHT);
         const int first = t->spent;
         if (exit_flag < 0 && MC > 0 && !first) {
             flag = WBC_RELAXED;
@@ -94,6 +91,8 @@ EXPORT int wbc_tick_solve(wbc_tick *t) {
         } else if (exit_flag < 0) {
             brake(t);
             flag = WBC_BRAKED;
+        } else if (t->alone) {
+            t->warm = 0;
         } else {
             remember(t);
         }
@@ -108,7 +107,7 @@ EXPORT int wbc_tick_solve(wbc_tick *t) {
     int gave_way = 0;
     for (int k = 0; (flag == WBC_RELAXED || flag == WBC_CAPPED) && k < MC; k++) {
         const double value = row_at(t, k, t->report.v);
-        const double slack = MINIMISED(k) ? 0.0 : fmax(t->free_low[k] - value, value - t->free_high[k]);
+        const double slack = MINIMISED(k) || price_at[k] >= 0 ? 0.0 : fmax(t->free_low[k] - value, value - t->free_high[k]);
         t->report.slack[k] = slack > 2.0 * TOLERANCE * row_scale[k] ? slack : 0.0;
         gave_way |= t->report.slack[k] > 0.0;
     }

@@ -36,12 +36,14 @@ static int unsound(const wbc_tick *t, int flag) {
 /* By how much soft rows are violated; the slack of those that give way by more than is worth telling */
 static void tell_soft_rows(wbc_tick *t) {
     for (int k = 0; k < MC; k++) {
-        if (slack_of[k] < 0) continue;
-        double value = 0.0;
-        for (int e = a_start[k]; e < a_end[k]; e++)
-            if (a_col[e] != slack_of[k]) value += t->at[e] * t->report.v[a_col[e]];
+        if (price_at[k] < 0) continue;
+        const double value = row_at(t, k, t->report.v);
         const double missed = fmax(t->free_low[k] - value, value - t->free_high[k]);
         t->report.slack[k] = t->report.flag != WBC_BRAKED && missed > slack_told[k] ? missed : 0.0;
+#if SOFT_ROWS > 0
+        const int optimal = t->report.flag == WBC_SOLVED || t->report.flag == WBC_RELAXED;
+        if (optimal && t->melted[k]) t->report.lambda[NV + k] = (value - met_side(t, k)) / t->give[k];
+#endif
     }
 }
 
@@ -57,7 +59,7 @@ EXPORT int wbc_tick_step(wbc_tick *t) {
 #else
     wbc_tick_certify(t);
 #endif
-    if (SLACKS) tell_soft_rows(t);
+    if (PRICES) tell_soft_rows(t);
     wbc_tick_look_ahead(t);
     memcpy(t->v_last, t->report.v, NV * sizeof(double));
     return unsound(t, flag) ? flag + WBC_UNSOUND : flag;
@@ -68,12 +70,12 @@ EXPORT long long wbc_tick_size(void) { return (long long)sizeof(wbc_tick); }
 #define OFFSET(field) (long long)offsetof(wbc_tick, field)
 
 /* Where the caller finds q, v_last, v_in, use_v, p, dt, weight, enabled, bound_enabled, report, H, g, A, low, high,
- * unusable, plain, cap, wish, free_low, free_high, given */
+ * unusable, plain, cap, wish, free_low, free_high, given, give */
 EXPORT void wbc_tick_layout(long long *out) {
     const long long offsets[] = {OFFSET(q), OFFSET(v_last), OFFSET(v_in), OFFSET(use_v), OFFSET(p), OFFSET(dt),
                                  OFFSET(weight), OFFSET(enabled), OFFSET(bound_enabled), OFFSET(report), OFFSET(H),
                                  OFFSET(g), OFFSET(A), OFFSET(low), OFFSET(high), OFFSET(unusable), OFFSET(plain),
-                                 OFFSET(cap), OFFSET(wish), OFFSET(free_low), OFFSET(free_high), OFFSET(given)};
+                                 OFFSET(cap), OFFSET(wish), OFFSET(free_low), OFFSET(free_high), OFFSET(given), OFFSET(give)};
     memcpy(out, offsets, sizeof offsets);
 }
 
@@ -94,6 +96,10 @@ EXPORT int wbc_tick_bent(const wbc_tick *t, double *out) {
 
 EXPORT void wbc_tick_reset(wbc_tick *t) {
     t->warm = 0;
+#if SOFT_ROWS > 0
+    memset(t->held, 0, sizeof t->held);
+    memset(t->later, 0, sizeof t->later);
+#endif
 #if LEVELS > 0
     memset(t->levels.warm, 0, sizeof t->levels.warm);
 #endif

@@ -2,7 +2,7 @@
  *
  * The sizes and tables that this file uses are in "stack.h", which is generated for one stack:
  *   NQ NV NP    configuration, variables of the QP, parameters
- *   DOFS        the first of the variables are velocities; the others are slacks and shares, see soft.py
+ *   DOFS        the first of the variables are velocities; the others are shares of scaled tasks, see soft.py
  *   MT MC NB MH task rows, general constraint rows, bound blocks, margin rows (arrays have at least one entry)
  *   NNZJ NNZA   structural non-zeros of task rows and of general rows
  *   j_start j_col a_start a_end a_col   their positions, row by row
@@ -14,9 +14,10 @@
  *   pull_scale  how much curvature a row of unit error may have
  *   brake_at brake_limit   entry of bound_enabled that limits the acceleration of a velocity (-1: none), and the limit
  *   row_order   class of each general row in the order of sacrifice
- *   SLACKS      whether there are soft rows
+ *   PRICES price_at   whether rows are soft at a price; where the price of each general row is in p (-1: it has none)
+ *   SOFT_ROWS   how many of them the first level's QP has: none where there are strict levels
  *   KEPT kept_of   whether tasks of the first level keep directions; the row of such a task for each row that does (-1)
- *   slack_of slack_told   variable that is its slack (-1: none), and the violation from which on that is told
+ *   slack_told  violation of a soft row from which on it is reported
  *   row_scale   its unit: the characteristic length for rows in metres
  *   BALLS SEGMENTS   items whose rows are distances between a ball and segments of links, and those segments
  *   ball_pose ball_velocity ball_margin ball_rate   where their inputs are in p
@@ -90,21 +91,22 @@ typedef struct {
 typedef struct {
     double x[NV], reached[(LEVELS + 1) * NV];   /* the point, and that of every level */
     double low[M_ALL], high[M_ALL], given_low[M_ALL], given_high[M_ALL], general[MC * NV + 1];
-    int on[M_ALL], slot[M_ALL];                 /* rows that hold; slack of those that are minimised, -1 for the others */
+    int on[M_ALL], soft[M_ALL];                 /* rows that hold; rows that are minimised */
     double space[NV * NV];                      /* what is left: `width` orthonormal vectors */
     double basis[NV * NV], direction[NV * NV];  /* the same turned: the `rank` that the level takes come first */
-    double row[LEVEL_MOST * NV], weight[LEVEL_MOST], wanted[NV], scale, soft_weight;
+    double row[LEVEL_MOST * NV], weight[LEVEL_MOST], wanted[NV], scale;
+    double give[M_ALL];                         /* of rows that are minimised: by how much they give way per multiplier */
     double column[NV * LEVEL_MOST], damped[NV], least; /* rows along the directions */
     double H[NV * NV], inverse[NV * NV], right[NV], plain[NV], lambda[M_ALL], length[M_ALL];
     double force[M_ALL];                        /* multipliers, those in it that do not count as pushing */
     double bent[NV * NV];                       /* curvature of the first level */
     int bends, seen;                            /* whether there is any; directions that the rows take */
-    int width, rank, count, soft_count, order[LEVEL_MOST];
+    int width, rank, count, order[LEVEL_MOST];
     int keep[(LEVELS + 1) * M_ALL], warm[LEVELS + 1];
     DAQPWorkspace daqp;
     DAQPProblem problem;
-    double M[M_ALL * (NV + SOFT_MAX)], dupper[M_ALL], dlower[M_ALL], shift[NV + SOFT_MAX], scaling[M_ALL];
-    double z[NV + SOFT_MAX], old[NV + SOFT_MAX], u[NV + SOFT_MAX];
+    double M[M_ALL * NV], dupper[M_ALL], dlower[M_ALL], shift[NV], scaling[M_ALL], soft_scaling[M_ALL];
+    double z[NV], old[NV], u[NV];
     double lam[NV + SOFT_MAX + 2], lam_star[NV + SOFT_MAX + 2];
     double factor[(NV + SOFT_MAX + 2) * (NV + SOFT_MAX + 3) / 2], pivot[NV + SOFT_MAX + 2];
     double xldl[NV + SOFT_MAX + 2], zldl[NV + SOFT_MAX + 2];
@@ -140,7 +142,15 @@ typedef struct {
     /* factorisation */
     double R[NV * WIDE], inverse[NV * WIDE], inverse_diagonal[NV], y[WIDE];
     double scratch[WIDE], product[WIDE];
-    double strength[MC + 1];                    /* what equality rows add to the Hessian, per a a' */
+    double strength[MC + 1];                    /* what equality rows and soft rows add to the factor, per a a' */
+    double give[MC + 1];                        /* by how much a soft row gives way per multiplier; 0 for hard rows */
+#if SOFT_ROWS > 0
+    double loose[MC + 1];                       /* the same of what `strength` leaves of its price */
+    double soft_scaling[M_ALL], own_H[NV * WIDE], own_g[WIDE];
+    int held[MC + 1], melted[MC + 1];           /* soft rows that are violated, and those in H: see soft.h */
+    int later[MC + 1];                          /* soft rows that are held from the next tick on */
+    int settled;                                /* `strength` is that of the search, not that of the curvature */
+#endif
     double free_low[MC + 1], free_high[MC + 1]; /* sides of general rows before relaxation */
     double work_w[WORK_W + 1];
     long long work_iw[WORK_IW + 1];

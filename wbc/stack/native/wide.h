@@ -38,12 +38,14 @@ static void solve_gram(const wbc_tick *t, int count, double *r) {
     }
 }
 
-/* By how much the command misses the side of active row i, as the solver scales it */
-static double side_gap(const wbc_tick *t, int i) {
+/* By how much the command misses the side of active row `a`, moved by what a soft row gives way, as the solver scales it */
+static double side_gap(const wbc_tick *t, int a) {
+    const int i = t->daqp.WS[a];
     wide gap = t->sense[i] & LOWER ? -(wide)t->low[i] : -(wide)t->high[i];
     if (i < NV) gap += t->report.v[i];
     for (int e = i < NV ? 0 : a_start[i - NV]; i >= NV && e < a_end[i - NV]; e++)
         gap += (wide)t->at[e] * t->report.v[a_col[e]];
+    if (i >= NV && SOFTENED(t, i - NV)) gap -= (wide)looseness(t, i - NV) * t->daqp.lam_star[a];
     return (double)gap * t->scaling[i];
 }
 
@@ -92,7 +94,7 @@ static void fit_multipliers(wbc_tick *t, wide *lambda) {
             const int i = work->WS[a], k = i - NV;
             if (i < NV || MC == 0) continue;
             const wide fitted = lambda[k] - (wide)(mu[a] * t->scaling[i]);
-            if (t->low[i] != t->high[i] && !(t->sense[i] & LOWER ? fitted < 0.0 : fitted > 0.0)) continue;
+            if (!stays(t, i) && !(t->sense[i] & LOWER ? fitted < 0.0 : fitted > 0.0)) continue;
             work->lam_star[a] += (double)(fitted - lambda[k]);
             lambda[k] = fitted;
         }
@@ -125,7 +127,7 @@ static double tilt(const wbc_tick *t, int count) {
 static double active_residual(const wbc_tick *t) {
     double total = 0.0, z[ACTIVE_MAX];
     for (int a = 0, at = 0; a < t->daqp.n_active; a++) {
-        double r = side_gap(t, t->daqp.WS[a]);
+        double r = side_gap(t, a);
         for (int b = 0; b < a; b++) r -= t->L[at++] * z[b];
         at++;
         z[a] = r;
@@ -151,7 +153,7 @@ static double wide_bound(wbc_tick *t) {
         if (t->low[i] != t->high[i] && (t->sense[i] & LOWER ? -own : own) <= rounding[i]) continue;
         residual[i] = rounding[i] = 0.0;
     }
-    while (equal < work->n_active && t->low[work->WS[equal]] == t->high[work->WS[equal]]) equal++;
+    while (equal < work->n_active && is_equality(t, work->WS[equal])) equal++;
     for (int i = 0; i < NV; i++) {
         const double force = t->scratch[i] = (double)residual[i];
         if (i >= DOFS && force == 0.0 && rounding[i] == 0.0) continue;
