@@ -70,6 +70,16 @@ static void command(wbc_tick *t) {
     }
 }
 
+/* The sides as they were before anything gave way, those that cross met half-way */
+static void own_sides(wbc_tick *t) {
+    form_bounds(t);
+    for (int k = 0; k < MC; k++) {
+        t->low[NV + k] = MINIMISED(k) ? -WBC_INF : t->free_low[k];
+        t->high[NV + k] = MINIMISED(k) ? WBC_INF : t->free_high[k];
+    }
+    uncross(t);
+}
+
 EXPORT int wbc_tick_solve(wbc_tick *t) {
     int flag = uncross(t) ? WBC_RELAXED : WBC_SOLVED;
     t->report.iterations = 0.0;
@@ -111,8 +121,11 @@ EXPORT int wbc_tick_solve(wbc_tick *t) {
         t->report.slack[k] = slack > 2.0 * TOLERANCE * row_scale[k] ? slack : 0.0;
         gave_way |= t->report.slack[k] > 0.0;
     }
-    /* Rows that contradict each other by rounding only */
-    if (flag == WBC_RELAXED && !gave_way) flag = WBC_SOLVED;
+    /* Rows that contradict each other by rounding only: what is certified are their own sides */
+    if (flag == WBC_RELAXED && !gave_way) {
+        flag = WBC_SOLVED;
+        own_sides(t);
+    }
     t->report.flag = flag;
     return flag;
 }

@@ -1,6 +1,7 @@
 /* The entry points of one stack's tick */
 #include "assemble.h"
 #include "levels.h"
+#include "primal.h"
 #include "pose.h"
 
 static int refused(const wbc_tick *t) {
@@ -58,6 +59,7 @@ EXPORT int wbc_tick_step(wbc_tick *t) {
     flag = all_levels(t, flag);
 #else
     wbc_tick_certify(t);
+    if (unsound(t, flag) && primal(t)) flag = (int)(t->report.flag = flag == WBC_RELAXED ? WBC_RELAXED : WBC_SOLVED);
 #endif
     if (PRICES) tell_soft_rows(t);
     wbc_tick_look_ahead(t);
