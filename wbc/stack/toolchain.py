@@ -21,6 +21,8 @@ log = logging.getLogger("wbc")
 #: Flags of the generated rows: straight-line code, on which higher levels cost minutes and gain nothing.
 #: ``WBC_ROWS_FLAGS`` replaces them: at -O0 they compile in half the time, to the same arithmetic
 ROWS_FLAGS = tuple(os.environ.get("WBC_ROWS_FLAGS", "-O1").split())
+#: Generated code longer than this [characters] is compiled at -O0: the time of -O1 grows faster than the code, to minutes
+LONG_ROWS = 1_000_000
 #: Flags of the hand-written cycle: its loops have constant bounds and are worth unrolling. ``WBC_TICK_FLAGS`` replaces
 #: them, as above
 TICK_FLAGS = tuple(os.environ.get("WBC_TICK_FLAGS", "-O3").split())
@@ -109,8 +111,9 @@ def compile_tick(files: dict[str, str], output: pathlib.Path, search: bool = Fal
         for name, text in files.items():
             (place / name).write_text(text)
         include = (f"-I{headers()}",)
+        flags = ROWS_FLAGS if len(files["rows.c"]) <= LONG_ROWS else ("-O0",)
         parts = (
-            [cc, *COMMON_FLAGS, *ROWS_FLAGS, "-c", "rows.c", "-o", "rows.o"],
+            [cc, *COMMON_FLAGS, *flags, "-c", "rows.c", "-o", "rows.o"],
             [cc, *COMMON_FLAGS, *TICK_FLAGS, *include, "-c", "converge.c" if search else "tick.c", "-o", "tick.o"],
         )
         with ThreadPoolExecutor(len(parts)) as pool:

@@ -15,7 +15,7 @@ int main(int argc, char **argv) {
     static wbc_memory memory;
     static double q[WBC_NQ + 1], v[WBC_NV], expected[1 + WBC_NV];
     double head[6], largest = 0.0;
-    int differ = 0, seen[4] = {0, 0, 0, 0};
+    int differ = 0, others = 0, seen[4] = {0, 0, 0, 0};
     const char *name = argc > 1 ? argv[1] : "check.bin";
     FILE *file = fopen(name, "rb");
     if (!file || !numbers(file, head, 6)) {
@@ -42,10 +42,11 @@ int main(int argc, char **argv) {
             same = same && difference <= head[5];
         }
         differ += !same;
-        if (status >= 0) seen[status]++;
+        if (status >= 0 && status < 4) seen[status]++;
+        else others++;
     }
     fclose(file);
-    printf("%d states: %d solved, %d relaxed, %d braked, %d capped; %d differ, by %.3g at most\n", states, seen[0], seen[1],
-           seen[2], seen[3], differ, largest);
+    printf("%d states: %d solved, %d relaxed, %d braked, %d capped, %d recovered or uncertified; %d differ, by %.3g at most\n",
+           states, seen[0], seen[1], seen[2], seen[3], others, differ, largest);
     return differ != 0;
 }

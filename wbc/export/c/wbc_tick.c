@@ -50,8 +50,7 @@ int wbc_step(wbc_controller *c, const double *q, const double *v) {
         memcpy(t->v_in, v, DOFS * sizeof(double));
         t->use_v = 1.0;
     }
-    const int flag = wbc_tick_step(t);
-    return flag < 0 ? flag : flag & ~WBC_UNSOUND;
+    return wbc_tick_safe_step(t);
 }
 
 const wbc_result *wbc_last(wbc_controller *c) { return (const wbc_result *)(void *)&inside(c)->report; }

@@ -21,8 +21,11 @@ extern "C" {
 /* Status of a step. Negative: the arguments were refused and nothing was changed. */
 #define WBC_SOLVED 0      /* every constraint row holds, v is the optimum */
 #define WBC_RELAXED 1     /* rows could not all hold: some gave way in the declared order, see `slack` */
-#define WBC_BRAKED 2      /* no optimum was found: v brings every joint to rest as fast as its bounds allow */
+#define WBC_BRAKED 2      /* numbers are not finite, or bounds leave no interval: v brings joints to rest as bounds allow */
 #define WBC_CAPPED 3      /* wbc_set_iteration_cap ended the search: v keeps the bounds, between braking and the best */
+#define WBC_RECOVERED 4   /* the first answer had no certificate, that of a search from no active set has: constraints
+                           * hold or have given way as `slack` says */
+#define WBC_UNCERTIFIED 8 /* neither had one: v brings every joint to rest as fast as its bounds allow */
 #define WBC_BAD_Q (-1)    /* q holds NaN or infinity */
 #define WBC_BAD_UNIT (-2) /* a quaternion or a (cos, sin) pair in q is not of unit length */
 #define WBC_BAD_V (-3)    /* v holds NaN or infinity */
@@ -85,7 +88,8 @@ wbc_controller *wbc_init(wbc_memory *memory);
 void wbc_reset(wbc_controller *c, const double *v);
 
 /* One cycle at configuration q. v: a measured velocity that acceleration bounds are counted from, or NULL for the last
- * command. Returns the status. */
+ * command. Returns the status; a command is certified unless it is WBC_BRAKED, WBC_CAPPED or WBC_UNCERTIFIED. Takes about
+ * twice as long where the first answer has no certificate. */
 int wbc_step(wbc_controller *c, const double *q, const double *v);
 
 /* The report of the last step; it lies in the controller and changes with the next one */

@@ -52,6 +52,10 @@
 #define WBC_RELAXED 1
 #define WBC_BRAKED 2
 #define WBC_CAPPED 3
+/* Of wbc_tick_safe_step: what the step led to had no certificate, and a search from no active set led to one that has, or
+ * had none either and every joint brakes */
+#define WBC_RECOVERED 4
+#define WBC_UNCERTIFIED 8
 /* Added to what wbc_tick_step returns: the certificate fails, or there is no answer although all numbers are fit */
 #define WBC_UNSOUND 4
 #define WBC_BAD_Q (-1)
