@@ -22,6 +22,7 @@ from wbc.controller.soft import SoftRows
 from wbc.controller.tick import Assembly, Buffers
 from wbc.qp.certificate import Certificate, certify
 from wbc.qp.hierarchy import Answer
+from wbc.qp.polish import polish
 from wbc.qp.problem import QP, Solution
 from wbc.qp.relax import Relaxation, Relaxed
 from wbc.qp.solvers import make_solver
@@ -32,6 +33,8 @@ from wbc.validation import Array
 
 #: What an equality row in its unit may be missed by through the rounding of its own numbers
 _ROUNDING = 1e-12
+#: Corrections of the active set where a solver's answer has no certificate
+POLISH_ROUNDS = 200
 #: Of a tick that brakes
 _NONE = Certificate(INFINITE, INFINITE, INFINITE, INFINITE)
 
@@ -95,6 +98,12 @@ class SolvedTick(Buffers):
                 multipliers = qp.rows_of(answer.multipliers)
                 sides = QP(wide.H, wide.g, *self._met(wide, answer, x), wide.A)
                 certificate = certify(sides, Solution(x, answer.multipliers, "solved"), self._velocities)
+                if not self._sound(certificate):
+                    found = polish(sides, Solution(x, answer.multipliers, "solved"), POLISH_ROUNDS)
+                    better = certify(sides, found.solution, self._velocities)
+                    if found.exact and self._sound(better):
+                        certificate, x = better, np.clip(found.solution.x, sides.lower[: wide.n], sides.upper[: wide.n])
+                        v, multipliers = x[: self._nv], qp.rows_of(found.solution.multipliers)
             else:
                 multipliers = levels.multipliers
                 sides = QP(qp.H, qp.g, *self._met(qp, answer, v), qp.A)
@@ -111,11 +120,13 @@ class SolvedTick(Buffers):
         self.v_last[:] = v
         if answer is None:
             return BRAKED + UNSOUND if self.assembly.usable else BRAKED
+        return flag if self._sound(certificate) else flag + UNSOUND
+
+    def _sound(self, certificate: Certificate) -> bool:
+        """Whether a certificate holds, as ``unsound`` in ``native/tick.c`` decides it."""
         optimal = max(certificate.stationarity, certificate.complementarity) <= OPTIMAL
-        sound = (
-            optimal or certificate.error_bound <= KNOWN * self._longest
-        ) and certificate.violation <= SOUND * self._longest
-        return flag if sound else flag + UNSOUND
+        known = optimal or certificate.error_bound <= KNOWN * self._longest
+        return known and certificate.violation <= SOUND * self._longest
 
     def brake(self, qp: QP) -> None:
         """Every joint comes to rest as fast as its bounds allow; the report says so."""
@@ -165,6 +176,13 @@ class SolvedTick(Buffers):
             if crossed[self._orders == 0].any():
                 return BRAKED, self.rest(qp), None
             answer = self._relaxation.solve(sides, self._orders, self._units, self._dof_scales)
+            if answer.flag == "failed":
+                found = polish(sides, Solution(answer.x, answer.multipliers, "failed"), POLISH_ROUNDS)
+                if found.exact:
+                    zero = np.zeros(qp.m)
+                    got, ends = found.solution, (sides.lower, sides.upper)
+                    x = np.clip(got.x, sides.lower[: qp.n], sides.upper[: qp.n])
+                    answer = Relaxed(x, got.multipliers, "solved", zero, zero > 0.0, *ends, got.iterations)
             if answer.flag != "failed":
                 answer = self._soft.polished(qp, answer)
                 return RELAXED if crossed.any() or answer.flag == "relaxed" else SOLVED, answer.x, answer

@@ -8,7 +8,7 @@ import re
 _BYTES = {"double": 8, "long long": 8, "int": 4, "DAQPWorkspace": 1024, "DAQPProblem": 256, "DAQPSettings": 512}
 _DEFINE = re.compile(r"^#define (\w+) +([-+*/() \w]+?)\s*$", re.MULTILINE)
 _STRUCT = re.compile(r"typedef struct \{(.*?)\} (\w+);", re.DOTALL)
-_BLOCK = re.compile(r"^#if LEVELS > 0$(.*?)^#endif$", re.DOTALL | re.MULTILINE)
+_BLOCK = re.compile(r"^#if (LEVELS|SOFT_ROWS) > 0$(.*?)^#endif$", re.DOTALL | re.MULTILINE)
 _FIELD = re.compile(r"\s*(\w+)\s*(?:\[(.+)\])?\s*$", re.DOTALL)
 
 
@@ -20,7 +20,7 @@ def bytes_of_tick(tick: str, stack: str) -> int:
     """
     known = dict(_DEFINE.findall(stack + tick))
     sizes = dict(_BYTES)
-    tick = _BLOCK.sub(lambda block: block[1] if int(known["LEVELS"]) > 0 else "", tick)
+    tick = _BLOCK.sub(lambda block: block[2] if int(known[block[1]]) > 0 else "", tick)
     for body, name in _STRUCT.findall(re.sub(r"/\*.*?\*/", "", tick, flags=re.DOTALL)):
         sizes[name] = sum(_bytes(declaration, sizes, known) for declaration in body.split(";") if declaration.strip())
     return sizes["wbc_tick"] // 64 * 64 + 64

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from wbc.qp.hierarchy import Achieved, Hierarchy, Level
+from wbc.qp.polish import polish
 from wbc.qp.problem import QP, Solution
 from wbc.validation import Array
 
@@ -15,6 +16,8 @@ if TYPE_CHECKING:
 
 #: Cost of the directions that a level leaves free, in the QP of that level; its steps take the effect away again
 PROXIMAL, STEPS, SETTLED = 1e-6, 12, 1e-11
+#: Corrections of the active set where the solver finds none
+POLISH_ROUNDS = 200
 #: Violations up to this are rounding
 ROOM = 1e-9
 #: Rows shorter than this in the space that is left cannot be moved
@@ -206,6 +209,8 @@ class LevelStep:
         for _ in range(STEPS):
             found = solver.solve(qp)
             self.iterations += found.iterations
+            if not found.solved:
+                found = polish(qp, found, POLISH_ROUNDS).solution
             if not found.solved:
                 break
             moved = np.inf if best is None else float(np.abs(found.x - best.x).max(initial=0.0))

@@ -46,7 +46,7 @@ int main(int argc, char **argv) {
         else others++;
     }
     fclose(file);
-    printf("%d states: %d solved, %d relaxed, %d braked, %d capped, %d recovered or uncertified; %d differ, by %.3g at most\n",
-           states, seen[0], seen[1], seen[2], seen[3], others, differ, largest);
+    printf("%d states: %d solved, %d relaxed, %d braked, %d recovered or uncertified, %d capped; %d differ, by %.3g at most\n",
+           states, seen[0], seen[1], seen[2], others, seen[3], differ, largest);
     return differ != 0;
 }

@@ -38,7 +38,10 @@ static wide wide_row(const wbc_tick *t, int k, const wide *x) {
 
 static double side_of(const wbc_tick *t, const wbc_primal *s, int i) { return s->side[i] & LOWER ? t->low[i] : t->high[i]; }
 
-INLINE int is_soft(const wbc_tick *t, int i) { return i >= NV && SOFTENED(t, i - NV); }
+INLINE int is_soft(const wbc_tick *t, int i) {
+    (void)t;
+    return i >= NV && SOFTENED(t, i - NV);
+}
 
 /* Where the search begins: the command, if it keeps all hard rows; 0 if it does not */
 static int begin_primal(wbc_tick *t, wbc_primal *s) {
@@ -61,7 +64,7 @@ static int begin_primal(wbc_tick *t, wbc_primal *s) {
     }
     for (int a = 0; a < t->daqp.n_active; a++) {
         const int i = t->daqp.WS[a], lower = t->sense[i] & LOWER;
-        if (s->side[i] || is_soft(t, i)) continue;
+        if ((i >= NV && MC == 0) || s->side[i] || is_soft(t, i)) continue;
         const wide at = i < NV ? s->x[i] : wide_row(t, i - NV, s->x), end = lower ? t->low[i] : t->high[i];
         if (i < NV ? at == end : fabsl(at - end) <= TOLERANCE * row_scale[i - NV]) s->side[i] = ACTIVE | lower;
     }
@@ -293,6 +296,7 @@ static int primal(wbc_tick *t) {
     wbc_primal s;
     int same = 0, found = 0;
     wbc_report *out = &t->report;
+    memset(&s, 0, sizeof s);
 #if SOFT_ROWS > 0
     s.H = t->own_H;
     s.g = t->own_g;

@@ -67,28 +67,6 @@ EXPORT int wbc_tick_step(wbc_tick *t) {
     return unsound(t, flag) ? flag + WBC_UNSOUND : flag;
 }
 
-/* The step where no other solver is at hand: what has no certificate is searched again from no active set, and brakes
- * where that has none either */
-EXPORT int wbc_tick_safe_step(wbc_tick *t) {
-    int flag = wbc_tick_step(t);
-    if (flag < 0 || !(flag & WBC_UNSOUND)) return flag;
-    memcpy(t->v_last, t->v_in, sizeof t->v_in);
-    wbc_tick_reset(t);
-    flag = wbc_tick_step(t);
-    if (!(flag & WBC_UNSOUND)) return (int)(t->report.flag = WBC_RECOVERED);
-    memcpy(t->v_last, t->v_in, sizeof t->v_in);
-    wbc_tick_reset(t);
-    assemble(t, 1);
-    brake(t);
-    command(t);
-    t->report.flag = WBC_BRAKED;
-    wbc_tick_certify(t);
-    memset(t->report.slack, 0, sizeof t->report.slack);
-    wbc_tick_look_ahead(t);
-    memcpy(t->v_last, t->report.v, NV * sizeof(double));
-    return (int)(t->report.flag = WBC_UNCERTIFIED);
-}
-
 EXPORT long long wbc_tick_size(void) { return (long long)sizeof(wbc_tick); }
 
 #define OFFSET(field) (long long)offsetof(wbc_tick, field)
@@ -127,6 +105,28 @@ EXPORT void wbc_tick_reset(wbc_tick *t) {
 #if LEVELS > 0
     memset(t->levels.warm, 0, sizeof t->levels.warm);
 #endif
+}
+
+/* The step where no other solver is at hand: what has no certificate is searched again from no active set, and brakes
+ * where that has none either */
+EXPORT int wbc_tick_safe_step(wbc_tick *t) {
+    int flag = wbc_tick_step(t);
+    if (flag < 0 || !(flag & WBC_UNSOUND)) return flag;
+    memcpy(t->v_last, t->v_in, sizeof t->v_in);
+    wbc_tick_reset(t);
+    flag = wbc_tick_step(t);
+    if (!(flag & WBC_UNSOUND)) return (int)(t->report.flag = WBC_RECOVERED);
+    memcpy(t->v_last, t->v_in, sizeof t->v_in);
+    wbc_tick_reset(t);
+    assemble(t, 1);
+    brake(t);
+    command(t);
+    t->report.flag = WBC_BRAKED;
+    wbc_tick_certify(t);
+    memset(t->report.slack, 0, sizeof t->report.slack);
+    wbc_tick_look_ahead(t);
+    memcpy(t->v_last, t->report.v, NV * sizeof(double));
+    return (int)(t->report.flag = WBC_UNCERTIFIED);
 }
 
 EXPORT void wbc_tick_init(wbc_tick *t) {
