@@ -16,6 +16,7 @@ from wbc.validation import Array
 #: As in ``native/reach.h``
 TRUSTED, AT_LIMIT, PUSHED, NEGLIGIBLE, LEAST_PIVOT, BRAKING = 2.0, 0.02, 0.01, 0.05, 1e-4, 1.0
 REMOVED, TOO_FAR, CORRECTIONS = 0.02, 1e50, 2
+SHARPENED, APART = 3, 1e6
 #: As in ``native/settings.h``
 FIRM = 1e4
 #: As in ``native/margins.h``
@@ -86,7 +87,7 @@ class Reach:
         metric = _cut_off(self._strengthened(H, equal), free)
         if not _is_definite(metric):
             return H, plain
-        curved = self._curved(H, metric, J, weight, error, slope, free, keepers)
+        curved = self._curved(H, metric, J, weight, error, slope, free, keepers, equal)
         if curved is not None:
             H, metric = curved, self._strengthened(curved, equal)
             if not _is_definite(metric):
@@ -136,6 +137,7 @@ class Reach:
         slope: Array,
         free: Array,
         keepers: tuple[Array, NDArray[np.intp], Array],
+        equal: Array,
     ) -> Array | None:
         """H with the curvature of the errors that one step leaves, None where there is none to count."""
         if self._bend is None:
@@ -145,11 +147,12 @@ class Reach:
         rows, kept, parts = keepers
         stiffness = FIRM * float((np.diag(H) * self._dofs**2).max(initial=0.0))
         firm = metric + _cut_off((stiffness - stiffness / FIRM) * rows.T @ rows, free)
-        step = np.linalg.solve(firm, slope)
+        squares = [(J, weight), (equal, np.full(len(equal), stiffness / FIRM)), (rows, np.full(len(rows), stiffness - stiffness / FIRM))]
+        step = self._sharp(firm, squares, free, 0.0, slope)
         length = float(np.abs(step / self._dofs)[: self._dof_count].max())
         if length > TRUSTED:
             more = float(np.abs(slope * self._dofs).max()) / TRUSTED * (1.0 - TRUSTED / length)
-            step = np.linalg.solve(firm + np.diag(more / self._dofs**2), slope)
+            step = self._sharp(firm + np.diag(more / self._dofs**2), squares, free, more, slope)
         step = free * step
         pull = weight * (error - J @ step)
         pull[kept] -= parts * stiffness * (rows @ step)
@@ -169,6 +172,31 @@ class Reach:
         least = max(LEAST_PIVOT * float(np.abs(bent * scale).max()), least)
         more_pivot = definite(mixed * scale, least)
         return np.asarray(mixed + np.diag(more_pivot / self._dofs**2))
+
+    def _sharp(
+        self, metric: Array, squares: list[tuple[Array, Array]], free: Array, more: float, b: Array
+    ) -> Array:
+        """metric^-1 b at rounding level, see ``sharpen`` in ``native/reach.h``.
+
+        Args:
+            squares: rows and what each counts, whose sum is the metric but for damping, ``more`` and what is cut off.
+        """
+        x = np.linalg.solve(metric, b)
+        pivots = (np.diag(np.linalg.cholesky(metric)) * self._dofs) ** 2
+        if pivots.max() <= APART * pivots.min():
+            return np.asarray(x)
+        diagonal = (self._damping + more / self._dofs**2).astype(np.longdouble)
+        for _ in range(SHARPENED):
+            rest = b - diagonal * x
+            for rows, counts in squares:
+                wide = rows.astype(np.longdouble)
+                rest = rest - free * (wide.T @ (counts * (wide @ (free * x))))
+                rest = rest - (1.0 - free**2) * np.einsum("ij,ij,i->j", wide, wide, counts) * x
+            change = np.linalg.solve(metric, rest.astype(np.float64))
+            x = x + change
+            if np.abs(change / self._dofs).max() <= 0.5 * np.finfo(np.float64).eps * np.abs(x / self._dofs).max():
+                break
+        return np.asarray(x)
 
     def _stoppable(
         self, metric: Array, J: Array, wanted: Array, largest: float, free: Array, bound_enabled: Array

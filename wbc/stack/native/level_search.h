@@ -10,6 +10,8 @@
 #define PROXIMAL 1e-6
 #define LEVEL_STEPS 12
 #define LEVEL_SETTLED 1e-11
+/* Corrections of the point where active rows meet */
+#define MEETINGS 2
 /* Rows shorter than this in the space that is left cannot be moved */
 #define UNMOVED 1e-9
 /* Multipliers below this are rounding, whatever drives the level */
@@ -125,6 +127,32 @@ static void level_multipliers(wbc_levels *s) {
         if (fabs(s->lambda[i]) * s->length[i] <= larger(PUSHING * drive, NOISE)) s->lambda[i] = 0.0;
 }
 
+/* Active rows meet their sides to rounding: the search leaves them off by what the cost of free directions hides */
+static void level_meet(wbc_tick *t, double *z) {
+    wbc_levels *s = &t->levels;
+    DAQPWorkspace *work = &s->daqp;
+    for (int n = 0; n < MEETINGS && work->n_active > 0; n++) {
+        double x[NV], move[NV] = {0}, mu[NV + SOFT_MAX + 2];
+        memcpy(x, s->x, sizeof x);
+        for (int j = 0; j < s->width; j++) add_to(x, s->basis + j * NV, z[j], NV);
+        for (int a = 0; a < work->n_active; a++) {
+            const int i = work->WS[a];
+            double low, high;
+            level_sides(s, i, &low, &high);
+            const double given = s->soft[i] ? s->give[i] * work->lam_star[a] * s->scaling[i] : 0.0;
+            mu[a] = ((s->sense[i] & LOWER ? low : high) + given - row_of(s, i, x)) * s->scaling[i];
+        }
+        solve_factors(s->factor, s->pivot, work->n_active, mu);
+        for (int a = 0; a < work->n_active; a++) {
+            add_to(move, s->M + work->WS[a] * s->width, mu[a], s->width);
+            work->lam_star[a] -= mu[a];
+        }
+        for (int k = 0; k < s->rank; k++)
+            for (int j = k; j < s->rank; j++) z[k] += s->inverse[k * NV + j] * move[j];
+        for (int j = s->rank; j < s->width; j++) z[j] += move[j] / sqrt(PROXIMAL);
+    }
+}
+
 /* The optimum of a level whose rows bind, into `z` (its directions) and lambda; 0 where it was not found */
 static int level_search(wbc_tick *t, int place, double *z) {
     wbc_levels *s = &t->levels;
@@ -149,6 +177,10 @@ static int level_search(wbc_tick *t, int place, double *z) {
         level_multipliers(s);
         s->warm[place] = found = 1;
         if (s->width == s->rank || (step > 0 && moved <= LEVEL_SETTLED)) break;
+    }
+    if (found && !t->spent) {
+        level_meet(t, z);
+        level_multipliers(s);
     }
     return found;
 }

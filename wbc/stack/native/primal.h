@@ -12,8 +12,6 @@
 
 #include "certify.h"
 
-#if LEVELS == 0
-
 /* Steps at most */
 #define PRIMAL_STEPS (6 * NV + 60)
 /* Rows whose part beside the others is shorter than this depend on them */
@@ -345,7 +343,5 @@ static int primal(wbc_tick *t) {
     t->warm = 1;
     return 1;
 }
-
-#endif
 
 #endif

@@ -22,6 +22,9 @@
 #define BRAKING 1.0
 /* Errors beyond this are left to the linear model, before squares of them overflow */
 #define TOO_FAR 1e50
+/* Corrections of a step with residuals in wide arithmetic, where the squared pivots of the metric are further apart */
+#define SHARPENED 3
+#define APART 1e6
 /* Corrections of the step that follows moving targets */
 #define CORRECTIONS 2
 
@@ -86,16 +89,59 @@ static int cut_off(wbc_tick *t, const double *free, double more) {
 
 #if NNZK > 0
 
+/* What a metric step leaves of the slope: r -= f a a' x for a row a, blocked joints cut off */
+INLINE void less_row(const double *a, const int *col, int count, double f, const double *free, const double *x, wide *r) {
+    wide sum = 0.0L;
+    for (int e = 0; e < count; e++) sum += (wide)a[e] * free[col[e]] * x[col[e]];
+    sum *= f;
+    for (int e = 0; e < count; e++) {
+        const double open = free[col[e]];
+        r[col[e]] -= a[e] * (open * sum + (1.0 - open * open) * f * a[e] * (wide)x[col[e]]);
+    }
+}
+
+/* The solution x for b in the metric of R, at rounding level however far its pivots are apart: the errors that a step
+ * leaves are small differences, and what they bend must not be noise. `more` is on the diagonal besides. */
+static void sharpen(const wbc_tick *t, const double *free, double more, const double *b, double *x) {
+    double least = WBC_INF, most = 0.0;
+    for (int i = 0; i < NV; i++) {
+        const double pivot = dof_scale[i] / t->inverse_diagonal[i];
+        least = smaller(least, pivot * pivot);
+        most = larger(most, pivot * pivot);
+    }
+    for (int n = 0; most > APART * least && n < SHARPENED; n++) {
+        wide r[NV];
+        double rest[WIDE] = {0}, change[WIDE];
+        for (int i = 0; i < NV; i++) {
+            const double fixed = t->low[i] == t->high[i] ? t->stiffness : 0.0;
+            r[i] = b[i] - (damping[i] + (more + fixed) / (dof_scale[i] * dof_scale[i])) * (wide)x[i];
+        }
+        for (int k = 0; k < LEADING; k++) {
+            const double f = t->weight[k] * t->report.factor[k];
+            if (f != 0.0) less_row(t->jt + j_start[k], j_col + j_start[k], j_start[k + 1] - j_start[k], f, free, x, r);
+        }
+        for (int k = 0; k < MC; k++)
+            if (t->strength[k] != 0.0) less_row(t->at + a_start[k], a_col + a_start[k], a_end[k] - a_start[k], t->strength[k], free, x, r);
+        for (int i = 0; i < NV; i++) rest[i] = (double)r[i];
+        solve_with(t, rest, change);
+        for (int i = 0; i < NV; i++) x[i] += change[i];
+        if (largest_step(change) <= EPS * largest_step(x)) break;
+    }
+}
+
 /* The step of the linear model, kept to TRUSTED where it asks for more, in R, which it changes then; 0 for none */
 static int trusted_step(wbc_tick *t, const double *free, const double *slope, double *step, int *changed) {
     solve_with(t, slope, step);
+    sharpen(t, free, 0.0, slope, step);
     const double length = largest_step(step);
     if (length > TRUSTED) {
         double steepest = 0.0;
         for (int i = 0; i < NV; i++) steepest = larger(steepest, fabs(slope[i]) * dof_scale[i]);
         *changed = 1;
-        if (!cut_off(t, free, steepest / TRUSTED * (1.0 - TRUSTED / length))) return 0;
+        const double more = steepest / TRUSTED * (1.0 - TRUSTED / length);
+        if (!cut_off(t, free, more)) return 0;
         solve_with(t, slope, step);
+        sharpen(t, free, more, slope, step);
     }
     for (int i = 0; i < NV; i++) step[i] *= free[i];
     return 1;

@@ -58,6 +58,10 @@ int bend(const double **arg, double **res, long long *iw, double *w, int mem);
 /* Violations of rows that the solver took into account, in row units: beyond this the row cannot hold */
 #define SEEN 1e-6
 
+/* Where double precision is not enough */
+typedef long double wide;
+#define WIDE_EPS (0.5L * LDBL_EPSILON)
+
 /* General rows that are minimised at a level are no part of the first level's QP */
 #if LEVELS > 0
 #define MINIMISED(k) (row_level[k] >= 0)

@@ -56,6 +56,7 @@ EXPORT int wbc_tick_step(wbc_tick *t) {
     assemble(t, 1);
     int flag = wbc_tick_solve(t);
 #if LEVELS > 0
+    if (flag == WBC_BRAKED && t->unusable == 0.0 && primal(t)) flag = (int)(t->report.flag = WBC_SOLVED);
     flag = all_levels(t, flag);
 #else
     wbc_tick_certify(t);
