@@ -107,7 +107,7 @@ class Levels:
             soft = np.flatnonzero(self._row_levels == place)
             prices = np.where(self._price_at[soft] >= 0, self._assembly.p[self._price_at[soft]], 1.0)
             soft, prices = soft[prices > 0.0], prices[prices > 0.0]
-            scale = float(weight[span][counts[span]].max(initial=0.0)) or float(prices.max(initial=0.0)) or 1.0
+            scale = max(float(weight[span][counts[span]].max(initial=0.0)), float(prices.max(initial=0.0))) or 1.0
             relative = np.where(counts[span], weight[span] / scale, 0.0)
             wanted = rows[span].T @ (relative * wish[span])
             bent = None

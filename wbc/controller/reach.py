@@ -147,7 +147,11 @@ class Reach:
         rows, kept, parts = keepers
         stiffness = FIRM * float((np.diag(H) * self._dofs**2).max(initial=0.0))
         firm = metric + _cut_off((stiffness - stiffness / FIRM) * rows.T @ rows, free)
-        squares = [(J, weight), (equal, np.full(len(equal), stiffness / FIRM)), (rows, np.full(len(rows), stiffness - stiffness / FIRM))]
+        squares = [
+            (J, weight),
+            (equal, np.full(len(equal), stiffness / FIRM)),
+            (rows, np.full(len(rows), stiffness - stiffness / FIRM)),
+        ]
         step = self._sharp(firm, squares, free, 0.0, slope)
         length = float(np.abs(step / self._dofs)[: self._dof_count].max())
         if length > TRUSTED:
@@ -173,9 +177,7 @@ class Reach:
         more_pivot = definite(mixed * scale, least)
         return np.asarray(mixed + np.diag(more_pivot / self._dofs**2))
 
-    def _sharp(
-        self, metric: Array, squares: list[tuple[Array, Array]], free: Array, more: float, b: Array
-    ) -> Array:
+    def _sharp(self, metric: Array, squares: list[tuple[Array, Array]], free: Array, more: float, b: Array) -> Array:
         """metric^-1 b at rounding level, see ``sharpen`` in ``native/reach.h``.
 
         Args:

@@ -52,7 +52,7 @@ class SolvedTick(Buffers):
         self._orders = np.array(row_orders(layout), dtype=np.int_)
         self._units = np.array(row_units(stack, layout), dtype=np.float64)
         scales = layout.dof_scales(stack)
-        self._longest = max(1.0, scales.max(initial=1.0), self._units.max(initial=1.0))
+        self._longest = max(1.0, float(scales.max(initial=1.0)), float(self._units.max(initial=1.0)))
         wide = np.concatenate((scales, np.ones(layout.with_slacks - layout.variables)))
         self._dof_scales = None if (scales == 1.0).all() else wide
         self._soft = SoftRows(stack, layout)
@@ -126,7 +126,7 @@ class SolvedTick(Buffers):
         """Whether a certificate holds, as ``unsound`` in ``native/tick.c`` decides it."""
         optimal = max(certificate.stationarity, certificate.complementarity) <= OPTIMAL
         known = optimal or certificate.error_bound <= KNOWN * self._longest
-        return known and certificate.violation <= SOUND * self._longest
+        return bool(known and certificate.violation <= SOUND * self._longest)
 
     def brake(self, qp: QP) -> None:
         """Every joint comes to rest as fast as its bounds allow; the report says so."""

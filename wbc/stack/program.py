@@ -212,9 +212,7 @@ class _Builder:
         matrix = tracer.jacobian(margin[: count - sensed, :])
         if sensed:
             empty = ca.SX(sensed, self.layout.nv)
-            matrix = ca.vertcat(
-                matrix, empty if self.loops else self.sensed_matrix(block, sensed)
-            )
+            matrix = ca.vertcat(matrix, empty if self.loops else self.sensed_matrix(block, sensed))
         rows = Rows(matrix, low, ca.SX.inf(count))
         return rows, tracer.expand(margin), tracer.expand(factor)
 

@@ -12,7 +12,6 @@ minimised at their level, like a constraint that was added to it.
 from __future__ import annotations
 
 import casadi as ca
-import numpy as np
 
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Block, Layout

@@ -16,15 +16,13 @@ static void unit_row(const wbc_tick *t, int k, double *out) {
 /* The weight of a row that is minimised, in its unit; 0 where it is switched off */
 static double row_price(const wbc_tick *t, int k) { return price_at[k] >= 0 ? t->p[price_at[k]] : 1.0; }
 
-/* The weight of the heaviest task row of a level, of its soft rows where there is none: the others count beside it */
+/* The weight of the heaviest row of a level, soft rows included: the others count beside it */
 static double heaviest(const wbc_tick *t, int place) {
     double most = 0.0;
+    for (int k = 0; k < MC; k++)
+        if (row_level[k] == place && !t->far[k]) most = larger(most, row_price(t, k));
     for (int k = level_start[place]; k < level_start[place + 1]; k++)
         if (t->report.factor[k] > 0.0) most = larger(most, t->weight[k] * task_scale[k] * task_scale[k]);
-    double price = 0.0;
-    for (int k = 0; k < MC; k++)
-        if (row_level[k] == place && !t->far[k]) price = larger(price, row_price(t, k));
-    if (most == 0.0) most = price;
     return most > 0.0 ? most : 1.0;
 }
 

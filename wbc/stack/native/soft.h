@@ -11,6 +11,13 @@
 
 /* Corrections of the rows that are held, before all is left to the search */
 #define CORRECTED 12
+/* Roundings of an entry of H, times its size */
+#define ROUNDINGS 16.0
+
+/* Weights may be so far apart that rounding makes H indefinite: as much as that on its diagonal makes it definite */
+static void steady(double *H) {
+    for (int i = 0; i < NV; i++) H[i * WIDE + i] *= 1.0 + ROUNDINGS * NV * EPS;
+}
 
 #if SOFT_ROWS > 0
 
@@ -119,7 +126,11 @@ static int search_again(wbc_tick *t, int round, double angle, int *flag) {
     melt(t);
     t->factored = 0;
     *flag = -1;
-    if (!factor(t)) return 0;
+    if (!factor(t)) {
+        steady(t->own_H);
+        melt(t);
+        if (!factor(t)) return 0;
+    }
     if (unconstrained(t)) {
         if (round < CORRECTED && revise(t, 0)) return 1;
         t->alone = 1;
@@ -163,7 +174,10 @@ static int optimum(wbc_tick *t, double angle) {
     if (flag < 0) unmelt(t);
 #else
     t->factored = 0;
-    if (!t->prepared && !factor(t)) return -1;
+    if (!t->prepared && !factor(t)) {
+        steady(t->H);
+        if (!factor(t)) return -1;
+    }
     t->alone = unconstrained(t);
     flag = t->alone ? 0 : constrained(t, angle);
 #endif

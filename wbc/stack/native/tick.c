@@ -56,11 +56,11 @@ EXPORT int wbc_tick_step(wbc_tick *t) {
     assemble(t, 1);
     int flag = wbc_tick_solve(t);
 #if LEVELS > 0
-    if (flag == WBC_BRAKED && t->unusable == 0.0 && primal(t)) flag = (int)(t->report.flag = WBC_SOLVED);
+    if (t->cap == 0.0 && flag == WBC_BRAKED && t->unusable == 0.0 && primal(t)) flag = (int)(t->report.flag = WBC_SOLVED);
     flag = all_levels(t, flag);
 #else
     wbc_tick_certify(t);
-    if (unsound(t, flag) && primal(t)) flag = (int)(t->report.flag = flag == WBC_RELAXED ? WBC_RELAXED : WBC_SOLVED);
+    if (t->cap == 0.0 && unsound(t, flag) && primal(t)) flag = (int)(t->report.flag = flag == WBC_RELAXED ? WBC_RELAXED : WBC_SOLVED);
 #endif
     if (PRICES) tell_soft_rows(t);
     wbc_tick_look_ahead(t);
