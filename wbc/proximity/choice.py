@@ -49,7 +49,7 @@ class Choice:
         has_row = np.zeros(number, dtype=bool)
         has_row[self.pairs[self.pairs >= 0]] = True
         bounds = self.sensing.bounds() - self._off
-        # At first as many as there are rows, then those with rows: none that is chosen scores worse than the worst of them
+        # At first as many as there are rows, then those with rows: none that is chosen scores worse than all of these
         some = has_row.nonzero()[0] if has_row.any() else np.sort(np.argsort(bounds, kind="stable")[: self.count])
         self.sensing.ask(some)
         worst = self._scores(some, has_row).max()
