@@ -43,6 +43,8 @@ _FILES = (
 #: Shapes that are no farther apart than this, without the balls that are added to them, overlap; in parts of the
 #: robot's characteristic length.
 TOUCH = 1e-10
+#: Points of hulls that ``native/shapes.h`` takes at a time.
+LANES = 8
 #: What rounding may do to bounds, in the same parts.
 OFF = 1e-12
 
@@ -185,7 +187,7 @@ def _bodies(scene: Scene) -> dict[str, Array]:
     corner = np.zeros((count, max(1, *(len(points) for points in corners)), 3))
     for k, points in enumerate(corners):
         corner[k, : len(points)] = points
-    hulls = {k: s.points - scene.centers[k] for k, s in enumerate(shapes) if isinstance(s, Convex)}
+    hulls = {k: _filled(s.points - scene.centers[k]) for k, s in enumerate(shapes) if isinstance(s, Convex)}
     start = np.cumsum([0, *(len(hulls.get(k, ())) for k in range(count))])
     outside = scene.robot.model.njoints
     joints = [outside if moves else joint for joint, moves in zip(scene.joints, scene.moving, strict=True)]
@@ -200,6 +202,11 @@ def _bodies(scene: Scene) -> dict[str, Array]:
         "corner": corner,
         "corner_count": np.array([len(points) for points in corners], dtype=np.int32),
     }
+
+
+def _filled(points: Array) -> Array:
+    """The last point again, up to a multiple of what the loop takes at a time."""
+    return np.vstack([points, np.tile(points[-1], (-len(points) % LANES, 1))])
 
 
 def _kind(shape: Shape) -> int:

@@ -10,7 +10,7 @@
 
 #define GJK_STEPS 128
 /* Ends where upper and lower bound of the distance are as close, in parts of the size of the shapes */
-#define GJK_GAP 1e-14
+#define GJK_GAP 1e-13
 
 /* Two shapes, seen from A: B is turned by R and moved by t */
 typedef struct {

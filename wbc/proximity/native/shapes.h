@@ -7,6 +7,10 @@
 
 /* Faces that a direction is this nearly normal to count as flat to it */
 #define FLAT 1e-9
+/* Hulls have so many points or a multiple of it: the last one is there more than once */
+#define LANES 8
+typedef double lanes_t __attribute__((vector_size(64), aligned(8), may_alias));
+typedef long long mask_t __attribute__((vector_size(64), aligned(8), may_alias));
 
 /* size: half sides (3), disc, ball, radius of the bounding sphere */
 typedef struct {
@@ -19,17 +23,29 @@ static shape_t shape_of(const scene_t *s, int body) {
     return out;
 }
 
+/* The first of a hull's points that reach farthest along d; LANES points at a time */
+static inline void farthest(const shape_t *a, const double *d, double *out) {
+    const double *x = a->points, *y = x + a->count, *z = y + a->count;
+    lanes_t most = {0}, at = {0};
+    most -= INFINITY;
+    for (int k = 0; k < a->count; k += LANES) {
+        const lanes_t height = d[0] * *(const lanes_t *)(x + k) + d[1] * *(const lanes_t *)(y + k) + d[2] * *(const lanes_t *)(z + k);
+        const mask_t higher = height > most;
+        most = (lanes_t)((higher & (mask_t)height) | (~higher & (mask_t)most));
+        at = (lanes_t)((higher & (mask_t)(at * 0.0 + k)) | (~higher & (mask_t)at));
+    }
+    int best = 0, first = (int)at[0];
+    for (int l = 1; l < LANES; l++) {
+        const int k = (int)at[l] + l;
+        if (most[l] > most[best] || (most[l] == most[best] && k < first)) best = l, first = k;
+    }
+    out[0] = x[first], out[1] = y[first], out[2] = z[first];
+}
+
 /* A point that reaches farthest along d, which need not be a unit vector */
 static inline void support(const shape_t *a, const double *d, double *out) {
     if (a->kind == HULL) {
-        const double *x = a->points, *y = x + a->count, *z = y + a->count;
-        double most = -INFINITY;
-        int at = 0;
-        for (int k = 0; k < a->count; k++) {
-            const double height = d[0] * x[k] + d[1] * y[k] + d[2] * z[k];
-            if (height > most) most = height, at = k;
-        }
-        out[0] = x[at], out[1] = y[at], out[2] = z[at];
+        farthest(a, d, out);
         return;
     }
     for (int k = 0; k < 3; k++) out[k] = copysign(a->size[k], d[k]);
@@ -61,7 +77,8 @@ static void middle(const shape_t *a, const double *d, double *out) {
         double sum[3] = {0.0, 0.0, 0.0};
         int count = 0;
         for (int k = 0; k < a->count; k++) {
-            if (d[0] * x[k] + d[1] * y[k] + d[2] * z[k] < most - FLAT * a->size[5]) continue;
+            const int again = k > 0 && x[k] == x[k - 1] && y[k] == y[k - 1] && z[k] == z[k - 1];
+            if (again || d[0] * x[k] + d[1] * y[k] + d[2] * z[k] < most - FLAT * a->size[5]) continue;
             sum[0] += x[k], sum[1] += y[k], sum[2] += z[k];
             count++;
         }
