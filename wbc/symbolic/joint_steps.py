@@ -29,8 +29,6 @@ class Kind(IntEnum):
     QUATERNION = 4
     #: a constant pose
     PLACE = 5
-    #: a shift along an axis by scale a + offset, where q has (cos a, sin a)
-    FOLLOW_SHIFT = 6
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,8 +62,9 @@ def joint_steps(model: pin.Model, joint: int) -> list[Step]:
         return _steps(model.joints[joint], start, name)
     leader = int(model.joints[followers[joint]].nq)
     turns, axis, scaling, offset = follower_of(model.joints[joint], leader, name)
-    kinds = (Kind.SHIFT, Kind.TURN) if leader == 1 else (Kind.FOLLOW_SHIFT, Kind.FOLLOW)
-    return [_step(kinds[turns], start, axis, scaling, offset)]
+    # Pinocchio lets a joint without end be followed by such a joint only
+    kind = Kind.SHIFT if not turns else (Kind.TURN if leader == 1 else Kind.FOLLOW)
+    return [_step(kind, start, axis, scaling, offset)]
 
 
 def _step(kind: Kind, q: int, axis: Vector, scale: float = 1.0, offset: float = 0.0) -> Step:

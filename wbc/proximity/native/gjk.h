@@ -9,8 +9,10 @@
 #include "shapes.h"
 
 #define GJK_STEPS 128
-/* Ends where upper and lower bound of the distance are as close, in parts of the size of the shapes */
+/* Ends where upper and lower bound of the distance are as close, in parts of it, or by rounding, in parts of the sizes: the
+ * normal is as good as the root of the former */
 #define GJK_GAP 1e-13
+#define GJK_ROUNDING 4e-16
 
 /* Two shapes, seen from A: B is turned by R and moved by t */
 typedef struct {
@@ -120,43 +122,44 @@ static inline int reduce(simplex_t *s, double *v) {
     return 1;
 }
 
-/* Distance of shapes that are farther apart than `touch`, its unit normal from A to B, and the nearest point of A, all seen
- * from A; a distance of 0 where they are not, and then no normal */
-static double apart(const view_t *view, double touch, double *normal, double *point) {
+/* Whether shapes are farther apart than `touch`; then their distance, its unit normal from A to B, and the nearest point of A,
+ * all seen from A. The distance is what the normal proves: the nearest points may be farther apart by what rounding leaves */
+static int apart(const view_t *view, double touch, double *distance, double *normal, double *point) {
     simplex_t s, last;
     double v[3], w[3], a[3];
     const double start[3] = {view->t[0], view->t[1], view->t[2]};
     facing(view, start, s.w[0], s.a[0]);
     s.count = 1, s.u[0] = 1.0;
     copy3(s.w[0], v);
-    const double gap = GJK_GAP * (view->a.size[5] + view->b.size[5] + sqrt(dot3(view->t, view->t)));
-    double square = dot3(v, v);
+    const double rounding = GJK_ROUNDING * (view->a.size[5] + view->b.size[5] + sqrt(dot3(view->t, view->t)));
+    double square = dot3(v, v), proven = 0.0, length = 0.0;
     for (int step = 0; step < GJK_STEPS; step++) {
-        if (square <= touch * touch) return 0.0;
+        if (square <= touch * touch) return 0;
         facing(view, v, w, a);
-        const double length = sqrt(square);
-        if (square - dot3(v, w) <= gap * length) break;
+        length = sqrt(square);
+        proven = dot3(v, w) / length;
+        if (length - proven <= fmax(GJK_GAP * length, rounding)) break;
         last = s;
         copy3(w, s.w[s.count]);
         copy3(a, s.a[s.count]);
         s.count++;
         double next[3];
-        if (!reduce(&s, next)) return 0.0;
+        if (!reduce(&s, next)) return 0;
         const double nearer = dot3(next, next);
-        if (nearer >= square) { /* rounding leaves nothing to gain */
+        if (nearer >= square || step == GJK_STEPS - 1) { /* rounding leaves nothing to gain */
             s = last;
             break;
         }
         copy3(next, v);
         square = nearer;
     }
-    const double length = sqrt(square);
+    *distance = proven;
     for (int k = 0; k < 3; k++) {
         normal[k] = v[k] / length;
         point[k] = 0.0;
         for (int i = 0; i < s.count; i++) point[k] += s.u[i] * s.a[i][k];
     }
-    return length;
+    return 1;
 }
 
 #endif

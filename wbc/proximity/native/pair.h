@@ -88,9 +88,9 @@ static int closed(const shape_t *a, const shape_t *b) {
 static void touching(const view_t *v, double value, const double *normal, double *point) {
     view_t raised = *v;
     const double size = v->a.size[5] + v->b.size[5];
-    double n[3];
+    double n[3], distance;
     along3(v->t, RAISED * size - value, normal, raised.t);
-    if (apart(&raised, 0.0, n, point) == 0.0) middle(&v->a, normal, point);
+    if (!apart(&raised, 0.0, &distance, n, point)) middle(&v->a, normal, point);
 }
 
 /* Where a declared normal leaves A and B, in the middle of what is flat to it */
@@ -106,8 +106,8 @@ static void between(const view_t *v, double value, const double *normal, double 
 
 static void measure_bounded(const scene_t *s, const view_t *v, answer_t *out) {
     const double balls = v->a.size[4] + v->b.size[4];
-    double value = apart(v, s->touch, out->normal, out->point), other[3];
-    if (value == 0.0) {
+    double value, other[3];
+    if (!apart(v, s->touch, &value, out->normal, out->point)) {
         value = best_declared(v, s->tie, out->normal);
         if (!closed(&v->a, &v->b)) {
             const double found = depth(v, other);

@@ -5,9 +5,9 @@
 #include "scene.h"
 #include "vectors.h"
 
-/* Numbers of a step: axis, scale, offset; of PLACE a pose. CIRCLE reads (cos, sin), FOLLOW and FOLLOW_SHIFT the
- * angle of such a pair. wbc/symbolic/joint_steps.py has the same numbers */
-enum { TURN, SHIFT, CIRCLE, FOLLOW, QUATERNION, PLACE, FOLLOW_SHIFT };
+/* Numbers of a step: axis, scale, offset; of PLACE a pose. CIRCLE reads (cos, sin), FOLLOW the angle of such a
+ * pair. wbc/symbolic/joint_steps.py has the same numbers */
+enum { TURN, SHIFT, CIRCLE, FOLLOW, QUATERNION, PLACE };
 
 static void axis_angle(const double *u, double c, double s, double *R) {
     const double t = 1.0 - c;
@@ -31,9 +31,8 @@ static void take_step(int kind, const double *number, const double *q, double *p
         memcpy(pose, next, sizeof next);
         return;
     }
-    const int follows = kind == FOLLOW || kind == FOLLOW_SHIFT;
-    const double by = number[3] * (follows ? atan2(q[1], q[0]) : q[0]) + number[4];
-    if (kind == SHIFT || kind == FOLLOW_SHIFT) {
+    const double by = number[3] * (kind == FOLLOW ? atan2(q[1], q[0]) : q[0]) + number[4];
+    if (kind == SHIFT) {
         turn(pose, number, shift);
         along3(pose + 9, by, shift, pose + 9);
         return;
