@@ -64,7 +64,7 @@ class PairSensor:
         self._names = [(a.name, b.name) for a, b in checked]
         self._rows = Rows.of(scene, count, corners, numbers)
         self._sensing = sensing(scene, self._rows)
-        self.count = count
+        self.count, self._robot, self._shape = count, robot, (robot.nq,)
         self.reset()
 
     @property
@@ -84,7 +84,13 @@ class PairSensor:
         self._rows.clear()
 
     def sense(self, q: Array) -> None:
-        """Measure at a configuration [nq] and write the rows."""
+        """Measure at a configuration [nq] and write the rows.
+
+        Raises:
+            ShapeError, NotFiniteError: no configuration; nothing is written. An array [nq] is taken as it is.
+        """
+        if type(q) is not np.ndarray or q.shape != self._shape:
+            q = self._robot.configuration("q", q)
         self._sensing.sense(q)
 
     def pairs(self) -> tuple[tuple[str, str, float], ...]:
