@@ -183,3 +183,35 @@ def test_bodies_that_touch(gap: float) -> None:
             # Two tips in each other leave sideways
             if gap > 1e-10 and not found.doubtful:
                 assert abs(found.normal @ turned.rotation[:, 2]) == pytest.approx(1.0, abs=1e-6)
+
+
+def thin(rng: np.random.Generator, size: float) -> Shape:
+    """Plates and needles, as thin as 3e-5 of their length."""
+    kind, part = rng.integers(4), float(10 ** rng.uniform(-4.5, -1))
+    if kind < 2:
+        sides = [size, size, size * part] if kind == 0 else [size, size * part, size * part]
+        return Convex(rng.normal(size=(rng.integers(4, 30), 3)) * sides)
+    return (
+        Box((size, size * part, size))
+        if kind == 2
+        else Cylinder(size * (part if rng.random() < 0.5 else 1), size * part)
+    )
+
+
+@pytest.mark.parametrize("case", [692, 1544, 3196, *range(10, 22)])
+def test_thin_bodies(case: int, back_end: str) -> None:
+    """Of a needle across a disc nearly every way is as short: the polytope has to grow all round before it knows."""
+    if back_end == "plain":
+        return
+    rng = np.random.default_rng([9, case])
+    size = float(rng.choice([0.01, 0.3, 3.0, 50.0]))
+    a, b = thin(rng, size), thin(rng, size)
+    at = poses(rng, size * 0.5)
+    there, back, _, proven = measured((a, at[0]), (b, at[1]))
+    near = 1e-8 * (5 * size + 1.0)
+    for found, one, two in ((there, (a, at[0]), (b, at[1])), (back, (b, at[1]), (a, at[0]))):
+        assert found.distance == pytest.approx(clear(one, two, found.normal), abs=near)
+        assert found.distance > proven - near
+        if not found.doubtful:
+            room = near if found.distance > 0 else 1e-5 * size
+            assert max(outside(*one, found.on_first), outside(*two, found.on_second)) < room

@@ -7,8 +7,8 @@
 
 #include "gjk.h"
 
-#define EPA_POINTS 160
-#define EPA_FACES 640
+#define EPA_POINTS 320
+#define EPA_FACES 1280
 #define EPA_EDGES 512
 /* Ends where both bounds are as close, in parts of the size of the shapes */
 #define EPA_GAP 1e-10
