@@ -18,7 +18,7 @@ from bench.harness import Plan, machine, measure, measure_startup
 from bench.pool import ROOT
 from bench.prepare import prepare
 from bench.versions import versions
-from wbc.stack import toolchain
+from wbc.native import toolchain
 
 OWN = ("wbc", "casadi", "pin", "numpy", "daqp")
 PEERS = ("pin-pink", "mink", "mujoco", "placo", "qpsolvers", "daqp", "quadprog", "pin", "numpy")

@@ -141,7 +141,7 @@ class Obstacle(Constraint):
         return self._nearest(robot) * (1 + self.corners)
 
     def sensor(self, robot: Robot, numbers: Numbers) -> Sensor:
-        """Coal, for the sensed pairs."""
+        """Distances of the sensed pairs."""
         return PairSensor(robot, self.sensed_pairs(robot), self._nearest(robot), numbers, corners=self.corners)
 
     def _nearest(self, robot: Robot) -> int:

@@ -12,7 +12,7 @@ from functools import cache, partial
 
 import pytest
 
-from wbc.stack import toolchain
+from wbc.native import toolchain
 
 _ask = toolchain.identity.__wrapped__
 

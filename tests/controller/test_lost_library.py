@@ -8,7 +8,7 @@ import pytest
 
 from bench.soak.faults import corrupt, delete
 from tests.stack import small
-from wbc.controller.library import load_library
+from wbc.native.library import load_library
 
 
 @pytest.fixture(scope="module")

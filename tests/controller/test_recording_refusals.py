@@ -123,7 +123,7 @@ class Trap:
         lambda p: Trap(shutil.copytree, str(TOP / "requirements"), str(p)),
         lambda p: Trap(eval, f"__import__('os').mkdir({str(p)!r})"),
         lambda p: Trap(wbc.controller.recording.Writer, p, {"sizes": {"a": 1}}, None, False),
-        lambda p: Trap(wbc.stack.toolchain.compile_tick, {}, p),
+        lambda p: Trap(wbc.native.toolchain.compile_tick, {}, p),
     ],
 )
 def test_a_trap_does_not_spring(trap: Any, tmp_path: Path) -> None:

@@ -17,6 +17,7 @@ FLOORS = {
     "wbc.shapes": 0,
     "wbc.style": 0,
     "wbc.terminal": 0,
+    "wbc.native": 1,
     "wbc.symbolic": 1,
     "wbc.robot": 2,
     "wbc.robots": 2,

@@ -109,6 +109,20 @@ def test_bad_configurations_of_distances() -> None:
         distances(bot, [(HAND, BLOCK)], bot.neutral, np.diag([2.0, 1.0, 1.0, 1.0]))
 
 
+def test_bad_configurations_write_nothing() -> None:
+    bot = robot("panda")
+    numbers = buffers(bot, 1)
+    made = PairSensor(bot, [(HAND, BLOCK)], 1, numbers)
+    made.sense(bot.neutral)
+    before = {key: value.copy() for key, value in numbers.items()}
+    for q, kind in ((np.zeros(3), ShapeError), ("here", ShapeError), ([np.nan] * bot.nq, NotFiniteError)):
+        with pytest.raises(kind):
+            made.sense(q)  # type: ignore[arg-type]
+        assert all(np.array_equal(numbers[key], before[key], equal_nan=True) for key in numbers)
+    made.sense(bot.neutral.tolist())
+    assert all(np.array_equal(numbers[key], before[key], equal_nan=True) for key in numbers)
+
+
 def mimicking() -> Any:
     """An arm of three joints, the third of which follows the first."""
     model = pin.Model()

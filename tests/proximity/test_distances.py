@@ -11,7 +11,7 @@ import pytest
 from tests.evaluation import random_configuration
 from tests.models import spherical_seven
 from tests.proximity.world import NAMES, SHAPES, Referee, all_pairs, place, robot, sensor
-from wbc.proximity import Body, distances, memory, witnesses
+from wbc.proximity import Body, distances, witnesses
 from wbc.shapes import Box, Capsule, Convex, Cylinder, Shape, Sphere
 
 QUARTERS = [np.round(pin.exp3(np.pi / 2 * k * axis)) for axis in np.eye(3) for k in (0, 1, 2)]
@@ -144,21 +144,6 @@ def test_a_body_just_inside_has_the_normal_out() -> None:
     assert back.normal == pytest.approx([0.0, 0.0, 1.0], abs=1e-9)
     assert there.on_second == pytest.approx([0.01, -0.02, 0.15], abs=1e-9)
     assert not there.doubtful
-
-
-def test_what_is_read_through_the_bindings_is_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
-    bot, rng = robot("ur5"), np.random.default_rng(4)
-    pairs, q, pose = all_pairs(bot, rng), random_configuration(bot, rng), place(rng, 0.4)
-    assert memory.offsets() is not None, "this platform's results are read directly"
-    direct = sensor(bot, pairs, 20, pose)
-    monkeypatch.setattr(memory, "offsets", lambda: None)
-    bound = sensor(bot, pairs, 20, pose)
-    for sensing, _ in (direct, bound):
-        sensing.sense(q)
-        sensing.sense(pin.integrate(bot.model, q, np.full(bot.nv, 0.01)))
-    assert direct[0].pairs() == bound[0].pairs()
-    for key, found in bound[1].items():
-        assert np.array_equal(found, direct[1][key]), key
 
 
 def test_distances_take_what_users_have() -> None:

@@ -54,9 +54,9 @@ def test_rows_are_those_of_measuring_everything(name: str, seed: int) -> None:
         expected = kept(every["distance"], rows, count, slack)
         changes += expected != rows
         rows = expected
-        assert sensing._choice.pairs.tolist() == rows, k
+        assert sensing._sensing.pairs.tolist() == rows, k
         assert np.array_equal(numbers["distance"], every["distance"][rows])
-        watched += len(sensing._scene.gaps)
+        watched += sensing.measured
     assert 5 < changes < 200
     assert watched < 0.6 * 250 * len(pairs)
 
@@ -93,7 +93,6 @@ def test_at_rest_nothing_but_the_nearest_is_measured() -> None:
     sensing, numbers = sensor(bot, [(hand, body) for body in cloud], 4)
     sensing.sense(bot.neutral)
     before = numbers["distance"].copy()
-    sensing._scene.lower_bounds = None  # type: ignore[assignment,method-assign]
     sensing.sense(bot.neutral)
     assert np.array_equal(before, numbers["distance"])
-    assert len(sensing._scene.gaps) < 20
+    assert sensing.measured < 20

@@ -20,8 +20,9 @@ import pytest
 import wbc
 from tests.stack import small
 from wbc.controller import Stack
+from wbc.native import cache, toolchain
 from wbc.shapes import HalfSpace, PlacedShape, Sphere
-from wbc.stack import artifact, cache, toolchain
+from wbc.stack import artifact
 from wbc.stack.key import key
 from wbc.tasks import Damping, EndEffector, Expression, Hold, JointLimits, Obstacle, Posture
 from wbc.tasks.base import Row, Task

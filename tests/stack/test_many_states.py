@@ -7,7 +7,7 @@ import pinocchio as pin
 import pytest
 
 import wbc
-from wbc.stack import toolchain
+from wbc.native import toolchain
 from wbc.stack.many import CHUNK, ManyStates
 from wbc.trajectory.checks import inverse_dynamics
 

@@ -128,7 +128,7 @@ def test_compiler_that_fails(
 def test_casadi_without_the_solver_library(tmp_path: pathlib.Path) -> None:
     """A compiler alone is not enough."""
     script = (
-        "import pathlib, wbc\nfrom wbc.stack import toolchain\n"
+        "import pathlib, wbc\nfrom wbc.native import toolchain\n"
         "toolchain.library = lambda: pathlib.Path('/nowhere.a')\n"
         "from tests.stack import small\nc = small.stack().compile()\nassert c.backend == 'vm'\n"
         "try:\n    small.stack().compile(backend='native')\n"

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from wbc.analysis.trig_form import TrigForm
 from wbc.errors import RangeError
-from wbc.stack.kernel import kernel
+from wbc.native.kernel import kernel
 from wbc.validation import Array
 
 _SOURCES = Path(__file__).parent / "native"

@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from wbc.controller.library import load_library
 from wbc.controller.report import INFINITE, ReportLayout
 from wbc.controller.tick import Assembly, TaskRows
 from wbc.errors import CompileError
+from wbc.native.library import load_library
 from wbc.qp.problem import QP
 from wbc.stack.layout import Layout
 from wbc.validation import Array

@@ -12,15 +12,15 @@ import casadi as ca
 import numpy as np
 
 from wbc import validation
-from wbc.controller.library import load_library
 from wbc.coordinates import expressions
 from wbc.coordinates.chains import free_joints
 from wbc.coordinates.rows import Coordinate
 from wbc.coordinates.scales import scales
 from wbc.errors import CompileError, ShapeError
+from wbc.native import toolchain
+from wbc.native.compiled_function import generated_library
+from wbc.native.library import load_library
 from wbc.robot import Robot
-from wbc.stack import toolchain
-from wbc.stack.compiled_function import generated_library
 from wbc.symbolic.kinematics import Kinematics
 from wbc.symbolic.tracer import Tracer
 from wbc.validation import Array

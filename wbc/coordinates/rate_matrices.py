@@ -10,8 +10,8 @@ import numpy as np
 
 from wbc.coordinates import expressions
 from wbc.coordinates.rows import Coordinate
+from wbc.native.compiled_function import compiled
 from wbc.robot import Robot
-from wbc.stack.compiled_function import compiled
 from wbc.stack.single import SingleState
 from wbc.validation import Array
 

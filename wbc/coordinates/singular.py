@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from wbc.controller.library import load_library
 from wbc.errors import CompileError
-from wbc.stack import toolchain
-from wbc.stack.kernel import kernel
+from wbc.native import toolchain
+from wbc.native.kernel import kernel
+from wbc.native.library import load_library
 from wbc.validation import Array
 
 _SOURCES = Path(__file__).parent / "native"

@@ -13,7 +13,7 @@ import urllib.parse
 import urllib.request
 
 from wbc.errors import WbcError
-from wbc.stack import toolchain
+from wbc.native import toolchain
 
 #: The release whose headers are those of the casadi wheel, and the hash of its source archive
 VERSION = "0.5.1"

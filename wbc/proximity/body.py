@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 #: The frame of bodies that move with a pose given from outside.
 OBSTACLE = "obstacle"
 
-#: More pairs than this are refused: Pinocchio keeps 10 kB for each.
+#: More pairs than this are refused: every tick bounds all of them.
 MAX_PAIRS = 10_000
 
 _SHAPES = (Sphere, Capsule, Box, Cylinder, Convex, HalfSpace)

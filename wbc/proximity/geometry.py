@@ -1,4 +1,4 @@
-"""Shapes as geometries of Coal, each about the centre of its bounding sphere."""
+"""Shapes as geometries of Coal."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ import pinocchio as pin
 import coal
 
 from wbc.errors import ShapeError
+from wbc.proximity.scene import sphere_round
 from wbc.shapes import Box, Capsule, Convex, Cylinder, HalfSpace, Shape, Sphere
 from wbc.validation import Array
 
@@ -25,12 +26,10 @@ class Geometry:
     Attributes:
         geometry: the Coal object; its origin is the centre of a sphere round the shape.
         center: that centre in the shape's frame [m].
-        radius: of that sphere [m]; infinite for a half-space, whose centre lies on its boundary.
     """
 
     geometry: Any
     center: Array
-    radius: float
 
     @property
     def offset(self) -> pin.SE3:
@@ -53,23 +52,20 @@ def geometry_of(shape: Shape) -> Geometry:
 def _made(shape: Shape) -> Geometry:
     zero = np.zeros(3)
     if isinstance(shape, Sphere):
-        return Geometry(coal.Sphere(shape.radius), zero, shape.radius)
+        return Geometry(coal.Sphere(shape.radius), zero)
     if isinstance(shape, Capsule):
-        return Geometry(coal.Capsule(shape.radius, shape.length), zero, shape.radius + shape.length / 2)
+        return Geometry(coal.Capsule(shape.radius, shape.length), zero)
     if isinstance(shape, Box):
-        return Geometry(coal.Box(*shape.size), zero, float(np.linalg.norm(shape.size)) / 2)
+        return Geometry(coal.Box(*shape.size), zero)
     if isinstance(shape, Cylinder):
-        return Geometry(
-            coal.Cylinder(shape.radius, shape.length), zero, float(np.hypot(shape.radius, shape.length / 2))
-        )
+        return Geometry(coal.Cylinder(shape.radius, shape.length), zero)
     if isinstance(shape, HalfSpace):
-        return Geometry(coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0), zero, np.inf)
+        return Geometry(coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0), zero)
     if isinstance(shape, Convex):
-        center = shape.points.mean(axis=0)
+        center, _ = sphere_round(shape)
         points = coal.StdVec_Vec3s()
         for point in shape.points - center:
             points.append(point)
         # "Qt": faces of more than three corners are cut into triangles, which Coal needs
-        hull = coal.Convex.convexHull(points, True, "Qt")
-        return Geometry(hull, center, float(np.linalg.norm(shape.points - center, axis=1).max()))
+        return Geometry(coal.Convex.convexHull(points, True, "Qt"), center)
     raise ShapeError("shape", shape, "this is no shape")

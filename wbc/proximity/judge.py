@@ -23,18 +23,14 @@ import pinocchio as pin
 # isort: split
 import coal
 
-from wbc.proximity.memory import Index
+from wbc.proximity.scene import TIE, TRUST, Index
 from wbc.proximity.support import Supports, clearance
 from wbc.shapes import Cylinder, HalfSpace, Sphere
 from wbc.validation import Array
 
 if TYPE_CHECKING:
-    from wbc.proximity.scene import Scene
+    from wbc.proximity.plain import PlainSensing
 
-#: How far a distance may be above what its normal proves, in parts of the robot's characteristic length.
-TRUST = 1e-5
-#: Clearances closer than this are equal, in the same parts.
-TIE = 1e-9
 #: How far from 1 the square of a unit normal may be.
 UNIT = 1e-6
 #: Directions more nearly parallel than this have no cross product.
@@ -44,93 +40,75 @@ TURN = 1e-4
 
 
 class Judge:
-    """Checks the results of a scene in place.
+    """Checks the results of a sensing in place.
 
     Attributes:
         doubtful: pairs whose last result is a declared one.
-        supports: support functions of the scene's bodies.
+        supports: support functions of the bodies.
     """
 
-    def __init__(self, scene: Scene, geometries: list[object], centers: list[Array]) -> None:
-        self.scene = scene
+    def __init__(self, sensing: PlainSensing) -> None:
+        self.sensing, scene = sensing, sensing.scene
         self.trust = TRUST * scene.robot.characteristic_length
         self.tie = TIE * scene.robot.characteristic_length
         self.doubtful = np.zeros(len(scene.first), dtype=bool)
-        self._marked = False
         shapes = [body.shape for body in scene.bodies]
-        self.supports = Supports(shapes, centers)
-        self._geometries = geometries
+        self.supports = Supports(shapes, scene.centers)
         kinds = [(type(shapes[a]), type(shapes[b])) for a, b in zip(scene.first, scene.second, strict=True)]
         #: clearances of half-spaces have one direction only, and Coal's closed forms have it
         self._bounded = np.array([HalfSpace not in pair for pair in kinds])
         self._blunt = np.array([set(pair) == {Cylinder, Sphere} for pair in kinds])
 
-    def check(self, measured: Index, gaps: Array) -> bool:
-        """Check the pairs just measured and their distances; those of them that fail are mended. Whether any was."""
-        scene = self.scene
-        if self._marked:
-            self.doubtful[measured] = False
-            self._marked = bool(self.doubtful.any())
-        # NaN fails every comparison, and is the least of all
-        if gaps.item(gaps.argmin()) > self.trust:
-            return False
-        flags = ~(gaps > self.trust)
-        flags &= self._bounded[measured]
-        if not np.count_nonzero(flags):
-            return False
-        suspect = measured[flags]
-        normal = scene.results.normal[suspect]
+    def check(self, measured: Index) -> None:
+        """Check the pairs just measured; those of them that fail are mended."""
+        found = self.sensing
+        self.doubtful[measured] = False
+        # NaN fails every comparison
+        suspect = measured[~(found.distances[measured] > self.trust) & self._bounded[measured]]
+        if not len(suspect):
+            return
+        normal = found.normals[suspect]
         proven = self._clearance(suspect, normal)
-        holds = scene.results.distance[suspect] - proven <= self.trust
+        holds = found.distances[suspect] - proven <= self.trust
         holds &= np.abs(np.einsum("ij,ij->i", normal, normal) - 1.0) < UNIT
         both_ways = proven - self._clearance(suspect, -normal) <= self.tie
         doubtful = ~holds | both_ways
-        mend = (doubtful | self._blunt[suspect]).nonzero()[0]
-        for row in mend:
+        for row in (doubtful | self._blunt[suspect]).nonzero()[0]:
             self._mend(int(suspect[row]), bool(doubtful[row]))
-        return len(mend) > 0
 
     def _clearance(self, pairs: Index, normal: Array) -> Array:
-        scene = self.scene
-        a, b = scene.first[pairs], scene.second[pairs]
-        turned = (scene.rotations[a], scene.rotations[b])
-        return clearance(self.supports, (a, b), turned, scene.centers[b] - scene.centers[a], normal)
+        found = self.sensing
+        a, b = found.scene.first[pairs], found.scene.second[pairs]
+        turned = (found.rotations[a], found.rotations[b])
+        return clearance(self.supports, (a, b), turned, found.centers[b] - found.centers[a], normal)
 
     def _mend(self, pair: int, doubtful: bool) -> None:
         """Give a pair the best direction there is; Coal's own stays where it is not in doubt and as good."""
-        scene = self.scene
-        a, b = int(scene.first[pair]), int(scene.second[pair])
-        offset = scene.centers[b] - scene.centers[a]
-        own = np.array(scene.results.normal[pair])
-        choices = [*declared(scene.rotations[a], scene.rotations[b], offset), *self._turned(a, b), own]
+        found = self.sensing
+        a, b = int(found.scene.first[pair]), int(found.scene.second[pair])
+        turns, centers = found.rotations, found.centers
+        own = np.array(found.normals[pair])
+        choices = [*declared(turns[a], turns[b], centers[b] - centers[a]), *self._turned(a, b), own]
         directions = np.array([n for n in choices if np.isfinite(n).all() and abs(n @ n - 1.0) < UNIT])
         values = self._clearance(np.full(len(directions), pair), directions)
         if not doubtful and values.max() - values[-1] <= self.trust:
             return
         best = int(np.argmax(values >= values.max() - self.tie))
         normal, value = directions[best], float(values[best])
-        first = scene.rotations[a] @ self.supports.point(a, scene.rotations[a].T @ normal) + scene.centers[a]
-        second = scene.rotations[b] @ self.supports.point(b, -scene.rotations[b].T @ normal) + scene.centers[b]
-        results = scene.results
-        results.distance[pair], results.normal[pair] = value, normal
-        results.point[pair] = (first + second - value * normal) / 2
-        self.doubtful[pair] = self._marked = True
+        first = turns[a] @ self.supports.point(a, turns[a].T @ normal) + centers[a]
+        second = turns[b] @ self.supports.point(b, -turns[b].T @ normal) + centers[b]
+        found.distances[pair], found.normals[pair] = value, normal
+        found.points[pair] = (first + second - value * normal) / 2
+        self.doubtful[pair] = True
 
     def _turned(self, a: int, b: int) -> list[Array]:
         """Coal's normals with B turned a little about each axis, and with the bodies in the other order."""
-        scene = self.scene
-        request, places = coal.DistanceRequest(), {}
-        for k in (a, b):
-            places[k] = coal.Transform3s(scene.rotations[k], scene.centers[k])
-        out = []
+        found, out = self.sensing, []
+        first, second = (coal.Transform3s(found.rotations[k], found.centers[k]) for k in (a, b))
         for axis in np.eye(3):
-            result = coal.DistanceResult()
-            turned = coal.Transform3s(scene.rotations[b] @ pin.exp3(TURN * axis), scene.centers[b])
-            coal.distance(self._geometries[a], places[a], self._geometries[b], turned, request, result)
-            out.append(np.array(result.normal))
-        result = coal.DistanceResult()
-        coal.distance(self._geometries[b], places[b], self._geometries[a], places[a], request, result)
-        return [*out, -np.array(result.normal)]
+            turned = coal.Transform3s(found.rotations[b] @ pin.exp3(TURN * axis), found.centers[b])
+            out.append(found.distance(a, first, b, turned)[1])
+        return [*out, -found.distance(b, second, a, first)[1]]
 
 
 def declared(first: Array, second: Array, offset: Array) -> list[Array]:

@@ -14,7 +14,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from wbc.proximity.memory import Index
+from wbc.proximity.scene import Index
 from wbc.shapes import Box, Capsule, Convex, Cylinder, HalfSpace, Shape, Sphere
 from wbc.validation import Array
 

@@ -12,6 +12,7 @@ import pinocchio as pin
 from wbc import validation
 from wbc.proximity.body import OBSTACLE, Body, checked_pairs
 from wbc.proximity.scene import Scene
+from wbc.proximity.sensor import sensing
 from wbc.validation import Array
 
 if TYPE_CHECKING:
@@ -28,7 +29,7 @@ class Witness:
         distance: signed [m]; negative: how far they must be moved apart along ``normal`` to touch.
         normal: unit, from body A to body B [3].
         on_first, on_second: the witness points in the world [m], 3 each.
-        doubtful: the normal is a declared one, see :mod:`wbc.proximity.judge`.
+        doubtful: the normal is a declared one, see docs/proximity.md.
     """
 
     distance: float
@@ -39,7 +40,7 @@ class Witness:
 
 
 def distances(robot: Robot, pairs: Sequence[tuple[Body, Body]], q: Any, pose: Any = None) -> Array:
-    """Signed distance of every pair [m], measured with Coal; negative where two bodies overlap.
+    """Signed distance of every pair [m]; negative where two bodies overlap.
 
     Args:
         robot: the robot that carries the bodies.
@@ -64,13 +65,10 @@ def witnesses(robot: Robot, pairs: Sequence[tuple[Body, Body]], q: Any, pose: An
     where = pin.SE3.Identity() if pose is None else validation.pose("pose", pose)
     if not checked:
         return ()
-    scene = Scene(robot, checked, outside)
-    scene.move(where)
-    scene.place(configuration)
-    scene.measure()
+    found = sensing(Scene(robot, checked, outside))
+    found.measure(configuration, where)
     out = []
-    results = scene.results
     for k in range(len(checked)):
-        gap, normal, point = float(results.distance[k]), np.array(results.normal[k]), np.array(results.point[k])
-        out.append(Witness(gap, normal, point, point + gap * normal, bool(scene.doubtful[k])))
+        gap, normal, point = float(found.distances[k]), np.array(found.normals[k]), np.array(found.points[k])
+        out.append(Witness(gap, normal, point, point + gap * normal, bool(found.doubtful[k])))
     return tuple(out)

@@ -10,7 +10,8 @@ import casadi as ca
 
 from wbc import validation
 from wbc.errors import CompileError
-from wbc.stack import cache, codegen, toolchain
+from wbc.native import cache, toolchain
+from wbc.stack import codegen
 from wbc.stack.declaration import Declaration
 from wbc.stack.key import key
 from wbc.stack.layout import Layout

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Self
 
 from wbc import pickling, validation
 from wbc.errors import DuplicateNameError, LevelError, PicklingError, RangeError, ShapeError, UnknownNameError
@@ -134,7 +134,7 @@ class Declaration:
         hard: bool = True,
         soft: float | None = None,
         scaled: bool = False,
-    ) -> Declaration:
+    ) -> Self:
         """Add an item; returns the stack, so that calls chain.
 
         Args:
@@ -213,12 +213,12 @@ class Declaration:
                     raise error.within(entry.name) from error
         return pickling.declared(self)
 
-    def __copy__(self) -> Declaration:
+    def __copy__(self) -> Self:
         out = object.__new__(type(self))
         out.__dict__ |= vars(self) | {"_entries": dict(self._entries)}
         return out
 
-    def __deepcopy__(self, memo: dict[int, Any]) -> Declaration:
+    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
         return pickling.deep_copy(self, memo)
 
     def key_data(self) -> dict[str, Any]:

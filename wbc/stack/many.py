@@ -7,7 +7,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from wbc.stack.compiled_function import compiled
+from wbc.native.compiled_function import compiled
 from wbc.validation import Array
 
 #: States of one call of the compiled loop

@@ -15,7 +15,7 @@ class SingleState:
     """f(x) of a CasADi function with column vectors in and one column vector out, in memory that stays where it is.
 
     Args:
-        function: what to evaluate, of :func:`wbc.stack.compiled_function.compiled` or not.
+        function: what to evaluate, of :func:`wbc.native.compiled_function.compiled` or not.
 
     Attributes:
         inputs: the vectors x, to be written. output: f(x), after :attr:`run`. run: evaluates.

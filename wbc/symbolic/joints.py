@@ -13,12 +13,12 @@ from wbc.symbolic import joint_maps as maps
 from wbc.symbolic import rotations as rot
 from wbc.symbolic.joint_maps import AXES, SymbolicJoint
 
-__all__ = ["SUPPORTED", "SymbolicJoint", "mimic_joint", "symbolic_joint"]
+__all__ = ["SUPPORTED", "SymbolicJoint", "follower_of", "mimic_joint", "motion_at", "symbolic_joint"]
 
 _MAKERS: dict[str, Callable[[Any], SymbolicJoint]] = {
     "RevoluteUnaligned": lambda j: maps.revolute(np.array(j.axis)),
     # Python sees no axis on this type, so it is read from the motion that Pinocchio computes
-    "RevoluteUnboundedUnaligned": lambda j: maps.unbounded(_at(j, np.array([1.0, 0.0]))[0][3:]),
+    "RevoluteUnboundedUnaligned": lambda j: maps.unbounded(motion_at(j, np.array([1.0, 0.0]))[0][3:]),
     "PrismaticUnaligned": lambda j: maps.prismatic(np.array(j.axis)),
     "HelicalUnaligned": lambda j: maps.helical(np.array(j.axis), float(j.pitch)),
     "Universal": lambda j: maps.universal(np.array(j.axis1), np.array(j.axis2)),
@@ -73,27 +73,11 @@ def mimic_joint(joint: Any, leader: SymbolicJoint, name: str = "joint") -> Symbo
     ``placement`` and ``subspace`` take the leader's q; ``nq`` and ``nv`` are the leader's, and the manifold maps are
     the leader's. For an unbounded leader q is its angle in (-pi, pi], so an uneven scaling jumps once a turn.
 
-    The type of the follower is not visible from Python, so it is recovered from the motion that Pinocchio computes
-    for it: a shift or a turn. A helical follower is refused; Pinocchio 4.1 drops its pitch from the motion.
-
     Raises:
-        UnsupportedJointError: the scaling is 0 (then the follower's axis cannot be recovered), or it is helical.
+        UnsupportedJointError: as of :func:`follower_of`.
     """
-    inner = joint.extract()
-    scaling, offset = float(inner.scaling), float(inner.offset)
-    if scaling == 0.0:
-        raise UnsupportedJointError(f"joint {name!r}", scaling, "a mimic joint of scaling 0 is a fixed joint")
-    start = np.zeros(leader.nq)
-    if leader.nq == 2:
-        start[0] = 1.0
-    twist, _ = _at(joint, start)
-    turned = _at(joint, np.array([1.0]) if leader.nq == 1 else np.array([np.cos(1.0), np.sin(1.0)]))[1]
-    if not twist[3:].any():
-        follower = maps.prismatic(twist[:3] / scaling)
-    elif twist[:3].any() or np.abs(turned).max() > rot.SNAP:
-        raise UnsupportedJointError(f"joint {name!r}", "helical follower", "a mimic joint follows by a turn or a shift")
-    else:
-        follower = maps.revolute(twist[3:] / scaling)
+    turns, axis, scaling, offset = follower_of(joint, leader.nq, name)
+    follower = maps.revolute(axis) if turns else maps.prismatic(axis)
 
     def angle(q: ca.SX) -> ca.SX:
         coordinate = q if leader.nq == 1 else ca.atan2(q[1], q[0])
@@ -108,7 +92,32 @@ def mimic_joint(joint: Any, leader: SymbolicJoint, name: str = "joint") -> Symbo
     return SymbolicJoint(leader.nq, leader.nv, placement, subspace, leader.tangent, leader.integrate, leader.difference)
 
 
-def _at(joint: Any, coordinates: Any) -> tuple[Any, Any]:
+def follower_of(joint: Any, leader_nq: int, name: str) -> tuple[bool, maps.Vector, float, float]:
+    """(whether it turns, not shifts; axis; scaling; offset) of a ``pin.JointModelMimic``.
+
+    The type of the follower is not visible from Python, so it is recovered from the motion that Pinocchio computes
+    for it: a shift or a turn. A helical follower is refused; Pinocchio 4.1 drops its pitch from the motion.
+
+    Raises:
+        UnsupportedJointError: the scaling is 0 (then the follower's axis cannot be recovered), or it is helical.
+    """
+    inner = joint.extract()
+    scaling, offset = float(inner.scaling), float(inner.offset)
+    if scaling == 0.0:
+        raise UnsupportedJointError(f"joint {name!r}", scaling, "a mimic joint of scaling 0 is a fixed joint")
+    start = np.zeros(leader_nq)
+    if leader_nq == 2:
+        start[0] = 1.0
+    twist, _ = motion_at(joint, start)
+    turned = motion_at(joint, np.array([1.0]) if leader_nq == 1 else np.array([np.cos(1.0), np.sin(1.0)]))[1]
+    if not twist[3:].any():
+        return False, twist[:3] / scaling, scaling, offset
+    if twist[:3].any() or np.abs(turned).max() > rot.SNAP:
+        raise UnsupportedJointError(f"joint {name!r}", "helical follower", "a mimic joint follows by a turn or a shift")
+    return True, twist[3:] / scaling, scaling, offset
+
+
+def motion_at(joint: Any, coordinates: Any) -> tuple[Any, Any]:
     """(motion axis, 6 numbers; position) that Pinocchio computes for a one-dof joint at its coordinates."""
     data = joint.createData()
     q = np.concatenate([np.zeros(joint.idx_q), coordinates])

@@ -6,7 +6,7 @@ import functools
 
 import casadi as ca
 
-from wbc.stack.compiled_function import compiled
+from wbc.native.compiled_function import compiled
 from wbc.walking.walk_hands import BEHIND
 
 #: Where things are in the output: what is `now` in the next tick, joints 4 to 6 with the part of the wrist's way, the

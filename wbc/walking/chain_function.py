@@ -9,8 +9,8 @@ import casadi as ca
 import numpy as np
 import pinocchio as pin
 
+from wbc.native.compiled_function import compiled
 from wbc.robots import Walker
-from wbc.stack.compiled_function import compiled
 from wbc.symbolic.kinematics import Kinematics
 from wbc.symbolic.rotations import from_quaternion
 

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wbc.errors import CompileError
+from wbc.native import toolchain
+from wbc.native.kernel import kernel
 from wbc.robots import WalkerData
-from wbc.stack import toolchain
-from wbc.stack.kernel import kernel
 
 _SOURCES = Path(__file__).parent / "native"
 _FILES = ("arm.h", "surface.h", "curve.h", "grips.h", "near.h", "speeds.h", "tracks.h", "ways.h", "planner.c")

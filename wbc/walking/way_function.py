@@ -6,7 +6,7 @@ import functools
 
 import casadi as ca
 
-from wbc.stack.compiled_function import compiled
+from wbc.native.compiled_function import compiled
 from wbc.symbolic.rotations import exp3, from_quaternion, left_jacobian, left_jacobian_inverse, log3, to_quaternion
 
 #: Where things are in the output: the target and its rate, and where it is afterwards as numbers and as position and

@@ -9,7 +9,7 @@ from collections.abc import Callable
 import casadi as ca
 
 from wbc.errors import CompileError
-from wbc.stack import cache, toolchain
+from wbc.native import cache, toolchain
 
 _LIBRARY = "function.so"
 

@@ -6,7 +6,7 @@ import hashlib
 from collections.abc import Sequence
 from pathlib import Path
 
-from wbc.stack import cache, toolchain
+from wbc.native import cache, toolchain
 
 
 def kernel(sources: Path, files: Sequence[str]) -> Path:

@@ -1,0 +1,90 @@
+"""What the name of a cache entry covers: all code of this package that runs when a program is built, and no less."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Any, get_type_hints
+
+import pinocchio as pin
+import pytest
+
+from tests.project.layout import module_name
+from tests.project.test_floors import PACKAGE_FILES, imported, part_of
+from tests.stack import small
+from wbc import Stack
+from wbc.shapes import Box, PlacedShape, Sphere
+from wbc.stack import key
+from wbc.stack.artifact import compile_stack
+from wbc.tasks import JointLimits, Obstacle, Posture, SelfCollision
+
+
+def test_parts_are_all_that_the_builder_imports() -> None:
+    """From ``wbc.stack`` on, over every import that runs, also those within functions."""
+    imports: dict[str, set[str]] = {}
+    for path in PACKAGE_FILES:
+        name = module_name(path)
+        imports.setdefault(part_of(name), set()).update(part_of(target) for _, target in imported(path))
+    reached, waiting = set(), {"wbc.stack"}
+    while waiting:
+        part = waiting.pop()
+        reached.add(part)
+        waiting |= imports.get(part, set()) - reached - {"wbc.__version__"}
+    assert tuple(sorted(reached)) == key.PARTS
+
+
+def test_every_file_that_runs_in_a_build_is_covered(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Seen from the interpreter: files whose functions are called while expressions and C code are made."""
+    monkeypatch.setenv("WBC_CACHE", str(tmp_path / "cache"))
+    box = PlacedShape(Box((0.1, 0.1, 0.1)), pin.SE3.Identity())
+    ball = PlacedShape(Sphere(0.1), pin.SE3.Identity())
+    robot = small.arm().with_shapes({"link1": [box], "link2": [box, ball]})
+    stack = small.stack(robot).add(SelfCollision(pairs=[("link1", "link2")])).add(Obstacle(Box((0.1,) * 3)))
+    stack.add(JointLimits(), name="more limits").add(Posture(), name="rest", level=1)
+    seen: set[str] = set()
+
+    def note(frame: Any, event: str, _: Any) -> None:
+        if event == "call":
+            seen.add(frame.f_code.co_filename)
+
+    sys.setprofile(note)
+    try:
+        compile_stack(stack, "vm", "1")
+    finally:
+        sys.setprofile(None)
+    root = Path(key.__file__).parents[2]
+    own = {Path(name).resolve() for name in seen if Path(name).resolve().is_relative_to(root / "wbc")}
+    own |= {Path(name).resolve() for name in seen if Path(name).resolve().is_relative_to(root / "tasks")}
+    covered = {path.resolve() for part in key.PARTS for _, path in key.files_of(part)}
+    assert len(own) > 30
+    assert own <= covered
+
+
+@pytest.mark.parametrize("part", key.PARTS)
+def test_a_change_in_any_part_changes_the_key(part: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    stack, files = small.stack(), key.files_of
+
+    def changed(which: str) -> list[tuple[str, Path]]:
+        found = files(which)
+        if which == part:
+            name, path = found[-1]
+            (tmp_path / "changed.py").write_bytes(path.read_bytes() + b"\n")
+            found[-1] = (name, tmp_path / "changed.py")
+        return found
+
+    before = key.key(stack, "1", "vm")
+    key._own_code.cache_clear()
+    monkeypatch.setattr(key, "files_of", changed)
+    try:
+        assert key.key(stack, "1", "vm") != before
+    finally:
+        monkeypatch.undo()
+        key._own_code.cache_clear()
+    assert key.key(stack, "1", "vm") == before
+
+
+def test_add_returns_the_stack_that_it_was_called_on() -> None:
+    """So that ``wbc.Stack(...).add(...).compile()`` is what a type checker takes it for."""
+    stack = Stack(small.arm(), 0.01)
+    assert stack.add(Posture()) is stack
+    assert str(get_type_hints(Stack.add)["return"]) == "typing.Self"

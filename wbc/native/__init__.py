@@ -1,0 +1,1 @@
+"""C code as libraries: the compiler, the cache on disk, and how libraries are loaded (floor 1)."""

@@ -1,0 +1,227 @@
+"""Distances and rows of the closest pairs in C: one call from the configuration to the rows."""
+
+from __future__ import annotations
+
+import ctypes
+import functools
+import logging
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from wbc.errors import CompileError
+from wbc.native import toolchain
+from wbc.native.kernel import kernel
+from wbc.native.library import load_library
+from wbc.proximity.choice import KEEP_LENGTH, KEEP_SHARE
+from wbc.proximity.corners import NEAR, corners_of
+from wbc.proximity.rows import Rows
+from wbc.proximity.scene import TIE, TRUST, Scene
+from wbc.shapes import FAR, Box, Capsule, Convex, Cylinder, HalfSpace, Shape, Sphere
+from wbc.symbolic.joint_steps import Step, joint_steps, place
+from wbc.validation import Array
+
+log = logging.getLogger("wbc")
+
+_SOURCES = Path(__file__).parent / "native"
+_FILES = (
+    "scene.h",
+    "vectors.h",
+    "steps.h",
+    "shapes.h",
+    "gjk.h",
+    "epa.h",
+    "pair.h",
+    "choose.h",
+    "corners.h",
+    "sensor.c",
+)
+
+#: Shapes that are no farther apart than this, without the balls that are added to them, overlap; in parts of the
+#: robot's characteristic length.
+TOUCH = 1e-10
+#: Points of hulls that ``native/shapes.h`` takes at a time.
+LANES = 8
+#: What rounding may do to bounds, in the same parts.
+OFF = 1e-12
+
+_INTEGERS = ("joints", "steps", "bodies", "pairs", "rows", "corners", "width", "nv", "has_pose", "has_velocity")
+_LENGTHS = ("far", "touch", "tie", "trust", "keep_share", "keep_length", "off", "near")
+_ARRAYS = (
+    *("q", "joint_parent", "joint_steps", "joint_place", "step_kind", "step_q", "step_number", "joint_pose"),
+    *("body_joint", "body_place", "body_pose", "kind", "hull", "size", "points", "corner", "corner_count"),
+    *("first", "second", "outward", "pair_side", "answer", "doubtful", "has_row", "is_measured", "score"),
+    *("row_pair", "heap", "row_near", "row_fresh", "distance", "drift", "line", "side", "pose", "velocity", "margin"),
+)
+
+
+class _Scene(ctypes.Structure):
+    """``scene_t`` of ``native/scene.h``."""
+
+    _fields_ = [
+        *((name, ctypes.c_int) for name in _INTEGERS),
+        *((name, ctypes.c_double) for name in _LENGTHS),
+        *((name, ctypes.c_void_p) for name in _ARRAYS),
+        ("measured", ctypes.c_int),
+    ]
+
+
+@functools.cache
+def library() -> ctypes.PyDLL | None:
+    """The compiled sensor, or None where there is no compiler, or it fails; the log says so once."""
+    if toolchain.compiler() is None:
+        log.warning("no C compiler: distances are measured with Coal from Python, some 100 times slower")
+        return None
+    try:
+        found = load_library(kernel(_SOURCES, _FILES))
+    except CompileError as error:
+        log.warning("%s: distances are measured with Coal from Python, some 100 times slower", error)
+        return None
+    found.wbc_scene_size.restype = ctypes.c_longlong
+    if found.wbc_scene_size() != ctypes.sizeof(_Scene):
+        raise CompileError("wbc_scene_size", found.wbc_scene_size(), f"expected {ctypes.sizeof(_Scene)} bytes")
+    for name in ("wbc_sense", "wbc_measure"):
+        getattr(found, name).argtypes = [ctypes.c_void_p]
+        getattr(found, name).restype = None
+    return found
+
+
+class NativeSensing:
+    """A scene, its rows and their memory; see :class:`wbc.proximity.plain.PlainSensing` for the same in Python.
+
+    Attributes:
+        pairs: number of the pair of each row, -1 without.
+        distances, normals, points, doubtful: of every pair at its last measurement.
+    """
+
+    def __init__(self, functions: ctypes.PyDLL, scene: Scene, rows: Rows | None = None) -> None:
+        length = scene.robot.characteristic_length
+        count, pairs = (0 if rows is None else rows.count), len(scene.first)
+        self._q, self._pose = np.zeros(scene.robot.nq), np.zeros(12)
+        self._answer, self._doubtful = np.zeros((pairs, 7)), np.zeros(pairs, dtype=np.int8)
+        self.pairs = np.full(count, -1, dtype=np.int32)
+        self._near, self._has_row = np.zeros(count, dtype=np.int8), np.zeros(pairs, dtype=np.int8)
+        arrays = _kinematics(scene) | _bodies(scene) | {
+            "q": self._q, "answer": self._answer, "doubtful": self._doubtful, "row_pair": self.pairs,
+            "first": scene.first.astype(np.int32), "second": scene.second.astype(np.int32), "outward": scene.outward,
+            "has_row": self._has_row, "is_measured": np.zeros(pairs, dtype=np.int8),
+            "score": np.zeros(pairs), "heap": np.zeros(max(count, 1), dtype=np.int32), "row_near": self._near,
+            "row_fresh": np.zeros(count, dtype=np.int8), "pose": self._pose,
+        }  # fmt: skip
+        if rows is not None:
+            names = ("distance", "drift", "line", "side", "pair_side", "margin", "pose", "velocity")
+            arrays |= {name: getattr(rows, name) for name in names if getattr(rows, name) is not None}
+        # Held, since the structure has their addresses only
+        self._arrays = {name: np.ascontiguousarray(array) for name, array in arrays.items()}
+        assert rows is None or all(self._arrays[n] is arrays[n] for n in ("distance", "drift", "line", "side"))
+        self._scene = _Scene(
+            joints=scene.robot.model.njoints, steps=len(arrays["step_q"]), bodies=len(scene.bodies), pairs=pairs,
+            rows=count, corners=0 if rows is None else rows.corners, width=arrays["corner"].shape[1],
+            nv=scene.robot.nv, has_pose=bool(scene.moving.any()), has_velocity="velocity" in arrays, far=FAR,
+            touch=TOUCH * length, tie=TIE * length, trust=TRUST * length, keep_share=KEEP_SHARE,
+            keep_length=KEEP_LENGTH * length, off=OFF * length, near=NEAR * length,
+            **{name: array.ctypes.data for name, array in self._arrays.items()},
+        )  # fmt: skip
+        self._at = ctypes.c_void_p(ctypes.addressof(self._scene))
+        self._sense, self._measure = functions.wbc_sense, functions.wbc_measure
+        self.distances, self.normals, self.points = self._answer[:, 0], self._answer[:, 1:4], self._answer[:, 4:]
+
+    @property
+    def doubtful(self) -> np.ndarray:
+        """Whether the normal of a pair is a declared one."""
+        return self._doubtful.astype(bool)
+
+    @property
+    def measured(self) -> int:
+        """How many pairs the last call measured."""
+        return int(self._scene.measured)
+
+    def reset(self) -> None:
+        """Forget the rows."""
+        self.pairs[:] = -1
+        self._has_row[:] = self._near[:] = 0
+
+    def sense(self, q: Array) -> None:
+        """Measure and write the rows."""
+        self._q[:] = q
+        self._sense(self._at)
+
+    def measure(self, q: Array, pose: pin.SE3) -> None:
+        """All pairs."""
+        self._q[:] = q
+        self._pose[:] = np.concatenate([np.asarray(pose.rotation).ravel("F"), pose.translation])
+        self._measure(self._at)
+
+
+def _kinematics(scene: Scene) -> dict[str, Array]:
+    """Steps of the joints that bodies stand on, and of those below them."""
+    model = scene.robot.model
+    needed = {int(j) for joint in scene.joints for j in model.supports[joint]}
+    steps: list[Step] = []
+    begin, parent = np.zeros(model.njoints + 1, dtype=np.int32), np.full(model.njoints, -1, dtype=np.int32)
+    places, poses = np.zeros((model.njoints, 12)), np.zeros((model.njoints + 1, 12))
+    poses[:] = place(pin.SE3.Identity())
+    for joint in range(1, model.njoints):
+        if joint in needed:
+            steps += joint_steps(model, joint)
+            parent[joint] = int(model.parents[joint])
+            places[joint] = place(model.jointPlacements[joint])
+        begin[joint + 1] = len(steps)
+    return {
+        "joint_parent": parent,
+        "joint_steps": begin,
+        "joint_place": places,
+        "joint_pose": poses,
+        "step_kind": np.array([step.kind for step in steps], dtype=np.int32),
+        "step_q": np.array([step.q for step in steps], dtype=np.int32),
+        "step_number": np.array([step.numbers for step in steps]).reshape(-1, 12),
+    }
+
+
+def _bodies(scene: Scene) -> dict[str, Array]:
+    count, shapes = len(scene.bodies), [body.shape for body in scene.bodies]
+    corners = [corners_of(shape, center) for shape, center in zip(shapes, scene.centers, strict=True)]
+    corner = np.zeros((count, max(1, *(len(points) for points in corners)), 3))
+    for k, points in enumerate(corners):
+        corner[k, : len(points)] = points
+    hulls = {k: _filled(s.points - scene.centers[k]) for k, s in enumerate(shapes) if isinstance(s, Convex)}
+    start = np.cumsum([0, *(len(hulls.get(k, ())) for k in range(count))])
+    outside = scene.robot.model.njoints
+    joints = [outside if moves else joint for joint, moves in zip(scene.joints, scene.moving, strict=True)]
+    return {
+        "body_joint": np.array(joints, dtype=np.int32),
+        "body_place": np.array([place(pose) for pose in scene.places]),
+        "body_pose": np.zeros((count, 12)),
+        "kind": np.array([_kind(shape) for shape in shapes], dtype=np.int32),
+        "hull": np.stack([start[:-1], np.diff(start)], axis=1).astype(np.int32),
+        "size": np.array([[*_size(s), r] for s, r in zip(shapes, scene.radii, strict=True)]),
+        "points": np.concatenate([np.zeros(0), *(points.T.ravel() for points in hulls.values())]),
+        "corner": corner,
+        "corner_count": np.array([len(points) for points in corners], dtype=np.int32),
+    }
+
+
+def _filled(points: Array) -> Array:
+    """The last point again, up to a multiple of what the loop takes at a time."""
+    return np.vstack([points, np.tile(points[-1], (-len(points) % LANES, 1))])
+
+
+def _kind(shape: Shape) -> int:
+    return 2 if isinstance(shape, HalfSpace) else int(isinstance(shape, Convex))
+
+
+def _size(shape: Shape) -> Iterator[float]:
+    """Half sides, disc and ball of which the shape is the sum; zeros for hulls and half-spaces."""
+    sizes: Any = (0.0,) * 5
+    if isinstance(shape, Sphere):
+        sizes = (0.0, 0.0, 0.0, 0.0, shape.radius)
+    elif isinstance(shape, Capsule):
+        sizes = (0.0, 0.0, shape.length / 2, 0.0, shape.radius)
+    elif isinstance(shape, Box):
+        sizes = (*(side / 2 for side in shape.size), 0.0, 0.0)
+    elif isinstance(shape, Cylinder):
+        sizes = (0.0, 0.0, shape.length / 2, shape.radius, 0.0)
+    yield from sizes

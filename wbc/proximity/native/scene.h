@@ -1,0 +1,44 @@
+/* What the sensor of the closest pairs works on: all arrays are Python's, which keeps them as long as this is used. */
+#ifndef WBC_SCENE_H
+#define WBC_SCENE_H
+
+/* Shapes: a box, a disc across z and a ball added up (spheres, capsules, boxes, cylinders); a hull; a half-space z <= 0 */
+enum { SUM, HULL, PLANE };
+
+/* See wbc/proximity/native.py, which fills it: the order of the fields is the same there */
+typedef struct {
+    int joints, steps, bodies, pairs, rows, corners, width, nv, has_pose, has_velocity;
+    /* rows further than `far` are without a pair; [m] also: what counts as touching, as equal, and as near contact */
+    double far, touch, tie, trust, keep_share, keep_length, off, near;
+    /* kinematics */
+    const double *q;
+    const int *joint_parent, *joint_steps; /* steps of joint k: joint_steps[k] to joint_steps[k + 1] */
+    const double *joint_place;             /* 12 each */
+    const int *step_kind, *step_q;
+    const double *step_number; /* 12 each */
+    double *joint_pose;        /* 12 each; the last one is what moves from outside */
+    /* bodies */
+    const int *body_joint;
+    const double *body_place; /* 12 each, on the joint */
+    double *body_pose;        /* 12 each, in the world */
+    const int *kind, *hull;   /* hull: where the points start, and how many, 2 each */
+    const double *size;       /* half sides, disc, ball, radius of the bounding sphere: 6 each */
+    const double *points;     /* of a hull: all x, then all y, then all z */
+    const double *corner;     /* width x 3 each */
+    const int *corner_count;
+    /* pairs */
+    const int *first, *second;
+    const double *outward; /* 1: only B moves from outside, -1: only A */
+    const double *pair_side; /* nv each */
+    double *answer;          /* distance, normal, point: 7 each */
+    signed char *doubtful, *has_row, *is_measured;
+    double *score;
+    /* rows */
+    int *row_pair, *heap;
+    signed char *row_near, *row_fresh;
+    double *distance, *drift, *line, *side;
+    const double *pose, *velocity, *margin;
+    int measured; /* how many pairs the last call measured */
+} scene_t;
+
+#endif
