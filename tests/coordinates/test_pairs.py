@@ -79,7 +79,7 @@ def test_one_stack_serves_several_pairs() -> None:
             DuplicateNameError,
         ),
         (lambda: mode_pairs("ssrms", "M9"), UnknownNameError),
-        (lambda: mode_pairs("panda", "M1"), UnknownNameError),
+        (lambda: mode_pairs("pnda", "M1"), UnknownNameError),
     ],
 )
 def test_bad_pairs(make: Any, error: type[WbcError]) -> None:

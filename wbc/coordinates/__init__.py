@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from wbc.analysis.rows import BodyRows, JointRows, PitchPlaneRows
 from wbc.coordinates.adviser import Advice, Adviser, Basis, Condition
-from wbc.coordinates.arm_parts import Arm, Parts, parts
+from wbc.coordinates.arm_parts import Arm, MissingPartError, Parts
 from wbc.coordinates.automatic import AutomaticPairs
 from wbc.coordinates.complete_sets import CompleteSet, smallest_complete_sets
 from wbc.coordinates.conditioning import Conditioning
 from wbc.coordinates.control import PairController
 from wbc.coordinates.determinant_places import ClosedForm, closed_form
 from wbc.coordinates.items import FollowRows, KeepRows
-from wbc.coordinates.modes import MissingPartError, Mode, mode_pairs, mode_table
+from wbc.coordinates.modes import Mode, mode_pairs, mode_row, mode_table, modes_of
 from wbc.coordinates.pair import CoordinatePair
 from wbc.coordinates.pair_stack import PairStack, pair_stack
 from wbc.coordinates.pair_survey import PairSurvey, advice_time, survey_pairs
@@ -20,6 +20,7 @@ from wbc.coordinates.point_sets import OnCircle, OnCylinder, OnLine, OnPlane, On
 from wbc.coordinates.published_trees import TREES, TreeSet, TreeSets, tree_sets
 from wbc.coordinates.restrictions import restriction_table
 from wbc.coordinates.rows import AxisRows, Coordinate, PlaneAngleRows, PointRows
+from wbc.coordinates.which_parts import parts
 
 __all__ = [
     "TREES",
@@ -60,7 +61,9 @@ __all__ = [
     "advice_time",
     "closed_form",
     "mode_pairs",
+    "mode_row",
     "mode_table",
+    "modes_of",
     "pair_stack",
     "parts",
     "plot_drives",

@@ -8,7 +8,8 @@ from functools import cache
 
 from wbc import validation
 from wbc.analysis.rows import JointRows, Rows
-from wbc.coordinates.arm_parts import Arm, parts
+from wbc.coordinates.arm_parts import Arm
+from wbc.coordinates.which_parts import parts
 from wbc.robot import Robot
 
 #: Robots that have sets of the whole tree
