@@ -119,8 +119,11 @@ def test_easing_is_that_of_the_least_singular_value() -> None:
     # One that looks at another pair in between answers as one that does not
     for pair, easing in zip(pairs, easings, strict=True):
         assert easings[0].at(pair.name, every) == easing.at(pair.name, every)
-    assert easings[0].weight(pairs[0].name, 0.0) == pytest.approx(0.005**2)
-    assert easings[0].weight(pairs[0].name, 0.005) == pytest.approx((0.005 * 0.75) ** 2)
+    least = easings[0].threshold(pairs[0].name)
+    assert 0.005 < least <= 0.01
+    assert easings[0].weight(pairs[0].name, 0.0) == pytest.approx((0.5 * least) ** 2)
+    assert easings[0].weight(pairs[0].name, 0.5 * least) == pytest.approx((0.5 * least * 0.75) ** 2)
+    assert easings[0].weight(pairs[0].name, least) == 0.0
 
 
 def test_thresholds_of_easing_are_parts_of_what_is_usual() -> None:
