@@ -24,7 +24,7 @@ Q = np.array([0.3, 0.5, -0.7, 1.1])
 
 @pytest.fixture(scope="module")
 def compiled() -> Teleoperation:
-    return Teleoperation("spherical_4r", acceleration=0.5, seconds=0.5, advice=True)
+    return Teleoperation("spherical_4r", acceleration=0.5, seconds=0.5)
 
 
 @pytest.fixture
@@ -76,7 +76,7 @@ def test_a_file_drives_and_changes_pairs(session: Teleoperation, tmp_path: Path)
     assert change < 0.5 + 1e-6
     written = log.write(tmp_path / "out" / "log.csv", session.robot.dof_names).read_text().splitlines()
     assert len(written) == 251
-    assert written[0].startswith("time,pair,status,q joint1")
+    assert written[0].startswith("time,pair,status,sigma,kept,advised,lost,why,asked 1,")
 
 
 def test_keys_that_are_held_and_pairs_by_keys(session: Teleoperation) -> None:

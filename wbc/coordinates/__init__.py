@@ -20,6 +20,7 @@ from wbc.coordinates.point_sets import OnCircle, OnCylinder, OnLine, OnPlane, On
 from wbc.coordinates.published_trees import TREES, TreeSet, TreeSets, tree_sets
 from wbc.coordinates.restrictions import restriction_table
 from wbc.coordinates.rows import AxisRows, Coordinate, PlaneAngleRows, PointRows
+from wbc.coordinates.starts import regular_start
 from wbc.coordinates.which_parts import parts
 
 __all__ = [
@@ -67,6 +68,7 @@ __all__ = [
     "pair_stack",
     "parts",
     "plot_drives",
+    "regular_start",
     "restriction_table",
     "smallest_complete_sets",
     "survey_pairs",
