@@ -52,8 +52,8 @@ def advise(
     out().print(f"use: [bold]{escape(adviser.recommend(q, current))}[/bold]")
     err().print(
         "sigma: least singular value, metres over the arm's length; of the task: over that of the task alone; "
-        f"condition: what loses its rank within {adviser.near:g} rad; distance in rad, exact to a joint's angle, else an "
-        "estimate",
+        f"condition: what loses its rank within {adviser.near:g} rad; distance in rad, exact to a joint's angle, "
+        "else an estimate",
         soft_wrap=True,
     )
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from pathlib import Path
 from typing import Annotated
 
@@ -110,7 +111,7 @@ def _report(found: SessionLog, session: Teleoperation, log: Path | None) -> None
     status, active, lost = found.status, found.active, found.lost
     statuses = ", ".join(f"{status.count(s)} {s}" for s in dict.fromkeys(status))
     fastest = max((float(np.abs(v).max()) for v in found.v), default=0.0)
-    changes = sum(a != b for a, b in zip(active, active[1:], strict=False))
+    changes = sum(a != b for a, b in pairwise(active))
     ended = ", ended by Ctrl-C" if found.interrupted else ""
     out().print(
         f"{len(found.time)} ticks: {statuses or 'none'}; fastest joint {fastest:.4g} rad/s, "

@@ -70,7 +70,7 @@ class Sampled:
     def completes(self, task: Coordinate, held: Held) -> bool:
         """Task and held rows have full column rank almost everywhere."""
         J = self.stacked((task, *held))
-        return rank(J) == J.shape[2]
+        return rank(J) == int(J.shape[2])
 
 
 def single_sets(sampled: Sampled, task: Coordinate, pool: Held) -> tuple[Held, ...]:

@@ -13,7 +13,7 @@ from wbc.controller import Step
 from wbc.coordinates import expressions
 from wbc.coordinates.conditioning import checked_configuration
 from wbc.coordinates.easing import Easing
-from wbc.coordinates.integrals import RateIntegrals
+from wbc.coordinates.integrals import RateIntegrals, Rows
 from wbc.coordinates.pair import CoordinatePair
 from wbc.coordinates.pair_stack import EASE, PairStack, pair_stack
 from wbc.coordinates.rate_matrices import RateMatrices
@@ -89,7 +89,7 @@ class PairController:
         #: Constraint coordinates that have rates: their references go along
         self._moving: tuple[Coordinate, ...] = ()
         self._q: Array | None = None
-        self._every = np.zeros((count, robot.nv))
+        self._every, self._weight = np.zeros((count, robot.nv)), 0.0
         self._activate()
 
     @property
@@ -181,7 +181,7 @@ class PairController:
                     # A task that goes on lags by what it was asked for, not by how that has changed since
                     asked = self._served if one in alike and one in was.task else self._command
                     self._fading[places[one]] = now[places[one]] - asked[places[one]]
-            wanted = max(wanted, self._shortest(v))
+            wanted = max(wanted, self._shortest(self._q, v))
             self._latch([one for one in self.pair.constraint if one not in before], self._q)
         self._integrals.restart(self.pair.task)
         self._time, self._seconds = 0.0, wanted
@@ -250,7 +250,7 @@ class PairController:
             self._fading[:] = 0.0
             self.blending, self._fresh = False, True
 
-    def _ask(self, field: str, rows: Array, rates: Any) -> None:
+    def _ask(self, field: str, rows: Rows, rates: Any) -> None:
         plain = type(rates) is np.ndarray and rates.dtype == np.float64 and rates.shape == rows.shape
         if not (plain and isfinite(rates.dot(rates))):
             rates = validation.real_array(field, rates, rows.shape)
@@ -263,9 +263,7 @@ class PairController:
         """Constraint coordinates that have rates, or had them in the last tick."""
         places = self._rates.places
         busy = [
-            one
-            for one in self.pair.constraint
-            if self._command[places[one]].any() or self._served[places[one]].any()
+            one for one in self.pair.constraint if self._command[places[one]].any() or self._served[places[one]].any()
         ]
         self._moving = tuple(dict.fromkeys((*self._moving, *busy)))
 
@@ -294,9 +292,9 @@ class PairController:
                 value = expressions.here(self.robot, one, q)
                 self.controller[self.declared.keep[one]].reference = value
 
-    def _shortest(self, v: Array) -> float:
+    def _shortest(self, q: Array, v: Array) -> float:
         """Time in which the joint rates can change to what the new pair wants."""
-        made, every = self._made[self.active], self._rates.whole(self._q)
+        made, every = self._made[self.active], self._rates.whole(q)
         rows = np.concatenate((made.task_rows, made.held_rows))
         change = np.abs(np.linalg.lstsq(every[rows], self._command[rows], rcond=1e-6)[0] - v)
         limit = self.robot.limits.acceleration

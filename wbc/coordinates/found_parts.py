@@ -10,7 +10,7 @@ import pinocchio as pin
 
 from wbc.analysis.rows import BodyRows, PitchPlaneRows
 from wbc.coordinates.arm_parts import Arm, Held, Parts, components
-from wbc.coordinates.constraint_sets import Sampled, single_sets, sets_of
+from wbc.coordinates.constraint_sets import Sampled, sets_of, single_sets
 from wbc.coordinates.rows import AxisRows, Coordinate, PlaneAngleRows
 from wbc.coordinates.samples import ROUNDING, rank, states_of
 from wbc.coordinates.tree import Chain, chains_of, single
@@ -71,6 +71,7 @@ class _Finder:
         end = chain.tip or self._frame(f"{prefix}tip", joints[-1], pin.SE3.Identity())
         tip = self._tip(prefix, end, joints)
         k, middle = self._middle(prefix, end, joints)
+        plane: PitchPlaneRows | PlaneAngleRows | None
         plane, in_plane = self._pitch_plane(prefix, joints)
         if plane is None and middle is not None:
             plane = self._three_points(prefix, joints, middle.frame, end)
@@ -146,31 +147,28 @@ class _Finder:
         model = self.robot.model
         axes = [_axis(self.robot, j) for j in joints]
         for i in range(1, len(joints) - 2):
-            three = axes[i : i + 3]
-            if any(a is None for a in three) or all(a is None for a in axes[:i]):
+            one, two, three = axes[i : i + 3]
+            if one is None or two is None or three is None or all(a is None for a in axes[:i]):
                 continue
-            turn, a, parallel = np.eye(3), axes[i], True
-            for k in (i + 1, i + 2):
-                # An axis does not move under the turn about itself: parallel in one configuration, parallel in all
-                turn = turn @ model.jointPlacements[joints[k]].rotation
-                parallel &= float(np.linalg.norm(np.cross(a, turn @ axes[k]))) < ROUNDING
-            if not parallel:
+            # An axis does not move under the turn about itself: parallel in one configuration, parallel in all
+            turn = np.array(model.jointPlacements[joints[i + 1]].rotation)
+            further = turn @ model.jointPlacements[joints[i + 2]].rotation
+            away = [np.cross(one, turn @ two), np.cross(one, further @ three)]
+            if np.linalg.norm(away) > ROUNDING:
                 continue
             shoulder = self._frame(f"{prefix}shoulder", joints[i], pin.SE3.Identity())
             wrist = self._frame(f"{prefix}wrist", joints[i + 2], pin.SE3.Identity())
             held: list[Coordinate] = []
             if i >= 2:
                 upper = self._frame(f"{prefix}shoulder_body", joints[i - 1], pin.SE3.Identity())
-                held.append(AxisRows(upper, _triple(axes[i]), shoulder, name=f"{prefix}beta"))
+                held.append(AxisRows(upper, _triple(one), shoulder, name=f"{prefix}beta"))
             if i + 3 < len(joints):
                 hand = self._frame(f"{prefix}wrist_body", joints[i + 3], pin.SE3.Identity())
-                held.append(AxisRows(hand, _triple(axes[i + 2]), wrist, name=f"{prefix}gamma"))
+                held.append(AxisRows(hand, _triple(three), wrist, name=f"{prefix}gamma"))
             return PitchPlaneRows(shoulder, wrist, name=f"{prefix}alpha"), tuple(held)
         return None, ()
 
-    def _three_points(
-        self, prefix: str, joints: tuple[int, ...], elbow: str, end: str
-    ) -> PlaneAngleRows | None:
+    def _three_points(self, prefix: str, joints: tuple[int, ...], elbow: str, end: str) -> PlaneAngleRows | None:
         """The angle of shoulder, elbow and wrist, where these are three points that joints move."""
         if len(joints) < 4:
             return None
@@ -268,7 +266,9 @@ def _axis(robot: Robot, joint: int) -> Array | None:
     """Axis of a turning joint in its own frame; None for one that slides."""
     data = robot.model.createData()
     pin.computeJointJacobians(robot.model, data, robot.neutral)
-    column = pin.getJointJacobian(robot.model, data, joint, pin.LOCAL).reshape(6, robot.nv)[3:, robot.model.idx_vs[joint]]
+    column = pin.getJointJacobian(robot.model, data, joint, pin.LOCAL).reshape(6, robot.nv)[
+        3:, robot.model.idx_vs[joint]
+    ]
     size = float(np.linalg.norm(column))
     return None if size < ROUNDING else np.asarray(column / size)
 

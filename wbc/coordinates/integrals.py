@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import TypeAlias
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 
 from wbc.coordinates import expressions
 from wbc.coordinates.rate_matrices import RateMatrices
 from wbc.coordinates.rows import Coordinate
 from wbc.robot import Robot
 from wbc.validation import Array
+
+#: Numbers of rows
+Rows: TypeAlias = NDArray[np.intp]
 
 
 class RateIntegrals:
@@ -36,7 +41,7 @@ class RateIntegrals:
             self._mask[rows] = expressions.rate_only(robot, one)
         self.masked = {one for one, rows in rates.places.items() if self._mask[rows].any()}
         self.off = np.zeros(len(self._mask))
-        self.rows = np.zeros(0, dtype=np.intp)
+        self.rows: Rows = np.zeros(0, dtype=np.intp)
         #: Where the robot was, the matrix of all rows there, and what the rows were to go from there
         self._q: Array | None = None
         self._before = np.zeros((len(self._mask), robot.nv))
@@ -52,7 +57,7 @@ class RateIntegrals:
         for one in rows:
             self.off[self._places[one]] = 0.0
 
-    def follow(self, rows: Array) -> None:
+    def follow(self, rows: Rows) -> None:
         """Another pair is active; what it has not planned yet does not count until the tick after the next one."""
         self.rows = np.intersect1d(self.rows, rows)
 
@@ -65,7 +70,7 @@ class RateIntegrals:
             self.off[rows] += self._mask[rows] * gone
         self._q = None
 
-    def plan(self, rows: Array, q: Array, every: Array, rates: Array, dt: float) -> None:
+    def plan(self, rows: Rows, q: Array, every: Array, rates: Array, dt: float) -> None:
         """Rows are to go at rates until the next :meth:`advance`."""
         self._q, self._before, self.rows = q, every, rows
         np.multiply(rates, dt, out=self._planned)

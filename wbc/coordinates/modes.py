@@ -188,9 +188,7 @@ def _hands(found: Parts) -> Held:
 def _two_arms(found: Parts) -> Made:
     if len(found.arms) < 2:
         return "second arm"
-    out = [
-        CoordinatePair(arm.tip, (*arm.sets[0], *_others(found, arm)), f"{arm.tip} | the rest") for arm in found.arms
-    ]
+    out = [CoordinatePair(arm.tip, (*arm.sets[0], *_others(found, arm)), f"{arm.tip} | the rest") for arm in found.arms]
     if found.body is not None:
         body, carrier = JointRows(found.body), () if found.carrier is None else found.carrier.locks()
         locked = tuple(lock for arm in found.arms for lock in arm.locks())

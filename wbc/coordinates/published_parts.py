@@ -34,11 +34,11 @@ def published_parts(name: str) -> Parts:
         return Parts(robot, (Arm("", joints, tip, middle, 2, None, (), sets, (), ()),))
     if name == "spherical_4r":
         elbow = BodyRows("end3", rotation=(), name="elbow")
-        joints = tuple(f"joint{k}" for k in range(1, 5))
+        four = tuple(f"joint{k}" for k in range(1, 5))
         alpha, beta = PitchPlaneRows("F3", "tip"), _beta("", 1)
-        sets = _single(alpha, (beta,), joints[:2], elbow)
+        sets = _single(alpha, (beta,), four[:2], elbow)
         tip = BodyRows("tip", rotation=(), name="tip")
-        return Parts(robot, (Arm("", joints, tip, elbow, 3, alpha, (beta,), sets, (alpha,), ()),))
+        return Parts(robot, (Arm("", four, tip, elbow, 3, alpha, (beta,), sets, (alpha,), ()),))
     return Parts(robot, (_seven("", 2 if name.startswith("spdm") else 1),))
 
 
@@ -56,7 +56,7 @@ def _seven(prefix: str, pitch: int) -> Arm:
     sets = _single(alpha, (beta, gamma), (joints[0], joints[1], joints[6]), elbow)
     wrist = tuple(JointRows(name) for name in joints[4:])
     # Three joints whose axes meet lead the elbow over a sphere; the turn about the line to it is the pitch plane's
-    position = (alpha, *wrist), (JointRows(joints[0]), *wrist)
+    position: tuple[Held, ...] = (alpha, *wrist), (JointRows(joints[0]), *wrist)
     tip = BodyRows(f"{prefix}tip", name=f"{prefix}xi")
     return Arm(prefix, joints, tip, elbow, 3, alpha, (beta, gamma), sets, (alpha,), position)
 

@@ -23,7 +23,8 @@ class RateMatrices:
         native: compile to C, where a compiler is there; else the virtual machine evaluates.
 
     Attributes:
-        robot: as given. places: coordinate -> its rows in the matrix of all. units: m or rad of every row, of its integral.
+        robot: as given. places: coordinate -> its rows in the matrix of all.
+        units: m or rad of every row, of its integral.
     """
 
     def __init__(self, robot: Robot, coordinates: Iterable[Coordinate], *, native: bool = True) -> None:

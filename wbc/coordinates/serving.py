@@ -5,11 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wbc.controller import Controller
 from wbc.coordinates.expressions import DRIFT
-from wbc.coordinates.integrals import RateIntegrals
+from wbc.coordinates.integrals import RateIntegrals, Rows
 from wbc.coordinates.pair import CoordinatePair
 from wbc.coordinates.pair_stack import PairStack, metric_of
 from wbc.coordinates.rate_matrices import RateMatrices
@@ -19,7 +18,6 @@ from wbc.validation import Array
 
 #: Commanded rows that are rates only lag their integral by this at most [m, rad]; what limits take is not made up for
 LAG = 5e-4
-Rows = NDArray[np.intp]
 
 
 @dataclass(frozen=True, eq=False)

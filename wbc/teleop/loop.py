@@ -65,7 +65,7 @@ class SessionLog:
         """Leave out a tick that an interrupt has cut in two."""
         count = min(len(self.time), len(self.q), len(self.seen))
         for some in (self.time, self.q, self.seen):
-            del some[count:]  # type: ignore[attr-defined]
+            del some[count:]
 
     def write(self, path: str | os.PathLike[str], names: tuple[str, ...]) -> pathlib.Path:
         """As CSV: time, pair, status, sigma, kept, advised, lost, why, asked and met by row, q and v by joint.

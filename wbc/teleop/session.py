@@ -10,7 +10,17 @@ import numpy as np
 
 from wbc import validation
 from wbc.controller import Status, Step
-from wbc.coordinates import Adviser, CoordinatePair, Mode, PairController, mode_pairs, modes_of, parts, regular_start
+from wbc.coordinates import (
+    Adviser,
+    CoordinatePair,
+    Mode,
+    PairController,
+    mode_pairs,
+    modes_of,
+    motion_cue,
+    parts,
+    regular_start,
+)
 from wbc.coordinates.modes import mode
 from wbc.coordinates.pair_stack import row_count
 from wbc.coordinates.scales import scales
@@ -41,7 +51,7 @@ class Seen:
         step: the tick. active: pair in use. blending: a change is under way. stale: the last order is too old, rates
             are zero.
         sigma: least singular value of the scaled rows of the pair, see :class:`wbc.coordinates.Adviser`. kept: sigma
-            over that of the task alone. advised: the pair to use among those that command the same.
+            over that of the task alone, 1 at most. advised: the pair to use among those that command the same.
         asked, met: rates of the task rows that were ordered, and those that the command gives [m/s, rad/s].
         lost: |D (asked - met)| / |D asked|, D: metres over the arm's length; 0 where nothing is asked.
         why: what took it, in words.
@@ -166,14 +176,12 @@ class Teleoperation:
         scale = self._scale[self.control.active]
         size = float(np.linalg.norm(scale * asked))
         lost = float(np.linalg.norm(scale * (asked - met))) / size if size > 0.0 else 0.0
-        kept = sigma / task if task > 0.0 else 0.0
-        why = self._why(step, sigma, kept, blending) if lost > NOTHING or step.status is not Status.SOLVED else ()
+        kept = min(1.0, sigma / task) if task > 0.0 else float(sigma > 0.0)
+        why = self._why(q, step, sigma, kept, blending) if lost > NOTHING or step.status is not Status.SOLVED else ()
         active = self.control.active
-        return Seen(
-            step, active, self.control.blending, stale, sigma, kept, advised, asked, met, max(0.0, lost), why
-        )
+        return Seen(step, active, self.control.blending, stale, sigma, kept, advised, asked, met, max(0.0, lost), why)
 
-    def _why(self, step: Step, sigma: float, kept: float, blending: bool) -> tuple[str, ...]:
+    def _why(self, q: Array, step: Step, sigma: float, kept: float, blending: bool) -> tuple[str, ...]:
         """What took a part of the command."""
         out = []
         if blending:
@@ -182,7 +190,8 @@ class Teleoperation:
             what = "the task is near a singular configuration" if kept > 0.5 else "this pair is near a locus of its own"
             out.append(f"{what}, sigma {sigma:.2g}")
         if self.control.pair.over_determined(self.robot):
-            out.append("more rows than joints: the task follows in the least-squares sense")
+            cue = motion_cue(self.robot, self.control.pair, q, self.control.asked)
+            out.append(f"more rows than joints: {cue}")
         joints = dict.fromkeys(b.row for b in step.binding if b.row in self.robot.dof_names and b.side != "equal")
         if joints:
             out.append(f"at limits of {', '.join(joints)}")
