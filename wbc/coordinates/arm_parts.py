@@ -39,7 +39,8 @@ class Arm:
         plane: rate alpha of the pitch plane, or angle psi of the plane of shoulder, elbow and wrist; None without one.
         in_plane: beta and gamma, as far as there are.
         sets: coordinates that are held while the tip is commanded, the default first; ``((),)`` where the tip takes
-            all joints. with_middle: those that are held with the joints beyond while the middle point is commanded.
+            all joints. with_middle: those that are held with the joints beyond while the middle point is commanded;
+            with_both: with the tip, so that it has more rows than are left; None where self-motion does not move it.
         position_sets: those that are held while the tip's position is commanded, of a tip that has a pose.
     """
 
@@ -52,6 +53,7 @@ class Arm:
     in_plane: Held
     sets: tuple[Held, ...]
     with_middle: Held
+    with_both: Held | None
     position_sets: tuple[Held, ...]
 
     @property

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import combinations
+from itertools import combinations, islice
 
 import numpy as np
 import pinocchio as pin
 
 from wbc.analysis.rows import BodyRows, PitchPlaneRows
 from wbc.coordinates.arm_parts import Arm, Held, Parts, components
-from wbc.coordinates.constraint_sets import Sampled, sets_of, single_sets
+from wbc.coordinates.constraint_sets import SUBSETS, Sampled, sets_of, single_sets
 from wbc.coordinates.rows import AxisRows, Coordinate, PlaneAngleRows
 from wbc.coordinates.samples import ROUNDING, rank, states_of
 from wbc.coordinates.tree import Chain, chains_of, single
@@ -75,7 +75,7 @@ class _Finder:
         plane, in_plane = self._pitch_plane(prefix, joints)
         if plane is None and middle is not None:
             plane = self._three_points(prefix, joints, middle.frame, end)
-        return Arm(prefix, names, tip, middle, k, plane, in_plane, (), (), ())
+        return Arm(prefix, names, tip, middle, k, plane, in_plane, (), (), None, ())
 
     def _frame(self, name: str, joint: int, place: pin.SE3) -> str:
         """A new frame on a joint's body; its name is made new, too."""
@@ -93,7 +93,7 @@ class _Finder:
         columns = [int(model.idx_vs[j]) for j in joints]
         out = np.empty((len(self._states), 6, len(joints)))
         for n, q in enumerate(self._states):
-            J = pin.computeFrameJacobian(model, self._data, q, index, pin.LOCAL_WORLD_ALIGNED)
+            J = pin.computeFrameJacobian(model, self._data, q, index, pin.LOCAL_WORLD_ALIGNED).reshape(6, -1)
             out[n] = J[:, columns]
         slides = np.array([self.robot.dof_units[c] == "m" for c in columns])
         length = self.robot.characteristic_length
@@ -207,7 +207,8 @@ def _with_sets(robot: Robot, arm: Arm) -> Arm:
     plane = () if arm.plane is None else (arm.plane,)
     pool = (*plane, *arm.in_plane, *arm.locks())
     points = components(arm.middle) if arm.middle is not None else ()
-    sampled = Sampled(robot, arm.joints, (arm.tip, *pool, *points))
+    whole = () if arm.middle is None else (arm.middle,)
+    sampled = Sampled(robot, arm.joints, (arm.tip, *pool, *points, *whole))
     spare = arm.redundancy
     if spare == 0:
         sets: tuple[Held, ...] = ((),)
@@ -217,7 +218,12 @@ def _with_sets(robot: Robot, arm: Arm) -> Arm:
     else:
         sets = sets_of(sampled, arm.tip, pool, spare)
     arm = replace(arm, sets=sets)
-    return replace(arm, with_middle=_with_middle(robot, arm, pool), position_sets=_position_sets(robot, arm, pool))
+    return replace(
+        arm,
+        with_middle=_with_middle(robot, arm, pool),
+        with_both=_with_both(sampled, arm, pool),
+        position_sets=_position_sets(robot, arm, pool),
+    )
 
 
 def _with_middle(robot: Robot, arm: Arm, pool: Held) -> Held:
@@ -235,6 +241,22 @@ def _with_middle(robot: Robot, arm: Arm, pool: Held) -> Held:
         if more > count:
             held, count = (*held, one), more
     return held
+
+
+def _with_both(sampled: Sampled, arm: Arm, pool: Held) -> Held | None:
+    """What is held besides the tip so that the middle point has more rows than there are motions left, and tells all
+    of these; None where it tells nothing of self-motion.
+    """
+    if arm.middle is None or not arm.redundancy:
+        return None
+    rows = len(arm.middle.translation)
+    for count in range(max(0, arm.redundancy + 1 - rows), arm.redundancy):
+        subsets = combinations(pool, count)
+        for held in islice(subsets, SUBSETS):
+            left = rank(sampled.stacked((arm.tip, *held)))
+            if left == len(arm.joints) - arm.redundancy + count and sampled.completes(arm.middle, (arm.tip, *held)):
+                return held
+    return None
 
 
 def _position_sets(robot: Robot, arm: Arm, pool: Held) -> tuple[Held, ...]:

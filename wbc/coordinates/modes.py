@@ -215,12 +215,9 @@ def _over_determined(found: Parts) -> Made:
         return [CoordinatePair(arm.tip, (*arm.locks(1)[:1], *_others(found, arm)), f"{arm.tip} | {arm.joints[1]}")]
     if arm.middle is None:
         return NO_MIDDLE
-    rows = len(arm.middle.translation)
-    # One row more than joints, where the point alone has not as many as there are joints to spare
-    count = min(arm.redundancy - 1, max(0, arm.redundancy + 1 - rows))
-    held = (arm.tip, *arm.sets[0][:count])
-    if rows + count <= arm.redundancy:
-        return "point between base and tip with more rows than there are joints to spare"
+    if arm.with_both is None:
+        return "point between base and tip that self-motion moves, with more rows than joints to spare"
+    held = (arm.tip, *arm.with_both)
     return [CoordinatePair(arm.middle, (*held, *_others(found, arm)), f"{arm.middle} | {_text(held)}")]
 
 

@@ -24,21 +24,21 @@ def published_parts(name: str) -> Parts:
         tip = BodyRows("tip", expressed=WORLD, translation=(0, 1), rotation=(), name="tip")
         # One joint cannot lead a point in the plane: what it can is one of its coordinates
         middle = BodyRows("end1", expressed=WORLD, translation=(1,), rotation=(), name="end of link 1 y")
-        return Parts(robot, (Arm("", ("joint1", "joint2"), tip, middle, 1, None, (), ((),), (), ()),))
+        return Parts(robot, (Arm("", ("joint1", "joint2"), tip, middle, 1, None, (), ((),), (), None, ()),))
     if name == "planar_3r":
         tip = BodyRows("tip", expressed=WORLD, translation=(0, 1), rotation=(), name="tip")
         robot = robot.with_frame("middle", "F2", pin.SE3(np.eye(3), np.array([0.4, 0.0, 0.0])))
         middle = BodyRows("middle", expressed=WORLD, translation=(0, 1), rotation=(), name="middle")
         joints = ("joint1", "joint2", "joint3")
         sets: tuple[Held, ...] = tuple((one,) for one in components(middle))
-        return Parts(robot, (Arm("", joints, tip, middle, 2, None, (), sets, (), ()),))
+        return Parts(robot, (Arm("", joints, tip, middle, 2, None, (), sets, (), (), ()),))
     if name == "spherical_4r":
         elbow = BodyRows("end3", rotation=(), name="elbow")
         four = tuple(f"joint{k}" for k in range(1, 5))
         alpha, beta = PitchPlaneRows("F3", "tip"), _beta("", 1)
         sets = _single(alpha, (beta,), four[:2], elbow)
         tip = BodyRows("tip", rotation=(), name="tip")
-        return Parts(robot, (Arm("", four, tip, elbow, 3, alpha, (beta,), sets, (alpha,), ()),))
+        return Parts(robot, (Arm("", four, tip, elbow, 3, alpha, (beta,), sets, (alpha,), (), ()),))
     return Parts(robot, (_seven("", 2 if name.startswith("spdm") else 1),))
 
 
@@ -58,7 +58,7 @@ def _seven(prefix: str, pitch: int) -> Arm:
     # Three joints whose axes meet lead the elbow over a sphere; the turn about the line to it is the pitch plane's
     position: tuple[Held, ...] = (alpha, *wrist), (JointRows(joints[0]), *wrist)
     tip = BodyRows(f"{prefix}tip", name=f"{prefix}xi")
-    return Arm(prefix, joints, tip, elbow, 3, alpha, (beta, gamma), sets, (alpha,), position)
+    return Arm(prefix, joints, tip, elbow, 3, alpha, (beta, gamma), sets, (alpha,), (), position)
 
 
 def _single(alpha: Coordinate, in_plane: Held, locks: tuple[str, ...], point: BodyRows) -> tuple[Held, ...]:
