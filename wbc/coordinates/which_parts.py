@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from functools import cache, lru_cache
+from functools import lru_cache
+from pathlib import Path
 
 from wbc.coordinates.arm_parts import Parts
 from wbc.coordinates.found_parts import found_parts
@@ -30,11 +31,13 @@ def parts(robot: str | Robot) -> Parts:
         return _found(robot)
     if not isinstance(robot, str):
         raise ShapeError("robot", robot, "expected a name, a file, or a Robot")
-    return _named(robot)
+    file = Path(robot)
+    return _named(robot, file.stat().st_mtime_ns if file.is_file() else 0)
 
 
-@cache
-def _named(robot: str) -> Parts:
+@lru_cache(maxsize=KEPT)
+def _named(robot: str, changed: int) -> Parts:
+    """``changed``: when a file was written last, so that another one of its name is read."""
     return published_parts(robot) if robot in OPERATOR_ARMS else found_parts(load(robot))
 
 
