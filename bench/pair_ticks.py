@@ -1,4 +1,4 @@
-"""``python -m bench.pair_ticks``: median time of a tick of a pair of coordinates, beside that of its bare controller."""
+"""``python -m bench.pair_ticks``: median time of a tick of a coordinate pair, beside that of its controller."""
 
 from __future__ import annotations
 

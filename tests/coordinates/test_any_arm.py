@@ -23,6 +23,7 @@ from wbc.coordinates import (
     parts,
     regular_start,
 )
+from wbc.coordinates.expressions import rate_function
 from wbc.errors import ShapeError, UnknownNameError
 from wbc.robot import Robot
 from wbc.robot.files import example_data_folder
@@ -94,7 +95,7 @@ def test_random_arms_have_modes_whose_pairs_determine_their_joints(seed: int) ->
 def test_an_arm_of_another_size_has_the_same_modes_and_advice(seed: int) -> None:
     """In millimetres, and as small as a watch: the same pairs, and ranks that are lost at the same places."""
     arms = [random_arm(seed, scale) for scale in (1.0, 1e3, 1e-2)]
-    names = [[[p.name for p in pairs] for pairs in mode_row(arm).values()] for arm in arms]
+    names = [[str([str(p) for p in pairs]) for pairs in mode_row(arm).values()] for arm in arms]
     assert names[0] == names[1] == names[2]
     advice = []
     for arm, scale in zip(arms, (1.0, 1e3, 1e-2), strict=True):
@@ -138,7 +139,7 @@ def test_a_random_arm_is_driven_and_tells_what_it_loses(seed: int) -> None:
 
 def test_arms_from_files_brake_their_fingers(tmp_path: Path) -> None:
     """A Panda with two fingers, from its URDF: the arm is the seven joints before them."""
-    file = str(example_data_folder() / "robots" / "panda_description" / "urdf" / "panda.urdf")
+    file = str(example_data_folder() / "panda_description" / "urdf" / "panda.urdf")
     found = parts(file)
     (arm,) = found.arms
     assert arm.joints == tuple(f"panda_joint{k}" for k in range(1, 8))
@@ -208,18 +209,14 @@ def test_parts_of_known_arms() -> None:
 
 
 def test_found_alpha_beta_and_gamma_are_the_published_ones() -> None:
-    from wbc.coordinates.expressions import rate_function
-
     published, found = parts("ssrms"), parts(parts("ssrms").robot)
     old, new = published.arms[0], found.arms[0]
     assert old.alpha is not None
     assert new.alpha is not None
     for q in np.random.default_rng(3).uniform(-2.0, 2.0, (5, 7)):
         for one, other in zip((old.alpha, *old.in_plane), (new.alpha, *new.in_plane), strict=True):
-            row, again = (
-                np.asarray(rate_function(p.robot, (c,))(q).full()) for p, c in ((published, one), (found, other))
-            )
-            np.testing.assert_allclose(row, again, atol=1e-12)
+            row, again = rate_function(published.robot, (one,))(q), rate_function(found.robot, (other,))(q)
+            np.testing.assert_allclose(row.full(), again.full(), atol=1e-12)
 
 
 def test_a_start_is_away_from_singular_configurations() -> None:

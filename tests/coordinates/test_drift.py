@@ -128,9 +128,8 @@ def test_easing_is_that_of_the_least_singular_value() -> None:
 
 def test_thresholds_of_easing_are_parts_of_what_is_usual() -> None:
     """A tenth of the median singular value of the pair, 0.01 at most: an arm ten times as small has the same ones."""
-    rows = [
-        DHRow(a=a, alpha=t, d=d) for a, t, d in ((0.0, 1.4, 0.3), (0.4, 0.3, 0.0), (0.1, -1.2, 0.1), (0.2, 0.5, 0.3))
-    ]
+    numbers = (0.0, 1.4, 0.3), (0.4, 0.3, 0.0), (0.1, -1.2, 0.1), (0.2, 0.5, 0.3)
+    rows = [DHRow(a=a, alpha=turn, d=d) for a, turn, d in numbers]
     found = []
     for scale in (1.0, 0.1):
         arm = from_dh([DHRow(a=scale * r.a, alpha=r.alpha, d=scale * r.d) for r in rows])
