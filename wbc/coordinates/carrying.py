@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, TypeAlias
 
+import casadi as ca
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
@@ -14,6 +16,7 @@ from wbc import validation
 from wbc.analysis.rows import BodyRows
 from wbc.coordinates import expressions
 from wbc.coordinates.pair import CoordinatePair
+from wbc.coordinates.rows import Coordinate
 from wbc.coordinates.scales import scales
 from wbc.coordinates.system_motion import system_coordinates
 from wbc.errors import RangeError, ShapeError
@@ -23,6 +26,8 @@ from wbc.validation import Array
 
 #: Intervals of the first look, and rounds of setting samples closer at most
 FIRST, ROUNDS = 64, 40
+#: Functions of rows that are kept
+KEPT = 64
 #: A pair is regular between two samples if its rows change by less than this part of its least singular value there
 SAFE = 0.5
 #: A pair is regular where it has this part of the least singular value of the system Jacobian
@@ -86,12 +91,16 @@ class CarriedMotion:
             RangeError: a time outside the motion.
         """
         pair, q = self.leg(time).pair, self.at(time)
-        sides = (pair.task, pair.constraint)
         task, held = (
-            expressions.rate_function(self.robot, side)(q).full() @ self.velocity if side else np.zeros(0)
-            for side in sides
+            np.asarray(_rates(self.robot, side)(q).full()) @ self.velocity if side else np.zeros(0)
+            for side in (pair.task, pair.constraint)
         )
         return task, held
+
+
+@lru_cache(maxsize=KEPT)
+def _rates(robot: Robot, rows: tuple[Coordinate, ...]) -> ca.Function:
+    return expressions.rate_function(robot, rows)
 
 
 def carry(

@@ -20,9 +20,12 @@ def states_of(robot: Robot, count: int, seed: int = 0) -> Array:
 
 
 def ranks(matrices: Array) -> Array:
-    """Rank of each matrix [...]: singular values above :data:`ROUNDING` of the largest."""
+    """Rank of each matrix [...]: singular values above :data:`ROUNDING` of the largest, or of 1 where that is more.
+
+    Rows are scaled by the arm's length; those that are zero but for rounding have no rank among themselves.
+    """
     sigma = np.linalg.svd(matrices, compute_uv=False)
-    return np.asarray((sigma > ROUNDING * np.maximum(sigma[..., :1], ROUNDING)).sum(axis=-1))
+    return np.asarray((sigma > ROUNDING * np.maximum(sigma[..., :1], 1.0)).sum(axis=-1))
 
 
 def rank(matrices: Array) -> int:

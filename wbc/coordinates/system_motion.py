@@ -122,7 +122,7 @@ class SystemMotion:
         return self._rows[:, None] * self.jacobian(q) * self._columns
 
     def rank(self, q: Any) -> int:
-        """Rank of J_S(q): singular values above 1e-9 of the largest."""
+        """Rank of J_S(q), see :func:`wbc.coordinates.samples.ranks`."""
         return int(ranks(self.scaled(q)))
 
     def count(self, q: Any) -> PairCount:
