@@ -219,3 +219,5 @@ def test_cues_where_all_or_nothing_can_be_had() -> None:
     assert (cue.lost, motion_cue(SSRMS, ELBOW, STATE, np.zeros(3)).lost) == (pytest.approx(1.0), 0.0)
     with pytest.raises(ShapeError):
         motion_cue(SSRMS, ELBOW, STATE, (1.0, 2.0))
+    with pytest.raises(ShapeError, match="expected a CoordinatePair"):
+        motion_cue(SSRMS, "elbow | xi", STATE, (1.0, 2.0))  # type: ignore[arg-type]

@@ -16,6 +16,7 @@ from wbc.coordinates.pair import CoordinatePair
 from wbc.coordinates.pair_stack import metric_of
 from wbc.coordinates.samples import ROUNDING
 from wbc.coordinates.scales import scales
+from wbc.errors import ShapeError
 from wbc.robot import Robot
 from wbc.symbolic.kinematics import Kinematics
 from wbc.symbolic.tracer import Tracer
@@ -79,6 +80,8 @@ def motion_cue(robot: Robot, pair: CoordinatePair, q: Any, rates: Any) -> Motion
     Raises:
         ShapeError, NotFiniteError, RotationError, UnknownNameError, RangeError: bad pair, configuration or rates.
     """
+    if not isinstance(pair, CoordinatePair):
+        raise ShapeError("pair", pair, "expected a CoordinatePair")
     pair.counts(robot)
     q = robot.configuration("q", q)
     names = tuple(f"{one} {row.label}" for one in pair.task for row in expressions.labels(robot, one))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from functools import lru_cache
 from pathlib import Path
 
@@ -29,6 +30,8 @@ def parts(robot: str | Robot) -> Parts:
     """
     if isinstance(robot, Robot):
         return _found(robot)
+    if isinstance(robot, os.PathLike):
+        robot = os.fspath(robot)
     if not isinstance(robot, str):
         raise ShapeError("robot", robot, "expected a name, a file, or a Robot")
     file = Path(robot)

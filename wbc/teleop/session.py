@@ -123,6 +123,11 @@ class Teleoperation:
         self._automatic = validation.flag("automatic", automatic)
         self.control = PairController(self.robot, list(given), 1.0 / RATE, items=items, backend=backend)
         self.adviser = Adviser(self.robot, given, exact=False, backend=backend)
+        self._tall = {pair.name for pair in given if pair.over_determined(self.robot)}
+        for pair in given:
+            if pair.name in self._tall:
+                # What a cue needs is made here, not in the first tick that has one
+                motion_cue(self.robot, pair, self.robot.neutral, np.zeros(row_count(self.robot, pair.task)))
         self._scale = {pair.name: scales(self.robot, pair.task)[0] for pair in given}
         self._order, self._age = Order(), 0.0
 
@@ -189,7 +194,7 @@ class Teleoperation:
         if self.control.eased:
             what = "the task is near a singular configuration" if kept > 0.5 else "this pair is near a locus of its own"
             out.append(f"{what}, sigma {sigma:.2g}")
-        if self.control.pair.over_determined(self.robot):
+        if self.control.active in self._tall:
             cue = motion_cue(self.robot, self.control.pair, q, self.control.asked)
             out.append(f"more rows than joints: {cue}")
         joints = dict.fromkeys(b.row for b in step.binding if b.row in self.robot.dof_names and b.side != "equal")
