@@ -12,7 +12,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from wbc.coordinates import BodyRows, CoordinatePair, JointRows, MissingPartError
+from wbc.coordinates import BodyRows, CoordinatePair, JointRows, MissingPartError, expressions
 from wbc.errors import NotFiniteError, RangeError, ShapeError, UnknownNameError
 from wbc.robot import Robot
 from wbc.teleop import Keyboard, Order, RateFile, RateFileError, SessionLog, Teleoperation, run_session
@@ -320,3 +320,23 @@ def test_an_error_leaves_the_log(session: Teleoperation) -> None:
     with pytest.raises(UnknownNameError):
         run_session(session, Source(), Q, log=log)
     assert len(log.seen) == 5
+
+
+def test_an_arm_that_is_driven_straight_comes_to_rest() -> None:
+    """One arm of a Baxter to the end of its reach with psi held: no lurch, psi stays, and what is lost is told."""
+    session = Teleoperation("baxter", ["M6"], backend="vm")
+    q = session.start()
+    session.reset(q)
+    psi = next(one for one in session.control.pair.constraint if str(one) == "left_psi")
+    held, lost = expressions.here(session.robot, psi, q), []
+    for _ in range(240):
+        seen = session.step(q, Order((0.0, 0.02)))
+        assert seen.step.status == "solved"
+        assert np.linalg.norm(seen.met[:3]) < 0.021
+        lost.append(seen.lost)
+        q = pin.integrate(session.robot.model, q, session.control.dt * seen.step.v)
+    assert lost[50] < 1e-3
+    assert lost[-1] > 0.5
+    assert any("sigma" in text for text in seen.why)
+    assert np.abs(seen.step.v).max() < 0.1
+    assert expressions.here(session.robot, psi, q) == pytest.approx(held, abs=1e-3)

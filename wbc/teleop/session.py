@@ -38,7 +38,7 @@ STALE = 0.5
 #: Modes whose pairs there are where nobody says which, as far as the robot has them
 USUAL = (Mode.M1, Mode.M2)
 #: Acceleration of joints where nobody says which: of the published arms, and of others that have no limit [rad/s^2]
-SLOW, PLAIN = 0.02, 1.0
+SLOW, PLAIN = 0.02, 10.0
 #: A part of the command below this is not lost but rounding and the lag of one tick
 NOTHING = 1e-3
 
@@ -90,7 +90,7 @@ class Teleoperation:
             own. items: further constraints.
         seconds: time of a change of pairs [s]. fastest: rates in metres and in radians [m/s, rad/s].
         automatic: change to the pair that is advised.
-        acceleration: of all joints [rad/s^2]; default: 0.02 for the published arms, else the robot's own, and 1 where
+        acceleration: of all joints [rad/s^2]; default: 0.02 for the published arms, else the robot's own, and 10 where
             it has none.
 
     Raises:
