@@ -25,7 +25,7 @@ from wbc.validation import Array
 FACTOR = 1.5
 #: A rank counts as lost where it is lost within this distance in the space of joints [rad, part of the arm's length].
 #: Unlike a threshold on a singular value it does not depend on units, on the scale of rows or on how large the arm is.
-NEAR = 0.05
+NEAR = 0.02
 #: Of a pair and its task, the one whose locus is this much nearer than the other's is to blame
 NEARER = 0.5
 #: Newton steps to a locus at most
