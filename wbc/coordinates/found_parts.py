@@ -251,8 +251,8 @@ def _with_both(sampled: Sampled, arm: Arm, pool: Held) -> Held | None:
         return None
     rows = len(arm.middle.translation)
     for count in range(max(0, arm.redundancy + 1 - rows), arm.redundancy):
-        subsets = combinations(pool, count)
-        for held in islice(subsets, SUBSETS):
+        # Locks of the last joints first: they leave the point its motion
+        for held in islice(combinations(reversed(pool), count), SUBSETS):
             left = rank(sampled.stacked((arm.tip, *held)))
             if left == len(arm.joints) - arm.redundancy + count and sampled.completes(arm.middle, (arm.tip, *held)):
                 return held
