@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import csv
+import signal
+import subprocess
+import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -80,3 +84,78 @@ def test_bad_input(tmp_path: Path) -> None:
     code, _, err = run("spherical_4r", "--keys", "--mode", "M4")
     assert code == 2
     assert "terminal" in err
+
+
+def test_what_is_lost_is_told_and_logged(tmp_path: Path) -> None:
+    orders, log = tmp_path / "orders.csv", tmp_path / "log.csv"
+    orders.write_text("time,pair,r1,r2,r3,r4,r5,r6\n0,xi | joint2,0,0.02\n0.4,,0,0.02\n3\n")
+    at = "0.3,1.5588,-0.5,1.2,0.7,-0.6,0.9"
+    given = ("--rates", orders, "--mode", "M1", "--at", at, "--log", log, "--backend", "vm")
+    code, out, err = run("ssrms", *given)
+    assert code == 0
+    assert "warning: this start is 0.012 rad from where 'xi | alpha' is singular; better: 'xi | " in err
+    assert "better: xi | " in err
+    assert "asked (0, 0.02, 0, 0, 0, 0), met (" in err
+    assert "this pair is near a locus of its own, sigma" in err
+    assert "lost: more than 1 % of the command in " in out
+    with log.open() as file:
+        ticks = list(csv.DictReader(file))
+    worst = max(ticks, key=lambda tick: float(tick["lost"]))
+    assert float(worst["lost"]) > 0.5
+    assert worst["why"]
+    assert all(tick["advised"] for tick in ticks)
+
+
+def test_without_a_start_a_regular_one_is_taken(tmp_path: Path) -> None:
+    """The neutral configuration of the Space Station arm is singular; of a Panda without modes M1 and M2 are taken."""
+    orders = tmp_path / "orders.csv"
+    orders.write_text("time,pair,r1,r2,r3,r4,r5,r6\n0,,0.001\n0.1\n")
+    for robot, pair in (("ssrms", "xi | alpha"), ("panda", "pose | psi"), ("ur5", "pose | nothing")):
+        code, out, err = run(robot, "--rates", orders, "--backend", "vm")
+        assert code == 0
+        assert "from --at=" in err
+        assert "warning" not in err
+        assert f"{pair}, solved, sigma 0." in err
+        assert "5 ticks: 5 solved" in out
+
+
+#: The command; of a shell in the background it would inherit that interrupts are ignored
+CHILD = """
+import signal
+signal.signal(signal.SIGINT, signal.default_int_handler)
+from wbc.cli.app import app
+app()
+"""
+
+
+def test_an_interrupted_drive_writes_its_log(tmp_path: Path) -> None:
+    """Ctrl-C in a process of its own: exit code 130, and a log of whole rows."""
+    orders, log = tmp_path / "orders.csv", tmp_path / "log.csv"
+    orders.write_text("time,pair,r1,r2,r3,r4,r5,r6\n0,,0.01\n1000\n")
+    given = ("--rates", orders, "--at", "0.3,0.5,-0.7,1.1", "--realtime", "--log", log, "--backend", "vm")
+    command = [sys.executable, "-c", CHILD, "drive", "spherical_4r", *map(str, given)]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    try:
+        assert process.stderr is not None
+        process.stderr.readline()
+        time.sleep(0.5)
+        process.send_signal(signal.SIGINT)
+        out, _ = process.communicate(timeout=30)
+    finally:
+        process.kill()
+        process.wait()
+    assert process.returncode == 130
+    assert "ended by Ctrl-C" in out
+    with log.open() as file:
+        ticks = list(csv.DictReader(file))
+    assert len(ticks) > 3
+    assert all(None not in tick.values() for tick in ticks)
+
+
+def test_arms_without_a_mode_or_a_base(tmp_path: Path) -> None:
+    orders = tmp_path / "orders.csv"
+    orders.write_text("time,pair,r1,r2,r3,r4,r5,r6\n0\n1\n")
+    code, _, err = run("a1", "--rates", orders)
+    assert (code, "the robot has no base that stands somewhere; it floats" in err) == (2, True)
+    code, _, err = run("ur5", "--rates", orders, "--mode", "M2")
+    assert (code, "the robot has no joint beyond those that its tip takes" in err) == (2, True)

@@ -8,6 +8,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from tests.published.arm_machine import Machine, rank
 from wbc.coordinates import (
     Adviser,
     AutomaticPairs,
@@ -28,6 +29,7 @@ from wbc.coordinates import (
 )
 from wbc.coordinates.singular import LeastSingular
 from wbc.errors import DuplicateNameError, RangeError, ShapeError, UnknownNameError
+from wbc.robots import DHRow, from_dh
 
 STATES = np.random.default_rng(0).uniform(-pi, pi, (30, 7))
 STATE = np.array([0.3, 0.4, -0.5, 1.2, 0.7, -0.6, 0.9])
@@ -257,3 +259,64 @@ def test_a_survey_is_of_singular_values_at_configurations_within_limits() -> Non
     for bad in (0, -1, True, 1.5):
         with pytest.raises(RangeError, match="count"):
             survey_pairs(robot, PAIRS, bad)  # type: ignore[arg-type]
+
+
+def test_a_straight_elbow_takes_the_rank_of_some_pairs_and_not_of_the_task() -> None:
+    """Joint 4 at 0: the task has rank 6 and the elbow point keeps the seventh; alpha, beta, gamma and locks lose it."""
+    robot, pairs = parts("ssrms").robot, mode_pairs("ssrms", "M1")
+    adviser, machine = Adviser(robot, pairs, backend="vm"), Machine(robot)
+    for q in (STATE.copy(), *np.random.default_rng(0).uniform(-2.0, 2.0, (6, 7))):
+        q[3] = 0.0
+        assert rank(machine.rows("tip", q)) == 6
+        found = {one.pair.removeprefix("xi | "): one for one in adviser.advise(q)}
+        for name, one in found.items():
+            if not name.startswith("elbow"):
+                assert (one.condition, one.distance) == (Condition.ALGORITHMIC, pytest.approx(0.0, abs=1e-9)), name
+        best = max((one for name, one in found.items() if name.startswith("elbow")), key=lambda one: one.sigma)
+        # Though its least singular value is about 0.01, which a fixed threshold took for a lost rank
+        assert best.condition is Condition.REGULAR
+        assert best.ratio > 0.9
+        assert best.sigma < 0.02
+        assert adviser.recommend(q, "xi | alpha") in {one.pair for one in found.values() if one.ratio > 0.6}
+
+
+@pytest.mark.parametrize("scale", [1e-3, 1.0, 1e3])
+def test_lost_ranks_do_not_depend_on_the_size_of_an_arm(scale: float) -> None:
+    """A UR5 and its copies in other units: ranks are lost where wrist 2 or the elbow is straight, and only there."""
+    rows = ((0.089, 0.0, np.pi / 2), (0.0, -0.425, 0.0), (0.0, -0.392, 0.0))
+    rows = (*rows, (0.109, 0.0, np.pi / 2), (0.095, 0.0, -np.pi / 2), (0.082, 0.0, 0.0))
+    arm = from_dh([DHRow(d=scale * d, a=scale * a, alpha=turn) for d, a, turn in rows])
+    adviser = Adviser(parts(arm).robot, mode_pairs(arm, "M1"), backend="vm")
+    for joint in (2, 4):
+        for off, lost in ((0.0, True), (0.015, True), (0.03, False)):
+            q = np.array([0.3, -1.0, 0.9, -0.8, 1.0, 0.2])
+            q[joint] = off
+            (found,) = adviser.advise(q)
+            assert (found.condition is Condition.TASK) == lost, (joint, off)
+            assert found.distance == pytest.approx(off, abs=1e-9)
+
+
+def test_the_default_adviser_takes_arms_that_exact_analysis_refuses() -> None:
+    """The Panda's hand is turned by 45 degrees: no determinant is factored, and distances are estimates."""
+    robot, pairs = parts("panda").robot, mode_pairs("panda", "M1")
+    q = robot.neutral
+    found = Adviser(robot, pairs).advise(q)
+    assert len(found) == len(pairs)
+    assert {one.basis for one in found} == {Basis.FIRST_ORDER}
+    assert closed_form(robot, pairs[1]) is None
+    # The lock of joint 2 loses its rank here, as the numbers say
+    J = np.vstack([Machine(robot).rows("panda_hand_tcp", q), np.eye(7)[1]])
+    assert rank(J) == 6
+    assert {one.pair: one.condition for one in found}["pose | panda_joint2"] is Condition.ALGORITHMIC
+
+
+def test_pairs_with_other_tasks_are_not_compared() -> None:
+    """Of pairs that command other coordinates none is recommended in place of the current one."""
+    every = [*PAIRS, *(CoordinatePair(one, TIP, f"{one} back") for one in (ALPHA, BETA))]
+    adviser = Adviser(FOUR.robot, every, exact=False, backend="vm")
+    at = (0.3, pi / 2, -0.7, 1.1)
+    assert adviser.recommend(at, "alpha") == "beta"
+    assert adviser.recommend(at, "alpha back") == "alpha back"
+    sigma, task, name = adviser.look(at, "alpha")
+    assert (sigma, name) == (pytest.approx(0.0, abs=1e-12), "beta")
+    assert task == pytest.approx(adviser.singular_values(at)[1][0])

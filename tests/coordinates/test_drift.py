@@ -8,10 +8,12 @@ import numpy as np
 import pytest
 
 from tests.published.arm_machine import STATE, Machine
-from wbc.coordinates import Coordinate, CoordinatePair, PairController, expressions, parts
+from wbc.coordinates import Coordinate, CoordinatePair, PairController, expressions, mode_pairs, parts
 from wbc.coordinates.conditioning import Conditioning
-from wbc.coordinates.easing import Easing
+from wbc.coordinates.easing import STATES, Easing
 from wbc.coordinates.rate_matrices import RateMatrices
+from wbc.coordinates.samples import states_of
+from wbc.robots import DHRow, from_dh
 
 PARTS = parts("ssrms")
 ROBOT, ARM = PARTS.robot, PARTS.arms[0]
@@ -103,19 +105,41 @@ def test_easing_is_that_of_the_least_singular_value() -> None:
     pairs = [CoordinatePair(XI, ALPHA), CoordinatePair(ALPHA, XI, "back"), CoordinatePair(XI, [ALPHA, BETA], "tall")]
     exact = Conditioning(ROBOT, [pair.rows for pair in pairs], backend="vm")
     compiled, plain = (RateMatrices(ROBOT, (XI, ALPHA, BETA), native=native) for native in (True, False))
-    easings = [Easing(ROBOT, ROBOT.characteristic_length, compiled) for _ in pairs]
+    easings = [Easing(ROBOT, pairs, ROBOT.characteristic_length, compiled) for _ in pairs]
     eased = []
     for x in np.linspace(0.0, 1.0, 301):
         q = STATE + x * np.array((0.2, 1.2, 0.3, -1.3 * STATE[3], 0.1, 0.2, 0.1))
         every = compiled.whole(q)
         np.testing.assert_allclose(every, plain.whole(q), rtol=0.0, atol=1e-13)
         for pair, easing, sigma in zip(pairs, easings, exact.sigmas(q), strict=True):
-            found = easing.at(pair, every)
-            assert found == pytest.approx(easing.weight(pair, sigma), rel=1e-6, abs=1e-15)
+            found = easing.at(pair.name, every)
+            assert found == pytest.approx(easing.weight(pair.name, sigma), rel=1e-6, abs=1e-15)
             eased.append(found > 0.0)
     assert 10 < sum(eased) < 400
     # One that looks at another pair in between answers as one that does not
     for pair, easing in zip(pairs, easings, strict=True):
-        assert easings[0].at(pair, every) == easing.at(pair, every)
-    assert easings[0].weight(pairs[0], 0.0) == pytest.approx(0.005**2)
-    assert easings[0].weight(pairs[0], 0.005) == pytest.approx((0.005 * 0.75) ** 2)
+        assert easings[0].at(pair.name, every) == easing.at(pair.name, every)
+    least = easings[0].threshold(pairs[0].name)
+    assert 0.005 < least <= 0.01
+    assert easings[0].weight(pairs[0].name, 0.0) == pytest.approx((0.5 * least) ** 2)
+    assert easings[0].weight(pairs[0].name, 0.5 * least) == pytest.approx((0.5 * least * 0.75) ** 2)
+    assert easings[0].weight(pairs[0].name, least) == 0.0
+
+
+def test_thresholds_of_easing_are_parts_of_what_is_usual() -> None:
+    """A tenth of the median singular value of the pair, 0.01 at most: an arm ten times as small has the same ones."""
+    numbers = (0.0, 1.4, 0.3), (0.4, 0.3, 0.0), (0.1, -1.2, 0.1), (0.2, 0.5, 0.3)
+    rows = [DHRow(a=a, alpha=turn, d=d) for a, turn, d in numbers]
+    found = []
+    for scale in (1.0, 0.1):
+        arm = from_dh([DHRow(a=scale * r.a, alpha=r.alpha, d=scale * r.d) for r in rows])
+        pairs = mode_pairs(arm, "M1")
+        robot = parts(arm).robot
+        control = PairController(robot, pairs, backend="vm")
+        found.append([control._easing.threshold(pair.name) for pair in pairs])
+        for pair, least in zip(pairs, found[-1], strict=True):
+            sigma = Conditioning(robot, [pair.rows], backend="vm").sigmas
+            usual = np.median([sigma(q)[0] for q in states_of(robot, STATES)])
+            assert least == pytest.approx(min(0.01, 0.1 * usual), rel=1e-9)
+    assert found[0] == pytest.approx(found[1], rel=1e-9)
+    assert min(found[0]) < 0.01

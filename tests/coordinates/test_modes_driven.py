@@ -78,7 +78,8 @@ def test_a_mode_drives_an_arm_or_says_what_is_missing(name: str, mode: Mode) -> 
     for pair in found:
         state = best(name, pair)
         q, there = driven(name).states[state].copy(), matrices(name)
-        held, led = (np.vstack([there[one][state] for one in rows]) for rows in (pair.constraint, pair.task))
+        nothing = np.zeros((0, len(q)))
+        held, led = (np.vstack([nothing, *(there[o][state] for o in rows)]) for rows in (pair.constraint, pair.task))
         free = np.eye(held.shape[1]) - np.linalg.pinv(held, rcond=1e-6) @ held
         rates = free @ np.linspace(1.0, 0.6, len(free))
         command = led @ (SPEED * rates / np.abs(rates).max())
@@ -93,9 +94,9 @@ def test_a_mode_drives_an_arm_or_says_what_is_missing(name: str, mode: Mode) -> 
             A = control.rates(q)
             met = np.concatenate([A[one] @ step.v for one in pair.task])
             assert np.abs(met - command).max() < 1e-3 * np.abs(command).max(), pair.name
-            still = np.concatenate([A[one] @ step.v for one in pair.constraint])
-            assert np.abs(still).max() < 1e-3 * np.abs(command).max(), pair.name
+            still = np.concatenate([np.zeros(0), *(A[one] @ step.v for one in pair.constraint)])
+            assert np.abs(still).max(initial=0.0) < 1e-3 * np.abs(command).max(), pair.name
             gone = gone + control.dt * still
             q = q + control.dt * step.v
-        assert np.abs(gone).max() < 1e-6, pair.name
+        assert np.abs(gone).max(initial=0.0) < 1e-6, pair.name
         assert np.abs(q - driven(name).states[state]).max() > 0.5 * SPEED * TICKS * control.dt, pair.name

@@ -79,7 +79,7 @@ def test_one_stack_serves_several_pairs() -> None:
             DuplicateNameError,
         ),
         (lambda: mode_pairs("ssrms", "M9"), UnknownNameError),
-        (lambda: mode_pairs("panda", "M1"), UnknownNameError),
+        (lambda: mode_pairs("pnda", "M1"), UnknownNameError),
     ],
 )
 def test_bad_pairs(make: Any, error: type[WbcError]) -> None:
@@ -96,7 +96,7 @@ def test_every_mode_is_there_or_says_what_is_missing() -> None:
     single = {name for name in OPERATOR_ARMS if not name.startswith("spdm") or "arm" in name}
     tip = "joint beyond those that its tip takes"
     assert missing == {
-        **{("planar_rp", m): tip for m in ("M1", "M2", "M4")},
+        ("planar_rp", "M2"): tip,
         **{(name, "M6"): "second arm" for name in single},
         **{(name, "M7"): "carrier" for name in (*single, "spdm")},
     }

@@ -12,9 +12,10 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from wbc.coordinates import BodyRows, CoordinatePair, JointRows, MissingPartError
+from wbc.coordinates import BodyRows, CoordinatePair, JointRows, MissingPartError, expressions
 from wbc.errors import NotFiniteError, RangeError, ShapeError, UnknownNameError
-from wbc.teleop import Keyboard, Order, RateFile, RateFileError, Teleoperation, run_session
+from wbc.robot import Robot
+from wbc.teleop import Keyboard, Order, RateFile, RateFileError, SessionLog, Teleoperation, run_session
 from wbc.teleop.keyboard import HELD
 from wbc.teleop.session import STALE
 from wbc.terminal import NoTerminalError
@@ -24,7 +25,7 @@ Q = np.array([0.3, 0.5, -0.7, 1.1])
 
 @pytest.fixture(scope="module")
 def compiled() -> Teleoperation:
-    return Teleoperation("spherical_4r", acceleration=0.5, seconds=0.5, advice=True)
+    return Teleoperation("spherical_4r", acceleration=0.5, seconds=0.5)
 
 
 @pytest.fixture
@@ -76,7 +77,7 @@ def test_a_file_drives_and_changes_pairs(session: Teleoperation, tmp_path: Path)
     assert change < 0.5 + 1e-6
     written = log.write(tmp_path / "out" / "log.csv", session.robot.dof_names).read_text().splitlines()
     assert len(written) == 251
-    assert written[0].startswith("time,pair,status,q joint1")
+    assert written[0].startswith("time,pair,status,sigma,kept,advised,lost,why,asked 1,")
 
 
 def test_keys_that_are_held_and_pairs_by_keys(session: Teleoperation) -> None:
@@ -225,3 +226,117 @@ def test_bad_sessions_and_files(tmp_path: Path) -> None:
             RateFile(file)
     with pytest.raises(RateFileError, match="cannot be read"):
         RateFile(tmp_path / "none.csv")
+
+
+#: Beside joint 2 at 90 degrees, where the lock of the yaw joint loses its rank
+BESIDE = np.array([0.3, np.pi / 2 - 0.012, -0.5, 1.2, 0.7, -0.6, 0.9])
+
+
+@pytest.fixture(scope="module")
+def station() -> Teleoperation:
+    return Teleoperation("ssrms", ["M1", "M8"], seconds=0.2, acceleration=1.0, backend="vm")
+
+
+def test_what_is_lost_is_told_with_the_reason_and_a_better_pair(station: Teleoperation) -> None:
+    """Beside the locus of the yaw joint's lock most of a command is lost, and told; another pair loses nothing."""
+    robot, q = station.robot, BESIDE
+    scale = np.array([1.0 / robot.characteristic_length] * 3 + [1.0] * 3)
+    J = jacobian(robot, BESIDE)
+    worst = np.linalg.svd(np.vstack([scale[:, None] * J, np.eye(7)[1]]))[0][:6, -1] / scale
+    rates = tuple(0.02 * worst / np.abs(worst[:3]).max())
+    station.reset(q)
+    for k in range(60):
+        seen = station.step(q, Order(rates, pair="xi | joint2" if k == 0 else None))
+        np.testing.assert_allclose(seen.met, jacobian(robot, q) @ seen.step.v, atol=1e-12)
+        np.testing.assert_array_equal(seen.asked, rates)
+        lost = np.linalg.norm(scale * (seen.asked - seen.met)) / np.linalg.norm(scale * seen.asked)
+        assert seen.lost == pytest.approx(lost, abs=1e-12)
+        assert seen.lost < 1e-3 or seen.why
+        q = q + station.control.dt * seen.step.v
+    assert (seen.active, seen.blending) == ("xi | joint2", False)
+    assert seen.sigma < 0.01
+    assert seen.kept < 0.2
+    assert seen.lost > 0.3
+    assert any("this pair is near a locus of its own, sigma" in text for text in seen.why)
+    assert seen.advised.startswith("xi | ")
+    assert seen.advised != "xi | joint2"
+    station.reset(BESIDE)
+    q = BESIDE
+    for k in range(60):
+        better = station.step(q, Order(rates, pair=seen.advised if k == 0 else None))
+        q = q + station.control.dt * better.step.v
+    assert better.lost < 1e-2
+
+
+def jacobian(robot: Robot, q: np.ndarray) -> np.ndarray:
+    """Of the tip, by Pinocchio."""
+    model = robot.model
+    index = model.getFrameId("tip")
+    return pin.computeFrameJacobian(model, model.createData(), q, index, pin.LOCAL_WORLD_ALIGNED)
+
+
+def test_over_determined_motion_has_its_cue(station: Teleoperation) -> None:
+    start = np.array([0.3, 0.4, -0.5, 1.2, 0.7, -0.6, 0.9])
+    station.control.switch("elbow | xi", 0.0)
+    station.reset(start)
+    q = start
+    for _ in range(20):
+        seen = station.step(q, Order((0.0, 0.0, 0.005)))
+        q = q + station.control.dt * seen.step.v
+    assert seen.lost == pytest.approx(0.965, abs=0.01)
+    assert seen.why[0].startswith("more rows than joints: 1 of 3 directions can be had along (+0.4")
+
+
+def test_a_log_has_what_there_was_at_ctrl_c(session: Teleoperation, tmp_path: Path) -> None:
+    """The interrupt comes in the middle of a tick; what was seen before it is written, in rows of one length."""
+    log = SessionLog()
+
+    class Source:
+        def order(self, time: float, *given: Any) -> Order:
+            if len(log.time) == 7:
+                log.time.append(time)
+                raise KeyboardInterrupt
+            return Order((0.05,))
+
+    found = run_session(session, Source(), Q, log=log)
+    assert found is log
+    assert found.interrupted
+    assert len(found.time) == len(found.q) == len(found.seen) == 7
+    text = found.write(tmp_path / "log.csv", session.robot.dof_names).read_text()
+    head, *rows = [line.split(",") for line in text.splitlines()]
+    assert len(rows) == 7
+    assert {"sigma", "kept", "advised", "lost", "why", "asked 1", "met 1"} <= set(head)
+    assert float(rows[3][head.index("asked 1")]) == 0.05
+    assert float(rows[3][head.index("sigma")]) == pytest.approx(found.seen[3].sigma, rel=1e-5)
+
+
+def test_an_error_leaves_the_log(session: Teleoperation) -> None:
+    log = SessionLog()
+
+    class Source:
+        def order(self, *given: Any) -> Order:
+            return Order((0.05,)) if len(log.time) < 5 else Order(pair="none of these")
+
+    with pytest.raises(UnknownNameError):
+        run_session(session, Source(), Q, log=log)
+    assert len(log.seen) == 5
+
+
+def test_an_arm_that_is_driven_straight_comes_to_rest() -> None:
+    """One arm of a Baxter to the end of its reach with psi held: no lurch, psi stays, and what is lost is told."""
+    session = Teleoperation("baxter", ["M6"], backend="vm")
+    q = session.start()
+    session.reset(q)
+    psi = next(one for one in session.control.pair.constraint if str(one) == "left_psi")
+    held, lost = expressions.here(session.robot, psi, q), []
+    for _ in range(240):
+        seen = session.step(q, Order((0.0, 0.02)))
+        assert seen.step.status == "solved"
+        assert np.linalg.norm(seen.met[:3]) < 0.021
+        lost.append(seen.lost)
+        q = pin.integrate(session.robot.model, q, session.control.dt * seen.step.v)
+    assert lost[50] < 1e-3
+    assert lost[-1] > 0.5
+    assert any("sigma" in text for text in seen.why)
+    assert np.abs(seen.step.v).max() < 0.1
+    assert expressions.here(session.robot, psi, q) == pytest.approx(held, abs=1e-3)

@@ -1,4 +1,4 @@
-"""``wbc advise``: which pair of coordinates an operator's arm is best commanded by, here."""
+"""``wbc advise``: which pair of coordinates an arm is best commanded by, here."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ TIMED, GOAL_TIME = 5, 100
 
 
 def advise(
-    robot: Annotated[str, typer.Argument(help="An arm of `wbc modes`.")],
+    robot: Annotated[str, typer.Argument(help="A name of `wbc modes` or `wbc robots`, or a URDF or MJCF file.")],
     at: Annotated[str, typer.Option(help="Joint coordinates with commas [rad, m]. Default: neutral.")] = "",
     mode: Annotated[str, typer.Option(help=f"Pairs of this mode: {', '.join(SHORT_NAMES)}.")] = "M1",
     current: Annotated[str | None, typer.Option(help="The pair in use: stay where none is much better.")] = None,
@@ -51,8 +51,9 @@ def advise(
     out().print(rows)
     out().print(f"use: [bold]{escape(adviser.recommend(q, current))}[/bold]")
     err().print(
-        "sigma: least singular value, metres over the characteristic length; of the task: over that of the task alone; "
-        "distance in rad, exact to a joint's angle, else an estimate",
+        "sigma: least singular value, metres over the arm's length; of the task: over that of the task alone; "
+        f"condition: what loses its rank within {adviser.near:g} rad; distance in rad, exact to a joint's angle, "
+        "else an estimate",
         soft_wrap=True,
     )
 

@@ -1,7 +1,8 @@
-"""``wbc drive``: an operator's arm by rates from a file or the keyboard."""
+"""``wbc drive``: an arm by rates from a file or the keyboard."""
 
 from __future__ import annotations
 
+from itertools import pairwise
 from pathlib import Path
 from typing import Annotated
 
@@ -12,55 +13,119 @@ from rich.markup import escape
 from wbc.cli.advise import configuration_of
 from wbc.cli.console import err, out
 from wbc.cli.options import Backend
-from wbc.coordinates import parts
+from wbc.coordinates import Condition, parts
 from wbc.errors import RangeError
 from wbc.teleop import Keyboard, RateFile, Seen, SessionLog, Teleoperation, run_session
 from wbc.teleop.keyboard import HELP
+from wbc.teleop.session import NOTHING
+
+#: Parts of a command between which losses are told apart, and the exit code after Ctrl-C
+STEPS, INTERRUPTED = (NOTHING, 0.01, 0.1, 0.5), 130
+#: While only the loss changes, a line after so long [s]
+PAUSE = 0.5
 
 
 def drive(
-    robot: Annotated[str, typer.Argument(help="An arm of `wbc modes`.")],
+    robot: Annotated[str, typer.Argument(help="A name of `wbc modes` or `wbc robots`, or a URDF or MJCF file.")],
     rates: Annotated[Path | None, typer.Option(help="CSV file of orders: time, pair, r1 ... r6.")] = None,
     keys: Annotated[bool, typer.Option("--keys", help="Orders from the keyboard, at 50 Hz.")] = False,
-    mode: Annotated[list[str] | None, typer.Option(help="Modes whose pairs there are; default M1 and M2.")] = None,
-    at: Annotated[str, typer.Option(help="First configuration, numbers with commas. Default: neutral.")] = "",
+    mode: Annotated[
+        list[str] | None, typer.Option(help="Modes whose pairs there are; default M1 and M2, where the robot has them.")
+    ] = None,
+    at: Annotated[
+        str, typer.Option(help="First configuration, numbers with commas. Default: one away from singular ones.")
+    ] = "",
     automatic: Annotated[bool, typer.Option("--automatic", help="Change pairs as the adviser says.")] = False,
     realtime: Annotated[bool, typer.Option("--realtime", help="Wait for the clock with a file, too.")] = False,
-    log: Annotated[Path | None, typer.Option(help="Write what happened to this CSV file.")] = None,
+    log: Annotated[Path | None, typer.Option(help="Write what happened to this CSV file, after Ctrl-C, too.")] = None,
     backend: Backend = "auto",
 ) -> None:
-    """Drive an arm by rates: the pair of coordinates that is chosen, at most six rates at a time, 50 times a second."""
+    """Drive an arm by rates: the pair of coordinates that is chosen, at most six rates at a time, 50 times a second.
+
+    What of a command is lost is said, with the reason and the pair to use; the log has it tick by tick.
+    """
     if keys == (rates is not None):
         raise RangeError("rates", rates, "give either --rates FILE or --keys")
-    q = configuration_of(parts(robot).robot, at)
+    given = configuration_of(parts(robot).robot, at) if at else None
     source = RateFile(rates) if rates is not None else None
-    session = Teleoperation(robot, mode or ("M1", "M2"), automatic=automatic, backend=backend)
-    last = [""]
+    session = Teleoperation(robot, mode or None, automatic=automatic, backend=backend)
+    q = session.start() if given is None else given
+    if given is None:
+        err().print(f"from --at={','.join(f'{x:.4f}' for x in q)}", soft_wrap=True, markup=False)
+    _warn(session, q)
+    found, tell = SessionLog(), _Teller()
+    try:
+        if source is not None:
+            run_session(session, source, q, realtime=realtime, tell=tell, log=found)
+        else:
+            err().print(HELP, soft_wrap=True)
+            with Keyboard().terminal() as keyboard:
+                run_session(session, keyboard, q, realtime=True, tell=tell, log=found)
+    finally:
+        _report(found, session, log)
+    if found.interrupted:
+        raise typer.Exit(INTERRUPTED)
 
-    def tell(time: float, seen: Seen) -> None:
-        """A line when something changes."""
-        text = f"{seen.active}{' (changing)' if seen.blending else ''}, {seen.step.status}"
-        if text != last[0]:
-            err().print(f"{time:8.2f} s  {escape(text)}", soft_wrap=True)
-            last[0] = text
 
-    if source is not None:
-        found = run_session(session, source, q, realtime=realtime, tell=tell)
-    else:
-        err().print(HELP, soft_wrap=True)
-        with Keyboard().terminal() as keyboard:
-            found = run_session(session, keyboard, q, realtime=True, tell=tell)
-    _report(found, session, log)
+class _Teller:
+    """A line when something changes."""
+
+    def __init__(self) -> None:
+        self._last: tuple[object, ...] = ()
+        self._loss, self._time = -1, -PAUSE
+
+    def __call__(self, time: float, seen: Seen) -> None:
+        state = seen.active, seen.blending, seen.step.status, seen.advised
+        loss = sum(seen.lost > step for step in STEPS)
+        if state == self._last and (loss == self._loss or time < self._time + PAUSE):
+            return
+        self._last, self._loss, self._time = state, loss, time
+        text = f"{seen.active}{' (changing)' if seen.blending else ''}, {seen.step.status}, sigma {seen.sigma:.2g}"
+        text += f" ({seen.kept:.2f} of the task's)"
+        if seen.advised != seen.active:
+            text += f", better: {seen.advised}"
+        if seen.lost > NOTHING:
+            text += f"; lost {100 * seen.lost:.2g} %: asked {_rates(seen.asked)}, met {_rates(seen.met)}"
+        if seen.why:
+            text += f": {', '.join(seen.why)}"
+        err().print(f"{time:8.2f} s  {escape(text)}", soft_wrap=True)
+
+
+def _rates(numbers: np.ndarray) -> str:
+    return f"({', '.join(f'{x:.3g}' for x in numbers)})"
+
+
+def _warn(session: Teleoperation, q: object) -> None:
+    """The first pair is near the loss of its rank where the session begins."""
+    first = session.control.active
+    here = next(one for one in session.adviser.advise(q) if one.pair == first)
+    if here.condition is not Condition.REGULAR:
+        what = "the task itself is" if here.condition is Condition.TASK else f"{first!r} is"
+        better = session.adviser.recommend(q, first)
+        hint = f"; better: {better!r}" if better != first else ""
+        text = f"this start is {min(here.distance, session.adviser.near):.2g} rad from where {what} singular{hint}"
+        err().print(f"warning: {escape(text)}", soft_wrap=True)
 
 
 def _report(found: SessionLog, session: Teleoperation, log: Path | None) -> None:
-    statuses = ", ".join(f"{found.status.count(s)} {s}" for s in dict.fromkeys(found.status))
+    status, active, lost = found.status, found.active, found.lost
+    statuses = ", ".join(f"{status.count(s)} {s}" for s in dict.fromkeys(status))
     fastest = max((float(np.abs(v).max()) for v in found.v), default=0.0)
-    changes = sum(a != b for a, b in zip(found.active, found.active[1:], strict=False))
+    changes = sum(a != b for a, b in pairwise(active))
+    ended = ", ended by Ctrl-C" if found.interrupted else ""
     out().print(
         f"{len(found.time)} ticks: {statuses or 'none'}; fastest joint {fastest:.4g} rad/s, "
-        f"{changes} changes of pairs, {found.late} late",
+        f"{changes} changes of pairs, {found.late} late{ended}",
         soft_wrap=True,
     )
+    worst = int(np.argmax(lost)) if lost else 0
+    if lost and lost[worst] > NOTHING:
+        seen = found.seen[worst]
+        count = sum(x > STEPS[1] for x in lost)
+        text = (
+            f"lost: more than 1 % of the command in {count} ticks, at most {100 * lost[worst]:.2g} % "
+            f"at {found.time[worst]:.2f} s with {seen.active}: {', '.join(seen.why)}"
+        )
+        out().print(escape(text), soft_wrap=True)
     if log is not None:
         out().print(escape(str(found.write(log, session.robot.dof_names))), soft_wrap=True)

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from wbc.analysis.rows import BodyRows, JointRows, PitchPlaneRows
 from wbc.coordinates.adviser import Advice, Adviser, Basis, Condition
-from wbc.coordinates.arm_parts import Arm, Parts, parts
+from wbc.coordinates.arm_parts import Arm, MissingPartError, Parts
 from wbc.coordinates.automatic import AutomaticPairs
+from wbc.coordinates.carrying import CarriedMotion, Leg, carry
 from wbc.coordinates.complete_sets import CompleteSet, smallest_complete_sets
 from wbc.coordinates.conditioning import Conditioning
 from wbc.coordinates.control import PairController
+from wbc.coordinates.cues import MotionCue, motion_cue
 from wbc.coordinates.determinant_places import ClosedForm, closed_form
 from wbc.coordinates.items import FollowRows, KeepRows
-from wbc.coordinates.modes import MissingPartError, Mode, mode_pairs, mode_table
+from wbc.coordinates.modes import Mode, mode_pairs, mode_row, mode_table, modes_of
 from wbc.coordinates.pair import CoordinatePair
 from wbc.coordinates.pair_stack import PairStack, pair_stack
 from wbc.coordinates.pair_survey import PairSurvey, advice_time, survey_pairs
@@ -20,6 +22,9 @@ from wbc.coordinates.point_sets import OnCircle, OnCylinder, OnLine, OnPlane, On
 from wbc.coordinates.published_trees import TREES, TreeSet, TreeSets, tree_sets
 from wbc.coordinates.restrictions import restriction_table
 from wbc.coordinates.rows import AxisRows, Coordinate, PlaneAngleRows, PointRows
+from wbc.coordinates.starts import regular_start
+from wbc.coordinates.system_motion import PairCount, SystemMotion, count_pairs, system_coordinates
+from wbc.coordinates.which_parts import parts
 
 __all__ = [
     "TREES",
@@ -30,6 +35,7 @@ __all__ = [
     "AxisRows",
     "Basis",
     "BodyRows",
+    "CarriedMotion",
     "ClosedForm",
     "CompleteSet",
     "Condition",
@@ -40,14 +46,17 @@ __all__ = [
     "FollowRows",
     "JointRows",
     "KeepRows",
+    "Leg",
     "MissingPartError",
     "Mode",
+    "MotionCue",
     "OnCircle",
     "OnCylinder",
     "OnLine",
     "OnPlane",
     "OnSphere",
     "PairController",
+    "PairCount",
     "PairStack",
     "PairSurvey",
     "Parts",
@@ -55,17 +64,25 @@ __all__ = [
     "PlaneAngleRows",
     "PointRows",
     "PointSet",
+    "SystemMotion",
     "TreeSet",
     "TreeSets",
     "advice_time",
+    "carry",
     "closed_form",
+    "count_pairs",
     "mode_pairs",
+    "mode_row",
     "mode_table",
+    "modes_of",
+    "motion_cue",
     "pair_stack",
     "parts",
     "plot_drives",
+    "regular_start",
     "restriction_table",
     "smallest_complete_sets",
     "survey_pairs",
+    "system_coordinates",
     "tree_sets",
 ]

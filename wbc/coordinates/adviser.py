@@ -8,28 +8,37 @@ from enum import StrEnum
 from typing import Any, TypeAlias
 
 import numpy as np
+import pinocchio as pin
 
 from wbc import validation
 from wbc.coordinates.chains import Braked, braked
-from wbc.coordinates.conditioning import LEAST, Conditioning, checked_configuration
+from wbc.coordinates.conditioning import Conditioning, checked_configuration
 from wbc.coordinates.determinant_places import ClosedForm, closed_form
 from wbc.coordinates.pair import CoordinatePair
 from wbc.coordinates.rows import Coordinate
+from wbc.coordinates.samples import ROUNDING
 from wbc.errors import DuplicateNameError, ShapeError, UnknownNameError
 from wbc.robot import Robot
 from wbc.validation import Array
 
 #: A change is recommended where another pair is better by this factor
 FACTOR = 1.5
+#: A rank counts as lost where it is lost within this distance in the space of joints [rad, part of the arm's length].
+#: Unlike a threshold on a singular value it does not depend on units, on the scale of rows or on how large the arm is.
+NEAR = 0.02
+#: Of a pair and its task, the one whose locus is this much nearer than the other's is to blame
+NEARER = 0.5
+#: Newton steps to a locus at most
+STEPS = 15
 
 
 class Condition(StrEnum):
-    """What is wrong with a pair at a configuration."""
+    """What is wrong with a pair at a configuration: what loses its rank within :data:`NEAR` of it."""
 
     REGULAR = "regular"
     #: Task and constraint have full rank each, but not together: another pair may do
     ALGORITHMIC = "algorithmic"
-    #: The task itself has lost rank: no constraint helps
+    #: The task itself loses rank: no constraint helps
     TASK = "task"
     #: The constraint rows depend on each other
     CONSTRAINT = "constraint"
@@ -51,8 +60,8 @@ class Advice:
     Attributes:
         pair: its name. sigma: least singular value of the scaled rows of task and constraint; task, constraint: of
             either alone. condition: see :class:`Condition`.
-        distance: to the nearest locus, in the space of joints [rad, length for sliding ones]; basis: what it is.
-        direction: unit vector there [nv]. locus: the exact one as text, or empty.
+        distance: to the nearest locus, in the space of joints [rad, part of the arm's length for sliding ones]; basis:
+            what it is. direction: direction * distance is the way there [nv]. locus: the exact one as text, or empty.
     """
 
     pair: str
@@ -93,7 +102,7 @@ class Adviser:
     over-determined pairs the matrix is tall.
 
     Args:
-        length: characteristic length [m]; default: the robot's. least: singular value below which a row is lost.
+        length: characteristic length [m]; default: the robot's. near: see :data:`NEAR`.
         factor: how much better another pair must be for a change, > 1: the hysteresis.
         exact: factor the determinants of square pairs, which takes some seconds when it is first needed.
         backend: ``native``, ``vm`` (numpy), or ``auto``.
@@ -108,7 +117,7 @@ class Adviser:
         pairs: Iterable[CoordinatePair],
         *,
         length: float | None = None,
-        least: float = LEAST,
+        near: float = NEAR,
         factor: float = FACTOR,
         exact: bool = True,
         backend: str = "auto",
@@ -123,7 +132,7 @@ class Adviser:
                 raise DuplicateNameError("pairs", pair.name, "two pairs of one name")
             self.pairs[pair.name] = pair
         self.robot = robot
-        self.least = validation.scalar("least", least, low=0.0)
+        self.near = validation.scalar("near", near, low=0.0, unit="rad")
         self.factor = validation.scalar("factor", factor, low=1.0)
         self._exact = validation.flag("exact", exact)
         groups: dict[_Group, int] = {}
@@ -135,6 +144,12 @@ class Adviser:
         self._names = list(self.pairs)
         self._wholes = self.conditioning.chosen(self._places[:, 0].tolist())
         self._wholes_and_tasks = self.conditioning.chosen(self._places[:, :2].ravel().tolist())
+        alike = [[k for k, other in enumerate(given) if other.task == pair.task] for pair in given]
+        #: Of each pair: those with its task, itself among them, and singular values of all these and of the task
+        self._siblings = {
+            pair.name: (some, self.conditioning.chosen([*self._places[some, 0].tolist(), int(self._places[k, 1])]))
+            for k, (pair, some) in enumerate(zip(given, alike, strict=True))
+        }
 
     def sigmas(self, q: Any) -> Array:
         """The least singular value of each pair, in their order: what a control loop asks for.
@@ -161,49 +176,95 @@ class Adviser:
         """
         q = self.robot.configuration("q", q)
         sigmas, slopes, _ = self.conditioning.slopes(q)
+        lost: dict[int, float] = {}
         out = []
         for (whole, task, constraint), name, some in zip(self._places, self._names, self._braked, strict=True):
-            sigma, alone = float(sigmas[whole]), float(sigmas[task])
-            # Brakes by themselves do not depend on each other
-            held = float(sigmas[constraint]) if some.held else 1.0
             known = closed_form(self.robot, self.pairs[name]) if self._exact else None
-            distance, basis, direction, locus = self._nearest(q, sigma, slopes[whole], known)
-            condition = self._condition(sigma, alone, held)
-            out.append(Advice(name, sigma, alone, held, condition, distance, basis, direction, locus))
+            distance, basis, direction, locus = self._nearest(q, float(sigmas[whole]), slopes[whole], known)
+            for group in (whole, task, constraint):
+                if group not in lost:
+                    lost[group] = self._way(q, group, float(sigmas[group]), slopes[group])
+            pair = min(lost[whole], distance) if basis is Basis.EXACT else lost[whole]
+            # Brakes by themselves do not depend on each other
+            held = lost[constraint] if some.held else np.inf
+            condition = self._condition(pair, lost[task], held)
+            alone, by_itself = float(sigmas[task]), float(sigmas[constraint]) if some.held else 1.0
+            sigma = float(sigmas[whole])
+            out.append(Advice(name, sigma, alone, by_itself, condition, distance, basis, direction, locus))
         return tuple(out)
 
     def recommend(self, q: Any, current: str | None = None) -> str:
         """The name of the pair to use: the best conditioned one, or the current one where none is better by the factor.
 
+        Only pairs that command the same can be compared: with ``current`` those with its task.
+
         Raises:
             UnknownNameError: no such pair. ShapeError, NotFiniteError, RotationError: no configuration.
         """
-        if current is not None and current not in self.pairs:
-            raise UnknownNameError("current", current, self.pairs)
-        sigmas = self.sigmas(q)
-        best = int(np.argmax(sigmas))
-        if current is not None and sigmas[best] < self.factor * sigmas[self._names.index(current)]:
-            return current
-        return self._names[best]
+        if current is None:
+            return self._names[int(np.argmax(self.sigmas(q)))]
+        return self.look(q, current)[2]
 
-    def _condition(self, sigma: float, task: float, constraint: float) -> Condition:
-        if sigma >= self.least:
+    def look(self, q: Any, current: str) -> tuple[float, float, str]:
+        """(sigma of a pair, that of its task alone, the pair to use), what driving asks for in every tick.
+
+        Raises:
+            UnknownNameError: no such pair. ShapeError, NotFiniteError, RotationError: no configuration.
+        """
+        if current not in self.pairs:
+            raise UnknownNameError("current", current, self.pairs)
+        alike, asked = self._siblings[current]
+        found = asked(checked_configuration(self.robot, q))
+        sigmas, task = found[:-1], float(found[-1])
+        best, own = int(np.argmax(sigmas)), alike.index(self._names.index(current))
+        stay = sigmas[best] < self.factor * sigmas[own] or best == own
+        return float(sigmas[own]), task, current if stay else self._names[alike[best]]
+
+    def _condition(self, pair: float, task: float, constraint: float) -> Condition:
+        """What loses its rank near here, by the distances to the loci of the pair, its task and its constraint."""
+        if pair >= self.near:
             return Condition.REGULAR
-        if task < self.least:
+        # On a locus of the pair the task's own may be near, too, and yet another pair does there
+        if task < self.near and NEARER * task <= pair:
             return Condition.TASK
-        return Condition.CONSTRAINT if constraint < self.least else Condition.ALGORITHMIC
+        own = constraint < self.near and NEARER * constraint <= pair
+        return Condition.CONSTRAINT if own else Condition.ALGORITHMIC
+
+    def _way(self, q: Array, group: int, sigma: float, slope: Array) -> float:
+        """How far it is to a configuration where a group has lost a rank, by Newton's method; inf beyond ``near``."""
+        scale = self.conditioning.dof_scale
+        here, gone = q, np.zeros(self.robot.nv)
+        for _ in range(STEPS):
+            if sigma <= ROUNDING * self.conditioning.size(here, group):
+                return float(np.linalg.norm(gone))
+            # In coordinates in which a sliding joint counts by the arm's length
+            along = slope * scale
+            steep = float(along @ along)
+            if steep == 0.0 or sigma > 2.0 * self.near * np.sqrt(steep):
+                return np.inf
+            gone = gone - sigma / steep * along
+            if np.linalg.norm(gone) > self.near:
+                return np.inf
+            here = pin.integrate(self.robot.model, q, scale * gone)
+            sigmas, slopes, _ = self.conditioning.slopes(here)
+            sigma, slope = float(sigmas[group]), slopes[group]
+        return np.inf
 
     def _nearest(
         self, q: Array, sigma: float, slope: Array, known: ClosedForm | None
     ) -> tuple[float, Basis, Array, str]:
         """(distance, basis, direction, text) of the locus that is nearest."""
-        steep = float(np.linalg.norm(slope))
+        scale = self.conditioning.dof_scale
+        along = slope * scale
+        steep = float(np.linalg.norm(along))
         guess = sigma / steep if steep > 0.0 else (0.0 if sigma == 0.0 else np.inf)
         found = known.nearest(q) if known is not None else None
-        if found is not None and abs(found[1]) <= guess:
+        if found is not None:
             place, way = found
-            direction = np.zeros(self.robot.nv)
-            direction[place.dof] = np.sign(way)
-            return abs(way), Basis.EXACT, direction, str(place)
-        direction = -slope / steep if steep > 0.0 else np.zeros(self.robot.nv)
+            away = abs(way) / float(scale[place.dof])
+            if away <= guess:
+                direction = np.zeros(self.robot.nv)
+                direction[place.dof] = np.sign(way) * scale[place.dof]
+                return away, Basis.EXACT, direction, str(place)
+        direction = -along / steep * scale if steep > 0.0 else np.zeros(self.robot.nv)
         return guess, Basis.FIRST_ORDER, direction, ""

@@ -24,8 +24,9 @@ from wbc.errors import RangeError, WbcError
 from wbc.robot import Robot
 from wbc.validation import Array
 
-#: Singular values below this are zero, and the task must keep this one for a witness
-ZERO, KEPT = 1e-9, 1e-3
+#: Part of the median of the task's least singular value below which one is zero, and that the task must keep for a
+#: witness: parts of what is usual for this task of this arm do not depend on its size or on the scale of rows
+ZERO, KEPT = 1e-8, 1e-2
 #: Configurations of the screen, and how many of them Newton's method starts from
 STATES, STARTS, STEPS = 2000, 60, 30
 SCREENED = "screened"
@@ -38,8 +39,8 @@ class CompleteSet:
     Attributes:
         constraint: the coordinates. verdict: ``strict`` or ``loose`` as :func:`wbc.analysis.analyse` has it, or
             ``screened``: no witness was found, and nothing is proved.
-        least: smallest ratio of the least singular values, rows over task, that the screen met where the task has one
-            above 1e-3.
+        least: smallest ratio of the least singular values, rows over task, that the screen met where the task keeps a
+            hundredth of its median.
     """
 
     constraint: tuple[Coordinate, ...]
@@ -67,18 +68,21 @@ def smallest_complete_sets(
     if validation.flag("certify", certify) and robot.nv > LARGE:
         raise RangeError("certify", certify, f"exact analysis takes up to {LARGE} joints; say certify=False")
     states = _states(robot, seed)
+    if robot.nq != robot.nv:
+        raise RangeError("robot", robot.name, "joints with one coordinate each are needed")
     found: list[CompleteSet] = []
     for size in range(1, len(given) + 1):
         subsets = list(combinations(given, size))
         screen = Conditioning(robot, [wanted, *((*wanted, *s) for s in subsets)], backend="auto")
         every = screen.many(states)
         task_sigma, *others = (np.linalg.svd(J, compute_uv=False)[:, -1] for J in every)
-        regular = task_sigma > KEPT
+        usual = float(np.median(task_sigma))
+        regular = task_sigma > KEPT * usual
         for k, (subset, sigma) in enumerate(zip(subsets, others, strict=True), start=1):
             if (
                 every[k].shape[1] < robot.nv
-                or (sigma[regular] < ZERO).any()
-                or _hunted(screen, k, np.asarray(states[regular]), np.asarray(sigma[regular], dtype=np.float64))
+                or (sigma[regular] < ZERO * usual).any()
+                or _hunted(screen, k, np.asarray(states[regular]), np.asarray(sigma[regular], dtype=np.float64), usual)
             ):
                 continue
             ratio = float((sigma[regular] / task_sigma[regular]).min())
@@ -100,7 +104,7 @@ def _states(robot: Robot, seed: int) -> Array:
     return np.where(chosen, special, q)
 
 
-def _hunted(screen: Conditioning, group: int, states: Array, sigma: Array) -> bool:
+def _hunted(screen: Conditioning, group: int, states: Array, sigma: Array, usual: float) -> bool:
     """Newton's method on sigma = 0 from the states where it is least; a zero with a regular task is a witness."""
     order = np.argsort(sigma)
     for start in states[np.concatenate((order[: STARTS // 2], order[:: max(1, len(order) // (STARTS // 2))]))]:
@@ -108,11 +112,11 @@ def _hunted(screen: Conditioning, group: int, states: Array, sigma: Array) -> bo
         for _ in range(STEPS):
             values, slopes, _ = screen.slopes(q)
             steep = float(slopes[group] @ slopes[group])
-            if values[group] < ZERO or steep < 1e-16 or values[0] < KEPT:
+            if values[group] < ZERO * usual or steep < (ZERO * usual) ** 2 or values[0] < KEPT * usual:
                 break
             step = -values[group] / steep * slopes[group]
             q = q + step * min(1.0, 0.3 / float(np.linalg.norm(step)))
-        if values[group] < ZERO and values[0] > KEPT:
+        if values[group] < ZERO * usual and values[0] > KEPT * usual:
             return True
     return False
 

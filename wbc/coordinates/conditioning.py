@@ -53,7 +53,7 @@ class Conditioning:
         length: one for all rows [m]; default: of the arm that a row belongs to, see :func:`scales`.
 
     Attributes:
-        groups: the coordinates of each. compiled: as C, else by numpy.
+        groups: the coordinates of each. compiled: as C, else by numpy. dof_scale: D_c [nv].
     """
 
     def __init__(
@@ -79,7 +79,7 @@ class Conditioning:
         self._columns = [free_joints(robot, names) for names in ([()] * len(self.groups) if brakes is None else brakes)]
         if len(self._columns) != len(self.groups) or not all(self._columns):
             raise ShapeError("brakes", brakes, "expected names of joints for each group, not of all joints")
-        self._row_scale, self._dof_scale = scales(robot, every, length)
+        self._row_scale, self.dof_scale = scales(robot, every, length)
         self._rates, self._slope = _functions(robot, every, len(self._row_scale))
         self._native = self._load(backend) if backend != "vm" else None
         if backend == "native" and self._native is None:
@@ -132,19 +132,23 @@ class Conditioning:
             left, right = np.zeros(len(self._row_scale)), self._right[g]
             left[rows] = u[:, -1] * self._row_scale[rows]
             self._sigma[g], right[columns] = sigma[-1], v[-1]
-            self._slopes[g] = np.asarray(self._slope(q, left, right * self._dof_scale).full()).ravel()
+            self._slopes[g] = np.asarray(self._slope(q, left, right * self.dof_scale).full()).ravel()
         return self._sigma.copy(), self._slopes.copy(), self._right.copy()
+
+    def size(self, q: Array, group: int) -> float:
+        """Frobenius norm of the scaled matrix of a group: what its entries are rounded in proportion to."""
+        return float(np.linalg.norm(self.matrices(q)[group]))
 
     def matrices(self, q: Array) -> list[Array]:
         """The scaled matrix of each group, for checks."""
-        every = self._row_scale[:, None] * np.asarray(self._rates(q).full()) * self._dof_scale
+        every = self._row_scale[:, None] * np.asarray(self._rates(q).full()) * self.dof_scale
         return [every[np.ix_(rows, columns)] for rows, columns in zip(self._rows, self._columns, strict=True)]
 
     def many(self, states: Array) -> list[Array]:
         """The scaled matrices of each group at many configurations [states, rows, joints that are not braked]."""
         rates = self._rates.map(len(states))(states.T).full()
         every = rates.reshape(len(self._row_scale), len(states), self.robot.nv).swapaxes(0, 1)
-        every = self._row_scale[:, None] * every * self._dof_scale
+        every = self._row_scale[:, None] * every * self.dof_scale
         return [every[:, rows][:, :, columns] for rows, columns in zip(self._rows, self._columns, strict=True)]
 
     def _load(self, backend: str) -> ctypes._NamedFuncPointer | None:
@@ -182,7 +186,7 @@ class Conditioning:
             *_table("row", self._rows),
             *_table("column", self._columns),
             f"static const double row_scale[] = {{{', '.join(x.hex() for x in self._row_scale.tolist())}}};",
-            f"static const double dof_scale[] = {{{', '.join(x.hex() for x in self._dof_scale.tolist())}}};",
+            f"static const double dof_scale[] = {{{', '.join(x.hex() for x in self.dof_scale.tolist())}}};",
         ]
         own = resources.files("wbc.coordinates") / "native"
         texts = ((own / name).read_text() for name in ("singular.c", "least.c"))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -12,11 +13,12 @@ from wbc.controller import Step
 from wbc.coordinates import expressions
 from wbc.coordinates.conditioning import checked_configuration
 from wbc.coordinates.easing import Easing
-from wbc.coordinates.integrals import RateIntegrals
+from wbc.coordinates.integrals import RateIntegrals, Rows
 from wbc.coordinates.pair import CoordinatePair
-from wbc.coordinates.pair_stack import EASE, PairStack, metric_of, pair_stack, row_count
+from wbc.coordinates.pair_stack import EASE, PairStack, pair_stack
 from wbc.coordinates.rate_matrices import RateMatrices
 from wbc.coordinates.rows import Coordinate
+from wbc.coordinates.serving import Served, served
 from wbc.errors import UnknownNameError
 from wbc.robot import Robot
 from wbc.tasks import Item
@@ -24,8 +26,6 @@ from wbc.validation import Array
 
 #: A blend's acceleration is at most this part of a joint's limit
 ROOM = 0.8
-#: Commanded rows that are rates only lag their integral by this at most [m, rad]; what limits take is not made up for
-LAG = 5e-4
 
 
 class PairController:
@@ -46,6 +46,9 @@ class PairController:
     to what is commanded fade like 1 - 3 s^2 + 2 s^3, s = time / seconds: where the new pair is regular the joint rates
     are continuous, and what both pairs hold stays exact. The time is the one asked for, or longer where a joint's
     acceleration limit needs it.
+
+    What all pairs have in common lies in flat arrays with one number a row of all coordinates, in their order, so that
+    a tick is a few operations on whole arrays; what changes only with the command is written only then.
 
     Attributes:
         declared: the pairs' stack. controller: its compiled controller.
@@ -69,16 +72,24 @@ class PairController:
         self.controller = self.declared.stack.compile(backend=backend)
         native = self.controller.backend == "native"
         self._rates = RateMatrices(robot, self.declared.coordinates, native=native)
-        self._sizes = {one: row_count(robot, [one]) for one in self.declared.coordinates}
+        self._integrals = RateIntegrals(robot, self._rates)
+        self._easing = Easing(robot, self.pairs.values(), self.declared.stack.length, self._rates, native=native)
+        self._made = {
+            name: served(self.controller, self.declared, pair, self._rates, self._integrals.masked)
+            for name, pair in self.pairs.items()
+        }
         self.active = next(iter(self.declared.pairs))
-        self._command: dict[Coordinate, Array] = {}
-        self._fading: dict[Coordinate, Array] = {}
-        self._served: dict[Coordinate, Array] = {}
+        count = len(self._rates.units)
+        #: What is asked of each row, what was served of it in the last tick, and what a switch has yet to let fade
+        self._command, self._served, self._fading = np.zeros(count), np.zeros(count), np.zeros(count)
         self._time, self._seconds = 0.0, 0.0
-        self._moving: set[Coordinate] = set()
-        self._integrals = RateIntegrals(robot, self.declared.coordinates)
-        self._easing = Easing(robot, self.declared.stack.length, self._rates, native=native)
+        self.blending = False
+        #: Something that is written only when it changes has changed
+        self._fresh = True
+        #: Constraint coordinates that have rates: their references go along
+        self._moving: tuple[Coordinate, ...] = ()
         self._q: Array | None = None
+        self._every, self._weight = np.zeros((count, robot.nv)), 0.0
         self._activate()
 
     @property
@@ -92,9 +103,23 @@ class PairController:
         return self.pairs[self.active]
 
     @property
-    def blending(self) -> bool:
-        """Whether a switch is under way."""
-        return bool(self._fading)
+    def asked(self) -> Array:
+        """Rates that the active pair's task rows were last commanded to have [m/s, rad/s]."""
+        return self._command[self._now.task_rows]
+
+    def met(self, v: Array) -> Array:
+        """Rates of the active pair's task rows at the last configuration for joint rates ``v`` [m/s, rad/s]."""
+        found: Array = self._every[self._now.task_rows] @ v
+        return found
+
+    def sigma(self) -> float:
+        """The least singular value of the active pair's scaled rows at the last configuration, see :class:`Adviser`."""
+        return self._easing.sigma(self.active, self._every)
+
+    @property
+    def eased(self) -> bool:
+        """Whether the task gave way in the last tick because a locus is near."""
+        return bool(self.controller[EASE].weight > 0.0)
 
     def reset(self, q: Any, v: Any = None) -> None:
         """Start anew at a configuration: commands are zero, what the active pair holds is held where it is.
@@ -104,7 +129,9 @@ class PairController:
         """
         q = self.robot.configuration("q", q)
         self.controller.reset(q, v)
-        self._command, self._fading, self._served, self._q = {}, {}, {}, q
+        for array in (self._command, self._served, self._fading):
+            array[:] = 0.0
+        self._q, self.blending, self._moving = q, False, ()
         self._integrals.forget()
         self._activate()
         self._latch(self.pair.constraint, q)
@@ -115,7 +142,7 @@ class PairController:
         Raises:
             ShapeError, NotFiniteError: not one finite number a row.
         """
-        self._command |= self._split("command", self.pair.task, rates)
+        self._ask("command", self._now.task_rows, rates)
 
     def prescribe(self, rates: Any) -> None:
         """Rates of the active pair's constraint rows [m/s, rad/s]; zero at first. While they are not zero, drift of
@@ -124,7 +151,7 @@ class PairController:
         Raises:
             ShapeError, NotFiniteError: not one finite number a row.
         """
-        self._command |= self._split("prescribe", self.pair.constraint, rates)
+        self._ask("prescribe", self._now.held_rows, rates)
 
     def switch(self, name: str, seconds: float = 1.0) -> float:
         """Make another pair the active one; returns the time of the blend [s].
@@ -139,26 +166,30 @@ class PairController:
         wanted = validation.scalar("seconds", seconds, low=0.0, unit="s")
         if name == self.active:
             return 0.0
-        before, was, commands = self._held(), self.pair, self._command
+        before, was, places = self._held(), self.pair, self._rates.places
         self.active = name
         alike = {*(set(was.task) & set(self.pair.task)), *(set(was.constraint) & set(self.pair.constraint))}
-        self._command = {one: rate for one, rate in commands.items() if one in alike}
-        self._fading = {}
+        for one, rows in places.items():
+            if one not in alike:
+                self._command[rows] = 0.0
+        self._fading[:] = 0.0
         if self._q is not None:
-            v, rows = self.controller.last_command, self.rates(self._q)
+            v = self.controller.last_command
+            now = self._rates.whole(self._q) @ v
             for one in self.pair.rows:
                 if not (one in before and one in self.pair.constraint):
                     # A task that goes on lags by what it was asked for, not by how that has changed since
-                    asked = self._served.get(one) if one in alike else None
-                    self._fading[one] = rows[one] @ v - (self._wanted(one) if asked is None else asked)
-            wanted = max(wanted, self._shortest(rows, v))
-            kept = [one for one in self.pair.constraint if one in before]
-            self._latch([one for one in self.pair.constraint if one not in kept], self._q)
+                    asked = self._served if one in alike and one in was.task else self._command
+                    self._fading[places[one]] = now[places[one]] - asked[places[one]]
+            wanted = max(wanted, self._shortest(self._q, v))
+            self._latch([one for one in self.pair.constraint if one not in before], self._q)
         self._integrals.restart(self.pair.task)
         self._time, self._seconds = 0.0, wanted
         if wanted == 0.0:
-            self._fading = {}
+            self._fading[:] = 0.0
+        self.blending = bool(self._fading.any())
         self._activate()
+        self._mark_moving()
         return wanted
 
     def units(self, rows: Iterable[Coordinate]) -> tuple[str, ...]:
@@ -172,7 +203,7 @@ class PairController:
             ShapeError, NotFiniteError, RotationError: no configuration.
         """
         whole = self._rates.whole(self.robot.configuration("q", q))
-        return self._rates.split(whole, self._rates.places)
+        return {one: whole[rows] for one, rows in self._rates.places.items()}
 
     def step(self, q: Any, v: Any = None, dt: Any = None) -> Step:
         """One cycle: the velocity for the next dt seconds, see :meth:`wbc.Controller.step`.
@@ -183,72 +214,75 @@ class PairController:
         q = checked_configuration(self.robot, q)
         if self._q is None:
             self._latch(self.pair.constraint, q)
-        self._q = np.array(q)
+        self._q = q.copy()
         period = self.dt if dt is None else validation.scalar("dt", dt, low=0.0, unit="s")
-        self._time += period
-        every = self._rates.whole(q)
-        matrices = self._rates.split(every, self.pair.rows)
-        self._integrals.advance(q, matrices)
-        s = min(1.0, self._time / self._seconds) if self._seconds > 0.0 else 1.0
-        left = 1.0 - s * s * (3.0 - 2.0 * s)
-        self._served = {one: self._wanted(one) + left * self._fading.get(one, 0.0) for one in self.pair.task}
-        for one, rate in self._served.items():
-            self._follow(one, rate)
-        for one in self.pair.constraint:
-            rate = self._wanted(one) + left * self._fading.get(one, 0.0)
-            self._keep(one, rate, q)
-            self._integrals.plan(one, rate, period, matrices[one])
-        for one, rate in self._served.items():
-            self._integrals.plan(one, rate, period, matrices[one])
-        if s >= 1.0:
-            self._fading = {}
-        ease, weight = self.controller[EASE], self._easing.at(self.pair, every)
+        now, every = self._now, self._rates.whole(q)
+        self._every = every
+        if self._integrals.rows.size:
+            self._integrals.advance(q, every)
+        if self.blending:
+            self._fade(period)
+        elif self._fresh:
+            self._served[:] = self._command
+            self._fresh = False
+            now.write(self.controller, self._served)
+        if self._moving:
+            self._latch(self._moving, q)
+            self._moving = tuple(one for one in self._moving if self._served[self._rates.places[one]].any())
+        if now.integral_rows.size:
+            self._integrals.plan(now.integral_rows, self._q, every, self._served, period)
+            now.write_integrals(self.controller, self._integrals)
+        weight = self._easing.at(self.active, every)
         # Writing a weight costs more than a look at it
-        if ease.weight != weight:
-            ease.weight = weight
+        if weight != self._weight:
+            self.controller[EASE].weight = self._weight = weight
         return self.controller.step(q, v, dt)
 
-    def _follow(self, one: Coordinate, rate: Array) -> None:
-        """A task coordinate goes at a rate; what it is behind its integral, it makes up for."""
-        item = self._item(one)
-        item.speed = rate
-        if one in self._integrals.masks and not self._tall:
-            self._integrals.cap(one, LAG)
-            item.offset = -self._integrals.off(one)
+    def _fade(self, period: float) -> None:
+        """Serve what is asked and what is left of the difference that a switch began with."""
+        self._time += period
+        s = min(1.0, self._time / self._seconds) if self._seconds > 0.0 else 1.0
+        np.multiply(self._fading, 1.0 - s * s * (3.0 - 2.0 * s), out=self._served)
+        self._served += self._command
+        self._now.write(self.controller, self._served)
+        self._mark_moving()
+        if s >= 1.0:
+            self._fading[:] = 0.0
+            self.blending, self._fresh = False, True
 
-    def _keep(self, one: Coordinate, rate: Array, q: Array) -> None:
-        """A constraint coordinate goes at a rate; at rest its drift is taken back."""
-        handle = self.controller[self.declared.keep[one]]
-        handle.speed = rate
-        if rate.any() or one in self._moving:
-            self._latch([one], q)
-        self._moving = self._moving | {one} if rate.any() else self._moving - {one}
-        if one in self._integrals.masks:
-            handle.drift = self._integrals.off(one)
+    def _ask(self, field: str, rows: Rows, rates: Any) -> None:
+        plain = type(rates) is np.ndarray and rates.dtype == np.float64 and rates.shape == rows.shape
+        if not (plain and isfinite(rates.dot(rates))):
+            rates = validation.real_array(field, rates, rows.shape)
+        self._command[rows] = rates
+        self._fresh = True
+        if field == "prescribe":
+            self._mark_moving()
 
-    def _item(self, one: Coordinate) -> Any:
-        return self.controller[self.declared.follow[one, metric_of(self.pair, one)]]
-
-    def _wanted(self, one: Coordinate) -> Array:
-        return self._command.get(one, np.zeros(self._sizes[one]))
+    def _mark_moving(self) -> None:
+        """Constraint coordinates that have rates, or had them in the last tick."""
+        places = self._rates.places
+        busy = [
+            one for one in self.pair.constraint if self._command[places[one]].any() or self._served[places[one]].any()
+        ]
+        self._moving = tuple(dict.fromkeys((*self._moving, *busy)))
 
     def _held(self) -> set[Coordinate]:
         """Constraint coordinates that are at rest."""
-        busy = {one for one, rate in self._fading.items() if rate.any()}
-        return {one for one in self.pair.constraint if not self._wanted(one).any()} - busy
-
-    def _split(self, field: str, rows: Sequence[Coordinate], rates: Any) -> dict[Coordinate, Array]:
-        sizes = [self._sizes[one] for one in rows]
-        numbers = validation.real_array(field, rates, (sum(sizes),))
-        return dict(zip(rows, np.split(numbers, np.cumsum(sizes)[:-1]), strict=True))
+        places = self._rates.places
+        moving = self._command != 0.0
+        if self.blending:
+            moving |= self._fading != 0.0
+        return {one for one in self.pair.constraint if not moving[places[one]].any()}
 
     def _activate(self) -> None:
         """Switch the items of the active pair on and all others off."""
-        self._tall = self.pair.over_determined(self.robot)
-        wishes = {self.declared.follow[one, metric_of(self.pair, one)] for one in self.pair.task}
-        kept = {self.declared.keep[one] for one in self.pair.constraint}
+        self._now: Served = self._made[self.active]
+        self._integrals.follow(self._now.integral_rows)
+        self._fresh, self._moving = True, ()
+        self._weight = float(self.controller[EASE].weight)
         for name in (*self.declared.follow.values(), *self.declared.keep.values()):
-            self.controller[name].enabled = name in wishes or name in kept
+            self.controller[name].enabled = name in self._now.items
 
     def _latch(self, rows: Iterable[Coordinate], q: Array) -> None:
         """What is held from now on is held where it is."""
@@ -258,11 +292,11 @@ class PairController:
                 value = expressions.here(self.robot, one, q)
                 self.controller[self.declared.keep[one]].reference = value
 
-    def _shortest(self, rows: dict[Coordinate, Array], v: Array) -> float:
+    def _shortest(self, q: Array, v: Array) -> float:
         """Time in which the joint rates can change to what the new pair wants."""
-        J = np.vstack([rows[one] for one in self.pair.rows])
-        wanted = np.concatenate([self._wanted(one) for one in self.pair.rows])
-        change = np.abs(np.linalg.lstsq(J, wanted, rcond=1e-6)[0] - v)
+        made, every = self._made[self.active], self._rates.whole(q)
+        rows = np.concatenate((made.task_rows, made.held_rows))
+        change = np.abs(np.linalg.lstsq(every[rows], self._command[rows], rcond=1e-6)[0] - v)
         limit = self.robot.limits.acceleration
         slow = np.isfinite(limit) & (limit > 0.0)
         return float((1.5 * change[slow] / (ROOM * limit[slow])).max(initial=0.0))

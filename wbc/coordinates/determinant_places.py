@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 from typing import TypeAlias
 
 from wbc.analysis import (
@@ -36,6 +36,8 @@ from wbc.validation import Array
 
 #: See :func:`closed_form`
 SMALL, LARGE = 4, 7
+#: Terms of a relation in half angles beyond which it is not written out: nobody reads it, and sorting it takes seconds
+LONG = 100
 #: What rank analysis knows
 _Known: TypeAlias = BodyRows | JointRows | PitchPlaneRows
 
@@ -62,18 +64,31 @@ class Place:
         return f"{self.joint} = {self.value:.4g}"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ClosedForm:
     """Where the determinant of a square pair vanishes.
 
     Attributes:
-        places: joints at angles. lines: all conditions as rank analysis writes them, joints by their number.
-        always: the determinant is identically zero.
+        places: joints at angles. always: the determinant is identically zero.
+        branches, exact: all conditions, and the arithmetic that they are of.
     """
 
     places: tuple[Place, ...]
-    lines: tuple[str, ...]
     always: bool = False
+    branches: tuple[Branch, ...] = ()
+    exact: Exact | None = None
+
+    @cached_property
+    def lines(self) -> tuple[str, ...]:
+        """All conditions as rank analysis writes them, joints by their number; of longer ones only that they are."""
+        if self.always:
+            return ("everywhere",)
+        if self.exact is None:
+            return ()
+        long = [b for b in self.branches if any(len(r.poly) > LONG for r in b.relations)]
+        short = [b for b in self.branches if b not in long]
+        counted = [sum(len(r.poly) for r in b.relations) for b in long]
+        return (*Notation(self.exact.half).branches(short), *(f"a relation of {n} terms = 0" for n in counted))
 
     def nearest(self, q: Array) -> tuple[Place, float] | None:
         """The nearest place and the way to it, or None where there is none."""
@@ -115,14 +130,17 @@ def _factored(robot: Robot, block: JointBlock) -> ClosedForm | None:
     if exact is None:
         return None
     model, rings = exact
-    factors = factored_determinant(rings, symbolic_jacobian(model, block.rows)).factors
+    try:
+        factors = factored_determinant(rings, symbolic_jacobian(model, block.rows)).factors
+    except WbcError:
+        # A frame of the rows is not placed by right angles, though the joints are
+        return None
     if factors.zero:
-        return ClosedForm((), ("everywhere",), always=True)
+        return ClosedForm((), always=True)
     values = [f for f, _ in factors.conditions if isinstance(f, Value)]
     relations = [f for f, _ in factors.conditions if isinstance(f, Relation) and _vanishes(rings, f)]
     branches = [Branch(values=(v,)) for v in values] + [Branch(relations=(r,)) for r in relations]
-    lines = tuple(Notation(rings.half).branches(branches))
-    return ClosedForm(tuple(_place(robot, model, v) for v in values), lines)
+    return ClosedForm(tuple(_place(robot, model, v) for v in values), branches=tuple(branches), exact=rings)
 
 
 def _vanishes(rings: Exact, relation: Relation) -> bool:

@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
+from typing import TypeAlias
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 
 from wbc.coordinates import expressions
+from wbc.coordinates.rate_matrices import RateMatrices
 from wbc.coordinates.rows import Coordinate
 from wbc.robot import Robot
 from wbc.validation import Array
+
+#: Numbers of rows
+Rows: TypeAlias = NDArray[np.intp]
 
 
 class RateIntegrals:
@@ -23,48 +29,53 @@ class RateIntegrals:
     depends on the way.
 
     Attributes:
-        masks: coordinate -> 1 for rows that are rates only, 0 for the others. Only coordinates with some are in it.
+        masked: coordinates with rows that are rates only; only these count. off: see above, one number a row of all
+            coordinates, zero in rows with another drift. rows: those that count at present.
     """
 
-    def __init__(self, robot: Robot, coordinates: Iterable[Coordinate]) -> None:
-        self._model = robot.model
-        masks = {one: expressions.rate_only(robot, one).astype(float) for one in coordinates}
-        self.masks = {one: mask for one, mask in masks.items() if mask.any()}
-        self._off: dict[Coordinate, Array] = {}
-        #: What was planned at the last configuration, and the matrix there
-        self._went: dict[Coordinate, tuple[Array, Array]] = {}
+    def __init__(self, robot: Robot, rates: RateMatrices) -> None:
+        self._model, self._places = robot.model, rates.places
+        self._plain = robot.nq == robot.nv
+        self._mask = np.zeros(len(rates.units))
+        for one, rows in rates.places.items():
+            self._mask[rows] = expressions.rate_only(robot, one)
+        self.masked = {one for one, rows in rates.places.items() if self._mask[rows].any()}
+        self.off = np.zeros(len(self._mask))
+        self.rows: Rows = np.zeros(0, dtype=np.intp)
+        #: Where the robot was, the matrix of all rows there, and what the rows were to go from there
         self._q: Array | None = None
+        self._before = np.zeros((len(self._mask), robot.nv))
+        self._planned = np.zeros(len(self._mask))
 
     def forget(self) -> None:
         """Begin anew, wherever the robot is next."""
-        self._off, self._went, self._q = {}, {}, None
+        self.off[:], self._q = 0.0, None
+        self.rows = np.zeros(0, dtype=np.intp)
 
     def restart(self, rows: Iterable[Coordinate]) -> None:
         """Some coordinates count from here on."""
         for one in rows:
-            self._off.pop(one, None)
+            self.off[self._places[one]] = 0.0
 
-    def advance(self, q: Array, rates: Mapping[Coordinate, Array]) -> None:
-        """The robot is at ``q`` now, on the shortest way from where it was; ``rates``: A(q) of active coordinates."""
-        if self._q is not None and self._went:
-            step = pin.difference(self._model, self._q, q)
-            for one, (planned, before) in self._went.items():
-                if one in rates:
-                    gone = 0.5 * (before + rates[one]) @ step - planned
-                    self._off[one] = self._off.get(one, 0.0) + self.masks[one] * gone
-        self._q, self._went = np.array(q), {}
+    def follow(self, rows: Rows) -> None:
+        """Another pair is active; what it has not planned yet does not count until the tick after the next one."""
+        self.rows = np.intersect1d(self.rows, rows)
 
-    def plan(self, one: Coordinate, rate: Array, dt: float, matrix: Array) -> None:
-        """A coordinate with the matrix A(q) is to go at a rate until the next :meth:`advance`."""
-        if one in self.masks:
-            self._went[one] = rate * dt, matrix
+    def advance(self, q: Array, every: Array) -> None:
+        """The robot is at ``q`` now, on the shortest way from where it was; ``every``: A(q) of all coordinates."""
+        rows = self.rows
+        if self._q is not None:
+            step = q - self._q if self._plain else pin.difference(self._model, self._q, q)
+            gone = (self._before[rows] + every[rows]) @ (0.5 * step) - self._planned[rows]
+            self.off[rows] += self._mask[rows] * gone
+        self._q = None
 
-    def off(self, one: Coordinate) -> Array:
-        """What a coordinate is ahead by, one number a row; zero in rows with another drift."""
-        found = self._off.get(one)
-        return np.zeros(len(self.masks[one])) if found is None else found
+    def plan(self, rows: Rows, q: Array, every: Array, rates: Array, dt: float) -> None:
+        """Rows are to go at rates until the next :meth:`advance`."""
+        self._q, self._before, self.rows = q, every, rows
+        np.multiply(rates, dt, out=self._planned)
 
-    def cap(self, one: Coordinate, most: float) -> None:
-        """Forget what a coordinate is ahead by beyond ``most``."""
-        if one in self._off:
-            self._off[one] = np.clip(self._off[one], -most, most)
+    def cap(self, rows: slice, most: float) -> None:
+        """Forget what rows are ahead by beyond ``most``."""
+        part = self.off[rows]
+        np.clip(part, -most, most, out=part)

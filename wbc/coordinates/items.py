@@ -75,14 +75,14 @@ class FollowRows(Task):
 
     def error(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
         """-offset, so that the rows ask for speed + gain offset."""
-        return ca.SX(-self._spread(kin) @ inputs["offset"])
+        return ca.SX(-self.spread(kin) @ inputs["offset"])
 
     def jacobian(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
         """A(q)."""
-        return self._spread(kin) @ expressions.matrix(robot, kin, self.coordinate)
+        return self.spread(kin) @ expressions.matrix(robot, kin, self.coordinate)
 
-    def _spread(self, kin: Tracer) -> ca.SX:
-        """From the rows to those that are served."""
+    def spread(self, kin: Tracer) -> ca.SX:
+        """From the rows to those that are served: S of S A(q) v."""
         if self.metric is None:
             return ca.SX(1)
         assert isinstance(self.coordinate, BodyRows)

@@ -2,8 +2,8 @@
 
 | mode | commanded | held |
 |---|---|---|
-| M1 | tip of the first arm | one scalar constraint, or two with the body joint free; other joints of a tree |
-| M2 | that constraint: self-motion | the tip |
+| M1 | tip of the first arm | scalar constraints, as many as there are joints beyond those that the tip takes |
+| M2 | one of those constraints: self-motion | the tip, and the others |
 | M3 | a point on the way to the tip, as far as it can go | joints beyond it, pitch plane |
 | M4 | position of the tip | joints of the wrist, and a scalar constraint where one is left |
 | M5 | one joint, or the body joint | all other joints |
@@ -11,21 +11,24 @@
 | M7 | tip of the carrier | both hands, fixed in space |
 | M8 | the point on the way, in the least-squares sense | the tip: more rows than joints |
 
+Joints of no arm have brakes in every mode.
+
 Source: E. Dupuis, PhD thesis, McGill University, 2001, chapter 4, eqs. 4.12 to 4.28, 4.43, 4.44 and 4.48.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from enum import StrEnum
 from typing import TypeAlias
 
 from wbc import validation
 from wbc.analysis.rows import BodyRows, JointRows
-from wbc.coordinates.arm_parts import Arm, Parts, parts
+from wbc.coordinates.arm_parts import Arm, Held, MissingPartError, Parts
 from wbc.coordinates.pair import CoordinatePair
 from wbc.coordinates.rows import Coordinate
-from wbc.errors import WbcError
+from wbc.coordinates.which_parts import parts
+from wbc.robot import Robot
 from wbc.robots.operator_arms import OPERATOR_ARMS
 
 
@@ -47,12 +50,7 @@ SHORT = {mode.name: mode for mode in Mode}
 #: The pairs of a mode, or the part that a robot lacks
 Made: TypeAlias = "Sequence[CoordinatePair] | str"
 NOT_REDUNDANT = "joint beyond those that its tip takes"
-
-
-class MissingPartError(WbcError):
-    """A mode that a robot has no rows for; ``part`` is what it lacks."""
-
-    part = ""
+NO_MIDDLE = "point between base and tip that joints move"
 
 
 def mode(name: str | Mode) -> Mode:
@@ -67,144 +65,160 @@ def mode(name: str | Mode) -> Mode:
     return by_name[validation.one_of("mode", name, by_name)]
 
 
-def mode_pairs(robot: str, wanted: str | Mode) -> tuple[CoordinatePair, ...]:
-    """The pairs of a mode on a robot of :func:`wbc.robots.operator_arm`; the frames they need are in
-    :func:`wbc.coordinates.parts`.
+def mode_pairs(robot: str | Robot, wanted: str | Mode) -> tuple[CoordinatePair, ...]:
+    """The pairs of a mode on a robot; the frames they need are those of the robot in :func:`wbc.coordinates.parts`.
+
+    Args:
+        robot: what :func:`wbc.robots.load` takes by name or file, or a robot.
 
     Raises:
         UnknownNameError: no such robot or mode. MissingPartError: the robot has no rows for it; the error says what
             is missing.
     """
-    chosen, found = mode(wanted), parts(robot)
+    chosen = mode(wanted)
+    found = parts(robot)
     pairs = _MAKERS[chosen](found)
     if isinstance(pairs, str):
-        error = MissingPartError("mode", f"{chosen.name} on {robot}", f"the robot has no {pairs}")
-        error.part = pairs
-        raise error
+        name = robot if isinstance(robot, str) else robot.name
+        raise MissingPartError.of("mode", f"{chosen.name} on {name}", pairs)
     return tuple(pairs)
 
 
+def mode_row(robot: str | Robot) -> dict[Mode, tuple[CoordinatePair, ...] | str]:
+    """Mode -> the pairs of a robot, or the part that is missing.
+
+    Raises:
+        UnknownNameError, MissingPartError: no such robot; one that has no arm at all.
+    """
+    found = parts(robot)
+    made = {one: _MAKERS[one](found) for one in Mode}
+    return {one: pairs if isinstance(pairs, str) else tuple(pairs) for one, pairs in made.items()}
+
+
+def modes_of(robot: str | Robot, wanted: Iterable[str | Mode]) -> tuple[Mode, ...]:
+    """Those of some modes that a robot has rows for.
+
+    Raises:
+        UnknownNameError: no such robot or mode. MissingPartError: the robot has none of them.
+    """
+    row, chosen = mode_row(robot), [mode(one) for one in wanted]
+    found = tuple(one for one in chosen if not isinstance(row[one], str))
+    if not found:
+        mode_pairs(robot, chosen[0])
+    return found
+
+
 def mode_table() -> dict[str, dict[Mode, tuple[CoordinatePair, ...] | str]]:
-    """Robot -> mode -> its pairs, or the part that is missing."""
-    out: dict[str, dict[Mode, tuple[CoordinatePair, ...] | str]] = {}
-    for robot in OPERATOR_ARMS:
-        row: dict[Mode, tuple[CoordinatePair, ...] | str] = {}
-        for one in Mode:
-            try:
-                row[one] = mode_pairs(robot, one)
-            except MissingPartError as error:
-                row[one] = error.part
-        out[robot] = row
-    return out
+    """Robot -> mode -> its pairs, or the part that is missing, for the arms of the published studies."""
+    return {robot: mode_row(robot) for robot in OPERATOR_ARMS}
 
 
-def _others(found: Parts, arm: Arm) -> tuple[Coordinate, ...]:
+def _others(found: Parts, arm: Arm) -> Held:
     """Brakes on everything but one arm."""
     body = () if found.body is None else (JointRows(found.body),)
-    return (*(lock for other in found.everything if other is not arm for lock in other.locks()), *body)
+    return (*(lock for other in found.everything if other is not arm for lock in other.locks()), *body, *found.brakes())
 
 
-def _redundant(arm: Arm) -> tuple[Coordinate, ...]:
-    return arm.candidates() if arm.redundancy == 1 else ()
+def _text(held: Iterable[Coordinate]) -> str:
+    return ", ".join(map(str, held)) or "nothing"
 
 
 def _end_effector(found: Parts) -> Made:
     arm = found.arms[0]
-    pairs = [CoordinatePair(arm.tip, (one, *_others(found, arm)), f"{arm.tip} | {one}") for one in _redundant(arm)]
-    return [*pairs, *_free_body(found, arm)] or NOT_REDUNDANT
-
-
-def _free_body(found: Parts, arm: Arm) -> list[CoordinatePair]:
-    """Pairs for where the arm by itself is singular: the body joint moves, two coordinates of the arm are held.
-
-    The five were chosen by a search over all twos of alpha, beta, gamma and locks; how well they do is measured in
-    docs/coordinates.md.
-    """
-    if found.body is None or found.carrier is not None or arm.alpha is None:
-        return []
+    pairs = [CoordinatePair(arm.tip, (*held, *_others(found, arm)), f"{arm.tip} | {_text(held)}") for held in arm.sets]
     others = tuple(lock for other in found.arms if other is not arm for lock in other.locks())
-    held: list[tuple[Coordinate, Coordinate]] = [(arm.alpha, JointRows(arm.joints[k])) for k in (1, 4)]
-    held += [(JointRows(arm.joints[i]), JointRows(arm.joints[k])) for i, k in ((0, 4), (1, 2), (2, 4))]
-    return [CoordinatePair(arm.tip, (a, b, *others), f"{arm.tip} | {a}, {b}; {found.body} free") for a, b in held]
+    return pairs + [
+        CoordinatePair(arm.tip, (*held, *others), f"{arm.tip} | {_text(held)}; {found.body} free")
+        for held in found.free_body
+    ]
 
 
 def _self_motion(found: Parts) -> Made:
-    arm = found.arms[0]
-    return [
-        CoordinatePair(one, (arm.tip, *_others(found, arm)), f"{one} | {arm.tip}") for one in _redundant(arm)
-    ] or NOT_REDUNDANT
+    arm, out = found.arms[0], []
+    if not arm.redundancy:
+        return NOT_REDUNDANT
+    for one in arm.candidates():
+        rest = next(tuple(other for other in held if other != one) for held in arm.sets if one in held)
+        text = ", ".join(map(str, (arm.tip, *rest)))
+        out.append(CoordinatePair(one, (arm.tip, *rest, *_others(found, arm)), f"{one} | {text}"))
+    return out
 
 
 def _intermediate(found: Parts) -> Made:
     arm = found.arms[0]
-    assert arm.middle is not None
     task = arm.middle
-    if len(task.translation) > arm.before_middle:
-        # Two joints or fewer cannot lead a point in the plane: what they can is one of its coordinates
-        task = arm.components()[1]
-    # Three joints whose axes meet lead a point over a sphere; the turn about the line to it is the pitch plane's
-    plane = () if arm.alpha is None else (arm.alpha,)
-    held = ", ".join(("joints beyond", *map(str, plane)))
-    return [CoordinatePair(task, (*plane, *arm.locks(arm.before_middle), *_others(found, arm)), f"{task} | {held}")]
+    if task is None:
+        return NO_MIDDLE
+    held = ", ".join(("joints beyond", *map(str, arm.with_middle)))
+    rows = (*arm.with_middle, *arm.locks(arm.before_middle), *_others(found, arm))
+    return [CoordinatePair(task, rows, f"{task} | {held}")]
 
 
 def _position(found: Parts) -> Made:
     arm = found.arms[0]
     if not arm.tip.rotation:
-        if not arm.redundancy:
-            return NOT_REDUNDANT
         return _end_effector(found)
+    if not arm.tip.translation:
+        return "tip whose position moves"
+    if not arm.position_sets:
+        return "set of coordinates that leaves the tip's position free"
     point = BodyRows(arm.tip.frame, rotation=(), name=f"{arm.prefix}tip")
-    wrist = arm.locks(4)
-    return [
-        CoordinatePair(point, (one, *wrist, *_others(found, arm)), f"{point} | {one}, wrist")
-        for one in (arm.alpha, JointRows(arm.joints[0]))
-        if one is not None
-    ]
+    wrist = {str(lock) for lock in arm.locks(min(4, len(arm.joints) - 3))}
+    out = []
+    for held in arm.position_sets:
+        names = [str(one) for one in held if str(one) not in wrist]
+        whole = wrist <= {str(one) for one in held}
+        text = ", ".join([*names, "wrist"] if whole else map(str, held))
+        out.append(CoordinatePair(point, (*held, *_others(found, arm)), f"{point} | {text}"))
+    return out
 
 
 def _joints(found: Parts) -> Made:
     every = [lock for arm in found.everything for lock in arm.locks()]
     every += [] if found.body is None else [JointRows(found.body)]
-    return [CoordinatePair(one, [o for o in every if o is not one], f"{one} | other joints") for one in every]
+    held = found.brakes()
+    return [CoordinatePair(o, [*(x for x in every if x is not o), *held], f"{o} | other joints") for o in every]
 
 
-def _hands(found: Parts) -> tuple[Coordinate, ...]:
-    """Both hands held by their poses, and the pitch planes of their arms."""
-    return tuple(one for arm in found.arms for one in (arm.tip, arm.alpha) if one is not None)
+def _hands(found: Parts) -> Held:
+    """Both hands held by their poses, and what takes up the redundancy of their arms."""
+    return tuple(one for arm in found.arms for one in (arm.tip, *arm.sets[0]))
 
 
 def _two_arms(found: Parts) -> Made:
-    if len(found.arms) < 2 or found.body is None:
+    if len(found.arms) < 2:
         return "second arm"
-    body = JointRows(found.body)
-    out = []
-    for arm in found.arms:
-        assert arm.alpha is not None
-        out.append(CoordinatePair(arm.tip, (arm.alpha, *_others(found, arm)), f"{arm.tip} | the rest"))
-    carrier = () if found.carrier is None else found.carrier.locks()
-    out.append(CoordinatePair(body, (*_hands(found), *carrier), f"{body} | hands"))
-    locked = tuple(lock for arm in found.arms for lock in arm.locks())
-    out.append(CoordinatePair(body, (*locked, *carrier), f"{body} | arms"))
+    out = [CoordinatePair(arm.tip, (*arm.sets[0], *_others(found, arm)), f"{arm.tip} | the rest") for arm in found.arms]
+    if found.body is not None:
+        body, carrier = JointRows(found.body), () if found.carrier is None else found.carrier.locks()
+        locked = tuple(lock for arm in found.arms for lock in arm.locks())
+        rest = (*carrier, *found.brakes())
+        out.append(CoordinatePair(body, (*_hands(found), *rest), f"{body} | hands"))
+        out.append(CoordinatePair(body, (*locked, *rest), f"{body} | arms"))
     return out
 
 
 def _carried(found: Parts) -> Made:
     carrier = found.carrier
-    if carrier is None or found.body is None:
+    if carrier is None:
         return "carrier"
-    assert carrier.alpha is not None
-    held = (*_hands(found), JointRows(found.body), carrier.alpha)
+    body = () if found.body is None else (JointRows(found.body),)
+    held = (*_hands(found), *body, *carrier.sets[0], *found.brakes())
     return [CoordinatePair(carrier.tip, held, f"{carrier.tip} | hands")]
 
 
 def _over_determined(found: Parts) -> Made:
     arm = found.arms[0]
-    if arm.middle is None:
-        return "point between base and tip"
     if not arm.redundancy:
-        return [CoordinatePair(arm.tip, arm.locks(1)[:1], f"{arm.tip} | {arm.joints[1]}")]
-    return [CoordinatePair(arm.middle, (arm.tip, *_others(found, arm)), f"{arm.middle} | {arm.tip}")]
+        if len(arm.joints) < 2:
+            return "second joint"
+        return [CoordinatePair(arm.tip, (*arm.locks(1)[:1], *_others(found, arm)), f"{arm.tip} | {arm.joints[1]}")]
+    if arm.middle is None:
+        return NO_MIDDLE
+    if arm.with_both is None:
+        return "point between base and tip that self-motion moves, with more rows than joints to spare"
+    held = (arm.tip, *arm.with_both)
+    return [CoordinatePair(arm.middle, (*held, *_others(found, arm)), f"{arm.middle} | {_text(held)}")]
 
 
 _MAKERS: dict[Mode, Callable[[Parts], Made]] = {

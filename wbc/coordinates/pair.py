@@ -27,13 +27,14 @@ class CoordinatePair:
     Attributes:
         task, constraint: one declaration or several: :class:`wbc.analysis.BodyRows`, ``JointRows``, ``PitchPlaneRows``,
             :class:`AxisRows`, :class:`PlaneAngleRows`, :class:`PointRows`.
+            A task that takes all joints needs no constraint: ``()``.
         name: how it is called; default: "task | constraint".
         metric: distance of the three points that stand for a whole pose in the task, see :class:`FollowRows` [m].
 
     Source: E. Dupuis, PhD thesis, McGill University, 2001, chapter 2 and appendix B.
 
     Raises:
-        ShapeError, DuplicateNameError, RangeError: no rows, the same coordinate twice, a metric without a pose.
+        ShapeError, DuplicateNameError, RangeError: no task, the same coordinate twice, a metric without a pose.
     """
 
     task: tuple[Coordinate, ...]
@@ -44,14 +45,15 @@ class CoordinatePair:
     def __init__(self, task: Any, constraint: Any, name: str = "", metric: float | None = None) -> None:
         put = object.__setattr__
         put(self, "task", coordinates("CoordinatePair.task", task))
-        put(self, "constraint", coordinates("CoordinatePair.constraint", constraint))
+        nothing = isinstance(constraint, tuple | list) and not constraint
+        put(self, "constraint", () if nothing else coordinates("CoordinatePair.constraint", constraint))
         rows = self.rows
         for k, one in enumerate(rows):
             if one in rows[:k]:
                 raise DuplicateNameError("CoordinatePair", str(one), "these coordinates are given twice")
         if not isinstance(name, str):
             raise ShapeError("CoordinatePair.name", name, "expected a text")
-        text = " | ".join(", ".join(map(str, side)) for side in (self.task, self.constraint))
+        text = " | ".join(", ".join(map(str, side)) or "nothing" for side in (self.task, self.constraint))
         put(self, "name", name or text)
         if metric is not None:
             metric = validation.scalar("CoordinatePair.metric", metric, low=0.0, open_low=True, unit="m")

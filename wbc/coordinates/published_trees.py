@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from functools import cache
 
 from wbc import validation
-from wbc.analysis.rows import JointRows, Rows
-from wbc.coordinates.arm_parts import Arm, parts
+from wbc.analysis.rows import BodyRows, JointRows, Rows
+from wbc.coordinates.arm_parts import Arm
+from wbc.coordinates.which_parts import parts
 from wbc.robot import Robot
 
 #: Robots that have sets of the whole tree
@@ -76,4 +77,6 @@ def _part(arm: Arm, name: str) -> Rows:
         return arm.alpha
     if name == "elbow" and arm.middle is not None:
         return arm.middle
-    return arm.in_plane[("beta", "gamma").index(name)]
+    found = arm.in_plane[("beta", "gamma").index(name)]
+    assert isinstance(found, BodyRows)
+    return found

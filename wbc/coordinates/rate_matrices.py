@@ -23,10 +23,12 @@ class RateMatrices:
         native: compile to C, where a compiler is there; else the virtual machine evaluates.
 
     Attributes:
-        places: coordinate -> its rows in the matrix of all. units: m or rad of every row, of its integral.
+        robot: as given. places: coordinate -> its rows in the matrix of all.
+        units: m or rad of every row, of its integral.
     """
 
     def __init__(self, robot: Robot, coordinates: Iterable[Coordinate], *, native: bool = True) -> None:
+        self.robot = robot
         every = tuple(coordinates)
         labels = [expressions.labels(robot, one) for one in every]
         ends = np.cumsum([0, *map(len, labels)]).tolist()
@@ -44,7 +46,3 @@ class RateMatrices:
         self._state.inputs[0][:] = q
         self._state.run()
         return self._state.output.reshape(self._shape).copy()
-
-    def split(self, whole: Array, coordinates: Iterable[Coordinate]) -> dict[Coordinate, Array]:
-        """The parts of some coordinates of what :meth:`whole` returned."""
-        return {one: whole[self.places[one]] for one in coordinates}

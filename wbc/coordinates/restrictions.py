@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from wbc.coordinates.arm_parts import parts
 from wbc.coordinates.determinant_places import closed_form
 from wbc.coordinates.modes import Mode, mode_pairs
+from wbc.coordinates.which_parts import parts
 
 
 def restriction_table(robot: str, mode: str | Mode = Mode.M1) -> str:

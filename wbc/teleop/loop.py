@@ -15,7 +15,7 @@ import pinocchio as pin
 
 from wbc import validation
 from wbc.errors import RobotFileError
-from wbc.teleop.order import Source
+from wbc.teleop.order import AT_ONCE, Source
 from wbc.teleop.session import Seen, Teleoperation
 from wbc.validation import Array
 
@@ -25,42 +25,80 @@ class SessionLog:
     """What happened tick by tick.
 
     Attributes:
-        time [s]. q: configurations before each tick. v: commands. active: pairs. status: how ticks ended.
-        late: ticks that began more than a period behind the clock.
+        time [s]. q: configurations before each tick. seen: what the operator was told. late: ticks that began more than
+        a period behind the clock. interrupted: ended by Ctrl-C.
     """
 
     time: list[float] = field(default_factory=list)
     q: list[Array] = field(default_factory=list)
-    v: list[Array] = field(default_factory=list)
-    active: list[str] = field(default_factory=list)
-    status: list[str] = field(default_factory=list)
+    seen: list[Seen] = field(default_factory=list)
     late: int = 0
+    interrupted: bool = False
+
+    @property
+    def v(self) -> list[Array]:
+        """Commands [nv]."""
+        return [one.step.v for one in self.seen]
+
+    @property
+    def active(self) -> list[str]:
+        """Pairs in use."""
+        return [one.active for one in self.seen]
+
+    @property
+    def status(self) -> list[str]:
+        """How ticks ended."""
+        return [str(one.step.status) for one in self.seen]
+
+    @property
+    def lost(self) -> list[float]:
+        """Parts of the command that were lost, see :class:`Seen`."""
+        return [one.lost for one in self.seen]
 
     def add(self, time: float, q: Array, seen: Seen) -> None:
         """One tick."""
         self.time.append(time)
         self.q.append(q)
-        self.v.append(seen.step.v.copy())
-        self.active.append(seen.active)
-        self.status.append(str(seen.step.status))
+        self.seen.append(seen)
+
+    def trim(self) -> None:
+        """Leave out a tick that an interrupt has cut in two."""
+        count = min(len(self.time), len(self.q), len(self.seen))
+        for some in (self.time, self.q, self.seen):
+            del some[count:]
 
     def write(self, path: str | os.PathLike[str], names: tuple[str, ...]) -> pathlib.Path:
-        """As CSV: time, pair, status, q and v by joint.
+        """As CSV: time, pair, status, sigma, kept, advised, lost, why, asked and met by row, q and v by joint.
 
         Raises:
             RobotFileError: it cannot be written.
         """
         file = pathlib.Path(path)
+        rows = range(1, AT_ONCE + 1)
+        head = ["time", "pair", "status", "sigma", "kept", "advised", "lost", "why"]
+        head += [*(f"asked {k}" for k in rows), *(f"met {k}" for k in rows)]
         try:
             file.parent.mkdir(parents=True, exist_ok=True)
             with file.open("w", newline="", encoding="utf-8") as out:
                 table = csv.writer(out)
-                table.writerow(["time", "pair", "status", *(f"q {n}" for n in names), *(f"v {n}" for n in names)])
-                for row in zip(self.time, self.active, self.status, self.q, self.v, strict=True):
-                    table.writerow([f"{row[0]:.6g}", row[1], row[2], *map(repr, [*row[3].tolist(), *row[4].tolist()])])
+                coordinates = len(self.q[0]) if self.q else len(names)
+                places = names if coordinates == len(names) else tuple(map(str, range(coordinates)))
+                table.writerow([*head, *(f"q {n}" for n in places), *(f"v {n}" for n in names)])
+                for time, q, seen in zip(self.time, self.q, self.seen, strict=True):
+                    own = [f"{seen.sigma:.6g}", f"{seen.kept:.6g}", seen.advised, f"{seen.lost:.6g}"]
+                    rates = (_padded(seen.asked), _padded(seen.met))
+                    numbers = map(repr, [*q.tolist(), *seen.step.v.tolist()])
+                    what = [f"{time:.6g}", seen.active, str(seen.step.status), *own, "; ".join(seen.why)]
+                    table.writerow([*what, *rates[0], *rates[1], *numbers])
         except OSError as error:
             raise RobotFileError("path", str(file), f"cannot be written: {error.strerror}") from error
         return file
+
+
+def _padded(rates: Array) -> list[str]:
+    """One cell for each of the rates that there can be."""
+    given = [f"{x:.9g}" for x in rates.tolist()]
+    return given + [""] * (AT_ONCE - len(given))
 
 
 def run_session(
@@ -71,19 +109,39 @@ def run_session(
     seconds: float = np.inf,
     realtime: bool = False,
     tell: Callable[[float, Seen], None] | None = None,
+    log: SessionLog | None = None,
 ) -> SessionLog:
-    """Orders from a source until it ends, or for some seconds; the robot follows its commands exactly.
+    """Orders from a source until it ends, for some seconds, or until Ctrl-C; the robot follows its commands exactly.
 
     Args:
         realtime: wait for the clock, 50 ticks a second; else as fast as it goes.
         tell: called after every tick with its time and what was seen.
+        log: written tick by tick, so that it has what there was when an error ends the run; default: a new one.
 
     Raises:
         WbcError: a bad order or configuration; the session is at rest then and can be reset.
     """
-    q, log = session.robot.configuration("q", q), SessionLog()
+    q, log = session.robot.configuration("q", q), SessionLog() if log is None else log
     limit = validation.real_array("seconds", seconds, (), finite=False)
     session.reset(q)
+    try:
+        _run(session, source, q, float(limit), realtime, tell, log)
+    except KeyboardInterrupt:
+        log.interrupted = True
+    finally:
+        log.trim()
+    return log
+
+
+def _run(
+    session: Teleoperation,
+    source: Source,
+    q: Array,
+    limit: float,
+    realtime: bool,
+    tell: Callable[[float, Seen], None] | None,
+    log: SessionLog,
+) -> None:
     period, began, tick = session.control.dt, time.monotonic(), 0
     while tick * period < limit:
         now = tick * period
@@ -94,11 +152,10 @@ def run_session(
         try:
             order = source.order(now, session.names, session.control.active, session.units)
         except StopIteration:
-            break
+            return
         seen = session.step(q, order)
         log.add(now, q, seen)
         if tell is not None:
             tell(now, seen)
         q = pin.integrate(session.robot.model, q, period * seen.step.v)
         tick += 1
-    return log

@@ -1,4 +1,4 @@
-"""A session of an operator with an arm: modes, pairs, rates at 50 Hz."""
+"""A session of an operator with an arm: modes, pairs, rates at 50 Hz, and what became of them."""
 
 from __future__ import annotations
 
@@ -9,18 +9,38 @@ from typing import Any
 import numpy as np
 
 from wbc import validation
-from wbc.controller import Step
-from wbc.coordinates import Adviser, CoordinatePair, Mode, PairController, mode_pairs, parts
+from wbc.controller import Status, Step
+from wbc.coordinates import (
+    Adviser,
+    CoordinatePair,
+    Mode,
+    PairController,
+    mode_pairs,
+    modes_of,
+    motion_cue,
+    parts,
+    regular_start,
+)
 from wbc.coordinates.modes import mode
 from wbc.coordinates.pair_stack import row_count
+from wbc.coordinates.scales import scales
 from wbc.errors import RangeError, UnknownNameError
+from wbc.robot import Robot
+from wbc.robots.operator_arms import OPERATOR_ARMS
 from wbc.tasks import Item
 from wbc.teleop.order import Order
+from wbc.validation import Array
 
 #: Orders a second
 RATE = 50.0
 #: An order older than this counts for nothing [s]
 STALE = 0.5
+#: Modes whose pairs there are where nobody says which, as far as the robot has them
+USUAL = (Mode.M1, Mode.M2)
+#: Acceleration of joints where nobody says which: of the published arms, and of others that have no limit [rad/s^2]
+SLOW, PLAIN = 0.02, 10.0
+#: A part of the command below this is not lost but rounding and the lag of one tick
+NOTHING = 1e-3
 
 
 @dataclass(frozen=True)
@@ -28,33 +48,50 @@ class Seen:
     """What an operator is told after a tick.
 
     Attributes:
-        step: the tick. active: pair in use. blending: a change is under way. advised: the pair that the adviser would
-            use, or "" without one. stale: the last order is too old, rates are zero.
+        step: the tick. active: pair in use. blending: a change is under way. stale: the last order is too old, rates
+            are zero.
+        sigma: least singular value of the scaled rows of the pair, see :class:`wbc.coordinates.Adviser`. kept: sigma
+            over that of the task alone, 1 at most. advised: the pair to use among those that command the same.
+        asked, met: rates of the task rows that were ordered, and those that the command gives [m/s, rad/s].
+        lost: |D (asked - met)| / |D asked|, D: metres over the arm's length; 0 where nothing is asked.
+        why: what took it, in words.
     """
 
     step: Step
     active: str
     blending: bool
-    advised: str
     stale: bool
+    sigma: float
+    kept: float
+    advised: str
+    asked: Array
+    met: Array
+    lost: float
+    why: tuple[str, ...]
 
 
 class Teleoperation:
-    """Drives an arm of :func:`wbc.robots.operator_arm` by an operator's orders.
+    """Drives an arm by an operator's orders.
 
         session = Teleoperation("spdm", ["M1", "M6"])
+        q = session.start()                                       # away from singular configurations
         session.reset(q)
         seen = session.step(q, Order((0.01, 0, 0, 0, 0, 0)))      # 50 times a second
         session.step(q, Order(pair="body_joint | hands"))
 
     One sub-chain moves at a time: locks of a pair are the brakes of all others. Rates are those of the active pair's
     task rows, at most six; an order without rates leaves the last ones, which count for half a second. The fastest rate
-    that a row may be given is ``fastest``; what the joints cannot do the limits take from the task.
+    that a row may be given is ``fastest``; what the joints cannot do the limits take from the task, and every
+    :class:`Seen` says how much that was and why.
 
     Args:
-        modes: whose pairs can be chosen. pairs: more pairs, of one's own. items: further constraints.
+        robot: what :func:`wbc.robots.load` takes by name or file, or a robot; see :func:`wbc.coordinates.parts`.
+        modes: whose pairs can be chosen; default: M1 and M2, as far as the robot has them. pairs: more pairs, of one's
+            own. items: further constraints.
         seconds: time of a change of pairs [s]. fastest: rates in metres and in radians [m/s, rad/s].
-        advice: state the adviser's choice among the pairs with the active one's task. automatic: follow it.
+        automatic: change to the pair that is advised.
+        acceleration: of all joints [rad/s^2]; default: 0.02 for the published arms, else the robot's own, and 10 where
+            it has none.
 
     Raises:
         UnknownNameError, MissingPartError: no such robot or mode, or a mode that the robot has not.
@@ -63,22 +100,19 @@ class Teleoperation:
 
     def __init__(
         self,
-        robot: str,
-        modes: Iterable[str | Mode] = ("M1", "M2"),
+        robot: str | Robot,
+        modes: Iterable[str | Mode] | None = None,
         *,
         pairs: Sequence[CoordinatePair] = (),
         items: Sequence[Item] = (),
         seconds: float = 2.0,
         fastest: tuple[float, float] = (0.3, 0.07),
-        advice: bool = False,
         automatic: bool = False,
-        acceleration: float = 0.02,
+        acceleration: float | None = None,
         backend: str = "auto",
     ) -> None:
-        found = parts(robot)
-        slow = validation.scalar("acceleration", acceleration, low=0.0, open_low=True, unit="rad/s^2")
-        self.robot = found.robot.with_limits(acceleration=slow)
-        chosen = [mode(one) for one in modes]
+        chosen = [mode(one) for one in modes] if modes is not None else modes_of(robot, USUAL)
+        self.robot = _slowed(parts(robot).robot, robot, acceleration)
         given = dict.fromkeys([*(p for one in chosen for p in mode_pairs(robot, one)), *pairs])
         for pair in given:
             rows = row_count(self.robot, pair.task)
@@ -88,9 +122,13 @@ class Teleoperation:
         self._fastest = [validation.scalar("fastest", x, low=0.0, open_low=True) for x in fastest]
         self._automatic = validation.flag("automatic", automatic)
         self.control = PairController(self.robot, list(given), 1.0 / RATE, items=items, backend=backend)
-        self._advisers: dict[str, Adviser] = {}
-        if advice or automatic:
-            self._prepare(list(given), backend)
+        self.adviser = Adviser(self.robot, given, exact=False, backend=backend)
+        self._tall = {pair.name for pair in given if pair.over_determined(self.robot)}
+        for pair in given:
+            if pair.name in self._tall:
+                # What a cue needs is made here, not in the first tick that has one
+                motion_cue(self.robot, pair, self.robot.neutral, np.zeros(row_count(self.robot, pair.task)))
+        self._scale = {pair.name: scales(self.robot, pair.task)[0] for pair in given}
         self._order, self._age = Order(), 0.0
 
     @property
@@ -102,6 +140,10 @@ class Teleoperation:
     def units(self) -> tuple[str, ...]:
         """m or rad of each row of the active pair's task."""
         return self.control.units(self.control.pair.task)
+
+    def start(self) -> Array:
+        """A configuration to begin at, away from singular ones of any pair; see :func:`regular_start`."""
+        return regular_start(self.robot, list(self.control.pairs.values()))
 
     def reset(self, q: Any) -> None:
         """Begin at a configuration, at rest.
@@ -128,12 +170,41 @@ class Teleoperation:
         else:
             self._age += self.control.dt
         stale = self._age > STALE + 0.5 * self.control.dt
-        advised = self._advise(q)
-        if self._automatic and advised and advised != self.control.active and not self.control.blending:
+        sigma, task, advised = self.adviser.look(q, self.control.active)
+        if self._automatic and advised != self.control.active and not self.control.blending:
             self.control.switch(advised, self._seconds)
+            sigma, task, _ = self.adviser.look(q, advised)
+        blending = self.control.blending
         self.control.command(self._rates(self.control.pair, Order() if stale else self._order))
         step = self.control.step(q)
-        return Seen(step, self.control.active, self.control.blending, advised, stale)
+        asked, met = self.control.asked, self.control.met(step.v)
+        scale = self._scale[self.control.active]
+        size = float(np.linalg.norm(scale * asked))
+        lost = float(np.linalg.norm(scale * (asked - met))) / size if size > 0.0 else 0.0
+        kept = min(1.0, sigma / task) if task > 0.0 else float(sigma > 0.0)
+        why = self._why(q, step, sigma, kept, blending) if lost > NOTHING or step.status is not Status.SOLVED else ()
+        active = self.control.active
+        return Seen(step, active, self.control.blending, stale, sigma, kept, advised, asked, met, max(0.0, lost), why)
+
+    def _why(self, q: Array, step: Step, sigma: float, kept: float, blending: bool) -> tuple[str, ...]:
+        """What took a part of the command."""
+        out = []
+        if blending:
+            out.append("pairs are changing")
+        if self.control.eased:
+            what = "the task is near a singular configuration" if kept > 0.5 else "this pair is near a locus of its own"
+            out.append(f"{what}, sigma {sigma:.2g}")
+        if self.control.active in self._tall:
+            cue = motion_cue(self.robot, self.control.pair, q, self.control.asked)
+            out.append(f"more rows than joints: {cue}")
+        joints = dict.fromkeys(b.row for b in step.binding if b.row in self.robot.dof_names and b.side != "equal")
+        if joints:
+            out.append(f"at limits of {', '.join(joints)}")
+        if step.relaxed:
+            out.append(f"gave way: {', '.join(dict.fromkeys(slack.item for slack in step.relaxed))}")
+        if step.status is not Status.SOLVED:
+            out.append(f"the tick is {step.status}")
+        return tuple(out) or ("other constraints, or the pair has no full rank here",)
 
     def _take(self, order: Order) -> None:
         """Check an order as a whole, then follow it."""
@@ -160,16 +231,14 @@ class Teleoperation:
                 raise RangeError("rates", order.rates, f"row {k + 1} is faster than {limit:g} {unit}/s")
         return out
 
-    def _prepare(self, pairs: list[CoordinatePair], backend: str) -> None:
-        """One adviser for all pairs that command the same."""
-        by_task: dict[Any, list[CoordinatePair]] = {}
-        for pair in pairs:
-            by_task.setdefault(pair.task, []).append(pair)
-        for alike in by_task.values():
-            if len(alike) > 1:
-                adviser = Adviser(self.robot, alike, exact=False, backend=backend)
-                self._advisers |= {pair.name: adviser for pair in alike}
 
-    def _advise(self, q: Any) -> str:
-        adviser = self._advisers.get(self.control.active)
-        return "" if adviser is None else adviser.recommend(q, self.control.active)
+def _slowed(robot: Robot, asked: str | Robot, acceleration: float | None) -> Robot:
+    """A robot with the acceleration limits of manual control."""
+    if acceleration is not None:
+        slow = validation.scalar("acceleration", acceleration, low=0.0, open_low=True, unit="rad/s^2")
+        return robot.with_limits(acceleration=slow)
+    if isinstance(asked, str) and asked in OPERATOR_ARMS:
+        return robot.with_limits(acceleration=SLOW)
+    own = robot.limits.acceleration
+    free = ~np.isfinite(own) & (np.arange(robot.nv) >= robot.base_nv)
+    return robot.with_limits(acceleration=np.where(free, PLAIN, own)) if free.any() else robot
