@@ -90,7 +90,7 @@ class Past:
         return [b for b in rows if isinstance(b.entry.item, Direction) and b.entry.item.of == task.entry.name]
 
     def solve(self) -> tuple[Array, Relaxed | None]:
-        """Command, and the answer to the QP with slacks, for the buffers as they are; no answer for a tick that brakes."""
+        """Command, and the answer to the QP with slacks, at the buffers' values; no answer for a tick that brakes."""
         qp = self.tick.qp()
         _, x, answer = self._solver.answer(qp.with_slacks())
         return self._solver.below(qp, x[: qp.n], answer)[0], answer
