@@ -80,7 +80,8 @@ class Online:
         self.dt = dt
         self.status: Status = "reached"
         self.clipped = False
-        self._refusal = ruckig.RuckigError
+        # A ValueError: its binding does not know the code of the refusal of motions that take longer than 7e3 s
+        self._refusals = (ruckig.RuckigError, ValueError)
         self._done = ruckig.Result.Finished
         self._modes = ruckig.ControlInterface
         names = {"time": ruckig.Synchronization.Time, "phase": ruckig.Synchronization.Phase}
@@ -173,7 +174,7 @@ class Online:
         answer, walls = self._answer, self._walls
         try:
             done = self._ruckig.update(self._asked, answer) is self._done
-        except self._refusal:
+        except self._refusals:
             p, v, a = self._recovered()
             self.status = "recovered"
             self._put([p, v, a])

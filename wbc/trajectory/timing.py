@@ -152,8 +152,9 @@ class Timing:
         """Times inside pieces at which s passes one of the places, ascending."""
         spans = np.diff(self.times)
         hull = self.hull()
-        # What only touches a break is not inside
-        room = 1e-12 * (1.0 + np.abs(hull).max(axis=1))
+        # What only touches a break is not inside; roots of straight lines are exact
+        edge = 1e-12 if self.degree > 1 else 1e-15
+        room = edge * (1.0 + np.abs(hull).max(axis=1))
         low, high = hull.min(axis=1) + room, hull.max(axis=1) - room
         ordered = np.sort(places)
         some = np.searchsorted(ordered, low) < np.searchsorted(ordered, high)
@@ -167,7 +168,7 @@ class Timing:
                 shifted[np.abs(shifted) < 1e-18 * np.abs(shifted).max()] = 0.0
                 roots = np.roots(shifted)
                 real = roots.real[np.abs(roots.imag) < 1e-9]
-                inside = real[(real > 1e-12) & (real < 1.0 - 1e-12)]
+                inside = real[(real > edge) & (real < 1.0 - edge)]
                 found.append(self.times[i] + spans[i] * inside)
         return np.unique(np.concatenate(found))
 
