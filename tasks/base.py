@@ -17,6 +17,7 @@ tables are derived from the expressions.
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import IntEnum
@@ -27,6 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wbc import pickling
+from wbc.errors import UnknownNameError
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks._plain import plain
 
@@ -78,12 +80,59 @@ class Input:
     sensed: bool = False
 
 
+#: Unit of a row -> (how many of it are one in SI units, power of the characteristic length that it is measured by);
+#: rows of momenta are not measured by a length, since no mass is the characteristic one
+UNITS: dict[str, tuple[float, int]] = {
+    "m": (1.0, 1),
+    "cm": (1e2, 1),
+    "mm": (1e3, 1),
+    "in": (1.0 / 0.0254, 1),
+    "m^2": (1.0, 2),
+    "rad": (1.0, 0),
+    "mrad": (1e3, 0),
+    "deg": (180.0 / math.pi, 0),
+    "1": (1.0, 0),
+    "": (1.0, 0),
+    "%": (1e2, 0),
+    "kg m": (1.0, 0),
+    "kg m^2": (1.0, 0),
+}
+
+
 @dataclass(frozen=True)
 class Row:
-    """One row of an item: ``label`` within the item ("x", "panda_joint4") and the unit of its error or margin."""
+    """One row of an item: ``label`` within the item ("x", "panda_joint4") and the unit of its error or margin.
+
+    Attributes:
+        unit: one of :data:`UNITS`, or a rate of it: ``"m/s"``.
+
+    Raises:
+        UnknownNameError: another unit.
+    """
 
     label: str
     unit: str
+
+    def __post_init__(self) -> None:
+        checked_unit(f"row {self.label!r}.unit", self.unit)
+
+    def scale(self, length: float) -> float:
+        """What counts as much as a radian, in the row's own unit, where ``length`` [m] is the characteristic length:
+        the length for rows in metres, 1000 times it for millimetres, 180 / pi for degrees, 1 for radians.
+        """
+        many, power = UNITS[self.unit.removesuffix("/s")]
+        return many * length**power
+
+
+def checked_unit(field: str, unit: Any) -> str:
+    """A unit that rows can have.
+
+    Raises:
+        UnknownNameError: it is not, with the list.
+    """
+    if not isinstance(unit, str) or unit.removesuffix("/s") not in UNITS:
+        raise UnknownNameError(field, unit, (known for known in UNITS if known))
+    return unit
 
 
 class Order(IntEnum):

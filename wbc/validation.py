@@ -7,8 +7,10 @@ the field; nothing is changed when it raises.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
-from typing import Any
+import os
+import pathlib
+from collections.abc import Iterable, Mapping
+from typing import Any, TypeVar
 
 import numpy as np
 import pinocchio as pin
@@ -17,6 +19,7 @@ from numpy.typing import NDArray
 from wbc.errors import NotFiniteError, RangeError, RotationError, ShapeError, UnknownNameError
 
 Array = NDArray[np.float64]
+T = TypeVar("T")
 
 #: How far a rotation may be from orthonormal (Frobenius norm of R'R - I) or a quaternion from unit length.
 ROTATION_TOLERANCE = 1e-6
@@ -89,6 +92,67 @@ def one_of(field: str, value: Any, choices: Iterable[str]) -> str:
     if not isinstance(value, str) or value not in names:
         raise UnknownNameError(field, value, names)
     return value
+
+
+def instance(field: str, value: Any, kind: type[T] | tuple[type[T], ...], expected: str) -> T:
+    """An object of a class, or of one of several; ``expected``: what to say of it."""
+    if not isinstance(value, kind):
+        raise ShapeError(field, value, f"expected {expected}")
+    return value
+
+
+def items(field: str, value: Any, expected: str = "items") -> tuple[Any, ...]:
+    """What a sequence or another iterable holds; neither text nor a mapping is one."""
+    try:
+        if not isinstance(value, (str, bytes, Mapping, type)):
+            return tuple(value)
+    except TypeError:
+        pass
+    raise ShapeError(field, value, f"expected a sequence of {expected}")
+
+
+def strings(field: str, value: Any) -> tuple[str, ...]:
+    """Several strings."""
+    out = items(field, value, "strings")
+    if not all(isinstance(item, str) for item in out):
+        raise ShapeError(field, value, "expected strings")
+    return out
+
+
+def mapping(field: str, value: Any, expected: str = "names to values") -> dict[str, Any]:
+    """A copy of a mapping whose keys are strings."""
+    if not isinstance(value, Mapping) or not all(isinstance(key, str) for key in value):
+        raise ShapeError(field, value, f"expected a mapping of {expected}")
+    return dict(value)
+
+
+def integer(field: str, value: Any, low: int = 0, high: int = 2**31 - 1) -> int:
+    """A whole number within [low, high]."""
+    if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, np.integer)):
+        raise ShapeError(field, value, "expected an integer")
+    if not low <= value <= high:
+        raise RangeError(field, value, f"expected an integer within [{low}, {high}]")
+    return int(value)
+
+
+def file_path(field: str, value: Any) -> pathlib.Path:
+    """A path that the file system can be asked for."""
+    try:
+        path = pathlib.Path(value)
+        os.fsencode(path)
+    except (TypeError, UnicodeError) as error:
+        raise ShapeError(field, value, "expected a path: a str or os.PathLike") from error
+    if "\0" in str(path):
+        raise ShapeError(field, value, "a path holds no null character")
+    return path
+
+
+def is_file(field: str, value: Any) -> bool:
+    """Whether there is a file of this name; a name that is too long for one is none."""
+    try:
+        return file_path(field, value).is_file()
+    except OSError:
+        return False
 
 
 def rotation(field: str, value: Any) -> Array:

@@ -37,6 +37,7 @@ class MovingTargets:
 
     def __init__(self, controller: Controller, targets: Mapping[str, Any], s: Array) -> None:
         self._p = controller.tick.p
+        targets = validation.mapping("targets", targets, "tasks to targets")
         #: between neighbouring coordinates all targets go straight
         self.smooth = not any(callable(given) for given in targets.values())
         self._parts: list[tuple[slice, Numbers]] = []

@@ -143,7 +143,8 @@ class Declaration:
             level: of a task, an integer >= 0: lower numbers first, and later levels never disturb earlier ones,
                 see docs/levels.md. A constraint is hard at level 0; at a level k > 0 its violation is minimised there.
             weight: of a task against the others of its level, >= 0; the cost of a row is
-                weight * (rate error / scale)^2 with scale = characteristic length for rows in metres, else 1.
+                weight * (rate error / scale)^2 with scale = characteristic length for rows in metres, else 1, see
+                :data:`wbc.tasks.base.UNITS` for other units.
             hard: of a constraint; False: its rows give way before those of any hard one, see the order of sacrifice.
             soft: of a constraint, its price >= 0: a row that is violated by x costs price * (x / scale)^2, as much as a
                 task row of that weight that misses its rate by x. The first value of the input ``price``.
@@ -182,6 +183,7 @@ class Declaration:
             kept = self._free_name(f"{chosen} direction")
             added.append(Entry(Direction(chosen, item), kept, level, 1.0, True, number * DIRECTION_PRICE))
         item.validate(self._robot)
+        item.rows(self._robot)  # units of rows are checked where they are made
         self._entries |= {entry.name: entry for entry in added}
         return self
 
@@ -199,7 +201,7 @@ class Declaration:
             raise UnknownNameError("item", name, self._entries) from None
 
     def __contains__(self, name: object) -> bool:
-        return name in self._entries
+        return isinstance(name, str) and name in self._entries
 
     def __len__(self) -> int:
         return len(self._entries)

@@ -76,7 +76,7 @@ def softened(stack: Declaration, block: Block, rows: Rows, p: ca.SX) -> Rows:
     on = price > 0.0
     for k, row in enumerate(block.rows):
         if k < soft_rows(block.entry, stack.robot):
-            scale = stack.length if row.unit.split("/")[0] == "m" else 1.0
+            scale = row.scale(stack.length)
             matrix[k, block.variables.start + k] = scale / ca.sqrt(ca.if_else(on, price, 1.0))
         lower.append(ca.if_else(on, rows.lower[k], -np.inf))
         upper.append(ca.if_else(on, rows.upper[k], np.inf))
