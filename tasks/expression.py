@@ -88,8 +88,11 @@ class Expression(Task):
         for word in words:
             checked_unit("Expression.units", word)
         object.__setattr__(self, "units", units if isinstance(units, str) else words)
-        object.__setattr__(self, "declared", (inputs,) if isinstance(inputs, Input) else validation.items(
-            "Expression.inputs", inputs, "inputs"))
+        object.__setattr__(
+            self,
+            "declared",
+            (inputs,) if isinstance(inputs, Input) else validation.items("Expression.inputs", inputs, "inputs"),
+        )
         object.__setattr__(self, "labels", None if labels is None else _strings("labels", labels))
         object.__setattr__(self, "weights", checked_weights("Expression.weights", weights))
         object.__setattr__(self, "gain", gain)

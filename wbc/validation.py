@@ -24,6 +24,9 @@ T = TypeVar("T")
 #: How far a rotation may be from orthonormal (Frobenius norm of R'R - I) or a quaternion from unit length.
 ROTATION_TOLERANCE = 1e-6
 
+#: Numbers beyond these have products that overflow, or vanish, in what is computed from them
+LARGEST, SMALLEST = 1e60, 1e-60
+
 #: A vector whose entries are all smaller than this has no direction.
 LEAST_DIRECTION = 1e-12
 
@@ -53,15 +56,31 @@ def scalar(
     open_low: bool = False,
     unit: str = "",
 ) -> float:
-    """A finite float within [low, high], or (low, high] with ``open_low``."""
-    if type(value) is float and low < value < high:
+    """A finite float within [low, high], or (low, high] with ``open_low``, and of a size whose products are numbers:
+    at most 1e60, and 1e-60 at least where it must be above 0.
+    """
+    if low < -LARGEST:
+        low = -LARGEST
+    if high > LARGEST:
+        high = LARGEST
+    if type(value) is float and low < value < high and (value > SMALLEST or not open_low):
         return value
     number = float(real_array(field, value, ()))
     bad = number <= low if open_low else number < low
+    if open_low and low == 0.0 and 0.0 < number < SMALLEST:
+        raise RangeError(field, value, f"expected at least {SMALLEST:g} {unit}".rstrip())
     if bad or number > high:
         left = "(" if open_low else "["
         raise RangeError(field, value, f"expected a value in {left}{low:g}, {high:g}] {unit}".rstrip())
     return number
+
+
+def ordinary_array(field: str, value: Any, shape: tuple[int, ...] | None = None, *, finite: bool = True) -> Array:
+    """:func:`real_array` of numbers whose products are numbers: finite ones are at most 1e60 in size."""
+    out = real_array(field, value, shape, finite=finite)
+    if (np.isfinite(out) & (np.abs(out) > LARGEST)).any():
+        raise RangeError(field, value, f"expected numbers of at most {LARGEST:g} in size")
+    return out
 
 
 def unit_vector(field: str, value: Any) -> Array:

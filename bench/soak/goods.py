@@ -16,7 +16,8 @@ from wbc import shapes, tasks, trajectory
 from wbc.proximity import Body
 from wbc.robot import Robot
 from wbc.robots import DHRow, LinkPair, SelfPairs, from_dh, operator_arm, walker
-from wbc.trajectory import Law, Path as Way
+from wbc.trajectory import Law
+from wbc.trajectory import Path as Way
 
 DT = 0.01
 Q = np.array([0.3, 0.8, -1.5])
@@ -183,7 +184,10 @@ class Goods:
             out = wbc.Stack(robot(), DT)
             out.add(answer, name="item")
             if rng.random() < 0.15:
-                _finite(out.compile(backend="vm").step(Q).v)
+                try:
+                    _finite(out.compile(backend="vm").step(Q).v)
+                except wbc.WbcError as error:
+                    raise AssertionError(f"passed add: {error}") from error
         elif isinstance(answer, wbc.Stack) and rng.random() < 0.15:
             _finite(answer.compile(backend="vm").step(Q).v)
         elif isinstance(answer, tasks.Input):
@@ -317,7 +321,7 @@ GOOD: dict[str, Callable[[Goods], Any]] = {
     "trajectory.via_points.acceleration": lambda g: 1.0, "trajectory.jerk_limited.target": lambda g: Q,
     "trajectory.blend_path.deviation": lambda g: 0.01, "Law.sliced.start": lambda g: 0.1, "Law.sliced.end": lambda g: 0.2,
     "Timing.sliced.start": lambda g: 0.1, "Timing.sliced.end": lambda g: 0.2, "Timing.identity.start": lambda g: 0.0,
-    "Timing.other": lambda g: trajectory.Timing.identity(1.0), 
+    "Timing.other": lambda g: trajectory.Timing.identity(1.0),
     "Online.target.position": lambda g: 5.0 * Q, "proximity.distances.pairs": lambda g: _bodies(),
     "proximity.witnesses.pairs": lambda g: _bodies(), "Body.frame": lambda g: "link3", "Body.name": lambda g: "body",
     "Solver.along.targets": lambda g: {"hand": [np.array([0.2, 0.6, 0.0]), np.array([0.3, 0.6, 0.0])]},

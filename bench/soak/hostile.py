@@ -14,7 +14,7 @@ HOSTILE: tuple[Callable[[], Any], ...] = (
     lambda: None, lambda: True, lambda: 0, lambda: -1, lambda: 2**70, lambda: -(2**70), lambda: 0.5, lambda: -0.0,
     lambda: math.nan, lambda: math.inf, lambda: -math.inf, lambda: 1e308, lambda: -1e200, lambda: 1e200,
     lambda: 1e-320, lambda: 1e-200, lambda: 1j, lambda: "", lambda: "typo", lambda: "a\0b", lambda: "\ud800",
-    lambda: "x" * 5000, lambda: "/", lambda: b"bytes", lambda: [], lambda: (), lambda: {}, lambda: {1, 2},
+    lambda: "x" * 5000, lambda: "/", lambda: b"bytes", list, lambda: (), dict, lambda: {1, 2},
     lambda: [math.nan], lambda: [[1.0], [1.0, 2.0]], lambda: [[]], lambda: [None], lambda: ["typo"], lambda: [[1], "a"],
     lambda: {"typo": 1.0}, lambda: {1: math.nan}, lambda: {"typo": [math.nan]}, lambda: [object()],
     lambda: object(), lambda: int, lambda: len, lambda: lambda: 1.0, lambda: lambda *_: math.nan,

@@ -44,6 +44,8 @@ MADE = (
     *("Form", "Order", "Status", "WbcError", "Bounds", "Rows", "Row", "Certificate", "Worst", "State", "Recipe"),
     *("SelfPairs", "LinkPair", "ConvexParts", "Witness", "Coupling", "Path"),
 )  # fmt: skip
+#: What decides how long a call takes is always given
+LONG = ("states", "samples", "restarts", "budget", "cells", "intervals", "backend")
 #: Longest time of one call [s]
 PATIENCE = 10.0
 
@@ -106,7 +108,9 @@ def _setter(value: Any, name: str) -> Callable[[Any], None]:
     return put
 
 
-def draw(callee: Callee, goods: Goods, rng: np.random.Generator, bad: bool = True) -> tuple[tuple[Any, ...], dict[str, Any]]:
+def draw(
+    callee: Callee, goods: Goods, rng: np.random.Generator, bad: bool = True
+) -> tuple[tuple[Any, ...], dict[str, Any]]:
     """Arguments that the signature takes, most of them good."""
     function = callee.function(goods)
     parameters = [p for p in inspect.signature(function).parameters.values() if p.name != "self"]
@@ -118,7 +122,7 @@ def draw(callee: Callee, goods: Goods, rng: np.random.Generator, bad: bool = Tru
             if isinstance(good, dict) and rng.random() < 0.5:
                 named |= spoiled_entries(good, rng) if rng.random() < 0.5 else good
             continue
-        if p.default is p.empty or rng.random() < 0.4:
+        if p.default is p.empty or p.name in LONG or rng.random() < 0.4:
             chosen.append((p, goods.value(callee.name, p.name)))
     worse = {int(rng.integers(len(chosen)))} if chosen and bad else set()
     worse |= {k for k in range(len(chosen)) if bad and rng.random() < 0.1}

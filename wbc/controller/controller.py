@@ -109,9 +109,8 @@ class Controller(Deployment):
                 self._prepare(q, v, dt)
             if not (type(q) is _Array and q.dtype is _FLOAT and q.shape == self._q_shape):
                 q = validation.real_array("q", q, self._q_shape)
-            if v is not None:
-                if not (type(v) is _Array and v.dtype is _FLOAT and v.shape == self._v_shape):
-                    v = validation.real_array("v", v, self._v_shape)
+            if v is not None and not (type(v) is _Array and v.dtype is _FLOAT and v.shape == self._v_shape):
+                v = validation.real_array("v", v, self._v_shape)
             if self._sensors:
                 self._sense(q)
             # What may raise is over
@@ -150,7 +149,7 @@ class Controller(Deployment):
         """
         if self._recorder is not None:
             raise RecordingError("path", str(path), f"the controller records into {self._recorder.path} already")
-        return Recorder(self, path, overwrite)
+        return Recorder(self, path, validation.flag("overwrite", overwrite))
 
     def clone(self) -> Controller:
         """Another controller of the same compiled stack, with its own memory and this one's values and last command.
@@ -185,7 +184,7 @@ class Controller(Deployment):
             raise UnknownNameError("item", name, self._handles) from None
 
     def __contains__(self, name: object) -> bool:
-        return name in self._handles
+        return isinstance(name, str) and name in self._handles
 
     def qp(self) -> QP:
         """The QP at the buffers' present values: at the configuration of the last step (before it: the neutral one),
@@ -250,7 +249,12 @@ class Controller(Deployment):
             self.require_value(slot, f"{name}.{slot.input.name}")
 
     def pairs(self, name: str) -> tuple[tuple[str, str, float], ...]:
-        """What the sensed rows of an item were about in the last tick: names of both bodies, distance [m]."""
+        """What the sensed rows of an item were about in the last tick: names of both bodies, distance [m].
+
+        Raises:
+            UnknownNameError: no such item.
+        """
+        validation.one_of("item", name, self._handles)
         return next((sensor.pairs() for sensor, handle in self._sensors if handle.item_name == name), ())
 
     def _is_sensed(self, name: str) -> bool:

@@ -121,14 +121,14 @@ class Deployment:
         Raises:
             ExportError: the folder is not empty or cannot be written.
             SolverError: run-time values still wait for the first configuration.
-            SolverSourceError: the solver cannot be had. RangeError: ``states`` is no integer >= 1.
+            SolverSourceError: the solver cannot be had. ShapeError, RangeError: ``states`` is no integer >= 1.
         """
         from wbc import __version__
 
         me = cast("Controller", self)
-        if isinstance(states, bool) or not isinstance(states, int) or states < 1:
-            raise RangeError("states", states, "expected an integer >= 1")
+        validation.integer("states", states, 1)
         me.require_values()
+        export.checked_folder(folder, overwrite)
         tick, layout, robot = self.tick, me.layout, me.stack.robot
         cost = me.row_costs.copy()
         for block in layout.of_form("task"):

@@ -19,7 +19,6 @@ from wbc.controller.starts import Starts
 from wbc.controller.step import Step
 from wbc.controller.tick import Assembly
 from wbc.controller.timeless import FIRST, TICK, chosen_goals, goal_rows, hasten, searching, timeless
-from wbc.errors import RangeError, ShapeError
 from wbc.qp.problem import QP
 from wbc.stack.declaration import Declaration
 from wbc.stack.places import stops

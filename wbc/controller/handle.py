@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from math import isfinite
+from math import hypot
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,7 +14,7 @@ from wbc.errors import RangeError, UnknownNameError
 from wbc.stack.layout import Block, Slot
 from wbc.tasks import inputs
 from wbc.tasks._direction import Direction
-from wbc.validation import Array
+from wbc.validation import LARGEST, Array
 
 _ARRAY, _FLOAT = np.ndarray, np.dtype(np.float64)
 _MATRIX, _SE3 = (4, 4), pin.SE3
@@ -103,8 +103,8 @@ class Handle:
                 if name in self._poses:
                     if numbers.shape == _MATRIX and self._controller.write_pose(slot, numbers):
                         return
-                # the sum is finite only if all numbers are; those of numpy would warn where they overflow
-                elif numbers.shape == self._plain.get(name) and isfinite(sum(numbers.tolist())):
+                # not for NaN; numpy would warn where squares overflow
+                elif numbers.shape == self._plain.get(name) and hypot(*numbers.tolist()) < LARGEST:
                     self._controller.write(slot, numbers)
                     return
             if slot.input.sensed:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import pathlib
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Any
@@ -83,8 +82,13 @@ def fit_shapes(
     convex part; ``notes["shapes"]`` names the link and the reason. Shapes around an open mesh contain its surface. A
     capsule may stand out of a bulky link by several centimetres: look at ``excess``.
     """
-    for link in links or ():
-        robot.check_frame("links", link)
+    validation.instance("robot", robot, Robot, "a wbc Robot, see wbc.robots.load")
+    if links is not None:
+        links = validation.strings("links", links)
+        for link in links:
+            robot.check_frame("links", link)
+    if geometry is not None:
+        validation.instance("geometry", geometry, pin.GeometryModel, "a pin.GeometryModel")
     style = Style(kind, count, tolerance)
     bodies = bodies_of(robot, package_dirs, geometry)
     shapes, problems = _collect([b for b in bodies if links is None or b.link in links], style)
@@ -118,7 +122,7 @@ def convex_parts(mesh: Any, triangles: Any = None, *, scale: Any = 1.0) -> Conve
     """
     factor = validation.real_array("scale", [scale] * 3 if np.ndim(scale) == 0 else scale, (3,))
     if triangles is None:
-        return parts_of(read_mesh(pathlib.Path(mesh), factor))
+        return parts_of(read_mesh(validation.file_path("mesh", mesh), factor))
     vertices = validation.real_array("mesh", mesh)
     if vertices.ndim != 2 or vertices.shape[1] != 3 or len(vertices) == 0:
         raise ShapeError("mesh", vertices.shape, "expected vertices, n x 3")

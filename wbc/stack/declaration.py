@@ -10,6 +10,7 @@ from wbc import pickling, validation
 from wbc.errors import DuplicateNameError, LevelError, PicklingError, RangeError, ShapeError, UnknownNameError
 from wbc.robot import Robot
 from wbc.stack.parts import inner_items
+from wbc.tasks import inputs
 from wbc.tasks._direction import DIRECTION_PRICE, Direction
 from wbc.tasks.base import Constraint, Item, Order, Task
 from wbc.tasks.mechanism import Mechanism
@@ -183,7 +184,7 @@ class Declaration:
             kept = self._free_name(f"{chosen} direction")
             added.append(Entry(Direction(chosen, item), kept, level, 1.0, True, number * DIRECTION_PRICE))
         item.validate(self._robot)
-        item.rows(self._robot)  # units of rows are checked where they are made
+        _check_values(item, self._robot)
         self._entries |= {entry.name: entry for entry in added}
         return self
 
@@ -232,6 +233,17 @@ class Declaration:
             "calm": self._calm,
             "items": [[e.name, e.level, e.item.declaration(self._robot), *_softness(e)] for e in self.entries],
         }
+
+
+def _check_values(item: Item, robot: Robot) -> None:
+    """Rows can be made, which checks their units, and first values of inputs are values of theirs."""
+    item.rows(robot)
+    kind = type(item).__name__
+    if isinstance(item, Task) and item.gain is not None:
+        validation.scalar(f"{kind}.gain", item.gain, low=0.0, unit="1/s")
+    for declared in item.inputs(robot):
+        if declared.default is not None:
+            inputs.flat(robot, f"{kind}.{declared.name}", declared, declared.default)
 
 
 def soft_rows(entry: Entry, robot: Robot) -> int:
