@@ -59,19 +59,18 @@ def scalar(
     """A finite float within [low, high], or (low, high] with ``open_low``, and of a size whose products are numbers:
     at most 1e60, and 1e-60 at least where it must be above 0.
     """
-    if low < -LARGEST:
-        low = -LARGEST
-    if high > LARGEST:
-        high = LARGEST
-    if type(value) is float and low < value < high and (value > SMALLEST or not open_low):
-        return value
+    if type(value) is float and low < value < high and -LARGEST < value < LARGEST:  # noqa: SIM102 (the usual first)
+        if value > SMALLEST or not open_low:
+            return value
     number = float(real_array(field, value, ()))
     bad = number <= low if open_low else number < low
-    if open_low and low == 0.0 and 0.0 < number < SMALLEST:
-        raise RangeError(field, value, f"expected at least {SMALLEST:g} {unit}".rstrip())
     if bad or number > high:
         left = "(" if open_low else "["
         raise RangeError(field, value, f"expected a value in {left}{low:g}, {high:g}] {unit}".rstrip())
+    if abs(number) > LARGEST:
+        raise RangeError(field, value, f"expected at most {LARGEST:g} {unit}".rstrip() + " in size")
+    if open_low and low == 0.0 and number < SMALLEST:
+        raise RangeError(field, value, f"expected at least {SMALLEST:g} {unit}".rstrip())
     return number
 
 

@@ -17,13 +17,14 @@ HOSTILE: tuple[Callable[[], Any], ...] = (
     lambda: "x" * 5000, lambda: "/", lambda: b"bytes", list, lambda: (), dict, lambda: {1, 2},
     lambda: [math.nan], lambda: [[1.0], [1.0, 2.0]], lambda: [[]], lambda: [None], lambda: ["typo"], lambda: [[1], "a"],
     lambda: {"typo": 1.0}, lambda: {1: math.nan}, lambda: {"typo": [math.nan]}, lambda: [object()],
-    lambda: object(), lambda: int, lambda: len, lambda: lambda: 1.0, lambda: lambda *_: math.nan,
+    object, lambda: int, lambda: len, lambda: lambda: 1.0, lambda: lambda *_: math.nan,
     lambda: np.zeros(0), lambda: np.zeros((3, 3, 3)), lambda: np.full(3, math.nan), lambda: np.array("text"),
     lambda: np.array([None]), lambda: np.array([1e200, -1e200, 1e200]), lambda: np.full(3, 1e-320),
     lambda: np.zeros(3, dtype=complex), lambda: np.datetime64("2020-01-01"), lambda: np.float32(1.0),
     lambda: np.int64(-3), lambda: range(3), lambda: iter([1.0]), lambda: slice(None), lambda: ...,
     lambda: pin.SE3(np.eye(3), np.full(3, math.nan)), lambda: pin.SE3(2.0 * np.eye(3), np.zeros(3)),
-    lambda: pin.SE3(np.eye(3), np.full(3, 1e200)), lambda: pin.Model(), lambda: (("a", "b"),), lambda: [("a", "b", "c")],
+    lambda: pin.SE3(np.eye(3), np.full(3, 1e200)), pin.Model, lambda: (("a", "b"),),
+    lambda: [("a", "b", "c")],
 )  # fmt: skip
 
 NUMBERS = (math.nan, math.inf, -math.inf, 1e308, -1e200, 1e200, 1e-320, -1.0, 0.0, 1e9)

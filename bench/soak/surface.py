@@ -124,8 +124,8 @@ def draw(
             continue
         if p.default is p.empty or p.name in LONG or rng.random() < 0.4:
             chosen.append((p, goods.value(callee.name, p.name)))
-    worse = {int(rng.integers(len(chosen)))} if chosen and bad else set()
-    worse |= {k for k in range(len(chosen)) if bad and rng.random() < 0.1}
+    worse = {int(rng.integers(len(chosen)))} if chosen else set()
+    worse |= {k for k in range(len(chosen)) if rng.random() < 0.1}
     for k, (p, good) in enumerate(chosen):
         value = good if k not in worse else hostile(rng) if good is None else spoiled(good, rng)
         if p.kind in (p.POSITIONAL_ONLY, p.POSITIONAL_OR_KEYWORD) and p.default is p.empty:
@@ -169,11 +169,9 @@ def attempt(callee: Callee, goods: Goods, rng: np.random.Generator) -> str:
         return f"refused: {type(error).__name__}"
     except Hang:
         return f"wrong: {callee.name} hangs{stage} {_shown(arguments, named)}"
-    except Exception as error:
-        # A module's own attribute errors are those of Python: "law.typo"
-        where = traceback.extract_tb(error.__traceback__)[-1]
-        inside = [f for f in traceback.extract_tb(error.__traceback__) if "bench/soak" not in f.filename]
-        place = f"{Path((inside or [where])[-1].filename).name}:{(inside or [where])[-1].lineno}"
+    except Exception as error:  # noqa: BLE001 (whatever it is, it is told)
+        last = traceback.extract_tb(error.__traceback__)[-1]
+        place = f"{Path(last.filename).name}:{last.lineno}"
         text = f"{type(error).__name__}: {str(error)[:80]}"
         return f"wrong: {callee.name}{stage} {text} at {place} {_shown(arguments, named)}"
     return "answered"

@@ -121,12 +121,13 @@ class Deployment:
         Raises:
             ExportError: the folder is not empty or cannot be written.
             SolverError: run-time values still wait for the first configuration.
-            SolverSourceError: the solver cannot be had. ShapeError, RangeError: ``states`` is no integer >= 1.
+            SolverSourceError: the solver cannot be had. RangeError: ``states`` is no integer >= 1.
         """
         from wbc import __version__
 
         me = cast("Controller", self)
-        validation.integer("states", states, 1)
+        if isinstance(states, bool) or not isinstance(states, int) or not 1 <= states < 2**31:
+            raise RangeError("states", states, "expected an integer >= 1")
         me.require_values()
         export.checked_folder(folder, overwrite)
         tick, layout, robot = self.tick, me.layout, me.stack.robot

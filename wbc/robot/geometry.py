@@ -68,7 +68,8 @@ def fit_shapes(
         robot: a robot that was read from a URDF or MJCF file, or any with ``geometry``.
         links: frames of the links to do; the shapes of the others stay as they are. Default: all links.
         kind: ``capsule``, ``spheres`` or ``convex``.
-        count: most shapes a body; default 1 capsule, 4 spheres. More are taken only where they stand out less.
+        count: most shapes a body, up to 32; default 1 capsule,
+            4 spheres. More are taken only where they stand out less.
         tolerance: fewer do where they stand out by at most this [m].
         package_dirs: folders to look for ``package://NAME/...`` in, besides the folders above the file.
         geometry: a collision model of the same links to use instead of the file's.
@@ -120,10 +121,10 @@ def convex_parts(mesh: Any, triangles: Any = None, *, scale: Any = 1.0) -> Conve
         >>> len(wbc.robots.convex_parts(np.vstack([corners, corners + 2]), faces + [[4, 5, 6], [4, 5, 7]]).parts)
         2
     """
-    factor = validation.real_array("scale", [scale] * 3 if np.ndim(scale) == 0 else scale, (3,))
+    factor = validation.ordinary_array("scale", [scale] * 3 if np.ndim(scale) == 0 else scale, (3,))
     if triangles is None:
         return parts_of(read_mesh(validation.file_path("mesh", mesh), factor))
-    vertices = validation.real_array("mesh", mesh)
+    vertices = validation.ordinary_array("mesh", mesh)
     if vertices.ndim != 2 or vertices.shape[1] != 3 or len(vertices) == 0:
         raise ShapeError("mesh", vertices.shape, "expected vertices, n x 3")
     faces = np.asarray(triangles)
