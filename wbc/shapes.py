@@ -141,7 +141,8 @@ class PlacedShape:
     excess: float = 0.0
 
     def __post_init__(self) -> None:
-        validation.instance("PlacedShape.shape", self.shape, Solid, "a Sphere, Capsule, Box, Cylinder or Convex")
+        if not isinstance(self.shape, Solid):
+            raise ShapeError("PlacedShape.shape", self.shape, "expected a Sphere, Capsule, Box, Cylinder or Convex")
         object.__setattr__(self, "placement", validation.pose("PlacedShape.placement", self.placement))
         object.__setattr__(self, "excess", validation.scalar("PlacedShape.excess", self.excess, low=0.0, unit="m"))
 

@@ -1,4 +1,4 @@
-"""Random calls of everything public: each answers, or refuses with a WbcError, in time; and the object works afterwards.
+"""Random calls of everything public: each answers, or refuses with a WbcError, in time; and objects work afterwards.
 
 The long form is the part ``calls`` of ``make soak``.
 """
@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 import wbc
-from bench.soak.goods import Goods, robot
+from bench.soak.arm import robot
+from bench.soak.goods import Goods
 from bench.soak.hostile import spoiled
 from bench.soak.surface import MODULES, Callee, Hang, attempt, calls, impatient, surface
 

@@ -13,8 +13,9 @@ from wbc.trajectory import jerk_limited
 CASES = {
     "straight, and back": {
         "start": [42.0942105962296], "target": [42.09421059670408], "velocity": [30.64328908095209], "straight": True,
-        "acceleration": [0.04017890149459199], "jerk": [0.1310324959493072], "lower": [-np.inf], "upper": [42.14664035147167],
-        "start_velocity": [-18.688624561022735], "start_acceleration": [-0.03252011048987531], "synchronisation": "phase",
+        "acceleration": [0.04017890149459199], "jerk": [0.1310324959493072], "lower": [-np.inf],
+        "upper": [42.14664035147167], "synchronisation": "phase",
+        "start_velocity": [-18.688624561022735], "start_acceleration": [-0.03252011048987531],
     },
     "a hard stop": {
         "start": [1.7785415394431099, 0.6096247368323655], "target": [1.7785415394431099, 0.6096247368323655],

@@ -106,7 +106,7 @@ def pieces_of(piece: Any, s: Array, count: int) -> Index:
             raise ShapeError("piece", numbers, "expected whole numbers")
     if piece.size and not (piece.min() >= 0 and piece.max() < count):
         raise RangeError("piece", piece, f"expected numbers of pieces, 0 to {count - 1}")
-    return piece
+    return np.asarray(piece)
 
 
 class PolynomialPath(Path):
