@@ -17,7 +17,6 @@ tables are derived from the expressions.
 from __future__ import annotations
 
 import dataclasses
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import IntEnum
@@ -28,9 +27,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wbc import pickling
-from wbc.errors import UnknownNameError
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks._plain import plain
+from wbc.tasks.units import UNITS, checked_unit
 
 if TYPE_CHECKING:
     from wbc.robot import Robot
@@ -80,31 +79,12 @@ class Input:
     sensed: bool = False
 
 
-#: Unit of a row -> (how many of it are one in SI units, power of the characteristic length that it is measured by);
-#: rows of momenta are not measured by a length, since no mass is the characteristic one
-UNITS: dict[str, tuple[float, int]] = {
-    "m": (1.0, 1),
-    "cm": (1e2, 1),
-    "mm": (1e3, 1),
-    "in": (1.0 / 0.0254, 1),
-    "m^2": (1.0, 2),
-    "rad": (1.0, 0),
-    "mrad": (1e3, 0),
-    "deg": (180.0 / math.pi, 0),
-    "1": (1.0, 0),
-    "": (1.0, 0),
-    "%": (1e2, 0),
-    "kg m": (1.0, 0),
-    "kg m^2": (1.0, 0),
-}
-
-
 @dataclass(frozen=True)
 class Row:
     """One row of an item: ``label`` within the item ("x", "panda_joint4") and the unit of its error or margin.
 
     Attributes:
-        unit: one of :data:`UNITS`, or a rate of it: ``"m/s"``.
+        unit: one of :data:`wbc.tasks.units.UNITS`, or a rate of it: ``"m/s"``.
 
     Raises:
         UnknownNameError: another unit.
@@ -122,17 +102,6 @@ class Row:
         """
         many, power = UNITS[self.unit.removesuffix("/s")]
         return many * length**power
-
-
-def checked_unit(field: str, unit: Any) -> str:
-    """A unit that rows can have.
-
-    Raises:
-        UnknownNameError: it is not, with the list.
-    """
-    if not isinstance(unit, str) or unit.removesuffix("/s") not in UNITS:
-        raise UnknownNameError(field, unit, (known for known in UNITS if known))
-    return unit
 
 
 class Order(IntEnum):

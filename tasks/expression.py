@@ -17,8 +17,9 @@ from wbc.pickling import by_name_or_value
 from wbc.symbolic.kinematics import Kinematics
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks import inputs as run_time
-from wbc.tasks.base import Input, Row, Task, Values, checked_unit
+from wbc.tasks.base import Input, Row, Task, Values
 from wbc.tasks.frames import checked_weights, weights_of_rows
+from wbc.tasks.units import checked_unit
 
 if TYPE_CHECKING:
     from wbc.robot import Robot
@@ -50,7 +51,7 @@ class Expression(Task):
 
     Attributes:
         function: called as ``function(kin, p)`` each time the task is built; it must give the same each time.
-        units: unit of each row, or one for all, of :data:`wbc.tasks.base.UNITS`; rows in ``m`` are divided by the
+        units: unit of each row, or one for all, of :data:`wbc.tasks.units.UNITS`; rows in ``m`` are divided by the
             characteristic length, those in ``mm`` by 1000 times it, those in ``deg`` by 180 / pi.
         inputs, declared: the run-time inputs, each with a default; ``declared`` when it is read.
         labels: name of each row; None: "value" for one row, else "0", "1", ...

@@ -8,11 +8,10 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 import pytest
 
 import wbc
-from bench.soak.arm import BOUNDS, DT, ONE, TIP, Q, compiled, plain, robot, solvers
+from bench.soak.arm import BOUNDS, ONE, TIP, Q, compiled, plain, robot, solvers
 from bench.soak.surface import impatient
 from wbc import shapes, tasks, trajectory
 from wbc.errors import BoundsError, NotFiniteError, RangeError, ShapeError, UnknownNameError, WbcError
@@ -122,12 +121,6 @@ def test_targets_far_away_leak_no_warning() -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         for size in (1e50, 1e155, 1e200, 1e308):
-            for put in (
-                {"hand": np.full(3, size)},
-                {"hand": [size, 0.0, -size]},
-                {"box": pin.SE3(np.eye(3), np.full(3, size))},
-            ):
-                for name, value in put.items():
-                    setattr(controller[name], "target" if name == "hand" else "pose", value)
+            for value in (np.full(3, size), [size, 0.0, -size]):
+                controller["hand"].target = value
                 assert np.isfinite(controller.step(Q).v).all()
-    assert controller.stack.dt == DT

@@ -128,8 +128,8 @@ class Deployment:
         me = cast("Controller", self)
         if isinstance(states, bool) or not isinstance(states, int) or not 1 <= states < 2**31:
             raise RangeError("states", states, "expected an integer >= 1")
-        me.require_values()
         export.checked_folder(folder, overwrite)
+        me.require_values()
         tick, layout, robot = self.tick, me.layout, me.stack.robot
         cost = me.row_costs.copy()
         for block in layout.of_form("task"):

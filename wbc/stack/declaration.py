@@ -145,7 +145,7 @@ class Declaration:
                 see docs/levels.md. A constraint is hard at level 0; at a level k > 0 its violation is minimised there.
             weight: of a task against the others of its level, >= 0; the cost of a row is
                 weight * (rate error / scale)^2 with scale = characteristic length for rows in metres, else 1, see
-                :data:`wbc.tasks.base.UNITS` for other units.
+                :data:`wbc.tasks.units.UNITS` for other units.
             hard: of a constraint; False: its rows give way before those of any hard one, see the order of sacrifice.
             soft: of a constraint, its price >= 0: a row that is violated by x costs price * (x / scale)^2, as much as a
                 task row of that weight that misses its rate by x. The first value of the input ``price``.
