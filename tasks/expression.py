@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wbc import validation
-from wbc.errors import NotFiniteError, ShapeError, UnknownNameError, WbcError
+from wbc.errors import NotFiniteError, ShapeError, UnknownNameError
 from wbc.pickling import by_name_or_value
 from wbc.symbolic.kinematics import Kinematics
 from wbc.symbolic.tracer import Tracer
@@ -139,14 +139,7 @@ class Expression(Task):
     def error(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
         """The user's function, its result checked and made a column."""
         given = _Named({d.name: inputs[d.name] for d in self.declared})
-        try:
-            result = self.function(kin, given)
-        except WbcError:
-            raise
-        except Exception as error:
-            reason = f"the function raised {type(error).__name__}: {error}"
-            raise WbcError("Expression.function", self.function, reason) from error
-        return _column(result)
+        return _column(validation.called("Expression.function", self.function, kin, given))
 
     def declaration(self, robot: Robot) -> dict[str, Any]:
         """What the function computes (not its source): a digest of the traced formula, with the inputs' layout."""

@@ -9,14 +9,14 @@ from __future__ import annotations
 import math
 import os
 import pathlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any, TypeVar
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wbc.errors import NotFiniteError, RangeError, RotationError, ShapeError, UnknownNameError
+from wbc.errors import NotFiniteError, RangeError, RotationError, ShapeError, UnknownNameError, WbcError
 
 Array = NDArray[np.float64]
 T = TypeVar("T")
@@ -151,6 +151,20 @@ def integer(field: str, value: Any, low: int = 0, high: int = 2**31 - 1) -> int:
     if not low <= value <= high:
         raise RangeError(field, value, f"expected an integer within [{low}, {high}]")
     return int(value)
+
+
+def called(field: str, function: Callable[..., Any], *arguments: Any) -> Any:
+    """What a user's function answers.
+
+    Raises:
+        WbcError: it raised; what it raised is the cause, unless it is such an error itself.
+    """
+    try:
+        return function(*arguments)
+    except WbcError:
+        raise
+    except Exception as error:
+        raise WbcError(field, function, f"the function raised {type(error).__name__}: {error}") from error
 
 
 def file_path(field: str, value: Any) -> pathlib.Path:

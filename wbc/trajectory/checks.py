@@ -195,7 +195,8 @@ class Inequality:
         """m x k."""
         shape = (self.matrix.shape[1],)
         states = zip(position, velocity, acceleration, strict=True)
-        w = [validation.ordinary_array(f"{self.name}.function", self.function(*s), shape) for s in states]
+        field = f"{self.name}.function"
+        w = [validation.ordinary_array(field, validation.called(field, self.function, *s), shape) for s in states]
         rows = np.array(w).reshape(-1, *shape) @ self.matrix.T
         return np.asarray(1.0 + (rows - self.bound) / self._size)
 
