@@ -17,7 +17,7 @@ HOSTILE: tuple[Callable[[], Any], ...] = (
     lambda: "x" * 5000, lambda: "/", lambda: b"bytes", list, lambda: (), dict, lambda: {1, 2},
     lambda: [math.nan], lambda: [[1.0], [1.0, 2.0]], lambda: [[]], lambda: [None], lambda: ["typo"], lambda: [[1], "a"],
     lambda: {"typo": 1.0}, lambda: {1: math.nan}, lambda: {"typo": [math.nan]}, lambda: [object()],
-    object, lambda: int, lambda: len, lambda: lambda: 1.0, lambda: lambda *_: math.nan,
+    object, lambda: str, lambda: repr, lambda: lambda *_: 1.0, lambda: lambda *_: math.nan,
     lambda: np.zeros(0), lambda: np.zeros((3, 3, 3)), lambda: np.full(3, math.nan), lambda: np.array("text"),
     lambda: np.array([None]), lambda: np.array([1e200, -1e200, 1e200]), lambda: np.full(3, 1e-320),
     lambda: np.zeros(3, dtype=complex), lambda: np.datetime64("2020-01-01"), lambda: np.float32(1.0),

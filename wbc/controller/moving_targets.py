@@ -45,7 +45,7 @@ class MovingTargets:
         for name, given in targets.items():
             handle = controller[name]
             if callable(given):
-                numbers = _called(f"targets[{name}]", functools.partial(handle.checked, "target"), given)
+                numbers = _called(functools.partial(handle.checked, "target"), given)
                 numbers(float(s[0]))
             else:
                 given = validation.items(f"targets[{name}]", given, f"{len(s)} targets, or a function of s")
@@ -62,8 +62,8 @@ class MovingTargets:
             self._p[span] = values
 
 
-def _called(field: str, checked: Callable[[Any], Array], function: Callable[[float], Any]) -> Numbers:
-    return lambda s: checked(validation.called(field, function, s))
+def _called(checked: Callable[[Any], Array], function: Callable[[float], Any]) -> Numbers:
+    return lambda s: checked(function(s))
 
 
 def _between(robot: Robot, declared: Input, s: Array, values: Array) -> Numbers:

@@ -196,7 +196,7 @@ class Inequality:
         shape = (self.matrix.shape[1],)
         states = zip(position, velocity, acceleration, strict=True)
         field = f"{self.name}.function"
-        w = [validation.ordinary_array(field, validation.called(field, self.function, *s), shape) for s in states]
+        w = [validation.ordinary_array(field, self.function(*s), shape) for s in states]
         rows = np.array(w).reshape(-1, *shape) @ self.matrix.T
         return np.asarray(1.0 + (rows - self.bound) / self._size)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib
 import os
 import zipfile
@@ -93,7 +94,8 @@ def save(law: Law, file: str | os.PathLike[str]) -> None:
             np.savez(stream, **arrays)  # type: ignore[arg-type]
         partial.replace(target)
     except OSError as error:
-        partial.unlink(missing_ok=True)
+        with contextlib.suppress(OSError):
+            partial.unlink(missing_ok=True)
         raise LawFileError("file", str(target), f"cannot be written: {error.strerror}") from error
 
 

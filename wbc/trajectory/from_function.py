@@ -102,7 +102,7 @@ class _Samples:
         if u not in self._known:
             x = self.argument(u)
             field = f"path.function({x:.6g})"
-            value = validation.called(field, self.function, x)
+            value = self.function(x)
             numbers = validation.ordinary_array(field, value, self._shape, finite=False)
             if numbers.ndim != 1 or not len(numbers):
                 raise ShapeError(field, value, "expected one number for each joint")
