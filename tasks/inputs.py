@@ -140,7 +140,9 @@ def check(robot: Robot, field: str, declared: Sequence[Input]) -> None:
         for word in ("unit", "rate", "below"):
             if getattr(d, word) is not None:
                 validation.instance(f"{where}.{word}", getattr(d, word), str, "a string")
-        if d.infinite is not None and d.infinite not in (math.inf, -math.inf):
+        if d.infinite is not None and not math.isinf(
+            float(validation.real_array(f"{where}.infinite", d.infinite, (), finite=False))
+        ):
             raise RangeError(f"{where}.infinite", d.infinite, "expected inf or -inf, or None for finite numbers")
         if not d.low <= d.high:
             raise BoundsError(f"{where}.low", d.low, f"above high = {d.high!r}, or NaN")

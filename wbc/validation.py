@@ -129,6 +129,16 @@ def items(field: str, value: Any, expected: str = "items") -> tuple[Any, ...]:
     raise ShapeError(field, value, f"expected a sequence of {expected}")
 
 
+def name(field: str, value: Any) -> str:
+    """Text that is not empty and that files and other languages can hold."""
+    try:
+        if isinstance(value, str) and value.encode():
+            return value
+    except UnicodeEncodeError:
+        pass
+    raise ShapeError(field, value, "expected a name that is not empty")
+
+
 def strings(field: str, value: Any) -> tuple[str, ...]:
     """Several strings."""
     out = items(field, value, "strings")

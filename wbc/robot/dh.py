@@ -56,7 +56,8 @@ class DHRow:
     def __post_init__(self) -> None:
         for key in ("a", "alpha", "d", "theta"):
             object.__setattr__(self, key, validation.scalar(f"DHRow.{key}", getattr(self, key)))
-        validation.instance("DHRow.name", self.name, str, "a string")
+        if self.name != "":
+            validation.name("DHRow.name", self.name)
         validation.one_of("DHRow.joint", self.joint, JOINTS)
         validation.one_of("DHRow.convention", self.convention, CONVENTIONS)
         for key in ("lower", "upper", "velocity", "acceleration", "effort"):

@@ -196,8 +196,7 @@ class Robot:
         Raises:
             DuplicateNameError, UnknownNameError, ShapeError, NotFiniteError, RotationError.
         """
-        if not validation.instance("frame", name, str, "a name"):
-            raise ShapeError("frame", name, "expected a name that is not empty")
+        validation.name("frame", name)
         if name in self.frame_names:
             raise DuplicateNameError("frame", name, "a frame of this name exists")
         self.check_frame("parent", parent)

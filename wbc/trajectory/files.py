@@ -88,6 +88,8 @@ def save(law: Law, file: str | os.PathLike[str]) -> None:
         if value is not None:
             arrays[f"limits.{field.name}"] = value
     _put(arrays, "path", law.path)
+    if not target.name:
+        raise LawFileError("file", str(target), "is a folder")
     partial = target.with_name(f"{target.name}.{os.getpid()}.part")
     try:
         with partial.open("wb") as stream:
