@@ -56,7 +56,7 @@ class DHRow:
     def __post_init__(self) -> None:
         for key in ("a", "alpha", "d", "theta"):
             object.__setattr__(self, key, validation.scalar(f"DHRow.{key}", getattr(self, key)))
-        if self.name != "":
+        if not isinstance(self.name, str) or self.name:
             validation.name("DHRow.name", self.name)
         validation.one_of("DHRow.joint", self.joint, JOINTS)
         validation.one_of("DHRow.convention", self.convention, CONVENTIONS)
