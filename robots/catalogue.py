@@ -94,9 +94,9 @@ def load(
         changes["lock"] = lock_mapping(lock)
         changes["pairs"] = ""  # other links move against each other
     if neutral is not None:
-        changes["neutral"] = {**recipe.neutral, **neutral}
+        changes["neutral"] = {**recipe.neutral, **validation.mapping("neutral", neutral, "joints to values")}
     if name is not None:
-        changes["name"] = name
+        changes["name"] = validation.instance("name", name, str, "a string")
     wanted = recipe.base if base is None and recipe.file else base
     limits = {
         "position_lower": position_lower,
@@ -128,6 +128,7 @@ def from_dh(
     Raises:
         ShapeError, DuplicateNameError, UnknownNameError, RangeError, BoundsError.
     """
+    validation.instance("name", name, str, "a string")
     for key in limits:
         validation.one_of("limit", key, ("position_lower", "position_upper", "velocity", "acceleration", "effort"))
     return finish(read_dh(rows, base, tool), Recipe(name, frames={"tip": "tip"}), "none", (), limits)
@@ -145,5 +146,5 @@ def _find(robot: Any) -> tuple[Recipe, Any]:
         if not looks_like_path(robot):
             raise unknown(robot, (*_by_name(), *MADE, *OPERATOR_ARMS))
     if isinstance(robot, (str, os.PathLike)):
-        return Recipe(pathlib.Path(robot).stem), robot
+        return Recipe(validation.file_path("robot", robot).stem), robot
     return Recipe(str(robot.name) if isinstance(robot, pin.Model) else "dh"), robot

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
+from wbc import validation
 from wbc.errors import RobotFileError
 from wbc.robot import Robot
 from wbc.robot.description import ROOT
@@ -83,7 +84,7 @@ def write_urdf(path: str | os.PathLike[str], robot: Robot, root: str, links: Ite
     Raises:
         RobotFileError: the file cannot be written.
     """
-    file = pathlib.Path(path)
+    file = validation.file_path("path", path)
     try:
         file.write_text(urdf_text(robot, root, links), encoding="utf-8")
     except OSError as error:

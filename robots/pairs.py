@@ -5,11 +5,12 @@ from __future__ import annotations
 import pathlib
 from typing import Any
 
+from wbc import validation
+from wbc.robot import Robot
 from wbc.robot.collision_pairs import SelfPairs
 from wbc.robot.collision_pairs import find_self_pairs as find
 from wbc.robot.files import example_data_folder
 from wbc.robot.pair_search import Progress
-from wbc.robot.robot import Robot
 from wbc.robots.catalogue import table
 
 
@@ -41,6 +42,7 @@ def find_self_pairs(
         >>> ("base_link", "wrist_2_link") in robot.self_pairs
         True
     """
+    validation.instance("robot", robot, Robot, "a wbc Robot, see wbc.robots.load")
     path = srdf_of(robot) if isinstance(srdf, str) and srdf == "auto" else srdf
     return find(robot, srdf=path, samples=samples, seed=seed, clearance=clearance, progress=progress)
 

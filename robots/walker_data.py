@@ -77,7 +77,7 @@ class _Numbers:
             UnknownNameError: no such field. RobotFileError: a file that cannot be read or lacks a number.
         """
         known = [f.name for f in fields(cls)]  # type: ignore[arg-type]
-        values = {k: v for group in cls.groups for k, v in _read(pathlib.Path(path))[group].items()}
+        values = {k: v for group in cls.groups for k, v in _read(validation.file_path("path", path))[group].items()}
         for key in values:
             if key not in known:
                 raise RobotFileError("data", f"{path}: {key}", "this class has no such field")

@@ -71,6 +71,10 @@ class Walker:
         return write_urdf(path, self.robot, BODY, self.links)
 
 
+#: More make a robot that nothing here could plan for
+MOST_ARMS = 64
+
+
 def walker(
     arms: int = 3,
     shoulder_radius: float | None = None,
@@ -91,7 +95,7 @@ def walker(
     first boom; ``arm1`` goes from there to one tip by joints 3, 2, 1, ``arm2`` to the other by joints 4 to 7.
 
     Args:
-        arms: number of arms, at least 2; two ends always are two.
+        arms: number of arms, 2 to 64; two ends always are two.
         shoulder_radius: body centre to arm base [m]; default: the data's.
         data: numbers; default: those of the file.
         two_ended: make the two-ended arm.
@@ -105,6 +109,10 @@ def walker(
         UnknownNameError: no such body shape.
     """
     validation.one_of("body_shape", body_shape, BODY_SHAPES)
+    two_ended = validation.flag("two_ended", two_ended)
+    artificial_limits = validation.flag("artificial_limits", artificial_limits)
+    if isinstance(arms, bool) or not isinstance(arms, int) or not 2 <= arms <= MOST_ARMS:
+        raise RangeError("arms", arms, f"expected a whole number of arms, 2 to {MOST_ARMS}")
     if two_ended:
         if shoulder_radius is not None or arms not in (2, 3):
             raise RangeError("two_ended", (arms, shoulder_radius), "the two-ended arm has no body to place arms on")
@@ -112,8 +120,6 @@ def walker(
         if not isinstance(numbers, TwoEndedData):
             raise ShapeError("data", type(numbers).__name__, "expected TwoEndedData")
         return _two_ended(numbers)
-    if isinstance(arms, bool) or not isinstance(arms, int) or arms < 2:
-        raise RangeError("arms", arms, "expected a whole number of arms, at least 2")
     found = WalkerData.read() if data is None else data
     if not isinstance(found, WalkerData):
         raise ShapeError("data", type(found).__name__, "expected WalkerData")

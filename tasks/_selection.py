@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
+from wbc import validation
 from wbc.errors import DuplicateNameError, ShapeError
 from wbc.tasks.base import Row
 
@@ -19,7 +19,7 @@ def selection(field: str, value: Any) -> tuple[str, ...]:
         ShapeError: not names, or none.
         DuplicateNameError: a name given twice.
     """
-    names = (value,) if isinstance(value, str) else tuple(value) if isinstance(value, Iterable) else ()
+    names = (value,) if isinstance(value, str) else validation.items(field, value, "names")
     if not names or not all(isinstance(name, str) for name in names):
         raise ShapeError(field, value, "expected one name or several")
     for k, name in enumerate(names):

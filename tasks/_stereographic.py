@@ -51,14 +51,10 @@ class PlaneReference:
     direction: Triple = (1.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
-        pole = validation.real_array("reference.pole", self.pole, (3,))
-        direction = validation.real_array("reference.direction", self.direction, (3,))
-        size, length = float(np.linalg.norm(pole)), float(np.linalg.norm(direction))
-        if size == 0.0:
-            raise RangeError("reference.pole", self.pole, "expected a vector of non-zero length")
-        pole = pole / size
+        pole = validation.unit_vector("reference.pole", self.pole)
+        direction = validation.unit_vector("reference.direction", self.direction)
         across = direction - pole * float(pole @ direction)
-        if not float(np.linalg.norm(across)) > 1e-6 * length:
+        if not float(np.linalg.norm(across)) > 1e-6:
             raise RangeError("reference.direction", self.direction, "expected a vector not parallel to reference.pole")
         across = across / float(np.linalg.norm(across))
         object.__setattr__(self, "pole", triple(pole))

@@ -29,6 +29,7 @@ from numpy.typing import NDArray
 from wbc import pickling
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks._plain import plain
+from wbc.tasks.units import UNITS, checked_unit
 
 if TYPE_CHECKING:
     from wbc.robot import Robot
@@ -80,10 +81,27 @@ class Input:
 
 @dataclass(frozen=True)
 class Row:
-    """One row of an item: ``label`` within the item ("x", "panda_joint4") and the unit of its error or margin."""
+    """One row of an item: ``label`` within the item ("x", "panda_joint4") and the unit of its error or margin.
+
+    Attributes:
+        unit: one of :data:`wbc.tasks.units.UNITS`, or a rate of it: ``"m/s"``.
+
+    Raises:
+        UnknownNameError: another unit.
+    """
 
     label: str
     unit: str
+
+    def __post_init__(self) -> None:
+        checked_unit(f"row {self.label!r}.unit", self.unit)
+
+    def scale(self, length: float) -> float:
+        """What counts as much as a radian, in the row's own unit, where ``length`` [m] is the characteristic length:
+        the length for rows in metres, 1000 times it for millimetres, 180 / pi for degrees, 1 for radians.
+        """
+        many, power = UNITS[self.unit.removesuffix("/s")]
+        return many * length**power
 
 
 class Order(IntEnum):

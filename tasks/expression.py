@@ -11,13 +11,15 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from wbc.errors import NotFiniteError, ShapeError, UnknownNameError, WbcError
+from wbc import validation
+from wbc.errors import NotFiniteError, ShapeError, UnknownNameError
 from wbc.pickling import by_name_or_value
 from wbc.symbolic.kinematics import Kinematics
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks import inputs as run_time
 from wbc.tasks.base import Input, Row, Task, Values
 from wbc.tasks.frames import checked_weights, weights_of_rows
+from wbc.tasks.units import checked_unit
 
 if TYPE_CHECKING:
     from wbc.robot import Robot
@@ -49,7 +51,8 @@ class Expression(Task):
 
     Attributes:
         function: called as ``function(kin, p)`` each time the task is built; it must give the same each time.
-        units: unit of each row, or one for all; rows in ``m`` are divided by the characteristic length.
+        units: unit of each row, or one for all, of :data:`wbc.tasks.units.UNITS`; rows in ``m`` are divided by the
+            characteristic length, those in ``mm`` by 1000 times it, those in ``deg`` by 180 / pi.
         inputs, declared: the run-time inputs, each with a default; ``declared`` when it is read.
         labels: name of each row; None: "value" for one row, else "0", "1", ...
         weights: one number >= 0 a row, None: 1 each.
@@ -58,7 +61,7 @@ class Expression(Task):
     for which ``cloudpickle`` must be installed; else pickling raises a ``PicklingError``.
 
     Raises:
-        WbcError: the function raised. UnknownNameError: a frame, joint or input that does not exist.
+        WbcError: the function raised. UnknownNameError: a frame, joint, input or unit that does not exist.
         ShapeError: the result is no SX column, has symbols of its own, or does not depend on q.
         NotFiniteError: the result or its Jacobian is not finite at the robot's neutral configuration.
     """
@@ -82,8 +85,15 @@ class Expression(Task):
         if not callable(function):
             raise ShapeError("Expression.function", function, "expected a function of (kin, p)")
         object.__setattr__(self, "function", function)
-        object.__setattr__(self, "units", units if isinstance(units, str) else _strings("units", units))
-        object.__setattr__(self, "declared", tuple(inputs) if isinstance(inputs, Iterable) else (inputs,))
+        words = (units,) if isinstance(units, str) else _strings("units", units)
+        for word in words:
+            checked_unit("Expression.units", word)
+        object.__setattr__(self, "units", units if isinstance(units, str) else words)
+        object.__setattr__(
+            self,
+            "declared",
+            (inputs,) if isinstance(inputs, Input) else validation.items("Expression.inputs", inputs, "inputs"),
+        )
         object.__setattr__(self, "labels", None if labels is None else _strings("labels", labels))
         object.__setattr__(self, "weights", checked_weights("Expression.weights", weights))
         object.__setattr__(self, "gain", gain)
@@ -129,14 +139,7 @@ class Expression(Task):
     def error(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
         """The user's function, its result checked and made a column."""
         given = _Named({d.name: inputs[d.name] for d in self.declared})
-        try:
-            result = self.function(kin, given)
-        except WbcError:
-            raise
-        except Exception as error:
-            reason = f"the function raised {type(error).__name__}: {error}"
-            raise WbcError("Expression.function", self.function, reason) from error
-        return _column(result)
+        return _column(validation.called("Expression.function", self.function, kin, given))
 
     def declaration(self, robot: Robot) -> dict[str, Any]:
         """What the function computes (not its source): a digest of the traced formula, with the inputs' layout."""
@@ -197,10 +200,7 @@ class _Named(dict[str, Any]):
 
 
 def _strings(field: str, value: Any) -> tuple[str, ...]:
-    items = tuple(value) if isinstance(value, Iterable) else (value,)
-    if not all(isinstance(item, str) for item in items):
-        raise ShapeError(f"Expression.{field}", value, "expected strings")
-    return items
+    return validation.strings(f"Expression.{field}", value)
 
 
 def _column(result: Any) -> ca.SX:

@@ -135,6 +135,15 @@ def check(robot: Robot, field: str, declared: Sequence[Input]) -> None:
         validation.one_of(f"{where}.kind", d.kind, get_args(Kind))
         if isinstance(d.size, bool) or not isinstance(d.size, int) or d.size < 0:
             raise RangeError(f"{where}.size", d.size, "expected an integer >= 0")
+        for side in ("low", "high"):
+            validation.real_array(f"{where}.{side}", getattr(d, side), (), finite=False)
+        for word in ("unit", "rate", "below"):
+            if getattr(d, word) is not None:
+                validation.instance(f"{where}.{word}", getattr(d, word), str, "a string")
+        if d.infinite is not None and not math.isinf(
+            float(validation.real_array(f"{where}.infinite", d.infinite, (), finite=False))
+        ):
+            raise RangeError(f"{where}.infinite", d.infinite, "expected inf or -inf, or None for finite numbers")
         if not d.low <= d.high:
             raise BoundsError(f"{where}.low", d.low, f"above high = {d.high!r}, or NaN")
         if d.default is not None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -62,9 +61,7 @@ class Posture(Task):
         validation.one_of("Posture.start", self.start, STARTS)
         joints: Any = self.joints
         if joints is not None:
-            if isinstance(joints, str) or not isinstance(joints, Iterable):
-                raise ShapeError("Posture.joints", joints, "expected a list of joint names")
-            object.__setattr__(self, "joints", tuple(joints))
+            object.__setattr__(self, "joints", validation.items("Posture.joints", joints, "joint names"))
         object.__setattr__(self, "weights", checked_weights("Posture.weights", self.weights))
 
     def validate(self, robot: Robot) -> None:

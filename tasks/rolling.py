@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -112,7 +111,7 @@ class Rolling(Constraint):
 
     def __post_init__(self) -> None:
         given = (self.wheels,) if isinstance(self.wheels, Wheel) else self.wheels
-        wheels = tuple(given) if isinstance(given, Iterable) else ()
+        wheels = validation.items("Rolling.wheels", given, "Wheel")
         if not wheels or not all(isinstance(wheel, Wheel) for wheel in wheels):
             raise ShapeError("Rolling.wheels", self.wheels, "expected one Wheel or several")
         joints = [wheel.joint for wheel in wheels]

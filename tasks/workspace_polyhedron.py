@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -113,7 +112,7 @@ class WorkspacePolyhedron(Constraint):
 
 
 def _normals(field: str, value: Any) -> tuple[Triple, ...]:
-    rows = list(value) if isinstance(value, Iterable) and not isinstance(value, str) else []
+    rows = list(validation.items(field, value, "vectors"))
     if not rows:
         raise ShapeError(field, value, "expected normals of three numbers each, one at least")
     out: list[Triple] = []

@@ -82,7 +82,7 @@ class Convex:
     points: Array
 
     def __post_init__(self) -> None:
-        points = validation.real_array("Convex.points", self.points)
+        points = validation.ordinary_array("Convex.points", self.points)
         if points.ndim != 2 or points.shape[1] != 3 or len(points) < 4:
             raise ShapeError("Convex.points", points.shape, "expected at least 4 points, n x 3")
         centred = points - points.mean(axis=0)
@@ -131,11 +131,20 @@ class PlacedShape:
         shape: a :data:`Solid`.
         placement: pose of the shape in the link's frame.
         excess: how far the shape may stand out of what it was fitted to [m]; 0 for exact shapes.
+
+    Raises:
+        ShapeError: no solid. NotFiniteError, RotationError, RangeError: a bad placement or excess.
     """
 
     shape: Solid
     placement: pin.SE3
     excess: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.shape, Solid):
+            raise ShapeError("PlacedShape.shape", self.shape, "expected a Sphere, Capsule, Box, Cylinder or Convex")
+        object.__setattr__(self, "placement", validation.pose("PlacedShape.placement", self.placement))
+        object.__setattr__(self, "excess", validation.scalar("PlacedShape.excess", self.excess, low=0.0, unit="m"))
 
     def ends(self) -> tuple[Array, Array]:
         """The two ends of the shape's core segment in the link's frame [m]; equal for all but a capsule."""

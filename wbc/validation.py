@@ -7,19 +7,25 @@ the field; nothing is changed when it raises.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
-from typing import Any
+import os
+import pathlib
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any, TypeVar
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wbc.errors import NotFiniteError, RangeError, RotationError, ShapeError, UnknownNameError
+from wbc.errors import NotFiniteError, RangeError, RotationError, ShapeError, UnknownNameError, WbcError
 
 Array = NDArray[np.float64]
+T = TypeVar("T")
 
 #: How far a rotation may be from orthonormal (Frobenius norm of R'R - I) or a quaternion from unit length.
 ROTATION_TOLERANCE = 1e-6
+
+#: Numbers beyond these have products that overflow, or vanish, in what is computed from them
+LARGEST, SMALLEST = 1e60, 1e-60
 
 #: A vector whose entries are all smaller than this has no direction.
 LEAST_DIRECTION = 1e-12
@@ -50,15 +56,30 @@ def scalar(
     open_low: bool = False,
     unit: str = "",
 ) -> float:
-    """A finite float within [low, high], or (low, high] with ``open_low``."""
-    if type(value) is float and low < value < high:
-        return value
+    """A finite float within [low, high], or (low, high] with ``open_low``, and of a size whose products are numbers:
+    at most 1e60, and 1e-60 at least where it must be above 0.
+    """
+    if type(value) is float and low < value < high and -LARGEST < value < LARGEST:  # noqa: SIM102 (the usual first)
+        if value > SMALLEST or not open_low:
+            return value
     number = float(real_array(field, value, ()))
     bad = number <= low if open_low else number < low
     if bad or number > high:
         left = "(" if open_low else "["
         raise RangeError(field, value, f"expected a value in {left}{low:g}, {high:g}] {unit}".rstrip())
+    if abs(number) > LARGEST:
+        raise RangeError(field, value, f"expected at most {LARGEST:g} {unit}".rstrip() + " in size")
+    if open_low and low == 0.0 and number < SMALLEST:
+        raise RangeError(field, value, f"expected at least {SMALLEST:g} {unit}".rstrip())
     return number
+
+
+def ordinary_array(field: str, value: Any, shape: tuple[int, ...] | None = None, *, finite: bool = True) -> Array:
+    """:func:`real_array` of numbers whose products are numbers: finite ones are at most 1e60 in size."""
+    out = real_array(field, value, shape, finite=finite)
+    if (np.isfinite(out) & (np.abs(out) > LARGEST)).any():
+        raise RangeError(field, value, f"expected numbers of at most {LARGEST:g} in size")
+    return out
 
 
 def unit_vector(field: str, value: Any) -> Array:
@@ -89,6 +110,91 @@ def one_of(field: str, value: Any, choices: Iterable[str]) -> str:
     if not isinstance(value, str) or value not in names:
         raise UnknownNameError(field, value, names)
     return value
+
+
+def instance(field: str, value: Any, kind: type[T] | tuple[type[T], ...], expected: str) -> T:
+    """An object of a class, or of one of several; ``expected``: what to say of it."""
+    if not isinstance(value, kind):
+        raise ShapeError(field, value, f"expected {expected}")
+    return value
+
+
+def items(field: str, value: Any, expected: str = "items") -> tuple[Any, ...]:
+    """What a sequence or another iterable holds; neither text nor a mapping is one."""
+    try:
+        if not isinstance(value, (str, bytes, Mapping, type)):
+            return tuple(value)
+    except TypeError:
+        pass
+    raise ShapeError(field, value, f"expected a sequence of {expected}")
+
+
+def name(field: str, value: Any) -> str:
+    """Text that is not empty and that files and other languages can hold."""
+    try:
+        if isinstance(value, str) and value.encode():
+            return value
+    except UnicodeEncodeError:
+        pass
+    raise ShapeError(field, value, "expected a name that is not empty")
+
+
+def strings(field: str, value: Any) -> tuple[str, ...]:
+    """Several strings."""
+    out = items(field, value, "strings")
+    if not all(isinstance(item, str) for item in out):
+        raise ShapeError(field, value, "expected strings")
+    return out
+
+
+def mapping(field: str, value: Any, expected: str = "names to values") -> dict[str, Any]:
+    """A copy of a mapping whose keys are strings."""
+    if not isinstance(value, Mapping) or not all(isinstance(key, str) for key in value):
+        raise ShapeError(field, value, f"expected a mapping of {expected}")
+    return dict(value)
+
+
+def integer(field: str, value: Any, low: int = 0, high: int = 2**31 - 1) -> int:
+    """A whole number within [low, high]."""
+    if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, np.integer)):
+        raise ShapeError(field, value, "expected an integer")
+    if not low <= value <= high:
+        raise RangeError(field, value, f"expected an integer within [{low}, {high}]")
+    return int(value)
+
+
+def called(field: str, function: Callable[..., Any], *arguments: Any) -> Any:
+    """What a user's function answers.
+
+    Raises:
+        WbcError: it raised; what it raised is the cause, unless it is such an error itself.
+    """
+    try:
+        return function(*arguments)
+    except WbcError:
+        raise
+    except Exception as error:
+        raise WbcError(field, function, f"the function raised {type(error).__name__}: {error}") from error
+
+
+def file_path(field: str, value: Any) -> pathlib.Path:
+    """A path that the file system can be asked for."""
+    try:
+        path = pathlib.Path(value)
+        os.fsencode(path)
+    except (TypeError, UnicodeError) as error:
+        raise ShapeError(field, value, "expected a path: a str or os.PathLike") from error
+    if "\0" in str(path):
+        raise ShapeError(field, value, "a path holds no null character")
+    return path
+
+
+def is_file(field: str, value: Any) -> bool:
+    """Whether there is a file of this name; a name that is too long for one is none."""
+    try:
+        return file_path(field, value).is_file()
+    except OSError:
+        return False
 
 
 def rotation(field: str, value: Any) -> Array:

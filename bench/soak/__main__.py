@@ -20,10 +20,11 @@ from bench.sheet import Sheet
 from bench.soak.jobs import Job, Kept, measure, parts_of
 
 #: Stacks and ticks a stack on the virtual machine; the same compiled; stacks with known problems and problems of each;
-#: stacks for the faults; stacks with strict levels on either back end, and ticks of each (ten times as many compiled)
+#: stacks for the faults; stacks with strict levels on either back end, and ticks of each (ten times as many compiled);
+#: runs of random calls of the public surface, and calls of every callable in each
 FULL = {
     "vm": 200, "vm ticks": 240, "native": 20, "native ticks": 47_600, "known": 40, "problems": 25, "faults": 10,
-    "levels": 10, "levels ticks": 200,
+    "levels": 10, "levels ticks": 200, "calls": 10, "call rounds": 20,
 }  # fmt: skip
 
 STATUSES = ("solved", "relaxed", "recovered", "braked", "capped")
@@ -84,7 +85,7 @@ def arguments(given: list[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--scale", type=float, default=1.0, help="share of the ticks, stacks stay as many")
     parser.add_argument("--stacks", type=int, help="stacks of each kind at most")
     parser.add_argument("--vm", action="store_true", help="only the virtual machine: no compiler is needed")
-    parser.add_argument("--parts", nargs="+", help="only parts whose names begin so: known, faults, vm, native, levels")
+    parser.add_argument("--parts", nargs="+", help="only parts whose names begin so: known, faults, vm, native, ...")
     parser.add_argument("--keep", type=Path, help="file of the jobs that are done: the same command goes on from there")
     parser.add_argument("--processes", type=int, default=os.cpu_count() or 1)
     parser.add_argument("--markdown", action="store_true", help="print the table as Markdown")
@@ -95,7 +96,7 @@ def sizes_of(scale: float, most: int | None) -> dict[str, int]:
     """Sizes of a run."""
     sizes = {name: max(20, int(n * scale)) if "ticks" in name else n for name, n in FULL.items()}
     if most is not None:
-        sizes |= {name: min(sizes[name], most) for name in ("vm", "native", "known", "faults", "levels")}
+        sizes |= {name: min(sizes[name], most) for name in ("vm", "native", "known", "faults", "levels", "calls")}
     return sizes
 
 

@@ -20,6 +20,7 @@ from bench.records import Parts
 from bench.soak.episodes import stack
 from bench.soak.faults import lost_library, one_iteration, plants
 from bench.soak.known import problems
+from bench.soak.surface import calls
 
 #: Names of runs with their counts
 Found = list[tuple[str, Counter[str]]]
@@ -43,6 +44,7 @@ def parts_of(seed: int, sizes: dict[str, int], native: bool) -> dict[str, list[J
     for b in backends:
         ticks, name = n["levels ticks"] * (10 if b == "native" else 1), f"levels {b} {seed}"
         out[name] = [partial(stack, seed, k, b, ticks, levels=True) for k in range(n["levels"])]
+    out[f"calls {seed}"] = [partial(calls, seed, k, n["call rounds"]) for k in range(n["calls"])]
     return out
 
 

@@ -54,11 +54,21 @@ def test_faults_are_survived() -> None:
 
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")
 def test_a_run_goes_on_from_the_jobs_that_are_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    sizes = {"vm": 1, "vm ticks": 20, "known": 1, "problems": 2, "faults": 0, "levels": 1, "levels ticks": 20}
+    sizes = {
+        "vm": 1,
+        "vm ticks": 20,
+        "known": 1,
+        "problems": 2,
+        "faults": 0,
+        "levels": 1,
+        "levels ticks": 20,
+        "calls": 0,
+    }
+    sizes["call rounds"] = 0
     path = tmp_path / "soak.jsonl"
     first, interrupted = measure(parts_of(2, sizes, False), Kept(path), 1, Progress(disable=True))
     assert interrupted is None
-    assert list(first) == ["known 2", "faults 2", "vm 2", "levels vm 2"]
+    assert list(first) == ["known 2", "faults 2", "vm 2", "levels vm 2", "calls 2"]
     monkeypatch.setattr("bench.soak.jobs._run", lambda jobs, pool: iter([(job, 1 / 0) for job in jobs]))
     again, _ = measure(parts_of(2, sizes, False), Kept(path), 1, Progress(disable=True))
     assert again == first

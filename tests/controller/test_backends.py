@@ -10,7 +10,9 @@ import numpy as np
 import pytest
 
 from tests.controller.stacks import DT, aim, controller, inside, near_limits, quarrel, randomise
+from tests.stack.small import stack as small
 from wbc.controller import Controller, Status, Step
+from wbc.errors import SolverError
 
 Setup = Callable[[Controller, np.random.Generator], Any]
 
@@ -100,3 +102,12 @@ def test_certificate_of_a_relaxed_native_tick_is_about_what_was_left() -> None:
     bounds = [a.certificate.error_bound for a, _ in pairs(("conflicts",), quarrel, 100, 5) if a.status == "relaxed"]
     assert len(bounds) > 50
     assert max(bounds) < 1e-6
+
+
+def test_rows_of_levels_are_refused_by_code_that_has_none() -> None:
+    native, vm = (small().compile(backend=backend).tick for backend in ("native", "vm"))
+    native.qp()
+    for name in ("task_rows", "bent"):
+        with pytest.raises(SolverError, match="strict levels"):
+            getattr(native, name)()
+    assert vm.assembly.task_rows().J.shape[1] == 2

@@ -104,3 +104,14 @@ def test_bad_ramps_are_refused(tick: Controller) -> None:
     with pytest.raises(UnknownNameError):
         tick["limits"].ramp(1.0, 1.0)
     assert not tick.ramps
+
+
+def test_a_clone_goes_on_with_the_ramps(tick: Controller) -> None:
+    tick["up"].ramp(0.0, 20 * DT)
+    tick["down"].ramp(1.0, 20 * DT)
+    run(tick, 8)
+    twin = tick.clone()
+    assert twin["down"].weight == tick["down"].weight != 0.0
+    weights = [(run(each, 20)[-1], each["up"].weight, each["down"].weight) for each in (twin, tick)]
+    assert weights[0] == weights[1]
+    assert weights[0][1:] == (0.0, 1.0)

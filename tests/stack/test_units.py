@@ -11,13 +11,15 @@ import pytest
 
 import wbc.robots
 from tests.stack.millimetres import configuration, moved, scaled, velocity
+from tests.stack.small import arm
 from wbc.controller import Controller, Stack, Step
+from wbc.errors import ShapeError, UnknownNameError
 from wbc.qp.problem import QP
 from wbc.qp.relax import Relaxation
 from wbc.robot import Robot
 from wbc.robots import DHRow, from_dh
 from wbc.shapes import Capsule, PlacedShape, Sphere
-from wbc.tasks import CenterOfMass, EndEffector, FrameVelocityLimit, JointLimits, Obstacle, Posture
+from wbc.tasks import CenterOfMass, EndEffector, Expression, FrameVelocityLimit, JointLimits, Obstacle, Posture, Row
 
 DT = 0.005
 STATES = 150
@@ -159,3 +161,48 @@ def test_relaxation_does_not_depend_on_units() -> None:
             assert (getattr(found, side)[:n] == getattr(two, side)[:n])[kept].all()
         given += wanted.flag == "relaxed"
     assert given > 20
+
+
+#: Unit of a row -> how many of it are a metre or a radian
+KNOWN = {"m": 1.0, "cm": 1e2, "mm": 1e3, "in": 1.0 / 0.0254, "rad": 1.0, "mrad": 1e3, "deg": 180.0 / np.pi}
+
+
+def row_in(unit: str) -> Expression:
+    """The height of the tip, or the angle of the first joint, in some unit."""
+    many = KNOWN[unit]
+    if unit in ("rad", "mrad", "deg"):
+        return Expression(lambda kin, p: many * (kin.joint("joint1") - 0.9), units=unit)
+    return Expression(lambda kin, p: many * (kin.position("tip")[1] - 0.3), units=unit)
+
+
+@pytest.mark.parametrize(("unit", "backend"), [*((u, "vm") for u in KNOWN), ("mm", "native"), ("deg", "native")])
+def test_a_row_costs_the_same_in_every_unit(unit: str, backend: str) -> None:
+    """Against a posture that wants something else, and the tolerance of inverse kinematics with it."""
+    base, answers = {"m": "m", "rad": "rad"}.get(unit, "rad" if unit in ("mrad", "deg") else "m"), []
+    for each in (base, unit):
+        stack = Stack(arm(), 0.01).add(row_in(each), name="row").add(Posture(), name="posture", weight=0.3)
+        tick = stack.add(JointLimits(), name="limits").compile(backend=backend)
+        tick["posture"].target = (0.0, 0.0)
+        answers.append(tick.step((0.3, 0.8)).v)
+        tick["row"].weight = 7.0
+        answers[-1] = np.concatenate((answers[-1], tick.step((0.3, 0.8)).v))
+    assert np.abs(answers[0]).max() > 0.05
+    np.testing.assert_allclose(answers[1], answers[0], rtol=1e-7, atol=1e-9)
+
+
+def test_tolerances_of_inverse_kinematics_are_in_metres() -> None:
+    for unit in ("m", "mm"):
+        stack = Stack(arm(), 0.01).add(row_in(unit), name="row")
+        found = stack.solve((0.3, 0.8), goals=["row"], backend="vm", tolerance=1e-4, budget=None)
+        residual = found.step.residuals["row"].values[0] / KNOWN[unit]
+        assert found.status == "solved"
+        assert abs(residual) <= 1e-4
+
+
+@pytest.mark.parametrize("unit", ["banana", "Mm", "degrees", "m/s/s", 3, None, ["m"]])
+def test_unknown_units_are_refused_with_the_list(unit: object) -> None:
+    for make in (lambda: Row("height", unit), lambda: Expression(lambda kin, p: kin.position("tip")[1], units=(unit,))):
+        with pytest.raises((UnknownNameError, ShapeError)) as caught:
+            make()
+        if isinstance(unit, str):
+            assert {"m", "mm", "deg", "rad"} <= set(caught.value.choices)

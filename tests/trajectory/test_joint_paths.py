@@ -138,7 +138,7 @@ def test_bad_waypoints_are_named() -> None:
         for value in (np.nan, np.inf):
             with pytest.raises(NotFiniteError, match=r"path\.waypoints"):
                 make([[0.0], [value]])
-        with pytest.raises(RangeError, match="too far apart"):
+        with pytest.raises(RangeError, match="at most 1e\\+60 in size"):
             make([[-1.7e308], [1.7e308]])
 
 

@@ -293,3 +293,21 @@ def test_bad_filters_are_refused(changes, error):
     arguments = {"dof": 2, "dt": 0.01, "velocity": 1.0, "acceleration": 1.0, "jerk": 1.0, **changes}
     with pytest.raises(error):
         online(arguments.pop("dof"), arguments.pop("dt"), **arguments)
+
+
+@pytest.mark.parametrize("synchronisation", ["time", "phase", "none"])
+@pytest.mark.parametrize("far", [1e3, 1e6])
+def test_moves_of_hours_are_begun(far, synchronisation):
+    """Longer than the 7e3 s that ruckig takes: its binding answers with a ValueError."""
+    dt, limits = 0.01, {"velocity": [0.1, 0.2], "acceleration": [1.0, 0.5], "jerk": [5.0, 5.0]}
+    filter = online(2, dt, **limits, synchronisation=synchronisation)
+    filter.target([far, -0.5 * far])
+    states = [filter.step() for _ in range(150)]
+    assert {filter.status} <= {"moving", "recovered"}
+    velocity, acceleration = (np.array([getattr(s, name) for s in states]) for name in ("velocity", "acceleration"))
+    assert (np.abs(velocity) <= np.array(limits["velocity"]) + 1e-9).all()
+    assert (np.abs(acceleration) <= np.array(limits["acceleration"]) + 1e-9).all()
+    assert (np.abs(np.diff(acceleration, axis=0)) <= np.array(limits["jerk"]) * dt + 1e-9).all()
+    # The joint that takes the longest goes at its highest speed
+    assert velocity[-1, 0] == pytest.approx(0.1, rel=1e-6)
+    assert velocity[-1, 1] < -0.02

@@ -105,18 +105,21 @@ class Controller(Deployment):
             raise BusyError("step", self.stack.robot.name, "this controller is in use by another thread; clone() it")
         try:
             self._busy = True
-            if dt is not None or self._slow:
+            if slow := dt is not None or self._slow:
                 self._prepare(q, v, dt)
             if not (type(q) is _Array and q.dtype is _FLOAT and q.shape == self._q_shape):
                 q = validation.real_array("q", q, self._q_shape)
+            if v is not None and not (type(v) is _Array and v.dtype is _FLOAT and v.shape == self._v_shape):
+                v = validation.real_array("v", v, self._v_shape)
+            if self._sensors:
+                self._sense(q)
+            # What may raise is over
             if v is not None:
-                if not (type(v) is _Array and v.dtype is _FLOAT and v.shape == self._v_shape):
-                    v = validation.real_array("v", v, self._v_shape)
                 self._v_in[:] = v
                 self._use_v[0] = 1.0
             self._q[:] = q
-            if self._sensors:
-                self._sense()
+            if slow:
+                self._advance(dt)
             if (flag := self._call()) and self.finish(flag) < 0:
                 self._refuse(q, v)
             return Step(self._snapshot(), self._context)
@@ -146,7 +149,7 @@ class Controller(Deployment):
         """
         if self._recorder is not None:
             raise RecordingError("path", str(path), f"the controller records into {self._recorder.path} already")
-        return Recorder(self, path, overwrite)
+        return Recorder(self, path, validation.flag("overwrite", overwrite))
 
     def clone(self) -> Controller:
         """Another controller of the same compiled stack, with its own memory and this one's values and last command.
@@ -160,6 +163,7 @@ class Controller(Deployment):
             getattr(out.tick, name)[:] = getattr(self.tick, name)
         out.tick.check()
         out.policy = self.policy
+        out.ramps.assume(self.ramps, out._handles)
         out._first, out._waiting, out._slow = dict(self._first), dict(self._waiting), self._slow
         return out
 
@@ -180,7 +184,7 @@ class Controller(Deployment):
             raise UnknownNameError("item", name, self._handles) from None
 
     def __contains__(self, name: object) -> bool:
-        return name in self._handles
+        return isinstance(name, str) and name in self._handles
 
     def qp(self) -> QP:
         """The QP at the buffers' present values: at the configuration of the last step (before it: the neutral one),
@@ -245,7 +249,12 @@ class Controller(Deployment):
             self.require_value(slot, f"{name}.{slot.input.name}")
 
     def pairs(self, name: str) -> tuple[tuple[str, str, float], ...]:
-        """What the sensed rows of an item were about in the last tick: names of both bodies, distance [m]."""
+        """What the sensed rows of an item were about in the last tick: names of both bodies, distance [m].
+
+        Raises:
+            UnknownNameError: no such item.
+        """
+        validation.one_of("item", name, self._handles)
         return next((sensor.pairs() for sensor, handle in self._sensors if handle.item_name == name), ())
 
     def _is_sensed(self, name: str) -> bool:
@@ -257,13 +266,13 @@ class Controller(Deployment):
         assert isinstance(item, Constraint)
         return item.sensor(self.stack.robot, {key: self.tick.p[slot.span] for key, slot in slots.items()})
 
-    def _sense(self) -> None:
+    def _sense(self, q: Array) -> None:
         """Measure what enabled items sense; not at numbers that the tick will refuse."""
-        if not np.isfinite(self._q).all():
+        if not np.isfinite(q).all():
             return
         for sensor, handle in self._sensors:
             if handle.enabled:
-                sensor.sense(self._q)
+                sensor.sense(q)
 
     # The first configuration
 
@@ -290,15 +299,20 @@ class Controller(Deployment):
     # Off the fast path
 
     def _prepare(self, q: Any, v: Any, dt: Any) -> None:
-        """Another dt than the last, or the first configuration. Everything is checked before anything is changed."""
-        low, high = self.stack.dt_range
-        step = self.stack.dt if dt is None else validation.scalar("dt", dt, low=low, high=high, unit="s")
+        """Check everything before anything is changed; the first configuration, where it is waited for."""
+        if dt is not None:
+            low, high = self.stack.dt_range
+            validation.scalar("dt", dt, low=low, high=high, unit="s")
         configuration = self.stack.robot.configuration("q", q)
         if v is not None:
             validation.real_array("v", v, self._v_shape)
         if self._waiting:
             self._initialise(self._waiting, configuration)
             self._waiting = {}
+
+    def _advance(self, dt: Any) -> None:
+        """Another dt than the last, and the ramps' next values."""
+        step = self.stack.dt if dt is None else float(dt)
         self.tick.dt[0] = step
         self.ramps.advance(step)
         self._slow = dt is not None or bool(self.ramps)

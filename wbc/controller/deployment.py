@@ -126,8 +126,9 @@ class Deployment:
         from wbc import __version__
 
         me = cast("Controller", self)
-        if isinstance(states, bool) or not isinstance(states, int) or states < 1:
+        if isinstance(states, bool) or not isinstance(states, int) or not 1 <= states < 2**31:
             raise RangeError("states", states, "expected an integer >= 1")
+        export.checked_folder(folder, overwrite)
         me.require_values()
         tick, layout, robot = self.tick, me.layout, me.stack.robot
         cost = me.row_costs.copy()

@@ -7,8 +7,9 @@ from collections.abc import Callable
 import numpy as np
 import pinocchio as pin
 
+from wbc import validation
 from wbc.controller.past import Frozen, Past
-from wbc.errors import SolverError, UnknownNameError
+from wbc.errors import SolverError
 from wbc.qp.problem import QP, Solution
 from wbc.qp.relax import Relaxed
 from wbc.qp.sensitivity import Sensitivity
@@ -101,17 +102,11 @@ def _moves(past: Past, name: str, value: str | None) -> tuple[Moves, int]:
 
     if value is None:
         own = {"q": move_q, "v": move_v}
-        if name not in own:
-            raise UnknownNameError("derivative", name, own)
-        return own[name], nv
-    if name not in past.layout.blocks:
-        raise UnknownNameError("derivative", name, past.layout.blocks)
-    block = past.layout.blocks[name]
-    if value == "weight" and block.form == "task":
+        return own[validation.one_of("derivative", name, own)], nv
+    block = past.layout.blocks[validation.one_of("derivative", name, past.layout.blocks)]
+    names = (*block.slots, "weight") if block.form == "task" else tuple(block.slots)
+    if validation.one_of(f"derivative.{name}", value, names) == "weight":
         return _weight(past, block), 1
-    if value not in block.slots:
-        names = (*block.slots, "weight") if block.form == "task" else tuple(block.slots)
-        raise UnknownNameError(f"derivative.{name}", value, names)
     return _input(past, block.slots[value])
 
 

@@ -36,6 +36,7 @@ class Search:
         self._units = np.concatenate([self._dofs, np.array(row_units(stack, layout))])
         self._best, self._cost, self._ticks = assembly.q.copy(), np.inf, 0
 
+    @np.errstate(over="ignore", invalid="ignore")
     def run(self, query: Query, seconds: float) -> Found:
         """Search from the tick's q, where the answer then is, for some seconds."""
         begin, tick = perf_counter(), self._tick

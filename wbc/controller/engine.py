@@ -19,7 +19,6 @@ from wbc.controller.starts import Starts
 from wbc.controller.step import Step
 from wbc.controller.tick import Assembly
 from wbc.controller.timeless import FIRST, TICK, chosen_goals, goal_rows, hasten, searching, timeless
-from wbc.errors import RangeError, ShapeError
 from wbc.qp.problem import QP
 from wbc.stack.declaration import Declaration
 from wbc.stack.places import stops
@@ -51,13 +50,16 @@ class Engine:
         layout, tick = self.controller.layout, self.controller.tick
         self.rows = goal_rows(self.controller, self.goals)
         self.dof_scales = layout.dof_scales(self.stack)
+        #: unit of each task row in one metre or radian, in which tolerances are given
+        self._units = np.array([row.scale(1.0) for block in layout.of_form("task") for row in block.rows])
         self.tick: Assembly = tick.assembly if isinstance(tick, SolvedTick) else tick
         self._stops = stops(self.stack, layout)
         at, lower, upper = np.array(self._stops[0]), *self._stops[1:]
         dofs = np.flatnonzero(at >= 0)
         #: coordinates with position limits: where they are in q and in ``bound_enabled``, and the limits
         self._limited = self.stack.robot.position_index[dofs], at[dofs], lower[dofs], upper[dofs]
-        self._switches, self._limits = b"", (np.zeros(0), np.zeros(0))
+        self._switches: bytes | None = None
+        self._limits = np.zeros(0), np.zeros(0)
         self._sensing = Sensing(self.controller, self.tick)
         self.search: NativeSearch | Search
         if isinstance(tick, NativeTick) and not self._sensing:
@@ -113,7 +115,7 @@ class Engine:
             self._queries[key] = Query(
                 starts=self.random(restarts, seed),
                 chosen=self.starts.chosen,
-                tolerance=np.where(rows > 0.0, tolerance, -1.0),
+                tolerance=np.where(rows > 0.0, tolerance * self._units, -1.0),
                 seeking=aims,
                 settling=aims * max(1.0, FIRST * heaviest) + wishes,
                 room=ROOM,
@@ -164,12 +166,3 @@ def ending(found: Found) -> Ending:
     if found.descents == 0:
         return Ending.OUT_OF_TIME
     return Ending.UNREACHABLE if found.cost < np.inf else Ending.CONTRADICTORY
-
-
-def count(field: str, value: Any) -> int:
-    """An integer of 0 or more."""
-    if isinstance(value, bool) or not isinstance(value, (int, np.integer)):
-        raise ShapeError(field, value, "expected an integer")
-    if value < 0:
-        raise RangeError(field, value, "expected an integer of 0 or more")
-    return int(value)

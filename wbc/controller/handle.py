@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from math import isfinite
+from math import hypot
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,7 +14,7 @@ from wbc.errors import RangeError, UnknownNameError
 from wbc.stack.layout import Block, Slot
 from wbc.tasks import inputs
 from wbc.tasks._direction import Direction
-from wbc.validation import Array
+from wbc.validation import LARGEST, Array
 
 _ARRAY, _FLOAT = np.ndarray, np.dtype(np.float64)
 _MATRIX, _SE3 = (4, 4), pin.SE3
@@ -90,7 +90,7 @@ class Handle:
             return self._mask.copy()
         if name == "weight" and self._block.form == "task":
             return self._weight
-        slot = self._slot(name)
+        slot = self.slot(name)
         self._controller.require_value(slot, self._field(name))
         return _as_written(slot, self._controller.tick.p[slot.span])
 
@@ -103,8 +103,8 @@ class Handle:
                 if name in self._poses:
                     if numbers.shape == _MATRIX and self._controller.write_pose(slot, numbers):
                         return
-                # the square is finite only if all numbers are
-                elif numbers.shape == self._plain.get(name) and isfinite(numbers.dot(numbers)):
+                # not for NaN; numpy would warn where squares overflow
+                elif numbers.shape == self._plain.get(name) and hypot(*numbers.tolist()) < LARGEST:
                     self._controller.write(slot, numbers)
                     return
             if slot.input.sensed:
@@ -170,7 +170,7 @@ class Handle:
         numbers = {name: self.checked(name, value) for name, value in values.items()}
         self._check_order(numbers)
         for name, given in numbers.items():
-            self._write(self._slot(name), given)
+            self._write(self.slot(name), given)
 
     def _write(self, slot: Slot, numbers: Array) -> None:
         if slot is self._ramped:
@@ -197,7 +197,7 @@ class Handle:
         Raises:
             WbcError: not a value of this input.
         """
-        return self._checked(self._slot(name), value)
+        return self._checked(self.slot(name), value)
 
     def _checked(self, slot: Slot, value: Any) -> Array:
         field = self._fields[slot.input.name]
@@ -242,7 +242,12 @@ class Handle:
                 raise RangeError(where, number, "a constraint's row is on (1) or off (0)")
         return mask
 
-    def _slot(self, name: str) -> Slot:
+    def slot(self, name: str) -> Slot:
+        """Where an input is in the buffer.
+
+        Raises:
+            UnknownValueError: there is no such input.
+        """
         slot: Slot | None = self._block.slots.get(name)
         if slot is None:
             raise UnknownValueError(self._field(name), name, self.names)

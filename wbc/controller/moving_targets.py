@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -37,6 +37,7 @@ class MovingTargets:
 
     def __init__(self, controller: Controller, targets: Mapping[str, Any], s: Array) -> None:
         self._p = controller.tick.p
+        targets = validation.mapping("targets", targets, "tasks to targets")
         #: between neighbouring coordinates all targets go straight
         self.smooth = not any(callable(given) for given in targets.values())
         self._parts: list[tuple[slice, Numbers]] = []
@@ -47,9 +48,9 @@ class MovingTargets:
                 numbers = _called(functools.partial(handle.checked, "target"), given)
                 numbers(float(s[0]))
             else:
-                if not isinstance(given, (Sequence, np.ndarray)) or len(given) != len(s):
-                    size = len(given) if isinstance(given, (Sequence, np.ndarray)) else given
-                    raise ShapeError(f"targets[{name}]", size, f"expected a function of s, or {len(s)} targets")
+                given = validation.items(f"targets[{name}]", given, f"{len(s)} targets, or a function of s")
+                if len(given) != len(s):
+                    raise ShapeError(f"targets[{name}]", len(given), f"expected a function of s, or {len(s)} targets")
                 values = np.array([handle.checked("target", value) for value in given])
                 numbers = _between(robot, controller.layout.blocks[name].slots["target"].input, s, values)
             self._parts.append((controller.layout.blocks[name].slots["target"].span, numbers))

@@ -11,7 +11,7 @@ import numpy as np
 
 from wbc.controller.report import INFINITE, ReportLayout
 from wbc.controller.tick import Assembly, TaskRows
-from wbc.errors import CompileError
+from wbc.errors import CompileError, SolverError
 from wbc.native.library import load_library
 from wbc.qp.problem import QP
 from wbc.stack.layout import Layout
@@ -149,14 +149,21 @@ class NativeTick(Assembly):
         return bool(self._unusable[0] == 0.0)
 
     def task_rows(self) -> TaskRows:
+        self._require_levels("task_rows")
         J = np.zeros((self._layout.task_rows, self._layout.variables))
         self._library.wbc_tick_task_rows(self.pointer, ctypes.c_void_p(J.ctypes.data))
         return TaskRows(J, self._wish.copy(), self._factor.copy())
 
     def bent(self) -> Array | None:
+        self._require_levels("bent")
         out = np.zeros((self._layout.variables, self._layout.variables))
         bends = self._library.wbc_tick_bent(self.pointer, ctypes.c_void_p(out.ctypes.data))
         return out if bends else None
+
+    def _require_levels(self, asked: str) -> None:
+        """Code of one level makes H of its rows, and keeps no rows."""
+        if not self._layout.cascade:
+            raise SolverError(asked, "one level", "only stacks with strict levels keep this; see qp()")
 
     def row_sides(self) -> tuple[Array, Array]:
         low, high = (side.copy() for side in self._sides)

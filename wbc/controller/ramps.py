@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -48,6 +49,10 @@ class Ramps:
     def start(self, handle: Handle, last: float, seconds: float) -> None:
         """From the present weight on; takes the place of a ramp of the same task."""
         self._running[handle.item_name] = Ramp(handle, handle.ramped, last, seconds)
+
+    def assume(self, other: Ramps, handles: Mapping[str, Handle]) -> None:
+        """Go on with the ramps of another controller from where they are."""
+        self._running = {name: replace(ramp, handle=handles[name]) for name, ramp in other._running.items()}
 
     def stop(self, name: str) -> None:
         """The weight stays as it is."""

@@ -9,13 +9,13 @@ import hashlib
 import json
 import logging
 import os
-import pathlib
 import pickle
 import platform
 import struct
 from importlib import metadata
 from typing import TYPE_CHECKING, Any
 
+from wbc import validation
 from wbc.controller.recording import FORMAT, RecordingError, Writer
 from wbc.stack.declaration import Declaration
 
@@ -51,7 +51,7 @@ class Recorder:
     """
 
     def __init__(self, controller: Controller, path: str | os.PathLike[str], overwrite: bool) -> None:
-        self.path = pathlib.Path(path)
+        self.path = validation.file_path("path", path)
         self.count = 0
         self._controller, self._tick = controller, controller.tick
         views = {name: getattr(self._tick, name) for name in INPUTS}

@@ -27,7 +27,8 @@ from typing import IO, Any
 
 import numpy as np
 
-from wbc.errors import UnknownNameError, WbcError
+from wbc import validation
+from wbc.errors import WbcError
 from wbc.validation import Array
 
 FORMAT = 2
@@ -122,7 +123,7 @@ class Recording:
     """
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
-        self.path = pathlib.Path(path)
+        self.path = validation.file_path("path", path)
         self.stack_pickle: bytes | None = None
         self.about: dict[str, Any] = {}
         for name, content in self._members():
@@ -174,8 +175,7 @@ class Recording:
         Raises:
             UnknownNameError: no such part.
         """
-        if name not in self.parts.slices:
-            raise UnknownNameError("part", name, self.parts.slices)
+        validation.one_of("part", name, self.parts.slices)
         part = self.parts[name]
         return np.concatenate([np.zeros((0, part.stop - part.start)), *(rows[:, part] for rows in self.chunks())])
 

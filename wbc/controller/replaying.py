@@ -17,6 +17,8 @@ from wbc.controller.recording import Recording, RecordingError
 from wbc.controller.stack import Stack
 from wbc.controller.step import Step
 from wbc.controller.unpickle import load_stack
+from wbc.errors import ShapeError
+from wbc.stack.declaration import Declaration
 from wbc.validation import Array
 
 
@@ -100,6 +102,10 @@ def replay(
         PicklingError: the stack in it cannot be read without ``trust``. CompileError: ``native`` without a compiler.
     """
     source = recording if isinstance(recording, Recording) else Recording(recording)
+    if stack is not None:
+        validation.instance("stack", stack, Declaration, "a wbc Stack")
+    if progress is not None and not callable(progress):
+        raise ShapeError("progress", progress, "expected a function of the number of ticks")
     controller = compiled(source, stack, backend=backend, trust=trust)
     count = differing = 0
     first = worst = None

@@ -71,6 +71,7 @@ class SolvedTick(Buffers):
     def qp(self) -> QP:
         return self.assembly.qp()
 
+    @np.errstate(over="ignore", invalid="ignore")
     def step(self) -> int:
         refused = self.assembly.check()
         if refused:

@@ -14,7 +14,7 @@ from wbc import validation
 from wbc.controller.batch import search_many
 from wbc.controller.branches import Branches, branches
 from wbc.controller.continuation import Branch, branch
-from wbc.controller.engine import Engine, count, ending
+from wbc.controller.engine import Engine, ending
 from wbc.controller.handle import Handle
 from wbc.controller.moving_targets import MovingTargets
 from wbc.controller.native import NativeTick
@@ -26,6 +26,9 @@ from wbc.stack.declaration import Declaration
 
 #: Share of the time that is kept for the question which goals contradict each other
 ASKING = 0.2
+
+#: Most random configurations, which are made before a search, and most threads
+RESTARTS, THREADS = 10**6, 1024
 
 
 class Solver:
@@ -77,7 +80,7 @@ class Solver:
                 number of restarts, unless the time ends the search.
             budget: time for the search [s], overrun by one iteration and the report of the answer at most; None: no
                 limit.
-            restarts: random configurations to start from after q0 at most.
+            restarts: random configurations to start from after q0 at most, 10^6 or fewer.
             tolerance: of every row of a goal, in metres and radians.
 
         Raises:
@@ -126,18 +129,19 @@ class Solver:
             WbcError: as for :meth:`solve`; ShapeError: no targets, or of different lengths.
         """
         engine, controller = self._engine, self._engine.controller
-        lengths = {name: len(values) for name, values in targets.items()}
+        given = validation.mapping("targets", targets, "tasks to targets")
+        wanted = {name: validation.items(f"targets[{name}]", values, "targets") for name, values in given.items()}
+        lengths = {name: len(values) for name, values in wanted.items()}
         if len(set(lengths.values())) != 1:
             raise ShapeError("targets", lengths, "expected targets of one length")
-        threads = count("workers", os.cpu_count() or 1 if workers is None else workers)
-        if threads < 1:
-            raise RangeError("workers", workers, "expected at least one thread")
+        threads = os.cpu_count() or 1 if workers is None else validation.integer("workers", workers, 1, THREADS)
         total = next(iter(lengths.values()))
         seconds, near, starts, number = _options(budget, tolerance, restarts, seed)
         first = engine.begin(q0)
         parameters = np.tile(engine.tick.p, (total, 1))
-        for name, values in targets.items():
-            handle, span = controller[name], controller.layout.blocks[name].slots["target"].span
+        for name, values in wanted.items():
+            handle = controller[name]
+            span = handle.slot("target").span
             for k, value in enumerate(values):
                 parameters[k, span] = handle.checked("target", value)
         query, before = engine.query(self.goals, near, starts, number), engine.tick.p.copy()
@@ -246,9 +250,7 @@ class Solver:
         """
         engine = self._engine
         seconds, near, starts, number = _options(budget, tolerance, restarts, seed)
-        wanted = count("most", sys.maxsize if most is None else most)
-        if wanted < 1:
-            raise RangeError("most", most, "expected at least one branch")
+        wanted = sys.maxsize if most is None else validation.integer("most", most, 1)
         return branches(engine, engine.begin(q0), wanted, number, seconds, starts, near)
 
 
@@ -256,4 +258,5 @@ def _options(budget: Any, tolerance: Any, restarts: Any, seed: Any) -> tuple[flo
     """Checked: seconds, tolerance, restarts, seed."""
     seconds = math.inf if budget is None else validation.scalar("budget", budget, low=0.0, open_low=True, unit="s")
     near = validation.scalar("tolerance", tolerance, low=0.0, open_low=True)
-    return seconds, near, count("restarts", restarts), count("seed", seed)
+    starts = validation.integer("restarts", restarts, 0, RESTARTS)
+    return seconds, near, starts, validation.integer("seed", seed, 0, 2**63 - 1)

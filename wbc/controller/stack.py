@@ -16,6 +16,10 @@ if TYPE_CHECKING:
     from wbc.controller.solver import Solver
 
 
+#: What :meth:`Stack.solve` hands on to :meth:`wbc.Solver.solve`
+OPTIONS = ("seed", "budget", "restarts", "tolerance")
+
+
 class Stack(Declaration):
     """Tasks and constraints on a robot.
 
@@ -86,7 +90,10 @@ class Stack(Declaration):
         Raises:
             WbcError: as these two.
         """
+        chosen = {} if targets is None else validation.mapping("targets", targets, "tasks to targets")
+        for option in options:
+            validation.one_of("option", option, OPTIONS)
         solver = self.solver(goals, backend)
-        for name, target in (targets or {}).items():
+        for name, target in chosen.items():
             solver[name].target = target
         return solver.solve(q0, **options)

@@ -72,11 +72,19 @@ class Assembly(Buffers, ABC):
 
     @abstractmethod
     def task_rows(self) -> TaskRows:
-        """Rows of all levels in the last QP."""
+        """Rows of all levels in the last QP.
+
+        Raises:
+            SolverError: a native tick of one level, whose code does not keep them.
+        """
 
     @abstractmethod
     def bent(self) -> Array | None:
-        """Curvature in H of the last QP [nv, nv], before anything made H positive definite; None for none."""
+        """Curvature in H of the last QP [nv, nv], before anything made H positive definite; None for none.
+
+        Raises:
+            SolverError: a native tick of one level, whose code does not keep it.
+        """
 
     @abstractmethod
     def row_sides(self) -> tuple[Array, Array]:

@@ -83,9 +83,10 @@ def chosen_goals(stack: Declaration, goals: Iterable[str] | None) -> tuple[str, 
     Raises:
         UnknownNameError: no such task. RangeError: none is left.
     """
+    validation.instance("stack", stack, Declaration, "a wbc Stack")
     names = [entry.name for entry in stack.tasks]
     if goals is not None:
-        chosen = tuple(dict.fromkeys((goals,) if isinstance(goals, str) else goals))
+        chosen = tuple(dict.fromkeys((goals,) if isinstance(goals, str) else validation.strings("goals", goals)))
         for name in chosen:
             validation.one_of("goals", name, names)
     else:

@@ -143,6 +143,7 @@ class VmAssembly(Assembly):
             self._q_good[:] = self.q
         return bad
 
+    @np.errstate(over="ignore", invalid="ignore")
     def qp(self) -> QP:
         """The QP at the present values; also writes errors, factors and margins to the report."""
         layout, out = self._layout, self._out

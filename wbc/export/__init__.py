@@ -1,6 +1,6 @@
 """A compiled stack as a folder of C: the tick, its solver, a header, a build and a check (floor 5)."""
 
-from wbc.export.folder import ExportError, write
+from wbc.export.folder import ExportError, checked_folder, write
 from wbc.export.snapshot import Snapshot
 
-__all__ = ["ExportError", "Snapshot", "write"]
+__all__ = ["ExportError", "Snapshot", "checked_folder", "write"]

@@ -11,6 +11,7 @@ from importlib import resources
 
 import numpy as np
 
+from wbc import validation
 from wbc.errors import WbcError
 from wbc.export.header import header
 from wbc.export.memory import bytes_of_tick
@@ -45,8 +46,7 @@ def write(
         ExportError: the folder is not empty, holds something else, or cannot be written.
         SolverSourceError: the solver cannot be had.
     """
-    place = pathlib.Path(folder).absolute()
-    _check(place, overwrite)
+    place = checked_folder(folder, overwrite)
     files = _files(snapshot, solver_source)
     try:
         place.parent.mkdir(parents=True, exist_ok=True)
@@ -67,6 +67,17 @@ def write(
     except OSError as error:
         raise ExportError("folder", str(place), f"cannot be written: {error.strerror}") from error
     return pathlib.Path(folder)
+
+
+def checked_folder(folder: str | os.PathLike[str], overwrite: bool) -> pathlib.Path:
+    """Where an export may be written.
+
+    Raises:
+        ShapeError: no path, or no flag. ExportError: the folder is not empty, or holds something else.
+    """
+    place = validation.file_path("folder", folder).absolute()
+    _check(place, validation.flag("overwrite", overwrite))
+    return place
 
 
 def _check(place: pathlib.Path, overwrite: bool) -> None:

@@ -12,6 +12,7 @@ import urllib.error
 import urllib.parse
 import urllib.request
 
+from wbc import validation
 from wbc.errors import WbcError
 from wbc.native import toolchain
 
@@ -56,7 +57,7 @@ def from_source(archive: str | os.PathLike[str] | None = None) -> dict[str, byte
     Raises:
         SolverSourceError: it cannot be read or fetched, or its hash is another.
     """
-    data = _read(pathlib.Path(archive)) if archive is not None else _fetch()
+    data = _read(validation.file_path("solver_source", archive)) if archive is not None else _fetch()
     found = hashlib.sha256(data).hexdigest()
     if found != SHA256:
         raise SolverSourceError("solver_source", found, f"the archive is not {ARCHIVE}, whose SHA-256 is {SHA256}")

@@ -59,6 +59,9 @@ def distances(robot: Robot, pairs: Sequence[tuple[Body, Body]], q: Any, pose: An
 
 def witnesses(robot: Robot, pairs: Sequence[tuple[Body, Body]], q: Any, pose: Any = None) -> tuple[Witness, ...]:
     """Distance, normal and witness points of every pair; arguments and errors as for :func:`distances`."""
+    from wbc.robot.robot import Robot  # robots measure their own pairs with this package
+
+    validation.instance("robot", robot, Robot, "a wbc Robot, see wbc.robots.load")
     outside = frozenset({OBSTACLE})
     checked = checked_pairs("pairs", robot, pairs, outside)
     configuration = robot.configuration("q", q)

@@ -78,7 +78,10 @@ def bodies_of(robot: Robot, package_dirs: Iterable[Any] = (), geometry: pin.Geom
     _, tree = read_xml(path)
     if tree.tag == "mujoco":
         return _geometry_bodies(*read_mjcf_geometry(path))
-    folders = [pathlib.Path(folder) for folder in package_dirs]
+    folders = [
+        validation.file_path("package_dirs", folder)
+        for folder in validation.items("package_dirs", package_dirs, "folders")
+    ]
     return [
         _urdf_body(str(link.get("name")), collision, path, folders)
         for link in tree.findall("link")

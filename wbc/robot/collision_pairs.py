@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import pathlib
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -119,9 +118,16 @@ def find_self_pairs(
 
     Cannot do: prove that two links never touch. The descents end in local minima.
     """
+    validation.instance("robot", robot, Robot, "a wbc Robot, see wbc.robots.load")
+    if progress is not None and not callable(progress):
+        raise ShapeError("progress", progress, "expected a function of (steps done, steps in all)")
     samples, seed = _whole("samples", samples), _whole("seed", seed)
     clearance = validation.scalar("clearance", clearance, unit="m")
-    rules = read_collisions(pathlib.Path(srdf)) if srdf is not None else CollisionRules({}, frozenset(), frozenset())
+    rules = (
+        read_collisions(validation.file_path("srdf", srdf))
+        if srdf is not None
+        else CollisionRules({}, frozenset(), frozenset())
+    )
     pairs = link_pairs(robot)
     if not any(robot.shapes.values()):
         raise MissingShapeError(

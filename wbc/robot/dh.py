@@ -56,6 +56,8 @@ class DHRow:
     def __post_init__(self) -> None:
         for key in ("a", "alpha", "d", "theta"):
             object.__setattr__(self, key, validation.scalar(f"DHRow.{key}", getattr(self, key)))
+        if not isinstance(self.name, str) or self.name:
+            validation.name("DHRow.name", self.name)
         validation.one_of("DHRow.joint", self.joint, JOINTS)
         validation.one_of("DHRow.convention", self.convention, CONVENTIONS)
         for key in ("lower", "upper", "velocity", "acceleration", "effort"):
@@ -89,6 +91,7 @@ def read_dh(rows: Sequence[DHRow], base: str | None = None, tool: Any = None) ->
         ShapeError: no rows, or something that is no :class:`DHRow`.
         DuplicateNameError: two joints of one name.
     """
+    rows = validation.items("rows", rows, "DHRow")
     if not rows or not all(isinstance(row, DHRow) for row in rows):
         raise ShapeError("rows", rows, "expected a non-empty sequence of DHRow")
     model = pin.Model()

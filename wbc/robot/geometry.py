@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import pathlib
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Any
@@ -69,7 +68,8 @@ def fit_shapes(
         robot: a robot that was read from a URDF or MJCF file, or any with ``geometry``.
         links: frames of the links to do; the shapes of the others stay as they are. Default: all links.
         kind: ``capsule``, ``spheres`` or ``convex``.
-        count: most shapes a body; default 1 capsule, 4 spheres. More are taken only where they stand out less.
+        count: most shapes a body, up to 32; default 1 capsule,
+            4 spheres. More are taken only where they stand out less.
         tolerance: fewer do where they stand out by at most this [m].
         package_dirs: folders to look for ``package://NAME/...`` in, besides the folders above the file.
         geometry: a collision model of the same links to use instead of the file's.
@@ -83,8 +83,13 @@ def fit_shapes(
     convex part; ``notes["shapes"]`` names the link and the reason. Shapes around an open mesh contain its surface. A
     capsule may stand out of a bulky link by several centimetres: look at ``excess``.
     """
-    for link in links or ():
-        robot.check_frame("links", link)
+    validation.instance("robot", robot, Robot, "a wbc Robot, see wbc.robots.load")
+    if links is not None:
+        links = validation.strings("links", links)
+        for link in links:
+            robot.check_frame("links", link)
+    if geometry is not None:
+        validation.instance("geometry", geometry, pin.GeometryModel, "a pin.GeometryModel")
     style = Style(kind, count, tolerance)
     bodies = bodies_of(robot, package_dirs, geometry)
     shapes, problems = _collect([b for b in bodies if links is None or b.link in links], style)
@@ -116,10 +121,10 @@ def convex_parts(mesh: Any, triangles: Any = None, *, scale: Any = 1.0) -> Conve
         >>> len(wbc.robots.convex_parts(np.vstack([corners, corners + 2]), faces + [[4, 5, 6], [4, 5, 7]]).parts)
         2
     """
-    factor = validation.real_array("scale", [scale] * 3 if np.ndim(scale) == 0 else scale, (3,))
+    factor = validation.ordinary_array("scale", [scale] * 3 if np.ndim(scale) == 0 else scale, (3,))
     if triangles is None:
-        return parts_of(read_mesh(pathlib.Path(mesh), factor))
-    vertices = validation.real_array("mesh", mesh)
+        return parts_of(read_mesh(validation.file_path("mesh", mesh), factor))
+    vertices = validation.ordinary_array("mesh", mesh)
     if vertices.ndim != 2 or vertices.shape[1] != 3 or len(vertices) == 0:
         raise ShapeError("mesh", vertices.shape, "expected vertices, n x 3")
     faces = np.asarray(triangles)

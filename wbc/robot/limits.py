@@ -47,7 +47,14 @@ class Limits:
         pickling.freeze(self)
 
     def override(self, **changes: Any) -> Limits:
-        """A copy with some arrays replaced; a scalar is spread over all degrees of freedom."""
-        shape = self.velocity.shape
-        spread = {k: np.broadcast_to(np.asarray(v, dtype=float), shape) for k, v in changes.items()}
+        """A copy with some arrays replaced; a scalar is spread over all degrees of freedom.
+
+        Raises:
+            UnknownNameError: no such limit. ShapeError, NotFiniteError, RangeError, BoundsError: a bad value.
+        """
+        spread = {}
+        for name, change in changes.items():
+            validation.one_of("limit", name, [f.name for f in fields(self)])
+            array = validation.real_array(f"limits.{name}", change, finite=False)
+            spread[name] = np.full(self.velocity.shape, float(array)) if array.ndim == 0 else array
         return replace(self, **spread)

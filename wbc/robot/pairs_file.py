@@ -13,7 +13,6 @@ one, ``hand``; ``distance`` [m] and ``detail`` (the SRDF file's reason) are for 
 
 from __future__ import annotations
 
-import pathlib
 import tomllib
 from collections.abc import Mapping
 from typing import Any
@@ -34,6 +33,8 @@ def save_self_pairs(found: SelfPairs, path: Any) -> None:
     Raises:
         RobotFileError: the file cannot be written.
     """
+    validation.instance("found", found, SelfPairs, "what find_self_pairs gives")
+    file = validation.file_path("path", path)
     lines = [
         "# Pairs of links: those with keep = true must not touch each other. Reasons:",
         *(f"#   {reason}: {meaning}" for reason, meaning in REASONS.items() if reason in found.counts()),
@@ -45,7 +46,6 @@ def save_self_pairs(found: SelfPairs, path: Any) -> None:
         *(f"  {{ {_fields(pair)} }}," for pair in found.pairs),
         "]",
     ]
-    file = pathlib.Path(path)
     try:
         file.write_text("\n".join(lines) + "\n", encoding="utf-8")
     except OSError as error:
@@ -62,7 +62,8 @@ def read_self_pairs(path: Any, robot: Robot) -> SelfPairs:
         DuplicateNameError: a pair that stands there twice, in either order, or a link with itself.
         ShapeError, RangeError, NotFiniteError: a bad value. All name the file, the line and the field.
     """
-    file = pathlib.Path(path)
+    file = validation.file_path("path", path)
+    validation.instance("robot", robot, Robot, "a wbc Robot, see wbc.robots.load")
     try:
         text = file.read_text(encoding="utf-8")
         tree = tomllib.loads(text)

@@ -194,8 +194,9 @@ class Robot:
         """A copy with one more frame, fixed to ``parent`` at ``placement`` (default: identity).
 
         Raises:
-            DuplicateNameError, UnknownNameError, RotationError.
+            DuplicateNameError, UnknownNameError, ShapeError, NotFiniteError, RotationError.
         """
+        validation.name("frame", name)
         if name in self.frame_names:
             raise DuplicateNameError("frame", name, "a frame of this name exists")
         self.check_frame("parent", parent)
@@ -266,11 +267,14 @@ class Robot:
         """A copy with other link shapes. Where other links have shapes than before, ``self_pairs`` must be chosen anew.
 
         Raises:
-            UnknownNameError: a link frame that does not exist.
+            UnknownNameError: a link frame that does not exist. ShapeError: no mapping of names to placed shapes.
         """
-        for frame in shapes:
+        new = {}
+        for frame, placed in validation.mapping("shapes", shapes, "links to placed shapes").items():
             self.check_frame("shapes", frame)
-        new = {k: tuple(v) for k, v in shapes.items()}
+            new[frame] = validation.items(f"shapes[{frame}]", placed, "placed shapes")
+            for shape in new[frame]:
+                validation.instance(f"shapes[{frame}]", shape, PlacedShape, "a PlacedShape")
         same = {k for k, v in new.items() if v} == {k for k, v in self.shapes.items() if v}
         return replace(self, shapes=new, self_pairs=self.self_pairs if same else None)
 
@@ -283,12 +287,15 @@ class Robot:
         """
         if pairs is None:
             return replace(self, self_pairs=None)
-        for pair in pairs:
-            if isinstance(pair, str) or len(pair) != 2:
+        chosen: list[tuple[str, str]] = []
+        for pair in validation.items("self_pairs", pairs, "pairs of link names"):
+            links = validation.strings("self_pairs", pair)
+            if len(links) != 2:
                 raise ShapeError("self_pairs", pair, "expected pairs of link names")
-        for link in dict.fromkeys(link for pair in pairs for link in pair):
+            chosen.append((links[0], links[1]))
+        for link in dict.fromkeys(link for pair in chosen for link in pair):
             self.check_frame("self_pairs", link)
-        return replace(self, self_pairs=tuple((str(a), str(b)) for a, b in pairs))
+        return replace(self, self_pairs=tuple(chosen))
 
     @cached_property
     def fingerprint(self) -> str:

@@ -21,6 +21,10 @@ from wbc.validation import Array
 COUNTS = {"capsule": 1, "spheres": 4, "convex": 1}
 
 
+#: Shapes around one body at most
+MOST = 32
+
+
 @dataclass(frozen=True)
 class Style:
     """How bodies become shapes.
@@ -43,8 +47,8 @@ class Style:
         if self.count is not None:
             if isinstance(self.count, bool) or not isinstance(self.count, int):
                 raise ShapeError("count", self.count, "expected a whole number")
-            if self.count < 1:
-                raise RangeError("count", self.count, "expected 1 or more")
+            if not 1 <= self.count <= MOST:
+                raise RangeError("count", self.count, f"expected 1 to {MOST}")
             if self.kind == "convex":
                 raise RangeError("count", self.count, "convex parts are as many as the mesh has")
         validation.scalar("tolerance", self.tolerance, low=0.0, unit="m")

@@ -186,8 +186,8 @@ def row_orders(layout: Layout) -> list[int]:
 
 def row_units(stack: Declaration, layout: Layout) -> list[float]:
     """Size of a violation that counts as one, per general row: the characteristic length for metres."""
-    rows = [r for b in layout.of_form("margins", "rows") for r in b.rows]
-    return [stack.length if r.unit.split("/")[0] == "m" else 1.0 for r in rows]
+    rows = [row for b in layout.of_form("margins", "rows") for row in b.rows]
+    return [row.scale(stack.length) for row in rows]
 
 
 def bound_sequence(layout: Layout) -> list[int]:

@@ -10,6 +10,7 @@ from wbc import pickling, validation
 from wbc.errors import DuplicateNameError, LevelError, PicklingError, RangeError, ShapeError, UnknownNameError
 from wbc.robot import Robot
 from wbc.stack.parts import inner_items
+from wbc.tasks import inputs
 from wbc.tasks._direction import DIRECTION_PRICE, Direction
 from wbc.tasks.base import Constraint, Item, Order, Task
 from wbc.tasks.mechanism import Mechanism
@@ -143,7 +144,8 @@ class Declaration:
             level: of a task, an integer >= 0: lower numbers first, and later levels never disturb earlier ones,
                 see docs/levels.md. A constraint is hard at level 0; at a level k > 0 its violation is minimised there.
             weight: of a task against the others of its level, >= 0; the cost of a row is
-                weight * (rate error / scale)^2 with scale = characteristic length for rows in metres, else 1.
+                weight * (rate error / scale)^2 with scale = characteristic length for rows in metres, else 1, see
+                :data:`wbc.tasks.units.UNITS` for other units.
             hard: of a constraint; False: its rows give way before those of any hard one, see the order of sacrifice.
             soft: of a constraint, its price >= 0: a row that is violated by x costs price * (x / scale)^2, as much as a
                 task row of that weight that misses its rate by x. The first value of the input ``price``.
@@ -182,6 +184,7 @@ class Declaration:
             kept = self._free_name(f"{chosen} direction")
             added.append(Entry(Direction(chosen, item), kept, level, 1.0, True, number * DIRECTION_PRICE))
         item.validate(self._robot)
+        _check_values(item, self._robot)
         self._entries |= {entry.name: entry for entry in added}
         return self
 
@@ -199,7 +202,7 @@ class Declaration:
             raise UnknownNameError("item", name, self._entries) from None
 
     def __contains__(self, name: object) -> bool:
-        return name in self._entries
+        return isinstance(name, str) and name in self._entries
 
     def __len__(self) -> int:
         return len(self._entries)
@@ -230,6 +233,17 @@ class Declaration:
             "calm": self._calm,
             "items": [[e.name, e.level, e.item.declaration(self._robot), *_softness(e)] for e in self.entries],
         }
+
+
+def _check_values(item: Item, robot: Robot) -> None:
+    """Rows can be made, which checks their units, and first values of inputs are values of theirs."""
+    item.rows(robot)
+    kind = type(item).__name__
+    if isinstance(item, Task) and item.gain is not None:
+        validation.scalar(f"{kind}.gain", item.gain, low=0.0, unit="1/s")
+    for declared in item.inputs(robot):
+        if declared.default is not None:
+            inputs.flat(robot, f"{kind}.{declared.name}", declared, declared.default)
 
 
 def soft_rows(entry: Entry, robot: Robot) -> int:

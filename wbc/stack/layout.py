@@ -157,12 +157,11 @@ class Layout:
         return slice(self._ends[place - 1] if place else 0, self._ends[place])
 
     def row_scales(self, stack: Declaration) -> np.ndarray:
-        """Scale of each task row: the characteristic length for rows in metres, 1 for others."""
+        """Scale of each task row: the characteristic length for rows in metres, see :meth:`Row.scale`."""
         scales = np.ones(self.task_rows)
         for block in self.of_form("task"):
             for k, row in enumerate(block.rows):
-                if row.unit.split("/")[0] == "m":
-                    scales[block.start + k] = stack.length
+                scales[block.start + k] = row.scale(stack.length)
         return scales
 
     def dof_scales(self, stack: Declaration) -> np.ndarray:

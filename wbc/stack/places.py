@@ -8,7 +8,7 @@ from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Layout
 from wbc.stack.program import Program
 from wbc.tasks._direction import Direction
-from wbc.tasks.base import Constraint
+from wbc.tasks.base import Constraint, Row
 
 #: What a direction that a level leaves to later ones may cost its rows at full joint speed, in their unit per second
 DISTURBANCE = 1e-6
@@ -53,8 +53,13 @@ def told_slacks(stack: Declaration, layout: Layout) -> list[float]:
     for block in layout.of_form("margins", "rows"):
         least = DIRECTION_TOLD if isinstance(block.entry.item, Direction) else SOFT_TOLD
         for k, row in enumerate(block.rows):
-            out[block.start + k] = least * (stack.length if row.unit.split("/")[0] == "m" else 1.0)
+            out[block.start + k] = least * row.scale(stack.length)
     return out
+
+
+def _lever(stack: Declaration, row: Row) -> float:
+    """Twice the scale of rows of lengths, that of others as it is."""
+    return row.scale(2.0 * stack.length)
 
 
 def pull_scales(stack: Declaration, layout: Layout, program: Program) -> list[float]:
@@ -64,7 +69,7 @@ def pull_scales(stack: Declaration, layout: Layout, program: Program) -> list[fl
     scales = np.zeros(layout.task_rows)
     if program.bend is not None:
         for block in layout.of_form("task"):
-            scales[block.span] = [2.0 * stack.length if r.unit.split("/")[0] == "m" else 1.0 for r in block.rows]
+            scales[block.span] = [_lever(stack, row) for row in block.rows]
         scales *= np.diff(program.bend.jac_sparsity(0, 4).colind()) > 0
     return scales.tolist()
 

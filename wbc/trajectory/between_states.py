@@ -108,16 +108,16 @@ def sizes_of(limits: Limits) -> tuple[Array, Array, Array]:
 
 
 def _for_all(name: str, value: Any, dof: int, finite: bool = False) -> Array:
-    raw = validation.real_array(name, value, finite=finite)
-    return np.full(dof, float(raw)) if raw.ndim == 0 else validation.real_array(name, value, (dof,), finite=finite)
+    raw = validation.ordinary_array(name, value, finite=finite)
+    return np.full(dof, float(raw)) if raw.ndim == 0 else validation.ordinary_array(name, value, (dof,), finite=finite)
 
 
 def _state(name: str, position: Any, velocity: Any, acceleration: Any, dof: int | None) -> Array:
-    place = np.atleast_1d(validation.real_array(name, position))
+    place = np.atleast_1d(validation.ordinary_array(name, position))
     shape = (len(place) if dof is None else dof,)
-    rows = [validation.real_array(name, place, shape)]
+    rows = [validation.ordinary_array(name, place, shape)]
     for part, value in (("velocity", velocity), ("acceleration", acceleration)):
-        rows.append(np.zeros(shape) if value is None else validation.real_array(f"{name}_{part}", value, shape))
+        rows.append(np.zeros(shape) if value is None else validation.ordinary_array(f"{name}_{part}", value, shape))
     return np.stack(rows)
 
 

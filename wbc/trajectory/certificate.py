@@ -10,10 +10,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Literal, Protocol
+from typing import Any, Literal, Protocol
 
 import numpy as np
 
+from wbc import validation
+from wbc.errors import ShapeError
 from wbc.trajectory import bernstein
 from wbc.trajectory.between import Highest, highest
 from wbc.trajectory.limits import Limits
@@ -53,6 +55,19 @@ class Check(Protocol):
     def ratios(self, position: Array, velocity: Array, acceleration: Array) -> Array:
         """m x k numbers that are at most 1 where the limits are kept, at m states (m x n, or m x 4 x 4)."""
         ...
+
+
+def all_checks(checks: Any) -> tuple[Check, ...]:
+    """Checks as they were given.
+
+    Raises:
+        ShapeError: something that has no ``name``, ``columns`` and ``ratios``.
+    """
+    out = validation.items("checks", checks, "checks")
+    for check in out:
+        if isinstance(check, type) or not all(hasattr(check, part) for part in ("name", "columns", "ratios")):
+            raise ShapeError("checks", check, "expected a check: name, columns and ratios")
+    return out
 
 
 @dataclass(frozen=True)

@@ -172,11 +172,11 @@ class Inequality:
     name: str = "inequality"
 
     def __post_init__(self) -> None:
-        matrix = validation.real_array(f"{self.name}.F", self.matrix)
+        matrix = validation.ordinary_array(f"{self.name}.F", self.matrix)
         if matrix.ndim != 2:
             raise ShapeError(f"{self.name}.F", self.matrix, "expected a matrix")
         object.__setattr__(self, "matrix", matrix)
-        object.__setattr__(self, "bound", validation.real_array(f"{self.name}.g", self.bound, (len(matrix),)))
+        object.__setattr__(self, "bound", validation.ordinary_array(f"{self.name}.g", self.bound, (len(matrix),)))
 
     @property
     def columns(self) -> int:
@@ -195,7 +195,8 @@ class Inequality:
         """m x k."""
         shape = (self.matrix.shape[1],)
         states = zip(position, velocity, acceleration, strict=True)
-        w = [validation.real_array(f"{self.name}.function", self.function(*s), shape) for s in states]
+        field = f"{self.name}.function"
+        w = [validation.ordinary_array(field, self.function(*s), shape) for s in states]
         rows = np.array(w).reshape(-1, *shape) @ self.matrix.T
         return np.asarray(1.0 + (rows - self.bound) / self._size)
 

@@ -70,6 +70,15 @@ class Course:
             time += span
         return low, high
 
+    def fastest(self) -> float:
+        """The highest speed, exact: at ends of phases and where a = 0."""
+        out = abs(self.start[1])
+        for point, jerk, span in zip(self._points, self.jerks, self.spans, strict=False):
+            top = -point[2] / jerk if jerk else 0.0
+            places = (top, span) if 0.0 < top < span else (span,)
+            out = max(out, *(abs(moved(point, jerk, u)[1]) for u in places))
+        return out
+
     def then(self, spans: tuple[float, ...], jerks: tuple[float, ...]) -> Course:
         """With further phases; those without duration are left out."""
         some = [(t, j) for t, j in zip(spans, jerks, strict=True) if t > 0.0]
@@ -110,23 +119,26 @@ def stop(point: Point, acceleration: float, jerk: float) -> Course:
     return Course(start, (), ()).then(*lead).then(spans, (-sign * jerk, 0.0, sign * jerk))
 
 
-def hard_stop(point: Point, acceleration: float, jerk: float) -> Course:
-    """To v = 0 with the least way, whatever the acceleration is then, and from there to rest.
+def hard_stop(point: Point, acceleration: float, jerk: float, left: float = math.inf) -> Course:
+    """To v = 0 with the least way, with a deceleration of at most ``left`` then, and from there to rest.
 
-    The least way: jerk against the motion down to the largest deceleration, which is held until v = 0.
+    The least way: jerk against the motion down to the deceleration d, d^2 = min(A^2, j v + (a^2 + left^2)/2), hold, and
+    up to ``left`` where v = 0. Taking that back moves the joint at up to left^2/2j the other way.
     """
     _, v, a = point
     if v == 0.0 or abs(a) > acceleration:
         return stop(point, acceleration, jerk)
     sign = math.copysign(1.0, v)
     v, a = abs(v), sign * a
-    ramp = (a + acceleration) / jerk
-    left = v + ramp * (a - 0.5 * jerk * ramp)
-    if left > 0.0:
-        spans: tuple[float, float] = (ramp, left / acceleration)
+    end = min(left, acceleration)
+    deepest = math.sqrt(max(jerk * v + 0.5 * (a * a + end * end), 0.0))
+    if deepest >= max(end, -a):
+        hold = max((v + 0.5 * (a * a + end * end) / jerk) / acceleration - acceleration / jerk, 0.0)
+        deepest = min(deepest, acceleration)
+        spans = (a + deepest) / jerk, hold, (deepest - end) / jerk
     else:
-        spans = (min((u for u in _zeros(-0.5 * jerk, a, v) if u > 0.0), default=0.0), 0.0)
-    first = Course(point, (), ()).then(spans, (-sign * jerk, 0.0))
+        spans = min((u for u in _zeros(-0.5 * jerk, a, v) if u > 0.0), default=0.0), 0.0, 0.0
+    first = Course(point, (), ()).then(spans, (-sign * jerk, 0.0, sign * jerk))
     after = stop(first.points()[-1], acceleration, jerk)
     return first.then(after.spans, after.jerks)
 

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib
 import os
 import zipfile
 import zlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
-from pathlib import Path as FilePath
 from typing import Any
 
 import numpy as np
 
+from wbc import validation
 from wbc.errors import LawFileError, WbcError
-from wbc.trajectory.certificate import Check
+from wbc.trajectory.certificate import Check, all_checks
 from wbc.trajectory.law import Law
 from wbc.trajectory.limits import Limits
 from wbc.trajectory.timing import Timing
@@ -79,6 +80,7 @@ def save(law: Law, file: str | os.PathLike[str]) -> None:
     Raises:
         LawFileError: the file cannot be written, or the path is of a kind that files do not hold.
     """
+    target = validation.file_path("file", file)
     arrays = {"format": np.array(FORMAT), "moving": np.array(law.moving)}
     arrays |= {"timing.times": law.timing.times, "timing.coefficients": law.timing.coefficients}
     for field in fields(law.limits):
@@ -86,14 +88,16 @@ def save(law: Law, file: str | os.PathLike[str]) -> None:
         if value is not None:
             arrays[f"limits.{field.name}"] = value
     _put(arrays, "path", law.path)
-    target = FilePath(file)
+    if not target.name:
+        raise LawFileError("file", str(target), "is a folder")
     partial = target.with_name(f"{target.name}.{os.getpid()}.part")
     try:
         with partial.open("wb") as stream:
             np.savez(stream, **arrays)  # type: ignore[arg-type]
         partial.replace(target)
     except OSError as error:
-        partial.unlink(missing_ok=True)
+        with contextlib.suppress(OSError):
+            partial.unlink(missing_ok=True)
         raise LawFileError("file", str(target), f"cannot be written: {error.strerror}") from error
 
 
@@ -106,9 +110,10 @@ def load(file: str | os.PathLike[str], checks: Sequence[Check] = ()) -> Law:
     Raises:
         LawFileError: no such file, not of a law, damaged, or of another format.
     """
-    name = str(file)
+    source, name = validation.file_path("file", file), str(file)
+    checks = all_checks(checks)
     try:
-        with FilePath(file).open("rb") as stream:
+        with source.open("rb") as stream:
             archive = np.load(stream, allow_pickle=False)
             if not isinstance(archive, np.lib.npyio.NpzFile):
                 raise LawFileError("file", name, "not a saved law: one array")

@@ -13,7 +13,8 @@ from wbc import validation
 from wbc.controller import Stack
 from wbc.controller.continuation import Tracker
 from wbc.controller.engine import Engine
-from wbc.errors import RangeError, ShapeError, UnknownNameError
+from wbc.errors import RangeError, ShapeError
+from wbc.stack.declaration import Declaration
 from wbc.tasks import EndEffector
 from wbc.trajectory.path import Path, PolynomialPath
 from wbc.validation import Array
@@ -101,15 +102,15 @@ class _Seeker:
     """Configurations at one pose after the other, and how far the frame is off between them."""
 
     def __init__(self, stack: Stack, poses: Path, task: str, tolerance: float) -> None:
-        if poses.space != "poses":
+        validation.instance("stack", stack, Declaration, "a wbc Stack")
+        if validation.instance("poses", poses, Path, "a path of poses").space != "poses":
             raise ShapeError("poses", poses.space, "expected a path of poses")
         if stack.robot.nq != stack.robot.nv:
             raise ShapeError(
                 "stack.robot", stack.robot.name, "has joints of several coordinates; a path needs one each"
             )
         names = [e.name for e in stack.tasks if isinstance(e.item, EndEffector) and e.item.kind == "pose"]
-        if task not in names:
-            raise UnknownNameError("task", task, names)
+        validation.one_of("task", task, names)
         self.poses, self.robot, self.data = poses, stack.robot, stack.robot.model.createData()
         self.near, self.turned = tolerance, tolerance / stack.length
         self.engine = Engine(stack, (task,), "auto")

@@ -44,7 +44,7 @@ class FunctionPath(PolynomialPath):
 
     def argument(self, s: Any) -> Array:
         """What the function is asked for at coordinates s: start + (end - start) s / length."""
-        places = validation.real_array("s", s)
+        places = validation.ordinary_array("s", s)
         return np.asarray(self.start + (self.end - self.start) * ((places - self.knots[0]) / self.length))
 
 
@@ -103,7 +103,7 @@ class _Samples:
             x = self.argument(u)
             field = f"path.function({x:.6g})"
             value = self.function(x)
-            numbers = validation.real_array(field, value, self._shape, finite=False)
+            numbers = validation.ordinary_array(field, value, self._shape, finite=False)
             if numbers.ndim != 1 or not len(numbers):
                 raise ShapeError(field, value, "expected one number for each joint")
             if not np.isfinite(numbers).all():

@@ -14,6 +14,9 @@ from wbc.validation import Array
 #: Duration of a law that has nowhere to go [s]: laws have a duration, and this one is short
 STILL = 1e-6
 
+#: Change of a direction that limits do not notice
+NEARLY = 1e-9
+
 
 def standing(position: Array, limits: Limits) -> Law:
     """The law that stays where it is, for a microsecond."""
@@ -65,8 +68,12 @@ def along_line(course: Course, direction: Array, begin: Array, end: Array, limit
         point = moved(point, jerk, span)
         times.append(times[-1] + span)
     low, high = lowest - room, highest + room
-    if np.abs(start + direction * point[0] - end[0]).max() < 1e-9 * (high - low) and point[0] != 0.0:
-        direction = (end[0] - start) / point[0]
+    # Rounding of the course is made up for by the direction, unless its end is so near the start that little would
+    # be much: limits along the line are those of the direction
+    if abs(point[0]) > NEARLY * (high - low):
+        met = (end[0] - start) / point[0]
+        if np.abs(met - direction).max() <= NEARLY:
+            direction = met
     path = PolynomialPath([low, high], [[direction], [start + low * direction]])
     moving = (any(course.start[1:]), ends_moving)
     return Law(path, Timing(times, np.array(rows).T), limits, moving=moving)

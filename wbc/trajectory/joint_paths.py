@@ -28,7 +28,7 @@ def standing_path(position: Any) -> PolynomialPath:
     Raises:
         ShapeError, NotFiniteError: not n finite numbers.
     """
-    place = validation.real_array("path.position", position)
+    place = validation.ordinary_array("path.position", position)
     if place.ndim != 1 or not len(place):
         raise ShapeError("path.position", position, "expected one number for each joint")
     return PolynomialPath([0.0, 1.0], place[None, None])
@@ -42,10 +42,10 @@ def straight_path(start: Any, end: Any) -> PolynomialPath:
     Raises:
         ShapeError, NotFiniteError: not two vectors of n finite numbers. RangeError: too far apart.
     """
-    first = validation.real_array("path.start", start)
+    first = validation.ordinary_array("path.start", start)
     if first.ndim != 1:
         raise ShapeError("path.start", start, "expected one number for each joint")
-    last = validation.real_array("path.end", end, first.shape)
+    last = validation.ordinary_array("path.end", end, first.shape)
     points, lengths = joint_waypoints("path", np.array([first, last]))
     if len(points) == 1:
         return standing_path(points[0])

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wbc import validation
-from wbc.errors import ContinuityError, RangeError
-from wbc.trajectory.certificate import Certificate, Check, certify, chain
+from wbc.errors import ContinuityError, RangeError, ShapeError
+from wbc.trajectory.certificate import Certificate, Check, all_checks, certify, chain
 from wbc.trajectory.limits import Limits
 from wbc.trajectory.path import Index, JoinedPath, Path, Space
 from wbc.trajectory.timing import Timing
@@ -62,8 +62,11 @@ class Law:
         checks: Sequence[Check] = (),
         moving: tuple[bool, bool] = (False, False),
     ) -> None:
-        self.path, self.timing, self.checks, self.moving = path, timing, tuple(checks), moving
-        self.limits = (limits or Limits()).for_dof(path.dof)
+        self.path = validation.instance("law.path", path, Path, "a Path")
+        self.timing = validation.instance("law.timing", timing, Timing, "a Timing")
+        self.checks, self.moving = all_checks(checks), _two_flags("law.moving", moving)
+        given = Limits() if limits is None else validation.instance("limits", limits, Limits, "trajectory.Limits")
+        self.limits = given.for_dof(path.dof)
         _check_within(path, timing)
 
     @property
@@ -87,7 +90,7 @@ class Law:
         Raises:
             ShapeError, NotFiniteError: not numbers, or not finite.
         """
-        times = validation.real_array("t", t)
+        times = validation.ordinary_array("t", t)
         flat = np.clip(np.atleast_1d(times).ravel(), 0.0, self.duration)
         parts = [self._derivative(flat, order) for order in (0, 1, 2)]
         outside = (np.atleast_1d(times).ravel() < 0.0) | (np.atleast_1d(times).ravel() > self.duration)
@@ -97,7 +100,7 @@ class Law:
 
     def jerk(self, t: Any) -> Array:
         """Derivative of the acceleration, where it has one [per s^3]."""
-        times = validation.real_array("t", t)
+        times = validation.ordinary_array("t", t)
         flat = np.clip(np.atleast_1d(times).ravel(), 0.0, self.duration)
         return self._derivative(flat, 3).reshape(*times.shape, self.dof)
 
@@ -158,7 +161,7 @@ class Law:
         Raises:
             ShapeError: of another kind. ContinuityError: they do not meet.
         """
-        path = JoinedPath(self.path, other.path)
+        path = JoinedPath(self.path, validation.instance("other", other, Law, "a Law").path)
         here, there = self.at(self.duration), other.at(0.0)
         for name in ("position", "velocity"):
             off = float(np.abs(getattr(here, name) - getattr(there, name)).max())
@@ -179,6 +182,13 @@ class Law:
         from wbc.trajectory import files
 
         files.save(self, file)
+
+
+def _two_flags(field: str, value: Any) -> tuple[bool, bool]:
+    flags = [validation.flag(field, each) for each in validation.items(field, value, "two flags")]
+    if len(flags) != 2:
+        raise ShapeError(field, value, "expected two flags")
+    return flags[0], flags[1]
 
 
 def _check_within(path: Path, timing: Timing) -> None:

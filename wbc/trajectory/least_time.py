@@ -134,22 +134,23 @@ def _standing(task: Task, duration: float | None) -> Law:
 
 def _limits(path: Path, limits: Limits | None, velocity: Any, acceleration: Any) -> Limits:
     """Limits with numbers spread over the joints."""
-    out = (limits or Limits()).for_dof(path.dof)
+    given = Limits() if limits is None else validation.instance("limits", limits, Limits, "trajectory.Limits")
+    out = given.for_dof(path.dof)
     if out.jerk is not None and np.isfinite(out.jerk).any():
         raise RangeError("limits.jerk", out.jerk, "laws of least time step in acceleration, see jerk_limited")
-    given = {"velocity": velocity, "acceleration": acceleration}
-    return replace(out, **{k: _spread(k, v, path.dof) for k, v in given.items() if v is not None})
+    own = {"velocity": velocity, "acceleration": acceleration}
+    return replace(out, **{k: _spread(k, v, path.dof) for k, v in own.items() if v is not None})
 
 
 def _spread(name: str, value: Any, count: int) -> Array:
     """A positive number, or one for each joint, as one for each joint; inf is no limit."""
-    out = validation.real_array(name, value, finite=False)
+    out = validation.ordinary_array(name, value, finite=False)
     if out.ndim == 0:
         out = np.full(count, float(out))
     if out.shape != (count,):
         raise ShapeError(name, value, f"expected a number or {count} numbers")
-    if not (out > 0.0).all():
-        raise RangeError(name, value, "limits must be positive numbers")
+    if not (out >= validation.SMALLEST).all():
+        raise RangeError(name, value, f"limits must be positive numbers, at least {validation.SMALLEST:g}")
     return out
 
 
@@ -157,6 +158,8 @@ def _checks(
     path: Path, robot: Robot | None, torque: Any, speed: Mapping[str, float] | None, inequality: Any
 ) -> tuple[tuple[Check, ...], tuple[Force, ...]]:
     """Checks of speeds, and of forces."""
+    if speed is not None:
+        speed = validation.mapping("cartesian_speed", speed, "frames or parts to speeds")
     speeds: list[Check] = []
     forces: list[Force] = []
     if speed and path.space == "poses":
@@ -178,6 +181,7 @@ def _checks(
 def _robot(name: str, path: Path, robot: Robot | None) -> Robot:
     if robot is None:
         raise ShapeError("robot", None, f"{name} needs one")
+    validation.instance("robot", robot, Robot, "a wbc Robot, see wbc.robots.load")
     if path.space != "joints" or path.dof != robot.nv:
         raise ShapeError("path", path.dof, f"{name} needs a path of the robot's {robot.nv} coordinates")
     return robot

@@ -42,6 +42,8 @@ class Limits:
             sizes[field.name] = len(array)
             if field.name not in ("lower", "upper") and not (array > 0.0).all():
                 raise RangeError(name, value, "limits must be positive")
+            if field.name not in ("lower", "upper") and (array < validation.SMALLEST).any():
+                raise RangeError(name, value, f"limits must be at least {validation.SMALLEST:g}")
         if len(set(sizes.values())) > 1:
             raise ShapeError("limits", sizes, "limits of different numbers of joints")
         if (self.lower is None) != (self.upper is None):
@@ -64,19 +66,25 @@ class Limits:
         Raises:
             ShapeError: they are not.
         """
+        validation.integer("dof", dof, 1)
         if self.dof not in (None, dof):
             raise ShapeError("limits", self.dof, f"expected limits of {dof} joints")
         return self
 
     def scaled(self, factor: float) -> Limits:
-        """Velocities, accelerations and jerks times a factor, positions as they are."""
+        """Velocities, accelerations and jerks times a factor, positions as they are.
+
+        Raises:
+            ShapeError, NotFiniteError, RangeError: not a positive number, or one that makes limits 0 or infinite.
+        """
+        factor = validation.scalar("factor", factor, low=0.0, open_low=True)
         parts = {name: getattr(self, name) for name in ("velocity", "acceleration", "jerk")}
         return Limits(self.lower, self.upper, **{k: None if v is None else v * factor for k, v in parts.items()})
 
 
 def _vector(name: str, value: Any) -> Array:
     """A vector without NaN; infinite entries are no limits."""
-    out = validation.real_array(name, value, finite=False)
+    out = validation.ordinary_array(name, value, finite=False)
     out = np.atleast_1d(out)
     if out.ndim != 1 or np.isnan(out).any():
         raise ShapeError(name, value, "expected a vector without NaN")

@@ -80,7 +80,8 @@ class Online:
         self.dt = dt
         self.status: Status = "reached"
         self.clipped = False
-        self._refusal = ruckig.RuckigError
+        # A ValueError: its binding does not know the code of the refusal of motions that take longer than 7e3 s
+        self._refusals = (ruckig.RuckigError, ValueError)
         self._done = ruckig.Result.Finished
         self._modes = ruckig.ControlInterface
         names = {"time": ruckig.Synchronization.Time, "phase": ruckig.Synchronization.Phase}
@@ -113,13 +114,13 @@ class Online:
             ShapeError, NotFiniteError: not n finite numbers. BoundsError: a position outside its limits. RangeError: a
             velocity or an acceleration beyond its limit.
         """
-        rows = [validation.real_array("position", position, (self.dof,))]
+        rows = [validation.ordinary_array("position", position, (self.dof,))]
         low, high = self._walls.lower, self._walls.upper
         if ((rows[0] < low) | (rows[0] > high)).any():
             raise BoundsError("position", position, f"expected within {low.tolist()} and {high.tolist()}")
         sizes = sizes_of(self._limits)
         for name, value, limit in (("velocity", velocity, sizes[0]), ("acceleration", acceleration, sizes[1])):
-            row = np.zeros(self.dof) if value is None else validation.real_array(name, value, (self.dof,))
+            row = np.zeros(self.dof) if value is None else validation.ordinary_array(name, value, (self.dof,))
             if (np.abs(row) > limit).any():
                 raise RangeError(name, value, f"expected at most {limit.tolist()} in size")
             rows.append(row)
@@ -136,7 +137,7 @@ class Online:
         """
         if velocity is None and self._plain and type(position) is np.ndarray and self._only_place(position):
             return
-        place = validation.real_array("target.position", position, (self.dof,))
+        place = validation.ordinary_array("target.position", position, (self.dof,))
         speed = None if velocity is None else self._speed("target.velocity", velocity)
         self._kind, self._place, self._pace = "position", place.tolist(), np.zeros(self.dof) if speed is None else speed
         self._aim()
@@ -173,7 +174,7 @@ class Online:
         answer, walls = self._answer, self._walls
         try:
             done = self._ruckig.update(self._asked, answer) is self._done
-        except self._refusal:
+        except self._refusals:
             p, v, a = self._recovered()
             self.status = "recovered"
             self._put([p, v, a])
@@ -212,7 +213,7 @@ class Online:
         return True
 
     def _speed(self, name: str, value: Any) -> Array:
-        row = validation.real_array(name, value, (self.dof,))
+        row = validation.ordinary_array(name, value, (self.dof,))
         limit = sizes_of(self._limits)[0]
         if (np.abs(row) > limit).any():
             raise RangeError(name, value, f"expected at most {limit.tolist()} in size")

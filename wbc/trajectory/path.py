@@ -50,6 +50,25 @@ class Path(ABC):
         taken; without it, the piece that begins at the knot.
         """
 
+    def places(self, s: Any, order: Any, piece: Any) -> tuple[Array, Index]:
+        """Checked: coordinates on the path, and the number of the piece of each.
+
+        Raises:
+            ShapeError, NotFiniteError, RangeError: not numbers in one row, no order of 0 to 3, no pieces.
+        """
+        validation.integer("order", order, 0, 3)
+        ready = type(s) is np.ndarray and s.dtype == np.float64 and s.ndim == 1 and np.isfinite(s).all()
+        if not ready:
+            s = validation.ordinary_array("s", s)
+            if s.ndim != 1:
+                raise ShapeError("s", s.shape, "expected numbers in one row")
+        room = self.length
+        if s.size and not (s.min() >= self.knots[0] - room and s.max() <= self.knots[-1] + room):
+            raise RangeError("s", s, f"expected coordinates of the path, {self.knots[0]:g} to {self.knots[-1]:g}")
+        if piece is None:
+            return s, self.pieces_at(s)
+        return s, pieces_of(piece, s, len(self.knots) - 1)
+
     @property
     def length(self) -> float:
         """Of the interval of s."""
@@ -74,6 +93,22 @@ class Path(ABC):
         return self.space == other.space and self.dof == other.dof
 
 
+def pieces_of(piece: Any, s: Array, count: int) -> Index:
+    """Numbers of pieces below ``count``, one for each coordinate.
+
+    Raises:
+        ShapeError, NotFiniteError, RangeError: they are not.
+    """
+    if not (type(piece) is np.ndarray and piece.dtype == np.intp and piece.shape == s.shape):
+        numbers = validation.ordinary_array("piece", piece, s.shape)
+        piece = numbers.astype(np.intp)
+        if (piece != numbers).any():
+            raise ShapeError("piece", numbers, "expected whole numbers")
+    if piece.size and not (piece.min() >= 0 and piece.max() < count):
+        raise RangeError("piece", piece, f"expected numbers of pieces, 0 to {count - 1}")
+    return np.asarray(piece)
+
+
 class PolynomialPath(Path):
     """Polynomials of one degree d between knots:
 
@@ -88,8 +123,8 @@ class PolynomialPath(Path):
     """
 
     def __init__(self, knots: Any, coefficients: Any) -> None:
-        self.knots = validation.real_array("path.knots", knots)
-        self.coefficients = validation.real_array("path.coefficients", coefficients)
+        self.knots = validation.ordinary_array("path.knots", knots)
+        self.coefficients = validation.ordinary_array("path.coefficients", coefficients)
         if self.knots.ndim != 1 or len(self.knots) < 2:
             raise ShapeError("path.knots", knots, "expected at least two numbers")
         if (np.diff(self.knots) <= 0.0).any():
@@ -105,8 +140,7 @@ class PolynomialPath(Path):
         self.dof = self.coefficients.shape[2]
 
     def evaluate(self, s: Array, order: int = 0, piece: Index | None = None) -> Array:
-        s = np.asarray(s, dtype=np.float64)
-        at = self.pieces_at(s) if piece is None else piece
+        s, at = self.places(s, order, piece)
         local = (s - self.knots[at])[:, None]
         out = np.zeros((len(s), self.dof))
         highest = self.coefficients.shape[0] - 1
@@ -139,8 +173,7 @@ class JoinedPath(Path):
         self.degree = max(first.degree or 0, second.degree or 0) if known else None
 
     def evaluate(self, s: Array, order: int = 0, piece: Index | None = None) -> Array:
-        s = np.asarray(s, dtype=np.float64)
-        at = self.pieces_at(s) if piece is None else np.asarray(piece)
+        s, at = self.places(s, order, piece)
         pieces = len(self.first.knots)
         behind = at >= pieces
         shape = (len(s), 4, 4) if self.space == "poses" and order == 0 else (len(s), self.dof)

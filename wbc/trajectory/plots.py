@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from wbc import style
+from wbc import style, validation
 from wbc.errors import LawFileError, ShapeError
 from wbc.trajectory.certificate import ORDERS, Pieces, Worst
 from wbc.trajectory.law import Law
@@ -54,7 +54,10 @@ def plot(law: Law, file: str | os.PathLike[str], names: Sequence[str] | None = N
     Raises:
         ShapeError: another number of names. LawFileError: the file cannot be written.
     """
-    if names is not None and len(names) != law.dof:
+    validation.instance("law", law, Law, "a Law")
+    file = validation.file_path("file", file)
+    validation.instance("title", title, str, "a string")
+    if names is not None and len(validation.strings("names", names)) != law.dof:
         raise ShapeError("names", names, f"expected {law.dof} names")
     pieces = Pieces.of(law.path, law.timing)
     share = np.linspace(0.0, 1.0, max(2, math.ceil(POINTS / len(pieces.start))))

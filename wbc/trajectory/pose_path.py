@@ -38,8 +38,7 @@ class PosePath(Path):
         self.degree = max(position.degree or 0, turning.degree or 0) if known else None
 
     def evaluate(self, s: Array, order: int = 0, piece: Index | None = None) -> Array:
-        s = np.asarray(s, dtype=np.float64)
-        at = self.pieces_at(s) if piece is None else piece
+        s, at = self.places(s, order, piece)
         place, turn = self.position.evaluate(s, order, at), self.turning.evaluate(s, order, at)
         if order:
             return np.hstack([place, turn])

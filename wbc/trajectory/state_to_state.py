@@ -12,13 +12,14 @@ What ruckig still refuses is driven as stop, course from rest to rest, and a sto
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
+from wbc.trajectory.certificate import STEP
 from wbc.trajectory.course import (
     Course,
     Point,
@@ -36,6 +37,9 @@ UNREACHED = 1e7
 
 #: A motion of no size [rad or m]
 LEAST = 1e-200
+
+#: What a course may miss its target by, and exceed its limits by, as a share of the motion and of the limit
+NEAR = 1e-8
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,7 +113,7 @@ def by_ruckig(task: Task, synchronisation: str, duration: float = 0.0) -> list[C
     answer = ruckig.Trajectory(task.dof)
     try:
         ruckig.Ruckig(task.dof).calculate(asked, answer)
-    except ruckig.RuckigError:
+    except (ruckig.RuckigError, ValueError):  # a ValueError: its binding does not know the code of long durations
         return None  # the caller has courses of its own
     courses = []
     for i, profile in enumerate(answer.profiles[0]):
@@ -117,31 +121,63 @@ def by_ruckig(task: Task, synchronisation: str, duration: float = 0.0) -> list[C
         jerks = [j * (length / tau**3) for j in (*profile.brake.j, *profile.j)]
         first, last = task.points(i)
         courses.append(polished(Course(first, (), ()).then(tuple(spans), tuple(jerks)), last, 1e-13 * length))
-    return courses if _arrive(task, courses) else None
+    return _repaired(task, courses)
 
 
-def _arrive(task: Task, courses: list[Course]) -> bool:
-    """Whether the courses end in the target, to rounding."""
-    length, tau = task.units
+def _repaired(task: Task, courses: list[Course]) -> list[Course] | None:
+    """Courses of joints that ruckig missed the target of, because it is measured in the units of a larger motion, in
+    their own units; None where that does not help.
+    """
+    longest = max(c.duration for c in courses)
     for i, course in enumerate(courses):
-        here, there = course.points()[-1], task.points(i)[1]
-        room = 1e-7 * length + 1e-14 * abs(there[0])
-        off = [abs(x - y) * w for x, y, w in zip(here, there, (1.0, tau, tau * tau), strict=True)]
-        if not all(x <= room for x in off):
-            return False
-    return True
+        if arrives(task, i, course):
+            continue
+        for least in (course.duration, 0.0) if task.dof > 1 else ():
+            alone = by_ruckig(task.joint(i), "none", least)
+            if alone is not None and _in_time(task, alone[0].duration, longest):
+                courses[i] = alone[0]
+                break
+        else:
+            return None
+    return courses
 
 
-def by_stops(task: Task, i: int, duration: float, hard: tuple[bool, bool] = (False, False)) -> Course:
+def _in_time(task: Task, duration: float, longest: float) -> bool:
+    """Whether a course may stand beside others: who arrives at rest may wait."""
+    early = task.ends_at_rest and duration <= longest
+    return early or math.isclose(duration, longest, rel_tol=1e-12)
+
+
+def arrives(task: Task, i: int, course: Course) -> bool:
+    """Whether a joint's course ends in its target, to rounding, and keeps its limits of velocity and acceleration."""
+    length, tau = task.joint(i).units
+    here, there = course.points()[-1], task.points(i)[1]
+    v, a = float(task.velocity[i]), float(task.acceleration[i])
+    room = (
+        NEAR * length + 1e-14 * abs(there[0]),
+        NEAR * length / tau if tau else 0.0,
+        min(NEAR * length / (tau * tau), 0.5 * STEP * a) if tau else 0.0,
+    )
+    if not all(abs(x - y) <= r for x, y, r in zip(here, there, room, strict=True)):
+        return False
+    pushes = [abs(point[2]) for point in course.points()]
+    return course.fastest() <= v * (1.0 + NEAR) and max(pushes) <= a * (1.0 + NEAR)
+
+
+def by_stops(
+    task: Task, i: int, duration: float, hard: tuple[bool, bool] = (False, False), left: float = math.inf
+) -> Course:
     """A joint's course that always exists: stop, from rest to rest, and the stop of the mirrored target backwards.
 
-    It takes ``duration``, or its own least time where that is longer. ``hard``: stop with the least way, at either end.
+    It takes ``duration``, or its own least time where that is longer. ``hard``: stop with the least way, at either end;
+    ``left``: the largest deceleration at the end of that way.
     """
     sizes = float(task.acceleration[i]), float(task.jerk[i])
     first, last = task.points(i)
-    stops: list[Callable[[Point, float, float], Course]] = [hard_stop if h else stop for h in hard]
-    leave = stops[0](first, *sizes)
-    arrive = stops[1]((last[0], -last[1], last[2]), *sizes)
+    leave, arrive = (
+        hard_stop(end, *sizes, left) if h else stop(end, *sizes)
+        for h, end in zip(hard, (first, (last[0], -last[1], last[2])), strict=True)
+    )
     way = arrive.points()[-1][0] - leave.points()[-1][0]
     middle = rest_to_rest(way, float(task.velocity[i]), *sizes)
     room = duration - leave.duration - arrive.duration
@@ -169,7 +205,11 @@ def others(task: Task, i: int, duration: float) -> Iterator[Course]:
     for the rest, then stops at both ends, then stops of the least way.
     """
     alone = by_ruckig(task.joint(i), "none")
-    if alone is not None and (task.ends_at_rest or math.isclose(alone[0].duration, duration, rel_tol=1e-12)):
+    if alone is not None and _in_time(task, alone[0].duration, duration):
         yield alone[0]
+    # Taking back the deceleration that is left when the joint stands moves it at up to left^2 / 2j
+    left = math.sqrt(2.0 * float(task.velocity[i]) * float(task.jerk[i]))
     for hard in ((False, False), (True, False), (False, True), (True, True)):
-        yield by_stops(task, i, duration, hard)
+        course = by_stops(task, i, duration, hard, left)
+        if arrives(task, i, course):
+            yield course

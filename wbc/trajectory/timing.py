@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from wbc import validation
 from wbc.errors import RangeError, ShapeError
 from wbc.trajectory import bernstein
-from wbc.trajectory.path import Index
+from wbc.trajectory.path import Index, pieces_of
 from wbc.validation import Array
 
 
@@ -29,8 +29,8 @@ class Timing:
     """
 
     def __init__(self, times: Any, coefficients: Any) -> None:
-        self.times = validation.real_array("timing.times", times)
-        self.coefficients = validation.real_array("timing.coefficients", coefficients)
+        self.times = validation.ordinary_array("timing.times", times)
+        self.coefficients = validation.ordinary_array("timing.coefficients", coefficients)
         if self.times.ndim != 1 or len(self.times) < 2:
             raise ShapeError("timing.times", times, "expected at least two numbers")
         if self.times[0] != 0.0 or (np.diff(self.times) <= 0.0).any():
@@ -57,10 +57,10 @@ class Timing:
         Raises:
             ShapeError, NotFiniteError: not two vectors of one length. RangeError: s does not increase, or bad speeds.
         """
-        places = validation.real_array("timing.s", s)
+        places = validation.ordinary_array("timing.s", s)
         if places.ndim != 1 or len(places) < 2:
             raise ShapeError("timing.s", s, "expected at least two numbers")
-        speeds = validation.real_array("timing.speed", speed, places.shape)
+        speeds = validation.ordinary_array("timing.speed", speed, places.shape)
         if (np.diff(places) <= 0.0).any():
             raise RangeError("timing.s", s, "must increase strictly")
         mean = 0.5 * (speeds[:-1] + speeds[1:])
@@ -85,8 +85,12 @@ class Timing:
 
     def evaluate(self, t: Array, order: int = 0, piece: Index | None = None) -> Array:
         """s or a derivative of it along t, at m times; ``piece`` decides on what side of a break it is taken."""
-        t = np.asarray(t, dtype=np.float64)
-        at = self.pieces_at(t) if piece is None else piece
+        t = times_row("t", t)
+        validation.integer("order", order, 0, 3)
+        room = self.duration
+        if t.size and not (t.min() >= -room and t.max() <= 2.0 * room):
+            raise RangeError("t", t, f"expected times of the timing, 0 to {self.duration:g} s")
+        at = self.pieces_at(t) if piece is None else pieces_of(piece, t, len(self.times) - 1)
         local, out = t - self.times[at], np.zeros(len(t))
         highest = self.degree
         for k in range(highest - order + 1):
@@ -96,7 +100,12 @@ class Timing:
         return out
 
     def scaled(self, factor: float) -> Timing:
-        """The same course in ``factor`` times the time."""
+        """The same course in ``factor`` times the time.
+
+        Raises:
+            RangeError: not positive, or such that the coefficients overflow.
+        """
+        factor = validation.scalar("factor", factor, low=0.0, open_low=True)
         powers = np.arange(self.degree, -1, -1)
         return Timing(self.times * factor, self.coefficients / factor ** powers[:, None])
 
@@ -110,7 +119,15 @@ class Timing:
         return Timing(times, (moved * signs[:, None])[:, ::-1])
 
     def sliced(self, start: float, end: float) -> Timing:
-        """The part between two times, from 0 on."""
+        """The part between two times, from 0 on.
+
+        Raises:
+            RangeError: outside [0, duration], or no time between them.
+        """
+        start = validation.scalar("start", start, low=0.0, high=self.duration, unit="s")
+        end = validation.scalar("end", end, low=0.0, high=self.duration, unit="s")
+        if not start < end:
+            raise RangeError("end", end, f"must be later than start, {start:g} s")
         first, last = (int(p) for p in self.pieces_at(np.array([start, end])))
         if last > first and self.times[last] >= end:
             last -= 1
@@ -121,7 +138,13 @@ class Timing:
         return Timing(times - start, _shifted(self.coefficients[:, first : last + 1], shift))
 
     def then(self, other: Timing, shift: float) -> Timing:
-        """This course, then another, whose s counts from ``shift``."""
+        """This course, then another, whose s counts from ``shift``.
+
+        Raises:
+            ShapeError, NotFiniteError, RangeError: no timing, or no shift.
+        """
+        validation.instance("other", other, Timing, "a Timing")
+        shift = validation.scalar("shift", shift)
         degree = max(self.degree, other.degree)
         parts = []
         for timing, offset in ((self, 0.0), (other, shift)):
@@ -152,8 +175,9 @@ class Timing:
         """Times inside pieces at which s passes one of the places, ascending."""
         spans = np.diff(self.times)
         hull = self.hull()
-        # What only touches a break is not inside
-        room = 1e-12 * (1.0 + np.abs(hull).max(axis=1))
+        # What only touches a break is not inside; roots of straight lines are exact
+        edge = 1e-12 if self.degree > 1 else 1e-15
+        room = edge * (1.0 + np.abs(hull).max(axis=1))
         low, high = hull.min(axis=1) + room, hull.max(axis=1) - room
         ordered = np.sort(places)
         some = np.searchsorted(ordered, low) < np.searchsorted(ordered, high)
@@ -167,9 +191,20 @@ class Timing:
                 shifted[np.abs(shifted) < 1e-18 * np.abs(shifted).max()] = 0.0
                 roots = np.roots(shifted)
                 real = roots.real[np.abs(roots.imag) < 1e-9]
-                inside = real[(real > 1e-12) & (real < 1.0 - 1e-12)]
+                inside = real[(real > edge) & (real < 1.0 - edge)]
                 found.append(self.times[i] + spans[i] * inside)
         return np.unique(np.concatenate(found))
+
+
+def times_row(field: str, value: Any) -> Array:
+    """Finite numbers in one row; arrays of floats are taken as they are."""
+    ready = type(value) is np.ndarray and value.dtype == np.float64 and value.ndim == 1
+    if ready and np.isfinite(value).all():
+        return np.asarray(value)
+    out = validation.ordinary_array(field, value)
+    if out.ndim != 1:
+        raise ShapeError(field, value, "expected numbers in one row")
+    return out
 
 
 def _shifted(coefficients: Array, by: Array) -> Array:

@@ -32,7 +32,7 @@ def joint_waypoints(field: str, value: Any) -> tuple[Array, Array]:
     Raises:
         ShapeError, NotFiniteError: not m x n finite numbers with m >= 2 and n >= 1. RangeError: too far apart to add.
     """
-    points = validation.real_array(field, value)
+    points = validation.ordinary_array(field, value)
     if points.ndim != 2 or points.shape[0] < 2 or points.shape[1] < 1:
         raise ShapeError(field, points.shape, "expected waypoints x joints, at least two waypoints")
     numbers = kept(field, len(points), lambda i, j: distance(points[i], points[j]), float(np.abs(points).max()))
