@@ -10,7 +10,7 @@ from wbc.analysis.branches import Branch, BranchArithmetic, unique
 from wbc.analysis.fourier import dominated, fourier
 from wbc.analysis.half_angles import Factor, Factors, HalfAngles, Relation
 from wbc.analysis.minors import eliminated, maximal_minors, transposed
-from wbc.analysis.points import univariate_roots
+from wbc.analysis.points import changes_sign, univariate_roots
 from wbc.analysis.ring import Matrix, Poly, TrigRing
 
 #: Minors, shortest first, that are factored to find the cheapest
@@ -80,7 +80,8 @@ class Exact:
             self._real[relation] = (
                 bool(univariate_roots(self.half, relation))
                 if alone
-                else not dominated(self.half, fourier(self.half, relation.poly, relation.degrees))
+                else changes_sign(self.half, relation)
+                or not dominated(self.half, fourier(self.half, relation.poly, relation.degrees))
             )
         return self._real[relation]
 

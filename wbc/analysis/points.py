@@ -17,6 +17,8 @@ from wbc.validation import Array
 
 #: A root of a polynomial in floats counts as real with this imaginary part, and a relation as zero at this value
 REAL, ZERO = 1e-9, 1e-10
+#: Configurations among which the signs of a relation are looked at
+SAMPLES = 256
 
 
 def angle(value: Value, half: HalfAngles) -> float:
@@ -54,6 +56,14 @@ def _sum(half: HalfAngles, form: HalfPoly, degrees: tuple[int, ...], q: Array) -
 def form_grid(half: HalfAngles, relation: Relation, q: Sequence[Array]) -> Array:
     """A relation at many configurations, one array a joint, all of one shape; 0 on the branch."""
     return np.asarray(sum(_terms(half, relation.poly, relation.degrees, q, np.sin, np.cos)))
+
+
+def changes_sign(half: HalfAngles, relation: Relation) -> bool:
+    """Whether a relation has both signs among some configurations, so that it has zeros; False proves nothing."""
+    rng = np.random.default_rng(0)
+    value = form_grid(half, relation, [rng.uniform(-pi, pi, SAMPLES) for _ in range(half.size)])
+    room = ZERO * float(np.abs(value).max())
+    return bool(value.min() < -room and value.max() > room)
 
 
 def form_value(half: HalfAngles, relation: Relation, q: Array) -> float:
