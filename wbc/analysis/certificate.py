@@ -15,6 +15,7 @@ from wbc.analysis.block_proofs import block_proofs
 from wbc.analysis.boxes import BoxSearch, Counts
 from wbc.analysis.jacobian import symbolic_jacobian
 from wbc.analysis.model import ExactModel
+from wbc.analysis.numeric import check_task
 from wbc.analysis.pieces import Pieces
 from wbc.analysis.rank_matrix import rank_matrices
 from wbc.analysis.ring import Matrix
@@ -31,8 +32,8 @@ COMPLETE, INCOMPLETE, UNDECIDED = "complete", "incomplete", "undecided"
 SMALLEST = 1e-6
 #: Matrices that are tried on random boxes of this half width [rad], how many boxes, and parts of each at most
 _TRIED, _HALF, _SAMPLES, _BUDGET = 8, 0.3, 6, 400
-#: Boxes to begin with, at least
-_FIRST = 256
+#: Boxes to begin with, at least; the part of the time that choosing a matrix may take
+_FIRST, _READY = 256, 0.2
 
 Progress = Callable[[float], None]
 
@@ -72,6 +73,7 @@ def certify(
     workers: int | None = None,
     state: str | os.PathLike[str] | None = None,
     progress: Progress | None = None,
+    ended: Callable[[], bool] | None = None,
 ) -> Certificate:
     """Completeness outside a tube around the task's singularities, by branch and bound over joint space:
 
@@ -85,25 +87,29 @@ def certify(
     are not subdivided, symmetries cut the rest. A numeric search for a witness goes first.
 
     Args:
-        part: of the largest sigma_min(J_T), > 0 and < 1. minutes: after which the rest is left undecided.
+        part: of the largest sigma_min(J_T), > 0 and < 1. minutes: by the clock, after which the rest is left undecided.
         workers: threads; None: one a core. state: file that keeps what is done, and from which a second call goes on.
-        progress: called with the decided part of the volume. A keyboard interrupt ends with what is known so far.
+        progress: called with the decided part of the volume. ended: asked now and then whether to stop. A keyboard
+            interrupt ends with what is known so far.
 
     Source: bounds of eigenvalues of non-negative matrices for regularity of interval matrices: J. Rohn, "Systems of
     linear interval equations", Linear Algebra and its Applications 126, 1989.
 
     Raises:
-        RangeError: numbers out of range, matrices too large. UnsupportedJointError: entries in a sliding joint.
+        RangeError: numbers out of range, matrices too large, a task of full rank nowhere. UnsupportedJointError: entries in a sliding joint.
         RobotFileError: a state of another problem. CompileError: no C compiler.
     """
     part, minutes = _checked(part, minutes)
     wanted, added = checked("task", task) if task else (), checked("constraints", constraints)
     J_T, J_R = _matrices(model, wanted, added)
+    if wanted:
+        check_task(model.robot, wanted)
     began = time.monotonic()
+    until = began + 60.0 * minutes
+    ready = began + 60.0 * _READY * minutes
     matrices = list(rank_matrices(model, (*wanted, *added)))
     if any(not matrix for matrix in matrices):
         return Certificate(COMPLETE, 0.0, 0.0, True, Counts(), 0.0, (), 1, time.monotonic() - began)
-    forms = [trig_form(model.ring, matrix) for matrix in matrices]
     own, every = trig_form(model.ring, J_T) if wanted else None, trig_form(model.ring, J_R)
     rng = np.random.default_rng(0)
     highest = 0.0 if own is None else peak(own, rng)
@@ -116,12 +122,12 @@ def certify(
     if witness is not None:
         seconds = time.monotonic() - began
         return Certificate(INCOMPLETE, eps, highest, False, Counts(), 1.0, (), 1, seconds, witness)
-    chosen = _chosen(forms, own, eps)
+    chosen = _chosen(_shortest(model, matrices, ready), own, eps, ready)
     both = _both(chosen, own)
     found = symmetries(both, used_joints(both))
     proofs = (*block_proofs(model, (*wanted, *added), chosen.joints), (chosen,))
     pieces = _pieces(proofs, own, eps, found, None if state is None else Path(state))
-    finished = pieces.work(minutes, workers or os.cpu_count() or 1, progress)
+    finished = pieces.work(until, workers or os.cpu_count() or 1, progress, ended)
     counts = pieces.counts
     verdict, left = COMPLETE, 0.0
     if not finished or counts.undecided > 0:
@@ -157,23 +163,35 @@ def _both(augmented: TrigForm, task: TrigForm | None) -> tuple[TrigForm, ...]:
     return (augmented,) if task is None else (augmented, task)
 
 
-def _chosen(forms: Sequence[TrigForm], task: TrigForm | None, eps: float) -> TrigForm:
-    """Of the matrices with the fewest terms the one that needs the fewest boxes on a sample."""
-    few = sorted(forms, key=lambda form: form.terms)[:_TRIED]
+def _shortest(model: ExactModel, matrices: Sequence[Matrix], until: float) -> list[TrigForm]:
+    """The matrices with the fewest terms as waves; at least one, however late it is."""
+    short = sorted(matrices, key=lambda matrix: sum(len(p) for row in matrix for p in row))
+    found = [trig_form(model.ring, short[0])]
+    for matrix in short[1:]:
+        if time.monotonic() > until:
+            break
+        found.append(trig_form(model.ring, matrix))
+    return sorted(found, key=lambda form: form.terms)[:_TRIED]
+
+
+def _chosen(forms: Sequence[TrigForm], task: TrigForm | None, eps: float, until: float) -> TrigForm:
+    """Of the forms the one that needs the fewest boxes on a sample; the first where there is no time for samples."""
     size = forms[0].waves.shape[1]
     rng = np.random.default_rng(1)
     centres = rng.uniform(-np.pi, np.pi, (_SAMPLES, size))
-
-    def boxes(form: TrigForm) -> float:
+    best, least = forms[0], np.inf
+    for form in forms:
         search = BoxSearch(((form,),), task, eps, SMALLEST, 1.0)
         half = np.where(np.isin(np.arange(size), used_joints(_both(form, task))), _HALF, 0.0)
         total = 0.0
         for centre in centres:
+            if time.monotonic() > until:
+                return best
             counts, left, _ = search.run(np.concatenate((centre, half, [0.0]))[None], _BUDGET)
             total += counts.boxes + len(left)
-        return total
-
-    return min(few, key=boxes)
+        if total < least:
+            best, least = form, total
+    return best
 
 
 def _pieces(
