@@ -17,7 +17,7 @@ from wbc.robots import from_dh
 from wbc.validation import Array
 
 #: Steps towards a null vector, and what counts as reached
-STEPS, REACHED = 60, 1e-9
+STEPS, REACHED = 80, 1e-13
 
 
 @dataclass(frozen=True)

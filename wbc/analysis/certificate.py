@@ -87,7 +87,8 @@ def certify(
     are not subdivided, symmetries cut the rest. A numeric search for a witness goes first.
 
     Args:
-        part: of the largest sigma_min(J_T), > 0 and < 1. minutes: by the clock, after which the rest is left undecided.
+        part: of the largest sigma_min(J_T), > 0 and < 1. minutes: by the clock, after which the rest is left undecided;
+            with a state the preparation is not cut short.
         workers: threads; None: one a core. state: file that keeps what is done, and from which a second call goes on.
         progress: called with the decided part of the volume. ended: asked now and then whether to stop. A keyboard
             interrupt ends with what is known so far.
@@ -96,8 +97,9 @@ def certify(
     linear interval equations", Linear Algebra and its Applications 126, 1989.
 
     Raises:
-        RangeError: numbers out of range, matrices too large, a task of full rank nowhere. UnsupportedJointError: entries in a sliding joint.
-        RobotFileError: a state of another problem. CompileError: no C compiler.
+        RangeError: numbers out of range, matrices too large, a task of full rank nowhere.
+        UnsupportedJointError: entries in a sliding joint. RobotFileError: a state of another problem.
+        CompileError: no C compiler.
     """
     part, minutes = _checked(part, minutes)
     wanted, added = checked("task", task) if task else (), checked("constraints", constraints)
@@ -106,19 +108,20 @@ def certify(
         check_task(model.robot, wanted)
     began = time.monotonic()
     until = began + 60.0 * minutes
-    ready = began + 60.0 * _READY * minutes
+    # What is kept in a file must be the same problem for the next call, so there its preparation is not cut short
+    last, ready = (until, began + 60.0 * _READY * minutes) if state is None else (np.inf, np.inf)
     matrices = list(rank_matrices(model, (*wanted, *added)))
     if any(not matrix for matrix in matrices):
         return Certificate(COMPLETE, 0.0, 0.0, True, Counts(), 0.0, (), 1, time.monotonic() - began)
     own, every = trig_form(model.ring, J_T) if wanted else None, trig_form(model.ring, J_R)
     rng = np.random.default_rng(0)
-    highest = 0.0 if own is None else peak(own, rng)
+    highest = 0.0 if own is None else peak(own, rng, last)
     eps = part * highest
 
     def witness_from(starts: Array) -> NumericWitness | None:
-        return numeric_witness(model, wanted, added, every, starts, eps)
+        return numeric_witness(model, wanted, added, every, starts, eps, last)
 
-    witness = witness_from(weakest(own, [every], eps, rng)[0])
+    witness = witness_from(weakest(own, [every], eps, rng, last)[0])
     if witness is not None:
         seconds = time.monotonic() - began
         return Certificate(INCOMPLETE, eps, highest, False, Counts(), 1.0, (), 1, seconds, witness)

@@ -92,7 +92,7 @@ class Child:
         with open(read, "rb") as pipe:
             while True:
                 try:
-                    kind, what = pickle.load(pipe)  # noqa: S301 - written by our own copy
+                    kind, what = pickle.load(pipe)
                 except (EOFError, pickle.UnpicklingError):
                     break
                 if kind == "told":
@@ -120,7 +120,7 @@ def _worked(work: Callable[[Tell], None], write: int, seconds: float) -> None:
                 ctypes.CDLL(None).prctl(_PARENT_DIED, signal.SIGKILL)
             work(lambda what: tell("told", what))
             tell("done")
-        except Exception as error:
+        except Exception as error:  # noqa: BLE001 - the parent raises it
             tell("error", error)
         finally:
             os._exit(0)  # a keyboard interrupt as well ends here

@@ -115,7 +115,7 @@ def analyse(
             if not search.wait(HEAD) and certificate is None:
                 certificate = _certified(model, wanted, added, budget, lambda: search.done)
             decided = None if certificate is None else _verdict(certificate)
-            if decided is not None and told is not None:
+            if decided is not None and told is not None and not search.done:
                 told(decided)
             if decided != STRICT:
                 search.wait(budget.seconds)
@@ -123,7 +123,7 @@ def analyse(
             search.interrupt()
             interrupted = True
         found = search.found()
-    if decided == STRICT:
+    if decided == STRICT and not search.done:
         found = Loci(found.exact, found.augmented, Locus(()), (), ())
     witness = None
     if certificate is not None and certificate.witness is not None:

@@ -80,24 +80,3 @@ def _real(sums: dict[tuple[Powers, Frequency], list[int]], below: int) -> list[T
 
 def _last(frequency: Frequency) -> tuple[int, ...]:
     return tuple(k for k, n in enumerate(frequency) if n)
-
-
-def dominated(half: HalfAngles, terms: list[Term]) -> bool:
-    """Whether one term without angles outweighs all others, so that the sum is never zero; symbols by their values.
-
-    False where joints slide: their terms have no bound.
-    """
-    values = [float(v) for v in half.ring.symbols.values()]
-    sliding = len(half.ring.slides)
-    constant = others = 0.0
-    for term in terms:
-        if any(term.powers[:sliding]):
-            return False
-        size = float(term.number)
-        for value, power in zip(values, term.powers[sliding:], strict=True):
-            size *= value**power
-        if any(term.frequency):
-            others += abs(size)
-        else:
-            constant += size
-    return abs(constant) > others * (1 + 1e-9)

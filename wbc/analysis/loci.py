@@ -119,6 +119,8 @@ class LocusSearch:
         exact = self._exact
         locus = self._algorithm(exact, _shortest(self._model, self._rows, self.augmented), self._budget, told)
         tell(locus)
+        locus = Locus(exact.real(locus.branches), locus.open)
+        tell(locus)
         for branch in (*locus.branches, *locus.open) if self._task else ():
             tell((branch, exact.deficient(self._task, branch)))
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import json
 import re
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -26,10 +27,12 @@ from wbc.analysis import (
     factored_determinant,
     published_sets,
 )
+from wbc.analysis.child import Child
+from wbc.analysis.half_angles import HalfAngles
 from wbc.analysis.locus import Located
 from wbc.analysis.pictures import save_pictures
 from wbc.analysis.published import ROBOTS
-from wbc.cli.certificates import Subdivision, certified, record, winner
+from wbc.cli.certificates import Subdivision, certified, record, show_certificate, winner
 from wbc.cli.console import out
 from wbc.cli.options import RobotName
 from wbc.cli.planning import tip_frame
@@ -37,6 +40,8 @@ from wbc.cli.trees import analyse_tree
 from wbc.coordinates import TREES
 from wbc.errors import RangeError, RobotFileError
 
+#: Part of the time that a certificate may take where the locus is searched as well
+_PROOF = 0.75
 _WHAT, _OUTPUT = "What is analysed", "What it writes"
 
 Sets = Annotated[
@@ -73,7 +78,9 @@ Screen = Annotated[
     int | None,
     typer.Option(help="Certify the best set of at most so many constraints instead.", rich_help_panel=_WHAT),
 ]
-Minutes = Annotated[float, typer.Option(help="Of one search or certificate, at most.", rich_help_panel=_WHAT)]
+Minutes = Annotated[
+    float, typer.Option(help="By the clock, for all the work on one set, at most.", rich_help_panel=_WHAT)
+]
 Resume = Annotated[
     Path | None,
     typer.Option(help="Folder to keep certificates in and go on from.", rich_help_panel=_OUTPUT),
@@ -96,7 +103,7 @@ def analyse_(
     tree: Tree = False,
     certify: Certify = False,
     screen: Screen = None,
-    minutes: Minutes = 30.0,
+    minutes: Minutes = 5.0,
     resume: Resume = None,
     plot: Plot = None,
     latex: Latex = False,
@@ -109,14 +116,14 @@ def analyse_(
     """
     validation.one_of("algorithm", algorithm, ALGORITHMS)
     robot = _meant(robot, tree, full, bool(lock or point or plane))
-    how = Subdivision(minutes, resume) if certify or full or screen is not None else None
+    how = Subdivision(resume) if certify or full or screen is not None else None
     own = _own(lock, point, plane)
     if screen is not None and (own or chosen):
         raise RangeError("screen", screen, "finds the constraints by itself: without --set, --lock, --point, --plane")
     if robot in TREES and not own and frame is None:
         refused = {"approximate": approximate, "full": full, "screen": screen}
         pictures = None if plot is None else functools.partial(_pictures, plot)
-        found_sets = analyse_tree(robot, chosen or (), algorithm, latex, refused, pictures, how)
+        found_sets = analyse_tree(robot, chosen or (), algorithm, latex, refused, pictures, how, minutes)
         _write(json_, {"robot": robot, "algorithm": algorithm, "sets": found_sets})
         return
     task: tuple[Rows, ...]
@@ -136,21 +143,34 @@ def analyse_(
             sets = {} if best is None else {", ".join(best.names): best.rows}
     for note in model.notes:
         out().print(escape(note))
+    names = [str(name) for name in model.robot.model.names[1:]]
+    out().print(f"joints: {escape(Notation(HalfAngles(model.ring), latex).joints(names))}", soft_wrap=True)
     records = []
     for name, rows in sets.items():
         entry: dict[str, Any] = {"set": name}
+        budget, proof = Budget(minutes=minutes), None
+        if how is not None:
+            share = 1.0 if screen is not None else _PROOF
+            proof = certified(model, robot, name, task, rows, how, share * budget.seconds / 60.0)
         if screen is None:
-            found = analyse(model, task, rows, algorithm=algorithm, budget=Budget(minutes=minutes))
-            _show(name, found, latex)
-            entry = _record(name, found)
+            known = functools.partial(_known, name)
+            found = analyse(model, task, rows, algorithm=algorithm, budget=budget, certificate=proof, told=known)
+            _show(name, found, latex, budget)
+            entry = _record(name, found, names)
             if plot is not None:
                 _pictures(plot, model, found, f"{robot} {name}")
-        if how is not None:
+        if proof is not None:
             if screen is not None:
                 out().print(f"[bold]{escape(name)}[/bold]")
-            entry["certificate"] = record(certified(model, robot, name, task, rows, how))
+            show_certificate(proof)
+            entry["certificate"] = record(proof)
         records.append(entry)
     _write(json_, {"robot": robot, "algorithm": algorithm, "sets": records})
+
+
+def _known(name: str, verdict: str) -> None:
+    """A verdict that is known before the locus."""
+    out().print(f"[bold]{escape(name)}[/bold]: {verdict}; the locus is being searched, Ctrl-C ends it")
 
 
 def _meant(robot: str, tree: bool, full: bool, own: bool) -> str:
@@ -181,14 +201,15 @@ def _plane(text: str) -> PitchPlaneRows:
     return PitchPlaneRows(parts[0], parts[1])
 
 
-def _show(name: str, found: Analysis, latex: bool) -> None:
+def _show(name: str, found: Analysis, latex: bool, budget: Budget) -> None:
     console, notation = out(), Notation(found.exact.half, latex)
     rows, joints = found.augmented.shape
-    console.print(f"[bold]{escape(name)}[/bold]: {rows} x {joints}, {found.verdict}, {found.seconds:.2f} s")
+    took = f"{found.seconds:.2f} s by the clock, {found.processor:.2f} s of processor time"
+    console.print(f"[bold]{escape(name)}[/bold]: {rows} x {joints}, {found.verdict}, {took}")
     axes = ", ".join(dict.fromkeys(found.augmented.axes))
     console.print(f"  cost     {found.augmented.cost}, task {found.task.cost}; axes {escape(axes)}", soft_wrap=True)
-    if rows == joints:
-        text = factored_determinant(found.exact, found.augmented).text(latex=latex)
+    if rows == joints and not found.locus.open:
+        text = _determinant(found, latex, budget.seconds)
         console.print(f"  det      {escape(text)}", soft_wrap=True)
     for line in notation.branches(found.locus.branches):
         console.print(f"  locus    {escape(line)}", soft_wrap=True)
@@ -198,6 +219,8 @@ def _show(name: str, found: Analysis, latex: bool) -> None:
             console.print(f"  solved   {escape(solved)}", soft_wrap=True)
     for line in notation.branches(found.locus.open):
         console.print(f"  open     {escape(line)}", soft_wrap=True)
+    if found.certificate is not None and found.witness is None:
+        show_certificate(found.certificate)
     if found.witness is not None:
         q = ", ".join(f"{x:.6g}" for x in found.witness.q)
         console.print(f"  witness  q = {q}", soft_wrap=True)
@@ -205,7 +228,16 @@ def _show(name: str, found: Analysis, latex: bool) -> None:
         console.print(f"           smallest singular value: task {task:.3g}, with constraints {every:.1g}")
 
 
-def _record(name: str, found: Analysis) -> dict[str, Any]:
+def _determinant(found: Analysis, latex: bool, seconds: float) -> str:
+    """The determinant in factors, if it takes no longer than this."""
+    with Child(
+        lambda tell: tell(factored_determinant(found.exact, found.augmented).text(latex=latex)), seconds
+    ) as work:
+        work.wait(seconds)
+        return str(work.told[0]) if work.told else "not expanded within the minutes"
+
+
+def _record(name: str, found: Analysis, names: Sequence[str]) -> dict[str, Any]:
     notation, tex = Notation(found.exact.half), Notation(found.exact.half, latex=True)
     witness = found.witness
     return {
@@ -213,6 +245,8 @@ def _record(name: str, found: Analysis) -> dict[str, Any]:
         "shape": list(found.augmented.shape),
         "verdict": found.verdict,
         "seconds": found.seconds,
+        "processor_seconds": found.processor,
+        "joints": {notation.label(k): joint for k, joint in enumerate(names)},
         "cost": str(found.augmented.cost),
         "locus": [notation.branch(branch) for branch in found.locus.branches],
         "latex": tex.branches(found.locus.branches),
