@@ -113,6 +113,8 @@ def certify(
     matrices = list(rank_matrices(model, (*wanted, *added)))
     if any(not matrix for matrix in matrices):
         return Certificate(COMPLETE, 0.0, 0.0, True, Counts(), 0.0, (), 1, time.monotonic() - began)
+    if time.monotonic() > last:
+        return Certificate(UNDECIDED, 0.0, 0.0, False, Counts(), 1.0, (), 1, time.monotonic() - began)
     own, every = trig_form(model.ring, J_T) if wanted else None, trig_form(model.ring, J_R)
     rng = np.random.default_rng(0)
     highest = 0.0 if own is None else peak(own, rng, last)

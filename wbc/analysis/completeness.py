@@ -28,6 +28,8 @@ from wbc.validation import Array
 TRIES = 40
 #: What the exact method gets before numbers are asked as well [s], and least minutes of a certificate
 HEAD, _LEAST = 1.0, 1e-6
+#: What is left for points of branches where the search has taken all the time [s]
+_AFTER = 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,7 +114,7 @@ def analyse(
     with LocusSearch(model, wanted, rows, algorithm, budget) as search:
         check_task(model.robot, wanted)
         try:
-            if not search.wait(HEAD) and certificate is None:
+            if not search.wait(min(HEAD, budget.seconds)) and certificate is None:
                 certificate = _certified(model, wanted, added, budget, lambda: search.done)
             decided = None if certificate is None else _verdict(certificate)
             if decided is not None and told is not None and not search.done:
@@ -135,7 +137,7 @@ def analyse(
     if witness is not None:
         verdict = INCOMPLETE
     elif verdict == UNDECIDED:
-        if decided is None and search.done and not interrupted:
+        if decided is None and search.done and not interrupted and budget.seconds > HEAD:
             certificate = _certified(model, wanted, added, budget, lambda: False) or certificate
             decided = None if certificate is None else _verdict(certificate)
         verdict = decided or UNDECIDED
@@ -186,11 +188,11 @@ def find_witness(
         configuration: of the robot, from a number for each joint of the arithmetic that found the branches.
     """
     numeric, rng = NumericRows(robot), np.random.default_rng(0)
+    until = time.monotonic() + max(budget.seconds, _AFTER)
     for branch in found.algorithmic:
         best: Witness | None = None
         for _ in range(TRIES):
-            # The points of one branch are looked for even if the search has taken all the time
-            if budget.seconds <= 0.0 and branch is not found.algorithmic[0]:
+            if time.monotonic() > until:
                 return best
             point = real_point(found.exact.half, branch, rng)
             if point is None:

@@ -58,8 +58,9 @@ class _Waves:
         values = [float(v) for v in half.ring.symbols.values()]
         terms = fourier(half, relation.poly, relation.degrees)
         sliding = len(half.ring.slides)
+        largest = max(abs(t.number) for t in terms)
         numbers = [
-            float(t.number) * float(np.prod([v**p for v, p in zip(values, t.powers[sliding:], strict=True)]))
+            float(t.number / largest) * float(np.prod([v**p for v, p in zip(values, t.powers[sliding:], strict=True)]))
             for t in terms
         ]
         self._number = np.array(numbers)

@@ -11,6 +11,8 @@ from wbc.analysis.branches import Branch
 from wbc.analysis.fourier import Term, fourier
 from wbc.analysis.half_angles import HalfAngles, HalfPoly, Relation, Value
 
+#: Terms in half angles beyond which a relation is not written out
+LONG = 400
 _ANGLES = {
     Fraction(0): ("0", "0"),
     Fraction(1): ("pi/2", r"\pi/2"),
@@ -69,6 +71,10 @@ class Notation:
 
     def relation(self, relation: Relation) -> str:
         """The condition: q4 = pi - 2 q3 where it is one of the angles themselves, else the polynomial that is zero."""
+        if len(relation.poly) > LONG:
+            labels = ", ".join(map(self.label, relation.joints))
+            text = f"({len(relation.poly)} terms in {labels}) = 0"
+            return rf"\text{{{text}}}" if self.latex else text
         return self._linear(relation) or f"{self.form(relation.poly, relation.degrees)} = 0"
 
     def _linear(self, relation: Relation) -> str:
@@ -108,7 +114,7 @@ class Notation:
         First degree, A sin(q/2) + B cos(q/2) = 0: tan(q/2) = -B/A. Second, A cos q + B sin q = C: for C = 0
         tan q = -A/B, else q = atan2(B, A) +- acos(C / sqrt(A^2 + B^2)).
         """
-        if self._linear(relation):
+        if len(relation.poly) > LONG or self._linear(relation):
             return ""
         turning = [k for k in relation.joints if k in self.half.ring.circles]
         for degree in (1, 2):

@@ -19,6 +19,8 @@ from wbc.validation import Array
 STARTS, FOLLOWED, STEPS = 4000, 48, 80
 #: Steps towards a null vector
 NEWTON = 40
+#: Configurations that are looked at before the clock is
+CHUNK = 500
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +64,11 @@ def descended(
         until: a time of the monotonic clock, at which the steps end.
     """
     q = rng.uniform(-np.pi, np.pi, (starts, joints))
-    value = cost(q)
+    value = np.full(starts, np.inf)
+    for part in np.array_split(np.arange(starts), max(1, starts // CHUNK)):
+        value[part] = cost(q[part])
+        if time.monotonic() > until:
+            break
     best = np.argsort(value)[:FOLLOWED]
     q, value, step = q[best], value[best], np.full(FOLLOWED, 0.3)
     for _ in range(steps):

@@ -153,8 +153,8 @@ def analyse_(
             share = 1.0 if screen is not None else _PROOF
             proof = certified(model, robot, name, task, rows, how, share * budget.seconds / 60.0)
         if screen is None:
-            known = functools.partial(_known, name)
-            found = analyse(model, task, rows, algorithm=algorithm, budget=budget, certificate=proof, told=known)
+            early = functools.partial(_known, name)
+            found = analyse(model, task, rows, algorithm=algorithm, budget=budget, certificate=proof, told=early)
             _show(name, found, latex, budget)
             entry = _record(name, found, names)
             if plot is not None:
