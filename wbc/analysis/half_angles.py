@@ -195,9 +195,9 @@ class HalfAngles:
         """The number that a polynomial is where its variables have these values."""
         return fmpq_mpoly(poly, self._rational)(*point)
 
-    def put(self, poly: HalfPoly, value: Value) -> HalfPoly:
-        """A form with one joint at a value, up to a factor that is not zero."""
-        k, degree = value.joint, int(poly.degrees()[value.joint])
+    def put(self, poly: HalfPoly, value: Value, degree: int) -> HalfPoly:
+        """A form of some degree in one joint with that joint at a value, up to a factor that is not zero."""
+        k = value.joint
         if value.value is None:
             kept = {p: a for p, a in poly.to_dict().items() if int(p[k]) == degree}
             return self.ctx.from_dict({(*p[:k], 0, *p[k + 1 :]): a for p, a in kept.items()})
