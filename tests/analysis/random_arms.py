@@ -1,7 +1,7 @@
 """Random arms with random coordinates, and a judge of their ranks that shares no code with the analysis.
 
-The judge builds Jacobians of declared rows from the chain of joint placements of the Pinocchio model, many configurations
-at once, and looks for places of lost rank from random starts.
+The judge builds Jacobians of declared rows from the chain of joint placements of the Pinocchio model, many
+configurations at once, and looks for places of lost rank from random starts.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ class Case:
 
 
 def random_arm(rng: np.random.Generator, joints: int, right_angles: bool = True) -> Robot:
-    """Turning joints, lengths of two digits or zero, twists by right angles, with a frame ``point<k>`` off each link."""
+    """Turning joints, lengths of two digits or zero, twists by right angles, a frame ``point<k>`` off each link."""
     rows = []
     for _ in range(joints):
         a, d = (0.0 if rng.random() < 0.4 else round(float(rng.uniform(-1.0, 1.0)), 2) for _ in "ad")
@@ -165,7 +165,7 @@ class Judge:
         return np.asarray(np.linalg.svd(self.value(rows, q), compute_uv=False)[:, -1])
 
     def lost(self, rows: tuple[Rows, ...], rng: np.random.Generator, starts: int = 60) -> Array:
-        """Configurations where J v = 0 was solved for |v| = 1, by Gauss and Newton steps from the weakest of random ones."""
+        """Configurations where J v = 0 was solved for |v| = 1, by Gauss and Newton steps from random ones."""
         size = len(self._steps)
         q = rng.uniform(-np.pi, np.pi, (20 * starts, size))
         # multiples of right angles are where special things happen
