@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import os
 import time
 from collections.abc import Callable, Sequence
@@ -24,7 +25,6 @@ from wbc.analysis.symmetry import Symmetry, fundamental_box, symmetries
 from wbc.analysis.trig_form import TrigForm, trig_form, used_joints
 from wbc.analysis.weakest import NumericWitness, numeric_witness, peak, weakest
 from wbc.errors import RangeError
-from wbc.validation import Array
 
 #: Verdicts
 COMPLETE, INCOMPLETE, UNDECIDED = "complete", "incomplete", "undecided"
@@ -90,8 +90,8 @@ def certify(
         part: of the largest sigma_min(J_T), > 0 and < 1. minutes: by the clock, after which the rest is left undecided;
             with a state the preparation is not cut short.
         workers: threads; None: one a core. state: file that keeps what is done, and from which a second call goes on.
-        progress: called with the decided part of the volume. ended: asked now and then whether to stop. A keyboard
-            interrupt ends with what is known so far.
+        progress: called with the decided part of the volume. ended: asked now and then whether to stop, as does a
+            keyboard interrupt, with what is known so far.
 
     Source: bounds of eigenvalues of non-negative matrices for regularity of interval matrices: J. Rohn, "Systems of
     linear interval equations", Linear Algebra and its Applications 126, 1989.
@@ -104,45 +104,43 @@ def certify(
     part, minutes = _checked(part, minutes)
     wanted, added = checked("task", task) if task else (), checked("constraints", constraints)
     J_T, J_R = _matrices(model, wanted, added)
-    if wanted:
-        check_task(model.robot, wanted)
     began = time.monotonic()
     until = began + 60.0 * minutes
     # What is kept in a file must be the same problem for the next call, so there its preparation is not cut short
     last, ready = (until, began + 60.0 * _READY * minutes) if state is None else (np.inf, np.inf)
     matrices = list(rank_matrices(model, (*wanted, *added)))
     if any(not matrix for matrix in matrices):
-        return Certificate(COMPLETE, 0.0, 0.0, True, Counts(), 0.0, (), 1, time.monotonic() - began)
+        return _without_boxes(COMPLETE, began)
     if time.monotonic() > last:
-        return Certificate(UNDECIDED, 0.0, 0.0, False, Counts(), 1.0, (), 1, time.monotonic() - began)
+        return _without_boxes(UNDECIDED, began)
     own, every = trig_form(model.ring, J_T) if wanted else None, trig_form(model.ring, J_R)
     rng = np.random.default_rng(0)
-    highest = 0.0 if own is None else peak(own, rng, last)
-    eps = part * highest
-
-    def witness_from(starts: Array) -> NumericWitness | None:
-        return numeric_witness(model, wanted, added, every, starts, eps, last)
-
-    witness = witness_from(weakest(own, [every], eps, rng, last)[0])
+    eps = part * (highest := 0.0 if own is None else peak(own, rng, last))
+    witness_from = functools.partial(numeric_witness, model, wanted, added, every, eps=eps, until=last)
+    witness = witness_from(starts=weakest(own, [every], eps, rng, last)[0])
     if witness is not None:
-        seconds = time.monotonic() - began
-        return Certificate(INCOMPLETE, eps, highest, False, Counts(), 1.0, (), 1, seconds, witness)
+        return _without_boxes(INCOMPLETE, began, eps, highest, witness)
     chosen = _chosen(_shortest(model, matrices, ready), own, eps, ready)
-    both = _both(chosen, own)
+    both, proofs = _both(chosen, own), block_proofs(model, (*wanted, *added), chosen.joints)
     found = symmetries(both, used_joints(both))
-    proofs = (*block_proofs(model, (*wanted, *added), chosen.joints), (chosen,))
-    pieces = _pieces(proofs, own, eps, found, None if state is None else Path(state))
-    finished = pieces.work(until, workers or os.cpu_count() or 1, progress, ended)
-    counts = pieces.counts
+    pieces = _pieces((*proofs, (chosen,)), own, eps, found, None if state is None else Path(state))
+    finished, counts = pieces.work(until, workers or os.cpu_count() or 1, progress, ended), pieces.counts
     verdict, left = COMPLETE, 0.0
     if not finished or counts.undecided > 0:
         verdict, left = UNDECIDED, max(0.0, 1.0 - counts.regular_part - counts.tube_part)
-        witness = witness_from(pieces.kept[:, : model.robot.nv]) if len(pieces.kept) else None
+        witness = witness_from(starts=pieces.kept[:, : model.robot.nv]) if len(pieces.kept) else None
         verdict = verdict if witness is None else INCOMPLETE
-    tubed = counts.tube > 0
-    cut = used_joints(both) if tubed else chosen.joints
-    everywhere = verdict == COMPLETE and not tubed
+    cut = used_joints(both) if counts.tube > 0 else chosen.joints
+    everywhere = verdict == COMPLETE and counts.tube == 0
     return Certificate(verdict, eps, highest, everywhere, counts, left, cut, len(found), pieces.seconds, witness)
+
+
+def _without_boxes(
+    verdict: str, began: float, eps: float = 0.0, highest: float = 0.0, witness: NumericWitness | None = None
+) -> Certificate:
+    """What is known before subdivision."""
+    done, seconds = verdict == COMPLETE, time.monotonic() - began
+    return Certificate(verdict, eps, highest, done, Counts(), 1.0 - done, (), 1, seconds, witness)
 
 
 def _matrices(model: ExactModel, task: tuple[Rows, ...], constraints: tuple[Rows, ...]) -> tuple[Matrix, Matrix]:
@@ -152,6 +150,8 @@ def _matrices(model: ExactModel, task: tuple[Rows, ...], constraints: tuple[Rows
     joints = model.robot.nv
     if len(J_T) > joints or len(J_R) < joints:
         raise RangeError("rows", len(J_R), f"expected at least {joints} in all and at most {joints} in the task")
+    if task:
+        check_task(model.robot, task)
     return J_T, J_R
 
 

@@ -52,6 +52,7 @@ class Analysis:
     """Rank analysis of one set.
 
     Attributes:
+        joints: names, in the order of the labels q1, q2, ...
         exact: arithmetic of the robot, which writes the branches. task, augmented: the symbolic Jacobians.
         locus: where the augmented one has less than its full rank. algorithmic: branches on which the task alone
             keeps full rank. verdict: ``strict`` (no such configuration), ``loose`` (only where the task itself is
@@ -61,6 +62,7 @@ class Analysis:
             of all threads and processes [s].
     """
 
+    joints: tuple[str, ...]
     exact: Exact
     task: SymbolicJacobian
     augmented: SymbolicJacobian
@@ -109,24 +111,7 @@ def analyse(
     budget = budget or Budget()
     budget.start()
     rows = (*wanted, *added)
-    decided: str | None = None
-    interrupted = False
-    with LocusSearch(model, wanted, rows, algorithm, budget) as search:
-        check_task(model.robot, wanted)
-        try:
-            if not search.wait(min(HEAD, budget.seconds)) and certificate is None:
-                certificate = _certified(model, wanted, added, budget, lambda: search.done)
-            decided = None if certificate is None else _verdict(certificate)
-            if decided is not None and told is not None and not search.done:
-                told(decided)
-            if decided != STRICT:
-                search.wait(budget.seconds)
-        except KeyboardInterrupt:
-            search.interrupt()
-            interrupted = True
-        found = search.found()
-    if decided == STRICT and not search.done:
-        found = Loci(found.exact, found.augmented, Locus(()), (), ())
+    found, certificate, done = _searched(model, wanted, added, algorithm, budget, certificate, told)
     witness = None
     if certificate is not None and certificate.witness is not None:
         at = certificate.witness
@@ -137,11 +122,11 @@ def analyse(
     if witness is not None:
         verdict = INCOMPLETE
     elif verdict == UNDECIDED:
-        if decided is None and search.done and not interrupted and budget.seconds > HEAD:
+        if done and _verdict(certificate) is None and budget.seconds > HEAD:
             certificate = _certified(model, wanted, added, budget, lambda: False) or certificate
-            decided = None if certificate is None else _verdict(certificate)
-        verdict = decided or UNDECIDED
+        verdict = _verdict(certificate) or UNDECIDED
     return Analysis(
+        model.robot.dof_names,
         found.exact,
         symbolic_jacobian(model, wanted),
         found.augmented,
@@ -153,6 +138,36 @@ def analyse(
         time.monotonic() - began,
         processor_seconds() - spent,
     )
+
+
+def _searched(
+    model: ExactModel,
+    task: tuple[Rows, ...],
+    added: tuple[Rows, ...],
+    algorithm: str,
+    budget: Budget,
+    certificate: Certificate | None,
+    told: Callable[[str], None] | None,
+) -> tuple[Loci, Certificate | None, bool]:
+    """(loci, certificate if it was asked for, whether the search came to its end)."""
+    done = False
+    with LocusSearch(model, task, (*task, *added), algorithm, budget) as search:
+        check_task(model.robot, task)
+        try:
+            if not search.wait(min(HEAD, budget.seconds)) and certificate is None:
+                certificate = _certified(model, task, added, budget, lambda: search.done)
+            decided = _verdict(certificate)
+            if decided is not None and told is not None and not search.done:
+                told(decided)
+            if decided != STRICT:
+                search.wait(budget.seconds)
+            done = search.done
+        except KeyboardInterrupt:
+            search.interrupt()
+        found = search.found()
+    if not done and _verdict(certificate) == STRICT:
+        found = Loci(found.exact, found.augmented, Locus(()), (), ())
+    return found, certificate, done
 
 
 def _certified(
@@ -167,8 +182,10 @@ def _certified(
         return None
 
 
-def _verdict(found: Certificate) -> str | None:
-    """Of a certificate, in the words of :class:`Analysis`."""
+def _verdict(found: Certificate | None) -> str | None:
+    """Of a certificate, in the words of :class:`Analysis`; None: it decides nothing."""
+    if found is None:
+        return None
     if found.verdict == COMPLETE:
         return STRICT if found.everywhere else COMPLETE
     return INCOMPLETE if found.verdict == INCOMPLETE else None

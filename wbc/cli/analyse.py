@@ -5,7 +5,6 @@ from __future__ import annotations
 import functools
 import json
 import re
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -143,29 +142,46 @@ def analyse_(
             sets = {} if best is None else {", ".join(best.names): best.rows}
     for note in model.notes:
         out().print(escape(note))
-    names = [str(name) for name in model.robot.model.names[1:]]
-    out().print(f"joints: {escape(Notation(HalfAngles(model.ring), latex).joints(names))}", soft_wrap=True)
+    joints = Notation(HalfAngles(model.ring), latex).joints(model.robot.dof_names)
+    out().print(f"joints: {escape(joints)}", soft_wrap=True)
     records = []
     for name, rows in sets.items():
-        entry: dict[str, Any] = {"set": name}
-        budget, proof = Budget(minutes=minutes), None
-        if how is not None:
-            share = 1.0 if screen is not None else _PROOF
-            proof = certified(model, robot, name, task, rows, how, share * budget.seconds / 60.0)
-        if screen is None:
-            early = functools.partial(_known, name)
-            found = analyse(model, task, rows, algorithm=algorithm, budget=budget, certificate=proof, told=early)
-            _show(name, found, latex, budget)
-            entry = _record(name, found, names)
-            if plot is not None:
-                _pictures(plot, model, found, f"{robot} {name}")
-        if proof is not None:
-            if screen is not None:
-                out().print(f"[bold]{escape(name)}[/bold]")
+        budget = Budget(minutes=minutes)
+        if screen is not None and how is not None:
+            out().print(f"[bold]{escape(name)}[/bold]")
+            proof = certified(model, robot, name, task, rows, how, budget.seconds / 60.0)
             show_certificate(proof)
-            entry["certificate"] = record(proof)
+            records.append({"set": name, "certificate": record(proof)})
+            continue
+        entry, found = _one_set(model, robot, name, task, rows, algorithm, budget, how, latex)
         records.append(entry)
+        if plot is not None:
+            _pictures(plot, model, found, f"{robot} {name}")
     _write(json_, {"robot": robot, "algorithm": algorithm, "sets": records})
+
+
+def _one_set(
+    model: ExactModel,
+    robot: str,
+    name: str,
+    task: tuple[Rows, ...],
+    rows: tuple[Rows, ...],
+    algorithm: str,
+    budget: Budget,
+    how: Subdivision | None,
+    latex: bool,
+) -> tuple[dict[str, Any], Analysis]:
+    """Certificate, if wanted, and locus of one set, printed, and as data."""
+    proof = None
+    if how is not None:
+        proof = certified(model, robot, name, task, rows, how, _PROOF * budget.seconds / 60.0)
+    early = functools.partial(_known, name)
+    found = analyse(model, task, rows, algorithm=algorithm, budget=budget, certificate=proof, told=early)
+    _show(name, found, latex, budget)
+    entry = _record(name, found)
+    if proof is not None:
+        entry["certificate"] = record(proof)
+    return entry, found
 
 
 def _known(name: str, verdict: str) -> None:
@@ -219,9 +235,9 @@ def _show(name: str, found: Analysis, latex: bool, budget: Budget) -> None:
             console.print(f"  solved   {escape(solved)}", soft_wrap=True)
     for line in notation.branches(found.locus.open):
         console.print(f"  open     {escape(line)}", soft_wrap=True)
-    if found.certificate is not None and found.witness is None:
+    if found.certificate is not None:
         show_certificate(found.certificate)
-    if found.witness is not None:
+    if found.witness is not None and found.witness.branch is not None:
         q = ", ".join(f"{x:.6g}" for x in found.witness.q)
         console.print(f"  witness  q = {q}", soft_wrap=True)
         task, every = found.witness.task[-1], found.witness.augmented[-1]
@@ -237,7 +253,7 @@ def _determinant(found: Analysis, latex: bool, seconds: float) -> str:
         return str(work.told[0]) if work.told else "not expanded within the minutes"
 
 
-def _record(name: str, found: Analysis, names: Sequence[str]) -> dict[str, Any]:
+def _record(name: str, found: Analysis) -> dict[str, Any]:
     notation, tex = Notation(found.exact.half), Notation(found.exact.half, latex=True)
     witness = found.witness
     return {
@@ -246,7 +262,7 @@ def _record(name: str, found: Analysis, names: Sequence[str]) -> dict[str, Any]:
         "verdict": found.verdict,
         "seconds": found.seconds,
         "processor_seconds": found.processor,
-        "joints": {notation.label(k): joint for k, joint in enumerate(names)},
+        "joints": {notation.label(k): joint for k, joint in enumerate(found.joints)},
         "cost": str(found.augmented.cost),
         "locus": [notation.branch(branch) for branch in found.locus.branches],
         "latex": tex.branches(found.locus.branches),
