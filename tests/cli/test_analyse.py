@@ -88,6 +88,13 @@ def test_certificate_on_screen_and_gone_on_with(tmp_path: Path) -> None:
     assert "no set of 1 or fewer constraints is complete" in out
 
 
+def test_a_screen_ends_at_its_minutes() -> None:
+    code, out, _ = run("ssrms", "--screen", 3, "--minutes", 0.01)
+    assert code == 0
+    assert "screen: ended after 0.01 min, before all sets were looked at" in out
+    assert "is complete" not in out
+
+
 def test_pictures_of_a_locus(tmp_path: Path) -> None:
     code, out, _ = run("spherical_4r", "--set", "alpha", "--plot", tmp_path)
     assert code == 0

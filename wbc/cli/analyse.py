@@ -78,7 +78,8 @@ Screen = Annotated[
     typer.Option(help="Certify the best set of at most so many constraints instead.", rich_help_panel=_WHAT),
 ]
 Minutes = Annotated[
-    float, typer.Option(help="By the clock, for all the work on one set, at most.", rich_help_panel=_WHAT)
+    float,
+    typer.Option(help="By the clock, for all the work on one set, or for a screen, at most.", rich_help_panel=_WHAT),
 ]
 Resume = Annotated[
     Path | None,
@@ -138,7 +139,7 @@ def analyse_(
         wanted = [validation.one_of("set", name, known.sets) for name in chosen or known.sets]
         sets = {name: known.sets[name] for name in wanted}
         if screen is not None:
-            best = winner(model, robot, task, screen)
+            best = winner(model, robot, task, screen, minutes)
             sets = {} if best is None else {", ".join(best.names): best.rows}
     for note in model.notes:
         out().print(escape(note))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -175,14 +176,24 @@ def record_tree(found: TreeCertificate) -> dict[str, Any]:
     }
 
 
-def winner(model: ExactModel, robot: str, task: Sequence[Rows], most: int) -> Screened | None:
-    """The best conditioned of the smallest sets that a numeric screen leaves, printed."""
+def winner(model: ExactModel, robot: str, task: Sequence[Rows], most: int, minutes: float) -> Screened | None:
+    """Within the minutes the best conditioned of the smallest sets that a numeric screen leaves, printed."""
     with progress_bar() as bar:
         shown = bar.add_task("screen", total=1.0)
+        began = time.monotonic()
         found = screen(
-            model, task, candidate_rows(robot), most=most, progress=lambda part: bar.update(shown, completed=part)
+            model,
+            task,
+            candidate_rows(robot),
+            most=most,
+            minutes=minutes,
+            progress=lambda part: bar.update(shown, completed=part),
         )
     console = out()
+    if time.monotonic() - began > 60.0 * minutes:
+        console.print(f"screen: ended after {minutes:g} min, before all sets were looked at")
+        if not found:
+            return None
     if not found:
         console.print(f"screen: no set of {most} or fewer constraints is complete")
         return None
