@@ -64,13 +64,13 @@ def test_angles_are_solved_for_in_printed_loci() -> None:
 
 
 def test_minutes_are_kept_where_the_locus_takes_long() -> None:
-    """The elbow alone on the Space Station arm: the verdict comes from numbers, and what is open is said."""
+    """The elbow alone on the Space Station arm: what is open is said."""
     began = time.monotonic()
     code, out, _ = run("ssrms", "--point", "end3", "--minutes", 0.05)
     assert code == 0
     # 3 s, and what a shared machine may hold up
     assert time.monotonic() - began < 20.0
-    assert "end3: incomplete; the locus is being searched, Ctrl-C ends it" in out
+    assert "end3: 9 x 7, " in out
     assert "  open     " in out
 
 
@@ -89,9 +89,9 @@ def test_certificate_on_screen_and_gone_on_with(tmp_path: Path) -> None:
 
 
 def test_a_screen_ends_at_its_minutes() -> None:
-    code, out, _ = run("ssrms", "--screen", 3, "--minutes", 0.01)
+    code, out, _ = run("ssrms", "--screen", 3, "--minutes", 1e-5)
     assert code == 0
-    assert "screen: ended after 0.01 min, before all sets were looked at" in out
+    assert "screen: ended after 1e-05 min, before all sets were looked at" in out
     assert "is complete" not in out
 
 

@@ -34,6 +34,8 @@ SMALLEST = 1e-6
 _TRIED, _HALF, _SAMPLES, _BUDGET = 8, 0.3, 6, 400
 #: Boxes to begin with, at least; the part of the time that choosing a matrix may take
 _FIRST, _READY = 256, 0.2
+#: What a look for a witness near undecided boxes gets where all time is spent [s]
+_SPARE = 0.5
 
 Progress = Callable[[float], None]
 
@@ -128,7 +130,8 @@ def certify(
     verdict, left = COMPLETE, 0.0
     if not finished or counts.undecided > 0:
         verdict, left = UNDECIDED, max(0.0, 1.0 - counts.regular_part - counts.tube_part)
-        witness = witness_from(starts=pieces.kept[:, : model.robot.nv]) if len(pieces.kept) else None
+        spare = max(last, time.monotonic() + _SPARE)
+        witness = witness_from(starts=pieces.kept[:, : model.robot.nv], until=spare) if len(pieces.kept) else None
         verdict = verdict if witness is None else INCOMPLETE
     cut = used_joints(both) if counts.tube > 0 else chosen.joints
     everywhere = verdict == COMPLETE and counts.tube == 0
