@@ -106,8 +106,7 @@ def certify(
     part, minutes = _checked(part, minutes)
     wanted, added = checked("task", task) if task else (), checked("constraints", constraints)
     J_T, J_R = _matrices(model, wanted, added)
-    began = time.monotonic()
-    until = began + 60.0 * minutes
+    until = (began := time.monotonic()) + 60.0 * minutes
     # What is kept in a file must be the same problem for the next call, so there its preparation is not cut short
     last, ready = (until, began + 60.0 * _READY * minutes) if state is None else (np.inf, np.inf)
     matrices = list(rank_matrices(model, (*wanted, *added)))
@@ -133,8 +132,8 @@ def certify(
         spare = max(last, time.monotonic() + _SPARE)
         witness = witness_from(starts=pieces.kept[:, : model.robot.nv], until=spare) if len(pieces.kept) else None
         verdict = verdict if witness is None else INCOMPLETE
-    cut = used_joints(both) if counts.tube > 0 else chosen.joints
-    everywhere = verdict == COMPLETE and counts.tube == 0
+    tubed = counts.tube > 0
+    cut, everywhere = used_joints(both) if tubed else chosen.joints, verdict == COMPLETE and not tubed
     return Certificate(verdict, eps, highest, everywhere, counts, left, cut, len(found), pieces.seconds, witness)
 
 
