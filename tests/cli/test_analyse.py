@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import time
 from pathlib import Path
 
 from typer.testing import CliRunner
@@ -40,6 +41,39 @@ def test_a_set_of_ones_own(tmp_path: Path) -> None:
     assert "joint1: 7 x 7, incomplete" in out
 
 
+def test_joints_by_their_names_and_times_that_say_what_they_are(tmp_path: Path) -> None:
+    """A point near the tip of the Panda, and q1 ... in formulas are its joints."""
+    file = tmp_path / "loci.json"
+    code, out, _ = run("panda", "--frame", "panda_link7", "--point", "panda_link5", "--json", file)
+    assert code == 0
+    assert "joints: q1 = panda_joint1, q2 = panda_joint2, " in out
+    assert "panda_link5: 9 x 7, incomplete, " in out
+    assert " s by the clock, " in out
+    assert " s of processor time" in out
+    assert "everywhere" not in out
+    (found,) = json.loads(file.read_text())["sets"]
+    assert found["joints"]["q7"] == "panda_joint7"
+    assert "q2 = 0" in found["locus"]
+
+
+def test_angles_are_solved_for_in_printed_loci() -> None:
+    code, out, _ = run("ssrms", "--point", "F5", "--lock", "joint1")
+    assert code == 0
+    assert "locus    q6 = +-pi/2 and q3 = q5 and q4 = pi - 2 q5" in out
+    assert "tan(q3/2)" not in out
+
+
+def test_minutes_are_kept_where_the_locus_takes_long() -> None:
+    """The elbow alone on the Space Station arm: what is open is said."""
+    began = time.monotonic()
+    code, out, _ = run("ssrms", "--point", "end3", "--minutes", 0.05)
+    assert code == 0
+    # 3 s, and what a shared machine may hold up
+    assert time.monotonic() - began < 20.0
+    assert "end3: 9 x 7, " in out
+    assert "  open     " in out
+
+
 def test_certificate_on_screen_and_gone_on_with(tmp_path: Path) -> None:
     arguments = ("spherical_4r", "--set", "elbow, beta", "--certify", "--resume", tmp_path / "states")
     for _ in range(2):
@@ -52,6 +86,13 @@ def test_certificate_on_screen_and_gone_on_with(tmp_path: Path) -> None:
     code, out, _ = run("spherical_4r", "--screen", 1)
     assert code == 0
     assert "no set of 1 or fewer constraints is complete" in out
+
+
+def test_a_screen_ends_at_its_minutes() -> None:
+    code, out, _ = run("ssrms", "--screen", 3, "--minutes", 1e-5)
+    assert code == 0
+    assert "screen: ended after 1e-05 min, before all sets were looked at" in out
+    assert "is complete" not in out
 
 
 def test_pictures_of_a_locus(tmp_path: Path) -> None:

@@ -24,7 +24,7 @@ from wbc.cli.app import app
 run = BoxSearch.run
 
 def slow(self, boxes, budget):
-    if budget > 1000:
+    if budget >= 1000:
         Path(sys.argv[1]).touch()
         time.sleep(0.3)
     return run(self, boxes, budget)

@@ -8,11 +8,12 @@ from wbc.analysis.boxes import Counts
 from wbc.analysis.branches import Branch
 from wbc.analysis.budget import Budget
 from wbc.analysis.certificate import Certificate, certify
-from wbc.analysis.completeness import ALGORITHMS, Analysis, Witness, analyse
+from wbc.analysis.completeness import Analysis, Witness, analyse
 from wbc.analysis.deficiency import Exact
 from wbc.analysis.determinants import Determinant, factored_determinant
 from wbc.analysis.half_angles import Relation, Value
 from wbc.analysis.jacobian import Cost, SymbolicJacobian, symbolic_jacobian
+from wbc.analysis.loci import ALGORITHMS
 from wbc.analysis.locus import Locus
 from wbc.analysis.model import ExactModel
 from wbc.analysis.notation import Notation

@@ -9,10 +9,13 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
-from wbc.analysis.completeness import INCOMPLETE, LOOSE, STRICT, UNDECIDED, Loci, Witness, find_witness, loci
+from wbc.analysis.budget import Budget, processor_seconds
+from wbc.analysis.certificate import INCOMPLETE
+from wbc.analysis.completeness import Witness, find_witness
 from wbc.analysis.jacobian import symbolic_jacobian
+from wbc.analysis.loci import LOOSE, STRICT, UNDECIDED, Loci, loci
 from wbc.analysis.model import ExactModel
-from wbc.analysis.numeric import NumericRows
+from wbc.analysis.numeric import NumericRows, check_task
 from wbc.analysis.rows import Rows, checked
 from wbc.analysis.tree_joints import JointBlock, TreeJoints, joint_blocks
 from wbc.robots import load
@@ -43,7 +46,7 @@ class TreeAnalysis:
         shape: rows and joints of J_R. blocks: in the order of the joints. parted: whether the task falls into the
             blocks as well.
         verdict, witness: as those of :class:`Analysis`, of the whole robot. lost: the block that loses rank at the
-            witness. seconds: processor time.
+            witness. seconds: by the clock. processor: processor time of all threads and processes [s].
     """
 
     shape: tuple[int, int]
@@ -53,10 +56,16 @@ class TreeAnalysis:
     witness: Witness | None
     lost: JointBlock | None
     seconds: float
+    processor: float
 
 
 def analyse_blocks(
-    model: ExactModel, task: Sequence[Rows], constraints: Sequence[Rows], *, algorithm: str = "sub_determinants"
+    model: ExactModel,
+    task: Sequence[Rows],
+    constraints: Sequence[Rows],
+    *,
+    algorithm: str = "sub_determinants",
+    minutes: float = 30.0,
 ) -> TreeAnalysis:
     """Completeness as :func:`analyse` decides it, of a tree whose rows fall into blocks J_b:
 
@@ -67,31 +76,42 @@ def analyse_blocks(
     constraint), a block that never loses rank is strict, and on the branches of the others a configuration of the
     whole robot is looked for where the task has full rank; it is checked by singular values of the whole Jacobians.
 
+    Args:
+        minutes: by the clock, for all blocks together.
+
     Source: E. Dupuis, PhD thesis, McGill University, 2001, section 4.5, eqs. 4.46 to 4.48.
 
     Raises:
-        RangeError: a row that leaves no blocks, or a block with fewer rows than joints; see :func:`joint_blocks`.
+        RangeError: a row that leaves no blocks, or a block with fewer rows than joints; see :func:`joint_blocks`. A
+            task that has full rank nowhere.
         UnknownNameError: algorithm, frame or joint.
     """
-    began = time.process_time()
+    began, spent = time.monotonic(), processor_seconds()
+    budget = Budget(minutes=minutes)
+    budget.start()
     wanted, added = checked("task", task), checked("constraints", constraints)
     rows = (*wanted, *added)
     blocks = joint_blocks(model.robot, rows)
     parted = parted_task(model, wanted, blocks)
+    check_task(model.robot, wanted)
     known: dict[tuple[object, ...], Loci] = {}
-    analysed = tuple(_analysed(model, block, wanted if parted else (), algorithm, known) for block in blocks)
+    analysed = tuple(
+        _analysed(model, block, wanted if parted else (), algorithm, known, budget.seconds / (len(blocks) - number))
+        for number, block in enumerate(blocks)
+    )
     verdicts = {one.verdict for one in analysed}
     witness: Witness | None = None
     lost: JointBlock | None = None
     for one in analysed:
         if one.verdict == UNDECIDED and witness is None:
-            witness = find_witness(model.robot, one.loci, wanted, rows, lift(model, one.model))
+            witness = find_witness(model.robot, one.loci, wanted, rows, lift(model, one.model), budget)
             lost = None if witness is None else one.block
     verdict = next(v for v in (UNDECIDED, LOOSE, STRICT) if v in verdicts)
     if witness is not None:
         verdict = INCOMPLETE
     shape = NumericRows(model.robot).value(rows, model.robot.neutral).shape
-    return TreeAnalysis((shape[0], shape[1]), analysed, parted, verdict, witness, lost, time.process_time() - began)
+    seconds, processor = time.monotonic() - began, processor_seconds() - spent
+    return TreeAnalysis((shape[0], shape[1]), analysed, parted, verdict, witness, lost, seconds, processor)
 
 
 def parted_task(model: ExactModel, task: tuple[Rows, ...], blocks: Sequence[JointBlock]) -> bool:
@@ -108,13 +128,14 @@ def _analysed(
     task: tuple[Rows, ...],
     algorithm: str,
     known: dict[tuple[object, ...], Loci],
+    seconds: float,
 ) -> BlockAnalysis:
     alone = block_model(model, block)
     own = [r for r in block.rows if any(r is t for t in task)]
     key = problem(alone, own, [r for r in block.rows if not any(r is t for t in own)])
     if key not in known:
-        known[key] = loci(alone, own, block.rows, algorithm)
-    return BlockAnalysis(block, alone, known[key], known[key].verdict(None))
+        known[key] = loci(alone, own, block.rows, algorithm, Budget(minutes=max(seconds, 1e-3) / 60.0))
+    return BlockAnalysis(block, alone, known[key], known[key].verdict)
 
 
 def problem(alone: ExactModel, task: Sequence[Rows], rest: Sequence[Rows]) -> tuple[object, ...]:

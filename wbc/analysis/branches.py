@@ -94,10 +94,7 @@ class BranchArithmetic:
             return condition in branch.values
         if condition in branch.relations:
             return True
-        form = condition.poly
-        for value in branch.values:
-            form = self.half.put(form, value)
-        return self.form_vanishes(form, branch)
+        return self.form_vanishes(self._put(condition, branch)[0], branch)
 
     def within(self, inner: Branch, outer: Branch) -> bool:
         """Whether the conditions of ``outer`` all follow from those of ``inner``."""
@@ -113,21 +110,27 @@ class BranchArithmetic:
                 return [branch] if value == condition else []
         out = [Branch(tuple(sorted((*branch.values, condition), key=lambda v: v.key)))]
         for relation in branch.relations:
-            out = [after for one in out for after in self._with_form(one, self.half.put(relation.poly, condition))]
+            out = [after for one in out for after in self._with_form(one, relation)]
         return unique(out)
 
-    def _with_form(self, branch: Branch, form: HalfPoly) -> list[Branch]:
-        """Branches in which a form vanishes; the values must not be put in yet."""
+    def _put(self, relation: Relation, branch: Branch) -> tuple[HalfPoly, tuple[int, ...]]:
+        """A relation with the values of a branch put in, and its degrees as a form in the other joints."""
+        form, degrees = relation.poly, list(relation.degrees)
         for value in branch.values:
-            form = self.half.put(form, value)
-        found = self.half.split(form)
+            form = self.half.put(form, value, degrees[value.joint])
+            degrees[value.joint] = 0
+        return form, tuple(degrees)
+
+    def _with_form(self, branch: Branch, relation: Relation) -> list[Branch]:
+        """Branches in which a relation holds, some joints of which are at values."""
+        found = self.half.split(*self._put(relation, branch))
         if found.zero:
             return [branch]
         return unique(after for factor, _ in found.conditions for after in self.with_condition(branch, factor))
 
     def _with_relation(self, branch: Branch, relation: Relation) -> list[Branch]:
         if {v.joint for v in branch.values} & set(relation.joints):
-            return self._with_form(branch, relation.poly)
+            return self._with_form(branch, relation)
         if relation in branch.relations:
             return [branch]
         together = _joined(branch, relation)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 
 from wbc import validation
@@ -9,10 +10,10 @@ from wbc.errors import RangeError
 
 
 class Budget:
-    """Branches and processor time of one search; what is left over when they are spent stays open.
+    """Branches and time of one search; what is left over when they are spent stays open.
 
     Args:
-        branches: looked at, at most. minutes: of processor time, from the first branch on; one branch is always ended.
+        branches: looked at, at most. minutes: by the clock, from :meth:`start` or the first branch on.
 
     Raises:
         RangeError: numbers that are not positive.
@@ -26,12 +27,21 @@ class Budget:
         self._left, self._minutes = branches, minutes
         self._until: float | None = None
 
+    def start(self) -> None:
+        """The clock starts, if it has not yet."""
+        if self._until is None:
+            self._until = time.monotonic() + 60.0 * self._minutes
+
+    @property
+    def seconds(self) -> float:
+        """What is left of the time, at least 0."""
+        self.start()
+        assert self._until is not None
+        return max(0.0, self._until - time.monotonic())
+
     def take(self) -> bool:
         """One branch more, if there is still something left."""
-        now = time.process_time()
-        if self._until is None:
-            self._until = now + 60.0 * self._minutes
-        if self._left <= 0 or now >= self._until:
+        if self._left <= 0 or self.seconds <= 0.0:
             self.end()
             return False
         self._left -= 1
@@ -40,3 +50,8 @@ class Budget:
     def end(self) -> None:
         """Nothing more, as after a keyboard interrupt."""
         self._left = 0
+
+
+def processor_seconds() -> float:
+    """Processor time so far of this process with all its threads and of its children that have ended."""
+    return sum(os.times()[:4])

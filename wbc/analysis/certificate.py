@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import os
 import time
 from collections.abc import Callable, Sequence
@@ -15,6 +16,7 @@ from wbc.analysis.block_proofs import block_proofs
 from wbc.analysis.boxes import BoxSearch, Counts
 from wbc.analysis.jacobian import symbolic_jacobian
 from wbc.analysis.model import ExactModel
+from wbc.analysis.numeric import check_task
 from wbc.analysis.pieces import Pieces
 from wbc.analysis.rank_matrix import rank_matrices
 from wbc.analysis.ring import Matrix
@@ -23,7 +25,6 @@ from wbc.analysis.symmetry import Symmetry, fundamental_box, symmetries
 from wbc.analysis.trig_form import TrigForm, trig_form, used_joints
 from wbc.analysis.weakest import NumericWitness, numeric_witness, peak, weakest
 from wbc.errors import RangeError
-from wbc.validation import Array
 
 #: Verdicts
 COMPLETE, INCOMPLETE, UNDECIDED = "complete", "incomplete", "undecided"
@@ -31,8 +32,10 @@ COMPLETE, INCOMPLETE, UNDECIDED = "complete", "incomplete", "undecided"
 SMALLEST = 1e-6
 #: Matrices that are tried on random boxes of this half width [rad], how many boxes, and parts of each at most
 _TRIED, _HALF, _SAMPLES, _BUDGET = 8, 0.3, 6, 400
-#: Boxes to begin with, at least
-_FIRST = 256
+#: Boxes to begin with, at least; the part of the time that choosing a matrix may take
+_FIRST, _READY = 256, 0.2
+#: What a look for a witness near undecided boxes gets where all time is spent [s]
+_SPARE = 0.5
 
 Progress = Callable[[float], None]
 
@@ -72,6 +75,7 @@ def certify(
     workers: int | None = None,
     state: str | os.PathLike[str] | None = None,
     progress: Progress | None = None,
+    ended: Callable[[], bool] | None = None,
 ) -> Certificate:
     """Completeness outside a tube around the task's singularities, by branch and bound over joint space:
 
@@ -85,53 +89,60 @@ def certify(
     are not subdivided, symmetries cut the rest. A numeric search for a witness goes first.
 
     Args:
-        part: of the largest sigma_min(J_T), > 0 and < 1. minutes: after which the rest is left undecided.
+        part: of the largest sigma_min(J_T), > 0 and < 1. minutes: by the clock, after which the rest is left undecided;
+            with a state the preparation is not cut short.
         workers: threads; None: one a core. state: file that keeps what is done, and from which a second call goes on.
-        progress: called with the decided part of the volume. A keyboard interrupt ends with what is known so far.
+        progress: called with the decided part of the volume. ended: asked now and then whether to stop, as does a
+            keyboard interrupt, with what is known so far.
 
     Source: bounds of eigenvalues of non-negative matrices for regularity of interval matrices: J. Rohn, "Systems of
     linear interval equations", Linear Algebra and its Applications 126, 1989.
 
     Raises:
-        RangeError: numbers out of range, matrices too large. UnsupportedJointError: entries in a sliding joint.
-        RobotFileError: a state of another problem. CompileError: no C compiler.
+        RangeError: numbers out of range, matrices too large, a task of full rank nowhere.
+        UnsupportedJointError: entries in a sliding joint. RobotFileError: a state of another problem.
+        CompileError: no C compiler.
     """
     part, minutes = _checked(part, minutes)
     wanted, added = checked("task", task) if task else (), checked("constraints", constraints)
     J_T, J_R = _matrices(model, wanted, added)
-    began = time.monotonic()
+    until = (began := time.monotonic()) + 60.0 * minutes
+    # What is kept in a file must be the same problem for the next call, so there its preparation is not cut short
+    last, ready = (until, began + 60.0 * _READY * minutes) if state is None else (np.inf, np.inf)
     matrices = list(rank_matrices(model, (*wanted, *added)))
     if any(not matrix for matrix in matrices):
-        return Certificate(COMPLETE, 0.0, 0.0, True, Counts(), 0.0, (), 1, time.monotonic() - began)
-    forms = [trig_form(model.ring, matrix) for matrix in matrices]
+        return _without_boxes(COMPLETE, began)
+    if time.monotonic() > last:
+        return _without_boxes(UNDECIDED, began)
     own, every = trig_form(model.ring, J_T) if wanted else None, trig_form(model.ring, J_R)
     rng = np.random.default_rng(0)
-    highest = 0.0 if own is None else peak(own, rng)
-    eps = part * highest
-
-    def witness_from(starts: Array) -> NumericWitness | None:
-        return numeric_witness(model, wanted, added, every, starts, eps)
-
-    witness = witness_from(weakest(own, [every], eps, rng)[0])
+    eps = part * (highest := 0.0 if own is None else peak(own, rng, last))
+    witness_from = functools.partial(numeric_witness, model, wanted, added, every, eps=eps, until=last)
+    witness = witness_from(starts=weakest(own, [every], eps, rng, last)[0])
     if witness is not None:
-        seconds = time.monotonic() - began
-        return Certificate(INCOMPLETE, eps, highest, False, Counts(), 1.0, (), 1, seconds, witness)
-    chosen = _chosen(forms, own, eps)
-    both = _both(chosen, own)
+        return _without_boxes(INCOMPLETE, began, eps, highest, witness)
+    chosen = _chosen(_shortest(model, matrices, ready), own, eps, ready)
+    both, proofs = _both(chosen, own), block_proofs(model, (*wanted, *added), chosen.joints)
     found = symmetries(both, used_joints(both))
-    proofs = (*block_proofs(model, (*wanted, *added), chosen.joints), (chosen,))
-    pieces = _pieces(proofs, own, eps, found, None if state is None else Path(state))
-    finished = pieces.work(minutes, workers or os.cpu_count() or 1, progress)
-    counts = pieces.counts
+    pieces = _pieces((*proofs, (chosen,)), own, eps, found, None if state is None else Path(state))
+    finished, counts = pieces.work(until, workers or os.cpu_count() or 1, progress, ended), pieces.counts
     verdict, left = COMPLETE, 0.0
     if not finished or counts.undecided > 0:
         verdict, left = UNDECIDED, max(0.0, 1.0 - counts.regular_part - counts.tube_part)
-        witness = witness_from(pieces.kept[:, : model.robot.nv]) if len(pieces.kept) else None
+        spare = max(last, time.monotonic() + _SPARE)
+        witness = witness_from(starts=pieces.kept[:, : model.robot.nv], until=spare) if len(pieces.kept) else None
         verdict = verdict if witness is None else INCOMPLETE
     tubed = counts.tube > 0
-    cut = used_joints(both) if tubed else chosen.joints
-    everywhere = verdict == COMPLETE and not tubed
+    cut, everywhere = used_joints(both) if tubed else chosen.joints, verdict == COMPLETE and not tubed
     return Certificate(verdict, eps, highest, everywhere, counts, left, cut, len(found), pieces.seconds, witness)
+
+
+def _without_boxes(
+    verdict: str, began: float, eps: float = 0.0, highest: float = 0.0, witness: NumericWitness | None = None
+) -> Certificate:
+    """What is known before subdivision."""
+    done, seconds = verdict == COMPLETE, time.monotonic() - began
+    return Certificate(verdict, eps, highest, done, Counts(), 1.0 - done, (), 1, seconds, witness)
 
 
 def _matrices(model: ExactModel, task: tuple[Rows, ...], constraints: tuple[Rows, ...]) -> tuple[Matrix, Matrix]:
@@ -141,6 +152,8 @@ def _matrices(model: ExactModel, task: tuple[Rows, ...], constraints: tuple[Rows
     joints = model.robot.nv
     if len(J_T) > joints or len(J_R) < joints:
         raise RangeError("rows", len(J_R), f"expected at least {joints} in all and at most {joints} in the task")
+    if task:
+        check_task(model.robot, task)
     return J_T, J_R
 
 
@@ -157,23 +170,35 @@ def _both(augmented: TrigForm, task: TrigForm | None) -> tuple[TrigForm, ...]:
     return (augmented,) if task is None else (augmented, task)
 
 
-def _chosen(forms: Sequence[TrigForm], task: TrigForm | None, eps: float) -> TrigForm:
-    """Of the matrices with the fewest terms the one that needs the fewest boxes on a sample."""
-    few = sorted(forms, key=lambda form: form.terms)[:_TRIED]
+def _shortest(model: ExactModel, matrices: Sequence[Matrix], until: float) -> list[TrigForm]:
+    """The matrices with the fewest terms as waves; at least one, however late it is."""
+    short = sorted(matrices, key=lambda matrix: sum(len(p) for row in matrix for p in row))
+    found = [trig_form(model.ring, short[0])]
+    for matrix in short[1:]:
+        if time.monotonic() > until:
+            break
+        found.append(trig_form(model.ring, matrix))
+    return sorted(found, key=lambda form: form.terms)[:_TRIED]
+
+
+def _chosen(forms: Sequence[TrigForm], task: TrigForm | None, eps: float, until: float) -> TrigForm:
+    """Of the forms the one that needs the fewest boxes on a sample; the first where there is no time for samples."""
     size = forms[0].waves.shape[1]
     rng = np.random.default_rng(1)
     centres = rng.uniform(-np.pi, np.pi, (_SAMPLES, size))
-
-    def boxes(form: TrigForm) -> float:
+    best, least = forms[0], np.inf
+    for form in forms:
         search = BoxSearch(((form,),), task, eps, SMALLEST, 1.0)
         half = np.where(np.isin(np.arange(size), used_joints(_both(form, task))), _HALF, 0.0)
         total = 0.0
         for centre in centres:
+            if time.monotonic() > until:
+                return best
             counts, left, _ = search.run(np.concatenate((centre, half, [0.0]))[None], _BUDGET)
             total += counts.boxes + len(left)
-        return total
-
-    return min(few, key=boxes)
+        if total < least:
+            best, least = form, total
+    return best
 
 
 def _pieces(

@@ -2,38 +2,34 @@
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from wbc import validation
 from wbc.analysis.branches import Branch
-from wbc.analysis.budget import Budget
+from wbc.analysis.budget import Budget, processor_seconds
+from wbc.analysis.certificate import COMPLETE, INCOMPLETE, Certificate, certify
 from wbc.analysis.deficiency import Exact
-from wbc.analysis.equivalent_rows import split_twists
 from wbc.analysis.jacobian import SymbolicJacobian, symbolic_jacobian
+from wbc.analysis.loci import STRICT, UNDECIDED, Loci, LocusSearch
 from wbc.analysis.locus import Locus
 from wbc.analysis.model import ExactModel
-from wbc.analysis.numeric import NumericRows, rank, singular_values
+from wbc.analysis.numeric import NumericRows, check_task, rank, singular_values
 from wbc.analysis.points import real_point
-from wbc.analysis.ring import Matrix
 from wbc.analysis.rows import Rows, checked
-from wbc.analysis.singular_vectors import singular_vector_locus
-from wbc.analysis.sub_determinants import sub_determinant_locus
-from wbc.errors import RangeError
+from wbc.errors import CompileError, RangeError, UnsupportedJointError
 from wbc.robot import Robot
 from wbc.validation import Array
 
-ALGORITHMS: dict[str, Callable[[Exact, Matrix, Budget | None], Locus]] = {
-    "sub_determinants": sub_determinant_locus,
-    "singular_vectors": singular_vector_locus,
-}
 #: Random points on a branch that are tried for a witness
 TRIES = 40
-#: Verdicts
-STRICT, LOOSE, INCOMPLETE, UNDECIDED = "strict", "loose", "incomplete", "undecided"
+#: What the exact method gets before numbers are asked as well [s], and least minutes of a certificate
+HEAD, _LEAST = 1.0, 1e-6
+#: What is left for points of branches where the search has taken all the time [s]
+_AFTER = 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,12 +37,12 @@ class Witness:
     """A configuration where the task has full rank and task and constraints together have not.
 
     Attributes:
-        q: configuration of the robot [nq]. branch: of the locus, on which it lies.
+        q: configuration of the robot [nq]. branch: of the locus, on which it lies; None: it was found by numbers.
         task: singular values of the task Jacobian there. augmented: those of task and constraints.
     """
 
     q: Array
-    branch: Branch
+    branch: Branch | None
     task: Array
     augmented: Array
 
@@ -56,13 +52,17 @@ class Analysis:
     """Rank analysis of one set.
 
     Attributes:
+        joints: names, in the order of the labels q1, q2, ...
         exact: arithmetic of the robot, which writes the branches. task, augmented: the symbolic Jacobians.
         locus: where the augmented one has less than its full rank. algorithmic: branches on which the task alone
             keeps full rank. verdict: ``strict`` (no such configuration), ``loose`` (only where the task itself is
-            deficient), ``incomplete``, or ``undecided`` (a branch is open, or no real point of it was found).
-        witness: for ``incomplete``. seconds: processor time.
+            deficient), ``incomplete``, ``complete`` (by the certificate, outside its tube; inside it is not decided),
+            or ``undecided``. witness: for ``incomplete``.
+        certificate: the one that was asked for the verdict, if any. seconds: by the clock. processor: processor time
+            of all threads and processes [s].
     """
 
+    joints: tuple[str, ...]
     exact: Exact
     task: SymbolicJacobian
     augmented: SymbolicJacobian
@@ -70,7 +70,9 @@ class Analysis:
     algorithmic: tuple[Branch, ...]
     verdict: str
     witness: Witness | None
+    certificate: Certificate | None
     seconds: float
+    processor: float
 
 
 def analyse(
@@ -80,28 +82,51 @@ def analyse(
     *,
     algorithm: str = "sub_determinants",
     budget: Budget | None = None,
+    certificate: Certificate | None = None,
+    told: Callable[[str], None] | None = None,
 ) -> Analysis:
     """Completeness of task and constraint coordinates: { q : rank J_R < m } within { q : rank J_T < n }.
 
     J_T are the rows of the task, J_R those of task and constraints, m the number of joints. If the tall J_R has rank m
     and J_T full rank, some rows of the constraints complete the task; so one locus stands for all pairs.
 
-    A witness is looked for on every branch where the task is not deficient, and checked with singular values of the
-    robot's Jacobians, computed apart from the polynomials. Where the budget is spent, or a keyboard interrupt comes,
-    what is known so far is the answer, with the branches that were not decided in ``locus.open``.
+    The locus is searched in exact arithmetic, in a process of its own. If it is not found within a second, numbers are
+    asked for the verdict meanwhile: a search for a witness, then :func:`certify`. Every witness is checked with
+    singular values of the robot's Jacobians, computed apart from the polynomials. Where the budget is spent, or a
+    keyboard interrupt comes, what is known so far is the answer, with the branches that were not decided in
+    ``locus.open``.
+
+    Args:
+        certificate: of this set, if there is one already. told: called with the verdict where it is known before the
+            locus is.
 
     Source: E. Dupuis, PhD thesis, McGill University, 2001, section 3.1.
 
     Raises:
-        UnknownNameError: algorithm, frame or joint. RangeError: fewer rows than joints, or more task rows than joints.
+        UnknownNameError: algorithm, frame or joint. RangeError: fewer rows than joints, more task rows than joints, or
+            a task that has full rank nowhere.
     """
-    began = time.process_time()
+    began, spent = time.monotonic(), processor_seconds()
     wanted, added = checked("task", task), checked("constraints", constraints)
+    budget = budget or Budget()
+    budget.start()
     rows = (*wanted, *added)
-    found = loci(model, wanted, rows, algorithm, budget)
-    witness = find_witness(model.robot, found, wanted, rows, model.configuration)
-    verdict = found.verdict(witness)
+    found, certificate, done = _searched(model, wanted, added, algorithm, budget, certificate, told)
+    witness = None
+    if certificate is not None and certificate.witness is not None:
+        at = certificate.witness
+        witness = Witness(at.q, None, at.task, at.augmented)
+    elif found.verdict == UNDECIDED:
+        witness = find_witness(model.robot, found, wanted, rows, model.configuration, budget)
+    verdict = found.verdict
+    if witness is not None:
+        verdict = INCOMPLETE
+    elif verdict == UNDECIDED:
+        if done and _verdict(certificate) is None and budget.seconds > HEAD:
+            certificate = _certified(model, wanted, added, budget, lambda: False) or certificate
+        verdict = _verdict(certificate) or UNDECIDED
     return Analysis(
+        model.robot.dof_names,
         found.exact,
         symbolic_jacobian(model, wanted),
         found.augmented,
@@ -109,64 +134,70 @@ def analyse(
         found.algorithmic,
         verdict,
         witness,
-        time.process_time() - began,
+        certificate,
+        time.monotonic() - began,
+        processor_seconds() - spent,
     )
 
 
-@dataclass(frozen=True, eq=False)
-class Loci:
-    """Where rows lose rank, and where the task does not.
-
-    Attributes:
-        exact: arithmetic of the robot. augmented: all rows. locus: where they have less than full rank.
-        algorithmic: branches on which the task is not known to be deficient. doubtful: those among the open ones.
-    """
-
-    exact: Exact
-    augmented: SymbolicJacobian
-    locus: Locus
-    algorithmic: tuple[Branch, ...]
-    doubtful: tuple[Branch, ...]
-
-    def verdict(self, witness: Witness | None) -> str:
-        """In the words of :class:`Analysis`."""
-        if witness is not None:
-            return INCOMPLETE
-        if self.algorithmic or self.doubtful:
-            return UNDECIDED
-        return LOOSE if self.locus.branches else STRICT
-
-
-def loci(
-    model: ExactModel, task: Sequence[Rows], rows: Sequence[Rows], algorithm: str, budget: Budget | None = None
-) -> Loci:
-    """The locus of rows; ``task``: some of them, none if their rank depends on other joints than the model's.
-
-    Raises:
-        UnknownNameError, RangeError: see :func:`analyse`.
-    """
-    validation.one_of("algorithm", algorithm, ALGORITHMS)
-    exact, joints = Exact(model.ring), model.robot.nv
-    J_T = symbolic_jacobian(model, task).matrix if task else []
-    J_R = symbolic_jacobian(model, rows)
-    if len(J_T) > joints or J_R.shape[0] < joints:
-        raise RangeError("rows", J_R.shape[0], f"expected at least {joints} in all and at most {joints} in the task")
-    locus = ALGORITHMS[algorithm](exact, _shortest(model, tuple(rows), J_R), budget)
-
-    def kept(branches: Sequence[Branch]) -> tuple[Branch, ...]:
-        return tuple(b for b in branches if not J_T or not exact.deficient(J_T, b))
-
-    return Loci(exact, J_R, locus, kept(locus.branches), kept(locus.open))
+def _searched(
+    model: ExactModel,
+    task: tuple[Rows, ...],
+    added: tuple[Rows, ...],
+    algorithm: str,
+    budget: Budget,
+    certificate: Certificate | None,
+    told: Callable[[str], None] | None,
+) -> tuple[Loci, Certificate | None, bool]:
+    """(loci, certificate if it was asked for, whether the search came to its end)."""
+    done = False
+    with LocusSearch(model, task, (*task, *added), algorithm, budget) as search:
+        check_task(model.robot, task)
+        try:
+            if not search.wait(min(HEAD, budget.seconds)) and certificate is None:
+                certificate = _certified(model, task, added, budget, lambda: search.done)
+            decided = _verdict(certificate)
+            if decided is not None and told is not None and not search.done:
+                told(decided)
+            if decided != STRICT:
+                search.wait(budget.seconds)
+            done = search.done
+        except KeyboardInterrupt:
+            search.interrupt()
+        found = search.found()
+    if not done and _verdict(certificate) == STRICT:
+        found = Loci(found.exact, found.augmented, Locus(()), (), ())
+    return found, certificate, done
 
 
-def _shortest(model: ExactModel, rows: tuple[Rows, ...], stacked: SymbolicJacobian) -> Matrix:
-    """Of the rows and their equivalents with a twist split at a point the matrix with the fewest terms."""
-    splits = (symbolic_jacobian(model, split).matrix for split in split_twists(model, rows))
-    return min((stacked.matrix, *splits), key=lambda matrix: sum(len(p) for row in matrix for p in row))
+def _certified(
+    model: ExactModel, task: tuple[Rows, ...], added: tuple[Rows, ...], budget: Budget, ended: Callable[[], bool]
+) -> Certificate | None:
+    """What numbers say within the budget, beside the search of the locus; None where they do not take the robot."""
+    workers = max(1, (os.cpu_count() or 1) - 1)
+    minutes = max(_LEAST, budget.seconds / 60.0)
+    try:
+        return certify(model, task, added, minutes=minutes, workers=workers, ended=ended)
+    except (UnsupportedJointError, RangeError, CompileError):
+        return None
+
+
+def _verdict(found: Certificate | None) -> str | None:
+    """Of a certificate, in the words of :class:`Analysis`; None: it decides nothing."""
+    if found is None:
+        return None
+    if found.verdict == COMPLETE:
+        return STRICT if found.everywhere else COMPLETE
+    return INCOMPLETE if found.verdict == INCOMPLETE else None
 
 
 def find_witness(
-    robot: Robot, found: Loci, task: Sequence[Rows], rows: Sequence[Rows], configuration: Callable[[Array], Array]
+    robot: Robot,
+    found: Loci,
+    task: Sequence[Rows],
+    rows: Sequence[Rows],
+    configuration: Callable[[Array], Array],
+    budget: Budget,
 ) -> Witness | None:
     """The best of random points on the first branch that has one: its task is farthest from a loss of rank.
 
@@ -174,9 +205,12 @@ def find_witness(
         configuration: of the robot, from a number for each joint of the arithmetic that found the branches.
     """
     numeric, rng = NumericRows(robot), np.random.default_rng(0)
+    until = time.monotonic() + max(budget.seconds, _AFTER)
     for branch in found.algorithmic:
         best: Witness | None = None
         for _ in range(TRIES):
+            if time.monotonic() > until:
+                return best
             point = real_point(found.exact.half, branch, rng)
             if point is None:
                 continue

@@ -7,14 +7,16 @@ from dataclasses import dataclass
 from itertools import islice
 
 from wbc.analysis.branches import Branch, BranchArithmetic, unique
-from wbc.analysis.fourier import dominated, fourier
+from wbc.analysis.emptiness import proved_empty
 from wbc.analysis.half_angles import Factor, Factors, HalfAngles, Relation
 from wbc.analysis.minors import eliminated, maximal_minors, transposed
-from wbc.analysis.points import univariate_roots
+from wbc.analysis.points import changes_sign, univariate_roots
 from wbc.analysis.ring import Matrix, Poly, TrigRing
 
 #: Minors, shortest first, that are factored to find the cheapest
 CANDIDATES = 16
+#: Terms of relations that bounds are computed of, at most
+TERMS = 600
 
 
 @dataclass(frozen=True)
@@ -74,15 +76,23 @@ class Exact:
         return [child for child in unique(out) if all(self.may_vanish(r) for r in child.relations)]
 
     def may_vanish(self, relation: Relation) -> bool:
-        """False where its roots, if it is in one joint, or a bound prove that the relation is never zero."""
+        """False where its roots, if it is in one joint, or bounds prove that the relation is never zero."""
         if relation not in self._real:
             alone = len(relation.joints) == 1 and not any(relation.poly.degrees()[self.half.size :])
             self._real[relation] = (
                 bool(univariate_roots(self.half, relation))
                 if alone
-                else not dominated(self.half, fourier(self.half, relation.poly, relation.degrees))
+                else changes_sign(self.half, relation) or not self._empty((relation,))
             )
         return self._real[relation]
+
+    def real(self, branches: Iterable[Branch]) -> tuple[Branch, ...]:
+        """The branches without those whose relations are proved to have no real solution together."""
+        return tuple(b for b in branches if len(b.relations) < 2 or not self._empty(b.relations))
+
+    def _empty(self, relations: tuple[Relation, ...]) -> bool:
+        """Whether bounds prove it; long relations are left alone."""
+        return sum(len(r.poly) for r in relations) <= TERMS and proved_empty(self.half, relations)
 
     def without_redundant(self, branches: Iterable[Branch]) -> list[Branch]:
         """The branches without those that lie within another one, larger sets first."""

@@ -21,9 +21,9 @@ def split_twists(model: ExactModel, rows: Sequence[Rows]) -> Iterator[tuple[Rows
     """Equivalents of rows with one whole twist and the velocity of a point of another body.
 
     With v_p of the point and (v; omega) of a frame t in the rows, v may give way to the velocity of the point relative
-    to the body of t, and omega stays:
+    to the body of t, while v_p and omega stay:
 
-        v_p - (v + omega x (p - t)),    omega
+        v_p - (v + omega x (p - t)),    v_p,    omega
 
     The first has the joints between the two bodies alone. omega is expressed in the axes of each frame in turn.
     """
@@ -31,12 +31,15 @@ def split_twists(model: ExactModel, rows: Sequence[Rows]) -> Iterator[tuple[Rows
     if len(whole) != 1:
         return
     tip = whole[0].frame
-    rest = [nearer(model, r, tip) for r in rows if r is not whole[0]]
-    points = {r.frame for r in rows if _from_world(r) and sorted(r.translation) == list(ALL)} - {tip}
-    for point in sorted(points):
+    rest = [r for r in rows if r is not whole[0]]
+    shorter = {r: nearer(model, r, tip) for r in rest}
+    points = {r.frame: r for r in rest if _from_world(r) and sorted(r.translation) == list(ALL) and r.frame != tip}
+    for point, held in sorted(points.items()):
+        # v is what v_p and the relative velocity leave, so v_p itself stays as it is
+        others = [r if r is held else shorter[r] for r in rest]
         between = BodyRows(point, base=tip, rotation=())
         for axes in model.distinct_frames():
-            yield (*rest, between, BodyRows(tip, expressed=axes, translation=()))
+            yield (*others, between, BodyRows(tip, expressed=axes, translation=()))
 
 
 def nearer(model: ExactModel, rows: Rows, tip: str) -> Rows:

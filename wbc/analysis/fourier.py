@@ -26,41 +26,43 @@ class Term:
 
 
 @cache
-def _expansion(sines: int, cosines: int) -> dict[int, Fraction]:
-    """Coefficients of (z - 1/z)^sines (z + 1/z)^cosines / 2^(sines + cosines) by powers of z."""
-    out: dict[int, Fraction] = {}
+def _expansion(sines: int, cosines: int) -> dict[int, int]:
+    """Coefficients of (z - 1/z)^sines (z + 1/z)^cosines by powers of z."""
+    out: dict[int, int] = {}
     for i in range(sines + 1):
         for j in range(cosines + 1):
             power = sines - 2 * i + cosines - 2 * j
-            out[power] = out.get(power, Fraction(0)) + Fraction((-1) ** i * comb(sines, i) * comb(cosines, j))
-    return {p: a / 2 ** (sines + cosines) for p, a in out.items() if a}
+            out[power] = out.get(power, 0) + (-1) ** i * comb(sines, i) * comb(cosines, j)
+    return {p: a for p, a in out.items() if a}
 
 
 def fourier(half: HalfAngles, form: HalfPoly, degrees: tuple[int, ...]) -> list[Term]:
     """The terms of a form of given degrees in (sin(q_i / 2), cos(q_i / 2)), sorted for display."""
-    sums: dict[tuple[Powers, Frequency], list[Fraction]] = {}
+    sums: dict[tuple[Powers, Frequency], list[int]] = {}
+    # Every term is over the same power of two, that of the degrees
+    below = 2 ** sum(degrees[k] for k in range(half.size) if k not in half.ring.slides)
     for powers, number in form.terms():
         exponents = [int(e) for e in powers]
-        parts: dict[Frequency, Fraction] = {(): Fraction(int(number))}
+        parts: dict[Frequency, int] = {(): int(number)}
         sines, others = 0, list[int]()
         for k in range(half.size):
             e = exponents[k]
             if k in half.ring.slides:
                 others.append(e)
-                table = {0: Fraction(1)}
+                table = {0: 1}
             else:
                 sines += e
                 table = _expansion(e, degrees[k] - e)
             parts = {(*f, n): a * b for f, a in parts.items() for n, b in table.items()}
         kind = (*others, *exponents[half.size :])
         for frequency, value in parts.items():
-            pair = sums.setdefault((kind, frequency), [Fraction(0), Fraction(0)])
+            pair = sums.setdefault((kind, frequency), [0, 0])
             # 1 / i^sines: 1, -i, -1, i
             pair[sines % 2] += value if sines % 4 in (0, 3) else -value
-    return _real(sums)
+    return _real(sums, below)
 
 
-def _real(sums: dict[tuple[Powers, Frequency], list[Fraction]]) -> list[Term]:
+def _real(sums: dict[tuple[Powers, Frequency], list[int]], below: int) -> list[Term]:
     """Conjugate pairs C z^n + conj(C) z^-n as 2 Re C cos - 2 Im C sin."""
     out: list[Term] = []
     for (powers, frequency), (real, imaginary) in sums.items():
@@ -69,33 +71,12 @@ def _real(sums: dict[tuple[Powers, Frequency], list[Fraction]]) -> list[Term]:
             continue
         double = 2 if first else 1
         if real:
-            out.append(Term(double * real, powers, frequency, False))
+            out.append(Term(Fraction(double * real, below), powers, frequency, False))
         if imaginary and first:
-            out.append(Term(-double * imaginary, powers, frequency, True))
+            out.append(Term(Fraction(-double * imaginary, below), powers, frequency, True))
     out.sort(key=lambda t: (tuple(-p for p in t.powers), sum(n != 0 for n in t.frequency), _last(t.frequency), t.sine))
     return out
 
 
 def _last(frequency: Frequency) -> tuple[int, ...]:
     return tuple(k for k, n in enumerate(frequency) if n)
-
-
-def dominated(half: HalfAngles, terms: list[Term]) -> bool:
-    """Whether one term without angles outweighs all others, so that the sum is never zero; symbols by their values.
-
-    False where joints slide: their terms have no bound.
-    """
-    values = [float(v) for v in half.ring.symbols.values()]
-    sliding = len(half.ring.slides)
-    constant = others = 0.0
-    for term in terms:
-        if any(term.powers[:sliding]):
-            return False
-        size = float(term.number)
-        for value, power in zip(values, term.powers[sliding:], strict=True):
-            size *= value**power
-        if any(term.frequency):
-            others += abs(size)
-        else:
-            constant += size
-    return abs(constant) > others * (1 + 1e-9)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
@@ -47,6 +47,10 @@ class Relation:
         self.joints = tuple(k for k, e in enumerate(self.degrees) if e)
         self.text = str(self.poly)
 
+    def __reduce__(self) -> tuple[Callable[..., Relation], tuple[object, ...]]:
+        terms = [(tuple(map(int, powers)), int(number)) for powers, number in self.poly.terms()]
+        return _relation, (self.poly.context().names(), terms, len(self.degrees))
+
     def __hash__(self) -> int:
         return hash(self.text)
 
@@ -57,6 +61,11 @@ class Relation:
     def key(self) -> tuple[int, float, str]:
         """For sorting."""
         return len(self.degrees), float(len(self.poly)), self.text
+
+
+def _relation(names: tuple[str, ...], terms: list[tuple[tuple[int, ...], int]], coordinates: int) -> Relation:
+    """Of its terms: polynomials of python-flint cannot be pickled."""
+    return Relation(fmpz_mpoly_ctx.get(names, "lex").from_dict(dict(terms)), coordinates)
 
 
 Factor: TypeAlias = Value | Relation
@@ -186,9 +195,9 @@ class HalfAngles:
         """The number that a polynomial is where its variables have these values."""
         return fmpq_mpoly(poly, self._rational)(*point)
 
-    def put(self, poly: HalfPoly, value: Value) -> HalfPoly:
-        """A form with one joint at a value, up to a factor that is not zero."""
-        k, degree = value.joint, int(poly.degrees()[value.joint])
+    def put(self, poly: HalfPoly, value: Value, degree: int) -> HalfPoly:
+        """A form of some degree in one joint with that joint at a value, up to a factor that is not zero."""
+        k = value.joint
         if value.value is None:
             kept = {p: a for p, a in poly.to_dict().items() if int(p[k]) == degree}
             return self.ctx.from_dict({(*p[:k], 0, *p[k + 1 :]): a for p, a in kept.items()})

@@ -11,6 +11,8 @@ from wbc.analysis.branches import Branch
 from wbc.analysis.fourier import Term, fourier
 from wbc.analysis.half_angles import HalfAngles, HalfPoly, Relation, Value
 
+#: Terms in half angles beyond which a relation is not written out
+LONG = 400
 _ANGLES = {
     Fraction(0): ("0", "0"),
     Fraction(1): ("pi/2", r"\pi/2"),
@@ -68,15 +70,52 @@ class Notation:
         return Fraction(above if scales[0] > 0 else -above, below)
 
     def relation(self, relation: Relation) -> str:
-        """The polynomial that is zero."""
-        return self.form(relation.poly, relation.degrees)
+        """The condition: q4 = pi - 2 q3 where it is one of the angles themselves, else the polynomial that is zero."""
+        if len(relation.poly) > LONG:
+            labels = ", ".join(map(self.label, relation.joints))
+            text = f"({len(relation.poly)} terms in {labels}) = 0"
+            return rf"\text{{{text}}}" if self.latex else text
+        return self._linear(relation) or f"{self.form(relation.poly, relation.degrees)} = 0"
+
+    def _linear(self, relation: Relation) -> str:
+        """A single sine or cosine of sum n_i q_i / 2 that is zero, solved for one joint; "" where it is none.
+
+        The sine is zero where the sum n_i q_i is a whole number of turns, the cosine half a turn away from it.
+        """
+        terms = fourier(self.half, relation.poly, relation.degrees)
+        if len(terms) != 1 or len(relation.joints) < 2 or set(relation.joints) & set(self.half.ring.slides):
+            return ""
+        turns = terms[0].frequency
+        alone = [k for k in relation.joints if abs(turns[k]) == 1]
+        if not alone:
+            return ""
+        # q3 = q5 and not q5 = q3, but q4 = -2 q3 and not the other way round
+        solved = max(alone, key=lambda k: (sum(abs(n) > 1 for n in turns[:k] + turns[k + 1 :]), -k))
+        pi = (r"\pi" if self.latex else "pi") if not terms[0].sine else ""
+        text = "".join(
+            f" {'-' if turns[k] * turns[solved] > 0 else '+'} {self._multiple(abs(turns[k]), k)}"
+            for k in relation.joints
+            if k != solved
+        )
+        right = f"{pi}{text}" if pi else f"-{text[3:]}" if text.startswith(" -") else text[3:]
+        return f"{self.label(solved)} = {right}"
+
+    def _multiple(self, times: int, joint: int) -> str:
+        return self.label(joint) if times == 1 else f"{times} {self.label(joint)}"
+
+    def joints(self, names: Sequence[str]) -> str:
+        """Whose numbers the labels are, by the names of the joints: q1 = shoulder, q2 = elbow."""
+        return ", ".join(f"{self.label(k)} = {name}" for k, name in enumerate(names))
 
     def solved(self, relation: Relation) -> str:
-        """The relation solved for one joint, where it is of first or second degree in its half angle; else "".
+        """The relation solved for one joint, where it is of first or second degree in its half angle; else "", as
+        where :meth:`relation` is solved already.
 
         First degree, A sin(q/2) + B cos(q/2) = 0: tan(q/2) = -B/A. Second, A cos q + B sin q = C: for C = 0
         tan q = -A/B, else q = atan2(B, A) +- acos(C / sqrt(A^2 + B^2)).
         """
+        if len(relation.poly) > LONG or self._linear(relation):
+            return ""
         turning = [k for k in relation.joints if k in self.half.ring.circles]
         for degree in (1, 2):
             chosen = [k for k in turning if relation.degrees[k] == degree]
@@ -113,7 +152,7 @@ class Notation:
         """The conditions, joined."""
         both = r" \wedge " if self.latex else " and "
         parts = [f"{self.label(v.joint)} = {self.value(v)}" for v in branch.values]
-        parts += [f"{self.relation(r)} = 0" for r in branch.relations]
+        parts += [self.relation(r) for r in branch.relations]
         return both.join(parts) or ("\\text{everywhere}" if self.latex else "everywhere")
 
     def branches(self, branches: Iterable[Branch]) -> list[str]:
@@ -129,7 +168,7 @@ class Notation:
             many = (r"\in \{", r"\}") if self.latex else ("in {", "}")
             said = f"= {texts[0]}" if len(texts) == 1 else f"{many[0]}{', '.join(texts)}{many[1]}"
             parts.append(f"{self.label(joint)} {said}")
-        parts += [f"{self.relation(r)} = 0" for r in relations]
+        parts += [self.relation(r) for r in relations]
         both = r" \wedge " if self.latex else " and "
         return both.join(parts) or (r"\text{everywhere}" if self.latex else "everywhere")
 

@@ -8,12 +8,15 @@ import numpy as np
 import pinocchio as pin
 
 from wbc.analysis.rows import BodyRows, JointRows, Rows
+from wbc.errors import RangeError
 from wbc.robot import Robot
 from wbc.symbolic.kinematics import WORLD, frame_index
 from wbc.validation import Array
 
 #: Singular values below this part of the largest count as zero
 RANK_TOLERANCE = 1e-9
+#: Random configurations among which a task must have full rank
+PLACES = 20
 
 
 class NumericRows:
@@ -57,6 +60,24 @@ class NumericRows:
         index = frame_index(self.robot.model, name)
         out: Array = pin.getFrameJacobian(self.robot.model, self._data, index, pin.LOCAL_WORLD_ALIGNED)
         return out
+
+
+def check_task(robot: Robot, task: Sequence[Rows]) -> None:
+    """That a task has full rank somewhere.
+
+    Raises:
+        RangeError: it loses rank at every configuration, so that nothing could be said of what completes it.
+    """
+    numeric, rng = NumericRows(robot), np.random.default_rng(0)
+    ranks = []
+    for _ in range(PLACES):
+        q = pin.integrate(robot.model, robot.neutral, rng.uniform(-np.pi, np.pi, robot.nv))
+        J = numeric.value(task, q)
+        ranks.append(rank(J))
+        if ranks[-1] == J.shape[0]:
+            return
+    names = ", ".join(map(str, task))
+    raise RangeError("task", names, f"its {J.shape[0]} rows have rank {max(ranks)} at most, at every configuration")
 
 
 def singular_values(matrix: Array) -> Array:

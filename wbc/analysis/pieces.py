@@ -22,8 +22,10 @@ from wbc.analysis.trig_form import TrigForm
 from wbc.errors import RobotFileError
 from wbc.validation import Array
 
-#: Boxes of one piece, boxes that it may become at most before it is handed back, seconds between two saves
-_PIECE, _BUDGET, _SAVE = 16, 20_000, 20.0
+#: Boxes of one piece, boxes that it may become before it is handed back, at first and at most
+_PIECE, _FEW, _BUDGET = 16, 1000, 20_000
+#: Seconds that a piece should take at most, and between two saves
+_TURN, _SAVE = 0.3, 20.0
 
 _Done: TypeAlias = tuple[Counts, Array, Array]
 
@@ -43,12 +45,21 @@ class Pieces:
     ) -> None:
         self.counts, self.kept, self.seconds = Counts(), np.empty((0, boxes.shape[1])), 0.0
         self._search, self._waiting, self._path = search, [boxes], path
+        self._budget = _FEW
         self._name = _name(forms, boxes, eps)
         if path is not None and path.exists():
             self._load(path)
 
-    def work(self, minutes: float, workers: int, progress: Callable[[float], None] | None) -> bool:
-        """Whether nothing is left. Stops after the minutes or at a keyboard interrupt, and saves."""
+    def work(
+        self,
+        until: float,
+        workers: int,
+        progress: Callable[[float], None] | None,
+        ended: Callable[[], bool] | None = None,
+    ) -> bool:
+        """Whether nothing is left. Stops at a time of the monotonic clock, if asked or at a keyboard interrupt, and
+        saves.
+        """
         began, spent = time.monotonic(), self.seconds
         running: dict[Future[_Done], Array] = {}
         saved = began
@@ -58,11 +69,11 @@ class Pieces:
                 while (self._waiting or running) and not stop and not asked:
                     while self._waiting and len(running) < 2 * workers:
                         piece = self._take()
-                        running[pool.submit(self._search.run, piece, _BUDGET)] = piece
+                        running[pool.submit(self._timed, piece)] = piece
                     self._collect(running)
                     now = time.monotonic()
                     self.seconds = spent + now - began
-                    stop = now - began > 60.0 * minutes
+                    stop = now > until or (ended is not None and ended())
                     if now - saved > _SAVE:
                         self._save(list(running.values()))
                         saved = now
@@ -70,11 +81,24 @@ class Pieces:
                         progress(self.counts.regular_part + self.counts.tube_part + self.counts.undecided_part)
             except KeyboardInterrupt:
                 stop = True
+            for future in [one for one in running if one.cancel()]:
+                self._waiting.append(running.pop(future))
             while running:
                 self._collect(running)
             self.seconds = spent + time.monotonic() - began
             self._save([])
         return not self._waiting
+
+    def _timed(self, piece: Array) -> _Done:
+        """Some boxes of a piece, as many as take a fraction of a second."""
+        began = time.monotonic()
+        done = self._search.run(piece, self._budget)
+        took = time.monotonic() - began
+        if took > _TURN:
+            self._budget = max(1, self._budget // 2)
+        elif took < _TURN / 4 and done[0].boxes >= self._budget:
+            self._budget = min(2 * self._budget, _BUDGET)
+        return done
 
     def _take(self) -> Array:
         """The last boxes that wait."""

@@ -17,6 +17,8 @@ from wbc.validation import Array
 
 #: A root of a polynomial in floats counts as real with this imaginary part, and a relation as zero at this value
 REAL, ZERO = 1e-9, 1e-10
+#: Configurations among which the signs of a relation are looked at
+SAMPLES = 256
 
 
 def angle(value: Value, half: HalfAngles) -> float:
@@ -26,11 +28,18 @@ def angle(value: Value, half: HalfAngles) -> float:
     return pi if value.value is None else 2.0 * atan(value.value)
 
 
-def _terms(half: HalfAngles, form: HalfPoly, degrees: tuple[int, ...], q: Any, sine: Any, cosine: Any) -> Iterator[Any]:
-    """Terms of a form in sin(q/2), cos(q/2) of given degrees, at numbers or at arrays of one shape."""
+def _scale(relation: Relation) -> int:
+    """What the numbers of a relation are divided by: they may be too large for floats."""
+    return max(abs(int(number)) for number in relation.poly.coeffs())
+
+
+def _terms(
+    half: HalfAngles, form: HalfPoly, degrees: tuple[int, ...], scale: int, q: Any, sine: Any, cosine: Any
+) -> Iterator[Any]:
+    """Terms of a form in sin(q/2), cos(q/2) of given degrees, over a scale, at numbers or at arrays of one shape."""
     symbols = [float(v) for v in half.ring.symbols.values()]
     for powers, number in form.terms():
-        term = float(int(number))
+        term = int(number) / scale
         for k, e in enumerate(powers):
             n = int(e)
             if k >= half.size:
@@ -42,10 +51,10 @@ def _terms(half: HalfAngles, form: HalfPoly, degrees: tuple[int, ...], q: Any, s
         yield term
 
 
-def _sum(half: HalfAngles, form: HalfPoly, degrees: tuple[int, ...], q: Array) -> tuple[float, float]:
+def _sum(half: HalfAngles, form: HalfPoly, degrees: tuple[int, ...], scale: int, q: Array) -> tuple[float, float]:
     """(value, largest term) of a form in sin(q/2), cos(q/2) of given degrees."""
     total = largest = 0.0
-    for term in _terms(half, form, degrees, q, sin, cos):
+    for term in _terms(half, form, degrees, scale, q, sin, cos):
         total += term
         largest = max(largest, abs(term))
     return total, largest
@@ -53,19 +62,28 @@ def _sum(half: HalfAngles, form: HalfPoly, degrees: tuple[int, ...], q: Array) -
 
 def form_grid(half: HalfAngles, relation: Relation, q: Sequence[Array]) -> Array:
     """A relation at many configurations, one array a joint, all of one shape; 0 on the branch."""
-    return np.asarray(sum(_terms(half, relation.poly, relation.degrees, q, np.sin, np.cos)))
+    return np.asarray(sum(_terms(half, relation.poly, relation.degrees, _scale(relation), q, np.sin, np.cos)))
+
+
+def changes_sign(half: HalfAngles, relation: Relation) -> bool:
+    """Whether a relation has both signs among some configurations, so that it has zeros; False proves nothing."""
+    rng = np.random.default_rng(0)
+    value = form_grid(half, relation, [rng.uniform(-pi, pi, SAMPLES) for _ in range(half.size)])
+    room = ZERO * float(np.abs(value).max())
+    return bool(value.min() < -room and value.max() > room)
 
 
 def form_value(half: HalfAngles, relation: Relation, q: Array) -> float:
     """A relation at a configuration, as a form in sin(q/2), cos(q/2), relative to its largest term; 0 on the branch."""
-    total, largest = _sum(half, relation.poly, relation.degrees, q)
+    total, largest = _sum(half, relation.poly, relation.degrees, _scale(relation), q)
     return total / largest if largest > 0.0 else 0.0
 
 
 def joint_roots(half: HalfAngles, relation: Relation, joint: int, q: Array) -> tuple[float, ...]:
     """All values of one joint, in (-pi, pi], at which a relation holds with the others where q has them; sorted."""
     rest = tuple(0 if k == joint else e for k, e in enumerate(relation.degrees))
-    numbers = [_sum(half, p, rest, q)[0] for p in coefficients(half, relation, joint)]
+    scale = _scale(relation)
+    numbers = [_sum(half, p, rest, scale, q)[0] for p in coefficients(half, relation, joint)]
     size = max(abs(x) for x in numbers)
     if size == 0.0:
         return ()
@@ -111,7 +129,7 @@ def real_point(half: HalfAngles, branch: Branch, rng: np.random.Generator) -> Ar
         at[free] = x
         return np.array([form_value(half, r, at) for r in branch.relations] + [0.0] * len(free))
 
-    found = least_squares(residual, q[free], xtol=1e-15, ftol=1e-15, gtol=1e-15)
+    found = least_squares(residual, q[free], xtol=1e-15, ftol=1e-15, gtol=1e-15, max_nfev=60)
     if np.abs(found.fun).max() > ZERO:
         return None
     q[free] = found.x

@@ -66,16 +66,16 @@ def reduced(ring: TrigRing, matrix: Matrix) -> Matrix:
     becomes a product of two others.
     """
     left = [list(row) for row in matrix if any(len(p) for p in row)]
-    while left and left[0]:
+    width = len(matrix[0])
+    while left:
         places = [(i, j) for i, row in enumerate(left) for j, p in enumerate(row) if _pivot(left, i, j, p)]
         if not places:
             break
         i, j = min(places, key=lambda place: _alone(left, *place))
-        rest = without(ring, left, i, j)
-        left = [row for row in rest if any(len(p) for p in row)]
-        if not left and rest and rest[0]:
-            return [rest[0]]
-    return left
+        left = [row for row in without(ring, left, i, j) if any(len(p) for p in row)]
+        width -= 1
+    # Columns without a row are a loss of rank, and no columns are none
+    return left or [[ring.zero] * width for _ in range(width > 0)]
 
 
 def _number(p: Poly) -> bool:

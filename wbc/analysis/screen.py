@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
 
+from wbc import validation
 from wbc.analysis.jacobian import symbolic_jacobian
 from wbc.analysis.model import ExactModel
 from wbc.analysis.rows import Rows, checked
@@ -42,6 +44,7 @@ def screen(
     *,
     most: int = 3,
     part: float = 0.01,
+    minutes: float = 30.0,
     progress: Callable[[float], None] | None = None,
 ) -> tuple[Screened, ...]:
     """Sets of the fewest candidates that may be complete, the best conditioned first; none with ``most`` or fewer: ().
@@ -50,7 +53,8 @@ def screen(
     set that fails there. What is left is not proved: :func:`wbc.analysis.certify` does that.
 
     Args:
-        candidates: name -> constraint rows. most: candidates in a set. part: as of ``certify``.
+        candidates: name -> constraint rows. most: candidates in a set. part: as of ``certify``. minutes: by the clock;
+            after them the sets of the present size that were looked at are the answer.
 
     Raises:
         ShapeError: no candidates. RangeError: ``most`` below 1. UnsupportedJointError: entries in a sliding joint.
@@ -59,6 +63,7 @@ def screen(
     checked("candidates", tuple(candidates.values()))
     if most < 1:
         raise RangeError("most", most, "expected at least 1")
+    until = time.monotonic() + 60.0 * validation.scalar("minutes", minutes)
     rng = np.random.default_rng(0)
     own = trig_form(model.ring, symbolic_jacobian(model, wanted).matrix)
     forms = {name: trig_form(model.ring, symbolic_jacobian(model, [r]).matrix) for name, r in candidates.items()}
@@ -69,6 +74,8 @@ def screen(
     for size in range(1, most + 1):
         found: list[Screened] = []
         for names in combinations(candidates, size):
+            if time.monotonic() > until:
+                break
             done += 1
             if progress is not None:
                 progress(done / total)

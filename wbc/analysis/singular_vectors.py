@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from itertools import combinations
 
@@ -29,7 +29,9 @@ class _Block:
     det: Poly
 
 
-def singular_vector_locus(exact: Exact, matrix: Matrix, budget: Budget | None = None) -> Locus:
+def singular_vector_locus(
+    exact: Exact, matrix: Matrix, budget: Budget | None = None, told: Callable[[Locus], None] | None = None
+) -> Locus:
     """The locus { q : rank J(q) < min(rows, columns) } as branches without redundant ones.
 
     Of a wide J (a tall one is transposed) the square part J_sq with the cheapest determinant is taken, J_r is the
@@ -38,6 +40,9 @@ def singular_vector_locus(exact: Exact, matrix: Matrix, budget: Budget | None = 
     vectors, or if U' J_r is zero. Where J_sq loses more rank, the branch is split first. What the budget, a keyboard
     interrupt or the length of relations cuts off is among the open branches.
 
+    Args:
+        told: called after each step of the outermost matrix with what is known.
+
     What differs from the published form: pivots that are numbers are eliminated first, null vectors are minors, not
     orthogonal (the rank of U' J_r is the same), branches within accepted ones are left out at once, and every accepted
     branch is checked: where null vectors vanish together they prove nothing.
@@ -45,7 +50,7 @@ def singular_vector_locus(exact: Exact, matrix: Matrix, budget: Budget | None = 
     Source: E. Dupuis, PhD thesis, McGill University, 2001, section 3.4.
     """
     wide = matrix if len(matrix) <= len(matrix[0]) else transposed(matrix)
-    search = _Search(exact, budget or Budget())
+    search = _Search(exact, budget or Budget(), told)
     found = search.started(wide)
     return Locus(tuple(exact.without_redundant(found)), tuple(unique(search.open)))
 
@@ -56,7 +61,9 @@ class _Search:
 
     exact: Exact
     budget: Budget
+    told: Callable[[Locus], None] | None
     open: list[Branch] = field(default_factory=list)
+    depth: int = 0
 
     def started(self, matrix: Matrix) -> list[Branch]:
         """The branches of the locus of a wide matrix."""
@@ -96,6 +103,7 @@ class _Search:
         """Of branches on which the square part, the first columns, is deficient those parts where the matrix is."""
         accepted: list[Branch] = []
         seen: set[Branch] = set()
+        self.depth += 1
         while waiting:
             waiting.sort(key=lambda b: (-b.codimension, -b.terms))
             branch = waiting.pop()
@@ -113,6 +121,9 @@ class _Search:
                 continue
             accepted += [b for b in inner if self.exact.deficient(matrix, b)]
             waiting += deeper
+            if self.told is not None and self.depth == 1:
+                self.told(Locus(tuple(unique(accepted)), tuple(unique([*waiting, *self.open]))))
+        self.depth -= 1
         return self.exact.without_redundant(accepted)
 
     def _on_branch(self, matrix: Matrix, branch: Branch, known: list[Branch]) -> tuple[list[Branch], list[Branch]]:

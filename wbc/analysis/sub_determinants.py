@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from wbc.analysis.branches import Branch, unique
 from wbc.analysis.budget import Budget
 from wbc.analysis.deficiency import Exact
@@ -9,13 +11,18 @@ from wbc.analysis.locus import Locus
 from wbc.analysis.ring import Matrix
 
 
-def sub_determinant_locus(exact: Exact, matrix: Matrix, budget: Budget | None = None) -> Locus:
+def sub_determinant_locus(
+    exact: Exact, matrix: Matrix, budget: Budget | None = None, told: Callable[[Locus], None] | None = None
+) -> Locus:
     """The locus { q : rank J(q) < min(rows, columns) } as branches without redundant ones.
 
     The conditions found so far are put into the original matrix. If it is deficient there, they are a branch of the
     locus. If some minor is never zero, they are none. Else the cheapest maximal minor that does not vanish is
     factored, and each of its factors joins the conditions in turn. What the budget or a keyboard interrupt cuts off
     is among the open branches.
+
+    Args:
+        told: called after each step with what is known.
 
     What differs from the published form: pivots that are numbers are eliminated before minors are formed, minors are
     ordered by their length after simplification, and zero is decided exactly.
@@ -44,6 +51,8 @@ def sub_determinant_locus(exact: Exact, matrix: Matrix, budget: Budget | None = 
             accepted.append(branch)
         else:
             waiting += sorted(children, key=lambda child: -len(child.relations))
+        if told is not None:
+            told(Locus(tuple(unique(accepted)), tuple(unique(waiting))))
     return Locus(tuple(exact.without_redundant(accepted)), tuple(unique(waiting)))
 
 

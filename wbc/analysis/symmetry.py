@@ -33,15 +33,20 @@ def symmetries(forms: Sequence[TrigForm], joints: Sequence[int]) -> tuple[Symmet
     Compared are the coefficients, not values at some configurations.
     """
     size = forms[0].waves.shape[1]
+    fewest = sorted(forms, key=lambda f: f.terms)
     found = []
     for choice in product((1, -1), repeat=len(joints)):
+        signs = np.ones(size, int)
+        signs[list(joints)] = choice
+        images = [_image(form, signs) for form in fewest]
+        known = [image for image in images if image is not None]
+        if len(known) < len(images):
+            continue
         for halves in product((0, 1), repeat=len(joints)):
-            signs, turns = [1] * size, [0] * size
-            for k, s, h in zip(joints, choice, halves, strict=True):
-                signs[k], turns[k] = s, h
-            moved = Symmetry(tuple(signs), tuple(turns))
-            if all(_unchanged(form, moved) for form in sorted(forms, key=lambda f: f.terms)):
-                found.append(moved)
+            turns = np.zeros(size, int)
+            turns[list(joints)] = halves
+            if all(_unchanged(form, image, turns) for form, image in zip(fewest, known, strict=True)):
+                found.append(Symmetry(tuple(signs.tolist()), tuple(turns.tolist())))
     return tuple(found)
 
 
@@ -82,19 +87,33 @@ def _halves(moved: Symmetry, k: int, centre: Array, half: Array) -> bool:
     return moved.signs[k] == -1
 
 
-def _unchanged(form: TrigForm, moved: Symmetry) -> bool:
+def _image(form: TrigForm, signs: Array) -> tuple[Array, Array] | None:
+    """(wave that each becomes, sign of its sine) where joints are reflected; None where sizes of coefficients differ.
+
+    Half turns and signs of rows and columns change no size.
+    """
+    waves = form.waves.astype(int)
+    image = waves * signs
+    first = image[np.arange(len(image)), (image != 0).argmax(axis=1)]
+    turned = np.where(first < 0, -1, 1)
+    base = (2 * np.abs(waves).max(initial=0) + 1) ** np.arange(waves.shape[1])
+    keys, wanted = waves @ base, (image * turned[:, None]) @ base
+    order = np.argsort(keys)
+    to = order[np.minimum(np.searchsorted(keys[order], wanted), len(keys) - 1)]
+    if (keys[to] != wanted).any():
+        return None
+    for part in (form.cosine, form.sine):
+        if np.abs(np.abs(part[:, to]) - np.abs(part)).max(initial=0.0) > SAME * np.abs(part).max(initial=0.0):
+            return None
+    return to, turned
+
+
+def _unchanged(form: TrigForm, image: tuple[Array, Array], turns: Array) -> bool:
     """Whether M(moved q) = R M(q) C with diagonal R, C of signs."""
-    place = {tuple(w): k for k, w in enumerate(form.waves.astype(int).tolist())}
+    to, turned = image
+    flip = np.where((form.waves.astype(int) @ turns) % 2, -1, 1)
     cosine, sine = np.zeros_like(form.cosine), np.zeros_like(form.sine)
-    for k, wave in enumerate(form.waves.astype(int)):
-        image = wave * np.array(moved.signs)
-        flip = -1 if int(wave @ np.array(moved.turns)) % 2 else 1
-        first = next((x for x in image if x), 1)
-        to = place.get(tuple((image * (1 if first > 0 else -1)).tolist()))
-        if to is None:
-            return False
-        cosine[:, to] += flip * form.cosine[:, k]
-        sine[:, to] += flip * form.sine[:, k] * (1 if first > 0 else -1)
+    cosine[:, to], sine[:, to] = flip * form.cosine, flip * turned * form.sine
     before = np.hstack((form.cosine, form.sine))
     after = np.hstack((cosine, sine))
     size = SAME * np.abs(before).max(initial=0.0)

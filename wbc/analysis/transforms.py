@@ -17,6 +17,8 @@ from wbc.validation import Array
 Vector: TypeAlias = list[Poly]
 #: An entry of a rotation this near to -1, 0 or 1 is that number
 SNAP = 1e-9
+#: Lengths below this are rounding: 0.4 cos(pi/2) is 2e-17 [m]
+LENGTH = 1e-12
 #: Largest denominator of the quaternions that approximate other rotations
 DENOMINATOR = 1000
 
@@ -73,15 +75,15 @@ def exact_placement(ring: TrigRing, placement: pin.SE3, what: str, approximate: 
     """A placement of a model.
 
     Rotations by multiples of 90 degrees are exact. Others are refused, or replaced by that of a quaternion with
-    rational entries, which is a rotation exactly; the angle between the two is added to ``notes``.
+    rational entries, which is a rotation exactly; the angle between the two is added to ``notes``. Lengths below
+    ``LENGTH`` are zero.
 
     Raises:
         RotationError: another rotation, and no ``approximate``.
     """
     entries = exact_rotation(np.asarray(placement.rotation), what, approximate, notes)
-    return Transform(
-        [[ring.constant(x) for x in row] for row in entries], [ring.number(float(x)) for x in placement.translation]
-    )
+    lengths = [0.0 if abs(x) < LENGTH else float(x) for x in placement.translation]
+    return Transform([[ring.constant(x) for x in row] for row in entries], [ring.number(x) for x in lengths])
 
 
 def exact_rotation(rotation: Array, what: str, approximate: bool, notes: list[str]) -> list[list[Fraction]]:

@@ -16,8 +16,8 @@ from wbc.validation import Array
 
 #: Whole multiples of the joint angles in one wave
 Wave: TypeAlias = tuple[int, ...]
-#: Real and imaginary parts of the coefficient of a wave
-Pair: TypeAlias = tuple[Fraction, Fraction]
+#: Real and imaginary parts of the coefficient of a wave, over a power of two
+Pair: TypeAlias = tuple[int, int]
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,11 +77,11 @@ def trig_form(ring: TrigRing, matrix: Matrix) -> TrigForm:
     return TrigForm(shape, np.array(order, float).reshape(-1, len(ring.coordinates)), cosine, sine)
 
 
-def _waves(ring: TrigRing, p: Poly) -> dict[Wave, Pair]:
+def _waves(ring: TrigRing, p: Poly) -> dict[Wave, tuple[Fraction, Fraction]]:
     """Coefficients of e^(i w.q), for w = 0 and those whose first entry that is not zero is positive."""
     lengths = list(ring.symbols.values())
     start = len(ring.names) - len(lengths)
-    sums: dict[Wave, Pair] = {}
+    sums: dict[Wave, tuple[Fraction, Fraction]] = {}
     for powers, number in p.terms():
         for k, place in ring.slides.items():
             if powers[place]:
@@ -91,24 +91,25 @@ def _waves(ring: TrigRing, p: Poly) -> dict[Wave, Pair]:
         scale = fraction(number)
         for value, power in zip(lengths, powers[start:], strict=True):
             scale *= value ** int(power)
-        parts: dict[Wave, Pair] = {(0,) * len(ring.coordinates): (scale, Fraction(0))}
+        parts: dict[Wave, Pair] = {(0,) * len(ring.coordinates): (1, 0)}
         for k, (s, c, _) in ring.circles.items():
             for sines in [False] * int(powers[c]) + [True] * int(powers[s]):
                 parts = _times(parts, k, sines)
+                scale /= 2
         for wave, (a, b) in parts.items():
             before = sums.get(wave, (Fraction(0), Fraction(0)))
-            sums[wave] = before[0] + a, before[1] + b
+            sums[wave] = before[0] + scale * a, before[1] + scale * b
     return {w: ab for w, ab in sums.items() if any(ab) and next((x for x in w if x), 1) > 0}
 
 
 def _times(parts: dict[Wave, Pair], joint: int, sine: bool) -> dict[Wave, Pair]:
-    """Times cos q = (z + 1/z) / 2 or sin q = (z - 1/z) / (2 i)."""
+    """Times 2 cos q = z + 1/z or 2 sin q = (z - 1/z) / i."""
     out: dict[Wave, Pair] = {}
     for wave, (a, b) in parts.items():
         for step in (1, -1):
             moved = (*wave[:joint], wave[joint] + step, *wave[joint + 1 :])
-            real, imaginary = (step * b / 2, -step * a / 2) if sine else (a / 2, b / 2)
-            before = out.get(moved, (Fraction(0), Fraction(0)))
+            real, imaginary = (step * b, -step * a) if sine else (a, b)
+            before = out.get(moved, (0, 0))
             out[moved] = before[0] + real, before[1] + imaginary
     return out
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from math import inf
 
 import numpy as np
 
@@ -17,6 +19,8 @@ from wbc.validation import Array
 STARTS, FOLLOWED, STEPS = 4000, 48, 80
 #: Steps towards a null vector
 NEWTON = 40
+#: Configurations that are looked at before the clock is
+CHUNK = 500
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,14 +51,29 @@ def joint_values(model: ExactModel, q: Array) -> Array:
 
 
 def descended(
-    cost: Callable[[Array], Array], joints: int, rng: np.random.Generator, starts: int = STARTS, steps: int = STEPS
+    cost: Callable[[Array], Array],
+    joints: int,
+    rng: np.random.Generator,
+    starts: int = STARTS,
+    steps: int = STEPS,
+    until: float = inf,
 ) -> tuple[Array, Array]:
-    """(configurations, costs) after random starts and random steps that shrink where they fail; least cost first."""
+    """(configurations, costs) after random starts and random steps that shrink where they fail; least cost first.
+
+    Args:
+        until: a time of the monotonic clock, at which the steps end.
+    """
     q = rng.uniform(-np.pi, np.pi, (starts, joints))
-    value = cost(q)
+    value = np.full(starts, np.inf)
+    for part in np.array_split(np.arange(starts), max(1, starts // CHUNK)):
+        value[part] = cost(q[part])
+        if time.monotonic() > until:
+            break
     best = np.argsort(value)[:FOLLOWED]
     q, value, step = q[best], value[best], np.full(FOLLOWED, 0.3)
     for _ in range(steps):
+        if time.monotonic() > until:
+            break
         tried = q + rng.normal(size=q.shape) * step[:, None]
         there = cost(tried)
         better = there < value
@@ -64,14 +83,18 @@ def descended(
     return q[order], value[order]
 
 
-def peak(task: TrigForm, rng: np.random.Generator) -> float:
+def peak(task: TrigForm, rng: np.random.Generator, until: float = inf) -> float:
     """The largest sigma_min(J_T) that the search finds."""
-    _, value = descended(lambda q: -least(task.value(q)), task.waves.shape[1], rng)
+    _, value = descended(lambda q: -least(task.value(q)), task.waves.shape[1], rng, until=until)
     return float(-value[0])
 
 
 def weakest(
-    task: TrigForm | None, constraints: Sequence[TrigForm], eps: float, rng: np.random.Generator
+    task: TrigForm | None,
+    constraints: Sequence[TrigForm],
+    eps: float,
+    rng: np.random.Generator,
+    until: float = inf,
 ) -> tuple[Array, Array]:
     """(configurations, sigma_min(J_R) / sigma_min(J_T)) where the ratio is least, sigma_min(J_T) >= eps.
 
@@ -88,7 +111,7 @@ def weakest(
             return np.where(own < eps, np.inf, 0.0)
         return np.where(own < eps, np.inf, least(together) / np.maximum(own, 1e-300))
 
-    return descended(cost, constraints[0].waves.shape[1], rng)
+    return descended(cost, constraints[0].waves.shape[1], rng, until=until)
 
 
 def numeric_witness(
@@ -98,13 +121,14 @@ def numeric_witness(
     augmented: TrigForm,
     starts: Array,
     eps: float,
+    until: float = inf,
 ) -> NumericWitness | None:
     """The first configuration, found from starts, where J_R v = 0 for some |v| = 1 and sigma_min(J_T) >= eps.
 
     Without a task the second does not count. Both are checked by Pinocchio's Jacobians.
     """
     numeric = NumericRows(model.robot)
-    for point in _null_points(augmented, starts):
+    for point in _null_points(augmented, starts, until):
         q = model.configuration(np.remainder(point + np.pi, 2 * np.pi) - np.pi)
         J_R = numeric.value((*task, *constraints), q)
         sigma = singular_values(numeric.value(task, q)) if task else np.empty(0)
@@ -113,12 +137,14 @@ def numeric_witness(
     return None
 
 
-def _null_points(form: TrigForm, starts: Array) -> Array:
+def _null_points(form: TrigForm, starts: Array, until: float) -> Array:
     """Where M(q) v = 0, |v| = 1 was solved from starts: damped Gauss and Newton steps in (q, v), all starts at once."""
     q = starts.copy()
     v = np.linalg.svd(form.value(q))[2][:, -1]
     joints = q.shape[1]
     for _ in range(NEWTON):
+        if time.monotonic() > until:
+            break
         matrix = form.value(q)
         residual = np.concatenate((np.einsum("sij,sj->si", matrix, v), (v * v).sum(1, keepdims=True) - 1.0), axis=1)
         by_q = np.einsum("skij,sj->sik", form.slopes(q), v)

@@ -26,10 +26,12 @@ from wbc.analysis import (
     factored_determinant,
     published_sets,
 )
+from wbc.analysis.child import Child
+from wbc.analysis.half_angles import HalfAngles
 from wbc.analysis.locus import Located
 from wbc.analysis.pictures import save_pictures
 from wbc.analysis.published import ROBOTS
-from wbc.cli.certificates import Subdivision, certified, record, winner
+from wbc.cli.certificates import Subdivision, certified, record, show_certificate, winner
 from wbc.cli.console import out
 from wbc.cli.options import RobotName
 from wbc.cli.planning import tip_frame
@@ -37,6 +39,8 @@ from wbc.cli.trees import analyse_tree
 from wbc.coordinates import TREES
 from wbc.errors import RangeError, RobotFileError
 
+#: Part of the time that a certificate may take where the locus is searched as well
+_PROOF = 0.75
 _WHAT, _OUTPUT = "What is analysed", "What it writes"
 
 Sets = Annotated[
@@ -73,7 +77,10 @@ Screen = Annotated[
     int | None,
     typer.Option(help="Certify the best set of at most so many constraints instead.", rich_help_panel=_WHAT),
 ]
-Minutes = Annotated[float, typer.Option(help="Of one search or certificate, at most.", rich_help_panel=_WHAT)]
+Minutes = Annotated[
+    float,
+    typer.Option(help="By the clock, for all the work on one set, or for a screen, at most.", rich_help_panel=_WHAT),
+]
 Resume = Annotated[
     Path | None,
     typer.Option(help="Folder to keep certificates in and go on from.", rich_help_panel=_OUTPUT),
@@ -96,7 +103,7 @@ def analyse_(
     tree: Tree = False,
     certify: Certify = False,
     screen: Screen = None,
-    minutes: Minutes = 30.0,
+    minutes: Minutes = 5.0,
     resume: Resume = None,
     plot: Plot = None,
     latex: Latex = False,
@@ -109,14 +116,14 @@ def analyse_(
     """
     validation.one_of("algorithm", algorithm, ALGORITHMS)
     robot = _meant(robot, tree, full, bool(lock or point or plane))
-    how = Subdivision(minutes, resume) if certify or full or screen is not None else None
+    how = Subdivision(resume) if certify or full or screen is not None else None
     own = _own(lock, point, plane)
     if screen is not None and (own or chosen):
         raise RangeError("screen", screen, "finds the constraints by itself: without --set, --lock, --point, --plane")
     if robot in TREES and not own and frame is None:
         refused = {"approximate": approximate, "full": full, "screen": screen}
         pictures = None if plot is None else functools.partial(_pictures, plot)
-        found_sets = analyse_tree(robot, chosen or (), algorithm, latex, refused, pictures, how)
+        found_sets = analyse_tree(robot, chosen or (), algorithm, latex, refused, pictures, how, minutes)
         _write(json_, {"robot": robot, "algorithm": algorithm, "sets": found_sets})
         return
     task: tuple[Rows, ...]
@@ -132,25 +139,55 @@ def analyse_(
         wanted = [validation.one_of("set", name, known.sets) for name in chosen or known.sets]
         sets = {name: known.sets[name] for name in wanted}
         if screen is not None:
-            best = winner(model, robot, task, screen)
+            best = winner(model, robot, task, screen, minutes)
             sets = {} if best is None else {", ".join(best.names): best.rows}
     for note in model.notes:
         out().print(escape(note))
+    joints = Notation(HalfAngles(model.ring), latex).joints(model.robot.dof_names)
+    out().print(f"joints: {escape(joints)}", soft_wrap=True)
     records = []
     for name, rows in sets.items():
-        entry: dict[str, Any] = {"set": name}
-        if screen is None:
-            found = analyse(model, task, rows, algorithm=algorithm, budget=Budget(minutes=minutes))
-            _show(name, found, latex)
-            entry = _record(name, found)
-            if plot is not None:
-                _pictures(plot, model, found, f"{robot} {name}")
-        if how is not None:
-            if screen is not None:
-                out().print(f"[bold]{escape(name)}[/bold]")
-            entry["certificate"] = record(certified(model, robot, name, task, rows, how))
+        budget = Budget(minutes=minutes)
+        if screen is not None and how is not None:
+            out().print(f"[bold]{escape(name)}[/bold]")
+            proof = certified(model, robot, name, task, rows, how, budget.seconds / 60.0)
+            show_certificate(proof)
+            records.append({"set": name, "certificate": record(proof)})
+            continue
+        entry, found = _one_set(model, robot, name, task, rows, algorithm, budget, how, latex)
         records.append(entry)
+        if plot is not None:
+            _pictures(plot, model, found, f"{robot} {name}")
     _write(json_, {"robot": robot, "algorithm": algorithm, "sets": records})
+
+
+def _one_set(
+    model: ExactModel,
+    robot: str,
+    name: str,
+    task: tuple[Rows, ...],
+    rows: tuple[Rows, ...],
+    algorithm: str,
+    budget: Budget,
+    how: Subdivision | None,
+    latex: bool,
+) -> tuple[dict[str, Any], Analysis]:
+    """Certificate, if wanted, and locus of one set, printed, and as data."""
+    proof = None
+    if how is not None:
+        proof = certified(model, robot, name, task, rows, how, _PROOF * budget.seconds / 60.0)
+    early = functools.partial(_known, name)
+    found = analyse(model, task, rows, algorithm=algorithm, budget=budget, certificate=proof, told=early)
+    _show(name, found, latex, budget)
+    entry = _record(name, found)
+    if proof is not None:
+        entry["certificate"] = record(proof)
+    return entry, found
+
+
+def _known(name: str, verdict: str) -> None:
+    """A verdict that is known before the locus."""
+    out().print(f"[bold]{escape(name)}[/bold]: {verdict}; the locus is being searched, Ctrl-C ends it")
 
 
 def _meant(robot: str, tree: bool, full: bool, own: bool) -> str:
@@ -181,14 +218,15 @@ def _plane(text: str) -> PitchPlaneRows:
     return PitchPlaneRows(parts[0], parts[1])
 
 
-def _show(name: str, found: Analysis, latex: bool) -> None:
+def _show(name: str, found: Analysis, latex: bool, budget: Budget) -> None:
     console, notation = out(), Notation(found.exact.half, latex)
     rows, joints = found.augmented.shape
-    console.print(f"[bold]{escape(name)}[/bold]: {rows} x {joints}, {found.verdict}, {found.seconds:.2f} s")
+    took = f"{found.seconds:.2f} s by the clock, {found.processor:.2f} s of processor time"
+    console.print(f"[bold]{escape(name)}[/bold]: {rows} x {joints}, {found.verdict}, {took}")
     axes = ", ".join(dict.fromkeys(found.augmented.axes))
     console.print(f"  cost     {found.augmented.cost}, task {found.task.cost}; axes {escape(axes)}", soft_wrap=True)
-    if rows == joints:
-        text = factored_determinant(found.exact, found.augmented).text(latex=latex)
+    if rows == joints and not found.locus.open:
+        text = _determinant(found, latex, budget.seconds)
         console.print(f"  det      {escape(text)}", soft_wrap=True)
     for line in notation.branches(found.locus.branches):
         console.print(f"  locus    {escape(line)}", soft_wrap=True)
@@ -198,11 +236,22 @@ def _show(name: str, found: Analysis, latex: bool) -> None:
             console.print(f"  solved   {escape(solved)}", soft_wrap=True)
     for line in notation.branches(found.locus.open):
         console.print(f"  open     {escape(line)}", soft_wrap=True)
-    if found.witness is not None:
+    if found.certificate is not None:
+        show_certificate(found.certificate)
+    if found.witness is not None and found.witness.branch is not None:
         q = ", ".join(f"{x:.6g}" for x in found.witness.q)
         console.print(f"  witness  q = {q}", soft_wrap=True)
         task, every = found.witness.task[-1], found.witness.augmented[-1]
         console.print(f"           smallest singular value: task {task:.3g}, with constraints {every:.1g}")
+
+
+def _determinant(found: Analysis, latex: bool, seconds: float) -> str:
+    """The determinant in factors, if it takes no longer than this."""
+    with Child(
+        lambda tell: tell(factored_determinant(found.exact, found.augmented).text(latex=latex)), seconds
+    ) as work:
+        work.wait(seconds)
+        return str(work.told[0]) if work.told else "not expanded within the minutes"
 
 
 def _record(name: str, found: Analysis) -> dict[str, Any]:
@@ -213,6 +262,8 @@ def _record(name: str, found: Analysis) -> dict[str, Any]:
         "shape": list(found.augmented.shape),
         "verdict": found.verdict,
         "seconds": found.seconds,
+        "processor_seconds": found.processor,
+        "joints": {notation.label(k): joint for k, joint in enumerate(found.joints)},
         "cost": str(found.augmented.cost),
         "locus": [notation.branch(branch) for branch in found.locus.branches],
         "latex": tex.branches(found.locus.branches),

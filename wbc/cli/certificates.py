@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -31,9 +32,8 @@ from wbc.errors import RobotFileError
 
 @dataclass(frozen=True)
 class Subdivision:
-    """Options of certificates: how many minutes each may take, and the folder of their states."""
+    """Options of certificates: the folder of their states."""
 
-    minutes: float
     folder: Path | None
 
     def state(self, robot: str, name: str) -> Path | None:
@@ -52,26 +52,37 @@ class Subdivision:
 
 
 def certified(
-    model: ExactModel, robot: str, name: str, task: Sequence[Rows], rows: Sequence[Rows], how: Subdivision
+    model: ExactModel,
+    robot: str,
+    name: str,
+    task: Sequence[Rows],
+    rows: Sequence[Rows],
+    how: Subdivision,
+    minutes: float,
 ) -> Certificate:
-    """The certificate of one set, with a progress bar, printed."""
+    """The certificate of one set, with a progress bar."""
     with progress_bar() as bar:
         shown = bar.add_task(f"{name}, decided", total=1.0)
-        found = certify(
+        return certify(
             model,
             task,
             rows,
-            minutes=how.minutes,
+            minutes=minutes,
             state=how.state(robot, name),
             progress=lambda part: bar.update(shown, completed=part),
         )
+
+
+def show_certificate(found: Certificate) -> None:
+    """Printed."""
     console = out()
     for line in lines(found):
         console.print(f"  {escape(line)}", soft_wrap=True)
-    return found
 
 
-def certified_tree(model: ExactModel, robot: str, name: str, one: TreeSet, how: Subdivision) -> TreeCertificate:
+def certified_tree(
+    model: ExactModel, robot: str, name: str, one: TreeSet, how: Subdivision, minutes: float
+) -> TreeCertificate:
     """The certificate of one set of a tree, each block with its own progress bar, printed."""
     with progress_bar() as bar:
         shown: dict[str, TaskID] = {}
@@ -82,11 +93,11 @@ def certified_tree(model: ExactModel, robot: str, name: str, one: TreeSet, how: 
             bar.update(shown[str(block)], completed=part)
 
         state = how.state(robot, name)
-        found = certify_blocks(model, one.task, one.constraints, minutes=how.minutes, state=state, progress=told)
+        found = certify_blocks(model, one.task, one.constraints, minutes=minutes, state=state, progress=told)
     console = out()
     where = {True: " everywhere", False: " outside the tubes of the blocks"}[found.everywhere]
     said = {"complete": where, "undecided": f": {found.left:.3g} of the volume is left", "incomplete": ""}
-    console.print(f"  certificate  {found.verdict}{said[found.verdict]}, by blocks; {found.seconds:.1f} s")
+    console.print(f"  certificate  {found.verdict}{said[found.verdict]}, by blocks; {found.seconds:.1f} s by the clock")
     for block, own in found.blocks:
         console.print(f"  block    {escape(str(block))}", soft_wrap=True)
         for line in lines(own):
@@ -124,7 +135,8 @@ def lines(found: Certificate) -> list[str]:
     joints = ", ".join(f"q{k + 1}" for k in found.joints) or "none"
     said.append(
         f"             {counts.boxes:.0f} boxes of {joints} ({found.symmetries} symmetries): full rank on "
-        f"{counts.regular:.0f}, in the tube {counts.tube:.0f}, undecided {counts.undecided:.0f}; {found.seconds:.1f} s"
+        f"{counts.regular:.0f}, in the tube {counts.tube:.0f}, undecided {counts.undecided:.0f}; "
+        f"{found.seconds:.1f} s by the clock"
     )
     return said
 
@@ -164,14 +176,24 @@ def record_tree(found: TreeCertificate) -> dict[str, Any]:
     }
 
 
-def winner(model: ExactModel, robot: str, task: Sequence[Rows], most: int) -> Screened | None:
-    """The best conditioned of the smallest sets that a numeric screen leaves, printed."""
+def winner(model: ExactModel, robot: str, task: Sequence[Rows], most: int, minutes: float) -> Screened | None:
+    """Within the minutes the best conditioned of the smallest sets that a numeric screen leaves, printed."""
     with progress_bar() as bar:
         shown = bar.add_task("screen", total=1.0)
+        began = time.monotonic()
         found = screen(
-            model, task, candidate_rows(robot), most=most, progress=lambda part: bar.update(shown, completed=part)
+            model,
+            task,
+            candidate_rows(robot),
+            most=most,
+            minutes=minutes,
+            progress=lambda part: bar.update(shown, completed=part),
         )
     console = out()
+    if time.monotonic() - began > 60.0 * minutes:
+        console.print(f"screen: ended after {minutes:g} min, before all sets were looked at")
+        if not found:
+            return None
     if not found:
         console.print(f"screen: no set of {most} or fewer constraints is complete")
         return None

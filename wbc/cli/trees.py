@@ -8,12 +8,15 @@ from typing import Any
 from rich.markup import escape
 
 from wbc import validation
-from wbc.analysis import BlockAnalysis, ExactModel, Notation, TreeAnalysis, analyse_blocks
+from wbc.analysis import BlockAnalysis, Budget, ExactModel, Notation, TreeAnalysis, analyse_blocks
 from wbc.analysis.locus import Located
 from wbc.cli.certificates import Subdivision, certified_tree, record_tree
 from wbc.cli.console import out
 from wbc.coordinates import tree_sets
 from wbc.errors import RangeError
+
+#: Minutes that a certificate gets where the search has used them up
+_LEAST = 1e-6
 
 
 def analyse_tree(
@@ -24,12 +27,13 @@ def analyse_tree(
     refused: Mapping[str, object],
     pictures: Callable[[ExactModel, Located, str], None] | None = None,
     how: Subdivision | None = None,
+    minutes: float = 30.0,
 ) -> list[dict[str, Any]]:
     """Sets of a tree by name, all of them by default, printed and as data.
 
     Args:
         pictures: called with every block's robot, loci and name.
-        how: to certify each set as well, block by block.
+        how: to certify each set as well, block by block. minutes: by the clock, for all the work on one set.
         refused: option -> whether it was given, of those that have no meaning for blocks.
 
     Raises:
@@ -44,26 +48,36 @@ def analyse_tree(
     records = []
     for name in [validation.one_of("set", name, known.sets) for name in chosen or known.sets]:
         one = known.sets[name]
-        found = analyse_blocks(model, one.task, one.constraints, algorithm=algorithm)
+        budget = Budget(minutes=minutes)
+        share = minutes if how is None else 0.5 * minutes
+        budget.start()
+        found = analyse_blocks(model, one.task, one.constraints, algorithm=algorithm, minutes=share)
         _show(name, found, latex)
         if pictures is not None:
             for part in found.blocks:
                 pictures(part.model, part.loci, f"{robot} {name} {part.block}")
         records.append(_record(name, found))
         if how is not None:
-            records[-1]["certificate"] = record_tree(certified_tree(model, robot, name, one, how))
+            records[-1]["certificate"] = record_tree(
+                certified_tree(model, robot, name, one, how, max(budget.seconds / 60.0, _LEAST))
+            )
     return records
 
 
 def _show(name: str, found: TreeAnalysis, latex: bool) -> None:
     console = out()
     rows, joints = found.shape
-    console.print(f"[bold]{escape(name)}[/bold]: {rows} x {joints}, {found.verdict}, {found.seconds:.2f} s")
+    took = f"{found.seconds:.2f} s by the clock, {found.processor:.2f} s of processor time"
+    console.print(f"[bold]{escape(name)}[/bold]: {rows} x {joints}, {found.verdict}, {took}")
     for one in found.blocks:
         shape = " x ".join(map(str, one.loci.augmented.shape))
         console.print(f"  block    {escape(str(one.block))}: {shape}, {_said(one)}", soft_wrap=True)
-        for line in Notation(one.loci.exact.half, latex).branches(one.loci.locus.branches):
+        notation = Notation(one.loci.exact.half, latex)
+        console.print(f"  joints   {escape(notation.joints(one.block.joints))}", soft_wrap=True)
+        for line in notation.branches(one.loci.locus.branches):
             console.print(f"  locus    {escape(line)}", soft_wrap=True)
+        for line in notation.branches(one.loci.locus.open):
+            console.print(f"  open     {escape(line)}", soft_wrap=True)
     if found.witness is not None:
         q = ", ".join(f"{x:.6g}" for x in found.witness.q)
         console.print(f"  witness  q = {q}", soft_wrap=True)
@@ -83,6 +97,7 @@ def _record(name: str, found: TreeAnalysis) -> dict[str, Any]:
         "shape": list(found.shape),
         "verdict": found.verdict,
         "seconds": found.seconds,
+        "processor_seconds": found.processor,
         "blocks": [
             {
                 "joints": list(one.block.joints),
