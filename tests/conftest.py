@@ -9,6 +9,8 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, settings
 
+pytest_plugins = ["tests.processes"]
+
 os.environ.setdefault("MPLBACKEND", "Agg")
 # One thread a process: pytest-xdist already fills the cores, and sums keep their order.
 for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
