@@ -160,6 +160,8 @@ class Controller(Deployment):
             getattr(out.tick, name)[:] = getattr(self.tick, name)
         out.tick.check()
         out.policy = self.policy
+        if self._fallback.prepared:
+            out.prepare()
         out._first, out._waiting, out._slow = dict(self._first), dict(self._waiting), self._slow
         return out
 
