@@ -199,7 +199,6 @@ def test_default_folder_is_under_runs(tmp_path: Path, monkeypatch: pytest.Monkey
     assert (folder / "log.parquet").is_file()
 
 
-@pytest.mark.slow
 def test_interrupt_leaves_a_valid_run_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Ctrl-C at tick 9 of the demo: log, plots and summary of nine ticks, exit code 130."""
     real = session.track

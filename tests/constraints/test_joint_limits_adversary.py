@@ -150,7 +150,6 @@ def check(worst: dict[str, float]) -> None:
     assert worst["harder"] <= 1 + 1e-9
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("shortest", [None, 0.005])
 def test_many_equal_ticks(shortest: float | None) -> None:
     worst = attack(draw(np.random.default_rng(1), 35), np.full(TICKS, 0.005), shortest, seed=2)
@@ -158,7 +157,6 @@ def test_many_equal_ticks(shortest: float | None) -> None:
     assert worst["near"] < 1e-6, "joints that are pushed outwards do come to their limits"
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("shortest", [None, 0.001])
 def test_many_ticks_of_changing_length(shortest: float | None) -> None:
     """Long, short, and mixed ticks: 1 to 8 ms, jumping between the ends half of the time."""

@@ -54,6 +54,7 @@ def test_failure():
 
 def test_children_that_end():
     subprocess.run([sys.executable, "-c", "pass"], check=True)
+    processes.GRACE = 60.0
     multiprocessing.get_context("spawn").Process(target=os.getpid).start()
 """
 
