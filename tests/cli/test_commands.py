@@ -15,7 +15,7 @@ import pytest
 from typer.testing import CliRunner
 
 import wbc
-from wbc import track
+from wbc import style, track
 from wbc.cli import bench, session
 from wbc.cli.app import app
 from wbc.errors import UnknownNameError, WbcError
@@ -213,6 +213,7 @@ def test_interrupt_leaves_a_valid_run_folder(tmp_path: Path, monkeypatch: pytest
 
     monkeypatch.setattr(session, "track", interrupted)
     monkeypatch.setattr(session, "save_picture", functools.partial(save_picture, size=(96, 60)))
+    monkeypatch.setitem(style.SETTINGS, "savefig.dpi", 50)
     handler = signal.getsignal(signal.SIGINT)
     code, out, _ = run("demo", "--backend", "vm", "--rate", "50", "--output", tmp_path)
     assert code == 130
