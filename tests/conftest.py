@@ -30,6 +30,11 @@ if sys.dont_write_bytecode:
     os.environ["PYTHONPYCACHEPREFIX"] = sys.pycache_prefix
     os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
+# Imported here, when the flags above are set
+from tests import objects  # noqa: E402
+
+objects.keep(BUILD / "test-cache" / "objects")
+
 # Thousands of tests are collected, and live to the end: searching them for garbage again and again takes a sixth of the
 # time of the collection, and a part of every later search
 gc.disable()

@@ -13,7 +13,7 @@ import pytest
 
 LIST = Path(__file__).with_name("slow.txt")
 #: Processor time of a test, of the slowest of its cases, or of what it shares with others, from which on it is slow [s]
-LIMIT = 0.2
+LIMIT = 0.15
 
 _times: dict[str, float] = {}
 
