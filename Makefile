@@ -7,6 +7,8 @@ PEERS_VENV ?= .venv-peers
 PYTEST_ARGS ?=
 # Processes of pytest; "auto" is one a core
 PYTEST_JOBS ?= auto
+# Random cases of a test, as a multiple of the usual number
+REPEATS ?= 1
 
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
@@ -15,7 +17,7 @@ TYPES := build/types
 SOURCES := wbc tasks robots tests bench examples
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test lint format types docs bench bench-ik bench-time-laws soak lock clean
+.PHONY: help setup demo test check slow lint format types docs bench bench-ik bench-time-laws soak lock clean
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 18
@@ -25,8 +27,14 @@ setup: $(READY)  ## create .venv with the pinned packages and this one
 demo: $(READY)  ## a three-armed robot walks along a cylinder at 4 in/s, into runs/walk (the Panda: wbc demo)
 	$(BIN)/wbc walk --out runs/walk --force
 
-test: $(READY)  ## all tests
-	$(BIN)/python -m pytest -n $(PYTEST_JOBS) $(PYTEST_ARGS)
+test: $(READY)  ## all tests; REPEATS=3 with three times as many random cases
+	WBC_REPEATS=$(REPEATS) $(BIN)/python -m pytest -n $(PYTEST_JOBS) $(PYTEST_ARGS)
+
+check: $(READY) lint types  ## between edits: lint, types and the tests that are quick
+	$(BIN)/python -m pytest -n $(PYTEST_JOBS) -q -m "not slow" $(PYTEST_ARGS)
+
+slow: $(READY)  ## find the tests that are not quick
+	$(BIN)/python -m pytest -n 0 -q --find-slow $(PYTEST_ARGS)
 
 lint: $(READY)  ## ruff: rules and format
 	$(BIN)/ruff check .

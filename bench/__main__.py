@@ -18,6 +18,7 @@ from bench.harness import Plan, machine, measure, measure_startup
 from bench.pool import ROOT
 from bench.prepare import prepare
 from bench.versions import versions
+from wbc.interrupts import obey_kill
 from wbc.native import toolchain
 
 OWN = ("wbc", "casadi", "pin", "numpy", "daqp")
@@ -73,4 +74,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
+    obey_kill()
     main()

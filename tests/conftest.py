@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import gc
 import os
+import sys
 from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, settings
+
+pytest_plugins = ["tests.processes", "tests.slow"]
 
 os.environ.setdefault("MPLBACKEND", "Agg")
 # One thread a process: pytest-xdist already fills the cores, and sums keep their order.
@@ -18,7 +21,19 @@ for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 os.environ.setdefault("WBC_TICK_FLAGS", "-O0")
 os.environ.setdefault("WBC_ROWS_FLAGS", "-O0")
 # Compiled ticks of the tests stay out of the user's cache, and survive from run to run.
-os.environ.setdefault("XDG_CACHE_HOME", str(Path(__file__).parents[1] / "build" / "test-cache"))
+BUILD = Path(__file__).parents[1] / "build"
+os.environ.setdefault("XDG_CACHE_HOME", str(BUILD / "test-cache"))
+# Where no bytecode may be written beside the sources, every process of the suite would compile all modules that it
+# imports, which takes longer than most tests
+if sys.dont_write_bytecode:
+    sys.dont_write_bytecode, sys.pycache_prefix = False, str(BUILD / "bytecode")
+    os.environ["PYTHONPYCACHEPREFIX"] = sys.pycache_prefix
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+
+# Imported here, when the flags above are set
+from tests import objects  # noqa: E402
+
+objects.keep(BUILD / "test-cache" / "objects")
 
 # Thousands of tests are collected, and live to the end: searching them for garbage again and again takes a sixth of the
 # time of the collection, and a part of every later search

@@ -18,6 +18,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from bench.records import Parts
 from bench.sheet import Sheet
 from bench.soak.jobs import Job, Kept, measure, parts_of
+from wbc.interrupts import obey_kill
 
 #: Stacks and ticks a stack on the virtual machine; the same compiled; stacks with known problems and problems of each;
 #: stacks for the faults; stacks with strict levels on either back end, and ticks of each (ten times as many compiled);
@@ -127,4 +128,5 @@ def main(given: list[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
+    obey_kill()
     sys.exit(main())

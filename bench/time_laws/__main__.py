@@ -24,6 +24,7 @@ from bench.time_laws import least_time, states, ticks
 from bench.time_laws.goals import goals
 from bench.time_laws.suite import INSTANCES
 from bench.time_laws.tables import Parts, Record, sheets
+from wbc.interrupts import obey_kill
 
 PACKAGES = ("wbc", "toppra", "ruckig", "numpy", "scipy", "pin")
 
@@ -164,4 +165,5 @@ def main(given: list[str] | None = None) -> None:
 
 
 if __name__ == "__main__":
+    obey_kill()
     main()

@@ -22,6 +22,7 @@ from bench.report import goal_sheet
 from bench.walk.machine import Machine
 from bench.walk.parts import QUICK, Sizes, goals, others, parts_of, records, sheets
 from wbc.errors import RangeError
+from wbc.interrupts import obey_kill
 from wbc.robots import WalkerData
 from wbc.robots.walker_data import WALKER_DIGEST
 
@@ -114,4 +115,5 @@ def write(folder: Path, parts: Parts, sizes: Sizes, lines: list[str]) -> None:
 
 
 if __name__ == "__main__":
+    obey_kill()
     main()

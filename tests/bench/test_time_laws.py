@@ -20,6 +20,7 @@ from bench.time_laws import __main__ as run
 from bench.time_laws import families, least_time, raw, states
 from bench.time_laws.goals import goals
 from bench.time_laws.tables import sheets
+from tests.processes import IN_BACKGROUND
 from wbc.trajectory import Law, PolynomialPath, jerk_limited
 
 ROOT = Path(__file__).parents[2]
@@ -70,8 +71,20 @@ def test_ctrl_c_keeps_what_was_measured() -> None:
     assert len(goals(parts)) == 1
 
 
-def test_ctrl_c_ends_a_run_with_its_workers(tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "bench.time_laws", "--parts", "straight", "states", "--problems", "2"]
+@pytest.mark.parametrize("background", [False, True])
+def test_ctrl_c_ends_a_run_with_its_workers(background: bool, tmp_path: Path) -> None:
+    """In the background of a shell that ignores Ctrl-C, kill does."""
+    command = [
+        *(IN_BACKGROUND if background else ()),
+        sys.executable,
+        "-m",
+        "bench.time_laws",
+        "--parts",
+        "straight",
+        "states",
+        "--problems",
+        "2",
+    ]
     command += ["--count", "10000000", "--processes", "2", "--output", str(tmp_path)]
     # As on a terminal, where bars show how far it is
     shown = {**os.environ, "FORCE_COLOR": "1"}
@@ -82,7 +95,7 @@ def test_ctrl_c_ends_a_run_with_its_workers(tmp_path: Path) -> None:
         letter = process.stderr.read(1)
         assert letter, seen
         seen += letter
-    process.send_signal(signal.SIGINT)
+    process.send_signal(signal.SIGTERM if background else signal.SIGINT)
     out, _ = process.communicate(timeout=60)
     assert process.returncode == 0
     assert "Ended by Ctrl-C in: states" in out

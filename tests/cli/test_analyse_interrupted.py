@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+from tests.processes import IN_BACKGROUND
 from wbc.cli.app import app
 
 #: The command, with every piece of the subdivision slowed so that there is time to interrupt it
@@ -19,28 +20,34 @@ CHILD = """
 import sys, time
 from pathlib import Path
 from wbc.analysis.boxes import BoxSearch
-from wbc.cli.app import app
+from wbc.cli import main
 
-run = BoxSearch.run
+run, begun = BoxSearch.run, Path(sys.argv[1])
 
 def slow(self, boxes, budget):
     if budget >= 1000:
-        Path(sys.argv[1]).touch()
+        begun.touch()
         time.sleep(0.3)
     return run(self, boxes, budget)
 
 BoxSearch.run = slow
-app(sys.argv[2:])
+del sys.argv[1]
+main()
 """
 
 
-def test_a_certificate_interrupted_as_a_process_is_gone_on_with(tmp_path: Path) -> None:
-    """SIGINT while boxes are looked at: what is known is told and kept, and the rest is done by the next call."""
+@pytest.mark.parametrize("background", [False, True])
+def test_a_certificate_interrupted_as_a_process_is_gone_on_with(background: bool, tmp_path: Path) -> None:
+    """SIGINT while boxes are looked at: what is known is told and kept, and the rest is done by the next call. In the
+    background of a shell that ignores SIGINT the same with SIGTERM.
+    """
     begun, states = tmp_path / "begun", tmp_path / "states"
     command = ["analyse", "spherical_4r", "--set", "elbow, beta", "--certify", "--resume", str(states), "--json"]
     cut, whole = tmp_path / "cut.json", tmp_path / "whole.json"
     child = subprocess.Popen(
-        [sys.executable, "-c", CHILD, str(begun), *command, str(cut)], stdout=subprocess.PIPE, text=True
+        [*(IN_BACKGROUND if background else ()), sys.executable, "-c", CHILD, str(begun), *command, str(cut)],
+        stdout=subprocess.PIPE,
+        text=True,
     )
     until = time.monotonic() + 60.0
     while not begun.exists():
@@ -48,6 +55,8 @@ def test_a_certificate_interrupted_as_a_process_is_gone_on_with(tmp_path: Path) 
         assert time.monotonic() < until
         time.sleep(0.02)
     child.send_signal(signal.SIGINT)
+    if background:
+        child.send_signal(signal.SIGTERM)
     told, _ = child.communicate(timeout=60.0)
     assert child.returncode == 0
     assert "certificate  undecided" in told

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
 
@@ -13,6 +13,7 @@ import pinocchio as pin
 import wbc.robots
 from tests.closed_loop.eyes import Array, Eyes
 from tests.closed_loop.loop import Loop
+from tests.closed_loop.machines import STARTS
 from tests.closed_loop.subjects import Subject
 from tests.closed_loop.tasks import DT
 from wbc.robot import Robot
@@ -91,7 +92,7 @@ def subject(kind: str, error: Any) -> Subject:
 
 
 SUBJECTS: dict[str, Subject] = {
-    "object": subject("pose", midway),
+    "object": replace(subject("pose", midway), starts=2 * STARTS),
     "pivot": subject("position", apart),
     "parallel": subject("orientation", turned),
 }

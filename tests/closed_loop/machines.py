@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from functools import cache
 
 import numpy as np
@@ -10,6 +9,7 @@ import pinocchio as pin
 
 import wbc.robots
 from tests.closed_loop.eyes import Array
+from tests.repeats import repeats
 from tests.tasks.robots import FRAMES
 from wbc.robot import Robot
 from wbc.shapes import Capsule, PlacedShape, Sphere
@@ -18,8 +18,8 @@ from wbc.shapes import Capsule, PlacedShape, Sphere
 TASK_ROBOTS = ("panda", "kinova", "talos")
 CONSTRAINT_ROBOTS = ("panda", "ur5", "talos")
 
-#: Random starts of a check; WBC_STARTS=100 takes more time
-STARTS = int(os.environ.get("WBC_STARTS", "60"))
+#: Random starts of a check, and of one that repeats what another shows, or whose robot takes longer
+STARTS, FEWER = repeats(24), repeats(16)
 
 
 @cache

@@ -14,9 +14,9 @@ import pinocchio as pin
 from tests.closed_loop import tasks
 from tests.closed_loop.eyes import Array, Eyes, cross, length
 from tests.closed_loop.loop import Loop, backend_of
-from tests.closed_loop.machines import STARTS, anywhere, machine
+from tests.closed_loop.machines import FEWER, STARTS, anywhere, machine
 from tests.closed_loop.subjects import Subject
-from tests.closed_loop.tasks import DT, FEWER, GAIN, TICKS, Figures
+from tests.closed_loop.tasks import DT, GAIN, TICKS, Figures
 from tests.tasks.robots import FRAMES, Frames
 from wbc.tasks import AxisAlign, Distance, Item, LookAt, Momentum
 

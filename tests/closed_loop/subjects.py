@@ -11,6 +11,7 @@ import numpy as np
 import pinocchio as pin
 
 from tests.closed_loop.eyes import Array, Eyes, wrap
+from tests.closed_loop.machines import STARTS
 from tests.tasks.robots import FRAMES, Frames
 from wbc.robot import Robot
 from wbc.tasks import (
@@ -45,6 +46,7 @@ class Subject:
         reach: how far targets are from starts in every degree of freedom [rad, m].
         usable: whether a configuration is away from the task's singular sets.
         rate: the input that takes the target's velocity.
+        starts: of :func:`tests.closed_loop.tasks.decay`; more where a wrong formula shows from few of them only.
     """
 
     cls: type[Task]
@@ -54,6 +56,7 @@ class Subject:
     reach: float = 0.25
     usable: Callable[[Eyes, Frames, Array], bool] = lambda eyes, f, q: True
     rate: str = "feedforward"
+    starts: int = STARTS
 
 
 def pose_error(eyes: Eyes, f: Frames, q: Array, target: pin.SE3) -> Array:

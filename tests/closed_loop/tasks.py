@@ -11,14 +11,11 @@ import pinocchio as pin
 
 from tests.closed_loop.eyes import Array, length
 from tests.closed_loop.loop import Loop
-from tests.closed_loop.machines import STARTS, anywhere, near
+from tests.closed_loop.machines import FEWER, STARTS, anywhere, near
 from tests.closed_loop.subjects import SUBJECTS, Subject, damping_weights
 from wbc.tasks import Posture
 
 DT, GAIN, TICKS = 0.02, 5.0, 110
-
-#: Starts of the checks that repeat what :func:`decay` shows under other circumstances
-FEWER = 40
 
 #: Starts and targets have rows whose smallest singular value is above this [m or rad per rad]
 LEAST_SINGULAR_VALUE = 0.1
@@ -74,7 +71,7 @@ def decay(loop: Loop, name: str, seed: int = 1, subjects: Mapping[str, Subject] 
     worst = {"left": 0.0, "bend": 0.0, "rate": 0.0, "unsolved": 0.0}
     every = 10
     powers = (1 - GAIN * DT) ** np.arange(0, TICKS + 1, every)
-    for q, goal in pairs(loop, subject, seed):
+    for q, goal in pairs(loop, subject, seed, count=subject.starts):
         target = subject.measure(loop.eyes, loop.frames, goal)
         loop[name].target = target
         run = loop.run(q, TICKS)

@@ -1,4 +1,4 @@
-"""Every task and constraint in its loop, on three robots, from 60 random starts, or as many as WBC_STARTS says."""
+"""Every task and constraint in its loop, on three robots, from random starts."""
 
 from __future__ import annotations
 

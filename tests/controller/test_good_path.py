@@ -18,7 +18,7 @@ asked_for = ("explaining", "explanation_text", "losses", "naming", "past", "deri
 loaded = {{name for name in sys.modules if name.startswith("wbc.")}}
 print(sorted(loaded & {{"wbc.controller." + name for name in asked_for}}), end=" ")
 print(sorted(loaded & {{"wbc.qp.conflict", "wbc.qp.sensitivity", "wbc.qp.level_sensitivity"}}), end=" ")
-print(controller._fallback._links)
+print(sorted(controller._fallback._links))
 controller.step(q).explain()
 assert "wbc.controller.losses" in sys.modules
 """
@@ -29,4 +29,5 @@ def test_nothing_of_it_is_even_loaded(backend: str) -> None:
     done = subprocess.run(
         [sys.executable, "-c", PROGRAM.format(backend=backend)], capture_output=True, text=True, check=True
     )
-    assert done.stdout == "[] [] {}\n"
+    # The links of the chain are made at compile, since a tick that needs one has no time for it
+    assert done.stdout == "[] [] ['daqp', 'elastic', 'osqp']\n"

@@ -34,8 +34,14 @@ def stack(name: str) -> Stack:
     return out
 
 
-def make(name: str, backend: str) -> Controller:
+@cache
+def untouched(name: str, backend: str) -> Controller:
+    """One that is compiled only."""
     return stack(name).compile(backend=backend)
+
+
+def make(name: str, backend: str) -> Controller:
+    return untouched(name, backend).clone()
 
 
 def prepare(controller: Controller, ticks: int) -> None:

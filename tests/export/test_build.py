@@ -10,11 +10,6 @@ import pytest
 from tests.export.cases import CASES, STRICT, TRAP, WRAP, exported, run
 
 
-@pytest.fixture(scope="module")
-def root(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return tmp_path_factory.mktemp("export")
-
-
 @pytest.mark.parametrize("name", CASES)
 def test_a_thousand_states_agree(name: str, root: Path) -> None:
     folder = exported(name, root)

@@ -19,11 +19,6 @@ from wbc.shapes import Box
 API = Path(__file__).with_name("api.c")
 
 
-@pytest.fixture(scope="module")
-def root(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return tmp_path_factory.mktemp("export")
-
-
 def defines(folder: Path) -> dict[str, str]:
     return dict(re.findall(r"^#define (WBC_\w+) (\S+)", (folder / "wbc_tick.h").read_text(), re.MULTILINE))
 

@@ -12,6 +12,7 @@ from tests.project.layout import ROOT, module_name, nodes, relative, sources
 #: Floor of each part of the package, from the ground up. Solvers know nothing of robots: see ONLY.
 FLOORS = {
     "wbc.errors": 0,
+    "wbc.interrupts": 0,
     "wbc.pickling": 0,
     "wbc.validation": 0,
     "wbc.shapes": 0,

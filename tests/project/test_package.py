@@ -39,7 +39,6 @@ def installed_name(path: Path) -> str:
     return inside if inside.startswith("wbc/") else f"wbc/{inside}"
 
 
-@pytest.mark.slow
 def test_wheel_holds_every_module(wheel: zipfile.ZipFile) -> None:
     wanted = {installed_name(p) for p in sources("wbc", "tasks", "robots")}
     names = {n for n in wheel.namelist() if n.endswith(".py")}
@@ -47,7 +46,6 @@ def test_wheel_holds_every_module(wheel: zipfile.ZipFile) -> None:
     assert {"wbc/tasks/base.py", "wbc/robots/__init__.py"} <= names
 
 
-@pytest.mark.slow
 def test_wheel_holds_type_marker_licence_and_data(wheel: zipfile.ZipFile) -> None:
     names = set(wheel.namelist())
     assert "wbc/py.typed" in names

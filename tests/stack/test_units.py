@@ -10,6 +10,7 @@ import pinocchio as pin
 import pytest
 
 import wbc.robots
+from tests.repeats import repeats
 from tests.stack.millimetres import configuration, moved, scaled, velocity
 from tests.stack.small import arm
 from wbc.controller import Controller, Stack, Step
@@ -22,7 +23,7 @@ from wbc.shapes import Capsule, PlacedShape, Sphere
 from wbc.tasks import CenterOfMass, EndEffector, Expression, FrameVelocityLimit, JointLimits, Obstacle, Posture, Row
 
 DT = 0.005
-STATES = 150
+STATES = repeats(150)
 RADIUS, MARGIN, SPEED = 0.08, 0.02, 0.25
 
 

@@ -86,7 +86,6 @@ def test_tube_stays_at_its_radius() -> None:
     assert len(render.tube(np.zeros((4, 3)), 0.02, RED).triangles) == 0
 
 
-@pytest.mark.slow
 def test_picture_and_plots_of_a_robot_without_meshes(tmp_path: Path) -> None:
     rows = [wbc.robots.DHRow(a=0.4) for _ in range(3)]
     robot = wbc.robots.from_dh(rows)

@@ -40,7 +40,6 @@ def test_on_a_line_it_is_the_law_between_two_states(way):
     assert -1e-9 <= law.duration / shortest - 1.0 <= 5e-3
 
 
-@pytest.mark.slow
 def test_splines_take_little_longer_than_without_a_limit_of_the_jerk():
     path = spline_path(POINTS)
     free = time_optimal(path, velocity=SIZES["velocity"], acceleration=SIZES["acceleration"]).duration

@@ -12,7 +12,6 @@ from tests.trajectory.families import judged
 MANY = {"random": 1500, "near rest": 1500, "one joint far": 500, "speeds only": 500}
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", FAMILIES)
 def test_limits_are_kept_and_ends_met(name):
     rng = np.random.default_rng(17)

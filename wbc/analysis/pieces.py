@@ -4,12 +4,9 @@ from __future__ import annotations
 
 import hashlib
 import os
-import signal
-import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
-from contextlib import contextmanager
 from dataclasses import astuple
 from pathlib import Path
 from typing import TypeAlias
@@ -20,6 +17,7 @@ import numpy as np
 from wbc.analysis.boxes import BoxSearch, Counts
 from wbc.analysis.trig_form import TrigForm
 from wbc.errors import RobotFileError
+from wbc.interrupts import interrupts
 from wbc.validation import Array
 
 #: Boxes of one piece, boxes that it may become before it is handed back, at first and at most
@@ -64,7 +62,9 @@ class Pieces:
         running: dict[Future[_Done], Array] = {}
         saved = began
         stop = False
-        with _interrupts() as asked, ThreadPoolExecutor(workers) as pool:
+        asked: list[bool] = []
+        # Interrupts are only noted: between two lines of the bookkeeping one would lose boxes
+        with interrupts(lambda: asked.append(True)), ThreadPoolExecutor(workers) as pool:
             try:
                 while (self._waiting or running) and not stop and not asked:
                     while self._waiting and len(running) < 2 * workers:
@@ -144,23 +144,6 @@ class Pieces:
             raise RobotFileError("state", str(path), "belongs to another robot, set or tube")
         self._waiting = [boxes] if len(boxes) else []
         self.kept, self.counts, self.seconds = kept, counts, seconds
-
-
-@contextmanager
-def _interrupts() -> Iterator[list[int]]:
-    """Keyboard interrupts, noted only: between two lines of the bookkeeping one would lose boxes.
-
-    Elsewhere than in the main thread none arrive.
-    """
-    asked: list[int] = []
-    if threading.current_thread() is not threading.main_thread():
-        yield asked
-        return
-    before = signal.signal(signal.SIGINT, lambda number, _: asked.append(number))
-    try:
-        yield asked
-    finally:
-        signal.signal(signal.SIGINT, before)
 
 
 def _name(forms: Sequence[TrigForm], boxes: Array, eps: float) -> str:

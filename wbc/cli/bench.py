@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import pathlib
-import signal
-import subprocess
 import sys
-from typing import Any
 
 import typer
 
@@ -41,13 +39,6 @@ def bench(context: typer.Context) -> None:
         raise BenchError("bench", str(ROOT / "bench"), reason)
     given = list(context.args)
     module = OTHERS[given.pop(0)] if given and given[0] in OTHERS else "bench"
-
-    def ignore(number: int, frame: Any) -> None:
-        """Ctrl-C goes to the benchmark too, which ends with what it has; SIG_IGN would be inherited by it."""
-
-    before = signal.signal(signal.SIGINT, ignore)
-    try:
-        done = subprocess.run([sys.executable, "-m", module, *given], cwd=ROOT, check=False)
-    finally:
-        signal.signal(signal.SIGINT, before)
-    raise typer.Exit(done.returncode)
+    # In place of this process: whoever interrupts or kills it means the benchmark, which ends with what it has
+    os.chdir(ROOT)
+    os.execv(sys.executable, [sys.executable, "-m", module, *given])

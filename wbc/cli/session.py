@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import datetime
-import signal
-import threading
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,6 +19,7 @@ from wbc.cli.console import err, out, progress_bar
 from wbc.controller import Controller
 from wbc.controller.recording import RecordingError
 from wbc.errors import WbcError
+from wbc.interrupts import interrupts
 from wbc.track.log import FORMATS, Log, save
 from wbc.track.picture import save_picture
 from wbc.track.plots import save_plots
@@ -63,20 +62,14 @@ class Stopper:
     @contextlib.contextmanager
     def listening(self) -> Iterator[None]:
         """Within it the first Ctrl-C asks to stop, and the second interrupts at once."""
-        if threading.current_thread() is not threading.main_thread():
-            yield
-            return
 
-        def asked(number: int, frame: Any) -> None:
+        def ask() -> None:
             if self.asked:
                 raise KeyboardInterrupt
             self.asked = True
 
-        before = signal.signal(signal.SIGINT, asked)
-        try:
+        with interrupts(ask):
             yield
-        finally:
-            signal.signal(signal.SIGINT, before)
 
 
 def perform(plan: Plan, output: Output) -> None:

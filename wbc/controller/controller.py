@@ -164,6 +164,8 @@ class Controller(Deployment):
         out.tick.check()
         out.policy = self.policy
         out.ramps.assume(self.ramps, out._handles)
+        if self._fallback.prepared:
+            out.prepare()
         out._first, out._waiting, out._slow = dict(self._first), dict(self._waiting), self._slow
         return out
 

@@ -58,6 +58,10 @@ class Deployment:
         self.ramps.start(handle, weight, seconds)
         self._slow = True
 
+    def prepare(self) -> None:
+        """Import and make now what the policy may need in a tick."""
+        self._fallback.prepare()
+
     def finish(self, flag: int) -> int:
         """What the policy adds to a tick that ended with ``flag``; negative: refused."""
         return self._fallback.finish(flag)

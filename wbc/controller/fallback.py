@@ -8,22 +8,42 @@ from wbc.controller.policy import CHAIN, Policy
 from wbc.controller.report import CHAIN_BRAKED, POLICY_BRAKED, RECOVERED, RELAXED, UNSOUND, ReportLayout
 from wbc.controller.solved import SolvedTick
 from wbc.controller.tick import Assembly
+from wbc.qp.factor import load
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Layout
 
 
 class Fallback:
-    """The links of one controller, made when they are needed for the first time.
+    """The links of one controller. :meth:`prepare` makes them, else the first tick that needs one.
 
     Attributes:
-        policy: what to do.
+        prepared: no tick has to import or to make anything.
     """
 
     def __init__(self, tick: NativeTick | SolvedTick, assembly: Assembly, stack: Declaration, layout: Layout) -> None:
-        self.policy = Policy()
+        self._policy, self.prepared = Policy(), False
         self._tick, self._given = tick, (assembly, stack, layout)
         self._flag = ReportLayout(layout).flag
         self._links: dict[str, SolvedTick] = {}
+
+    @property
+    def policy(self) -> Policy:
+        """What to do."""
+        return self._policy
+
+    @policy.setter
+    def policy(self, policy: Policy) -> None:
+        self._policy = policy
+        if self.prepared:
+            self.prepare()
+
+    def prepare(self) -> None:
+        """Import and make what the policy may need: importing takes longer than a tick may."""
+        load()
+        for name in ("daqp", *self._policy.chain):
+            if name != "cold":
+                self._link(name)
+        self.prepared = True
 
     def finish(self, flag: int) -> int:
         """Replace the report of a tick that ended with ``flag`` where the policy wants that; negative: refused."""
@@ -32,13 +52,13 @@ class Fallback:
         answered = flag & ~UNSOUND
         if flag & UNSOUND:
             answered = self._chain()
-        if answered == RELAXED and self.policy.conflict == "brake":
+        if answered == RELAXED and self._policy.conflict == "brake":
             answered = self._brake(POLICY_BRAKED)
         return 0
 
     def _chain(self) -> int:
         """The first link with a certified answer, else braking. RELAXED where that answer is one."""
-        for link in self.policy.chain:
+        for link in self._policy.chain:
             self._again()
             if link == "cold":
                 self._tick.reset()

@@ -53,7 +53,9 @@ class Stack(Declaration):
         from wbc import __version__
 
         validation.one_of("solver", solver, available_solvers(experimental=True))
-        return Controller(self, compile_stack(self, backend, __version__), solver)
+        controller = Controller(self, compile_stack(self, backend, __version__), solver)
+        controller.prepare()
+        return controller
 
     def solver(self, goals: Iterable[str] | None = None, backend: str = "auto") -> Solver:
         """Inverse kinematics of these tasks and constraints, compiled; see :class:`wbc.Solver`.

@@ -126,6 +126,11 @@ class ActiveRows:
         return float(np.linalg.norm(_lapack().dtrtri(self.T, lower=0)[0]))
 
 
+def load() -> None:
+    """Import LAPACK now, where the first factor must not wait for it."""
+    _lapack()
+
+
 @functools.cache
 def _lapack() -> Any:
     """LAPACK of scipy, imported at first use: the compiled tick does without it."""

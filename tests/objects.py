@@ -1,0 +1,49 @@
+"""Object files of compiled stacks, kept by what they are made from.
+
+A stack is compiled again as soon as a line of the package changes that may have to do with it (wbc.stack.key); nearly
+always the C code stays the same, and so does its object file.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import pathlib
+import shutil
+import tempfile
+
+import casadi as ca
+
+from wbc.stack import toolchain
+
+_run, _compiler = toolchain._run, toolchain.compiler()
+
+
+def keep(folder: pathlib.Path) -> None:
+    """From now on this process takes object files from the folder where it can. Another compiler is always asked."""
+    folder.mkdir(parents=True, exist_ok=True)
+
+    def run(command: list[str], place: pathlib.Path) -> None:
+        if command[0] != _compiler or "-c" not in command:
+            _run(command, place)
+            return
+        made = place / command[command.index("-o") + 1]
+        kept = folder / _name(command, place)
+        if kept.exists():
+            shutil.copyfile(kept, made)
+            return
+        _run(command, place)
+        # Renamed into its place, since other processes look for it
+        with tempfile.NamedTemporaryFile(dir=folder, delete=False) as file:
+            file.write(made.read_bytes())
+        os.replace(file.name, kept)
+
+    toolchain._run = run
+
+
+def _name(command: list[str], place: pathlib.Path) -> str:
+    """Of the command, the compiler, the solver's headers and all sources in the folder."""
+    digest = hashlib.sha256("\n".join([*command, toolchain.identity(), ca.__version__]).encode())
+    for path in sorted(place.glob("*.[ch]")):
+        digest.update(path.name.encode() + b"\0" + path.read_bytes())
+    return digest.hexdigest() + ".o"
