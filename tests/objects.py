@@ -14,7 +14,7 @@ import tempfile
 
 import casadi as ca
 
-from wbc.stack import toolchain
+from wbc.native import toolchain
 
 _run, _compiler = toolchain._run, toolchain.compiler()
 

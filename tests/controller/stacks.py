@@ -12,9 +12,9 @@ import wbc
 from tests.constraints.robots import robot as limited_robot
 from tests.tasks.robots import FRAMES, random_configuration
 from wbc.controller import Controller, Stack
+from wbc.native import toolchain
 from wbc.robot import Robot
 from wbc.shapes import HalfSpace, Sphere
-from wbc.stack import toolchain
 from wbc.tasks import (
     CenterOfMass,
     Damping,

@@ -16,7 +16,7 @@ import matplotlib.pyplot as plt
 import pytest
 from matplotlib.image import imread
 
-from wbc.stack import toolchain
+from wbc.native import toolchain
 from wbc.track import render, scene
 
 FOLDER = Path(__file__).parents[2] / "examples"
