@@ -128,7 +128,7 @@ class PlacedShape:
     """A shape fixed to a link frame.
 
     Attributes:
-        shape: a :data:`Solid`.
+        shape: a :data:`Solid`; a :class:`HalfSpace` is no part of a link, but may stand in the world.
         placement: pose of the shape in the link's frame.
         excess: how far the shape may stand out of what it was fitted to [m]; 0 for exact shapes.
 
@@ -141,7 +141,7 @@ class PlacedShape:
     excess: float = 0.0
 
     def __post_init__(self) -> None:
-        if not isinstance(self.shape, Solid):
+        if not isinstance(self.shape, Shape):
             raise ShapeError("PlacedShape.shape", self.shape, "expected a Sphere, Capsule, Box, Cylinder or Convex")
         object.__setattr__(self, "placement", validation.pose("PlacedShape.placement", self.placement))
         object.__setattr__(self, "excess", validation.scalar("PlacedShape.excess", self.excess, low=0.0, unit="m"))

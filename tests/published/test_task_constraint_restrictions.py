@@ -42,13 +42,17 @@ def factor(line: str) -> Function:
     if choice and choice[2] in CHOICES:
         joint, function = int(choice[1]) - 1, CHOICES[choice[2]]
         return lambda q: float(function(q[joint]))
+    solved = re.fullmatch(r"q(\d) = (?!0$)(.+)", line)
+    if solved:
+        joint, other = int(solved[1]) - 1, factor(f"{solved[2]} = 0")
+        return lambda q: float(np.sin(0.5 * (q[joint] - other(q))))
     text = line.removesuffix(" = 0")
     assert text != line
     text = re.sub(r"(?<![\w/])(\d+) (?=[\w(])", r"\1 * ", text)
     text = re.sub(r"\b([cs])(\d+)\b", lambda m: _trig(m[1], m[2]), text)
     text = re.sub(r"(?<=\d) (?=q\d)", " * ", text)
     code = compile(re.sub(r"\bq(\d)\b", lambda m: f"q[{int(m[1]) - 1}]", text), line, "eval")
-    return lambda q: float(eval(code, {"cos": np.cos, "sin": np.sin}, {"q": q}))
+    return lambda q: float(eval(code, {"cos": np.cos, "sin": np.sin, "pi": pi}, {"q": q}))
 
 
 def _trig(kind: str, digits: str) -> str:

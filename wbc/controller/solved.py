@@ -177,13 +177,6 @@ class SolvedTick(Buffers):
             if crossed[self._orders == 0].any():
                 return BRAKED, self.rest(qp), None
             answer = self._relaxation.solve(sides, self._orders, self._units, self._dof_scales)
-            if answer.flag == "failed":
-                found = polish(sides, Solution(answer.x, answer.multipliers, "failed"), POLISH_ROUNDS)
-                if found.exact:
-                    zero = np.zeros(qp.m)
-                    got, ends = found.solution, (sides.lower, sides.upper)
-                    x = np.clip(got.x, sides.lower[: qp.n], sides.upper[: qp.n])
-                    answer = Relaxed(x, got.multipliers, "solved", zero, zero > 0.0, *ends, got.iterations)
             if answer.flag != "failed":
                 answer = self._soft.polished(qp, answer)
                 return RELAXED if crossed.any() or answer.flag == "relaxed" else SOLVED, answer.x, answer
