@@ -10,25 +10,16 @@ step = controller.step(robot.neutral)
 
 __version__ = "0.1.0"
 
+from wbc import controller
 from wbc import robots as robots
 from wbc import shapes as shapes
 from wbc import tasks as tasks
 from wbc import trajectory as trajectory
-from wbc.controller import (
-    Certificate,
-    Controller,
-    Explanation,
-    Policy,
-    Recording,
-    Replay,
-    Solution,
-    Solver,
-    Stack,
-    Status,
-    Step,
-    replay,
-)
+from wbc.controller import Certificate, Controller, Policy, Stack, Status, Step
 from wbc.errors import WbcError
+from wbc.explain import Explanation
+from wbc.ik import Branch, Branches, Ending, Solution, Solver
+from wbc.record import Recorder, Recording, Replay, replay, replayed
 
 __all__ = [
     "Certificate",
@@ -50,3 +41,7 @@ __all__ = [
     "tasks",
     "trajectory",
 ]
+
+# These stood in wbc.controller before they had packages of their own; they are found there for one version more
+_MOVED = (Branch, Branches, Ending, Explanation, Recorder, Recording, Replay, Solution, Solver, replay, replayed)
+vars(controller).update({thing.__name__: thing for thing in _MOVED})

@@ -12,7 +12,7 @@ from tests.cli.test_commands import FAST, run
 from tests.stack import small
 from wbc import Recording, track
 from wbc.cli import session
-from wbc.controller.recording import Writer
+from wbc.record.recording import Writer
 from wbc.tasks import Expression
 
 

@@ -11,8 +11,8 @@ import pinocchio as pin
 import pytest
 
 from tests.controller.test_inverse_kinematics import TIPS, arm, outside, random_q, solver, stack, tip
-from wbc.controller import Solver
 from wbc.errors import InfeasibleError, RangeError, ShapeError, WbcError
+from wbc.ik import Solver
 from wbc.tasks import Damping, Posture
 from wbc.validation import Array
 

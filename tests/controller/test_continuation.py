@@ -9,7 +9,7 @@ import pinocchio as pin
 import pytest
 
 from tests.controller.test_inverse_kinematics import TIPS, arm, random_q, solver, stack, tip
-from wbc.controller import Solver, Stack
+from wbc.controller import Stack
 from wbc.errors import (
     ContinuityError,
     InfeasibleError,
@@ -19,6 +19,7 @@ from wbc.errors import (
     UnknownNameError,
     WbcError,
 )
+from wbc.ik import Solver
 from wbc.tasks import EndEffector, JointLimits, Posture
 
 HOME = np.array([0.3, -1.2, 1.5, -0.7, 1.2, 0.4])

@@ -14,13 +14,13 @@ controller = small.stack().compile(backend={backend!r})
 q = controller.stack.robot.neutral
 statuses = {{str(controller.step(q).status) for _ in range(50)}}
 assert statuses == {{"solved"}}, statuses
-asked_for = ("explaining", "explanation_text", "losses", "naming", "past", "derivative")
+asked_for = ("explaining", "losses", "naming", "past", "sensitivity")
 loaded = {{name for name in sys.modules if name.startswith("wbc.")}}
-print(sorted(loaded & {{"wbc.controller." + name for name in asked_for}}), end=" ")
+print(sorted(loaded & {{"wbc.explain." + name for name in asked_for}}), end=" ")
 print(sorted(loaded & {{"wbc.qp.conflict", "wbc.qp.sensitivity", "wbc.qp.level_sensitivity"}}), end=" ")
 print(sorted(controller._fallback._links))
 controller.step(q).explain()
-assert "wbc.controller.losses" in sys.modules
+assert "wbc.explain.losses" in sys.modules
 """
 
 

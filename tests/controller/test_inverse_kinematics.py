@@ -12,8 +12,9 @@ from scipy.optimize import minimize
 
 import wbc
 from tests.constraints.test_obstacle import coal_pose, coal_shape
-from wbc.controller import Ending, Solver, Stack
-from wbc.controller.timeless import searching, timeless
+from wbc.controller import Stack
+from wbc.ik import Ending, Solver
+from wbc.ik.timeless import searching, timeless
 from wbc.robot import Robot
 from wbc.shapes import Sphere
 from wbc.tasks import EndEffector, Hold, JointLimits, Obstacle, Posture

@@ -12,8 +12,9 @@ import pytest
 
 import wbc
 from tests.controller.test_inverse_kinematics import TIPS, arm, random_q, solver, stack, tip
-from wbc.controller import Solver, Stack
+from wbc.controller import Stack
 from wbc.errors import NotFiniteError, RangeError, ShapeError, UnknownNameError, WbcError
+from wbc.ik import Solver
 from wbc.tasks import Damping, EndEffector, FrameVelocityLimit, JointLimits, Posture, SelfCollision
 
 NAN = np.full(7, np.nan)

@@ -10,9 +10,10 @@ import pinocchio as pin
 import pytest
 
 from tests.controller.stacks import aim, arm, controller, inside, robot
-from wbc.controller import Controller, Status, replay
+from wbc.controller import Controller, Status
 from wbc.errors import RangeError, SolverError
 from wbc.qp.problem import QP
+from wbc.record import replay
 
 
 def hard(c: Controller, rng: np.random.Generator) -> np.ndarray:

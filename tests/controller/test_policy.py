@@ -160,7 +160,7 @@ def test_recovered_and_braked_ticks_replay(tick: Controller, tmp_path: Path, mon
             tick.policy = Policy()
     found = wbc.replay(tmp_path / "run.npz")
     assert found.identical, str(found)
-    (tick_then, *_) = wbc.controller.replayed(wbc.Recording(tmp_path / "run.npz"))
+    (tick_then, *_) = wbc.record.replayed(wbc.Recording(tmp_path / "run.npz"))
     assert tick_then.step.answered_by == "policy"
     assert tick.clone().policy == tick.policy
 

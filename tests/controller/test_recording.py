@@ -16,11 +16,11 @@ import pytest
 from tests.controller.stacks import arm, controller, near_limits, randomise
 from tests.stack import small
 from wbc import Controller, Recording, Stack, replay
-from wbc.controller import recording as files
-from wbc.controller import replayed
-from wbc.controller.recorder import INPUTS
-from wbc.controller.recording import RecordingError, Writer
 from wbc.errors import NotFiniteError, UnknownNameError
+from wbc.record import recording as files
+from wbc.record import replayed
+from wbc.record.recorder import INPUTS
+from wbc.record.recording import RecordingError, Writer
 from wbc.shapes import Box
 from wbc.tasks import Obstacle
 

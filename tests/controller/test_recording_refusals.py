@@ -16,8 +16,8 @@ import wbc
 from tests.controller.test_recording import TOP, recorded
 from tests.stack import small
 from wbc import Recording, Stack, replay
-from wbc.controller.recording import RecordingError, Writer
 from wbc.errors import PicklingError, UnknownNameError
+from wbc.record.recording import RecordingError, Writer
 from wbc.tasks import Expression, Posture
 
 
@@ -122,7 +122,7 @@ class Trap:
         lambda p: Trap(os.mkdir, str(p)),
         lambda p: Trap(shutil.copytree, str(TOP / "requirements"), str(p)),
         lambda p: Trap(eval, f"__import__('os').mkdir({str(p)!r})"),
-        lambda p: Trap(wbc.controller.recording.Writer, p, {"sizes": {"a": 1}}, None, False),
+        lambda p: Trap(wbc.record.recording.Writer, p, {"sizes": {"a": 1}}, None, False),
         lambda p: Trap(wbc.native.toolchain.compile_tick, {}, p),
     ],
 )

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from wbc import replay
-from wbc.controller.unpickle import _Careful
 from wbc.coordinates import (
     AxisRows,
     CoordinatePair,
@@ -21,6 +20,7 @@ from wbc.coordinates import (
     parts,
 )
 from wbc.errors import PicklingError
+from wbc.record.unpickle import _Careful
 
 ARM = parts("spherical_4r").arms[0]
 

@@ -1,8 +1,10 @@
-"""Imports of the package only point down the floors."""
+"""Imports of the package only point down the floors, and go round nowhere."""
 
 from __future__ import annotations
 
 import ast
+import re
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import pytest
@@ -30,16 +32,26 @@ FLOORS = {
     "wbc.resolvers": 5,
     "wbc.export": 5,
     "wbc.controller": 6,
-    "wbc.trajectory": 7,
-    "wbc.coordinates": 7,
-    "wbc.teleop": 8,
-    "wbc.track": 8,
-    "wbc.walking": 8,
-    "wbc.pages": 8,
-    "wbc.cli": 9,
+    "wbc.explain": 7,
+    "wbc.ik": 7,
+    "wbc.record": 7,
+    "wbc.trajectory": 8,
+    "wbc.coordinates": 8,
+    "wbc.teleop": 9,
+    "wbc.track": 9,
+    "wbc.walking": 9,
+    "wbc.pages": 9,
+    "wbc.cli": 10,
 }
 #: Parts that may import only the listed floors, whatever stands below them
 ONLY = {"wbc.qp": {0}, "wbc.resolvers": {0}}
+#: Packages without a circle of imports among their files, and those of them where imports for types count as well
+STRAIGHT = ("controller", "explain", "export", "ik", "native", "proximity", "qp", "record", "stack")
+STRICTLY = ("controller", "explain", "export", "ik", "native", "record", "stack")
+#: A module in a string, as importlib takes it; f-strings end where their first value begins
+NAMED = re.compile(r"wbc(\.[a-z_]+)+\.?")
+#: Modules in strings that are not imported by who names them: classes that a pickle may ask for
+LISTED = {("wbc.record.unpickle", "wbc.coordinates"), ("wbc.record.unpickle", "wbc.analysis")}
 #: The package's own __init__ collects names from every floor
 ROOF = "wbc"
 PACKAGE_FILES = sources("wbc", "tasks", "robots")
@@ -51,8 +63,8 @@ def part_of(module: str) -> str:
     return ".".join(parts[:2])
 
 
-def imported(path: Path) -> list[tuple[int, str]]:
-    """(line, module) of every import of this package that runs; those for type checking only are left out."""
+def imported(path: Path, types: bool = False) -> list[tuple[int, str]]:
+    """(line, module) of every import of this package that runs, in functions too, and of those for types if wanted."""
     idle = {
         id(inner)
         for node in nodes(path)
@@ -62,7 +74,7 @@ def imported(path: Path) -> list[tuple[int, str]]:
     }
     found: list[tuple[int, str]] = []
     for node in nodes(path):
-        if id(node) in idle:
+        if id(node) in idle and not types:
             continue
         if isinstance(node, ast.Import):
             found += [(node.lineno, a.name) for a in node.names if a.name.split(".")[0] == "wbc"]
@@ -70,6 +82,44 @@ def imported(path: Path) -> list[tuple[int, str]]:
             module = node.module or ""
             found += [(node.lineno, f"{module}.{a.name}" if module == "wbc" else module) for a in node.names]
     return found
+
+
+def named(path: Path) -> list[tuple[int, str]]:
+    """(line, module) of every string that is the name of a module of this package."""
+    strings = [n for n in nodes(path) if isinstance(n, ast.Constant) and isinstance(n.value, str)]
+    return [(n.lineno, n.value.rstrip(".")) for n in strings if NAMED.fullmatch(n.value)]
+
+
+def files_imported(path: Path, types: bool, modules: Mapping[str, Path]) -> set[str]:
+    """Modules that a file imports, a name of a package as the module that it is."""
+    out = {module for _, module in imported(path, types)}
+    for node in nodes(path):
+        if isinstance(node, ast.ImportFrom) and node.module in out:
+            inner = {f"{node.module}.{a.name}" for a in node.names} & modules.keys()
+            if inner:
+                out |= inner
+                # The package itself is only on the way where all names are modules of it
+                if len(inner) == len(node.names):
+                    out.discard(node.module)
+    # A package that names itself asks for its data
+    strings = {module for _, module in named(path) if not module_name(path).startswith(f"{module}.")}
+    return (out | strings) & modules.keys()
+
+
+def circles(files: list[Path], types: bool) -> Iterator[list[str]]:
+    """Modules that import each other in a circle, each group once."""
+    modules = {module_name(path): path for path in files}
+    steps = {name: files_imported(path, types, modules) - {name} for name, path in modules.items()}
+    reached = {name: set(targets) for name, targets in steps.items()}
+    for middle in modules:
+        for targets in reached.values():
+            if middle in targets:
+                targets |= reached[middle]
+    left = [name for name in sorted(modules) if name in reached[name]]
+    while left:
+        group = [name for name in left if name == left[0] or (name in reached[left[0]] and left[0] in reached[name])]
+        yield group
+        left = [name for name in left if name not in group]
 
 
 def faults(path: Path) -> list[str]:
@@ -81,7 +131,8 @@ def faults(path: Path) -> list[str]:
     if here not in FLOORS:
         return [f"{relative(path)}: {here} has no floor"]
     out = []
-    for line, target in imported(path):
+    strings = [(line, target) for line, target in named(path) if (module, part_of(target)) not in LISTED]
+    for line, target in imported(path) + strings:
         there = part_of(target)
         if there == here or target == "wbc.__version__":
             continue
@@ -94,6 +145,40 @@ def faults(path: Path) -> list[str]:
 def test_imports_point_down() -> None:
     assert len(PACKAGE_FILES) > 400
     assert [fault for path in PACKAGE_FILES for fault in faults(path)] == []
+
+
+def test_no_two_packages_import_each_other() -> None:
+    """On one floor too; robots hold the pairs that proximity measures, and proximity measures robots."""
+    parts = {part_of(module_name(path)) for path in PACKAGE_FILES} - {ROOF}
+    ways: dict[str, set[str]] = {part: set() for part in parts}
+    for path in PACKAGE_FILES:
+        here = part_of(module_name(path))
+        if here != ROOF:
+            ways[here] |= {part_of(target) for _, target in imported(path)} & parts - {here}
+    both = {tuple(sorted((a, b))) for a in ways for b in ways[a] if a in ways[b]}
+    assert both == {("wbc.proximity", "wbc.robot")}
+
+
+@pytest.mark.parametrize("package", STRAIGHT)
+def test_no_files_of_a_package_import_each_other_in_a_circle(package: str) -> None:
+    files = [path for path in sources("wbc") if part_of(module_name(path)) == f"wbc.{package}"]
+    assert len(files) > 3
+    assert list(circles(files, types=package in STRICTLY)) == []
+
+
+def test_the_rule_finds_circles_and_names_in_strings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("tests.project.layout.ROOT", tmp_path)
+    room = tmp_path / "wbc" / "stack"
+    room.mkdir(parents=True)
+    a, b, c = (room / f"{name}.py" for name in "abc")
+    a.write_text("def f():\n    from wbc.stack import b\n    return b\n")
+    b.write_text("MODULE = 'wbc.stack.c'\n")
+    c.write_text("from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    from wbc.stack.a import f\n")
+    assert list(circles([a, b, c], types=False)) == []
+    assert list(circles([a, b, c], types=True)) == [["wbc.stack.a", "wbc.stack.b", "wbc.stack.c"]]
+    d = room / "d.py"
+    d.write_text("MODULE = 'wbc.controller.tick'\n")
+    assert faults(d) == ["wbc/stack/d.py:1: wbc.stack imports wbc.controller"]
 
 
 def test_the_rule_finds_an_import_that_points_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

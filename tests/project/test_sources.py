@@ -18,15 +18,6 @@ FOREIGN = ("from_" + "address", "as_" + "strided", "string_" + "at")
 SWITCHES = {"skip" + "if", "x" + "fail", "import" + "orskip"}
 
 
-def long(path: Path) -> Iterator[str]:
-    """Files and functions that are too long."""
-    if path.read_text().count("\n") >= 350:
-        yield relative(path)
-    for f in nodes(path):
-        if isinstance(f, (ast.FunctionDef, ast.AsyncFunctionDef)) and (f.end_lineno or 0) - f.lineno + 1 > 70:
-            yield f"{relative(path)}:{f.lineno}: {f.name}"
-
-
 def unfinished(path: Path) -> Iterator[str]:
     """Marks of unfinished work, and errors that say that nothing is there."""
     text = path.read_text()
@@ -60,11 +51,6 @@ def switched_off(path: Path) -> Iterator[str]:
             yield f"{relative(path)}:{n.lineno}: {n.attr}"
 
 
-def test_files_and_functions_are_short() -> None:
-    assert len(PACKAGE) > 400
-    assert [fault for path in PACKAGE for fault in long(path)] == []
-
-
 def test_nothing_is_left_unfinished() -> None:
     assert len(EVERYTHING) > 800
     assert [fault for path in EVERYTHING for fault in unfinished(path)] == []
@@ -91,7 +77,6 @@ def test_the_rules_find_what_breaks_them(tmp_path: Path, monkeypatch) -> None:
     bad.write_text(
         f"# {'TO' + 'DO'}\n@pytest.mark.{'skip' + 'if'}(True)\ndef f(x: int):\n{body}    raise {error}\n" + FOREIGN[0]
     )
-    assert list(long(bad)) == ["bad.py:3: f"]
     assert [fault.split(":")[1] for fault in unfinished(bad)] == ["1", "84"]
     assert list(foreign(bad)) == [f"bad.py:85: {FOREIGN[0]}"]
     assert list(eager(bad)) == ["bad.py"]

@@ -13,7 +13,7 @@ from rich.table import Table
 from wbc import validation
 from wbc.cli.console import err, out
 from wbc.cli.session import OutputError
-from wbc.controller import Solution
+from wbc.ik import Solution
 from wbc.robot import Robot
 
 SUFFIXES = (".csv", ".npz")

@@ -13,8 +13,8 @@ from wbc.cli import options
 from wbc.cli.answers import Answer, check_output, report, save
 from wbc.cli.planning import given_obstacles, planned
 from wbc.cli.targets import Target, given_targets
-from wbc.controller import Solution, Solver
 from wbc.errors import InfeasibleError, RangeError
+from wbc.ik import Solution, Solver
 from wbc.track.setup import Moving
 from wbc.validation import Array
 

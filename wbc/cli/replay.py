@@ -10,7 +10,7 @@ from rich.markup import escape
 from rich.progress import BarColumn, Progress, TextColumn
 from rich.table import Table
 
-from wbc import controller, validation
+from wbc import record, validation
 from wbc.cli.console import err, out
 from wbc.cli.session import RECORDING, STRIDE
 
@@ -33,7 +33,7 @@ def replay(
     declares is read from it.
     """
     validation.one_of("backend", backend, BACKENDS)
-    recording = controller.Recording(run / RECORDING if run.is_dir() else run)
+    recording = record.Recording(run / RECORDING if run.is_dir() else run)
     console = err()
     bar = Progress(
         TextColumn("replaying"),
@@ -52,7 +52,7 @@ def replay(
                 bar.update(stage, completed=ticks)
 
         chosen = None if backend == BACKENDS[0] else backend
-        found = controller.replay(recording, backend=chosen, trust=trust, progress=progress)
+        found = record.replay(recording, backend=chosen, trust=trust, progress=progress)
     report(recording, found)
     for note in found.notes:
         console.print(f"[yellow]note[/yellow]: {escape(note)}", soft_wrap=True)
@@ -62,7 +62,7 @@ def replay(
         raise typer.Exit(DIFFERS)
 
 
-def report(recording: controller.Recording, found: controller.Replay) -> None:
+def report(recording: record.Recording, found: record.Replay) -> None:
     """Print what was replayed and what came of it."""
     told = recording.about
     table = Table(title=f"{told['robot']}: {recording.path}", title_justify="left", title_style="bold")

@@ -17,9 +17,9 @@ from rich.table import Table
 from wbc import validation
 from wbc.cli.console import err, out, progress_bar
 from wbc.controller import Controller
-from wbc.controller.recording import RecordingError
 from wbc.errors import WbcError
 from wbc.interrupts import interrupts
+from wbc.record.recording import RecordingError
 from wbc.track.log import FORMATS, Log, save
 from wbc.track.picture import save_picture
 from wbc.track.plots import save_plots

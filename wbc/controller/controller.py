@@ -4,27 +4,27 @@ from __future__ import annotations
 
 import functools
 import os
+import pathlib
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from wbc import validation
-from wbc.controller.assembly import assembly_of
-from wbc.controller.deployment import Deployment
-from wbc.controller.directions import Directions
+from wbc import export, validation
+from wbc.controller import hooks
 from wbc.controller.fallback import Fallback
-from wbc.controller.handle import Handle
+from wbc.controller.handle import Directions, Handle
 from wbc.controller.native import NativeTick
+from wbc.controller.policy import Policy
 from wbc.controller.ramps import Ramps
-from wbc.controller.recorder import Recorder
-from wbc.controller.recording import RecordingError
 from wbc.controller.report import BAD_V
 from wbc.controller.solved import SolvedTick
 from wbc.controller.step import Context, Step
 from wbc.controller.table import describe
 from wbc.controller.tick import Assembly
-from wbc.errors import BusyError, PicklingError, SolverError, UnknownNameError
+from wbc.controller.vectors import vectors
+from wbc.controller.vm import VmAssembly
+from wbc.errors import BusyError, PicklingError, RangeError, ShapeError, SolverError, UnknownNameError
 from wbc.qp.problem import QP
 from wbc.stack.artifact import Artifact
 from wbc.stack.declaration import Declaration
@@ -32,11 +32,31 @@ from wbc.stack.layout import Slot
 from wbc.tasks.base import Constraint, Sensor
 from wbc.validation import Array
 
+if TYPE_CHECKING:
+    from wbc.record.recorder import Recorder
+
 _Array = np.ndarray
 _FLOAT = np.dtype(np.float64)
 
+#: How far an export's commands may be from those of the tick that it is [rad/s, m/s], and from those of another solver:
+#: the native tick refines answers whose error it cannot bound by a tenth of that
+SAME, SIMILAR = 1e-9, 1e-6
 
-class Controller(Deployment):
+
+def assembly_of(stack: Declaration, artifact: Artifact) -> Assembly:
+    """The native tick, or the virtual machine's.
+
+    Raises:
+        SolverError: the artifact has neither.
+    """
+    if artifact.library is not None:
+        return NativeTick(artifact.library, artifact.layout)
+    if artifact.program is not None:
+        return VmAssembly(artifact.program, stack, artifact.layout)
+    raise SolverError("artifact", artifact, "has neither a library nor a program")
+
+
+class Controller:
     """A compiled stack with its run-time values. Made by :meth:`wbc.Stack.compile`.
 
     Each controller has its own memory, see :meth:`clone`; one controller must not be stepped from two threads at once.
@@ -147,9 +167,8 @@ class Controller(Deployment):
         Raises:
             RecordingError: the file is there or cannot be written, or the controller records already.
         """
-        if self._recorder is not None:
-            raise RecordingError("path", str(path), f"the controller records into {self._recorder.path} already")
-        return Recorder(self, path, validation.flag("overwrite", overwrite))
+        recorder: Recorder = hooks.record(self, path, overwrite)
+        return recorder
 
     def clone(self) -> Controller:
         """Another controller of the same compiled stack, with its own memory and this one's values and last command.
@@ -205,9 +224,127 @@ class Controller(Deployment):
         return self.tick.v_last[: self.layout.nv].copy()
 
     def __str__(self) -> str:
-        return describe(self)
+        return describe(self.stack, self._handles, f"solver {self.solver} ({self.backend})")
 
-    # What handles and inverse kinematics need; not for users
+    @property
+    def policy(self) -> Policy:
+        """What happens where rows conflict or an answer cannot be certified, see :class:`wbc.Policy`.
+
+        Raises:
+            ShapeError: no policy. SolverError: the controller records; a recording has one policy.
+        """
+        return self._fallback.policy
+
+    @policy.setter
+    def policy(self, policy: Policy) -> None:
+        if not isinstance(policy, Policy):
+            raise ShapeError("policy", policy, "expected a wbc.Policy")
+        if self._recorder is not None:
+            raise SolverError("policy", policy, "cannot change while the controller records")
+        self._fallback.policy = policy
+
+    @property
+    def iteration_cap(self) -> int | None:
+        """Iterations of the QP solver that a tick may take, or None for as many as it takes (the default).
+
+        A tick whose search the cap ends has the status ``capped``. It commands
+
+            v = v_brake + s (v_found - v_brake),
+
+        v_brake bringing every joint to rest as fast as its bounds allow, v_found the solver's last iterate, clipped
+        into the bounds, and s in [0, 1] as large as no row leaves its sides by it. So bounds hold, rows that v_brake
+        satisfies hold, and others are not missed by more than v_brake misses them. The next tick goes on from the
+        active set that was reached. Rows of a warm start are put in without counting.
+
+        Raises:
+            RangeError: not None and no integer >= 1. SolverError: a cap where the tick is not native with daqp.
+        """
+        cap = int(self.tick.cap[0])
+        return cap if cap > 0 else None
+
+    @iteration_cap.setter
+    def iteration_cap(self, cap: int | None) -> None:
+        if cap is None:
+            self.tick.cap[0] = 0.0
+            return
+        if isinstance(cap, bool) or not isinstance(cap, int):
+            raise RangeError("iteration_cap", cap, "expected an integer >= 1, or None for no cap")
+        validation.scalar("iteration_cap", cap, low=1.0)
+        if not isinstance(self.tick, NativeTick):
+            reason = f"only the native tick with daqp can be capped, this one is {self.backend} with {self.solver}"
+            raise SolverError("iteration_cap", cap, reason)
+        self.tick.cap[0] = float(cap)
+
+    def export(
+        self,
+        folder: str | os.PathLike[str],
+        *,
+        overwrite: bool = False,
+        solver_source: bool | str | os.PathLike[str] = False,
+        states: int = 1000,
+    ) -> pathlib.Path:
+        """Write the tick as self-contained C99, with its QP solver, a header, build files and a check.
+
+            controller.reset(q)
+            controller.export("arm_tick")           # then: make -C arm_tick run
+
+        The values that the controller has now (targets, gains, weights, switches, the cap) are those that the C code
+        begins with. Nothing is compiled, and any backend will do; the C code is the native tick. docs/export.md.
+
+        Args:
+            folder: where to; it must be empty or not there.
+            overwrite: an export that is there is replaced.
+            solver_source: the solver's source in place of the library for this platform: True fetches it from the
+                package index, or the path of its archive. Its hash is checked.
+            states: how many states the check has, with this controller's commands; other backends than the native one
+                give those of them that they solve with certainty.
+
+        Raises:
+            ExportError: the folder is not empty or cannot be written.
+            SolverError: run-time values still wait for the first configuration.
+            SolverSourceError: the solver cannot be had. RangeError: ``states`` is no integer >= 1.
+        """
+        from wbc import __version__
+
+        if isinstance(states, bool) or not isinstance(states, int) or not 1 <= states < 2**31:
+            raise RangeError("states", states, "expected an integer >= 1")
+        export.checked_folder(folder, overwrite)
+        self.require_values()
+        tick, layout, robot = self.tick, self.layout, self.stack.robot
+        cost = self.row_costs.copy()
+        for block in layout.of_form("task"):
+            cost[block.span] *= block.entry.item.row_weights(robot)
+        snapshot = export.Snapshot(
+            self.stack,
+            layout,
+            tick.q.copy(),
+            tick.p.copy(),
+            tick.weight.copy(),
+            cost,
+            tick.enabled.copy(),
+            tick.bound_enabled.copy(),
+            float(tick.cap[0]),
+            __version__,
+            vectors(self.clone(), states),
+            f"the {self.backend} tick with {self.solver}",
+            SAME if self.backend == "native" and self.solver == "daqp" else SIMILAR,
+        )
+        return export.write(snapshot, folder, overwrite, solver_source)
+
+    # What handles and the packages above need; not for users
+
+    def start_ramp(self, handle: Handle, weight: float, seconds: float) -> None:
+        """See :meth:`Handle.ramp`."""
+        self.ramps.start(handle, weight, seconds)
+        self._slow = True
+
+    def prepare(self) -> None:
+        """Import and make now what the policy may need in a tick."""
+        self._fallback.prepare()
+
+    def finish(self, flag: int) -> int:
+        """What the policy adds to a tick that ended with ``flag``; negative: refused."""
+        return self._fallback.finish(flag)
 
     def begin(self, configuration: Array | None, velocity: Array) -> None:
         """A reset with checked values."""

@@ -4,23 +4,52 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from math import hypot
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 import numpy as np
 import pinocchio as pin
 
 from wbc import validation
+from wbc.controller.ramps import Ramps
+from wbc.controller.tick import Buffers
 from wbc.errors import RangeError, UnknownNameError
-from wbc.stack.layout import Block, Slot
+from wbc.stack.declaration import Declaration
+from wbc.stack.layout import Block, Layout, Slot
 from wbc.tasks import inputs
-from wbc.tasks._direction import Direction
+from wbc.tasks._direction import DIRECTION_PRICE, Direction
 from wbc.validation import LARGEST, Array
 
 _ARRAY, _FLOAT = np.ndarray, np.dtype(np.float64)
 _MATRIX, _SE3 = (4, 4), pin.SE3
 
-if TYPE_CHECKING:
-    from wbc.controller.controller import Controller
+
+class Owner(Protocol):
+    """What a handle needs of its controller."""
+
+    @property
+    def stack(self) -> Declaration: ...
+    @property
+    def layout(self) -> Layout: ...
+    @property
+    def tick(self) -> Buffers: ...
+    @property
+    def ramps(self) -> Ramps: ...
+    @property
+    def row_costs(self) -> Array: ...
+    @property
+    def directions(self) -> Directions: ...
+
+    def write(self, slot: Slot, numbers: Array) -> None:
+        """See :meth:`Controller.write`."""
+
+    def write_pose(self, slot: Slot, matrix: Array) -> bool:
+        """See :meth:`Controller.write_pose`."""
+
+    def require_value(self, slot: Slot, field: str) -> None:
+        """See :meth:`Controller.require_value`."""
+
+    def start_ramp(self, handle: Handle, weight: float, seconds: float) -> None:
+        """See :meth:`Handle.ramp`."""
 
 
 class UnknownValueError(UnknownNameError, AttributeError):
@@ -50,7 +79,7 @@ class Handle:
         "_weight",
     )
 
-    def __init__(self, controller: Controller, block: Block) -> None:
+    def __init__(self, controller: Owner, block: Block) -> None:
         put = super().__setattr__
         put("_controller", controller)
         put("_block", block)
@@ -270,3 +299,26 @@ def _as_written(slot: Slot, numbers: Array) -> Any:
     if kind == "vector" and slot.input.size == 0:
         return float(numbers[0])
     return numbers.copy()
+
+
+class Directions:
+    """The scaled tasks of one controller: what keeps the direction of one follows its weight and switches."""
+
+    def __init__(self, layout: Layout, tick: Buffers, handles: Mapping[str, Handle]) -> None:
+        self._layout, self._tick, self._handles = layout, tick, handles
+        named = [(b.entry.name, b.entry.item.of) for b in layout.of_form("rows") if isinstance(b.entry.item, Direction)]
+        #: name of the task, by its own name and by that of what keeps its direction
+        self._tasks = dict(named) | {task: task for _, task in named}
+        self._keepers = {task: kept for kept, task in named}
+
+    def follow(self, name: str) -> None:
+        """A task, or what keeps its direction, has another weight or other switches: rows that count, and the price."""
+        task = self._tasks.get(name)
+        if task is None:
+            return
+        kept = self._keepers[task]
+        block, keeper = self._layout.blocks[task], self._layout.blocks[kept]
+        counts = (self._tick.weight[block.span] > 0.0) & self._handles[kept].enabled
+        on = np.append(counts, counts.any()) * self._handles[kept].mask
+        self._tick.enabled[keeper.span] = on
+        self._tick.p[keeper.slots["price"].span] = DIRECTION_PRICE * self._handles[task].weight

@@ -5,13 +5,21 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from wbc.controller.handle import Handle
+from typing import Protocol
 
 #: Share of the larger weight at which a weight of zero begins or ends
 _FLOOR = 1e-6
+
+
+class Ramped(Protocol):
+    """What has a weight that ramps: a handle."""
+
+    @property
+    def item_name(self) -> str: ...
+    @property
+    def ramped(self) -> float: ...
+    def put_ramped(self, value: float) -> None:
+        """Write the weight."""
 
 
 @dataclass
@@ -21,7 +29,7 @@ class Ramp:
     A weight of zero takes the place of 1e-6 of the other one on the way.
     """
 
-    handle: Handle
+    handle: Ramped
     first: float
     last: float
     seconds: float
@@ -46,11 +54,11 @@ class Ramps:
     def __bool__(self) -> bool:
         return bool(self._running)
 
-    def start(self, handle: Handle, last: float, seconds: float) -> None:
+    def start(self, handle: Ramped, last: float, seconds: float) -> None:
         """From the present weight on; takes the place of a ramp of the same task."""
         self._running[handle.item_name] = Ramp(handle, handle.ramped, last, seconds)
 
-    def assume(self, other: Ramps, handles: Mapping[str, Handle]) -> None:
+    def assume(self, other: Ramps, handles: Mapping[str, Ramped]) -> None:
         """Go on with the ramps of another controller from where they are."""
         self._running = {name: replace(ramp, handle=handles[name]) for name, ramp in other._running.items()}
 

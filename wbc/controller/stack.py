@@ -6,14 +6,14 @@ from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from wbc import validation
+from wbc.controller import hooks
 from wbc.controller.controller import Controller
 from wbc.qp.solvers import available_solvers
 from wbc.stack.artifact import compile_stack
 from wbc.stack.declaration import Declaration
 
 if TYPE_CHECKING:
-    from wbc.controller.solution import Solution
-    from wbc.controller.solver import Solver
+    from wbc.ik import Solution, Solver
 
 
 #: What :meth:`Stack.solve` hands on to :meth:`wbc.Solver.solve`
@@ -68,9 +68,8 @@ class Stack(Declaration):
         Raises:
             UnknownNameError: unknown task or backend. RangeError: no goal is left. CompileError: see :meth:`compile`.
         """
-        from wbc.controller.solver import Solver
-
-        return Solver(self, goals, backend)
+        solver: Solver = hooks.solver(self, goals, backend)
+        return solver
 
     def solve(
         self,

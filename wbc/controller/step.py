@@ -9,19 +9,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from wbc.controller.explanation import Explanation
+from wbc.controller import hooks
 from wbc.controller.level_report import LevelCertificate, certificates
 from wbc.controller.outcome import ANSWERED, STATUSES, Binding, Certificate, Residual, Slack, Status
 from wbc.controller.report import INFINITE, ReportLayout
 from wbc.controller.soft import scales
 from wbc.controller.tick import Assembly
-from wbc.errors import SolverError
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Block, Layout
 from wbc.validation import Array
 
 if TYPE_CHECKING:
-    from wbc.controller.past import Past
+    from wbc.explain.explanation import Explanation
 
 
 class Context:
@@ -199,9 +198,8 @@ class Step:
         Raises:
             SolverError: the step comes from a pickle, which holds no code to set its tick up with.
         """
-        from wbc.controller.explaining import Explainer
-
-        return Explainer(self._past()).explain(str(self.status), self.answered_by)
+        explanation: Explanation = hooks.explain(self._data, self._context, str(self.status), self.answered_by)
+        return explanation
 
     def derivative(self, name: str, value: str | None = None) -> Array:
         """dv/dx [nv, k], how the command moves with what the tick was given, as long as the same rows bind.
@@ -217,18 +215,8 @@ class Step:
             UnknownNameError: no such item or value.
             SolverError: the step comes from a pickle, rows gave way, or there is no optimum.
         """
-        from wbc.controller.derivative import derivative
-
-        return derivative(self._past(), name, value)
-
-    def _past(self) -> Past:
-        """The tick again, in memory of its own."""
-        from wbc.controller.past import Past
-
-        context = self._context
-        if context.assembly is None:
-            raise SolverError("step", None, "comes from a pickle; ask in the process that made it")
-        return Past(self._data, context.stack, context.layout, context.assembly)
+        found: Array = hooks.derivative(self._data, self._context, name, value)
+        return found
 
     def __repr__(self) -> str:
         text = f"Step({self.status}, |v| = {np.linalg.norm(self.v):.4g}"

@@ -2,26 +2,23 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
 
+from wbc.controller.handle import Handle
+from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Block
-
-if TYPE_CHECKING:
-    from wbc.controller.controller import Controller
 
 _HEAD = ("item", "kind", "level", "weight", "gain or rate", "rows", "unit", "on")
 
 
-def describe(controller: Controller) -> str:
+def describe(stack: Declaration, handles: Mapping[str, Handle], solver: str) -> str:
     """The table as text."""
-    stack = controller.stack
-    layout = controller.layout
     robot = stack.robot
-    lines = [_row(controller, block) for block in layout.blocks.values()]
+    lines = [_row(handle) for handle in handles.values()]
     widths = [max(len(r[k]) for r in [_HEAD, *lines]) for k in range(len(_HEAD))]
     head = (
         f"{robot.name}: {robot.nv} degrees of freedom, dt {stack.dt:g} s "
-        f"({stack.dt_range[0]:g} to {stack.dt_range[1]:g}), solver {controller.solver} ({controller.backend}), "
+        f"({stack.dt_range[0]:g} to {stack.dt_range[1]:g}), {solver}, "
         f"characteristic length {stack.length:.3g} m, damping {stack.damping:g}"
     )
     text = [head]
@@ -30,8 +27,8 @@ def describe(controller: Controller) -> str:
     return "\n".join(text)
 
 
-def _row(controller: Controller, block: Block) -> tuple[str, ...]:
-    handle = controller[block.entry.name]
+def _row(handle: Handle) -> tuple[str, ...]:
+    block: Block = handle._block
     speed = "gain" if block.form == "task" else "rate"
     rate = f"{getattr(handle, speed):g} 1/s" if speed in block.slots else "-"
     kind_of_row = "minimised" if block.entry.level > 0 else "hard" if block.entry.hard else "soft"

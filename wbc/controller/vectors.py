@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
 import pinocchio as pin
 
+from wbc.controller.handle import Handle
 from wbc.controller.outcome import STATUSES, Status
 from wbc.controller.step import Step
+from wbc.controller.tick import Buffers
 from wbc.robot import Robot
-from wbc.stack.layout import Slot
+from wbc.stack.declaration import Declaration
+from wbc.stack.layout import Layout, Slot
 from wbc.tasks.base import Task
 from wbc.validation import Array
-
-if TYPE_CHECKING:
-    from wbc.controller.controller import Controller
 
 #: Ticks from one configuration on before the next is drawn
 RUN = 20
@@ -25,30 +25,50 @@ CERTAIN = 1e-10
 PATIENCE = 4
 
 
-def vectors(controller: Controller, count: int, seed: int = 0) -> Array:
+class Stepped(Protocol):
+    """What is asked for commands: a controller."""
+
+    @property
+    def stack(self) -> Declaration: ...
+    @property
+    def layout(self) -> Layout: ...
+    @property
+    def tick(self) -> Buffers: ...
+    @property
+    def backend(self) -> str: ...
+    @property
+    def solver(self) -> str: ...
+
+    def step(self, q: Array, v: Array) -> Step:
+        """One control cycle."""
+
+    def __getitem__(self, name: str) -> Handle: ...
+
+
+def vectors(controller: Stepped, count: int, seed: int = 0) -> Array:
     """States row by row: q, v measured, the run-time inputs, flag, command.
 
-    Short runs from random configurations within the joints' ranges, with targets near the hand and inputs near those
-    of the controller. Where another solver than the native one answers, only states that it solved with certainty;
-    there may be fewer than ``count``.
+    Short runs of the controller from random configurations within the joints' ranges, with targets near the hand and
+    inputs near those that it has; it keeps the last ones. Where another solver than the native one answers, only states
+    that it solved with certainty; there may be fewer than ``count``.
     """
-    rng, other = np.random.default_rng(seed), controller.clone()
+    rng = np.random.default_rng(seed)
     model = controller.stack.robot.model
     rows: list[Array] = []
-    start = other.tick.p.copy()
+    start = controller.tick.p.copy()
     for k in range(PATIENCE * count):
         if len(rows) == count:
             break
         if k % RUN == 0:
-            q, v = _configuration(controller.stack.robot, rng), 0.05 * rng.normal(size=other.layout.nv)
-            other.tick.p[:] = start
-            _vary(other, q, rng)
-        step = other.step(q, v)
+            q, v = _configuration(controller.stack.robot, rng), 0.05 * rng.normal(size=controller.layout.nv)
+            controller.tick.p[:] = start
+            _vary(controller, q, rng)
+        step = controller.step(q, v)
         first = not step.answered_by  # exported code has no chain
-        if first and ((other.backend == "native" and other.solver == "daqp") or _certain(step)):
-            rows.append(np.concatenate([q, v, other.tick.p, [STATUSES.index(step.status)], step.v]))
+        if first and ((controller.backend == "native" and controller.solver == "daqp") or _certain(step)):
+            rows.append(np.concatenate([q, v, controller.tick.p, [STATUSES.index(step.status)], step.v]))
         q, v = pin.integrate(model, q, step.v * controller.stack.dt), step.v.copy()
-    width = other.layout.nq + 2 * other.layout.nv + other.layout.parameters + 1
+    width = controller.layout.nq + 2 * controller.layout.nv + controller.layout.parameters + 1
     return np.array(rows).reshape(len(rows), width)
 
 
@@ -66,7 +86,7 @@ def _configuration(robot: Robot, rng: np.random.Generator) -> Array:
     return q
 
 
-def _vary(controller: Controller, q: Array, rng: np.random.Generator) -> None:
+def _vary(controller: Stepped, q: Array, rng: np.random.Generator) -> None:
     """Inputs of another moment: what follows the configuration is where q has it, the rest near where it was."""
     for name, block in controller.layout.blocks.items():
         item = block.entry.item

@@ -11,9 +11,9 @@ import pinocchio as pin
 
 from wbc import validation
 from wbc.controller import Stack
-from wbc.controller.continuation import Tracker
-from wbc.controller.engine import Engine
 from wbc.errors import RangeError, ShapeError
+from wbc.ik.continuation import Tracker
+from wbc.ik.engine import Engine
 from wbc.stack.declaration import Declaration
 from wbc.tasks import EndEffector
 from wbc.trajectory.path import Path, PolynomialPath

@@ -11,17 +11,16 @@ from typing import Any
 import numpy as np
 
 from wbc import validation
-from wbc.controller.batch import search_many
-from wbc.controller.branches import Branches, branches
-from wbc.controller.continuation import Branch, branch
-from wbc.controller.engine import Engine, ending
 from wbc.controller.handle import Handle
-from wbc.controller.moving_targets import MovingTargets
 from wbc.controller.native import NativeTick
-from wbc.controller.search import EXHAUSTED, FOUND, NativeSearch
-from wbc.controller.solution import Batch, Ending, Solution
-from wbc.controller.timeless import TICK
 from wbc.errors import RangeError, ShapeError
+from wbc.ik.branches import Branches, branches
+from wbc.ik.continuation import Branch, branch
+from wbc.ik.engine import Engine, ending
+from wbc.ik.moving_targets import MovingTargets
+from wbc.ik.search import EXHAUSTED, FOUND, NativeSearch, search_many
+from wbc.ik.solution import Batch, Ending, Solution
+from wbc.ik.timeless import TICK
 from wbc.stack.declaration import Declaration
 
 #: Share of the time that is kept for the question which goals contradict each other

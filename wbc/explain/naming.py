@@ -6,8 +6,8 @@ from functools import cached_property
 
 import numpy as np
 
-from wbc.controller.explanation import Side
-from wbc.controller.past import Past
+from wbc.explain.explanation import Side
+from wbc.explain.past import Past
 from wbc.stack.codegen import row_orders, row_units
 from wbc.stack.layout import Block
 from wbc.tasks._direction import Direction

@@ -8,8 +8,8 @@ import numpy as np
 import pinocchio as pin
 
 from wbc import validation
-from wbc.controller.past import Frozen, Past
 from wbc.errors import SolverError
+from wbc.explain.past import Frozen, Past
 from wbc.qp.problem import QP, Solution
 from wbc.qp.relax import Relaxed
 from wbc.qp.sensitivity import Sensitivity

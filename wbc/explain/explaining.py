@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from wbc.controller.explanation import Contradiction, Explanation, Give, Residue, Side
 from wbc.controller.level_report import certificates
-from wbc.controller.losses import groups, losses, prices
-from wbc.controller.naming import Naming
-from wbc.controller.past import Past
 from wbc.controller.soft import scales
+from wbc.explain.explanation import Contradiction, Explanation, Give, Residue, Side
+from wbc.explain.losses import groups, losses, prices
+from wbc.explain.naming import Naming
+from wbc.explain.past import Past
 from wbc.qp.conflict import Conflict, Infeasibility, diagnose
 from wbc.qp.problem import QP
 from wbc.stack.layout import Block

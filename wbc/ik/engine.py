@@ -9,19 +9,20 @@ from typing import Any
 import numpy as np
 
 from wbc.controller.controller import Controller
-from wbc.controller.descent import Search
+from wbc.controller.handle import Handle
 from wbc.controller.native import NativeTick
-from wbc.controller.search import FOUND, Found, NativeSearch, Query
-from wbc.controller.sensing import Sensing
-from wbc.controller.solution import Ending
 from wbc.controller.solved import SolvedTick
-from wbc.controller.starts import Starts
 from wbc.controller.step import Step
 from wbc.controller.tick import Assembly
-from wbc.controller.timeless import FIRST, TICK, chosen_goals, goal_rows, hasten, searching, timeless
+from wbc.ik.descent import Search
+from wbc.ik.search import FOUND, Found, NativeSearch, Query
+from wbc.ik.solution import Ending
+from wbc.ik.starts import Starts
+from wbc.ik.timeless import FIRST, TICK, chosen_goals, goal_rows, hasten, searching, timeless
 from wbc.qp.problem import QP
 from wbc.stack.declaration import Declaration
 from wbc.stack.places import stops
+from wbc.tasks.base import Constraint, Sensor
 from wbc.validation import Array
 
 #: How far constraints may be off at an answer [m, rad, or the margin's unit]
@@ -32,6 +33,31 @@ _MOVED = 1e-6
 
 #: Searches that are prepared for other goals or another tolerance at most
 _KEPT = 16
+
+
+class Sensing:
+    """What items want measured with Coal before a tick that no controller steps: their sensors, writing into its
+    parameters; false where there are none.
+    """
+
+    def __init__(self, controller: Controller, tick: Assembly) -> None:
+        robot, self._tick = controller.stack.robot, tick
+        self._sensors: list[tuple[Sensor, Handle]] = []
+        for entry in controller.stack.entries:
+            item = entry.item
+            if isinstance(item, Constraint) and item.sensed_rows(robot) > 0:
+                slots = controller.layout.blocks[entry.name].slots
+                places = {name: tick.p[slot.span] for name, slot in slots.items()}
+                self._sensors.append((item.sensor(robot, places), controller[entry.name]))
+
+    def __bool__(self) -> bool:
+        return bool(self._sensors)
+
+    def sense(self) -> None:
+        """Measure at the tick's q what enabled items sense."""
+        for sensor, handle in self._sensors:
+            if handle.enabled:
+                sensor.sense(self._tick.q)
 
 
 class Engine:

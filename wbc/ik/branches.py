@@ -8,10 +8,10 @@ from time import perf_counter
 import numpy as np
 import pinocchio as pin
 
-from wbc.controller.engine import Engine
-from wbc.controller.search import FOUND, Found, Query
-from wbc.controller.solution import Ending, Solution
 from wbc.errors import InfeasibleError, RangeError
+from wbc.ik.engine import Engine
+from wbc.ik.search import FOUND, Found, Query
+from wbc.ik.solution import Ending, Solution
 from wbc.tasks import Damping, Momentum
 from wbc.validation import Array
 

@@ -12,12 +12,12 @@ from wbc import validation
 from wbc.controller.controller import Controller
 from wbc.controller.outcome import STATUSES
 from wbc.controller.policy import Policy
-from wbc.controller.recorder import INPUTS, about, declaration_key
-from wbc.controller.recording import Recording, RecordingError
 from wbc.controller.stack import Stack
 from wbc.controller.step import Step
-from wbc.controller.unpickle import load_stack
 from wbc.errors import ShapeError
+from wbc.record.recorder import INPUTS, about, declaration_key
+from wbc.record.recording import Recording, RecordingError
+from wbc.record.unpickle import load_stack
 from wbc.stack.declaration import Declaration
 from wbc.validation import Array
 
@@ -94,7 +94,7 @@ def replay(
         recording: the file, or what was read from it.
         stack: the declaration; default: the one in the recording.
         backend: default: that of the recording. Another gives the same commands only up to rounding.
-        trust: see :func:`wbc.controller.unpickle.load_stack`.
+        trust: see :func:`wbc.record.unpickle.load_stack`.
         progress: called with the number of finished ticks after each.
 
     Raises:

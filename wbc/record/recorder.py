@@ -13,14 +13,12 @@ import pickle
 import platform
 import struct
 from importlib import metadata
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from wbc import validation
-from wbc.controller.recording import FORMAT, RecordingError, Writer
+from wbc.controller.controller import Controller
+from wbc.record.recording import FORMAT, RecordingError, Writer
 from wbc.stack.declaration import Declaration
-
-if TYPE_CHECKING:
-    from wbc.controller.controller import Controller
 
 log = logging.getLogger("wbc")
 
@@ -155,6 +153,13 @@ def _recorded(recorder: Recorder) -> int:
     if len(recorder._rows) >= recorder._chunk:
         recorder.flush()
     return flag
+
+
+def record(controller: Controller, path: str | os.PathLike[str], overwrite: bool) -> Recorder:
+    """See :meth:`wbc.Controller.record`."""
+    if controller._recorder is not None:
+        raise RecordingError("path", str(path), f"the controller records into {controller._recorder.path} already")
+    return Recorder(controller, path, validation.flag("overwrite", overwrite))
 
 
 def about(controller: Controller) -> dict[str, Any]:

@@ -10,7 +10,9 @@ import numpy as np
 
 from wbc.controller.report import ReportLayout
 from wbc.controller.solved import SolvedTick
+from wbc.controller.step import Context
 from wbc.controller.tick import Assembly
+from wbc.errors import SolverError
 from wbc.qp.hierarchy import Answer, Hierarchy
 from wbc.qp.level_sensitivity import FrozenLevels
 from wbc.qp.problem import QP
@@ -172,3 +174,14 @@ class Past:
         tasks, span = self.tick.task_rows(), block.span
         counts = (self.tick.weight[span] > 0.0) & (tasks.factor[span] > 0.0)
         return np.where(counts[:, None], tasks.J[span], 0.0), np.where(counts, tasks.wish[span], 0.0)
+
+
+def past_of(data: bytes, context: Context) -> Past:
+    """The tick of a step again, in memory of its own.
+
+    Raises:
+        SolverError: the step comes from a pickle, which holds no code to set its tick up with.
+    """
+    if context.assembly is None:
+        raise SolverError("step", None, "comes from a pickle; ask in the process that made it")
+    return Past(data, context.stack, context.layout, context.assembly)

@@ -6,8 +6,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from wbc.controller.explanation import Loss, Price, Share, Side
-from wbc.controller.past import Frozen, Past
+from wbc.explain.explanation import Loss, Price, Share, Side
+from wbc.explain.past import Frozen, Past
 from wbc.qp.problem import Solution
 from wbc.qp.relax import Relaxed
 from wbc.qp.sensitivity import Sensitivity

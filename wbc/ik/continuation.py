@@ -10,10 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
-from wbc.controller.engine import Engine
-from wbc.controller.search import FOUND
 from wbc.controller.step import Step
 from wbc.errors import ContinuityError, InfeasibleError
+from wbc.ik.engine import Engine
+from wbc.ik.search import FOUND
 from wbc.validation import Array
 
 #: Neighbouring configurations farther apart than this [rad, or characteristic lengths] have a jump between them if

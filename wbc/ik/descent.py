@@ -10,9 +10,9 @@ import numpy as np
 import pinocchio as pin
 
 from wbc.controller.report import ReportLayout
-from wbc.controller.search import EXHAUSTED, FOUND, OUT_OF_TIME, REFUSED, Found, Query
 from wbc.controller.solved import SolvedTick
 from wbc.controller.tick import Assembly
+from wbc.ik.search import EXHAUSTED, FOUND, OUT_OF_TIME, REFUSED, Found, Query
 from wbc.qp.problem import QP
 from wbc.stack.codegen import row_units
 from wbc.stack.declaration import Declaration
