@@ -47,7 +47,7 @@ FLOORS = {
 ONLY = {"wbc.qp": {0}, "wbc.resolvers": {0}}
 #: Packages without a circle of imports among their files, and those of them where imports for types count as well
 STRAIGHT = ("controller", "explain", "export", "ik", "native", "proximity", "qp", "record", "stack")
-STRICTLY = ("controller", "explain", "export", "ik", "native", "record", "stack")
+STRICTLY = ("controller", "explain", "export", "ik", "native", "qp", "record", "stack")
 #: A module in a string, as importlib takes it; f-strings end where their first value begins
 NAMED = re.compile(r"wbc(\.[a-z_]+)+\.?")
 #: Modules in strings that are not imported by who names them: classes that a pickle may ask for

@@ -224,7 +224,7 @@ class Controller:
         return self.tick.v_last[: self.layout.nv].copy()
 
     def __str__(self) -> str:
-        return describe(self.stack, self._handles, f"solver {self.solver} ({self.backend})")
+        return describe(self.stack, self.layout, self._handles, f"solver {self.solver} ({self.backend})")
 
     @property
     def policy(self) -> Policy:

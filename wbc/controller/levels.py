@@ -6,10 +6,9 @@ import numpy as np
 
 from wbc.controller.report import INFINITE, LEVEL_NUMBERS, ReportLayout
 from wbc.controller.tick import Assembly
-from wbc.qp.cascade import Cascade
+from wbc.qp.cascade import NOISE, PUSHING, Cascade
 from wbc.qp.certificate import Certificate
 from wbc.qp.hierarchy import Answer, Hierarchy, Level
-from wbc.qp.level_step import NOISE, PUSHING
 from wbc.qp.problem import QP
 from wbc.qp.relax import Relaxed
 from wbc.stack.codegen import row_units

@@ -6,15 +6,15 @@ from collections.abc import Mapping
 
 from wbc.controller.handle import Handle
 from wbc.stack.declaration import Declaration
-from wbc.stack.layout import Block
+from wbc.stack.layout import Block, Layout
 
 _HEAD = ("item", "kind", "level", "weight", "gain or rate", "rows", "unit", "on")
 
 
-def describe(stack: Declaration, handles: Mapping[str, Handle], solver: str) -> str:
+def describe(stack: Declaration, layout: Layout, handles: Mapping[str, Handle], solver: str) -> str:
     """The table as text."""
     robot = stack.robot
-    lines = [_row(handle) for handle in handles.values()]
+    lines = [_row(handles[name], block) for name, block in layout.blocks.items()]
     widths = [max(len(r[k]) for r in [_HEAD, *lines]) for k in range(len(_HEAD))]
     head = (
         f"{robot.name}: {robot.nv} degrees of freedom, dt {stack.dt:g} s "
@@ -27,8 +27,7 @@ def describe(stack: Declaration, handles: Mapping[str, Handle], solver: str) -> 
     return "\n".join(text)
 
 
-def _row(handle: Handle) -> tuple[str, ...]:
-    block: Block = handle._block
+def _row(handle: Handle, block: Block) -> tuple[str, ...]:
     speed = "gain" if block.form == "task" else "rate"
     rate = f"{getattr(handle, speed):g} 1/s" if speed in block.slots else "-"
     kind_of_row = "minimised" if block.entry.level > 0 else "hard" if block.entry.hard else "soft"

@@ -6,6 +6,10 @@ statistics; an answer that the plugin does not call a success is never passed on
 
 from __future__ import annotations
 
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any, cast
 
 import casadi as ca
@@ -14,7 +18,6 @@ import numpy as np
 from wbc.errors import SolverError, UnknownNameError
 from wbc.qp.backend import Backend, answer, refusal
 from wbc.qp.problem import QP, Solution
-from wbc.qp.quiet import quiet_stdout
 from wbc.validation import Array
 
 #: Plugins and their options. All but qpoases are experimental: docs/solvers.md lists their measured errors.
@@ -32,6 +35,25 @@ PLUGINS: dict[str, dict[str, Any]] = {
 EXPERIMENTAL = tuple(name for name in PLUGINS if name != "qpoases")
 
 _INFEASIBLE = ("infeasib", "Infeasib", "INFEASIB")
+
+
+@contextmanager
+def quiet_stdout() -> Iterator[None]:
+    """Send file descriptor 1, on which C libraries print, to the null device meanwhile, with all that others print."""
+    sys.stdout.flush()
+    try:
+        saved = os.dup(1)
+    except OSError:  # standard output is closed: nothing can be printed
+        yield
+        return
+    null = os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(null, 1)
+        yield
+    finally:
+        os.dup2(saved, 1)
+        os.close(saved)
+        os.close(null)
 
 
 class Conic(Backend):
