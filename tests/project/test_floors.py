@@ -45,9 +45,8 @@ FLOORS = {
 }
 #: Parts that may import only the listed floors, whatever stands below them
 ONLY = {"wbc.qp": {0}, "wbc.resolvers": {0}}
-#: Packages without a circle of imports among their files, and those of them where imports for types count as well
+#: Packages without a circle of imports among their files, imports for types counted
 STRAIGHT = ("controller", "explain", "export", "ik", "native", "proximity", "qp", "record", "stack")
-STRICTLY = ("controller", "explain", "export", "ik", "native", "qp", "record", "stack")
 #: A module in a string, as importlib takes it; f-strings end where their first value begins
 NAMED = re.compile(r"wbc(\.[a-z_]+)+\.?")
 #: Modules in strings that are not imported by who names them: classes that a pickle may ask for
@@ -163,7 +162,7 @@ def test_no_two_packages_import_each_other() -> None:
 def test_no_files_of_a_package_import_each_other_in_a_circle(package: str) -> None:
     files = [path for path in sources("wbc") if part_of(module_name(path)) == f"wbc.{package}"]
     assert len(files) > 3
-    assert list(circles(files, types=package in STRICTLY)) == []
+    assert list(circles(files, types=True)) == []
 
 
 def test_the_rule_finds_circles_and_names_in_strings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

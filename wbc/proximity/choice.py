@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from wbc.proximity.measured import Measured
 from wbc.proximity.scene import Index
-
-if TYPE_CHECKING:
-    from wbc.proximity.plain import PlainSensing
 
 #: A pair keeps its row until another one is closer by this share of its distance ...
 KEEP_SHARE = 0.1
@@ -33,7 +29,7 @@ class Choice:
         pairs: number of the pair of each row, -1 without.
     """
 
-    def __init__(self, sensing: PlainSensing, count: int) -> None:
+    def __init__(self, sensing: Measured, count: int) -> None:
         length = sensing.scene.robot.characteristic_length
         self.sensing, self.count = sensing, count
         self.pairs: Index = np.full(count, -1, dtype=np.intp)

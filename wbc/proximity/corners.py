@@ -12,15 +12,11 @@ that is close the nearest of these have rows; for other pairs they are too far t
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from wbc.proximity.measured import Measured
 from wbc.shapes import FAR, Box, Capsule, Convex, Cylinder, HalfSpace, Shape
 from wbc.validation import Array
-
-if TYPE_CHECKING:
-    from wbc.proximity.plain import PlainSensing
 
 #: Pairs farther apart than the margin and this share of the robot's characteristic length have no such rows.
 NEAR = 0.05
@@ -44,7 +40,7 @@ class Corners:
         count: how many corners a pair has rows for.
     """
 
-    def __init__(self, sensing: PlainSensing, count: int) -> None:
+    def __init__(self, sensing: Measured, count: int) -> None:
         self.sensing, self.count, self._scene = sensing, count, sensing.scene
         centers = self._scene.centers
         self._points = [corners_of(body.shape, centers[k]) for k, body in enumerate(self._scene.bodies)]

@@ -13,8 +13,6 @@ normal holds as well (balls about one centre), and a ball in a cylinder, where a
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 # isort: split
@@ -23,13 +21,11 @@ import pinocchio as pin
 # isort: split
 import coal
 
+from wbc.proximity.measured import Measured
 from wbc.proximity.scene import TIE, TRUST, Index
 from wbc.proximity.support import Supports, clearance
 from wbc.shapes import Cylinder, HalfSpace, Sphere
 from wbc.validation import Array
-
-if TYPE_CHECKING:
-    from wbc.proximity.plain import PlainSensing
 
 #: How far from 1 the square of a unit normal may be.
 UNIT = 1e-6
@@ -47,7 +43,7 @@ class Judge:
         supports: support functions of the bodies.
     """
 
-    def __init__(self, sensing: PlainSensing) -> None:
+    def __init__(self, sensing: Measured) -> None:
         self.sensing, scene = sensing, sensing.scene
         self.trust = TRUST * scene.robot.characteristic_length
         self.tie = TIE * scene.robot.characteristic_length

@@ -11,7 +11,6 @@ import numpy as np
 from wbc.shapes import FAR
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Layout
-from wbc.stack.motion import motion
 from wbc.stack.pattern import sparsity_rows
 from wbc.stack.places import (
     brakes,
@@ -25,6 +24,7 @@ from wbc.stack.places import (
     told_slacks,
 )
 from wbc.stack.program import Program
+from wbc.symbolic.kinematics import Kinematics
 
 #: Numbers that a tick reports of each level, see ``native/tick.h``
 LEVEL_NUMBERS = 9
@@ -226,3 +226,10 @@ def _blocks(start: np.ndarray, col: np.ndarray) -> list[str]:
                 build.append(f"block(t, {row}, {end - row}, {start[row]}, {len(columns)});")
         row = end
     return [f"#define BLOCKS {' '.join(build)}", f"#define DIAGONALS {' '.join(diagonals)}"]
+
+
+def motion(stack: Declaration) -> ca.Function:
+    """From one configuration to the next: ``move(q, v, dt)`` is q (+) v dt, for ticks that follow each other in C."""
+    kinematics, dt = Kinematics(stack.robot.model), ca.SX.sym("dt")
+    later = kinematics.integrate(kinematics.q, kinematics.v * dt)
+    return ca.Function("move", [kinematics.q, kinematics.v, dt], [ca.densify(later)], ["q", "v", "dt"], ["later"])

@@ -1,5 +1,5 @@
 /* Inverse kinematics: the same rows and the same QP, tick after tick without time between them (dt = 1, gains 1), until
- * the tasks that are goals are met. docs/ik.md has the formulas; wbc/controller/descent.py is the same in Python.
+ * the tasks that are goals are met. docs/ik.md has the formulas; wbc/ik/descent.py is the same in Python.
  *
  * A search is a sequence of descents, first from the given configuration, then from those of a table. The configuration
  * with the least error of the goals that keeps all constraints is in q_good all the time. */
