@@ -19,6 +19,7 @@ import wbc
 from bench.sheet import Sheet, us
 from wbc.controller import Controller
 from wbc.errors import SolverError
+from wbc.explain.past import past_of
 from wbc.qp import make_solver
 from wbc.qp.reference import reference
 from wbc.shapes import Sphere
@@ -70,7 +71,7 @@ def measure(controller: Controller, weight: float, states: int) -> tuple[list[fl
         times.append(perf_counter() - start)
         if step.status not in ("solved", "recovered") or step.relaxed:
             continue
-        qp = step._past().qp
+        qp = past_of(step._data, step._context).qp
         try:
             best = reference(qp, make_solver("daqp", qp.n, qp.m).solve(qp, warm=False)).x
         except SolverError:

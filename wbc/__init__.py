@@ -10,7 +10,7 @@ step = controller.step(robot.neutral)
 
 __version__ = "0.1.0"
 
-from wbc import controller
+from wbc import controller, explain, ik, record
 from wbc import robots as robots
 from wbc import shapes as shapes
 from wbc import tasks as tasks
@@ -18,8 +18,8 @@ from wbc import trajectory as trajectory
 from wbc.controller import Certificate, Controller, Policy, Stack, Status, Step
 from wbc.errors import WbcError
 from wbc.explain import Explanation
-from wbc.ik import Branch, Branches, Ending, Solution, Solver
-from wbc.record import Recorder, Recording, Replay, replay, replayed
+from wbc.ik import Solution, Solver
+from wbc.record import Recording, Replay, replay
 
 __all__ = [
     "Certificate",
@@ -43,5 +43,9 @@ __all__ = [
 ]
 
 # These stood in wbc.controller before they had packages of their own; they are found there for one version more
-_MOVED = (Branch, Branches, Ending, Explanation, Recorder, Recording, Replay, Solution, Solver, replay, replayed)
-vars(controller).update({thing.__name__: thing for thing in _MOVED})
+_MOVED = {
+    explain: ("Explanation",),
+    ik: ("Branch", "Branches", "Ending", "Solution", "Solver"),
+    record: ("Recorder", "Recording", "Replay", "replay", "replayed"),
+}
+vars(controller).update({name: getattr(room, name) for room, names in _MOVED.items() for name in names})

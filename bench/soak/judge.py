@@ -6,6 +6,7 @@ import numpy as np
 
 from bench.soak.referee import SAME, distance
 from wbc.controller import Controller, Status, Step
+from wbc.explain.past import past_of
 from wbc.robot import Robot
 from wbc.validation import Array
 
@@ -62,7 +63,7 @@ class Judge:
             return ""
         self.loose += 1
         if step.status == Status.SOLVED and not step.levels:
-            off = distance(step._past().qp, step.v)
+            off = distance(past_of(step._data, step._context).qp, step.v)
             self.compared += off is not None
             if off is not None and off > SAME * self.longest:
                 return "another optimum than the referee's"
