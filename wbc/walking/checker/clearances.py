@@ -21,7 +21,7 @@ from wbc.walking.checker.report import Tally
 from wbc.walking.checker.rules import Rules
 from wbc.walking.checker.samples import Samples
 from wbc.walking.checker.urdf import CapsuleOfLink, Urdf
-from wbc.walking.structure import Structure
+from wbc.walking.holds.structure import Structure
 
 LINKS, STRUCTURE = "clearance of links", "clearance of the structure"
 

@@ -1,4 +1,4 @@
-/* The least time along a hand's way under the limits of joints 1 to 5, as wbc.walking.swing_path and swing_speed. */
+/* The least time along a hand's way under the limits of joints 1 to 5, as wbc.walking.planner.swings.joints and swing_speed. */
 #ifndef WBC_WALKING_SPEEDS_H
 #define WBC_WALKING_SPEEDS_H
 

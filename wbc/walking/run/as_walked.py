@@ -9,9 +9,9 @@ import numpy as np
 import pinocchio as pin
 
 from wbc.walking.body_path import SPACING, BodyPath
-from wbc.walking.plan import Plan, Regrasp
+from wbc.walking.log.log import CLOSED, WalkLog
+from wbc.walking.planner.plan import Plan, Regrasp
 from wbc.walking.run.recording import TickColumns
-from wbc.walking.run_log import CLOSED, WalkLog
 
 
 def as_walked(log: WalkLog, ticks: TickColumns, steps: Sequence[Regrasp]) -> tuple[Plan, TickColumns]:

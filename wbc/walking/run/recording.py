@@ -13,10 +13,11 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from wbc.robots import Walker
 from wbc.validation import Array
-from wbc.walking.run_log import CLOSED, HAND_STATES, OPEN, OPENING, WalkLog, WalkLogError
-from wbc.walking.run_recorder import LogRecorder
-from wbc.walking.walk import Event, Tick, Walk
+from wbc.walking.log.log import CLOSED, HAND_STATES, OPEN, OPENING, WalkLog, WalkLogError
+from wbc.walking.log.recorder import LogRecorder
+from wbc.walking.loop.walk import Event, Tick, Walk
 
 #: Name of the file in a run's folder
 TICKS = "ticks.npz"
@@ -179,3 +180,13 @@ class WalkRecorder:
         now = [self._structure.index(ids[hold]) if hold >= 0 else -1 for hold in tick.holds]
         leaving = [state == OPENING for state in self._states]
         self._holds = [old if leaves else new for old, new, leaves in zip(self._holds, now, leaving, strict=True)]
+
+
+def configuration(walker: Walker, log: WalkLog, row: int) -> Array:
+    """The robot's configuration at a row of a log, in the structure's frame."""
+    q = np.array(walker.robot.neutral)
+    q[:7] = log.pose_body_in_structure[row]
+    column = {name: k for k, name in enumerate(log.joints)}
+    for arm in walker.arms:
+        q[arm.q] = log.q[row, [column[joint] for joint in arm.joints]]
+    return q

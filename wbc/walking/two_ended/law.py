@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from wbc.validation import Array
-from wbc.walking.swing_law import Aim, SwingLaw
+from wbc.walking.planner.swings.law import Aim, SwingLaw
 
 
 class TurnLaw(SwingLaw):

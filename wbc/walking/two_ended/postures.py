@@ -9,10 +9,10 @@ import numpy as np
 
 from wbc.robots import Walker
 from wbc.validation import Array
-from wbc.walking.grip_rolls import frame_on
-from wbc.walking.structure import Structure
+from wbc.walking.arms.two_ended import TwoEndedKinematics
+from wbc.walking.holds.structure import Structure
+from wbc.walking.planner.grips.rolls import frame_on
 from wbc.walking.two_ended.shapes import ArmShapes
-from wbc.walking.two_ended_kinematics import TwoEndedKinematics
 
 #: Angles of joint 1 that are tried, from limit to limit
 ROLLS = 217

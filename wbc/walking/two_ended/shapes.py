@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from wbc.errors import ShapeError
 from wbc.robots import TwoEndedData, Walker
 from wbc.validation import Array
-from wbc.walking.arm_clearance import segment_distances
-from wbc.walking.structure import Structure
+from wbc.walking.holds.structure import Structure
+from wbc.walking.planner.grips.conflicts import segment_distances
 
 #: What the plan keeps of the clearance for feedback, besides the clearance itself [m]
 ROOM = 0.02

@@ -8,7 +8,7 @@ import numpy as np
 
 from wbc.trajectory import spline_path, time_optimal
 from wbc.validation import Array
-from wbc.walking.swing_curve import step
+from wbc.walking.planner.swings.curve import step
 from wbc.walking.two_ended.postures import Grip, PairPostures
 
 #: Points of a swing, heights at which it is computed, and parts at its ends in which the hand does not go across
