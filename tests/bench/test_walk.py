@@ -22,10 +22,10 @@ from bench.walk.reference.verdict import Kind
 from wbc.errors import RangeError
 from wbc.walking import cylinder
 from wbc.walking.log.recorder import versions
-from wbc.walking.loop.aim_function import aim_function
-from wbc.walking.loop.chain_function import chain_function
+from wbc.walking.loop.body_command import way_function
+from wbc.walking.loop.closed_chain import chain_function
+from wbc.walking.loop.hand_command import aim_function
 from wbc.walking.loop.stack import WalkStack
-from wbc.walking.loop.way_function import way_function
 from wbc.walking.run.compiling import compiled_stack
 
 #: A course of a few seconds

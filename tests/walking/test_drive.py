@@ -17,9 +17,8 @@ from wbc.walking.checker import Rules, check_walk
 from wbc.walking.holds.built_in import grid_pose
 from wbc.walking.loop.stack import WalkStack
 from wbc.walking.loop.walk import Tick, Walk
-from wbc.walking.modes.commands import CommandTable, read_commands
+from wbc.walking.modes.commands import CommandTable, NumberTableError, read_commands
 from wbc.walking.modes.drive import Drive, standing_plan
-from wbc.walking.modes.number_table import NumberTableError
 from wbc.walking.modes.steering import Steering
 from wbc.walking.planner.plan import Plan
 from wbc.walking.run.recording import WalkRecorder

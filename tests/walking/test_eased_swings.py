@@ -11,10 +11,10 @@ from wbc.robots import Walker
 from wbc.walking import Structure
 from wbc.walking.arms.puma import ArmKinematics
 from wbc.walking.body_path import grid_path
+from wbc.walking.planner.eased import ACCELERATION, CHANGE, JERK, RAMP, SPEED, profile_at
 from wbc.walking.planner.follow import follow_plan
 from wbc.walking.planner.plan import Plan, read_plan
 from wbc.walking.planner.planner import plan_walk
-from wbc.walking.planner.swing_profile import ACCELERATION, CHANGE, JERK, RAMP, SPEED, profile_at
 from wbc.walking.planner.swings.joints import joint_paths
 from wbc.walking.planner.swings.law import SwingLaw
 from wbc.walking.planner.swings.least_time import RATE_PART

@@ -13,9 +13,8 @@ from wbc.robots import Walker, WalkerData
 from wbc.walking import ArmKinematics, Structure
 from wbc.walking.body_path import BodyPath, grid_path, standing_path
 from wbc.walking.planner.follow import follow_plan
-from wbc.walking.planner.joints_of_plan import planned_joints
 from wbc.walking.planner.plan import NoPlanError, Plan
-from wbc.walking.planner.plan_time import PlanTime, least_plan_time
+from wbc.walking.planner.plan_time import PlanTime, least_plan_time, planned_joints
 from wbc.walking.planner.planner import plan_walk
 from wbc.walking.planner.swings.swings import SETTLE
 

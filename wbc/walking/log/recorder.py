@@ -103,7 +103,7 @@ class LogRecorder:
 
         Args:
             pose: of the body, seven numbers or ``pin.SE3``. twist: six numbers along the body's axes.
-            states: an index into ``run_log.HAND_STATES`` an arm. holds: a row of the structure an arm, -1 for none.
+            states: an index into ``HAND_STATES`` an arm. holds: a row of the structure an arm, -1 for none.
             command: None, a twist of six numbers or a pose of seven.
 
         Raises:

@@ -15,8 +15,7 @@ from wbc.walking.holds.structure import Structure
 from wbc.walking.loop.state import Tick
 from wbc.walking.loop.walk import Walk
 from wbc.walking.modes.courses import Course, course, course_slices, time_left
-from wbc.walking.modes.leeway import PARTS, displaced, displacement, towards, undisplaced
-from wbc.walking.modes.steering import Steering
+from wbc.walking.modes.steering import PARTS, Steering, displaced, displacement, towards, undisplaced
 from wbc.walking.planner.plan import NoPlanError, Plan
 from wbc.walking.planner.planner import plan_walk
 

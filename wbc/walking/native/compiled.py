@@ -15,6 +15,8 @@ from wbc.errors import CompileError
 from wbc.native import toolchain
 from wbc.native.kernel import kernel
 from wbc.robots import WalkerData
+from wbc.walking.holds.structure import Structure
+from wbc.walking.holds.surface import CylinderSurface
 
 _SOURCES = Path(__file__).parent
 _FILES = ("arm.h", "surface.h", "curve.h", "grips.h", "near.h", "speeds.h", "tracks.h", "ways.h", "planner.c")
@@ -77,3 +79,15 @@ def library() -> ctypes.PyDLL | None:
         return None
     # Not CDLL: a call takes microseconds, giving up the interpreter's lock would cost as much
     return ctypes.PyDLL(str(path))
+
+
+def plain_surface(structure: Structure) -> Numbers | None:
+    """A point, a direction and a radius, 0 for a plane.
+
+    None where there is more than a surface, or none, or no compiler.
+    """
+    surface = structure.surface
+    if surface is None or structure.obstacles or library() is None:
+        return None
+    radius = surface.radius if isinstance(surface, CylinderSurface) else 0.0
+    return doubles([*surface.pose.translation, *surface.pose.rotation[:, 2], radius])

@@ -14,8 +14,7 @@ from wbc.validation import Array
 from wbc.walking.log.log import WalkLog
 from wbc.walking.report import surroundings
 from wbc.walking.report.capsule_picture import Capsules, Ground
-from wbc.walking.report.joining_pieces import Part
-from wbc.walking.report.parts import PALE_HAND, part_poses, parts_of
+from wbc.walking.report.parts import PALE_HAND, Part, part_poses, parts_of
 from wbc.walking.report.stills import AZIMUTH, ELEVATION, SHOWN, held_by
 from wbc.walking.report.surroundings import arm_colour, mixed
 from wbc.walking.run.perform import WalkRun

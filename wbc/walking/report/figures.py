@@ -12,8 +12,8 @@ from wbc.track.summary import Figure, save_summary
 from wbc.validation import Array
 from wbc.walking.checker import Report
 from wbc.walking.log.log import CLOSED, OPENING, WalkLog
+from wbc.walking.planner.eased import JERK
 from wbc.walking.planner.plan import Plan
-from wbc.walking.planner.swing_profile import JERK
 from wbc.walking.planner.swings.law import SwingLaw
 from wbc.walking.run.perform import WalkRun
 from wbc.walking.run.recording import TickColumns

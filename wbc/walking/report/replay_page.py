@@ -20,8 +20,7 @@ from wbc.track.scene import simplified
 from wbc.validation import Array
 from wbc.walking.log.log import WalkLog
 from wbc.walking.report import surroundings
-from wbc.walking.report.joining_pieces import Part
-from wbc.walking.report.parts import PALE_HAND, part_poses, parts_of
+from wbc.walking.report.parts import PALE_HAND, Part, part_poses, parts_of
 from wbc.walking.report.stills import AZIMUTH, ELEVATION, held_by
 from wbc.walking.run.perform import WalkRun
 from wbc.walking.run.recording import configuration

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from wbc.track.scene import Scene
 from wbc.walking.log.log import CLOSED, OPENING, WalkLog
 from wbc.walking.report import surroundings
-from wbc.walking.report.joining_pieces import joining_pieces
-from wbc.walking.report.parts import link_colours, part_poses
+from wbc.walking.report.parts import joining_pieces, link_colours, part_poses
 from wbc.walking.run.perform import WalkRun
 from wbc.walking.run.recording import configuration
 

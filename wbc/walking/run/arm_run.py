@@ -28,15 +28,14 @@ from wbc.walking.holds.structure import Structure
 from wbc.walking.loop.stack import WalkStack
 from wbc.walking.loop.walk import Walk
 from wbc.walking.modes.arm_mode import ArmMode, ArmStopped
+from wbc.walking.modes.commands import read_numbers
 from wbc.walking.modes.drive import standing_plan
 from wbc.walking.modes.hand_motion import ArmRefused
-from wbc.walking.modes.number_table import read_numbers
 from wbc.walking.planner.plan import HoldLost, NoPlanError
-from wbc.walking.run.as_walked import as_walked
 from wbc.walking.run.carrying_out import CarryingOut, Progress, farthest, travelled
 from wbc.walking.run.compiling import compiled_stack
 from wbc.walking.run.perform import WalkRun
-from wbc.walking.run.recording import WalkRecorder
+from wbc.walking.run.recording import WalkRecorder, as_walked
 from wbc.walking.run.request import WalkRequest
 
 Kind = Literal["hold", "poses", "rate"]

@@ -21,11 +21,10 @@ from wbc.walking.loop.walk import Walk
 from wbc.walking.modes.commands import Commands
 from wbc.walking.modes.drive import Drive, standing_plan
 from wbc.walking.planner.plan import NoPlanError
-from wbc.walking.run.as_walked import as_walked
 from wbc.walking.run.carrying_out import CarryingOut, Progress
 from wbc.walking.run.compiling import compiled_stack
 from wbc.walking.run.perform import WalkRun
-from wbc.walking.run.recording import WalkRecorder
+from wbc.walking.run.recording import WalkRecorder, as_walked
 from wbc.walking.run.request import WalkRequest
 
 #: Time that the body has to come to rest after the last command [s]

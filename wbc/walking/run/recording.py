@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import os
 import pathlib
-from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
 from itertools import groupby
 from typing import Any
 
@@ -15,9 +15,11 @@ from numpy.typing import NDArray
 
 from wbc.robots import Walker
 from wbc.validation import Array
+from wbc.walking.body_path import SPACING, BodyPath
 from wbc.walking.log.log import CLOSED, HAND_STATES, OPEN, OPENING, WalkLog, WalkLogError
 from wbc.walking.log.recorder import LogRecorder
 from wbc.walking.loop.walk import Event, Tick, Walk
+from wbc.walking.planner.plan import Plan, Regrasp
 
 #: Name of the file in a run's folder
 TICKS = "ticks.npz"
@@ -190,3 +192,18 @@ def configuration(walker: Walker, log: WalkLog, row: int) -> Array:
     for arm in walker.arms:
         q[arm.q] = log.q[row, [column[joint] for joint in arm.joints]]
     return q
+
+
+def as_walked(log: WalkLog, ticks: TickColumns, steps: Sequence[Regrasp]) -> tuple[Plan, TickColumns]:
+    """A plan whose path is the way of the logged body, over the time of the log; and ticks that say so.
+
+    Args:
+        steps: re-grasps that were begun.
+    """
+    stride = max(round(SPACING / log.dt), 1)
+    poses = [pin.XYZQUATToSE3(row).homogeneous for row in log.pose_body_in_structure[::stride]]
+    path = BodyPath(np.array(poses), stride * log.dt)
+    closed = [np.flatnonzero(log.hand_state[:, arm] == CLOSED) for arm in range(len(log.arms))]
+    start = tuple(log.hold_id[log.hand_hold[rows[0], arm]] if len(rows) else "" for arm, rows in enumerate(closed))
+    time = np.minimum(log.t[1:] - log.t[0], path.duration)
+    return Plan(path, start, tuple(steps), True, path.duration), replace(ticks, path_time=time)

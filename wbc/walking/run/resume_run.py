@@ -26,11 +26,10 @@ from wbc.walking.loop.state import State
 from wbc.walking.loop.walk import PATIENCE, SLACK, Walk
 from wbc.walking.modes.first_grasps import plan_from_state
 from wbc.walking.planner.plan import NoPlanError
-from wbc.walking.run.as_walked import as_walked
 from wbc.walking.run.carrying_out import CarryingOut, Progress
 from wbc.walking.run.compiling import compiled_stack
 from wbc.walking.run.perform import WalkRun
-from wbc.walking.run.recording import TICKS, TickColumns, WalkRecorder, configuration
+from wbc.walking.run.recording import TICKS, TickColumns, WalkRecorder, as_walked, configuration
 from wbc.walking.run.request import WalkRequest
 
 STRUCTURE = "structure.csv"

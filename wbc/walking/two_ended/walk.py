@@ -20,9 +20,8 @@ from wbc.walking.loop.stopping import Stops
 from wbc.walking.loop.walk import Walk
 from wbc.walking.planner.plan import NoPlanError
 from wbc.walking.planner.replanning import PlanSlices
-from wbc.walking.two_ended.law import TurnLaw
 from wbc.walking.two_ended.planner import TwoEndedPlan, plan_two_ended
-from wbc.walking.two_ended.swing_path import ACCELERATION_PART, RATE_PART
+from wbc.walking.two_ended.swing_path import ACCELERATION_PART, RATE_PART, TurnLaw
 
 #: The last part of a swing, in which the hand comes straight down and its frame counts [s]
 NEAR = 2.0

@@ -205,7 +205,7 @@ def _of_arm(
         return
     postures, solved = _postures(kinematics, structure, holds, points, axes, turn[samples])
     margins = kinematics.margins(postures)
-    margins[..., 5] = np.inf  # joint 6 turns the hand about its own axis: free, or see grip_rolls
+    margins[..., 5] = np.inf  # joint 6 turns the hand about its own axis: free, or see rolls.py
     good = solved & np.logical_and.reduce([margins[..., k] > ANGLE_ROOM for k in range(margins.shape[-1])])
     most = RATE_PART * spacing * np.array(data.joint_rates)[:5]
     neighbours = (holds[1:] == holds[:-1]) & (samples[1:] == samples[:-1] + 1)

@@ -32,8 +32,7 @@ from wbc.walking.planner.grips.conflicts import ArmClearance
 from wbc.walking.planner.grips.table import Grips, Ints
 from wbc.walking.planner.slices import Slices, drained
 from wbc.walking.planner.stances.candidates import QUANTUM, Fan, Outlook, following
-from wbc.walking.planner.stances.nodes import Found, Node, way_to
-from wbc.walking.planner.stances.rooms import StanceRooms
+from wbc.walking.planner.stances.nodes import Found, Node, StanceRooms, way_to
 from wbc.walking.planner.swings.move import Key, Move
 from wbc.walking.planner.swings.swings import SETTLE, Swing, Swings
 

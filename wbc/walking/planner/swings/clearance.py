@@ -12,7 +12,7 @@ from wbc.robots import Walker
 from wbc.validation import Array
 from wbc.walking.holds.structure import Structure
 from wbc.walking.native import compiled
-from wbc.walking.native.plain_surface import plain_surface
+from wbc.walking.native.compiled import plain_surface
 from wbc.walking.planner.grips.conflicts import ROOM, ArmClearance
 from wbc.walking.planner.grips.table import Ints
 

@@ -12,7 +12,7 @@ from wbc.robots import Walker
 from wbc.walking.body_path import BodyPath
 from wbc.walking.holds.structure import Structure
 from wbc.walking.native import compiled
-from wbc.walking.native.plain_surface import plain_surface
+from wbc.walking.native.compiled import plain_surface
 from wbc.walking.planner.grips.rolls import ANY
 from wbc.walking.planner.grips.table import Grips
 from wbc.walking.planner.swings.clearance import ALONG, SwingClearance

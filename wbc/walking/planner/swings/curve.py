@@ -11,7 +11,7 @@ from wbc.robots import WalkerData
 from wbc.validation import Array
 from wbc.walking.holds.structure import Structure
 from wbc.walking.native import compiled
-from wbc.walking.native.plain_surface import plain_surface
+from wbc.walking.native.compiled import plain_surface
 from wbc.walking.planner.grips.table import Ints
 
 #: Parts of the curve, at its beginning and its end, in which the hand does not go across
