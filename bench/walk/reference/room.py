@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from bench.walk.reference.lattice import Ints
 from wbc.robots import Walker
 from wbc.validation import Array
+from wbc.walking.arms.capsules import segment_distances
 from wbc.walking.holds.structure import Structure
 from wbc.walking.holds.surface import CylinderSurface
-from wbc.walking.planner.grips.conflicts import segment_distances
 
 Flags = NDArray[np.bool_]
 

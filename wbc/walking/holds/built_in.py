@@ -1,4 +1,4 @@
-"""Built-in structures: the published cylinder, a plane, a truss and a station module."""
+"""Built-in structures: the published cylinder, a plane, a truss, a station module and a row of grapples."""
 
 from __future__ import annotations
 

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from wbc.errors import ShapeError
 from wbc.robots import TwoEndedData, Walker
 from wbc.validation import Array
+from wbc.walking.arms.capsules import segment_distances
 from wbc.walking.arms.two_ended import TwoEndedKinematics
 from wbc.walking.holds.structure import Structure
-from wbc.walking.planner.grips.conflicts import segment_distances
 from wbc.walking.planner.grips.rolls import frame_on
 
 #: What the plan keeps of the clearance for feedback, besides the clearance itself [m]
