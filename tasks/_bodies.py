@@ -53,13 +53,17 @@ def sensed_margins(inputs: Values, count: int) -> ca.SX:
     return inputs["distance"] - inputs["margin"] if count else ca.SX(0, 1)
 
 
+#: Pairs, or corners of each, that have a row at most
+MOST = 1000
+
+
 def checked_count(field: str, value: Any, least: int = 1) -> int:
     """How many of the closest pairs, or of their corners, have a row.
 
     Raises:
-        RangeError: not an integer >= ``least``.
+        RangeError: not an integer from ``least`` to :data:`MOST`.
     """
-    number = validation.scalar(field, value, low=float(least))
+    number = validation.scalar(field, value, low=float(least), high=float(MOST))
     if isinstance(value, bool) or number != int(number):
         raise RangeError(field, value, f"expected an integer >= {least}")
     return int(number)

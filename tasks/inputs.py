@@ -59,7 +59,7 @@ def flat(robot: Robot, field: str, declared: Input, value: Any) -> Array:
     count = declared.size if declared.kind == "vector" else size(robot, declared)
     bounded = declared.low > -math.inf or declared.high < math.inf
     plain = not (bounded or declared.direction)
-    ready = type(value) is np.ndarray and value.dtype == np.float64 and value.shape == (count,) and plain
+    ready = type(value) is np.ndarray and value.dtype == np.float64 and value.shape == (count,) and plain and count > 0
     # The sum of the magnitudes is finite only if all numbers are
     if ready and math.isfinite(sum(map(abs, value.tolist()))):
         return np.asarray(value)
@@ -137,6 +137,8 @@ def check(robot: Robot, field: str, declared: Sequence[Input]) -> None:
             raise RangeError(f"{where}.size", d.size, "expected an integer >= 0")
         for side in ("low", "high"):
             validation.real_array(f"{where}.{side}", getattr(d, side), (), finite=False)
+        for switch in ("direction", "sensed"):
+            validation.flag(f"{where}.{switch}", getattr(d, switch))
         for word in ("unit", "rate", "below"):
             if getattr(d, word) is not None:
                 validation.instance(f"{where}.{word}", getattr(d, word), str, "a string")

@@ -47,6 +47,18 @@ def real_array(field: str, value: Any, shape: tuple[int, ...] | None = None, *, 
     return out
 
 
+def dimensions(field: str, value: Any) -> tuple[int, ...]:
+    """Shape of an array-like.
+
+    Raises:
+        ShapeError: its rows are of different lengths.
+    """
+    try:
+        return np.shape(value)
+    except ValueError as error:
+        raise ShapeError(field, value, "expected rows of one length") from error
+
+
 def scalar(
     field: str,
     value: Any,

@@ -17,6 +17,7 @@ from rich.progress import Progress
 from bench import kept
 from bench.kept import sources
 from bench.records import Parts
+from bench.soak.both import both
 from bench.soak.episodes import stack
 from bench.soak.faults import lost_library, one_iteration, plants
 from bench.soak.known import problems
@@ -44,6 +45,10 @@ def parts_of(seed: int, sizes: dict[str, int], native: bool) -> dict[str, list[J
     for b in backends:
         ticks, name = n["levels ticks"] * (10 if b == "native" else 1), f"levels {b} {seed}"
         out[name] = [partial(stack, seed, k, b, ticks, levels=True) for k in range(n["levels"])]
+    if native:
+        out[f"both {seed}"] = [
+            partial(both, seed, k, n["both ticks"], levels=levels) for levels in (False, True) for k in range(n["both"])
+        ]
     out[f"calls {seed}"] = [partial(calls, seed, k, n["call rounds"]) for k in range(n["calls"])]
     return out
 

@@ -63,7 +63,7 @@ class Judge:
             return ""
         self.loose += 1
         if step.status == Status.SOLVED and not step.levels:
-            off = distance(past_of(step._data, step._context).qp, step.v)
+            off = distance(past_of(step._data, step._context).qp.with_slacks(), step.v)
             self.compared += off is not None
             if off is not None and off > SAME * self.longest:
                 return "another optimum than the referee's"

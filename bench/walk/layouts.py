@@ -8,9 +8,9 @@ from functools import partial
 import numpy as np
 
 from bench.walk.machine import INCH, Job, Machine, Record
+from bench.walk.reference import GridPose
 from wbc.walking import Structure, remove_fraction
 from wbc.walking.body_path import grid_path
-from wbc.walking.reference import GridPose
 
 #: Speed of the body [in/s], and its height at both ends [m]
 SPEED, HEIGHT = 2.0, 52 * INCH

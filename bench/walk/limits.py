@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from wbc.robots import Walker
-from wbc.walking.plan import Plan
-from wbc.walking.run_log import OPEN, WalkLog
+from wbc.walking.log.log import OPEN, WalkLog
+from wbc.walking.planner.plan import Plan
 
 #: A joint is at its limit from this part of it on
 AT = 0.85

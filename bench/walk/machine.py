@@ -13,20 +13,20 @@ from typing import Any
 import numpy as np
 
 from bench.walk.limits import Pressed, plan_limit
+from bench.walk.reference import Reference
 from wbc.robots import Walker
 from wbc.validation import Array
 from wbc.walking import Structure, cylinder
 from wbc.walking.body_path import BodyPath
 from wbc.walking.checker import check_walk
-from wbc.walking.plan import HoldLost, NoPlanError, Plan
-from wbc.walking.planner import plan_walk
-from wbc.walking.reference import Reference
+from wbc.walking.log.log import WalkLog
+from wbc.walking.loop.stack import WalkStack
+from wbc.walking.loop.walk import Tick, Walk
+from wbc.walking.planner.plan import HoldLost, NoPlanError, Plan
+from wbc.walking.planner.planner import plan_walk
+from wbc.walking.report.figures import RAMP, body_speed
 from wbc.walking.run.compiling import compiled_stack, keep
-from wbc.walking.run.figures import RAMP, body_speed
 from wbc.walking.run.recording import TickColumns, WalkRecorder
-from wbc.walking.run_log import WalkLog
-from wbc.walking.walk import Tick, Walk
-from wbc.walking.walk_stack import WalkStack
 
 Record = dict[str, Any]
 

@@ -9,12 +9,12 @@ from math import pi, radians
 import numpy as np
 
 from bench.walk.machine import INCH, Job, Machine, Record
+from bench.walk.reference import Rules, fewest_along
 from wbc.validation import Array
 from wbc.walking import Structure
 from wbc.walking.body_path import BodyPath, grid_path
-from wbc.walking.plan import NoPlanError
-from wbc.walking.planner import plan_walk
-from wbc.walking.reference import Rules, fewest_along
+from wbc.walking.planner.plan import NoPlanError
+from wbc.walking.planner.planner import plan_walk
 
 #: What the planner keeps of limits and reach
 ROOM = Rules(angle_room=radians(2.0), reach_room=0.3 * INCH)

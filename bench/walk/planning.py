@@ -13,13 +13,13 @@ from bench.walk.courses import COURSES, SPEED
 from bench.walk.machine import INCH, Job, Machine, Record, speeds
 from wbc.walking import Structure
 from wbc.walking.body_path import BodyPath, grid_path
-from wbc.walking.drive import Drive, standing_plan
-from wbc.walking.plan import NoPlanError
-from wbc.walking.planner import plan_walk
-from wbc.walking.replanning import plan_from_stance
+from wbc.walking.holds.built_in import grid_pose
+from wbc.walking.loop.walk import Walk
+from wbc.walking.modes.drive import Drive, standing_plan
+from wbc.walking.planner.plan import NoPlanError
+from wbc.walking.planner.planner import plan_walk
+from wbc.walking.planner.replanning import plan_from_stance
 from wbc.walking.run.recording import WalkRecorder
-from wbc.walking.structures import grid_pose
-from wbc.walking.walk import Walk
 
 #: First commands that are timed on each course, and the longest time from command to command [s]
 REPEATS, STALL = 10, 0.05

@@ -6,9 +6,9 @@ from functools import partial
 from math import sqrt
 
 from bench.walk.machine import INCH, Job, Machine, Record
+from bench.walk.reference import GridPose
 from wbc.walking import Structure, remove_columns, remove_rows
 from wbc.walking.body_path import grid_path
-from wbc.walking.reference import GridPose
 
 Place = tuple[int, int]
 

@@ -11,6 +11,7 @@ from rich.progress import Progress
 
 from bench.records import Parts
 from bench.soak.__main__ import conflicts, failures, is_wrong, sheet
+from bench.soak.both import both
 from bench.soak.episodes import episode, stack
 from bench.soak.faults import one_iteration, plants
 from bench.soak.jobs import Kept, measure, parts_of
@@ -50,6 +51,13 @@ def test_faults_are_survived() -> None:
     for name, each in plants(0, 1, "vm"):
         assert wrong(each) == {}, name
         assert sum(n for key, n in each.items() if not key.startswith("gave way")) == 20, name
+
+
+@pytest.mark.parametrize("levels", [False, True])
+def test_both_back_ends_are_within_their_bounds(levels: bool) -> None:
+    ((_, counts),) = both(0, 1, 12, levels)
+    assert wrong(counts) == {}
+    assert sum(n for key, n in counts.items() if not key.startswith("gave way")) == 12
 
 
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")

@@ -17,16 +17,16 @@ from bench.walk import courses, layouts, patches, planning, planning_tables, tab
 from bench.walk.layout_tables import layout_goals, layout_sheet
 from bench.walk.machine import Job, Machine, Record
 from bench.walk.parts import records
+from bench.walk.reference import Verdict
+from bench.walk.reference.verdict import Kind
 from wbc.errors import RangeError
 from wbc.walking import cylinder
-from wbc.walking.aim_function import aim_function
-from wbc.walking.chain_function import chain_function
-from wbc.walking.reference import Verdict
-from wbc.walking.reference.verdict import Kind
+from wbc.walking.log.recorder import versions
+from wbc.walking.loop.body_command import way_function
+from wbc.walking.loop.closed_chain import chain_function
+from wbc.walking.loop.hand_command import aim_function
+from wbc.walking.loop.stack import WalkStack
 from wbc.walking.run.compiling import compiled_stack
-from wbc.walking.run_recorder import versions
-from wbc.walking.walk_stack import WalkStack
-from wbc.walking.way_function import way_function
 
 #: A course of a few seconds
 SHORT = ((13, 12), (13, 13))

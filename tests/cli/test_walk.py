@@ -18,25 +18,25 @@ from tests.cli.test_commands import run
 from wbc import style
 from wbc.robots import WalkerData
 from wbc.robots.walker_data import WALKER_DIGEST
-from wbc.walking import detours
 from wbc.walking import run as walking_run
+from wbc.walking.holds.built_in import plane
+from wbc.walking.log.log import WalkLog
+from wbc.walking.planner.detours import ALONG
+from wbc.walking.planner.detours import ways_round as detours
+from wbc.walking.report.folder import RunFolderError
 from wbc.walking.run import perform
-from wbc.walking.run.folder import RunFolderError
 from wbc.walking.run.request import WalkRequest, over_holds
-from wbc.walking.run_log import WalkLog
-from wbc.walking.structures import plane
-from wbc.walking.ways import ALONG
 
 SHORT = ["--from", "13,9", "--to", "13,14"]
 
 
 #: Pictures as small as can be looked at by a test
 SMALL = {
-    "wbc.walking.run.stills.COUNT": 1,
-    "wbc.walking.run.stills.SIZE": (300, 200),
-    "wbc.walking.run.animation.SIZE": (300, 200),
-    "wbc.walking.run.animation.MOST": 6,
-    "wbc.walking.run.replay_page.MOST": 30,
+    "wbc.walking.report.stills.COUNT": 1,
+    "wbc.walking.report.stills.SIZE": (300, 200),
+    "wbc.walking.report.animation.SIZE": (300, 200),
+    "wbc.walking.report.animation.MOST": 6,
+    "wbc.walking.report.replay_page.MOST": 30,
     "wbc.track.scene.SUPERSAMPLING": 1,
     "wbc.track.render.SHADOW_MAP": 300,
     "wbc.style.SETTINGS": {**style.SETTINGS, "savefig.dpi": 50},

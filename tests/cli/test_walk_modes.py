@@ -19,9 +19,9 @@ from wbc.cli.app import app
 from wbc.cli.keyboard import END, KeyCommands
 from wbc.terminal import terminal_keys
 from wbc.walking.checker import check_run
+from wbc.walking.log.log import WalkLog
 from wbc.walking.run.drive_run import perform_drive
 from wbc.walking.run.request import WalkRequest
-from wbc.walking.run_log import WalkLog
 
 BARE = ["--no-pictures", "--strict"]
 

@@ -12,11 +12,11 @@ from tests.cli.test_commands import run
 from tests.cli.test_walk import SMALL
 from wbc import robots
 from wbc.robots import TwoEndedData, Walker
-from wbc.walking.run.folder import save_run
+from wbc.walking.report.folder import save_run
+from wbc.walking.report.plots import save_plots
+from wbc.walking.report.stills import save_overview
 from wbc.walking.run.perform import WalkRun
-from wbc.walking.run.plots import save_plots
 from wbc.walking.run.request import WalkRequest
-from wbc.walking.run.stills import save_overview
 from wbc.walking.run.two_ended_run import perform_two_ended
 from wbc.walking.two_ended import TwoEndedStack, grapple_row
 

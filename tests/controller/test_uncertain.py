@@ -188,3 +188,18 @@ def test_levels_are_within_their_bounds_on_both_back_ends() -> None:
                 stated = one.certificate.error_bound + other.certificate.error_bound
                 assert np.abs(one.v - other.v).max() <= stated + 1e-10
             q, v = pin.integrate(bot.model, q, one.v * DT), one.v
+
+
+def test_the_virtual_machine_raises_nothing_whatever_the_weights() -> None:
+    out = (
+        Stack(robot("panda"), DT)
+        .add(EndEffector(TIP), name="hand")
+        .add(EndEffector(MIDDLE, kind="position"), name="elbow")
+    )
+    out.add(Posture(), name="posture", level=1).add(JointLimits())
+    controller = out.add(FrameVelocityLimit(TIP, linear=0.1), name="slow", soft=1.0).compile(backend="vm")
+    rng, statuses = np.random.default_rng(0), []
+    for _ in range(120):
+        provoke(controller, rng)
+        statuses.append(controller.step(controller.tick.q.copy(), controller.tick.v_last[:7].copy()).status)
+    assert statuses.count(Status.SOLVED) > 100

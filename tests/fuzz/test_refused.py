@@ -124,3 +124,19 @@ def test_targets_far_away_leak_no_warning() -> None:
             for value in (np.full(3, size), [size, 0.0, -size]):
                 controller["hand"].target = value
                 assert np.isfinite(controller.step(Q).v).all()
+
+
+@pytest.mark.parametrize(
+    ("call", "field"),
+    [
+        (lambda: wbc.robot.Limits([[1.0], [1.0, 2.0]], *[np.ones(2)] * 4), "position_lower"),
+        (lambda: wbc.robots.load("panda", velocity=[[1.0], [1.0, 2.0]]), "velocity"),
+        (lambda: wbc.robots.load("panda", effort={"panda_joint1": [[1], "a"]}), "effort"),
+        (lambda: wbc.robots.convex_parts(np.eye(3), [[1], "a"]), "triangles"),
+        (lambda: wbc.tasks.SelfCollision(corners=1e9, method="sensed"), "corners"),
+        (lambda: wbc.tasks.SelfCollision(closest=10**9, method="sensed"), "closest"),
+    ],
+)
+def test_ragged_rows_and_counts_beyond_use(call: Callable[[], object], field: str) -> None:
+    with pytest.raises(WbcError, match=field):
+        call()

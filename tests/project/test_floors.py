@@ -39,10 +39,30 @@ FLOORS = {
     "wbc.coordinates": 8,
     "wbc.teleop": 9,
     "wbc.track": 9,
+    "wbc.published": 9,
     "wbc.walking": 9,
     "wbc.pages": 9,
     "wbc.cli": 10,
 }
+#: Floors inside wbc.walking; a room imports only rooms on lower floors
+WALKING = {
+    "holds": 0,
+    "arms": 0,
+    "body_path": 1,
+    "native": 1,
+    "log": 2,
+    "checker": 3,
+    "planner": 3,
+    "loop": 4,
+    "modes": 5,
+    "two_ended": 5,
+    "run": 6,
+    "report": 7,
+}
+#: Packages in which no two modules or packages side by side import each other, also not through others
+NO_CIRCLES = ("wbc.walking", "wbc.published")
+#: Names what it leads to in strings, and must: what it stands for lies above it
+OLD_NAMES = "wbc.walking.old_names"
 #: Parts that may import only the listed floors, whatever stands below them
 ONLY = {"wbc.qp": {0}, "wbc.resolvers": {0}}
 #: Packages without a circle of imports among their files, imports for types counted
@@ -121,6 +141,37 @@ def circles(files: list[Path], types: bool) -> Iterator[list[str]]:
         left = [name for name in left if name not in group]
 
 
+def mentioned(path: Path) -> list[tuple[int, str]]:
+    """(line, module) of every module that a file imports or names in a string; ``from package import module`` too."""
+    found = imported(path)
+    for node in nodes(path):
+        if isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] == "wbc":
+            found += [(node.lineno, f"{node.module}.{alias.name}") for alias in node.names]
+        elif isinstance(node, ast.Constant) and isinstance(node.value, str) and node.value.startswith("wbc."):
+            found.append((node.lineno, node.value))
+    known = {module_name(file) for file in PACKAGE_FILES}
+    return [(line, target) for line, target in found if target in known]
+
+
+def package_circles(package: str, arrows: set[tuple[str, str]]) -> set[str]:
+    """Modules and packages directly in a package that import each other, also through others."""
+    depth = package.count(".") + 2
+    down: dict[str, set[str]] = {}
+    for ends in arrows:
+        if all(end.startswith(f"{package}.") for end in ends):
+            one, other = (".".join(end.split(".")[:depth]) for end in ends)
+            if one != other:
+                down.setdefault(one, set()).add(other)
+    # What imports nothing that is left, or is imported by nothing that is left, is in no circle
+    while True:
+        targets = {target for some in down.values() for target in some}
+        left = {one: {t for t in some if t in down} for one, some in down.items() if one in targets}
+        left = {one: some for one, some in left.items() if some}
+        if left == down:
+            return set(down)
+        down = left
+
+
 def faults(path: Path) -> list[str]:
     """Imports of a file that point up, or to a part that has no floor."""
     module = module_name(path)
@@ -190,6 +241,55 @@ def test_the_rule_finds_an_import_that_points_up(tmp_path: Path, monkeypatch: py
     solver.parent.mkdir(parents=True)
     solver.write_text("from wbc.robot import Robot\nfrom wbc.errors import WbcError\n")
     assert faults(solver) == ["wbc/qp/bad.py:1: wbc.qp imports wbc.robot"]
+
+
+def test_rooms_of_walking_import_only_rooms_below() -> None:
+    used, up = set(), []
+    for path in PACKAGE_FILES:
+        module = module_name(path)
+        if not module.startswith("wbc.walking.") or module == OLD_NAMES:
+            continue
+        here = module.split(".")[2]
+        used.add(here)
+        for line, target in mentioned(path):
+            there = [*target.split("."), ""][2]
+            if target.startswith("wbc.walking.") and there != here and not WALKING[there] < WALKING[here]:
+                up.append(f"{relative(path)}:{line}: {here} names {there}")
+    assert up == []
+    assert used == set(WALKING)
+
+
+def test_no_modules_import_each_other_in_a_circle() -> None:
+    arrows, packages = set(), set()
+    for path in PACKAGE_FILES:
+        module = module_name(path)
+        if not module.startswith(NO_CIRCLES) or module == OLD_NAMES:
+            continue
+        if path.name == "__init__.py":
+            # A package's own names come from what it holds
+            packages.add(module)
+            continue
+        arrows |= {(module, target) for _, target in mentioned(path)}
+    assert len(packages) > 15
+    assert {package: found for package in sorted(packages) if (found := package_circles(package, arrows))} == {}
+
+
+def test_the_rule_finds_a_circle() -> None:
+    chain = {("p.a.x", "p.b"), ("p.b", "p.c.y"), ("p.c.z", "p.d")}
+    assert package_circles("p", chain) == set()
+    assert package_circles("p", chain | {("p.c.w", "p.a.v")}) == {"p.a", "p.b", "p.c"}
+    assert package_circles("p.a", {("p.a.x", "p.a.y"), ("p.a.y", "p.a.x")}) == {"p.a.x", "p.a.y"}
+
+
+def test_reproductions_are_imported_by_the_command_line_alone() -> None:
+    parts = {
+        part_of(module_name(path))
+        for path in PACKAGE_FILES
+        if module_name(path) != OLD_NAMES
+        for _, target in mentioned(path)
+        if part_of(target) == "wbc.published"
+    }
+    assert parts == {"wbc.published", "wbc.cli"}
 
 
 def test_relative_imports_are_not_used() -> None:

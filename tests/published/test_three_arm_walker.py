@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from tests.published.three_arms import INCH, along, driven, hold_offsets, rows, shared
-from wbc.walking.published import Outcome, PublishedWalker
-from wbc.walking.published.reach import reach_radius
+from wbc.published.three_arm_walker import Outcome, PublishedWalker
+from wbc.published.three_arm_walker.reach import reach_radius
 
 #: A turn of a column [in] at the body
 COLUMN = 152.0 * np.radians(5.0)

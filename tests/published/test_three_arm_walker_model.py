@@ -13,7 +13,7 @@ import pytest
 from wbc.robots import walker
 from wbc.robots.walker_data import INCH
 from wbc.walking import ArmKinematics, cylinder
-from wbc.walking.structures import grid_angle, grid_pose
+from wbc.walking.holds.built_in import grid_angle, grid_pose
 
 ARM = ArmKinematics()
 STRUCTURE = cylinder()

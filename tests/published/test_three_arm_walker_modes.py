@@ -12,9 +12,9 @@ import pytest
 
 from tests.published.three_arms import INCH, along, driven, hold_offsets
 from wbc.errors import NotFiniteError, RangeError, ShapeError, UnknownNameError, WbcError
-from wbc.walking.published import Calibration, PublishedWalker
-from wbc.walking.published.commands import DestinationCommand, Line, joystick
-from wbc.walking.published.grid import frame
+from wbc.published.three_arm_walker import Calibration, PublishedWalker
+from wbc.published.three_arm_walker.commands import DestinationCommand, Line, joystick
+from wbc.published.three_arm_walker.grid import frame
 
 
 def hands_at(walker: PublishedWalker) -> list[Any]:

@@ -12,16 +12,16 @@ import numpy as np
 import pytest
 
 from tests.published.three_arms import INCH
-from wbc.walking.published import Calibration, grid
-from wbc.walking.published.body import body_twist
-from wbc.walking.published.gait import Gait
-from wbc.walking.published.grid import Place, Terrain, frame
-from wbc.walking.published.holds import handholds
-from wbc.walking.published.margin import margins
-from wbc.walking.published.motion import CYCLE, Motion
-from wbc.walking.published.plant import IdealPlant
-from wbc.walking.published.reach import Shoulders, View, reach_radius
-from wbc.walking.published.swing import swing_poses
+from wbc.published.three_arm_walker import Calibration, grid
+from wbc.published.three_arm_walker.body import body_twist
+from wbc.published.three_arm_walker.gait import Gait
+from wbc.published.three_arm_walker.grid import Place, Terrain, frame
+from wbc.published.three_arm_walker.holds import handholds
+from wbc.published.three_arm_walker.margin import margins
+from wbc.published.three_arm_walker.motion import CYCLE, Motion
+from wbc.published.three_arm_walker.plant import IdealPlant
+from wbc.published.three_arm_walker.reach import Shoulders, View, reach_radius
+from wbc.published.three_arm_walker.swing import swing_poses
 
 SHOULDERS = Shoulders(12.0, 52.0)
 BODY = frame(13, 12, 152.0)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from wbc.walking.published import Log, Outcome, PublishedWalker
+from wbc.published.three_arm_walker import Log, Outcome, PublishedWalker
 
 INCH = 0.0254
 

@@ -7,7 +7,7 @@ import pytest
 import wbc
 from wbc.robots import Walker
 from wbc.walking import Structure, cylinder
-from wbc.walking.walk_stack import WalkStack
+from wbc.walking.loop.stack import WalkStack
 
 
 @pytest.fixture(scope="module")

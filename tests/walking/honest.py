@@ -10,9 +10,9 @@ import pinocchio as pin
 
 from wbc.robots import walker
 from wbc.walking import ArmKinematics, Hold, Structure
-from wbc.walking.run_log import CLOSED, CLOSING, OPEN, OPENING, WalkLog
-from wbc.walking.run_recorder import LogRecorder
-from wbc.walking.surface import PlaneSurface
+from wbc.walking.holds.surface import PlaneSurface
+from wbc.walking.log.log import CLOSED, CLOSING, OPEN, OPENING, WalkLog
+from wbc.walking.log.recorder import LogRecorder
 
 INCH = 0.0254
 DT, HEIGHT, LIFT, RADIUS = 0.01, 52 * INCH, 5.0 * INCH, 30 * INCH

@@ -6,9 +6,9 @@ import numpy as np
 
 import wbc
 from wbc.walking import cylinder
-from wbc.walking.arm_clearance import ArmClearance
 from wbc.walking.body_path import grid_path
-from wbc.walking.grips import find_grips
+from wbc.walking.planner.grips.conflicts import ArmClearance
+from wbc.walking.planner.grips.table import find_grips
 
 
 def test_the_quick_look_finds_what_all_distances_find() -> None:

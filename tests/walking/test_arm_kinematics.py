@@ -12,7 +12,7 @@ import pytest
 from wbc.errors import NotFiniteError, ShapeError
 from wbc.robots import walker
 from wbc.walking import ArmKinematics
-from wbc.walking.arm_kinematics import LIMIT_NAMES
+from wbc.walking.arms.puma import LIMIT_NAMES
 
 MACHINE = walker()
 ARM = MACHINE.arms[1]

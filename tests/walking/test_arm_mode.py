@@ -9,14 +9,14 @@ import pytest
 from wbc.errors import UnknownNameError
 from wbc.robots import Walker
 from wbc.walking import Structure
-from wbc.walking.arm_mode import ArmMode, ArmStopped
 from wbc.walking.body_path import grid_path
 from wbc.walking.checker import Rules, check_walk
-from wbc.walking.hand_motion import ArmRefused
-from wbc.walking.planner import plan_walk
+from wbc.walking.loop.stack import WalkStack
+from wbc.walking.loop.walk import Tick, Walk
+from wbc.walking.modes.arm_mode import ArmMode, ArmStopped
+from wbc.walking.modes.hand_motion import ArmRefused
+from wbc.walking.planner.planner import plan_walk
 from wbc.walking.run.recording import WalkRecorder
-from wbc.walking.walk import Tick, Walk
-from wbc.walking.walk_stack import WalkStack
 
 
 @pytest.fixture

@@ -9,9 +9,9 @@ import pytest
 from wbc.robots import Walker
 from wbc.walking import cylinder
 from wbc.walking.checker import Rules, check_walk
+from wbc.walking.loop.stack import WalkStack
 from wbc.walking.run.perform import perform_walk
 from wbc.walking.run.request import WalkRequest
-from wbc.walking.walk_stack import WalkStack
 
 
 @pytest.fixture(scope="module")

@@ -9,14 +9,14 @@ from wbc.errors import UnknownNameError
 from wbc.robots import Walker
 from wbc.walking import Structure, remove_rows
 from wbc.walking.body_path import BodyPath, grid_path
-from wbc.walking.plan import HoldLost, NoPlanError
-from wbc.walking.planner import plan_walk
-from wbc.walking.replanning import HEAD, plan_from_stance
+from wbc.walking.loop.stack import WalkStack
+from wbc.walking.loop.walk import Tick, Walk
+from wbc.walking.planner.plan import HoldLost, NoPlanError
+from wbc.walking.planner.planner import plan_walk
+from wbc.walking.planner.replanning import HEAD, plan_from_stance
+from wbc.walking.planner.slices import drained
 from wbc.walking.run.carrying_out import CarryingOut
 from wbc.walking.run.recording import WalkRecorder
-from wbc.walking.slices import drained
-from wbc.walking.walk import Tick, Walk
-from wbc.walking.walk_stack import WalkStack
 
 INCH = 0.0254
 

@@ -13,12 +13,12 @@ from wbc.robots import Walker
 from wbc.walking import Structure
 from wbc.walking.body_path import grid_path
 from wbc.walking.checker import Rules, check_walk
-from wbc.walking.planner import plan_walk
+from wbc.walking.holds.surface import CylinderSurface
+from wbc.walking.log.log import CLOSED, OPEN, WalkLog
+from wbc.walking.loop.stack import WalkStack
+from wbc.walking.loop.walk import Walk
+from wbc.walking.planner.planner import plan_walk
 from wbc.walking.run.recording import WalkRecorder
-from wbc.walking.run_log import CLOSED, OPEN, WalkLog
-from wbc.walking.surface import CylinderSurface
-from wbc.walking.walk import Walk
-from wbc.walking.walk_stack import WalkStack
 
 INCH = 0.0254
 FEW = Rules(sub_samples=1)

@@ -16,11 +16,10 @@ from wbc.walking import CylinderSurface, Obstacle, PlaneSurface
 from wbc.walking.checker import distances
 from wbc.walking.checker.body import Hands, estimate, single
 from wbc.walking.checker.check import check_walk
-from wbc.walking.checker.forward import forward
 from wbc.walking.checker.holds import HoldTable, angles_between, rotations, turns_between
 from wbc.walking.checker.rules import Rules
 from wbc.walking.checker.samples import blocks
-from wbc.walking.checker.urdf import read_urdf
+from wbc.walking.checker.urdf import forward, read_urdf
 
 RNG = np.random.default_rng(6)
 

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 import wbc
 from wbc.errors import RangeError
 from wbc.walking import cylinder
-from wbc.walking.closed_chain import AXIS_LENGTH, ClosedChain
+from wbc.walking.loop.closed_chain import AXIS_LENGTH, ClosedChain
 
 
 @pytest.mark.parametrize("roll", ["free", "fixed"])

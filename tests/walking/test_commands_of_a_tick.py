@@ -7,10 +7,10 @@ import pinocchio as pin
 
 import wbc
 from wbc.walking import cylinder
-from wbc.walking.body_command import BodyCommand
 from wbc.walking.body_path import grid_path
-from wbc.walking.planner import plan_walk
-from wbc.walking.walk import Walk
+from wbc.walking.loop.body_command import BodyCommand
+from wbc.walking.loop.walk import Walk
+from wbc.walking.planner.planner import plan_walk
 
 DT = 0.01
 

@@ -10,17 +10,18 @@ import numpy as np
 import pytest
 
 from wbc.robots import Walker
-from wbc.walking import Structure, compiled, cylinder, plane
-from wbc.walking.arm_clearance import ArmClearance
+from wbc.walking import Structure, cylinder, plane
 from wbc.walking.body_path import BodyPath, grid_path
-from wbc.walking.grips import Grips, find_grips
-from wbc.walking.plan import Plan
-from wbc.walking.planner import plan_walk
-from wbc.walking.swing_clearance import SwingClearance
-from wbc.walking.swing_curve import WAYS
-from wbc.walking.swing_speed import speeds
-from wbc.walking.swing_tracks import Asked, Tracks, tracks
-from wbc.walking.swings import Chosen, Swing, Swings
+from wbc.walking.native import compiled
+from wbc.walking.planner.grips.conflicts import ArmClearance
+from wbc.walking.planner.grips.table import Grips, find_grips
+from wbc.walking.planner.plan import Plan
+from wbc.walking.planner.planner import plan_walk
+from wbc.walking.planner.swings.clearance import SwingClearance
+from wbc.walking.planner.swings.curve import WAYS
+from wbc.walking.planner.swings.least_time import speeds
+from wbc.walking.planner.swings.swings import Chosen, Swing, Swings
+from wbc.walking.planner.swings.tracks import Asked, Tracks, tracks
 
 Both = Callable[[Callable[[], Any]], tuple[Any, Any]]
 COUNT, N = 120, 25

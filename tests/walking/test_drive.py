@@ -9,20 +9,19 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-import wbc.walking.drive as driving
+import wbc.walking.modes.drive as driving
 from wbc.errors import NotFiniteError, RangeError, ShapeError
 from wbc.robots import Walker
 from wbc.walking import Structure, plane, remove_rows
 from wbc.walking.checker import Rules, check_walk
-from wbc.walking.commands import CommandTable, read_commands
-from wbc.walking.drive import Drive, standing_plan
-from wbc.walking.number_table import NumberTableError
-from wbc.walking.plan import Plan
+from wbc.walking.holds.built_in import grid_pose
+from wbc.walking.loop.stack import WalkStack
+from wbc.walking.loop.walk import Tick, Walk
+from wbc.walking.modes.commands import CommandTable, NumberTableError, read_commands
+from wbc.walking.modes.drive import Drive, standing_plan
+from wbc.walking.modes.steering import Steering
+from wbc.walking.planner.plan import Plan
 from wbc.walking.run.recording import WalkRecorder
-from wbc.walking.steering import Steering
-from wbc.walking.structures import grid_pose
-from wbc.walking.walk import Tick, Walk
-from wbc.walking.walk_stack import WalkStack
 
 INCH = 0.0254
 HEIGHT = 52 * INCH

@@ -9,15 +9,15 @@ import pytest
 
 from wbc.robots import Walker
 from wbc.walking import Structure
-from wbc.walking.arm_kinematics import ArmKinematics
+from wbc.walking.arms.puma import ArmKinematics
 from wbc.walking.body_path import grid_path
-from wbc.walking.followed_plan import follow_plan
-from wbc.walking.plan import Plan, read_plan
-from wbc.walking.planner import plan_walk
-from wbc.walking.swing_law import SwingLaw
-from wbc.walking.swing_path import joint_paths
-from wbc.walking.swing_profile import ACCELERATION, CHANGE, JERK, RAMP, SPEED, profile_at
-from wbc.walking.swing_speed import RATE_PART
+from wbc.walking.planner.eased import ACCELERATION, CHANGE, JERK, RAMP, SPEED, profile_at
+from wbc.walking.planner.follow import follow_plan
+from wbc.walking.planner.plan import Plan, read_plan
+from wbc.walking.planner.planner import plan_walk
+from wbc.walking.planner.swings.joints import joint_paths
+from wbc.walking.planner.swings.law import SwingLaw
+from wbc.walking.planner.swings.least_time import RATE_PART
 
 INCH = 0.0254
 

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from bench.walk.patches import ROOM, looked_at, patch
+from bench.walk.reference import fewest_along
 from wbc.robots import Walker
 from wbc.walking import Structure
-from wbc.walking.fewer_regrasps import least_regrasps
-from wbc.walking.grips import Grips
-from wbc.walking.planner import plan_walk
-from wbc.walking.reference import fewest_along
+from wbc.walking.planner.fewest import least_regrasps
+from wbc.walking.planner.grips.table import Grips
+from wbc.walking.planner.planner import plan_walk
 
 #: Ways by their seed, and the fewest re-grasps of each; at 16 and 74 the last pose counts, at 61 a hand has to wait in
 #: the air, at 76 a hand begins on a hold that it cannot keep for long, and at 144 on one that is no promising start

@@ -8,10 +8,10 @@ import wbc
 from wbc.walking import Structure
 from wbc.walking.body_path import grid_path
 from wbc.walking.checker import check_walk
-from wbc.walking.planner import plan_walk
+from wbc.walking.loop.stack import WalkStack
+from wbc.walking.loop.walk import Walk
+from wbc.walking.planner.planner import plan_walk
 from wbc.walking.run.recording import WalkRecorder
-from wbc.walking.walk import Walk
-from wbc.walking.walk_stack import WalkStack
 
 INCH = 0.0254
 

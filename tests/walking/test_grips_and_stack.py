@@ -12,8 +12,8 @@ from wbc.robots import Walker, WalkerData
 from wbc.validation import Array
 from wbc.walking import Structure
 from wbc.walking.body_path import BodyPath, grid_path
-from wbc.walking.grips import ANGLE_ROOM, RATE_PART, Grips, find_grips
-from wbc.walking.walk_stack import WalkStack
+from wbc.walking.loop.stack import WalkStack
+from wbc.walking.planner.grips.table import ANGLE_ROOM, RATE_PART, Grips, find_grips
 
 INCH = 0.0254
 #: (T, A, heading) from and to: across the grid, and a turn of the body where it is

@@ -10,9 +10,9 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from wbc.walking.hand_landing import HandLanding
-from wbc.walking.swing_law import Aim
-from wbc.walking.walk_state import Axes, Swinging
+from wbc.walking.loop.hand_landing import HandLanding
+from wbc.walking.loop.state import Axes, Swinging
+from wbc.walking.planner.swings.law import Aim
 
 DT = 0.01
 #: Place and axes of the hold; lean of the hand where its wrist is let go [rad]; its heights from tick to tick [m]

@@ -16,14 +16,14 @@ from wbc.walking.body_path import BodyPath, grid_path
 from wbc.walking.checker import Rules, check_walk
 from wbc.walking.checker.body import Hands, estimate
 from wbc.walking.checker.holds import HoldTable
-from wbc.walking.closed_chain import ClosedChain
-from wbc.walking.grip_rolls import ANY, frame_on, turns
-from wbc.walking.grips import Grips, find_grips
-from wbc.walking.hand_tilt import TILT_PART, leaning
-from wbc.walking.planner import plan_walk
+from wbc.walking.loop.closed_chain import ClosedChain
+from wbc.walking.loop.stack import WalkStack
+from wbc.walking.loop.walk import Tick, Walk
+from wbc.walking.planner.grips.rolls import ANY, frame_on, turns
+from wbc.walking.planner.grips.table import Grips, find_grips
+from wbc.walking.planner.grips.tilt import TILT_PART, leaning
+from wbc.walking.planner.planner import plan_walk
 from wbc.walking.run.recording import WalkRecorder
-from wbc.walking.walk import Tick, Walk
-from wbc.walking.walk_stack import WalkStack
 
 INCH = 0.0254
 

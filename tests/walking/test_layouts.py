@@ -7,11 +7,11 @@ import pytest
 from bench.walk.layout_tables import layout_goals
 from bench.walk.layouts import judged, layout
 from bench.walk.machine import Machine
+from bench.walk.reference import Reference
 from tests.repeats import repeats
 from wbc.robots import Walker
 from wbc.walking import Structure
-from wbc.walking.reference import Reference
-from wbc.walking.walk_stack import WalkStack
+from wbc.walking.loop.stack import WalkStack
 
 #: Layouts, and how many a test judges; `wbc bench walk` judges 1000
 COUNT, AT_ONCE = repeats(12), 3

@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from wbc.walking.leeway import SPEEDS, displaced, displacement, towards, undisplaced
+from wbc.walking.modes.steering import SPEEDS, displaced, displacement, towards, undisplaced
 
 INCH = 0.0254
 

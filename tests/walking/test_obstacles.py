@@ -12,12 +12,12 @@ from wbc.shapes import Box, Capsule
 from wbc.walking import Obstacle, Structure, read_structure, save_structure
 from wbc.walking.body_path import grid_path
 from wbc.walking.checker import Report, Rules, check_walk
-from wbc.walking.plan import Plan
-from wbc.walking.planner import plan_walk
+from wbc.walking.holds.built_in import grid_pose
+from wbc.walking.loop.stack import WalkStack
+from wbc.walking.loop.walk import Walk
+from wbc.walking.planner.plan import Plan
+from wbc.walking.planner.planner import plan_walk
 from wbc.walking.run.recording import WalkRecorder
-from wbc.walking.structures import grid_pose
-from wbc.walking.walk import Walk
-from wbc.walking.walk_stack import WalkStack
 
 INCH = 0.0254
 CLEARANCE = "clearance of the structure"

@@ -12,12 +12,12 @@ from wbc.robots import Walker
 from wbc.walking import Structure
 from wbc.walking.body_path import grid_path
 from wbc.walking.checker import Rules, check_walk
-from wbc.walking.plan import Plan
-from wbc.walking.planner import plan_walk
+from wbc.walking.loop.stack import WalkStack
+from wbc.walking.loop.walk import Walk
+from wbc.walking.modes.veto import HoldRefusedError, Veto
+from wbc.walking.planner.plan import Plan
+from wbc.walking.planner.planner import plan_walk
 from wbc.walking.run.recording import WalkRecorder
-from wbc.walking.veto import HoldRefusedError, Veto
-from wbc.walking.walk import Walk
-from wbc.walking.walk_stack import WalkStack
 
 INCH = 0.0254
 

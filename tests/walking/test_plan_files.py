@@ -16,11 +16,11 @@ from wbc.errors import StructureFileError, UnknownNameError
 from wbc.robots import Walker
 from wbc.walking import Structure, cylinder
 from wbc.walking.body_path import grid_path
-from wbc.walking.followed_plan import follow_plan
-from wbc.walking.plan import NoPlanError, Plan, differences, read_plan
-from wbc.walking.planner import plan_walk
-from wbc.walking.walk import Walk
-from wbc.walking.walk_stack import WalkStack
+from wbc.walking.loop.stack import WalkStack
+from wbc.walking.loop.walk import Walk
+from wbc.walking.planner.follow import follow_plan
+from wbc.walking.planner.plan import NoPlanError, Plan, differences, read_plan
+from wbc.walking.planner.planner import plan_walk
 
 INCH = 0.0254
 

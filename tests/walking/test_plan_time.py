@@ -12,12 +12,11 @@ from wbc.errors import NotFiniteError, ShapeError
 from wbc.robots import Walker, WalkerData
 from wbc.walking import ArmKinematics, Structure
 from wbc.walking.body_path import BodyPath, grid_path, standing_path
-from wbc.walking.followed_plan import follow_plan
-from wbc.walking.joints_of_plan import planned_joints
-from wbc.walking.plan import NoPlanError, Plan
-from wbc.walking.plan_time import PlanTime, least_plan_time
-from wbc.walking.planner import plan_walk
-from wbc.walking.swings import SETTLE
+from wbc.walking.planner.follow import follow_plan
+from wbc.walking.planner.plan import NoPlanError, Plan
+from wbc.walking.planner.plan_time import PlanTime, least_plan_time, planned_joints
+from wbc.walking.planner.planner import plan_walk
+from wbc.walking.planner.swings.swings import SETTLE
 
 INCH = 0.0254
 

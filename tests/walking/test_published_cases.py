@@ -12,10 +12,10 @@ from wbc.robots import Walker
 from wbc.walking import Structure, remove_rows
 from wbc.walking.body_path import grid_path
 from wbc.walking.checker import Rules, check_walk
-from wbc.walking.planner import plan_walk
+from wbc.walking.loop.stack import WalkStack
+from wbc.walking.loop.walk import Tick, Walk
+from wbc.walking.planner.planner import plan_walk
 from wbc.walking.run.recording import WalkRecorder
-from wbc.walking.walk import Tick, Walk
-from wbc.walking.walk_stack import WalkStack
 
 INCH = 0.0254
 

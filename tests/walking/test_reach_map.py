@@ -12,8 +12,8 @@ import pytest
 from wbc.robots import Walker
 from wbc.walking import Hold, Structure
 from wbc.walking.body_path import BodyPath, grid_path
+from wbc.walking.report.reach_map import REASONS, save_reach_map, why_unusable
 from wbc.walking.run.perform import WalkRun
-from wbc.walking.run.reach_map import REASONS, save_reach_map, why_unusable
 from wbc.walking.run.request import WalkRequest
 
 INCH = 0.0254

@@ -9,12 +9,12 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from bench.walk.reference import STRICT, GridPose, Reference, Rules, Step, fewest_along
+from bench.walk.reference.arm_table import arm_table
+from bench.walk.reference.lattice import FAR
 from wbc.errors import RangeError, ShapeError, UnknownNameError
 from wbc.walking import ArmKinematics, Structure, cylinder, plane, remove_rows
-from wbc.walking.reference import STRICT, GridPose, Reference, Rules, Step, fewest_along
-from wbc.walking.reference.arm_table import arm_table
-from wbc.walking.reference.lattice import FAR
-from wbc.walking.structures import INCH, grid_pose
+from wbc.walking.holds.built_in import INCH, grid_pose
 
 HEIGHT = 52 * INCH
 SOUTH, NORTH = GridPose(13, 7, None), GridPose(13, 18, None)

@@ -14,19 +14,19 @@ from wbc.robots import Walker
 from wbc.walking import Structure
 from wbc.walking.body_path import BodyPath, grid_path
 from wbc.walking.checker import Rules, check_walk
-from wbc.walking.first_grasps import free_state, plan_from_state
-from wbc.walking.plan import Plan
-from wbc.walking.planner import plan_walk
+from wbc.walking.log.body_paths import path_of
+from wbc.walking.log.log import CLOSED, CLOSING, OPEN, OPENING, WalkLog, WalkLogError
+from wbc.walking.loop.stack import WalkStack
+from wbc.walking.loop.walk import Walk
+from wbc.walking.modes.first_grasps import free_state, plan_from_state
+from wbc.walking.planner.plan import Plan
+from wbc.walking.planner.planner import plan_walk
+from wbc.walking.report.folder import save_run
 from wbc.walking.run import perform
-from wbc.walking.run.folder import save_run
 from wbc.walking.run.perform import WalkRun, perform_walk
 from wbc.walking.run.recording import WalkRecorder
 from wbc.walking.run.request import WalkRequest
 from wbc.walking.run.resume_run import perform_resume, resumed_state
-from wbc.walking.run_log import CLOSED, CLOSING, OPEN, OPENING, WalkLog, WalkLogError
-from wbc.walking.walk import Walk
-from wbc.walking.walk_stack import WalkStack
-from wbc.walking.way_data import path_of
 
 INCH = 0.0254
 

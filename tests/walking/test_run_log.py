@@ -14,8 +14,8 @@ import pytest
 import wbc
 from tests.walking.honest import MACHINE, honest, structure
 from wbc.errors import NotFiniteError, RangeError, RotationError, ShapeError, UnknownNameError, WbcError
-from wbc.walking.run_log import CLOSED, FILE, OPEN, WalkLog, WalkLogError
-from wbc.walking.run_recorder import LogRecorder
+from wbc.walking.log.log import CLOSED, FILE, OPEN, WalkLog, WalkLogError
+from wbc.walking.log.recorder import LogRecorder
 
 JOINTS, ARMS, HANDS = ("a", "b"), ("left", "right"), ("left_hand", "right_hand")
 POSE = np.array([1.0, 2.0, 3.0, 0.0, 0.0, 0.6, 0.8])

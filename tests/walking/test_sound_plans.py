@@ -7,12 +7,12 @@ import pytest
 from wbc.robots import Walker
 from wbc.walking import Structure
 from wbc.walking.body_path import grid_path
-from wbc.walking.drive import standing_plan
-from wbc.walking.planner import plan_walk
-from wbc.walking.stance_search import Move
-from wbc.walking.structures import grid_pose, remove_fraction
-from wbc.walking.swing_law import SwingLaw
-from wbc.walking.swings import Swings
+from wbc.walking.holds.built_in import grid_pose, remove_fraction
+from wbc.walking.modes.drive import standing_plan
+from wbc.walking.planner.planner import plan_walk
+from wbc.walking.planner.swings.law import SwingLaw
+from wbc.walking.planner.swings.move import Move
+from wbc.walking.planner.swings.swings import Swings
 
 
 def test_a_swing_that_turns_out_impossible_is_not_in_the_plan(

@@ -30,7 +30,7 @@ from wbc.walking import (
     save_structure,
     truss,
 )
-from wbc.walking.structures import BUILT_IN, INCH, grid_pose
+from wbc.walking.holds.built_in import BUILT_IN, INCH, grid_pose
 
 ALL = {name: make() for name, make in BUILT_IN.items()}
 POSE = pin.SE3(pin.utils.rotate("x", 0.7) @ pin.utils.rotate("z", -1.1), np.array([0.3, -2.0, 5.0]))

@@ -6,12 +6,12 @@ from math import pi, radians
 
 import pytest
 
+from bench.walk.reference import Rules, fewest_along
 from wbc.robots import Walker
 from wbc.walking import Structure
 from wbc.walking.body_path import BodyPath, grid_path
-from wbc.walking.plan import Plan
-from wbc.walking.planner import plan_walk
-from wbc.walking.reference import Rules, fewest_along
+from wbc.walking.planner.plan import Plan
+from wbc.walking.planner.planner import plan_walk
 
 INCH = 0.0254
 #: Over a patch of 8 x 8 holds, from and to in (T, A)

@@ -15,7 +15,8 @@ from wbc.robots import TwoEndedData, Walker
 from wbc.shapes import Box
 from wbc.walking import Hold, Obstacle, Structure, cylinder
 from wbc.walking.checker import Rules, check_walk
-from wbc.walking.plan import HoldLost, NoPlanError
+from wbc.walking.loop.walk import Walk
+from wbc.walking.planner.plan import HoldLost, NoPlanError
 from wbc.walking.run.recording import WalkRecorder
 from wbc.walking.two_ended import (
     TwoEndedPlan,
@@ -25,7 +26,6 @@ from wbc.walking.two_ended import (
     plan_two_ended,
     touching_distance,
 )
-from wbc.walking.walk import Walk
 
 START = {"arm1": "1", "arm2": "2"}
 #: Control period of the walks [s]

@@ -13,13 +13,13 @@ from wbc.robots import Walker
 from wbc.walking import Structure
 from wbc.walking.body_path import grid_path
 from wbc.walking.checker import check_walk
-from wbc.walking.plan import NoPlanError, Plan
-from wbc.walking.planner import plan_walk
+from wbc.walking.loop.stack import WalkStack
+from wbc.walking.loop.walk import Tick, Walk
+from wbc.walking.planner.plan import NoPlanError, Plan
+from wbc.walking.planner.planner import plan_walk
 from wbc.walking.run.perform import perform_walk
 from wbc.walking.run.recording import WalkRecorder
 from wbc.walking.run.request import WalkRequest
-from wbc.walking.walk import Tick, Walk
-from wbc.walking.walk_stack import WalkStack
 
 INCH = 0.0254
 PATHS = {"+A": [(13, 9), (13, 14)], "-T": [(16, 12), (11, 12)]}
@@ -123,7 +123,7 @@ def test_a_budget_ends_the_search_with_what_is_found(machine: Walker, structure:
 def test_a_walk_that_takes_too_long_is_given_up_and_says_so(
     machine: Walker, structure: Structure, stack: WalkStack, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    for name in ("wbc.walking.walk", "wbc.walking.run.perform"):
+    for name in ("wbc.walking.loop.walk", "wbc.walking.run.perform"):
         monkeypatch.setattr(f"{name}.PATIENCE", 0.0)
         monkeypatch.setattr(f"{name}.SLACK", 0.3)
     walk = Walk(machine, structure, plan_walk(machine, structure, grid_path([(13, 12), (13, 13)], 0.1)), stack=stack)

@@ -5,17 +5,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from bench.walk.reference import Rules, fewest_along
 from wbc.robots import Walker
 from wbc.walking import Structure, plane, remove_rows
 from wbc.walking.body_path import BodyPath, grid_path, straight_path
-from wbc.walking.parked_swings import DEPTH, RADIUS
-from wbc.walking.plan import NoPlanError
-from wbc.walking.planner import plan_walk
-from wbc.walking.reference import Rules, fewest_along
+from wbc.walking.planner.detours import Mesh, find_route
+from wbc.walking.planner.detours.cell_graph import round_labels
+from wbc.walking.planner.plan import NoPlanError
+from wbc.walking.planner.planner import plan_walk
+from wbc.walking.planner.swings.curve import WAYS
+from wbc.walking.planner.swings.parked import DEPTH, RADIUS
 from wbc.walking.run.request import over_holds
-from wbc.walking.swing_curve import WAYS
-from wbc.walking.ways import Mesh, find_route
-from wbc.walking.ways.cell_graph import round_labels
 
 INCH = 0.0254
 #: One height, and as few poses as will do

@@ -40,7 +40,7 @@ class KeyCommands:
         self._begin: float | None = None
 
     def rates(self, now: float) -> Array | None:
-        """As of :class:`wbc.walking.commands.Commands`."""
+        """As of :class:`wbc.walking.modes.commands.Commands`."""
         if self._real_time:
             self._begin = time.monotonic() - now if self._begin is None else self._begin
             time.sleep(max(self._begin + now - time.monotonic(), 0.0))

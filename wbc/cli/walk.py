@@ -14,17 +14,17 @@ from rich.table import Table
 from wbc import robots
 from wbc.cli import walk_options as options
 from wbc.cli.console import err, out, progress_bar
+from wbc.cli.published_walk import perform_published, published_figures, save_published
 from wbc.cli.session import INTERRUPTED, Stopper
 from wbc.cli.walk_modes import Perform, performance
 from wbc.errors import RangeError, ShapeError
 from wbc.robots import TwoEndedData, Walker, WalkerData
 from wbc.track.summary import Figure
-from wbc.walking.plan import differences, read_plan
+from wbc.walking.planner.plan import differences, read_plan
+from wbc.walking.report.figures import figures_of, save_figures
+from wbc.walking.report.folder import make_folder, save_pictures, save_run
 from wbc.walking.run.compiling import keep
-from wbc.walking.run.figures import figures_of, save_figures
-from wbc.walking.run.folder import make_folder, save_pictures, save_run
 from wbc.walking.run.perform import WalkRun
-from wbc.walking.run.published_run import perform_published, published_figures, save_published
 from wbc.walking.run.request import GRAPPLES, SPEED, WalkRequest
 
 #: Exit codes: the walk is not possible or did not arrive, and what a check of it violates
@@ -93,7 +93,7 @@ def walk(
         plan,
     )
     if change and planner == "published":
-        raise RangeError("set", change, "the published planner has numbers of its own, walking.published.Calibration")
+        raise RangeError("set", change, "the published planner has numbers of its own, three_arm_walker.Calibration")
     machine = robots.walker(data=changed_data(change or [], two_ended), two_ended=two_ended)
     perform = performance(request, machine, resume, ask, least_time)  # bad input shows before a folder is made
     stamp = datetime.datetime.now().strftime("%Y%m%d-%H%M%S")

@@ -13,12 +13,12 @@ from wbc.cli.keyboard import HELP, KeyCommands
 from wbc.errors import RangeError
 from wbc.robots import Walker, WalkerData
 from wbc.terminal import terminal, terminal_keys
-from wbc.walking.commands import read_commands
-from wbc.walking.plan import Regrasp, read_plan
+from wbc.walking.modes.commands import read_commands
+from wbc.walking.planner.plan import Regrasp, read_plan
+from wbc.walking.report.figures import least_time_figure
 from wbc.walking.run.arm_run import arm_task, perform_arm
 from wbc.walking.run.carrying_out import Progress
 from wbc.walking.run.drive_run import perform_drive
-from wbc.walking.run.figures import least_time_figure
 from wbc.walking.run.perform import WalkRun, perform_walk
 from wbc.walking.run.request import WalkRequest
 from wbc.walking.run.resume_run import perform_resume

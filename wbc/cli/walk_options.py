@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from wbc.walking.structures import BUILT_IN
+from wbc.walking.holds.built_in import BUILT_IN
 
 _SCENE, _HOW, _OUTPUT = "What it does", "How it is done", "What it writes"
 

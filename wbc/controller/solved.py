@@ -81,7 +81,7 @@ class SolvedTick(Buffers):
 
     def finish(self, qp: QP) -> int:
         """Solve a QP of this layout and write the report; the flag, with ``UNSOUND`` where the certificate fails."""
-        wide = qp.with_slacks()
+        wide = qp.with_slacks().definite()
         flag, x, answer = self.answer(wide)
         v, levels = self.below(qp, x[: self._nv], answer)
         slack = qp.violation(v)[self._nv :] if flag == RELAXED else np.zeros(self._units.size)

@@ -78,6 +78,7 @@ class Judge:
         turned = (found.rotations[a], found.rotations[b])
         return clearance(self.supports, (a, b), turned, found.centers[b] - found.centers[a], normal)
 
+    @np.errstate(over="ignore", invalid="ignore")
     def _mend(self, pair: int, doubtful: bool) -> None:
         """Give a pair the best direction there is; Coal's own stays where it is not in doubt and as good."""
         found = self.sensing

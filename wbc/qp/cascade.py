@@ -18,7 +18,7 @@ from wbc.qp.daqp import Daqp
 from wbc.qp.equalities import independent
 from wbc.qp.hierarchy import Achieved, Answer, Hierarchy, Level
 from wbc.qp.polish import polish
-from wbc.qp.problem import QP, Solution
+from wbc.qp.problem import QP, Solution, definite
 from wbc.validation import Array
 
 #: Singular values below this are damped
@@ -195,6 +195,7 @@ class LevelStep:
                 self.H += self.Z.T @ level.bent[0] @ self.Z
                 pull -= level.bent[0] @ x
             self.plain = self.Z.T @ pull
+        self.H = definite(self.H)
         self.right = self.plain - self.damped * (self.Z.T @ x)
 
     def solve(self, place: int) -> tuple[Achieved, Array, Array]:

@@ -112,6 +112,11 @@ class QP:
         )
         return QP(H, np.concatenate((self.g, np.zeros(soft.size))), lower, upper, A)
 
+    def definite(self) -> QP:
+        """The same with 16 n u of its diagonal added to H where rounding makes that indefinite; u = 2^-53."""
+        H = definite(self.H)
+        return self if H is self.H else QP(H, self.g, self.lower, self.upper, self.A, self.give)
+
     def hard(self) -> QP:
         """The same without the sides of soft rows."""
         if self.give is None:
@@ -123,6 +128,21 @@ class QP:
     def rows_of(self, wide: Array) -> Array:
         """Of numbers of [1; A] of :meth:`with_slacks` those that this problem has."""
         return np.concatenate((wide[: self.n], wide[wide.size - self.m :]))
+
+
+def definite(matrix: Array) -> Array:
+    """A symmetric matrix, with rounding of its diagonal added to it until it is positive definite."""
+    more = 16.0 * len(matrix) * 2.0**-53
+    out = matrix
+    for _ in range(8):
+        try:
+            np.linalg.cholesky(out)
+        except np.linalg.LinAlgError:
+            out = out + np.diag(more * np.diag(matrix) + more * 1e-3 * np.abs(matrix).max(initial=0.0))
+            more *= 10.0
+        else:
+            break
+    return out
 
 
 @dataclass(frozen=True, eq=False, slots=True)

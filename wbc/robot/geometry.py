@@ -121,12 +121,14 @@ def convex_parts(mesh: Any, triangles: Any = None, *, scale: Any = 1.0) -> Conve
         >>> len(wbc.robots.convex_parts(np.vstack([corners, corners + 2]), faces + [[4, 5, 6], [4, 5, 7]]).parts)
         2
     """
-    factor = validation.ordinary_array("scale", [scale] * 3 if np.ndim(scale) == 0 else scale, (3,))
+    alike = validation.dimensions("scale", scale) == ()
+    factor = validation.ordinary_array("scale", [scale] * 3 if alike else scale, (3,))
     if triangles is None:
         return parts_of(read_mesh(validation.file_path("mesh", mesh), factor))
     vertices = validation.ordinary_array("mesh", mesh)
     if vertices.ndim != 2 or vertices.shape[1] != 3 or len(vertices) == 0:
         raise ShapeError("mesh", vertices.shape, "expected vertices, n x 3")
+    validation.dimensions("triangles", triangles)
     faces = np.asarray(triangles)
     if faces.ndim != 2 or faces.shape[1] != 3 or faces.dtype.kind not in "iu":
         raise ShapeError("triangles", triangles, "expected whole numbers, m x 3")

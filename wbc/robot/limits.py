@@ -30,7 +30,7 @@ class Limits:
     effort: Array
 
     def __post_init__(self) -> None:
-        n = np.shape(self.velocity)
+        n = validation.dimensions("limits.velocity", self.velocity)
         for f in fields(self):
             array = validation.real_array(f"limits.{f.name}", getattr(self, f.name), n, finite=False)
             if np.isnan(array).any():

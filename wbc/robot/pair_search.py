@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from wbc import validation
 from wbc.robot.pair_descent import Descent
 from wbc.robot.pair_distances import Links, Scenes
 from wbc.robot.sampling import draw
@@ -68,7 +69,7 @@ def search(
         for pair, finding in found.items():
             _scan(finding, scenes, pair, steps, clearance)
             done += 1
-            progress(done, total)
+            validation.called("progress", progress, done, total)
     for pair, finding in found.items():
         finding.distance = finding.sampled
         if finding.sampled > clearance and pair not in settled:
@@ -77,7 +78,7 @@ def search(
                 if finding.distance <= clearance:
                     break
         done += 1
-        progress(done, total)
+        validation.called("progress", progress, done, total)
     return found
 
 

@@ -239,10 +239,10 @@ class Robot:
                 validation.one_of(label, key, (*self.joint_names, *self.dof_names))
                 where = self.dofs(key) if key in self.joint_names else slice(*self._dof_range(key))
                 width = where.stop - where.start
-                shape = () if np.ndim(value) == 0 else (width,)
+                shape = () if validation.dimensions(f"{label}[{key!r}]", value) == () else (width,)
                 out[where] = validation.real_array(f"{label}[{key!r}]", value, shape, finite=False)
             return out
-        if np.ndim(change) == 0:
+        if validation.dimensions(label, change) == ():
             number = validation.real_array(label, change, (), finite=False)
             chosen = np.arange(self.nv) >= self.base_nv
             if limit.startswith("position"):

@@ -21,6 +21,8 @@ from wbc.validation import Array
 #: Steps of the first or second derivative at a knot, as a share of its size, that are rounding
 STEP = 1e-9
 
+#: Parts into which a path may be cut at most
+MOST_CELLS = 20_000.0
 #: Laws are slowed down by this share more than the certificate asks for
 ROOM = 1e-9
 
@@ -58,7 +60,7 @@ def jerk_limited_along(
     """
     if not isinstance(path, Path):
         raise ShapeError("path", path, "expected a path")
-    cells = int(validation.scalar("cells", cells, low=8.0))
+    cells = int(validation.scalar("cells", cells, low=8.0, high=MOST_CELLS))
     stops = validation.flag("stops", stops)
     limits = limits_of(path.dof, velocity, acceleration, jerk, lower, upper)
     breaks = _breaks(path)

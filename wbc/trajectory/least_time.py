@@ -22,6 +22,8 @@ from wbc.trajectory.repair import repaired
 from wbc.trajectory.timing import Timing
 from wbc.validation import Array
 
+#: Parts into which a path may be cut at most
+MOST_INTERVALS = 100_000.0
 #: Duration of a law that has nowhere to go, unless another one is asked for [s]
 STANDING = 1e-3
 
@@ -85,7 +87,7 @@ def time_optimal(
     longer = None if duration is None else validation.scalar("duration", duration, low=0.0, open_low=True, unit="s")
     if longer is not None and not task.rests:
         raise RangeError("duration", duration, "a duration can only be asked for from rest to rest")
-    count = None if intervals is None else validation.scalar("intervals", intervals, low=2.0)
+    count = None if intervals is None else validation.scalar("intervals", intervals, low=2.0, high=MOST_INTERVALS)
     if count is not None and count != int(count):
         raise RangeError("intervals", intervals, "expected a whole number")
     _within_positions(way, kept)

@@ -1,12 +1,9 @@
 """Walking on holds: structures, and the kinematics of the walker's arms in closed form (floor 8)."""
 
 from wbc.errors import StructureFileError
-from wbc.walking.arm_kinematics import ArmKinematics
-from wbc.walking.hold import Hold
-from wbc.walking.obstacle import Obstacle
-from wbc.walking.structure import Structure
-from wbc.walking.structure_file import parse_structure, read_structure, save_structure
-from wbc.walking.structures import (
+from wbc.walking.arms.puma import ArmKinematics
+from wbc.walking.arms.two_ended import TwoEndedKinematics
+from wbc.walking.holds.built_in import (
     cylinder,
     module,
     plane,
@@ -15,8 +12,12 @@ from wbc.walking.structures import (
     remove_rows,
     truss,
 )
-from wbc.walking.surface import CylinderSurface, PlaneSurface
-from wbc.walking.two_ended_kinematics import TwoEndedKinematics
+from wbc.walking.holds.files import parse_structure, read_structure, save_structure
+from wbc.walking.holds.hold import Hold
+from wbc.walking.holds.obstacle import Obstacle
+from wbc.walking.holds.structure import Structure
+from wbc.walking.holds.surface import CylinderSurface, PlaneSurface
+from wbc.walking.old_names import keep_old_names
 
 __all__ = [
     "ArmKinematics",
@@ -38,3 +39,5 @@ __all__ = [
     "save_structure",
     "truss",
 ]
+
+keep_old_names()

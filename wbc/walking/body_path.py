@@ -14,7 +14,7 @@ import pinocchio as pin
 from wbc import validation
 from wbc.errors import RangeError, ShapeError
 from wbc.validation import Array
-from wbc.walking.structures import PITCH, RADIUS, grid_angle, grid_pose
+from wbc.walking.holds.built_in import PITCH, RADIUS, grid_angle, grid_pose
 
 #: Time from one sample to the next [s]
 SPACING = 0.05

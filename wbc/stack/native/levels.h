@@ -177,6 +177,13 @@ static int one_level(wbc_tick *t, int place, double *error) {
     for (int i = 0; i < M_ALL; i++) s->lambda[i] = s->force[i] = 0.0;
     memcpy(x, s->x, sizeof x);
     int solved = invert_matrix(s->H, s->rank, s->inverse);
+    if (!solved) {
+        /* Weights within the level are so far apart that rounding makes H indefinite: as much as that makes it definite */
+        double largest = 0.0;
+        for (int i = 0; i < s->rank; i++) largest = larger(largest, s->H[i * NV + i]);
+        for (int i = 0; i < s->rank; i++) s->H[i * NV + i] += ROUNDINGS * NV * EPS * largest;
+        solved = invert_matrix(s->H, s->rank, s->inverse);
+    }
     if (solved) {
         solve_level(s->inverse, s->rank, s->right, z);
         into_point(s, z, s->rank, x);

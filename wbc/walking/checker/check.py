@@ -13,15 +13,14 @@ from wbc.errors import ShapeError
 from wbc.validation import Array
 from wbc.walking.checker import clearances, clock_and_joints, grasps, table_of_holds
 from wbc.walking.checker.body import Bodies, Hands, estimate, single
-from wbc.walking.checker.forward import Placements, forward
 from wbc.walking.checker.holds import HoldTable, turns_between
 from wbc.walking.checker.report import Report, Tally
 from wbc.walking.checker.rules import Rules
 from wbc.walking.checker.samples import Samples, blocks
-from wbc.walking.checker.urdf import Urdf, read_urdf
-from wbc.walking.run_log import WalkLog
-from wbc.walking.structure import Structure
-from wbc.walking.structure_file import read_structure
+from wbc.walking.checker.urdf import Placements, Urdf, forward, read_urdf
+from wbc.walking.holds.files import read_structure
+from wbc.walking.holds.structure import Structure
+from wbc.walking.log.log import WalkLog
 
 #: Names of the files in a run's folder
 URDF_FILE, STRUCTURE_FILE = "robot.urdf", "structure.csv"

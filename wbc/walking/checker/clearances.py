@@ -15,13 +15,12 @@ from numpy.typing import NDArray
 
 from wbc.validation import Array
 from wbc.walking.checker import distances
-from wbc.walking.checker.forward import Placements
 from wbc.walking.checker.holds import HoldTable
 from wbc.walking.checker.report import Tally
 from wbc.walking.checker.rules import Rules
 from wbc.walking.checker.samples import Samples
-from wbc.walking.checker.urdf import CapsuleOfLink, Urdf
-from wbc.walking.structure import Structure
+from wbc.walking.checker.urdf import CapsuleOfLink, Placements, Urdf
+from wbc.walking.holds.structure import Structure
 
 LINKS, STRUCTURE = "clearance of links", "clearance of the structure"
 

@@ -10,7 +10,7 @@ from wbc.walking.checker.report import Tally
 from wbc.walking.checker.rules import Rules
 from wbc.walking.checker.samples import Samples
 from wbc.walking.checker.urdf import Urdf
-from wbc.walking.run_log import WalkLog
+from wbc.walking.log.log import WalkLog
 
 #: A step of time below this [s] is none
 LEAST_STEP = 1e-12

@@ -9,8 +9,8 @@ import numpy as np
 from wbc.errors import UnknownNameError
 from wbc.shapes import Capsule
 from wbc.validation import Array
-from wbc.walking.obstacle import Obstacle
-from wbc.walking.surface import CylinderSurface, PlaneSurface, Surface
+from wbc.walking.holds.obstacle import Obstacle
+from wbc.walking.holds.surface import CylinderSurface, PlaneSurface, Surface
 
 #: Thirds taken of an interval in which a convex function is least: (2/3)^60 = 3e-11
 THIRDS = 60

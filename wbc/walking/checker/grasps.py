@@ -12,7 +12,7 @@ from wbc.validation import Array
 from wbc.walking.checker.report import Tally
 from wbc.walking.checker.rules import Rules
 from wbc.walking.checker.samples import holding
-from wbc.walking.run_log import CLOSED, CLOSING, HAND_STATES, OPEN, OPENING, WalkLog
+from wbc.walking.log.log import CLOSED, CLOSING, HAND_STATES, OPEN, OPENING, WalkLog
 
 #: Changes of state from a tick to the next; closed to open only where the hold vanished
 ALLOWED = {

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wbc.validation import Array
-from wbc.walking.run_log import WalkLog
+from wbc.walking.log.log import WalkLog
 
 
 def rotations(quaternions: Array) -> Array:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from wbc.validation import Array
 from wbc.walking.checker.holds import rotations
-from wbc.walking.run_log import CLOSED, WalkLog
+from wbc.walking.log.log import CLOSED, WalkLog
 
 #: Ticks of a block
 BLOCK = 400

@@ -7,9 +7,9 @@ import numpy as np
 from wbc.walking.checker.holds import HoldTable
 from wbc.walking.checker.report import Tally
 from wbc.walking.checker.rules import Rules
-from wbc.walking.hold import FIXED, FREE
-from wbc.walking.run_log import WalkLog
-from wbc.walking.structure import Structure
+from wbc.walking.holds.hold import FIXED, FREE
+from wbc.walking.holds.structure import Structure
+from wbc.walking.log.log import WalkLog
 
 #: What the numbers of a hold may differ by [m, rad]: a file gives them back within rounding
 SAME = 1e-9

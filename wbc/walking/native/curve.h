@@ -1,4 +1,4 @@
-/* Ways of hands, as wbc.walking.swing_curve: arcs about the axis of the arm's first joint, raised along the normals. */
+/* Ways of hands, as wbc.walking.planner.swings.curve: arcs about the axis of the arm's first joint, raised along the normals. */
 #ifndef WBC_WALKING_CURVE_H
 #define WBC_WALKING_CURVE_H
 

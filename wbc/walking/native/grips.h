@@ -1,4 +1,4 @@
-/* Where along a path an arm can have its hand on holds, as wbc.walking.grips with holds on which hands may roll. */
+/* Where along a path an arm can have its hand on holds, as wbc.walking.planner.grips.table with holds on which hands may roll. */
 #ifndef WBC_WALKING_GRIPS_H
 #define WBC_WALKING_GRIPS_H
 
@@ -23,7 +23,7 @@ static double span(const Arm *arm, double theta3)
     return sqrt(arm->upper * arm->upper + arm->fore * arm->fore + 2.0 * arm->upper * arm->fore * cos(theta3));
 }
 
-/* Signed margin of a wrist from the bounds of the first three joints, see wbc.walking.arm_reach. */
+/* Signed margin of a wrist from the bounds of the first three joints, see wbc.walking.arms.reach. */
 static double wrist_margin(const Arm *arm, const double *p, double longest, double shortest)
 {
     const double es = arm->upper, we = arm->fore, across2 = p[0] * p[0] + p[1] * p[1] - arm->offset * arm->offset;
@@ -36,7 +36,7 @@ static double wrist_margin(const Arm *arm, const double *p, double longest, doub
     return smaller(smaller(longest - distance, distance - shortest), cone);
 }
 
-/* The axis of a hand that leans by no more than it needs, and than it may, see wbc.walking.hand_tilt. */
+/* The axis of a hand that leans by no more than it needs, and than it may, see wbc.walking.planner.grips.tilt. */
 static void lean(const Arm *arm, const Keeping *keep, double tilt, double lack, const double *wrist, double *axis)
 {
     double away[3] = { wrist[0], wrist[1], wrist[2] - arm->neck }, across[3];

@@ -1,4 +1,4 @@
-/* Whether two arms are too near to each other: capsules about O N, S E, E W and W H, as wbc.walking.arm_clearance. */
+/* Whether two arms are too near to each other: capsules about O N, S E, E W and W H, as wbc.walking.planner.grips.conflicts. */
 #ifndef WBC_WALKING_NEAR_H
 #define WBC_WALKING_NEAR_H
 

@@ -1,4 +1,4 @@
-/* The least time along a hand's way under the limits of joints 1 to 5, as wbc.walking.swing_path and swing_speed. */
+/* The least time along a hand's way under the limits of joints 1 to 5, as planner/swings/joints.py and least_time.py. */
 #ifndef WBC_WALKING_SPEEDS_H
 #define WBC_WALKING_SPEEDS_H
 
@@ -88,7 +88,7 @@ static void gradient(const double *f, long n, long stride, double gap, int secon
     }
 }
 
-/* The largest squares of dx/dt under `most`, which is made smaller, with |a u + b s| <= limit; see swing_speed. */
+/* The largest squares of dx/dt under `most`, which is made smaller, with |a u + b s| <= limit; see least_time.py. */
 static void squares(const double (*first)[JOINTS], const double (*second)[JOINTS], const double *limits, int joints,
                     long n, double gap, double least, double *most, double *out)
 {

@@ -1,4 +1,4 @@
-/* Whether swinging arms stay above a plane or outside a cylinder, as wbc.walking.swing_clearance. */
+/* Whether swinging arms stay above a plane or outside a cylinder, as wbc.walking.planner.swings.clearance. */
 #ifndef WBC_WALKING_SURFACE_H
 #define WBC_WALKING_SURFACE_H
 

@@ -1,4 +1,4 @@
-/* The first way of a swing that is possible and clear, of all that are tried, as wbc.walking.swings has it. */
+/* The first way of a swing that is possible and clear, of all that are tried, as wbc.walking.planner.swings.swings has it. */
 #ifndef WBC_WALKING_WAYS_H
 #define WBC_WALKING_WAYS_H
 

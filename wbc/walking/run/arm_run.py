@@ -22,22 +22,21 @@ import pinocchio as pin
 from wbc.errors import ShapeError
 from wbc.robots import Walker, WalkerData
 from wbc.track.summary import Figure
-from wbc.walking.arm_mode import ArmMode, ArmStopped
 from wbc.walking.body_path import standing_path
-from wbc.walking.drive import standing_plan
-from wbc.walking.hand_motion import ArmRefused
-from wbc.walking.hold import frame_of
-from wbc.walking.number_table import read_numbers
-from wbc.walking.plan import HoldLost, NoPlanError
-from wbc.walking.run.as_walked import as_walked
+from wbc.walking.holds.hold import frame_of
+from wbc.walking.holds.structure import Structure
+from wbc.walking.loop.stack import WalkStack
+from wbc.walking.loop.walk import Walk
+from wbc.walking.modes.arm_mode import ArmMode, ArmStopped
+from wbc.walking.modes.commands import read_numbers
+from wbc.walking.modes.drive import standing_plan
+from wbc.walking.modes.hand_motion import ArmRefused
+from wbc.walking.planner.plan import HoldLost, NoPlanError
 from wbc.walking.run.carrying_out import CarryingOut, Progress, farthest, travelled
 from wbc.walking.run.compiling import compiled_stack
 from wbc.walking.run.perform import WalkRun
-from wbc.walking.run.recording import WalkRecorder
+from wbc.walking.run.recording import WalkRecorder, as_walked
 from wbc.walking.run.request import WalkRequest
-from wbc.walking.structure import Structure
-from wbc.walking.walk import Walk
-from wbc.walking.walk_stack import WalkStack
 
 Kind = Literal["hold", "poses", "rate"]
 Reason = Literal["reached", "time", "key", "refused"]

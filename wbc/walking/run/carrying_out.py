@@ -8,10 +8,10 @@ from typing import Any, Literal
 import numpy as np
 
 from wbc.track.summary import Figure
-from wbc.walking.plan import HoldLost, NoPlanError
+from wbc.walking.loop.state import Tick
+from wbc.walking.loop.walk import Walk
+from wbc.walking.planner.plan import HoldLost, NoPlanError
 from wbc.walking.run.recording import WalkRecorder
-from wbc.walking.walk import Walk
-from wbc.walking.walk_state import Tick
 
 #: How a mode ended: where it was to go, too late, its time over, by key, aborted, or why it could not go on
 Outcome = Literal["arrived", "late", "time", "key", "interrupted", "hold lost", "refused"]

@@ -5,13 +5,13 @@ from __future__ import annotations
 import gc
 
 from wbc.robots import Walker
-from wbc.walking import compiled
-from wbc.walking.aim_function import aim_function
-from wbc.walking.chain_function import chain_function
-from wbc.walking.run_recorder import versions
-from wbc.walking.structure import Structure
-from wbc.walking.walk_stack import WalkStack
-from wbc.walking.way_function import way_function
+from wbc.walking.holds.structure import Structure
+from wbc.walking.log.recorder import versions
+from wbc.walking.loop.body_command import way_function
+from wbc.walking.loop.closed_chain import chain_function
+from wbc.walking.loop.hand_command import aim_function
+from wbc.walking.loop.stack import WalkStack
+from wbc.walking.native import compiled
 
 
 def compiled_stack(

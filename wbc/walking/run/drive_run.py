@@ -15,18 +15,17 @@ from wbc.robots import Walker, WalkerData
 from wbc.track.summary import Figure
 from wbc.validation import Array
 from wbc.walking.body_path import standing_path
-from wbc.walking.commands import Commands
-from wbc.walking.drive import Drive, standing_plan
-from wbc.walking.plan import NoPlanError
-from wbc.walking.run.as_walked import as_walked
+from wbc.walking.log.log import WalkLog
+from wbc.walking.loop.stack import WalkStack
+from wbc.walking.loop.walk import Walk
+from wbc.walking.modes.commands import Commands
+from wbc.walking.modes.drive import Drive, standing_plan
+from wbc.walking.planner.plan import NoPlanError
 from wbc.walking.run.carrying_out import CarryingOut, Progress
 from wbc.walking.run.compiling import compiled_stack
 from wbc.walking.run.perform import WalkRun
-from wbc.walking.run.recording import WalkRecorder
+from wbc.walking.run.recording import WalkRecorder, as_walked
 from wbc.walking.run.request import WalkRequest
-from wbc.walking.run_log import WalkLog
-from wbc.walking.walk import Walk
-from wbc.walking.walk_stack import WalkStack
 
 #: Time that the body has to come to rest after the last command [s]
 COMING_DOWN = 30.0

@@ -10,20 +10,20 @@ from wbc.errors import ShapeError, WbcError
 from wbc.robots import Walker, WalkerData
 from wbc.track.summary import Figure
 from wbc.walking.body_path import BodyPath
-from wbc.walking.first_grasps import free_state, plan_from_state
-from wbc.walking.followed_plan import follow_plan
-from wbc.walking.plan import NoPlanError, Plan, Regrasp, read_plan
-from wbc.walking.planner import Objective, plan_walk
+from wbc.walking.holds.structure import Structure
+from wbc.walking.log.body_paths import way_of
+from wbc.walking.log.log import WalkLog
+from wbc.walking.loop.stack import WalkStack
+from wbc.walking.loop.walk import PATIENCE, SLACK, Walk
+from wbc.walking.modes.first_grasps import free_state, plan_from_state
+from wbc.walking.modes.veto import Veto
+from wbc.walking.planner.follow import follow_plan
+from wbc.walking.planner.plan import NoPlanError, Plan, Regrasp, read_plan
+from wbc.walking.planner.planner import Objective, plan_walk
 from wbc.walking.run.carrying_out import CarryingOut, Outcome, Progress
 from wbc.walking.run.compiling import compiled_stack
 from wbc.walking.run.recording import TickColumns, WalkRecorder
 from wbc.walking.run.request import WalkRequest
-from wbc.walking.run_log import WalkLog
-from wbc.walking.structure import Structure
-from wbc.walking.veto import Veto
-from wbc.walking.walk import PATIENCE, SLACK, Walk
-from wbc.walking.walk_stack import WalkStack
-from wbc.walking.way_data import way_of
 
 
 @dataclass(frozen=True, eq=False)

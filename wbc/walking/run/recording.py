@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import os
 import pathlib
-from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
 from itertools import groupby
 from typing import Any
 
@@ -13,10 +13,13 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from wbc.robots import Walker
 from wbc.validation import Array
-from wbc.walking.run_log import CLOSED, HAND_STATES, OPEN, OPENING, WalkLog, WalkLogError
-from wbc.walking.run_recorder import LogRecorder
-from wbc.walking.walk import Event, Tick, Walk
+from wbc.walking.body_path import SPACING, BodyPath
+from wbc.walking.log.log import CLOSED, HAND_STATES, OPEN, OPENING, WalkLog, WalkLogError
+from wbc.walking.log.recorder import LogRecorder
+from wbc.walking.loop.walk import Event, Tick, Walk
+from wbc.walking.planner.plan import Plan, Regrasp
 
 #: Name of the file in a run's folder
 TICKS = "ticks.npz"
@@ -179,3 +182,28 @@ class WalkRecorder:
         now = [self._structure.index(ids[hold]) if hold >= 0 else -1 for hold in tick.holds]
         leaving = [state == OPENING for state in self._states]
         self._holds = [old if leaves else new for old, new, leaves in zip(self._holds, now, leaving, strict=True)]
+
+
+def configuration(walker: Walker, log: WalkLog, row: int) -> Array:
+    """The robot's configuration at a row of a log, in the structure's frame."""
+    q = np.array(walker.robot.neutral)
+    q[:7] = log.pose_body_in_structure[row]
+    column = {name: k for k, name in enumerate(log.joints)}
+    for arm in walker.arms:
+        q[arm.q] = log.q[row, [column[joint] for joint in arm.joints]]
+    return q
+
+
+def as_walked(log: WalkLog, ticks: TickColumns, steps: Sequence[Regrasp]) -> tuple[Plan, TickColumns]:
+    """A plan whose path is the way of the logged body, over the time of the log; and ticks that say so.
+
+    Args:
+        steps: re-grasps that were begun.
+    """
+    stride = max(round(SPACING / log.dt), 1)
+    poses = [pin.XYZQUATToSE3(row).homogeneous for row in log.pose_body_in_structure[::stride]]
+    path = BodyPath(np.array(poses), stride * log.dt)
+    closed = [np.flatnonzero(log.hand_state[:, arm] == CLOSED) for arm in range(len(log.arms))]
+    start = tuple(log.hold_id[log.hand_hold[rows[0], arm]] if len(rows) else "" for arm, rows in enumerate(closed))
+    time = np.minimum(log.t[1:] - log.t[0], path.duration)
+    return Plan(path, start, tuple(steps), True, path.duration), replace(ticks, path_time=time)

@@ -15,9 +15,9 @@ from wbc.errors import RangeError, ShapeError
 from wbc.robots import WalkerData
 from wbc.validation import Array
 from wbc.walking.body_path import BodyPath, grid_path, straight_path
-from wbc.walking.structure import Structure
-from wbc.walking.structure_file import read_structure
-from wbc.walking.structures import BUILT_IN, ROWS_A, ROWS_T, remove_columns, remove_fraction, remove_rows
+from wbc.walking.holds.built_in import BUILT_IN, ROWS_A, ROWS_T, remove_columns, remove_fraction, remove_rows
+from wbc.walking.holds.files import read_structure
+from wbc.walking.holds.structure import Structure
 from wbc.walking.two_ended import grapple_row
 from wbc.walking.two_ended.search import GAITS
 

@@ -17,22 +17,20 @@ from wbc.robots import Walker, WalkerData
 from wbc.track.summary import Figure
 from wbc.validation import Array
 from wbc.walking.body_path import BodyPath, straight_path
-from wbc.walking.first_grasps import plan_from_state
-from wbc.walking.plan import NoPlanError
-from wbc.walking.run.as_walked import as_walked
+from wbc.walking.holds.files import read_structure
+from wbc.walking.holds.structure import Structure
+from wbc.walking.log.body_paths import path_of
+from wbc.walking.log.log import CLOSED, OPENING, WalkLog, WalkLogError
+from wbc.walking.loop.stack import WalkStack
+from wbc.walking.loop.state import State
+from wbc.walking.loop.walk import PATIENCE, SLACK, Walk
+from wbc.walking.modes.first_grasps import plan_from_state
+from wbc.walking.planner.plan import NoPlanError
 from wbc.walking.run.carrying_out import CarryingOut, Progress
 from wbc.walking.run.compiling import compiled_stack
-from wbc.walking.run.parts import configuration
 from wbc.walking.run.perform import WalkRun
-from wbc.walking.run.recording import TICKS, TickColumns, WalkRecorder
+from wbc.walking.run.recording import TICKS, TickColumns, WalkRecorder, as_walked, configuration
 from wbc.walking.run.request import WalkRequest
-from wbc.walking.run_log import CLOSED, OPENING, WalkLog, WalkLogError
-from wbc.walking.structure import Structure
-from wbc.walking.structure_file import read_structure
-from wbc.walking.walk import PATIENCE, SLACK, Walk
-from wbc.walking.walk_stack import WalkStack
-from wbc.walking.walk_state import State
-from wbc.walking.way_data import path_of
 
 STRUCTURE = "structure.csv"
 

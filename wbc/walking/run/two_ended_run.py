@@ -9,12 +9,12 @@ from dataclasses import asdict, replace
 from wbc.errors import ShapeError
 from wbc.robots import TwoEndedData, Walker
 from wbc.walking.body_path import standing_path
-from wbc.walking.plan import NoPlanError
+from wbc.walking.holds.structure import Structure
+from wbc.walking.planner.plan import NoPlanError
 from wbc.walking.run.carrying_out import Progress
 from wbc.walking.run.perform import WalkRun, walked
 from wbc.walking.run.recording import WalkRecorder
 from wbc.walking.run.request import WalkRequest
-from wbc.walking.structure import Structure
 from wbc.walking.two_ended import TwoEndedStack, TwoEndedWalk, plan_two_ended
 
 

@@ -13,14 +13,13 @@ from wbc.errors import RangeError, ShapeError
 from wbc.robots import Walker
 from wbc.validation import Array
 from wbc.walking.body_path import BodyPath
-from wbc.walking.grips import Grips
-from wbc.walking.plan import NoPlanError, Plan, Regrasp
-from wbc.walking.stance_search import Found
-from wbc.walking.structure import Structure
-from wbc.walking.two_ended.law import TurnLaw
+from wbc.walking.holds.structure import Structure
+from wbc.walking.planner.grips.table import Grips
+from wbc.walking.planner.plan import NoPlanError, Plan, Regrasp
+from wbc.walking.planner.stances.search import Found
 from wbc.walking.two_ended.postures import Grip, PairPostures
 from wbc.walking.two_ended.search import GAITS, TurnSearch
-from wbc.walking.two_ended.swing_path import Turn, TurnPaths
+from wbc.walking.two_ended.swing_path import Turn, TurnLaw, TurnPaths
 
 #: Samples of a plan are this far apart [s]
 SPACING = 0.05

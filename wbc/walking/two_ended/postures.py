@@ -1,4 +1,4 @@
-"""The posture of the two-ended arm between two holds: one for each pair, so that stances can be searched."""
+"""The posture of the two-ended arm between two holds, one for each pair, so that stances can be searched."""
 
 from __future__ import annotations
 
@@ -6,14 +6,20 @@ from math import radians
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from wbc.robots import Walker
+from wbc.errors import ShapeError
+from wbc.robots import TwoEndedData, Walker
 from wbc.validation import Array
-from wbc.walking.grip_rolls import frame_on
-from wbc.walking.structure import Structure
-from wbc.walking.two_ended.shapes import ArmShapes
-from wbc.walking.two_ended_kinematics import TwoEndedKinematics
+from wbc.walking.arms.capsules import segment_distances
+from wbc.walking.arms.two_ended import TwoEndedKinematics
+from wbc.walking.holds.structure import Structure
+from wbc.walking.planner.grips.rolls import frame_on
 
+#: What the plan keeps of the clearance for feedback, besides the clearance itself [m]
+ROOM = 0.02
+#: Pairs of the capsules near tip, first boom, second boom, far tip that may meet: those of the robot's self pairs
+PAIRS = ((0, 1), (0, 2), (0, 3), (1, 3), (2, 3))
 #: Angles of joint 1 that are tried, from limit to limit
 ROLLS = 217
 #: What is kept of the joint limits [rad]
@@ -22,6 +28,71 @@ ANGLE_ROOM = radians(2.0)
 WEIGHTS = np.array([0.1, 1.0, 0.02, 0.0, 0.02, 1.0, 0.1])
 #: Postures whose clearance is looked at together, the best first
 TOGETHER = 16
+
+
+def touching_distance(walker: Walker) -> float:
+    """A hand of the two-ended arm this near to its hold may touch what the hold stands on [m]: half its width, the
+    clearance and what the plan keeps.
+
+    Raises:
+        ShapeError: another machine.
+    """
+    if not isinstance(walker.data, TwoEndedData):
+        raise ShapeError("walker", walker.robot.name, "expected the two-ended arm")
+    return walker.data.wrist_radius + walker.tolerances.clearance + 2 * ROOM
+
+
+class ArmShapes:
+    """Four capsules about the tips and booms of the two-ended arm.
+
+    Args:
+        walker: the two-ended arm. structure: what it stands on.
+
+    Attributes:
+        data: lengths and radii. tolerances: clearance, latches and closing, which the two machines share.
+        exempt: a hand this near to its hold may touch what the hold stands on [m].
+
+    Raises:
+        ShapeError: another machine.
+    """
+
+    def __init__(self, walker: Walker, structure: Structure) -> None:
+        self.exempt = touching_distance(walker)
+        assert isinstance(walker.data, TwoEndedData)
+        self.data, self.tolerances, self._structure = walker.data, walker.tolerances, structure
+        boom, tip = self.data.boom_radius, self.data.wrist_radius
+        self._radii = np.array([tip, boom, boom, tip])
+
+    def clear(self, frames: Array, ends: Array) -> NDArray[np.bool_]:
+        """Whether postures keep their clearance.
+
+        Args:
+            frames: frames 0 to 7 in the structure ``[n, 8, 4, 4]`` [m].
+            ends: holds that the near and the far hand leave or come to ``[2, k, 3]`` [m].
+
+        Returns:
+            ``[n]``.
+        """
+        starts, stops = self._cores(frames)
+        least = self.tolerances.clearance + ROOM
+        room = self._structure.segment_clearance(starts, stops) - self._radii - least
+        for tip, hand, holds in ((0, 0, ends[0]), (3, 7, ends[1])):
+            places = frames[:, hand, :3, 3]
+            near = np.linalg.norm(places[:, None] - holds, axis=2).min(axis=1) <= self.exempt
+            room[near, tip] = np.inf
+        i, j = np.array(PAIRS).T
+        gaps = segment_distances(starts[:, i], stops[:, i], starts[:, j], stops[:, j])
+        apart = gaps - self._radii[i] - self._radii[j] - least
+        out: NDArray[np.bool_] = (room >= 0.0).all(axis=1) & (apart >= 0.0).all(axis=1)
+        return out
+
+    def _cores(self, frames: Array) -> tuple[Array, Array]:
+        """Ends of the cores of the capsules ``[n, 4, 3]``."""
+        boom, tip = self.data.boom_length, self.data.roll_offset
+        origin, x, z = frames[..., :3, 3], frames[..., :3, 0], frames[..., :3, 2]
+        starts = origin[:, [0, 3, 4, 7]]
+        along = (tip * z[:, 0], -boom * x[:, 3], -boom * x[:, 4], -tip * z[:, 7])
+        return starts, starts + np.stack(along, axis=1)
 
 
 class Grip(NamedTuple):

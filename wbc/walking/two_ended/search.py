@@ -10,14 +10,15 @@ from numpy.typing import NDArray
 
 from wbc.robots import Walker
 from wbc.validation import Array
-from wbc.walking.arm_clearance import NEVER
 from wbc.walking.body_path import BodyPath
-from wbc.walking.grips import Grips, Ints
-from wbc.walking.slices import Slices
-from wbc.walking.stance_fan import QUANTUM
-from wbc.walking.stance_search import INSIDE, Key, Node, StanceSearch
-from wbc.walking.structure import Structure
-from wbc.walking.swings import Chosen, Swing
+from wbc.walking.holds.structure import Structure
+from wbc.walking.planner.grips.conflicts import NEVER
+from wbc.walking.planner.grips.table import Grips, Ints
+from wbc.walking.planner.slices import Slices
+from wbc.walking.planner.stances.candidates import QUANTUM
+from wbc.walking.planner.stances.search import INSIDE, Node, StanceSearch
+from wbc.walking.planner.swings.move import Key
+from wbc.walking.planner.swings.swings import Chosen, Swing
 from wbc.walking.two_ended.postures import Grip, PairPostures
 from wbc.walking.two_ended.swing_path import Turn, TurnPaths
 
@@ -34,7 +35,7 @@ GAITS: dict[str, Callable[[float, float], bool]] = {
 class Pairs:
     """Which grips of the two hands go together: those with a posture; at the end those that the goal allows.
 
-    It is what :class:`wbc.walking.arm_clearance.ArmClearance` is for a body with arms.
+    It is what :class:`wbc.walking.planner.grips.conflicts.ArmClearance` is for a body with arms.
 
     Args:
         grips: of the search. last: sample at which the goal counts. goal: of the grips of near and far hand.
@@ -64,7 +65,7 @@ class Pairs:
 
 
 class Turns:
-    """Swings between grips, as the search asks for them: as :class:`wbc.walking.swings.Swings`.
+    """Swings between grips, as the search asks for them: as :class:`wbc.walking.planner.swings.swings.Swings`.
 
     Args:
         places: of the holds along the way [m]. gait: one of :data:`GAITS`.

@@ -13,16 +13,15 @@ from wbc.errors import ShapeError
 from wbc.robots import TwoEndedData, Walker
 from wbc.validation import Array
 from wbc.walking.body_path import BodyPath
-from wbc.walking.plan import NoPlanError
-from wbc.walking.replanning import PlanSlices
-from wbc.walking.stopping import Stops
-from wbc.walking.structure import Structure
-from wbc.walking.two_ended.law import TurnLaw
+from wbc.walking.holds.structure import Structure
+from wbc.walking.loop.stack import AXIS, DT, FREE_AXIS, FREE_WRIST, WalkStack
+from wbc.walking.loop.state import Swinging, Wrist
+from wbc.walking.loop.stopping import Stops
+from wbc.walking.loop.walk import Walk
+from wbc.walking.planner.plan import NoPlanError
+from wbc.walking.planner.replanning import PlanSlices
 from wbc.walking.two_ended.planner import TwoEndedPlan, plan_two_ended
-from wbc.walking.two_ended.swing_path import ACCELERATION_PART, RATE_PART
-from wbc.walking.walk import Walk
-from wbc.walking.walk_stack import AXIS, DT, FREE_AXIS, FREE_WRIST, WalkStack
-from wbc.walking.walk_state import Swinging, Wrist
+from wbc.walking.two_ended.swing_path import ACCELERATION_PART, RATE_PART, TurnLaw
 
 #: The last part of a swing, in which the hand comes straight down and its frame counts [s]
 NEAR = 2.0
@@ -59,7 +58,7 @@ class TwoEndedWalk(Walk):
 
     Args:
         walker, structure, plan: the two-ended arm, the holds, and a plan of :func:`plan_two_ended`.
-        dt, backend, stack, grasps: as of :class:`wbc.walking.walk.Walk`.
+        dt, backend, stack, grasps: as of :class:`wbc.walking.loop.walk.Walk`.
 
     Raises:
         ShapeError: another machine, or a plan without its grips.

@@ -1,0 +1,1 @@
+"""Faithful reproductions of published methods, one package each: for comparison, no part of the product uses them."""

@@ -1,0 +1,14 @@
+"""The published planner of a three-armed grasping walker: free gait on a cylinder of handholds.
+
+Source: M. R. Patterson's thesis on a three-armed walking robot, text and Fortran listing. Where both disagree both are
+there and the listing is the default. What neither prints is :class:`Calibration`.
+"""
+
+from __future__ import annotations
+
+from wbc.published.three_arm_walker.calibration import Calibration
+from wbc.published.three_arm_walker.record import Log
+from wbc.published.three_arm_walker.supervisor import Outcome
+from wbc.published.three_arm_walker.walker import PublishedWalker
+
+__all__ = ["Calibration", "Log", "Outcome", "PublishedWalker"]

@@ -1,0 +1,90 @@
+"""Rate control as the thesis has it: joints are integrated from rates and the body follows from a holding arm.
+
+    support arms    hand twist = -(that of its base) + error of its hold / dt
+    swing arm       hand twist = command - (that of its base)
+    v_a = R_b^T (v - v_v - w_v x (p_hand - p_v)),    w_a = R_b^T (w - w_v)              axes of the arm base
+
+Units: inch, radian, second. Holds are kept where the hand was when it grasped, so an offset within the tolerance stays.
+Source: M. R. Patterson's thesis, 5.3.2 and MAIN; AVEL, HLDPOS, MOVROB and ROBST, not listed, are reconstructions.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from wbc.published.three_arm_walker.arm import START, forward, joint_beyond
+from wbc.published.three_arm_walker.calibration import Calibration, Variant
+from wbc.published.three_arm_walker.motion import CYCLE
+from wbc.published.three_arm_walker.plant import Fault, Order
+from wbc.published.three_arm_walker.rates import joint_rates, saturated
+from wbc.published.three_arm_walker.reach import ARMS, Shoulders
+from wbc.published.three_arm_walker.rigid import cross, inverse
+from wbc.published.three_arm_walker.tracking import pose_error
+from wbc.validation import Array
+
+
+class LiteralPlant:
+    """A body whose arms are moved by SOLVE.
+
+    Args:
+        shoulders: of the body. body: where it starts, the arms in their starting posture.
+        calibration: for the joint rates. singular: what SOLVE does where joints 4 and 6 are aligned.
+
+    Attributes:
+        joints, rates: 3 x 6 [rad, rad/s].
+    """
+
+    def __init__(
+        self, shoulders: Shoulders, body: Array, calibration: Calibration, singular: Variant = "listing"
+    ) -> None:
+        self.shoulders, self.body, self.singular = shoulders, body, singular
+        self.limits = np.array(calibration.joint_rates)
+        self.joints, self.rates = np.tile(START, (ARMS, 1)), np.zeros((ARMS, 6))
+        self.latched: list[Array | None] = [None] * ARMS
+
+    @property
+    def hands(self) -> Array:
+        return np.asarray(self.body @ self.shoulders.frames @ np.array([forward(theta) for theta in self.joints]))
+
+    def place(self, arm: int, pose: Array) -> int | None:
+        """Hands are where their joints put them."""
+        return None
+
+    def move(self, twist: Array, order: Order) -> Fault | None:
+        hands = self.hands
+        for arm in range(ARMS):
+            self._latch(arm, order.supporting[arm], hands[arm])
+            latched = self.latched[arm]
+            if latched is not None:
+                self._drive(arm, twist, pose_error(latched, hands[arm]) / CYCLE, hands[arm])
+            elif arm == order.arm and order.twist is not None:
+                self._drive(arm, twist, order.twist, hands[arm])
+        joints = self.joints + CYCLE * self.rates
+        for arm in range(ARMS):
+            joint = joint_beyond(joints[arm])
+            if joint is not None:
+                self.rates[:] = 0.0
+                return Fault(joint, arm + 1)
+        self.joints = joints
+        self._find_body()
+        return None
+
+    def _latch(self, arm: int, supporting: bool, hand: Array) -> None:
+        if not supporting:
+            self.latched[arm] = None
+        elif self.latched[arm] is None:
+            self.latched[arm] = hand
+
+    def _drive(self, arm: int, body: Array, twist: Array, hand: Array) -> None:
+        """AVEL, SOLVE: rates for a hand twist in fixed axes on a moving base."""
+        turn = (self.body @ self.shoulders.frames[arm])[:3, :3].T
+        carried = body[:3] + cross(body[3:], hand[:3, 3] - self.body[:3, 3])
+        relative = np.concatenate([turn @ (twist[:3] - carried), turn @ (twist[3:] - body[3:])])
+        self.rates[arm] = saturated(joint_rates(self.joints[arm], relative, self.singular), self.limits)
+
+    def _find_body(self) -> None:
+        """ROBST: the body's pose from the first arm that holds; it stays where none does."""
+        for arm, latched in enumerate(self.latched):
+            if latched is not None:
+                self.body = latched @ inverse(self.shoulders.frames[arm] @ forward(self.joints[arm]))
+                return

@@ -1,0 +1,1 @@
+"""Kinematics of the walkers' arms in closed form; they know no structure."""

@@ -1,0 +1,271 @@
+"""Structures as files: comma-separated rows in three sections.
+
+    id, x, y, z, ax, ay, az, rx, ry, rz, roll, max_tilt
+    h1, 0, 0, 0, 0, 0, -1, 1, 0, 0, free, 0.05
+
+    [obstacles]
+    id, shape, x, y, z, ax, ay, az, rx, ry, rz, d1, d2, d3
+    tank, box, 1, 0, 0.2, 0, 0, 1, 1, 0, 0, 0.3, 0.3, 0.4
+    pipe, capsule, 2, 0, 0.1, 1, 0, 0, 0, 0, 1, 0.05, 1.5,
+
+    [surface]
+    shape, x, y, z, ax, ay, az, rx, ry, rz, d1
+    plane, 0, 0, 0, 0, 0, 1, 1, 0, 0,
+
+(x, y, z) is the origin [m], (ax, ay, az) the z axis and (rx, ry, rz) the direction whose part across it is the x axis,
+of any length. Holds come first, with z the approach direction, roll ``free``, ``fixed`` or a whole number from 2 to
+360, and max_tilt [rad]. The numbers d1, d2, d3 of a box are its sides along x, y, z; of a capsule radius and length
+between the centres of its ends, along z; of a ``cylinder`` surface its radius about z, and a ``plane`` has none. A
+text with a comma in it stands in double quotes. Empty lines and lines that begin with ``#`` do not count.
+"""
+
+from __future__ import annotations
+
+import csv
+import os
+import pathlib
+from collections.abc import Mapping, Sequence
+from math import isfinite
+from typing import Any, TextIO
+
+import pinocchio as pin
+
+from wbc.errors import StructureFileError, WbcError
+from wbc.shapes import Box, Capsule
+from wbc.walking.holds.hold import Hold, checked_id, checked_roll, frame_of
+from wbc.walking.holds.obstacle import Obstacle
+from wbc.walking.holds.structure import Structure
+from wbc.walking.holds.surface import CylinderSurface, PlaneSurface, Surface
+
+_POSE = ("x", "y", "z", "ax", "ay", "az", "rx", "ry", "rz")
+#: Section -> its columns; the first has no line of its own
+COLUMNS: Mapping[str, tuple[str, ...]] = {
+    "holds": ("id", *_POSE, "roll", "max_tilt"),
+    "obstacles": ("id", "shape", *_POSE, "d1", "d2", "d3"),
+    "surface": ("shape", *_POSE, "d1"),
+}
+#: Shape -> how many of d1, d2, d3 it has
+_SIZES = {"box": 3, "capsule": 2, "plane": 0, "cylinder": 1}
+
+
+def read_structure(path: str | os.PathLike[str]) -> Structure:
+    """The structure of a file; its name is the file's stem.
+
+    Raises:
+        StructureFileError: a file that cannot be read, or a bad line: ``field`` names the line and the column.
+    """
+    file = pathlib.Path(path)
+    try:
+        text = file.read_text(encoding="utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        raise StructureFileError("structure", str(path), f"cannot be read: {error}") from error
+    return parse_structure(text, file.stem)
+
+
+def parse_structure(text: str, name: str = "structure") -> Structure:
+    """The structure in a text; see the module for its form.
+
+    Raises:
+        StructureFileError: a bad line: ``field`` names the line and the column.
+    """
+    section, header = "holds", False
+    holds: dict[str, Hold] = {}
+    obstacles: dict[str, Obstacle] = {}
+    surface: Surface | None = None
+    for number, line in enumerate(text.splitlines(), start=1):
+        if not line.strip() or line.lstrip().startswith("#"):
+            continue
+        if line.lstrip().startswith("["):
+            section, header = _section(number, line), False
+            continue
+        cells = _cells(number, line)
+        if not header:
+            _check_header(number, cells, COLUMNS[section])
+            header = True
+            continue
+        row = _row(number, cells, COLUMNS[section])
+        if section == "holds":
+            _add(number, holds, _hold(row))
+        elif section == "obstacles":
+            _add(number, obstacles, _obstacle(row))
+        elif surface is not None:
+            raise StructureFileError(f"line {number}", line.strip(), "a structure has one surface")
+        else:
+            surface = _surface(row)
+    if not holds:
+        raise StructureFileError("holds", name, "the file has no hold")
+    return Structure(name, tuple(holds.values()), tuple(obstacles.values()), surface)
+
+
+def save_structure(structure: Structure, path: str | os.PathLike[str]) -> pathlib.Path:
+    """Writes a structure such that reading gives every number back within 1e-15 of its size; returns the file.
+
+    Raises:
+        StructureFileError: the file cannot be written.
+    """
+    file = pathlib.Path(path)
+    try:
+        with file.open("w", encoding="utf-8", newline="") as stream:
+            out = _Writer(stream)
+            out.writerow(COLUMNS["holds"])
+            for hold in structure.holds:
+                out.writerow([hold.id, *_numbers(hold.pose), hold.roll, repr(hold.max_tilt)])
+            if structure.obstacles:
+                stream.write("\n[obstacles]\n")
+                out.writerow(COLUMNS["obstacles"])
+            for obstacle in structure.obstacles:
+                kind, sizes = _shape_numbers(obstacle.shape)
+                out.writerow([obstacle.id, kind, *_numbers(obstacle.placement), *sizes])
+            if structure.surface is not None:
+                stream.write("\n[surface]\n")
+                out.writerow(COLUMNS["surface"])
+                round_ = isinstance(structure.surface, CylinderSurface)
+                size = repr(structure.surface.radius) if isinstance(structure.surface, CylinderSurface) else ""
+                out.writerow(["cylinder" if round_ else "plane", *_numbers(structure.surface.pose), size])
+    except OSError as error:
+        raise StructureFileError("path", str(path), f"cannot be written: {error.strerror}") from error
+    return file
+
+
+class _Writer:
+    """Rows of cells; the first is quoted where it would be read as something else."""
+
+    def __init__(self, stream: TextIO) -> None:
+        self.stream = stream
+
+    def writerow(self, cells: Sequence[Any]) -> None:
+        first, *rest = (str(cell) for cell in cells)
+        if first[0] in "#[" or any(sign in first for sign in ',"'):
+            first = '"' + first.replace('"', '""') + '"'
+        self.stream.write(",".join([first, *rest]) + "\n")
+
+
+class _Row:
+    """One line: its cells by column, read with errors that name both."""
+
+    def __init__(self, number: int, cells: Mapping[str, str]) -> None:
+        self.number, self.cells = number, cells
+
+    def field(self, column: str) -> str:
+        return f"line {self.number}: {column}"
+
+    def text(self, column: str) -> str:
+        if not self.cells[column]:
+            raise StructureFileError(self.field(column), "", "expected a text")
+        return self.cells[column]
+
+    def name(self) -> str:
+        text = self.text("id")
+        return str(self.made("id", lambda: checked_id("id", text)))
+
+    def real(self, column: str, low: float | None = None) -> float:
+        value = self.cells[column]
+        try:
+            number = float(value)
+        except ValueError as error:
+            raise StructureFileError(self.field(column), value, "expected a number") from error
+        if not isfinite(number):
+            raise StructureFileError(self.field(column), value, "expected a finite number")
+        if low is not None and number < low:
+            raise StructureFileError(self.field(column), value, f"expected a number of at least {low:g}")
+        return number
+
+    def choice(self, column: str, choices: Sequence[str]) -> str:
+        if self.cells[column] not in choices:
+            raise StructureFileError(self.field(column), self.cells[column], "unknown", choices)
+        return self.cells[column]
+
+    def pose(self) -> pin.SE3:
+        position, axis, reference = ([self.real(c) for c in _POSE[k : k + 3]] for k in (0, 3, 6))
+        for columns, vector in (("ax, ay, az", axis), ("rx, ry, rz", reference)):
+            if not any(vector):
+                raise StructureFileError(
+                    self.field(columns), vector, "expected a direction: a vector of non-zero length"
+                )
+        return self.made("rx, ry, rz", lambda: frame_of("frame", position, axis, reference))
+
+    def sizes(self, kind: str) -> list[float]:
+        columns = [c for c in ("d1", "d2", "d3") if c in self.cells]
+        count = _SIZES[kind]
+        for column in columns[count:]:
+            if self.cells[column]:
+                raise StructureFileError(self.field(column), self.cells[column], f"a {kind} has {count} sizes")
+        return [self.real(column, low=0.0) for column in columns[:count]]
+
+    def made(self, column: str, make: Any) -> Any:
+        """What ``make`` returns; its typed error becomes one about this line and column."""
+        try:
+            return make()
+        except StructureFileError:
+            raise
+        except WbcError as error:
+            reason = str(error).removeprefix(f"{error.field}: ").split(" (got ")[0]
+            raise StructureFileError(self.field(column), error.value, reason) from error
+
+
+def _hold(row: _Row) -> Hold:
+    name, pose, tilt = row.name(), row.pose(), row.real("max_tilt", low=0.0)
+    text = row.text("roll")
+    whole = text.isdecimal() and len(text) < 9
+    roll = row.made("roll", lambda: checked_roll("roll", int(text) if whole else text))
+    found: Hold = row.made("max_tilt", lambda: Hold(name, pose, roll, tilt))
+    return found
+
+
+def _obstacle(row: _Row) -> Obstacle:
+    name, kind, pose = row.name(), row.choice("shape", ("box", "capsule")), row.pose()
+    sizes = row.sizes(kind)
+    shape: Box | Capsule = row.made("d1, d2, d3", lambda: Capsule(*sizes) if kind == "capsule" else Box(tuple(sizes)))  # type: ignore[arg-type]
+    return Obstacle(name, shape, pose)
+
+
+def _surface(row: _Row) -> Surface:
+    kind, pose = row.choice("shape", ("plane", "cylinder")), row.pose()
+    sizes = row.sizes(kind)
+    if kind == "plane":
+        return PlaneSurface(pose)
+    found: CylinderSurface = row.made("d1", lambda: CylinderSurface(pose, sizes[0]))
+    return found
+
+
+def _section(number: int, line: str) -> str:
+    name = line.split("#")[0].strip().strip(",").strip()
+    if name not in ("[obstacles]", "[surface]"):
+        raise StructureFileError(f"line {number}", name, "no such section", ("[obstacles]", "[surface]"))
+    return name.strip("[]")
+
+
+def _cells(number: int, line: str) -> list[str]:
+    try:
+        return [cell.strip() for cell in next(csv.reader([line], skipinitialspace=True, strict=True))]
+    except csv.Error as error:
+        raise StructureFileError(f"line {number}", line.strip(), f"cannot be read: {error}") from error
+
+
+def _check_header(number: int, cells: Sequence[str], columns: Sequence[str]) -> None:
+    if tuple(cells) != tuple(columns):
+        raise StructureFileError(f"line {number}", ", ".join(cells), f"expected the columns {', '.join(columns)}")
+
+
+def _row(number: int, cells: Sequence[str], columns: Sequence[str]) -> _Row:
+    if len(cells) != len(columns):
+        reason = f"expected {len(columns)} values, not {len(cells)}: {', '.join(columns)}"
+        raise StructureFileError(f"line {number}", ", ".join(cells), reason)
+    return _Row(number, dict(zip(columns, cells, strict=True)))
+
+
+def _add(number: int, known: dict[str, Any], thing: Hold | Obstacle) -> None:
+    if thing.id in known:
+        raise StructureFileError(f"line {number}: id", thing.id, "two of this id")
+    known[thing.id] = thing
+
+
+def _numbers(pose: pin.SE3) -> list[str]:
+    vectors = (pose.translation, pose.rotation[:, 2], pose.rotation[:, 0])
+    return [repr(float(x)) for vector in vectors for x in vector]
+
+
+def _shape_numbers(shape: Box | Capsule) -> tuple[str, list[str]]:
+    if isinstance(shape, Capsule):
+        return "capsule", [repr(shape.radius), repr(shape.length), ""]
+    return "box", [repr(x) for x in shape.size]

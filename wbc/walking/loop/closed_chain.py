@@ -1,0 +1,236 @@
+"""Where the body is, given the joints and the holds that hands are on: the closed chains decide, nothing else."""
+
+from __future__ import annotations
+
+import weakref
+from collections.abc import Mapping
+from itertools import combinations
+from math import sqrt
+
+import casadi as ca
+import numpy as np
+import pinocchio as pin
+
+from wbc.errors import RangeError
+from wbc.native.compiled_function import compiled
+from wbc.robots import Walker
+from wbc.stack.single import SingleState
+from wbc.symbolic.kinematics import Kinematics
+from wbc.symbolic.rotations import from_quaternion
+from wbc.validation import Array
+from wbc.walking.holds.structure import Structure
+from wbc.walking.planner.grips.rolls import allowed_x
+from wbc.walking.planner.grips.tilt import LEAST_TILT
+
+#: Sweeps of Jacobi's rotations; four are enough for a matrix of four rows, more change nothing
+SWEEPS = 6
+#: Keeps 0 / 0 away where a matrix is diagonal
+TINY = 1e-300
+
+_KNOWN: weakref.WeakKeyDictionary[object, ca.Function] = weakref.WeakKeyDictionary()
+#: Metres that a unit of misalignment of a hand's axis counts for: hands give way to turning before they slip
+AXIS_LENGTH = 0.05
+#: The same of a compliant hold: origins keep their place to 1e-7 m against it
+BALL_LENGTH = 1e-3
+
+
+def chain_function(walker: Walker) -> ca.Function:
+    """f(q, v, dt, weights, mean, centre, mask, holds): see :class:`wbc.walking.loop.closed_chain.ClosedChain`.
+
+    The joints move on from q by v dt. Of n arms, with 3 n rows of numbers for origins, z axes and x axes of the hands:
+    ``weights`` ``[9 n]`` by rows, ``mean`` ``[n]``, ``centre`` ``[3]`` [m], ``mask`` ``[n]``, ``holds`` ``[3 n]`` [m].
+
+    Returns:
+        q with the joints moved on and the body where the holds have it, its quaternion with the sign nearest to the one
+        given; the slip [m]; and the 3 n rows in the structure ``[9 n]``.
+    """
+    known = _KNOWN.get(walker.robot)
+    if known is None:
+        known = _KNOWN[walker.robot] = compiled(_function(walker))
+    return known
+
+
+def _function(walker: Walker) -> ca.Function:
+    n, rows = len(walker.arms), _hands(walker)
+    q, v, dt = ca.SX.sym("q", walker.robot.nq), ca.SX.sym("v", walker.robot.nv), ca.SX.sym("dt")
+    joints = q[7:] + v[6:] * dt
+    sizes = {"weights": 9 * n, "mean": n, "centre": 3, "mask": n, "holds": 3 * n}
+    weights, mean, centre, mask, holds = (ca.SX.sym(name, size) for name, size in sizes.items())
+    ours = ca.reshape(rows(joints), 3, 3 * n).T
+    quaternion = largest(davenport(ca.reshape(weights, 3, 3 * n) @ ours))
+    quaternion = ca.if_else(ca.dot(quaternion, q[3:7]) < 0.0, -quaternion, quaternion)
+    moved = ours @ from_quaternion(quaternion).T
+    place = centre - moved[:n, :].T @ mean
+    moved[:n, :] += ca.repmat(place.T, n, 1)
+    gaps = moved[:n, :] - ca.reshape(holds, 3, n).T
+    slip = ca.sqrt(ca.mmax(mask * ca.sum2(gaps**2)))
+    out = ca.vertcat(place, quaternion, joints, slip, ca.vec(moved.T))
+    return ca.Function("chain", [q, v, dt, weights, mean, centre, mask, holds], [out])
+
+
+def _hands(walker: Walker) -> ca.Function:
+    """Origins, z axes and x axes of the hands in the body's frame, from the joints."""
+    model = walker.robot.model
+    kinematics = Kinematics(model)
+    poses = [kinematics.pose(arm.hand) for arm in walker.arms]
+    rows = [pose.position for pose in poses] + [pose.rotation[:, k] for k in (2, 0) for pose in poses]
+    joints = ca.SX.sym("joints", model.nq - 7)
+    still = ca.vertcat(*np.array(pin.neutral(model))[:7].tolist(), joints)
+    return ca.Function("hands", [joints], [ca.substitute(ca.vertcat(*rows), kinematics.q, still)])
+
+
+def davenport(a: ca.SX) -> ca.SX:
+    """K of A for quaternions (x, y, z, w): tr(R' A) = q' K q.
+
+    K_vv = A + A' - tr(A) 1,    K_vw = (A32 - A23, A13 - A31, A21 - A12),    K_ww = tr(A)
+    """
+    trace, across = ca.trace(a), ca.vertcat(a[2, 1] - a[1, 2], a[0, 2] - a[2, 0], a[1, 0] - a[0, 1])
+    return ca.blockcat([[a + a.T - trace * ca.SX.eye(3), across], [across.T, trace]])
+
+
+def largest(matrix: ca.SX) -> ca.SX:
+    """The unit eigenvector of the largest eigenvalue of a symmetric matrix, by Jacobi's rotations."""
+    count = matrix.size1()
+    a, vectors = ca.densify(ca.SX(matrix)), ca.densify(ca.SX.eye(count))
+    for _ in range(SWEEPS):
+        for i, j in combinations(range(count), 2):
+            _rotate(a, vectors, i, j)
+    best, value = vectors[:, 0], a[0, 0]
+    for k in range(1, count):
+        best = ca.if_else(a[k, k] > value, vectors[:, k], best)
+        value = ca.fmax(a[k, k], value)
+    return best / ca.norm_2(best)
+
+
+def _rotate(a: ca.SX, vectors: ca.SX, i: int, j: int) -> None:
+    """Turn rows and columns i and j so that a_ij becomes 0, by the smaller of the two angles."""
+    apart, off = a[j, j] - a[i, i], a[i, j]
+    size = ca.fabs(apart) + ca.sqrt(apart * apart + 4.0 * off * off) + TINY
+    tangent = ca.if_else(apart < 0.0, -2.0, 2.0) * off / size
+    cosine = 1.0 / ca.sqrt(1.0 + tangent * tangent)
+    sine = tangent * cosine
+    a[i, i], a[j, j] = a[i, i] - tangent * off, a[j, j] + tangent * off
+    a[i, j] = a[j, i] = 0.0
+    for k in set(range(a.size1())) - {i, j}:
+        one, other = a[k, i], a[k, j]
+        a[k, i] = a[i, k] = cosine * one - sine * other
+        a[k, j] = a[j, k] = sine * one + cosine * other
+    one, other = vectors[:, i], vectors[:, j]
+    vectors[:, i], vectors[:, j] = cosine * one - sine * other, sine * one + cosine * other
+
+
+class ClosedChain:
+    """The pose X = (R, t) of the body at which the holding hands fit their holds best:
+
+        min  sum_k |R p_k + t - h_k|^2 + L^2 |R z_k - a_k|^2
+
+    with p_k and z_k the hand's origin and z axis in the body's frame, h_k and a_k those of its hold, L =
+    :data:`AXIS_LENGTH`; holds that fix the roll add their x axes in the same way. A compliant hold is a ball with a
+    weak spring, L = :data:`BALL_LENGTH`, which decides what the origins leave open. This is Wahba's problem, solved by
+    Davenport's q method: with A = sum (h_k - mean h) p_k' + L^2 a_k z_k', tr(R' A) = q' K q for the quaternion q of R.
+
+    Args:
+        walker: its joints are what moves. structure: whose holds are meant.
+
+    Attributes:
+        origins, axes, sides: of all hands in the structure, and their z and x axes, after the last :meth:`settle`:
+            ``[arms, 3]`` each, origins in m.
+    """
+
+    def __init__(self, walker: Walker, structure: Structure) -> None:
+        self.walker, self.structure = walker, structure
+        model = walker.robot.model
+        self._model, self._data = model, model.createData()
+        self._still = np.array(pin.neutral(model))
+        # Views of what Pinocchio computes: origins, z axes and x axes of the hands
+        frames = [self._data.oMf[model.getFrameId(arm.hand)] for arm in walker.arms]
+        self._rows = [*(f.translation for f in frames), *(f.rotation[:, k] for k in (2, 0) for f in frames)]
+        count = len(walker.arms)
+        self.origins, self.axes, self.sides = np.zeros((3, count, 3))
+        self._fit = SingleState(chain_function(walker))
+        self._q, self._v, self._dt, *self._fitted = self._fit.inputs
+        self._none = np.zeros(model.nv)
+        self._held: dict[int, int] | None = None
+        self._leans = False
+
+    def on(self, structure: Structure) -> ClosedChain:
+        """The same robot, at the same place, on another structure."""
+        out = ClosedChain(self.walker, structure)
+        out.origins, out.axes, out.sides = self.origins, self.axes, self.sides
+        return out
+
+    def place(self, q: Array) -> None:
+        """Where the hands are, of a body that is where a configuration has it."""
+        origins, self.axes, self.sides = self._hands(q)
+        self.origins = origins + q[:3]
+
+    def slip(self, held: Mapping[int, int]) -> float:
+        """Largest distance of a held hand from its hold [m]."""
+        gaps = [self.origins[arm] - self.structure.positions[hold] for arm, hold in held.items()]
+        return max((sqrt(gap.dot(gap)) for gap in gaps), default=0.0)
+
+    def settle(self, q: Array, held: Mapping[int, int]) -> tuple[Array, float]:
+        """A configuration with the same joints and the body where the held hands put it.
+
+        Args:
+            q: its joints count; its body pose only says which of the allowed rolls a hand has.
+            held: row of the arm -> row of the hold.
+
+        Returns:
+            (q, slip): slip is the largest distance of a held hand from its hold [m].
+
+        Raises:
+            RangeError: nothing is held, or by one hand that may roll: the body's pose is not determined.
+        """
+        return self.move(q, self._none, 0.0, held)
+
+    def move(self, q: Array, v: Array, dt: float, held: Mapping[int, int]) -> tuple[Array, float]:
+        """As :meth:`settle`, with the joints moved on for a time by their rates: q + v dt.
+
+        Args:
+            q: before. v: rates; those of the body do not count. dt: [s].
+        """
+        if held != self._held or self._leans:
+            self._take(held, q)
+        self._q[:], self._v[:], self._dt[0] = q, v, dt
+        self._fit.run()
+        found, nq, count = self._fit.output.copy(), len(q), len(self.origins)
+        moved = found[nq + 1 :].reshape(-1, 3)
+        self.origins, self.axes, self.sides = moved[:count], moved[count : 2 * count], moved[2 * count :]
+        return found[:nq], found.item(nq)
+
+    def _take(self, held: Mapping[int, int], q: Array) -> None:
+        """What depends on the holds alone, until other ones are held.
+
+        The x axis of a hand that leans and must not roll goes with its z axis, so it is taken anew every time, from the
+        hands on the body as it was.
+        """
+        structure = self.structure
+        if not held or (len(held) == 1 and structure.free_rolls[next(iter(held.values()))]):
+            raise RangeError("held", dict(held), "the body's pose needs two hands, or one that cannot roll")
+        arms, holds, count = list(held), list(held.values()), len(self.origins)
+        rolled = [arm for arm, hold in held.items() if not structure.free_rolls[hold]]
+        theirs, mask = np.zeros((count, 3)), np.zeros((count, 1))
+        theirs[arms], mask[arms] = structure.positions[holds], 1.0
+        mean = mask[:, 0] / len(arms)
+        centre = mean @ theirs
+        weights = np.zeros((3 * count, 3))
+        weights[:count] = mask * (theirs - centre)
+        lengths = np.where(structure.tilts[holds] < LEAST_TILT, AXIS_LENGTH, BALL_LENGTH)
+        weights[[count + arm for arm in arms]] = lengths[:, None] ** 2 * structure.axes[holds]
+        if rolled:
+            _, axes, sides = self._hands(q)
+        for arm in rolled:
+            weights[2 * count + arm] = AXIS_LENGTH**2 * allowed_x(structure, held[arm], sides[arm], axes[arm])
+        self._leans = any(structure.tilts[held[arm]] >= LEAST_TILT for arm in rolled)
+        # The weights of the origins sum to nothing, so their mean does not count in A = weights' ours
+        for numbers, given in zip(self._fitted, (weights, mean, centre, mask, theirs), strict=True):
+            numbers[:] = given.ravel()
+        self._held = dict(held)
+
+    def _hands(self, q: Array) -> Array:
+        """Origins, z axes and x axes of the hands ``[3, arms, 3]``, turned as a configuration has the body."""
+        self._still[7:] = q[7:]
+        pin.framesForwardKinematics(self._model, self._data, self._still)
+        out: Array = np.concatenate(self._rows).reshape(3, -1, 3).dot(pin.Quaternion(q[3:7]).matrix().T)
+        return out

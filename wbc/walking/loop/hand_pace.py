@@ -1,0 +1,87 @@
+"""How fast a swinging hand's aim goes on, and when a hand may close."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import dist, hypot, sqrt
+
+import numpy as np
+
+from wbc.robots import WalkerData
+from wbc.validation import Array
+from wbc.walking.loop.stack import SWING_GAIN
+from wbc.walking.loop.state import Swinging
+
+#: A swing waits for a hand that is this far behind its aim [m]: full pace below half of it, least pace beyond
+BEHIND, LEAST_PACE = 0.02, 0.05
+#: A hand is near its hold from this part of the wrist's way on; its joints are then this near to theirs [rad]
+LANDING, TURNED = 0.97, 0.5
+#: Part of the tolerances within which a hand closes: it is still moving a little as it does
+SURE = 0.7
+#: A hand closes on a compliant hold when it leans by less than this part of what it may
+CLOSING_TILT = 0.5
+#: The pace of a hand changes from nothing to all in [s]
+HAND_RAMP = 0.2
+#: After an abort it goes to nothing in [s]: joints at their rates need 0.25 s
+HAND_STOP = 0.3
+
+
+def hand_pace(swinging: Swinging, place: Array, turned: bool, early: float, pace: float) -> float:
+    """Part of full speed at which the aim of a hand should go on.
+
+    Args:
+        place: of the hand [m]. turned: its wrist is on the branch that it lands with.
+        early: path time until the hold can be held [s]. pace: of the body.
+    """
+    aim = swinging.aim
+    # In plain floats: three numbers are too few for numpy to be quick
+    (a, b, c), (x, y, z), (u, v, w) = aim.position.tolist(), place.tolist(), aim.velocity.tolist()
+    x, y, z, speed = a - x, b - y, c - z, sqrt(u * u + v * v + w * w)
+    along = (x * u + y * v + z * w) / speed if speed > 1e-6 else 0.0
+    across = sqrt(max(x * x + y * y + z * z - along * along, 0.0))
+    # A hand that is ahead must not be stopped: it could not
+    wanted = min(max(1.5 - (max(along, 0.0) + across) / BEHIND, LEAST_PACE), 1.0)
+    wait = early - pace * (swinging.law.duration - swinging.clock)
+    if wait > 0.0:
+        wanted /= 1.0 + 4.0 * wait
+    return 0.0 if aim.blend > LANDING and not turned else wanted
+
+
+def at_rest(
+    before: tuple[Array, Array, Array],
+    hand: tuple[Array, Array, Array],
+    hold: tuple[Array, Array],
+    x: Array | None,
+    tilt: float,
+    data: WalkerData,
+    dt: float,
+) -> bool:
+    """Whether a hand is on its hold and still, so that it may close.
+
+    Args:
+        before, hand: its place [m], z axis and x axis a tick ago and now. hold: place and z axis.
+        x: the x axis that it is to have, None if it may roll. tilt: ``max_tilt`` of the hold [rad].
+    """
+    (place, axis, side), (there, wanted) = hand, hold
+    # A hand at the turning point of an overshoot is slow, but what is left brings it up to speed again
+    near, slow = SURE * data.close_distance, SURE * data.close_speed
+    if dist(place, there) >= min(near, slow / SWING_GAIN) or dist(place, before[0]) / dt >= slow:
+        return False
+    turn = angle(axis, before[1])
+    if x is not None:
+        turn = hypot(turn, angle(side, before[2]))
+        if abs(np.arctan2(side @ np.cross(wanted, x), side @ x)) >= SURE * data.close_angle:
+            return False
+    leaned = max(SURE * data.close_angle, CLOSING_TILT * tilt)
+    return turn / dt < SURE * data.close_rate and angle(axis, wanted) < leaned
+
+
+def turned(swinging: Swinging, wrist: Sequence[float]) -> bool:
+    """Whether joints 4 and 5, and 6 where the roll counts, are near to where they are to be [rad]."""
+    (a, b, c), (d, e, f) = wrist, swinging.bend
+    return abs(a - d) < TURNED and abs(b - e) < TURNED and (swinging.x is None or abs(c - f) < TURNED)
+
+
+def angle(one: Array, other: Array) -> float:
+    """Between two unit vectors [rad]; exact for small angles."""
+    return float(np.arctan2(np.linalg.norm(np.cross(one, other)), one @ other))

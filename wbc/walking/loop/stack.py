@@ -1,0 +1,167 @@
+"""The stack of a walking body: held hands exactly, the body's pose, the swinging hand, wrists and joint limits."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from wbc import tasks
+from wbc.controller.controller import Controller
+from wbc.controller.input_group import InputGroup
+from wbc.controller.stack import Stack
+from wbc.robots import Arm, Walker
+from wbc.validation import Array
+from wbc.walking.holds.structure import Structure
+from wbc.walking.loop.hold_items import HoldItems
+from wbc.walking.loop.state import Axes
+from wbc.walking.planner.grips.rolls import ANY
+
+#: Control period [s]
+DT = 0.01
+#: Weights: the body does not give way to a swing, a swing not to postures
+BODY, SWING, AXIS, WRIST, UPRIGHT = 1e4, 10.0, 3.0, 1e-3, 100.0
+#: Gains [1/s] of body, swinging hand, its axis and the wrists
+BODY_GAIN, SWING_GAIN, AXIS_GAIN, WRIST_GAIN = 12.0, 25.0, 20.0, 12.0
+#: On the way the wrist follows its postures; near the next hold its axis counts
+FREE_AXIS, FREE_WRIST, RESTING = 1e-6, 40.0, 0.1
+
+
+class WalkStack:
+    """A compiled stack with items for each arm that holds and for each that swings; the state of the hand switches.
+
+    Args:
+        collisions: keep the links clear of each other (compiles longer and costs time in every tick).
+        backend: as of ``Stack.compile``.
+    """
+
+    def __init__(
+        self, walker: Walker, structure: Structure, dt: float = DT, *, collisions: bool = True, backend: str = "auto"
+    ) -> None:
+        self.walker, self.structure, self.dt = walker, structure, dt
+        stack = Stack(walker.robot, dt=dt, calm=False)
+        stack.add(tasks.EndEffector("body"), name="body", weight=BODY)
+        self._holds = HoldItems(stack, walker, structure, dt)
+        for arm in walker.arms:
+            stack.add(tasks.EndEffector(arm.hand, kind="position"), name=f"{arm.name} swing", weight=SWING)
+            stack.add(tasks.AxisAlign(arm.hand), name=f"{arm.name} axis", weight=AXIS)
+        stack.add(tasks.Posture(), name="posture", weight=WRIST)
+        stack.add(tasks.JointLimits(), name="limits")
+        if collisions:
+            margin = walker.data.clearance  # type: ignore[union-attr]
+            stack.add(tasks.SelfCollision(margin=margin), name="links")
+        self.stack = stack
+        self.controller: Controller = stack.compile(backend=backend)
+        self._posture = np.array(walker.robot.neutral)
+        self._mask = np.full(walker.robot.nv - 6, RESTING)
+        self._turning = np.zeros(walker.robot.nv)
+        self._near = (-1, False)
+        items: Any = self.controller
+        self._body = InputGroup(self.controller, [("body", "target", None), ("body", "feedforward", None)])
+        self._rest = items["posture"]
+        self._holds.of(self.controller)
+        self._swings, self._axes = ([items[f"{arm.name} {kind}"] for arm in walker.arms] for kind in ("swing", "axis"))
+        items["body"].gain, self._rest.gain = BODY_GAIN, WRIST_GAIN
+        self._hands = [self._hand(arm) for arm in walker.arms]
+        for swing, axis in zip(self._swings, self._axes, strict=True):
+            swing.gain, axis.gain = SWING_GAIN, AXIS_GAIN
+
+    def hold(self, arm: int, hold: int, roll: int = ANY) -> None:
+        """A closed hand, at one of the rolls of its hold: the hold is exact; a hand that may tilt prefers not to.
+
+        Raises:
+            RangeError: a hold of a kind that the stack was not compiled for.
+        """
+        tilts = self._holds.hold(arm, self.structure, hold, roll)
+        self._swings[arm].enabled, self._axes[arm].enabled = False, tilts
+        if tilts:
+            axis = self._axes[arm]
+            axis.target, axis.feedforward, axis.weight = self.structure.axes[hold], np.zeros(3), UPRIGHT
+        self._mask[self._joints(arm)] = RESTING
+        self._still(arm)
+        self._rest.mask = self._mask
+
+    def release(self, arm: int) -> None:
+        """An open hand, which follows aims."""
+        self._holds.release(arm)
+        self._swings[arm].enabled = self._axes[arm].enabled = True
+        self._catch_up()
+
+    def rest(self, arm: int, place: Array, axis: Array) -> None:
+        """A free hand that stays where it is."""
+        swing, aligned = self._swings[arm], self._axes[arm]
+        swing.target, swing.feedforward = place, np.zeros(3)
+        aligned.target, aligned.feedforward, aligned.weight = axis, np.zeros(3), AXIS
+        self._still(arm)
+
+    def body(self, aim: Array) -> None:
+        """The pose that the body goes to, rotation by columns and position, and its rate in the structure's axes
+        (linear; angular) ``[18]`` [m, m/s, rad/s].
+        """
+        self._body.write(aim)
+
+    def swing(self, arm: int, followed: Array, at_hold: Axes | None) -> None:
+        """What a free hand follows.
+
+        Args:
+            followed: its position [m] and velocity [m/s], joints 4 to 6 [rad] and their rates [rad/s] ``[12]``.
+            at_hold: axes of a hand near its hold: they then count and not the wrist. None on the way.
+        """
+        near = at_hold is not None
+        if self._near != (arm, near):
+            self._catch_up()
+            aligned, resting, joints = self._axes[arm], self._rest, self._joints(arm)
+            self._posture[7:][joints][3:], self._turning[6:][joints][3:] = followed[6:9], followed[9:]
+            aligned.weight = AXIS if near else FREE_AXIS
+            self._mask[joints][:3] = 0.0
+            self._mask[joints][3:] = 1.0 if near else FREE_WRIST
+            self._holds.turn(arm, None)
+            resting.target, resting.feedforward, resting.mask = self._posture, self._turning, self._mask
+            self._near = arm, near
+        if at_hold is not None:
+            self._axes[arm].target, self._axes[arm].feedforward = at_hold.z, at_hold.z_rate
+            self._holds.turn(arm, at_hold.x, at_hold.x_rate)
+        self._hands[arm].write(followed)
+
+    def joints(self, arm: int, posture: Array, rates: Array) -> None:
+        """A free hand follows the joints of its arm: ``[6]`` [rad] and their rates [rad/s]."""
+        self._swings[arm].enabled = self._axes[arm].enabled = False
+        mine = self._joints(arm)
+        self._catch_up()
+        self._mask[mine] = FREE_WRIST
+        self._posture[7:][mine], self._turning[6:][mine] = posture, rates
+        self._rest.mask, self._rest.target, self._rest.feedforward = self._mask, self._posture, self._turning
+
+    def settle(self, arm: int, place: Array, axis: Array, x: Array | None) -> None:
+        """A hand that follows joints comes to rest at a place, with a z axis, and an x axis if its roll counts."""
+        self._swings[arm].enabled = self._axes[arm].enabled = True
+        self._holds.turn(arm, x)
+        self.rest(arm, place, axis)
+        self._mask[self._joints(arm)] = RESTING
+        self._rest.mask = self._mask
+
+    def _still(self, arm: int) -> None:
+        """Wrists of arms that do not swing have no rates of their own."""
+        self._catch_up()
+        self._turning[6:][self._joints(arm)] = 0.0
+        self._rest.feedforward = self._turning
+
+    def _catch_up(self) -> None:
+        """Postures and rates become what was written last: of a swinging hand only joints 4 to 6 are, tick by tick."""
+        arm = self._near[0]
+        followed = None if arm < 0 else self._hands[arm].written
+        if followed is not None:
+            joints = self._joints(arm)
+            self._posture[7:][joints][3:], self._turning[6:][joints][3:] = followed[6:9], followed[9:]
+        self._near = (-1, False)
+
+    def _joints(self, arm: int) -> slice:
+        of = self.walker.arms[arm].v
+        return slice(of.start - 6, of.stop - 6)
+
+    def _hand(self, arm: Arm) -> InputGroup:
+        """What a swinging hand follows: its place and velocity, joints 4 to 6 and their rates."""
+        name = f"{arm.name} swing"
+        wrist, turning = slice(arm.q.start + 3, arm.q.stop), slice(arm.v.start + 3, arm.v.stop)
+        posture = ("posture", "target", wrist), ("posture", "feedforward", turning)
+        return InputGroup(self.controller, [(name, "target", None), (name, "feedforward", None), *posture])

@@ -1,0 +1,129 @@
+"""What a walk is made of from tick to tick: hands, swings, ticks and events."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal, NamedTuple
+
+import numpy as np
+import pinocchio as pin
+
+from wbc.validation import Array
+from wbc.walking.planner.swings.law import Aim, SwingLaw
+
+Hand = Literal["closed", "opening", "open", "closing"]
+#: Of joints 4 to 6
+Wrist = tuple[float, float, float]
+What = Literal["lift", "land", "failed", "vanished", "replanned", "refused"]
+
+
+class Axes(NamedTuple):
+    """z axis of a hand and its rate [1/s], its x axis and the rate of that; None where the roll does not count."""
+
+    z: Array
+    z_rate: Array
+    x: Array | None
+    x_rate: Array | None
+
+
+@dataclass(eq=False)
+class Swinging:
+    """A hand on its way.
+
+    Attributes:
+        arm: its row. hold: row of the hold that it goes to. grip: which it is to be.
+        law: the aims. clock: time on the law [s]. aim: the one at that time.
+        pace: part of full speed. latch: time until the latch is through [s].
+        place, axis, side: of the hand one tick before and its z and x axes, for speeds.
+        x: the x axis that the hand has on its hold; None if it may roll there.
+        wrist: joints 4 to 6 of a hand that was in the air when it was sent [rad]; None: those of the grip it leaves.
+        bend: joints 4 to 6 as they are to be now [rad].
+        counted: it is a move of the plan, not one of an earlier plan, or one that brings a free hand to it.
+        waits: the body stands until the hand has landed.
+    """
+
+    arm: int
+    hold: int
+    grip: int
+    law: SwingLaw
+    latch: float
+    counted: bool = True
+    waits: bool = False
+    clock: float = 0.0
+    pace: float = 1.0
+    state: Hand = "opening"
+    tries: int = 0
+    place: Array = field(default_factory=lambda: np.zeros(3))
+    axis: Array = field(default_factory=lambda: np.zeros(3))
+    side: Array = field(default_factory=lambda: np.zeros(3))
+    x: Array | None = None
+    wrist: Wrist | None = None
+    bend: Wrist = (0.0, 0.0, 0.0)
+    aim: Aim = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.aim = self.law.at(self.clock)
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """Where a walk begins that does not begin on the holds of its plan.
+
+    Attributes:
+        q: configuration. held: row of the arm -> row of the hold. time: [s].
+        opening: row of an arm that opens, and of the hold that it leaves; None: none does.
+    """
+
+    q: Array
+    held: Mapping[int, int]
+    time: float = 0.0
+    opening: tuple[int, int] | None = None
+
+
+@dataclass(eq=False, slots=True)
+class Tick:
+    """What happened in one tick; arrays are the tick's own.
+
+    Attributes:
+        time: [s]. path_time: u [s]. q, v: configuration after it, and what the controller returned.
+        hands: state of each hand. holds: row of the hold that each hand is at or goes to, -1 for none.
+        target: pose that the body was to have: position [m] and quaternion x, y, z, w.
+        body_error: its distance from it [m].
+        slip: of the worst held hand [m].
+        status: of the controller. cost: of the controller's tick [s].
+        fixed: the body is declared fixed: fewer hands hold than it needs, and have since the beginning.
+    """
+
+    time: float
+    path_time: float
+    q: Array
+    v: Array
+    hands: tuple[Hand, ...]
+    holds: tuple[int, ...]
+    target: Array
+    body_error: float
+    slip: float
+    status: str
+    cost: float
+    fixed: bool = False
+
+    @property
+    def command(self) -> pin.SE3:
+        """:attr:`target` as a pose."""
+        return pin.XYZQUATToSE3(self.target)
+
+
+@dataclass(frozen=True)
+class Event:
+    """A hand that was lifted, has landed or failed to grasp; holds that vanished; a new plan.
+
+    Attributes:
+        time: [s]. what: which of these. arm, hold: names; "" for none. path_time: u [s].
+    """
+
+    time: float
+    what: What
+    arm: str
+    hold: str
+    path_time: float

@@ -1,0 +1,175 @@
+"""Motions of one hand while the body stands: joint angles along poses, checked before anything moves."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from math import ceil
+
+import numpy as np
+import pinocchio as pin
+
+from wbc.errors import WbcError
+from wbc.robots import Walker
+from wbc.validation import Array
+from wbc.walking.arms.puma import LIMIT_NAMES, ArmKinematics
+from wbc.walking.planner.grips.conflicts import ArmClearance
+from wbc.walking.planner.swings.clearance import SwingClearance
+
+#: Parts of joint rates and accelerations that motions use, and room to the other limits [rad]
+PART, ROOM = 0.9, 0.01
+#: Motions that ask too much of a joint are made slower, by this factor and at most so often
+SLOWER, TRIES = 1.25, 12
+#: Width of the edge of that distance, and what the checker leaves of the clearance, less a half [m]
+EDGE, SLACK = 0.002, 5e-5
+#: A hand within this of a waypoint is there [m, rad]
+THERE = 1e-9
+
+
+class ArmRefused(WbcError):
+    """A motion of a hand that is not possible, with the reason; nothing has moved."""
+
+
+@dataclass(frozen=True)
+class Standing:
+    """A body that stands, and what a hand of it must stay clear of.
+
+    Attributes:
+        arm: row of the arm that moves. body: pose of the body. q: configuration. dt: control period [s].
+    """
+
+    walker: Walker
+    clear: SwingClearance
+    arms: ArmClearance
+    arm: int
+    body: pin.SE3
+    q: Array
+    dt: float
+
+    def along(self, poses: Sequence[pin.SE3], speed: float, turn_rate: float) -> Array:
+        """Joints tick by tick ``[n, 6]`` [rad] from where the arm is through poses of the hand in the structure.
+
+        From pose to pose the hand goes straight and turns about one axis with x = 10 s^3 - 15 s^4 + 6 s^5, whose top
+        speed is 15 / 8 of the mean; it stops at each. Slower than asked where a joint needs it.
+
+        Raises:
+            ArmRefused: a pose out of reach, a limit, the structure or another arm in the way.
+        """
+        out = self._through(self.q[self.walker.arms[self.arm].q][None], poses, speed, turn_rate)
+        self._check_clear(out)
+        return out
+
+    def onto(self, off: Sequence[pin.SE3], on: Sequence[pin.SE3], speed: float, turn_rate: float) -> Array:
+        """As :meth:`along` through ``off``, by joints to the first pose of ``on``, and straight through the others.
+
+        The posture there is the one that is reached soonest of those that lead on.
+
+        Raises:
+            ArmRefused: none does; the reason is that of the last one.
+        """
+        kinematics, base = self._kinematics, self._base
+        rows = self._through(self.q[self.walker.arms[self.arm].q][None], off, speed, turn_rate)
+        found, valid = kinematics.inverse(base.actInv(on[0]).homogeneous[None])
+        choices = [
+            kinematics.nearest(found[:, k : k + 1], valid[:, k : k + 1], rows[-1]) for k in range(found.shape[1])
+        ]
+        why = ArmRefused("hold", on[-1].translation.tolist(), "out of reach")
+        for q, branch, _ in sorted(choices, key=lambda choice: float(choice[2][0])):
+            if branch[0] < 0:
+                continue
+            begin, change = rows[-1], q[0] - rows[-1]
+            try:
+                across = self._timed(lambda x, a=begin, d=change: a + x[:, None] * d, 0.5, "hold", on[0])  # type: ignore[misc]
+                out = self._through(np.concatenate([rows, across[1:]]), on[1:], speed, turn_rate)
+                self._check_clear(out)
+            except ArmRefused as error:
+                why = error
+                continue
+            return out
+        raise why
+
+    @property
+    def _kinematics(self) -> ArmKinematics:
+        return ArmKinematics(self.walker.data)  # type: ignore[arg-type]
+
+    @property
+    def _base(self) -> pin.SE3:
+        return self.body * self.walker.arms[self.arm].base
+
+    def _through(self, rows: Array, poses: Sequence[pin.SE3], speed: float, turn_rate: float) -> Array:
+        """Rows, and from their last one straight through poses."""
+        here = self._base * pin.SE3(self._kinematics.forward(rows[-1]))
+        for k, pose in enumerate(poses):
+            step = pin.log3(here.rotation.T @ pose.rotation)
+            least = max(np.linalg.norm(pose.translation - here.translation) / speed, np.linalg.norm(step) / turn_rate)
+            if least >= THERE:
+                way = here, pose, step, rows[-1], f"poses[{k}]"
+                more = self._timed(lambda x, way=way: self._straight(x, *way), 15 / 8 * float(least), way[4], pose)  # type: ignore[misc]
+                rows = np.concatenate([rows, more[1:]])
+            here = pose
+        return rows
+
+    def _timed(self, make: Callable[[Array], Array], duration: float, field: str, pose: pin.SE3) -> Array:
+        """Rows of one part of the way, in the duration [s] or in what its joints need.
+
+        Args:
+            make: parts of the way in [0, 1] -> rows.
+        """
+        data = self._kinematics.data
+        for _ in range(TRIES):
+            s = np.linspace(0.0, 1.0, max(ceil(duration / self.dt), 2) + 1)
+            out = make(s**3 * (10.0 - 15.0 * s + 6.0 * s * s))
+            first = np.abs(np.diff(out, axis=0)) / self.dt / (PART * np.array(data.joint_rates))
+            second = np.abs(np.diff(out, 2, axis=0)) / self.dt**2 / (PART * np.array(data.joint_accelerations))
+            worst = np.maximum(first.max(axis=0), second.max(axis=0))
+            if worst.max() <= 1.0:
+                return out
+            duration *= SLOWER
+        joint = int(worst.argmax()) + 1
+        raise ArmRefused(field, pose.translation.tolist(), f"joint {joint} would have to turn too fast")
+
+    def _straight(self, x: Array, here: pin.SE3, pose: pin.SE3, step: Array, start: Array, field: str) -> Array:
+        """Joints at parts x of the way from a pose to another that is turned by ``step``."""
+        kinematics, base = self._kinematics, self._base
+        hands = [
+            pin.SE3(here.rotation @ pin.exp3(step * part), here.translation * (1 - part) + pose.translation * part)
+            for part in x.tolist()
+        ]
+        found, valid = kinematics.inverse(np.array([(base.actInv(h)).homogeneous for h in hands]), limits=False)
+        rows = [start]
+        for q, solved in zip(found[1:], valid[1:], strict=True):
+            near, branch, _ = kinematics.nearest(q[None], solved[None], rows[-1])
+            if branch[0] < 0:
+                raise ArmRefused(field, pose.translation.tolist(), "out of reach")
+            rows.append(near[0])
+        out = np.array(rows)
+        margins = kinematics.margins(out[1:])
+        if margins.min() < min(ROOM, float(kinematics.margins(start).min())):
+            name = LIMIT_NAMES[int(margins.min(axis=0).argmin())]
+            raise ArmRefused(field, pose.translation.tolist(), f"the way leads beyond the {name}")
+        return out
+
+    def _check_clear(self, rows: Array) -> None:
+        """Refuse what comes too near to the structure or to another arm; the hold that the hand leaves is exempt."""
+        points = self.arms.points(self.arm, rows)
+        bodies = np.repeat(self.body.homogeneous[None, None], len(rows), axis=1)
+        hands = points[[0, -1], 5] @ self.body.rotation.T + self.body.translation
+        if not self.clear.structure(points[None], bodies, hands[None])[0] or not self._leaves(points, hands):
+            raise ArmRefused("poses", len(rows), "the arm would come too near to the structure")
+        for other, arm in enumerate(self.walker.arms):
+            if other == self.arm:
+                continue
+            held = np.repeat(self.arms.points(other, self.q[arm.q])[None], len(rows), axis=0)
+            if self.arms.near(points, held).any():
+                raise ArmRefused("poses", len(rows), f"the arm would come too near to {arm.name}")
+
+    def _leaves(self, points: Array, ends: Array) -> bool:
+        """Whether the hand is clear of the structure where it comes out of the distance in which it may be near.
+
+        Swings are so by their shape, and :class:`SwingClearance` does not look there; this hand may go anywhere.
+        """
+        data, places = self._kinematics.data, points[:, 5] @ self.body.rotation.T + self.body.translation
+        far = np.linalg.norm(places[:, None] - ends, axis=2).min(axis=1) - data.exempt_distance
+        edge = (far > 0.0) & (far < EDGE)
+        room = self.clear.room(places[edge]) - data.hand_radius - data.clearance
+        return bool((room > -SLACK).all())

@@ -1,0 +1,93 @@
+"""The compiled inner loops of the planner; where there is no compiler, numpy does the same."""
+
+from __future__ import annotations
+
+import ctypes
+import functools
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wbc.errors import CompileError
+from wbc.native import toolchain
+from wbc.native.kernel import kernel
+from wbc.robots import WalkerData
+from wbc.walking.holds.structure import Structure
+from wbc.walking.holds.surface import CylinderSurface
+
+_SOURCES = Path(__file__).parent
+_FILES = ("arm.h", "surface.h", "curve.h", "grips.h", "near.h", "speeds.h", "tracks.h", "ways.h", "planner.c")
+
+
+class Arm(ctypes.Structure):
+    """Arm of native/arm.h."""
+
+    _fields_ = [
+        *((name, ctypes.c_double) for name in ("neck", "offset", "upper", "fore", "hand")),
+        *((name, ctypes.c_double * 6) for name in ("limits", "rates", "accelerations")),
+        *((name, ctypes.c_double) for name in ("elbow", "shoulder")),
+    ]
+
+
+class Table(ctypes.Structure):
+    """Grips of native/tracks.h."""
+
+    _fields_ = [(name, ctypes.c_void_p) for name in ("postures", "offset", "first", "last")]
+
+
+@functools.cache
+def arm(data: WalkerData) -> Arm:
+    """An arm's numbers as the compiled code wants them."""
+    lengths = data.neck_length, data.shoulder_offset, data.upper_arm_length, data.forearm_length, data.hand_length
+    sixes = ((ctypes.c_double * 6)(*v) for v in (data.position_limits, data.joint_rates, data.joint_accelerations))
+    return Arm(*lengths, *sixes, data.elbow_limit, data.shoulder_limit)
+
+
+#: Numbers in a row
+Numbers = ctypes.Array[ctypes.c_double]
+
+
+def doubles(numbers: Sequence[float]) -> Numbers:
+    """Numbers in a row, as the compiled code wants them."""
+    return (ctypes.c_double * len(numbers))(*numbers)
+
+
+def at(array: NDArray[Any]) -> ctypes.c_void_p:
+    """Where the numbers of an array lie; it must be contiguous and outlive the call."""
+    assert array.flags.c_contiguous
+    # Half as long as array.ctypes.data
+    return ctypes.c_void_p(array.__array_interface__["data"][0])
+
+
+def packed(array: Any) -> NDArray[np.float64]:
+    """An array of doubles, row by row in memory."""
+    return np.ascontiguousarray(array, dtype=np.float64)
+
+
+@functools.cache
+def library() -> ctypes.PyDLL | None:
+    """The compiled code, from the cache; None where there is no compiler, or it fails, which the log says."""
+    if not toolchain.available():
+        return None
+    try:
+        path = kernel(_SOURCES, _FILES)
+    except CompileError as error:
+        toolchain.fall_back(str(error))
+        return None
+    # Not CDLL: a call takes microseconds, giving up the interpreter's lock would cost as much
+    return ctypes.PyDLL(str(path))
+
+
+def plain_surface(structure: Structure) -> Numbers | None:
+    """A point, a direction and a radius, 0 for a plane.
+
+    None where there is more than a surface, or none, or no compiler.
+    """
+    surface = structure.surface
+    if surface is None or structure.obstacles or library() is None:
+        return None
+    radius = surface.radius if isinstance(surface, CylinderSurface) else 0.0
+    return doubles([*surface.pose.translation, *surface.pose.rotation[:, 2], radius])

@@ -1,0 +1,178 @@
+"""A body path round what cannot be passed: a way from cell to cell, as a path."""
+
+from __future__ import annotations
+
+import heapq
+import itertools
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import ceil, pi
+
+import numpy as np
+import pinocchio as pin
+
+from wbc.robots import Walker
+from wbc.validation import Array
+from wbc.walking.body_path import BodyPath
+from wbc.walking.holds.structure import Structure
+from wbc.walking.planner.detours.cell_grips import cell_grips
+from wbc.walking.planner.detours.cells import ALONG, Cells, Ints, Mesh, cells_about
+from wbc.walking.planner.detours.pair_search import Node, PairSearch
+
+#: How fast the body goes down [m/s] and turns [rad/s]
+DOWN_SPEED, TURN_SPEED = 0.05, 0.1
+#: Half of the time over which its velocity changes [s]
+CORNER = 0.3
+#: Least speed beside the path [m/s]
+SLOW = 0.01
+#: What a cell off the path costs for each m beside, m lower and rad turned; a step along the path costs 1
+DEAR = np.array([0.1, 0.2, 0.1])
+
+
+@dataclass(frozen=True, eq=False)
+class BodyRoute:
+    """What was found.
+
+    Attributes:
+        path: of the body; None if there is no way.
+        complete: the search looked at all that it can reach, so there is none among its cells.
+        separating: ids of the holds at which the way ends; empty if there is one.
+        text: how far the body goes off its path, or why there is no way.
+    """
+
+    path: BodyPath | None
+    complete: bool
+    separating: tuple[str, ...]
+    text: str
+
+
+def find_route(
+    walker: Walker,
+    structure: Structure,
+    path: BodyPath,
+    *,
+    mesh: Mesh = ALONG,
+    start: Mapping[int, int] | None = None,
+    deadline: float | None = None,
+) -> BodyRoute:
+    """A way from a path's beginning to its end, along it, beside it, lower and turned.
+
+    Args:
+        mesh: how far beside the path, how low, and how closely it is looked.
+        start: arm -> hold (rows) of hands that hold at the beginning. deadline: of ``time.perf_counter``.
+    """
+    cells = cells_about(path, structure, mesh)
+    grips = cell_grips(walker, structure, cells)
+    outcome = PairSearch(walker, structure, cells, grips).run(start, deadline)
+    if not outcome.nodes:
+        names = tuple(structure.ids[k] for k in sorted({int(grips.hold[g]) for g in outcome.reached}))
+        number = f"{outcome.expanded} landings looked at{'' if outcome.complete else ', more are left'}"
+        where = f"beyond {', '.join(names)}" if names else "from the start"
+        text = f"up to {mesh.beside * mesh.side:.2f} m beside the path there is no way {where} ({number})"
+        return BodyRoute(None, outcome.complete, names, text)
+    chain = shortest(cells, outcome.nodes, outcome.final)
+    off = cells.offsets(np.array(chain))
+    far = np.abs(off[:, 1]).max(), off[:, 2].max(), np.degrees(np.abs(off[:, 3]).max())
+    text = f"up to {far[0]:.2f} m beside, {far[1]:.2f} m lower, turned by {far[2]:.0f} deg"
+    return BodyRoute(as_path(cells, chain, path), True, (), text)
+
+
+def shortest(cells: Cells, nodes: tuple[Node, ...], final: Ints) -> list[int]:
+    """The quickest chain of cells through the sets of nodes, each left where the next hand lands."""
+    sets = [set(node.cells.tolist()) for node in nodes]
+    doors = [*(set(node.landed.tolist()) for node in nodes[1:]), set(final.tolist())]
+    off = _dear(cells)
+    begin = (0, cells.start)
+    cost: dict[tuple[int, int], float] = {begin: 0.0}
+    came: dict[tuple[int, int], tuple[int, int] | None] = {begin: None}
+    queue, done = [(0.0, begin)], set[tuple[int, int]]()
+    while queue:
+        spent, here = heapq.heappop(queue)
+        if here in done:
+            continue
+        done.add(here)
+        layer, cell = here
+        if layer == len(nodes):
+            return _chain(came, here)
+        steps = [((layer, there), price) for there, price in _neighbours(cells, cell) if there in sets[layer]]
+        if cell in doors[layer]:
+            steps.append(((layer + 1, cell), 0.0))
+        for there, price in steps:
+            total = spent + price + (off[there[1]] if price else 0.0)
+            if total < cost.get(there, np.inf):
+                cost[there], came[there] = total, here
+                heapq.heappush(queue, (total, there))
+    raise AssertionError("sets of nodes are connected")
+
+
+def as_path(cells: Cells, chain: list[int], path: BodyPath) -> BodyPath:
+    """The path over a chain of cells, as fast as the given one along it."""
+    off = cells.offsets(np.array(chain))
+    poses = [pin.SE3(cells.frames[cell]) for cell in chain]
+    out = [poses[0].homogeneous[None]]
+    pace = _pace(path)
+    for (one, other), (first, last) in zip(itertools.pairwise(off), itertools.pairwise(poses), strict=True):
+        seconds = _seconds(other - one, pace)
+        count = max(ceil(seconds / path.spacing - 1e-9), 1)
+        step = pin.log6(first.actInv(last))
+        out.append(np.array([(first * pin.exp6(step * (k / count))).homogeneous for k in range(1, count + 1)]))
+    return BodyPath(_rounded(np.concatenate(out), round(CORNER / path.spacing)), path.spacing)
+
+
+def _rounded(poses: Array, most: int) -> Array:
+    """Means over each pose and up to ``most`` before and as many after it: velocities change over that long; the ends
+    stay.
+    """
+    rows = np.arange(len(poses))
+    half = np.minimum(np.minimum(rows, rows[::-1]), most)
+    total = np.concatenate([np.zeros((1, 4, 4)), np.cumsum(poses, axis=0)])
+    out: Array = (total[rows + half + 1] - total[rows - half]) / (2 * half + 1)[:, None, None]
+    u, _, v = np.linalg.svd(out[:, :3, :3])
+    out[:, :3, :3] = u @ v
+    out[[0, -1]] = poses[[0, -1]]
+    return out
+
+
+def _pace(path: BodyPath) -> float:
+    """Mean speed of a path's origin [m/s]; of one that only turns :data:`SLOW`."""
+    way = float(np.linalg.norm(np.diff(path.poses[:, :3, 3], axis=0), axis=1).sum())
+    return max(way / path.duration, SLOW)
+
+
+def _seconds(change: Array, pace: float) -> float:
+    time, side, lower, turned = np.abs(change).tolist()
+    turned = min(turned, 2.0 * pi - turned)
+    return float(max(np.hypot(time, side / pace), lower / DOWN_SPEED, turned / TURN_SPEED))
+
+
+def _dear(cells: Cells) -> Array:
+    off = np.abs(cells.offsets(np.arange(len(cells))))
+    out: Array = off[:, 1:] @ DEAR
+    return out
+
+
+def _neighbours(cells: Cells, cell: int) -> list[tuple[int, float]]:
+    """Cells next to one, diagonal ones too, and what it costs to go there."""
+    place = np.array(np.unravel_index(cell, cells.shape))
+    there = place + _AROUND
+    price = np.abs(there - place) @ _PRICES
+    there[:, 3] %= cells.shape[3]
+    inside = ((there >= 0) & (there < cells.shape)).all(axis=1)
+    there, price = there[inside], price[inside]
+    numbers = np.ravel_multi_index(tuple(there.T), cells.shape)
+    return list(zip(numbers.tolist(), price.tolist(), strict=True))
+
+
+def _chain(came: dict[tuple[int, int], tuple[int, int] | None], end: tuple[int, int]) -> list[int]:
+    out = [end[1]]
+    at = came[end]
+    while at is not None:
+        if at[1] != out[-1]:
+            out.append(at[1])
+        at = came[at]
+    return out[::-1]
+
+
+_AROUND = np.array([step for step in itertools.product((-1, 0, 1), repeat=4) if any(step)])
+#: What a step along the path, beside, lower and turned costs
+_PRICES = np.array([1.0, 1.0, 0.4, 0.6])

@@ -1,0 +1,208 @@
+"""The free-gait planner: from a structure and a body path to a plan."""
+
+from __future__ import annotations
+
+import functools
+import time
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
+from math import inf
+from typing import Literal
+
+from wbc import validation
+from wbc.errors import ShapeError
+from wbc.robots import Walker
+from wbc.validation import Array
+from wbc.walking.body_path import BodyPath
+from wbc.walking.holds.structure import Structure
+from wbc.walking.planner.detours.ways_round import ways_round
+from wbc.walking.planner.fewest import fewer_slices
+from wbc.walking.planner.grips.table import Grips, grip_slices
+from wbc.walking.planner.plan import NoPlanError, Plan, Regrasp
+from wbc.walking.planner.slices import Slices, drained
+from wbc.walking.planner.sound import sound_slices
+from wbc.walking.planner.stances.search import HOVER, Found, StanceSearch
+from wbc.walking.planner.starts import ALL_STARTS, NOTHING, STARTS, Beginning, stance_slices
+from wbc.walking.planner.swings.law import SwingLaw
+
+Objective = Literal["velocity", "destination"]
+
+#: Delays of one swing that velocity mode allows one after the other [s]
+DELAYS = (0.0, 0.25, 0.5, 1.0, 2.0, float("inf"))
+SOON = (0.0, 0.25, float("inf"))
+#: Where all searches fail, the one with any delay is made again, so many times as wide
+WIDER = 5
+
+
+def plan_walk(
+    walker: Walker,
+    structure: Structure,
+    path: BodyPath,
+    *,
+    start: Mapping[str, str] | None = None,
+    postures: Mapping[str, Array] | None = None,
+    avoid: Mapping[str, Collection[str]] | None = None,
+    objective: Objective = "velocity",
+    width: int | None = 16,
+    time_budget: float | None = None,
+    partial: bool = False,
+    detour: bool = False,
+) -> Plan:
+    """Which hands to move where so that the body can follow a path.
+
+    Velocity: of the plans that delay no swing by more than 0, else 0.25, 0.5, ... s, one with the fewest re-grasps.
+    Destination: the fewest re-grasps, however much the body slows down.
+
+    Args:
+        start: arm name -> hold id of the hands that hold at the beginning; default: the planner chooses.
+        postures: arm name -> its joints now [rad]: a hand that holds keeps the branch of its wrist.
+        avoid: arm name -> holds that it does not begin on.
+        width: stances kept for each number of re-grasps; None: all, which finds the fewest.
+        time_budget: [s]; after it what is found is returned or refused.
+        partial: return a plan that does not lead to the end instead of refusing.
+        detour: where the body cannot follow the path, look for a way round: lower, turned, beside it, see
+            :mod:`wbc.walking.planner.detours.ways_round`; the plan's path says what was found.
+
+    Raises:
+        UnknownNameError: another arm, hold or objective. ShapeError: a walker that is no body with PUMA arms.
+        NoPlanError: there is no way, with where it ends, holds and limits.
+    """
+    beginning = start or {}, postures or {}, avoid or {}
+    deadline = None if time_budget is None else time.perf_counter() + time_budget
+    search = functools.partial(
+        plan_slices, walker, structure, width=width, deadline=deadline, thorough=time_budget is None
+    )
+    # Where a way round is looked for, the widest searches come last
+    narrow = [(delay, width) for delay in (DELAYS if objective == "velocity" else DELAYS[-1:])] if detour else ()
+    plan = drained(search(path, beginning, objective=objective, tries=narrow))
+    if not plan.complete and detour:
+        rows = {arm.name: k for k, arm in enumerate(walker.arms)}
+        hands = {rows[name]: structure.index(hold) for name, hold in beginning[0].items()}
+        for route in ways_round(walker, structure, path, hands, deadline):
+            if route.path is None:
+                plan = replace(plan, reason=f"{plan.reason}; {route.text}", separating=route.separating)
+                continue
+            changed = drained(search(route.path, beginning, objective="destination"))
+            if changed.complete:
+                return changed
+    if not plan.complete and not partial:
+        raise NoPlanError("plan", structure.name, plan.reason, separating=plan.separating)
+    return plan
+
+
+def plan_slices(
+    walker: Walker,
+    structure: Structure,
+    path: BodyPath,
+    beginning: Beginning = NOTHING,
+    *,
+    objective: Objective = "velocity",
+    width: int | None = 16,
+    deadline: float | None = None,
+    grips: Grips | None = None,
+    stance: tuple[int, ...] | None = None,
+    sample: int = 0,
+    soon: bool = False,
+    thorough: bool = False,
+    tries: Sequence[tuple[float, int | None]] = (),
+    first: tuple[int, int] | None = None,
+) -> Slices[Plan]:
+    """The best plan along one path, complete or not, in slices of some milliseconds of work; the same every time.
+
+    Args:
+        beginning: start, postures and avoid of :func:`plan_walk`. deadline: of ``time.perf_counter``.
+        grips: of the path, if they are known. stance: grips that hold at the sample, instead of a beginning.
+        sample: of the path, from which on hands may be lifted.
+        soon: somebody waits: fewer delays are tried (:data:`SOON`).
+        thorough: to a destination, begin on more holds, let hands wait in the air for as long as it takes, and look for
+            fewer re-grasps than were found (:mod:`wbc.walking.planner.fewest`).
+        tries: delays and widths of the searches, one after the other, instead of what objective and width say.
+        first: row of an arm and of a hold: the first re-grasp, whether it is needed or not.
+
+    Raises:
+        as :func:`plan_walk`, where no stance is possible at the beginning.
+    """
+    validation.one_of("objective", objective, ("velocity", "destination"))
+    if walker.robot.name == "two_ended_arm":
+        raise ShapeError("walker", walker.robot.name, "expected a body with arms")
+    if grips is None:
+        grips = yield from grip_slices(walker, structure, path)
+    best: tuple[Found, tuple[SwingLaw, ...]] | None = None
+    delays: tuple[float, ...] = DELAYS[-1:] if objective == "destination" else SOON if soon else DELAYS
+    usual: list[tuple[float, int | None]] = [(delay, width) for delay in delays]
+    if width is not None:
+        usual.append((delays[-1], WIDER * width))
+    search: StanceSearch | None = None
+    thorough = thorough and objective == "destination"
+    wait, most = (inf, ALL_STARTS) if thorough else (HOVER, STARTS)
+    for delay, wide in tries or usual:
+        search = StanceSearch(
+            walker,
+            structure,
+            path,
+            grips,
+            longest_delay=delay,
+            longest_wait=wait,
+            width=wide,
+            known=search,
+            first=first,
+        )
+        starts = [stance] if stance else (yield from stance_slices(walker, structure, search, beginning, sample, most))
+        yield None
+        found, laws = yield from sound_slices(search, starts, sample, deadline)
+        if best is None or (found.complete, found.reached) > (best[0].complete, best[0].reached):
+            best = found, laws
+        if found.complete or (deadline is not None and time.perf_counter() > deadline):
+            break
+    assert best is not None
+    if thorough and search is not None and best[0].complete and not (stance or first):
+        best = (yield from fewer_slices(search, beginning, best[0], sample)) or best
+    return plan_found(walker, structure, path, grips, *best)
+
+
+def _roll(structure: Structure, grips: Grips, grip: int) -> float | None:
+    """Which of the allowed rolls a grip has [rad]; None where the hand may roll."""
+    rolls = structure.holds[grips.hold[grip]].rolls
+    return rolls[grips.roll[grip]] if rolls else None
+
+
+def plan_found(
+    walker: Walker, structure: Structure, path: BodyPath, grips: Grips, found: Found, laws: tuple[SwingLaw, ...]
+) -> Plan:
+    """The plan of what a search found, and of the laws of its moves."""
+    ids, spacing = structure.ids, path.spacing
+    steps, chain = [], [[g] for g in found.start]
+    for move in found.moves:
+        chain[move.arm].append(move.target)
+        steps.append(
+            Regrasp(
+                walker.arms[move.arm].name,
+                ids[grips.hold[move.source]],
+                ids[grips.hold[move.target]],
+                int(grips.branch[move.target]),
+                round(move.lift * spacing, 9),
+                round(move.land * spacing, 9),
+                round(move.duration, 6),
+                round(move.delay, 6),
+                round(float(grips.last[move.source] - move.lift) * spacing, 9),
+                grips.reasons[grips.ends[move.target]],
+                round(float(grips.last[move.target]) * spacing, 9),
+                move.way,
+                _roll(structure, grips, move.target),
+            )
+        )
+    reason, separating = "", list[str]()
+    if not found.complete:
+        causes = [
+            f"{walker.arms[grips.arm[g]].name} on {ids[grips.hold[g]]}: {grips.reasons[grips.ends[g]]}"
+            for g in found.blocking
+        ] or ["arms in each other's way"]
+        reason = (
+            f"no hand can be moved in time after {found.reached * spacing:.2f} s of {path.duration:.2f} s "
+            f"({'; '.join(causes)})"
+        )
+        separating = sorted(ids[grips.hold[grip[-1]]] for grip in chain)
+    start = tuple(ids[grips.hold[g]] for g in found.start)
+    used = tuple(map(tuple, chain))
+    reached = found.reached * spacing
+    return Plan(path, start, tuple(steps), found.complete, reached, reason, grips, used, tuple(separating), laws)

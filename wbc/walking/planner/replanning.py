@@ -1,0 +1,218 @@
+"""Plans that are made while the walk goes on, slice by slice: a first one to begin with, the rest between ticks."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Iterator, Mapping
+from itertools import product
+from typing import Protocol
+
+import numpy as np
+
+from wbc.errors import ShapeError
+from wbc.robots import Walker, WalkerData
+from wbc.validation import Array
+from wbc.walking.body_path import BodyPath, straight_path
+from wbc.walking.holds.structure import Structure
+from wbc.walking.planner.grips.table import Grips, grip_slices
+from wbc.walking.planner.plan import NoPlanError, Plan
+from wbc.walking.planner.planner import Objective, plan_slices
+from wbc.walking.planner.stances.search import StanceSearch
+from wbc.walking.planner.starts import Beginning, stances
+from wbc.walking.planner.swings.curve import Pivots, between
+from wbc.walking.planner.swings.joints import blend
+from wbc.walking.planner.swings.law import SwingLaw
+from wbc.walking.planner.swings.swings import FINE
+
+#: Yields None or, first, a plan to begin with; returns the whole one
+PlanSlices = Generator[Plan | None, None, Plan]
+#: Path time that the body may go before the plan of its hands is made [s], from rest and under way; it takes RAMP / 2
+#: to stop. The fewer seconds, the better the plan: hands that have to be lifted soon are lifted late
+HEAD, ONWARD = 0.55, 1.0
+#: A new plan begins with a body that stands for so many samples
+STANDING = 10
+#: How far the body goes back to where a hand may be lifted [m]
+BACK = (0.05, 0.1, 0.2, 0.4)
+#: How far it goes towards a hold instead, at the height that it has [m], and how fast [m/s]
+TOWARDS, ASIDE = (0.15, 0.3), 0.05
+
+
+class HandsThere(Protocol):
+    """Where all hands are in the structure, when it is asked: their origins [m] and z axes, ``[arms, 3]`` each."""
+
+    @property
+    def origins(self) -> Array: ...
+
+    @property
+    def axes(self) -> Array: ...
+
+
+def plan_from_stance(
+    walker: Walker,
+    structure: Structure,
+    path: BodyPath,
+    start: Mapping[str, str],
+    *,
+    postures: Mapping[str, Array] | None = None,
+    objective: Objective = "velocity",
+) -> PlanSlices:
+    """A plan for a body that stands at the beginning of a path, all its hands on holds.
+
+    The first plan that is yielded, after some milliseconds, moves no hand: the body may go :data:`HEAD` seconds of path
+    time as far as its hands reach. From there on hands are moved in the plan that is returned.
+
+    Args:
+        start, postures: as of :func:`wbc.walking.planner.planner.plan_walk`; ``start`` has every arm.
+
+    Raises:
+        as ``plan_walk``, also where the way does not lead to the end.
+    """
+    beginning: Beginning = start, postures or {}, {}
+    rows = [structure.index(start[arm.name]) for arm in walker.arms]
+    grips = yield from grip_slices(walker, structure, path, rows)
+    search = StanceSearch(walker, structure, path, grips)
+    stance = stances(walker, structure, search, beginning)[0]
+    # The plan that follows keeps the branches
+    here = {arm.name: grips.posture_at(grip, 0) for arm, grip in zip(walker.arms, stance, strict=True)}
+    beginning = start, here, {}
+    yield None
+    until = search.until(stance, 0)
+    # The plan needs a stance that goes on behind it
+    head = min(round(HEAD / path.spacing), max(until - 1, 0))
+    yield _standing(path, grips, tuple(start[arm.name] for arm in walker.arms), stance, head)
+    plan = yield from plan_slices(walker, structure, path, beginning, objective=objective, sample=head, soon=True)
+    return _complete(structure, plan)
+
+
+def plan_rest(
+    walker: Walker, structure: Structure, plan: Plan, kept: int, here: float, objective: Objective = "velocity"
+) -> PlanSlices:
+    """A plan along the same path that keeps the first re-grasps and makes the others anew.
+
+    The first plan that is yielded has the kept ones alone.
+
+    Args:
+        plan: whose grips know which holds are gone. kept: so many re-grasps. here: path time of the body [s].
+
+    Raises:
+        NoPlanError: there is none.
+    """
+    grips, path = plan.grips, plan.path
+    assert grips is not None
+    landed = round(plan.regrasps[kept - 1].land / path.spacing) if kept else 0
+    names = [arm.name for arm in walker.arms]
+    stance = tuple(grips[-1] for grips in plan.cut(names, kept, 0.0).chain)
+    search, soonest = StanceSearch(walker, structure, path, grips), max(landed, round((here + ONWARD) / path.spacing))
+    # The plan needs a stance that goes on behind it
+    sample = max(min(soonest, search.until(stance, landed) - 1), landed)
+    begun = plan.cut(names, kept, sample * path.spacing)
+    yield begun
+    rest = yield from plan_slices(
+        walker, structure, path, objective=objective, grips=grips, stance=stance, sample=sample, soon=True
+    )
+    return begun.then(_complete(structure, rest))
+
+
+def plan_from_here(
+    walker: Walker,
+    structure: Structure,
+    path: BodyPath,
+    held: Mapping[int, int],
+    q: Array,
+    hands: HandsThere,
+    behind: Array,
+) -> PlanSlices:
+    """A plan along a path that begins where the body stands. If there is none, the body first goes back where it came
+    from, by :data:`BACK`, or towards one of its holds, by :data:`TOWARDS`, and returns: a hand at the edge of its reach
+    cannot be lifted there.
+
+    Args:
+        held: row of the arm -> row of the hold, of hands that hold. q: configuration. hands: where they are.
+        behind: poses that the body had, the last ones first ``[n, 4, 4]``.
+
+    Raises:
+        NoPlanError: there is none.
+    """
+    here = np.repeat(path.poses[:1], STANDING, axis=0)
+    refused: NoPlanError | None = None
+    for there in _asides(path.poses[0], behind, structure.positions[list(held.values())]):
+        other = BodyPath(np.concatenate([here, there, there[::-1], path.poses]), path.spacing)
+        sample = STANDING + len(there) if len(there) else 0
+        try:
+            plan = yield from _from_here(walker, structure, other, held, q, hands, sample)
+            return plan
+        except NoPlanError as error:
+            refused = refused or error
+    assert refused is not None
+    raise refused
+
+
+def _asides(pose: Array, behind: Array, holds: Array) -> Iterator[Array]:
+    """Where the body may go first, poses ``[n, 4, 4]``; nowhere to begin with."""
+    yield behind[:0]
+    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(behind[:, :3, 3], axis=0), axis=1))])
+    for back in BACK:
+        if back < way[-1]:
+            yield behind[: int(np.searchsorted(way, back)) + 1]
+    for far, hold in product(TOWARDS, holds):
+        offset = hold - pose[:3, 3]
+        offset -= pose[:3, 2] * (pose[:3, 2] @ offset)
+        end = pose.copy()
+        end[:3, 3] += far * offset / max(float(np.linalg.norm(offset)), 1e-9)
+        yield straight_path([pose, end], ASIDE).poses
+
+
+def _from_here(
+    walker: Walker,
+    structure: Structure,
+    path: BodyPath,
+    held: Mapping[int, int],
+    q: Array,
+    hands: HandsThere,
+    sample: int,
+) -> PlanSlices:
+    """Along one path, with free hands where they can be brought to."""
+    arms, avoid = walker.arms, dict[str, set[str]]()
+    start = {arms[arm].name: structure.ids[hold] for arm, hold in held.items()}
+    postures = {arms[arm].name: q[arms[arm].q] for arm in held}
+    free = [arm for arm in range(len(arms)) if arm not in held]
+    grips = yield from grip_slices(walker, structure, path)
+    while True:
+        beginning: Beginning = start, postures, avoid
+        asked = plan_slices(walker, structure, path, beginning, objective="destination", grips=grips, sample=sample)
+        plan = _complete(structure, (yield from asked))
+        far = [arm for arm in free if not way_to(walker, structure, plan, arm, hands, q).possible]
+        if not far:
+            return plan
+        for arm in far:
+            avoid.setdefault(arms[arm].name, set()).add(plan.start[arm])
+
+
+def way_to(walker: Walker, structure: Structure, plan: Plan, arm: int, hands: HandsThere, q: Array) -> SwingLaw:
+    """From where a free hand is to where the plan has it at the beginning; the body stands there."""
+    grips, data = plan.grips, walker.data
+    if grips is None or not isinstance(data, WalkerData):
+        raise ShapeError("plan", plan, "expected a plan of the planner for a body with arms")
+    grip, mine = plan.chain[arm][0], q[walker.arms[arm].q]
+    turn = grips.posture_at(grip, 0)[:1] - mine[:1]
+    pivots = Pivots((plan.path.poses[0] @ walker.arms[arm].base.homogeneous)[None], turn)
+    hold = structure.index(plan.start[arm])
+    places, axes = (
+        (now[arm][None], there[[hold]])
+        for now, there in ((hands.origins, structure.positions), (hands.axes, structure.axes))
+    )
+    way = between(structure, places, axes, np.array([[True, False]]), pivots, data)
+    first, last = np.array(mine[3:]), np.array(grips.wrist_at(grip, 0.0))
+    bent = first + blend(np.linspace(0.0, 1.0, FINE))[None, :, None] * (last - first)
+    return SwingLaw(walker, arm, plan.path, way, np.zeros(FINE), lambda _: bent, 1.0)
+
+
+def _standing(path: BodyPath, grips: Grips, start: tuple[str, ...], stance: tuple[int, ...], sample: int) -> Plan:
+    """A plan without re-grasps up to a sample."""
+    reached = sample * path.spacing
+    return Plan(path, start, (), False, reached, "being planned", grips, tuple((grip,) for grip in stance))
+
+
+def _complete(structure: Structure, plan: Plan) -> Plan:
+    if not plan.complete:
+        raise NoPlanError("plan", structure.name, plan.reason)
+    return plan

@@ -1,0 +1,1 @@
+"""The search over stances: which hand goes where, and when."""

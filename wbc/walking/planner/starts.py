@@ -1,0 +1,123 @@
+"""The stances that a plan may begin with."""
+
+from __future__ import annotations
+
+from bisect import insort
+from collections.abc import Collection, Mapping
+from itertools import combinations, product
+
+import numpy as np
+
+from wbc import validation
+from wbc.robots import Walker
+from wbc.validation import Array
+from wbc.walking.holds.structure import Structure
+from wbc.walking.planner.grips.table import Grips
+from wbc.walking.planner.plan import NoPlanError
+from wbc.walking.planner.slices import Slices, drained
+from wbc.walking.planner.stances.search import PAIRS, StanceSearch
+
+#: Holds that hands begin on, postures that they have, and holds that they must not begin on, by arm
+Beginning = tuple[Mapping[str, str], Mapping[str, Array], Mapping[str, Collection[str]]]
+NOTHING: Beginning = ({}, {}, {})
+#: Grips of an arm that a start may have, and stances that a search begins with; the same of a thorough one
+STARTS, ALL_STARTS = (10, 24), (24, 200)
+#: Joints of one branch differ by less than this from where they are [rad]; other branches by more
+SAME_BRANCH = 0.3
+
+
+def grips_at_first(walker: Walker, structure: Structure, grips: Grips, beginning: Beginning) -> list[list[int]]:
+    """Of each arm the grips that it may begin with, those that last longest first.
+
+    Raises:
+        UnknownNameError: another arm or hold. NoPlanError: an arm has none.
+    """
+    start, postures, avoid = beginning
+    names = [arm.name for arm in walker.arms]
+    for name in (*start, *postures, *avoid):
+        validation.one_of("start", name, names)
+    choices = list[list[int]]()
+    for k, name in enumerate(names):
+        mine = [int(g) for g in grips.of_arm(k) if grips.first[g] == 0]
+        if name in start:
+            row = structure.index(start[name])
+            mine = [g for g in mine if grips.hold[g] == row]
+            if name in postures:
+                # Joint 6 counts where the hold fixes the roll
+                here, counts = np.array(postures[name]), 5 if structure.free_rolls[row] else 6
+                off = [np.abs(grips.posture_at(g, 0) - here)[:counts].max() for g in mine]
+                mine = [g for g, gap in zip(mine, off, strict=True) if gap < SAME_BRANCH]
+            if not mine:
+                raise NoPlanError(
+                    f"start.{name}",
+                    start[name],
+                    "the arm cannot hold it at the beginning of the path",
+                    separating=[start[name]],
+                )
+        mine = [g for g in mine if structure.ids[grips.hold[g]] not in avoid.get(name, ())]
+        mine.sort(key=lambda g: (-int(grips.last[g]), int(grips.hold[g]), int(grips.branch[g])))
+        if not mine:
+            raise NoPlanError(
+                "plan", name, "no hold is in reach at the beginning of the path", separating=_at_first(structure, grips)
+            )
+        choices.append(mine)
+    return choices
+
+
+def stances(
+    walker: Walker, structure: Structure, search: StanceSearch, beginning: Beginning, sample: int = 0
+) -> list[tuple[int, ...]]:
+    """As :func:`stance_slices`, at once."""
+    return drained(stance_slices(walker, structure, search, beginning, sample))
+
+
+def stance_slices(
+    walker: Walker,
+    structure: Structure,
+    search: StanceSearch,
+    beginning: Beginning,
+    sample: int = 0,
+    most: tuple[int, int] = STARTS,
+) -> Slices[list[tuple[int, ...]]]:
+    """Grips, one an arm, that hold from the beginning of the path to beyond a sample, those that last longest first.
+
+    Args:
+        most: grips of an arm that are looked at, and stances.
+
+    Raises:
+        UnknownNameError: another arm or hold. NoPlanError: there are none.
+    """
+    grips, choices = (
+        search.grips,
+        [mine[: most[0]] for mine in grips_at_first(walker, structure, search.grips, beginning)],
+    )
+    pairs = [(a, b) for one, other in combinations(choices, 2) for a, b in product(one, other)]
+    for begin in range(0, len(pairs), PAIRS):
+        search.clearance.prepare(pairs[begin : begin + PAIRS])
+        yield None
+    every = np.array(list(product(*choices)), dtype=np.int64)
+    holds, bounds = np.sort(grips.hold[every], axis=1), grips.last[every].min(axis=1)
+    every = every[np.argsort(np.where((np.diff(holds, axis=1) > 0).all(axis=1), -bounds, 1), kind="stable")]
+    found = list[tuple[int, tuple[tuple[int, int], ...], tuple[int, ...]]]()
+    for stance in map(tuple, every.tolist()):
+        # No stance lasts longer than its grips
+        if len({int(grips.hold[g]) for g in stance}) < len(stance) or (
+            len(found) >= most[1] and min(int(grips.last[g]) for g in stance) < -found[most[1] - 1][0]
+        ):
+            break
+        until = search.until(stance, 0)
+        if until > sample:
+            insort(found, (-until, search.order(stance), stance))
+    if not found:
+        raise NoPlanError(
+            "plan",
+            structure.name,
+            "no stance is possible at the beginning: the arms are in each other's way",
+            separating=_at_first(structure, grips),
+        )
+    return [stance for _, _, stance in found[: most[1]]]
+
+
+def _at_first(structure: Structure, grips: Grips) -> list[str]:
+    """Holds that some arm can hold at the beginning of the path."""
+    return [structure.ids[k] for k in np.unique(grips.hold[grips.first == 0])]

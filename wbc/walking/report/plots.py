@@ -1,0 +1,231 @@
+"""Plots of a walk, from its log and plan."""
+
+from __future__ import annotations
+
+import pathlib
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wbc import style
+from wbc.robots import TwoEndedData
+from wbc.walking.log.log import CLOSED, OPENING, WalkLog
+from wbc.walking.report.figures import body_speed, wrist_angles
+from wbc.walking.report.surroundings import arm_colour
+from wbc.walking.run.perform import WalkRun
+from wbc.walking.run.recording import TickColumns
+
+INCH = 0.0254
+Draw = Callable[[Any, WalkRun, WalkLog, TickColumns], Any]
+
+
+def save_plots(run: WalkRun, log: WalkLog, ticks: TickColumns, folder: pathlib.Path) -> list[pathlib.Path]:
+    """Writes holds, margins, joints, rates, drift, wrists, speed and tick_time, PNG each; returns the files.
+
+    Of the two-ended arm no margins and wrists: its hands hold until they swing, and it has no theta5.
+    """
+    draws: dict[str, Draw] = {
+        "holds": _holds,
+        "margins": _margins,
+        "joints": _joints,
+        "rates": _rates,
+        "drift": _drift,
+        "wrists": _wrists,
+        "speed": _speed,
+        "tick_time": _tick_time,
+    }
+    if isinstance(run.walker.data, TwoEndedData):
+        del draws["margins"], draws["wrists"]
+    files = []
+    with style.pyplot() as plt:
+        for name, draw in draws.items():
+            figure = draw(plt, run, log, ticks)
+            files.append(folder / f"{name}.png")
+            figure.savefig(files[-1])
+            plt.close(figure)
+    return files
+
+
+def spans(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """(first row, row behind the last) of every run of True."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(int), [0]])))
+    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
+
+
+def _holds(plt: Any, run: WalkRun, log: WalkLog, ticks: TickColumns) -> Any:
+    """Which hand is on which hold when."""
+    figure, panel = plt.subplots(figsize=(9.2, 0.75 * len(log.arms) + 1.5), layout="constrained")
+    for arm in range(len(log.arms)):
+        on = np.isin(log.hand_state[:, arm], (CLOSED, OPENING))
+        for hold in np.unique(log.hand_hold[on, arm]):
+            for start, end in spans(on & (log.hand_hold[:, arm] == hold)):
+                left, right = log.t[start], log.t[min(end, len(log) - 1)]
+                panel.barh(arm, right - left, left=left, height=0.62, color=arm_colour(arm), lw=0)
+                name, part = log.hold_id[hold], (right - left) / log.t[-1]
+                turned = 0 if part > 0.013 * len(name) else 90
+                panel.text(
+                    (left + right) / 2,
+                    arm,
+                    name,
+                    ha="center",
+                    va="center",
+                    color="white",
+                    fontsize=8.5,
+                    rotation=turned,
+                )
+        for start, end in spans(~on):
+            panel.plot(
+                log.t[[start, min(end, len(log) - 1)]], [arm, arm], color=arm_colour(arm), lw=1.2, ls=(0, (1, 1.5))
+            )
+    panel.set_yticks(range(len(log.arms)), log.arms)
+    panel.invert_yaxis()
+    panel.grid(visible=False, axis="y")
+    panel.set_xlabel("time [s]")
+    panel.margins(x=0.01)
+    panel.set_title("Holds over time; dotted: the hand is on its way", fontsize=13)
+    return figure
+
+
+def _margins(plt: Any, run: WalkRun, log: WalkLog, ticks: TickColumns) -> Any:
+    """For how much longer the body could have gone on before a hand had to let go, at every re-grasp."""
+    assert run.plan is not None
+    steps = run.plan.regrasps
+    figure, panel = plt.subplots(figsize=(9.2, 3.8), layout="constrained")
+    names = [arm.name for arm in run.walker.arms]
+    for k, name in enumerate(names):
+        mine = [(n, step) for n, step in enumerate(steps, start=1) if step.arm == name]
+        panel.bar([n for n, _ in mine], [s.margin for _, s in mine], 0.6, color=arm_colour(k), label=name)
+    for n, step in enumerate(steps, start=1):
+        panel.annotate(
+            step.limit,
+            (n, step.margin),
+            (0, 3),
+            textcoords="offset points",
+            rotation=90,
+            ha="center",
+            va="bottom",
+            fontsize=8,
+            color=style.GREY,
+        )
+    panel.set_ylim(0.0, 1.45 * max([step.margin for step in steps], default=1.0) + 0.5)
+    panel.set_xticks(range(1, len(steps) + 1))
+    panel.set_xlabel("re-grasp")
+    panel.set_ylabel("path time left [s]")
+    panel.set_title("Left on the old hold at the lift; in grey what will end the new one", fontsize=13)
+    panel.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    return figure
+
+
+def _joints(plt: Any, run: WalkRun, log: WalkLog, ticks: TickColumns) -> Any:
+    limits = run.walker.robot.limits
+    return _grid(
+        plt,
+        run,
+        log,
+        np.degrees(log.q),
+        np.degrees(limits.position_lower[6:]),
+        np.degrees(limits.position_upper[6:]),
+        "deg",
+    )
+
+
+def _rates(plt: Any, run: WalkRun, log: WalkLog, ticks: TickColumns) -> Any:
+    top = np.degrees(run.walker.robot.limits.velocity[6:])
+    return _grid(plt, run, log, np.degrees(log.v), -top, top, "deg/s")
+
+
+def _grid(plt: Any, run: WalkRun, log: WalkLog, values: Any, low: Any, high: Any, unit: str) -> Any:
+    """A panel a joint number, a curve an arm, limits in red."""
+    count = max(len(arm.joints) for arm in run.walker.arms)
+    columns = 2
+    rows = -(-count // columns)
+    figure, axes = plt.subplots(rows, columns, figsize=(9.2, 1.9 * rows + 0.8), sharex=True, layout="constrained")
+    column = {name: k for k, name in enumerate(log.joints)}
+    for number, panel in enumerate(axes.flat):
+        members = [(k, column[arm.joints[number]]) for k, arm in enumerate(run.walker.arms) if number < len(arm.joints)]
+        for k, joint in members:
+            panel.plot(log.t, values[:, joint], color=arm_colour(k), lw=1.1, label=run.walker.arms[k].name)
+        bottom, top = (f(limit[j] for _, j in members) for f, limit in ((min, low), (max, high)))
+        pad = 0.06 * (top - bottom)
+        panel.set_ylim(bottom - pad, top + pad)
+        for edge, end in ((bottom, bottom - pad), (top, top + pad)):
+            panel.axhspan(*sorted((edge, end)), color=style.RED, alpha=0.12, lw=0)
+            panel.axhline(edge, color=style.RED, lw=1.0)
+        # Joints of the two-ended arm are counted from tip to tip, its halves from the elbow
+        names = dict.fromkeys(log.joints[joint].rpartition("joint")[2] for _, joint in members)
+        panel.set_title(f"joint {', '.join(names)}", fontsize=10)
+        panel.set_ylabel(unit)
+        panel.margins(x=0.01)
+    for panel in axes.flat[-columns:]:
+        panel.set_xlabel("time [s]")
+    what = "Joint angles" if unit == "deg" else "Joint rates"
+    figure.suptitle(f"{what} and their limits", x=0.01, ha="left", fontweight="bold", fontsize=13)
+    axes.flat[1].legend(loc="lower right", ncols=len(run.walker.arms), bbox_to_anchor=(1.0, 1.12))
+    return figure
+
+
+def _drift(plt: Any, run: WalkRun, log: WalkLog, ticks: TickColumns) -> Any:
+    """How far the body is off its command, and how far held hands are off their holds."""
+    curves = (
+        (1e3 * ticks.body_error, style.BLUE, "body [mm]"),
+        (1e6 * ticks.slip, style.ORANGE, "worst held hand [um]"),
+    )
+    figure, axes = plt.subplots(2, 1, figsize=(9.2, 4.6), sharex=True, layout="constrained")
+    for panel, (values, colour, label) in zip(axes, curves, strict=True):
+        panel.plot(log.t[1:], values, color=colour)
+        panel.set_ylabel(label)
+        panel.set_ylim(bottom=0.0)
+        panel.margins(x=0.01)
+    axes[-1].set_xlabel("time [s]")
+    figure.suptitle(
+        "Drift: body off its command, held hands off their holds", x=0.01, ha="left", fontweight="bold", fontsize=13
+    )
+    return figure
+
+
+def _wrists(plt: Any, run: WalkRun, log: WalkLog, ticks: TickColumns) -> Any:
+    """How far held wrists are from the singularity at theta5 = 0."""
+    angles = np.degrees(wrist_angles(run, log))
+    figure, panel = plt.subplots(figsize=(9.2, 3.6), layout="constrained")
+    for k, arm in enumerate(run.walker.arms):
+        panel.plot(log.t, angles[:, k], color=arm_colour(k), label=arm.name)
+    panel.axhline(0.0, color=style.RED, lw=1.2)
+    panel.annotate("singular", (log.t[0], 0.0), (4, 3), textcoords="offset points", color=style.RED, fontsize=9)
+    least = np.nanmin(np.abs(angles))
+    panel.set_xlabel("time [s]")
+    panel.set_ylabel("theta5 [deg]")
+    panel.margins(x=0.01)
+    panel.set_title(f"Wrists of holding arms; the nearest to 0 is {least:.1f} deg", fontsize=13)
+    panel.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    return figure
+
+
+def _speed(plt: Any, run: WalkRun, log: WalkLog, ticks: TickColumns) -> Any:
+    """Speed of the body's origin, commanded at the request and achieved."""
+    time, speed, _ = body_speed(log)
+    assert run.plan is not None
+    poses, spacing = run.plan.path.poses, run.plan.path.spacing
+    asked = np.linalg.norm(np.diff(poses[:, :3, 3], axis=0), axis=1) / spacing
+    at = np.interp(time, log.t[1:], ticks.path_time)
+    command = asked[np.clip((at / spacing).astype(int), 0, len(asked) - 1)]
+    if run.request.commands:
+        told = np.linalg.norm(log.command[:, :2], axis=1)
+        command = np.interp(time, log.t, told)
+    figure, panel = plt.subplots(figsize=(9.2, 3.6), layout="constrained")
+    panel.plot(time, command, color=style.GREY, ls=(0, (4, 2)), label="commanded")
+    panel.plot(time, speed, color=style.BLUE, lw=1.8, label="achieved")
+    panel.set_ylim(0.0, 1.2 * max(float(command.max()), float(speed.max()), 1e-3))
+    panel.secondary_yaxis("right", functions=(lambda v: v / INCH, lambda v: v * INCH)).set_ylabel("[in/s]")
+    panel.set_xlabel("time [s]")
+    panel.set_ylabel("speed of the body [m/s]")
+    panel.margins(x=0.01)
+    panel.set_title("Speed of the body's origin in the structure's frame, means over 0.1 s", fontsize=13)
+    panel.legend(loc="lower center", ncols=2)
+    return figure
+
+
+def _tick_time(plt: Any, run: WalkRun, log: WalkLog, ticks: TickColumns) -> Any:
+    """Histogram of the controller's tick."""
+    return style.tick_histogram(plt, ticks.cost, f"Tick time, {len(ticks.cost)} ticks")
