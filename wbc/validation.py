@@ -163,6 +163,12 @@ def integer(field: str, value: Any, low: int = 0, high: int = 2**31 - 1) -> int:
     return int(value)
 
 
+def function(field: str, value: Any) -> None:
+    """Something that can be called, or None where it is left out."""
+    if value is not None and not callable(value):
+        raise ShapeError(field, value, "expected a function")
+
+
 def called(field: str, function: Callable[..., Any], *arguments: Any) -> Any:
     """What a user's function answers.
 

@@ -15,12 +15,13 @@ from numpy.typing import NDArray
 from wbc import validation
 from wbc.analysis.rows import BodyRows
 from wbc.coordinates import expressions
-from wbc.coordinates.pair import CoordinatePair
+from wbc.coordinates.pair import CoordinatePair, pairs_of
 from wbc.coordinates.rows import Coordinate
 from wbc.coordinates.scales import scales
 from wbc.coordinates.system_motion import system_coordinates
-from wbc.errors import RangeError, ShapeError
+from wbc.errors import RangeError
 from wbc.robot import Robot
+from wbc.robot.robot import checked_robot
 from wbc.symbolic.kinematics import WORLD
 from wbc.validation import Array
 
@@ -136,10 +137,9 @@ def carry(
         ShapeError, NotFiniteError, RotationError, RangeError: bad configurations, pairs or numbers.
         MissingPartError: a body without a frame.
     """
+    checked_robot(robot)
     start, end = robot.configuration("q0", q0), robot.configuration("q1", q1)
-    given = list(pairs)
-    if not all(isinstance(p, CoordinatePair) for p in given):
-        raise ShapeError("pairs", pairs, "expected CoordinatePairs")
+    given = pairs_of(pairs, some=False)
     for pair in given:
         pair.counts(robot)
     total = validation.scalar("seconds", seconds, low=0.0, open_low=True, unit="s")

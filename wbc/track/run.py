@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
+from wbc import validation
 from wbc.controller import Controller
 from wbc.shapes import Sphere
 from wbc.track.clearance import clearances, least_mesh_clearance
@@ -46,6 +47,9 @@ def track(
     Raises:
         WbcError: the stack does not fit the robot, or it does not compile.
     """
+    validation.instance("plan", plan, Plan, "a Plan")
+    for name, one in (("progress", progress), ("stop", stop), ("compiled", compiled)):
+        validation.function(name, one)
     began = time.perf_counter()
     controller = plan.stack().compile(solver=plan.solver, backend=plan.backend)
     compile_time = time.perf_counter() - began
