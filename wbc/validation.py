@@ -203,6 +203,14 @@ def is_file(field: str, value: Any) -> bool:
         return False
 
 
+def exists(field: str, value: Any) -> bool:
+    """Whether there is a file or folder of this name; a name that is too long for one is none."""
+    try:
+        return file_path(field, value).exists()
+    except OSError:
+        return False
+
+
 def rotation(field: str, value: Any) -> Array:
     """A 3x3 rotation matrix, from a matrix or from a unit quaternion (x, y, z, w)."""
     raw = real_array(field, value)

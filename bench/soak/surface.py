@@ -55,7 +55,7 @@ MADE = (
     *("Exact", "Notation", "factored_determinant", "joint_roots", "singular_vector_locus", "sub_determinant_locus"),
 )  # fmt: skip
 #: What decides how long a call takes is always given
-LONG = ("states", "samples", "restarts", "budget", "cells", "intervals", "backend")
+LONG = ("states", "size", "seconds", "samples", "restarts", "budget", "cells", "intervals", "backend")
 #: Longest time of one call [s]
 PATIENCE = 10.0
 

@@ -84,6 +84,8 @@ def certify_blocks(
     rows = (*wanted, *added)
     blocks = joint_blocks(checked_model(model).robot, rows)
     validation.function("progress", progress)
+    part = validation.scalar("part", part, low=0.0, high=1.0, open_low=True)
+    minutes = validation.scalar("minutes", minutes, low=0.0, open_low=True, unit="min")
     parted = parted_task(model, wanted, blocks)
     found: list[tuple[JointBlock, ExactModel, Certificate]] = []
     known: dict[tuple[object, ...], Certificate] = {}

@@ -105,12 +105,11 @@ def certify(
         CompileError: no C compiler.
     """
     part, minutes = _checked(part, minutes)
-    wanted, added = checked("task", task) if task else (), checked("constraints", constraints)
-    checked_model(model)
+    wanted, added = _task(task), checked("constraints", constraints)
     workers, file = _means(workers, state, progress, ended)
-    J_T, J_R = _matrices(model, wanted, added)
+    J_T, J_R = _matrices(checked_model(model), wanted, added)
     until = (began := time.monotonic()) + 60.0 * minutes
-    # What is kept in a file must be the same problem for the next call, so there its preparation is not cut short
+    # What a file keeps must be the same problem for the next call, so there its preparation is not cut short
     last, ready = (until, began + 60.0 * _READY * minutes) if file is None else (np.inf, np.inf)
     matrices = list(rank_matrices(model, (*wanted, *added)))
     if any(not matrix for matrix in matrices):
@@ -128,8 +127,7 @@ def certify(
     both, proofs = _both(chosen, own), block_proofs(model, (*wanted, *added), chosen.joints)
     found = symmetries(both, used_joints(both))
     pieces = _pieces((*proofs, (chosen,)), own, eps, found, file)
-    finished, counts = pieces.work(until, workers, progress, ended), pieces.counts
-    verdict, left = COMPLETE, 0.0
+    finished, counts, verdict, left = pieces.work(until, workers, progress, ended), pieces.counts, COMPLETE, 0.0
     if not finished or counts.undecided > 0:
         verdict, left = UNDECIDED, max(0.0, 1.0 - counts.regular_part - counts.tube_part)
         spare = max(last, time.monotonic() + _SPARE)
@@ -138,6 +136,10 @@ def certify(
     tubed = counts.tube > 0
     cut, everywhere = used_joints(both) if tubed else chosen.joints, verdict == COMPLETE and not tubed
     return Certificate(verdict, eps, highest, everywhere, counts, left, cut, len(found), pieces.seconds, witness)
+
+
+def _task(task: Any) -> tuple[Rows, ...]:
+    return () if isinstance(task, tuple | list) and not task else checked("task", task)
 
 
 def _means(workers: Any, state: Any, progress: Any, ended: Any) -> tuple[int, Path | None]:

@@ -36,7 +36,7 @@ class PseudoInverse:
             return
         A = validation.ordinary_array("weight", self.weight)
         A = np.diag(A) if A.ndim == 1 else A
-        if A.ndim != 2 or A.shape[0] != A.shape[1] or not np.allclose(A, A.T):
+        if A.ndim != 2 or A.shape[0] != A.shape[1] or not A.size or not np.allclose(A, A.T):
             raise ShapeError("weight", self.weight, "expected a symmetric matrix, or its diagonal")
         if np.linalg.eigvalsh(A)[0] <= 0.0:
             raise RangeError("weight", self.weight, "expected a positive definite matrix")

@@ -163,6 +163,6 @@ def _run(
         seen = session.step(q, order)
         log.add(now, q, seen)
         if tell is not None:
-            tell(now, seen)
+            validation.called("tell", tell, now, seen)
         q = pin.integrate(session.robot.model, q, period * seen.step.v)
         tick += 1

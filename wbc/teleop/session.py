@@ -124,7 +124,8 @@ class Teleoperation:
             if rows > 6:
                 raise RangeError("pairs", pair.name, f"its task has {rows} rows, an operator gives at most 6 rates")
         self._seconds = validation.scalar("seconds", seconds, low=0.0, unit="s")
-        self._fastest = [validation.scalar("fastest", x, low=0.0, open_low=True) for x in fastest]
+        metres, radians = validation.ordinary_array("fastest", fastest, (2,)).tolist()
+        self._fastest = [validation.scalar("fastest", x, low=0.0, open_low=True) for x in (metres, radians)]
         self._automatic = validation.flag("automatic", automatic)
         self.control = PairController(self.robot, list(given), 1.0 / RATE, items=items, backend=backend)
         self.adviser = Adviser(self.robot, list(given), exact=False, backend=backend)

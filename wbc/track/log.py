@@ -107,10 +107,8 @@ def load(run: str | os.PathLike[str]) -> Log:
         LogFileError: there is no log, or it cannot be read.
     """
     path = validation.file_path("run", run)
-    try:
-        path.lstat()
-    except OSError as error:
-        raise LogFileError("run", str(path), "there is no such file or folder") from error
+    if not validation.exists("run", path):
+        raise LogFileError("run", str(path), "there is no such file or folder")
     if path.is_dir():
         found = [path / f"log.{kind}" for kind in FORMATS if (path / f"log.{kind}").is_file()]
         if not found:

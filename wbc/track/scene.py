@@ -37,6 +37,8 @@ BIAS = 0.003
 #: Largest angle above or below the scene: straight from above no direction is up [rad]
 HIGHEST = 1.5
 SOLIDS = (Sphere, Capsule, Box, Cylinder, Convex)
+#: Corners closer than this are never merged [m]
+FINEST = 1e-6
 #: Pixels of a picture at most, and lengths of a radius along a path
 PIXELS, STATIONS = 2**24, 1_000_000
 #: Links whose poses differ by less stand at one place
@@ -78,10 +80,15 @@ class Scene:
         floor: bool = True,
     ) -> None:
         detail = validation.scalar("Scene.detail", detail, low=0.0, unit="m")
+        # What is finer than a thousandth of a millimetre merges nothing that can be seen
+        detail = detail if detail >= FINEST else 0.0
         floor = validation.flag("Scene.floor", floor)
         dark, hidden = (validation.items(f"Scene.{n}", v, "names") for n, v in (("dark", dark), ("hidden", hidden)))
         shades = {
-            p: _colour(c) for p, c in validation.mapping("Scene.colours", colours or {}, "links to colours").items()
+            p: _colour(c)
+            for p, c in validation.mapping(
+                "Scene.colours", {} if colours is None else colours, "links to colours"
+            ).items()
         }
         checked_robot(robot)
         frames = [robot.model.getFrameId(robot.check_frame("Scene.dark", frame)) for frame in dark]
