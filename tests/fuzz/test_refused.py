@@ -132,6 +132,8 @@ CALLS: dict[str, tuple[Callable[[], Any], type[WbcError], str]] = {
     "groups": (lambda: conditioning().chosen(["a"]), ShapeError, "group"),
     "sigmas": (lambda: conditioning().sigmas([math.nan] * 3), NotFiniteError, "q"),
     "carry of no robot": (lambda: coordinates.carry("arm", Q, -Q), ShapeError, "robot"),
+    "carry too far": (lambda: coordinates.carry(robot(), Q, np.array([1e200, 0.0, 0.0])), RangeError, "q1"),
+    "cue too fast": (lambda: coordinates.motion_cue(robot(), pair(), Q, [1e200, 0, 0]), RangeError, "rates"),
     "modes of none": (lambda: coordinates.modes_of(robot(), []), ShapeError, "wanted"),
     "row components": (lambda: coordinates.BodyRows(TIP, translation=[[1.0]]), RangeError, "rows.translation"),
     "point of a set": (lambda: coordinates.OnSphere((0, 0, 0), 1.0).values("x"), ShapeError, "x"),

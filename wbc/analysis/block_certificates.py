@@ -19,6 +19,7 @@ from wbc.analysis.numeric import NumericRows, rank, singular_values
 from wbc.analysis.rows import Rows, checked
 from wbc.analysis.tree_joints import JointBlock, joint_blocks
 from wbc.analysis.weakest import NumericWitness, descended, joint_values
+from wbc.errors import ShapeError
 from wbc.validation import Array
 
 #: Minutes that a block gets when the others have used up the time [min]
@@ -85,6 +86,8 @@ def certify_blocks(
     blocks = joint_blocks(checked_model(model).robot, rows)
     validation.function("progress", progress)
     part = validation.scalar("part", part, low=0.0, high=1.0, open_low=True)
+    if state is not None and not validation.file_path("state", state).name:
+        raise ShapeError("state", state, "expected the name of a file")
     minutes = validation.scalar("minutes", minutes, low=0.0, open_low=True, unit="min")
     parted = parted_task(model, wanted, blocks)
     found: list[tuple[JointBlock, ExactModel, Certificate]] = []

@@ -27,6 +27,8 @@ from wbc.validation import Array
 
 #: Intervals of the first look, and rounds of setting samples closer at most
 FIRST, ROUNDS = 64, 40
+#: A joint goes this far at most [rad, m]: the way is sampled closely all along
+FARTHEST = 1e3
 #: Functions of rows that are kept
 KEPT = 64
 #: A pair is regular between two samples if its rows change by less than this part of its least singular value there
@@ -144,7 +146,10 @@ def carry(
         pair.counts(robot)
     total = validation.scalar("seconds", seconds, low=0.0, open_low=True, unit="s")
     part = validation.scalar("share", share, low=0.0, high=1.0)
-    search = _Search(robot, start, np.asarray(pin.difference(robot.model, start, end)), given, part)
+    step = np.asarray(pin.difference(robot.model, start, end))
+    if not np.abs(step).max(initial=0.0) <= FARTHEST:
+        raise RangeError("q1", q1, f"expected joints that go {FARTHEST:g} rad or m at most")
+    search = _Search(robot, start, step, given, part)
     legs = tuple(Leg(p, a * total, b * total, s, k >= len(given)) for p, k, a, b, s in search.legs())
     return CarriedMotion(robot, start, end, total, search.step / total, legs)
 
