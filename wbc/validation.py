@@ -175,6 +175,12 @@ def integer(field: str, value: Any, low: int = 0, high: int = 2**31 - 1) -> int:
     return int(value)
 
 
+def function(field: str, value: Any) -> None:
+    """Something that can be called, or None where it is left out."""
+    if value is not None and not callable(value):
+        raise ShapeError(field, value, "expected a function")
+
+
 def called(field: str, function: Callable[..., Any], *arguments: Any) -> Any:
     """What a user's function answers.
 
@@ -205,6 +211,14 @@ def is_file(field: str, value: Any) -> bool:
     """Whether there is a file of this name; a name that is too long for one is none."""
     try:
         return file_path(field, value).is_file()
+    except OSError:
+        return False
+
+
+def exists(field: str, value: Any) -> bool:
+    """Whether there is a file or folder of this name; a name that is too long for one is none."""
+    try:
+        return file_path(field, value).exists()
     except OSError:
         return False
 

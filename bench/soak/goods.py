@@ -11,6 +11,7 @@ import numpy as np
 import pinocchio as pin
 
 import wbc
+from bench.soak import operated
 from bench.soak.arguments import GOOD
 from bench.soak.arm import BOUNDS, DT, ONE, ROWS, TIP, Q, compiled, plain, robot, solvers, stack
 from wbc import shapes, tasks, trajectory
@@ -32,6 +33,7 @@ class Goods:
         law = trajectory.jerk_limited(np.zeros(3), Q, **BOUNDS)
         law.save(folder / "good.law")
         wbc.robots.save_self_pairs(wbc.robots.find_self_pairs(robot(), srdf=None, samples=20), folder / "pairs.toml")
+        operated.files(folder)
         controller = self._controller()
         self._recorded(controller)
         line = trajectory.spline_path(np.array([np.zeros(3), Q, -Q]))
@@ -65,6 +67,7 @@ class Goods:
             "walker": cache(walker),
             "recording": lambda: wbc.Recording(folder / "good.rec"),
             "policy": wbc.Policy,
+            **operated.subjects(folder),
         }
         self._answers: dict[str, Any] = {}
 
@@ -85,6 +88,7 @@ class Goods:
             "solver": lambda: solvers().solve(Q, seed=1, budget=None, restarts=3).q,
             "robot": lambda: robot().configuration("q", Q),
             "law": lambda: np.concatenate(self.subjects["law"]().at(0.1)),
+            **operated.probes(),
         }
         probe = probes.get("controller" if "handle" in subject or subject == "step" else subject)
         if probe is None:
@@ -97,8 +101,9 @@ class Goods:
         """A good value of a parameter; None where none is known."""
         owner = callee.split(".")[0]
         for key in (f"{callee}.{parameter}", f"{owner}.{parameter}", parameter):
-            if key in GOOD:
-                return GOOD[key](self)
+            for good in (GOOD, operated.GOOD):
+                if key in good:
+                    return good[key](self)
         return None
 
     def use(self, answer: Any, rng: np.random.Generator) -> None:

@@ -28,7 +28,10 @@ from wbc.errors import WbcError
 from wbc.tasks import Constraint, Item, Task
 
 #: What a user imports from
-MODULES = ("wbc", "wbc.robots", "wbc.robot", "wbc.shapes", "wbc.tasks", "wbc.trajectory", "wbc.proximity")
+MODULES = (
+    *("wbc", "wbc.robots", "wbc.robot", "wbc.shapes", "wbc.tasks", "wbc.trajectory", "wbc.proximity"),
+    *("wbc.coordinates", "wbc.analysis", "wbc.track", "wbc.teleop", "wbc.resolvers"),
+)
 
 #: Attributes that only the package itself calls, with arguments that it has checked: hooks of items, memory of ticks
 INTERNAL = {
@@ -42,10 +45,17 @@ MADE = (
     *("Controller", "Step", "Recording", "Online", "FunctionPath", "PosePath", "Followed", "Walker", "OperatorArm"),
     *("Arm", "Solution", "Explanation", "Replay", "PairSensor", "Robot", "Item", "Task", "Constraint", "Values"),
     *("Form", "Order", "Status", "WbcError", "Bounds", "Rows", "Row", "Certificate", "Worst", "State", "Recipe"),
-    *("SelfPairs", "LinkPair", "ConvexParts", "Witness", "Coupling", "Path"),
+    *("SelfPairs", "LinkPair", "ConvexParts", "Witness", "Coupling", "Path", "Advice", "CarriedMotion", "ClosedForm"),
+    *("CompleteSet", "Leg", "MotionCue", "PairCount", "PairStack", "PairSurvey", "Parts", "TreeSet", "TreeSets"),
+    *("Analysis", "BlockAnalysis", "Branch", "Cost", "Counts", "Determinant", "JointBlock", "Locus", "NumericWitness"),
+    *("PublishedSets", "Relation", "Screened", "SymbolicJacobian", "TreeAnalysis", "TreeCertificate", "Value", "Seen"),
+    *("Sample", "Basis", "Condition", "Mode", "MissingPartError", "RateFileError", "PointSet", "Resolver", "Source"),
+    *("Coordinate", "TREES", "PRESETS", "ALGORITHMS"),
+    # Algebra of polynomials that only the package makes
+    *("Exact", "Notation", "factored_determinant", "joint_roots", "singular_vector_locus", "sub_determinant_locus"),
 )  # fmt: skip
 #: What decides how long a call takes is always given
-LONG = ("states", "samples", "restarts", "budget", "cells", "intervals", "backend")
+LONG = ("states", "size", "seconds", "samples", "restarts", "budget", "cells", "intervals", "backend")
 #: Longest time of one call [s]
 PATIENCE = 10.0
 
@@ -97,7 +107,8 @@ def _of_subject(goods: Goods, subject: str) -> Iterator[Callee]:
         elif isinstance(static, property) or name in getattr(value, "names", ()):
             yield Callee(f"{kind.__name__}.{name}=", subject, lambda g, n=name: _setter(g.subjects[subject](), n))
     for name in ("__getitem__", "__contains__", "__call__", "__eq__", "__hash__", "__repr__"):
-        if any(name in vars(base) for base in kind.__mro__[:-1]):
+        # None: a class whose objects are hashed by nothing, a TypeError for a wrong call
+        if next((vars(base)[name] for base in kind.__mro__[:-1] if name in vars(base)), None) is not None:
             yield Callee(f"{kind.__name__}.{name}", subject, lambda g, n=name: getattr(g.subjects[subject](), n))
 
 

@@ -13,7 +13,7 @@ import pytest
 import wbc
 from bench.soak.arm import BOUNDS, ONE, TIP, Q, compiled, plain, robot, solvers
 from bench.soak.surface import impatient
-from wbc import shapes, tasks, trajectory
+from wbc import analysis, coordinates, resolvers, shapes, tasks, teleop, track, trajectory
 from wbc.errors import BoundsError, NotFiniteError, RangeError, ShapeError, UnknownNameError, WbcError
 from wbc.proximity import distances
 from wbc.robots import DHRow
@@ -29,6 +29,36 @@ def expression(*inputs: Any) -> tasks.Expression:
 
 def step() -> wbc.Step:
     return plain().compile(backend="vm").step(Q)
+
+
+def rows() -> coordinates.BodyRows:
+    return coordinates.BodyRows(TIP, rotation=())
+
+
+def pair() -> coordinates.CoordinatePair:
+    return coordinates.CoordinatePair(rows(), ())
+
+
+def conditioning() -> coordinates.Conditioning:
+    return coordinates.Conditioning(robot(), [[rows()]], backend="vm")
+
+
+def model() -> analysis.ExactModel:
+    return analysis.ExactModel(robot(), approximate=True)
+
+
+def way() -> track.SplinePath:
+    return track.SplinePath([0.0, 1.0], [ONE, ONE])
+
+
+def scene() -> track.Scene:
+    out = track.Scene(robot())
+    out.add_robot(Q)
+    return out
+
+
+def problem() -> resolvers.RateProblem:
+    return resolvers.RateProblem(np.eye(2, 3), np.ones(2))
 
 
 #: What is called, the error, and what its message names
@@ -96,6 +126,39 @@ CALLS: dict[str, tuple[Callable[[], Any], type[WbcError], str]] = {
     "subnormal jerk": (lambda: trajectory.jerk_limited(0 * Q, Q, **BOUNDS | {"jerk": 1e-320}), RangeError, "jerk"),
     "huge waypoints": (lambda: trajectory.spline_path([[0.0], [1e200]]), RangeError, "waypoints"),
     "subnormal dt": (lambda: wbc.Stack(robot(), 1e-320), RangeError, "dt"),
+    "load of a long name": (lambda: wbc.robots.load("x" * 5000), UnknownNameError, "robot"),
+    "pair of no robot": (lambda: pair().counts("arm"), ShapeError, "robot"),
+    "pairs of no pairs": (lambda: coordinates.regular_start(robot(), 3), ShapeError, "pairs"),
+    "groups": (lambda: conditioning().chosen(["a"]), ShapeError, "group"),
+    "sigmas": (lambda: conditioning().sigmas([math.nan] * 3), NotFiniteError, "q"),
+    "carry of no robot": (lambda: coordinates.carry("arm", Q, -Q), ShapeError, "robot"),
+    "carry too far": (lambda: coordinates.carry(robot(), Q, np.array([1e200, 0.0, 0.0])), RangeError, "q1"),
+    "cue too fast": (lambda: coordinates.motion_cue(robot(), pair(), Q, [1e200, 0, 0]), RangeError, "rates"),
+    "modes of none": (lambda: coordinates.modes_of(robot(), []), ShapeError, "wanted"),
+    "row components": (lambda: coordinates.BodyRows(TIP, translation=[[1.0]]), RangeError, "rows.translation"),
+    "point of a set": (lambda: coordinates.OnSphere((0, 0, 0), 1.0).values("x"), ShapeError, "x"),
+    "drives": (lambda: coordinates.plot_drives("a.png", 3, 0), ShapeError, "drives"),
+    "trees": (lambda: coordinates.tree_sets(["a"]), UnknownNameError, "robot"),
+    "analysis of no model": (lambda: analysis.analyse(3, [rows()], [rows()]), ShapeError, "model"),
+    "blocks of no robot": (lambda: analysis.joint_blocks(3, [rows()]), ShapeError, "robot"),
+    "joint of a model": (lambda: model().support(1e200), ShapeError, "joint"),
+    "configuration of a model": (lambda: model().configuration([1.0]), ShapeError, "values"),
+    "budget of text": (lambda: analysis.Budget("a"), ShapeError, "branches"),
+    "log to nowhere": (lambda: track.save(3, "a"), ShapeError, "log"),
+    "path to read": (lambda: track.read_path(3), ShapeError, "path"),
+    "time of a path": (lambda: way().sample("now"), ShapeError, "t"),
+    "stretched for ever": (lambda: way().stretched(1e55), RangeError, "times"),
+    "moving": (lambda: track.Moving(3, ONE), ShapeError, "Moving.shape"),
+    "clearances": (lambda: track.clearances(robot(), Q, {}, [0.0]), ShapeError, "q"),
+    "plan of nothing": (lambda: track.track(3), ShapeError, "plan"),
+    "picture of a long path": (lambda: scene().add_path([[0, 0, 0], [1e9, 0, 0]]), RangeError, "Scene.points"),
+    "picture of many pixels": (lambda: scene().save("a.png", size=(10**6, 10**6)), RangeError, "Scene.size"),
+    "rates from nowhere": (lambda: teleop.RateFile(3), ShapeError, "path"),
+    "keys": (lambda: teleop.Keyboard().feed(b"w"), ShapeError, "text"),
+    "order to stop": (lambda: teleop.Order(stop="now"), ShapeError, "True or False"),
+    "session of nothing": (lambda: teleop.run_session(3, teleop.Keyboard(), Q), ShapeError, "session"),
+    "resolver": (lambda: resolvers.TaskPriority().resolve(3), ShapeError, "problem"),
+    "rank reduction": (lambda: resolvers.RankReduction(("a",)).resolve(problem()), ShapeError, "given"),
     "DHRow bounds": (lambda: DHRow(lower=1.0, upper=0.0), BoundsError, "DHRow.lower"),
 }
 

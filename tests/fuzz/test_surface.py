@@ -32,6 +32,8 @@ def test_the_walk_meets_what_users_call(tmp_path) -> None:
     assert found >= {
         "robots.load", "trajectory.load", "proximity.distances", "DHRow", "PlacedShape", "Input", "EndEffector",
         "Robot.with_self_pairs", "Controller.step", "Controller.__contains__", "Handle.target=", "Solver.along",
+        "Adviser", "PairController.step", "analysis.certify", "track.track", "Teleoperation.step",
+        "TaskPriority.resolve",
         "Step.derivative", "Law.then", "PolynomialPath.evaluate", "Online.step", "Recording.__getitem__",
     }  # fmt: skip
     every = {*wbc.tasks.registry(), *(n for m in MODULES for n in getattr(wbc, m.removeprefix("wbc."), wbc).__dict__)}

@@ -10,14 +10,16 @@ from pathlib import Path
 
 import numpy as np
 
+from wbc import validation
 from wbc.analysis.blocks import block_model, lift, parted_task, problem
 from wbc.analysis.certificate import COMPLETE, INCOMPLETE, UNDECIDED, Certificate, certify
 from wbc.analysis.completeness import TRIES
-from wbc.analysis.model import ExactModel
+from wbc.analysis.model import ExactModel, checked_model
 from wbc.analysis.numeric import NumericRows, rank, singular_values
 from wbc.analysis.rows import Rows, checked
 from wbc.analysis.tree_joints import JointBlock, joint_blocks
 from wbc.analysis.weakest import NumericWitness, descended, joint_values
+from wbc.errors import ShapeError
 from wbc.validation import Array
 
 #: Minutes that a block gets when the others have used up the time [min]
@@ -81,7 +83,12 @@ def certify_blocks(
     began = time.monotonic()
     wanted, added = checked("task", task), checked("constraints", constraints)
     rows = (*wanted, *added)
-    blocks = joint_blocks(model.robot, rows)
+    blocks = joint_blocks(checked_model(model).robot, rows)
+    validation.function("progress", progress)
+    part = validation.scalar("part", part, low=0.0, high=1.0, open_low=True)
+    if state is not None and not validation.file_path("state", state).name:
+        raise ShapeError("state", state, "expected the name of a file")
+    minutes = validation.scalar("minutes", minutes, low=0.0, open_low=True, unit="min")
     parted = parted_task(model, wanted, blocks)
     found: list[tuple[JointBlock, ExactModel, Certificate]] = []
     known: dict[tuple[object, ...], Certificate] = {}
@@ -93,7 +100,7 @@ def certify_blocks(
         if key not in known:
             left = (minutes - (time.monotonic() - began) / 60.0) / (len(blocks) - number)
             told = None if progress is None else _told(progress, block)
-            file = None if state is None else _file(Path(state), block)
+            file = None if state is None else _file(validation.file_path("state", state), block)
             known[key] = certify(
                 alone, own, rest, part=part, minutes=max(left, _LAST), workers=workers, state=file, progress=told
             )

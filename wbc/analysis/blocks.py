@@ -14,7 +14,7 @@ from wbc.analysis.certificate import INCOMPLETE
 from wbc.analysis.completeness import Witness, find_witness
 from wbc.analysis.jacobian import symbolic_jacobian
 from wbc.analysis.loci import LOOSE, STRICT, UNDECIDED, Loci, loci
-from wbc.analysis.model import ExactModel
+from wbc.analysis.model import ExactModel, checked_model
 from wbc.analysis.numeric import NumericRows, check_task
 from wbc.analysis.rows import Rows, checked
 from wbc.analysis.tree_joints import JointBlock, TreeJoints, joint_blocks
@@ -91,7 +91,7 @@ def analyse_blocks(
     budget.start()
     wanted, added = checked("task", task), checked("constraints", constraints)
     rows = (*wanted, *added)
-    blocks = joint_blocks(model.robot, rows)
+    blocks = joint_blocks(checked_model(model).robot, rows)
     parted = parted_task(model, wanted, blocks)
     check_task(model.robot, wanted)
     known: dict[tuple[object, ...], Loci] = {}

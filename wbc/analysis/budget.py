@@ -20,8 +20,7 @@ class Budget:
     """
 
     def __init__(self, branches: int = 2000, minutes: float = 30.0) -> None:
-        if branches < 1:
-            raise RangeError("branches", branches, "expected at least 1")
+        branches = validation.integer("branches", branches, low=1)
         if validation.scalar("minutes", minutes) <= 0.0:
             raise RangeError("minutes", minutes, "expected more than 0")
         self._left, self._minutes = branches, minutes

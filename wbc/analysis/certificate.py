@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -15,7 +16,7 @@ from wbc import validation
 from wbc.analysis.block_proofs import block_proofs
 from wbc.analysis.boxes import BoxSearch, Counts
 from wbc.analysis.jacobian import symbolic_jacobian
-from wbc.analysis.model import ExactModel
+from wbc.analysis.model import ExactModel, checked_model
 from wbc.analysis.numeric import check_task
 from wbc.analysis.pieces import Pieces
 from wbc.analysis.rank_matrix import rank_matrices
@@ -104,11 +105,12 @@ def certify(
         CompileError: no C compiler.
     """
     part, minutes = _checked(part, minutes)
-    wanted, added = checked("task", task) if task else (), checked("constraints", constraints)
-    J_T, J_R = _matrices(model, wanted, added)
+    wanted, added = _task(task), checked("constraints", constraints)
+    workers, file = _means(workers, state, progress, ended)
+    J_T, J_R = _matrices(checked_model(model), wanted, added)
     until = (began := time.monotonic()) + 60.0 * minutes
-    # What is kept in a file must be the same problem for the next call, so there its preparation is not cut short
-    last, ready = (until, began + 60.0 * _READY * minutes) if state is None else (np.inf, np.inf)
+    # What a file keeps must be the same problem for the next call, so there its preparation is not cut short
+    last, ready = (until, began + 60.0 * _READY * minutes) if file is None else (np.inf, np.inf)
     matrices = list(rank_matrices(model, (*wanted, *added)))
     if any(not matrix for matrix in matrices):
         return _without_boxes(COMPLETE, began)
@@ -124,9 +126,8 @@ def certify(
     chosen = _chosen(_shortest(model, matrices, ready), own, eps, ready)
     both, proofs = _both(chosen, own), block_proofs(model, (*wanted, *added), chosen.joints)
     found = symmetries(both, used_joints(both))
-    pieces = _pieces((*proofs, (chosen,)), own, eps, found, None if state is None else Path(state))
-    finished, counts = pieces.work(until, workers or os.cpu_count() or 1, progress, ended), pieces.counts
-    verdict, left = COMPLETE, 0.0
+    pieces = _pieces((*proofs, (chosen,)), own, eps, found, file)
+    finished, counts, verdict, left = pieces.work(until, workers, progress, ended), pieces.counts, COMPLETE, 0.0
     if not finished or counts.undecided > 0:
         verdict, left = UNDECIDED, max(0.0, 1.0 - counts.regular_part - counts.tube_part)
         spare = max(last, time.monotonic() + _SPARE)
@@ -135,6 +136,18 @@ def certify(
     tubed = counts.tube > 0
     cut, everywhere = used_joints(both) if tubed else chosen.joints, verdict == COMPLETE and not tubed
     return Certificate(verdict, eps, highest, everywhere, counts, left, cut, len(found), pieces.seconds, witness)
+
+
+def _task(task: Any) -> tuple[Rows, ...]:
+    return () if isinstance(task, tuple | list) and not task else checked("task", task)
+
+
+def _means(workers: Any, state: Any, progress: Any, ended: Any) -> tuple[int, Path | None]:
+    """Threads and file of a search; what it calls can be called."""
+    for name, one in (("progress", progress), ("ended", ended)):
+        validation.function(name, one)
+    threads = os.cpu_count() or 1 if workers is None else validation.integer("workers", workers, low=1)
+    return threads, None if state is None else validation.file_path("state", state)
 
 
 def _without_boxes(

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from wbc import validation
 from wbc.analysis.branches import Branch
 from wbc.analysis.budget import Budget, processor_seconds
 from wbc.analysis.certificate import COMPLETE, INCOMPLETE, Certificate, certify
@@ -16,7 +17,7 @@ from wbc.analysis.deficiency import Exact
 from wbc.analysis.jacobian import SymbolicJacobian, symbolic_jacobian
 from wbc.analysis.loci import STRICT, UNDECIDED, Loci, LocusSearch
 from wbc.analysis.locus import Locus
-from wbc.analysis.model import ExactModel
+from wbc.analysis.model import ExactModel, checked_model
 from wbc.analysis.numeric import NumericRows, check_task, rank, singular_values
 from wbc.analysis.points import real_point
 from wbc.analysis.rows import Rows, checked
@@ -108,7 +109,11 @@ def analyse(
     """
     began, spent = time.monotonic(), processor_seconds()
     wanted, added = checked("task", task), checked("constraints", constraints)
-    budget = budget or Budget()
+    checked_model(model)
+    budget = Budget() if budget is None else validation.instance("budget", budget, Budget, "a Budget")
+    if certificate is not None:
+        validation.instance("certificate", certificate, Certificate, "a Certificate of certify")
+    validation.function("told", told)
     budget.start()
     rows = (*wanted, *added)
     found, certificate, done = _searched(model, wanted, added, algorithm, budget, certificate, told)

@@ -7,6 +7,7 @@ from fractions import Fraction
 
 from flint import fmpq
 
+from wbc import validation
 from wbc.analysis.branches import cosine_sine
 from wbc.analysis.deficiency import Exact
 from wbc.analysis.fourier import fourier
@@ -32,6 +33,7 @@ class Determinant:
 
     def text(self, *, latex: bool = False) -> str:
         """number * lengths * cosines and sines * the rest: c2 c6 L^2 s4 (L (s3 + s34) + D (1 - c345))."""
+        latex = validation.flag("latex", latex)
         if self.factors.zero:
             return "0"
         notation = Notation(self.exact.half, latex)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from wbc import validation
-from wbc.analysis.model import ExactModel
+from wbc.analysis.model import ExactModel, checked_model
 from wbc.analysis.ring import Matrix, Poly, TrigRing
 from wbc.analysis.rows import BodyRows, JointRows, PitchPlaneRows, Rows, checked
 from wbc.analysis.transforms import cross, dot
@@ -33,7 +33,7 @@ class Cost:
         return f"{self.additions} add, {self.multiplications} mult, {self.functions} trig"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class SymbolicJacobian:
     """Rows of a Jacobian as polynomials.
 
@@ -92,6 +92,7 @@ def symbolic_jacobian(model: ExactModel, rows: Sequence[Rows], *, axes: str | No
     Raises:
         ShapeError: no declarations. UnknownNameError: no such frame or joint.
     """
+    checked_model(model)
     if axes is not None:
         model.robot.check_frame("axes", axes)
     matrix: Matrix = []

@@ -8,10 +8,12 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
+from wbc import validation
 from wbc.analysis.ring import Coordinate, TrigRing
 from wbc.analysis.transforms import SNAP, Transform, Vector, apply, exact_placement, exact_rotation, identity
-from wbc.errors import ShapeError, UnsupportedJointError
+from wbc.errors import UnsupportedJointError
 from wbc.robot import Robot
+from wbc.robot.robot import checked_robot
 from wbc.symbolic.kinematics import WORLD, frame_index
 from wbc.validation import Array
 
@@ -36,9 +38,10 @@ class ExactModel:
             RotationError: a rotation that is not exact, without ``approximate``.
             DuplicateNameError, RangeError: symbols that cannot be told apart, or that are zero.
         """
-        if not isinstance(robot, Robot):
-            raise ShapeError("robot", robot, "expected a Robot")
-        self.robot, self.approximate, self.notes = robot, approximate, list[str]()
+        self.robot, self.notes = checked_robot(robot), list[str]()
+        self.approximate = approximate = validation.flag("approximate", approximate)
+        if symbols is not None:
+            symbols = validation.mapping("symbols", symbols, "names to lengths")
         model = robot.model
         axes = [self._axis(j, approximate) for j in range(1, model.njoints)]
         coordinates = [
@@ -69,11 +72,13 @@ class ExactModel:
 
     def support(self, joint: int) -> tuple[int, ...]:
         """Joints between the world and a joint, itself included."""
+        joint = validation.integer("joint", joint, high=self.robot.model.njoints - 1)
         return tuple(int(j) for j in self.robot.model.supports[joint] if j)
 
     def joint_in(self, seen_from: str, joint: int) -> Transform:
         """Where a joint's frame is, seen from a frame: only joints between the two appear in it."""
-        key = seen_from, joint
+        joint = validation.integer("joint", joint, high=self.robot.model.njoints - 1)
+        key = self.robot.check_frame("frame", seen_from), joint
         if key not in self._seen:
             start, place = self.frame(seen_from)
             if joint == start:
@@ -94,6 +99,7 @@ class ExactModel:
 
     def axis_in(self, seen_from: str, joint: int) -> Vector:
         """The axis of a joint, seen from a frame."""
+        validation.integer("joint", joint, low=1)
         return apply(self.joint_in(seen_from, joint).rotation, self._axes[joint - 1], self.ring)
 
     def distinct_frames(self) -> tuple[str, ...]:
@@ -106,6 +112,7 @@ class ExactModel:
 
     def configuration(self, values: Any) -> Array:
         """A configuration of the robot from one number a joint."""
+        values = validation.ordinary_array("values", values, (len(self.ring.coordinates),))
         q = self.robot.neutral.copy()
         for joint, value in zip(self.ring.coordinates, values, strict=True):
             if int(self.robot.model.nqs[joint.dof + 1]) == 2:
@@ -148,3 +155,12 @@ class ExactModel:
         to_axis = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), axis).matrix()
         rows = exact_rotation(to_axis, f"axis of {name}", approximate, self.notes)
         return [row[2] for row in rows], bool(slide)
+
+
+def checked_model(model: Any) -> ExactModel:
+    """The model that a user hands in.
+
+    Raises:
+        ShapeError: something else.
+    """
+    return validation.instance("model", model, ExactModel, "an ExactModel")

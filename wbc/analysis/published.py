@@ -46,14 +46,17 @@ class PublishedSets:
     sets: Mapping[str, tuple[Rows, ...]]
 
 
-@cache
 def published_sets(name: str) -> PublishedSets:
     """The sets of a robot.
 
     Raises:
         UnknownNameError: no published sets for it.
     """
-    validation.one_of("robot", name, ROBOTS)
+    return _published(validation.one_of("robot", name, ROBOTS))
+
+
+@cache
+def _published(name: str) -> PublishedSets:
     robot = operator_arm(name).robot
     if name == "planar_3r":
         middle = robot.with_frame("middle", "F2", pin.SE3(np.eye(3), np.array([0.4, 0.0, 0.0])))

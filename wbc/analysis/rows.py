@@ -6,6 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
+import numpy as np
+
+from wbc import validation
 from wbc.analysis.kept_hash import keeps_hash
 from wbc.errors import RangeError, ShapeError
 from wbc.symbolic.kinematics import WORLD
@@ -34,8 +37,9 @@ class BodyRows:
 
     def __post_init__(self) -> None:
         for kind in ("translation", "rotation"):
-            chosen = tuple(getattr(self, kind))
-            if sorted(set(chosen)) != sorted(chosen) or not set(chosen) <= set(ALL):
+            chosen = validation.items(f"rows.{kind}", getattr(self, kind), "components")
+            whole = all(isinstance(k, int | np.integer) and not isinstance(k, bool) for k in chosen)
+            if not whole or sorted(set(chosen)) != sorted(chosen) or not set(chosen) <= set(ALL):
                 raise RangeError(f"rows.{kind}", chosen, "expected different numbers among 0, 1, 2")
             if self.expressed is None and len(chosen) not in (0, 3):
                 raise RangeError(f"rows.{kind}", chosen, "a part of the components needs `expressed`, a frame")
@@ -95,7 +99,7 @@ def checked(field_name: str, rows: object) -> tuple[Rows, ...]:
     Raises:
         ShapeError: something else than a sequence of declarations, or an empty one.
     """
-    found = tuple(rows) if isinstance(rows, Sequence) and not isinstance(rows, str) else (rows,)
+    found = tuple(rows) if isinstance(rows, Sequence) and not isinstance(rows, str | bytes) else (rows,)
     if not found or not all(isinstance(r, (BodyRows, JointRows, PitchPlaneRows)) for r in found):
         raise ShapeError(field_name, rows, "expected BodyRows, JointRows or PitchPlaneRows, at least one")
     return found

@@ -11,11 +11,10 @@ import numpy as np
 
 from wbc import validation
 from wbc.analysis.jacobian import symbolic_jacobian
-from wbc.analysis.model import ExactModel
+from wbc.analysis.model import ExactModel, checked_model
 from wbc.analysis.rows import Rows, checked
 from wbc.analysis.trig_form import TrigForm, trig_form
 from wbc.analysis.weakest import NumericWitness, joint_values, least, numeric_witness, peak, weakest
-from wbc.errors import RangeError
 from wbc.validation import Array
 
 #: Below this ratio of singular values at a witness of another set a set fails as well
@@ -60,9 +59,12 @@ def screen(
         ShapeError: no candidates. RangeError: ``most`` below 1. UnsupportedJointError: entries in a sliding joint.
     """
     wanted = checked("task", task)
+    candidates = validation.mapping("candidates", candidates, "names to rows")
     checked("candidates", tuple(candidates.values()))
-    if most < 1:
-        raise RangeError("most", most, "expected at least 1")
+    most = validation.integer("most", most, low=1)
+    part = validation.scalar("part", part, low=0.0, high=1.0, open_low=True)
+    validation.function("progress", progress)
+    checked_model(model)
     until = time.monotonic() + 60.0 * validation.scalar("minutes", minutes)
     rng = np.random.default_rng(0)
     own = trig_form(model.ring, symbolic_jacobian(model, wanted).matrix)

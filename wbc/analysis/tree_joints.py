@@ -6,9 +6,10 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from wbc.analysis.equivalent_rows import whole_twist
-from wbc.analysis.rows import BodyRows, JointRows, Rows
+from wbc.analysis.rows import BodyRows, JointRows, Rows, checked
 from wbc.errors import RangeError
 from wbc.robot import Robot
+from wbc.robot.robot import checked_robot
 from wbc.symbolic.kinematics import WORLD, frame_index
 
 
@@ -112,10 +113,11 @@ def joint_blocks(robot: Robot, rows: Sequence[Rows]) -> tuple[JointBlock, ...]:
     Source: E. Dupuis, PhD thesis, McGill University, 2001, section 4.5, eq. 4.48.
 
     Raises:
+        ShapeError: no robot, or no rows.
         RangeError: a row that ties runs of joints together, named with what would part them; joints without a row.
         UnknownNameError: no such frame or joint.
     """
-    tree = TreeJoints(robot)
+    rows, tree = checked("rows", rows), TreeJoints(checked_robot(robot))
     known = tree.known(rows)
     found = [(declared, tree.joints_of(declared, known)) for declared in rows]
     segments = tree.segments()

@@ -14,10 +14,10 @@ from wbc import validation
 from wbc.coordinates.chains import Braked, braked
 from wbc.coordinates.conditioning import Conditioning, checked_configuration
 from wbc.coordinates.determinant_places import ClosedForm, closed_form
-from wbc.coordinates.pair import CoordinatePair
+from wbc.coordinates.pair import CoordinatePair, pairs_of
 from wbc.coordinates.rows import Coordinate
 from wbc.coordinates.samples import ROUNDING
-from wbc.errors import DuplicateNameError, ShapeError, UnknownNameError
+from wbc.errors import DuplicateNameError
 from wbc.robot import Robot
 from wbc.validation import Array
 
@@ -122,9 +122,7 @@ class Adviser:
         exact: bool = True,
         backend: str = "auto",
     ) -> None:
-        given = list(pairs)
-        if not given or not all(isinstance(p, CoordinatePair) for p in given):
-            raise ShapeError("pairs", pairs, "expected one CoordinatePair or several")
+        given = pairs_of(pairs)
         self.pairs: dict[str, CoordinatePair] = {}
         for pair in given:
             pair.counts(robot)
@@ -211,8 +209,7 @@ class Adviser:
         Raises:
             UnknownNameError: no such pair. ShapeError, NotFiniteError, RotationError: no configuration.
         """
-        if current not in self.pairs:
-            raise UnknownNameError("current", current, self.pairs)
+        validation.one_of("current", current, self.pairs)
         alike, asked = self._siblings[current]
         found = asked(checked_configuration(self.robot, q))
         sigmas, task = found[:-1], float(found[-1])

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TypeAlias
 
+from wbc import validation
 from wbc.analysis.rows import BodyRows, JointRows, PitchPlaneRows
 from wbc.coordinates.rows import Coordinate, PlaneAngleRows
 from wbc.errors import WbcError
@@ -68,7 +69,7 @@ class Arm:
 
     def locks(self, first: int = 0) -> tuple[JointRows, ...]:
         """Locks of the joints from number ``first`` on."""
-        return tuple(JointRows(name) for name in self.joints[first:])
+        return tuple(JointRows(name) for name in self.joints[validation.integer("first", first) :])
 
     def candidates(self) -> Held:
         """Coordinates of the sets, each once, the default first."""

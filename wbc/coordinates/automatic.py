@@ -29,6 +29,8 @@ class AutomaticPairs:
     """
 
     def __init__(self, control: PairController, adviser: Adviser, seconds: float = 1.0) -> None:
+        validation.instance("control", control, PairController, "a PairController")
+        validation.instance("adviser", adviser, Adviser, "an Adviser")
         for name, pair in adviser.pairs.items():
             if control.pairs.get(name) != pair:
                 raise RangeError("adviser", name, "the controller has no such pair")
@@ -50,5 +52,6 @@ class AutomaticPairs:
             if name != self.control.active:
                 self.control.switch(name, self._seconds)
                 self.changes.append((self._time, name))
+        step = self.control.step(q, v, dt)
         self._time += self.control.dt if dt is None else float(dt)
-        return self.control.step(q, v, dt)
+        return step

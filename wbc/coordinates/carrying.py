@@ -15,17 +15,20 @@ from numpy.typing import NDArray
 from wbc import validation
 from wbc.analysis.rows import BodyRows
 from wbc.coordinates import expressions
-from wbc.coordinates.pair import CoordinatePair
+from wbc.coordinates.pair import CoordinatePair, pairs_of
 from wbc.coordinates.rows import Coordinate
 from wbc.coordinates.scales import scales
 from wbc.coordinates.system_motion import system_coordinates
-from wbc.errors import RangeError, ShapeError
+from wbc.errors import RangeError
 from wbc.robot import Robot
+from wbc.robot.robot import checked_robot
 from wbc.symbolic.kinematics import WORLD
 from wbc.validation import Array
 
 #: Intervals of the first look, and rounds of setting samples closer at most
 FIRST, ROUNDS = 64, 40
+#: A joint goes this far at most [rad, m]: the way is sampled closely all along
+FARTHEST = 1e3
 #: Functions of rows that are kept
 KEPT = 64
 #: A pair is regular between two samples if its rows change by less than this part of its least singular value there
@@ -136,15 +139,17 @@ def carry(
         ShapeError, NotFiniteError, RotationError, RangeError: bad configurations, pairs or numbers.
         MissingPartError: a body without a frame.
     """
+    checked_robot(robot)
     start, end = robot.configuration("q0", q0), robot.configuration("q1", q1)
-    given = list(pairs)
-    if not all(isinstance(p, CoordinatePair) for p in given):
-        raise ShapeError("pairs", pairs, "expected CoordinatePairs")
+    given = pairs_of(pairs, some=False)
     for pair in given:
         pair.counts(robot)
     total = validation.scalar("seconds", seconds, low=0.0, open_low=True, unit="s")
     part = validation.scalar("share", share, low=0.0, high=1.0)
-    search = _Search(robot, start, np.asarray(pin.difference(robot.model, start, end)), given, part)
+    step = np.asarray(pin.difference(robot.model, start, end))
+    if not np.abs(step).max(initial=0.0) <= FARTHEST:
+        raise RangeError("q1", q1, f"expected joints that go {FARTHEST:g} rad or m at most")
+    search = _Search(robot, start, step, given, part)
     legs = tuple(Leg(p, a * total, b * total, s, k >= len(given)) for p, k, a, b, s in search.legs())
     return CarriedMotion(robot, start, end, total, search.step / total, legs)
 

@@ -17,11 +17,13 @@ import numpy as np
 
 from wbc import validation
 from wbc.analysis import ExactModel, analyse
+from wbc.coordinates import expressions
 from wbc.coordinates.conditioning import Conditioning
 from wbc.coordinates.determinant_places import LARGE
 from wbc.coordinates.rows import Coordinate, coordinates
 from wbc.errors import RangeError, WbcError
 from wbc.robot import Robot
+from wbc.robot.robot import checked_robot
 from wbc.validation import Array
 
 #: Part of the median of the task's least singular value below which one is zero, and that the task must keep for a
@@ -65,6 +67,9 @@ def smallest_complete_sets(
         ShapeError, UnknownNameError, RangeError: bad rows; too few candidates for the joints.
     """
     wanted, given = coordinates("task", task), coordinates("candidates", candidates)
+    checked_robot(robot)
+    for one in (*wanted, *given):
+        expressions.check(robot, "candidates", one)
     if validation.flag("certify", certify) and robot.nv > LARGE:
         raise RangeError("certify", certify, f"exact analysis takes up to {LARGE} joints; say certify=False")
     states = _states(robot, seed)
@@ -96,7 +101,7 @@ def smallest_complete_sets(
 
 def _states(robot: Robot, seed: int) -> Array:
     """Half at random; half with some joints at multiples of 90 degrees."""
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(validation.integer("seed", seed))
     q = rng.uniform(-pi, pi, (STATES, robot.nq))
     special = rng.integers(-1, 3, q.shape) * (pi / 2)
     chosen = rng.random(q.shape) < rng.uniform(0.2, 0.9, (STATES, 1))

@@ -14,13 +14,14 @@ import numpy as np
 from wbc import validation
 from wbc.coordinates import expressions
 from wbc.coordinates.chains import free_joints
-from wbc.coordinates.rows import Coordinate
+from wbc.coordinates.rows import Coordinate, coordinates
 from wbc.coordinates.scales import scales
 from wbc.errors import CompileError, ShapeError
 from wbc.native import toolchain
 from wbc.native.compiled_function import generated_library
 from wbc.native.library import load_library
 from wbc.robot import Robot
+from wbc.robot.robot import checked_robot
 from wbc.symbolic.kinematics import Kinematics
 from wbc.symbolic.tracer import Tracer
 from wbc.validation import Array
@@ -36,7 +37,8 @@ def checked_configuration(robot: Robot, q: Any) -> Array:
         ShapeError, NotFiniteError, RotationError: none.
     """
     plain = type(q) is np.ndarray and q.dtype == np.float64 and q.shape == (robot.nq,) and robot.nq == robot.nv
-    if plain and isfinite(q.dot(q)):
+    # Not by a product of q with itself, which overflows with a warning where q does not
+    if plain and isfinite(abs(q).max(initial=0.0)):
         out: Array = q
         return out
     return robot.configuration("q", q)
@@ -66,17 +68,22 @@ class Conditioning:
         backend: str = "auto",
     ) -> None:
         validation.one_of("backend", backend, ("auto", "native", "vm"))
-        self.robot, self.groups = robot, tuple(tuple(g) for g in groups)
-        if not self.groups or not all(self.groups):
+        self.robot = checked_robot(robot)
+        given = validation.items("groups", groups, "groups of coordinates")
+        self.groups: tuple[tuple[Coordinate, ...], ...] = tuple(coordinates("groups", g) for g in given)
+        if not self.groups:
             raise ShapeError("groups", groups, "expected one group of coordinates or several")
         if length is not None:
             length = validation.scalar("length", length, low=0.0, open_low=True, unit="m")
         every = tuple(dict.fromkeys(one for group in self.groups for one in group))
+        for one in every:
+            expressions.check(robot, "groups", one)
         labels = [expressions.labels(robot, one) for one in every]
         starts = dict(zip(every, np.cumsum([0, *map(len, labels)]).tolist(), strict=False))
         sizes = dict(zip(every, map(len, labels), strict=True))
         self._rows = [[starts[one] + k for one in group for k in range(sizes[one])] for group in self.groups]
-        self._columns = [free_joints(robot, names) for names in ([()] * len(self.groups) if brakes is None else brakes)]
+        locked = [()] * len(self.groups) if brakes is None else validation.items("brakes", brakes, "names")
+        self._columns = [free_joints(robot, validation.strings("brakes", names)) for names in locked]
         if len(self._columns) != len(self.groups) or not all(self._columns):
             raise ShapeError("brakes", brakes, "expected names of joints for each group, not of all joints")
         self._row_scale, self.dof_scale = scales(robot, every, length)
@@ -93,8 +100,12 @@ class Conditioning:
         )
 
     def sigmas(self, q: Array) -> Array:
-        """The least singular value of each group; ``q`` is not checked."""
-        self._q[:] = q
+        """The least singular value of each group.
+
+        Raises:
+            ShapeError, NotFiniteError, RotationError: no configuration.
+        """
+        self._q[:] = q = checked_configuration(self.robot, q)
         if self._native is None:
             return np.array([np.linalg.svd(J, compute_uv=False)[-1] for J in self.matrices(q)])
         at, sigma, _, _ = self._pointers
@@ -102,8 +113,13 @@ class Conditioning:
         return self._sigma.copy()
 
     def chosen(self, groups: Sequence[int]) -> Callable[[Array], Array]:
-        """:meth:`sigmas` of some groups alone, given by their numbers, in that order."""
-        order = np.array(groups, dtype=np.intp)
+        """:meth:`sigmas` of some groups alone, given by their numbers, in that order; ``q`` is not checked there.
+
+        Raises:
+            ShapeError, RangeError: no such groups.
+        """
+        numbers = [self._number(group) for group in validation.items("groups", groups, "numbers of groups")]
+        order = np.array(numbers, dtype=np.intp)
         if self._native is None:
             return lambda q: self.sigmas(q)[order]
         native, (at, sigma, _, _) = self._native, self._pointers
@@ -120,8 +136,12 @@ class Conditioning:
         return some
 
     def slopes(self, q: Array) -> tuple[Array, Array, Array]:
-        """(least singular values, their derivatives along q [groups, nv], right singular vectors [groups, nv])."""
-        self._q[:] = q
+        """(least singular values, their derivatives along q [groups, nv], right singular vectors [groups, nv]).
+
+        Raises:
+            ShapeError, NotFiniteError, RotationError: no configuration.
+        """
+        self._q[:] = q = checked_configuration(self.robot, q)
         if self._native is not None:
             at, *out = self._pointers
             self._native(at, None, *out)
@@ -137,15 +157,22 @@ class Conditioning:
 
     def size(self, q: Array, group: int) -> float:
         """Frobenius norm of the scaled matrix of a group: what its entries are rounded in proportion to."""
-        return float(np.linalg.norm(self.matrices(q)[group]))
+        return float(np.linalg.norm(self.matrices(q)[self._number(group)]))
+
+    def _number(self, group: int) -> int:
+        return validation.integer("group", group, high=len(self.groups) - 1)
 
     def matrices(self, q: Array) -> list[Array]:
         """The scaled matrix of each group, for checks."""
+        q = checked_configuration(self.robot, q)
         every = self._row_scale[:, None] * np.asarray(self._rates(q).full()) * self.dof_scale
         return [every[np.ix_(rows, columns)] for rows, columns in zip(self._rows, self._columns, strict=True)]
 
     def many(self, states: Array) -> list[Array]:
         """The scaled matrices of each group at many configurations [states, rows, joints that are not braked]."""
+        states = validation.ordinary_array("states", states)
+        if states.ndim != 2 or states.shape[1] != self.robot.nq or not len(states):
+            raise ShapeError("states", states, f"expected configurations side by side [states, {self.robot.nq}]")
         rates = self._rates.map(len(states))(states.T).full()
         every = rates.reshape(len(self._row_scale), len(states), self.robot.nv).swapaxes(0, 1)
         every = self._row_scale[:, None] * every * self.dof_scale

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -17,9 +16,8 @@ from wbc.coordinates.integrals import RateIntegrals, Rows
 from wbc.coordinates.pair import CoordinatePair
 from wbc.coordinates.pair_stack import EASE, PairStack, pair_stack
 from wbc.coordinates.rate_matrices import RateMatrices
-from wbc.coordinates.rows import Coordinate
+from wbc.coordinates.rows import Coordinate, coordinates
 from wbc.coordinates.serving import Served, served
-from wbc.errors import UnknownNameError
 from wbc.robot import Robot
 from wbc.tasks import Item
 from wbc.validation import Array
@@ -109,7 +107,7 @@ class PairController:
 
     def met(self, v: Array) -> Array:
         """Rates of the active pair's task rows at the last configuration for joint rates ``v`` [m/s, rad/s]."""
-        found: Array = self._every[self._now.task_rows] @ v
+        found: Array = self._every[self._now.task_rows] @ validation.ordinary_array("v", v, (self.robot.nv,))
         return found
 
     def sigma(self) -> float:
@@ -161,8 +159,7 @@ class PairController:
         Raises:
             UnknownNameError: no such pair. RangeError: a negative time.
         """
-        if name not in self.pairs:
-            raise UnknownNameError("pair", name, self.pairs)
+        validation.one_of("pair", name, self.pairs)
         wanted = validation.scalar("seconds", seconds, low=0.0, unit="s")
         if name == self.active:
             return 0.0
@@ -194,7 +191,7 @@ class PairController:
 
     def units(self, rows: Iterable[Coordinate]) -> tuple[str, ...]:
         """Unit of each row of some coordinates, of their integrals: m or rad."""
-        return tuple(row.unit for one in rows for row in expressions.labels(self.robot, one))
+        return tuple(row.unit for one in coordinates("rows", rows) for row in expressions.labels(self.robot, one))
 
     def rates(self, q: Any) -> dict[Coordinate, Array]:
         """The matrix of every coordinate's rates at a configuration [rows, nv].
@@ -252,8 +249,8 @@ class PairController:
 
     def _ask(self, field: str, rows: Rows, rates: Any) -> None:
         plain = type(rates) is np.ndarray and rates.dtype == np.float64 and rates.shape == rows.shape
-        if not (plain and isfinite(rates.dot(rates))):
-            rates = validation.real_array(field, rates, rows.shape)
+        if not (plain and abs(rates).max(initial=0.0) <= validation.LARGEST):
+            rates = validation.ordinary_array(field, rates, rows.shape)
         self._command[rows] = rates
         self._fresh = True
         if field == "prescribe":

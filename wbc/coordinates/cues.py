@@ -85,7 +85,7 @@ def motion_cue(robot: Robot, pair: CoordinatePair, q: Any, rates: Any) -> Motion
     pair.counts(robot)
     q = robot.configuration("q", q)
     names = tuple(f"{one} {row.label}" for one in pair.task for row in expressions.labels(robot, one))
-    asked = validation.real_array("rates", rates, (len(names),))
+    asked = validation.ordinary_array("rates", rates, (len(names),))
     task, spread, held = (np.asarray(part.full()) for part in _function(robot, pair)(q))
     return _cue(task, held, spread, asked, names)
 

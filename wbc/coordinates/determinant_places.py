@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from functools import cache, cached_property
 from typing import TypeAlias
 
+from wbc import validation
 from wbc.analysis import (
     BodyRows,
     Branch,
@@ -30,8 +31,9 @@ from wbc.analysis import (
 from wbc.analysis.blocks import block_model
 from wbc.analysis.points import univariate_roots
 from wbc.coordinates.pair import CoordinatePair
-from wbc.errors import RangeError, WbcError
+from wbc.errors import RangeError, ShapeError, WbcError
 from wbc.robot import Robot
+from wbc.robot.robot import checked_robot
 from wbc.validation import Array
 
 #: See :func:`closed_form`
@@ -92,6 +94,11 @@ class ClosedForm:
 
     def nearest(self, q: Array) -> tuple[Place, float] | None:
         """The nearest place and the way to it, or None where there is none."""
+        if self.places:
+            q = validation.ordinary_array("q", q)
+            least = 1 + max(place.dof for place in self.places)
+            if q.ndim != 1 or len(q) < least:
+                raise ShapeError("q", q, f"expected {least} numbers or more, one a joint")
         found = [(place, place.way(q)) for place in self.places]
         return min(found, key=lambda item: abs(item[1]), default=None)
 
@@ -104,6 +111,8 @@ def closed_form(robot: Robot, pair: CoordinatePair) -> ClosedForm | None:
     :data:`SMALL` joints, or more than :data:`LARGE` joints, has a determinant too long to be of use. Of a tree it is
     the determinant of the one arm that is not locked, whose joints count from 1.
     """
+    pair = validation.instance("pair", pair, CoordinatePair, "a CoordinatePair")
+    checked_robot(robot)
     rows = [one for one in pair.rows if isinstance(one, (BodyRows, JointRows, PitchPlaneRows))]
     parted = any(isinstance(one, BodyRows) and len(one.translation) in (1, 2) for one in rows)
     if len(rows) < len(pair.rows) or sum(pair.counts(robot)) != robot.nv or robot.nq != robot.nv:

@@ -13,9 +13,11 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from wbc import validation
 from wbc.analysis.rows import BodyRows, JointRows, PitchPlaneRows
-from wbc.coordinates.rows import AxisRows, Coordinate, PlaneAngleRows, PointRows
+from wbc.coordinates.rows import KINDS, AxisRows, Coordinate, PlaneAngleRows, PointRows
 from wbc.robot import Robot
+from wbc.robot.robot import checked_robot
 from wbc.symbolic import rotations as rot
 from wbc.symbolic.kinematics import WORLD, Kinematics, frame_index
 from wbc.symbolic.tracer import Tracer
@@ -34,6 +36,8 @@ def check(robot: Robot, field: str, rows: Coordinate) -> None:
     Raises:
         UnknownNameError, RangeError: see the classes.
     """
+    checked_robot(robot)
+    validation.instance(field, rows, KINDS, f"one of {', '.join(kind.__name__ for kind in KINDS)}")
     if isinstance(rows, JointRows):
         robot.dofs(rows.joint, f"{field}.joint")
     elif isinstance(rows, PlaneAngleRows):

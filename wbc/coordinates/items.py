@@ -12,7 +12,7 @@ from wbc import validation
 from wbc.analysis.rows import BodyRows
 from wbc.coordinates import expressions
 from wbc.coordinates.expressions import DRIFT, REFERENCE
-from wbc.coordinates.rows import Coordinate
+from wbc.coordinates.rows import KINDS, Coordinate
 from wbc.errors import RangeError
 from wbc.robot import Robot
 from wbc.symbolic.tracer import Tracer
@@ -45,6 +45,7 @@ class FollowRows(Task):
     metric: float | None = None
 
     def __post_init__(self) -> None:
+        validation.instance("coordinate", self.coordinate, KINDS, "a coordinate, such as BodyRows")
         if self.metric is None:
             return
         d = validation.scalar("metric", self.metric, low=0.0, open_low=True, unit="m")

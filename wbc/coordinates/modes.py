@@ -28,6 +28,7 @@ from wbc.coordinates.arm_parts import Arm, Held, MissingPartError, Parts
 from wbc.coordinates.pair import CoordinatePair
 from wbc.coordinates.rows import Coordinate
 from wbc.coordinates.which_parts import parts
+from wbc.errors import ShapeError
 from wbc.robot import Robot
 from wbc.robots.operator_arms import OPERATOR_ARMS
 
@@ -101,7 +102,9 @@ def modes_of(robot: str | Robot, wanted: Iterable[str | Mode]) -> tuple[Mode, ..
     Raises:
         UnknownNameError: no such robot or mode. MissingPartError: the robot has none of them.
     """
-    row, chosen = mode_row(robot), [mode(one) for one in wanted]
+    row, chosen = mode_row(robot), [mode(one) for one in validation.items("wanted", wanted, "modes")]
+    if not chosen:
+        raise ShapeError("wanted", wanted, "expected one mode or several")
     found = tuple(one for one in chosen if not isinstance(row[one], str))
     if not found:
         mode_pairs(robot, chosen[0])

@@ -98,6 +98,19 @@ class CoordinatePair:
         return self.name
 
 
+def pairs_of(pairs: Any, *, some: bool = True) -> list[CoordinatePair]:
+    """One pair or several, as a list; none of them only without ``some``.
+
+    Raises:
+        ShapeError: something else.
+    """
+    given = [pairs] if isinstance(pairs, CoordinatePair) else list(validation.items("pairs", pairs, "CoordinatePairs"))
+    if (some and not given) or not all(isinstance(p, CoordinatePair) for p in given):
+        expected = "one CoordinatePair or several" if some else "CoordinatePairs"
+        raise ShapeError("pairs", pairs, f"expected {expected}")
+    return given
+
+
 def replace_pair(pair: CoordinatePair, **changes: Any) -> CoordinatePair:
     """A pair with some fields changed; a metric that no longer has its pose is dropped."""
     given = {name: getattr(pair, name) for name in ("task", "constraint", "name", "metric")} | changes

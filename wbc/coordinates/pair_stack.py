@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
+from wbc import validation
 from wbc.controller import Stack
 from wbc.coordinates import expressions
 from wbc.coordinates.items import FollowRows, KeepRows
-from wbc.coordinates.pair import CoordinatePair, is_pose
+from wbc.coordinates.pair import CoordinatePair, is_pose, pairs_of
 from wbc.coordinates.rows import Coordinate
-from wbc.errors import DuplicateNameError, ShapeError
+from wbc.errors import DuplicateNameError
 from wbc.robot import Robot
 from wbc.tasks import Damping, Item, JointLimits
 
@@ -62,9 +63,7 @@ def pair_stack(
         ShapeError, DuplicateNameError: no pairs, two of one name. UnknownNameError, RangeError: as of
             :meth:`CoordinatePair.counts`.
     """
-    given = [pairs] if isinstance(pairs, CoordinatePair) else list(pairs)
-    if not given or not all(isinstance(p, CoordinatePair) for p in given):
-        raise ShapeError("pairs", pairs, "expected one CoordinatePair or several")
+    given = pairs_of(pairs)
     named: dict[str, CoordinatePair] = {}
     for pair in given:
         pair.counts(robot)
@@ -88,9 +87,9 @@ def pair_stack(
                 keep[one] = f"keep {labels[one]}"
                 stack.add(KeepRows(one, SHARE / dt if gain is None else gain), name=keep[one])
     stack.add(Damping(), name=EASE)
-    for item in items:
+    for item in validation.items("items", items, "items of a stack"):
         stack.add(item)
-    stack.add(JointLimits() if limits else JointLimits(position=False, acceleration=False))
+    stack.add(JointLimits() if validation.flag("limits", limits) else JointLimits(position=False, acceleration=False))
     return PairStack(stack, named, every, follow, keep)
 
 

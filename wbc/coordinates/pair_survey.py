@@ -76,6 +76,7 @@ def survey_pairs(robot: Robot, pairs: Sequence[CoordinatePair], count: int, *, s
 
 def advice_time(adviser: Adviser, *, seed: int = 0) -> float:
     """Median time of :meth:`Adviser.sigmas`, what a control loop asks for in a tick [s]."""
+    validation.instance("adviser", adviser, Adviser, "an Adviser")
     spent = []
     for q in _states(adviser.robot, TICKS, seed):
         began = perf_counter()
@@ -85,4 +86,5 @@ def advice_time(adviser: Adviser, *, seed: int = 0) -> float:
 
 
 def _states(robot: Robot, count: int, seed: int) -> Array:
+    seed = validation.integer("seed", seed)
     return np.array([configuration(robot, step) for step in draw(robot, count, np.random.default_rng(seed))])

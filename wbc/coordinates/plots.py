@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from wbc import validation
 from wbc.errors import RobotFileError, ShapeError
 from wbc.style import pyplot
 from wbc.validation import Array
@@ -53,9 +54,17 @@ def plot_drives(
     Raises:
         ShapeError: no drive, or one without ticks. RobotFileError: the file cannot be written.
     """
+    drives = validation.mapping("drives", drives, "names to DriveLogs")
+    for name, log in drives.items():
+        validation.instance(f"drives[{name}]", log, DriveLog, "a DriveLog")
     if not drives or not all(log.time for log in drives.values()):
         raise ShapeError("drives", list(drives), "expected logs with ticks")
-    file = pathlib.Path(path)
+    count = min(len(q) for log in drives.values() for q in log.q)
+    joint = validation.integer("joint", joint, high=count - 1)
+    marks = validation.ordinary_array("limits", limits)
+    if marks.ndim != 1:
+        raise ShapeError("limits", limits, "expected a row of numbers")
+    file = validation.file_path("path", path)
     with pyplot() as plt:
         figure, axes = plt.subplots(4, 1, figsize=(8.5, 9.5), sharex=True, layout="constrained")
         for name, log in drives.items():
@@ -67,7 +76,7 @@ def plot_drives(
                 if log.active[k] != log.active[k - 1]:
                     axes[1].axvline(log.time[k], color=line.get_color(), linewidth=0.9, linestyle=":")
                     axes[1].annotate(f" {log.active[k]}", (log.time[k], 0.9), xycoords=("data", "axes fraction"))
-        for value in limits:
+        for value in marks.tolist():
             axes[0].axhline(value, color="#c0392b", linewidth=0.9, linestyle="--")
         titles = (
             f"joint {joint + 1} [rad]",
@@ -82,7 +91,7 @@ def plot_drives(
         try:
             file.parent.mkdir(parents=True, exist_ok=True)
             figure.savefig(file)
-        except OSError as error:
-            raise RobotFileError("path", str(file), f"cannot be written: {error.strerror}") from error
+        except (OSError, ValueError) as error:
+            raise RobotFileError("path", str(file), f"cannot be written: {error}") from error
         plt.close(figure)
     return file

@@ -9,6 +9,7 @@ import casadi as ca
 import numpy as np
 
 from wbc import validation
+from wbc.errors import ShapeError
 
 Triple = tuple[float, float, float]
 #: Squared lengths below this are not divided by [m^2]
@@ -24,6 +25,15 @@ class PointSet(Protocol):
 
     def values(self, x: ca.SX) -> ca.SX:
         """f(x) [m], a column of ``count`` rows, zero on the set."""
+
+
+def _place(x: Any) -> ca.SX:
+    """Three expressions, or numbers, as a column."""
+    if isinstance(x, ca.SX):
+        if x.shape != (3, 1):
+            raise ShapeError("x", x, "expected a column of three")
+        return x
+    return ca.SX(ca.DM(validation.ordinary_array("x", x, (3,)).tolist()))
 
 
 def _point(owner: object, name: str) -> None:
@@ -72,6 +82,7 @@ class OnPlane:
 
     def values(self, x: ca.SX) -> ca.SX:
         """See the class."""
+        x = _place(x)
         return ca.dot(_constant(self.normal), x - _constant(self.point))
 
 
@@ -89,6 +100,7 @@ class OnSphere:
 
     def values(self, x: ca.SX) -> ca.SX:
         """See the class."""
+        x = _place(x)
         return _length(x - _constant(self.point)) - self.radius
 
 
@@ -108,6 +120,7 @@ class OnCylinder:
 
     def values(self, x: ca.SX) -> ca.SX:
         """See the class."""
+        x = _place(x)
         off, along = x - _constant(self.point), _constant(self.axis)
         return _length(off - along * ca.dot(along, off)) - self.radius
 
@@ -126,6 +139,7 @@ class OnLine:
 
     def values(self, x: ca.SX) -> ca.SX:
         """See the class."""
+        x = _place(x)
         off = x - _constant(self.point)
         return ca.vertcat(*[ca.dot(side, off) for side in _across(self.axis)])
 
@@ -146,5 +160,6 @@ class OnCircle:
 
     def values(self, x: ca.SX) -> ca.SX:
         """See the class."""
+        x = _place(x)
         off = x - _constant(self.point)
         return ca.vertcat(ca.dot(_constant(self.normal), off), _length(off) - self.radius)

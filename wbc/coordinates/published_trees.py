@@ -36,7 +36,6 @@ class TreeSets:
     sets: Mapping[str, TreeSet]
 
 
-@cache
 def tree_sets(name: str) -> TreeSets:
     """Sets of a tree: the poses of both hands as the task, alpha, q1, q7 and elbow of each arm, the body's lock, and
 
@@ -49,7 +48,11 @@ def tree_sets(name: str) -> TreeSets:
     Raises:
         UnknownNameError: no such tree.
     """
-    validation.one_of("robot", name, TREES)
+    return _tree_sets(validation.one_of("robot", name, TREES))
+
+
+@cache
+def _tree_sets(name: str) -> TreeSets:
     whole = parts(name)
     assert whole.body is not None
     hands, body = tuple(arm.tip for arm in whole.arms), JointRows(whole.body)

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from wbc.coordinates.conditioning import Conditioning
-from wbc.coordinates.pair import CoordinatePair
+from wbc.coordinates.pair import CoordinatePair, pairs_of
 from wbc.coordinates.samples import ROUNDING, states_of
-from wbc.errors import ShapeError
 from wbc.robot import Robot
+from wbc.robot.robot import checked_robot
 from wbc.validation import Array
 
 #: Configurations that are looked at
@@ -30,9 +30,7 @@ def regular_start(robot: Robot, pairs: Sequence[CoordinatePair]) -> Array:
     Raises:
         ShapeError: no pairs.
     """
-    if not pairs:
-        raise ShapeError("pairs", pairs, "expected one CoordinatePair or several")
-    neutral = robot.neutral
+    pairs, neutral = pairs_of(pairs), checked_robot(robot).neutral
     states = [neutral, *(q for q in states_of(robot, STATES) if _inside(robot, q))]
     found = Conditioning(robot, [pair.rows for pair in pairs], backend="vm").many(np.array(states))
     shares = []

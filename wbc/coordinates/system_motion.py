@@ -19,6 +19,7 @@ from wbc.coordinates.samples import ROUNDING, ranks
 from wbc.coordinates.scales import scales
 from wbc.errors import RangeError
 from wbc.robot import Robot
+from wbc.robot.robot import checked_robot
 from wbc.symbolic.kinematics import WORLD, frame_index
 from wbc.validation import Array
 
@@ -34,7 +35,7 @@ def system_coordinates(robot: Robot) -> tuple[BodyRows, ...]:
     Raises:
         MissingPartError: a joint whose body has no frame.
     """
-    model, out = robot.model, []
+    model, out = checked_robot(robot).model, []
     for j in range(1, model.njoints):
         names = [(f.type != pin.FrameType.BODY, str(f.name)) for f in model.frames if int(f.parentJoint) == j]
         own = [name for _, name in sorted(names, key=lambda item: item[0]) if _leads_to(robot, name, j)]
@@ -98,7 +99,7 @@ class SystemMotion:
     """
 
     def __init__(self, robot: Robot, rows: Coordinate | Sequence[Coordinate] | None = None) -> None:
-        self.robot = robot
+        self.robot = checked_robot(robot)
         self.coordinates: tuple[Coordinate, ...] = (
             system_coordinates(robot) if rows is None else coordinates("rows", rows)
         )

@@ -6,6 +6,7 @@ import os
 from functools import lru_cache
 from pathlib import Path
 
+from wbc import validation
 from wbc.coordinates.arm_parts import Parts
 from wbc.coordinates.found_parts import found_parts
 from wbc.coordinates.published_parts import published_parts
@@ -34,8 +35,8 @@ def parts(robot: str | Robot) -> Parts:
         robot = os.fspath(robot)
     if not isinstance(robot, str):
         raise ShapeError("robot", robot, "expected a name, a file, or a Robot")
-    file = Path(robot)
-    return _named(robot, file.stat().st_mtime_ns if file.is_file() else 0)
+    known = validation.is_file("robot", robot)
+    return _named(robot, Path(robot).stat().st_mtime_ns if known else 0)
 
 
 @lru_cache(maxsize=KEPT)

@@ -8,7 +8,7 @@ import numpy as np
 
 from wbc import validation
 from wbc.errors import RangeError
-from wbc.resolvers.problem import RateProblem, damped_inverse, solved
+from wbc.resolvers.problem import RateProblem, checked, damped_inverse, solved
 from wbc.validation import Array
 
 
@@ -33,6 +33,7 @@ class ExtendedJacobian:
         Raises:
             RangeError: not as many rows as joints, or a singular matrix without damping.
         """
+        checked(problem)
         second, rates = problem.rows
         J, right = np.vstack((problem.task, second)), np.concatenate((problem.wanted, rates))
         if J.shape[0] != problem.joints:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from wbc import validation
-from wbc.resolvers.problem import RateProblem, damped_inverse
+from wbc.resolvers.problem import RateProblem, checked, damped_inverse
 from wbc.validation import Array
 
 
@@ -25,11 +25,12 @@ class GradientProjection:
     gradient: Array
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "gradient", validation.real_array("gradient", self.gradient))
+        object.__setattr__(self, "gradient", validation.ordinary_array("gradient", self.gradient))
 
     def resolve(self, problem: RateProblem) -> Array:
         """See the class; second rows are not used."""
-        z = validation.real_array("gradient", self.gradient, (problem.joints,))
+        checked(problem)
+        z = validation.ordinary_array("gradient", self.gradient, (problem.joints,))
         inverse = damped_inverse(problem.task, 0.0)
         out: Array = inverse @ (problem.wanted + problem.task @ z) - z
         return out

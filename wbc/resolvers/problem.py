@@ -30,17 +30,19 @@ class RateProblem:
 
     def __post_init__(self) -> None:
         put = object.__setattr__
-        task = validation.real_array("task", self.task)
+        task = validation.ordinary_array("task", self.task)
         if task.ndim != 2 or not task.size:
             raise ShapeError("task", self.task, "expected a matrix, rows by joints")
         put(self, "task", task)
-        put(self, "wanted", validation.real_array("wanted", self.wanted, (task.shape[0],)))
-        second = np.zeros((0, task.shape[1])) if self.second is None else validation.real_array("second", self.second)
+        put(self, "wanted", validation.ordinary_array("wanted", self.wanted, (task.shape[0],)))
+        second = (
+            np.zeros((0, task.shape[1])) if self.second is None else validation.ordinary_array("second", self.second)
+        )
         if second.ndim != 2 or second.shape[1] != task.shape[1]:
             raise ShapeError("second", self.second, f"expected a matrix with {task.shape[1]} columns")
         put(self, "second", second)
         rates: Any = np.zeros(second.shape[0]) if self.second_rates is None else self.second_rates
-        put(self, "second_rates", validation.real_array("second_rates", rates, (second.shape[0],)))
+        put(self, "second_rates", validation.ordinary_array("second_rates", rates, (second.shape[0],)))
 
     @property
     def joints(self) -> int:
@@ -53,6 +55,15 @@ class RateProblem:
         assert self.second is not None
         assert self.second_rates is not None
         return self.second, self.second_rates
+
+
+def checked(problem: Any) -> None:
+    """What a resolver is given is a problem.
+
+    Raises:
+        ShapeError: something else.
+    """
+    validation.instance("problem", problem, RateProblem, "a RateProblem")
 
 
 class Resolver(Protocol):

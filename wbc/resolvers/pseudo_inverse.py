@@ -8,7 +8,7 @@ import numpy as np
 
 from wbc import validation
 from wbc.errors import RangeError, ShapeError
-from wbc.resolvers.problem import RateProblem, damped_inverse
+from wbc.resolvers.problem import RateProblem, checked, damped_inverse
 from wbc.validation import Array
 
 
@@ -34,9 +34,9 @@ class PseudoInverse:
         object.__setattr__(self, "damping", validation.scalar("damping", self.damping, low=0.0))
         if self.weight is None:
             return
-        A = validation.real_array("weight", self.weight)
+        A = validation.ordinary_array("weight", self.weight)
         A = np.diag(A) if A.ndim == 1 else A
-        if A.ndim != 2 or A.shape[0] != A.shape[1] or not np.allclose(A, A.T):
+        if A.ndim != 2 or A.shape[0] != A.shape[1] or not A.size or not np.allclose(A, A.T):
             raise ShapeError("weight", self.weight, "expected a symmetric matrix, or its diagonal")
         if np.linalg.eigvalsh(A)[0] <= 0.0:
             raise RangeError("weight", self.weight, "expected a positive definite matrix")
@@ -44,6 +44,7 @@ class PseudoInverse:
 
     def resolve(self, problem: RateProblem) -> Array:
         """See the class; second rows are not used."""
+        checked(problem)
         if self.weight is None:
             return np.asarray(damped_inverse(problem.task, self.damping) @ problem.wanted)
         if self.weight.shape[0] != problem.joints:

@@ -7,9 +7,10 @@ from itertools import combinations
 
 import numpy as np
 
-from wbc.errors import RangeError, ShapeError
-from wbc.resolvers.problem import RateProblem, solved
-from wbc.validation import Array, real_array
+from wbc import validation
+from wbc.errors import RangeError
+from wbc.resolvers.problem import RateProblem, checked, solved
+from wbc.validation import Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,17 +33,21 @@ class RankReduction:
         Raises:
             ShapeError, RangeError: indices that do not leave a square J_R, or a singular one.
         """
+        checked(problem)
         m, n = problem.joints, problem.task.shape[0]
-        chosen = self._best(problem.task) if self.given is None else tuple(self.given)
+        chosen = self._best(problem.task) if self.given is None else self._chosen(m)
         if len(set(chosen)) != m - n or not set(chosen) <= set(range(m)):
             raise RangeError("given", chosen, f"expected {m - n} different joints of 0 to {m - 1}")
-        if self.rates is not None and np.shape(self.rates) != (len(chosen),):
-            raise ShapeError("rates", self.rates, f"expected {len(chosen)} numbers")
         out, rest = np.zeros(m), [k for k in range(m) if k not in chosen]
         if self.rates is not None:
-            out[list(chosen)] = real_array("rates", self.rates)
+            out[list(chosen)] = validation.ordinary_array("rates", self.rates, (len(chosen),))
         out[rest] = solved(problem.task[:, rest], problem.wanted - problem.task @ out, "J_R")
         return out
+
+    def _chosen(self, joints: int) -> tuple[int, ...]:
+        return tuple(
+            validation.integer("given", k, high=joints - 1) for k in validation.items("given", self.given, "joints")
+        )
 
     def _best(self, J: Array) -> tuple[int, ...]:
         """Joints without which the least singular value stays largest."""

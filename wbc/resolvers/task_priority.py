@@ -8,7 +8,7 @@ import numpy as np
 
 from wbc import validation
 from wbc.errors import RangeError
-from wbc.resolvers.problem import RateProblem, damped_inverse
+from wbc.resolvers.problem import RateProblem, checked, damped_inverse
 from wbc.validation import Array
 
 
@@ -33,6 +33,7 @@ class TaskPriority:
         Raises:
             RangeError: no second rows.
         """
+        checked(problem)
         second, rates = problem.rows
         if not len(second):
             raise RangeError("second", 0, "task priority needs second rows")

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wbc.errors import RangeError
-from wbc.resolvers.problem import RateProblem, solved
+from wbc.resolvers.problem import RateProblem, checked, solved
 from wbc.validation import Array
 
 
@@ -29,6 +29,7 @@ class VirtualArms:
         Raises:
             RangeError: no constraint rows, as many as joints, or dependent ones.
         """
+        checked(problem)
         held, rates = problem.rows
         p, m = held.shape
         if not 0 < p < m:

@@ -120,7 +120,11 @@ def _with_pairs(robot: Robot, recipe: Recipe, file: str = "") -> Robot:
 def looks_like_path(text: str) -> bool:
     """Whether a string that is no known robot name is meant as a path."""
     path = pathlib.Path(text)
-    return path.suffix.lower() in (".urdf", ".xml", ".mjcf", ".xacro", ".sdf") or len(path.parts) > 1 or path.exists()
+    return (
+        path.suffix.lower() in (".urdf", ".xml", ".mjcf", ".xacro", ".sdf")
+        or len(path.parts) > 1
+        or validation.exists("robot", text)
+    )
 
 
 def unknown(name: str, names: Iterable[str]) -> UnknownNameError:

@@ -317,3 +317,12 @@ class Robot:
             for s in shapes:
                 h.update(f"{frame} {s.shape} {s.excess!r}".encode() + s.placement.homogeneous.tobytes())
         return h.hexdigest()
+
+
+def checked_robot(robot: Any) -> Robot:
+    """The robot that a user hands in.
+
+    Raises:
+        ShapeError: something else.
+    """
+    return validation.instance("robot", robot, Robot, "a wbc Robot, see wbc.robots.load")

@@ -52,7 +52,7 @@ class Keyboard:
 
     def feed(self, text: str) -> None:
         """Keys that were typed since the last order."""
-        self._typed += text
+        self._typed += validation.instance("text", text, str, "text")
 
     def order(self, time: float, names: Sequence[str], active: str, units: Sequence[str]) -> Order:
         """What the keys say: axes that are held, another pair, or stop.

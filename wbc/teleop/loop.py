@@ -14,7 +14,7 @@ import numpy as np
 import pinocchio as pin
 
 from wbc import validation
-from wbc.errors import RobotFileError
+from wbc.errors import RobotFileError, ShapeError
 from wbc.teleop.order import AT_ONCE, Source
 from wbc.teleop.session import Seen, Teleoperation
 from wbc.validation import Array
@@ -73,7 +73,7 @@ class SessionLog:
         Raises:
             RobotFileError: it cannot be written.
         """
-        file = pathlib.Path(path)
+        file, names = validation.file_path("path", path), validation.strings("names", names)
         rows = range(1, AT_ONCE + 1)
         head = ["time", "pair", "status", "sigma", "kept", "advised", "lost", "why"]
         head += [*(f"asked {k}" for k in rows), *(f"met {k}" for k in rows)]
@@ -121,6 +121,13 @@ def run_session(
     Raises:
         WbcError: a bad order or configuration; the session is at rest then and can be reset.
     """
+    validation.instance("session", session, Teleoperation, "a Teleoperation")
+    if not callable(getattr(source, "order", None)):
+        raise ShapeError("source", source, "expected a source of orders: RateFile, Keyboard, ...")
+    if log is not None:
+        validation.instance("log", log, SessionLog, "a SessionLog")
+    validation.function("tell", tell)
+    realtime = validation.flag("realtime", realtime)
     q, log = session.robot.configuration("q", q), SessionLog() if log is None else log
     limit = validation.real_array("seconds", seconds, (), finite=False)
     session.reset(q)
@@ -156,6 +163,6 @@ def _run(
         seen = session.step(q, order)
         log.add(now, q, seen)
         if tell is not None:
-            tell(now, seen)
+            validation.called("tell", tell, now, seen)
         q = pin.integrate(session.robot.model, q, period * seen.step.v)
         tick += 1

@@ -30,11 +30,14 @@ class Order:
     stop: bool = False
 
     def __post_init__(self) -> None:
-        numbers = validation.real_array("rates", self.rates)
+        numbers = validation.ordinary_array("rates", self.rates)
         if numbers.ndim != 1:
             raise ShapeError("rates", self.rates, "expected a row of numbers")
         if len(numbers) > AT_ONCE:
             raise RangeError("rates", self.rates, f"an operator gives at most {AT_ONCE} rates at a time")
+        if self.pair is not None:
+            validation.name("pair", self.pair)
+        object.__setattr__(self, "stop", validation.flag("stop", self.stop))
         object.__setattr__(self, "rates", tuple(float(x) for x in numbers))
 
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import csv
 import os
-import pathlib
 from collections.abc import Sequence
 
+from wbc import validation
 from wbc.errors import WbcError
 from wbc.teleop.order import AT_ONCE, Order
 
@@ -34,7 +34,7 @@ class RateFile:
     def __init__(self, path: str | os.PathLike[str]) -> None:
         self.orders: list[tuple[float, Order]] = []
         try:
-            lines = list(csv.reader(pathlib.Path(path).read_text(encoding="utf-8").splitlines()))
+            lines = list(csv.reader(validation.file_path("path", path).read_text(encoding="utf-8").splitlines()))
         except (OSError, UnicodeDecodeError, csv.Error) as error:
             raise RateFileError("path", str(path), f"cannot be read: {error}") from error
         if not lines or tuple(cell.strip() for cell in lines[0]) != COLUMNS:

@@ -22,9 +22,10 @@ from wbc.coordinates import (
     regular_start,
 )
 from wbc.coordinates.modes import mode
+from wbc.coordinates.pair import pairs_of
 from wbc.coordinates.pair_stack import row_count
 from wbc.coordinates.scales import scales
-from wbc.errors import RangeError, UnknownNameError
+from wbc.errors import RangeError
 from wbc.robot import Robot
 from wbc.robots.operator_arms import OPERATOR_ARMS
 from wbc.tasks import Item
@@ -43,7 +44,7 @@ SLOW, PLAIN = 0.02, 10.0
 NOTHING = 1e-3
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Seen:
     """What an operator is told after a tick.
 
@@ -111,18 +112,23 @@ class Teleoperation:
         acceleration: float | None = None,
         backend: str = "auto",
     ) -> None:
-        chosen = [mode(one) for one in modes] if modes is not None else modes_of(robot, USUAL)
+        chosen = (
+            [mode(one) for one in validation.items("modes", modes, "modes")]
+            if modes is not None
+            else modes_of(robot, USUAL)
+        )
         self.robot = _slowed(parts(robot).robot, robot, acceleration)
-        given = dict.fromkeys([*(p for one in chosen for p in mode_pairs(robot, one)), *pairs])
+        given = dict.fromkeys([*(p for one in chosen for p in mode_pairs(robot, one)), *pairs_of(pairs, some=False)])
         for pair in given:
             rows = row_count(self.robot, pair.task)
             if rows > 6:
                 raise RangeError("pairs", pair.name, f"its task has {rows} rows, an operator gives at most 6 rates")
         self._seconds = validation.scalar("seconds", seconds, low=0.0, unit="s")
-        self._fastest = [validation.scalar("fastest", x, low=0.0, open_low=True) for x in fastest]
+        metres, radians = validation.ordinary_array("fastest", fastest, (2,)).tolist()
+        self._fastest = [validation.scalar("fastest", x, low=0.0, open_low=True) for x in (metres, radians)]
         self._automatic = validation.flag("automatic", automatic)
         self.control = PairController(self.robot, list(given), 1.0 / RATE, items=items, backend=backend)
-        self.adviser = Adviser(self.robot, given, exact=False, backend=backend)
+        self.adviser = Adviser(self.robot, list(given), exact=False, backend=backend)
         self._tall = {pair.name for pair in given if pair.over_determined(self.robot)}
         for pair in given:
             if pair.name in self._tall:
@@ -208,9 +214,8 @@ class Teleoperation:
 
     def _take(self, order: Order) -> None:
         """Check an order as a whole, then follow it."""
-        name = order.pair or self.control.active
-        if name not in self.control.pairs:
-            raise UnknownNameError("pair", name, self.control.pairs)
+        validation.instance("order", order, Order, "an Order")
+        name = validation.one_of("pair", order.pair or self.control.active, self.control.pairs)
         fresh = Order() if order.stop else order
         self._rates(self.control.pairs[name], fresh)
         if name != self.control.active:

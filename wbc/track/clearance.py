@@ -12,10 +12,12 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from wbc.errors import MissingShapeError
+from wbc import validation
+from wbc.errors import MissingShapeError, ShapeError
 from wbc.proximity.geometry import geometry_of
 from wbc.robot import Robot
 from wbc.robot.files import captured_stderr
+from wbc.robot.robot import checked_robot
 from wbc.shapes import Shape
 from wbc.track.setup import Moving
 from wbc.validation import Array
@@ -33,6 +35,11 @@ def clearances(robot: Robot, q: Array, obstacles: Mapping[str, Moving], t: Array
         q: configurations, n x nq.
         t: times, n, at which the obstacles are looked at.
     """
+    q, t = _states(robot, q), validation.ordinary_array("t", t)
+    if t.shape != (len(q),):
+        raise ShapeError("t", t, f"expected {len(q)} times, one for each configuration")
+    for name, one in validation.mapping("obstacles", obstacles, "names to Movings").items():
+        validation.instance(f"obstacles[{name}]", one, Moving, "a Moving")
     bodies = {link: _bodies(robot, link) for link in robot.shapes if _moves(robot, link)}
     return _distances(robot, bodies, q, obstacles, t)
 
@@ -47,7 +54,11 @@ def self_clearances(robot: Robot, q: Array, pairs: Iterable[tuple[str, str]]) ->
     Raises:
         UnknownNameError: no such frame. MissingShapeError: no shapes on it.
     """
-    out = {(first, second): np.full(len(q), np.inf) for first, second in pairs}
+    q = _states(robot, q)
+    both = [validation.strings("pairs", pair) for pair in validation.items("pairs", pairs, "pairs of links")]
+    if any(len(pair) != 2 for pair in both):
+        raise ShapeError("pairs", pairs, "expected pairs of links")
+    out = {(pair[0], pair[1]): np.full(len(q), np.inf) for pair in both}
     bodies = {link: _bodies(robot, robot.check_frame("pairs", link)) for pair in out for link in pair}
     for link, group in bodies.items():
         if not group:
@@ -61,6 +72,15 @@ def self_clearances(robot: Robot, q: Array, pairs: Iterable[tuple[str, str]]) ->
                 result.clear()
                 gaps[k] = min(gaps[k], coal.distance(*a, *b, request, result))
     return out
+
+
+def _states(robot: Robot, q: Any) -> Array:
+    """Configurations, n x nq."""
+    checked_robot(robot)
+    states = validation.ordinary_array("q", q)
+    if states.ndim != 2 or states.shape[1] != robot.nq:
+        raise ShapeError("q", q, f"expected configurations, n x {robot.nq}")
+    return states
 
 
 def least_mesh_clearance(

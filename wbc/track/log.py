@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from wbc import validation
-from wbc.errors import UnknownNameError, WbcError
+from wbc.errors import WbcError
 from wbc.validation import Array
 
 FORMATS = ("parquet", "npz")
@@ -40,12 +40,11 @@ class Log:
     meta: Mapping[str, Any]
 
     def __getitem__(self, name: str) -> np.ndarray:
-        if name not in self.columns:
-            raise UnknownNameError("column", name, self.columns)
+        validation.one_of("column", name, self.columns)
         return self.columns[name]
 
     def __contains__(self, name: object) -> bool:
-        return name in self.columns
+        return isinstance(name, str) and name in self.columns
 
     def __len__(self) -> int:
         return len(self.columns["t"])
@@ -61,13 +60,25 @@ class Log:
 
 
 def save(log: Log, folder: pathlib.Path, kind: str = "parquet") -> pathlib.Path:
-    """Write a log into a folder, whole or not at all; returns the file.
+    """Write a log into a folder, which is made where it is not there, whole or not at all; returns the file.
 
     Raises:
+        ShapeError: no log, or no folder's name. LogFileError: it cannot be written.
         UnknownNameError: another format than ``parquet`` or ``npz``.
     """
     validation.one_of("log", kind, FORMATS)
+    validation.instance("log", log, Log, "a Log")
+    folder = validation.file_path("folder", folder)
     file = folder / f"log.{kind}"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        _write(log, folder, kind, file)
+    except (OSError, KeyError, TypeError, ValueError) as error:
+        raise LogFileError("folder", str(file), f"cannot be written: {error}") from error
+    return file
+
+
+def _write(log: Log, folder: pathlib.Path, kind: str, file: pathlib.Path) -> None:
     text = json.dumps({"units": dict(log.units), "meta": dict(log.meta)})
     # Written beside its place and renamed into it, so that no reader ever meets half a file
     fresh = folder / f".log.{kind}"
@@ -84,7 +95,6 @@ def save(log: Log, folder: pathlib.Path, kind: str = "parquet") -> pathlib.Path:
         schema = pa.schema(fields, metadata={_META: text})
         pq.write_table(pa.Table.from_arrays(table.columns, schema=schema), fresh)
     fresh.replace(file)
-    return file
 
 
 def load(run: str | os.PathLike[str]) -> Log:
@@ -96,7 +106,9 @@ def load(run: str | os.PathLike[str]) -> Log:
     Raises:
         LogFileError: there is no log, or it cannot be read.
     """
-    path = pathlib.Path(run)
+    path = validation.file_path("run", run)
+    if not validation.exists("run", path):
+        raise LogFileError("run", str(path), "there is no such file or folder")
     if path.is_dir():
         found = [path / f"log.{kind}" for kind in FORMATS if (path / f"log.{kind}").is_file()]
         if not found:

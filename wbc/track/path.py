@@ -21,6 +21,9 @@ from wbc.validation import Array
 #: Consecutive orientations may be at most this far apart [rad]; beyond it, the way round is ambiguous.
 LARGEST_TURN = math.radians(170.0)
 
+#: Shortest time between poses, and longest path [s]: powers up to the fifth of times are added
+SHORTEST, LONGEST = 1e-6, 1e9
+
 #: The spline of quaternions may not come nearer to zero than this, where its direction is badly defined.
 SHORTEST_QUATERNION = 0.2
 
@@ -74,14 +77,17 @@ class SplinePath:
     def __init__(self, times: Any, poses: Sequence[Any]) -> None:
         from scipy.interpolate import make_interp_spline
 
-        stamps = validation.real_array("path.times", times)
+        poses = validation.items("path.poses", poses, "poses")
+        stamps = validation.ordinary_array("path.times", times)
         if stamps.ndim != 1 or len(stamps) < 2 or len(stamps) != len(poses):
             raise ShapeError("path.times", times, f"expected at least two times, one for each of {len(poses)} poses")
         if (np.diff(stamps) <= 0.0).any():
             k = int(np.argmax(np.diff(stamps) <= 0.0)) + 1
             raise RangeError(f"path.times[{k}]", float(stamps[k]), f"expected a time after {stamps[k - 1]:g} s")
+        if (np.diff(stamps) < SHORTEST).any() or stamps[-1] - stamps[0] > LONGEST:
+            raise RangeError("path.times", times, f"expected times {SHORTEST:g} s apart or more, {LONGEST:g} s in all")
         placed = [validation.pose(f"path.poses[{k}]", pose) for k, pose in enumerate(poses)]
-        points = np.array([pose.translation for pose in placed])
+        points = validation.ordinary_array("path.poses", [pose.translation for pose in placed])
         quaternions = _continuous(np.array([pin.Quaternion(pose.rotation).coeffs() for pose in placed]))
         self.times = stamps - stamps[0]
         self.points = points
@@ -99,7 +105,8 @@ class SplinePath:
 
     def sample(self, t: float) -> Sample:
         """Pose and twist at time t [s]; at rest outside [0, duration]."""
-        inside = min(max(float(t), 0.0), self.duration)
+        t = validation.scalar("t", t, unit="s")
+        inside = min(max(t, 0.0), self.duration)
         value = self._spline(inside)
         rate = self._rate(inside) if inside == t else np.zeros(7)
         size = float(np.linalg.norm(value[3:]))
@@ -110,6 +117,7 @@ class SplinePath:
 
     def stretched(self, duration: float) -> SplinePath:
         """The same poses in another time [s], > 0."""
+        duration = validation.scalar("duration", duration, low=0.0, open_low=True, unit="s")
         poses = [pin.SE3(pin.Quaternion(q).matrix(), p) for p, q in zip(self.points, self._quaternions, strict=True)]
         return SplinePath(self.times * (duration / self.duration), poses)
 

@@ -40,7 +40,7 @@ def read_path(file: str | os.PathLike[str]) -> SplinePath:
             the waypoint is named.
         RangeError: times that do not increase, or orientations too far apart (see :class:`SplinePath`).
     """
-    path = pathlib.Path(file)
+    path = validation.file_path("path", file)
     if path.suffix.lower() not in SUFFIXES:
         raise PathFileError("path", str(path), "unknown kind of file", SUFFIXES)
     try:

@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
+from wbc import validation
 from wbc.controller import Controller
 from wbc.shapes import Sphere
 from wbc.track.clearance import clearances, least_mesh_clearance
@@ -46,11 +47,14 @@ def track(
     Raises:
         WbcError: the stack does not fit the robot, or it does not compile.
     """
+    validation.instance("plan", plan, Plan, "a Plan")
+    for name, one in (("progress", progress), ("stop", stop), ("compiled", compiled)):
+        validation.function(name, one)
     began = time.perf_counter()
     controller = plan.stack().compile(solver=plan.solver, backend=plan.backend)
     compile_time = time.perf_counter() - began
     if compiled is not None:
-        compiled(controller)
+        validation.called("compiled", compiled, controller)
     recorder = Recorder(plan, controller)
     _loop(plan, controller, recorder, progress, stop)
     columns, units = recorder.columns()
@@ -80,7 +84,7 @@ def _loop(
     rest = float(controller["plane"].target) if plan.plane is not None else 0.0
     clock = time.perf_counter_ns
     for k in range(plan.ticks):
-        if stop is not None and stop():
+        if stop is not None and validation.called("stop", stop):
             break
         t = k * dt
         target, middle = plan.path.sample(t).pose, plan.path.sample(t + dt / 2).twist
@@ -100,7 +104,7 @@ def _loop(
         recorder.add(t, q, target, angle, step, (clock() - start) * 1e-9)
         q = pin.integrate(model, q, step.v * dt)
         if progress is not None:
-            progress(k + 1)
+            validation.called("progress", progress, k + 1)
 
 
 def _meta(plan: Plan, controller: Controller, recorder: Recorder, compile_time: float) -> dict[str, Any]:

@@ -6,14 +6,16 @@ import fnmatch
 import math
 import pathlib
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import coal
 import numpy as np
 import pinocchio as pin
 
 from wbc import style, validation
-from wbc.errors import RangeError, ShapeError
+from wbc.errors import RangeError, RobotFileError, ShapeError
 from wbc.robot import Robot
+from wbc.robot.robot import checked_robot
 from wbc.shapes import Box, Capsule, Convex, Cylinder, PlacedShape, Solid, Sphere
 from wbc.track import render, solids
 from wbc.track.clearance import bodies_of
@@ -35,6 +37,10 @@ BIAS = 0.003
 #: Largest angle above or below the scene: straight from above no direction is up [rad]
 HIGHEST = 1.5
 SOLIDS = (Sphere, Capsule, Box, Cylinder, Convex)
+#: Corners closer than this are never merged [m]
+FINEST = 1e-6
+#: Pixels of a picture at most, and lengths of a radius along a path
+PIXELS, STATIONS = 2**24, 1_000_000
 #: Links whose poses differ by less stand at one place
 SAME = 1e-3
 #: Part of the picture's width or height that the scene takes
@@ -74,11 +80,22 @@ class Scene:
         floor: bool = True,
     ) -> None:
         detail = validation.scalar("Scene.detail", detail, low=0.0, unit="m")
+        # What is finer than a thousandth of a millimetre merges nothing that can be seen
+        detail = detail if detail >= FINEST else 0.0
+        floor = validation.flag("Scene.floor", floor)
+        dark, hidden = (validation.items(f"Scene.{n}", v, "names") for n, v in (("dark", dark), ("hidden", hidden)))
+        shades = {
+            p: _colour(c)
+            for p, c in validation.mapping(
+                "Scene.colours", {} if colours is None else colours, "links to colours"
+            ).items()
+        }
+        checked_robot(robot)
         frames = [robot.model.getFrameId(robot.check_frame("Scene.dark", frame)) for frame in dark]
         self._robot = robot
         unseen = _matching(robot, "hidden", hidden)
         self._floor = floor
-        self._colours = {link: c for p, c in (colours or {}).items() for link in _matching(robot, "colours", (p,))}
+        self._colours = {link: c for p, c in shades.items() for link in _matching(robot, "colours", (p,))}
         self._meshes = [(link, simplified(m, detail)) for link, m in link_meshes(robot) if link not in unseen]
         self._dark = {int(robot.model.frames[frame].parentJoint) for frame in frames} - {0}
         self._stands: list[list[pin.SE3]] = [[] for _ in self._meshes]
@@ -95,6 +112,8 @@ class Scene:
         """
         model, data = self._robot.model, self._robot.model.createData()
         pin.framesForwardKinematics(model, data, self._robot.configuration("q", q))
+        pale = validation.flag("Scene.pale", pale)
+        extra = [_piece(piece) for piece in validation.items("Scene.pieces", pieces, "(shape, pose, colour)")]
         meshes = []
         for (link, triangles), stands in zip(self._meshes, self._stands, strict=True):
             index = model.getFrameId(link)
@@ -105,7 +124,7 @@ class Scene:
             plain = DARK if int(model.frames[index].parentJoint) in self._dark else WHITE
             colour = self._colours.get(link, plain)
             meshes.append(render.Mesh(triangles @ pose.rotation.T + pose.translation, colour))
-        meshes += [_surface(shape, place, colour) for shape, place, colour in pieces]
+        meshes += extra
         if pale:
             self._pale.append(meshes)
         else:
@@ -120,7 +139,7 @@ class Scene:
         pale: bool = False,
     ) -> None:
         """A shape of :mod:`wbc.shapes`, or the parts of a mesh, at a pose in the world; a label goes into the key."""
-        place = validation.pose("Scene.pose", pose)
+        place, colour = validation.pose("Scene.pose", pose), _colour(colour)
         meshes = [_surface(part, place, colour) for part in (shape if isinstance(shape, Sequence) else [shape])]
         if pale:
             self._pale.append(meshes)
@@ -130,7 +149,8 @@ class Scene:
 
     def add_triangles(self, triangles: Array, label: str = "", colour: Colour = OBSTACLE) -> None:
         """Triangles in the world, m x 3 x 3 [m]."""
-        corners = validation.real_array("Scene.triangles", triangles)
+        colour = _colour(colour)
+        corners = validation.ordinary_array("Scene.triangles", triangles)
         if corners.ndim != 3 or corners.shape[1:] != (3, 3):
             raise ShapeError("Scene.triangles", triangles, f"expected m x 3 x 3, not {corners.shape}")
         self._solid.append(render.Mesh(corners, colour))
@@ -138,10 +158,13 @@ class Scene:
 
     def add_path(self, points: Array, label: str = "", colour: Colour = PATH, radius: float = 0.006) -> None:
         """A tube along points, n x 3 [m]."""
-        line = validation.real_array("Scene.points", points)
+        colour = _colour(colour)
+        line = validation.ordinary_array("Scene.points", points)
         if line.ndim != 2 or line.shape[1] != 3:
             raise ShapeError("Scene.points", points, f"expected n x 3, not {line.shape}")
         wide = validation.scalar("Scene.radius", radius, low=0.0, open_low=True, unit="m")
+        if float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum()) > STATIONS * wide:
+            raise RangeError("Scene.points", points, f"expected a path of at most {STATIONS} times its radius")
         self._solid.append(render.tube(line, wide, colour))
         self._label(colour, label)
 
@@ -161,18 +184,24 @@ class Scene:
         """
         azimuth = validation.scalar("Scene.azimuth", azimuth, unit="rad")
         elevation = validation.scalar("Scene.elevation", elevation, low=-HIGHEST, high=HIGHEST, unit="rad")
-        if not all(isinstance(side, int) and side > 0 for side in size) or len(size) != 2:
+        sides = [validation.integer("Scene.size", n, 1, PIXELS) for n in validation.items("Scene.size", size, "pixels")]
+        if len(sides) != 2:
             raise RangeError("Scene.size", size, "expected two whole numbers of pixels above 0")
+        if sides[0] * sides[1] > PIXELS:
+            raise RangeError("Scene.size", size, f"expected at most {PIXELS} pixels in all")
+        path = validation.file_path("Scene.file", file)
         if not any(len(mesh.triangles) for mesh in self._solid):
             raise RangeError("Scene", len(self._solid), "nothing was added that is not pale")
         everything = [*self._solid, *(mesh for meshes in self._pale for mesh in meshes)]
         # Some hundred points of each are enough to see how large the scene is
         sample = [mesh.triangles.reshape(-1, 3)[:: max(1, len(mesh.triangles) // 200)] for mesh in everything]
-        camera = _camera(np.concatenate(sample), size, azimuth, elevation)
+        camera = _camera(np.concatenate(sample), (sides[0], sides[1]), azimuth, elevation)
         image = _render(camera, self._solid, self._pale, self._floor)
-        path = pathlib.Path(file)
-        path.parent.mkdir(parents=True, exist_ok=True)
-        _write(image, self._key, path)
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            _write(image, self._key, path)
+        except (OSError, ValueError) as error:
+            raise RobotFileError("Scene.file", str(path), f"cannot be written: {error}") from error
         return path
 
     def _label(self, colour: Colour, label: str) -> None:
@@ -195,7 +224,7 @@ def link_meshes(robot: Robot) -> list[tuple[str, Array]]:
 
 def _matching(robot: Robot, field: str, patterns: Sequence[str]) -> set[str]:
     found: set[str] = set()
-    for pattern in patterns:
+    for pattern in validation.strings(f"Scene.{field}", patterns):
         names = fnmatch.filter(robot.frame_names, pattern)
         found.update(names or [robot.check_frame(f"Scene.{field}", pattern)])
     return found
@@ -265,6 +294,22 @@ def _render(camera: render.Camera, solid: list[render.Mesh], pale: list[list[ren
     darker = render.occlusion(np.minimum(depth, far), 5.0 * SUPERSAMPLING)
     image *= (1.0 - np.where(image.min(axis=-1) < 0.99, darker, 0.0))[..., None]
     return render.reduced(image, SUPERSAMPLING)
+
+
+def _piece(piece: Any) -> render.Mesh:
+    """(shape, pose, colour) as triangles."""
+    three = validation.items("Scene.pieces", piece, "shape, pose and colour")
+    if len(three) != 3:
+        raise ShapeError("Scene.pieces", piece, "expected shape, pose and colour")
+    return _surface(three[0], validation.pose("Scene.pose", three[1]), _colour(three[2]))
+
+
+def _colour(colour: Any) -> Colour:
+    """Red, green and blue from 0 to 1."""
+    red, green, blue = validation.ordinary_array("Scene.colour", colour, (3,)).tolist()
+    if not (min(red, green, blue) >= 0.0 and max(red, green, blue) <= 1.0):
+        raise RangeError("Scene.colour", colour, "expected red, green and blue from 0 to 1")
+    return red, green, blue
 
 
 def _tinted(colour: Colour) -> Colour:

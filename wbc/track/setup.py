@@ -10,8 +10,9 @@ import pinocchio as pin
 
 from wbc import shapes, tasks, validation
 from wbc.controller import Stack
-from wbc.errors import WbcError
+from wbc.errors import ShapeError, WbcError
 from wbc.robot import Robot
+from wbc.robot.robot import checked_robot
 from wbc.track.path import Path, smooth_step
 from wbc.validation import Array
 
@@ -31,8 +32,16 @@ class Moving:
     pose: pin.SE3
     velocity: Array = field(default_factory=lambda: np.zeros(3))
 
+    def __post_init__(self) -> None:
+        if not isinstance(self.shape, shapes.Shape):
+            raise ShapeError("Moving.shape", self.shape, "expected a shape of wbc.shapes")
+        object.__setattr__(self, "pose", validation.pose("Moving.pose", self.pose))
+        velocity = validation.ordinary_array("Moving.velocity", self.velocity, (3,))
+        object.__setattr__(self, "velocity", velocity)
+
     def at(self, t: float) -> pin.SE3:
         """Pose at time t [s]."""
+        t = validation.scalar("t", t, unit="s")
         return pin.SE3(self.pose.rotation, self.pose.translation + t * self.velocity)
 
 
@@ -95,7 +104,16 @@ class Plan:
     backend: str = "auto"
 
     def __post_init__(self) -> None:
-        self.robot.check_frame("frame", self.frame)
+        checked_robot(self.robot).check_frame("frame", self.frame)
+        if not callable(getattr(self.path, "sample", None)) or not hasattr(self.path, "duration"):
+            raise ShapeError("path", self.path, "expected a path: duration, and sample(t)")
+        for name, one in validation.mapping("obstacles", self.obstacles, "names to Movings").items():
+            validation.instance(f"obstacles[{name}]", one, Moving, "a Moving")
+        if self.plane is not None:
+            validation.instance("plane", self.plane, Swing, "a Swing")
+        for frame in validation.items("holds", self.holds, "frames"):
+            self.robot.check_frame("holds", frame)
+        object.__setattr__(self, "label", validation.name("label", self.label))
         validation.scalar("dt", self.dt, low=0.0, open_low=True, unit="s")
         validation.scalar("margin", self.margin, low=0.0, unit="m")
         validation.scalar("approach", self.approach, low=0.0, open_low=True, unit="1/s")
