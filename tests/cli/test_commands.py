@@ -151,7 +151,7 @@ def test_track_with_holds_and_start(tmp_path: Path) -> None:
         (["track", "--sphere", "1,2,3,x"], "sphere: expected numbers"),
         (["track", "--sphere", "1,2,3,-1"], "radius"),
         (["track", "--start", "0,0"], "start: expected shape (7,)"),
-        (["track", "--hold", "panda_link99"], "Hold.frame"),
+        (["track", "--hold", "panda_link99"], "holds"),
         (["track", "double_pendulum", "--plane", "hold"], "knows no shoulder, elbow and wrist"),
     ],
     ids=lambda value: "_".join(value) if isinstance(value, list) else "",
