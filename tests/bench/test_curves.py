@@ -121,3 +121,7 @@ def test_tables_and_goals_of_made_up_figures() -> None:
     pages = [sheet.markdown() for sheet in curve_sheets(made)]
     assert "| 50 | 10.0 | 25.0 (2.5x) |" in pages[0]
     assert "| 50 | - / 10.00 | - / 10.00 |" in pages[1]
+
+
+def test_sensing_is_a_phase_of_measured_pairs(boxed: Case) -> None:
+    assert {"sense", "python"} <= set(worker.time_phases(Ours(boxed), 5))
