@@ -21,6 +21,8 @@ from wbc.walking.holds.surface import CylinderSurface, PlaneSurface
 INCH = 0.0254
 #: The published cylinder: radius and axial pitch [m], rows T and A
 RADIUS, PITCH, ROWS_T, ROWS_A = 100 * INCH, 9.25 * INCH, 25, 24
+#: Longest module that is built [m]
+LONGEST = 1e3
 #: Tilt that a compliant hold allows [rad]
 TILT = 0.05
 
@@ -46,7 +48,7 @@ def cylinder(rigid: bool = False, max_tilt: float = TILT) -> Structure:
 
     Holds: x = 100 cos(180 - ang), y = 100 sin(180 - ang), z = -9.25 A [in]; free roll. ``rigid`` fixes the tilt.
     """
-    tilt = 0.0 if rigid else max_tilt
+    tilt = 0.0 if validation.flag("rigid", rigid) else max_tilt
     holds = tuple(
         Hold(f"{t},{a}", grid_pose(t, a), FREE, tilt) for t in range(1, ROWS_T + 1) for a in range(1, ROWS_A + 1)
     )
@@ -126,7 +128,7 @@ def module(length: float = 6.0, radius: float = 2.1, max_tilt: float = TILT) -> 
     Raises:
         RangeError: a module too short for one rail, or a radius under 1 m.
     """
-    length = validation.scalar("length", length, low=1.0, unit="m")
+    length = validation.scalar("length", length, low=1.0, high=LONGEST, unit="m")
     radius = validation.scalar("radius", radius, low=1.0, unit="m")
     top, spacing, gap, per_rail = radius + 0.07, 0.22, 0.3, 3
     rail = (per_rail - 1) * spacing
@@ -177,6 +179,7 @@ def remove_fraction(structure: Structure, fraction: float, seed: int = 0) -> Str
     Raises:
         RangeError: a fraction outside [0, 1]. ShapeError: no hold would be left.
     """
+    validation.instance("structure", structure, Structure, "a Structure")
     share = validation.scalar("fraction", fraction, low=0.0, high=1.0)
     if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:
         raise RangeError("seed", seed, "expected a whole number of at least 0")
@@ -186,6 +189,7 @@ def remove_fraction(structure: Structure, fraction: float, seed: int = 0) -> Str
 
 
 def _remove(structure: Structure, field: str, wanted: Any, place: int) -> Structure:
+    validation.instance("structure", structure, Structure, "a Structure")
     numbers = _numbers(field, wanted)
     keys = {hold: _grid_key(field, hold)[place] for hold in structure.ids}
     present = set(keys.values())

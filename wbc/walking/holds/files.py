@@ -30,6 +30,7 @@ from typing import Any, TextIO
 
 import pinocchio as pin
 
+from wbc import validation
 from wbc.errors import StructureFileError, WbcError
 from wbc.shapes import Box, Capsule
 from wbc.walking.holds.hold import Hold, checked_id, checked_roll, frame_of
@@ -54,7 +55,7 @@ def read_structure(path: str | os.PathLike[str]) -> Structure:
     Raises:
         StructureFileError: a file that cannot be read, or a bad line: ``field`` names the line and the column.
     """
-    file = pathlib.Path(path)
+    file = validation.file_path("path", path)
     try:
         text = file.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
@@ -68,6 +69,7 @@ def parse_structure(text: str, name: str = "structure") -> Structure:
     Raises:
         StructureFileError: a bad line: ``field`` names the line and the column.
     """
+    validation.instance("text", text, str, "text")
     section, header = "holds", False
     holds: dict[str, Hold] = {}
     obstacles: dict[str, Obstacle] = {}
@@ -103,7 +105,8 @@ def save_structure(structure: Structure, path: str | os.PathLike[str]) -> pathli
     Raises:
         StructureFileError: the file cannot be written.
     """
-    file = pathlib.Path(path)
+    validation.instance("structure", structure, Structure, "a Structure")
+    file = validation.file_path("path", path)
     try:
         with file.open("w", encoding="utf-8", newline="") as stream:
             out = _Writer(stream)

@@ -40,7 +40,7 @@ class Structure:
 
     def __post_init__(self) -> None:
         for field, kind in (("holds", Hold), ("obstacles", Obstacle)):
-            things = tuple(getattr(self, field))
+            things = validation.items(f"Structure.{field}", getattr(self, field), f"{kind.__name__}s")
             if not all(isinstance(thing, kind) for thing in things):
                 raise ShapeError(f"Structure.{field}", things, f"expected {kind.__name__}s")
             seen: set[str] = set()
