@@ -60,12 +60,12 @@ def test_scaled_hands_are_always_solved(level: int | None) -> None:
     assert set(seen) == {(Status.SOLVED, "")}
 
 
-def wild(level: int) -> Controller:
+def wild(level: int, backend: str = "native") -> Controller:
     """Two tasks, a posture and a soft speed, whose weights are far apart."""
     out = Stack(robot("panda"), DT)
     out.add(EndEffector(TIP), name="hand").add(EndEffector(MIDDLE, kind="position"), name="elbow")
     out.add(Posture(), name="posture", level=level).add(JointLimits())
-    return out.add(FrameVelocityLimit(TIP, linear=0.1), name="slow", soft=1.0).compile(backend="native")
+    return out.add(FrameVelocityLimit(TIP, linear=0.1), name="slow", soft=1.0).compile(backend=backend)
 
 
 def provoke(controller: Controller, rng: np.random.Generator) -> None:
@@ -191,14 +191,7 @@ def test_levels_are_within_their_bounds_on_both_back_ends() -> None:
 
 
 def test_the_virtual_machine_raises_nothing_whatever_the_weights() -> None:
-    out = (
-        Stack(robot("panda"), DT)
-        .add(EndEffector(TIP), name="hand")
-        .add(EndEffector(MIDDLE, kind="position"), name="elbow")
-    )
-    out.add(Posture(), name="posture", level=1).add(JointLimits())
-    controller = out.add(FrameVelocityLimit(TIP, linear=0.1), name="slow", soft=1.0).compile(backend="vm")
-    rng, statuses = np.random.default_rng(0), []
+    controller, rng, statuses = wild(1, "vm"), np.random.default_rng(0), []
     for _ in range(120):
         provoke(controller, rng)
         statuses.append(controller.step(controller.tick.q.copy(), controller.tick.v_last[:7].copy()).status)
