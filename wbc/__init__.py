@@ -11,6 +11,7 @@ step = controller.step(robot.neutral)
 __version__ = "0.1.0"
 
 from wbc import controller, explain, ik, record
+from wbc import export as export
 from wbc import robots as robots
 from wbc import shapes as shapes
 from wbc import tasks as tasks
@@ -18,18 +19,18 @@ from wbc import trajectory as trajectory
 from wbc.controller import Certificate, Controller, Policy, Stack, Status, Step
 from wbc.errors import WbcError
 from wbc.explain import Explanation
-from wbc.ik import Solution, Solver
+from wbc.ik import InverseKinematics, Solution
 from wbc.record import Recording, Replay, replay
 
 __all__ = [
     "Certificate",
     "Controller",
     "Explanation",
+    "InverseKinematics",
     "Policy",
     "Recording",
     "Replay",
     "Solution",
-    "Solver",
     "Stack",
     "Status",
     "Step",
@@ -45,7 +46,14 @@ __all__ = [
 # These stood in wbc.controller before they had packages of their own; they are found there for one version more
 _MOVED = {
     explain: ("Explanation",),
-    ik: ("Branch", "Branches", "Ending", "Solution", "Solver"),
+    ik: ("Branch", "Branches", "Ending", "InverseKinematics", "Solution"),
     record: ("Recorder", "Recording", "Replay", "replay", "replayed"),
 }
 vars(controller).update({name: getattr(room, name) for room, names in _MOVED.items() for name in names})
+vars(controller)["Solver"] = ik.InverseKinematics
+
+
+def __getattr__(name: str) -> object:
+    if name == "Solver":
+        return ik.Solver  # says its new name
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -12,7 +12,7 @@ import pytest
 
 from tests.controller.test_inverse_kinematics import TIPS, arm, outside, random_q, solver, stack, tip
 from wbc.errors import InfeasibleError, RangeError, ShapeError, WbcError
-from wbc.ik import Solver
+from wbc.ik import InverseKinematics
 from wbc.tasks import Damping, Posture
 from wbc.validation import Array
 
@@ -133,9 +133,14 @@ def test_answers_are_sorted_and_of_one_seed() -> None:
 
 
 @cache
-def decided() -> Solver:
+def decided() -> InverseKinematics:
     # Damping decides nothing
-    return stack().add(Posture(), name="posture", weight=1e-3).add(Damping(), name="calm", weight=1e-6).solver()
+    return (
+        stack()
+        .add(Posture(), name="posture", weight=1e-3)
+        .add(Damping(), name="calm", weight=1e-6)
+        .inverse_kinematics()
+    )
 
 
 def test_on_a_redundant_arm_they_are_where_the_wishes_rest() -> None:

@@ -19,7 +19,7 @@ from wbc.errors import (
     UnknownNameError,
     WbcError,
 )
-from wbc.ik import Solver
+from wbc.ik import InverseKinematics
 from wbc.tasks import EndEffector, JointLimits, Posture
 
 HOME = np.array([0.3, -1.2, 1.5, -0.7, 1.2, 0.4])
@@ -64,7 +64,7 @@ def test_the_branch_does_not_depend_on_where_it_is_asked_for() -> None:
 def test_what_the_goals_leave_open_is_at_rest() -> None:
     """A redundant arm with a posture: the distance to it cannot fall along the goals' null space."""
     robot = arm("panda")
-    ik = stack().add(Posture(), name="posture", weight=1e-3).solver()
+    ik = stack().add(Posture(), name="posture", weight=1e-3).inverse_kinematics()
     pose = circle(tip(robot, robot.neutral, TIPS["panda"]))
     s = np.linspace(0.0, 2.0 * np.pi, 40)
     ik["posture"].target = robot.neutral
@@ -111,7 +111,7 @@ def test_targets_are_also_sequences() -> None:
 @pytest.mark.parametrize("kind", ["position", "orientation"])
 def test_sequences_of_positions_and_of_rotations(kind: str) -> None:
     robot = arm("ur5")
-    ik = stack("ur5", kind).add(Posture(), name="posture", weight=1e-3).solver()
+    ik = stack("ur5", kind).add(Posture(), name="posture", weight=1e-3).inverse_kinematics()
     first, last = tip(robot, HOME, "tool0"), tip(robot, HOME + 0.3, "tool0")
     part = "translation" if kind == "position" else "rotation"
     ends = [getattr(first, part), getattr(last, part)]
@@ -149,7 +149,7 @@ def test_the_limit_that_binds_is_named() -> None:
     upper = robot.limits.position_upper.copy()
     upper[0] = 1.0
     bounded = Stack(robot.with_limits(position_upper=upper), 0.01).add(EndEffector("tool0"), name="hand")
-    ik = bounded.add(JointLimits(), name="limits").solver()
+    ik = bounded.add(JointLimits(), name="limits").inverse_kinematics()
     home = tip(robot, HOME, "tool0")
 
     def turned(s: float) -> pin.SE3:
@@ -165,7 +165,7 @@ def test_the_limit_that_binds_is_named() -> None:
 def test_a_jump_is_named() -> None:
     """A random line; before the place that is named there is no jump on it."""
     robot, rng = arm("panda"), np.random.default_rng(0)
-    ik = stack().add(Posture(), name="posture", weight=1e-3).solver()
+    ik = stack().add(Posture(), name="posture", weight=1e-3).inverse_kinematics()
     for _ in range(7):
         start = robot.neutral + rng.uniform(-0.8, 0.8, 7)
         start = np.clip(start, robot.limits.position_lower + 0.1, robot.limits.position_upper - 0.1)
@@ -213,7 +213,7 @@ def test_targets_are_as_before() -> None:
     ],
 )
 def test_bad_input_is_refused(change: dict[str, Any], error: type[WbcError], field: str) -> None:
-    ik: Solver = solver("ur5")
+    ik: InverseKinematics = solver("ur5")
     good = {"targets": {"hand": circle(tip(arm("ur5"), HOME, "tool0"))}, "s": [0.0, 0.1], "q0": HOME}
     with pytest.raises(error) as caught:
         ik.along(**{**good, **change})

@@ -13,7 +13,7 @@ import pinocchio as pin
 import pytest
 
 from tests.controller.stacks import DT, FRAMES, robot
-from wbc.controller import Controller, Stack, Status
+from wbc.controller import Controller, Stack, Status, core_of
 from wbc.errors import SolverError
 from wbc.shapes import Sphere
 from wbc.tasks import Constraint, EndEffector, Hold, Input, JointLimits, Obstacle, Posture, Row, Rows
@@ -106,7 +106,7 @@ def test_a_margin_says_what_it_has_to_spare(tick: Controller) -> None:
     sides = [side for conflict in step.explain().conflicts for side in conflict.sides if side.item == "ball"]
     assert sides
     for side in sides:
-        block = tick.layout.blocks["ball"]
+        block = core_of(tick).layout.blocks["ball"]
         k = [row.label for row in block.rows].index(side.row)
         assert side.margin == step.margins["ball"][k]
 

@@ -13,7 +13,7 @@ from scipy.optimize import minimize
 import wbc
 from tests.constraints.test_obstacle import coal_pose, coal_shape
 from wbc.controller import Stack
-from wbc.ik import Ending, Solver
+from wbc.ik import Ending, InverseKinematics
 from wbc.ik.timeless import searching, timeless
 from wbc.robot import Robot
 from wbc.shapes import Sphere
@@ -36,9 +36,9 @@ def stack(name: str = "panda", kind: str = "pose") -> Stack:
 
 
 @cache
-def solver(name: str = "panda", backend: str = "auto", kind: str = "pose") -> Solver:
+def solver(name: str = "panda", backend: str = "auto", kind: str = "pose") -> InverseKinematics:
     """Solvers are kept: each test sets all that it depends on."""
-    return stack(name, kind).solver(backend=backend)
+    return stack(name, kind).inverse_kinematics(backend=backend)
 
 
 def tip(robot: Robot, q: Array, frame: str) -> pin.SE3:
@@ -149,7 +149,7 @@ def test_out_of_reach_the_nearest_configuration_is_found(kind: str) -> None:
 def test_goals_that_contradict_each_other_are_told_from_those_out_of_reach() -> None:
     robot = arm("panda")
     both = stack(kind="position").add(EndEffector("panda_link7", kind="position"), name="wrist")
-    ik = both.solver()
+    ik = both.inverse_kinematics()
     q = random_q(robot, np.random.default_rng(4))
     ik["hand"].target = tip(robot, q, TIPS["panda"]).translation
     ik["wrist"].target = tip(robot, q, "panda_link7").translation
@@ -162,7 +162,7 @@ def test_goals_that_contradict_each_other_are_told_from_those_out_of_reach() -> 
 
 def test_constraints_that_no_configuration_keeps() -> None:
     robot = arm("panda")
-    held = stack(kind="position").add(Hold("panda_link7", kind="position"), name="hold").solver()
+    held = stack(kind="position").add(Hold("panda_link7", kind="position"), name="hold").inverse_kinematics()
     held["hold"].target = pin.SE3(np.eye(3), np.array([3.0, 0.0, 0.0]))
     solution = held.solve(robot.neutral, budget=None, restarts=3)
     assert solution.status == "contradictory"
@@ -172,7 +172,7 @@ def test_constraints_that_no_configuration_keeps() -> None:
 def test_wishes_are_followed_where_they_cost_nothing() -> None:
     robot, name = arm("panda"), TIPS["panda"]
     low, high = robot.limits.position_lower, robot.limits.position_upper
-    ik = stack().add(Posture(), name="posture", weight=1e-3).solver()
+    ik = stack().add(Posture(), name="posture", weight=1e-3).inverse_kinematics()
     assert ik.goals == ("hand",)
     for seed in range(6):
         goal = tip(robot, random_q(robot, np.random.default_rng(seed)), name)
@@ -200,7 +200,7 @@ def test_wishes_are_followed_where_they_cost_nothing() -> None:
 def test_obstacles_are_respected() -> None:
     robot = arm("panda")
     ball = stack().add(Obstacle(Sphere(0.15), margin=0.02), name="ball")
-    ik, plain, rng = ball.solver(), solver(), np.random.default_rng(9)
+    ik, plain, rng = ball.inverse_kinematics(), solver(), np.random.default_rng(9)
     hit = 0
     for _ in range(25):
         q = random_q(robot, rng)

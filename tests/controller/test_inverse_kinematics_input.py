@@ -14,7 +14,7 @@ import wbc
 from tests.controller.test_inverse_kinematics import TIPS, arm, random_q, solver, stack, tip
 from wbc.controller import Stack
 from wbc.errors import NotFiniteError, RangeError, ShapeError, UnknownNameError, WbcError
-from wbc.ik import Solver
+from wbc.ik import InverseKinematics
 from wbc.tasks import Damping, EndEffector, FrameVelocityLimit, JointLimits, Posture, SelfCollision
 
 NAN = np.full(7, np.nan)
@@ -59,14 +59,14 @@ def test_targets_are_checked() -> None:
 def test_goals_are_named_or_chosen_by_weight() -> None:
     arms = stack().add(Posture(), name="posture", weight=5.0).add(Damping(), name="calm", weight=2.0)
     arms.add(EndEffector("panda_link7", kind="position"), name="wrist", weight=0.5)
-    assert arms.solver().goals == ("hand",)
-    assert arms.solver(goals=("wrist", "hand")).goals == ("wrist", "hand")
+    assert arms.inverse_kinematics().goals == ("hand",)
+    assert arms.inverse_kinematics(goals=("wrist", "hand")).goals == ("wrist", "hand")
     with pytest.raises(UnknownNameError) as unknown:
-        arms.solver(goals=("hend",))
+        arms.inverse_kinematics(goals=("hend",))
     assert unknown.value.field == "goals"
     assert unknown.value.choices[0] == "hand"
     with pytest.raises(RangeError) as none:
-        Stack(arm("panda"), 0.01).add(Posture(), name="posture").solver()
+        Stack(arm("panda"), 0.01).add(Posture(), name="posture").inverse_kinematics()
     assert none.value.field == "goals"
 
 
@@ -86,10 +86,10 @@ def test_a_budget_is_kept_and_says_so() -> None:
 
 
 @cache
-def crowded(backend: str) -> Solver:
+def crowded(backend: str) -> InverseKinematics:
     """Two goals and a wish: a search, then two that ask which goal can be met, each with its settling."""
     arms = stack(kind="position").add(EndEffector("panda_link7", kind="position"), name="wrist")
-    return arms.add(Posture(), name="posture", weight=1e-3).solver(backend=backend)
+    return arms.add(Posture(), name="posture", weight=1e-3).inverse_kinematics(backend=backend)
 
 
 @pytest.mark.parametrize(("backend", "budget"), [("native", 5e-5), ("native", 2e-4), ("vm", 0.1)])
@@ -147,10 +147,10 @@ def test_limits_of_speed_do_not_count() -> None:
 
 
 @cache
-def humanoid() -> Solver:
+def humanoid() -> InverseKinematics:
     robot = wbc.robots.load("talos")
     out = Stack(robot, 0.005).add(EndEffector("gripper_left_base_link", relative_to="torso_2_link"), name="hand")
-    return out.add(JointLimits(), name="limits").solver()
+    return out.add(JointLimits(), name="limits").inverse_kinematics()
 
 
 def test_joints_that_no_goal_moves_stay() -> None:
@@ -174,7 +174,7 @@ def test_joints_that_no_goal_moves_stay() -> None:
 
 def test_measured_pairs_are_respected() -> None:
     robot = arm("panda")
-    ik = stack().add(SelfCollision(margin=0.01), name="self").solver()
+    ik = stack().add(SelfCollision(margin=0.01), name="self").inverse_kinematics()
     rng = np.random.default_rng(0)
     for _ in range(3):
         ik["hand"].target = tip(robot, random_q(robot, rng), TIPS["panda"])

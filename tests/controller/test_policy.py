@@ -12,13 +12,13 @@ import pytest
 import wbc
 from tests.controller.stacks import DT, FRAMES, arm, robot
 from tests.controller.test_sacrifice import within_actuators
-from wbc.controller import Controller, Policy, Status
+from wbc.controller import Controller, Policy, Status, core_of
 from wbc.controller.policy import CHAIN
-from wbc.controller.report import UNSOUND
+from wbc.controller.tick.buffers import UNSOUND
 from wbc.errors import DuplicateNameError, ShapeError, SolverError, UnknownNameError
 from wbc.qp import QP, Solution, make_solver
-from wbc.qp import daqp as daqp_module
 from wbc.qp.certificate import certify
+from wbc.qp.solvers import daqp as daqp_module
 from wbc.tasks import Hold
 
 
@@ -54,7 +54,7 @@ def contradict(tick: Controller) -> None:
 
 def unsound(tick: Controller, times: int) -> Any:
     """The next answers of the tick as if their certificates failed."""
-    real, left = tick._call, [times]
+    real, left = core_of(tick).call, [times]
 
     def call() -> int:
         flag = real()

@@ -16,6 +16,7 @@ import pytest
 from tests.controller.stacks import arm, controller, near_limits, randomise
 from tests.stack import small
 from wbc import Controller, Recording, Stack, replay
+from wbc.controller import core_of
 from wbc.errors import NotFiniteError, UnknownNameError
 from wbc.record import recording as files
 from wbc.record import replayed
@@ -113,7 +114,7 @@ def test_a_recording_says_what_was_given(tmp_path: Path) -> None:
     made = Recording(tmp_path / "run.npz")
     for name, part in (("q", "q"), ("v", "v"), ("dt", "dt"), ("reset", "reset"), ("last", "v_last")):
         assert np.array_equal(made[part], given[name]), name
-    span = one.layout.blocks["hand"].slots["target"].span
+    span = core_of(one).layout.blocks["hand"].slots["target"].span
     assert np.array_equal(made["p"][:, span], given["target"])
     assert np.array_equal(made["bound_enabled"][:, 0], [k % 2 for k in range(40)])
     assert not made["use_v"].any()
@@ -152,12 +153,12 @@ def test_memory_is_bounded(tmp_path: Path) -> None:
 
 def test_one_that_does_not_record_is_as_before(tmp_path: Path) -> None:
     one = controller("arm", "panda", backend="native")
-    call = one._call
+    call = core_of(one).call
     with one.record(tmp_path / "run.npz"):
-        assert one._call is not call
+        assert core_of(one).call is not call
         assert one.clone()._recorder is None
-    assert one._call is call
-    assert one._recorder is None
+    assert core_of(one).call is call
+    assert core_of(one).recording is None
 
 
 # What differs
@@ -310,7 +311,7 @@ def test_a_full_disk_does_not_stop_the_controller(tmp_path: Path, caplog: pytest
     with pytest.raises(RecordingError, match="cannot be written: No space left"):
         small.stack().compile(backend="vm").record("/dev/full", overwrite=True)
     one = small.stack().compile(backend="native")
-    call = one._call
+    call = core_of(one).call
     recorder = one.record(tmp_path / "run.npz")
     assert recorder._writer is not None
 
@@ -322,7 +323,7 @@ def test_a_full_disk_does_not_stop_the_controller(tmp_path: Path, caplog: pytest
     recorder._writer._put = full  # type: ignore[method-assign]
     for _ in range(2 * recorder._chunk):
         assert one.step(small.Q).status == "solved"
-    assert one._call is call
+    assert core_of(one).call is call
     assert [r.getMessage() for r in caplog.records] == [
         f"the recording {tmp_path / 'run.npz'} ends after {CHUNK} ticks: No space left on device"
     ]
@@ -339,7 +340,7 @@ def heir(ticks: int) -> bool:
     assert _shared is not None
     for _ in range(ticks):
         _shared.step(small.Q)
-    return _shared._recorder is None
+    return core_of(_shared).recording is None
 
 
 def test_a_fork_leaves_the_file_to_its_parent(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -356,6 +357,6 @@ def test_a_fork_leaves_the_file_to_its_parent(tmp_path: Path, monkeypatch: pytes
 
 def test_parts_are_all_that_a_tick_reads() -> None:
     """A buffer that is added to the tick must be added to the recording."""
-    from wbc.controller.tick import Buffers
+    from wbc.controller.tick.buffers import Buffers
 
     assert set(INPUTS) == set(Buffers.__annotations__) - {"report", "state"}

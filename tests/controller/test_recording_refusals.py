@@ -16,6 +16,7 @@ import wbc
 from tests.controller.test_recording import TOP, recorded
 from tests.stack import small
 from wbc import Recording, Stack, replay
+from wbc.controller import core_of
 from wbc.errors import PicklingError, UnknownNameError
 from wbc.record.recording import RecordingError, Writer
 from wbc.tasks import Expression, Posture
@@ -34,7 +35,7 @@ def test_files_are_not_written_over_by_accident(tmp_path: Path) -> None:
     assert replay(run).ticks == 0
     with pytest.raises(RecordingError, match="cannot be written: No such file"):
         one.record(tmp_path / "none" / "run.npz")
-    assert one._recorder is None
+    assert core_of(one).recording is None
 
 
 def rewritten(source: Path, target: Path, **changes: Any) -> Path:

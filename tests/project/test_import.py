@@ -33,4 +33,4 @@ def test_names_that_left_the_controller_are_still_found_there() -> None:
     code = (
         "from wbc.controller import Branches, Ending, Explanation, Recorder, Solver, replayed; print(Solver.__module__)"
     )
-    assert run(code).strip() == "wbc.ik.solver"
+    assert run(code).strip() == "wbc.ik.inverse_kinematics"

@@ -8,7 +8,7 @@ import pytest
 
 import wbc
 from wbc.native import toolchain
-from wbc.stack.many import CHUNK, ManyStates
+from wbc.stack.evaluation import CHUNK, ManyStates
 from wbc.trajectory.checks import inverse_dynamics
 
 

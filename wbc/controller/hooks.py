@@ -13,7 +13,9 @@ from typing import Any
 explain: Callable[..., Any]
 #: By ``wbc.explain``, for :meth:`wbc.Step.derivative`: (the same two, item, value) -> numbers [nv, k]
 derivative: Callable[..., Any]
+#: By ``wbc.export``, for :meth:`wbc.Controller.export`: (controller, and its arguments) -> folder
+export: Callable[..., Any]
 #: By ``wbc.record``, for :meth:`wbc.Controller.record`: (controller, file, overwrite) -> Recorder
 record: Callable[..., Any]
-#: By ``wbc.ik``, for :meth:`wbc.Stack.solver`: (stack, goals, back end) -> Solver
-solver: Callable[..., Any]
+#: By ``wbc.ik``, for :meth:`wbc.Stack.inverse_kinematics`: (stack, goals, back end) -> InverseKinematics
+inverse_kinematics: Callable[..., Any]

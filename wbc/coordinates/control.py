@@ -287,7 +287,7 @@ class PairController:
         for one in rows:
             if expressions.reference(self.robot, one) is not None:
                 value = expressions.here(self.robot, one, q)
-                self.controller[self.declared.keep[one]].reference = value
+                self.controller[self.declared.keep[one]].set(reference=value)
 
     def _shortest(self, q: Array, v: Array) -> float:
         """Time in which the joint rates can change to what the new pair wants."""

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wbc.controller import Controller
+from wbc.controller import Controller, core_of
 from wbc.coordinates.expressions import DRIFT
 from wbc.coordinates.integrals import RateIntegrals, Rows
 from wbc.coordinates.pair import CoordinatePair
@@ -41,23 +41,25 @@ class Served:
 
     def write(self, controller: Controller, rates: Array) -> None:
         """Rates of all coordinates into the inputs of this pair's."""
+        core = core_of(controller)
         for slot, rows in self.speeds:
-            controller.write(slot, rates[rows])
+            core.write(slot, rates[rows])
 
     def write_integrals(self, controller: Controller, integrals: RateIntegrals) -> None:
         """What coordinates are ahead of their integrals by; what is commanded makes up for little of it."""
+        core = core_of(controller)
         for slot, rows in self.offsets:
             integrals.cap(rows, LAG)
-            controller.write(slot, -integrals.off[rows])
+            core.write(slot, -integrals.off[rows])
         for slot, rows in self.drifts:
-            controller.write(slot, integrals.off[rows])
+            core.write(slot, integrals.off[rows])
 
 
 def served(
     controller: Controller, declared: PairStack, pair: CoordinatePair, rates: RateMatrices, masked: set[Coordinate]
 ) -> Served:
     """What the tick of a pair writes; ``masked``: coordinates that have integrals."""
-    blocks = controller.layout.blocks
+    blocks = core_of(controller).layout.blocks
     places = rates.places
     follow = {one: declared.follow[one, metric_of(pair, one)] for one in pair.task}
     keep = {one: declared.keep[one] for one in pair.constraint}

@@ -17,7 +17,7 @@ import pinocchio as pin
 from wbc import validation
 from wbc.errors import RangeError, ShapeError
 from wbc.robot.robot import Robot
-from wbc.stack.many import ManyStates
+from wbc.stack.evaluation import ManyStates
 from wbc.symbolic.dynamics import Dynamics
 from wbc.symbolic.kinematics import Kinematics, frame_index
 from wbc.trajectory.certificate import Check

@@ -16,8 +16,8 @@ import casadi as ca
 import numpy as np
 
 from wbc.errors import SolverError, UnknownNameError
-from wbc.qp.backend import Backend, answer, refusal
 from wbc.qp.problem import QP, Solution
+from wbc.qp.solvers.backend import Backend, answer, refusal
 from wbc.validation import Array
 
 #: Plugins and their options. All but qpoases are experimental: docs/solvers.md lists their measured errors.

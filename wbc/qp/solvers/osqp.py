@@ -12,9 +12,9 @@ import numpy as np
 import osqp
 from scipy import sparse
 
-from wbc.qp.backend import Backend, refusal
 from wbc.qp.polish import polish
 from wbc.qp.problem import QP, Solution
+from wbc.qp.solvers.backend import Backend, refusal
 
 #: Tolerances of the two attempts: the second only if the active set of the first could not be corrected
 TOLERANCES = (1e-5, 1e-9)

@@ -1,4 +1,4 @@
-"""What ticks have in common: the flat buffers that the controller writes and the report that it reads."""
+"""What ticks have in common: flat buffers that the controller writes, the report that it reads, flags, tolerances."""
 
 from __future__ import annotations
 
@@ -7,6 +7,31 @@ from dataclasses import dataclass
 
 from wbc.qp.problem import QP
 from wbc.validation import Array
+
+#: Flags of a tick
+SOLVED, RELAXED, BRAKED, CAPPED = 0, 1, 2, 3
+#: In the report in place of these: the first of the links of a chain that may have given the answer; braked at its end;
+#: braked because the policy wants it
+RECOVERED, CHAIN_BRAKED, POLICY_BRAKED = 4, 8, 9
+#: Added to what a tick returns, not to what it reports: the certificate fails, or a solver has found no answer
+UNSOUND = 4
+#: Refusals: nothing was changed
+BAD_Q, BAD_UNIT, BAD_V = -1, -2, -3
+
+#: Stand-in for infinity in bounds and in the error bound of a tick without a certificate
+INFINITE = 1e30
+
+#: Violations up to this, in row units, are rounding; squared lengths of quaternions may be off by the other
+#: (both as in ``native/settings.h``)
+TOLERANCE, UNIT_TOLERANCE = 1e-9, 2.00001e-6
+
+#: A certificate fails where a violation is above the first, or where both the bound on the error of v is above the
+#: second (a length of the characteristic one counts as 1 rad) and the optimality conditions are off by more than the
+#: third; as in ``native/settings.h``
+SOUND, KNOWN, OPTIMAL = 1e-6, 1e-3, 1e-9
+
+#: Paths to another answer, in the order in which they are tried by default; braking is always the last
+CHAIN = ("cold", "daqp", "osqp", "elastic")
 
 
 class Buffers:
@@ -19,7 +44,7 @@ class Buffers:
         p: run-time inputs, see :class:`wbc.stack.layout.Layout`. dt: one number.
         weight: of each task row, scale included. enabled: 1 or 0 for each general row.
         bound_enabled: the same for each entry of each bound block.
-        report: see :class:`wbc.controller.report.ReportLayout`.
+        report: see :class:`wbc.stack.memory.ReportLayout`.
         state: all of these in one piece of memory that begins with the report. ``v_in`` in it is, after a tick, the
             velocity that the tick counted accelerations from.
     """

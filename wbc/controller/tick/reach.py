@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Layout
-from wbc.stack.places import brakes, gain_places, kept_rows, margin_places, pull_scales, rate_places, stops
 from wbc.stack.program import Program
+from wbc.stack.tables import brakes, gain_places, kept_rows, margin_places, pull_scales, rate_places, stops
 from wbc.validation import Array
 
 #: As in ``native/reach.h``

@@ -7,6 +7,7 @@ from abc import ABC, abstractmethod
 import numpy as np
 
 from wbc.errors import ShapeError
+from wbc.qp.equalities import independent, orthonormal, restore
 from wbc.qp.problem import QP, Flag, Solution
 from wbc.validation import Array
 
@@ -65,3 +66,27 @@ def answer(qp: QP, x: Array, multipliers: Array, iterations: int) -> Solution:
     if not np.isfinite(x.sum() + multipliers.sum()):
         return refusal(qp, "failed", iterations)
     return Solution(x, multipliers, "solved", iterations)
+
+
+class Prepared(Backend):
+    """Makes equality rows independent and orthonormal, calls ``inner``, and translates the multipliers back.
+
+    A right side that contradicts other equality rows gives the flag ``infeasible`` without a call.
+    """
+
+    def __init__(self, inner: Backend) -> None:
+        super().__init__(inner.n, inner.m)
+        self.inner = inner
+        self.name = inner.name
+
+    def reset(self) -> None:
+        self.inner.reset()
+
+    def _solve(self, qp: QP, warm: bool) -> Solution:
+        n = self.n
+        if not np.any(qp.lower[n:] == qp.upper[n:]):
+            return self.inner.solve(qp, warm)
+        equalities = independent(qp)
+        if not equalities.all_consistent:
+            return refusal(qp, "infeasible")
+        return restore(qp, equalities, self.inner.solve(orthonormal(qp, equalities), warm))

@@ -4,22 +4,22 @@ from __future__ import annotations
 
 import numpy as np
 
-from wbc.controller.report import INFINITE, LEVEL_NUMBERS, ReportLayout
-from wbc.controller.tick import Assembly
-from wbc.qp.cascade import NOISE, PUSHING, Cascade
+from wbc.controller.tick.buffers import INFINITE, Assembly
 from wbc.qp.certificate import Certificate
-from wbc.qp.hierarchy import Answer, Hierarchy, Level
+from wbc.qp.levels.cascade import NOISE, PUSHING, Cascade
+from wbc.qp.levels.hierarchy import Answer, Hierarchy, Level
 from wbc.qp.problem import QP
 from wbc.qp.relax import Relaxed
 from wbc.stack.codegen import row_units
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Layout
-from wbc.stack.places import left_free
+from wbc.stack.memory import LEVEL_NUMBERS, ReportLayout
+from wbc.stack.tables import left_free
 from wbc.validation import Array
 
 
 class Levels:
-    """The cascade of one layout, in the units of :mod:`wbc.qp.cascade`: v / dof scales, rows / their scales.
+    """The cascade of one layout, in the units of :mod:`wbc.qp.levels.cascade`: v / dof scales, rows / their scales.
 
     Attributes:
         cascade: what solves them. sizes: these scales, of v and of general rows.

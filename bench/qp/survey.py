@@ -1,7 +1,7 @@
-"""Every solver on one set of problems, each in its own process: ``python -m wbc.qp.survey``.
+"""Every solver on one set of problems, each in its own process: ``python -m bench.qp.survey``.
 
 Some plugins of ``casadi.conic`` crash, hang, or call a wrong answer solved. A child process keeps that
-from the caller, and the exact minimiser (:mod:`wbc.qp.reference`) tells the rest.
+from the caller, and the exact minimiser (:mod:`bench.qp.reference`) tells the rest.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from pathlib import Path
 
 import numpy as np
 
+from bench.qp.reference import reference
+from bench.qp.samples import sample_set
 from wbc.errors import WbcError
-from wbc.qp.backend import Backend
 from wbc.qp.certificate import certify
-from wbc.qp.conic import PLUGINS
 from wbc.qp.problem import QP
-from wbc.qp.reference import reference
-from wbc.qp.samples import sample_set
 from wbc.qp.solvers import make_solver
+from wbc.qp.solvers.backend import Backend
+from wbc.qp.solvers.conic import PLUGINS
 
 
 @dataclass(frozen=True)
@@ -95,7 +95,7 @@ def survey(names: Sequence[str], count: int = 2, timeout: float = 300.0) -> list
     for name in names:
         with tempfile.TemporaryDirectory() as folder:
             result = Path(folder) / "finding.json"
-            command = [sys.executable, "-m", "wbc.qp.survey", "--worker", name, str(result), "--count", str(count)]
+            command = [sys.executable, "-m", "bench.qp.survey", "--worker", name, str(result), "--count", str(count)]
             try:
                 child = subprocess.run(command, capture_output=True, timeout=timeout, check=False)
                 end = f"ended with code {child.returncode}"
@@ -143,7 +143,7 @@ def _worker(name: str, result: Path, count: int) -> None:
 def main(arguments: Sequence[str] | None = None) -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(
-        prog="python -m wbc.qp.survey", description="every QP solver on one set of problems"
+        prog="python -m bench.qp.survey", description="every QP solver on one set of problems"
     )
     parser.add_argument("names", nargs="*", help="solvers; default: all")
     parser.add_argument("--count", type=int, default=2, help="problems of every size and weight")

@@ -10,8 +10,8 @@ from typing import Any
 import daqp
 import numpy as np
 
-from wbc.qp.backend import Backend, answer, refusal
 from wbc.qp.problem import QP, Solution
+from wbc.qp.solvers.backend import Backend, answer, refusal
 
 #: Settings of the wheel; ``eps_prox`` 0 switches the regularisation off (H is positive definite).
 SETTINGS: dict[str, float] = {"primal_tol": 1e-11, "dual_tol": 1e-12, "eps_prox": 0.0, "iter_limit": 2000}

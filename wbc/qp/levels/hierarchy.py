@@ -1,4 +1,4 @@
-"""Strict levels of least squares over common rows, as :class:`wbc.qp.cascade.Cascade` takes and answers them.
+"""Strict levels of least squares over common rows, as :class:`wbc.qp.levels.cascade.Cascade` takes and answers them.
 
 Variables x are counted in their own units (radians, characteristic lengths), rows in theirs.
 """

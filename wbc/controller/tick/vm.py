@@ -6,13 +6,13 @@ from collections.abc import Callable
 
 import numpy as np
 
-from wbc.controller.reach import DEAD, Reach
-from wbc.controller.report import BAD_Q, BAD_UNIT, BAD_V, INFINITE, TOLERANCE, UNIT_TOLERANCE, ReportLayout
-from wbc.controller.tick import Assembly, TaskRows
+from wbc.controller.tick.buffers import BAD_Q, BAD_UNIT, BAD_V, INFINITE, TOLERANCE, UNIT_TOLERANCE, Assembly, TaskRows
+from wbc.controller.tick.reach import DEAD, Reach
 from wbc.qp.problem import QP
 from wbc.stack.codegen import bound_sequence, row_units, unit_groups
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Layout
+from wbc.stack.memory import ReportLayout
 from wbc.stack.program import ROWS_OUTPUTS, Program
 from wbc.validation import Array
 

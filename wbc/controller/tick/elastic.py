@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from wbc.controller.report import BRAKED, RELAXED
-from wbc.controller.solved import SolvedTick
-from wbc.controller.tick import Assembly
-from wbc.qp.daqp import Daqp
-from wbc.qp.prepared import Prepared
+from wbc.controller.tick.buffers import BRAKED, RELAXED, Assembly
+from wbc.controller.tick.solved import SolvedTick
 from wbc.qp.problem import QP
 from wbc.qp.relax import Relaxed
+from wbc.qp.solvers.backend import Prepared
+from wbc.qp.solvers.daqp import Daqp
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Layout
 from wbc.validation import Array

@@ -6,28 +6,6 @@ from functools import cached_property
 
 from wbc.stack.layout import Layout
 
-#: Flags of a tick
-SOLVED, RELAXED, BRAKED, CAPPED = 0, 1, 2, 3
-#: In the report in place of these: the first of the links of a chain that may have given the answer; braked at its end;
-#: braked because the policy wants it
-RECOVERED, CHAIN_BRAKED, POLICY_BRAKED = 4, 8, 9
-#: Added to what a tick returns, not to what it reports: the certificate fails, or a solver has found no answer
-UNSOUND = 4
-#: Refusals: nothing was changed
-BAD_Q, BAD_UNIT, BAD_V = -1, -2, -3
-
-#: Stand-in for infinity in bounds and in the error bound of a tick without a certificate
-INFINITE = 1e30
-
-#: Violations up to this, in row units, are rounding; squared lengths of quaternions may be off by the other
-#: (both as in ``native/settings.h``)
-TOLERANCE, UNIT_TOLERANCE = 1e-9, 2.00001e-6
-
-#: A certificate fails where a violation is above the first, or where both the bound on the error of v is above the
-#: second (a length of the characteristic one counts as 1 rad) and the optimality conditions are off by more than the
-#: third; as in ``native/settings.h``
-SOUND, KNOWN, OPTIMAL = 1e-6, 1e-3, 1e-9
-
 #: What is reported of each level, and of the least velocity after them
 LEVEL_NUMBERS = (
     "rank",

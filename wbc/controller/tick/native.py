@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from wbc.controller.report import INFINITE, ReportLayout
-from wbc.controller.tick import Assembly, TaskRows
+from wbc.controller.tick.buffers import INFINITE, Assembly, TaskRows
 from wbc.errors import CompileError, SolverError
 from wbc.native.library import load_library
 from wbc.qp.problem import QP
 from wbc.stack.layout import Layout
+from wbc.stack.memory import ReportLayout
 from wbc.validation import Array
 
 _FIELDS = (

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wbc.errors import SolverError
-from wbc.qp.cascade import Cascade, LevelStep, Rows, complement, rest
-from wbc.qp.hierarchy import Answer, Hierarchy
+from wbc.qp.levels.cascade import Cascade, LevelStep, Rows, complement, rest
+from wbc.qp.levels.hierarchy import Answer, Hierarchy
 from wbc.validation import Array
 
 #: Curvature of a level's cost along what the rows that push leave, below which a direction is not its own

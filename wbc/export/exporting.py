@@ -1,19 +1,21 @@
-"""States with the commands that a controller gives, for others to reproduce."""
+"""A controller as a folder of C, with states and the commands that it gives there, for the C code to reproduce."""
 
 from __future__ import annotations
 
-from typing import Protocol
+import os
+import pathlib
 
 import numpy as np
 import pinocchio as pin
 
-from wbc.controller.handle import Handle
+from wbc.controller.controller import Controller, core_of
 from wbc.controller.outcome import STATUSES, Status
 from wbc.controller.step import Step
-from wbc.controller.tick import Buffers
+from wbc.errors import RangeError
+from wbc.export.folder import checked_folder, write
+from wbc.export.snapshot import Snapshot
 from wbc.robot import Robot
-from wbc.stack.declaration import Declaration
-from wbc.stack.layout import Layout, Slot
+from wbc.stack.layout import Slot
 from wbc.tasks.base import Task
 from wbc.validation import Array
 
@@ -25,27 +27,49 @@ CERTAIN = 1e-10
 PATIENCE = 4
 
 
-class Stepped(Protocol):
-    """What is asked for commands: a controller."""
-
-    @property
-    def stack(self) -> Declaration: ...
-    @property
-    def layout(self) -> Layout: ...
-    @property
-    def tick(self) -> Buffers: ...
-    @property
-    def backend(self) -> str: ...
-    @property
-    def solver(self) -> str: ...
-
-    def step(self, q: Array, v: Array) -> Step:
-        """One control cycle."""
-
-    def __getitem__(self, name: str) -> Handle: ...
+#: How far an export's commands may be from those of the tick that it is [rad/s, m/s], and from those of another solver:
+#: the native tick refines answers whose error it cannot bound by a tenth of that
+SAME, SIMILAR = 1e-9, 1e-6
 
 
-def vectors(controller: Stepped, count: int, seed: int = 0) -> Array:
+def export(
+    controller: Controller,
+    folder: str | os.PathLike[str],
+    overwrite: bool,
+    solver_source: bool | str | os.PathLike[str],
+    states: int,
+) -> pathlib.Path:
+    """See :meth:`wbc.Controller.export`."""
+    from wbc import __version__
+
+    if isinstance(states, bool) or not isinstance(states, int) or not 1 <= states < 2**31:
+        raise RangeError("states", states, "expected an integer >= 1")
+    checked_folder(folder, overwrite)
+    core = core_of(controller)
+    core.require_values()
+    tick, layout = core.tick, core.layout
+    cost = core.row_costs.copy()
+    for block in layout.of_form("task"):
+        cost[block.span] *= block.entry.item.row_weights(core.stack.robot)
+    snapshot = Snapshot(
+        core.stack,
+        layout,
+        tick.q.copy(),
+        tick.p.copy(),
+        tick.weight.copy(),
+        cost,
+        tick.enabled.copy(),
+        tick.bound_enabled.copy(),
+        float(tick.cap[0]),
+        __version__,
+        vectors(controller.clone(), states),
+        f"the {controller.backend} tick with {controller.solver}",
+        SAME if controller.backend == "native" and controller.solver == "daqp" else SIMILAR,
+    )
+    return write(snapshot, folder, overwrite, solver_source)
+
+
+def vectors(controller: Controller, count: int, seed: int = 0) -> Array:
     """States row by row: q, v measured, the run-time inputs, flag, command.
 
     Short runs of the controller from random configurations within the joints' ranges, with targets near the hand and
@@ -53,22 +77,22 @@ def vectors(controller: Stepped, count: int, seed: int = 0) -> Array:
     that it solved with certainty; there may be fewer than ``count``.
     """
     rng = np.random.default_rng(seed)
-    model = controller.stack.robot.model
+    core, model = core_of(controller), controller.stack.robot.model
     rows: list[Array] = []
-    start = controller.tick.p.copy()
+    start = core.tick.p.copy()
     for k in range(PATIENCE * count):
         if len(rows) == count:
             break
         if k % RUN == 0:
-            q, v = _configuration(controller.stack.robot, rng), 0.05 * rng.normal(size=controller.layout.nv)
-            controller.tick.p[:] = start
+            q, v = _configuration(controller.stack.robot, rng), 0.05 * rng.normal(size=core.layout.nv)
+            core.tick.p[:] = start
             _vary(controller, q, rng)
         step = controller.step(q, v)
         first = not step.answered_by  # exported code has no chain
         if first and ((controller.backend == "native" and controller.solver == "daqp") or _certain(step)):
-            rows.append(np.concatenate([q, v, controller.tick.p, [STATUSES.index(step.status)], step.v]))
+            rows.append(np.concatenate([q, v, core.tick.p, [STATUSES.index(step.status)], step.v]))
         q, v = pin.integrate(model, q, step.v * controller.stack.dt), step.v.copy()
-    width = controller.layout.nq + 2 * controller.layout.nv + controller.layout.parameters + 1
+    width = core.layout.nq + 2 * core.layout.nv + core.layout.parameters + 1
     return np.array(rows).reshape(len(rows), width)
 
 
@@ -86,18 +110,19 @@ def _configuration(robot: Robot, rng: np.random.Generator) -> Array:
     return q
 
 
-def _vary(controller: Stepped, q: Array, rng: np.random.Generator) -> None:
+def _vary(controller: Controller, q: Array, rng: np.random.Generator) -> None:
     """Inputs of another moment: what follows the configuration is where q has it, the rest near where it was."""
-    for name, block in controller.layout.blocks.items():
+    core = core_of(controller)
+    for name, block in core.layout.blocks.items():
         item = block.entry.item
         initial = item.initial(controller.stack.robot, q)
         for slot in block.slots.values():
             if slot.input.default is None and slot.input.name in initial:
                 numbers = controller[name].checked(slot.input.name, initial[slot.input.name])
-                controller.tick.p[slot.span] = numbers
+                core.tick.p[slot.span] = numbers
                 if not isinstance(item, Task):
                     continue
-            _shake(slot, controller.tick.p[slot.span], rng)
+            _shake(slot, core.tick.p[slot.span], rng)
 
 
 def _shake(slot: Slot, numbers: Array, rng: np.random.Generator) -> None:

@@ -14,11 +14,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from wbc.qp.daqp import Daqp
 from wbc.qp.equalities import independent
-from wbc.qp.hierarchy import Achieved, Answer, Hierarchy, Level
+from wbc.qp.levels.hierarchy import Achieved, Answer, Hierarchy, Level
 from wbc.qp.polish import polish
 from wbc.qp.problem import QP, Solution, definite
+from wbc.qp.solvers.daqp import Daqp
 from wbc.validation import Array
 
 #: Singular values below this are damped

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
-from wbc.controller.levels import Levels
-from wbc.controller.report import (
+from wbc.controller.tick.buffers import (
     BRAKED,
     INFINITE,
     KNOWN,
@@ -16,12 +17,12 @@ from wbc.controller.report import (
     SOUND,
     TOLERANCE,
     UNSOUND,
-    ReportLayout,
+    Assembly,
+    Buffers,
 )
-from wbc.controller.soft import SoftRows
-from wbc.controller.tick import Assembly, Buffers
+from wbc.controller.tick.levels import Levels
 from wbc.qp.certificate import Certificate, certify
-from wbc.qp.hierarchy import Answer
+from wbc.qp.levels.hierarchy import Answer
 from wbc.qp.polish import polish
 from wbc.qp.problem import QP, Solution
 from wbc.qp.relax import Relaxation, Relaxed
@@ -29,6 +30,8 @@ from wbc.qp.solvers import make_solver
 from wbc.stack.codegen import row_orders, row_units
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Layout
+from wbc.stack.memory import ReportLayout
+from wbc.stack.tables import told_slacks
 from wbc.validation import Array
 
 #: What an equality row in its unit may be missed by through the rounding of its own numbers
@@ -192,3 +195,34 @@ class SolvedTick(Buffers):
         middle = 0.5 * (qp.lower[n:] + qp.upper[n:])
         out.lower[n:], out.upper[n:] = np.where(gap > 0, middle, qp.lower[n:]), np.where(gap > 0, middle, qp.upper[n:])
         return out, gap > 4.0 * TOLERANCE * self._units
+
+
+class SoftRows:
+    """Soft rows of one layout."""
+
+    def __init__(self, stack: Declaration, layout: Layout) -> None:
+        self._rows = np.flatnonzero(np.array(layout.price_at, dtype=np.intp) >= 0)
+        self._told = np.array(told_slacks(stack, layout))[self._rows]
+
+    def told(self, qp: QP, v: Array, sides: tuple[Array, Array], slack: Array) -> Array:
+        """``slack`` of the general rows with the violations of those that are soft."""
+        rows = self._rows
+        if not rows.size:
+            return slack
+        at = qp.A[rows] @ v
+        missed = np.maximum(sides[0][rows] - at, at - sides[1][rows])
+        out = slack.copy()
+        out[rows] = np.where(missed > self._told, missed, 0.0)
+        return out
+
+    def polished(self, qp: QP, answer: Relaxed) -> Relaxed:
+        """The answer at rounding level, where there are soft rows: nearly dependent ones leave solvers less."""
+        if not self._rows.size:
+            return answer
+        sides = QP(qp.H, qp.g, answer.lower, answer.upper, qp.A)
+        found = polish(sides, Solution(answer.x, answer.multipliers, "solved"))
+        if not found.exact:
+            return answer
+        n = qp.n
+        x = np.clip(found.solution.x, answer.lower[:n], answer.upper[:n])
+        return replace(answer, x=x, multipliers=found.solution.multipliers)

@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 
 from wbc import validation
-from wbc.controller.handle import Handle
-from wbc.controller.native import NativeTick
+from wbc.controller import core_of
+from wbc.controller.handles import Handles
+from wbc.controller.tick.native import NativeTick
 from wbc.errors import RangeError, ShapeError
 from wbc.ik.branches import Branches, branches
 from wbc.ik.continuation import Branch, branch
@@ -30,12 +31,12 @@ ASKING = 0.2
 RESTARTS, THREADS = 10**6, 1024
 
 
-class Solver:
-    """Inverse kinematics of a stack, compiled once. Made by :meth:`wbc.Stack.solver`.
+class InverseKinematics(Handles):
+    """Inverse kinematics of a stack, compiled once. Made by :meth:`wbc.Stack.inverse_kinematics`.
 
-        solver = stack.solver()
-        solver["hand"].target = pose
-        solution = solver.solve(q0)
+        kinematics = stack.inverse_kinematics()
+        kinematics["hand"].target = pose             # targets that nobody sets are taken from q0
+        solution = kinematics.solve(q0)
 
     A search makes Newton steps on the rows of the controller, with gains of one step, no limits of speed, and a damping
     that falls with the error, from q0 and then from random configurations, until the goals are met and the constraints
@@ -54,13 +55,7 @@ class Solver:
         self._engine = Engine(stack, goals, backend)
         self.stack, self.goals = self._engine.stack, self._engine.goals
         self.backend = self._engine.controller.backend
-
-    def __getitem__(self, name: str) -> Handle:
-        """Run-time values of an item, as ``controller[name]``; targets that nobody sets are taken from q0."""
-        return self._engine.controller[name]
-
-    def __contains__(self, name: object) -> bool:
-        return name in self._engine.controller
+        super().__init__(self._engine.core.handles, stack)
 
     def solve(
         self,
@@ -146,7 +141,7 @@ class Solver:
         query, before = engine.query(self.goals, near, starts, number), engine.tick.p.copy()
         answers = np.tile(first, (total, 1))
         if isinstance(engine.search, NativeSearch):
-            clones = [controller.clone().tick for _ in range(min(threads, max(1, total)))]
+            clones = [core_of(controller.clone()).tick for _ in range(min(threads, max(1, total)))]
             ticks = [tick for tick in clones if isinstance(tick, NativeTick)]
             for tick in ticks:
                 tick.dt[0] = TICK
