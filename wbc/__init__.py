@@ -8,6 +8,8 @@ controller = stack.compile()
 step = controller.step(robot.neutral)
 """
 
+from __future__ import annotations
+
 __version__ = "0.1.0"
 
 from wbc import controller, explain, ik, record

@@ -67,7 +67,7 @@ def unsound(tick: Controller, times: int) -> Any:
 def spread(tick: Controller, monkeypatch: pytest.MonkeyPatch, link: str) -> None:
     """Only one link of the chain, after an answer that is not certified."""
     tick.policy = Policy(chain=(link,))
-    monkeypatch.setattr(tick, "_call", unsound(tick, 1))
+    monkeypatch.setattr(core_of(tick), "call", unsound(tick, 1))
 
 
 @pytest.mark.parametrize("link", CHAIN)
@@ -103,7 +103,7 @@ def test_every_link_gives_a_certified_answer(
 def test_an_empty_chain_brakes(tick: Controller, monkeypatch: pytest.MonkeyPatch) -> None:
     bot, v = robot("panda"), np.array([1.0, -0.5, 0.02, 0.8, -1.2, 0.0, 0.3])
     tick.policy = Policy(chain=())
-    monkeypatch.setattr(tick, "_call", unsound(tick, 1))
+    monkeypatch.setattr(core_of(tick), "call", unsound(tick, 1))
     step = tick.step(bot.neutral, v)
     assert (step.status, step.answered_by) == (Status.BRAKED, "braking")
     limit = bot.limits.acceleration * DT

@@ -78,7 +78,7 @@ def provoke(controller: Controller, rng: np.random.Generator) -> None:
     controller["slow"].price = float(10.0 ** rng.uniform(-9.0, 9.0))
     controller["hand"].target = pin.SE3(pin.exp3(rng.normal(size=3)), rng.normal(0.0, 0.5, 3))
     controller["elbow"].target = rng.normal(0.0, 0.5, 3)
-    controller.begin(q, rng.normal(0.0, 0.3, 7))
+    core_of(controller).begin(q, rng.normal(0.0, 0.3, 7))
 
 
 def feasible(qp: QP) -> bool:

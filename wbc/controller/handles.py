@@ -52,7 +52,6 @@ from wbc.tasks.base import Item
 class TaskHandle(Handle):
     """Of every task."""
 
-    __slots__ = ()
     weight: float
     gain: float
 
@@ -60,7 +59,6 @@ class TaskHandle(Handle):
 class FollowerHandle(TaskHandle):
     """Of tasks that follow a target."""
 
-    __slots__ = ()
     target: Any
     feedforward: Any
 
@@ -68,7 +66,6 @@ class FollowerHandle(TaskHandle):
 class DistanceHandle(FollowerHandle):
     """Of :class:`Distance`."""
 
-    __slots__ = ()
     point: Any
     point_velocity: Any
 
@@ -76,14 +73,12 @@ class DistanceHandle(FollowerHandle):
 class RelativePoseHandle(FollowerHandle):
     """Of :class:`RelativePose`."""
 
-    __slots__ = ()
     at: Any
 
 
 class MomentumHandle(TaskHandle):
     """Of :class:`Momentum`."""
 
-    __slots__ = ()
     lag: Any
     target: Any
 
@@ -91,14 +86,12 @@ class MomentumHandle(TaskHandle):
 class ConstraintHandle(Handle):
     """Of every constraint; ``price``: of a soft one."""
 
-    __slots__ = ()
     price: float
 
 
 class HoldHandle(ConstraintHandle):
     """Of equalities that are corrected with a gain."""
 
-    __slots__ = ()
     gain: float
     target: Any
 
@@ -106,7 +99,6 @@ class HoldHandle(ConstraintHandle):
 class RollingHandle(ConstraintHandle):
     """Of :class:`Rolling`."""
 
-    __slots__ = ()
     gain: float
     ground: Any
 
@@ -114,7 +106,6 @@ class RollingHandle(ConstraintHandle):
 class JointLimitsHandle(ConstraintHandle):
     """Of :class:`JointLimits`."""
 
-    __slots__ = ()
     velocity_scale: float
     return_rate: float
 
@@ -122,7 +113,6 @@ class JointLimitsHandle(ConstraintHandle):
 class FrameVelocityHandle(ConstraintHandle):
     """Of :class:`FrameVelocityLimit`."""
 
-    __slots__ = ()
     linear: Any
     angular: Any
 
@@ -130,14 +120,12 @@ class FrameVelocityHandle(ConstraintHandle):
 class MarginHandle(ConstraintHandle):
     """Of constraints with margins."""
 
-    __slots__ = ()
     rate: float
 
 
 class ConeHandle(MarginHandle):
     """Of :class:`AxisCone` and :class:`GazeCone`."""
 
-    __slots__ = ()
     half_angle: float
     half_angle_rate: float
 
@@ -145,7 +133,6 @@ class ConeHandle(MarginHandle):
 class AxisConeHandle(ConeHandle):
     """Of :class:`AxisCone`."""
 
-    __slots__ = ()
     direction: Any
     direction_rate: Any
 
@@ -153,7 +140,6 @@ class AxisConeHandle(ConeHandle):
 class GazeConeHandle(ConeHandle):
     """Of :class:`GazeCone`."""
 
-    __slots__ = ()
     point: Any
     point_velocity: Any
 
@@ -161,7 +147,6 @@ class GazeConeHandle(ConeHandle):
 class ClearanceHandle(MarginHandle):
     """Of :class:`SelfCollision` and :class:`Obstacle`, with what is measured in every tick where shapes are meshes."""
 
-    __slots__ = ()
     margin: float
     distance: Any
     drift: Any
@@ -172,7 +157,6 @@ class ClearanceHandle(MarginHandle):
 class ObstacleHandle(ClearanceHandle):
     """Of :class:`Obstacle`."""
 
-    __slots__ = ()
     pose: Any
     velocity: Any
 
@@ -180,7 +164,6 @@ class ObstacleHandle(ClearanceHandle):
 class BoxHandle(MarginHandle):
     """Of :class:`WorkspaceBox`."""
 
-    __slots__ = ()
     lower: Any
     lower_rate: Any
     upper: Any
@@ -190,7 +173,6 @@ class BoxHandle(MarginHandle):
 class PolyhedronHandle(MarginHandle):
     """Of :class:`WorkspacePolyhedron`."""
 
-    __slots__ = ()
     offsets: Any
     offsets_rate: Any
     pose: Any

@@ -12,7 +12,7 @@ from scipy.optimize import minimize
 
 import wbc
 from tests.constraints.test_obstacle import coal_pose, coal_shape
-from wbc.controller import Stack
+from wbc.controller import Stack, core_of
 from wbc.ik import Ending, InverseKinematics
 from wbc.ik.timeless import searching, timeless
 from wbc.robot import Robot
@@ -232,5 +232,5 @@ def nearest(robot: Robot, q: Array, ball: pin.SE3) -> float:
 
 
 def test_a_controller_is_compiled_without_the_search() -> None:
-    assert not hasattr(stack().compile(backend="native").tick._library, "wbc_tick_converge")
-    assert hasattr(searching(timeless(stack()), "native").tick._library, "wbc_tick_converge")
+    assert not hasattr(core_of(stack().compile(backend="native")).tick._library, "wbc_tick_converge")
+    assert hasattr(core_of(searching(timeless(stack()), "native")).tick._library, "wbc_tick_converge")

@@ -156,7 +156,7 @@ def test_one_that_does_not_record_is_as_before(tmp_path: Path) -> None:
     call = core_of(one).call
     with one.record(tmp_path / "run.npz"):
         assert core_of(one).call is not call
-        assert one.clone()._recorder is None
+        assert core_of(one.clone()).recording is None
     assert core_of(one).call is call
     assert core_of(one).recording is None
 

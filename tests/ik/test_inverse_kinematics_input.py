@@ -11,7 +11,7 @@ import pinocchio as pin
 import pytest
 
 import wbc
-from tests.controller.test_inverse_kinematics import TIPS, arm, random_q, solver, stack, tip
+from tests.ik.test_inverse_kinematics import TIPS, arm, random_q, solver, stack, tip
 from wbc.controller import Stack
 from wbc.errors import NotFiniteError, RangeError, ShapeError, UnknownNameError, WbcError
 from wbc.ik import InverseKinematics

@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from tests.controller.test_inverse_kinematics import TIPS, arm, random_q, solver, stack, tip
+from tests.ik.test_inverse_kinematics import TIPS, arm, random_q, solver, stack, tip
 from wbc.controller import Stack
 from wbc.errors import (
     ContinuityError,

@@ -10,7 +10,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from tests.controller.test_inverse_kinematics import TIPS, arm, outside, random_q, solver, stack, tip
+from tests.ik.test_inverse_kinematics import TIPS, arm, outside, random_q, solver, stack, tip
 from wbc.errors import InfeasibleError, RangeError, ShapeError, WbcError
 from wbc.ik import InverseKinematics
 from wbc.tasks import Damping, Posture

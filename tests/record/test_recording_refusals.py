@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import wbc
-from tests.controller.test_recording import TOP, recorded
+from tests.record.test_recording import TOP, recorded
 from tests.stack import small
 from wbc import Recording, Stack, replay
 from wbc.controller import core_of
