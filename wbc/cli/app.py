@@ -40,7 +40,8 @@ COMMANDS = {
     "walk": Entry(
         "walk",
         "walk",
-        "Walk on a structure of holds with three arms, or end over end, and leave log, plan, check, pictures and a page.",
+        "Walk on a structure of holds with three arms, or end over end, and leave log, "
+        "plan, check, pictures and a page.",
     ),
     "plans": Entry(
         "walk", "plans", "Show what two plans do differently, one line each; exit code 1 if there is anything."
@@ -72,7 +73,8 @@ COMMANDS = {
     "drive": Entry(
         "drive",
         "drive",
-        "Drive an arm by rates: the pair of coordinates that is chosen, at most six rates at a time, 50 times a second.",
+        "Drive an arm by rates: the pair of coordinates that is chosen, at most six "
+        "rates at a time, 50 times a second.",
     ),
     "bench": Entry(
         "bench",

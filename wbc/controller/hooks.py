@@ -1,4 +1,4 @@
-"""What a controller, its steps and its stack offer and packages above this one do: named, and imported when it is used."""
+"""What a controller, its steps and its stack offer and packages above this one do: imported when it is used."""
 
 from __future__ import annotations
 
@@ -9,7 +9,11 @@ from typing import Any
 
 def _above(module: str, name: str) -> Callable[..., Any]:
     """A function or class of a package above, which is imported when it is called."""
-    return lambda *arguments: getattr(importlib.import_module(module), name)(*arguments)
+
+    def call(*arguments: Any) -> Any:
+        return getattr(importlib.import_module(module), name)(*arguments)
+
+    return call
 
 
 #: For :meth:`wbc.Step.explain`: (a step's copy of its tick, what its controller's steps share, status, what gave the
