@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from wbc import validation
-from wbc.robot.pair_descent import Descent
-from wbc.robot.pair_distances import Links, Scenes
+from wbc.robot.pairs.descent import Descent
+from wbc.robot.pairs.distances import Links, Scenes
 from wbc.robot.sampling import draw
 from wbc.validation import Array
 
@@ -57,7 +57,7 @@ def search(
     """Least distances of pairs over samples of the joint range, then over descents from the closest of them; no
     descents for pairs that are ``settled`` whatever the answer.
 
-    Descents find touching configurations that random samples miss, see :class:`~wbc.robot.pair_descent.Descent`.
+    Descents find touching configurations that random samples miss, see :class:`~wbc.robot.pairs.descent.Descent`.
     """
     rng = np.random.default_rng(seed)
     descent, found = Descent(robot, links, clearance), {pair: Finding() for pair in pairs}

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wbc.errors import RobotFileError
-from wbc.robot.files import read_xml
+from wbc.robot.sources.files import read_xml
 from wbc.validation import Array
 
 

@@ -17,9 +17,10 @@ import pinocchio as pin
 # isort: split
 import coal
 
-from wbc.robot.link_pairs import joint_of
+from wbc.robot.geometry.coal_shapes import geometry_of
+from wbc.robot.geometry.segments import bounding_capsule, segment_distances
+from wbc.robot.pairs.link_pairs import joint_of
 from wbc.robot.sampling import joint_poses
-from wbc.robot.segments import bounding_capsule, segment_distances
 from wbc.shapes import Capsule, PlacedShape, Sphere
 from wbc.symbolic.kinematics import WORLD, frame_index
 from wbc.validation import Array
@@ -162,9 +163,6 @@ def _moved(turn: Array, shift: Array, point: Array) -> Array:
 
 
 def _part(robot: Robot, link: str, placed: PlacedShape) -> Part:
-    # Imported here: loading a robot without shapes needs no geometries
-    from wbc.proximity.geometry import geometry_of
-
     above = pin.SE3.Identity() if link == WORLD else robot.model.frames[frame_index(robot.model, link)].placement
     geometry = geometry_of(placed.shape)
     a, b, radius = bounding_capsule(placed)

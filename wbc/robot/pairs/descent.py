@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pinocchio as pin
 
-from wbc.robot.pair_distances import Links
+from wbc.robot.pairs.distances import Links
 from wbc.robot.sampling import configuration, joint_range
 from wbc.validation import Array
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from wbc.robot.hull import Hull
+from wbc.robot.geometry.hull import Hull
 from wbc.robot.recipe import segment_shape
 from wbc.shapes import PlacedShape
 from wbc.validation import Array

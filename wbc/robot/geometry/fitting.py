@@ -1,4 +1,4 @@
-"""Spheres and capsules that contain given bodies, and how far they stand out of them: see :mod:`wbc.robot.hull`."""
+"""Spheres and capsules that contain given bodies, and how far they stand out of them: see ``hull``."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from wbc import validation
 from wbc.errors import ShapeError
-from wbc.robot.hull import Hull
+from wbc.robot.geometry.hull import Hull
 from wbc.robot.recipe import segment_shape
 from wbc.shapes import Capsule, PlacedShape, Sphere
 from wbc.validation import Array
@@ -22,7 +22,7 @@ def fit_capsule(points: Array) -> PlacedShape:
 
     Returns:
         The shape in the points' frame. ``excess`` is over the points' convex hull, see
-        :meth:`~wbc.robot.hull.Hull.excess` for its accuracy.
+        :meth:`~wbc.robot.geometry.hull.Hull.excess` for its accuracy.
 
     Raises:
         ShapeError, NotFiniteError: not n x 3 finite numbers.

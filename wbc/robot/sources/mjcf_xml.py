@@ -15,7 +15,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from wbc.errors import RobotFileError
-from wbc.robot.files import read_xml
+from wbc.robot.sources.files import read_xml
 
 Element = ElementTree.Element
 

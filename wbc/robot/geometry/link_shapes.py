@@ -11,11 +11,11 @@ import pinocchio as pin
 
 from wbc import validation
 from wbc.errors import RobotFileError, ShapeError
-from wbc.robot.bodies import Body, bodies_of
-from wbc.robot.convex_parts import ConvexParts, parts_of
-from wbc.robot.meshes import Mesh, read_mesh
+from wbc.robot.geometry.bodies import Body, bodies_of
+from wbc.robot.geometry.convex_parts import ConvexParts, parts_of
+from wbc.robot.geometry.meshes import Mesh, read_mesh
+from wbc.robot.geometry.styles import Style
 from wbc.robot.robot import Robot
-from wbc.robot.styles import Style
 from wbc.shapes import PlacedShape
 
 
@@ -61,7 +61,7 @@ def fit_shapes(
     ======== ====================================================== ==================================================
 
     Spheres and capsules stay themselves. ``excess`` [m] is how far a shape stands out of the hull of the body (for
-    convex parts 0): exact for meshes and boxes, see :class:`~wbc.robot.hull.Hull`; an upper bound for spheres and for
+    convex parts 0): exact for meshes and boxes, see ``Hull``; an upper bound for spheres and for
     several capsules around cylinders and ellipsoids, which are fitted to a polyhedron around them.
 
     Args:
@@ -107,7 +107,7 @@ def convex_parts(mesh: Any, triangles: Any = None, *, scale: Any = 1.0) -> Conve
         scale: factor of the vertices, one number or three.
 
     Returns:
-        ``parts`` and ``remarks``; see :func:`wbc.robot.convex_parts.parts_of` for what happens to components without
+        ``parts`` and ``remarks``; see ``parts_of`` for what happens to components without
         volume.
 
     Raises:

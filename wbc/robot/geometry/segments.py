@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from wbc.robot.fitting import around_cylinder, quick_capsule
+from wbc.robot.geometry.fitting import around_cylinder, quick_capsule
 from wbc.shapes import Box, Capsule, Convex, Cylinder, PlacedShape
 from wbc.validation import Array
 

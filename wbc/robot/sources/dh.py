@@ -11,7 +11,7 @@ import pinocchio as pin
 
 from wbc import validation
 from wbc.errors import BoundsError, DuplicateNameError, RangeError, ShapeError
-from wbc.robot.description import Description, with_base
+from wbc.robot.sources.description import Description, with_base
 
 CONVENTIONS = ("standard", "modified")
 JOINTS = ("revolute", "prismatic")

@@ -10,8 +10,8 @@ import numpy as np
 import pinocchio as pin
 
 from wbc.errors import RobotFileError
-from wbc.robot.description import Description, Mimic, root_joint
-from wbc.robot.files import PARSER_ERRORS, captured_stderr, read_xml
+from wbc.robot.sources.description import Description, Mimic, root_joint
+from wbc.robot.sources.files import PARSER_ERRORS, captured_stderr, read_xml
 
 
 def read_urdf(

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from wbc.errors import RangeError, RobotFileError, ShapeError
-from wbc.robot.hull import Hull
-from wbc.robot.meshes import Mesh
+from wbc.robot.geometry.hull import Hull
+from wbc.robot.geometry.meshes import Mesh
 from wbc.shapes import Convex
 from wbc.validation import Array
 

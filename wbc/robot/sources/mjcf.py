@@ -12,9 +12,9 @@ import numpy as np
 import pinocchio as pin
 
 from wbc.errors import RobotFileError
-from wbc.robot.description import Description, Mimic, with_base
-from wbc.robot.files import PARSER_ERRORS, captured_stderr
-from wbc.robot.mjcf_xml import Element, MjcfJoint, joints, parser_file, read_tree
+from wbc.robot.sources.description import Description, Mimic, with_base
+from wbc.robot.sources.files import PARSER_ERRORS, captured_stderr
+from wbc.robot.sources.mjcf_xml import Element, MjcfJoint, joints, parser_file, read_tree
 from wbc.validation import Array
 
 _KINDS = {"hinge": (1, 1), "slide": (1, 1), "ball": (4, 3), "free": (7, 6)}

@@ -14,7 +14,6 @@ import pinocchio as pin
 import coal
 
 from wbc.errors import ShapeError
-from wbc.proximity.scene import sphere_round
 from wbc.shapes import Box, Capsule, Convex, Cylinder, HalfSpace, Shape, Sphere
 from wbc.validation import Array
 
@@ -69,3 +68,21 @@ def _made(shape: Shape) -> Geometry:
         # "Qt": faces of more than three corners are cut into triangles, which Coal needs
         return Geometry(coal.Convex.convexHull(points, True, "Qt"), center)
     raise ShapeError("shape", shape, "this is no shape")
+
+
+def sphere_round(shape: Shape) -> tuple[Array, float]:
+    """(centre in the shape's frame, radius) of a sphere round a shape [m]; infinite round a half-space."""
+    if isinstance(shape, Convex):
+        center = shape.points.mean(axis=0)
+        return center, float(np.linalg.norm(shape.points - center, axis=1).max())
+    return np.zeros(3), _radius(shape)
+
+
+def _radius(shape: Sphere | Capsule | Box | Cylinder | HalfSpace) -> float:
+    if isinstance(shape, Sphere):
+        return shape.radius
+    if isinstance(shape, Capsule):
+        return shape.radius + shape.length / 2
+    if isinstance(shape, Box):
+        return float(np.linalg.norm(shape.size)) / 2
+    return np.inf if isinstance(shape, HalfSpace) else float(np.hypot(shape.radius, shape.length / 2))

@@ -14,10 +14,10 @@ import pinocchio as pin
 
 from wbc import validation
 from wbc.errors import RobotFileError, ShapeError
-from wbc.robot.files import read_xml
-from wbc.robot.meshes import Mesh, hull_mesh, mesh_of, read_mesh
-from wbc.robot.mjcf import read_mjcf_geometry
+from wbc.robot.geometry.meshes import Mesh, hull_mesh, mesh_of, read_mesh
 from wbc.robot.robot import Robot
+from wbc.robot.sources.files import read_xml
+from wbc.robot.sources.mjcf import read_mjcf_geometry
 from wbc.shapes import Capsule, Sphere
 from wbc.validation import Array
 

@@ -7,7 +7,7 @@
       { links = ["panda_link0", "panda_link1"], keep = false },
     ]
 
-``links`` and ``keep`` must be there. ``reason`` is one of :data:`~wbc.robot.collision_pairs.REASONS`, and without
+``links`` and ``keep`` must be there. ``reason`` is one of :data:`~wbc.robot.pairs.collision_pairs.REASONS`, and without
 one, ``hand``; ``distance`` [m] and ``detail`` (the SRDF file's reason) are for the reader.
 """
 
@@ -19,8 +19,8 @@ from typing import Any
 
 from wbc import validation
 from wbc.errors import DuplicateNameError, RangeError, RobotFileError, ShapeError
-from wbc.robot.collision_pairs import REASONS, LinkPair, SelfPairs
-from wbc.robot.link_pairs import link_pairs, shaped_links
+from wbc.robot.pairs.collision_pairs import REASONS, LinkPair, SelfPairs
+from wbc.robot.pairs.link_pairs import link_pairs, shaped_links
 from wbc.robot.robot import Robot
 
 _HEAD = ("robot", "samples", "seed", "clearance", "pairs")

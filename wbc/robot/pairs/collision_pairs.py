@@ -9,11 +9,11 @@ from typing import Any
 
 from wbc import validation
 from wbc.errors import MissingShapeError, RangeError, ShapeError
-from wbc.robot.link_pairs import link_pairs, neighbours
-from wbc.robot.pair_distances import Links
-from wbc.robot.pair_search import Finding, Progress, search
+from wbc.robot.pairs.distances import Links
+from wbc.robot.pairs.link_pairs import link_pairs, neighbours
+from wbc.robot.pairs.search import Finding, Progress, search
 from wbc.robot.robot import Robot
-from wbc.robot.srdf import CollisionRules, read_collisions
+from wbc.robot.sources.srdf import CollisionRules, read_collisions
 
 #: Reason -> what it means; the first three are of pairs that are kept.
 REASONS: Mapping[str, str] = {

@@ -9,11 +9,11 @@ import pinocchio as pin
 
 from wbc import validation
 from wbc.errors import RangeError, ShapeError
-from wbc.robot import fitting
-from wbc.robot.bodies import Raw, RawBox, RawCylinder, RawEllipsoid
-from wbc.robot.convex_parts import parts_of
-from wbc.robot.covering import cover
-from wbc.robot.meshes import Mesh, box_mesh, cylinder_mesh, ellipsoid_mesh
+from wbc.robot.geometry import fitting
+from wbc.robot.geometry.bodies import Raw, RawBox, RawCylinder, RawEllipsoid
+from wbc.robot.geometry.convex_parts import parts_of
+from wbc.robot.geometry.covering import cover
+from wbc.robot.geometry.meshes import Mesh, box_mesh, cylinder_mesh, ellipsoid_mesh
 from wbc.shapes import Box, Capsule, Convex, Cylinder, PlacedShape, Sphere
 from wbc.validation import Array
 

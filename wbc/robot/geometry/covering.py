@@ -1,7 +1,7 @@
 """Several spheres or capsules that contain a mesh together: the mesh is cut into slabs, each gets one.
 
 A slab's shape contains the corners of the mesh's pieces in it, hence their hull, hence all of the body in that slab
-(see :meth:`~wbc.robot.meshes.Mesh.slabs`); so the shapes together contain the body. ``excess`` is how far a shape
+(see ``Mesh.slabs``); so the shapes together contain the body. ``excess`` is how far a shape
 stands out of the hull of the whole mesh, not of its slab: shapes of neighbouring slabs overlap within the body.
 """
 
@@ -13,10 +13,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from wbc.robot.ball import least_excess_ball, quick_ball
-from wbc.robot.fitting import fit_capsule, quick_capsule
-from wbc.robot.hull import Hull
-from wbc.robot.meshes import Mesh
+from wbc.robot.geometry.ball import least_excess_ball, quick_ball
+from wbc.robot.geometry.fitting import fit_capsule, quick_capsule
+from wbc.robot.geometry.hull import Hull
+from wbc.robot.geometry.meshes import Mesh
 from wbc.shapes import PlacedShape
 from wbc.validation import Array
 

@@ -13,7 +13,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from wbc.errors import RobotFileError
-from wbc.robot.files import PARSER_ERRORS, captured_stderr
+from wbc.robot.sources.files import PARSER_ERRORS, captured_stderr
 from wbc.validation import Array
 
 Triangles = NDArray[np.intp]
