@@ -24,7 +24,7 @@ from wbc.analysis import (
     certify,
     certify_blocks,
 )
-from wbc.analysis.certificates import screen
+from wbc.analysis.certificates.screen import screen
 from wbc.cli.console import out, progress_bar
 from wbc.coordinates.arms.published_trees import TreeSet
 from wbc.errors import RobotFileError
