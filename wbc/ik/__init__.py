@@ -5,15 +5,12 @@ from __future__ import annotations
 import warnings
 from typing import Any
 
-from wbc.controller import hooks
 from wbc.ik.branches import Branches
 from wbc.ik.continuation import Branch
 from wbc.ik.inverse_kinematics import InverseKinematics
 from wbc.ik.solution import Batch, Ending, Solution
 
 __all__ = ["Batch", "Branch", "Branches", "Ending", "InverseKinematics", "Solution"]
-
-hooks.inverse_kinematics = InverseKinematics
 
 
 def __getattr__(name: str) -> Any:
