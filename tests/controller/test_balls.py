@@ -76,7 +76,7 @@ def test_rows_are_those_of_the_expressions(name: str) -> None:
         native, vm = (core_of(controller).tick.qp() for controller in controllers)
         # q is what the last step left in the buffers
         assert np.abs(native.A - vm.A).max() < 1e-12
-        n = controllers[0].layout.nv
+        n = core_of(controllers[0]).layout.nv
         assert np.abs(native.lower - vm.lower)[n:][np.isfinite(vm.lower[n:])].max() < 1e-11
         assert (np.isfinite(native.lower) == np.isfinite(vm.lower)).all()
         for k in range(BALLS):

@@ -10,6 +10,7 @@ import pytest
 PROGRAM = """
 import sys
 from tests.stack import small
+from wbc.controller import core_of
 controller = small.stack().compile(backend={backend!r})
 q = controller.stack.robot.neutral
 statuses = {{str(controller.step(q).status) for _ in range(50)}}

@@ -13,7 +13,7 @@ from wbc import lazy
 #: Everything that ``dir(wbc)`` shows
 NAMES = {
     *("Controller", "Policy", "Stack", "Status", "Step", "Certificate", "Explanation", "Recording", "replay"),
-    *("Solution", "Solver", "WbcError", "__version__"),
+    *("InverseKinematics", "Solution", "WbcError", "__version__"),
     *("analysis", "coordinates", "errors", "proximity", "resolvers", "robots", "shapes", "tasks"),
     *("teleop", "track", "trajectory", "walking"),
 }
