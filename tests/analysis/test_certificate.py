@@ -10,9 +10,9 @@ import pytest
 from tests.analysis.jacobians import jacobians
 from wbc.analysis import BodyRows, ExactModel, JointRows, candidate_rows, certify, published_sets, symbolic_jacobian
 from wbc.analysis.algebra.trig_form import TrigForm, trig_form, used_joints
-from wbc.analysis.certificates.screen import screen
 from wbc.analysis.certificates.block_proofs import block_proofs
 from wbc.analysis.certificates.boxes import BoxSearch
+from wbc.analysis.certificates.screen import screen
 from wbc.analysis.certificates.symmetry import fundamental_box, symmetries
 from wbc.analysis.jacobians.numeric import rank
 from wbc.analysis.jacobians.rank_matrix import rank_matrices

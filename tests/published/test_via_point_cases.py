@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 from tests.published.via_walker import place
 from wbc.trajectory import Law, via_points
-from wbc.trajectory.jerk.via_speeds import Bounds, Corners, corner_speeds
+from wbc.trajectory.jerk.via_speeds import SpeedBounds, ViaCorners, corner_speeds
 
 #: In m, s; the rotation of the middle segment in rad
 SPEED, ACCELERATION, DEVIATION, TURN = 1.2, 1.0, 0.05, 1.0
@@ -39,10 +39,12 @@ def law_of(poses: list[np.ndarray], turning: float) -> Law:
     return via_points(poses, speed=SPEED, acceleration=ACCELERATION, deviation=DEVIATION, angular_acceleration=turning)
 
 
-def corners_of(poses: list[np.ndarray], turns: list[float]) -> Corners:
+def corners_of(poses: list[np.ndarray], turns: list[float]) -> ViaCorners:
     steps = np.diff([pose[:3, 3] for pose in poses], axis=0)
     lengths = np.linalg.norm(steps, axis=1)
-    return corner_speeds(lengths, steps / lengths[:, None], np.array(turns), Bounds(SPEED, ACCELERATION, DEVIATION))
+    return corner_speeds(
+        lengths, steps / lengths[:, None], np.array(turns), SpeedBounds(SPEED, ACCELERATION, DEVIATION)
+    )
 
 
 def straight_part(law: Law, poses: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -58,7 +60,7 @@ def straight_part(law: Law, poses: list[np.ndarray]) -> tuple[np.ndarray, np.nda
     return times - begin, state.velocity[:, :3] @ along, state.acceleration[:, :3] @ along
 
 
-def case_of(case: int, falling: bool) -> tuple[list[np.ndarray], float, Corners, float]:
+def case_of(case: int, falling: bool) -> tuple[list[np.ndarray], float, ViaCorners, float]:
     """(poses, angular acceleration, corners, mean speed) with a rotation that takes as long as the case wants."""
     poses = bent(6.0 if case == 1 else 1.5, falling)
     corners = corners_of(poses, [0.0, 0.0, 0.0])

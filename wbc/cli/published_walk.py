@@ -9,7 +9,7 @@ import numpy as np
 
 from wbc import style
 from wbc.errors import RangeError
-from wbc.published.three_arm_walker import Calibration, Log, Outcome, PublishedWalker
+from wbc.published.three_arm_walker import Calibration, PublishedLog, PublishedOutcome, PublishedWalker
 from wbc.track.summary import Figure
 from wbc.walking.holds.built_in import PITCH, RADIUS, grid_angle
 from wbc.walking.holds.structure import Structure
@@ -33,8 +33,8 @@ class PublishedRun:
 
     request: WalkRequest
     structure: Structure
-    log: Log
-    outcomes: tuple[Outcome, ...]
+    log: PublishedLog
+    outcomes: tuple[PublishedOutcome, ...]
     arrived: bool
     reason: str
 
@@ -53,7 +53,7 @@ def perform_published(request: WalkRequest) -> PublishedRun:
     there = set(structure.ids)
     removed = [tuple(int(part) for part in hold.split(",")) for hold in whole.ids if hold not in there]
     walker = PublishedWalker(points[0][:2], points[0][2], removed=removed)
-    outcomes = list[Outcome]()
+    outcomes = list[PublishedOutcome]()
     if request.mode == "destination":
         outcomes.append(walker.to(points[1:]))
     else:
@@ -116,7 +116,7 @@ def save_published(run: PublishedRun, folder: pathlib.Path) -> list[pathlib.Path
     return [file, folder / PLOT]
 
 
-def _driven(walker: PublishedWalker, request: WalkRequest, point: tuple[float, float, float]) -> Outcome:
+def _driven(walker: PublishedWalker, request: WalkRequest, point: tuple[float, float, float]) -> PublishedOutcome:
     """Velocity control straight towards a point, for as long as that takes."""
     now = np.array(walker.place)
     off = np.array(point) - now

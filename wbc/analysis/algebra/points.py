@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from flint import fmpz_poly
 
-from wbc.analysis.algebra.branches import Branch
+from wbc.analysis.algebra.branches import LocusBranch
 from wbc.analysis.algebra.half_angles import HalfAngles, HalfPoly, Relation, Value
 from wbc.analysis.algebra.notation import coefficients
 from wbc.validation import Array
@@ -106,7 +106,7 @@ def univariate_roots(half: HalfAngles, relation: Relation) -> tuple[float, ...]:
     return tuple(sorted(r if joint in half.ring.slides else 2.0 * atan(r) for r in roots))
 
 
-def real_point(half: HalfAngles, branch: Branch, rng: np.random.Generator) -> Array | None:
+def real_point(half: HalfAngles, branch: LocusBranch, rng: np.random.Generator) -> Array | None:
     """A random configuration on a branch, one number a joint, or None where this try found none."""
     q: Array = rng.uniform(-pi, pi, half.size)
     for value in branch.values:

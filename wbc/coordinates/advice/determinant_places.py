@@ -15,11 +15,11 @@ from typing import TypeAlias
 from wbc import validation
 from wbc.analysis import (
     BodyRows,
-    Branch,
     Exact,
     ExactModel,
     JointBlock,
     JointRows,
+    LocusBranch,
     Notation,
     PitchPlaneRows,
     Relation,
@@ -77,7 +77,7 @@ class ClosedForm:
 
     places: tuple[Place, ...]
     always: bool = False
-    branches: tuple[Branch, ...] = ()
+    branches: tuple[LocusBranch, ...] = ()
     exact: Exact | None = None
 
     @cached_property
@@ -148,7 +148,7 @@ def _factored(robot: Robot, block: JointBlock) -> ClosedForm | None:
         return ClosedForm((), always=True)
     values = [f for f, _ in factors.conditions if isinstance(f, Value)]
     relations = [f for f, _ in factors.conditions if isinstance(f, Relation) and _vanishes(rings, f)]
-    branches = [Branch(values=(v,)) for v in values] + [Branch(relations=(r,)) for r in relations]
+    branches = [LocusBranch(values=(v,)) for v in values] + [LocusBranch(relations=(r,)) for r in relations]
     return ClosedForm(tuple(_place(robot, model, v) for v in values), branches=tuple(branches), exact=rings)
 
 

@@ -19,7 +19,7 @@ RATE = 10.0
 CYCLE = 1.0 / RATE
 
 
-class Motion:
+class BodyMotion:
     """From rest at the first pose past all others to rest at the last.
 
     Args:

@@ -48,7 +48,7 @@ Raw = Sphere | Capsule | RawBox | RawCylinder | RawEllipsoid | Mesh
 
 
 @dataclass(frozen=True, eq=False)
-class Body:
+class CollisionBody:
     """One collision body of a link.
 
     Attributes:
@@ -64,7 +64,9 @@ class Body:
     read: Callable[[], Raw]
 
 
-def bodies_of(robot: Robot, package_dirs: Iterable[Any] = (), geometry: pin.GeometryModel | None = None) -> list[Body]:
+def bodies_of(
+    robot: Robot, package_dirs: Iterable[Any] = (), geometry: pin.GeometryModel | None = None
+) -> list[CollisionBody]:
     """The collision bodies of the file that a robot was read from, or of a Pinocchio collision model.
 
     Raises:
@@ -90,7 +92,9 @@ def bodies_of(robot: Robot, package_dirs: Iterable[Any] = (), geometry: pin.Geom
     ]
 
 
-def _urdf_body(link: str, collision: ElementTree.Element, path: pathlib.Path, folders: list[pathlib.Path]) -> Body:
+def _urdf_body(
+    link: str, collision: ElementTree.Element, path: pathlib.Path, folders: list[pathlib.Path]
+) -> CollisionBody:
     """The body of one <collision> element."""
     origin, shape = collision.find("origin"), collision.find("geometry")[0]  # type: ignore[index]
     xyz = _numbers(origin.get("xyz", "0 0 0") if origin is not None else "0 0 0", link)
@@ -113,7 +117,7 @@ def _urdf_body(link: str, collision: ElementTree.Element, path: pathlib.Path, fo
             return read_mesh(file, _numbers(shape.get("scale", "1 1 1"), link))
         raise RobotFileError("geometry", shape.tag, "neither sphere, capsule, cylinder, box nor mesh")
 
-    return Body(link, shape.tag == "mesh", pin.SE3(pin.rpy.rpyToMatrix(rpy), xyz), read)
+    return CollisionBody(link, shape.tag == "mesh", pin.SE3(pin.rpy.rpyToMatrix(rpy), xyz), read)
 
 
 def _numbers(text: str, link: str) -> Array:
@@ -141,14 +145,14 @@ def resolve_mesh(name: str, source: pathlib.Path, folders: Sequence[pathlib.Path
     return path if path.is_absolute() else source.parent / path
 
 
-def _geometry_bodies(model: pin.Model, geometry: pin.GeometryModel) -> list[Body]:
+def _geometry_bodies(model: pin.Model, geometry: pin.GeometryModel) -> list[CollisionBody]:
     """Bodies of a Pinocchio collision model, placed in the frames of their links."""
     bodies = []
     for item in geometry.geometryObjects:
         frame = model.frames[item.parentFrame]
         local = frame.placement.inverse() * item.placement
         mesh = isinstance(item.geometry, (coal.BVHModelBase, coal.ConvexBase))
-        bodies.append(Body(str(frame.name), mesh, local, lambda g=item.geometry: _from_coal(g)))  # type: ignore[misc]
+        bodies.append(CollisionBody(str(frame.name), mesh, local, lambda g=item.geometry: _from_coal(g)))  # type: ignore[misc]
     return bodies
 
 

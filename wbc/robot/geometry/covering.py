@@ -28,7 +28,7 @@ GAIN = 0.02
 
 
 @dataclass(frozen=True)
-class Kind:
+class CoverKind:
     """A kind of shape: ``fit`` makes a good one around points, ``guess`` a quick one (end, end, radius)."""
 
     fit: Callable[[Array, Hull], PlacedShape]
@@ -62,7 +62,7 @@ def _flat(hull: Hull) -> bool:
     return len(hull.facets) == 0
 
 
-def _slabs(mesh: Mesh, number: int, how: Kind, hull: Hull) -> list[Array]:
+def _slabs(mesh: Mesh, number: int, how: CoverKind, hull: Hull) -> list[Array]:
     """Slabs across the principal axis on which equal ones do best, whose borders then move where that helps."""
 
     def equal(axis: Array) -> tuple[float, list[Array], Array, Array]:
@@ -84,7 +84,7 @@ def _slabs(mesh: Mesh, number: int, how: Kind, hull: Hull) -> list[Array]:
     return slabs
 
 
-def _judged(mesh: Mesh, axis: Array, cuts: Array, how: Kind, hull: Hull) -> tuple[float, list[Array]]:
+def _judged(mesh: Mesh, axis: Array, cuts: Array, how: CoverKind, hull: Hull) -> tuple[float, list[Array]]:
     """(largest excess of quick shapes, slabs with something in them)."""
     slabs = [points for points in mesh.slabs(axis, cuts) if len(points)]
     worst = 0.0
@@ -99,4 +99,4 @@ def _capsule(points: Array, hull: Hull) -> PlacedShape:
     return replace(shape, excess=hull.excess(*shape.ends(), shape.shape.radius))  # type: ignore[union-attr]
 
 
-KINDS = {"capsule": Kind(_capsule, quick_capsule), "spheres": Kind(least_excess_ball, quick_ball)}
+KINDS = {"capsule": CoverKind(_capsule, quick_capsule), "spheres": CoverKind(least_excess_ball, quick_ball)}

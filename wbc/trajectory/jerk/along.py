@@ -98,9 +98,9 @@ def _part(path: Path, start: float, end: float, sizes: tuple[Array, Array, Array
 def _slower(law: Law, sizes: tuple[Array, Array, Array] | None = None) -> float:
     """The factor of time at which the limits are just kept, at least 1."""
     if sizes is not None:
-        from wbc.trajectory.laws.limits import Limits
+        from wbc.trajectory.laws.limits import MotionLimits
 
-        law = law.with_limits(Limits(velocity=sizes[0], acceleration=sizes[1], jerk=sizes[2]))
+        law = law.with_limits(MotionLimits(velocity=sizes[0], acceleration=sizes[1], jerk=sizes[2]))
     worst = law.certificate.worst
     factor = 1.0
     for order, name in enumerate(("velocity", "acceleration", "jerk"), 1):

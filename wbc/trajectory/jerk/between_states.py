@@ -10,9 +10,9 @@ from wbc import validation
 from wbc.errors import BoundsError, ContinuityError, InfeasibleError, RangeError
 from wbc.trajectory.jerk.course import Course
 from wbc.trajectory.jerk.joined_courses import along_line, law_of, standing
-from wbc.trajectory.jerk.state_to_state import Task, by_ruckig, by_stops, others, plan
+from wbc.trajectory.jerk.state_to_state import StateTask, by_ruckig, by_stops, others, plan
 from wbc.trajectory.laws.law import Law
-from wbc.trajectory.laws.limits import Limits
+from wbc.trajectory.laws.limits import MotionLimits
 from wbc.validation import Array
 
 Synchronisation = Literal["time", "phase", "none"]
@@ -72,7 +72,7 @@ def jerk_limited(
     limits = limits_of(begin.shape[1], velocity, acceleration, jerk, lower, upper)
     _check_inside("start", begin, limits, 1.0)
     _check_inside("target", end, limits, -1.0)
-    task = Task(begin, end, *sizes_of(limits))
+    task = StateTask(begin, end, *sizes_of(limits))
     if synchronisation == "none" and not task.ends_at_rest:
         raise RangeError("synchronisation", synchronisation, "joints that arrive one by one must arrive at rest")
     if straight:
@@ -81,11 +81,11 @@ def jerk_limited(
     return law_of(courses, end, limits) if any(c.spans for c in courses) else standing(begin[0], limits)
 
 
-def limits_of(dof: int, velocity: Any, acceleration: Any, jerk: Any, lower: Any, upper: Any) -> Limits:
+def limits_of(dof: int, velocity: Any, acceleration: Any, jerk: Any, lower: Any, upper: Any) -> MotionLimits:
     """Limits of so many joints, from numbers for all of them or one for each; sizes must be finite.
 
     Raises:
-        ShapeError, NotFiniteError, RangeError, BoundsError: as of :class:`~wbc.trajectory.laws.limits.Limits`.
+        ShapeError, NotFiniteError, RangeError, BoundsError: as of :class:`~wbc.trajectory.laws.limits.MotionLimits`.
     """
     sizes = {}
     for name, value in (("velocity", velocity), ("acceleration", acceleration), ("jerk", jerk)):
@@ -96,10 +96,10 @@ def limits_of(dof: int, velocity: Any, acceleration: Any, jerk: Any, lower: Any,
     places = {} if lower is None else {"lower": _for_all("limits.lower", lower, dof)}
     if upper is not None:
         places["upper"] = _for_all("limits.upper", upper, dof)
-    return Limits(**sizes, **places)
+    return MotionLimits(**sizes, **places)
 
 
-def sizes_of(limits: Limits) -> tuple[Array, Array, Array]:
+def sizes_of(limits: MotionLimits) -> tuple[Array, Array, Array]:
     """Limits of velocity, acceleration and jerk, all of which there are."""
     assert limits.velocity is not None
     assert limits.acceleration is not None
@@ -121,7 +121,7 @@ def _state(name: str, position: Any, velocity: Any, acceleration: Any, dof: int 
     return np.stack(rows)
 
 
-def _check_inside(name: str, state: Array, limits: Limits, towards: float) -> None:
+def _check_inside(name: str, state: Array, limits: MotionLimits, towards: float) -> None:
     """Ends within the limits, also of what their acceleration makes of the velocity (towards the future: 1)."""
     v, a, j = sizes_of(limits)
     if limits.lower is not None and limits.upper is not None:
@@ -148,7 +148,7 @@ def _check_inside(name: str, state: Array, limits: Limits, towards: float) -> No
         )
 
 
-def _within(task: Task, courses: list[Course], limits: Limits) -> list[Course]:
+def _within(task: StateTask, courses: list[Course], limits: MotionLimits) -> list[Course]:
     """Courses that keep the position limits, the given ones where they do."""
     if limits.lower is None or limits.upper is None:
         return courses
@@ -171,7 +171,7 @@ def _within(task: Task, courses: list[Course], limits: Limits) -> list[Course]:
     raise InfeasibleError("target_velocity", task.target[1].tolist(), f"joint {i} finds no common time of arrival")
 
 
-def _kept(task: Task, i: int, first: Course, duration: float, limits: Limits) -> Course:
+def _kept(task: StateTask, i: int, first: Course, duration: float, limits: MotionLimits) -> Course:
     for course in others(task, i, duration):
         if _escape(course, limits, i) is None:
             return course
@@ -186,7 +186,7 @@ def _kept(task: Task, i: int, first: Course, duration: float, limits: Limits) ->
     )
 
 
-def _escape(course: Course, limits: Limits, i: int) -> tuple[float, float] | None:
+def _escape(course: Course, limits: MotionLimits, i: int) -> tuple[float, float] | None:
     """(position, time) farthest outside the limits of the joint, None where it stays within them."""
     assert limits.lower is not None
     assert limits.upper is not None
@@ -198,7 +198,7 @@ def _escape(course: Course, limits: Limits, i: int) -> tuple[float, float] | Non
     return below if below[0] < low - ROOM * size else None
 
 
-def _on_line(task: Task, limits: Limits) -> Law:
+def _on_line(task: StateTask, limits: MotionLimits) -> Law:
     """One course along start + s u, |u| = 1."""
     way = task.target[0] - task.start[0]
     lengths = [float(np.linalg.norm(x)) for x in (way, *task.start[1:], *task.target[1:])]
@@ -218,7 +218,7 @@ def _on_line(task: Task, limits: Limits) -> Law:
     ]
     first = np.array([0.0, task.start[1] @ u, task.start[2] @ u])
     last = np.array([way @ u, task.target[1] @ u, task.target[2] @ u])
-    scalar = Task(first[:, None], last[:, None], *sizes)
+    scalar = StateTask(first[:, None], last[:, None], *sizes)
     course = plan(scalar, "none")[0]
     law = along_line(course, u, task.start, task.target, limits)
     for i in range(task.dof):

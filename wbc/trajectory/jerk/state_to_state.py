@@ -43,7 +43,7 @@ NEAR = 1e-8
 
 
 @dataclass(frozen=True, eq=False)
-class Task:
+class StateTask:
     """Two states (3 x n: positions, velocities, accelerations) and the sizes allowed between them (n each)."""
 
     start: Array
@@ -62,10 +62,10 @@ class Task:
         """Whether joints may arrive early and wait."""
         return not self.target[1:].any()
 
-    def joint(self, i: int) -> Task:
+    def joint(self, i: int) -> StateTask:
         """The task of one joint."""
         k = slice(i, i + 1)
-        return Task(self.start[:, k], self.target[:, k], self.velocity[k], self.acceleration[k], self.jerk[k])
+        return StateTask(self.start[:, k], self.target[:, k], self.velocity[k], self.acceleration[k], self.jerk[k])
 
     def points(self, i: int) -> tuple[Point, Point]:
         """Start and target of a joint."""
@@ -90,7 +90,7 @@ class Task:
         return float(np.max([way, speed * tau, push * tau * tau])), tau
 
 
-def by_ruckig(task: Task, synchronisation: str, duration: float = 0.0) -> list[Course] | None:
+def by_ruckig(task: StateTask, synchronisation: str, duration: float = 0.0) -> list[Course] | None:
     """A course a joint, None where ruckig refuses; ``synchronisation``: time, phase, none; ``duration``: at least."""
     import ruckig
 
@@ -124,7 +124,7 @@ def by_ruckig(task: Task, synchronisation: str, duration: float = 0.0) -> list[C
     return _repaired(task, courses)
 
 
-def _repaired(task: Task, courses: list[Course]) -> list[Course] | None:
+def _repaired(task: StateTask, courses: list[Course]) -> list[Course] | None:
     """Courses of joints that ruckig missed the target of, because it is measured in the units of a larger motion, in
     their own units; None where that does not help.
     """
@@ -142,13 +142,13 @@ def _repaired(task: Task, courses: list[Course]) -> list[Course] | None:
     return courses
 
 
-def _in_time(task: Task, duration: float, longest: float) -> bool:
+def _in_time(task: StateTask, duration: float, longest: float) -> bool:
     """Whether a course may stand beside others: who arrives at rest may wait."""
     early = task.ends_at_rest and duration <= longest
     return early or math.isclose(duration, longest, rel_tol=1e-12)
 
 
-def arrives(task: Task, i: int, course: Course) -> bool:
+def arrives(task: StateTask, i: int, course: Course) -> bool:
     """Whether a joint's course ends in its target, to rounding, and keeps its limits of velocity and acceleration."""
     length, tau = task.joint(i).units
     here, there = course.points()[-1], task.points(i)[1]
@@ -165,7 +165,7 @@ def arrives(task: Task, i: int, course: Course) -> bool:
 
 
 def by_stops(
-    task: Task, i: int, duration: float, hard: tuple[bool, bool] = (False, False), left: float = math.inf
+    task: StateTask, i: int, duration: float, hard: tuple[bool, bool] = (False, False), left: float = math.inf
 ) -> Course:
     """A joint's course that always exists: stop, from rest to rest, and the stop of the mirrored target backwards.
 
@@ -186,7 +186,7 @@ def by_stops(
     return leave.then(middle.spans, middle.jerks).then(*backwards(arrive))
 
 
-def plan(task: Task, synchronisation: str) -> list[Course]:
+def plan(task: StateTask, synchronisation: str) -> list[Course]:
     """Courses of all joints, of one duration but for ``none``; never refused for a task within its limits."""
     for how in dict.fromkeys((synchronisation, "time")):
         courses = by_ruckig(task, how)
@@ -200,7 +200,7 @@ def plan(task: Task, synchronisation: str) -> list[Course]:
     return [by_stops(task, i, longest) for i in range(task.dof)]
 
 
-def others(task: Task, i: int, duration: float) -> Iterator[Course]:
+def others(task: StateTask, i: int, duration: float) -> Iterator[Course]:
     """Further courses of one joint, tried where the first leaves its position limits: the fastest one, if it may wait
     for the rest, then stops at both ends, then stops of the least way.
     """

@@ -19,7 +19,7 @@ SETTLED = 1e-13
 
 
 @dataclass(frozen=True)
-class Bounds:
+class SpeedBounds:
     """What the generator keeps: largest speed [m/s], acceleration [m/s^2], distance from a corner [m]."""
 
     speed: float
@@ -28,7 +28,7 @@ class Bounds:
 
 
 @dataclass(frozen=True, eq=False)
-class Corners:
+class ViaCorners:
     """Corners and segments of a polygon of n segments.
 
     Attributes:
@@ -93,7 +93,7 @@ class Corners:
         return np.where(stops, np.inf, (high + low - 2.0 * np.sqrt(np.where(stops, 0.0, least))) / a)
 
 
-def corner_speeds(lengths: Array, directions: Array, turns: Array, bounds: Bounds) -> Corners:
+def corner_speeds(lengths: Array, directions: Array, turns: Array, bounds: SpeedBounds) -> ViaCorners:
     """Steps 1 to 5 and 8(b) of the generator: the speeds at which corners are passed.
 
     Args:
@@ -112,7 +112,7 @@ def corner_speeds(lengths: Array, directions: Array, turns: Array, bounds: Bound
     squares[1:-1] = np.minimum(allowed, bounds.speed**2)
     # A segment of no length has no direction to go through in: it is reached and left at rest
     squares[1:-1][(lengths[:-1] == 0.0) | (lengths[1:] == 0.0)] = 0.0
-    corners = Corners(lengths, bends, squares, a)
+    corners = ViaCorners(lengths, bends, squares, a)
     stopping: set[int] = set()
     while True:
         _settle(corners)
@@ -125,7 +125,7 @@ def corner_speeds(lengths: Array, directions: Array, turns: Array, bounds: Bound
         stopping.add(worst)
 
 
-def _settle(corners: Corners) -> None:
+def _settle(corners: ViaCorners) -> None:
     """Steps 3 and 4: while a segment is too short for its change of speed, lower the higher one, worst first."""
     a, squares = corners.acceleration, corners.squares
     while True:
@@ -140,7 +140,7 @@ def _settle(corners: Corners) -> None:
         squares[high] = (squares[low] + 2.0 * a * rest) / (1.0 + corners.bends[high])
 
 
-def _let_stop(corners: Corners, segment: int) -> None:
+def _let_stop(corners: ViaCorners, segment: int) -> None:
     """Step 8(b): lower the speeds at the ends of a segment until one can stop in it.
 
     Stopping takes v_lo^2 + v_hi^2 <= 2 a (d - r_lo - r_hi). The listing's equal speeds, v^2 = a d / (1 + U_lo + U_hi),

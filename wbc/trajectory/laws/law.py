@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from wbc import validation
 from wbc.errors import ContinuityError, LawFileError, RangeError, ShapeError, WbcError
 from wbc.trajectory.laws import files
-from wbc.trajectory.laws.certificate import Certificate, Check, all_checks, certify, chain
-from wbc.trajectory.laws.limits import Limits
+from wbc.trajectory.laws.certificate import Check, LawCertificate, all_checks, certify, chain
+from wbc.trajectory.laws.limits import MotionLimits
 from wbc.trajectory.laws.timing import Timing
 from wbc.trajectory.paths.path import Index, JoinedPath, Path, Space
 from wbc.validation import Array
@@ -59,14 +59,18 @@ class Law:
         self,
         path: Path,
         timing: Timing,
-        limits: Limits | None = None,
+        limits: MotionLimits | None = None,
         checks: Sequence[Check] = (),
         moving: tuple[bool, bool] = (False, False),
     ) -> None:
         self.path = validation.instance("law.path", path, Path, "a Path")
         self.timing = validation.instance("law.timing", timing, Timing, "a Timing")
         self.checks, self.moving = all_checks(checks), _two_flags("law.moving", moving)
-        given = Limits() if limits is None else validation.instance("limits", limits, Limits, "trajectory.Limits")
+        given = (
+            MotionLimits()
+            if limits is None
+            else validation.instance("limits", limits, MotionLimits, "trajectory.MotionLimits")
+        )
         self.limits = given.for_dof(path.dof)
         _check_within(path, timing)
 
@@ -122,11 +126,11 @@ class Law:
         return np.where(back, self.path.pieces_before(s[0], pieces), pieces)
 
     @cached_property
-    def certificate(self) -> Certificate:
+    def certificate(self) -> LawCertificate:
         """How much of :attr:`limits` and of :attr:`checks` the law uses at worst."""
         return certify(self.path, self.timing, self.limits, self.checks, moving=self.moving)
 
-    def with_limits(self, limits: Limits) -> Law:
+    def with_limits(self, limits: MotionLimits) -> Law:
         """The same law, to be compared with other limits."""
         return Law(self.path, self.timing, limits, self.checks, self.moving)
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from wbc import style, validation
 from wbc.errors import LawFileError, ShapeError
-from wbc.trajectory.laws.certificate import ORDERS, Pieces, Worst
+from wbc.trajectory.laws.certificate import ORDERS, LawPieces, Worst
 from wbc.trajectory.laws.law import Law
 from wbc.trajectory.paths.turning import quaternion
 from wbc.validation import Array
@@ -59,7 +59,7 @@ def plot(law: Law, file: str | os.PathLike[str], names: Sequence[str] | None = N
     validation.instance("title", title, str, "a string")
     if names is not None and len(validation.strings("names", names)) != law.dof:
         raise ShapeError("names", names, f"expected {law.dof} names")
-    pieces = Pieces.of(law.path, law.timing)
+    pieces = LawPieces.of(law.path, law.timing)
     share = np.linspace(0.0, 1.0, max(2, math.ceil(POINTS / len(pieces.start))))
     times = (pieces.start[:, None] + pieces.span[:, None] * share).ravel()
     columns = _pose_panels(law, pieces, share) if law.space == "poses" else [_joint_panels(law, pieces, share, names)]
@@ -108,7 +108,7 @@ def _orders(law: Law) -> list[tuple[str, int]]:
     return [(name, order) for name, order in ORDERS.items() if not (name == "jerk" and jumps)]
 
 
-def _joint_panels(law: Law, pieces: Pieces, share: Array, names: Sequence[str] | None) -> list[Panel]:
+def _joint_panels(law: Law, pieces: LawPieces, share: Array, names: Sequence[str] | None) -> list[Panel]:
     labels = [f"joint {k}" for k in range(law.dof)] if names is None else list(names)
     panels = []
     for name, order in _orders(law):
@@ -119,7 +119,7 @@ def _joint_panels(law: Law, pieces: Pieces, share: Array, names: Sequence[str] |
     return panels
 
 
-def _pose_panels(law: Law, pieces: Pieces, share: Array) -> list[list[Panel]]:
+def _pose_panels(law: Law, pieces: LawPieces, share: Array) -> list[list[Panel]]:
     origin, turning = [], []
     for name, order in _orders(law):
         values = pieces.at(law.path, law.timing, order, share)

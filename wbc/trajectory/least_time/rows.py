@@ -48,7 +48,7 @@ class Grid:
 
 
 @dataclass(frozen=True, eq=False)
-class Rows:
+class PathRows:
     """a u + b x + c <= 1, with c <= 1, at both ends of N intervals: N x 2 x m each; >= -1 too where ``both``, with
     c = 0.
     """
@@ -58,17 +58,17 @@ class Rows:
     c: Array
     both: bool = True
 
-    def shrunk(self, factor: float) -> Rows:
+    def shrunk(self, factor: float) -> PathRows:
         """The same with limits that are smaller by a factor; what is there without motion stays inside."""
         room = np.maximum(1.0 / factor, self.c)
-        return Rows(self.a / room, self.b / room, self.c / room, self.both)
+        return PathRows(self.a / room, self.b / room, self.c / room, self.both)
 
 
-def accelerations(path: Path, grid: Grid, limit: Array) -> Rows:
+def accelerations(path: Path, grid: Grid, limit: Array) -> PathRows:
     """|q' u + q'' x| <= limit, for the joints that have one."""
     has = np.isfinite(limit)
     a = grid.at_ends(path, 1)[..., has] / limit[has]
-    return Rows(a, grid.at_ends(path, 2)[..., has] / limit[has], np.zeros_like(a))
+    return PathRows(a, grid.at_ends(path, 2)[..., has] / limit[has], np.zeros_like(a))
 
 
 def squared_speed(slope: Array, limit: Array) -> Array:

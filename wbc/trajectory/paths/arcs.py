@@ -12,7 +12,7 @@ from wbc.errors import RangeError
 from wbc.trajectory.paths.path import Path, PolynomialPath
 from wbc.trajectory.paths.pose_path import Circle, PosePath
 from wbc.trajectory.paths.pose_paths import LARGEST_TURN, RADIUS, standing_pose
-from wbc.trajectory.paths.turning import Turns, matrices, quaternion, turn_between
+from wbc.trajectory.paths.turning import TwoTurns, matrices, quaternion, turn_between
 from wbc.trajectory.paths.waypoints import SMALLEST, distance
 from wbc.validation import Array
 
@@ -128,4 +128,4 @@ def _arc(center: Array, x: Array, normal: Array, angle: float, turn: Array, rota
     angles = np.zeros((2, pieces, 2))
     angles[0, :, 1], angles[1, :, 1] = 1.0, knots[:-1]
     parts = (np.zeros((pieces, 3)), np.tile(turn / length, (pieces, 1)), np.repeat(rotation, pieces, axis=0))
-    return PosePath(position, Turns(PolynomialPath(knots, angles), *parts))
+    return PosePath(position, TwoTurns(PolynomialPath(knots, angles), *parts))

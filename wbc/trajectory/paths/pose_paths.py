@@ -19,11 +19,11 @@ import numpy as np
 
 from wbc import validation
 from wbc.errors import RangeError, ShapeError
-from wbc.trajectory.paths.corners import DEEPEST, Corners, rounded
+from wbc.trajectory.paths.corners import DEEPEST, RoundedCorners, rounded
 from wbc.trajectory.paths.joint_paths import standing_path
 from wbc.trajectory.paths.path import PolynomialPath
 from wbc.trajectory.paths.pose_path import PosePath
-from wbc.trajectory.paths.turning import QuaternionSpline, Turns, matrices, quaternion, turn_between
+from wbc.trajectory.paths.turning import QuaternionSpline, TwoTurns, matrices, quaternion, turn_between
 from wbc.trajectory.paths.waypoints import ENDS, Ends, cubic_spline, distance, kept, summed
 from wbc.validation import Array
 
@@ -189,12 +189,12 @@ def standing_pose(point: Array, rotation: Array) -> PosePath:
     """Of degree 0, over s in [0, 1]; ``rotation``: 1 x 3 x 3."""
     none = np.zeros((1, 3))
     angles = PolynomialPath([0.0, 1.0], np.zeros((1, 1, 2)))
-    return PosePath(standing_path(point), Turns(angles, none, none, rotation))
+    return PosePath(standing_path(point), TwoTurns(angles, none, none, rotation))
 
 
-def _turns(corners: Corners, rates: Array, rotations: Array) -> Turns:
+def _turns(corners: RoundedCorners, rates: Array, rotations: Array) -> TwoTurns:
     angles = np.stack([corners.before, corners.behind], axis=2)
     if not corners.behind[:-2].any():
         angles = angles[-2:]
     first, second = corners.directions(rates)
-    return Turns(PolynomialPath(corners.knots, angles), first, second, rotations[corners.corner])
+    return TwoTurns(PolynomialPath(corners.knots, angles), first, second, rotations[corners.corner])
