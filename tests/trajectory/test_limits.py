@@ -101,7 +101,7 @@ def test_joined_paths_are_their_parts(seed: int) -> None:
             begin += len(part.knots)
         gap = joined.knots[joined.gaps]
         assert joined.pieces_at(gap + 1e-9).tolist() == (joined.gaps - 1).tolist()
-        assert joined.pieces_at(gap + JoinedPath.ROOM - 1e-9).tolist() == (joined.gaps + 1).tolist()
+        assert joined.pieces_at(gap + JoinedPath.GAP - 1e-9).tolist() == (joined.gaps + 1).tolist()
 
 
 @pytest.mark.parametrize(

@@ -73,12 +73,12 @@ def perform_published(request: WalkRequest) -> PublishedRun:
 
 def published_figures(run: PublishedRun) -> list[Figure]:
     """The figures in the order in which they are shown."""
-    told = "arrived" if run.arrived else f"stopped: {run.reason}"
+    text = "arrived" if run.arrived else f"stopped: {run.reason}"
     lifts = sum(len(outcome.lifts) for outcome in run.outcomes)
     last = float(run.log.times[-1]) if len(run.log.times) else 0.0
     time = sum(outcome.time for outcome in run.outcomes)
     return [
-        Figure("outcome", "outcome", "arrived" if run.arrived else "stopped", told),
+        Figure("outcome", "outcome", "arrived" if run.arrived else "stopped", text),
         Figure("reason", "", run.reason, ""),
         Figure("planner", "planner", "published", "published, ideal tracking, wrist reach only"),
         Figure("robot", "robot", Calibration().digest, f"published walker, Calibration {Calibration().digest}"),
@@ -121,9 +121,9 @@ def _driven(walker: PublishedWalker, request: WalkRequest, point: tuple[float, f
     now = np.array(walker.place)
     off = np.array(point) - now
     radius = RADIUS + 52 * 0.0254
-    way = np.array([(grid_angle(1.0) - grid_angle(0.0)) * radius * off[0], PITCH * off[1]])
+    offset = np.array([(grid_angle(1.0) - grid_angle(0.0)) * radius * off[0], PITCH * off[1]])
     spin = (off[2] + np.pi) % (2.0 * np.pi) - np.pi
-    time = max(float(np.linalg.norm(way)) / request.speed, abs(spin) / request.turn_rate)
+    time = max(float(np.linalg.norm(offset)) / request.speed, abs(spin) / request.turn_rate)
     if time <= 0.0:
         raise RangeError("to", point, "the body is there already")
-    return walker.drive([way[0] / time, way[1] / time, spin / time], time)
+    return walker.drive([offset[0] / time, offset[1] / time, spin / time], time)

@@ -68,8 +68,8 @@ def changes_sign(half: HalfAngles, relation: Relation) -> bool:
     """Whether a relation has both signs among some configurations, so that it has zeros; False proves nothing."""
     rng = np.random.default_rng(0)
     value = form_grid(half, relation, [rng.uniform(-pi, pi, SAMPLES) for _ in range(half.size)])
-    room = ZERO * float(np.abs(value).max())
-    return bool(value.min() < -room and value.max() > room)
+    tolerance = ZERO * float(np.abs(value).max())
+    return bool(value.min() < -tolerance and value.max() > tolerance)
 
 
 def form_value(half: HalfAngles, relation: Relation, q: Array) -> float:

@@ -73,9 +73,9 @@ def _slabs(mesh: Mesh, number: int, how: CoverKind, hull: Hull) -> list[Array]:
     axes = np.linalg.svd(hull.vertices - hull.vertices.mean(axis=0), full_matrices=False)[2]
     worst, slabs, axis, cuts = min((equal(axis) for axis in axes), key=lambda found: found[0])
     width = (cuts[-1] - cuts[0]) / number
-    for move, k, way in itertools.product(MOVES, range(1, number), (-1.0, 1.0)):
+    for move, k, sign in itertools.product(MOVES, range(1, number), (-1.0, 1.0)):
         moved = cuts.copy()
-        moved[k] += way * move * width
+        moved[k] += sign * move * width
         if (np.diff(moved) <= 0.0).any():
             continue
         new, pieces = _judged(mesh, axis, moved[1:-1], how, hull)

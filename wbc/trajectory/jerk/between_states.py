@@ -21,7 +21,7 @@ Synchronisation = Literal["time", "phase", "none"]
 ACROSS = 1e-9
 
 #: Positions outside their limits by less than this share of the range are rounding
-ROOM = 1e-10
+TOLERANCE = 1e-10
 
 
 def jerk_limited(
@@ -45,8 +45,8 @@ def jerk_limited(
 
         q(0), dq(0), d2q(0) = start,    q(T), dq(T), d2q(T) = target,    |dq| <= V, |d2q| <= A, |d3q| <= J
 
-    A joint that leaves its position limits on the way is driven otherwise: as fast as it can where it may wait at its
-    target, else it stops (first in the shortest time, then with the least way), and goes on from rest to rest.
+    A joint that leaves its position limits in between is driven otherwise: as fast as it can where it may wait at its
+    target, else it stops (first in the shortest time, then over the least distance), and goes on from rest to rest.
 
     Args:
         start, target: n joint coordinates [rad or m].
@@ -139,12 +139,12 @@ def _check_inside(name: str, state: Array, limits: MotionLimits, towards: float)
     out = np.flatnonzero(peak > v * (1.0 + 1e-9))
     if out.size:
         i = int(out[0])
-        room = max(float(v[i] - 0.5 * state[2, i] ** 2 / j[i]), 0.0)
+        largest = max(float(v[i] - 0.5 * state[2, i] ** 2 / j[i]), 0.0)
         raise InfeasibleError(
             f"{name}_velocity",
             float(state[1, i]),
             f"joint {i}: with its acceleration of {state[2, i]:g} the velocity passes {v[i]:g}; largest that works: "
-            f"{room:g}",
+            f"{largest:g}",
         )
 
 
@@ -181,8 +181,8 @@ def _kept(task: StateTask, i: int, first: Course, duration: float, limits: Motio
     raise BoundsError(
         f"position of joint {i}",
         value,
-        f"leaves its limits at {time:.6g} s; tried: the shortest course, stops in the shortest time and with the least "
-        "way at either end",
+        f"leaves its limits at {time:.6g} s; tried: the shortest course, stops in the shortest time and over the least "
+        "distance at either end",
     )
 
 
@@ -193,16 +193,17 @@ def _escape(course: Course, limits: MotionLimits, i: int) -> tuple[float, float]
     low, high = float(limits.lower[i]), float(limits.upper[i])
     below, above = course.extrema()
     size = high - low if np.isfinite(high - low) else max(abs(x) for x in (low, high, 1.0) if np.isfinite(x))
-    if above[0] > high + ROOM * size:
+    if above[0] > high + TOLERANCE * size:
         return above
-    return below if below[0] < low - ROOM * size else None
+    return below if below[0] < low - TOLERANCE * size else None
 
 
 def _on_line(task: StateTask, limits: MotionLimits) -> Law:
     """One course along start + s u, |u| = 1."""
-    way = task.target[0] - task.start[0]
-    lengths = [float(np.linalg.norm(x)) for x in (way, *task.start[1:], *task.target[1:])]
-    along = next((x for x, size in zip((way, *task.start[1:], *task.target[1:]), lengths, strict=True) if size), None)
+    displacement = task.target[0] - task.start[0]
+    vectors = (displacement, *task.start[1:], *task.target[1:])
+    lengths = [float(np.linalg.norm(x)) for x in vectors]
+    along = next((x for x, size in zip(vectors, lengths, strict=True) if size), None)
     if along is None:
         return standing(task.start[0], limits)
     u = along / np.abs(along).max()
@@ -217,7 +218,7 @@ def _on_line(task: StateTask, limits: MotionLimits) -> Law:
         np.array([float(np.min(x[moving] / np.abs(u[moving])))]) for x in (task.velocity, task.acceleration, task.jerk)
     ]
     first = np.array([0.0, task.start[1] @ u, task.start[2] @ u])
-    last = np.array([way @ u, task.target[1] @ u, task.target[2] @ u])
+    last = np.array([displacement @ u, task.target[1] @ u, task.target[2] @ u])
     scalar = StateTask(first[:, None], last[:, None], *sizes)
     course = plan(scalar, "none")[0]
     law = along_line(course, u, task.start, task.target, limits)

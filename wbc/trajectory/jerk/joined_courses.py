@@ -61,13 +61,13 @@ def along_line(course: Course, direction: Array, begin: Array, end: Array, limit
     """q = start + s direction, with s the course, between two states (3 x n each)."""
     start, ends_moving = begin[0], bool(end[1:].any())
     (lowest, _), (highest, _) = course.extrema()
-    room = 1e-12 * (1.0 + abs(lowest) + abs(highest))
+    tolerance = 1e-12 * (1.0 + abs(lowest) + abs(highest))
     point, rows, times = course.start, [], [0.0]
     for span, jerk in zip(course.spans, course.jerks, strict=True):
         rows.append([jerk / 6.0, 0.5 * point[2], point[1], point[0]])
         point = moved(point, jerk, span)
         times.append(times[-1] + span)
-    low, high = lowest - room, highest + room
+    low, high = lowest - tolerance, highest + tolerance
     # Rounding of the course is made up for by the direction, unless its end is so near the start that little would
     # be much: limits along the line are those of the direction
     if abs(point[0]) > NEARLY * (high - low):

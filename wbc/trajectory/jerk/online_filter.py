@@ -252,7 +252,7 @@ class Online:
             self._goal, self._aims = goal, (pace, limit, np.ones(self.dof, dtype=bool))
             return
         self.clipped = False
-        # Towards a wall, a velocity is a way to the wall that is no faster: so the joint comes to rest there in time
+        # Towards a wall, a velocity becomes a course to it that is no faster: so the joint comes to rest there in time
         wall = np.where(pace > 0.0, self._walls.upper, self._walls.lower)
         here = np.array(self._asked.current_position)
         to_wall = (pace != 0.0) & np.isfinite(wall)

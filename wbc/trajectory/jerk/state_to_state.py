@@ -75,19 +75,19 @@ class StateTask:
     @cached_property
     def units(self) -> tuple[float, float]:
         """A length P and a time tau of the size of the motion."""
-        way = np.abs(self.target[0] - self.start[0])
+        distance = np.abs(self.target[0] - self.start[0])
         speed = np.maximum(np.abs(self.start[1]), np.abs(self.target[1]))
         push = np.maximum(np.abs(self.start[2]), np.abs(self.target[2]))
         times = (
-            np.cbrt(way / self.jerk),
-            np.sqrt(way / self.acceleration),
-            way / self.velocity,
+            np.cbrt(distance / self.jerk),
+            np.sqrt(distance / self.acceleration),
+            distance / self.velocity,
             np.sqrt(speed / self.jerk),
             speed / self.acceleration,
             push / self.jerk,
         )
         tau = float(np.max(times))
-        return float(np.max([way, speed * tau, push * tau * tau])), tau
+        return float(np.max([distance, speed * tau, push * tau * tau])), tau
 
 
 def by_ruckig(task: StateTask, synchronisation: str, duration: float = 0.0) -> list[Course] | None:
@@ -153,12 +153,12 @@ def arrives(task: StateTask, i: int, course: Course) -> bool:
     length, tau = task.joint(i).units
     here, there = course.points()[-1], task.points(i)[1]
     v, a = float(task.velocity[i]), float(task.acceleration[i])
-    room = (
+    tolerance = (
         NEAR * length + 1e-14 * abs(there[0]),
         NEAR * length / tau if tau else 0.0,
         min(NEAR * length / (tau * tau), 0.5 * STEP * a) if tau else 0.0,
     )
-    if not all(abs(x - y) <= r for x, y, r in zip(here, there, room, strict=True)):
+    if not all(abs(x - y) <= r for x, y, r in zip(here, there, tolerance, strict=True)):
         return False
     pushes = [abs(point[2]) for point in course.points()]
     return course.fastest() <= v * (1.0 + NEAR) and max(pushes) <= a * (1.0 + NEAR)
@@ -169,8 +169,8 @@ def by_stops(
 ) -> Course:
     """A joint's course that always exists: stop, from rest to rest, and the stop of the mirrored target backwards.
 
-    It takes ``duration``, or its own least time where that is longer. ``hard``: stop with the least way, at either end;
-    ``left``: the largest deceleration at the end of that way.
+    It takes ``duration``, or its own least time where that is longer. ``hard``: stop over the least distance, at either
+    end; ``left``: the largest deceleration at the end of that stop.
     """
     sizes = float(task.acceleration[i]), float(task.jerk[i])
     first, last = task.points(i)
@@ -178,11 +178,11 @@ def by_stops(
         hard_stop(end, *sizes, left) if h else stop(end, *sizes)
         for h, end in zip(hard, (first, (last[0], -last[1], last[2])), strict=True)
     )
-    way = arrive.points()[-1][0] - leave.points()[-1][0]
-    middle = rest_to_rest(way, float(task.velocity[i]), *sizes)
-    room = duration - leave.duration - arrive.duration
-    if room > middle.duration:
-        middle = stretched(middle, room) if middle.spans else Course(middle.start, (room,), (0.0,))
+    distance = arrive.points()[-1][0] - leave.points()[-1][0]
+    middle = rest_to_rest(distance, float(task.velocity[i]), *sizes)
+    left_over = duration - leave.duration - arrive.duration
+    if left_over > middle.duration:
+        middle = stretched(middle, left_over) if middle.spans else Course(middle.start, (left_over,), (0.0,))
     return leave.then(middle.spans, middle.jerks).then(*backwards(arrive))
 
 
@@ -202,7 +202,7 @@ def plan(task: StateTask, synchronisation: str) -> list[Course]:
 
 def others(task: StateTask, i: int, duration: float) -> Iterator[Course]:
     """Further courses of one joint, tried where the first leaves its position limits: the fastest one, if it may wait
-    for the rest, then stops at both ends, then stops of the least way.
+    for the rest, then stops at both ends, then stops over the least distance.
     """
     alone = by_ruckig(task.joint(i), "none")
     if alone is not None and _in_time(task, alone[0].duration, duration):

@@ -121,9 +121,9 @@ def _path(points: Array, quaternions: Array, bounds: SpeedBounds, turning: float
     for i, span in enumerate(spans):
         if reaches[i] > 0.0:
             blend = 2.0 * reaches[i] / speeds[i]
-            pull = speeds[i] / blend * (directions[i] - directions[i - 1])
+            push = speeds[i] / blend * (directions[i] - directions[i - 1])
             start = points[i] - reaches[i] * directions[i - 1]
-            build.add(blend, start, speeds[i] * directions[i - 1], pull, rotations[i])
+            build.add(blend, start, speeds[i] * directions[i - 1], push, rotations[i])
         if turns[i] <= times[i]:
             along = _quick(corners, i, float(times[i]), float(tops[i]))
         else:
@@ -152,7 +152,7 @@ def _quick(corners: ViaCorners, i: int, time: float, top: float) -> list[Piece]:
 def _slowed(corners: ViaCorners, i: int, time: float, bounds: SpeedBounds) -> list[Piece]:
     """Step 8(c): the straight part in the time of its rotation, by the mean speed that is left to it (4-48).
 
-    Five cases: above half way from the higher corner speed to the largest speed; above the higher; between both;
+    Five cases: above half-way from the higher corner speed to the largest speed; above the higher; between both;
     above half the lower; below it, where the hand stops.
     """
     a, slow, fast = corners.acceleration, float(corners.slow[i]), float(corners.fast[i])
@@ -233,11 +233,11 @@ class _Build:
                 kept.append(float(time))
         for begin, end in pairwise(kept):
             middle = 0.5 * (begin + end)
-            push, v, way = _moved(moving, middle, begin)
+            push, v, travelled = _moved(moving, middle, begin)
             twist, w, angle = _moved(turning, middle, begin)
             self.add(
                 end - begin,
-                origin + way * direction,
+                origin + travelled * direction,
                 v * direction,
                 push * direction,
                 rotation,
@@ -257,19 +257,19 @@ class _Build:
 
 
 def _table(pieces: list[Piece], speed: float) -> Array:
-    """Rows (start, acceleration, speed, way) of pieces of constant acceleration."""
-    rows, time, way = [], 0.0, 0.0
+    """Rows (start, acceleration, speed, travelled) of pieces of constant acceleration."""
+    rows, time, travelled = [], 0.0, 0.0
     for span, push in pieces:
-        rows.append((time, push, speed, way))
-        way += span * (speed + 0.5 * push * span)
+        rows.append((time, push, speed, travelled))
+        travelled += span * (speed + 0.5 * push * span)
         speed += push * span
         time += span
     return np.array(rows)
 
 
 def _moved(table: Array, within: float, time: float) -> tuple[float, float, float]:
-    """(acceleration, speed, way) at a time, of the piece that ``within`` lies in."""
+    """(acceleration, speed, travelled) at a time, of the piece that ``within`` lies in."""
     row = table[max(int(np.searchsorted(table[:, 0], within, side="right")) - 1, 0)]
-    start, push, speed, way = (float(x) for x in row)
+    start, push, speed, travelled = (float(x) for x in row)
     e = time - start
-    return push, speed + push * e, way + e * (speed + 0.5 * push * e)
+    return push, speed + push * e, travelled + e * (speed + 0.5 * push * e)

@@ -248,8 +248,8 @@ def _worst(start: Array, span: Array, top: Highest, joints: int) -> Worst:
 
 def _exact(pieces: LawPieces, c: Array, joints: int) -> Worst:
     count, size, columns = c.shape
-    room = max(bernstein.CLOSE, bernstein.rounding(size - 1))
-    ratio, number, place = bernstein.largest(c.transpose(0, 2, 1).reshape(count * columns, size), room)
+    tolerance = max(bernstein.CLOSE, bernstein.rounding(size - 1))
+    ratio, number, place = bernstein.largest(c.transpose(0, 2, 1).reshape(count * columns, size), tolerance)
     piece, column = divmod(number, columns)
     time = float(pieces.start[piece] + place * pieces.span[piece])
     return Worst(ratio, column % joints, time, "exact")

@@ -214,15 +214,15 @@ def _check_within(path: Path, timing: Timing) -> None:
     """Every piece of a timing stays on one stretch of a path without gaps."""
     starts = path.knots[np.concatenate([[0], path.gaps + 1])]
     ends = path.knots[np.concatenate([path.gaps, [-1]])]
-    room = 1e-9 * (1.0 + np.abs(path.knots[[0, -1]]).max())
-    low, high = timing.ranges(lambda low, high: _within(starts, ends, room, low, high))
-    bad = np.flatnonzero(~_within(starts, ends, room, low, high))
+    tolerance = 1e-9 * (1.0 + np.abs(path.knots[[0, -1]]).max())
+    low, high = timing.ranges(lambda low, high: _within(starts, ends, tolerance, low, high))
+    bad = np.flatnonzero(~_within(starts, ends, tolerance, low, high))
     if bad.size:
         reached = (float(low[bad[0]]), float(high[bad[0]]))
         stretches = " or ".join(f"{a:g} to {b:g}" for a, b in zip(starts, ends, strict=True))
         raise RangeError("law.timing", reached, f"s must stay within the path, {stretches}")
 
 
-def _within(starts: Array, ends: Array, room: float, low: Array, high: Array) -> NDArray[np.bool_]:
+def _within(starts: Array, ends: Array, tolerance: float, low: Array, high: Array) -> NDArray[np.bool_]:
     stretch = np.clip(np.searchsorted(starts, 0.5 * (low + high), side="right") - 1, 0, None)
-    return np.asarray((low >= starts[stretch] - room) & (high <= ends[stretch] + room))
+    return np.asarray((low >= starts[stretch] - tolerance) & (high <= ends[stretch] + tolerance))

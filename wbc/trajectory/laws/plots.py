@@ -159,8 +159,8 @@ def _draw(axis: Any, times: Array, panel: Panel) -> None:
     for k, label in enumerate(panel.names):
         axis.plot(times, panel.values[:, k], color=_colour(k), label=label)
     low, high = float(panel.values.min()), float(panel.values.max())
-    room = 0.08 * (high - low) or 0.1 * max(abs(high), 1e-9)
-    bottom, top = low - room, high + room
+    margin = 0.08 * (high - low) or 0.1 * max(abs(high), 1e-9)
+    bottom, top = low - margin, high + margin
     for bounds in (panel.lower, panel.upper):
         if bounds is None:
             continue
@@ -171,7 +171,7 @@ def _draw(axis: Any, times: Array, panel: Panel) -> None:
             axis.axhline(bounds[k], color=style.INK if same else _colour(k), lw=1.1, ls="--", zorder=1.5)
             extreme = panel.values[:, k].min() if bounds[k] < 0.0 else panel.values[:, k].max()
             if extreme / bounds[k] > NEAR if bounds[k] else True:
-                bottom, top = min(bottom, bounds[k] - room), max(top, bounds[k] + room)
+                bottom, top = min(bottom, bounds[k] - margin), max(top, bounds[k] + margin)
     axis.set_ylim(bottom, top)
     axis.set_xlim(times[0], times[-1])
     axis.set_title(panel.title)

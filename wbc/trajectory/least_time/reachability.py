@@ -91,8 +91,8 @@ class SpeedProgram:
         if np.isnan(high[0]):
             return PathSpeeds(None, None)
         reach = float(np.sqrt(low[0])) / factor, float(np.sqrt(high[0])) / factor
-        room = 1e-9 * (1.0 + first)
-        if not low[0] - room <= first <= high[0] + room:
+        tolerance = 1e-9 * (1.0 + first)
+        if not low[0] - tolerance <= first <= high[0] + tolerance:
             return PathSpeeds(None, reach)
         squared = self._forwards(min(max(first, low[0]), high[0]), low, high)
         if squared is None:
@@ -165,8 +165,8 @@ def _unit_of_time(rows: Sequence[PathRows], squared: Array, spans: Array) -> flo
     """About the time that the path takes."""
     length = float(spans.sum())
     slopes = max((float(np.abs(r.a).max(initial=0.0)) * length for r in rows), default=0.0)
-    bends = [float((np.sqrt(np.abs(r.b).max(axis=(1, 2), initial=0.0)) * spans).sum()) for r in rows]
-    quick = float(np.sqrt(slopes)) + max(bends, default=0.0)
+    curvatures = [float((np.sqrt(np.abs(r.b).max(axis=(1, 2), initial=0.0)) * spans).sum()) for r in rows]
+    quick = float(np.sqrt(slopes)) + max(curvatures, default=0.0)
     speeds = np.sqrt(np.minimum(squared[:-1], squared[1:]))
     slow = float((spans / speeds).sum())
     if quick == 0.0:

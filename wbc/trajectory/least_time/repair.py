@@ -23,7 +23,7 @@ GRIDS = 4
 ROUNDS = 6
 
 #: What is kept beyond the tolerance of a certificate
-ROOM = 1e-9
+MARGIN = 1e-9
 
 #: Largest factor of time by which forces are repaired
 SLOWEST = 4.0
@@ -139,7 +139,7 @@ def _more(task: FastestTask, shrunk: Shrunk, certificate: LawCertificate) -> Shr
     def over(*names: str) -> float:
         ratios = [certificate.worst[name].ratio for name in names if name in certificate.worst]
         worst = max(ratios, default=0.0)
-        return worst + ROOM if worst > 1.0 + TOLERANCE else 1.0
+        return worst + MARGIN if worst > 1.0 + TOLERANCE else 1.0
 
     return Shrunk(
         shrunk.velocity * over("velocity"),

@@ -1,7 +1,8 @@
 """Limits along a path as rows that are linear in the path acceleration and in the square of the path speed.
 
 With u = d2s/dt2 and x = (ds/dt)^2 a joint's acceleration is q' u + q'' x, and a torque M q' u + (M q'' + C(q, q') q') x
-+ g. Both are taken at both ends of each interval of a grid, from inside of it, because the path may bend at a knot.
++ g. Both are taken at both ends of each interval of a grid, from inside of it,
+because the path may have a corner at a knot.
 """
 
 from __future__ import annotations
@@ -60,8 +61,8 @@ class PathRows:
 
     def shrunk(self, factor: float) -> PathRows:
         """The same with limits that are smaller by a factor; what is there without motion stays inside."""
-        room = np.maximum(1.0 / factor, self.c)
-        return PathRows(self.a / room, self.b / room, self.c / room, self.both)
+        bound = np.maximum(1.0 / factor, self.c)
+        return PathRows(self.a / bound, self.b / bound, self.c / bound, self.both)
 
 
 def accelerations(path: Path, grid: Grid, limit: Array) -> PathRows:

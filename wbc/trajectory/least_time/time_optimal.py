@@ -78,19 +78,19 @@ def time_optimal(
     Source: H. Pham, Q.-C. Pham, A new approach to time-optimal path parameterization based on reachability analysis,
     IEEE T-RO 34, 2018.
     """
-    way = path if isinstance(path, Path) else spline_path(path)
-    kept = _limits(way, limits, velocity, acceleration)
-    speeds, forces = _checks(way, robot, torque, cartesian_speed, inequality)
+    curve = path if isinstance(path, Path) else spline_path(path)
+    kept = _limits(curve, limits, velocity, acceleration)
+    speeds, forces = _checks(curve, robot, torque, cartesian_speed, inequality)
     start = validation.scalar("start_speed", start_speed, low=0.0)
     end = validation.scalar("end_speed", end_speed, low=0.0)
-    task = FastestTask(way, kept, speeds, forces, start, end)
+    task = FastestTask(curve, kept, speeds, forces, start, end)
     longer = None if duration is None else validation.scalar("duration", duration, low=0.0, open_low=True, unit="s")
     if longer is not None and not task.rests:
         raise RangeError("duration", duration, "a duration can only be asked for from rest to rest")
     count = None if intervals is None else validation.scalar("intervals", intervals, low=2.0, high=MOST_INTERVALS)
     if count is not None and count != int(count):
         raise RangeError("intervals", intervals, "expected a whole number")
-    _within_positions(way, kept)
+    _within_positions(curve, kept)
     law = _law(task, None if count is None else int(count), longer)
     if longer is None:
         return law

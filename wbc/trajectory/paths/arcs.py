@@ -68,7 +68,7 @@ def arc_through(start: Any, via: Any, end: Any, radius: float = RADIUS) -> PoseP
 
     Raises:
         ShapeError, NotFiniteError, RotationError: bad poses or via. RangeError: radius not positive; the three points
-        on one line, or two of them equal, which is no circle; half a turn, whose way round is not given.
+        on one line, or two of them equal, which is no circle; half a turn, whose direction is not given.
     """
     radius = validation.scalar("path.radius", radius, low=0.0, open_low=True, unit="m")
     first, last = validation.pose("path.start", start), validation.pose("path.end", end)
@@ -80,12 +80,12 @@ def arc_through(start: Any, via: Any, end: Any, radius: float = RADIUS) -> PoseP
     quaternions = quaternion(first.rotation), quaternion(last.rotation)
     turn = turn_between(*quaternions)
     if np.linalg.norm(turn) > LARGEST_TURN:
-        raise RangeError("path.end", end, "half a turn from the first orientation: both ways round are as long")
+        raise RangeError("path.end", end, "half a turn from the first orientation: both directions are as long")
     return _arc(middle, x, normal, angle, turn, matrices(quaternions[0][None]), radius)
 
 
 def _circle(a: Array, b: Array, c: Array) -> tuple[Array, Array]:
-    """(center, unit normal such that a, b, c follow each other the positive way round).
+    """(center, unit normal such that a, b, c follow each other counter-clockwise).
 
     With u = b - a and v = c - a:    center - a = (|v|^2 (u x v) x u + |u|^2 v x (u x v)) / (2 |u x v|^2)
     """
