@@ -29,8 +29,10 @@ class Listed(NamedTuple):
 
 
 COMMANDS = {
-    "robots": Listed("robots", "table", "List the robots that load by name."),
-    "robot": Listed("robots", "show", "Show a robot: joints, limits, frames, shapes and where the numbers come from."),
+    "robots": Listed("robot.robots", "table", "List the robots that load by name."),
+    "robot": Listed(
+        "robot.robots", "show", "Show a robot: joints, limits, frames, shapes and where the numbers come from."
+    ),
     "track": Listed("track", "track", "Follow a timed Cartesian path, and leave a log, plots and a summary."),
     "demo": Listed(
         "demo",
@@ -38,13 +40,13 @@ COMMANDS = {
         "Do the main job: a Panda follows a timed path round an obstacle with its elbow plane commanded.",
     ),
     "walk": Listed(
-        "walk",
+        "walking.walk",
         "walk",
         "Walk on a structure of holds with three arms, or end over end, and leave log, "
         "plan, check, pictures and a page.",
     ),
     "plans": Listed(
-        "walk", "plans", "Show what two plans do differently, one line each; exit code 1 if there is anything."
+        "walking.walk", "plans", "Show what two plans do differently, one line each; exit code 1 if there is anything."
     ),
     "replay": Listed("replay", "replay", "Do the ticks of a recording again and compare every bit of their commands."),
     "export": Listed(
@@ -53,20 +55,22 @@ COMMANDS = {
         "Write one control cycle of a robot, QP solver included, as C99 with a header, build files and a check.",
     ),
     "ik": Listed(
-        "ik",
+        "ik.ik",
         "ik",
         "Find joint positions that put a frame at a pose or a position, clear of obstacles and within the limits.",
     ),
     "analyse": Listed(
-        "analyse", "analyse_", "Say where task and constraint coordinates lose rank, and whether they always suffice."
+        "analysis.analyse",
+        "analyse_",
+        "Say where task and constraint coordinates lose rank, and whether they always suffice.",
     ),
     "advise": Listed(
-        "advise",
+        "analysis.advise",
         "advise",
         "Say which pairs are well conditioned at a configuration, where the next locus is, and which pair to use.",
     ),
     "modes": Listed(
-        "modes",
+        "analysis.modes",
         "modes",
         "Say in which modes arms can be commanded: how many pairs, or what is missing; of one robot, which pairs.",
     ),

@@ -8,8 +8,8 @@ import typer
 from rich.markup import escape
 from rich.table import Table
 
+from wbc.cli.analysis.modes import SHORT_NAMES
 from wbc.cli.console import err, out
-from wbc.cli.modes import SHORT_NAMES
 from wbc.coordinates import Adviser, advice_time, mode_pairs, parts, restriction_table, survey_pairs
 from wbc.errors import ShapeError
 from wbc.robot import Robot

@@ -10,9 +10,9 @@ import numpy as np
 import typer
 
 from wbc.cli import options
-from wbc.cli.answers import TargetAnswer, check_output, report, save
+from wbc.cli.ik.answers import TargetAnswer, check_output, report, save
+from wbc.cli.ik.targets import Target, given_targets
 from wbc.cli.planning import given_obstacles, planned
-from wbc.cli.targets import Target, given_targets
 from wbc.errors import InfeasibleError, RangeError
 from wbc.ik import Solution, Solver
 from wbc.track.setup import Moving
