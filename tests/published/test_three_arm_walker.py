@@ -12,7 +12,7 @@ import pytest
 
 from tests.published.three_arms import INCH, along, driven, hold_offsets, rows, shared
 from wbc.published.three_arm_walker import PublishedOutcome, PublishedWalker
-from wbc.published.three_arm_walker.reach import reach_radius
+from wbc.published.three_arm_walker.machine.reach import reach_radius
 
 #: A turn of a column [in] at the body
 COLUMN = 152.0 * np.radians(5.0)

@@ -12,16 +12,17 @@ import numpy as np
 import pytest
 
 from tests.published.three_arms import INCH
-from wbc.published.three_arm_walker import Calibration, grid
-from wbc.published.three_arm_walker.body import body_twist
-from wbc.published.three_arm_walker.gait import Gait
-from wbc.published.three_arm_walker.grid import Place, Terrain, frame
-from wbc.published.three_arm_walker.holds import handholds
-from wbc.published.three_arm_walker.margin import margins
-from wbc.published.three_arm_walker.motion import CYCLE, BodyMotion
-from wbc.published.three_arm_walker.plant import IdealPlant
-from wbc.published.three_arm_walker.reach import Shoulders, View, reach_radius
-from wbc.published.three_arm_walker.swing import swing_poses
+from wbc.published.three_arm_walker import Calibration
+from wbc.published.three_arm_walker.gait.gait import Gait
+from wbc.published.three_arm_walker.gait.holds import handholds
+from wbc.published.three_arm_walker.gait.margin import margins
+from wbc.published.three_arm_walker.gait.swing import swing_poses
+from wbc.published.three_arm_walker.machine import grid
+from wbc.published.three_arm_walker.machine.body import body_twist
+from wbc.published.three_arm_walker.machine.grid import Place, Terrain, frame
+from wbc.published.three_arm_walker.machine.motion import CYCLE, BodyMotion
+from wbc.published.three_arm_walker.machine.plant import IdealPlant
+from wbc.published.three_arm_walker.machine.reach import Shoulders, View, reach_radius
 
 SHOULDERS = Shoulders(12.0, 52.0)
 BODY = frame(13, 12, 152.0)

@@ -85,7 +85,7 @@ def test_a_pendulum_against_gravity_has_the_closed_form():
     joint = model.addJoint(0, pin.JointModelPZ(), pin.SE3.Identity(), "lift")
     model.appendBodyToJoint(joint, pin.Inertia.FromSphere(2.0, 0.1), pin.SE3.Identity())
     robot = wbc.robots.load("panda")
-    limits = wbc.robot.limits.MotionLimits(*(np.array([x]) for x in (-9.0, 9.0, 100.0, 100.0, 100.0)))
+    limits = wbc.robot.limits.Limits(*(np.array([x]) for x in (-9.0, 9.0, 100.0, 100.0, 100.0)))
     lift = type(robot)(name="lift", model=model, limits=limits)
     weight = 2.0 * 9.81
     # Up with 30 N: (30 - m g) / m upwards, braked by (30 + m g) / m; d = T^2 / 2 / (1 / up + 1 / down)

@@ -14,11 +14,11 @@ from typing import Protocol
 
 import numpy as np
 
-from wbc.published.three_arm_walker.body import moved
-from wbc.published.three_arm_walker.gait import Gait
-from wbc.published.three_arm_walker.grid import Place
-from wbc.published.three_arm_walker.motion import BodyMotion
-from wbc.published.three_arm_walker.plant import CycleCommand, Fault, Plant
+from wbc.published.three_arm_walker.gait.gait import Gait
+from wbc.published.three_arm_walker.machine.body import moved
+from wbc.published.three_arm_walker.machine.grid import Place
+from wbc.published.three_arm_walker.machine.motion import BodyMotion
+from wbc.published.three_arm_walker.machine.plant import CycleCommand, Fault, Plant
 from wbc.validation import Array
 
 

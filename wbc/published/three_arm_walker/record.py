@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from wbc.published.three_arm_walker.gait import Gait
-from wbc.published.three_arm_walker.grid import INCH, PITCH, STEP
-from wbc.published.three_arm_walker.motion import RATE
-from wbc.published.three_arm_walker.plant import Plant
-from wbc.published.three_arm_walker.reach import ARMS
+from wbc.published.three_arm_walker.gait.gait import Gait
+from wbc.published.three_arm_walker.machine.grid import INCH, PITCH, STEP
+from wbc.published.three_arm_walker.machine.motion import RATE
+from wbc.published.three_arm_walker.machine.plant import Plant
+from wbc.published.three_arm_walker.machine.reach import ARMS
 from wbc.validation import Array
 
 

@@ -18,14 +18,14 @@ from typing import Literal
 import numpy as np
 
 from wbc.published.three_arm_walker.arm_control import ArmMotion
-from wbc.published.three_arm_walker.body import body_place, body_twist
 from wbc.published.three_arm_walker.commands import Command
-from wbc.published.three_arm_walker.gait import LATE, Gait, Lift
-from wbc.published.three_arm_walker.grid import Place
-from wbc.published.three_arm_walker.holds import handholds
-from wbc.published.three_arm_walker.motion import CYCLE
-from wbc.published.three_arm_walker.plant import Fault, Plant
-from wbc.published.three_arm_walker.reach import ARMS, INNER, View
+from wbc.published.three_arm_walker.gait.gait import LATE, Gait, Lift
+from wbc.published.three_arm_walker.gait.holds import handholds
+from wbc.published.three_arm_walker.machine.body import body_place, body_twist
+from wbc.published.three_arm_walker.machine.grid import Place
+from wbc.published.three_arm_walker.machine.motion import CYCLE
+from wbc.published.three_arm_walker.machine.plant import Fault, Plant
+from wbc.published.three_arm_walker.machine.reach import ARMS, INNER, View
 from wbc.published.three_arm_walker.record import CycleRecorder
 from wbc.validation import Array
 

@@ -10,15 +10,25 @@ import numpy as np
 from wbc import validation
 from wbc.errors import RangeError, ShapeError
 from wbc.published.three_arm_walker.arm_control import ArmMotion, Destination, Handhold, Velocity
-from wbc.published.three_arm_walker.body import moved
-from wbc.published.three_arm_walker.calibration import Calibration, Variant
 from wbc.published.three_arm_walker.commands import DestinationCommand, VelocityCommand, joystick
-from wbc.published.three_arm_walker.gait import Gait
-from wbc.published.three_arm_walker.grid import COLUMNS, INCH, PITCH, RADIUS, ROWS, STEP, Terrain, checked_place, frame
+from wbc.published.three_arm_walker.gait.gait import Gait
 from wbc.published.three_arm_walker.literal import LiteralPlant
-from wbc.published.three_arm_walker.motion import CYCLE
-from wbc.published.three_arm_walker.plant import IdealPlant, Plant
-from wbc.published.three_arm_walker.reach import ARMS, Shoulders
+from wbc.published.three_arm_walker.machine.body import moved
+from wbc.published.three_arm_walker.machine.calibration import Calibration, Variant
+from wbc.published.three_arm_walker.machine.grid import (
+    COLUMNS,
+    INCH,
+    PITCH,
+    RADIUS,
+    ROWS,
+    STEP,
+    Terrain,
+    checked_place,
+    frame,
+)
+from wbc.published.three_arm_walker.machine.motion import CYCLE
+from wbc.published.three_arm_walker.machine.plant import IdealPlant, Plant
+from wbc.published.three_arm_walker.machine.reach import ARMS, Shoulders
 from wbc.published.three_arm_walker.record import PublishedLog
 from wbc.published.three_arm_walker.supervisor import PublishedOutcome, Supervisor
 from wbc.validation import Array

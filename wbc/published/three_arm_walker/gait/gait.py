@@ -17,15 +17,15 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from wbc.published.three_arm_walker.calibration import Calibration, Variant
-from wbc.published.three_arm_walker.grid import Place, Terrain
-from wbc.published.three_arm_walker.holds import handholds
-from wbc.published.three_arm_walker.margin import margins
-from wbc.published.three_arm_walker.motion import RATE, BodyMotion
-from wbc.published.three_arm_walker.plant import CycleCommand, Plant
-from wbc.published.three_arm_walker.reach import ARMS, Shoulders, View
-from wbc.published.three_arm_walker.swing import swing_poses
-from wbc.published.three_arm_walker.tracking import has_arrived, tracking_command
+from wbc.published.three_arm_walker.gait.holds import handholds
+from wbc.published.three_arm_walker.gait.margin import margins
+from wbc.published.three_arm_walker.gait.swing import swing_poses
+from wbc.published.three_arm_walker.gait.tracking import has_arrived, tracking_command
+from wbc.published.three_arm_walker.machine.calibration import Calibration, Variant
+from wbc.published.three_arm_walker.machine.grid import Place, Terrain
+from wbc.published.three_arm_walker.machine.motion import RATE, BodyMotion
+from wbc.published.three_arm_walker.machine.plant import CycleCommand, Plant
+from wbc.published.three_arm_walker.machine.reach import ARMS, Shoulders, View
 from wbc.validation import Array
 
 #: How long after its expected end a swing is given up [s]

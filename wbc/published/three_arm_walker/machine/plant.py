@@ -9,10 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol
 
-from wbc.published.three_arm_walker.arm import START, forward, joint_beyond_reach
-from wbc.published.three_arm_walker.body import moved
-from wbc.published.three_arm_walker.reach import ARMS, Shoulders
-from wbc.published.three_arm_walker.rigid import inverse
+from wbc.published.three_arm_walker.machine.arm import START, forward, joint_beyond_reach
+from wbc.published.three_arm_walker.machine.body import moved
+from wbc.published.three_arm_walker.machine.reach import ARMS, Shoulders
+from wbc.published.three_arm_walker.machine.rigid import inverse
 from wbc.validation import Array
 
 

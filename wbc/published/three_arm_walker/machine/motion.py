@@ -9,8 +9,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from wbc.published.three_arm_walker.calibration import Calibration
-from wbc.published.three_arm_walker.grid import INCH
+from wbc.published.three_arm_walker.machine.calibration import Calibration
+from wbc.published.three_arm_walker.machine.grid import INCH
 from wbc.trajectory import via_points
 from wbc.validation import Array
 

@@ -11,9 +11,9 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
-from wbc.published.three_arm_walker.calibration import Calibration
-from wbc.published.three_arm_walker.grid import INCH
-from wbc.published.three_arm_walker.motion import CYCLE, RATE, BodyMotion
+from wbc.published.three_arm_walker.machine.calibration import Calibration
+from wbc.published.three_arm_walker.machine.grid import INCH
+from wbc.published.three_arm_walker.machine.motion import CYCLE, RATE, BodyMotion
 from wbc.validation import Array
 
 
