@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache
+from typing import Any
 
 from flint import fmpq, fmpz_mpoly_vec
 
@@ -206,7 +207,8 @@ class BranchArithmetic:
         """Basis of the ideal, or None where it takes too much."""
         if relations not in self._bases:
             vector = fmpz_mpoly_vec([r.poly for r in relations], self.half.ctx)
-            found: tuple[fmpz_mpoly_vec, bool] = vector.buchberger_naive(limits=LIMITS)  # type: ignore[assignment]
+            # With limits it says as well whether it came to an end, which the annotations of python-flint leave out
+            found: Any = vector.buchberger_naive(limits=LIMITS)
             self._bases[relations] = found[0].autoreduction() if found[1] else None
         return self._bases[relations]
 

@@ -101,7 +101,7 @@ def univariate_roots(half: HalfAngles, relation: Relation) -> tuple[float, ...]:
     for powers, number in relation.poly.terms():
         numbers[int(powers[joint])] = int(number)
     # Roots come with their powers, which the annotations of python-flint leave out
-    found: list[tuple[Any, int]] = fmpz_poly(numbers).complex_roots()  # type: ignore[assignment]
+    found: Any = fmpz_poly(numbers).complex_roots()
     roots = [float(r.real) for r, _ in found if r.imag == 0]
     return tuple(sorted(r if joint in half.ring.slides else 2.0 * atan(r) for r in roots))
 

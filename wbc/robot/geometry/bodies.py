@@ -6,6 +6,7 @@ import pathlib
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import coal
@@ -85,18 +86,22 @@ def bodies_of(
         for folder in validation.items("package_dirs", package_dirs, "folders")
     ]
     return [
-        _urdf_body(str(link.get("name")), collision, path, folders)
+        _urdf_body(str(link.get("name")), collision, shape, path, folders)
         for link in tree.findall("link")
         for collision in link.findall("collision")
-        if collision.find("geometry") is not None and len(collision.find("geometry") or ())
+        if (shape := collision.find("geometry/*")) is not None
     ]
 
 
 def _urdf_body(
-    link: str, collision: ElementTree.Element, path: pathlib.Path, folders: list[pathlib.Path]
+    link: str,
+    collision: ElementTree.Element,
+    shape: ElementTree.Element,
+    path: pathlib.Path,
+    folders: list[pathlib.Path],
 ) -> CollisionBody:
-    """The body of one <collision> element."""
-    origin, shape = collision.find("origin"), collision.find("geometry")[0]  # type: ignore[index]
+    """The body of one <collision> element, whose geometry is ``shape``."""
+    origin = collision.find("origin")
     xyz = _numbers(origin.get("xyz", "0 0 0") if origin is not None else "0 0 0", link)
     rpy = _numbers(origin.get("rpy", "0 0 0") if origin is not None else "0 0 0", link)
 
@@ -152,7 +157,7 @@ def _geometry_bodies(model: pin.Model, geometry: pin.GeometryModel) -> list[Coll
         frame = model.frames[item.parentFrame]
         local = frame.placement.inverse() * item.placement
         mesh = isinstance(item.geometry, (coal.BVHModelBase, coal.ConvexBase))
-        bodies.append(CollisionBody(str(frame.name), mesh, local, lambda g=item.geometry: _from_coal(g)))  # type: ignore[misc]
+        bodies.append(CollisionBody(str(frame.name), mesh, local, partial(_from_coal, item.geometry)))
     return bodies
 
 

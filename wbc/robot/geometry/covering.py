@@ -17,7 +17,7 @@ from wbc.robot.geometry.ball import least_excess_ball, quick_ball
 from wbc.robot.geometry.fitting import fit_capsule, quick_capsule
 from wbc.robot.geometry.hull import Hull
 from wbc.robot.geometry.meshes import Mesh
-from wbc.shapes import PlacedShape
+from wbc.shapes import Capsule, PlacedShape, Sphere
 from wbc.validation import Array
 
 #: Fractions of a slab's width by which its borders are moved in search of better ones.
@@ -95,8 +95,9 @@ def _judged(mesh: Mesh, axis: Array, cuts: Array, how: CoverKind, hull: Hull) ->
 
 
 def _capsule(points: Array, hull: Hull) -> PlacedShape:
-    shape = fit_capsule(points)
-    return replace(shape, excess=hull.excess(*shape.ends(), shape.shape.radius))  # type: ignore[union-attr]
+    placed = fit_capsule(points)
+    assert isinstance(placed.shape, (Capsule, Sphere))
+    return replace(placed, excess=hull.excess(*placed.ends(), placed.shape.radius))
 
 
 KINDS = {"capsule": CoverKind(_capsule, quick_capsule), "spheres": CoverKind(least_excess_ball, quick_ball)}
