@@ -1,5 +1,7 @@
 """Robots by name, from files, from models and from Denavit-Hartenberg rows; machines that walk on holds."""
 
+from __future__ import annotations
+
 from typing import TYPE_CHECKING
 
 from wbc import lazy

@@ -8,6 +8,8 @@ controller = stack.compile()
 step = controller.step(robot.neutral)
 """
 
+from __future__ import annotations
+
 from typing import TYPE_CHECKING
 
 from wbc import lazy

@@ -1,5 +1,7 @@
 """Rank analysis of task and constraint coordinates: symbolic Jacobians, loci, completeness. See docs/analysis.md."""
 
+from __future__ import annotations
+
 from typing import TYPE_CHECKING
 
 from wbc import lazy

@@ -1,5 +1,7 @@
 """Task and constraint coordinates of redundant arms under manual control. See docs/coordinates.md."""
 
+from __future__ import annotations
+
 from typing import TYPE_CHECKING
 
 from wbc import lazy

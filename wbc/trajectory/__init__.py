@@ -1,5 +1,7 @@
 """Laws of motion: paths, timings, and certificates of the limits that they keep."""
 
+from __future__ import annotations
+
 from typing import TYPE_CHECKING
 
 from wbc import lazy
