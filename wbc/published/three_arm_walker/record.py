@@ -37,7 +37,7 @@ class PublishedLog:
         return PublishedLog(*(getattr(self, name)[rows] for name in self.__dataclass_fields__))
 
 
-class CycleRecorder:
+class WalkerRecorder:
     """Cycles in the source's units, collected."""
 
     def __init__(self) -> None:

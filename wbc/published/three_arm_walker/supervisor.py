@@ -26,7 +26,7 @@ from wbc.published.three_arm_walker.machine.grid import Place
 from wbc.published.three_arm_walker.machine.motion import CYCLE
 from wbc.published.three_arm_walker.machine.plant import Fault, Plant
 from wbc.published.three_arm_walker.machine.reach import ARMS, INNER, View
-from wbc.published.three_arm_walker.record import CycleRecorder
+from wbc.published.three_arm_walker.record import WalkerRecorder
 from wbc.validation import Array
 
 Reason = Literal["key", "time", "reached", "limits", "no hold"]
@@ -63,7 +63,7 @@ class Supervisor:
 
     def __init__(self, gait: Gait, plant: Plant) -> None:
         self.gait, self.plant = gait, plant
-        self.recorder = CycleRecorder()
+        self.recorder = WalkerRecorder()
 
     @property
     def place(self) -> Array:
