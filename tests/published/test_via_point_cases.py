@@ -131,7 +131,7 @@ def test_a_corner_is_slowed_where_a_hand_must_wait() -> None:
     kept = corners_of(poses, [0.0, 0.999 * longest, 0.0])
     assert np.array_equal(kept.squares, free.squares)
     slowed = corners_of(poses, [0.0, 1.001 * longest, 0.0])
-    bends = free.bends[1] + free.bends[2]
+    bends = free.deflections[1] + free.deflections[2]
     assert slowed.squares[1:3] == pytest.approx(ACCELERATION * 0.5 / (1.0 + bends), rel=1e-12)
     # A stop takes v^2 / a of the straight part; the printed speeds leave room, and these would leave none
     assert slowed.squares[1] / ACCELERATION < slowed.straight[1]
@@ -156,7 +156,7 @@ def test_segments_are_too_short_for_a_change_of_speed() -> None:
     poses = bent(0.2, False, bends=(2.6, 0.1))
     corners = corners_of(poses, [0.0, 0.0, 0.0])
     low, high = corners.squares[1:3]
-    length, bend = 0.2, corners.bends[2]
+    length, bend = 0.2, corners.deflections[2]
     assert high == pytest.approx((low + 2.0 * ACCELERATION * (length - corners.reaches[1])) / (1.0 + bend), rel=1e-12)
     assert high - low == pytest.approx(2.0 * ACCELERATION * corners.straight[1], rel=1e-9)
 
