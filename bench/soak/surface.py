@@ -43,14 +43,15 @@ INTERNAL = {
 #: Classes that only the package itself makes: answers, and what is made by a function or a method
 MADE = (
     *("Controller", "Step", "Recording", "Online", "FunctionPath", "PosePath", "Followed", "Walker", "OperatorArm"),
-    *("Arm", "WalkerArm", "Solution", "Explanation", "Replay", "PairSensor", "Robot", "Item", "Task", "Constraint", "Values"),
-    *("Form", "Order", "Status", "WbcError", "Bounds", "Rows", "Row", "Certificate", "LawCertificate", "Worst", "State", "Recipe"),
-    *("SelfPairs", "LinkPair", "ConvexParts", "Witness", "RankWitness", "Coupling", "Path", "Advice", "CarriedMotion", "ClosedForm"),
+    *("Arm", "Solution", "Explanation", "Replay", "PairSensor", "Robot", "Item", "Task", "Constraint", "Values"),
+    *("Form", "Order", "Status", "WbcError", "Bounds", "Rows", "Row", "Certificate", "Worst", "State", "Recipe"),
+    *("SelfPairs", "LinkPair", "ConvexParts", "Witness", "Coupling", "Path", "Advice", "CarriedMotion", "ClosedForm"),
     *("CompleteSet", "Leg", "MotionCue", "PairCount", "PairStack", "PairSurvey", "Parts", "TreeSet", "TreeSets"),
-    *("Analysis", "BlockAnalysis", "LocusBranch", "RankCertificate", "Cost", "Counts", "Determinant", "JointBlock", "Locus", "NumericWitness"),
+    *("Analysis", "BlockAnalysis", "Branch", "Cost", "Counts", "Determinant", "JointBlock", "Locus", "NumericWitness"),
     *("PublishedSets", "Relation", "Screened", "SymbolicJacobian", "TreeAnalysis", "TreeCertificate", "Value", "Seen"),
     *("Sample", "Basis", "Condition", "Mode", "MissingPartError", "RateFileError", "PointSet", "Resolver", "Source"),
     *("Coordinate", "TREES", "PRESETS", "ALGORITHMS"),
+    *("WalkerArm", "LawCertificate", "RankCertificate", "RankWitness", "LocusBranch"),
     # Algebra of polynomials that only the package makes
     *("Exact", "Notation", "factored_determinant", "joint_roots", "singular_vector_locus", "sub_determinant_locus"),
 )  # fmt: skip
