@@ -16,7 +16,7 @@ from wbc.controller.tick.native import NativeTick
 from wbc.qp.polish import polish
 from wbc.qp.problem import QP, Solution
 from wbc.stack.layout import Layout
-from wbc.stack.memory import ReportLayout
+from wbc.stack.memory import Memory
 from wbc.tasks import EndEffector, FrameVelocityLimit, JointLimits, Posture, WorkspacePolyhedron
 
 TIP, MIDDLE = "panda_hand_tcp", "panda_link5"
@@ -94,7 +94,7 @@ def feasible(qp: QP) -> bool:
 
 def test_weights_of_every_size_are_solved_within_the_stated_bound() -> None:
     controller, rng = wild(0), np.random.default_rng(3)
-    tick, places, compared = core_of(controller).tick, ReportLayout(core_of(controller).layout), 0
+    tick, places, compared = core_of(controller).tick, Memory(core_of(controller).layout), 0
     assert isinstance(tick, NativeTick)
     for _ in range(300):
         provoke(controller, rng)
@@ -115,7 +115,7 @@ def test_weights_of_every_size_are_solved_within_the_stated_bound() -> None:
 
 def test_a_step_without_other_solvers_brakes_and_says_so() -> None:
     controller, rng = wild(1), np.random.default_rng(0)
-    tick, places = core_of(controller).tick, ReportLayout(core_of(controller).layout)
+    tick, places = core_of(controller).tick, Memory(core_of(controller).layout)
     assert isinstance(tick, NativeTick)
     safe = tick._library.wbc_tick_safe_step
     seen = dict.fromkeys((SOLVED, RECOVERED, UNCERTIFIED), 0)

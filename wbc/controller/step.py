@@ -25,7 +25,7 @@ from wbc.controller.outcome import (
 from wbc.controller.tick.buffers import INFINITE, Assembly
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Block, Layout
-from wbc.stack.memory import ReportLayout
+from wbc.stack.memory import Memory
 from wbc.validation import Array
 
 if TYPE_CHECKING:
@@ -38,7 +38,7 @@ class Context:
     def __init__(self, stack: Declaration, layout: Layout, assembly: Assembly | None) -> None:
         self.stack, self.layout, self.assembly = stack, layout, assembly
         self.nv = layout.nv
-        self.report = ReportLayout(layout)
+        self.report = Memory(layout)
         self.flag_offset = 8 * self.report.flag
 
     def __getstate__(self) -> dict[str, Any]:

@@ -18,7 +18,7 @@ from wbc.qp.problem import QP
 from wbc.qp.relax import Relaxed
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Block, Layout
-from wbc.stack.memory import ReportLayout
+from wbc.stack.memory import Memory
 from wbc.tasks._direction import Direction
 from wbc.tasks.mechanism import Mechanism
 from wbc.validation import Array
@@ -52,7 +52,7 @@ class Past:
 
     def __init__(self, data: bytes, stack: Declaration, layout: Layout, assembly: Assembly) -> None:
         self.stack, self.layout = stack, layout
-        self.places = ReportLayout(layout)
+        self.places = Memory(layout)
         self.tick = assembly.twin()
         self.tick.state[:] = np.frombuffer(data)
         self.tick.v_last[:] = self.tick.v_in

@@ -16,7 +16,7 @@ from wbc.qp.problem import QP
 from wbc.stack.codegen import row_units
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Layout
-from wbc.stack.memory import ReportLayout
+from wbc.stack.memory import Memory
 from wbc.validation import Array
 
 #: As in ``native/converge.h``
@@ -31,7 +31,7 @@ class Search:
         self._assembly, self._sense = assembly, sense
         self._tick = SolvedTick(assembly, stack, layout, "daqp")
         self._model, self._rows = stack.robot.model, layout.task_rows
-        self._places = ReportLayout(layout)
+        self._places = Memory(layout)
         self._dofs = layout.dof_scales(stack)
         self._units = np.concatenate([self._dofs, np.array(row_units(stack, layout))])
         self._best, self._cost, self._ticks = assembly.q.copy(), np.inf, 0

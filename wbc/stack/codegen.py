@@ -11,6 +11,7 @@ import numpy as np
 from wbc.shapes import FAR
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Layout
+from wbc.stack.memory import LEVEL_NUMBERS, structures
 from wbc.stack.program import Program, sparsity_rows
 from wbc.stack.tables import (
     brakes,
@@ -25,8 +26,6 @@ from wbc.stack.tables import (
 )
 from wbc.symbolic.kinematics import Kinematics
 
-#: Numbers that a tick reports of each level, see ``native/tick.h``
-LEVEL_NUMBERS = 9
 #: Class of rows that have a price in the order of sacrifice: they give way at it, and before any other
 PRICED = 99
 
@@ -36,7 +35,12 @@ def sources(stack: Declaration, layout: Layout, program: Program) -> dict[str, s
     native = resources.files("wbc.stack") / "native"
     written = {file.name: file.read_text() for file in native.iterdir() if file.name.endswith((".c", ".h"))}
     functions = [*program.functions.values(), motion(stack)]
-    return {"rows.c": _casadi_source(functions), "stack.h": _header(stack, layout, program, functions), **written}
+    return {
+        "rows.c": _casadi_source(functions),
+        "stack.h": _header(stack, layout, program, functions),
+        "memory.h": structures(layout),
+        **written,
+    }
 
 
 def _casadi_source(functions: list[ca.Function]) -> str:
@@ -141,7 +145,7 @@ def _levels(stack: Declaration, layout: Layout) -> list[str]:
     return [
         f"#define LEADING {layout.leading}",
         f"#define LEVELS {len(spans)}",
-        f"#define LEVEL_NUMBERS {LEVEL_NUMBERS}",
+        f"#define LEVEL_NUMBERS {len(LEVEL_NUMBERS)}",
         f"#define LEVEL_MOST {max(most, layout.variables + layout.general_rows)}",
         f"#define SOFT_MAX {max(soft)}",
         f"#define LEFT_FREE {left_free(stack).hex()}",

@@ -44,7 +44,7 @@ class Buffers:
         p: run-time inputs, see :class:`wbc.stack.layout.Layout`. dt: one number.
         weight: of each task row, scale included. enabled: 1 or 0 for each general row.
         bound_enabled: the same for each entry of each bound block.
-        report: see :class:`wbc.stack.memory.ReportLayout`.
+        report: see :class:`wbc.stack.memory.Memory`.
         state: all of these in one piece of memory that begins with the report. ``v_in`` in it is, after a tick, the
             velocity that the tick counted accelerations from.
     """

@@ -13,7 +13,7 @@ from wbc.qp.relax import Relaxed
 from wbc.stack.codegen import row_units
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Layout
-from wbc.stack.memory import LEVEL_NUMBERS, ReportLayout
+from wbc.stack.memory import LEVEL_NUMBERS, Memory
 from wbc.stack.tables import left_free
 from wbc.validation import Array
 
@@ -34,7 +34,7 @@ class Levels:
         self._damping = stack.damping
         self.cascade = Cascade(layout.variables, layout.general_rows, left_free(stack), stack.damping)
         self.sizes = np.concatenate((self._dofs, self._units))
-        self._places = ReportLayout(layout)
+        self._places = Memory(layout)
 
     def reset(self) -> None:
         """Forget the active sets of the last tick."""

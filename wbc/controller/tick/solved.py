@@ -30,7 +30,7 @@ from wbc.qp.solvers import make_solver
 from wbc.stack.codegen import row_orders, row_units
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Layout
-from wbc.stack.memory import ReportLayout
+from wbc.stack.memory import Memory
 from wbc.stack.tables import told_slacks
 from wbc.validation import Array
 
@@ -49,7 +49,7 @@ class SolvedTick(Buffers):
         self.assembly = assembly
         self.share(assembly)
         self._nv, self._velocities = layout.variables, layout.nv
-        self._places = ReportLayout(layout)
+        self._places = Memory(layout)
         self._solver = make_solver(solver, layout.with_slacks, layout.general_rows)
         self._relaxation = Relaxation(layout.with_slacks, layout.general_rows, self._solver)
         self._orders = np.array(row_orders(layout), dtype=np.int_)

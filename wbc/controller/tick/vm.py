@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 
 import numpy as np
@@ -12,7 +13,7 @@ from wbc.qp.problem import QP
 from wbc.stack.codegen import bound_sequence, row_units, unit_groups
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Layout
-from wbc.stack.memory import ReportLayout
+from wbc.stack.memory import Memory
 from wbc.stack.program import ROWS_OUTPUTS, Program
 from wbc.validation import Array
 
@@ -34,14 +35,6 @@ def _room(count: int) -> Array:
     return np.zeros(max(1, count))
 
 
-def _pieces(sizes: dict[str, int]) -> dict[str, Array]:
-    """Arrays of at least these sizes in one piece of memory, which is the item without a name."""
-    ends = np.cumsum([max(1, size) for size in sizes.values()])
-    memory = np.zeros(int(ends[-1]))
-    starts = np.concatenate(([0], ends[:-1]))
-    return {"": memory} | {name: memory[a:b] for name, a, b in zip(sizes, starts, ends, strict=True)}
-
-
 class VmAssembly(Assembly):
     """Buffers of a controller and the QP at their values; mirrors ``native/assemble.h``."""
 
@@ -49,23 +42,15 @@ class VmAssembly(Assembly):
         nv, rows, tasks = layout.variables, layout.general_rows, layout.task_rows
         self._layout = layout
         self._given = (program, stack, layout)
-        self.places = ReportLayout(layout)
-        sizes = {
-            "report": self.places.size,
-            "q": layout.nq,
-            "v_last": nv,
-            "p": layout.parameters,
-            "dt": 1,
-            "v_in": nv,
-            "use_v": 1,
-            "cap": 1,
-        }
-        sizes |= {"weight": tasks, "enabled": rows, "bound_enabled": layout.bound_blocks * nv, "plain": 1}
-        parts = _pieces(sizes)
-        self.state = parts[""]
-        self._q, self._v, self._p = parts["q"], parts["v_last"][: layout.nv], parts["p"]
-        for name, size in sizes.items():
-            setattr(self, name, parts[name][:size])
+        self.places = places = Memory(layout)
+        self.state = np.zeros(places.state)
+        self.report = self.state[: places.report]
+        view = functools.partial(places.view, self.state)
+        self.q, self.p, self.dt, self.cap, self.plain = (view(name) for name in ("q", "p", "dt", "cap", "plain"))
+        self.v_last, self.v_in, self.use_v = view("v_last"), view("v_in"), view("use_v")
+        self.weight, self.enabled, self.bound_enabled = view("weight"), view("enabled"), view("bound_enabled")
+        # CasADi's buffers take no empty array: with the spare number
+        self._q, self._v, self._p = self._wide("q"), self.v_last[: layout.nv], self._wide("p")
         self.weight[:], self.enabled[:], self.bound_enabled[:] = 1.0, 1.0, 1.0
         function = program.rows
         self._out = {n: _room(function.nnz_out(i)) for i, n in enumerate(ROWS_OUTPUTS)}
@@ -94,6 +79,11 @@ class VmAssembly(Assembly):
         self._row_units = np.array(row_units(stack, layout), dtype=np.float64)
         self._bent: Array | None = None
         self._last = TaskRows(self._J, np.zeros(tasks), np.zeros(tasks))
+
+    def _wide(self, name: str) -> Array:
+        """A field of the state with its spare number, which no empty array lacks."""
+        place = self.places[name]
+        return self.state[place.start : max(place.stop, place.start + 1)]
 
     def task_rows(self) -> TaskRows:
         return self._last

@@ -39,7 +39,7 @@ static void load_level(wbc_tick *t, int place) {
     for (int k = level_start[place]; k < level_start[place + 1]; k++, s->count++) {
         double *row = s->row + s->count * NV;
         unit_row(t, k, row);
-        const double wish = sqrt(larger(t->report.factor[k], 0.0)) / task_scale[k] * t->wish[k];
+        const double wish = sqrt(larger(t->report.factor[k], 0.0)) / task_scale[k] * t->desired[k];
         s->weight[s->count] = t->weight[k] * task_scale[k] * task_scale[k] / s->scale;
         add_to(s->wanted, row, s->weight[s->count] * wish, NV);
     }

@@ -258,7 +258,7 @@ static int all_levels(wbc_tick *t, int flag) {
             wbc_tick_certify(t);
         }
     }
-    for (int k = 0; k < MT; k++) out->missed[k] = along(t, k, out->v) - t->wish[k];
+    for (int k = 0; k < MT; k++) out->missed[k] = along(t, k, out->v) - t->desired[k];
     return flag;
 }
 

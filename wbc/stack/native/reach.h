@@ -325,7 +325,7 @@ static void reach(wbc_tick *t) {
     for (int k = 0; k < LEADING; k++) {
         const double gain = t->p[gain_at[k]];
         wanted[k] = smaller(gain, allowed) * error[k];
-        drift[k] = -t->wish[k] - gain * error[k];
+        drift[k] = -t->desired[k] - gain * error[k];
         moving |= t->weight[k] * t->report.factor[k] != 0.0 && drift[k] != 0.0;
         if (!t->curved) wanted[k] += drift[k];
     }

@@ -70,16 +70,12 @@ EXPORT int wbc_tick_step(wbc_tick *t) {
 
 EXPORT long long wbc_tick_size(void) { return (long long)sizeof(wbc_tick); }
 
-#define OFFSET(field) (long long)offsetof(wbc_tick, field)
-
-/* Where the caller finds q, v_last, v_in, use_v, p, dt, weight, enabled, bound_enabled, report, H, g, A, low, high,
- * unusable, plain, cap, wish, free_low, free_high, given, give */
-EXPORT void wbc_tick_layout(long long *out) {
-    const long long offsets[] = {OFFSET(q), OFFSET(v_last), OFFSET(v_in), OFFSET(use_v), OFFSET(p), OFFSET(dt),
-                                 OFFSET(weight), OFFSET(enabled), OFFSET(bound_enabled), OFFSET(report), OFFSET(H),
-                                 OFFSET(g), OFFSET(A), OFFSET(low), OFFSET(high), OFFSET(unusable), OFFSET(plain),
-                                 OFFSET(cap), OFFSET(wish), OFFSET(free_low), OFFSET(free_high), OFFSET(given), OFFSET(give)};
-    memcpy(out, offsets, sizeof offsets);
+/* Bytes before field k of memory.h, -1 behind the last one: what the caller takes for granted */
+EXPORT long long wbc_tick_offset(int k) {
+#define IN_REPORT(field) (long long)(offsetof(wbc_tick, report) + offsetof(wbc_report, field)),
+#define IN_TICK(field) (long long)offsetof(wbc_tick, field),
+    static const long long offsets[] = {WBC_REPORT_FIELDS(IN_REPORT) WBC_BUFFER_FIELDS(IN_TICK) -1};
+    return k >= 0 && k < (int)(sizeof offsets / sizeof *offsets) ? offsets[k] : -1;
 }
 
 #if LEVELS > 0
