@@ -48,11 +48,11 @@ __all__ = [
 # These stood in wbc.controller before they had packages of their own; they are found there for one version more
 _MOVED = {
     explain: ("Explanation",),
-    ik: ("Branch", "Branches", "Ending", "InverseKinematics", "Solution"),
+    ik: ("Branches", "Ending", "InverseKinematics", "Solution"),
     record: ("Recorder", "Recording", "Replay", "replay", "replayed"),
 }
 vars(controller).update({name: getattr(room, name) for room, names in _MOVED.items() for name in names})
-vars(controller)["Solver"] = ik.InverseKinematics
+vars(controller).update({"Branch": ik.PathBranch, "Solver": ik.InverseKinematics})
 
 
 def __getattr__(name: str) -> object:

@@ -14,7 +14,7 @@ from wbc.controller import Controller, Stack, Status, core_of
 from wbc.controller.tick.buffers import BRAKED, SOLVED, UNSOUND
 from wbc.controller.tick.native import NativeTick
 from wbc.qp.polish import polish
-from wbc.qp.problem import QP, Solution
+from wbc.qp.problem import QP, QPSolution
 from wbc.stack.layout import Layout
 from wbc.stack.memory import Memory
 from wbc.tasks import EndEffector, FrameVelocityLimit, JointLimits, Posture, WorkspacePolyhedron
@@ -101,7 +101,7 @@ def test_weights_of_every_size_are_solved_within_the_stated_bound() -> None:
         qp = tick.qp()
         assert tick.step() == SOLVED or not feasible(qp)
         wide = qp.with_slacks()
-        found = polish(wide, Solution(np.zeros(wide.n), np.zeros(wide.n + wide.m), "failed"), 200)
+        found = polish(wide, QPSolution(np.zeros(wide.n), np.zeros(wide.n + wide.m), "failed"), 200)
         push = np.abs(found.solution.multipliers[found.solution.multipliers != 0.0])
         spread = np.linalg.cond(qp.H)
         # numbers that far apart leave the referee's signs to rounding
@@ -165,7 +165,7 @@ def test_many_soft_rows_at_once(backend: str) -> None:
         tick = getattr(core_of(controller).tick, "assembly", core_of(controller).tick)
         tick.v_last[:] = 0.0
         wide = tick.qp().with_slacks()
-        found = polish(wide, Solution(np.zeros(wide.n), np.zeros(wide.n + wide.m), "failed"), 400)
+        found = polish(wide, QPSolution(np.zeros(wide.n), np.zeros(wide.n + wide.m), "failed"), 400)
         if found.exact:
             assert step.v == pytest.approx(found.solution.x[:7], abs=step.certificate.error_bound + 1e-9)
         given = max(given, len(step.relaxed))

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from tests.trajectory.random_laws import ragged, smooth
 from wbc import trajectory
-from wbc.trajectory import Certificate, Law, Limits, Path, PolynomialPath, Timing
+from wbc.trajectory import Law, LawCertificate, Limits, Path, PolynomialPath, Timing
 from wbc.trajectory.certificate import ORDERS, Pieces
 
 seeds = st.integers(0, 2**32 - 1)
@@ -191,7 +191,7 @@ def test_no_limits_no_quantities() -> None:
     assert set(law.certificate.worst) == {"jerk"}
     assert law.certificate.ratio == 0.0
     assert law.certificate.kept
-    assert str(Certificate({})) == "no limits"
+    assert str(LawCertificate({})) == "no limits"
 
 
 def test_infinite_limits_are_none() -> None:

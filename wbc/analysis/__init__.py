@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import warnings
+from typing import Any
+
 from wbc.analysis.block_certificates import TreeCertificate, certify_blocks
 from wbc.analysis.blocks import BlockAnalysis, TreeAnalysis, analyse_blocks
 from wbc.analysis.boxes import Counts
 from wbc.analysis.branches import Branch
 from wbc.analysis.budget import Budget
-from wbc.analysis.certificate import Certificate, certify
+from wbc.analysis.certificate import RankCertificate, certify
 from wbc.analysis.completeness import Analysis, Witness, analyse
 from wbc.analysis.deficiency import Exact
 from wbc.analysis.determinants import Determinant, factored_determinant
@@ -33,7 +36,6 @@ __all__ = [
     "BodyRows",
     "Branch",
     "Budget",
-    "Certificate",
     "Cost",
     "Counts",
     "Determinant",
@@ -46,6 +48,7 @@ __all__ = [
     "NumericWitness",
     "PitchPlaneRows",
     "PublishedSets",
+    "RankCertificate",
     "Relation",
     "Rows",
     "Screened",
@@ -68,3 +71,10 @@ __all__ = [
     "sub_determinant_locus",
     "symbolic_jacobian",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    if name != "Certificate":
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    warnings.warn("Certificate is called RankCertificate now", DeprecationWarning, stacklevel=2)
+    return RankCertificate

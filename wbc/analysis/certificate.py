@@ -42,7 +42,7 @@ Progress = Callable[[float], None]
 
 
 @dataclass(frozen=True, eq=False)
-class Certificate:
+class RankCertificate:
     """What subdivision proved.
 
     Attributes:
@@ -77,7 +77,7 @@ def certify(
     state: str | os.PathLike[str] | None = None,
     progress: Progress | None = None,
     ended: Callable[[], bool] | None = None,
-) -> Certificate:
+) -> RankCertificate:
     """Completeness outside a tube around the task's singularities, by branch and bound over joint space:
 
         sigma_min(J_T(q)) >= eps  implies  rank J_R(q) = m,     eps = part * max sigma_min(J_T)
@@ -135,7 +135,7 @@ def certify(
         verdict = verdict if witness is None else INCOMPLETE
     tubed = counts.tube > 0
     cut, everywhere = used_joints(both) if tubed else chosen.joints, verdict == COMPLETE and not tubed
-    return Certificate(verdict, eps, highest, everywhere, counts, left, cut, len(found), pieces.seconds, witness)
+    return RankCertificate(verdict, eps, highest, everywhere, counts, left, cut, len(found), pieces.seconds, witness)
 
 
 def _task(task: Any) -> tuple[Rows, ...]:
@@ -152,10 +152,10 @@ def _means(workers: Any, state: Any, progress: Any, ended: Any) -> tuple[int, Pa
 
 def _without_boxes(
     verdict: str, began: float, eps: float = 0.0, highest: float = 0.0, witness: NumericWitness | None = None
-) -> Certificate:
+) -> RankCertificate:
     """What is known before subdivision."""
     done, seconds = verdict == COMPLETE, time.monotonic() - began
-    return Certificate(verdict, eps, highest, done, Counts(), 1.0 - done, (), 1, seconds, witness)
+    return RankCertificate(verdict, eps, highest, done, Counts(), 1.0 - done, (), 1, seconds, witness)
 
 
 def _matrices(model: ExactModel, task: tuple[Rows, ...], constraints: tuple[Rows, ...]) -> tuple[Matrix, Matrix]:

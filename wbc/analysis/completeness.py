@@ -12,7 +12,7 @@ import numpy as np
 from wbc import validation
 from wbc.analysis.branches import Branch
 from wbc.analysis.budget import Budget, processor_seconds
-from wbc.analysis.certificate import COMPLETE, INCOMPLETE, Certificate, certify
+from wbc.analysis.certificate import COMPLETE, INCOMPLETE, RankCertificate, certify
 from wbc.analysis.deficiency import Exact
 from wbc.analysis.jacobian import SymbolicJacobian, symbolic_jacobian
 from wbc.analysis.loci import STRICT, UNDECIDED, Loci, LocusSearch
@@ -71,7 +71,7 @@ class Analysis:
     algorithmic: tuple[Branch, ...]
     verdict: str
     witness: Witness | None
-    certificate: Certificate | None
+    certificate: RankCertificate | None
     seconds: float
     processor: float
 
@@ -83,7 +83,7 @@ def analyse(
     *,
     algorithm: str = "sub_determinants",
     budget: Budget | None = None,
-    certificate: Certificate | None = None,
+    certificate: RankCertificate | None = None,
     told: Callable[[str], None] | None = None,
 ) -> Analysis:
     """Completeness of task and constraint coordinates: { q : rank J_R < m } within { q : rank J_T < n }.
@@ -112,7 +112,7 @@ def analyse(
     checked_model(model)
     budget = Budget() if budget is None else validation.instance("budget", budget, Budget, "a Budget")
     if certificate is not None:
-        validation.instance("certificate", certificate, Certificate, "a Certificate of certify")
+        validation.instance("certificate", certificate, RankCertificate, "a RankCertificate, see certify")
     validation.function("told", told)
     budget.start()
     rows = (*wanted, *added)
@@ -151,9 +151,9 @@ def _searched(
     added: tuple[Rows, ...],
     algorithm: str,
     budget: Budget,
-    certificate: Certificate | None,
+    certificate: RankCertificate | None,
     told: Callable[[str], None] | None,
-) -> tuple[Loci, Certificate | None, bool]:
+) -> tuple[Loci, RankCertificate | None, bool]:
     """(loci, certificate if it was asked for, whether the search came to its end)."""
     done = False
     with LocusSearch(model, task, (*task, *added), algorithm, budget) as search:
@@ -177,7 +177,7 @@ def _searched(
 
 def _certified(
     model: ExactModel, task: tuple[Rows, ...], added: tuple[Rows, ...], budget: Budget, ended: Callable[[], bool]
-) -> Certificate | None:
+) -> RankCertificate | None:
     """What numbers say within the budget, beside the search of the locus; None where they do not take the robot."""
     workers = max(1, (os.cpu_count() or 1) - 1)
     minutes = max(_LEAST, budget.seconds / 60.0)
@@ -187,7 +187,7 @@ def _certified(
         return None
 
 
-def _verdict(found: Certificate | None) -> str | None:
+def _verdict(found: RankCertificate | None) -> str | None:
     """Of a certificate, in the words of :class:`Analysis`; None: it decides nothing."""
     if found is None:
         return None

@@ -13,7 +13,7 @@ from rich.markup import escape
 from rich.progress import TaskID
 
 from wbc.analysis import (
-    Certificate,
+    RankCertificate,
     ExactModel,
     JointBlock,
     NumericWitness,

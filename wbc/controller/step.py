@@ -14,7 +14,6 @@ from wbc.controller.outcome import (
     ANSWERED,
     STATUSES,
     Binding,
-    Certificate,
     LevelCertificate,
     Residual,
     Slack,
@@ -23,6 +22,7 @@ from wbc.controller.outcome import (
     scales,
 )
 from wbc.controller.tick.buffers import INFINITE, Assembly
+from wbc.qp.certificate import Certificate
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Block, Layout
 from wbc.stack.memory import Memory
@@ -93,7 +93,7 @@ class Step:
 
     @property
     def certificate(self) -> Certificate:
-        """Residuals and the error bound of v."""
+        """How good v is; all inf for a braked or capped tick. ``stationarity`` in cost per rad/s."""
         names = ("stationarity", "violation", "complementarity", "error_bound")
         values = [self._number(n) for n in names]
         return Certificate(*(np.inf if value >= INFINITE else value for value in values))

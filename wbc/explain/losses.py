@@ -8,7 +8,7 @@ import numpy as np
 
 from wbc.explain.explanation import Loss, Price, Share, Side
 from wbc.explain.past import Frozen, Past
-from wbc.qp.problem import Solution
+from wbc.qp.problem import QPSolution
 from wbc.qp.relax import Relaxed
 from wbc.qp.sensitivity import Sensitivity
 from wbc.stack.layout import Block
@@ -138,7 +138,7 @@ def prices(past: Past, found: list[Group], answer: Relaxed, sides: dict[int, Sid
 def _of_one(past: Past, answer: Relaxed) -> tuple[Array, Callable[[int], Array]]:
     """(command, row -> dv / db of the side that holds it, zero where it holds nothing)."""
     wide, n = past.qp.with_slacks(), past.qp.n
-    one = Sensitivity(wide, Solution(answer.x, answer.multipliers, "solved"))
+    one = Sensitivity(wide, QPSolution(answer.x, answer.multipliers, "solved"))
 
     def slope(row: int) -> Array:
         return one.to_bound(row if row < n else row + wide.n - n)[:n]
@@ -148,7 +148,7 @@ def _of_one(past: Past, answer: Relaxed) -> tuple[Array, Callable[[int], Array]]
 
 def _of_levels(past: Past, frozen: Frozen) -> tuple[Array, Callable[[int], Array]]:
     """The same with strict levels."""
-    first = Sensitivity(frozen.qp, Solution(frozen.first.x, frozen.first.multipliers, "solved"))
+    first = Sensitivity(frozen.qp, QPSolution(frozen.first.x, frozen.first.multipliers, "solved"))
     dofs, numbers = past.layout.dof_scales(past.stack), frozen.numbers(past.tick.qp(), frozen.first.x)
 
     def slope(row: int) -> Array:

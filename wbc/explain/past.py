@@ -12,7 +12,7 @@ from wbc.controller.step import Context
 from wbc.controller.tick.buffers import Assembly
 from wbc.controller.tick.solved import SolvedTick
 from wbc.errors import SolverError
-from wbc.qp.levels.hierarchy import Answer, Hierarchy
+from wbc.qp.levels.hierarchy import Hierarchy, LevelsAnswer
 from wbc.qp.levels.sensitivity import FrozenLevels
 from wbc.qp.problem import QP
 from wbc.qp.relax import Relaxed
@@ -36,7 +36,7 @@ class Frozen:
 
     qp: QP
     first: Relaxed
-    answer: Answer
+    answer: LevelsAnswer
     optimum: FrozenLevels
     numbers: Callable[[QP, Array], Hierarchy]
     sizes: Array

@@ -11,7 +11,7 @@ import pinocchio as pin
 
 from wbc.controller.tick.buffers import Assembly
 from wbc.controller.tick.solved import SolvedTick
-from wbc.ik.search import EXHAUSTED, FOUND, OUT_OF_TIME, REFUSED, Found, Query
+from wbc.ik.search import EXHAUSTED, FOUND, OUT_OF_TIME, REFUSED, Query, SearchResult
 from wbc.qp.problem import QP
 from wbc.stack.codegen import row_units
 from wbc.stack.declaration import Declaration
@@ -37,12 +37,12 @@ class Search:
         self._best, self._cost, self._ticks = assembly.q.copy(), np.inf, 0
 
     @np.errstate(over="ignore", invalid="ignore")
-    def run(self, query: Query, seconds: float) -> Found:
+    def run(self, query: Query, seconds: float) -> SearchResult:
         """Search from the tick's q, where the answer then is, for some seconds."""
         begin, tick = perf_counter(), self._tick
         self._cost, self._ticks, descents = np.inf, 0, 0
         if tick.check():
-            return Found(REFUSED, 0, 0, perf_counter() - begin, np.inf)
+            return SearchResult(REFUSED, 0, 0, perf_counter() - begin, np.inf)
         first, weight = tick.q.copy(), tick.weight.copy()
         self._best, ending = first, EXHAUSTED
         tick.weight[:] = query.seeking
@@ -63,7 +63,7 @@ class Search:
         self._assembly.plain[0] = 0.0
         tick.q[:], tick.weight[:] = self._best, weight
         tick.reset()
-        return Found(ending, self._ticks, descents, perf_counter() - begin, self._cost)
+        return SearchResult(ending, self._ticks, descents, perf_counter() - begin, self._cost)
 
     def _descend(self, query: Query, end: float) -> int:
         least, idle = np.inf, 0

@@ -16,7 +16,7 @@ from wbc.controller.tick.buffers import Assembly
 from wbc.controller.tick.native import NativeTick
 from wbc.controller.tick.solved import SolvedTick
 from wbc.ik.descent import Search
-from wbc.ik.search import FOUND, Found, NativeSearch, Query
+from wbc.ik.search import FOUND, NativeSearch, Query, SearchResult
 from wbc.ik.solution import Ending
 from wbc.ik.starts import Starts
 from wbc.ik.timeless import FIRST, TICK, chosen_goals, goal_rows, hasten, searching, timeless
@@ -107,7 +107,7 @@ class Engine:
         self.tick.q[:] = self.within_limits(q)
         return self.tick.q.copy()
 
-    def run(self, first: Array, query: Query, seconds: float) -> Found:
+    def run(self, first: Array, query: Query, seconds: float) -> SearchResult:
         """Search from a configuration for some seconds; the answer is in the tick's q."""
         self.tick.q[:], self.tick.v_last[:] = first, 0.0
         return self.search.run(query, seconds)
@@ -187,7 +187,7 @@ class Engine:
         return qp
 
 
-def ending(found: Found) -> Ending:
+def ending(found: SearchResult) -> Ending:
     """How a search ended, in words."""
     if found.ending == FOUND:
         return Ending.SOLVED

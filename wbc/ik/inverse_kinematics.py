@@ -16,7 +16,7 @@ from wbc.controller.handles import Handles
 from wbc.controller.tick.native import NativeTick
 from wbc.errors import RangeError, ShapeError
 from wbc.ik.branches import Branches, branches
-from wbc.ik.continuation import Branch, branch
+from wbc.ik.continuation import PathBranch, branch
 from wbc.ik.engine import Engine, ending
 from wbc.ik.moving_targets import MovingTargets
 from wbc.ik.search import EXHAUSTED, FOUND, NativeSearch, search_many
@@ -167,7 +167,7 @@ class InverseKinematics(Handles):
         q0: Any,
         *,
         tolerance: float = 1e-8,
-    ) -> Branch:
+    ) -> PathBranch:
         """The branch of configurations over targets that change with a path coordinate.
 
             q(s_0) = where a descent from q0 ends,    q(s + ds) = where one from q(s) + (dq/ds) ds ends,

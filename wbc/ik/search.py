@@ -41,7 +41,7 @@ class Query:
 
 
 @dataclass(frozen=True)
-class Found:
+class SearchResult:
     """How a search ended: :data:`FOUND` and so on, ticks, descents that came to their end, time [s], and the weighted
     square of the goals' errors (infinite where no configuration kept the constraints).
     """
@@ -74,9 +74,11 @@ class CFound(ctypes.Structure):
     _fields_ = [(name, ctypes.c_double) for name in ("ending", "ticks", "descents", "seconds", "cost")]
 
     @property
-    def found(self) -> Found:
+    def found(self) -> SearchResult:
         """A copy."""
-        return Found(int(self.ending), int(self.ticks), int(self.descents), float(self.seconds), float(self.cost))
+        return SearchResult(
+            int(self.ending), int(self.ticks), int(self.descents), float(self.seconds), float(self.cost)
+        )
 
 
 class NativeSearch:
@@ -87,7 +89,7 @@ class NativeSearch:
         self._found = CFound()
         self._query: Query | None = None
 
-    def run(self, query: Query, seconds: float) -> Found:
+    def run(self, query: Query, seconds: float) -> SearchResult:
         """Search for some seconds; keeps the interpreter lock, as a tick does."""
         if query is not self._query:
             self._query, self._given = query, CQuery.of(query, seconds)
@@ -104,7 +106,7 @@ class NativeSearch:
 
 def search_many(
     ticks: Sequence[NativeTick], query: Query, seconds: float, first: Array, parameters: Array
-) -> tuple[Array, list[Found]]:
+) -> tuple[Array, list[SearchResult]]:
     """Search for some seconds from each configuration [count, nq] with its run-time values [count, parameters].
 
     In C, with the interpreter lock released. The ticks, one a thread, have the same switches. Answers do not depend on

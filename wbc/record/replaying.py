@@ -23,7 +23,7 @@ from wbc.validation import Array
 
 
 @dataclass(frozen=True, eq=False)
-class Tick:
+class ReplayedTick:
     """A recorded tick and its replay.
 
     Attributes:
@@ -62,8 +62,8 @@ class Replay:
 
     ticks: int
     differing: int
-    first: Tick | None
-    worst: Tick | None
+    first: ReplayedTick | None
+    worst: ReplayedTick | None
     backend: str
     complete: bool
     notes: tuple[str, ...]
@@ -147,7 +147,7 @@ def compiled(
     return controller
 
 
-def replayed(recording: Recording, controller: Controller | None = None) -> Iterator[Tick]:
+def replayed(recording: Recording, controller: Controller | None = None) -> Iterator[ReplayedTick]:
     """The ticks of a recording one by one, each with the whole step: ``print(tick.step)`` says what bound it.
 
     Args:
@@ -165,7 +165,7 @@ def replayed(recording: Recording, controller: Controller | None = None) -> Iter
                 buffer[:] = row[part]
             if row[reset]:
                 tick.reset()
-            yield Tick(number, row[v].copy(), STATUSES[int(row[flag])], core.again())
+            yield ReplayedTick(number, row[v].copy(), STATUSES[int(row[flag])], core.again())
             number += 1
 
 
@@ -186,6 +186,6 @@ def _notes(recording: Recording, controller: Controller) -> tuple[str, ...]:
     return tuple(f"{name} was {a}, is {b}" for name, (a, b) in pairs.items() if a != b)
 
 
-def _said(tick: Tick) -> str:
+def _said(tick: ReplayedTick) -> str:
     text = f"tick {tick.number}, by {tick.difference:.3g}"
     return text if tick.step.status == tick.status else f"{text}, {tick.status} then, {tick.step.status} now"

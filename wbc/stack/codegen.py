@@ -12,7 +12,7 @@ from wbc.shapes import FAR
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Layout
 from wbc.stack.memory import LEVEL_NUMBERS, structures
-from wbc.stack.program import Program, sparsity_rows
+from wbc.stack.program import TickProgram, sparsity_rows
 from wbc.stack.tables import (
     brakes,
     gain_places,
@@ -30,7 +30,7 @@ from wbc.symbolic.kinematics import Kinematics
 PRICED = 99
 
 
-def sources(stack: Declaration, layout: Layout, program: Program) -> dict[str, str]:
+def sources(stack: Declaration, layout: Layout, program: TickProgram) -> dict[str, str]:
     """File name -> text of everything that makes the tick of a stack."""
     native = resources.files("wbc.stack") / "native"
     written = {file.name: file.read_text() for file in native.iterdir() if file.name.endswith((".c", ".h"))}
@@ -50,7 +50,7 @@ def _casadi_source(functions: list[ca.Function]) -> str:
     return str(generator.dump())
 
 
-def _header(stack: Declaration, layout: Layout, program: Program, functions: list[ca.Function]) -> str:
+def _header(stack: Declaration, layout: Layout, program: TickProgram, functions: list[ca.Function]) -> str:
     jt, at = program.rows.sparsity_out("jt"), program.rows.sparsity_out("at")
     j_start, j_col = sparsity_rows(jt)
     a_start, a_end, a_col = program.sensed.entries(*program.balls.entries(*sparsity_rows(at)))

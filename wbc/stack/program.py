@@ -64,7 +64,7 @@ ROWS_OUTPUTS = (
 
 
 @dataclass(frozen=True, eq=False)
-class Program:
+class TickProgram:
     """The compiled-to-be functions of a stack; ``ahead`` is None where there are no margins, ``bend`` where no task
     bends or the stack does not want it; ``balls`` and ``sensed`` are rows that are left to loops.
     """
@@ -239,7 +239,7 @@ class _Builder:
         return margin
 
 
-def build(stack: Declaration, layout: Layout, loops: bool = False) -> Program:
+def build(stack: Declaration, layout: Layout, loops: bool = False) -> TickProgram:
     """Build the functions of a stack; ``loops``: without what a compiled tick computes in loops.
 
     Raises:
@@ -289,7 +289,7 @@ def build(stack: Declaration, layout: Layout, loops: bool = False) -> Program:
         bent = widened(layout, widened(layout, ca.triu(curvature(b.kinematics, b.pulls))).T).T
     if bent.nnz():
         bend = checked_function("bend", [*inputs, b.pull], [bent], ["bend"])
-    return Program(rows, ahead, bend, balls, sensed)
+    return TickProgram(rows, ahead, bend, balls, sensed)
 
 
 def shared_pattern(transposed: ca.SX) -> ca.SX:

@@ -6,7 +6,7 @@ import numpy as np
 
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Layout
-from wbc.stack.program import Program
+from wbc.stack.program import TickProgram
 from wbc.tasks._direction import Direction
 from wbc.tasks.base import Constraint, Row
 
@@ -62,7 +62,7 @@ def _lever(stack: Declaration, row: Row) -> float:
     return row.scale(2.0 * stack.length)
 
 
-def pull_scales(stack: Declaration, layout: Layout, program: Program) -> list[float]:
+def pull_scales(stack: Declaration, layout: Layout, program: TickProgram) -> list[float]:
     """How much curvature a task row of unit weighted error may have: its lever for metres, else 1; 0 for rows that
     do not bend.
     """

@@ -6,6 +6,7 @@ Names are imported when they are first used, so that toppra and ruckig cost noth
 from __future__ import annotations
 
 import importlib
+import warnings
 from typing import Any
 
 #: Public name -> module that defines it
@@ -13,7 +14,7 @@ _WHERE = {
     "Law": "law",
     "State": "law",
     "Limits": "limits",
-    "Certificate": "certificate",
+    "LawCertificate": "certificate",
     "Worst": "certificate",
     "Path": "path",
     "PolynomialPath": "path",
@@ -46,6 +47,9 @@ __all__ = sorted(_WHERE)  # noqa: PLE0605
 
 
 def __getattr__(name: str) -> Any:
+    if name == "Certificate":
+        warnings.warn("Certificate is called LawCertificate now", DeprecationWarning, stacklevel=2)
+        name = "LawCertificate"
     if name not in _WHERE:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return getattr(importlib.import_module(f"{__name__}.{_WHERE[name]}"), name)

@@ -92,7 +92,7 @@ class Worst:
 
 
 @dataclass(frozen=True)
-class Certificate:
+class LawCertificate:
     """Worst places by quantity: ``position``, ``velocity``, ``acceleration``, ``jerk``, and what else was asked for.
 
     Quantities without a limit are not in it, but for jerk, which is in it as ``unbounded`` where accelerations jump.
@@ -186,7 +186,7 @@ def certify(
     checks: Sequence[Check] = (),
     samples: int = 16,
     moving: tuple[bool, bool] = (False, False),
-) -> Certificate:
+) -> LawCertificate:
     """Worst places of a law; ``samples``: of each piece, at first, where it is no polynomial or one of a degree above
     24; ``moving``: as of the law.
     """
@@ -214,7 +214,7 @@ def certify(
     for check in checks:
         limited.add(check.name)
         worst[check.name] = checked(path, timing, pieces, check)
-    return Certificate(worst, frozenset(limited))
+    return LawCertificate(worst, frozenset(limited))
 
 
 def _sampling(

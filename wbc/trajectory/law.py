@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from wbc import validation
 from wbc.errors import ContinuityError, RangeError, ShapeError
-from wbc.trajectory.certificate import Certificate, Check, all_checks, certify, chain
+from wbc.trajectory.certificate import Check, LawCertificate, all_checks, certify, chain
 from wbc.trajectory.limits import Limits
 from wbc.trajectory.path import Index, JoinedPath, Path, Space
 from wbc.trajectory.timing import Timing
@@ -121,7 +121,7 @@ class Law:
         return np.where(back, self.path.pieces_before(s[0], pieces), pieces)
 
     @cached_property
-    def certificate(self) -> Certificate:
+    def certificate(self) -> LawCertificate:
         """How much of :attr:`limits` and of :attr:`checks` the law uses at worst."""
         return certify(self.path, self.timing, self.limits, self.checks, moving=self.moving)
 

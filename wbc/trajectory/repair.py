@@ -6,7 +6,7 @@ import numpy as np
 
 from wbc.errors import InfeasibleError
 from wbc.trajectory.between import highest
-from wbc.trajectory.certificate import SAMPLES, TOLERANCE, Certificate, Check, Pieces
+from wbc.trajectory.certificate import SAMPLES, TOLERANCE, Check, LawCertificate, Pieces
 from wbc.trajectory.checks import at_rest
 from wbc.trajectory.fastest import Shrunk, Task
 from wbc.trajectory.law import Law
@@ -135,7 +135,7 @@ def _shrunk(task: Task, count: int | None) -> Law:
     raise failed or InfeasibleError("start_speed", (task.start, task.end), "no law between these path speeds was found")
 
 
-def _more(task: Task, shrunk: Shrunk, certificate: Certificate) -> Shrunk:
+def _more(task: Task, shrunk: Shrunk, certificate: LawCertificate) -> Shrunk:
     def over(*names: str) -> float:
         ratios = [certificate.worst[name].ratio for name in names if name in certificate.worst]
         worst = max(ratios, default=0.0)

@@ -7,7 +7,7 @@ import numpy as np
 from wbc.controller.tick.buffers import INFINITE, Assembly
 from wbc.qp.certificate import Certificate
 from wbc.qp.levels.cascade import NOISE, PUSHING, Cascade
-from wbc.qp.levels.hierarchy import Answer, Hierarchy, Level
+from wbc.qp.levels.hierarchy import Hierarchy, Level, LevelsAnswer
 from wbc.qp.problem import QP
 from wbc.qp.relax import Relaxed
 from wbc.stack.codegen import row_units
@@ -40,7 +40,7 @@ class Levels:
         """Forget the active sets of the last tick."""
         self.cascade.reset()
 
-    def below(self, qp: QP, v: Array, first: Relaxed | None, report: Array) -> tuple[Array, Answer | None]:
+    def below(self, qp: QP, v: Array, first: Relaxed | None, report: Array) -> tuple[Array, LevelsAnswer | None]:
         """The command and the answer of all levels, which is written to the report; v where the tick brakes.
 
         Args:
@@ -58,7 +58,7 @@ class Levels:
         self._write(answer, command, report)
         return command, answer
 
-    def _held_by_equalities(self, problem: Hierarchy, qp: QP, first: Relaxed, answer: Answer) -> None:
+    def _held_by_equalities(self, problem: Hierarchy, qp: QP, first: Relaxed, answer: LevelsAnswer) -> None:
         """Multipliers of the equality rows that push against the first level: those of its QP, which has them all."""
         push = np.abs(first.multipliers) * self.sizes
         drive = max(float(np.abs(qp.g * self._dofs).max(initial=0.0)), float(push.max(initial=0.0)))
@@ -84,7 +84,7 @@ class Levels:
         return np.where(self._row_levels >= 0, np.maximum(0.0, np.maximum(low - at, at - high)), slack)
 
     @staticmethod
-    def certified(answer: Answer, violation: float) -> Certificate:
+    def certified(answer: LevelsAnswer, violation: float) -> Certificate:
         """The certificate of all levels together."""
         return Certificate(
             max(level.stationarity for level in answer.levels),
@@ -120,7 +120,7 @@ class Levels:
             scales.append(scale)
         return out, scales
 
-    def _write(self, answer: Answer | None, v: Array, report: Array) -> None:
+    def _write(self, answer: LevelsAnswer | None, v: Array, report: Array) -> None:
         places, tasks = self._places, self._assembly.task_rows()
         share = np.zeros(self._layout.task_rows)
         report[places["missed"]] = tasks.J @ v - tasks.wish

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Layout
-from wbc.stack.program import Program
+from wbc.stack.program import TickProgram
 from wbc.stack.tables import brakes, gain_places, kept_rows, margin_places, pull_scales, rate_places, stops
 from wbc.validation import Array
 
@@ -33,7 +33,7 @@ class Reach:
     """
 
     def __init__(
-        self, stack: Declaration, layout: Layout, program: Program, bend: Callable[[Array], Array] | None
+        self, stack: Declaration, layout: Layout, program: TickProgram, bend: Callable[[Array], Array] | None
     ) -> None:
         self._bend = bend
         #: curvature in the last QP, before anything made it positive definite; None for none

@@ -22,9 +22,9 @@ from wbc.controller.tick.buffers import (
 )
 from wbc.controller.tick.levels import Levels
 from wbc.qp.certificate import Certificate, certify
-from wbc.qp.levels.hierarchy import Answer
+from wbc.qp.levels.hierarchy import LevelsAnswer
 from wbc.qp.polish import polish
-from wbc.qp.problem import QP, Solution
+from wbc.qp.problem import QP, QPSolution
 from wbc.qp.relax import Relaxation, Relaxed
 from wbc.qp.solvers import make_solver
 from wbc.stack.codegen import row_orders, row_units
@@ -101,9 +101,9 @@ class SolvedTick(Buffers):
             if levels is None:
                 multipliers = qp.rows_of(answer.multipliers)
                 sides = QP(wide.H, wide.g, *self._met(wide, answer, x), wide.A)
-                certificate = certify(sides, Solution(x, answer.multipliers, "solved"), self._velocities)
+                certificate = certify(sides, QPSolution(x, answer.multipliers, "solved"), self._velocities)
                 if not self._sound(certificate):
-                    found = polish(sides, Solution(x, answer.multipliers, "solved"), POLISH_ROUNDS)
+                    found = polish(sides, QPSolution(x, answer.multipliers, "solved"), POLISH_ROUNDS)
                     better = certify(sides, found.solution, self._velocities)
                     if found.exact and self._sound(better):
                         certificate, x = better, np.clip(found.solution.x, sides.lower[: wide.n], sides.upper[: wide.n])
@@ -159,7 +159,7 @@ class SolvedTick(Buffers):
         met[: qp.n] = False
         return np.where(met, -np.inf, answer.lower), np.where(met, np.inf, answer.upper)
 
-    def below(self, qp: QP, v: Array, first: Relaxed | None) -> tuple[Array, Answer | None]:
+    def below(self, qp: QP, v: Array, first: Relaxed | None) -> tuple[Array, LevelsAnswer | None]:
         """The command with all levels below the first, whose answer is v, and their answer; v where there are none."""
         if self.levels is None:
             return v, None
@@ -220,7 +220,7 @@ class SoftRows:
         if not self._rows.size:
             return answer
         sides = QP(qp.H, qp.g, answer.lower, answer.upper, qp.A)
-        found = polish(sides, Solution(answer.x, answer.multipliers, "solved"))
+        found = polish(sides, QPSolution(answer.x, answer.multipliers, "solved"))
         if not found.exact:
             return answer
         n = qp.n

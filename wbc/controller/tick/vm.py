@@ -14,7 +14,7 @@ from wbc.stack.codegen import bound_sequence, row_units, unit_groups
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Layout
 from wbc.stack.memory import Memory
-from wbc.stack.program import ROWS_OUTPUTS, Program
+from wbc.stack.program import ROWS_OUTPUTS, TickProgram
 from wbc.validation import Array
 
 
@@ -38,7 +38,7 @@ def _room(count: int) -> Array:
 class VmAssembly(Assembly):
     """Buffers of a controller and the QP at their values; mirrors ``native/assemble.h``."""
 
-    def __init__(self, program: Program, stack: Declaration, layout: Layout) -> None:
+    def __init__(self, program: TickProgram, stack: Declaration, layout: Layout) -> None:
         nv, rows, tasks = layout.variables, layout.general_rows, layout.task_rows
         self._layout = layout
         self._given = (program, stack, layout)
@@ -94,7 +94,7 @@ class VmAssembly(Assembly):
     def row_sides(self) -> tuple[Array, Array]:
         return self._sides
 
-    def _bender(self, program: Program, arguments: list[Array]) -> Callable[[Array], Array] | None:
+    def _bender(self, program: TickProgram, arguments: list[Array]) -> Callable[[Array], Array] | None:
         """Weights of the task rows -> curvature, nv x nv."""
         if program.bend is None:
             return None

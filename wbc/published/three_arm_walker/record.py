@@ -37,7 +37,7 @@ class Log:
         return Log(*(getattr(self, name)[rows] for name in self.__dataclass_fields__))
 
 
-class Recorder:
+class WalkerRecorder:
     """Cycles in the source's units, collected."""
 
     def __init__(self) -> None:

@@ -26,7 +26,7 @@ from wbc.published.three_arm_walker.holds import handholds
 from wbc.published.three_arm_walker.motion import CYCLE
 from wbc.published.three_arm_walker.plant import Fault, Plant
 from wbc.published.three_arm_walker.reach import ARMS, INNER, View
-from wbc.published.three_arm_walker.record import Recorder
+from wbc.published.three_arm_walker.record import WalkerRecorder
 from wbc.validation import Array
 
 Reason = Literal["key", "time", "reached", "limits", "no hold"]
@@ -63,7 +63,7 @@ class Supervisor:
 
     def __init__(self, gait: Gait, plant: Plant) -> None:
         self.gait, self.plant = gait, plant
-        self.recorder = Recorder()
+        self.recorder = WalkerRecorder()
 
     @property
     def place(self) -> Array:
