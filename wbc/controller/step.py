@@ -38,8 +38,8 @@ class Context:
     def __init__(self, stack: Declaration, layout: Layout, assembly: Assembly | None) -> None:
         self.stack, self.layout, self.assembly = stack, layout, assembly
         self.nv = layout.nv
-        self.report = Memory(layout)
-        self.flag_offset = 8 * self.report.flag
+        self.memory = Memory(layout)
+        self.flag_offset = 8 * self.memory.flag
 
     def __getstate__(self) -> dict[str, Any]:
         # the memory of a process; a step from a pickle tells everything but its explanation
@@ -70,11 +70,11 @@ class Step:
         self._context = context
 
     def _part(self, name: str) -> Array:
-        where = self._context.report[name]
+        where = self._context.memory[name]
         return np.frombuffer(self._data, _FLOAT, where.stop - where.start, 8 * where.start)
 
     def _number(self, name: str) -> float:
-        return float(_DOUBLE(self._data, 8 * self._context.report[name].start)[0])
+        return float(_DOUBLE(self._data, 8 * self._context.memory[name].start)[0])
 
     @property
     def v(self) -> Array:

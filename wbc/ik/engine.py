@@ -65,7 +65,7 @@ class Engine:
     """A timeless stack with the memory of its tick; see :class:`wbc.InverseKinematics`.
 
     Attributes:
-        goals: names of the tasks to be met. rows: 1 for their task rows, 0 for those of wishes.
+        goals: names of the tasks to be met. rows: 1 for their task rows, 0 for those of secondary tasks.
         stack: the items without time. controller: theirs. core: what that is inside, whose tick is :attr:`tick`.
     """
 
@@ -138,16 +138,16 @@ class Engine:
             if len(self._queries) > _KEPT:
                 self._queries.clear()
             rows = goal_rows(self.controller, goals)
-            aims, wishes = weight * rows, weight * (1.0 - self.rows)
-            heaviest = float((wishes / self.core.row_costs).max(initial=0.0))
+            aims, secondary = weight * rows, weight * (1.0 - self.rows)
+            heaviest = float((secondary / self.core.row_costs).max(initial=0.0))
             self._queries[key] = Query(
                 starts=self.random(restarts, seed),
                 chosen=self.starts.chosen,
                 tolerance=np.where(rows > 0.0, tolerance * self._units, -1.0),
                 seeking=aims,
-                settling=aims * max(1.0, FIRST * heaviest) + wishes,
+                settling=aims * max(1.0, FIRST * heaviest) + secondary,
                 room=ROOM,
-                wishes=heaviest > 0.0,
+                secondary=heaviest > 0.0,
             )
         return self._queries[key]
 

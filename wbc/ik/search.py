@@ -24,11 +24,11 @@ class Query:
     Attributes:
         starts: configurations to start again from [restarts, nq].
         chosen: 1 where a restart takes a number of ``starts``, 0 where the first configuration's stays [nq].
-        tolerance: of each task row in its unit, negative for wishes [task rows].
+        tolerance: of each task row in its unit, negative for secondary tasks [task rows].
         seeking: weights of the task rows while the goals are sought [task rows].
-        settling: weights while wishes are followed [task rows].
+        settling: weights while secondary tasks are followed [task rows].
         room: how far constraints may be off at the answer, in row units.
-        wishes: there are wishes to follow once the goals are met.
+        secondary: there are secondary tasks to follow once the goals are met.
     """
 
     starts: Array
@@ -37,7 +37,7 @@ class Query:
     seeking: Array
     settling: Array
     room: float
-    wishes: bool
+    secondary: bool
 
 
 @dataclass(frozen=True)
@@ -57,14 +57,14 @@ class CQuery(ctypes.Structure):
     """``wbc_search`` of ``native/converge.h``."""
 
     _fields_ = [(name, ctypes.c_void_p) for name in ("starts", "chosen", "tolerance", "seeking", "settling")] + [
-        (name, ctypes.c_double) for name in ("restarts", "seconds", "room", "wishes")
+        (name, ctypes.c_double) for name in ("restarts", "seconds", "room", "secondary")
     ]
 
     @classmethod
     def of(cls, query: Query, seconds: float) -> CQuery:
         """Points into the arrays of the query, which must outlive it; the search ends after some seconds."""
         arrays = (query.starts, query.chosen, query.tolerance, query.seeking, query.settling)
-        numbers = (float(len(query.starts)), seconds, query.room, float(query.wishes))
+        numbers = (float(len(query.starts)), seconds, query.room, float(query.secondary))
         return cls(*(array.ctypes.data for array in arrays), *numbers)
 
 

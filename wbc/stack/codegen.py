@@ -15,14 +15,14 @@ from wbc.stack.memory import LEVEL_NUMBERS, structures
 from wbc.stack.program import TickProgram, sparsity_rows
 from wbc.stack.tables import (
     brakes,
-    gain_places,
+    force_scales,
+    gain_table,
     kept_rows,
     left_free,
-    margin_places,
-    pull_scales,
-    rate_places,
+    margin_table,
+    rate_table,
+    reported_slacks,
     stops,
-    told_slacks,
 )
 from wbc.symbolic.kinematics import Kinematics
 
@@ -56,7 +56,11 @@ def _header(stack: Declaration, layout: Layout, program: TickProgram, functions:
     a_start, a_end, a_col = program.sensed.entries(*program.balls.entries(*sparsity_rows(at)))
     orders, scales, sequence = row_orders(layout), row_units(stack, layout), bound_sequence(layout)
     dofs, units = layout.dof_scales(stack), unit_groups(stack)
-    bent = ca.Sparsity(layout.variables, layout.variables) if program.bend is None else program.bend.sparsity_out(0)
+    upper = (
+        ca.Sparsity(layout.variables, layout.variables)
+        if program.curvature is None
+        else program.curvature.sparsity_out(0)
+    )
     brake_at, brake_limit = brakes(stack, layout)
     stop_at, stop_low, stop_high = stops(stack, layout)
     lines = [
@@ -78,7 +82,7 @@ def _header(stack: Declaration, layout: Layout, program: TickProgram, functions:
                 "SEGMENTS": len(program.balls.segment_rows),
                 "SENSED": len(program.sensed.blocks),
                 "FAR": FAR,
-                "NNZK": bent.nnz(),
+                "NNZK": upper.nnz(),
                 "CALM": int(stack.calm),
                 "UNITS": len(units),
                 "LAST_ORDER": max((o for o in orders if o < PRICED), default=0),
@@ -97,12 +101,12 @@ def _header(stack: Declaration, layout: Layout, program: TickProgram, functions:
         _table("int", "bound_sequence", sequence),
         _table("int", "unit_start", [u[0] for u in units]),
         _table("int", "unit_size", [u[1] for u in units]),
-        _table("int", "k_row", bent.get_triplet()[0]),
-        _table("int", "k_col", bent.get_triplet()[1]),
-        _table("int", "margin_at", margin_places(layout)),
-        _table("int", "rate_at", rate_places(layout)),
-        _table("int", "gain_at", gain_places(layout)),
-        _table("double", "pull_scale", pull_scales(stack, layout, program)),
+        _table("int", "k_row", upper.get_triplet()[0]),
+        _table("int", "k_col", upper.get_triplet()[1]),
+        _table("int", "margin_at", margin_table(layout)),
+        _table("int", "rate_at", rate_table(layout)),
+        _table("int", "gain_at", gain_table(layout)),
+        _table("double", "force_scale", force_scales(stack, layout, program)),
         _table("int", "brake_at", brake_at),
         _table("double", "brake_limit", np.where(np.isfinite(brake_limit), brake_limit, 0.0)),
         _table("int", "stop_at", stop_at),
@@ -131,7 +135,7 @@ def _soft(stack: Declaration, layout: Layout) -> list[str]:
         f"#define KEPT {int(max(kept_rows(layout), default=-1) >= 0)}",
         _table("int", "kept_of", kept_rows(layout)),
         _table("int", "price_at", layout.price_at),
-        _table("double", "slack_told", told_slacks(stack, layout)),
+        _table("double", "slack_reported", reported_slacks(stack, layout)),
     ]
 
 

@@ -145,8 +145,8 @@ class Memory:
     """
 
     def __init__(self, layout: Layout) -> None:
-        known, told = sizes(layout), report_fields(layout)
-        self.fields = (*told, *INPUTS, *QP_FIELDS)
+        known, reported = sizes(layout), report_fields(layout)
+        self.fields = (*reported, *INPUTS, *QP_FIELDS)
         self._slices: dict[str, slice] = {}
         self._shapes: dict[str, tuple[int, ...]] = {}
         ends = {}
@@ -156,7 +156,7 @@ class Memory:
             self._shapes[field.name] = shape or (1,)
             self._slices[field.name] = slice(start, start + math.prod(shape))
             start = ends[field.name] = start + math.prod(shape) + field.spare
-        self.report, self.state, self.size = ends[told[-1].name], ends[INPUTS[-1].name], start
+        self.report, self.state, self.size = ends[reported[-1].name], ends[INPUTS[-1].name], start
         #: place of the flag
         self.flag = int(self._slices["flag"].start)
 
@@ -189,21 +189,21 @@ class Memory:
 
 def structures(layout: Layout) -> str:
     """``memory.h``: the report's structure, and the fields that the tick begins with."""
-    told = report_fields(layout)
+    reported = report_fields(layout)
     lines = ["/* Memory of a tick that its caller knows, from the table in memory.py; generated */"]
     lines += [
         "#ifndef WBC_MEMORY_H",
         "#define WBC_MEMORY_H",
         "",
         "typedef struct {",
-        *_members(told),
+        *_members(reported),
         "} wbc_report;",
         "",
     ]
     buffers = ["    wbc_report report;", *_members((*INPUTS, *QP_FIELDS))]
     lines += ["/* The first fields of wbc_tick */", "#define WBC_BUFFERS \\", " \\\n".join(buffers), ""]
     lines += ["/* X(field) for each, in the order of memory */"]
-    lines += [f"#define WBC_REPORT_FIELDS(X) {' '.join(f'X({field.c_name})' for field in told)}"]
+    lines += [f"#define WBC_REPORT_FIELDS(X) {' '.join(f'X({field.c_name})' for field in reported)}"]
     lines += [f"#define WBC_BUFFER_FIELDS(X) {' '.join(f'X({f.c_name})' for f in (*INPUTS, *QP_FIELDS))}"]
     return "\n".join([*lines, "", "#endif", ""])
 

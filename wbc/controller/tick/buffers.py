@@ -70,10 +70,10 @@ class Buffers:
 
 @dataclass(frozen=True, eq=False)
 class TaskRows:
-    """Rows of all tasks in the last QP: J [rows, nv], wished rates and fading factors [rows]."""
+    """Rows of all tasks in the last QP: J [rows, nv], desired rates and fading factors [rows]."""
 
     J: Array
-    wish: Array
+    desired: Array
     factor: Array
 
 
@@ -104,7 +104,7 @@ class Assembly(Buffers, ABC):
         """
 
     @abstractmethod
-    def bent(self) -> Array | None:
+    def curvature(self) -> Array | None:
         """Curvature in H of the last QP [nv, nv], before anything made H positive definite; None for none.
 
         Raises:

@@ -99,7 +99,7 @@ class Levels:
         weight = self._assembly.weight * self._scales**2
         counts = (weight > 0.0) & (tasks.factor > 0.0)
         fading = np.sqrt(np.where(counts, tasks.factor, 0.0)) / self._scales
-        rows, wish = fading[:, None] * tasks.J * dofs, fading * tasks.wish
+        rows, desired = fading[:, None] * tasks.J * dofs, fading * tasks.desired
         out, scales = [], []
         for place in range(len(layout.levels)):
             span = layout.level_rows(place)
@@ -108,22 +108,22 @@ class Levels:
             soft, prices = soft[prices > 0.0], prices[prices > 0.0]
             scale = max(float(weight[span][counts[span]].max(initial=0.0)), float(prices.max(initial=0.0))) or 1.0
             relative = np.where(counts[span], weight[span] / scale, 0.0)
-            wanted = rows[span].T @ (relative * wish[span])
-            bent = None
+            wanted = rows[span].T @ (relative * desired[span])
+            second = None
             if place == 0 and layout.leading:
                 wanted = -qp.g * dofs / scale
                 change = qp.H * np.outer(dofs, dofs) / scale - rows[span].T @ (relative[:, None] * rows[span])
-                curvature = self._assembly.bent()
+                curvature = self._assembly.curvature()
                 if curvature is not None:
-                    bent = change, curvature * np.outer(dofs, dofs) / scale
-            out.append(Level(rows[span], relative, wanted, soft, prices / scale, bent))
+                    second = change, curvature * np.outer(dofs, dofs) / scale
+            out.append(Level(rows[span], relative, wanted, soft, prices / scale, second))
             scales.append(scale)
         return out, scales
 
     def _write(self, answer: LevelsAnswer | None, v: Array, report: Array) -> None:
         places, tasks = self._places, self._assembly.task_rows()
         share = np.zeros(self._layout.task_rows)
-        report[places["missed"]] = tasks.J @ v - tasks.wish
+        report[places["missed"]] = tasks.J @ v - tasks.desired
         report[places["share"]] = share
         report[places["dropped"]] = report[places["pushes"]] = -1.0
         report[places["levels"]] = 0.0

@@ -110,11 +110,11 @@ class NativeTick(Assembly):
         self._library.wbc_tick_task_rows(self.pointer, ctypes.c_void_p(J.ctypes.data))
         return TaskRows(J, self._desired.copy(), self._factor.copy())
 
-    def bent(self) -> Array | None:
-        self._require_levels("bent")
+    def curvature(self) -> Array | None:
+        self._require_levels("curvature")
         out = np.zeros((self._layout.variables, self._layout.variables))
-        bends = self._library.wbc_tick_bent(self.pointer, ctypes.c_void_p(out.ctypes.data))
-        return out if bends else None
+        curved = self._library.wbc_tick_curvature(self.pointer, ctypes.c_void_p(out.ctypes.data))
+        return out if curved else None
 
     def _require_levels(self, asked: str) -> None:
         """Code of one level makes H of its rows, and keeps no rows."""

@@ -31,7 +31,7 @@ from wbc.stack.codegen import row_orders, row_units
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Layout
 from wbc.stack.memory import Memory
-from wbc.stack.tables import told_slacks
+from wbc.stack.tables import reported_slacks
 from wbc.validation import Array
 
 #: What an equality row in its unit may be missed by through the rounding of its own numbers
@@ -90,7 +90,7 @@ class SolvedTick(Buffers):
         slack = qp.violation(v)[self._nv :] if flag == RELAXED else np.zeros(self._units.size)
         if self.levels is not None:
             slack = self.levels.with_soft(qp, v, slack)
-        slack = self._soft.told(qp, v, self.assembly.row_sides(), slack) if answer is not None else slack
+        slack = self._soft.reported(qp, v, self.assembly.row_sides(), slack) if answer is not None else slack
         slack = np.where(slack > 2.0 * TOLERANCE * self._units, slack, 0.0)
         if flag == RELAXED and not slack[self._hard].any():
             flag = SOLVED  # the rows contradict each other by rounding only
@@ -202,9 +202,9 @@ class SoftRows:
 
     def __init__(self, stack: Declaration, layout: Layout) -> None:
         self._rows = np.flatnonzero(np.array(layout.price_at, dtype=np.intp) >= 0)
-        self._told = np.array(told_slacks(stack, layout))[self._rows]
+        self._least = np.array(reported_slacks(stack, layout))[self._rows]
 
-    def told(self, qp: QP, v: Array, sides: tuple[Array, Array], slack: Array) -> Array:
+    def reported(self, qp: QP, v: Array, sides: tuple[Array, Array], slack: Array) -> Array:
         """``slack`` of the general rows with the violations of those that are soft."""
         rows = self._rows
         if not rows.size:
@@ -212,7 +212,7 @@ class SoftRows:
         at = qp.A[rows] @ v
         missed = np.maximum(sides[0][rows] - at, at - sides[1][rows])
         out = slack.copy()
-        out[rows] = np.where(missed > self._told, missed, 0.0)
+        out[rows] = np.where(missed > self._least, missed, 0.0)
         return out
 
     def polished(self, qp: QP, answer: Relaxed) -> Relaxed:

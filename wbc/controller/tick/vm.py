@@ -60,8 +60,8 @@ class VmAssembly(Assembly):
         self._later, self._command = _room(layout.margin_rows), _room(layout.nv)
         if program.ahead is not None:
             self._ahead = _Call(program.ahead, [self._q, self._command, self._p, self.dt], [self._later])
-        self._pull = _room(tasks)
-        self._reach = Reach(stack, layout, program, self._bender(program, arguments)) if stack.calm else None
+        self._force = _room(tasks)
+        self._reach = Reach(stack, layout, program, self._curvature_of(program, arguments)) if stack.calm else None
         jt, at = function.sparsity_out("jt"), function.sparsity_out("at")
         self._j_index = (np.repeat(np.arange(tasks), np.diff(jt.colind())), np.array(jt.row(), dtype=np.intp))
         self._a_index = (np.repeat(np.arange(rows), np.diff(at.colind())), np.array(at.row(), dtype=np.intp))
@@ -77,7 +77,7 @@ class VmAssembly(Assembly):
         self._price_at = np.array(layout.price_at, dtype=np.intp)
         self._priced = self._price_at >= 0
         self._row_units = np.array(row_units(stack, layout), dtype=np.float64)
-        self._bent: Array | None = None
+        self._curvature: Array | None = None
         self._last = TaskRows(self._J, np.zeros(tasks), np.zeros(tasks))
 
     def _wide(self, name: str) -> Array:
@@ -88,29 +88,29 @@ class VmAssembly(Assembly):
     def task_rows(self) -> TaskRows:
         return self._last
 
-    def bent(self) -> Array | None:
-        return self._bent
+    def curvature(self) -> Array | None:
+        return self._curvature
 
     def row_sides(self) -> tuple[Array, Array]:
         return self._sides
 
-    def _bender(self, program: TickProgram, arguments: list[Array]) -> Callable[[Array], Array] | None:
+    def _curvature_of(self, program: TickProgram, arguments: list[Array]) -> Callable[[Array], Array] | None:
         """Weights of the task rows -> curvature, nv x nv."""
-        if program.bend is None:
+        if program.curvature is None:
             return None
-        entries = _room(program.bend.nnz_out(0))
-        call = _Call(program.bend, [*arguments, self._pull], [entries])
-        row, column = (np.array(i, dtype=np.intp) for i in program.bend.sparsity_out(0).get_triplet())
+        entries = _room(program.curvature.nnz_out(0))
+        call = _Call(program.curvature, [*arguments, self._force], [entries])
+        row, column = (np.array(i, dtype=np.intp) for i in program.curvature.sparsity_out(0).get_triplet())
         nv = self._layout.variables
 
-        def bend(pull: Array) -> Array:
-            self._pull[: len(pull)] = pull
+        def curve(force: Array) -> Array:
+            self._force[: len(force)] = force
             call.run()
             upper = np.zeros((nv, nv))
             upper[row, column] = entries[: len(row)]
             return upper + np.triu(upper, 1).T
 
-        return bend
+        return curve
 
     def twin(self) -> VmAssembly:
         return VmAssembly(*self._given)
@@ -141,18 +141,18 @@ class VmAssembly(Assembly):
         self._report_rows()
         self._J[self._j_index] = out["jt"][: len(self._j_index[0])]
         self._A[self._a_index] = out["at"][: len(self._a_index[0])]
-        factor, wish = out["factor"][: layout.task_rows].copy(), out["wish"][: layout.task_rows].copy()
+        factor, desired = out["factor"][: layout.task_rows].copy(), out["desired"][: layout.task_rows].copy()
         J = self._J.copy()
-        self._usable = self._drop_idle_rows(J, wish, factor)
+        self._usable = self._drop_idle_rows(J, desired, factor)
         self.report[self.places["factor"]] = factor
-        self._last = TaskRows(J, wish, factor)
+        self._last = TaskRows(J, desired, factor)
         first = slice(layout.leading)
-        J, weight, wish = J[first], (self.weight * factor)[first], wish[first]
+        J, weight, desired = J[first], (self.weight * factor)[first], desired[first]
         weighted = weight[:, None] * J
         H = J.T @ weighted
         H = 0.5 * (H + H.T)
         H[np.diag_indices(layout.variables)] += self._damping
-        g = -weighted.T @ wish
+        g = -weighted.T @ desired
         error = out["error"][first]
         low, high = self._bounds()
         price = np.where(self._priced, self.p[self._price_at], 1.0)
@@ -167,12 +167,12 @@ class VmAssembly(Assembly):
         low_rows[low_rows <= -INFINITE], high_rows[high_rows >= INFINITE] = -np.inf, np.inf
         self._sides = low_rows, high_rows
         low_rows, high_rows = np.where(self._soft, -np.inf, low_rows), np.where(self._soft, np.inf, high_rows)
-        self._bent = None
+        self._curvature = None
         if self._reach is not None and not self.plain[0] and self._usable and layout.leading:
             equal = _unit_equalities(low, high, low_rows, high_rows, A, self._dof_scales)
             keepers = self._reach.keepers(A, self._sides[0] == self._sides[1], factor)
-            H, g = self._reach.change(H, J, weight, error, wish, self.q, self.p, equal, keepers, self.bound_enabled)
-            self._bent = self._reach.bent
+            H, g = self._reach.change(H, J, weight, error, desired, self.q, self.p, equal, keepers, self.bound_enabled)
+            self._curvature = self._reach.curvature
         give = np.where(price > 0.0, self._row_units**2 / np.where(price > 0.0, price, 1.0), 1.0)
         give = np.where(self._priced & ~self._soft, give, 0.0)
         return QP(H, g, np.concatenate((low, low_rows)), np.concatenate((high, high_rows)), A, give)
@@ -188,10 +188,10 @@ class VmAssembly(Assembly):
             values = self._out[name][:size]
             self.report[places[name]] = np.where(np.isnan(values), instead, values)
 
-    def _drop_idle_rows(self, J: Array, wish: Array, factor: Array) -> bool:
+    def _drop_idle_rows(self, J: Array, desired: Array, factor: Array) -> bool:
         """Task rows without weight leave the problem, whatever their numbers are. False: others are not finite."""
-        bad = ~(np.isfinite(J).all(axis=1) & np.isfinite(wish) & np.isfinite(factor))
-        J[bad], wish[bad], factor[bad] = 0.0, 0.0, 0.0
+        bad = ~(np.isfinite(J).all(axis=1) & np.isfinite(desired) & np.isfinite(factor))
+        J[bad], desired[bad], factor[bad] = 0.0, 0.0, 0.0
         return not bool((bad & (self.weight != 0.0)).any())
 
     def _bounds(self) -> tuple[Array, Array]:

@@ -5,7 +5,7 @@
 #include "reach.h"
 #include "sensed.h"
 
-/* H += J' diag(w) J, g -= J' diag(w) wish, for `count` rows that share the `cols` columns listed from `first` */
+/* H += J' diag(w) J, g -= J' diag(w) desired, for `count` rows that share the `cols` columns listed from `first` */
 INLINE void block(wbc_tick *t, int row, int count, int first, int cols) {
     const int *col = j_col + first;
     const double *J = t->jt + first;

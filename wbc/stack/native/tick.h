@@ -11,13 +11,13 @@
  *   NNZK k_row k_col   entries of the curvature's upper triangle
  *   margin_at rate_at   margin of each general row (-1: none), and where its rate is in p
  *   gain_at     where the gain of each task row is in p
- *   pull_scale  how much curvature a row of unit error may have
+ *   force_scale  how much curvature a row of unit error may have
  *   brake_at brake_limit   entry of bound_enabled that limits the acceleration of a velocity (-1: none), and the limit
  *   row_order   class of each general row in the order of sacrifice
  *   PRICES price_at   whether rows are soft at a price; where the price of each general row is in p (-1: it has none)
  *   SOFT_ROWS   how many of them the first level's QP has: none where there are strict levels
  *   KEPT kept_of   whether tasks of the first level keep directions; the row of such a task for each row that does (-1)
- *   slack_told  violation of a soft row from which on it is reported
+ *   slack_reported  violation of a soft row from which on it is reported
  *   row_scale   its unit: the characteristic length for rows in metres
  *   BALLS SEGMENTS   items whose rows are distances between a ball and segments of links, and those segments
  *   ball_pose ball_velocity ball_margin ball_rate   where their inputs are in p
@@ -77,8 +77,8 @@ typedef struct {
     double column[NV * LEVEL_MOST], damped[NV], least; /* rows along the directions */
     double H[NV * NV], inverse[NV * NV], right[NV], plain[NV], lambda[M_ALL], length[M_ALL];
     double force[M_ALL];                        /* multipliers, those in it that do not count as pushing */
-    double bent[NV * NV];                       /* curvature of the first level */
-    int bends, seen;                            /* whether there is any; directions that the rows take */
+    double curvature[NV * NV];                  /* of the first level */
+    int curved, seen;                           /* whether there is any; directions that the rows take */
     int width, rank, count, order[LEVEL_MOST];
     int keep[(LEVELS + 1) * M_ALL], warm[LEVELS + 1];
     DAQPWorkspace daqp;
@@ -98,7 +98,7 @@ typedef struct {
     int curved;                  /* H contains curvature */
     int firm;                    /* rows that keep directions are firm in R */
     double stiffness;            /* what fixed variables add to the Hessian, in units of dof_scale */
-    double bent[NNZK + 1];       /* curvature */
+    double curvature_entries[NNZK + 1]; /* of its upper triangle */
     int idle[MC + 1];            /* rows that no velocity within the bounds violates */
     int far[MC + 1];             /* rows of balls and sensed pairs that are left out of this tick */
     double segment[6 * SEGMENTS + 1], screw[6 * NV], segment_ahead[6 * SEGMENTS + 1];
