@@ -1,5 +1,5 @@
 /* Strict levels, one after the other, each in the space that the earlier ones leave: docs/levels.md, and the same in
- * numpy in wbc/qp/cascade.py. */
+ * numpy in wbc/qp/levels/cascade.py. */
 #ifndef WBC_LEVELS_H
 #define WBC_LEVELS_H
 
