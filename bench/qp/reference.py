@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from wbc.errors import SolverError
 from wbc.qp.factor import ActiveRows, Factor, sides
 from wbc.qp.polish import polish
-from wbc.qp.problem import QP, Solution
+from wbc.qp.problem import QP, QPSolution
 
 _DIGITS = 60
 _STEPS = 20
@@ -24,7 +24,7 @@ _CONVERGED = 1e-32
 _TINY = Decimal("1e-25")
 
 
-def reference(qp: QP, guess: Solution) -> Solution:
+def reference(qp: QP, guess: QPSolution) -> QPSolution:
     """The minimiser, rounded to double; errors before rounding are below 1e-20.
 
     Raises:
@@ -41,7 +41,7 @@ def reference(qp: QP, guess: Solution) -> Solution:
             at = np.concatenate((x, _decimal(qp.A) @ x)) if qp.m else x
             change = _verify(qp, side, rows, at, lam)
             if change is None:
-                return Solution(x.astype(np.float64), lam.astype(np.float64), "solved")
+                return QPSolution(x.astype(np.float64), lam.astype(np.float64), "solved")
             side[change[0]] = change[1]
     raise SolverError("qp", "reference", "no active set passes the exact optimality conditions")
 

@@ -40,7 +40,7 @@ class Judge:
     def step(self, step: Step, before: Array, dt: float) -> str:
         """Numbers, actuator limits about the velocity before, and the certificate."""
         v, limits = step.v, self.limits
-        if not np.isfinite(v).all() or np.isnan(np.frombuffer(step._data, count=step._context.report.size)).any():
+        if not np.isfinite(v).all() or np.isnan(np.frombuffer(step._data, count=step._context.memory.report)).any():
             return "NaN"
         reach = limits.acceleration * dt
         high = np.maximum(limits.velocity, before - reach) + self.room

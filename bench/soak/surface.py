@@ -24,6 +24,7 @@ import numpy as np
 
 from bench.soak.goods import Goods
 from bench.soak.hostile import hostile, spoiled, spoiled_entries
+from wbc.controller.handle import Handle
 from wbc.errors import WbcError
 from wbc.tasks import Constraint, Item, Task
 
@@ -36,8 +37,8 @@ MODULES = (
 #: Attributes that only the package itself calls, with arguments that it has checked: hooks of items, memory of ticks
 INTERNAL = {
     *(name for base in (Item, Task, Constraint) for name in vars(base) if not name.startswith("_")),
-    *("again", "begin", "finish", "write", "write_pose", "start_ramp", "require_value", "require_values", "tick"),
-    *("layout", "row_costs", "ramps", "directions", "checked", "apply", "assume", "put_ramped", "item_name"),
+    *("write", "tick"),
+    *("layout", "checked", "apply", "assume", "put_ramped", "item_name"),
     *("sense", "key_data", "model", "within", "same_kind", "pieces_at", "pieces_before", "crossings", "ranges"),
 }
 #: Classes that only the package itself makes: answers, and what is made by a function or a method
@@ -45,6 +46,7 @@ MADE = (
     *("Controller", "Step", "Recording", "Online", "FunctionPath", "PosePath", "Followed", "Walker", "OperatorArm"),
     *("Arm", "Solution", "Explanation", "Replay", "PairSensor", "Robot", "Item", "Task", "Constraint", "Values"),
     *("Form", "Order", "Status", "WbcError", "Bounds", "Rows", "Row", "Certificate", "Worst", "State", "Recipe"),
+    *("RankCertificate", "LawCertificate"),
     *("SelfPairs", "LinkPair", "ConvexParts", "Witness", "Coupling", "Path", "Advice", "CarriedMotion", "ClosedForm"),
     *("CompleteSet", "Leg", "MotionCue", "PairCount", "PairStack", "PairSurvey", "Parts", "TreeSet", "TreeSets"),
     *("Analysis", "BlockAnalysis", "Branch", "Cost", "Counts", "Determinant", "JointBlock", "Locus", "NumericWitness"),
@@ -96,7 +98,8 @@ def _of_modules() -> Iterator[Callee]:
 
 def _of_subject(goods: Goods, subject: str) -> Iterator[Callee]:
     value = goods.subjects[subject]()
-    kind = type(value)
+    # What handles share is known by one name
+    kind = Handle if isinstance(value, Handle) else type(value)
     for name in dir(value):
         if name.startswith("_") or name in INTERNAL:
             continue

@@ -107,7 +107,7 @@ def test_certificate_of_a_relaxed_native_tick_is_about_what_was_left() -> None:
 def test_rows_of_levels_are_refused_by_code_that_has_none() -> None:
     native, vm = (core_of(small().compile(backend=backend)).tick for backend in ("native", "vm"))
     native.qp()
-    for name in ("task_rows", "bent"):
+    for name in ("task_rows", "curvature"):
         with pytest.raises(SolverError, match="strict levels"):
             getattr(native, name)()
     assert vm.assembly.task_rows().J.shape[1] == 2

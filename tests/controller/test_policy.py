@@ -16,7 +16,7 @@ from wbc.controller import Controller, Policy, Status, core_of
 from wbc.controller.policy import CHAIN
 from wbc.controller.tick.buffers import UNSOUND
 from wbc.errors import DuplicateNameError, ShapeError, SolverError, UnknownNameError
-from wbc.qp import QP, Solution, make_solver
+from wbc.qp import QP, QPSolution, make_solver
 from wbc.qp.certificate import certify
 from wbc.qp.solvers import daqp as daqp_module
 from wbc.tasks import Hold
@@ -189,4 +189,4 @@ def test_certificates_of_wrong_answers_fail() -> None:
     for k in range(7):
         x = good.x.copy()
         x[k] -= 1e-3 * np.sign(x[k])
-        assert certify(qp, Solution(x, good.multipliers, "solved")).error_bound > 1e-6
+        assert certify(qp, QPSolution(x, good.multipliers, "solved")).error_bound > 1e-6

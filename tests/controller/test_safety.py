@@ -36,7 +36,7 @@ BACKENDS = ("native", "vm")
 
 def numbers(step: Step) -> np.ndarray:
     """Every number of a step."""
-    return np.frombuffer(step._data, dtype=np.float64, count=step._context.report.size)
+    return np.frombuffer(step._data, dtype=np.float64, count=step._context.memory.report)
 
 
 seeds = st.integers(0, 2**32 - 1)

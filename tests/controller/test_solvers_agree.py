@@ -11,7 +11,7 @@ from bench.qp.reference import reference
 from tests.controller.stacks import aim, controller, inside
 from tests.qp.problems import quadprog_solution
 from wbc.controller import Controller, Status, core_of
-from wbc.qp import Solution
+from wbc.qp import QPSolution
 
 WEIGHTS = (1.0, 1e-2, 1e-4, 1e-6)
 SOLVERS = ("daqp", "osqp", "qpoases")
@@ -50,7 +50,7 @@ def test_solvers_agree_and_know_their_error(name: str, weight: float) -> None:
         judge = controllers["vm daqp"]
         core_of(judge).tick.v_last[:] = v
         qp, guess = judge.qp(), steps["vm daqp"]
-        exact = reference(qp, Solution(guess.v.copy(), guess._part("multipliers").copy(), "solved")).x
+        exact = reference(qp, QPSolution(guess.v.copy(), guess._part("multipliers").copy(), "solved")).x
         for label, step in steps.items():
             error = float(np.abs(step.v - exact).max())
             assert error < 1e-9, label

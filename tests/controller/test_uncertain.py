@@ -14,9 +14,9 @@ from wbc.controller import Controller, Stack, Status, core_of
 from wbc.controller.tick.buffers import BRAKED, SOLVED, UNSOUND
 from wbc.controller.tick.native import NativeTick
 from wbc.qp.polish import polish
-from wbc.qp.problem import QP, Solution
+from wbc.qp.problem import QP, QPSolution
 from wbc.stack.layout import Layout
-from wbc.stack.memory import ReportLayout
+from wbc.stack.memory import Memory
 from wbc.tasks import EndEffector, FrameVelocityLimit, JointLimits, Posture, WorkspacePolyhedron
 
 TIP, MIDDLE = "panda_hand_tcp", "panda_link5"
@@ -94,14 +94,14 @@ def feasible(qp: QP) -> bool:
 
 def test_weights_of_every_size_are_solved_within_the_stated_bound() -> None:
     controller, rng = wild(0), np.random.default_rng(3)
-    tick, places, compared = core_of(controller).tick, ReportLayout(core_of(controller).layout), 0
+    tick, places, compared = core_of(controller).tick, Memory(core_of(controller).layout), 0
     assert isinstance(tick, NativeTick)
     for _ in range(300):
         provoke(controller, rng)
         qp = tick.qp()
         assert tick.step() == SOLVED or not feasible(qp)
         wide = qp.with_slacks()
-        found = polish(wide, Solution(np.zeros(wide.n), np.zeros(wide.n + wide.m), "failed"), 200)
+        found = polish(wide, QPSolution(np.zeros(wide.n), np.zeros(wide.n + wide.m), "failed"), 200)
         push = np.abs(found.solution.multipliers[found.solution.multipliers != 0.0])
         spread = np.linalg.cond(qp.H)
         # numbers that far apart leave the referee's signs to rounding
@@ -115,7 +115,7 @@ def test_weights_of_every_size_are_solved_within_the_stated_bound() -> None:
 
 def test_a_step_without_other_solvers_brakes_and_says_so() -> None:
     controller, rng = wild(1), np.random.default_rng(0)
-    tick, places = core_of(controller).tick, ReportLayout(core_of(controller).layout)
+    tick, places = core_of(controller).tick, Memory(core_of(controller).layout)
     assert isinstance(tick, NativeTick)
     safe = tick._library.wbc_tick_safe_step
     seen = dict.fromkeys((SOLVED, RECOVERED, UNCERTIFIED), 0)
@@ -165,7 +165,7 @@ def test_many_soft_rows_at_once(backend: str) -> None:
         tick = getattr(core_of(controller).tick, "assembly", core_of(controller).tick)
         tick.v_last[:] = 0.0
         wide = tick.qp().with_slacks()
-        found = polish(wide, Solution(np.zeros(wide.n), np.zeros(wide.n + wide.m), "failed"), 400)
+        found = polish(wide, QPSolution(np.zeros(wide.n), np.zeros(wide.n + wide.m), "failed"), 400)
         if found.exact:
             assert step.v == pytest.approx(found.solution.x[:7], abs=step.certificate.error_bound + 1e-9)
         given = max(given, len(step.relaxed))

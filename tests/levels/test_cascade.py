@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from tests.levels.reference import Array, Goal, hierarchy
 from wbc.qp.levels.cascade import ONSET, Cascade
-from wbc.qp.levels.hierarchy import Answer, Hierarchy, Level
+from wbc.qp.levels.hierarchy import Hierarchy, Level, LevelsAnswer
 
 THRESHOLD, DAMPING = 1.6e-7, 1e-8
 NONE: NDArray[np.intp] = np.zeros(0, dtype=np.intp)
@@ -26,7 +26,7 @@ def goal(of: Level, b: Array) -> Goal:
     return Goal(root[:, None] * of.rows, root * b, of.soft)
 
 
-def answer(levels: list[Level], bound: float = 10.0, x: Array | None = None) -> Answer:
+def answer(levels: list[Level], bound: float = 10.0, x: Array | None = None) -> LevelsAnswer:
     """Levels within bounds, from x."""
     n = levels[0].rows.shape[1]
     start = np.zeros(n) if x is None else x

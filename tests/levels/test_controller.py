@@ -46,7 +46,7 @@ def goals(controller: Controller) -> list[Goal]:
         soft = np.flatnonzero(np.array(layout.row_levels) == place)
         scale = max([float(w) for w in tick.weight[at] * layout.row_scales(controller.stack)[at] ** 2], default=1.0)
         assert scale == 1.0 or not soft.size
-        out.append(Goal(weight[:, None] * rows.J[at], weight * rows.wish[at], soft))
+        out.append(Goal(weight[:, None] * rows.J[at], weight * rows.desired[at], soft))
     return out
 
 
@@ -117,7 +117,7 @@ def test_sensible_words_for_every_level(vm: Controller) -> None:
     # what a dropped row misses is what its task asks for and does not get
     tick: Any = core_of(vm).tick
     rows = tick.assembly.task_rows()
-    missed = np.abs(rows.J @ step.v - rows.wish)
+    missed = np.abs(rows.J @ step.v - rows.desired)
     knee = next(d for d in dropped if (d.item, d.row) == ("knee", "x"))
     assert knee.inconsistency == pytest.approx(missed[core_of(vm).layout.blocks["knee"].start])
 

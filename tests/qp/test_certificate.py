@@ -8,22 +8,22 @@ import pytest
 from bench.qp.reference import reference
 from bench.qp.samples import SIZES, WEIGHTS, whole_body
 from tests.repeats import repeats
-from wbc.qp import QP, Solution, certify, make_solver
+from wbc.qp import QP, QPSolution, certify, make_solver
 from wbc.qp.polish import polish
 
 COUNT = {7: repeats(48), 12: repeats(16), 25: repeats(5), 38: repeats(2), 40: repeats(2)}
 
 
-def disturbed(rng: np.random.Generator, answer: Solution) -> list[Solution]:
+def disturbed(rng: np.random.Generator, answer: QPSolution) -> list[QPSolution]:
     """The answer, and answers with noise on the point, on the multipliers, and on both."""
     out = [answer]
     for size in (1e-14, 1e-11, 1e-8, 1e-5):
         x = answer.x + size * rng.normal(size=answer.x.size)
         lam = answer.multipliers * (1.0 + size * rng.normal(size=answer.multipliers.size))
         out += [
-            Solution(x, answer.multipliers, "solved"),
-            Solution(answer.x, lam, "solved"),
-            Solution(x, lam, "solved"),
+            QPSolution(x, answer.multipliers, "solved"),
+            QPSolution(answer.x, lam, "solved"),
+            QPSolution(x, lam, "solved"),
         ]
     return out
 
@@ -53,7 +53,7 @@ def test_bound_is_within_a_factor_of_the_error_where_the_worst_direction_is_hit(
     # one weak direction, error put along it: the bound must not be a loose constant
     qp = QP.checked(np.diag([1.0, 1.0, 1e-6]), [-0.1, 0.2, -1e-7], [-1.0] * 3, [1.0] * 3)
     x = np.array([0.1, -0.2, 0.1 + 1e-5])
-    bound = certify(qp, Solution(x, np.zeros(3), "solved")).error_bound
+    bound = certify(qp, QPSolution(x, np.zeros(3), "solved")).error_bound
     assert 1e-5 <= bound <= 1.001e-5
 
 
@@ -70,20 +70,20 @@ def test_duplicate_active_rows_have_a_finite_bound():
 def test_bound_at_zero_that_is_touched_only_to_rounding_has_a_certificate():
     qp = QP.checked(np.eye(2), [1.0, -0.5], [0.0, -1.0], [1.0, 1.0])
     for x0 in (-1e-30, 1e-30, 0.0):
-        answer = Solution(np.array([x0, 0.5]), np.array([-1.0, 0.0]), "solved")
+        answer = QPSolution(np.array([x0, 0.5]), np.array([-1.0, 0.0]), "solved")
         assert certify(qp, answer).error_bound < 1e-15
 
 
 def test_no_bound_is_stated_where_none_can_be_had():
     qp = QP.checked(np.diag([1.0, 0.0]), [0.0, 0.0], [-1.0, -1.0], [1.0, 1.0])
-    assert certify(qp, Solution(np.zeros(2), np.zeros(2), "solved")).error_bound == np.inf
+    assert certify(qp, QPSolution(np.zeros(2), np.zeros(2), "solved")).error_bound == np.inf
     qp = QP.checked(np.eye(2), [0.0, 0.0], [-1.0, -1.0, 2.0, 3.0], [1.0, 1.0, 2.0, 3.0], [[1.0, 1.0], [1.0, 1.0]])
-    assert certify(qp, Solution(np.ones(2), np.zeros(4), "solved")).error_bound == np.inf
+    assert certify(qp, QPSolution(np.ones(2), np.zeros(4), "solved")).error_bound == np.inf
 
 
 def test_residuals_are_those_of_the_definition():
     qp = QP.checked(np.eye(2), [-1.0, 0.0], [-1.0, -1.0, 0.5], [0.25, 1.0, 0.5], [[0.0, 2.0]])
-    found = certify(qp, Solution(np.array([0.5, 0.25]), np.array([0.75, 0.0, -0.25]), "solved"))
+    found = certify(qp, QPSolution(np.array([0.5, 0.25]), np.array([0.75, 0.0, -0.25]), "solved"))
     assert found.stationarity == pytest.approx(0.25)
     assert found.violation == pytest.approx(0.25)
     assert found.complementarity == pytest.approx(0.75 * 0.25)

@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import linprog
 
 from wbc.qp import QP
-from wbc.qp.conflict import Side, diagnose
+from wbc.qp.conflict import RowBound, diagnose
 
 
 def problem(seed: int) -> QP:
@@ -24,7 +24,7 @@ def problem(seed: int) -> QP:
     return QP(np.eye(n), np.zeros(n), lower, np.maximum(upper, lower), A)
 
 
-def gap(qp: QP, sides: list[Side], soft: list[Side]) -> float:
+def gap(qp: QP, sides: list[RowBound], soft: list[RowBound]) -> float:
     """Least s >= 0 with which all sides hold, each of ``soft`` being allowed s; inf: there is none."""
     C = np.vstack((np.eye(qp.n), qp.A))
     rows = [(C[i], qp.upper[i]) if up else (-C[i], -qp.lower[i]) for i, up in sides]
@@ -35,9 +35,9 @@ def gap(qp: QP, sides: list[Side], soft: list[Side]) -> float:
     return float(found.fun) if found.status == 0 else np.inf
 
 
-def every(qp: QP) -> list[Side]:
+def every(qp: QP) -> list[RowBound]:
     finite = (np.isfinite(qp.lower), np.isfinite(qp.upper))
-    return [Side(int(i), bool(up)) for up in (0, 1) for i in np.flatnonzero(finite[up])]
+    return [RowBound(int(i), bool(up)) for up in (0, 1) for i in np.flatnonzero(finite[up])]
 
 
 @pytest.mark.parametrize("seed", range(40))
@@ -70,7 +70,7 @@ def test_two_rows_that_name_each_other() -> None:
     """x + y >= 3 on the unit box: all three sides are needed, and only the row is worth giving."""
     qp = QP(np.eye(2), np.zeros(2), np.array([-1, -1, 3.0]), np.array([1, 1, np.inf]), np.array([[1.0, 1.0]]))
     found = diagnose(qp)
-    assert [c.sides for c in found.conflicts] == [(Side(0, True), Side(1, True), Side(2, False))]
+    assert [c.sides for c in found.conflicts] == [(RowBound(0, True), RowBound(1, True), RowBound(2, False))]
     assert found.conflicts[0].alone == pytest.approx([1.0, 1.0, 1.0], abs=1e-8)
     assert found.slack == pytest.approx([0, 0, 1.0], abs=1e-8)
 

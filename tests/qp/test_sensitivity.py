@@ -7,13 +7,13 @@ import pytest
 
 from bench.qp.samples import whole_body
 from wbc.errors import SolverError
-from wbc.qp import QP, Solution, make_solver
+from wbc.qp import QP, QPSolution, make_solver
 from wbc.qp.sensitivity import Sensitivity
 
 STEP = 1e-6
 
 
-def solved(qp: QP) -> Solution:
+def solved(qp: QP) -> QPSolution:
     return make_solver("daqp", qp.n, qp.m).solve(qp, warm=False)
 
 
@@ -73,4 +73,4 @@ def test_one_bound() -> None:
 def test_a_hessian_that_is_not_definite_is_refused() -> None:
     qp = QP(np.zeros((1, 1)), np.zeros(1), np.array([-1.0]), np.array([1.0]), np.zeros((0, 1)))
     with pytest.raises(SolverError):
-        Sensitivity(qp, Solution(np.zeros(1), np.zeros(1), "solved"))
+        Sensitivity(qp, QPSolution(np.zeros(1), np.zeros(1), "solved"))

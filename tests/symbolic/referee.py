@@ -12,7 +12,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wbc.symbolic import Centroidal, Dynamics, Kinematics, Motion
+from wbc.symbolic import Centroidal, Dynamics, Kinematics, Velocities
 from wbc.symbolic.kinematics import WORLD, frame_index
 
 Array = NDArray[np.float64]
@@ -64,7 +64,7 @@ class Comparison:
     def __init__(self, model: pin.Model, seed: str = "") -> None:
         self.model, self.data = model, model.createData()
         self.kinematics = Kinematics(model)
-        self.motion = Motion(self.kinematics)
+        self.motion = Velocities(self.kinematics)
         self.dynamics = Dynamics(self.kinematics, self.motion)
         self.centroidal = Centroidal(self.dynamics)
         self.q, self.v, self.a = random_state(model, f"{model.name} {model.nv} {seed}")

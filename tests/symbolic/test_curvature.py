@@ -10,7 +10,7 @@ import pinocchio as pin
 import pytest
 
 import wbc.robots
-from wbc.symbolic.curvature import Pull, curvature
+from wbc.symbolic.curvature import Force, curvature
 from wbc.symbolic.kinematics import Kinematics
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks import AxisAlign
@@ -47,7 +47,7 @@ def test_against_differences(name: str, kind: str) -> None:
     ]
     wanted = 0.5 * (np.array(columns) + np.array(columns).T)
     kinematics = Kinematics(model)
-    K = curvature(kinematics, [Pull(kind, FRAMES[name], ca.SX(ca.DM(vector)))])  # type: ignore[arg-type]
+    K = curvature(kinematics, [Force(kind, FRAMES[name], ca.SX(ca.DM(vector)))])  # type: ignore[arg-type]
     found = np.array(ca.Function("K", [kinematics.q], [K])(q))
     assert np.abs(found - wanted).max() < 1e-7 * max(1.0, float(np.abs(wanted).max()))
 
@@ -58,7 +58,7 @@ def test_an_expression_pulls_at_what_it_is_made_of() -> None:
     kinematics = Kinematics(robot.model)
     tracer = Tracer(kinematics)
     height = 2.0 * tracer.position(FRAMES["panda"])[2]
-    K = curvature(kinematics, tracer.pulls(height))
+    K = curvature(kinematics, tracer.forces(height))
     plain = ca.hessian(2.0 * kinematics.pose(FRAMES["panda"]).position[2], kinematics.q)[0]
     difference = ca.Function("d", [kinematics.q], [K - plain])
     assert np.abs(np.array(difference(robot.neutral))).max() < 1e-12
@@ -66,21 +66,21 @@ def test_an_expression_pulls_at_what_it_is_made_of() -> None:
 
 @cache
 def aligned(name: str, base: str) -> ca.Function:
-    """(q, target, pull) -> error of an axis, its Jacobian, curvature for the pull."""
+    """(q, target, force) -> error of an axis, its Jacobian, curvature for the force."""
     robot = wbc.robots.load(name, shapes="none")
     kinematics = Kinematics(robot.model)
     tracer, item = Tracer(kinematics), AxisAlign(FRAMES[name], relative_to=base)
-    target, pull = ca.SX.sym("target", 3), ca.SX.sym("pull", 2)
+    target, force = ca.SX.sym("target", 3), ca.SX.sym("force", 2)
     inputs = {"target": target, "feedforward": ca.SX(3, 1)}
     error, J = item.error(robot, tracer, inputs), item.jacobian(robot, tracer, inputs)
-    parts = [tracer.expand(error), tracer.expand(J), curvature(kinematics, tracer.pulls(ca.dot(pull, error)))]
-    return ca.Function("H", [kinematics.q, target, pull], parts)
+    parts = [tracer.expand(error), tracer.expand(J), curvature(kinematics, tracer.forces(ca.dot(force, error)))]
+    return ca.Function("H", [kinematics.q, target, force], parts)
 
 
 @pytest.mark.parametrize(("name", "base"), [("panda", "world"), ("talos", "world"), ("talos", "torso_2_link")])
 @pytest.mark.parametrize("angle", [0.3, 1.5, 2.6])
 def test_an_axis_bends_like_its_angle_and_never_about_itself(name: str, base: str, angle: float) -> None:
-    """J'J and the curvature for the pull e are the second derivative of theta^2 / 2; a turn about the axis is flat.
+    """J'J and the curvature for the force e are the second derivative of theta^2 / 2; a turn about the axis is flat.
 
     Beyond 2.8 rad, where cot theta - 1/theta < -3, less of it would count.
     """

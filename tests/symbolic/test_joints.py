@@ -11,7 +11,7 @@ from tests.symbolic.chains import KINDS, SLANTED, VARYING, chain, unaligned_unbo
 from tests.symbolic.referee import DESCRIPTIONS, REFERENCES, TOLERANCE, Comparison, distance, load, random_state
 from wbc.errors import UnknownNameError, UnsupportedJointError
 from wbc.robot import Limits, Robot
-from wbc.symbolic import Centroidal, Dynamics, Kinematics, Motion
+from wbc.symbolic import Centroidal, Dynamics, Kinematics, Velocities
 from wbc.symbolic.kinematics import frame_index
 
 BOX = pin.Inertia(2.0, np.array([0.1, 0.2, 0.3]), np.diag([0.1, 0.2, 0.25]))
@@ -36,7 +36,7 @@ def test_jacobian_drift_is_the_rate_of_the_jacobian(kind: str, reference: str) -
     """dJ/dt v against central differences of Pinocchio's J v along q (+) t v, step 1e-6."""
     model = chain([pin.JointModelRX(), KINDS[kind]()])
     data, (q, v, _) = model.createData(), random_state(model, kind)
-    motion = Motion(Kinematics(model))
+    motion = Velocities(Kinematics(model))
     kin, tip = motion.kinematics, model.getFrameId("tip")
     ours = ca.Function("f", [kin.q, kin.v], [motion.jacobian_drift("tip", reference)])(q, v).full().ravel()
     ends = []
@@ -165,7 +165,7 @@ def test_a_name_of_several_frames_means_the_link() -> None:
 
 def test_unknown_names_are_refused() -> None:
     kin = Kinematics(chain([pin.JointModelRX()]))
-    motion = Motion(kin)
+    motion = Velocities(kin)
     with pytest.raises(UnknownNameError, match="'branch_tip'"):
         kin.pose("branch_tap")
     with pytest.raises(UnknownNameError, match="reference"):
@@ -179,7 +179,7 @@ def test_unknown_names_are_refused() -> None:
 
 def test_the_world_is_at_rest() -> None:
     kin = Kinematics(chain([pin.JointModelRX()]))
-    motion = Motion(kin)
+    motion = Velocities(kin)
     assert kin.jacobian("world").nnz() == 0
     for reference in ("world_aligned", "local", "world"):
         assert motion.frame_velocity("world", reference).is_zero()

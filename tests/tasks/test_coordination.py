@@ -20,7 +20,7 @@ from tests.tasks.robots import FRAMES, NAMES, placement, random_configuration, r
 from wbc.errors import DuplicateNameError, NotFiniteError, RangeError, ShapeError, UnknownNameError, WbcError
 from wbc.robot import Robot
 from wbc.symbolic.kinematics import Kinematics
-from wbc.symbolic.manipulability import FLOOR, bend, manipulability
+from wbc.symbolic.manipulability import FLOOR, manipulability, manipulability_curvature
 from wbc.tasks import EndEffector, Expression, Item, JointCoupling, Limit, Manipulability, Posture, RelativePose
 
 HAND, OTHER = "panda_hand", "panda_link4"
@@ -195,7 +195,7 @@ def test_slope_costs_less_than_automatic_differentiation() -> None:
     ]
     assert counts[0] < 1700
     assert counts[0] < 0.75 * counts[1]
-    bound = ca.diag(bend(kinematics, tip, "torso_2_link", 2.0))
+    bound = ca.diag(manipulability_curvature(kinematics, tip, "torso_2_link", 2.0))
     assert np.count_nonzero(np.array(ca.DM(bound))) == 7
 
 

@@ -4,10 +4,11 @@ from typing import TYPE_CHECKING
 
 from wbc.controller import hooks
 from wbc.controller.controller import Controller, core_of
-from wbc.controller.outcome import Certificate, Status
+from wbc.controller.outcome import Status
 from wbc.controller.policy import Policy
 from wbc.controller.stack import Stack
 from wbc.controller.step import Step
+from wbc.qp.certificate import Certificate
 
 __all__ = ["Certificate", "Controller", "Policy", "Stack", "Status", "Step", "core_of"]
 

@@ -186,6 +186,8 @@ class Handle:
         Raises:
             UnknownNameError: there is none of that name.
         """
+        if not isinstance(name, str) or name not in {*self.names, *self._block.slots}:
+            raise UnknownValueError(self._field("get"), name, self.names)
         return self._get(name)
 
     def ramp(self, weight: float, seconds: float) -> None:

@@ -86,23 +86,6 @@ class Residual:
         return ", ".join(f"{self.norm(u):.3g} {u}".rstrip() for u in dict.fromkeys(self.units))
 
 
-@dataclass(frozen=True)
-class Certificate:
-    """How good the answer is, computed within the tick; all inf for a braked or capped tick.
-
-    Attributes:
-        stationarity: largest entry of |H v + g + A' lambda| (cost per rad/s).
-        violation: largest violation of a row that was not relaxed, in its unit per second.
-        complementarity: largest |lambda (A v - b)|.
-        error_bound: bound on the largest |v - v*| [rad/s, m/s].
-    """
-
-    stationarity: float
-    violation: float
-    complementarity: float
-    error_bound: float
-
-
 #: Rows of which less than this part is free are dropped
 GONE = 1e-6
 

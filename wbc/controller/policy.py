@@ -13,7 +13,7 @@ from wbc.errors import DuplicateNameError, ShapeError
 from wbc.qp.factor import load
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Layout
-from wbc.stack.memory import ReportLayout
+from wbc.stack.memory import Memory
 
 #: What to do with rows that cannot all hold
 CONFLICTS = ("elastic", "brake")
@@ -61,7 +61,7 @@ class Fallback:
     def __init__(self, tick: NativeTick | SolvedTick, assembly: Assembly, stack: Declaration, layout: Layout) -> None:
         self._policy, self.prepared = Policy(), False
         self._tick, self._given = tick, (assembly, stack, layout)
-        self._flag = ReportLayout(layout).flag
+        self._flag = Memory(layout).flag
         self._links: dict[str, SolvedTick] = {}
 
     @property

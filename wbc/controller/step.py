@@ -14,7 +14,6 @@ from wbc.controller.outcome import (
     ANSWERED,
     STATUSES,
     Binding,
-    Certificate,
     LevelCertificate,
     Residual,
     Slack,
@@ -23,9 +22,10 @@ from wbc.controller.outcome import (
     scales,
 )
 from wbc.controller.tick.buffers import INFINITE, Assembly
+from wbc.qp.certificate import Certificate
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Block, Layout
-from wbc.stack.memory import ReportLayout
+from wbc.stack.memory import Memory
 from wbc.validation import Array
 
 if TYPE_CHECKING:
@@ -38,8 +38,8 @@ class Context:
     def __init__(self, stack: Declaration, layout: Layout, assembly: Assembly | None) -> None:
         self.stack, self.layout, self.assembly = stack, layout, assembly
         self.nv = layout.nv
-        self.report = ReportLayout(layout)
-        self.flag_offset = 8 * self.report.flag
+        self.memory = Memory(layout)
+        self.flag_offset = 8 * self.memory.flag
 
     def __getstate__(self) -> dict[str, Any]:
         # the memory of a process; a step from a pickle tells everything but its explanation
@@ -70,11 +70,11 @@ class Step:
         self._context = context
 
     def _part(self, name: str) -> Array:
-        where = self._context.report[name]
+        where = self._context.memory[name]
         return np.frombuffer(self._data, _FLOAT, where.stop - where.start, 8 * where.start)
 
     def _number(self, name: str) -> float:
-        return float(_DOUBLE(self._data, 8 * self._context.report[name].start)[0])
+        return float(_DOUBLE(self._data, 8 * self._context.memory[name].start)[0])
 
     @property
     def v(self) -> Array:
@@ -93,7 +93,7 @@ class Step:
 
     @property
     def certificate(self) -> Certificate:
-        """Residuals and the error bound of v."""
+        """How good v is; all inf for a braked or capped tick. ``stationarity`` in cost per rad/s."""
         names = ("stationarity", "violation", "complementarity", "error_bound")
         values = [self._number(n) for n in names]
         return Certificate(*(np.inf if value >= INFINITE else value for value in values))

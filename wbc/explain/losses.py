@@ -8,31 +8,31 @@ import numpy as np
 
 from wbc.explain.explanation import Loss, Price, Share, Side
 from wbc.explain.past import Frozen, Past
-from wbc.qp.problem import Solution
+from wbc.qp.problem import QPSolution
 from wbc.qp.relax import Relaxed
 from wbc.qp.sensitivity import Sensitivity
 from wbc.stack.layout import Block
 from wbc.tasks._direction import Direction
 from wbc.validation import Array
 
-#: Losses and regained parts below this share of what was asked, and below this rate, are not told [rad/s, m/s]
+#: Losses and regained parts below this share of what was asked, and below this rate, are not named [rad/s, m/s]
 _SHARE, _LEAST = 1e-3, 1e-6
 
 
 class Group:
     """Rows of one task that share a unit: J v - w is what they miss."""
 
-    def __init__(self, block: Block, unit: str, J: Array, wishes: Array) -> None:
-        self.block, self.J, self.wishes = block, J, wishes
+    def __init__(self, block: Block, unit: str, J: Array, desired: Array) -> None:
+        self.block, self.J, self.desired = block, J, desired
         self.unit = unit if unit.endswith("/s") else f"{unit or '1'}/s"
 
     def lost(self, v: Array) -> float:
         """Norm of what is missing at v."""
-        return float(np.linalg.norm(self.J @ v - self.wishes))
+        return float(np.linalg.norm(self.J @ v - self.desired))
 
     def slope(self, v: Array) -> Array:
         """Derivative of :meth:`lost` along v."""
-        missing = self.J @ v - self.wishes
+        missing = self.J @ v - self.desired
         return np.asarray(missing @ self.J / np.linalg.norm(missing))
 
 
@@ -61,12 +61,12 @@ def groups(past: Past) -> list[Group]:
     for block in past.layout.of_form("task"):
         if not past.is_on(block):
             continue
-        J, wishes = past.task_rows(block)
+        J, desired = past.task_rows(block)
         counts = past.tick.weight[block.span] > 0.0
         for unit in dict.fromkeys(row.unit for row in block.rows):
             mine = np.array([row.unit == unit for row in block.rows]) & counts
             if mine.any():
-                out.append(Group(block, unit, J[mine], wishes[mine]))
+                out.append(Group(block, unit, J[mine], desired[mine]))
     return [*out, *_soft_groups(past)]
 
 
@@ -87,7 +87,7 @@ def _soft_groups(past: Past) -> list[Group]:
 
 def losses(past: Past, found: list[Group], v: Array, culprits: list[Block]) -> tuple[Loss, ...]:
     """Every task that misses something, and what it would regain without each of the culprits."""
-    short = [g for g in found if g.lost(v) > max(_LEAST, _SHARE * float(np.linalg.norm(g.wishes)))]
+    short = [g for g in found if g.lost(v) > max(_LEAST, _SHARE * float(np.linalg.norm(g.desired)))]
     if not short:
         return ()
     without: dict[str, Array] = {}
@@ -100,11 +100,11 @@ def losses(past: Past, found: list[Group], v: Array, culprits: list[Block]) -> t
             alone[block.entry.name] = past.solve()[0]
     out = []
     for group in short:
-        name, lost, asked = group.block.entry.name, group.lost(v), float(np.linalg.norm(group.wishes))
+        name, lost, asked = group.block.entry.name, group.lost(v), float(np.linalg.norm(group.desired))
         regained = [Share(item, lost - group.lost(other)) for item, other in without.items() if item != name]
-        told = [share for share in regained if share.amount > max(_LEAST, _SHARE * asked)]
-        told.sort(key=lambda share: -share.amount)
-        out.append(Loss(name, group.unit, asked, lost, group.lost(alone[name]), tuple(told)))
+        named = [share for share in regained if share.amount > max(_LEAST, _SHARE * asked)]
+        named.sort(key=lambda share: -share.amount)
+        out.append(Loss(name, group.unit, asked, lost, group.lost(alone[name]), tuple(named)))
     return tuple(out)
 
 
@@ -123,7 +123,7 @@ def prices(past: Past, found: list[Group], answer: Relaxed, sides: dict[int, Sid
             continue
         moved = moved * (-1.0 if side.side == "lower" else 1.0)
         for group in found:
-            if group.lost(v) <= max(_LEAST, _SHARE * float(np.linalg.norm(group.wishes))):
+            if group.lost(v) <= max(_LEAST, _SHARE * float(np.linalg.norm(group.desired))):
                 continue
             if group.block.entry.name == side.item:
                 continue
@@ -138,7 +138,7 @@ def prices(past: Past, found: list[Group], answer: Relaxed, sides: dict[int, Sid
 def _of_one(past: Past, answer: Relaxed) -> tuple[Array, Callable[[int], Array]]:
     """(command, row -> dv / db of the side that holds it, zero where it holds nothing)."""
     wide, n = past.qp.with_slacks(), past.qp.n
-    one = Sensitivity(wide, Solution(answer.x, answer.multipliers, "solved"))
+    one = Sensitivity(wide, QPSolution(answer.x, answer.multipliers, "solved"))
 
     def slope(row: int) -> Array:
         return one.to_bound(row if row < n else row + wide.n - n)[:n]
@@ -148,7 +148,7 @@ def _of_one(past: Past, answer: Relaxed) -> tuple[Array, Callable[[int], Array]]
 
 def _of_levels(past: Past, frozen: Frozen) -> tuple[Array, Callable[[int], Array]]:
     """The same with strict levels."""
-    first = Sensitivity(frozen.qp, Solution(frozen.first.x, frozen.first.multipliers, "solved"))
+    first = Sensitivity(frozen.qp, QPSolution(frozen.first.x, frozen.first.multipliers, "solved"))
     dofs, numbers = past.layout.dof_scales(past.stack), frozen.numbers(past.tick.qp(), frozen.first.x)
 
     def slope(row: int) -> Array:

@@ -12,13 +12,13 @@ from wbc.controller.step import Context
 from wbc.controller.tick.buffers import Assembly
 from wbc.controller.tick.solved import SolvedTick
 from wbc.errors import SolverError
-from wbc.qp.levels.hierarchy import Answer, Hierarchy
+from wbc.qp.levels.hierarchy import Hierarchy, LevelsAnswer
 from wbc.qp.levels.sensitivity import FrozenLevels
 from wbc.qp.problem import QP
 from wbc.qp.relax import Relaxed
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Block, Layout
-from wbc.stack.memory import ReportLayout
+from wbc.stack.memory import Memory
 from wbc.tasks._direction import Direction
 from wbc.tasks.mechanism import Mechanism
 from wbc.validation import Array
@@ -36,7 +36,7 @@ class Frozen:
 
     qp: QP
     first: Relaxed
-    answer: Answer
+    answer: LevelsAnswer
     optimum: FrozenLevels
     numbers: Callable[[QP, Array], Hierarchy]
     sizes: Array
@@ -52,7 +52,7 @@ class Past:
 
     def __init__(self, data: bytes, stack: Declaration, layout: Layout, assembly: Assembly) -> None:
         self.stack, self.layout = stack, layout
-        self.places = ReportLayout(layout)
+        self.places = Memory(layout)
         self.tick = assembly.twin()
         self.tick.state[:] = np.frombuffer(data)
         self.tick.v_last[:] = self.tick.v_in
@@ -151,7 +151,7 @@ class Past:
             return self._level_rows(block)
         tick, weight, factor = self.tick, self.tick.weight.copy(), self.part("factor")
         damping = self.stack.damping / self.layout.dof_scales(self.stack) ** 2
-        rows, wishes = np.zeros((len(block.rows), self.layout.variables)), np.zeros(len(block.rows))
+        rows, desired = np.zeros((len(block.rows), self.layout.variables)), np.zeros(len(block.rows))
         tick.plain[0] = 1.0
         for k in range(len(block.rows)):
             share = factor[block.start + k]
@@ -164,16 +164,16 @@ class Past:
             i = int(np.diag(square).argmax())
             if square[i, i] > 0.0:
                 rows[k] = square[i] / np.sqrt(square[i, i])
-                wishes[k] = -qp.g[i] / share / rows[k, i]
+                desired[k] = -qp.g[i] / share / rows[k, i]
         tick.weight[:], tick.plain[0] = weight, 0.0
-        return rows, wishes
+        return rows, desired
 
     def _level_rows(self, block: Block) -> tuple[Array, Array]:
         """The same from the rows that levels have."""
         self.tick.qp()
         tasks, span = self.tick.task_rows(), block.span
         counts = (self.tick.weight[span] > 0.0) & (tasks.factor[span] > 0.0)
-        return np.where(counts[:, None], tasks.J[span], 0.0), np.where(counts, tasks.wish[span], 0.0)
+        return np.where(counts[:, None], tasks.J[span], 0.0), np.where(counts, tasks.desired[span], 0.0)
 
 
 def past_of(data: bytes, context: Context) -> Past:

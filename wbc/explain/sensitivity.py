@@ -10,7 +10,7 @@ import pinocchio as pin
 from wbc import validation
 from wbc.errors import SolverError
 from wbc.explain.past import Frozen, Past
-from wbc.qp.problem import QP, Solution
+from wbc.qp.problem import QP, QPSolution
 from wbc.qp.relax import Relaxed
 from wbc.qp.sensitivity import Sensitivity
 from wbc.stack.layout import Block, Slot
@@ -48,7 +48,7 @@ def _of_one(past: Past, answer: Relaxed, moves: Moves, count: int) -> Array:
     """Of one level, or of the first."""
     wide, variables = past.qp.with_slacks(), past.layout.variables
     n, size = wide.n, wide.lower.size
-    sensitivity = Sensitivity(wide, Solution(answer.x, answer.multipliers, "solved"))
+    sensitivity = Sensitivity(wide, QPSolution(answer.x, answer.multipliers, "solved"))
     upper = np.where(answer.multipliers > 0.0, 1.0, 0.0)
     force, offset = np.zeros((n, count)), np.zeros((size, count))
     for k in range(count):

@@ -103,7 +103,7 @@ def _files(snapshot: Snapshot, solver_source: bool | str | os.PathLike[str]) -> 
     else:
         solver = from_source(None if solver_source is True else solver_source)
     sources = snapshot.sources
-    memory = bytes_of_tick(sources["tick.h"], sources["stack.h"])
+    memory = bytes_of_tick(sources["tick.h"], sources["stack.h"], snapshot.layout)
     texts = {f"tick/{name}": text for name, text in sources.items()}
     texts |= {name: (resources.files("wbc.export") / "c" / name).read_text() for name in _SAME}
     texts |= {"wbc_tick.h": header(snapshot), "values.h": snapshot.values, "names.h": _names(sources["rows.c"])}

@@ -7,8 +7,8 @@ from importlib import resources
 
 from wbc.export.memory import bytes_of_tick
 from wbc.export.snapshot import Snapshot, numbers
-from wbc.stack.codegen import LEVEL_NUMBERS
 from wbc.stack.layout import Block, Slot
+from wbc.stack.memory import report_fields, sizes
 
 _KINDS = {
     "pose": "rotation matrix by columns (9), then position (3)",
@@ -26,7 +26,7 @@ def header(snapshot: Snapshot) -> str:
         "SIZES": _sizes(snapshot),
         "PLACES": _places(snapshot),
         "ROBOT": _robot(snapshot),
-        "LEVELS": _levels(snapshot),
+        "RESULT": _result(snapshot),
     }
     for name, text in parts.items():
         template = template.replace(f"@{name}@", text)
@@ -48,26 +48,29 @@ def _sizes(snapshot: Snapshot) -> str:
         "ROWS": (layout.general_rows, "rows of constraints other than bounds on velocities"),
         "MARGINS": (layout.margin_rows, "rows of constraints that have a margin"),
         "BOUND_BLOCKS": (layout.bound_blocks, "constraints that are bounds on velocities"),
-        "BYTES": (bytes_of_tick(sources["tick.h"], sources["stack.h"]), "memory of a controller, or a little more"),
+        "BYTES": (
+            bytes_of_tick(sources["tick.h"], sources["stack.h"], layout),
+            "memory of a controller, or a little more",
+        ),
         "DT": (repr(snapshot.stack.dt), f"time between commands [s]; wbc_set_dt takes {low:g} to {high:g}"),
     }
     return "\n".join(f"#define WBC_{name} {value} /* {text} */" for name, (value, text) in named.items())
 
 
-def _levels(snapshot: Snapshot) -> str:
-    """What a result has more where there are strict levels."""
-    layout = snapshot.layout
-    if not layout.cascade:
-        return ""
-    fields = {
-        "missed[WBC_TASK_ROWS + 1]": "rate of every task row less the rate that it asks for",
-        "share[WBC_TASK_ROWS + 1]": "part of every task row that the levels before left free, 0 to 1",
-        "dropped[WBC_ROWS + 1]": "of equality rows that depend on others, how far they are off; else -1",
-        "pushes[WBC_VARIABLES + WBC_ROWS + 1]": "level, by its place, that a row pushes against first, -1: none",
-        f"levels[{len(layout.levels) + 1}][{LEVEL_NUMBERS}]": "rank, free directions, least singular value, damping, "
-        "disturbance, stationarity, complementarity, error bound, solved; last the least velocity",
-    }
-    return "".join(f"    double {name}; /* {text} */\n" for name, text in fields.items())
+#: Sizes in the public header
+_MACROS = {"NV": "WBC_VARIABLES", "MT": "WBC_TASK_ROWS", "MC": "WBC_ROWS", "MH": "WBC_MARGINS"}
+
+
+def _result(snapshot: Snapshot) -> str:
+    """Members of ``wbc_result``."""
+    known = sizes(snapshot.layout)
+    numbers = {name: str(known[name]) for name in ("LEVELS", "LEVEL_NUMBERS")}
+
+    def macro(size: str) -> str:
+        return re.sub(r"[A-Z_]{2,}", lambda word: (_MACROS | numbers)[word[0]], size)
+
+    fields = report_fields(snapshot.layout)
+    return "\n".join(f"    {f.declaration(flat=False, macro=macro)} /* {f.text} */" for f in fields)
 
 
 def _robot(snapshot: Snapshot) -> str:

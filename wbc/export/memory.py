@@ -1,8 +1,11 @@
-"""How much memory a tick needs, from the text of its structures: known without a compiler."""
+"""How much memory a tick needs, from the table of its fields and the text of the rest: known without a compiler."""
 
 from __future__ import annotations
 
 import re
+
+from wbc.stack.layout import Layout
+from wbc.stack.memory import Memory
 
 #: Bytes of what the fields are, a pointer counted as 8; those of DAQP are bounds, which the compiler checks
 _BYTES = {"double": 8, "long long": 8, "int": 4, "DAQPWorkspace": 1024, "DAQPProblem": 256, "DAQPSettings": 512}
@@ -12,18 +15,19 @@ _BLOCK = re.compile(r"^#if (LEVELS|SOFT_ROWS) > 0$(.*?)^#endif$", re.DOTALL | re
 _FIELD = re.compile(r"\s*(\w+)\s*(?:\[(.+)\])?\s*$", re.DOTALL)
 
 
-def bytes_of_tick(tick: str, stack: str) -> int:
+def bytes_of_tick(tick: str, stack: str, layout: Layout) -> int:
     """Bound on the size of ``wbc_tick``.
 
     Args:
-        tick: text of ``tick.h``. stack: text of ``stack.h``.
+        tick: text of ``tick.h``. stack: text of ``stack.h``. layout: that of both.
     """
     known = dict(_DEFINE.findall(stack + tick))
-    sizes = dict(_BYTES)
+    sizes, known_fields = dict(_BYTES), 8 * Memory(layout).size
+    tick = tick.replace("WBC_BUFFERS", "")
     tick = _BLOCK.sub(lambda block: block[2] if int(known[block[1]]) > 0 else "", tick)
     for body, name in _STRUCT.findall(re.sub(r"/\*.*?\*/", "", tick, flags=re.DOTALL)):
         sizes[name] = sum(_bytes(declaration, sizes, known) for declaration in body.split(";") if declaration.strip())
-    return sizes["wbc_tick"] // 64 * 64 + 64
+    return (sizes["wbc_tick"] + known_fields) // 64 * 64 + 64
 
 
 def _bytes(declaration: str, sizes: dict[str, int], known: dict[str, str]) -> int:

@@ -10,7 +10,7 @@ import pinocchio as pin
 
 from wbc.errors import InfeasibleError, RangeError
 from wbc.ik.engine import Engine
-from wbc.ik.search import FOUND, Found, Query
+from wbc.ik.search import FOUND, Query, SearchResult
 from wbc.ik.solution import Ending, Solution
 from wbc.tasks import Damping, Momentum
 from wbc.validation import Array
@@ -74,7 +74,7 @@ class Gathering:
         #: degrees of freedom of which full turns leave all links where they are, and their coordinates
         self._turning = np.flatnonzero((robot.position_index >= 0) & np.array(turning))
         self._coordinates = robot.position_index[self._turning]
-        self.found: list[tuple[Array, Found]] = []
+        self.found: list[tuple[Array, SearchResult]] = []
         self.hits: list[float] = []
         self.nearest: tuple[float, Array] = np.inf, first
 

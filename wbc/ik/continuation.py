@@ -28,7 +28,7 @@ LOOKS = 100
 
 
 @dataclass(frozen=True, eq=False)
-class Branch:
+class PathBranch:
     """Answer of :meth:`wbc.InverseKinematics.along`.
 
     Attributes:
@@ -48,7 +48,7 @@ class Branch:
 
 def branch(
     engine: Engine, aim: Callable[[float], None], s: Array, first: Array, tolerance: float, smooth: bool
-) -> Branch:
+) -> PathBranch:
     """The branch at coordinates, from a configuration at which the search of the first one begins; ``smooth``: targets
     go straight from one coordinate to the next, and no step is too long.
     """
@@ -58,7 +58,7 @@ def branch(
     for before, here in itertools.pairwise(s.tolist()):
         q.append(tracker.go(before, here, q[-1]))
         steps.append(tracker.look(q[-1]))
-    return Branch(s, np.array(q), tuple(steps), tracker.samples, tracker.moved)
+    return PathBranch(s, np.array(q), tuple(steps), tracker.samples, tracker.moved)
 
 
 class Tracker:

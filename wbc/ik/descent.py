@@ -11,12 +11,12 @@ import pinocchio as pin
 
 from wbc.controller.tick.buffers import Assembly
 from wbc.controller.tick.solved import SolvedTick
-from wbc.ik.search import EXHAUSTED, FOUND, OUT_OF_TIME, REFUSED, Found, Query
+from wbc.ik.search import EXHAUSTED, FOUND, OUT_OF_TIME, REFUSED, Query, SearchResult
 from wbc.qp.problem import QP
 from wbc.stack.codegen import row_units
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Layout
-from wbc.stack.memory import ReportLayout
+from wbc.stack.memory import Memory
 from wbc.validation import Array
 
 #: As in ``native/converge.h``
@@ -31,18 +31,18 @@ class Search:
         self._assembly, self._sense = assembly, sense
         self._tick = SolvedTick(assembly, stack, layout, "daqp")
         self._model, self._rows = stack.robot.model, layout.task_rows
-        self._places = ReportLayout(layout)
+        self._places = Memory(layout)
         self._dofs = layout.dof_scales(stack)
         self._units = np.concatenate([self._dofs, np.array(row_units(stack, layout))])
         self._best, self._cost, self._ticks = assembly.q.copy(), np.inf, 0
 
     @np.errstate(over="ignore", invalid="ignore")
-    def run(self, query: Query, seconds: float) -> Found:
+    def run(self, query: Query, seconds: float) -> SearchResult:
         """Search from the tick's q, where the answer then is, for some seconds."""
         begin, tick = perf_counter(), self._tick
         self._cost, self._ticks, descents = np.inf, 0, 0
         if tick.check():
-            return Found(REFUSED, 0, 0, perf_counter() - begin, np.inf)
+            return SearchResult(REFUSED, 0, 0, perf_counter() - begin, np.inf)
         first, weight = tick.q.copy(), tick.weight.copy()
         self._best, ending = first, EXHAUSTED
         tick.weight[:] = query.seeking
@@ -58,12 +58,12 @@ class Search:
                 break
         if ending != FOUND and self._cost < np.inf:
             ending = self._settle(query, ending, begin + seconds)
-        if ending == FOUND and query.wishes:
+        if ending == FOUND and query.secondary:
             ending = self._settle(query, ending, begin + seconds)
         self._assembly.plain[0] = 0.0
         tick.q[:], tick.weight[:] = self._best, weight
         tick.reset()
-        return Found(ending, self._ticks, descents, perf_counter() - begin, self._cost)
+        return SearchResult(ending, self._ticks, descents, perf_counter() - begin, self._cost)
 
     def _descend(self, query: Query, end: float) -> int:
         least, idle = np.inf, 0
@@ -91,8 +91,8 @@ class Search:
         return EXHAUSTED
 
     def _corrected(self, query: Query, found: bool, end: float) -> tuple[float, bool]:
-        """Cost of the goals or, where they were found, of the wishes, after ticks that bring the goals back; and
-        whether the goals are met.
+        """Cost of the goals or, where they were found, of the secondary tasks, after ticks that bring the goals back;
+        and whether the goals are met.
         """
         self._assembly.plain[0] = 1.0
         self._tick.weight[:] = query.seeking
@@ -104,7 +104,7 @@ class Search:
                 break
             cost, met = self._squares(query, share=CLOSELY if found else 1.0)
             if self._may_rest(qp, query.room) and (met or not found):
-                return (self._squares(query, wishes=True)[0] if found else cost), met
+                return (self._squares(query, secondary=True)[0] if found else cost), met
             self._step(qp, 0.0, SHORT_STRIDE)
             self._move_on()
         return np.inf, False
@@ -146,11 +146,11 @@ class Search:
         self._ticks += 1
         return self._assembly.qp()
 
-    def _squares(self, query: Query, *, wishes: bool = False, share: float = 1.0) -> tuple[float, bool]:
-        """Weighted square of the errors of goals or wishes, and whether all are within a share of their tolerance."""
-        weight = query.settling if wishes else query.seeking
+    def _squares(self, query: Query, *, secondary: bool = False, share: float = 1.0) -> tuple[float, bool]:
+        """Weighted square of the errors of goals or secondary tasks; whether all are within a share of tolerance."""
+        weight = query.settling if secondary else query.seeking
         error = self._tick.report[self._places["error"]]
-        those = ((query.tolerance < 0.0) == wishes) & (weight != 0.0)
+        those = ((query.tolerance < 0.0) == secondary) & (weight != 0.0)
         size = np.abs(error[those])
         return float(weight[those] @ size**2), bool((size <= share * query.tolerance[those]).all())
 

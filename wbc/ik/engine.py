@@ -16,7 +16,7 @@ from wbc.controller.tick.buffers import Assembly
 from wbc.controller.tick.native import NativeTick
 from wbc.controller.tick.solved import SolvedTick
 from wbc.ik.descent import Search
-from wbc.ik.search import FOUND, Found, NativeSearch, Query
+from wbc.ik.search import FOUND, NativeSearch, Query, SearchResult
 from wbc.ik.solution import Ending
 from wbc.ik.starts import Starts
 from wbc.ik.timeless import FIRST, TICK, chosen_goals, goal_rows, hasten, searching, timeless
@@ -65,7 +65,7 @@ class Engine:
     """A timeless stack with the memory of its tick; see :class:`wbc.InverseKinematics`.
 
     Attributes:
-        goals: names of the tasks to be met. rows: 1 for their task rows, 0 for those of wishes.
+        goals: names of the tasks to be met. rows: 1 for their task rows, 0 for those of secondary tasks.
         stack: the items without time. controller: theirs. core: what that is inside, whose tick is :attr:`tick`.
     """
 
@@ -107,7 +107,7 @@ class Engine:
         self.tick.q[:] = self.within_limits(q)
         return self.tick.q.copy()
 
-    def run(self, first: Array, query: Query, seconds: float) -> Found:
+    def run(self, first: Array, query: Query, seconds: float) -> SearchResult:
         """Search from a configuration for some seconds; the answer is in the tick's q."""
         self.tick.q[:], self.tick.v_last[:] = first, 0.0
         return self.search.run(query, seconds)
@@ -138,16 +138,16 @@ class Engine:
             if len(self._queries) > _KEPT:
                 self._queries.clear()
             rows = goal_rows(self.controller, goals)
-            aims, wishes = weight * rows, weight * (1.0 - self.rows)
-            heaviest = float((wishes / self.core.row_costs).max(initial=0.0))
+            aims, secondary = weight * rows, weight * (1.0 - self.rows)
+            heaviest = float((secondary / self.core.row_costs).max(initial=0.0))
             self._queries[key] = Query(
                 starts=self.random(restarts, seed),
                 chosen=self.starts.chosen,
                 tolerance=np.where(rows > 0.0, tolerance * self._units, -1.0),
                 seeking=aims,
-                settling=aims * max(1.0, FIRST * heaviest) + wishes,
+                settling=aims * max(1.0, FIRST * heaviest) + secondary,
                 room=ROOM,
-                wishes=heaviest > 0.0,
+                secondary=heaviest > 0.0,
             )
         return self._queries[key]
 
@@ -187,7 +187,7 @@ class Engine:
         return qp
 
 
-def ending(found: Found) -> Ending:
+def ending(found: SearchResult) -> Ending:
     """How a search ended, in words."""
     if found.ending == FOUND:
         return Ending.SOLVED

@@ -16,7 +16,7 @@ from wbc.controller.handles import Handles
 from wbc.controller.tick.native import NativeTick
 from wbc.errors import RangeError, ShapeError
 from wbc.ik.branches import Branches, branches
-from wbc.ik.continuation import Branch, branch
+from wbc.ik.continuation import PathBranch, branch
 from wbc.ik.engine import Engine, ending
 from wbc.ik.moving_targets import MovingTargets
 from wbc.ik.search import EXHAUSTED, FOUND, NativeSearch, search_many
@@ -40,7 +40,7 @@ class InverseKinematics(Handles):
 
     A search makes Newton steps on the rows of the controller, with gains of one step, no limits of speed, and a damping
     that falls with the error, from q0 and then from random configurations, until the goals are met and the constraints
-    hold. Then the wishes (all other tasks) are followed as far as they cost the goals nothing. docs/ik.md
+    hold. Then the secondary tasks (all others) are followed as far as they cost the goals nothing. docs/ik.md
 
     Attributes:
         stack: the same items without time.
@@ -167,15 +167,15 @@ class InverseKinematics(Handles):
         q0: Any,
         *,
         tolerance: float = 1e-8,
-    ) -> Branch:
+    ) -> PathBranch:
         """The branch of configurations over targets that change with a path coordinate.
 
             q(s_0) = where a descent from q0 ends,    q(s + ds) = where one from q(s) + (dq/ds) ds ends,
 
-        and the wishes are at rest. ds goes to the next s, but no farther than a hundredth of the whole where a target
-        is a function. It is halved where the descent fails or a joint moves by more than 0.02 (rad, or characteristic
-        lengths), and doubled again where all move by less than a quarter of that. What is still so after 24 halvings is
-        a jump, or the end of what can be reached.
+        and the secondary tasks are at rest. ds goes to the next s, but no farther than a hundredth of the whole where a
+        target is a function. It is halved where the descent fails or a joint moves by more than 0.02 (rad, or
+        characteristic lengths), and doubled again where all move by less than a quarter of that. What is still so after
+        24 halvings is a jump, or the end of what can be reached.
 
         Args:
             targets: name of a task -> function of s that returns its ``target``, or a sequence with one for each entry
@@ -219,12 +219,12 @@ class InverseKinematics(Handles):
         """The distinct configurations that meet the goals, as one descent from each of many configurations finds them.
 
         Two are distinct where a joint differs by more than 0.01 (rad, or characteristic lengths), full turns not
-        counted; of those that differ by full turns the one nearest to q0 within the limits is given. With wishes, a
-        branch is a configuration where they are at rest: the best one of its neighbourhood.
+        counted; of those that differ by full turns the one nearest to q0 within the limits is given. With secondary
+        tasks, a branch is a configuration where they are at rest: the best one of its neighbourhood.
 
         Answers are points only where tasks, holds and couplings leave no direction free. A redundant arm with a pose
-        alone has curves of answers, of which any list would be arbitrary: such a stack is refused. With a wish that
-        decides, as a Posture of small weight, the points are those of the curves where it is at rest.
+        alone has curves of answers, of which any list would be arbitrary: such a stack is refused. With a secondary
+        task that decides, as a Posture of small weight, the points are those of the curves where it is at rest.
 
         Args:
             q0: where the first descent begins [nq], and what distances are counted from.

@@ -24,11 +24,11 @@ class Query:
     Attributes:
         starts: configurations to start again from [restarts, nq].
         chosen: 1 where a restart takes a number of ``starts``, 0 where the first configuration's stays [nq].
-        tolerance: of each task row in its unit, negative for wishes [task rows].
+        tolerance: of each task row in its unit, negative for secondary tasks [task rows].
         seeking: weights of the task rows while the goals are sought [task rows].
-        settling: weights while wishes are followed [task rows].
+        settling: weights while secondary tasks are followed [task rows].
         room: how far constraints may be off at the answer, in row units.
-        wishes: there are wishes to follow once the goals are met.
+        secondary: there are secondary tasks to follow once the goals are met.
     """
 
     starts: Array
@@ -37,11 +37,11 @@ class Query:
     seeking: Array
     settling: Array
     room: float
-    wishes: bool
+    secondary: bool
 
 
 @dataclass(frozen=True)
-class Found:
+class SearchResult:
     """How a search ended: :data:`FOUND` and so on, ticks, descents that came to their end, time [s], and the weighted
     square of the goals' errors (infinite where no configuration kept the constraints).
     """
@@ -57,14 +57,14 @@ class CQuery(ctypes.Structure):
     """``wbc_search`` of ``native/converge.h``."""
 
     _fields_ = [(name, ctypes.c_void_p) for name in ("starts", "chosen", "tolerance", "seeking", "settling")] + [
-        (name, ctypes.c_double) for name in ("restarts", "seconds", "room", "wishes")
+        (name, ctypes.c_double) for name in ("restarts", "seconds", "room", "secondary")
     ]
 
     @classmethod
     def of(cls, query: Query, seconds: float) -> CQuery:
         """Points into the arrays of the query, which must outlive it; the search ends after some seconds."""
         arrays = (query.starts, query.chosen, query.tolerance, query.seeking, query.settling)
-        numbers = (float(len(query.starts)), seconds, query.room, float(query.wishes))
+        numbers = (float(len(query.starts)), seconds, query.room, float(query.secondary))
         return cls(*(array.ctypes.data for array in arrays), *numbers)
 
 
@@ -74,9 +74,11 @@ class CFound(ctypes.Structure):
     _fields_ = [(name, ctypes.c_double) for name in ("ending", "ticks", "descents", "seconds", "cost")]
 
     @property
-    def found(self) -> Found:
+    def found(self) -> SearchResult:
         """A copy."""
-        return Found(int(self.ending), int(self.ticks), int(self.descents), float(self.seconds), float(self.cost))
+        return SearchResult(
+            int(self.ending), int(self.ticks), int(self.descents), float(self.seconds), float(self.cost)
+        )
 
 
 class NativeSearch:
@@ -87,7 +89,7 @@ class NativeSearch:
         self._found = CFound()
         self._query: Query | None = None
 
-    def run(self, query: Query, seconds: float) -> Found:
+    def run(self, query: Query, seconds: float) -> SearchResult:
         """Search for some seconds; keeps the interpreter lock, as a tick does."""
         if query is not self._query:
             self._query, self._given = query, CQuery.of(query, seconds)
@@ -104,7 +106,7 @@ class NativeSearch:
 
 def search_many(
     ticks: Sequence[NativeTick], query: Query, seconds: float, first: Array, parameters: Array
-) -> tuple[Array, list[Found]]:
+) -> tuple[Array, list[SearchResult]]:
     """Search for some seconds from each configuration [count, nq] with its run-time values [count, parameters].
 
     In C, with the interpreter lock released. The ticks, one a thread, have the same switches. Answers do not depend on

@@ -23,7 +23,7 @@ TICK = 1.0
 #: What joints may move in a tick at most [rad, or characteristic lengths]; descents take shorter strides
 LONGEST = 1.0
 
-#: Goals outweigh wishes by this once they are met, so that the wishes cost them nothing
+#: Goals outweigh secondary tasks by this once they are met, so that these cost them nothing
 FIRST = 1e8
 
 
@@ -39,7 +39,7 @@ def timeless(stack: Declaration) -> Stack:
             raise RangeError(f"stack.{entry.name}", entry.price, reason)
     levels = stack.levels
     if len(levels) > 1 or any(e.level > 0 and not e.is_task for e in stack.entries):
-        reason = "inverse kinematics takes one level: goals come before wishes there; name them with goals="
+        reason = "inverse kinematics takes one level: goals come before secondary tasks there; name them with goals="
         raise LevelError("levels", levels, reason)
     scales = np.array([stack.length if u == "m" else 1.0 for u in stack.robot.dof_units])
     robot = stack.robot.with_limits(velocity=LONGEST / TICK * scales, acceleration=np.inf)
@@ -99,7 +99,7 @@ def chosen_goals(stack: Declaration, goals: Iterable[str] | None) -> tuple[str, 
 
 
 def goal_rows(controller: Controller, goals: Iterable[str]) -> Array:
-    """1 for the task rows of goals, 0 for those of wishes."""
+    """1 for the task rows of goals, 0 for those of secondary tasks."""
     out = np.zeros(core_of(controller).layout.task_rows)
     for name in goals:
         out[core_of(controller).layout.blocks[name].span] = 1.0

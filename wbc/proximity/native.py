@@ -21,7 +21,7 @@ from wbc.proximity.corners import NEAR, corners_of
 from wbc.proximity.rows import PairRows
 from wbc.proximity.scene import TIE, TRUST, PairScene
 from wbc.shapes import FAR, Box, Capsule, Convex, Cylinder, HalfSpace, Shape, Sphere
-from wbc.symbolic.joint_steps import Step, joint_steps, place
+from wbc.symbolic.joint_steps import JointStep, joint_steps, place
 from wbc.validation import Array
 
 log = logging.getLogger("wbc")
@@ -160,7 +160,7 @@ def _kinematics(scene: PairScene) -> dict[str, Array]:
     """Steps of the joints that bodies stand on, and of those below them."""
     model = scene.robot.model
     needed = {int(j) for joint in scene.joints for j in model.supports[joint]}
-    steps: list[Step] = []
+    steps: list[JointStep] = []
     begin, parent = np.zeros(model.njoints + 1, dtype=np.int32), np.full(model.njoints, -1, dtype=np.int32)
     places, poses = np.zeros((model.njoints, 12)), np.zeros((model.njoints + 1, 12))
     poses[:] = place(pin.SE3.Identity())

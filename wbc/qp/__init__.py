@@ -3,7 +3,7 @@
 from wbc.qp.certificate import Certificate, certify
 from wbc.qp.equalities import Equalities, independent
 from wbc.qp.polish import Polished, polish
-from wbc.qp.problem import QP, Solution
+from wbc.qp.problem import QP, QPSolution
 from wbc.qp.solvers import available_solvers, make_solver
 from wbc.qp.solvers.backend import Backend
 
@@ -13,7 +13,7 @@ __all__ = [
     "Certificate",
     "Equalities",
     "Polished",
-    "Solution",
+    "QPSolution",
     "available_solvers",
     "certify",
     "independent",

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wbc.qp.factor import ROUNDOFF, WIDE_ROUNDOFF, ActiveRows, Factor, Wide, sides
-from wbc.qp.problem import QP, Solution
+from wbc.qp.problem import QP, QPSolution
 from wbc.validation import Array
 
 _CORRECTIONS = 4
@@ -48,7 +48,7 @@ class Certificate:
     error_bound: float
 
 
-def certify(qp: QP, solution: Solution, count: int | None = None) -> Certificate:
+def certify(qp: QP, solution: QPSolution, count: int | None = None) -> Certificate:
     """The certificate of ``solution.x`` and ``solution.multipliers``; the flag is not read.
 
     The bound is on the errors of the first ``count`` variables; None: of all.
@@ -70,7 +70,7 @@ def certify(qp: QP, solution: Solution, count: int | None = None) -> Certificate
     )
 
 
-def error_bound(qp: QP, solution: Solution, count: int | None = None) -> float:
+def error_bound(qp: QP, solution: QPSolution, count: int | None = None) -> float:
     """The bound on max |x_j - x*_j| over the first ``count`` variables, or inf."""
     factor = Factor(qp)
     if not factor.definite:

@@ -27,7 +27,7 @@ _PUSHING = 1e-6
 _Mask = NDArray[np.bool_]
 
 
-class Side(NamedTuple):
+class RowBound(NamedTuple):
     """One side of a row of [1; A]."""
 
     row: int
@@ -45,7 +45,7 @@ class Conflict:
         within: the same if only the sides of this conflict have to hold.
     """
 
-    sides: tuple[Side, ...]
+    sides: tuple[RowBound, ...]
     alone: Array
     within: Array
 
@@ -70,7 +70,7 @@ def diagnose(qp: QP, limit: int = 4) -> Infeasibility:
     Simple bounds must leave an interval each. Rows are compared as they are: give them in units in which violations
     compare. H and g are not read.
     """
-    search = _Search(qp)
+    search = _ConflictSearch(qp)
     sides = np.isfinite(qp.lower), np.isfinite(qp.upper)
     whole = search.least_slack(sides, np.arange(search.n, search.size))
     if whole is None:
@@ -94,7 +94,7 @@ def diagnose(qp: QP, limit: int = 4) -> Infeasibility:
     return Infeasibility(np.abs(whole[0]), tuple(found))
 
 
-class _Search:
+class _ConflictSearch:
     """Feasibility of parts of one problem."""
 
     def __init__(self, qp: QP) -> None:
@@ -113,14 +113,14 @@ class _Search:
             np.where(sides[1], self.qp.upper + room, np.inf),
         )
 
-    def only(self, members: Iterable[Side]) -> tuple[_Mask, _Mask]:
+    def only(self, members: Iterable[RowBound]) -> tuple[_Mask, _Mask]:
         """These sides on and no other."""
         on = np.zeros(self.size, dtype=np.bool_), np.zeros(self.size, dtype=np.bool_)
         for side in members:
             on[int(side.upper)][side.row] = True
         return on
 
-    def contradictory(self, members: list[Side]) -> bool:
+    def contradictory(self, members: list[RowBound]) -> bool:
         """No x meets all of these sides."""
         lower, upper = self.bounds(self.only(members), ROOM)
         if (self.dead & ((lower > 0.0) | (upper < 0.0))).any():
@@ -163,13 +163,13 @@ class _Search:
         slack[soft] = best.x[n:]
         return slack, best.multipliers[n + count :] / scale
 
-    def irreducible(self, sides: tuple[_Mask, _Mask], multipliers: Array) -> tuple[Side, ...]:
+    def irreducible(self, sides: tuple[_Mask, _Mask], multipliers: Array) -> tuple[RowBound, ...]:
         """An irreducible conflict; sides of small multipliers are tried first for deletion."""
         force = np.abs(multipliers) * self.norms
         pushing = force > _PUSHING * force.max(initial=0.0)
-        members = [Side(int(i), bool(multipliers[i] > 0.0)) for i in np.flatnonzero(pushing)]
+        members = [RowBound(int(i), bool(multipliers[i] > 0.0)) for i in np.flatnonzero(pushing)]
         if not self.contradictory(members):
-            members = [Side(int(i), bool(u)) for u in (0, 1) for i in np.flatnonzero(sides[u])]
+            members = [RowBound(int(i), bool(u)) for u in (0, 1) for i in np.flatnonzero(sides[u])]
             if not self.contradictory(members):
                 return ()
         for side in sorted(members, key=lambda side: force[side.row]):

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from wbc.qp.problem import QP, Solution
+from wbc.qp.problem import QP, QPSolution
 from wbc.validation import Array
 
 Index = NDArray[np.intp]
@@ -152,7 +152,7 @@ def orthonormal(qp: QP, equalities: Equalities) -> QP:
     return out
 
 
-def restore(qp: QP, equalities: Equalities, solution: Solution) -> Solution:
+def restore(qp: QP, equalities: Equalities, solution: QPSolution) -> QPSolution:
     """The solution of :func:`orthonormal` in terms of the rows of ``qp``; dropped rows get multiplier zero."""
     if equalities.kept.size + equalities.dropped.size == 0 or not solution.solved:
         return solution
@@ -171,4 +171,4 @@ def restore(qp: QP, equalities: Equalities, solution: Solution) -> Solution:
     fixed = np.flatnonzero(qp.lower[:n] == qp.upper[:n])
     if fixed.size:  # the basis has zeros in fixed columns: their multipliers take up the rest
         lam[fixed] = -(qp.H[fixed] @ solution.x + qp.g[fixed] + qp.A[:, fixed].T @ lam[n:])
-    return Solution(solution.x, lam, solution.flag, solution.iterations)
+    return QPSolution(solution.x, lam, solution.flag, solution.iterations)

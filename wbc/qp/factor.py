@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wbc.qp.problem import QP, Solution
+from wbc.qp.problem import QP, QPSolution
 from wbc.validation import Array
 
 Wide = NDArray[np.longdouble]
@@ -64,7 +64,7 @@ class Factor:
         return np.concatenate((wide, self.wide_A @ wide))
 
 
-def sides(qp: QP, factor: Factor, solution: Solution) -> NDArray[np.int8]:
+def sides(qp: QP, factor: Factor, solution: QPSolution) -> NDArray[np.int8]:
     """The guessed active set: +1 at the upper bound, -1 at the lower, +2 equality, 0 inactive [n + m].
 
     Seen through the factor, dropping the multiplier of row i moves y by |lam_i| |M_i|, and moving the

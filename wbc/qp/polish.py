@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wbc.qp.factor import ActiveRows, Factor, sides
-from wbc.qp.problem import QP, Solution
+from wbc.qp.problem import QP, QPSolution
 from wbc.validation import Array
 
 #: Corrections of the active set before giving up, and steps of iterative refinement on each set
@@ -37,12 +37,12 @@ class Polished:
         rounds: active sets tried.
     """
 
-    solution: Solution
+    solution: QPSolution
     exact: bool
     rounds: int
 
 
-def polish(qp: QP, solution: Solution, rounds: int = ROUNDS) -> Polished:
+def polish(qp: QP, solution: QPSolution, rounds: int = ROUNDS) -> Polished:
     """Polish ``solution`` (only its x and multipliers are read).
 
     Each round solves the problem on the present set and then makes one change: if multipliers have the
@@ -54,10 +54,10 @@ def polish(qp: QP, solution: Solution, rounds: int = ROUNDS) -> Polished:
     """
     factor = Factor(qp)
     if not factor.definite:
-        return Polished(Solution(solution.x, solution.multipliers, "failed", 0), False, 0)
+        return Polished(QPSolution(solution.x, solution.multipliers, "failed", 0), False, 0)
     side = sides(qp, factor, solution)
     norms = np.where(factor.norms > 0.0, factor.norms, 1.0)
-    best, best_error = Solution(solution.x, solution.multipliers, "failed", 0), np.inf
+    best, best_error = QPSolution(solution.x, solution.multipliers, "failed", 0), np.inf
     lam = solution.multipliers
     for count in range(1, rounds + 1):
         x, lam, rows = solve_on(qp, factor, side, lam)
@@ -65,9 +65,9 @@ def polish(qp: QP, solution: Solution, rounds: int = ROUNDS) -> Polished:
         beyond = _violations(qp, x) / norms
         error = float(max(wrong.max(initial=0.0), beyond.max(initial=0.0)))
         if error < best_error:
-            best, best_error = Solution(x, lam, "failed", count), error
+            best, best_error = QPSolution(x, lam, "failed", count), error
         if error == 0.0:
-            return Polished(Solution(x, lam, "solved", count), True, count)
+            return Polished(QPSolution(x, lam, "solved", count), True, count)
         side[rows.dependent[side[rows.dependent] != 2]] = 0
         if wrong.max(initial=0.0) > 0.0:
             side[int(wrong.argmax())] = 0

@@ -146,7 +146,7 @@ def definite(matrix: Array) -> Array:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Solution:
+class QPSolution:
     """What a solver answers; never contains NaN.
 
     Attributes:

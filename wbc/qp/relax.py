@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from wbc import validation
 from wbc.errors import BoundsError
-from wbc.qp.problem import QP, Solution
+from wbc.qp.problem import QP, QPSolution
 from wbc.qp.solvers.backend import Backend, Prepared
 from wbc.qp.solvers.daqp import Daqp
 from wbc.validation import Array
@@ -141,11 +141,11 @@ class Relaxation:
         flag = "relaxed" if last.solved else "failed"
         size = np.concatenate((np.ones(n), unit))
         x = np.clip(last.x if last.solved else v, work.lower[:n], work.upper[:n])
-        final = Solution(x, last.multipliers / size, last.flag)
+        final = QPSolution(x, last.multipliers / size, last.flag)
         self._meet(work, x)
         return self._answer(qp, final, flag, iterations, unit, (work.lower * size, work.upper * size))
 
-    def _rest(self, work: QP, v: Array) -> tuple[Solution, int]:
+    def _rest(self, work: QP, v: Array) -> tuple[QPSolution, int]:
         """The optimum over what the classes left, and the iterations; all that is held meets at v.
 
         Where nearly every joint is held, rounding may leave nothing else: then rows held as equalities get room, and
@@ -166,7 +166,7 @@ class Relaxation:
             iterations += last.iterations
         return last, iterations
 
-    def _least_violation(self, work: QP, rows: NDArray[np.intp], v: Array) -> Solution | None:
+    def _least_violation(self, work: QP, rows: NDArray[np.intp], v: Array) -> QPSolution | None:
         """(v, s) of the least |s| for ``rows``; the other rows of ``work`` are hard."""
         n, m = self.n, self.m
         free = np.full(m, np.inf)
@@ -176,7 +176,7 @@ class Relaxation:
         lower = np.concatenate((work.lower[:n], -free, work.lower[n:]))
         upper = np.concatenate((work.upper[:n], free, work.upper[n:]))
         problem = QP(H, np.zeros(n + m), lower, upper, A)
-        best: Solution | None = None
+        best: QPSolution | None = None
         iterations = 0
         for _ in range(STEPS):
             problem.g[:n] = -PROXIMAL * v
@@ -188,9 +188,9 @@ class Relaxation:
             best, v = stage, stage.x[:n]
             if change <= SETTLED:
                 break
-        return None if best is None else Solution(best.x, best.multipliers, "solved", iterations)
+        return None if best is None else QPSolution(best.x, best.multipliers, "solved", iterations)
 
-    def _freeze(self, work: QP, rows: NDArray[np.intp], stage: Solution) -> Array:
+    def _freeze(self, work: QP, rows: NDArray[np.intp], stage: QPSolution) -> Array:
         """Write the least violation of a class into the bounds of its rows, and hold what pushes against it.
 
         Returns the point at which all that is held meets: the stage's x, put exactly on the bounds that are held.
@@ -224,7 +224,7 @@ class Relaxation:
         high[close] = np.where(equal, value, np.maximum(high, value))[close]
 
     def _answer(
-        self, qp: QP, last: Solution, flag: str, iterations: int, unit: Array, ends: tuple[Array, Array]
+        self, qp: QP, last: QPSolution, flag: str, iterations: int, unit: Array, ends: tuple[Array, Array]
     ) -> Relaxed:
         x = np.clip(last.x, qp.lower[: self.n], qp.upper[: self.n])
         slack = qp.violation(x)[self.n :]

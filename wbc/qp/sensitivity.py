@@ -14,7 +14,7 @@ import numpy as np
 
 from wbc.errors import SolverError
 from wbc.qp.factor import ActiveRows, Factor, sides
-from wbc.qp.problem import QP, Solution
+from wbc.qp.problem import QP, QPSolution
 from wbc.validation import Array
 
 
@@ -28,7 +28,7 @@ class Sensitivity:
         SolverError: H is not positive definite.
     """
 
-    def __init__(self, qp: QP, solution: Solution) -> None:
+    def __init__(self, qp: QP, solution: QPSolution) -> None:
         self._factor = Factor(qp)
         if not self._factor.definite:
             raise SolverError("qp", "H", "is not positive definite, so the minimiser has no derivative")

@@ -43,15 +43,15 @@ class RecordingError(WbcError):
 
 
 @dataclass(frozen=True)
-class Parts:
+class Columns:
     """Places of the parts of a tick in its row of numbers."""
 
     slices: Mapping[str, slice]
     width: int
 
     @classmethod
-    def of(cls, sizes: Mapping[str, int]) -> Parts:
-        """Parts side by side."""
+    def of(cls, sizes: Mapping[str, int]) -> Columns:
+        """Columns side by side."""
         ends = np.cumsum([0, *sizes.values()]).tolist()
         return cls({n: slice(a, b) for n, a, b in zip(sizes, ends, ends[1:], strict=False)}, ends[-1])
 
@@ -139,7 +139,7 @@ class Recording:
             raise RecordingError(
                 "recording", self.about["format"], f"is of another format, this version reads {FORMAT}"
             )
-        self.parts = Parts.of(self.about["sizes"])
+        self.parts = Columns.of(self.about["sizes"])
 
     @property
     def complete(self) -> bool:

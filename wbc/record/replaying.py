@@ -23,7 +23,7 @@ from wbc.validation import Array
 
 
 @dataclass(frozen=True, eq=False)
-class Tick:
+class ReplayedTick:
     """A recorded tick and its replay.
 
     Attributes:
@@ -62,8 +62,8 @@ class Replay:
 
     ticks: int
     differing: int
-    first: Tick | None
-    worst: Tick | None
+    first: ReplayedTick | None
+    worst: ReplayedTick | None
     backend: str
     complete: bool
     notes: tuple[str, ...]
@@ -127,27 +127,27 @@ def compiled(
     """A controller for the ticks of a recording; arguments and errors as of :func:`replay`."""
     from wbc import __version__
 
-    told = recording.about
-    if told["wbc"] != __version__:
-        raise RecordingError("recording", told["wbc"], f"was made by another version of wbc, this is {__version__}")
-    chosen = told["backend"] if backend is None else validation.one_of("backend", backend, ("auto", "native", "vm"))
+    given = recording.about
+    if given["wbc"] != __version__:
+        raise RecordingError("recording", given["wbc"], f"was made by another version of wbc, this is {__version__}")
+    chosen = given["backend"] if backend is None else validation.one_of("backend", backend, ("auto", "native", "vm"))
     if stack is None:
         stack = _own_stack(recording, trust)
-    if declaration_key(stack) != told["declaration"]:
+    if declaration_key(stack) != given["declaration"]:
         items = [[e.name, type(e.item).__name__] for e in stack.entries]
-        reason = f"is of another stack: {told['robot']} with {told['items']}, not {stack.robot.name} with {items}"
-        raise RecordingError("recording", told["declaration"], reason)
-    controller = stack.compile(solver=told["solver"], backend=chosen)
-    conflict, chain = told["policy"]
+        reason = f"is of another stack: {given['robot']} with {given['items']}, not {stack.robot.name} with {items}"
+        raise RecordingError("recording", given["declaration"], reason)
+    controller = stack.compile(solver=given["solver"], backend=chosen)
+    conflict, chain = given["policy"]
     controller.policy = Policy(conflict, tuple(chain))
     sizes = {name: getattr(core_of(controller).tick, name).size for name in INPUTS}
-    expected = {name: told["sizes"][name] for name in INPUTS}
+    expected = {name: given["sizes"][name] for name in INPUTS}
     if sizes != expected:
         raise RecordingError("recording", expected, f"is of another layout, this version's is {sizes}")
     return controller
 
 
-def replayed(recording: Recording, controller: Controller | None = None) -> Iterator[Tick]:
+def replayed(recording: Recording, controller: Controller | None = None) -> Iterator[ReplayedTick]:
     """The ticks of a recording one by one, each with the whole step: ``print(tick.step)`` says what bound it.
 
     Args:
@@ -165,7 +165,7 @@ def replayed(recording: Recording, controller: Controller | None = None) -> Iter
                 buffer[:] = row[part]
             if row[reset]:
                 tick.reset()
-            yield Tick(number, row[v].copy(), STATUSES[int(row[flag])], core.again())
+            yield ReplayedTick(number, row[v].copy(), STATUSES[int(row[flag])], core.again())
             number += 1
 
 
@@ -186,6 +186,6 @@ def _notes(recording: Recording, controller: Controller) -> tuple[str, ...]:
     return tuple(f"{name} was {a}, is {b}" for name, (a, b) in pairs.items() if a != b)
 
 
-def _said(tick: Tick) -> str:
+def _said(tick: ReplayedTick) -> str:
     text = f"tick {tick.number}, by {tick.difference:.3g}"
     return text if tick.step.status == tick.status else f"{text}, {tick.status} then, {tick.step.status} now"

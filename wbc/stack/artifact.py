@@ -15,7 +15,7 @@ from wbc.stack import codegen
 from wbc.stack.declaration import Declaration
 from wbc.stack.key import key
 from wbc.stack.layout import Layout
-from wbc.stack.program import Program, build
+from wbc.stack.program import TickProgram, build
 
 BackendName = Literal["auto", "native", "vm"]
 
@@ -33,7 +33,7 @@ class Artifact:
 
     layout: Layout
     library: pathlib.Path | None
-    program: Program | None
+    program: TickProgram | None
     cached: bool
 
 
@@ -85,5 +85,5 @@ def _virtual(stack: Declaration, layout: Layout, version: str) -> Artifact:
 
     folder, cached = cache.fetch(key(stack, version, "vm"), fill)
     saved = {path.stem: ca.Function.load(str(path)) for path in sorted(folder.glob("*.casadi"))}
-    functions = Program(saved["rows"], saved.get("ahead"), saved.get("bend"))
+    functions = TickProgram(saved["rows"], saved.get("ahead"), saved.get("curvature"))
     return Artifact(layout, None, functions, cached)

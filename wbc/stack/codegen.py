@@ -11,32 +11,36 @@ import numpy as np
 from wbc.shapes import FAR
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Layout
-from wbc.stack.program import Program, sparsity_rows
+from wbc.stack.memory import LEVEL_NUMBERS, structures
+from wbc.stack.program import TickProgram, sparsity_rows
 from wbc.stack.tables import (
     brakes,
-    gain_places,
+    force_scales,
+    gain_table,
     kept_rows,
     left_free,
-    margin_places,
-    pull_scales,
-    rate_places,
+    margin_table,
+    rate_table,
+    reported_slacks,
     stops,
-    told_slacks,
 )
 from wbc.symbolic.kinematics import Kinematics
 
-#: Numbers that a tick reports of each level, see ``native/tick.h``
-LEVEL_NUMBERS = 9
 #: Class of rows that have a price in the order of sacrifice: they give way at it, and before any other
 PRICED = 99
 
 
-def sources(stack: Declaration, layout: Layout, program: Program) -> dict[str, str]:
+def sources(stack: Declaration, layout: Layout, program: TickProgram) -> dict[str, str]:
     """File name -> text of everything that makes the tick of a stack."""
     native = resources.files("wbc.stack") / "native"
     written = {file.name: file.read_text() for file in native.iterdir() if file.name.endswith((".c", ".h"))}
     functions = [*program.functions.values(), motion(stack)]
-    return {"rows.c": _casadi_source(functions), "stack.h": _header(stack, layout, program, functions), **written}
+    return {
+        "rows.c": _casadi_source(functions),
+        "stack.h": _header(stack, layout, program, functions),
+        "memory.h": structures(layout),
+        **written,
+    }
 
 
 def _casadi_source(functions: list[ca.Function]) -> str:
@@ -46,13 +50,17 @@ def _casadi_source(functions: list[ca.Function]) -> str:
     return str(generator.dump())
 
 
-def _header(stack: Declaration, layout: Layout, program: Program, functions: list[ca.Function]) -> str:
+def _header(stack: Declaration, layout: Layout, program: TickProgram, functions: list[ca.Function]) -> str:
     jt, at = program.rows.sparsity_out("jt"), program.rows.sparsity_out("at")
     j_start, j_col = sparsity_rows(jt)
     a_start, a_end, a_col = program.sensed.entries(*program.balls.entries(*sparsity_rows(at)))
     orders, scales, sequence = row_orders(layout), row_units(stack, layout), bound_sequence(layout)
     dofs, units = layout.dof_scales(stack), unit_groups(stack)
-    bent = ca.Sparsity(layout.variables, layout.variables) if program.bend is None else program.bend.sparsity_out(0)
+    upper = (
+        ca.Sparsity(layout.variables, layout.variables)
+        if program.curvature is None
+        else program.curvature.sparsity_out(0)
+    )
     brake_at, brake_limit = brakes(stack, layout)
     stop_at, stop_low, stop_high = stops(stack, layout)
     lines = [
@@ -74,7 +82,7 @@ def _header(stack: Declaration, layout: Layout, program: Program, functions: lis
                 "SEGMENTS": len(program.balls.segment_rows),
                 "SENSED": len(program.sensed.blocks),
                 "FAR": FAR,
-                "NNZK": bent.nnz(),
+                "NNZK": upper.nnz(),
                 "CALM": int(stack.calm),
                 "UNITS": len(units),
                 "LAST_ORDER": max((o for o in orders if o < PRICED), default=0),
@@ -93,12 +101,12 @@ def _header(stack: Declaration, layout: Layout, program: Program, functions: lis
         _table("int", "bound_sequence", sequence),
         _table("int", "unit_start", [u[0] for u in units]),
         _table("int", "unit_size", [u[1] for u in units]),
-        _table("int", "k_row", bent.get_triplet()[0]),
-        _table("int", "k_col", bent.get_triplet()[1]),
-        _table("int", "margin_at", margin_places(layout)),
-        _table("int", "rate_at", rate_places(layout)),
-        _table("int", "gain_at", gain_places(layout)),
-        _table("double", "pull_scale", pull_scales(stack, layout, program)),
+        _table("int", "k_row", upper.get_triplet()[0]),
+        _table("int", "k_col", upper.get_triplet()[1]),
+        _table("int", "margin_at", margin_table(layout)),
+        _table("int", "rate_at", rate_table(layout)),
+        _table("int", "gain_at", gain_table(layout)),
+        _table("double", "force_scale", force_scales(stack, layout, program)),
         _table("int", "brake_at", brake_at),
         _table("double", "brake_limit", np.where(np.isfinite(brake_limit), brake_limit, 0.0)),
         _table("int", "stop_at", stop_at),
@@ -127,7 +135,7 @@ def _soft(stack: Declaration, layout: Layout) -> list[str]:
         f"#define KEPT {int(max(kept_rows(layout), default=-1) >= 0)}",
         _table("int", "kept_of", kept_rows(layout)),
         _table("int", "price_at", layout.price_at),
-        _table("double", "slack_told", told_slacks(stack, layout)),
+        _table("double", "slack_reported", reported_slacks(stack, layout)),
     ]
 
 
@@ -141,7 +149,7 @@ def _levels(stack: Declaration, layout: Layout) -> list[str]:
     return [
         f"#define LEADING {layout.leading}",
         f"#define LEVELS {len(spans)}",
-        f"#define LEVEL_NUMBERS {LEVEL_NUMBERS}",
+        f"#define LEVEL_NUMBERS {len(LEVEL_NUMBERS)}",
         f"#define LEVEL_MOST {max(most, layout.variables + layout.general_rows)}",
         f"#define SOFT_MAX {max(soft)}",
         f"#define LEFT_FREE {left_free(stack).hex()}",

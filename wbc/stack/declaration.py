@@ -267,7 +267,7 @@ def _require_soft(item: Item, field: str, value: object) -> None:
         RangeError: a task, simple bounds, or rows of the actuators or the mechanism.
     """
     if not isinstance(item, Constraint):
-        raise RangeError(field, value, "a task is a wish: it has a weight")
+        raise RangeError(field, value, "a task is never hard: it has a weight")
     if item.form == "bounds":
         raise RangeError(field, value, f"{type(item).__name__} bounds joints, and bounds never give way")
     if item.order <= Order.POSITION:

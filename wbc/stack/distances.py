@@ -19,7 +19,7 @@ from wbc.tasks.base import Constraint
 
 
 @dataclass(frozen=True, eq=False)
-class Item:
+class BallBlock:
     """The block of one ball; for each of its rows what it is and which velocities move it."""
 
     block: Block
@@ -31,7 +31,7 @@ class Item:
 class Balls:
     """All rows of a stack that are left to the loop, item by item."""
 
-    items: tuple[Item, ...] = ()
+    items: tuple[BallBlock, ...] = ()
 
     @classmethod
     def of(cls, stack: Declaration, layout: Layout) -> Balls:
@@ -48,7 +48,7 @@ class Balls:
                 tuple(k for j in chain for k in range(model.idx_vs[j], model.idx_vs[j] + model.nvs[j]))
                 for chain in moved
             ]
-            out.append(Item(block, rows, tuple(columns)))
+            out.append(BallBlock(block, rows, tuple(columns)))
         return cls(tuple(out))
 
     def __bool__(self) -> bool:

@@ -3,7 +3,7 @@
 Outputs of ``rows(q, v, p, dt)`` (MT task rows, MC general rows, NB bound blocks, MH margins):
 
     error   MT       e of every task row
-    wish    MT       -gain e - de/dt, the rate that the row asks for
+    desired    MT       -gain e - de/dt, the rate that the row asks for
     factor  MT       fading factor in [0, 1]
     jt      nv x MT  sparse, de/dq transposed: the columns are the rows of J
     at      nv x MC  sparse, general constraint rows transposed
@@ -16,8 +16,8 @@ Outputs of ``rows(q, v, p, dt)`` (MT task rows, MC general rows, NB bound blocks
 nv counts the variables of the QP here, which may be more than the velocities, see :mod:`wbc.stack.shares`.
 The tick forms H = sum w (factor J)'J + damping and g from these, so that the compiled expression stays
 small and levels have their rows. ``ahead(q, v, p, dt)`` is h(q (+) v dt) with moving
-inputs advanced by their rates. ``bend(q, v, p, dt, pull)`` is the upper triangle of sum_k pull_k d2(e_k)/dq2, the
-curvature of the errors of the first level's tasks for a weight ``pull`` on each row, as far as it comes from the
+inputs advanced by their rates. ``curvature(q, v, p, dt, force)`` is the upper triangle of sum_k pull_k d2(e_k)/dq2, the
+curvature of the errors of the first level's tasks for a weight ``force`` on each row, as far as it comes from the
 robot's links; see :mod:`wbc.symbolic.curvature`.
 
 For a compiled tick the rows of :meth:`Constraint.ball_rows` are left to the loop in ``native/balls.h``: here they have
@@ -41,7 +41,7 @@ from wbc.stack.distances import Balls, Sensed
 from wbc.stack.layout import Block, Layout, Slot
 from wbc.stack.shares import kept_direction, speeds, unlimited, widened
 from wbc.symbolic import rotations as rot
-from wbc.symbolic.curvature import Pull, curvature
+from wbc.symbolic.curvature import Force, curvature
 from wbc.symbolic.kinematics import Kinematics, Pose
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks._direction import Direction
@@ -50,7 +50,7 @@ from wbc.tasks.inputs import as_value
 
 ROWS_OUTPUTS = (
     "error",
-    "wish",
+    "desired",
     "factor",
     "jt",
     "at",
@@ -64,21 +64,21 @@ ROWS_OUTPUTS = (
 
 
 @dataclass(frozen=True, eq=False)
-class Program:
-    """The compiled-to-be functions of a stack; ``ahead`` is None where there are no margins, ``bend`` where no task
-    bends or the stack does not want it; ``balls`` and ``sensed`` are rows that are left to loops.
+class TickProgram:
+    """The compiled-to-be functions of a stack; ``ahead`` is None where there are no margins, ``curvature`` where no
+    task has any or the stack does not want it; ``balls`` and ``sensed`` are rows that are left to loops.
     """
 
     rows: ca.Function
     ahead: ca.Function | None
-    bend: ca.Function | None
+    curvature: ca.Function | None
     balls: Balls = field(default_factory=Balls)
     sensed: Sensed = field(default_factory=Sensed)
 
     @property
     def functions(self) -> dict[str, ca.Function]:
         """Those that exist, by name."""
-        every = {"rows": self.rows, "ahead": self.ahead, "bend": self.bend}
+        every = {"rows": self.rows, "ahead": self.ahead, "curvature": self.curvature}
         return {name: function for name, function in every.items() if function is not None}
 
 
@@ -89,8 +89,8 @@ class _Builder:
         self.kinematics = Kinematics(stack.robot.model)
         self.p = ca.SX.sym("p", layout.parameters)
         self.dt = ca.SX.sym("dt")
-        self.pull = ca.SX.sym("pull", layout.task_rows)
-        self.pulls: list[Pull] = []
+        self.force = ca.SX.sym("force", layout.task_rows)
+        self.forces: list[Force] = []
         self.tasks: dict[str, tuple[ca.SX, ca.SX, ca.SX, ca.SX]] = {}
 
     @cached_property
@@ -157,7 +157,7 @@ class _Builder:
         return ca.densify(expression)
 
     def task(self, block: Block) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
-        """error, wish, factor, J of a task."""
+        """error, desired, factor, J of a task."""
         item = block.entry.item
         assert isinstance(item, Task)
         robot, tracer, inputs = self.stack.robot, Tracer(self.kinematics), self.values(block)
@@ -165,12 +165,12 @@ class _Builder:
         own = item.jacobian(robot, tracer, inputs)
         jacobian = tracer.jacobian(error) if own is None else tracer.expand(ca.SX(own))
         if self.stack.calm and block.span.stop <= self.layout.leading:
-            self.pulls += tracer.pulls(ca.dot(self.pull[block.span], error))
+            self.forces += tracer.forces(ca.dot(self.force[block.span], error))
         gain = self.p[block.slots["gain"].span]
-        wish = tracer.expand(-gain * error - self.drift(block, error))
+        desired = tracer.expand(-gain * error - self.drift(block, error))
         fade = item.row_factor(robot, tracer, inputs)
         factor = ca.SX.ones(len(block.rows)) if fade is None else self.column(block, "row_factor", fade)
-        out = self.tasks[block.entry.name] = tracer.expand(error), wish, tracer.expand(factor), jacobian
+        out = self.tasks[block.entry.name] = tracer.expand(error), desired, tracer.expand(factor), jacobian
         return out
 
     def general(self, block: Block) -> tuple[Rows, ca.SX | None, ca.SX | None]:
@@ -239,7 +239,7 @@ class _Builder:
         return margin
 
 
-def build(stack: Declaration, layout: Layout, loops: bool = False) -> Program:
+def build(stack: Declaration, layout: Layout, loops: bool = False) -> TickProgram:
     """Build the functions of a stack; ``loops``: without what a compiled tick computes in loops.
 
     Raises:
@@ -283,13 +283,13 @@ def build(stack: Declaration, layout: Layout, loops: bool = False) -> Program:
         later = ca.vertcat(*[b.ahead(block) for block in layout.of_form("margins")])
         more = [ca.Function("segments", [b.kinematics.q], [segments])(b.later)] if balls else []
         ahead = checked_function("ahead", inputs, [ca.densify(later), *more], ["ahead", "segment"][: 1 + len(more)])
-    bend = None
-    bent = ca.SX(nv, nv)
-    if b.pulls:
-        bent = widened(layout, widened(layout, ca.triu(curvature(b.kinematics, b.pulls))).T).T
-    if bent.nnz():
-        bend = checked_function("bend", [*inputs, b.pull], [bent], ["bend"])
-    return Program(rows, ahead, bend, balls, sensed)
+    second = None
+    upper = ca.SX(nv, nv)
+    if b.forces:
+        upper = widened(layout, widened(layout, ca.triu(curvature(b.kinematics, b.forces))).T).T
+    if upper.nnz():
+        second = checked_function("curvature", [*inputs, b.force], [upper], ["curvature"])
+    return TickProgram(rows, ahead, second, balls, sensed)
 
 
 def shared_pattern(transposed: ca.SX) -> ca.SX:
@@ -307,7 +307,7 @@ def sparsity_rows(transposed: ca.Sparsity) -> tuple[np.ndarray, np.ndarray]:
 
 
 def checked_function(name: str, inputs: list[ca.SX], outputs: list[ca.SX], labels: list[str]) -> ca.Function:
-    """A function of (q, v, p, dt, pull), as many of them as there are inputs.
+    """A function of (q, v, p, dt, force), as many of them as there are inputs.
 
     Raises:
         ShapeError: symbols that are no inputs.
@@ -317,4 +317,4 @@ def checked_function(name: str, inputs: list[ca.SX], outputs: list[ca.SX], label
     stray = [s.name() for s in free if s.__hash__() not in known]
     if stray:
         raise ShapeError(f"stack.{name}", stray, "an item's expression contains symbols that are not its inputs")
-    return ca.Function(name, inputs, ca.cse(outputs), ["q", "v", "p", "dt", "pull"][: len(inputs)], labels)
+    return ca.Function(name, inputs, ca.cse(outputs), ["q", "v", "p", "dt", "force"][: len(inputs)], labels)

@@ -31,8 +31,8 @@ def speeds(
     for row, block in zip(layout.share_rows, _directions(layout), strict=True):
         assert isinstance(block.entry.item, Direction)
         task = layout.blocks[block.entry.item.of]
-        _, wish, factor, _ = tasks[task.entry.name]
-        asked = speed(factor * wish / scales[task.span])
+        _, desired, factor, _ = tasks[task.entry.name]
+        asked = speed(factor * desired / scales[task.span])
         out.append((row, asked, zero, zero, ca.SX(layout.variables, 1)))
     return out
 
@@ -58,15 +58,15 @@ def unlimited(layout: Layout, bounds: Bounds) -> Bounds:
 
 
 def kept_direction(
-    stack: Declaration, layout: Layout, block: Block, wish: ca.SX, factor: ca.SX, jacobian: ca.SX
+    stack: Declaration, layout: Layout, block: Block, desired: ca.SX, factor: ca.SX, jacobian: ca.SX
 ) -> Rows:
     """Rows over all variables of what keeps a task's direction, see :class:`wbc.tasks._direction.Direction`."""
     assert isinstance(block.entry.item, Direction)
     count = jacobian.shape[0]
-    asked = speed(factor * wish / layout.row_scales(stack)[layout.blocks[block.entry.item.of].span])
+    asked = speed(factor * desired / layout.row_scales(stack)[layout.blocks[block.entry.item.of].span])
     matrix = ca.SX(count + 1, layout.variables)
     matrix[:count, : layout.nv] = ca.diag(factor) @ jacobian
-    matrix[:count, block.share] = -factor * wish / asked
+    matrix[:count, block.share] = -factor * desired / asked
     matrix[count, block.share] = 1.0
     ends = ca.SX.zeros(count)
     return Rows(matrix, ca.vertcat(ends, 0.0), ca.vertcat(ends, asked))

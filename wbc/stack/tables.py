@@ -6,7 +6,7 @@ import numpy as np
 
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Layout
-from wbc.stack.program import Program
+from wbc.stack.program import TickProgram
 from wbc.tasks._direction import Direction
 from wbc.tasks.base import Constraint, Row
 
@@ -14,8 +14,8 @@ from wbc.tasks.base import Constraint, Row
 DISTURBANCE = 1e-6
 #: Full speed of joints without a limit [rad/s, or characteristic lengths per second]
 UNLIMITED = 10.0
-#: Violations of soft rows, and of rows that keep a direction, up to this are not told [rad/s, lengths per second]
-SOFT_TOLD, DIRECTION_TOLD = 2e-9, 1e-5
+#: Violations of soft rows, and of rows that keep a direction, up to this are not reported [rad/s, lengths per second]
+SOFT_REPORTED, DIRECTION_REPORTED = 2e-9, 1e-5
 
 
 def left_free(stack: Declaration) -> float:
@@ -26,7 +26,7 @@ def left_free(stack: Declaration) -> float:
     return DISTURBANCE / (max(1.0, stack.length) * max(float(np.linalg.norm(fastest)), 1e-3))
 
 
-def gain_places(layout: Layout) -> list[int]:
+def gain_table(layout: Layout) -> list[int]:
     """Where the gain of each task row is in the parameters."""
     places = [layout.nothing] * layout.task_rows
     for block in layout.of_form("task"):
@@ -45,13 +45,13 @@ def kept_rows(layout: Layout) -> list[int]:
     return rows
 
 
-def told_slacks(stack: Declaration, layout: Layout) -> list[float]:
-    """Violation of each soft row from which on a report tells it, per second: beyond rounding, and for kept directions
+def reported_slacks(stack: Declaration, layout: Layout) -> list[float]:
+    """Violation of each soft row from which on it is reported, per second: beyond rounding, and for kept directions
     beyond what their finite price leaves.
     """
     out = [0.0] * layout.general_rows
     for block in layout.of_form("margins", "rows"):
-        least = DIRECTION_TOLD if isinstance(block.entry.item, Direction) else SOFT_TOLD
+        least = DIRECTION_REPORTED if isinstance(block.entry.item, Direction) else SOFT_REPORTED
         for k, row in enumerate(block.rows):
             out[block.start + k] = least * row.scale(stack.length)
     return out
@@ -62,15 +62,15 @@ def _lever(stack: Declaration, row: Row) -> float:
     return row.scale(2.0 * stack.length)
 
 
-def pull_scales(stack: Declaration, layout: Layout, program: Program) -> list[float]:
-    """How much curvature a task row of unit weighted error may have: its lever for metres, else 1; 0 for rows that
-    do not bend.
+def force_scales(stack: Declaration, layout: Layout, program: TickProgram) -> list[float]:
+    """How much curvature a task row of unit weighted error may have: its lever for metres, else 1; 0 for rows
+    without any.
     """
     scales = np.zeros(layout.task_rows)
-    if program.bend is not None:
+    if program.curvature is not None:
         for block in layout.of_form("task"):
             scales[block.span] = [_lever(stack, row) for row in block.rows]
-        scales *= np.diff(program.bend.jac_sparsity(0, 4).colind()) > 0
+        scales *= np.diff(program.curvature.jac_sparsity(0, 4).colind()) > 0
     return scales.tolist()
 
 
@@ -86,7 +86,7 @@ def brakes(stack: Declaration, layout: Layout) -> tuple[list[int], np.ndarray]:
     return places, limits
 
 
-def margin_places(layout: Layout) -> list[int]:
+def margin_table(layout: Layout) -> list[int]:
     """Margin row of each general row, -1 for rows that are none."""
     out: list[int] = []
     for block in layout.of_form("margins", "rows"):
@@ -94,7 +94,7 @@ def margin_places(layout: Layout) -> list[int]:
     return out
 
 
-def rate_places(layout: Layout) -> list[int]:
+def rate_table(layout: Layout) -> list[int]:
     """Where the rate of each general row is in the parameters, 0 for rows without."""
     blocks = layout.of_form("margins", "rows")
     return [b.slots["rate"].start if b.form == "margins" else 0 for b in blocks for _ in b.rows]

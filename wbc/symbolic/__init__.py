@@ -3,6 +3,6 @@
 from wbc.symbolic.dynamics import Centroidal, Dynamics
 from wbc.symbolic.kinematics import WORLD, Kinematics, Pose
 from wbc.symbolic.tracer import Tracer
-from wbc.symbolic.velocity import Motion
+from wbc.symbolic.velocity import Velocities
 
-__all__ = ["WORLD", "Centroidal", "Dynamics", "Kinematics", "Motion", "Pose", "Tracer"]
+__all__ = ["WORLD", "Centroidal", "Dynamics", "Kinematics", "Pose", "Tracer", "Velocities"]

@@ -23,7 +23,7 @@ from wbc.symbolic.kinematics import Kinematics
 
 
 @dataclass(frozen=True, eq=False)
-class Pull:
+class Force:
     """A force at the origin of ``frame``, a torque on it, or a force on every body in proportion to its mass.
 
     ``vector``: world axes, 3 entries; for ``mass`` the force on the whole robot. What is no force but knows its
@@ -37,22 +37,22 @@ class Pull:
 
 @dataclass(eq=False)
 class _Load:
-    """What pulls on a joint and on all that it carries: force, sum of f p', torque."""
+    """What acts on a joint and on all that it carries: force, sum of f p', torque."""
 
     force: ca.SX
     moment: ca.SX
     torque: ca.SX
 
 
-def curvature(kinematics: Kinematics, pulls: Iterable[Pull]) -> ca.SX:
-    """K of the module, nv x nv, symmetric, for all pulls together."""
-    known = list(pulls)
-    loads = _loads(kinematics, [pull for pull in known if pull.kind != "own"])
+def curvature(kinematics: Kinematics, forces: Iterable[Force]) -> ca.SX:
+    """K of the module, nv x nv, symmetric, for all forces together."""
+    known = list(forces)
+    loads = _loads(kinematics, [force for force in known if force.kind != "own"])
     turned = {j: _turned(kinematics, j, load) for j, load in loads.items()}
     K = ca.SX(kinematics.nv, kinematics.nv)
-    for pull in known:
-        if pull.kind == "own":
-            K += pull.vector
+    for force in known:
+        if force.kind == "own":
+            K += force.vector
     for k in turned:
         for i in kinematics.support(k):
             angular = kinematics.joint_twist(i)[1]
@@ -66,29 +66,29 @@ def curvature(kinematics: Kinematics, pulls: Iterable[Pull]) -> ca.SX:
     return ca.sparsify(K)
 
 
-def _loads(kinematics: Kinematics, pulls: Iterable[Pull]) -> dict[int, _Load]:
-    """Per joint that carries a pull, all that it carries."""
+def _loads(kinematics: Kinematics, forces: Iterable[Force]) -> dict[int, _Load]:
+    """Per joint that carries a force, all that it carries."""
     loads: dict[int, _Load] = {}
 
     def at(joint: int) -> _Load:
         return loads.setdefault(joint, _Load(ca.SX(3, 1), ca.SX(3, 3), ca.SX(3, 1)))
 
-    for pull in pulls:
-        if pull.kind == "mass":
+    for force in forces:
+        if force.kind == "mass":
             for j, share, moment in kinematics.body_shares():
                 load = at(j)
-                load.force += share * pull.vector
-                load.moment += pull.vector @ moment.T
+                load.force += share * force.vector
+                load.moment += force.vector @ moment.T
             continue
-        joint = kinematics.frame(pull.frame)[0]
+        joint = kinematics.frame(force.frame)[0]
         if joint == 0:
             continue
         load = at(joint)
-        if pull.kind == "torque":
-            load.torque += pull.vector
+        if force.kind == "torque":
+            load.torque += force.vector
         else:
-            load.force += pull.vector
-            load.moment += pull.vector @ kinematics.pose(pull.frame).position.T
+            load.force += force.vector
+            load.moment += force.vector @ kinematics.pose(force.frame).position.T
     for j in range(kinematics.njoints - 1, 0, -1):
         parent = kinematics.parents[j]
         if j in loads and parent > 0:
@@ -108,6 +108,6 @@ def _turned(kinematics: Kinematics, joint: int, load: _Load) -> ca.SX:
     columns = []
     for c in range(linear.shape[1]):
         v, w = linear[:, c], angular[:, c]
-        bent = moment.T @ w - ca.trace(moment) * w
-        columns.append(ca.cross(v, load.force) + bent + 0.5 * ca.cross(w, load.torque))
+        turned = moment.T @ w - ca.trace(moment) * w
+        columns.append(ca.cross(v, load.force) + turned + 0.5 * ca.cross(w, load.torque))
     return ca.horzcat(*columns)

@@ -18,12 +18,12 @@ import numpy as np
 from wbc.symbolic import kernels
 from wbc.symbolic import rotations as rot
 from wbc.symbolic.kinematics import Kinematics
-from wbc.symbolic.velocity import AccelerationField, Motion
+from wbc.symbolic.velocity import AccelerationField, Velocities
 
 _ZERO = ca.SX(3, 1)
 
 
-class Bodies:
+class Inertias:
     """Constant inertias of a model's bodies, per joint: (mass, first moment, second moment) in joint axes."""
 
     def __init__(self, kinematics: Kinematics) -> None:
@@ -67,10 +67,10 @@ class Dynamics:
     Each property is built on first use. ``motion`` may be shared with whoever asks for frame velocities.
     """
 
-    def __init__(self, kinematics: Kinematics, motion: Motion | None = None) -> None:
+    def __init__(self, kinematics: Kinematics, motion: Velocities | None = None) -> None:
         self.kinematics = kinematics
-        self.motion = motion if motion is not None else Motion(kinematics)
-        self.bodies = Bodies(kinematics)
+        self.motion = motion if motion is not None else Velocities(kinematics)
+        self.bodies = Inertias(kinematics)
         self.a = ca.SX.sym("a", kinematics.nv)
         self._up = ca.SX(-rot.constant(np.array(kinematics.model.gravity.linear)))
         self._armature = np.array(kinematics.model.armature, dtype=float)

@@ -14,7 +14,7 @@ from wbc.symbolic.joint_maps import AXES, Vector
 from wbc.symbolic.joints import SUPPORTED, follower_of, motion_at
 
 
-class Kind(IntEnum):
+class JointKind(IntEnum):
     """What a step does; the same numbers stand in ``wbc/proximity/native/steps.h``."""
 
     #: a turn about an axis by scale q + offset
@@ -32,7 +32,7 @@ class Kind(IntEnum):
 
 
 @dataclass(frozen=True, eq=False)
-class Step:
+class JointStep:
     """One step.
 
     Attributes:
@@ -40,7 +40,7 @@ class Step:
         numbers: axis, scale and offset; of a pose the rotation row by row, then the position [12].
     """
 
-    kind: Kind
+    kind: JointKind
     q: int
     numbers: Vector
 
@@ -50,7 +50,7 @@ def place(pose: pin.SE3) -> Vector:
     return np.concatenate([np.asarray(pose.rotation).ravel(), pose.translation])
 
 
-def joint_steps(model: pin.Model, joint: int) -> list[Step]:
+def joint_steps(model: pin.Model, joint: int) -> list[JointStep]:
     """What joint number ``joint`` does after its placement.
 
     Raises:
@@ -63,21 +63,21 @@ def joint_steps(model: pin.Model, joint: int) -> list[Step]:
     leader = int(model.joints[followers[joint]].nq)
     turns, axis, scaling, offset = follower_of(model.joints[joint], leader, name)
     # Pinocchio lets a joint without end be followed by such a joint only
-    kind = Kind.SHIFT if not turns else (Kind.TURN if leader == 1 else Kind.FOLLOW)
+    kind = JointKind.SHIFT if not turns else (JointKind.TURN if leader == 1 else JointKind.FOLLOW)
     return [_step(kind, start, axis, scaling, offset)]
 
 
-def _step(kind: Kind, q: int, axis: Vector, scale: float = 1.0, offset: float = 0.0) -> Step:
-    return Step(kind, q, np.concatenate([axis, [scale, offset], np.zeros(7)]))
+def _step(kind: JointKind, q: int, axis: Vector, scale: float = 1.0, offset: float = 0.0) -> JointStep:
+    return JointStep(kind, q, np.concatenate([axis, [scale, offset], np.zeros(7)]))
 
 
-def _steps(joint: Any, q: int, name: str) -> list[Step]:
+def _steps(joint: Any, q: int, name: str) -> list[JointStep]:
     kind = joint.shortname().removeprefix("JointModel")
     inner = joint.extract()
     if kind == "Composite":
         out, at = [], q
         for k, (part, fixed) in enumerate(zip(inner.joints, inner.jointPlacements, strict=True)):
-            out += [Step(Kind.PLACE, q, place(fixed)), *_steps(part, at, f"{name}[{k}]")]
+            out += [JointStep(JointKind.PLACE, q, place(fixed)), *_steps(part, at, f"{name}[{k}]")]
             at += int(part.nq)
         return out
     if kind[-1:] in AXES and kind[:-1] in ("R", "RUB", "P", "H"):
@@ -86,19 +86,19 @@ def _steps(joint: Any, q: int, name: str) -> list[Step]:
         axis = motion_at(inner, np.array([1.0, 0.0]))[0][3:] if _UNALIGNED[kind] == "RUB" else np.array(inner.axis)
         return _along(_UNALIGNED[kind], axis, inner, q)
     x, y, z = AXES["X"], AXES["Y"], AXES["Z"]
-    shifts = [_step(Kind.SHIFT, q + k, axis) for k, axis in enumerate((x, y, z))]
-    whole = Step(Kind.QUATERNION, q, np.zeros(12))
+    shifts = [_step(JointKind.SHIFT, q + k, axis) for k, axis in enumerate((x, y, z))]
+    whole = JointStep(JointKind.QUATERNION, q, np.zeros(12))
     known = {
         "Translation": shifts,
         "Spherical": [whole],
-        "FreeFlyer": [*shifts, Step(Kind.QUATERNION, q + 3, np.zeros(12))],
-        "Planar": [*shifts[:2], _step(Kind.CIRCLE, q + 2, z)],
-        "SphericalZYX": [_step(Kind.TURN, q + k, axis) for k, axis in enumerate((z, y, x))],
+        "FreeFlyer": [*shifts, JointStep(JointKind.QUATERNION, q + 3, np.zeros(12))],
+        "Planar": [*shifts[:2], _step(JointKind.CIRCLE, q + 2, z)],
+        "SphericalZYX": [_step(JointKind.TURN, q + k, axis) for k, axis in enumerate((z, y, x))],
     }
     if kind in known:
         return known[kind]
     if kind == "Universal":
-        return [_step(Kind.TURN, q, np.array(inner.axis1)), _step(Kind.TURN, q + 1, np.array(inner.axis2))]
+        return [_step(JointKind.TURN, q, np.array(inner.axis1)), _step(JointKind.TURN, q + 1, np.array(inner.axis2))]
     raise UnsupportedJointError(f"joint {name!r}", kind, "this joint type has no symbolic model", SUPPORTED)
 
 
@@ -111,10 +111,10 @@ _UNALIGNED = {
 }
 
 
-def _along(kind: str, axis: Vector, joint: Any, q: int) -> list[Step]:
+def _along(kind: str, axis: Vector, joint: Any, q: int) -> list[JointStep]:
     if kind == "RUB":
-        return [_step(Kind.CIRCLE, q, axis)]
+        return [_step(JointKind.CIRCLE, q, axis)]
     if kind == "P":
-        return [_step(Kind.SHIFT, q, axis)]
-    turn = _step(Kind.TURN, q, axis)
-    return [turn] if kind == "R" else [turn, _step(Kind.SHIFT, q, axis, float(joint.pitch))]
+        return [_step(JointKind.SHIFT, q, axis)]
+    turn = _step(JointKind.TURN, q, axis)
+    return [turn] if kind == "R" else [turn, _step(JointKind.SHIFT, q, axis, float(joint.pitch))]

@@ -76,7 +76,7 @@ def manipulability(
     return measure, measure * row
 
 
-def bend(kinematics: Kinematics, frame: str, base: str, length: float) -> ca.SX:
+def manipulability_curvature(kinematics: Kinematics, frame: str, base: str, length: float) -> ca.SX:
     """An estimate of the second derivative of log w where w has a maximum, nv x nv: -:data:`BEND` on the diagonal.
 
     It has the right sign and is large enough in every direction, so that a Newton step on a target that is beyond the

@@ -21,10 +21,10 @@ import casadi as ca
 
 from wbc.errors import UnknownNameError
 from wbc.symbolic import rotations as rot
-from wbc.symbolic.curvature import Pull
+from wbc.symbolic.curvature import Force
 from wbc.symbolic.gaps import Gap, gap_jacobian
 from wbc.symbolic.kinematics import WORLD, Kinematics, Pose
-from wbc.symbolic.manipulability import bend, manipulability
+from wbc.symbolic.manipulability import manipulability, manipulability_curvature
 from wbc.symbolic.rotations import rotation_rate
 
 
@@ -86,7 +86,7 @@ class Tracer:
                     lambda: kinematics.center_of_mass,
                     ca.SX.eye(3),
                     lambda: kinematics.center_of_mass_jacobian,
-                    pulls=lambda force: (Pull("mass", WORLD, force),),
+                    forces=lambda force: (Force("mass", WORLD, force),),
                 )
             )
         return self._com
@@ -120,7 +120,7 @@ class Tracer:
                 motion,
                 partial(self._spin, frame, base),
                 inner=True,
-                pulls=lambda torque: (Pull("torque", frame, torque), Pull("torque", base, -torque)),
+                forces=lambda torque: (Force("torque", frame, torque), Force("torque", base, -torque)),
             )
         )
         if not ca.symvar(target):
@@ -134,8 +134,8 @@ class Tracer:
     def across(self, frame: str, base: str, axes: ca.SX, turn: ca.SX) -> ca.SX:
         """Zero, with the angular velocity of ``frame`` across an axis of it as its rate: (b1, b2)' R_b' (w - w_b).
 
-        What bends is the angle of the axis to a direction, for which ``turn`` stands, and not the rows: they turn with
-        the axis but not about it, see :func:`wbc.symbolic.tracer.axis_bend`.
+        What has curvature is the angle of the axis to a direction, for which ``turn`` stands, and not the rows: these
+        turn with the axis but not about it, see :func:`wbc.symbolic.tracer.axis_curvature`.
 
         Args:
             axes: 3x3, unit columns b1, b2, a, fixed in ``frame``, in the axes of ``base``.
@@ -148,13 +148,13 @@ class Tracer:
         still = self.held(axes)
         outer = still if base == WORLD else self.rotation(base) @ still
 
-        def pulls(torque: ca.SX) -> tuple[Pull, ...]:
-            bent = axis_bend(spin(), self.expand(outer[:, 2]), torque, self.expand(outer[:, :2] @ turn))
-            return (Pull("torque", frame, torque), Pull("torque", base, -torque), Pull("own", frame, bent))
+        def forces(torque: ca.SX) -> tuple[Force, ...]:
+            curved = axis_curvature(spin(), self.expand(outer[:, 2]), torque, self.expand(outer[:, :2] @ turn))
+            return (Force("torque", frame, torque), Force("torque", base, -torque), Force("own", frame, curved))
 
         zero = ca.SX.zeros(2)
         across = Placeholder(
-            f"across {frame} {base}", symbol, lambda: zero, outer[:, :2].T, spin, inner=True, pulls=pulls
+            f"across {frame} {base}", symbol, lambda: zero, outer[:, :2].T, spin, inner=True, forces=forces
         )
         self._symbols.append(across)
         return symbol
@@ -206,11 +206,11 @@ class Tracer:
             kinematics.frame(name)
         both = cache(lambda: manipulability(kinematics, frame, base, rows, length))
 
-        def pulls(force: ca.SX) -> tuple[Pull, ...]:
-            return (Pull("own", frame, force * both()[0] * bend(kinematics, frame, base, length)),)
+        def forces(force: ca.SX) -> tuple[Force, ...]:
+            return (Force("own", frame, force * both()[0] * manipulability_curvature(kinematics, frame, base, length)),)
 
         text = f"manipulability {frame} {base} {rows} {length!r}"
-        slope = Placeholder(text, symbol, lambda: both()[0], ca.SX(1), lambda: both()[1], pulls=pulls)
+        slope = Placeholder(text, symbol, lambda: both()[0], ca.SX(1), lambda: both()[1], forces=forces)
         self._symbols.append(slope)
         return symbol
 
@@ -238,21 +238,21 @@ class Tracer:
                 total = total + ca.sparsify(change @ known.motion) @ known.jacobian()
         return self.expand(ca.sparsify(total))
 
-    def pulls(self, expression: ca.SX) -> list[Pull]:
+    def forces(self, expression: ca.SX) -> list[Force]:
         """Forces and torques on the robot whose virtual work is the derivative of a scalar expression.
 
-        What depends on joint coordinates directly does not bend and gives none.
+        What depends on joint coordinates directly has no curvature and gives none.
         """
-        out: list[Pull] = []
+        out: list[Force] = []
         works: list[tuple[Placeholder, ca.SX]] = []
         for known in self._symbols:
             partial = ca.jacobian(expression, known.symbol)
             if partial.nnz() and known.motion.nnz():
                 work = ca.densify(partial @ known.motion).T
-                out += known.pulls(self.expand(work))
+                out += known.forces(self.expand(work))
                 works.append((known, work))
-        bent = turning(works, self._symbols, self.expand, self.kinematics.nv)
-        return [*out, Pull("own", WORLD, bent)] if bent.nnz() else out
+        curved = turning(works, self._symbols, self.expand, self.kinematics.nv)
+        return [*out, Force("own", WORLD, curved)] if curved.nnz() else out
 
     def expand(self, expression: ca.SX) -> ca.SX:
         """The expression with every placeholder replaced by the kinematics that it stands for."""
@@ -289,7 +289,7 @@ class Placeholder:
     The rate is kept as two factors because ``(partial @ motion) @ jacobian`` is much smaller than
     ``partial @ (motion @ jacobian)``. Kinematics are built when they are needed, so that an item can be traced
     (to count its rows, to make its cache key) without them. ``inner``: value and motion are in other placeholders.
-    ``turns``: it is the rotation of a frame, by which other forces turn. ``pulls``: what a force along the rate, given
+    ``turns``: it is the rotation of a frame, by which other forces turn. ``forces``: what a force along the rate, given
     as a 3-vector in the axes of ``jacobian``, does to the robot.
     """
 
@@ -300,7 +300,7 @@ class Placeholder:
     jacobian: Callable[[], ca.SX]
     inner: bool = False
     turns: bool = False
-    pulls: Callable[[ca.SX], tuple[Pull, ...]] = lambda force: ()
+    forces: Callable[[ca.SX], tuple[Force, ...]] = lambda force: ()
 
 
 def of_frame(kinematics: Kinematics, frame: str, pose: Pose) -> list[Placeholder]:
@@ -313,7 +313,7 @@ def of_frame(kinematics: Kinematics, frame: str, pose: Pose) -> list[Placeholder
         lambda: kinematics.pose(frame).position,
         ca.SX.eye(3),
         lambda: kinematics.jacobian(frame)[:3, :],
-        pulls=lambda force: (Pull("force", frame, force),),
+        forces=lambda force: (Force("force", frame, force),),
     )
     rotation = Placeholder(
         f"rotation {frame}",
@@ -322,7 +322,7 @@ def of_frame(kinematics: Kinematics, frame: str, pose: Pose) -> list[Placeholder
         rotation_rate(pose.rotation),
         lambda: kinematics.jacobian(frame)[3:, :],
         turns=True,
-        pulls=lambda torque: (Pull("torque", frame, torque),),
+        forces=lambda torque: (Force("torque", frame, torque),),
     )
     return [position, rotation]
 
@@ -337,10 +337,10 @@ def turning(
 
         symmetric part of  sum over k, l of  J_k' (dw_k/ds_l) J_l        w_k: force along the rate of placeholder k
 
-    Pairs without a rotation are left out: those are errors that bend by themselves.
+    Pairs without a rotation are left out: those are errors with curvature of their own.
 
     Args:
-        works: placeholders that an expression pulls at, each with its force. expand: puts the kinematics in.
+        works: placeholders that an expression depends on, each with its force. expand: puts the kinematics in.
     """
     total = ca.SX(nv, nv)
     for cause in placeholders:
@@ -357,12 +357,12 @@ def turning(
     return ca.sparsify(total)
 
 
-def axis_bend(spin: ca.SX, axis: ca.SX, torque: ca.SX, turn: ca.SX) -> ca.SX:
+def axis_curvature(spin: ca.SX, axis: ca.SX, torque: ca.SX, turn: ca.SX) -> ca.SX:
     """What a torque m across an axis a adds to the curvature where the axis alone counts, nv x nv.
 
         J' (- (a t' + t a') / 2  +  m.n (cot theta - 1/theta) (a x n)(a x n)') J,        t = a x m
 
-    The first part undoes what a turn about the axis would bend: with it, its row of the curvature is zero. The second
+    The first part undoes what a turn about the axis would curve: with it, its row of the curvature is zero. The second
     is that of the angle to a direction, which the turn theta n takes to a; of its bracket no less than -3 counts, and
     below 1e-4 rad it is left out. Then J'J and the curvature for m = theta n are the second derivative of theta^2 / 2.
 
@@ -374,5 +374,5 @@ def axis_bend(spin: ca.SX, axis: ca.SX, torque: ca.SX, turn: ca.SX) -> ca.SX:
     safe = ca.if_else(inside, theta, 1.0)
     share = ca.fmax(ca.cos(safe) / ca.sin(safe) - 1.0 / safe, -3.0) / safe**3
     along, aside, sideways = spin.T @ axis, spin.T @ ca.cross(axis, torque), spin.T @ ca.cross(axis, turn)
-    bent = -0.5 * (along @ aside.T + aside @ along.T)
-    return bent + ca.if_else(inside, ca.dot(torque, turn) * share, 0.0) * sideways @ sideways.T
+    curved = -0.5 * (along @ aside.T + aside @ along.T)
+    return curved + ca.if_else(inside, ca.dot(torque, turn) * share, 0.0) * sideways @ sideways.T

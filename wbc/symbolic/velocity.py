@@ -37,7 +37,7 @@ class AccelerationField:
 
     def __init__(
         self,
-        motion: Motion,
+        motion: Velocities,
         joint_acceleration: ca.SX | None = None,
         root: ca.SX | None = None,
         spins: AccelerationField | None = None,
@@ -101,7 +101,7 @@ class AccelerationField:
         return known
 
 
-class Motion:
+class Velocities:
     """Velocities and bias accelerations of one :class:`Kinematics`, as expressions in its q and v."""
 
     def __init__(self, kinematics: Kinematics) -> None:

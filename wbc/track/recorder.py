@@ -15,7 +15,7 @@ STATUSES = tuple(Status)
 POSE = ("x", "y", "z", "qx", "qy", "qz", "qw")
 
 
-class Recorder:
+class RunRecorder:
     """Columns of a run that grow by one tick with each :meth:`add`."""
 
     def __init__(self, plan: Plan, controller: Controller) -> None:

@@ -24,7 +24,7 @@ from wbc.controller import Controller
 from wbc.shapes import Sphere
 from wbc.track.clearance import clearances, least_mesh_clearance
 from wbc.track.log import Log
-from wbc.track.recorder import Recorder
+from wbc.track.recorder import RunRecorder
 from wbc.track.setup import Plan
 
 VERSIONS = ("wbc", "casadi", "pin", "daqp", "osqp", "numpy")
@@ -55,7 +55,7 @@ def track(
     compile_time = time.perf_counter() - began
     if compiled is not None:
         validation.called("compiled", compiled, controller)
-    recorder = Recorder(plan, controller)
+    recorder = RunRecorder(plan, controller)
     _loop(plan, controller, recorder, progress, stop)
     columns, units = recorder.columns()
     robot, obstacles, t = plan.robot, plan.obstacles, recorder.times
@@ -72,7 +72,7 @@ def track(
 def _loop(
     plan: Plan,
     controller: Controller,
-    recorder: Recorder,
+    recorder: RunRecorder,
     progress: Callable[[int], None] | None,
     stop: Callable[[], bool] | None,
 ) -> None:
@@ -107,7 +107,7 @@ def _loop(
             validation.called("progress", progress, k + 1)
 
 
-def _meta(plan: Plan, controller: Controller, recorder: Recorder, compile_time: float) -> dict[str, Any]:
+def _meta(plan: Plan, controller: Controller, recorder: RunRecorder, compile_time: float) -> dict[str, Any]:
     robot, limits = plan.robot, plan.robot.limits
     arrays = {
         "position_lower": limits.position_lower,

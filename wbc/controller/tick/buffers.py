@@ -44,7 +44,7 @@ class Buffers:
         p: run-time inputs, see :class:`wbc.stack.layout.Layout`. dt: one number.
         weight: of each task row, scale included. enabled: 1 or 0 for each general row.
         bound_enabled: the same for each entry of each bound block.
-        report: see :class:`wbc.stack.memory.ReportLayout`.
+        report: see :class:`wbc.stack.memory.Memory`.
         state: all of these in one piece of memory that begins with the report. ``v_in`` in it is, after a tick, the
             velocity that the tick counted accelerations from.
     """
@@ -70,10 +70,10 @@ class Buffers:
 
 @dataclass(frozen=True, eq=False)
 class TaskRows:
-    """Rows of all tasks in the last QP: J [rows, nv], wished rates and fading factors [rows]."""
+    """Rows of all tasks in the last QP: J [rows, nv], desired rates and fading factors [rows]."""
 
     J: Array
-    wish: Array
+    desired: Array
     factor: Array
 
 
@@ -104,7 +104,7 @@ class Assembly(Buffers, ABC):
         """
 
     @abstractmethod
-    def bent(self) -> Array | None:
+    def curvature(self) -> Array | None:
         """Curvature in H of the last QP [nv, nv], before anything made H positive definite; None for none.
 
         Raises:

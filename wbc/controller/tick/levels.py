@@ -7,13 +7,13 @@ import numpy as np
 from wbc.controller.tick.buffers import INFINITE, Assembly
 from wbc.qp.certificate import Certificate
 from wbc.qp.levels.cascade import NOISE, PUSHING, Cascade
-from wbc.qp.levels.hierarchy import Answer, Hierarchy, Level
+from wbc.qp.levels.hierarchy import Hierarchy, Level, LevelsAnswer
 from wbc.qp.problem import QP
 from wbc.qp.relax import Relaxed
 from wbc.stack.codegen import row_units
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Layout
-from wbc.stack.memory import LEVEL_NUMBERS, ReportLayout
+from wbc.stack.memory import LEVEL_NUMBERS, Memory
 from wbc.stack.tables import left_free
 from wbc.validation import Array
 
@@ -34,13 +34,13 @@ class Levels:
         self._damping = stack.damping
         self.cascade = Cascade(layout.variables, layout.general_rows, left_free(stack), stack.damping)
         self.sizes = np.concatenate((self._dofs, self._units))
-        self._places = ReportLayout(layout)
+        self._places = Memory(layout)
 
     def reset(self) -> None:
         """Forget the active sets of the last tick."""
         self.cascade.reset()
 
-    def below(self, qp: QP, v: Array, first: Relaxed | None, report: Array) -> tuple[Array, Answer | None]:
+    def below(self, qp: QP, v: Array, first: Relaxed | None, report: Array) -> tuple[Array, LevelsAnswer | None]:
         """The command and the answer of all levels, which is written to the report; v where the tick brakes.
 
         Args:
@@ -58,7 +58,7 @@ class Levels:
         self._write(answer, command, report)
         return command, answer
 
-    def _held_by_equalities(self, problem: Hierarchy, qp: QP, first: Relaxed, answer: Answer) -> None:
+    def _held_by_equalities(self, problem: Hierarchy, qp: QP, first: Relaxed, answer: LevelsAnswer) -> None:
         """Multipliers of the equality rows that push against the first level: those of its QP, which has them all."""
         push = np.abs(first.multipliers) * self.sizes
         drive = max(float(np.abs(qp.g * self._dofs).max(initial=0.0)), float(push.max(initial=0.0)))
@@ -84,7 +84,7 @@ class Levels:
         return np.where(self._row_levels >= 0, np.maximum(0.0, np.maximum(low - at, at - high)), slack)
 
     @staticmethod
-    def certified(answer: Answer, violation: float) -> Certificate:
+    def certified(answer: LevelsAnswer, violation: float) -> Certificate:
         """The certificate of all levels together."""
         return Certificate(
             max(level.stationarity for level in answer.levels),
@@ -99,7 +99,7 @@ class Levels:
         weight = self._assembly.weight * self._scales**2
         counts = (weight > 0.0) & (tasks.factor > 0.0)
         fading = np.sqrt(np.where(counts, tasks.factor, 0.0)) / self._scales
-        rows, wish = fading[:, None] * tasks.J * dofs, fading * tasks.wish
+        rows, desired = fading[:, None] * tasks.J * dofs, fading * tasks.desired
         out, scales = [], []
         for place in range(len(layout.levels)):
             span = layout.level_rows(place)
@@ -108,22 +108,22 @@ class Levels:
             soft, prices = soft[prices > 0.0], prices[prices > 0.0]
             scale = max(float(weight[span][counts[span]].max(initial=0.0)), float(prices.max(initial=0.0))) or 1.0
             relative = np.where(counts[span], weight[span] / scale, 0.0)
-            wanted = rows[span].T @ (relative * wish[span])
-            bent = None
+            wanted = rows[span].T @ (relative * desired[span])
+            second = None
             if place == 0 and layout.leading:
                 wanted = -qp.g * dofs / scale
                 change = qp.H * np.outer(dofs, dofs) / scale - rows[span].T @ (relative[:, None] * rows[span])
-                curvature = self._assembly.bent()
+                curvature = self._assembly.curvature()
                 if curvature is not None:
-                    bent = change, curvature * np.outer(dofs, dofs) / scale
-            out.append(Level(rows[span], relative, wanted, soft, prices / scale, bent))
+                    second = change, curvature * np.outer(dofs, dofs) / scale
+            out.append(Level(rows[span], relative, wanted, soft, prices / scale, second))
             scales.append(scale)
         return out, scales
 
-    def _write(self, answer: Answer | None, v: Array, report: Array) -> None:
+    def _write(self, answer: LevelsAnswer | None, v: Array, report: Array) -> None:
         places, tasks = self._places, self._assembly.task_rows()
         share = np.zeros(self._layout.task_rows)
-        report[places["missed"]] = tasks.J @ v - tasks.wish
+        report[places["missed"]] = tasks.J @ v - tasks.desired
         report[places["share"]] = share
         report[places["dropped"]] = report[places["pushes"]] = -1.0
         report[places["levels"]] = 0.0

@@ -10,44 +10,18 @@ from typing import Any
 import numpy as np
 
 from wbc.controller.tick.buffers import INFINITE, Assembly, TaskRows
-from wbc.errors import CompileError, SolverError
+from wbc.errors import SolverError
 from wbc.native.library import load_library
 from wbc.qp.problem import QP
 from wbc.stack.layout import Layout
-from wbc.stack.memory import ReportLayout
+from wbc.stack.memory import Memory
 from wbc.validation import Array
-
-_FIELDS = (
-    "q",
-    "v_last",
-    "v_in",
-    "use_v",
-    "p",
-    "dt",
-    "weight",
-    "enabled",
-    "bound_enabled",
-    "report",
-    "H",
-    "g",
-    "A",
-    "low",
-    "high",
-    "unusable",
-    "plain",
-    "cap",
-    "wish",
-    "free_low",
-    "free_high",
-    "given",
-    "give",
-)
 
 
 class NativeTick(Assembly):
     """Memory of one controller and the functions of its library; see :class:`wbc.controller.tick.Buffers`.
 
-    The report's size in memory is checked against the layout, so that a library of another layout is refused.
+    Where each field is in memory is checked against the layout, so that a library of another layout is refused.
     """
 
     def __init__(self, library: pathlib.Path | ctypes.PyDLL, layout: Layout) -> None:
@@ -59,40 +33,22 @@ class NativeTick(Assembly):
         shift = (-raw.ctypes.data % 64) // 8
         self._memory = raw[shift : shift + size // 8]
         self.pointer = ctypes.c_void_p(self._memory.ctypes.data)
-        offsets = (ctypes.c_longlong * len(_FIELDS))()
-        self._library.wbc_tick_layout(offsets)
-        places = dict(zip(_FIELDS, (int(o) // 8 for o in offsets), strict=True))
-        report = ReportLayout(layout)
-        if places["q"] - places["report"] != report.size:
-            raise CompileError("library", self._library._name, "was built for another layout")
-        nv, rows = layout.variables, layout.general_rows
+        places = Memory(layout)
+        self._library.wbc_tick_offset.restype = ctypes.c_longlong
+        places.require(self._library.wbc_tick_offset, self._library._name)
         self._layout = layout
-        self._wide = (nv + 7) // 8 * 8
-
-        def view(name: str, count: int) -> Array:
-            return self._memory[places[name] : places[name] + count]
-
         self._library.wbc_tick_init(self.pointer)
-        self.q = view("q", layout.nq)
-        self.v_last, self.v_in = view("v_last", nv), view("v_in", nv)
-        self.use_v = view("use_v", 1)
-        self.cap = view("cap", 1)
-        self.p = view("p", layout.parameters)
-        self.dt = view("dt", 1)
-        self.weight = view("weight", layout.task_rows)
-        self.enabled = view("enabled", rows)
-        self.bound_enabled = view("bound_enabled", layout.bound_blocks * nv)
-        self.report = view("report", report.size)
-        self.state = self._memory[places["report"] : places["H"]]
-        self._H = view("H", nv * self._wide).reshape(nv, self._wide)
-        self._g = view("g", nv)
-        self._A = view("A", rows * nv).reshape(rows, nv)
-        self._low, self._high = view("low", nv + rows), view("high", nv + rows)
-        self._unusable, self.plain = view("unusable", 1), view("plain", 1)
-        self._wish, self._factor = view("wish", layout.task_rows), self.report[report["factor"]]
-        self._sides = view("free_low", rows), view("free_high", rows)
-        self._given = view("given", 16).reshape(4, 4)
-        self._give = view("give", rows)
+        view = functools.partial(places.view, self._memory)
+        self.q, self.p, self.dt, self.cap = view("q"), view("p"), view("dt"), view("cap")
+        self.v_last, self.v_in, self.use_v = view("v_last"), view("v_in"), view("use_v")
+        self.weight, self.enabled, self.bound_enabled = view("weight"), view("enabled"), view("bound_enabled")
+        self.report, self.state = self._memory[: places.report], self._memory[: places.state]
+        self._H, self._g, self._low, self._high = view("H"), view("g"), view("low"), view("high")
+        self._A = view("A").reshape(layout.general_rows, layout.variables)
+        self._unusable, self.plain = view("unusable"), view("plain")
+        self._desired, self._factor = view("desired"), view("factor")
+        self._sides = view("free_low"), view("free_high")
+        self._given, self._give = view("given"), view("give")
         self.step_function = self._library.wbc_tick_step
         self._take_pose = functools.partial(self._library.wbc_tick_pose, self.pointer)
 
@@ -152,13 +108,13 @@ class NativeTick(Assembly):
         self._require_levels("task_rows")
         J = np.zeros((self._layout.task_rows, self._layout.variables))
         self._library.wbc_tick_task_rows(self.pointer, ctypes.c_void_p(J.ctypes.data))
-        return TaskRows(J, self._wish.copy(), self._factor.copy())
+        return TaskRows(J, self._desired.copy(), self._factor.copy())
 
-    def bent(self) -> Array | None:
-        self._require_levels("bent")
+    def curvature(self) -> Array | None:
+        self._require_levels("curvature")
         out = np.zeros((self._layout.variables, self._layout.variables))
-        bends = self._library.wbc_tick_bent(self.pointer, ctypes.c_void_p(out.ctypes.data))
-        return out if bends else None
+        curved = self._library.wbc_tick_curvature(self.pointer, ctypes.c_void_p(out.ctypes.data))
+        return out if curved else None
 
     def _require_levels(self, asked: str) -> None:
         """Code of one level makes H of its rows, and keeps no rows."""
@@ -177,4 +133,4 @@ class NativeTick(Assembly):
         H = upper + np.triu(upper, 1).T
         low, high = self._low.copy(), self._high.copy()
         low[low <= -INFINITE], high[high >= INFINITE] = -np.inf, np.inf
-        return QP(H, self._g.copy(), low, high, self._A.copy(), self._give.copy())
+        return QP(H, self._g[:nv].copy(), low, high, self._A.copy(), self._give.copy())

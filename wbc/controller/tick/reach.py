@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Layout
-from wbc.stack.program import Program
-from wbc.stack.tables import brakes, gain_places, kept_rows, margin_places, pull_scales, rate_places, stops
+from wbc.stack.program import TickProgram
+from wbc.stack.tables import brakes, force_scales, gain_table, kept_rows, margin_table, rate_table, stops
 from wbc.validation import Array
 
 #: As in ``native/reach.h``
@@ -29,17 +29,17 @@ class Reach:
     """Curvature of the errors that no step removes, and gains that leave room to brake.
 
     Args:
-        bend: weights of the task rows -> curvature (nv x nv, symmetric); None: no task bends.
+        curve: weights of the task rows -> curvature (nv x nv, symmetric); None: no task has any.
     """
 
     def __init__(
-        self, stack: Declaration, layout: Layout, program: Program, bend: Callable[[Array], Array] | None
+        self, stack: Declaration, layout: Layout, program: TickProgram, curve: Callable[[Array], Array] | None
     ) -> None:
-        self._bend = bend
+        self._curve = curve
         #: curvature in the last QP, before anything made it positive definite; None for none
-        self.bent: Array | None = None
-        self._gain_at = np.array(gain_places(layout), dtype=np.intp)[: layout.leading]
-        self._pull_scale = np.array(pull_scales(stack, layout, program))[: layout.leading]
+        self.curvature: Array | None = None
+        self._gain_at = np.array(gain_table(layout), dtype=np.intp)[: layout.leading]
+        self._force_scale = np.array(force_scales(stack, layout, program))[: layout.leading]
         self._dofs = layout.dof_scales(stack)
         self._damping = stack.damping / self._dofs**2
         places, self._brake_limit = brakes(stack, layout)
@@ -49,11 +49,11 @@ class Reach:
         self._stop_q = np.zeros(layout.variables, dtype=np.intp)
         self._stop_q[: layout.nv] = np.maximum(stack.robot.position_index, 0)
         self._dof_count = layout.nv
-        margins = np.array(margin_places(layout), dtype=np.intp)
+        margins = np.array(margin_table(layout), dtype=np.intp)
         self._kept = np.array(kept_rows(layout), dtype=np.intp)
         self._margin_rows = np.flatnonzero(margins >= 0)
         self._margin_at = margins[self._margin_rows]
-        self._rate_at = np.array(rate_places(layout), dtype=np.intp)[self._margin_rows]
+        self._rate_at = np.array(rate_table(layout), dtype=np.intp)[self._margin_rows]
 
     def change(
         self,
@@ -61,7 +61,7 @@ class Reach:
         J: Array,
         weight: Array,
         error: Array,
-        wish: Array,
+        desired: Array,
         q: Array,
         p: Array,
         equal: Array,
@@ -76,10 +76,10 @@ class Reach:
         """
         counts = weight != 0.0
         error = np.where(counts, error, 0.0)
-        self.bent = None
+        self.curvature = None
         gain = p[self._gain_at]
         largest = float(gain[counts].max(initial=0.0))
-        plain = -(J.T @ (weight * wish))
+        plain = -(J.T @ (weight * desired))
         slope = J.T @ (weight * error)
         if not (np.abs(error) < TOO_FAR).all():
             return H, plain
@@ -95,7 +95,7 @@ class Reach:
         allowed = self._stoppable(metric, J, weight * gain**2 * error, largest, free, bound_enabled)
         if curved is None and allowed >= largest:
             return H, plain
-        drift = -wish - gain * error
+        drift = -desired - gain * error
         wanted = np.minimum(gain, allowed) * error
         if curved is None:
             return H, J.T @ (weight * (wanted + drift))
@@ -140,7 +140,7 @@ class Reach:
         equal: Array,
     ) -> Array | None:
         """H with the curvature of the errors that one step leaves, None where there is none to count."""
-        if self._bend is None:
+        if self._curve is None:
             return None
         # what blocked joints are asked for is not asked of the others
         slope = free * slope
@@ -158,22 +158,22 @@ class Reach:
             more = float(np.abs(slope * self._dofs).max()) / TRUSTED * (1.0 - TRUSTED / length)
             step = self._sharp(firm + np.diag(more / self._dofs**2), squares, free, more, slope)
         step = free * step
-        pull = weight * (error - J @ step)
-        pull[kept] -= parts * stiffness * (rows @ step)
-        size, whole = (float((np.abs(x) * self._pull_scale).sum()) for x in (pull, weight * error))
+        force = weight * (error - J @ step)
+        force[kept] -= parts * stiffness * (rows @ step)
+        size, whole = (float((np.abs(x) * self._force_scale).sum()) for x in (force, weight * error))
         pivots = np.diag(np.linalg.cholesky(metric)) * self._dofs
         least = float((pivots**2).min())
         share = float(np.clip(size / (NEGLIGIBLE * least) - 1.0, 0.0, 1.0))
         share *= float(np.clip(size / (REMOVED * whole + np.finfo(float).tiny) - 1.0, 0.0, 1.0))
         if not share > 0.0:
             return None
-        bent = share * np.outer(free, free) * self._bend(pull)
-        if not np.isfinite(bent).all():
+        curvature = share * np.outer(free, free) * self._curve(force)
+        if not np.isfinite(curvature).all():
             return None
-        self.bent = bent
-        mixed = share * _cut_off(H, free) + (1.0 - share) * H + bent
+        self.curvature = curvature
+        mixed = share * _cut_off(H, free) + (1.0 - share) * H + curvature
         scale = np.outer(self._dofs, self._dofs)
-        least = max(LEAST_PIVOT * float(np.abs(bent * scale).max()), least)
+        least = max(LEAST_PIVOT * float(np.abs(curvature * scale).max()), least)
         more_pivot = definite(mixed * scale, least)
         return np.asarray(mixed + np.diag(more_pivot / self._dofs**2))
 

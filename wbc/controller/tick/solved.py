@@ -22,16 +22,16 @@ from wbc.controller.tick.buffers import (
 )
 from wbc.controller.tick.levels import Levels
 from wbc.qp.certificate import Certificate, certify
-from wbc.qp.levels.hierarchy import Answer
+from wbc.qp.levels.hierarchy import LevelsAnswer
 from wbc.qp.polish import polish
-from wbc.qp.problem import QP, Solution
+from wbc.qp.problem import QP, QPSolution
 from wbc.qp.relax import Relaxation, Relaxed
 from wbc.qp.solvers import make_solver
 from wbc.stack.codegen import row_orders, row_units
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Layout
-from wbc.stack.memory import ReportLayout
-from wbc.stack.tables import told_slacks
+from wbc.stack.memory import Memory
+from wbc.stack.tables import reported_slacks
 from wbc.validation import Array
 
 #: What an equality row in its unit may be missed by through the rounding of its own numbers
@@ -49,7 +49,7 @@ class SolvedTick(Buffers):
         self.assembly = assembly
         self.share(assembly)
         self._nv, self._velocities = layout.variables, layout.nv
-        self._places = ReportLayout(layout)
+        self._places = Memory(layout)
         self._solver = make_solver(solver, layout.with_slacks, layout.general_rows)
         self._relaxation = Relaxation(layout.with_slacks, layout.general_rows, self._solver)
         self._orders = np.array(row_orders(layout), dtype=np.int_)
@@ -90,7 +90,7 @@ class SolvedTick(Buffers):
         slack = qp.violation(v)[self._nv :] if flag == RELAXED else np.zeros(self._units.size)
         if self.levels is not None:
             slack = self.levels.with_soft(qp, v, slack)
-        slack = self._soft.told(qp, v, self.assembly.row_sides(), slack) if answer is not None else slack
+        slack = self._soft.reported(qp, v, self.assembly.row_sides(), slack) if answer is not None else slack
         slack = np.where(slack > 2.0 * TOLERANCE * self._units, slack, 0.0)
         if flag == RELAXED and not slack[self._hard].any():
             flag = SOLVED  # the rows contradict each other by rounding only
@@ -101,9 +101,9 @@ class SolvedTick(Buffers):
             if levels is None:
                 multipliers = qp.rows_of(answer.multipliers)
                 sides = QP(wide.H, wide.g, *self._met(wide, answer, x), wide.A)
-                certificate = certify(sides, Solution(x, answer.multipliers, "solved"), self._velocities)
+                certificate = certify(sides, QPSolution(x, answer.multipliers, "solved"), self._velocities)
                 if not self._sound(certificate):
-                    found = polish(sides, Solution(x, answer.multipliers, "solved"), POLISH_ROUNDS)
+                    found = polish(sides, QPSolution(x, answer.multipliers, "solved"), POLISH_ROUNDS)
                     better = certify(sides, found.solution, self._velocities)
                     if found.exact and self._sound(better):
                         certificate, x = better, np.clip(found.solution.x, sides.lower[: wide.n], sides.upper[: wide.n])
@@ -159,7 +159,7 @@ class SolvedTick(Buffers):
         met[: qp.n] = False
         return np.where(met, -np.inf, answer.lower), np.where(met, np.inf, answer.upper)
 
-    def below(self, qp: QP, v: Array, first: Relaxed | None) -> tuple[Array, Answer | None]:
+    def below(self, qp: QP, v: Array, first: Relaxed | None) -> tuple[Array, LevelsAnswer | None]:
         """The command with all levels below the first, whose answer is v, and their answer; v where there are none."""
         if self.levels is None:
             return v, None
@@ -202,9 +202,9 @@ class SoftRows:
 
     def __init__(self, stack: Declaration, layout: Layout) -> None:
         self._rows = np.flatnonzero(np.array(layout.price_at, dtype=np.intp) >= 0)
-        self._told = np.array(told_slacks(stack, layout))[self._rows]
+        self._least = np.array(reported_slacks(stack, layout))[self._rows]
 
-    def told(self, qp: QP, v: Array, sides: tuple[Array, Array], slack: Array) -> Array:
+    def reported(self, qp: QP, v: Array, sides: tuple[Array, Array], slack: Array) -> Array:
         """``slack`` of the general rows with the violations of those that are soft."""
         rows = self._rows
         if not rows.size:
@@ -212,7 +212,7 @@ class SoftRows:
         at = qp.A[rows] @ v
         missed = np.maximum(sides[0][rows] - at, at - sides[1][rows])
         out = slack.copy()
-        out[rows] = np.where(missed > self._told, missed, 0.0)
+        out[rows] = np.where(missed > self._least, missed, 0.0)
         return out
 
     def polished(self, qp: QP, answer: Relaxed) -> Relaxed:
@@ -220,7 +220,7 @@ class SoftRows:
         if not self._rows.size:
             return answer
         sides = QP(qp.H, qp.g, answer.lower, answer.upper, qp.A)
-        found = polish(sides, Solution(answer.x, answer.multipliers, "solved"))
+        found = polish(sides, QPSolution(answer.x, answer.multipliers, "solved"))
         if not found.exact:
             return answer
         n = qp.n

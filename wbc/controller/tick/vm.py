@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 
 import numpy as np
@@ -12,8 +13,8 @@ from wbc.qp.problem import QP
 from wbc.stack.codegen import bound_sequence, row_units, unit_groups
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Layout
-from wbc.stack.memory import ReportLayout
-from wbc.stack.program import ROWS_OUTPUTS, Program
+from wbc.stack.memory import Memory
+from wbc.stack.program import ROWS_OUTPUTS, TickProgram
 from wbc.validation import Array
 
 
@@ -34,38 +35,22 @@ def _room(count: int) -> Array:
     return np.zeros(max(1, count))
 
 
-def _pieces(sizes: dict[str, int]) -> dict[str, Array]:
-    """Arrays of at least these sizes in one piece of memory, which is the item without a name."""
-    ends = np.cumsum([max(1, size) for size in sizes.values()])
-    memory = np.zeros(int(ends[-1]))
-    starts = np.concatenate(([0], ends[:-1]))
-    return {"": memory} | {name: memory[a:b] for name, a, b in zip(sizes, starts, ends, strict=True)}
-
-
 class VmAssembly(Assembly):
     """Buffers of a controller and the QP at their values; mirrors ``native/assemble.h``."""
 
-    def __init__(self, program: Program, stack: Declaration, layout: Layout) -> None:
+    def __init__(self, program: TickProgram, stack: Declaration, layout: Layout) -> None:
         nv, rows, tasks = layout.variables, layout.general_rows, layout.task_rows
         self._layout = layout
         self._given = (program, stack, layout)
-        self.places = ReportLayout(layout)
-        sizes = {
-            "report": self.places.size,
-            "q": layout.nq,
-            "v_last": nv,
-            "p": layout.parameters,
-            "dt": 1,
-            "v_in": nv,
-            "use_v": 1,
-            "cap": 1,
-        }
-        sizes |= {"weight": tasks, "enabled": rows, "bound_enabled": layout.bound_blocks * nv, "plain": 1}
-        parts = _pieces(sizes)
-        self.state = parts[""]
-        self._q, self._v, self._p = parts["q"], parts["v_last"][: layout.nv], parts["p"]
-        for name, size in sizes.items():
-            setattr(self, name, parts[name][:size])
+        self.places = places = Memory(layout)
+        self.state = np.zeros(places.state)
+        self.report = self.state[: places.report]
+        view = functools.partial(places.view, self.state)
+        self.q, self.p, self.dt, self.cap, self.plain = (view(name) for name in ("q", "p", "dt", "cap", "plain"))
+        self.v_last, self.v_in, self.use_v = view("v_last"), view("v_in"), view("use_v")
+        self.weight, self.enabled, self.bound_enabled = view("weight"), view("enabled"), view("bound_enabled")
+        # CasADi's buffers take no empty array: with the spare number
+        self._q, self._v, self._p = self._wide("q"), self.v_last[: layout.nv], self._wide("p")
         self.weight[:], self.enabled[:], self.bound_enabled[:] = 1.0, 1.0, 1.0
         function = program.rows
         self._out = {n: _room(function.nnz_out(i)) for i, n in enumerate(ROWS_OUTPUTS)}
@@ -75,8 +60,8 @@ class VmAssembly(Assembly):
         self._later, self._command = _room(layout.margin_rows), _room(layout.nv)
         if program.ahead is not None:
             self._ahead = _Call(program.ahead, [self._q, self._command, self._p, self.dt], [self._later])
-        self._pull = _room(tasks)
-        self._reach = Reach(stack, layout, program, self._bender(program, arguments)) if stack.calm else None
+        self._force = _room(tasks)
+        self._reach = Reach(stack, layout, program, self._curvature_of(program, arguments)) if stack.calm else None
         jt, at = function.sparsity_out("jt"), function.sparsity_out("at")
         self._j_index = (np.repeat(np.arange(tasks), np.diff(jt.colind())), np.array(jt.row(), dtype=np.intp))
         self._a_index = (np.repeat(np.arange(rows), np.diff(at.colind())), np.array(at.row(), dtype=np.intp))
@@ -92,35 +77,40 @@ class VmAssembly(Assembly):
         self._price_at = np.array(layout.price_at, dtype=np.intp)
         self._priced = self._price_at >= 0
         self._row_units = np.array(row_units(stack, layout), dtype=np.float64)
-        self._bent: Array | None = None
+        self._curvature: Array | None = None
         self._last = TaskRows(self._J, np.zeros(tasks), np.zeros(tasks))
+
+    def _wide(self, name: str) -> Array:
+        """A field of the state with its spare number, which no empty array lacks."""
+        place = self.places[name]
+        return self.state[place.start : max(place.stop, place.start + 1)]
 
     def task_rows(self) -> TaskRows:
         return self._last
 
-    def bent(self) -> Array | None:
-        return self._bent
+    def curvature(self) -> Array | None:
+        return self._curvature
 
     def row_sides(self) -> tuple[Array, Array]:
         return self._sides
 
-    def _bender(self, program: Program, arguments: list[Array]) -> Callable[[Array], Array] | None:
+    def _curvature_of(self, program: TickProgram, arguments: list[Array]) -> Callable[[Array], Array] | None:
         """Weights of the task rows -> curvature, nv x nv."""
-        if program.bend is None:
+        if program.curvature is None:
             return None
-        entries = _room(program.bend.nnz_out(0))
-        call = _Call(program.bend, [*arguments, self._pull], [entries])
-        row, column = (np.array(i, dtype=np.intp) for i in program.bend.sparsity_out(0).get_triplet())
+        entries = _room(program.curvature.nnz_out(0))
+        call = _Call(program.curvature, [*arguments, self._force], [entries])
+        row, column = (np.array(i, dtype=np.intp) for i in program.curvature.sparsity_out(0).get_triplet())
         nv = self._layout.variables
 
-        def bend(pull: Array) -> Array:
-            self._pull[: len(pull)] = pull
+        def curve(force: Array) -> Array:
+            self._force[: len(force)] = force
             call.run()
             upper = np.zeros((nv, nv))
             upper[row, column] = entries[: len(row)]
             return upper + np.triu(upper, 1).T
 
-        return bend
+        return curve
 
     def twin(self) -> VmAssembly:
         return VmAssembly(*self._given)
@@ -151,18 +141,18 @@ class VmAssembly(Assembly):
         self._report_rows()
         self._J[self._j_index] = out["jt"][: len(self._j_index[0])]
         self._A[self._a_index] = out["at"][: len(self._a_index[0])]
-        factor, wish = out["factor"][: layout.task_rows].copy(), out["wish"][: layout.task_rows].copy()
+        factor, desired = out["factor"][: layout.task_rows].copy(), out["desired"][: layout.task_rows].copy()
         J = self._J.copy()
-        self._usable = self._drop_idle_rows(J, wish, factor)
+        self._usable = self._drop_idle_rows(J, desired, factor)
         self.report[self.places["factor"]] = factor
-        self._last = TaskRows(J, wish, factor)
+        self._last = TaskRows(J, desired, factor)
         first = slice(layout.leading)
-        J, weight, wish = J[first], (self.weight * factor)[first], wish[first]
+        J, weight, desired = J[first], (self.weight * factor)[first], desired[first]
         weighted = weight[:, None] * J
         H = J.T @ weighted
         H = 0.5 * (H + H.T)
         H[np.diag_indices(layout.variables)] += self._damping
-        g = -weighted.T @ wish
+        g = -weighted.T @ desired
         error = out["error"][first]
         low, high = self._bounds()
         price = np.where(self._priced, self.p[self._price_at], 1.0)
@@ -177,12 +167,12 @@ class VmAssembly(Assembly):
         low_rows[low_rows <= -INFINITE], high_rows[high_rows >= INFINITE] = -np.inf, np.inf
         self._sides = low_rows, high_rows
         low_rows, high_rows = np.where(self._soft, -np.inf, low_rows), np.where(self._soft, np.inf, high_rows)
-        self._bent = None
+        self._curvature = None
         if self._reach is not None and not self.plain[0] and self._usable and layout.leading:
             equal = _unit_equalities(low, high, low_rows, high_rows, A, self._dof_scales)
             keepers = self._reach.keepers(A, self._sides[0] == self._sides[1], factor)
-            H, g = self._reach.change(H, J, weight, error, wish, self.q, self.p, equal, keepers, self.bound_enabled)
-            self._bent = self._reach.bent
+            H, g = self._reach.change(H, J, weight, error, desired, self.q, self.p, equal, keepers, self.bound_enabled)
+            self._curvature = self._reach.curvature
         give = np.where(price > 0.0, self._row_units**2 / np.where(price > 0.0, price, 1.0), 1.0)
         give = np.where(self._priced & ~self._soft, give, 0.0)
         return QP(H, g, np.concatenate((low, low_rows)), np.concatenate((high, high_rows)), A, give)
@@ -198,10 +188,10 @@ class VmAssembly(Assembly):
             values = self._out[name][:size]
             self.report[places[name]] = np.where(np.isnan(values), instead, values)
 
-    def _drop_idle_rows(self, J: Array, wish: Array, factor: Array) -> bool:
+    def _drop_idle_rows(self, J: Array, desired: Array, factor: Array) -> bool:
         """Task rows without weight leave the problem, whatever their numbers are. False: others are not finite."""
-        bad = ~(np.isfinite(J).all(axis=1) & np.isfinite(wish) & np.isfinite(factor))
-        J[bad], wish[bad], factor[bad] = 0.0, 0.0, 0.0
+        bad = ~(np.isfinite(J).all(axis=1) & np.isfinite(desired) & np.isfinite(factor))
+        J[bad], desired[bad], factor[bad] = 0.0, 0.0, 0.0
         return not bool((bad & (self.weight != 0.0)).any())
 
     def _bounds(self) -> tuple[Array, Array]:

@@ -53,23 +53,8 @@ extern "C" {
 
 /* What the last step reports */
 typedef struct {
-    double v[WBC_VARIABLES];                   /* the command, WBC_NV numbers [rad/s, m/s]; then the rest of the QP's */
-    double flag;                               /* its status, as wbc_step returned it */
-    double iterations;                         /* of the QP solver, all solves of the step together */
-    double stationarity;                       /* largest entry of |H v + g + A' lambda| */
-    double violation;                          /* largest violation of a row that was not relaxed, in its unit / s */
-    double complementarity;                    /* largest |lambda (A v - b)| */
-    double error_bound;                        /* bound on the largest |v - v*|; 1e30: not known */
-    double error[WBC_TASK_ROWS + 1];           /* residual of every task row before the step, in its unit */
-    double factor[WBC_TASK_ROWS + 1];          /* 1, or less where a task row fades near a singularity */
-    double margin[WBC_MARGINS + 1];            /* margins before the step, in their units, >= 0 where they hold */
-    double margin_factor[WBC_MARGINS + 1];     /* 1, or less where a margin row fades */
-    double ahead[WBC_MARGINS + 1];             /* margins after v has been held for dt */
-    double lambda[WBC_VARIABLES + WBC_ROWS + 1]; /* multipliers of the bounds, then of the rows; > 0 at the upper side */
-    double slack[WBC_ROWS + 1];                /* by how much a row is missed, in its unit / s */
-    double owner_low[WBC_VARIABLES];           /* number of the bound that sets each lower side of v, -1: none */
-    double owner_high[WBC_VARIABLES];          /* the same for the upper side */
-@LEVELS@} wbc_result;
+@RESULT@
+} wbc_result;
 
 /* Memory of one controller; its contents are private */
 typedef union {

@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wbc.qp.equalities import independent
-from wbc.qp.levels.hierarchy import Achieved, Answer, Hierarchy, Level
+from wbc.qp.levels.hierarchy import Achieved, Hierarchy, Level, LevelsAnswer
 from wbc.qp.polish import polish
-from wbc.qp.problem import QP, Solution, definite
+from wbc.qp.problem import QP, QPSolution, definite
 from wbc.qp.solvers.daqp import Daqp
 from wbc.validation import Array
 
@@ -59,10 +59,10 @@ class Cascade:
         for solver in self._solvers.values():
             solver.reset()
 
-    def solve(self, problem: Hierarchy) -> Answer:
+    def solve(self, problem: Hierarchy) -> LevelsAnswer:
         """The optimum of all levels."""
         n = self.n
-        rows = Rows(problem)
+        rows = LevelRows(problem)
         space, dropped = _equalities(problem, rows)
         x, iterations, error = problem.x, 0, 0.0
         multipliers, pushes = np.zeros(n + self.m), np.full(n + self.m, -1)
@@ -81,7 +81,7 @@ class Cascade:
         for level, out in zip(problem.levels, achieved, strict=False):
             out.disturbance = float(np.abs(level.rows @ (x - out.x)).max(initial=0.0))
         off = np.abs(problem.A @ x - problem.lower[n:])
-        return Answer(x, multipliers, pushes, np.where(dropped, off, -1.0), achieved, iterations)
+        return LevelsAnswer(x, multipliers, pushes, np.where(dropped, off, -1.0), achieved, iterations)
 
     def split(self, rows: Array) -> tuple[Array, Array, int]:
         """(V, singular values, number of those that count) of rows in the space that is left."""
@@ -110,7 +110,7 @@ def rest(n: int) -> Level:
     return Level(np.zeros((0, n)), np.zeros(0), np.zeros(n), np.zeros(0, dtype=np.intp), np.zeros(0))
 
 
-def _equalities(problem: Hierarchy, rows: Rows) -> tuple[Array, NDArray[np.bool_]]:
+def _equalities(problem: Hierarchy, rows: LevelRows) -> tuple[Array, NDArray[np.bool_]]:
     """(basis of the space that equality rows leave, rows that were dropped because they depend on others)."""
     n, m = problem.x.size, problem.A.shape[0]
     low, high = np.where(rows.equal, problem.lower, -np.inf), np.where(rows.equal, problem.upper, np.inf)
@@ -121,7 +121,7 @@ def _equalities(problem: Hierarchy, rows: Rows) -> tuple[Array, NDArray[np.bool_
     return complement(np.vstack((fixed, found.basis)), np.eye(n)), dropped
 
 
-class Rows:
+class LevelRows:
     """Sides of all rows as they stand for a level, and how x sees them."""
 
     def __init__(self, problem: Hierarchy) -> None:
@@ -155,7 +155,7 @@ class Rows:
 class LevelStep:
     """One level at work: its coordinates y_c (taken) and y_f (free), its optimum, and what it leaves."""
 
-    def __init__(self, cascade: Cascade, level: Level, rows: Rows, space: Array, x: Array, last: bool) -> None:
+    def __init__(self, cascade: Cascade, level: Level, rows: LevelRows, space: Array, x: Array, last: bool) -> None:
         self.cascade, self.level, self.rows, self.x, self.last = cascade, level, rows, x, last
         self.local = space if last else level.rows @ space
         if last:
@@ -291,11 +291,11 @@ class LevelStep:
         drive = max(float(np.abs(self.right).max(initial=0.0)), float(np.abs(force).max(initial=0.0)))
         return np.where(np.abs(force) * seen <= max(PUSHING * drive, NOISE), 0.0, force)
 
-    def _proximal(self, place: int, qp: QP) -> Solution | None:
+    def _proximal(self, place: int, qp: QP) -> QPSolution | None:
         """The QP with the cost of the free directions taken away again."""
         free = slice(self.rank, self.rank + self.F.shape[1])
         solver = self.cascade.solver(place, qp.n)
-        best: Solution | None = None
+        best: QPSolution | None = None
         for _ in range(STEPS):
             found = solver.solve(qp)
             self.iterations += found.iterations

@@ -49,7 +49,7 @@ class Hierarchy:
 
 @dataclass(eq=False, slots=True)
 class Achieved:
-    """What became of one level; the last of :attr:`Answer.levels` is the least x of all that is left.
+    """What became of one level; the last of :attr:`LevelsAnswer.levels` is the least x of all that is left.
 
     Attributes:
         x: its optimum [n].
@@ -77,7 +77,7 @@ class Achieved:
 
 
 @dataclass(eq=False, slots=True)
-class Answer:
+class LevelsAnswer:
     """Answer of a cascade.
 
     Attributes:

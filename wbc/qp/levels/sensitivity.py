@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wbc.errors import SolverError
-from wbc.qp.levels.cascade import Cascade, LevelStep, Rows, complement, rest
-from wbc.qp.levels.hierarchy import Answer, Hierarchy
+from wbc.qp.levels.cascade import Cascade, LevelRows, LevelStep, complement, rest
+from wbc.qp.levels.hierarchy import Hierarchy, LevelsAnswer
 from wbc.validation import Array
 
 #: Curvature of a level's cost along what the rows that push leave, below which a direction is not its own
@@ -28,10 +28,10 @@ class FrozenLevels:
         problem, answer: where these come from; multipliers of the answer may be in any units.
     """
 
-    def __init__(self, cascade: Cascade, problem: Hierarchy, answer: Answer) -> None:
+    def __init__(self, cascade: Cascade, problem: Hierarchy, answer: LevelsAnswer) -> None:
         n = problem.x.size
         self._cascade = cascade
-        self._equal = Rows(problem).equal
+        self._equal = LevelRows(problem).equal
         self._equal[n:] &= answer.dropped < 0.0
         self._places = np.where(self._equal, -1, answer.pushes)
         self._upper = answer.multipliers > 0.0
@@ -49,7 +49,7 @@ class FrozenLevels:
             SolverError: it has another rank.
         """
         n = problem.x.size
-        rows = Rows(problem)
+        rows = LevelRows(problem)
         low, high = problem.lower.copy(), problem.upper.copy()
         crossed = low > high
         low[crossed] = high[crossed] = 0.5 * (low[crossed] + high[crossed])

@@ -8,7 +8,7 @@ import numpy as np
 
 from wbc.errors import ShapeError
 from wbc.qp.equalities import independent, orthonormal, restore
-from wbc.qp.problem import QP, Flag, Solution
+from wbc.qp.problem import QP, Flag, QPSolution
 from wbc.validation import Array
 
 
@@ -25,7 +25,7 @@ class Backend(ABC):
         self.n = n
         self.m = m
 
-    def solve(self, qp: QP, warm: bool = True) -> Solution:
+    def solve(self, qp: QP, warm: bool = True) -> QPSolution:
         """Solve ``qp``; with ``warm`` start from the previous answer.
 
         Not-finite data give the flag ``failed``, crossed bounds ``infeasible``; neither changes the
@@ -45,7 +45,7 @@ class Backend(ABC):
         return self._solve(qp, warm)
 
     @abstractmethod
-    def _solve(self, qp: QP, warm: bool) -> Solution:
+    def _solve(self, qp: QP, warm: bool) -> QPSolution:
         """Solve a problem with finite data and ordered bounds."""
 
     @abstractmethod
@@ -53,19 +53,19 @@ class Backend(ABC):
         """Forget the previous answer."""
 
 
-def refusal(qp: QP, flag: Flag, iterations: int = 0) -> Solution:
+def refusal(qp: QP, flag: Flag, iterations: int = 0) -> QPSolution:
     """An answer without a minimiser: the point of the box nearest to zero, zero multipliers."""
     n = qp.g.size
     with np.errstate(invalid="ignore"):
         x = np.minimum(np.maximum(0.0, qp.lower[:n]), qp.upper[:n])
-    return Solution(np.where(np.isfinite(x), x, 0.0), np.zeros(qp.lower.size), flag, iterations)
+    return QPSolution(np.where(np.isfinite(x), x, 0.0), np.zeros(qp.lower.size), flag, iterations)
 
 
-def answer(qp: QP, x: Array, multipliers: Array, iterations: int) -> Solution:
+def answer(qp: QP, x: Array, multipliers: Array, iterations: int) -> QPSolution:
     """A ``solved`` answer, or ``failed`` if any number in it is not finite."""
     if not np.isfinite(x.sum() + multipliers.sum()):
         return refusal(qp, "failed", iterations)
-    return Solution(x, multipliers, "solved", iterations)
+    return QPSolution(x, multipliers, "solved", iterations)
 
 
 class Prepared(Backend):
@@ -82,7 +82,7 @@ class Prepared(Backend):
     def reset(self) -> None:
         self.inner.reset()
 
-    def _solve(self, qp: QP, warm: bool) -> Solution:
+    def _solve(self, qp: QP, warm: bool) -> QPSolution:
         n = self.n
         if not np.any(qp.lower[n:] == qp.upper[n:]):
             return self.inner.solve(qp, warm)

@@ -16,7 +16,7 @@ import casadi as ca
 import numpy as np
 
 from wbc.errors import SolverError, UnknownNameError
-from wbc.qp.problem import QP, Solution
+from wbc.qp.problem import QP, QPSolution
 from wbc.qp.solvers.backend import Backend, answer, refusal
 from wbc.validation import Array
 
@@ -105,7 +105,7 @@ class Conic(Backend):
             self._in[name][:] = 0.0
         self._fresh = True
 
-    def _solve(self, qp: QP, warm: bool) -> Solution:
+    def _solve(self, qp: QP, warm: bool) -> QPSolution:
         self._load(qp)
         solution = None
         if warm and not self._fresh:
@@ -125,7 +125,7 @@ class Conic(Backend):
             self._in["a"][:] = qp.A.ravel(order="F")
             self._in["lba"][:], self._in["uba"][:] = qp.lower[n:], qp.upper[n:]
 
-    def _attempt(self, qp: QP) -> Solution:
+    def _attempt(self, qp: QP) -> QPSolution:
         n, m = self.n, self.m
         for out in self._out.values():
             out[:] = np.nan
@@ -143,7 +143,7 @@ class Conic(Backend):
         self._remember(solution)
         return solution
 
-    def _remember(self, solution: Solution) -> None:
+    def _remember(self, solution: QPSolution) -> None:
         if not solution.solved:
             self.reset()
             return

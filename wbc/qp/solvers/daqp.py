@@ -10,7 +10,7 @@ from typing import Any
 import daqp
 import numpy as np
 
-from wbc.qp.problem import QP, Solution
+from wbc.qp.problem import QP, QPSolution
 from wbc.qp.solvers.backend import Backend, answer, refusal
 
 #: Settings of the wheel; ``eps_prox`` 0 switches the regularisation off (H is positive definite).
@@ -46,7 +46,7 @@ class Daqp(Backend):
     def reset(self) -> None:
         self._active[:] = 0
 
-    def _solve(self, qp: QP, warm: bool) -> Solution:
+    def _solve(self, qp: QP, warm: bool) -> QPSolution:
         size = self.n + self.m
         np.maximum(qp.lower, -_INFINITE, out=self._lower[:size])
         np.minimum(qp.upper, _INFINITE, out=self._upper[:size])

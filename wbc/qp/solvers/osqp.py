@@ -13,7 +13,7 @@ import osqp
 from scipy import sparse
 
 from wbc.qp.polish import polish
-from wbc.qp.problem import QP, Solution
+from wbc.qp.problem import QP, QPSolution
 from wbc.qp.solvers.backend import Backend, refusal
 
 #: Tolerances of the two attempts: the second only if the active set of the first could not be corrected
@@ -62,7 +62,7 @@ class Osqp(Backend):
         self._solver.warm_start(x=np.zeros(self.n), y=np.zeros(self.n + self.m))
         self._solver.update_settings(rho=self._rho)
 
-    def _solve(self, qp: QP, warm: bool) -> Solution:
+    def _solve(self, qp: QP, warm: bool) -> QPSolution:
         if not warm:
             self.reset()
         self._columns[:, 1:] = qp.A.T
@@ -78,10 +78,10 @@ class Osqp(Backend):
                 return refusal(qp, "infeasible", iterations)
             if result.info.status not in _SOLVED or not np.isfinite(result.x.sum() + result.y.sum()):
                 break
-            polished = polish(qp, Solution(np.array(result.x), np.array(result.y), "solved"))
+            polished = polish(qp, QPSolution(np.array(result.x), np.array(result.y), "solved"))
             if polished.exact:
                 solution = polished.solution
                 self._solver.warm_start(x=solution.x, y=solution.multipliers)
-                return Solution(solution.x, solution.multipliers, "solved", iterations)
+                return QPSolution(solution.x, solution.multipliers, "solved", iterations)
         self.reset()
         return refusal(qp, "failed", iterations)

@@ -5,7 +5,7 @@
 #include "reach.h"
 #include "sensed.h"
 
-/* H += J' diag(w) J, g -= J' diag(w) wish, for `count` rows that share the `cols` columns listed from `first` */
+/* H += J' diag(w) J, g -= J' diag(w) desired, for `count` rows that share the `cols` columns listed from `first` */
 INLINE void block(wbc_tick *t, int row, int count, int first, int cols) {
     const int *col = j_col + first;
     const double *J = t->jt + first;
@@ -13,7 +13,7 @@ INLINE void block(wbc_tick *t, int row, int count, int first, int cols) {
         double f[count], line[WIDE], rhs = 0.0;
         for (int r = 0; r < count; r++) {
             f[r] = t->weight[row + r] * t->report.factor[row + r] * J[r * cols + a];
-            rhs += f[r] * t->wish[row + r];
+            rhs += f[r] * t->desired[row + r];
         }
         t->g[col[a]] -= rhs;
         for (int b = a & ~7; b < cols; b++) {
@@ -31,7 +31,7 @@ INLINE void diagonal(wbc_tick *t, int row, int count, int first) {
     for (int r = 0; r < count; r++) {
         const int c = j_col[first + r];
         const double wa = t->weight[row + r] * t->report.factor[row + r] * t->jt[first + r];
-        t->g[c] -= wa * t->wish[row + r];
+        t->g[c] -= wa * t->desired[row + r];
         t->H[c * WIDE + c] += wa * t->jt[first + r];
     }
 }
@@ -41,11 +41,11 @@ static int usable_tasks(wbc_tick *t) {
     int ok = 1;
     for (int k = 0; k < MT; k++) {
         const int first = j_start[k], count = j_start[k + 1] - first;
-        const int fine = all_finite(t->jt + first, count) && all_finite(t->wish + k, 1) && all_finite(t->report.factor + k, 1);
+        const int fine = all_finite(t->jt + first, count) && all_finite(t->desired + k, 1) && all_finite(t->report.factor + k, 1);
         if (fine) continue;
         ok &= t->weight[k] == 0.0;
         memset(t->jt + first, 0, count * sizeof(double));
-        t->wish[k] = t->report.factor[k] = 0.0;
+        t->desired[k] = t->report.factor[k] = 0.0;
     }
     return ok;
 }
@@ -80,14 +80,14 @@ static void form_bounds(wbc_tick *t) {
 /* `screen`: without rows that no velocity within the bounds could violate */
 static void assemble(wbc_tick *t, int screen) {
     const double *arg[4] = {t->q, t->v_last, t->p, &t->dt};
-    double *res[13] = {t->report.error, t->wish, t->report.factor, t->jt, t->at, t->free_low, t->free_high,
+    double *res[13] = {t->report.error, t->desired, t->report.factor, t->jt, t->at, t->free_low, t->free_high,
                        t->report.margin, t->bound_low, t->bound_high, t->report.margin_factor, t->segment, t->screw};
     rows(arg, res, t->work_iw, t->work_w, 0);
     memset(t->H, 0, sizeof t->H);
     memset(t->g, 0, sizeof t->g);
     /* Comparisons with NaN are false, so a row of NaN would pass as satisfied: such a tick brakes */
     t->unusable = 0.0;
-    if (!(all_finite(t->jt, NNZJ) && all_finite(t->wish, MT) && all_finite(t->report.factor, MT)))
+    if (!(all_finite(t->jt, NNZJ) && all_finite(t->desired, MT) && all_finite(t->report.factor, MT)))
         t->unusable = !usable_tasks(t);
     for (int i = 0; i < NV; i++) t->H[i * WIDE + i] = damping[i];
     BLOCKS

@@ -34,8 +34,8 @@ int move(const double **arg, double **res, long long *iw, double *w, int mem);
  * by less than this share */
 #define AT_REST 1e-7
 #define GAINED 1e-9
-/* Ticks that bring the goals back after one that follows wishes at most, to within this share of their tolerance: else
- * wishes would gain by errors of the goals */
+/* Ticks that bring the goals back after one that follows secondary tasks at most, to within this share of their tolerance: else
+ * those would gain by errors of the goals */
 #define RETURNS 5
 #define CLOSELY 0.01
 /* Share of the time after which no goal is sought any more and the nearest configuration settles */
@@ -44,13 +44,13 @@ int move(const double **arg, double **res, long long *iw, double *w, int mem);
 typedef struct {
     const double *starts;    /* restarts x NQ */
     const double *chosen;    /* NQ: 1 where a restart takes the table's number, 0 where the first configuration's stays */
-    const double *tolerance; /* MT: of each task row, negative for wishes */
+    const double *tolerance; /* MT: of each task row, negative for secondary tasks */
     const double *seeking;   /* MT: weights while the goals are sought */
-    const double *settling;  /* MT: weights while wishes are followed */
+    const double *settling;  /* MT: weights while secondary tasks are followed */
     double restarts;         /* rows of the table */
     double seconds;          /* until the search ends */
     double room;             /* how far constraints may be off at the answer, in row units */
-    double wishes;           /* not 0: there are wishes to follow once the goals are met */
+    double secondary;        /* not 0: there are secondary tasks to follow once the goals are met */
 } wbc_search;
 
 typedef struct {
@@ -64,14 +64,14 @@ static double clock_seconds(void) {
     return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
-/* Weighted square of errors, of the goals or of the wishes; and whether all these are within a share of their tolerance */
-static double squares(const wbc_tick *t, const wbc_search *s, int wishes, double share, int *met) {
-    const double *weight = wishes ? s->settling : s->seeking;
+/* Weighted square of errors, of the goals or of the secondary tasks; and whether all these are within a share of their tolerance */
+static double squares(const wbc_tick *t, const wbc_search *s, int secondary, double share, int *met) {
+    const double *weight = secondary ? s->settling : s->seeking;
     double sum = 0.0;
     *met = 1;
     for (int k = 0; k < MT; k++) {
         const double e = t->report.error[k];
-        if ((s->tolerance[k] < 0.0) != wishes || weight[k] == 0.0) continue;
+        if ((s->tolerance[k] < 0.0) != secondary || weight[k] == 0.0) continue;
         sum += weight[k] * e * e;
         *met &= fabs(e) <= share * s->tolerance[k];
     }
@@ -135,7 +135,7 @@ static int descend(wbc_tick *t, const wbc_search *s, wbc_found *out, double end)
     return WBC_EXHAUSTED;
 }
 
-/* Ticks of the goals alone until they are met again; the cost of the goals or, where they were found, of the wishes, at
+/* Ticks of the goals alone until they are met again; the cost of the goals or, where they were found, of the secondary tasks, at
  * t->q. Infinite where constraints or goals that were met are not. */
 static double corrected(wbc_tick *t, const wbc_search *s, wbc_found *out, int found, double end) {
     double cost = HUGE_VAL;
@@ -158,7 +158,7 @@ static double corrected(wbc_tick *t, const wbc_search *s, wbc_found *out, int fo
     return HUGE_VAL;
 }
 
-/* From the best configuration on to where the stack rests, with curvature: goals that are met stay met and the wishes
+/* From the best configuration on to where the stack rests, with curvature: goals that are met stay met and the secondary tasks
  * come nearer; of goals that are not met, the error falls. Strides that bring nothing are taken back and shortened. */
 static void settle(wbc_tick *t, const wbc_search *s, wbc_found *out, double end) {
     const int found = out->ending == WBC_FOUND;
@@ -212,7 +212,7 @@ EXPORT void wbc_tick_converge(wbc_tick *t, const wbc_search *s, wbc_found *out) 
         if (out->ending == WBC_FOUND) break;
     }
     if (out->ending != WBC_FOUND && out->cost < HUGE_VAL) settle(t, s, out, end);
-    if (out->ending == WBC_FOUND && s->wishes != 0.0) settle(t, s, out, end);
+    if (out->ending == WBC_FOUND && s->secondary != 0.0) settle(t, s, out, end);
     memcpy(t->q, t->q_good, NQ * sizeof(double));
     memcpy(t->weight, weight, MT * sizeof(double));
     t->plain = 0.0;

@@ -39,9 +39,9 @@ static void load_level(wbc_tick *t, int place) {
     for (int k = level_start[place]; k < level_start[place + 1]; k++, s->count++) {
         double *row = s->row + s->count * NV;
         unit_row(t, k, row);
-        const double wish = sqrt(larger(t->report.factor[k], 0.0)) / task_scale[k] * t->wish[k];
+        const double rate = sqrt(larger(t->report.factor[k], 0.0)) / task_scale[k] * t->desired[k];
         s->weight[s->count] = t->weight[k] * task_scale[k] * task_scale[k] / s->scale;
-        add_to(s->wanted, row, s->weight[s->count] * wish, NV);
+        add_to(s->wanted, row, s->weight[s->count] * rate, NV);
     }
     /* The first level's, as its gains were changed where joints could not brake */
     for (int i = 0; place == 0 && LEADING > 0 && i < NV; i++) s->wanted[i] = -t->g[i] * dof_scale[i] / s->scale;
@@ -91,12 +91,12 @@ static void take_all(wbc_levels *s) {
 
 /* H, and the right side without and with damping, in the directions that are taken */
 static void level_quadratic(wbc_levels *s, int rest) {
-    double pull[NV];
-    for (int i = 0; i < NV; i++) pull[i] = rest ? -s->x[i] : s->wanted[i];
-    for (int r = 0; r < s->count; r++) add_to(pull, s->row + r * NV, -s->weight[r] * inner(s->row + r * NV, s->x, NV), NV);
+    double descent[NV];
+    for (int i = 0; i < NV; i++) descent[i] = rest ? -s->x[i] : s->wanted[i];
+    for (int r = 0; r < s->count; r++) add_to(descent, s->row + r * NV, -s->weight[r] * inner(s->row + r * NV, s->x, NV), NV);
     for (int i = 0; i < s->rank; i++) {
         const double *basis = s->basis + i * NV;
-        s->plain[i] = inner(basis, pull, NV);
+        s->plain[i] = inner(basis, descent, NV);
         s->right[i] = s->plain[i] - s->damped[i] * inner(basis, s->x, NV);
         for (int j = i; j < s->rank; j++) {
             double sum = i == j ? s->damped[i] + (rest ? 1.0 : 0.0) : 0.0;

@@ -1,9 +1,9 @@
 /* Strict levels, one after the other, each in the space that the earlier ones leave: docs/levels.md, and the same in
- * numpy in wbc/qp/cascade.py. */
+ * numpy in wbc/qp/levels/cascade.py. */
 #ifndef WBC_LEVELS_H
 #define WBC_LEVELS_H
 
-#include "level_bend.h"
+#include "level_curvature.h"
 
 #if LEVELS > 0
 
@@ -168,12 +168,12 @@ static int one_level(wbc_tick *t, int place, double *error) {
     load_level(t, place);
     if (rest) take_all(s);
     else take_directions(t, place);
-    s->bends = 0;
-    if (place == 0 && t->curved) take_bent(t);
+    s->curved = 0;
+    if (place == 0 && t->curved) take_curvature(t);
     numbers[0] = s->rank;
     numbers[2] = s->least;
     level_quadratic(s, rest);
-    if (s->bends) add_bent(s);
+    if (s->curved) add_level_curvature(s);
     for (int i = 0; i < M_ALL; i++) s->lambda[i] = s->force[i] = 0.0;
     memcpy(x, s->x, sizeof x);
     int solved = invert_matrix(s->H, s->rank, s->inverse);
@@ -258,7 +258,7 @@ static int all_levels(wbc_tick *t, int flag) {
             wbc_tick_certify(t);
         }
     }
-    for (int k = 0; k < MT; k++) out->missed[k] = along(t, k, out->v) - t->wish[k];
+    for (int k = 0; k < MT; k++) out->missed[k] = along(t, k, out->v) - t->desired[k];
     return flag;
 }
 

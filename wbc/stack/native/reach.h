@@ -101,7 +101,7 @@ INLINE void less_row(const double *a, const int *col, int count, double f, const
 }
 
 /* The solution x for b in the metric of R, at rounding level however far its pivots are apart: the errors that a step
- * leaves are small differences, and what they bend must not be noise. `more` is on the diagonal besides. */
+ * leaves are small differences, and the curvature along them must not be noise. `more` is on the diagonal besides. */
 static void sharpen(const wbc_tick *t, const double *free, double more, const double *b, double *x) {
     double least = WBC_INF, most = 0.0;
     for (int i = 0; i < NV; i++) {
@@ -148,7 +148,7 @@ static int trusted_step(wbc_tick *t, const double *free, const double *slope, do
 }
 
 /* Weighted errors that this step leaves. R is the metric without curvature, before and after. */
-static int left_over(wbc_tick *t, const double *free, const double *error, const double *whole, double *pull) {
+static int left_over(wbc_tick *t, const double *free, const double *error, const double *whole, double *force) {
     double step[WIDE], slope[WIDE] = {0};
     int changed = KEPT;
     /* What blocked joints are asked for is not asked of the others */
@@ -159,9 +159,9 @@ static int left_over(wbc_tick *t, const double *free, const double *error, const
     if (!found) return 0;
     for (int k = 0; k < LEADING; k++) {
         const double f = t->weight[k] * t->report.factor[k];
-        pull[k] = f == 0.0 ? 0.0 : f * (error[k] - along(t, k, step));
+        force[k] = f == 0.0 ? 0.0 : f * (error[k] - along(t, k, step));
     }
-    if (KEPT) without_kept(t, step, pull);
+    if (KEPT) without_kept(t, step, force);
     return !changed || cut_off(t, free, 0.0);
 }
 
@@ -196,19 +196,19 @@ static double least_pivot(const wbc_tick *t) {
 }
 
 /* H += curvature of the errors that are left, with blocked joints cut off; how large it is, 0 for none to count */
-static double bend_errors(wbc_tick *t, const double *free, const double *error, const double *pull, double least) {
+static double curve_errors(wbc_tick *t, const double *free, const double *error, const double *force, double least) {
     double size = 0.0, whole = 0.0, largest = 0.0;
     for (int k = 0; k < LEADING; k++) {
-        size += fabs(pull[k]) * pull_scale[k];
-        whole += fabs(t->weight[k] * t->report.factor[k] * error[k]) * pull_scale[k];
+        size += fabs(force[k]) * force_scale[k];
+        whole += fabs(t->weight[k] * t->report.factor[k] * error[k]) * force_scale[k];
     }
     const double counts = clamp(size / (NEGLIGIBLE * least) - 1.0, 0.0, 1.0);
     const double share = counts * clamp(size / (REMOVED * whole + DBL_MIN) - 1.0, 0.0, 1.0);
     if (!(share > 0.0)) return 0.0;
-    const double *arg[5] = {t->q, t->v_last, t->p, &t->dt, pull};
-    double *res[1] = {t->bent};
-    bend(arg, res, t->work_iw, t->work_w, 0);
-    if (!all_finite(t->bent, NNZK)) return 0.0;
+    const double *arg[5] = {t->q, t->v_last, t->p, &t->dt, force};
+    double *res[1] = {t->curvature_entries};
+    curvature(arg, res, t->work_iw, t->work_w, 0);
+    if (!all_finite(t->curvature_entries, NNZK)) return 0.0;
 #if LEVELS > 0
     memset(t->curvature, 0, sizeof t->curvature);
 #endif
@@ -216,20 +216,20 @@ static double bend_errors(wbc_tick *t, const double *free, const double *error, 
         for (int j = i + 1; j < NV; j++) t->H[i * WIDE + j] *= 1.0 - share * (1.0 - free[i] * free[j]);
     for (int e = 0; e < NNZK; e++) {
         const int i = k_row[e], j = k_col[e];
-        const double bent = share * free[i] * free[j] * t->bent[e];
-        largest = larger(largest, fabs(bent) * dof_scale[i] * dof_scale[j]);
-        t->H[i * WIDE + j] += bent;
+        const double entry = share * free[i] * free[j] * t->curvature_entries[e];
+        largest = larger(largest, fabs(entry) * dof_scale[i] * dof_scale[j]);
+        t->H[i * WIDE + j] += entry;
 #if LEVELS > 0
-        t->curvature[i * NV + j] = t->curvature[j * NV + i] = bent;
+        t->curvature[i * NV + j] = t->curvature[j * NV + i] = entry;
 #endif
     }
     return largest;
 }
 
 /* Curvature into H and what makes it positive definite again; leaves the factor. 1 where there is any to count. */
-static int add_curvature(wbc_tick *t, const double *free, const double *error, const double *pull) {
+static int add_curvature(wbc_tick *t, const double *free, const double *error, const double *force) {
     double scaled[NV * NV], more[NV], least = least_pivot(t);
-    const double largest = bend_errors(t, free, error, pull, least);
+    const double largest = curve_errors(t, free, error, force, least);
     if (largest == 0.0) return 0;
     least = larger(LEAST_PIVOT * largest, least);
     /* Where no pivot is too small the modified factorisation is the plain one; but equality rows are not in H */
@@ -310,11 +310,11 @@ static void reach(wbc_tick *t) {
         return;
     }
 #if NNZK > 0
-    double pull[MT + 1];
-    if (!left_over(t, free, error, slope, pull)) return;
+    double force[MT + 1];
+    if (!left_over(t, free, error, slope, force)) return;
     const int prepared = t->prepared;
     t->prepared = 1;
-    t->curved = add_curvature(t, free, error, pull);
+    t->curved = add_curvature(t, free, error, force);
     if (!t->prepared) return;
     if (!t->curved) t->prepared = prepared;
 #endif
@@ -325,7 +325,7 @@ static void reach(wbc_tick *t) {
     for (int k = 0; k < LEADING; k++) {
         const double gain = t->p[gain_at[k]];
         wanted[k] = smaller(gain, allowed) * error[k];
-        drift[k] = -t->wish[k] - gain * error[k];
+        drift[k] = -t->desired[k] - gain * error[k];
         moving |= t->weight[k] * t->report.factor[k] != 0.0 && drift[k] != 0.0;
         if (!t->curved) wanted[k] += drift[k];
     }

@@ -34,13 +34,13 @@ static int unsound(const wbc_tick *t, int flag) {
     return !((optimal || t->report.error_bound <= KNOWN * LONGEST) && t->report.violation <= SOUND * LONGEST);
 }
 
-/* By how much soft rows are violated; the slack of those that give way by more than is worth telling */
-static void tell_soft_rows(wbc_tick *t) {
+/* By how much soft rows are violated; the slack of those that give way by more than is worth a report */
+static void report_soft_rows(wbc_tick *t) {
     for (int k = 0; k < MC; k++) {
         if (price_at[k] < 0) continue;
         const double value = row_at(t, k, t->report.v);
         const double missed = fmax(t->free_low[k] - value, value - t->free_high[k]);
-        t->report.slack[k] = t->report.flag != WBC_BRAKED && missed > slack_told[k] ? missed : 0.0;
+        t->report.slack[k] = t->report.flag != WBC_BRAKED && missed > slack_reported[k] ? missed : 0.0;
 #if SOFT_ROWS > 0
         const int optimal = t->report.flag == WBC_SOLVED || t->report.flag == WBC_RELAXED;
         if (optimal && t->melted[k]) t->report.lambda[NV + k] = (value - met_side(t, k)) / t->give[k];
@@ -62,7 +62,7 @@ EXPORT int wbc_tick_step(wbc_tick *t) {
     wbc_tick_certify(t);
     if (t->cap == 0.0 && unsound(t, flag) && primal(t)) flag = (int)(t->report.flag = flag == WBC_RELAXED ? WBC_RELAXED : WBC_SOLVED);
 #endif
-    if (PRICES) tell_soft_rows(t);
+    if (PRICES) report_soft_rows(t);
     wbc_tick_look_ahead(t);
     memcpy(t->v_last, t->report.v, NV * sizeof(double));
     return unsound(t, flag) ? flag + WBC_UNSOUND : flag;
@@ -70,16 +70,12 @@ EXPORT int wbc_tick_step(wbc_tick *t) {
 
 EXPORT long long wbc_tick_size(void) { return (long long)sizeof(wbc_tick); }
 
-#define OFFSET(field) (long long)offsetof(wbc_tick, field)
-
-/* Where the caller finds q, v_last, v_in, use_v, p, dt, weight, enabled, bound_enabled, report, H, g, A, low, high,
- * unusable, plain, cap, wish, free_low, free_high, given, give */
-EXPORT void wbc_tick_layout(long long *out) {
-    const long long offsets[] = {OFFSET(q), OFFSET(v_last), OFFSET(v_in), OFFSET(use_v), OFFSET(p), OFFSET(dt),
-                                 OFFSET(weight), OFFSET(enabled), OFFSET(bound_enabled), OFFSET(report), OFFSET(H),
-                                 OFFSET(g), OFFSET(A), OFFSET(low), OFFSET(high), OFFSET(unusable), OFFSET(plain),
-                                 OFFSET(cap), OFFSET(wish), OFFSET(free_low), OFFSET(free_high), OFFSET(given), OFFSET(give)};
-    memcpy(out, offsets, sizeof offsets);
+/* Bytes before field k of memory.h, -1 behind the last one: what the caller takes for granted */
+EXPORT long long wbc_tick_offset(int k) {
+#define IN_REPORT(field) (long long)(offsetof(wbc_tick, report) + offsetof(wbc_report, field)),
+#define IN_TICK(field) (long long)offsetof(wbc_tick, field),
+    static const long long offsets[] = {WBC_REPORT_FIELDS(IN_REPORT) WBC_BUFFER_FIELDS(IN_TICK) -1};
+    return k >= 0 && k < (int)(sizeof offsets / sizeof *offsets) ? offsets[k] : -1;
 }
 
 #if LEVELS > 0
@@ -91,7 +87,7 @@ EXPORT void wbc_tick_task_rows(const wbc_tick *t, double *J) {
 }
 
 /* The curvature in H [NV, NV]; 0 for none */
-EXPORT int wbc_tick_bent(const wbc_tick *t, double *out) {
+EXPORT int wbc_tick_curvature(const wbc_tick *t, double *out) {
     memcpy(out, t->curvature, sizeof t->curvature);
     return t->curved;
 }

@@ -11,13 +11,13 @@
  *   NNZK k_row k_col   entries of the curvature's upper triangle
  *   margin_at rate_at   margin of each general row (-1: none), and where its rate is in p
  *   gain_at     where the gain of each task row is in p
- *   pull_scale  how much curvature a row of unit error may have
+ *   force_scale  how much curvature a row of unit error may have
  *   brake_at brake_limit   entry of bound_enabled that limits the acceleration of a velocity (-1: none), and the limit
  *   row_order   class of each general row in the order of sacrifice
  *   PRICES price_at   whether rows are soft at a price; where the price of each general row is in p (-1: it has none)
  *   SOFT_ROWS   how many of them the first level's QP has: none where there are strict levels
  *   KEPT kept_of   whether tasks of the first level keep directions; the row of such a task for each row that does (-1)
- *   slack_told  violation of a soft row from which on it is reported
+ *   slack_reported  violation of a soft row from which on it is reported
  *   row_scale   its unit: the characteristic length for rows in metres
  *   BALLS SEGMENTS   items whose rows are distances between a ball and segments of links, and those segments
  *   ball_pose ball_velocity ball_margin ball_rate   where their inputs are in p
@@ -47,6 +47,8 @@
 #define PACKED (NV * (NV + 1) / 2)
 #define WBC_INF 1e30
 
+#include "memory.h"
+
 /* Flags of a tick. Negative: the inputs were refused and nothing was changed. */
 #define WBC_SOLVED 0
 #define WBC_RELAXED 1
@@ -62,34 +64,6 @@
 #define WBC_BAD_UNIT (-2)
 #define WBC_BAD_V (-3)
 
-/* What a tick reports, in this order, before the row-wise outputs. */
-typedef struct {
-    double v[NV];         /* the command, and the other variables */
-    double flag;          /* one of the flags above */
-    double iterations;    /* of the active-set solver, all solves of the tick together */
-    double stationarity;  /* largest entry of |H v + g + A' lambda|, per dof */
-    double violation;     /* largest violation of a row or bound that was not relaxed, row units */
-    double complementarity; /* largest |lambda (A v - b)| */
-    double error_bound;   /* bound on the largest |v - v*| */
-    double error[MT + 1];     /* e of the task rows */
-    double factor[MT + 1];    /* fading factor of the task rows */
-    double margin[MH + 1];    /* h of the margin rows */
-    double margin_factor[MH + 1]; /* fading factor of the margin rows */
-    double ahead[MH + 1];     /* h at q (+) v dt */
-    double lambda[M_ALL + 1]; /* multipliers of bounds, then of general rows; > 0 at the upper side */
-    double slack[MC + 1];     /* by how much a general row was relaxed, row units */
-    double owner_low[NV];     /* bound block that sets each lower bound, -1 for none */
-    double owner_high[NV];
-#if LEVELS > 0
-    double missed[MT + 1];    /* J v - wish of the task rows */
-    double share[MT + 1];     /* part of each that the levels before left free */
-    double dropped[MC + 1];   /* of equality rows that depend on others, how far they are off; else -1 */
-    double pushes[M_ALL + 1]; /* level against whose optimum a row pushes first, -1: none */
-    double levels[(LEVELS + 1) * LEVEL_NUMBERS]; /* rank, free, least singular value, cost of damping, disturbance,
-                               * stationarity, complementarity, error bound, 1 where it was solved; last the least v */
-#endif
-} wbc_report;
-
 #if LEVELS > 0
 /* What the levels of a tick work with; vectors are of v / dof_scale, rows per unit */
 typedef struct {
@@ -103,8 +77,8 @@ typedef struct {
     double column[NV * LEVEL_MOST], damped[NV], least; /* rows along the directions */
     double H[NV * NV], inverse[NV * NV], right[NV], plain[NV], lambda[M_ALL], length[M_ALL];
     double force[M_ALL];                        /* multipliers, those in it that do not count as pushing */
-    double bent[NV * NV];                       /* curvature of the first level */
-    int bends, seen;                            /* whether there is any; directions that the rows take */
+    double curvature[NV * NV];                  /* of the first level */
+    int curved, seen;                           /* whether there is any; directions that the rows take */
     int width, rank, count, order[LEVEL_MOST];
     int keep[(LEVELS + 1) * M_ALL], warm[LEVELS + 1];
     DAQPWorkspace daqp;
@@ -119,35 +93,22 @@ typedef struct {
 #endif
 
 typedef struct {
-    wbc_report report;
-    /* inputs, written by the caller; in one piece with the report, so that one copy holds a whole tick */
-    double q[NQ + 1], v_last[NV], p[NP + 1], dt;
-    double v_in[NV], use_v;      /* a measured velocity, taken in place of the last command where use_v is not 0 */
-    double cap;                  /* iterations of the active-set solver a tick at most; 0: as many as it takes */
-    double weight[MT + 1];       /* weight of each task row, scale included */
-    double enabled[MC + 1];      /* 1 or 0 for each general row */
-    double bound_enabled[NB * NV + 1];
-    double plain;                /* not 0: the linear model as it is, whatever CALM says */
-    /* the QP */
-    double H[NV * WIDE], g[WIDE], A[MC * NV + 1], low[M_ALL], high[M_ALL];
-    double unusable;             /* not 0: numbers that are not finite, or bounds without an interval */
+    WBC_BUFFERS                  /* what the caller knows: see memory.h, which is generated */
     int prepared;                /* R is the factor of H, and y its right side */
     int curved;                  /* H contains curvature */
     int firm;                    /* rows that keep directions are firm in R */
     double stiffness;            /* what fixed variables add to the Hessian, in units of dof_scale */
-    double bent[NNZK + 1];       /* curvature */
+    double curvature_entries[NNZK + 1]; /* of its upper triangle */
     int idle[MC + 1];            /* rows that no velocity within the bounds violates */
     int far[MC + 1];             /* rows of balls and sensed pairs that are left out of this tick */
     double segment[6 * SEGMENTS + 1], screw[6 * NV], segment_ahead[6 * SEGMENTS + 1];
-    double given[16];            /* a pose on its way into p: a homogeneous matrix, row by row */
     double q_good[NQ + 1];       /* q of the last tick that was not refused, put back by one that is */
     /* outputs of the generated rows */
-    double wish[MT + 1], jt[NNZJ + 1], at[NNZA + 1], bound_low[NB * NV + 1], bound_high[NB * NV + 1];
+    double jt[NNZJ + 1], at[NNZA + 1], bound_low[NB * NV + 1], bound_high[NB * NV + 1];
     /* factorisation */
     double R[NV * WIDE], inverse[NV * WIDE], inverse_diagonal[NV], y[WIDE];
     double scratch[WIDE], product[WIDE];
     double strength[MC + 1];                    /* what equality rows and soft rows add to the factor, per a a' */
-    double give[MC + 1];                        /* by how much a soft row gives way per multiplier; 0 for hard rows */
 #if SOFT_ROWS > 0
     double loose[MC + 1];                       /* the same of what `strength` leaves of its price */
     double soft_scaling[M_ALL], own_H[NV * WIDE], own_g[WIDE];
@@ -155,7 +116,6 @@ typedef struct {
     int later[MC + 1];                          /* soft rows that are held from the next tick on */
     int settled;                                /* `strength` is that of the search, not that of the curvature */
 #endif
-    double free_low[MC + 1], free_high[MC + 1]; /* sides of general rows before relaxation */
     double work_w[WORK_W + 1];
     long long work_iw[WORK_IW + 1];
     int warm;                    /* the sense array holds the active set of the last tick */

@@ -1,6 +1,6 @@
-/* The first level where the errors that no step removes bend: see reach.h. */
-#ifndef WBC_LEVEL_BEND_H
-#define WBC_LEVEL_BEND_H
+/* Curvature of the first level, of errors that no step removes: see reach.h. */
+#ifndef WBC_LEVEL_CURVATURE_H
+#define WBC_LEVEL_CURVATURE_H
 
 #include "level.h"
 
@@ -40,17 +40,17 @@ static void principal(double *a, int size, double *turn) {
 }
 
 /* What curvature adds to the first level, and the directions that it takes after those of the rows */
-static void take_bent(wbc_tick *t) {
+static void take_curvature(wbc_tick *t) {
     wbc_levels *s = &t->levels;
     double local[NV * NV], turn[NV * NV], turned[NV * NV], curved[NV * NV], most = 0.0;
     for (int i = 0; i < NV; i++)
         for (int j = i; j < NV; j++) {
             const double size = dof_scale[i] * dof_scale[j] / s->scale, change = t->H[i * WIDE + j] - t->straight[i * WIDE + j];
-            s->bent[i * NV + j] = s->bent[j * NV + i] = (change + (i == j ? damping[i] : 0.0)) * size;
+            s->curvature[i * NV + j] = s->curvature[j * NV + i] = (change + (i == j ? damping[i] : 0.0)) * size;
             curved[i * NV + j] = curved[j * NV + i] = t->curvature[i * NV + j] * size;
             most = larger(most, fabs(curved[i * NV + j]));
         }
-    s->bends = 1;
+    s->curved = 1;
     const int free = s->width - s->rank;
     double *left = s->basis + s->rank * NV;
     for (int a = 0; a < free; a++) {
@@ -73,10 +73,10 @@ static void take_bent(wbc_tick *t) {
 }
 
 /* What curvature adds to H and to the right side */
-static void add_bent(wbc_levels *s) {
+static void add_level_curvature(wbc_levels *s) {
     for (int i = 0; i < s->rank; i++) {
         double image[NV];
-        for (int j = 0; j < NV; j++) image[j] = inner(s->bent + j * NV, s->basis + i * NV, NV);
+        for (int j = 0; j < NV; j++) image[j] = inner(s->curvature + j * NV, s->basis + i * NV, NV);
         s->plain[i] -= inner(image, s->x, NV);
         s->right[i] = s->plain[i];
         for (int j = 0; j < s->rank; j++) s->H[i * NV + j] += inner(image, s->basis + j * NV, NV);
