@@ -6,6 +6,8 @@ from wbc.robot.dh import DHRow
 from wbc.robot.geometry import convex_parts, fit_shapes
 from wbc.robot.pairs_file import read_self_pairs, save_self_pairs
 from wbc.robots.catalogue import from_dh, load, names, table
+from wbc.robots.limb import BodyLimb, Limb
+from wbc.robots.margins import Margins
 from wbc.robots.operator_arms import OperatorArm, operator_arm
 from wbc.robots.pairs import find_self_pairs
 from wbc.robots.walker_arms import Arm
@@ -14,9 +16,12 @@ from wbc.robots.walker_robot import Walker, walker
 
 __all__ = [
     "Arm",
+    "BodyLimb",
     "ConvexParts",
     "DHRow",
+    "Limb",
     "LinkPair",
+    "Margins",
     "OperatorArm",
     "SelfPairs",
     "TwoEndedData",

@@ -15,9 +15,7 @@ from wbc.walking.planner.eased import ACCELERATION, CHANGE, JERK, RAMP, SPEED, p
 from wbc.walking.planner.follow import follow_plan
 from wbc.walking.planner.plan import Plan, read_plan
 from wbc.walking.planner.planner import plan_walk
-from wbc.walking.planner.swings.joints import joint_paths
 from wbc.walking.planner.swings.law import SwingLaw
-from wbc.walking.planner.swings.least_time import RATE_PART
 
 INCH = 0.0254
 
@@ -80,10 +78,10 @@ def test_joints_keep_to_their_rates_with_the_body_on_its_way(machine: Walker, pl
         part = np.array([law.at(k * law.spacing).blend for k in range(count)])[:, None]
         first, last = (grips.between(np.array([[grip]]), samples)[..., 3:5] for grip in (source, target))
         frames = plan.path.blended(samples) @ machine.arms[arm].base.homogeneous
-        angles, possible = joint_paths(kinematics, frames, law.places[None], first + part * (last - first))
+        angles, possible = kinematics.follow(frames, law.places[None], first + part * (last - first), machine.margins)
         assert possible.all()
         rates = np.abs(np.diff(angles[0], axis=0)) / law.spacing / np.array(kinematics.data.joint_rates)[:5]
-        assert 0.3 < rates.max() <= RATE_PART * 1.02
+        assert 0.3 < rates.max() <= machine.margins.swing_rate * 1.02
 
 
 def test_a_plan_of_a_file_has_the_same_laws(

@@ -8,13 +8,13 @@ import pytest
 from bench.walk.reference import Rules, fewest_along
 from wbc.robots import Walker
 from wbc.walking import Structure, plane, remove_rows
+from wbc.walking.arms.puma import limb_of
 from wbc.walking.body_path import BodyPath, grid_path, straight_path
 from wbc.walking.planner.detours import Mesh, find_route
 from wbc.walking.planner.detours.cell_graph import round_labels
 from wbc.walking.planner.plan import NoPlanError
 from wbc.walking.planner.planner import plan_walk
-from wbc.walking.planner.swings.curve import WAYS
-from wbc.walking.planner.swings.parked import DEPTH, RADIUS
+from wbc.walking.planner.swings.curve import ALTERNATIVES
 from wbc.walking.run.request import over_holds
 
 INCH = 0.0254
@@ -49,9 +49,9 @@ def test_over_a_wide_trench_hands_wait_where_they_go_with_the_body(machine: Walk
     plan = plan_walk(machine, trench, path, objective="destination", detour=True)
     assert plan.complete
     np.testing.assert_allclose(ends(plan.path), ends(path), atol=1e-9)
-    waits = [one for one in zip(plan.regrasps, plan.laws, strict=True) if one[0].way >= len(WAYS)]
+    waits = [one for one in zip(plan.regrasps, plan.laws, strict=True) if one[0].way >= len(ALTERNATIVES)]
     assert waits
-    latch = machine.tolerances.latch_time
+    latch, (_, radius, height) = machine.tolerances.latch_time, limb_of(machine).waiting[0]
     for step, law in waits:
         assert law.possible
         base = next(arm.base.homogeneous for arm in machine.arms if arm.name == step.arm)
@@ -59,8 +59,8 @@ def test_over_a_wide_trench_hands_wait_where_they_go_with_the_body(machine: Walk
         frames = plan.path.blended((step.lift + latch + rides) / plan.path.spacing) @ base
         places = np.array([law.at(time).position for time in rides]) - frames[:, :3, 3]
         hands = np.einsum("nji,nj->ni", frames[:, :3, :3], places)
-        np.testing.assert_allclose(np.hypot(hands[:, 0], hands[:, 1]), RADIUS, atol=2e-3)
-        np.testing.assert_allclose(hands[:, 2], DEPTH, atol=2e-3)
+        np.testing.assert_allclose(np.hypot(hands[:, 0], hands[:, 1]), radius, atol=2e-3)
+        np.testing.assert_allclose(hands[:, 2], height, atol=2e-3)
 
 
 def test_a_way_round_changes_its_velocity_gradually(machine: Walker, structure: Structure) -> None:

@@ -1,10 +1,10 @@
-/* The least time along a hand's way under the limits of joints 1 to 5, as planner/swings/joints.py and least_time.py. */
+/* The least time along a hand's curve under the limits of joints 1 to 5, as arms/puma.py (follow) and planner/swings/least_time.py. */
 #ifndef WBC_WALKING_SPEEDS_H
 #define WBC_WALKING_SPEEDS_H
 
 #include "arm.h"
 
-/* Points of a way at most; joints that limit */
+/* Points of a curve at most; joints that limit */
 enum { MOST = 128, FIVE = 5 };
 
 /* Parts of rates and accelerations, the fastest hand [m/s], the least derivative [rad], samples between which the
@@ -36,7 +36,7 @@ static void unwrap(double (*angles)[JOINTS], long n)
 }
 
 /* Angles of a hand at `place` with the wrist bent by `wrists` (`bends` numbers a point), the body at `samples` + step.
-   Returns whether the whole way is within reach and limits. */
+   Returns whether the whole swing is within reach and limits. */
 static int joint_path(const Arm *arm, const Rules *rules, const double *base, const double *poses, long count, long n,
                       int bends, const double *place, const double *wrists, const double *samples, double step,
                       double (*angles)[JOINTS])

@@ -1,4 +1,4 @@
-/* Laws of swings: the least time along ways of hands while the body moves, and where the arm is meanwhile. */
+/* Laws of swings: the least time along curves of hands while the body moves, and where the arm is meanwhile. */
 #ifndef WBC_WALKING_TRACKS_H
 #define WBC_WALKING_TRACKS_H
 
@@ -53,7 +53,7 @@ int swing_speeds(const Arm *arm, const Rules *rules, long m, long n, int bends, 
         for (long i = 0; i < n; ++i) {
             double top = rules->fastest / larger(sqrt(dot(slope[i], slope[i])), rules->least);
             for (int k = 0; k < joints; ++k) {
-                /* Where the body goes the way of the hand, the hand may go faster */
+                /* Where the body goes where the hand does, the hand may go faster */
                 const double bias = (further[i][k] - here[i][k]) / rules->step, d = first[i][k];
                 const double with = (double)((d > 0.0) - (d < 0.0)) * bias / spacing;
                 const double most_rate = larger(rules->rate_part * arm->rates[k] - with, 0.1 * arm->rates[k]);

@@ -6,13 +6,12 @@ import functools
 import time
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
-from math import inf
 from typing import Literal
 
 from wbc import validation
-from wbc.errors import ShapeError
 from wbc.robots import Walker
 from wbc.validation import Array
+from wbc.walking.arms.puma import limb_of
 from wbc.walking.body_path import BodyPath
 from wbc.walking.holds.structure import Structure
 from wbc.walking.planner.detours.ways_round import ways_round
@@ -21,7 +20,8 @@ from wbc.walking.planner.grips.table import Grips, grip_slices
 from wbc.walking.planner.plan import NoPlanError, Plan, Regrasp
 from wbc.walking.planner.slices import Slices, drained
 from wbc.walking.planner.sound import sound_slices
-from wbc.walking.planner.stances.search import HOVER, Found, StanceSearch
+from wbc.walking.planner.stances.body import BodySearch
+from wbc.walking.planner.stances.nodes import Found
 from wbc.walking.planner.starts import ALL_STARTS, NOTHING, STARTS, Beginning, stance_slices
 from wbc.walking.planner.swings.law import SwingLaw
 
@@ -123,8 +123,7 @@ def plan_slices(
         as :func:`plan_walk`, where no stance is possible at the beginning.
     """
     validation.one_of("objective", objective, ("velocity", "destination"))
-    if walker.robot.name == "two_ended_arm":
-        raise ShapeError("walker", walker.robot.name, "expected a body with arms")
+    limb_of(walker)
     if grips is None:
         grips = yield from grip_slices(walker, structure, path)
     best: tuple[Found, tuple[SwingLaw, ...]] | None = None
@@ -132,21 +131,12 @@ def plan_slices(
     usual: list[tuple[float, int | None]] = [(delay, width) for delay in delays]
     if width is not None:
         usual.append((delays[-1], WIDER * width))
-    search: StanceSearch | None = None
+    search: BodySearch | None = None
     thorough = thorough and objective == "destination"
-    wait, most = (inf, ALL_STARTS) if thorough else (HOVER, STARTS)
+    most = ALL_STARTS if thorough else STARTS
     for delay, wide in tries or usual:
-        search = StanceSearch(
-            walker,
-            structure,
-            path,
-            grips,
-            longest_delay=delay,
-            longest_wait=wait,
-            width=wide,
-            known=search,
-            first=first,
-        )
+        more = {"longest_delay": delay, "width": wide, "first": first}
+        search = BodySearch(walker, structure, path, grips, known=search, patient=thorough, **more)
         starts = [stance] if stance else (yield from stance_slices(walker, structure, search, beginning, sample, most))
         yield None
         found, laws = yield from sound_slices(search, starts, sample, deadline)

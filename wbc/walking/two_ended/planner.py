@@ -14,9 +14,9 @@ from wbc.robots import Walker
 from wbc.validation import Array
 from wbc.walking.body_path import BodyPath
 from wbc.walking.holds.structure import Structure
-from wbc.walking.planner.grips.table import Grips
+from wbc.walking.planner.grips.table import END, Grips
 from wbc.walking.planner.plan import NoPlanError, Plan, Regrasp
-from wbc.walking.planner.stances.search import Found
+from wbc.walking.planner.stances.nodes import Found
 from wbc.walking.two_ended.postures import Grip, PairPostures
 from wbc.walking.two_ended.search import GAITS, TurnSearch
 from wbc.walking.two_ended.swing_path import Turn, TurnLaw, TurnPaths
@@ -179,10 +179,12 @@ def _grips(
         ends = [lift + STAND // 2 for lift in lifts] + [len(joints) - 1]
         chain.append(tuple(range(len(rows), len(rows) + len(mine))))
         for (grip, first), last in zip(mine, ends, strict=True):
-            rows.append([arm, grip.hold, 0, first, last, offset, Grips.reasons.index("end of the path"), grip.roll])
+            rows.append([arm, grip.hold, 0, first, last, offset, 0, grip.roll])
             part = np.zeros((last - first + 1, 4))
             part[:, : columns.shape[1]] = columns[first : last + 1]
             parts.append(part)
             offset += len(part)
     arms, holds, branch, firsts, lasts, offsets, ends_by, rolls = np.array(rows, dtype=np.int64).T
-    return Grips(arms, holds, branch, firsts, lasts, offsets, np.concatenate(parts), ends_by, rolls), tuple(chain)
+    return Grips(arms, holds, branch, firsts, lasts, offsets, np.concatenate(parts), ends_by, rolls, (END,)), tuple(
+        chain
+    )

@@ -21,7 +21,7 @@ from wbc.walking.loop.walk import Walk
 from wbc.walking.planner.plan import NoPlanError
 from wbc.walking.planner.replanning import PlanSlices
 from wbc.walking.two_ended.planner import TwoEndedPlan, plan_two_ended
-from wbc.walking.two_ended.swing_path import ACCELERATION_PART, RATE_PART, TurnLaw
+from wbc.walking.two_ended.swing_path import TurnLaw
 
 #: The last part of a swing, in which the hand comes straight down and its frame counts [s]
 NEAR = 2.0
@@ -130,11 +130,11 @@ class TwoEndedWalk(Walk):
             swinging.latch -= self.dt
             if swinging.latch <= 1e-9:
                 swinging.state = "open"
-        now, before = swinging.aim, law.posture(swinging.clock)[0]
+        now, before = swinging.aim, law.posture(swinging.clock)
         lifted = self.plan.regrasps[self.next].lift
         swinging.clock = min(self.path_time - lifted, law.duration)
         swinging.aim = law.at(swinging.clock)
-        speed, rates = (swinging.aim.position - now.position) / self.dt, law.posture(swinging.clock)[0] - before
+        speed, rates = (swinging.aim.position - now.position) / self.dt, law.posture(swinging.clock) - before
         near = swinging.clock > law.duration - NEAR
         at_hold = (self.structure.axes[swinging.hold], swinging.x) if near and swinging.x is not None else None
         self._turns.turn(arm, (now.position, speed), (before, rates / self.dt), at_hold)
@@ -151,9 +151,8 @@ class TwoEndedWalk(Walk):
     @cached_property
     def stops(self) -> Stops:
         """Laws leave half the accelerations for a stop; the hand comes to rest with the body."""
-        data = self.walker.data
-        assert isinstance(data, TwoEndedData)
-        ramp = RATE_PART / (1.0 - ACCELERATION_PART) * data.acceleration_time
+        data, margins = self.walker.two_ended_data, self.walker.margins
+        ramp = margins.swing_rate / (1.0 - margins.swing_acceleration) * data.acceleration_time
         return Stops(self.dt, ramp, ramp)
 
     def stopping(self) -> tuple[float, float]:

@@ -1,4 +1,4 @@
-"""A body path round what cannot be passed: a way from cell to cell, as a path."""
+"""A body path round what cannot be passed: from cell to cell, as a path."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from wbc.validation import Array
 from wbc.walking.body_path import BodyPath
 from wbc.walking.holds.structure import Structure
 from wbc.walking.planner.detours.cell_grips import cell_grips
+from wbc.walking.planner.detours.cell_search import CellSearch, Node
 from wbc.walking.planner.detours.cells import ALONG, Cells, Ints, Mesh, cells_about
-from wbc.walking.planner.detours.pair_search import Node, PairSearch
 
 #: How fast the body goes down [m/s] and turns [rad/s]
 DOWN_SPEED, TURN_SPEED = 0.05, 0.1
@@ -55,7 +55,7 @@ def find_route(
     start: Mapping[int, int] | None = None,
     deadline: float | None = None,
 ) -> BodyRoute:
-    """A way from a path's beginning to its end, along it, beside it, lower and turned.
+    """A detour from a path's beginning to its end, along it, beside it, lower and turned.
 
     Args:
         mesh: how far beside the path, how low, and how closely it is looked.
@@ -63,7 +63,7 @@ def find_route(
     """
     cells = cells_about(path, structure, mesh)
     grips = cell_grips(walker, structure, cells)
-    outcome = PairSearch(walker, structure, cells, grips).run(start, deadline)
+    outcome = CellSearch(walker, structure, cells, grips).run(start, deadline)
     if not outcome.nodes:
         names = tuple(structure.ids[k] for k in sorted({int(grips.hold[g]) for g in outcome.reached}))
         number = f"{outcome.expanded} landings looked at{'' if outcome.complete else ', more are left'}"
