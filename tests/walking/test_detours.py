@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+import wbc
 from bench.walk.reference import Rules, fewest_along
 from wbc.robots import Walker
 from wbc.walking import Structure, plane, remove_rows
@@ -20,6 +21,8 @@ from wbc.walking.run.request import over_holds
 INCH = 0.0254
 #: One height, and as few poses as will do
 COARSE = Mesh(0.14, 0.2, 5, (0.0,), 24)
+#: Along the path alone, at its height and a little lower
+NARROW = Mesh(0.14, 0.0, 0, (0.0, 0.1), 12)
 
 
 def ends(path: BodyPath) -> np.ndarray:
@@ -114,3 +117,17 @@ def test_connected_sets_go_on_after_a_full_turn() -> None:
     assert numbers[0, 0, 0, 0] == numbers[0, 0, 0, 5] == numbers[1, 0, 0, 5] == numbers[1, 0, 0, 0]
     assert numbers[0, 0, 0, 3] not in (0, numbers[0, 0, 0, 0])
     assert (numbers[~flags] == 0).all()
+
+
+@pytest.mark.parametrize("arms", range(2, 7))
+def test_bodies_with_two_to_six_arms_look_for_detours(structure: Structure, arms: int) -> None:
+    """As many hands as must hold do, of any number of arms; and where holds end, all of them are refused."""
+    machine = wbc.robots.walker(arms, (8 + 3 * arms) * INCH)
+    path = grid_path([(13, 9), (13, 12)], 2 * INCH)
+    route = find_route(machine, remove_rows(structure, "10-11"), path, mesh=NARROW)
+    assert route.path is not None, route.text
+    np.testing.assert_allclose(ends(route.path), ends(path), atol=1e-9)
+    few = structure.without([hold for hold in structure.ids if int(hold.split(",")[1]) > 11])
+    refused = find_route(machine, few, grid_path([(13, 9), (13, 22)], 2 * INCH), mesh=NARROW)
+    assert refused.path is None
+    assert refused.separating
