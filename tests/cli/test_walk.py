@@ -22,7 +22,7 @@ from wbc.walking import run as walking_run
 from wbc.walking.holds.built_in import plane
 from wbc.walking.log.log import WalkLog
 from wbc.walking.planner.detours import ALONG
-from wbc.walking.planner.detours import ways_round as detours
+from wbc.walking.planner.detours import route as detours
 from wbc.walking.report.folder import RunFolderError
 from wbc.walking.run import perform
 from wbc.walking.run.request import WalkRequest, over_holds

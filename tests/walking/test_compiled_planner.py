@@ -69,8 +69,8 @@ def test_swings_are_the_same(machine: Walker, structure: Structure, path: BodyPa
     swings, arms = Swings(machine, structure, path, grips), ArmClearance(machine, grips)
     asked, lift, others = drawn(grips, path)
     found = set()
-    for way in range(len(ALTERNATIVES)):
-        curve = swings.curve(asked.arms, asked.source, asked.target, lift, way)
+    for which in range(len(ALTERNATIVES)):
+        curve = swings.curve(asked.arms, asked.source, asked.target, lift, which)
         fast, slow = both(lambda c=curve: c.at(np.linspace(0.0, 1.0, 40)))
         np.testing.assert_allclose(fast, slow, rtol=0.0, atol=1e-12)
         one: Tracks
@@ -94,7 +94,7 @@ def test_swings_are_the_same(machine: Walker, structure: Structure, path: BodyPa
     assert len(found) == 6
 
 
-def test_chosen_ways_are_the_same(machine: Walker, structure: Structure, path: BodyPath, both: Both) -> None:
+def test_chosen_curves_are_the_same(machine: Walker, structure: Structure, path: BodyPath, both: Both) -> None:
     """Also of hands that must not roll, and where swings were corrected."""
     rolls = [replace(hold, roll=("free", 4)[k % 2]) for k, hold in enumerate(structure.holds)]
     some = replace(structure, holds=tuple(rolls))
@@ -112,7 +112,7 @@ def test_chosen_ways_are_the_same(machine: Walker, structure: Structure, path: B
         first = [search.choose(swing) for swing in swings]
         for swing, found in zip(swings[::2], first[::2], strict=True):
             if found is not None:
-                move = Move(*swing[:4], swing.lift + 40, found.duration, 0.0, found.way)
+                move = Move(*swing[:4], swing.lift + 40, found.duration, 0.0, found.curve)
                 search.correct(move, 4.0, found.duration < 2.5)
         search.prepare(swings)
         return first + [search.choose(swing) for swing in swings]
@@ -120,10 +120,10 @@ def test_chosen_ways_are_the_same(machine: Walker, structure: Structure, path: B
     one: list[Chosen | None]
     other: list[Chosen | None]
     one, other = both(chosen)
-    assert [c and c.way for c in one] == [c and c.way for c in other]
+    assert [c and c.curve for c in one] == [c and c.curve for c in other]
     times = [[c.duration for c in many if c] for many in (one, other)]
     np.testing.assert_allclose(times[0], times[1], rtol=1e-9, atol=1e-9)
-    assert len({c.way for c in one if c}) > 1
+    assert len({c.curve for c in one if c}) > 1
     assert None in one
     assert 4.0 in times[0]
 

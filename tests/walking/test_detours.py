@@ -1,4 +1,4 @@
-"""Ways round: routes of the body that the reference search confirms, and refusals that name holds."""
+"""Detours: routes of the body that the reference search confirms, and refusals that name holds."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def ends(path: BodyPath) -> np.ndarray:
 
 
 def confirm(machine: Walker, structure: Structure, path: BodyPath, every: int) -> None:
-    """Exact breadth-first search over all grips along the poses finds a way: arms clear, joints within their limits."""
+    """Exact breadth-first search over all grips along the poses finds one: arms clear, joints within their limits."""
     assert fewest_along(machine, structure, path.poses[::every], Rules()) is not None
 
 
@@ -66,7 +66,7 @@ def test_over_a_wide_trench_hands_wait_where_they_go_with_the_body(machine: Walk
         np.testing.assert_allclose(hands[:, 2], height, atol=2e-3)
 
 
-def test_a_way_round_changes_its_velocity_gradually(machine: Walker, structure: Structure) -> None:
+def test_a_detour_changes_its_velocity_gradually(machine: Walker, structure: Structure) -> None:
     path = grid_path([(13, 9), (13, 18)], 2 * INCH)
     route = find_route(machine, remove_rows(structure, "12-15"), path)
     assert route.path is not None
@@ -95,7 +95,7 @@ def test_two_islands_are_refused_with_the_holds_that_separate_them(machine: Walk
     second = {f"{t},{a}" for t in range(12, 15) for a in range(20, 24)}
     islands = structure.without([hold for hold in structure.ids if hold not in first | second])
     path = grid_path([(13, 7), (13, 21.5)], 2 * INCH)
-    with pytest.raises(NoPlanError, match="beside the path there is no way beyond") as caught:
+    with pytest.raises(NoPlanError, match="beside the path there is no route beyond") as caught:
         plan_walk(machine, islands, path, objective="destination", width=4, detour=True)
     assert caught.value.separating
     assert set(caught.value.separating) <= first

@@ -28,12 +28,12 @@ def plan(machine: Walker, structure: Structure) -> Plan:
 def test_the_law_goes_from_rest_to_rest_with_bounded_jerk() -> None:
     parts = np.linspace(0.0, 1.0, 2001)
     law, gap = profile_at(parts), parts[1]
-    assert (law.way[0], law.rate[0], law.acceleration[0]) == (0.0, 0.0, 0.0)
-    assert law.way[-1] == pytest.approx(1.0, abs=1e-9)
+    assert (law.position[0], law.rate[0], law.acceleration[0]) == (0.0, 0.0, 0.0)
+    assert law.position[-1] == pytest.approx(1.0, abs=1e-9)
     assert law.rate[-1] == pytest.approx(0.0, abs=1e-9)
     assert law.acceleration[-1] == pytest.approx(0.0, abs=1e-8)
-    # The derivatives are those of the way, and the acceleration nowhere jumps
-    assert np.diff(law.way) / gap == pytest.approx((law.rate[1:] + law.rate[:-1]) / 2, abs=JERK * gap**2)
+    # The derivatives are those of the position, and the acceleration nowhere jumps
+    assert np.diff(law.position) / gap == pytest.approx((law.rate[1:] + law.rate[:-1]) / 2, abs=JERK * gap**2)
     assert np.abs(np.diff(law.acceleration)).max() <= JERK * gap * (1 + 1e-6)
     assert law.rate.max() == pytest.approx(SPEED)
     assert np.abs(law.acceleration).max() == pytest.approx(ACCELERATION)

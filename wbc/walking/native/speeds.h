@@ -8,7 +8,7 @@
 enum { MOST = 128, FIVE = 5 };
 
 /* Parts of rates and accelerations, the fastest hand [m/s], the least derivative [rad], samples between which the
-   body's part of the rates is taken; room of reach [m], angles, elbow [rad] and from the axis of joint 1 [m]. */
+   body's part of the rates is taken; margins of reach [m], angles, elbow [rad] and from the axis of joint 1 [m]. */
 typedef struct {
     double rate_part, acceleration_part, fastest, least, step;
     double reach_room, angle_room, elbow_room, axis_room;

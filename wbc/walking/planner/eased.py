@@ -24,7 +24,7 @@ from wbc.walking.planner.swings.swings import FINE, Swings
 
 #: Parts of the time in which it gets up to its speed, and slows down; and those in which its acceleration changes
 RAMP, CHANGE = 0.2, 0.06
-#: Bounds of the way from 0 to 1 in the time 1: the fastest law under them takes just as long
+#: Bounds of a motion from 0 to 1 in the time 1: the fastest law under them takes just as long
 SPEED = 1.0 / (1.0 - RAMP)
 ACCELERATION = SPEED / (RAMP - CHANGE)
 JERK = ACCELERATION / CHANGE
@@ -37,12 +37,12 @@ TRIES, LONGER = 4, 1.002
 
 
 class Profile(NamedTuple):
-    """The way from 0 to 1, and its first and second derivative, at n times from 0 to 1 ``[n]``.
+    """The position from 0 to 1, and its first and second derivative, at n times from 0 to 1 ``[n]``.
 
     Over a duration T the derivatives are to be divided by T and T^2; the third is at most :data:`JERK` / T^3.
     """
 
-    way: Array
+    position: Array
     rate: Array
     acceleration: Array
 
@@ -59,8 +59,8 @@ def profile() -> Profile:
 def profile_at(parts: Array) -> Profile:
     """At parts of the time, 0 to 1."""
     law = _law()
-    way, rate, acceleration = (np.array(rows)[:, 0] for rows in law.at(law.duration * parts))
-    return Profile(np.clip(way, 0.0, 1.0), rate, acceleration)
+    position, rate, acceleration = (np.array(rows)[:, 0] for rows in law.at(law.duration * parts))
+    return Profile(np.clip(position, 0.0, 1.0), rate, acceleration)
 
 
 @cache
@@ -76,7 +76,7 @@ def eased_law(swings: Swings, move: Move, others: Sequence[int]) -> SwingLaw | N
     Args:
         others: grips of the other arms.
     """
-    return None if move.delay or move.way >= len(ALTERNATIVES) else _tried(swings, move, others)[0]
+    return None if move.delay or move.curve >= len(ALTERNATIVES) else _tried(swings, move, others)[0]
 
 
 def eased_slices(
@@ -95,7 +95,7 @@ def eased_slices(
         until = moves[k + 1].lift if k + 1 < len(moves) else found.reached
         last = min(until - spare, search.ends.among(others, sample))
         longest = (max(last, move.land) - move.lift) * search.path.spacing - search.swings.extra
-        if not move.delay and move.way < len(ALTERNATIVES) and longest > EVEN * laws[k].fastest:
+        if not move.delay and move.curve < len(ALTERNATIVES) and longest > EVEN * laws[k].fastest:
             yield None
             best = _eased_move(search, move, others, last)
             if best is not None:
@@ -128,9 +128,9 @@ def _tried(swings: Swings, move: Move, others: Sequence[int]) -> tuple[SwingLaw 
     whole = max(move.duration, (move.land - move.lift) * spacing)
     duration = whole - swings.extra
     arms, source, target = np.array([move.arm]), np.array([move.source]), np.array([move.target])
-    curve = swings.curve(arms, source, target, np.array([move.lift]), move.way)
+    curve = swings.curve(arms, source, target, np.array([move.lift]), move.curve)
     x = np.linspace(0.0, 1.0, FINE)
-    times = duration * np.interp(x, steady.way, np.linspace(0.0, 1.0, POINTS))
+    times = duration * np.interp(x, steady.position, np.linspace(0.0, 1.0, POINTS))
     samples = (move.lift + (move.land - move.lift) * (swings.latch + times) / whole)[None]
     guide, places = guide_between(swings.limb, swings.grips, source, target, FINE), curve.at(x)
     bases = swings.shapes.bases[[move.arm]]
@@ -143,7 +143,7 @@ def _tried(swings: Swings, move: Move, others: Sequence[int]) -> tuple[SwingLaw 
     if not swings.clear_along(move, others, curve, joints.angles, samples):
         return None, 0.0
     rows = rows_over(duration)
-    along = profile_at(rows / duration).way
+    along = profile_at(rows / duration).position
     return SwingLaw(rows, curve.at(along)[0], blend(along), jerk_limited=True), needed
 
 
@@ -153,12 +153,12 @@ def _least_duration(swings: Swings, joints: SwingJoints, places: Array) -> float
     """
     steady, margins, x = profile(), swings.margins, np.linspace(0.0, 1.0, FINE)
     first, second, bias = (
-        np.stack([np.interp(steady.way, x, row) for row in rows[0].T])
+        np.stack([np.interp(steady.position, x, row) for row in rows[0].T])
         for rows in (joints.first, joints.second, joints.bias)
     )
     rates, most = (np.array(v)[: len(first), None] for v in (swings.limb.joint_rates, swings.limb.joint_accelerations))
     free = np.maximum(margins.swing_rate * rates - np.sign(first) * bias / swings.path.spacing, 0.1 * rates)
     going = float((np.abs(first) * steady.rate / free).max())
-    slope = np.interp(steady.way, x, np.linalg.norm(np.gradient(places, x, axis=0), axis=1))
+    slope = np.interp(steady.position, x, np.linalg.norm(np.gradient(places, x, axis=0), axis=1))
     turning = np.abs(first * steady.acceleration + second * steady.rate**2) / (margins.swing_acceleration * most)
     return max(going, float((slope * steady.rate).max()) / margins.hand_speed, float(np.sqrt(turning.max())))

@@ -2,7 +2,7 @@
 
 A search keeps the promising stances, and begins with some. With h_arm(g) re-grasps that an arm needs at least from its
 grip g to the end of the path, whatever the other arms do, a stance needs at least the sum h over its grips; of stances
-after d re-grasps only those with d + h <= k can be on the way to the end with k. They are few as long as k is small.
+after d re-grasps only those with d + h <= k can lead to the end with k. They are few as long as k is small.
 """
 
 from __future__ import annotations

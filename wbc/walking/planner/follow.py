@@ -1,4 +1,4 @@
-"""A plan of a file made again: the same hands go to the same holds at the same places of the way."""
+"""A plan of a file made again: the same hands go to the same holds at the same places of the path."""
 
 from __future__ import annotations
 
@@ -108,7 +108,7 @@ def _law(
     waits = (move.land - move.lift) * spacing > move.duration + spacing
     soonest = move.land if waits else int(search.soonest[move.target])
     swing = Swing(move.arm, move.source, move.target, move.lift, until, others, soonest)
-    if not search.swings.clear(swing, move.way):
+    if not search.swings.clear(swing, move.curve):
         raise _refused(step, k, "the hand's path is out of reach, or too near to another arm or the structure")
     law = law_of(search.swings, move)
     planned = max(move.duration, 0.0 if move.delay else (move.land - move.lift) * spacing)

@@ -14,7 +14,7 @@ from wbc.validation import Array
 from wbc.walking.arms.puma import limb_of
 from wbc.walking.body_path import BodyPath
 from wbc.walking.holds.structure import Structure
-from wbc.walking.planner.detours.ways_round import ways_round
+from wbc.walking.planner.detours.route import find_routes
 from wbc.walking.planner.fewest import fewer_slices
 from wbc.walking.planner.grips.table import Grips, grip_slices
 from wbc.walking.planner.plan import NoPlanError, Plan, Regrasp
@@ -60,25 +60,25 @@ def plan_walk(
         width: stances kept for each number of re-grasps; None: all, which finds the fewest.
         time_budget: [s]; after it what is found is returned or refused.
         partial: return a plan that does not lead to the end instead of refusing.
-        detour: where the body cannot follow the path, look for a way round: lower, turned, beside it, see
-            :mod:`wbc.walking.planner.detours.ways_round`; the plan's path says what was found.
+        detour: where the body cannot follow the path, look for a detour: lower, turned, beside it, see
+            :mod:`wbc.walking.planner.detours`; the plan's path says what was found.
 
     Raises:
         UnknownNameError: another arm, hold or objective. ShapeError: a walker that is no body with PUMA arms.
-        NoPlanError: there is no way, with where it ends, holds and limits.
+        NoPlanError: there is no plan, with where it ends, holds and limits.
     """
     beginning = start or {}, postures or {}, avoid or {}
     deadline = None if time_budget is None else time.perf_counter() + time_budget
     search = functools.partial(
         plan_slices, walker, structure, width=width, deadline=deadline, thorough=time_budget is None
     )
-    # Where a way round is looked for, the widest searches come last
+    # Where a detour is looked for, the widest searches come last
     narrow = [(delay, width) for delay in (DELAYS if objective == "velocity" else DELAYS[-1:])] if detour else ()
     plan = drained(search(path, beginning, objective=objective, tries=narrow))
     if not plan.complete and detour:
         rows = {arm.name: k for k, arm in enumerate(walker.arms)}
         hands = {rows[name]: structure.index(hold) for name, hold in beginning[0].items()}
-        for route in ways_round(walker, structure, path, hands, deadline):
+        for route in find_routes(walker, structure, path, hands, deadline):
             if route.path is None:
                 plan = replace(plan, reason=f"{plan.reason}; {route.text}", separating=route.separating)
                 continue
@@ -177,7 +177,7 @@ def plan_found(
                 round(float(grips.last[move.source] - move.lift) * spacing, 9),
                 grips.reasons[grips.ends[move.target]],
                 round(float(grips.last[move.target]) * spacing, 9),
-                move.way,
+                move.curve,
                 _roll(structure, grips, move.target),
             )
         )

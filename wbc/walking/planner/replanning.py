@@ -62,7 +62,7 @@ def plan_from_stance(
         start, postures: as of :func:`wbc.walking.planner.planner.plan_walk`; ``start`` has every arm.
 
     Raises:
-        as ``plan_walk``, also where the way does not lead to the end.
+        as ``plan_walk``, also where no plan leads to the end.
     """
     beginning: Beginning = start, postures or {}, {}
     rows = [structure.index(start[arm.name]) for arm in walker.arms]
@@ -150,10 +150,10 @@ def plan_from_here(
 def _asides(pose: Array, behind: Array, holds: Array) -> Iterator[Array]:
     """Where the body may go first, poses ``[n, 4, 4]``; nowhere to begin with."""
     yield behind[:0]
-    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(behind[:, :3, 3], axis=0), axis=1))])
+    length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(behind[:, :3, 3], axis=0), axis=1))])
     for back in BACK:
-        if back < way[-1]:
-            yield behind[: int(np.searchsorted(way, back)) + 1]
+        if back < length[-1]:
+            yield behind[: int(np.searchsorted(length, back)) + 1]
     for far, hold in product(TOWARDS, holds):
         offset = hold - pose[:3, 3]
         offset -= pose[:3, 2] * (pose[:3, 2] @ offset)

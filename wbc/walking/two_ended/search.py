@@ -23,7 +23,7 @@ from wbc.walking.two_ended.swing_path import Turn, TurnPaths
 
 #: Samples of the search count re-grasps: no swing takes longer than one [s]
 SAMPLE = 1e4
-#: Whether the hands have exchanged their order in a swing: before and after, far hand less near hand along the way [m]
+#: Whether the hands have exchanged their order in a swing: before and after, far hand less near hand along it [m]
 GAITS: dict[str, Callable[[float, float], bool]] = {
     "any": lambda before, after: True,
     "inchworm": lambda before, after: before * after > 0.0,
@@ -67,7 +67,7 @@ class Turns:
     """Swings between grips, as the search asks for them, a :class:`wbc.walking.planner.stances.nodes.SwingTable`.
 
     Args:
-        places: of the holds along the way [m]. gait: one of :data:`GAITS`.
+        places: of the holds along the route [m]. gait: one of :data:`GAITS`.
     """
 
     #: A sample is a re-grasp: none passes while a hand closes
@@ -104,7 +104,7 @@ class Turns:
             yield None
 
     def choose(self, swing: Swing) -> Chosen | None:
-        """The way of a swing; None where none is possible, or the gait does not allow it."""
+        """How a hand swings; None where it cannot, or the gait does not allow it."""
         turn = self.turn(swing)
         before, after = (self._places[grip.hold] - self._places[turn.held.hold] for grip in (turn.source, turn.target))
         if not self._fits(before, after) or self._paths.path(turn) is None:
@@ -115,10 +115,10 @@ class Turns:
 class TurnSearch(StanceSearch[Turns]):
     """The fewest re-grasps, then the least time, from a stance to one that the goal allows.
 
-    A sample is a re-grasp, and a grip ends the later the further its hold is along the way, so hands only go on.
+    A sample is a re-grasp, and a grip ends the later the further its hold is along the route, so hands only go on.
 
     Args:
-        towards: places of the holds along the way [m]. goal: whether grips of near and far hand are an end.
+        towards: places of the holds along the route [m]. goal: whether grips of near and far hand are an end.
     """
 
     def __init__(

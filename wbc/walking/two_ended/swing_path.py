@@ -33,7 +33,7 @@ class Turn:
 
 
 class TurnPaths:
-    """Ways of swings, each made of the postures over the two holds, h above them, one after the other:
+    """Paths of swings, each made of the postures over the two holds, h above them, one after the other:
 
         q(x) = (1 - y) a(h) + y b(h),    h = L (1 - (1 - 2x)^2),    y = step((x - c) / (1 - 2c))
 
@@ -45,10 +45,10 @@ class TurnPaths:
         self._known: dict[Turn, Array | None] = {}
 
     def path(self, turn: Turn) -> Array | None:
-        """Joints 1 to 7 along the first way that is possible and clear ``[POINTS, 7]`` [rad]; None if none is."""
+        """Joints 1 to 7 along the first path that is possible and clear ``[POINTS, 7]`` [rad]; None if none is."""
         if turn not in self._known:
-            ways = (self._way(turn, lift) for lift in LIFTS)
-            self._known[turn] = next((way for way in ways if way is not None), None)
+            paths = (self._made(turn, lift) for lift in LIFTS)
+            self._known[turn] = next((path for path in paths if path is not None), None)
         return self._known[turn]
 
     def seconds(self, turn: Turn) -> float:
@@ -69,7 +69,7 @@ class TurnPaths:
         count = int(np.ceil(law.duration / spacing))
         return np.asarray(law.at(np.linspace(0.0, law.duration, count + 1)).position)
 
-    def _way(self, turn: Turn, lift: float) -> Array | None:
+    def _made(self, turn: Turn, lift: float) -> Array | None:
         before, after = self._pair(turn, turn.source), self._pair(turn, turn.target)
         first, last = self.postures.between(*before), self.postures.between(*after)
         if first is None or last is None:
@@ -82,10 +82,10 @@ class TurnPaths:
         grid = np.linspace(0.0, 1.0, HEIGHTS)
         a, b = (np.stack([np.interp(height, grid, q[:, k]) for k in range(7)], axis=1) for q in (leaving, coming))
         y = step((x - UPRIGHT) / (1.0 - 2.0 * UPRIGHT))[:, None]
-        way: Array = (1.0 - y) * a + y * b
-        if np.abs(way).max() > self.postures.limit:
+        path: Array = (1.0 - y) * a + y * b
+        if np.abs(path).max() > self.postures.limit:
             return None
-        return way if self._clear(turn, way) else None
+        return path if self._clear(turn, path) else None
 
     def _pair(self, turn: Turn, grip: Grip) -> tuple[Grip, Grip]:
         """Grips of the near and of the far hand."""
@@ -110,10 +110,10 @@ class TurnPaths:
             out[k] = last = near[best]
         return out
 
-    def _clear(self, turn: Turn, way: Array) -> bool:
+    def _clear(self, turn: Turn, path: Array) -> bool:
         postures = self.postures
         near, far = (postures.frame(grip)[:3, 3] for grip in self._pair(turn, turn.source))
-        frames = self.frames(turn, way)
+        frames = self.frames(turn, path)
         other = postures.frame(turn.target)[:3, 3]
         ends = np.array([[near, other], [far, far]] if turn.arm == 0 else [[near, near], [far, other]])
         return bool(postures.shapes.clear(frames, ends).all())

@@ -36,7 +36,7 @@ class TwoEndedStack(WalkStack):
         """What a free hand follows: its position [m] and velocity [m/s], joints [rad] and rates [rad/s].
 
         Args:
-            at_hold: z and x axis of the hand near its hold; None on the way.
+            at_hold: z and x axis of the hand near its hold; None before.
         """
         swing, aligned, resting, mine = self._swings[arm], self._axes[arm], self._rest, self._joints(arm)
         near = at_hold is not None
@@ -97,7 +97,7 @@ class TwoEndedWalk(Walk):
         self._stop()
 
     def vanish(self, ids: Iterable[str]) -> None:
-        """Take holds away; the rest of the way is planned anew from the next stance, if the plan needs one of them.
+        """Take holds away; the rest is planned anew from the next stance, if the plan needs one of them.
 
         A hand that held one is open at once. Where a hand is in the air and its hold is gone, there is no plan.
 
@@ -140,12 +140,12 @@ class TwoEndedWalk(Walk):
         self._turns.turn(arm, (now.position, speed), (before, rates / self.dt), at_hold)
 
     def _stands(self) -> bool:
-        """A hand that is on its way goes on to its hold, as the arm moves as one; after an abort all of it stops."""
+        """A hand that swings goes on to its hold, as the arm moves as one; after an abort all of it stops."""
         return self.halted or self.aborted or (self._changing and self.swinging is None)
 
     @property
     def still(self) -> bool:
-        """The arm does not move as it is told."""
+        """The arm does not move."""
         return self.pace == 0.0
 
     @cached_property

@@ -34,7 +34,7 @@ class Turned:
 def turns(angles: Array, rolls: tuple[float, ...], limit: float, fastest: float, shortest: int) -> Iterator[Turned]:
     """Grips of one stretch: theta6 + roll + 2 pi w within the limit for as long as possible.
 
-    Where the whole stretch is possible in several ways the one nearest to the middle of the joint is taken; of a fixed
+    Where the whole stretch is possible at several turns the one nearest to the middle of the joint is taken; of a fixed
     roll both, as a swing may take half a turn more to the one than to the other.
 
     Args:

@@ -22,7 +22,7 @@ STEEP = 2
 #: Points at which the height above the structure is measured
 LOOKS = 9
 #: Curves that are tried, the first that is clear is taken: how much higher in the middle, in ``Margins.higher``, and
-#: what part of the arc. ``python -m bench.walk.fits`` prints how often each is taken
+#: what part of the arc. ``python -m bench.walk.fits`` prints how often each is the first
 ALTERNATIVES = ((0.0, 1.0), (0.0, 0.6), (0.0, 0.2), (1.0, 1.0), (1.0, 0.4), (0.0, 1.4))
 
 
@@ -47,7 +47,7 @@ class Curves:
         r = 1 - (1 - 2 x)^2,     u = -(1 - y) z_a - y z_b,     y = step((x - c) / (1 - 2 c))
 
     y, a third-degree step, is 0 over the first c of the curve and 1 over the last, so that the hand leaves and arrives
-    along the normals. c(y) is the part w of the way from the chord a b to an arc round the axis of the arm's first
+    along the normals. c(y) lies the part w between the chord a b and an arc round the axis of the arm's first
     joint, on which distance and angle change evenly: there joint 1 turns evenly, and the hand comes no nearer to it.
 
     Attributes:

@@ -136,9 +136,9 @@ def law_of(swings: Swings, move: Move) -> SwingLaw:
     # It comes when the next grip begins, if it does not hold the body up
     whole = max(move.duration, 0.0 if move.delay else (move.land - move.lift) * swings.path.spacing)
     least = whole - swings.extra
-    if move.way >= len(ALTERNATIVES):
+    if move.curve >= len(ALTERNATIVES):
         return _waiting_law(swings, move, (arms, source, target), least)
-    curve = swings.curve(arms, source, target, np.array([move.lift]), move.way)
+    curve = swings.curve(arms, source, target, np.array([move.lift]), move.curve)
     part = np.linspace(0.0, 1.0, COARSE)
     guide = guide_between(swings.limb, swings.grips, source, target, COARSE)
     for _ in range(PASSES):
@@ -154,7 +154,7 @@ def law_of(swings: Swings, move: Move) -> SwingLaw:
 def _waiting_law(swings: Swings, move: Move, ends: tuple[Ints, Ints, Ints], whole: float) -> SwingLaw:
     """The law of a move whose hand waits: off the hold, the ride, and onto the next one."""
     spacing, begin = swings.path.spacing, np.array([move.lift + swings.latch / swings.path.spacing])
-    found = swings.waiting(ends, (begin, begin + whole / spacing), move.way, FINE)
+    found = swings.waiting(ends, (begin, begin + whole / spacing), move.curve, FINE)
     slow = SLOWLY * float(found.onto.law.duration[0])
     away, onto = (
         least_time_law(swings.walker, move.arm, swings.path, half.curve, half.samples[0], half.guide, least)

@@ -146,7 +146,7 @@ def _numpy(walker: Walker, bases: Array, path: BodyPath, places: Array, samples:
     first, second, bias = joints.first, joints.second, joints.bias
     gap = 1.0 / (samples.shape[1] - 1)
     limits, most = (np.array(v)[: first.shape[2]] for v in (limb.joint_rates, limb.joint_accelerations))
-    # Where the body goes the way of the hand, the hand may go faster
+    # Where the body goes where the hand does, the hand may go faster
     rates = np.maximum(margins.swing_rate * limits - np.sign(first) * bias / path.spacing, 0.1 * limits)
     slope = np.linalg.norm(np.gradient(places, gap, axis=1), axis=2)
     top = (

@@ -15,7 +15,7 @@ class Move(NamedTuple):
         lift, land: samples.
         duration: of the swing, latches and settling included [s].
         delay: by which the body is late after it, because it had to slow down [s].
-        way: which curve, see :data:`wbc.walking.planner.swings.curve.ALTERNATIVES`.
+        curve: which one, see :data:`wbc.walking.planner.swings.curve.ALTERNATIVES`.
     """
 
     arm: int
@@ -25,7 +25,7 @@ class Move(NamedTuple):
     land: int
     duration: float
     delay: float
-    way: int = 0
+    curve: int = 0
 
 
 class Swing(NamedTuple):
@@ -50,5 +50,5 @@ class Swing(NamedTuple):
 class Chosen(NamedTuple):
     """How a hand swings: along which of the curves, and how long, latches and settling included [s]."""
 
-    way: int
+    curve: int
     duration: float

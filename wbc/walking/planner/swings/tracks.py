@@ -1,4 +1,4 @@
-"""Swings as the search has them: the law of each with the body on its way, and the points of its arm."""
+"""Swings as the search has them: the law of each while the body moves, and the points of its arm."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """Swings in which the hand waits: off its hold to a place that goes with the body, and from there onto the next hold.
 
-A hand whose next hold comes into reach long after it had to leave the last one cannot be on its way all the time: the
+A hand whose next hold comes into reach long after it had to leave the last one cannot swing all the time: the
 body would carry the arm past it. It is drawn in at once, rides with the body, and goes on as late as it can.
 """
 
@@ -43,7 +43,7 @@ class Asked:
 
 @dataclass(frozen=True, eq=False)
 class Half:
-    """m hands on their way from their holds, or onto them, over n points.
+    """m hands that go from their holds, or onto them, over n points.
 
     Attributes:
         curve: of the hands. samples: of the body ``[m, n]``. guide: of the guided joints. law: the least times.
