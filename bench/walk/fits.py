@@ -2,8 +2,8 @@
 
 Swings between grips along the published courses are computed as the search computes them. From them: the parts of the
 estimate of a swing's duration (``swings.ESTIMATE``), the usual duration (``search.USUAL``) and half of it
-(``swings.HALFWAY``), how often each alternative curve is the first that is possible (``curve.ALTERNATIVES``); and over a
-wide trench, for several places in which a hand may wait (``puma.WAITING_*``), how many of the swings that wait are
+(``swings.HALFWAY``), and how often each alternative curve is the first that is possible (``curve.ALTERNATIVES``). Over
+a wide trench, for several places in which a hand may wait (``puma.WAITING_*``): how many of the swings that wait are
 possible and clear of the structure.
 """
 

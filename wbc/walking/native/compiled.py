@@ -1,4 +1,9 @@
-"""The compiled inner loops of the planner; where there is no compiler, numpy does the same."""
+"""The compiled inner loops of the planner; where there is no compiler, or another kind of limb, numpy does the same.
+
+They know the PUMA's closed form a second time, which the tests compare. What that buys, in processor time of the demo's
+plan: 0.17 s instead of 0.81 s; its grips 25 instead of 55 ms, conflicts of 1300 pairs of grips 5 instead of 10 ms, a
+swing 0.04 instead of 0.17 ms, and all curves of a dozen swings in one call.
+"""
 
 from __future__ import annotations
 
