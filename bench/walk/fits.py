@@ -3,8 +3,8 @@
 Swings between grips along the published courses are computed as the search computes them. From them: the parts of the
 estimate of a swing's duration (``swings.ESTIMATE``), the usual duration (``search.USUAL``) and half of it
 (``swings.HALFWAY``), and how often each alternative curve is the first that is possible (``curve.ALTERNATIVES``). Over
-a wide trench, for several places in which a hand may wait (``puma.WAITING_*``): how many of the swings that wait are
-possible and clear of the structure.
+a wide trench, for several places in which a hand may wait (``puma.WAITING_*``), and how it comes to them and leaves
+them (``waiting.HALFWAY``, ``SLOWLY``): how many of the swings that wait are possible and clear of the structure.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import product
+from unittest.mock import patch
 
 import numpy as np
 
@@ -23,8 +24,9 @@ from wbc.validation import Array
 from wbc.walking import Structure, cylinder, remove_rows
 from wbc.walking.arms.puma import ArmKinematics, limb_of
 from wbc.walking.body_path import BodyPath, grid_path
-from wbc.walking.planner.grips.table import find_grips
+from wbc.walking.planner.grips.table import Grips, find_grips
 from wbc.walking.planner.stances.search import USUAL
+from wbc.walking.planner.swings import waiting as swings_that_wait
 from wbc.walking.planner.swings.curve import ALTERNATIVES
 from wbc.walking.planner.swings.move import Swing
 from wbc.walking.planner.swings.swings import ESTIMATE, HALFWAY, Swings
@@ -34,6 +36,9 @@ COURSES = (((13, 6), (13, 18)), ((8, 12), (18, 12)), ((9, 8), (17, 16)), ((13, 8
 COUNT, SPEEDS = 60, (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
 #: Distances from the axis of joint 1 and heights below the neck of a hand that waits, in upper arm and forearm
 RADII, BEYOND = (16.0 / 34.0, 20.0 / 34.0, 24.0 / 34.0), (6.0 / 34.0, 10.0 / 34.0, 14.0 / 34.0)
+
+#: Parts of the guided joints' change while a hand waits, and how many times slower than it could it comes down
+HALVES, SLOWER = (0.5, 0.65, 0.8), (1.0, 1.5, 2.0)
 
 
 @dataclass(frozen=True)
@@ -88,8 +93,8 @@ def missed(swings: list[Swung], parts: tuple[float, ...]) -> Array:
     return np.array([parts[0] + parts[1] * s.turning + parts[2] * s.distance - s.duration for s in swings])
 
 
-def waiting_places(walker: Walker, structure: Structure, path: BodyPath) -> list[str]:
-    """One line a place: of long swings over a trench, how many that wait there are possible and clear."""
+def long_swings(walker: Walker, structure: Structure, path: BodyPath) -> tuple[Grips, list[Swing]]:
+    """Grips along a path, and swings to holds that come into reach 2 s or more after the last one has left it."""
     grips = find_grips(walker, structure, path)
     rng = np.random.default_rng(0)
     pairs = [
@@ -97,17 +102,27 @@ def waiting_places(walker: Walker, structure: Structure, path: BodyPath) -> list
         for source, target in rng.integers(0, len(grips), (4000, 2)).tolist()
         if grips.arm[source] == grips.arm[target] and grips.first[target] - grips.last[source] > 40
     ][:200]
-    asked = [
+    swings = [
         Swing(int(grips.arm[a]), a, b, int(grips.last[a]), len(path) - 1, (), int(grips.first[b]) + 1) for a, b in pairs
     ]
-    out = []
+    return grips, swings
+
+
+def waiting(walker: Walker, structure: Structure, path: BodyPath) -> Iterator[str]:
+    """One line a choice: of long swings over a trench, how many that wait so are possible and clear."""
+    grips, asked = long_swings(walker, structure, path)
+
+    def count(one: Walker) -> str:
+        swings = Swings(one, structure, path, grips)
+        return f"{sum(swings.clear(swing, len(ALTERNATIVES)) for swing in asked)} of {len(asked)}"
+
     for radius, beyond in product(RADII, BEYOND):
         limb = _Waits(walker.arm_data, (0.0, radius, beyond))
-        swings = Swings(replace(walker, limb=limb), structure, path, grips)
-        count = sum(swings.clear(swing, len(ALTERNATIVES)) for swing in asked)
         where = f"{34 * radius:4.0f} in from the axis, {34 * beyond:4.0f} in beyond the neck"
-        out.append(f"  {where}: {count} of {len(asked)}")
-    return out
+        yield f"  {where}: {count(replace(walker, limb=limb))}"
+    for halfway, slowly in product(HALVES, SLOWER):
+        with patch.multiple(swings_that_wait, HALFWAY=halfway, SLOWLY=slowly):
+            yield f"  {halfway:g} of the change, {slowly:g} times slower: {count(walker)}"
 
 
 @dataclass(frozen=True)
@@ -145,7 +160,7 @@ def main() -> None:
         count = sum(one.which == which for one in usual)
         print(f"  curve {which}: {more:g} higher, {part:g} of the arc: {count} swings")
     trench, path = remove_rows(structure, "12-17"), grid_path([(13, 6), (13, 20)], 1.5 * INCH, height=44 * INCH)
-    print("waiting, one place alone:", *waiting_places(walker, trench, path), sep="\n")
+    print("hands that wait; one place alone, then those of the limb:", *waiting(walker, trench, path), sep="\n")
 
 
 if __name__ == "__main__":

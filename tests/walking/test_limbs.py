@@ -1,4 +1,4 @@
-"""Limbs of another kind: a UR5 solved by damped least squares holds, searches and swings in the planner as it is."""
+"""Limbs of another kind: three UR5 solved by damped least squares are planned for, and walk, as three PUMA are."""
 
 from __future__ import annotations
 
@@ -13,11 +13,15 @@ import pytest
 import wbc
 from wbc.robot import DHRow
 from wbc.robots import Arm, Margins, Walker, WalkerData
+from wbc.robots.link_tree import Link, build_model
+from wbc.robots.walker_arms import BODY, chain
 from wbc.validation import Array
 from wbc.walking import Hold, PlaneSurface, Structure, cylinder
 from wbc.walking.arms.angles import wrapped
 from wbc.walking.arms.puma import ArmKinematics, limb_of
 from wbc.walking.body_path import BodyPath, grid_path, straight_path
+from wbc.walking.loop.stack import WalkStack
+from wbc.walking.loop.walk import Walk
 from wbc.walking.planner.grips.conflicts import LimbShapes
 from wbc.walking.planner.grips.table import Grips, find_grips
 from wbc.walking.planner.plan import Plan
@@ -156,20 +160,23 @@ class NumericLimb:
 
 
 def numeric_walker() -> Walker:
-    """A body with three such arms; the planner asks its robot nothing."""
-    rows = [DHRow(a, alpha, d, 0.0, lower=-LIMIT, upper=LIMIT, velocity=RATE) for a, alpha, d in ROWS]
-    robot = wbc.robots.from_dh(rows, name="ur5_dh")
+    """A body with three such arms, 0.3 m from its middle."""
+    rows = [DHRow(a, alpha, d, lower=-LIMIT, upper=LIMIT, velocity=RATE) for a, alpha, d in ROWS]
     seeds = np.array([[0.28, 3.0, 1.56, 0.15, 1.57, 0.0], [0.28, 3.05, 2.01, 2.8, -1.57, 0.0]])
-    limb, arms = NumericLimb.of(robot.model, seeds), []
+    limb, arms, links = NumericLimb.of(wbc.robots.from_dh(rows).model, seeds), list[Arm](), list[Link]()
     for k in range(3):
-        base = pin.SE3(pin.utils.rotate("z", 2 * pi * k / 3), np.zeros(3)) * pin.SE3(
-            np.eye(3), np.array([0.3, 0.0, 0.0])
-        )
-        names = tuple(f"arm{k + 1}_joint{j}" for j in range(1, 7))
+        name, out = f"arm{k + 1}", pin.SE3(np.eye(3), np.array([0.3, 0.0, 0.0]))
+        base = pin.SE3(pin.utils.rotate("z", 2 * pi * k / 3), np.zeros(3)) * out
+        links += [Link(f"{name}_base", BODY, base), *chain(name, f"{name}_base", rows, f"{name}_hand")]
+        joints = tuple(f"{name}_joint{j}" for j in range(1, 7))
         some = slice(7 + 6 * k, 13 + 6 * k), slice(6 + 6 * k, 12 + 6 * k)
-        arms.append(Arm(f"arm{k + 1}", base, names, *some, f"arm{k + 1}_base", f"arm{k + 1}_hand", ()))
+        arms.append(Arm(name, base, joints, *some, f"{name}_base", f"{name}_hand", ()))
+    neutral = {joint: value for arm in arms for joint, value in zip(arm.joints, seeds[0].tolist(), strict=True)}
+    model = build_model("three_ur5", BODY, links)
+    robot = wbc.robots.load(model, base="floating", neutral=neutral, acceleration=ACCELERATION)
     data = WalkerData.read(clearance=0.01, lift_height=0.07, exempt_distance=0.08)
-    return Walker(robot, tuple(arms), 2, data, (), limb=limb, margins=Margins.of_reach(0.81725))
+    margins = Margins.of_reach(0.81725)
+    return Walker(robot, tuple(arms), 2, data, tuple(links), limb=limb, margins=margins)
 
 
 @pytest.fixture(scope="module")
@@ -263,6 +270,14 @@ def _held(plan: Plan, names: list[str], arm: int, sample: int) -> int:
     """The grip of an arm at a sample; while it swings the one that lasts."""
     mine = [step for step in plan.regrasps if step.arm == names[arm] and step.land <= sample * 0.05]
     return plan.chain[arm][len(mine)]
+
+
+def test_the_plan_is_carried_out(numeric: Walker, floor: Structure, path: BodyPath, plan: Plan) -> None:
+    walk = Walk(numeric, floor, plan, stack=WalkStack(numeric, floor, collisions=False))
+    assert walk.run() == "arrived"
+    assert [event.hold for event in walk.events if event.what == "land"] == [step.target for step in plan.regrasps]
+    np.testing.assert_allclose(walk.q[:3], path.poses[-1, :3, 3], atol=1e-4)
+    assert walk.time < path.duration + 1.0
 
 
 def test_the_walkers_own_limb_is_taken(numeric: Walker) -> None:

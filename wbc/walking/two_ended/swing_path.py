@@ -14,8 +14,8 @@ from wbc.walking.two_ended.postures import Grip, PairPostures
 
 #: Points of a swing, heights at which it is computed, and parts at its ends in which the hand does not go across
 POINTS, HEIGHTS, UPRIGHT = 73, 17, 0.2
-#: How high hands go along the normals of their holds [m], the first that is clear is taken
-LIFTS = (1.0, 2.0, 4.0)
+#: How high hands go along the normals of their holds, with booms of BOOM [m]; the first that is clear is taken
+LIFTS, BOOM = (1.0, 2.0, 4.0), 7.11
 #: Intervals of the time law
 INTERVALS = 300
 #: From height to height no joint turns further [rad], else it is another branch
@@ -47,7 +47,8 @@ class TurnPaths:
     def path(self, turn: Turn) -> Array | None:
         """Joints 1 to 7 along the first path that is possible and clear ``[POINTS, 7]`` [rad]; None if none is."""
         if turn not in self._known:
-            paths = (self._made(turn, lift) for lift in LIFTS)
+            scale = self.postures.kinematics.data.boom_length / BOOM
+            paths = (self._made(turn, scale * lift) for lift in LIFTS)
             self._known[turn] = next((path for path in paths if path is not None), None)
         return self._known[turn]
 

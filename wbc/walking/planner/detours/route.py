@@ -14,6 +14,7 @@ import pinocchio as pin
 
 from wbc.robots import Walker
 from wbc.validation import Array
+from wbc.walking.arms.puma import limb_of
 from wbc.walking.body_path import BodyPath
 from wbc.walking.holds.structure import Structure
 from wbc.walking.planner.detours.cell_grips import cell_grips
@@ -94,10 +95,11 @@ def find_routes(
     Args:
         start, deadline: of :func:`find_route`.
     """
+    limb = limb_of(walker)
     for mesh in MESHES:
         if deadline is not None and time.perf_counter() > deadline:
             return
-        yield find_route(walker, structure, path, mesh=mesh, start=start, deadline=deadline)
+        yield find_route(walker, structure, path, mesh=mesh.of(limb), start=start, deadline=deadline)
 
 
 def shortest(cells: Cells, nodes: tuple[Node, ...], final: Ints) -> list[int]:
