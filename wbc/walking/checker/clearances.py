@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -84,7 +85,7 @@ class Surroundings:
         if surface is not None:
             parts["surface"] = lambda a, b: distances.from_surface(surface, a, b)
         for obstacle in () if structure is None else structure.obstacles:
-            parts[obstacle.id] = lambda a, b, o=obstacle: distances.from_obstacle(o, a, b)  # type: ignore[misc]
+            parts[obstacle.id] = partial(distances.from_obstacle, obstacle)
         if not parts:
             axes = table.rotation[:, :, 2]
             parts["plane of a hold"] = lambda a, b: distances.from_tangents(table.position, axes, a, b)
