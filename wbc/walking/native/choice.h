@@ -86,14 +86,14 @@ static int clear_along(const Scene *scene, const Swing *swing, long which, const
                        double *duration)
 {
     const long n = scene->n, hold[2] = { scene->holds[swing->source], scene->holds[swing->target] };
-    const int bends = scene->free[swing->source] && scene->free[swing->target] ? 2 : 3;
+    const int guided = scene->free[swing->source] && scene->free[swing->target] ? 2 : 3;
     const double begin = (double)swing->lift + scene->latch / scene->spacing;
     const double least = (double)(swing->soonest - swing->lift) * scene->spacing - scene->extra;
     const double *base = scene->bases + 16 * swing->arm;
     double place[3 * MOST], samples[MOST], points[3 * POINTS * MOST], bodies[16 * MOST], ends[2][3];
     unsigned char fits = 0;
     curve_of(scene, swing, which, place);
-    swing_tracks(scene->arm, scene->rules, &scene->grips, 1, n, bends, scene->passes, base, scene->path, scene->count,
+    swing_tracks(scene->arm, scene->rules, &scene->grips, 1, n, guided, scene->passes, base, scene->path, scene->count,
                  scene->spacing, place, scene->blend, &swing->source, &swing->target, &begin, &swing->last, &least,
                  &fits, duration, samples, points);
     if (!fits)

@@ -65,10 +65,10 @@ def speeds(walker: Walker, arms: Ints, path: BodyPath, curve: Curves, samples: A
     for all joints that count, by one pass forwards and one backwards over x'^2; q_u u' is what the body's motion asks
     of a hand at rest.
     """
-    places, bends = curve.at(np.linspace(0.0, 1.0, samples.shape[1])), guide(samples)
+    places, guided = curve.at(np.linspace(0.0, 1.0, samples.shape[1])), guide(samples)
     bases = np.array([arm.base.homogeneous for arm in walker.arms])[arms]
-    found = _compiled(walker, bases, path, places, samples, bends)
-    return found or _numpy(walker, bases, path, places, samples, bends)
+    found = _compiled(walker, bases, path, places, samples, guided)
+    return found or _numpy(walker, bases, path, places, samples, guided)
 
 
 def _compiled(
@@ -79,8 +79,8 @@ def _compiled(
     library = compiled.library_for(limb)
     if library is None:
         return None
-    count, points, bends = guide.shape
-    angles = np.empty((count, points, 3 + bends))
+    count, points, guided = guide.shape
+    angles = np.empty((count, points, 3 + guided))
     rate, time, possible = np.empty((count, points)), np.empty((count, points)), np.empty(count, dtype=np.bool_)
     given = [compiled.packed(array) for array in (bases, path.poses, places, guide, samples)]
     where = [compiled.at(array) for array in given]
@@ -89,7 +89,7 @@ def _compiled(
         rules(walker.margins),
         ctypes.c_long(count),
         ctypes.c_long(points),
-        ctypes.c_int(bends),
+        ctypes.c_int(guided),
         *where[:2],
         ctypes.c_long(len(path)),
         ctypes.c_double(path.spacing),

@@ -33,7 +33,7 @@ FINER = 1.04
 SETTLE = 0.06
 #: Swings that are computed together, curve by curve and with all curves at once
 TOGETHER, QUICKLY = 24, 12
-#: Swings with more samples left by the other arms than this are one
+#: No swing lasts so many samples: that other arms hold for longer makes no difference
 LONG = 60
 #: Parts of the estimate: of every swing [s], of the slowest joint's least time, of the distance [s/m]. It is low, so
 #: that the search drops no swing that would do: of ten swings between all grips of the published courses, eight last
