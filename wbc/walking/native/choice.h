@@ -1,4 +1,4 @@
-/* The first curve of a swing that is possible and clear, of all that are tried, as wbc.walking.planner.swings.swings. */
+/* The first curve of a swing that is possible and clear, of all that are tried, as planner/swings/swings.py. */
 #ifndef WBC_WALKING_CHOICE_H
 #define WBC_WALKING_CHOICE_H
 
@@ -29,10 +29,10 @@ void swings_clear(const Arm *arm, const Grips *grips, long m, long n, const doub
 
    Curves have n points: how far `across`, how far `raised`, and the part of the wrists' change, `blend`. The numbers of
    raise_curves: `span` at `spans` places, `look_across` and `look_raised` at `looks`, `steps` and `half` at `halves`.
-   `alternatives` says how much higher and what part of the arc each of `tried` curves is. Clear: `parts` of the links, `some` of
-   them, at which they are at least `above` the surface, unless a hand is within `touching` of a hold, and `apart` of
-   the links of two arms. The body is looked at `halfway` samples after the hand is lifted; a swing takes `extra`
-   besides its law, of which the hand opens for `latch` [s]. */
+   `alternatives` says how much higher and what part of the arc each of `tried` curves is. Clear: `parts` of the links,
+   `some` of them, at which they are at least `above` the surface, unless a hand is within `touching` of a hold, and
+   `apart` of the links of two arms. The body is looked at `halfway` samples after the hand is lifted; a swing takes
+   `extra` besides its law, of which the hand opens for `latch` [s]. */
 typedef struct {
     const Arm *arm;
     const Rules *rules;

@@ -1,4 +1,4 @@
-/* Curves of hands, as wbc.walking.planner.swings.curve: arcs about the axis of the arm's first joint, raised along the normals. */
+/* Curves of hands, as planner/swings/curve.py: arcs about the axis of an arm's first joint, raised along the normals. */
 #ifndef WBC_WALKING_CURVE_H
 #define WBC_WALKING_CURVE_H
 

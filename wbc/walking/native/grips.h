@@ -1,4 +1,4 @@
-/* Where along a path an arm can have its hand on holds, as wbc.walking.planner.grips.table with holds on which hands may roll. */
+/* Where along a path an arm can have its hand on holds on which it may roll, as planner/grips/table.py. */
 #ifndef WBC_WALKING_GRIPS_H
 #define WBC_WALKING_GRIPS_H
 

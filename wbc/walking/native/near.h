@@ -1,4 +1,4 @@
-/* Whether two arms are too near to each other: capsules about O N, S E, E W and W H, as wbc.walking.planner.grips.conflicts. */
+/* Whether two arms are too near to each other: capsules about O N, S E, E W and W H, as planner/grips/conflicts.py. */
 #ifndef WBC_WALKING_NEAR_H
 #define WBC_WALKING_NEAR_H
 

@@ -1,4 +1,4 @@
-/* The least time along a hand's curve under the limits of joints 1 to 5, as arms/puma.py (follow) and planner/swings/least_time.py. */
+/* The least time along a curve under the limits of joints 1 to 5, as arms/puma.py and planner/swings/least_time.py. */
 #ifndef WBC_WALKING_SPEEDS_H
 #define WBC_WALKING_SPEEDS_H
 

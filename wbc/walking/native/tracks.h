@@ -21,12 +21,12 @@ static void posture_at(const Grips *grips, long grip, double sample, int begin, 
         out[k - begin] = q[k] + (at - (double)low) * (q[JOINTS + k] - q[k]);
 }
 
-/* Laws of m swings over n points each, see wbc.walking.planner.swings.least_time. `bases` (4 x 4) are those of the swings' arms, and
+/* Laws of m swings over n points each, see planner/swings/least_time.py. `bases` (4 x 4) are of the swings' arms, and
    `path` has `count` poses, `spacing` apart. `place` m x n x 3, `wrists` m x n x guided, `samples` m x n; `angles`
    m x n x (3 + guided), `rate` and `time` m x n. Returns 1 where n is too large. */
-int swing_speeds(const Arm *arm, const Rules *rules, long m, long n, int guided, const double *bases, const double *path,
-                 long count, double spacing, const double *place, const double *wrists, const double *samples,
-                 unsigned char *possible, double *angles, double *rate, double *time)
+int swing_speeds(const Arm *arm, const Rules *rules, long m, long n, int guided, const double *bases,
+                 const double *path, long count, double spacing, const double *place, const double *wrists,
+                 const double *samples, unsigned char *possible, double *angles, double *rate, double *time)
 {
     const int joints = 3 + guided;
     const double gap = 1.0 / (double)(n - 1);
