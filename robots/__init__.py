@@ -13,6 +13,8 @@ if TYPE_CHECKING:
     from wbc.robot.pairs.pairs_file import read_self_pairs, save_self_pairs
     from wbc.robot.sources.dh import DHRow
     from wbc.robots.catalogue import from_dh, load, names, table
+    from wbc.robots.limb import BodyLimb, Limb
+    from wbc.robots.margins import Margins
     from wbc.robots.operator_arms import OperatorArm, operator_arm
     from wbc.robots.pairs import find_self_pairs
     from wbc.robots.walker_arms import WalkerArm
@@ -22,9 +24,12 @@ else:
     __getattr__ = lazy.attach(__name__, __file__, {"Arm": "WalkerArm"})
 
 __all__ = [
+    "BodyLimb",
     "ConvexParts",
     "DHRow",
+    "Limb",
     "LinkPair",
+    "Margins",
     "OperatorArm",
     "SelfPairs",
     "TwoEndedData",

@@ -18,7 +18,9 @@ from wbc.robot import Robot
 from wbc.robot.loading import finish
 from wbc.robot.recipe import LinkShape, Recipe
 from wbc.robot.sources.description import Description
+from wbc.robots.limb import BodyLimb
 from wbc.robots.link_tree import Link, build_model, write_urdf
+from wbc.robots.margins import Margins
 from wbc.robots.walker_arms import BODY, WalkerArm, chain, puma_rows, reversed_chain, two_ended_rows
 from wbc.robots.walker_data import TwoEndedData, WalkerData
 from wbc.robots.walker_shapes import body_shapes, link_pairs, puma_shapes, two_ended_shapes
@@ -40,6 +42,9 @@ class Walker:
         min_holds: fewest hands that must hold at any time.
         data: the numbers that it was made of.
         links: the tree of links and joints, as the URDF has it.
+        limb: kinematics of its arms, which are all alike, as the planner asks for them; None: the closed form of
+            :attr:`arm_data`. A robot of one's own brings its own.
+        margins: what plans leave of its limits to feedback, and how long they wait.
     """
 
     robot: Robot
@@ -47,6 +52,8 @@ class Walker:
     min_holds: int
     data: WalkerData | TwoEndedData
     links: tuple[Link, ...] = field(repr=False)
+    limb: BodyLimb | None = field(default=None, repr=False)
+    margins: Margins = field(default_factory=Margins, repr=False)
 
     def arm(self, name: str) -> WalkerArm:
         """The arm of a name.
@@ -61,6 +68,28 @@ class Walker:
     def tolerances(self) -> WalkerData:
         """Clearance, latch and closing: those of its data; of the two-ended arm, which has none, those of the file."""
         return self.data if isinstance(self.data, WalkerData) else WalkerData.read()
+
+    @property
+    def arm_data(self) -> WalkerData:
+        """Numbers of a body with PUMA arms.
+
+        Raises:
+            ShapeError: another machine.
+        """
+        if not isinstance(self.data, WalkerData):
+            raise ShapeError("walker", self.robot.name, "expected a body with arms")
+        return self.data
+
+    @property
+    def two_ended_data(self) -> TwoEndedData:
+        """Numbers of the two-ended arm.
+
+        Raises:
+            ShapeError: another machine.
+        """
+        if not isinstance(self.data, TwoEndedData):
+            raise ShapeError("walker", self.robot.name, "expected the two-ended arm")
+        return self.data
 
     def urdf(self, path: str | os.PathLike[str]) -> pathlib.Path:
         """Writes the robot as URDF without its floating base; returns the file. The root link is ``body``.
@@ -191,7 +220,8 @@ def _bodied(count: int, data: WalkerData, artificial_limits: bool, body_shape: s
         for name, base in zip(names, bases, strict=True)
     )
     robot = _with_shapes(robot, shapes, link_pairs(arms, BODY in shapes, data))
-    return Walker(robot, arms, 2 if count > 2 else 1, data, tuple(links))
+    margins = Margins.of_reach(data.upper_arm_length + data.forearm_length)
+    return Walker(robot, arms, 2 if count > 2 else 1, data, tuple(links), margins=margins)
 
 
 def _two_ended(data: TwoEndedData) -> Walker:
@@ -210,7 +240,9 @@ def _two_ended(data: TwoEndedData) -> Walker:
     tip, boom, far_tip = "arm1_link1", "arm2_link4", "arm2_link7"
     pairs = [(tip, BODY), (tip, boom), (tip, far_tip), (BODY, far_tip), (boom, far_tip)]
     robot = _with_shapes(robot, shapes, pairs)
-    return Walker(robot, tuple(arms), 1, data, tuple(links))
+    # All joints move at once, and half of their accelerations are left for a stop
+    margins = Margins(held_clearance=0.02, swing_rate=0.9, swing_acceleration=0.5)
+    return Walker(robot, tuple(arms), 1, data, tuple(links), margins=margins)
 
 
 def _robot(

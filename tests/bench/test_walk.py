@@ -6,6 +6,7 @@ import gc
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 from rich.progress import Progress
 
@@ -13,7 +14,7 @@ import wbc
 from bench.kept import Kept
 from bench.records import measure
 from bench.walk import __main__ as command
-from bench.walk import courses, layouts, patches, planning, planning_tables, tables, trenches
+from bench.walk import courses, fits, layouts, patches, planning, planning_tables, tables, trenches
 from bench.walk.layout_tables import layout_goals, layout_sheet
 from bench.walk.machine import Job, Machine, Record
 from bench.walk.parts import records
@@ -21,15 +22,18 @@ from bench.walk.reference import Verdict
 from bench.walk.reference.verdict import Kind
 from wbc.errors import RangeError
 from wbc.walking import cylinder
+from wbc.walking.body_path import grid_path
 from wbc.walking.log.recorder import versions
 from wbc.walking.loop.body_command import way_function
 from wbc.walking.loop.closed_chain import chain_function
 from wbc.walking.loop.hand_command import aim_function
 from wbc.walking.loop.stack import WalkStack
+from wbc.walking.planner.swings.swings import ESTIMATE
 from wbc.walking.run.compiling import compiled_stack
 
 #: A course of a few seconds
 SHORT = ((13, 12), (13, 13))
+INCH = 0.0254
 
 
 class Says:
@@ -231,3 +235,18 @@ def test_other_data_are_not_reported(monkeypatch: pytest.MonkeyPatch, tmp_path: 
     with pytest.raises(RangeError, match=r"walker\.toml.*000000000000 only"):
         command.main(["--parts", "patches", "--output", str(tmp_path)])
     assert list(tmp_path.iterdir()) == []
+
+
+def test_the_estimate_is_fitted_to_swings() -> None:
+    rng = np.random.default_rng(0)
+    drawn = [(float(a), float(b)) for a, b in rng.uniform(0.2, 1.5, (30, 2))]
+    parts, off = fits.fitted([fits.Swung(1.1 + 0.6 * a + 0.5 * b, a, b, 0) for a, b in drawn])
+    assert parts == pytest.approx([1.1, 0.6, 0.5])
+    assert np.abs(off).max() < 1e-9
+    walker, whole = wbc.robots.walker(), cylinder()
+    found = list(fits.swings_of(walker, whole, grid_path([(13, 6), (13, 18)], 4 * INCH)))
+    assert len(found) > 20
+    # The estimate is low: it drops no swing that would do
+    off = fits.missed(found, ESTIMATE)
+    assert (off < 0.25).all()
+    assert -0.8 < np.median(off) < 0.0

@@ -22,7 +22,7 @@ from wbc.walking import run as walking_run
 from wbc.walking.holds.built_in import plane
 from wbc.walking.log.log import WalkLog
 from wbc.walking.planner.detours import ALONG
-from wbc.walking.planner.detours import ways_round as detours
+from wbc.walking.planner.detours import route as detours
 from wbc.walking.report.folder import RunFolderError
 from wbc.walking.run import perform
 from wbc.walking.run.request import WalkRequest, over_holds
@@ -182,7 +182,7 @@ def test_what_is_out_of_reach_is_refused_with_its_reason(tmp_path: Path, monkeyp
     code, _, err = run("walk", *SHORT, *changed, "--remove-rows", "1-9,12-24", "--out", folder, "--force")
     assert code == 3
     assert "refused" in err
-    assert "no way beyond" in err
+    assert "no route beyond" in err
     told = json.loads((folder / "summary.json").read_text())
     assert told["outcome"] == "refused"
     assert told["reason"]

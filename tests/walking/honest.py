@@ -19,7 +19,7 @@ DT, HEIGHT, LIFT, RADIUS = 0.01, 52 * INCH, 5.0 * INCH, 30 * INCH
 #: Seconds: holding at both ends, opening and closing, swinging. In the swing a joint reaches 0.987 of its rate
 HOLD, LATCH, SWING = 0.3, 0.1, 1.1
 MACHINE = walker()
-ARM = ArmKinematics(MACHINE.data)
+ARM = ArmKinematics(MACHINE.arm_data)
 #: Looking down on the plane: x along x, z into the structure
 DOWN = pin.utils.rotate("x", pi)
 #: Holds lean inwards, so that the wrists stay away from their singularity

@@ -13,7 +13,7 @@ from wbc.walking.loop.stack import WalkStack
 from wbc.walking.loop.walk import Tick, Walk
 from wbc.walking.planner.plan import HoldLost, NoPlanError
 from wbc.walking.planner.planner import plan_walk
-from wbc.walking.planner.replanning import HEAD, plan_from_stance
+from wbc.walking.planner.replanning import plan_from_stance
 from wbc.walking.planner.slices import drained
 from wbc.walking.run.carrying_out import CarryingOut
 from wbc.walking.run.recording import WalkRecorder
@@ -187,7 +187,7 @@ def test_a_walk_begins_before_its_plan_is_made(machine: Walker, structure: Struc
     assert walk.plan.regrasps == ()
     while not walk.plan.complete:
         walk.tick()
-        assert walk.path_time <= HEAD + 1e-9
+        assert walk.path_time <= walk.walker.margins.head + 1e-9
     assert walk.path_time > 0.0
     finish(walk)
     assert path.duration / (walk.time - 0.5) >= 0.98

@@ -18,9 +18,10 @@ from wbc.walking.planner.grips.table import Grips, find_grips
 from wbc.walking.planner.plan import Plan
 from wbc.walking.planner.planner import plan_walk
 from wbc.walking.planner.swings.clearance import SwingClearance
-from wbc.walking.planner.swings.curve import WAYS
+from wbc.walking.planner.swings.curve import ALTERNATIVES
 from wbc.walking.planner.swings.least_time import speeds
-from wbc.walking.planner.swings.swings import Chosen, Swing, Swings
+from wbc.walking.planner.swings.move import Chosen, Move, Swing
+from wbc.walking.planner.swings.swings import Swings
 from wbc.walking.planner.swings.tracks import Asked, Tracks, tracks
 
 Both = Callable[[Callable[[], Any]], tuple[Any, Any]]
@@ -68,32 +69,32 @@ def test_swings_are_the_same(machine: Walker, structure: Structure, path: BodyPa
     swings, arms = Swings(machine, structure, path, grips), ArmClearance(machine, grips)
     asked, lift, others = drawn(grips, path)
     found = set()
-    for way in range(len(WAYS)):
-        curve = swings.curve(asked.arms, asked.source, asked.target, lift, way)
+    for which in range(len(ALTERNATIVES)):
+        curve = swings.curve(asked.arms, asked.source, asked.target, lift, which)
         fast, slow = both(lambda c=curve: c.at(np.linspace(0.0, 1.0, 40)))
         np.testing.assert_allclose(fast, slow, rtol=0.0, atol=1e-12)
         one: Tracks
         other: Tracks
-        one, other = both(lambda c=curve: tracks(machine, arms, path, grips, c, asked, N))
+        one, other = both(lambda c=curve: tracks(machine, arms.shapes, path, grips, c, asked, N))
         assert one.possible.tolist() == other.possible.tolist()
         fits = one.possible
         for name in ("duration", "samples", "points"):
             np.testing.assert_allclose(getattr(one, name)[fits], getattr(other, name)[fits], rtol=1e-9, atol=1e-9)
         for what in (structure, plane()):
-            clear = SwingClearance(machine, what, arms)
+            clear = SwingClearance(machine, what)
             ends = np.stack([curve.begin, curve.end], axis=1)
             bodies = path.blended(one.samples)
             fast, slow = both(lambda c=clear, b=bodies, e=ends, p=one.points: c.structure(p, b, e))
             assert fast.tolist() == slow.tolist()
             found |= {("structure", x) for x in fast.tolist()}
-        fast, slow = both(lambda c=clear, t=one: c.others(t.points, t.samples, others))
+        fast, slow = both(lambda t=one: arms.stay_clear(t.points, t.samples, others, 0.004))
         assert fast.tolist() == slow.tolist()
         found |= {("others", x) for x in fast.tolist()} | {("possible", x) for x in fits.tolist()}
     # Every check has said yes and no
     assert len(found) == 6
 
 
-def test_chosen_ways_are_the_same(machine: Walker, structure: Structure, path: BodyPath, both: Both) -> None:
+def test_chosen_curves_are_the_same(machine: Walker, structure: Structure, path: BodyPath, both: Both) -> None:
     """Also of hands that must not roll, and where swings were corrected."""
     rolls = [replace(hold, roll=("free", 4)[k % 2]) for k, hold in enumerate(structure.holds)]
     some = replace(structure, holds=tuple(rolls))
@@ -111,18 +112,18 @@ def test_chosen_ways_are_the_same(machine: Walker, structure: Structure, path: B
         first = [search.choose(swing) for swing in swings]
         for swing, found in zip(swings[::2], first[::2], strict=True):
             if found is not None:
-                name = swing.arm, swing.source, swing.target, swing.lift
-                search.correct(*name, found.way, 4.0, found.duration < 2.5)
+                move = Move(*swing[:4], swing.lift + 40, found.duration, 0.0, found.curve)
+                search.correct(move, 4.0, found.duration < 2.5)
         search.prepare(swings)
         return first + [search.choose(swing) for swing in swings]
 
     one: list[Chosen | None]
     other: list[Chosen | None]
     one, other = both(chosen)
-    assert [c and c.way for c in one] == [c and c.way for c in other]
+    assert [c and c.curve for c in one] == [c and c.curve for c in other]
     times = [[c.duration for c in many if c] for many in (one, other)]
     np.testing.assert_allclose(times[0], times[1], rtol=1e-9, atol=1e-9)
-    assert len({c.way for c in one if c}) > 1
+    assert len({c.curve for c in one if c}) > 1
     assert None in one
     assert 4.0 in times[0]
 
@@ -137,19 +138,17 @@ def test_laws_and_arms_are_the_same(
     for bends in (2, 3):
         wrists = np.linspace(-0.4, 0.9, N)[:, None] + 0.1 * np.arange(bends)
         bent = np.repeat(wrists[None], len(lift), axis=0)
-        one, other = both(
-            lambda b=bent: speeds(swings.kinematics, machine, asked.arms, path, curve, samples, lambda _: b)
-        )
+        one, other = both(lambda b=bent: speeds(machine, asked.arms, path, curve, samples, lambda _: b))
         assert one.possible.tolist() == other.possible.tolist()
         fits = one.possible
         assert set(fits.tolist()) == {True, False}
         for name in ("angles", "rate", "time"):
             np.testing.assert_allclose(getattr(one, name)[fits], getattr(other, name)[fits], rtol=1e-9, atol=1e-9)
     postures = grips.postures[np.random.default_rng(1).integers(0, len(grips.postures), 4000)]
-    points = [both(lambda k=k, q=q: arms.points(k, q)) for k, q in enumerate(np.split(postures, 2))]
+    points = [both(lambda k=k, q=q: arms.shapes.points(k, q)) for k, q in enumerate(np.split(postures, 2))]
     for fast, slow in points:
         np.testing.assert_allclose(fast, slow, rtol=0.0, atol=1e-14)
-    fast, slow = both(lambda: arms.near(points[0][0], points[1][0]))
+    fast, slow = both(lambda: arms.shapes.near(points[0][0], points[1][0]))
     assert fast.tolist() == slow.tolist()
     assert set(fast.tolist()) == {True, False}
 

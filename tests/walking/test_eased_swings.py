@@ -15,9 +15,7 @@ from wbc.walking.planner.eased import ACCELERATION, CHANGE, JERK, RAMP, SPEED, p
 from wbc.walking.planner.follow import follow_plan
 from wbc.walking.planner.plan import Plan, read_plan
 from wbc.walking.planner.planner import plan_walk
-from wbc.walking.planner.swings.joints import joint_paths
 from wbc.walking.planner.swings.law import SwingLaw
-from wbc.walking.planner.swings.least_time import RATE_PART
 
 INCH = 0.0254
 
@@ -30,12 +28,12 @@ def plan(machine: Walker, structure: Structure) -> Plan:
 def test_the_law_goes_from_rest_to_rest_with_bounded_jerk() -> None:
     parts = np.linspace(0.0, 1.0, 2001)
     law, gap = profile_at(parts), parts[1]
-    assert (law.way[0], law.rate[0], law.acceleration[0]) == (0.0, 0.0, 0.0)
-    assert law.way[-1] == pytest.approx(1.0, abs=1e-9)
+    assert (law.position[0], law.rate[0], law.acceleration[0]) == (0.0, 0.0, 0.0)
+    assert law.position[-1] == pytest.approx(1.0, abs=1e-9)
     assert law.rate[-1] == pytest.approx(0.0, abs=1e-9)
     assert law.acceleration[-1] == pytest.approx(0.0, abs=1e-8)
-    # The derivatives are those of the way, and the acceleration nowhere jumps
-    assert np.diff(law.way) / gap == pytest.approx((law.rate[1:] + law.rate[:-1]) / 2, abs=JERK * gap**2)
+    # The derivatives are those of the position, and the acceleration nowhere jumps
+    assert np.diff(law.position) / gap == pytest.approx((law.rate[1:] + law.rate[:-1]) / 2, abs=JERK * gap**2)
     assert np.abs(np.diff(law.acceleration)).max() <= JERK * gap * (1 + 1e-6)
     assert law.rate.max() == pytest.approx(SPEED)
     assert np.abs(law.acceleration).max() == pytest.approx(ACCELERATION)
@@ -68,7 +66,7 @@ def test_a_slow_walk_has_such_swings(plan: Plan) -> None:
 def test_joints_keep_to_their_rates_with_the_body_on_its_way(machine: Walker, plan: Plan) -> None:
     grips, names, used = plan.grips, [arm.name for arm in machine.arms], [0, 0, 0]
     assert grips is not None
-    kinematics, spacing, latch = ArmKinematics(machine.data), plan.path.spacing, machine.tolerances.latch_time
+    kinematics, spacing, latch = ArmKinematics(machine.arm_data), plan.path.spacing, machine.tolerances.latch_time
     for step, law in zip(plan.regrasps, plan.laws, strict=True):
         arm = names.index(step.arm)
         used[arm] += 1
@@ -80,10 +78,10 @@ def test_joints_keep_to_their_rates_with_the_body_on_its_way(machine: Walker, pl
         part = np.array([law.at(k * law.spacing).blend for k in range(count)])[:, None]
         first, last = (grips.between(np.array([[grip]]), samples)[..., 3:5] for grip in (source, target))
         frames = plan.path.blended(samples) @ machine.arms[arm].base.homogeneous
-        angles, possible = joint_paths(kinematics, frames, law.places[None], first + part * (last - first))
+        angles, possible = kinematics.follow(frames, law.places[None], first + part * (last - first), machine.margins)
         assert possible.all()
         rates = np.abs(np.diff(angles[0], axis=0)) / law.spacing / np.array(kinematics.data.joint_rates)[:5]
-        assert 0.3 < rates.max() <= RATE_PART * 1.02
+        assert 0.3 < rates.max() <= machine.margins.swing_rate * 1.02
 
 
 def test_a_plan_of_a_file_has_the_same_laws(

@@ -8,12 +8,12 @@ import numpy as np
 import pinocchio as pin
 
 import wbc
-from wbc.robots import Walker, WalkerData
+from wbc.robots import Margins, Walker, WalkerData
 from wbc.validation import Array
 from wbc.walking import Structure
 from wbc.walking.body_path import BodyPath, grid_path
 from wbc.walking.loop.stack import WalkStack
-from wbc.walking.planner.grips.table import ANGLE_ROOM, RATE_PART, Grips, find_grips
+from wbc.walking.planner.grips.table import Grips, find_grips
 
 INCH = 0.0254
 #: (T, A, heading) from and to: across the grid, and a turn of the body where it is
@@ -27,8 +27,11 @@ STRIDE, COUNT = 3, 15
 
 def tight() -> Walker:
     """A machine whose limits are what the planner keeps of them."""
-    data = WalkerData.read()
-    limits, rates = np.array(data.position_limits) - ANGLE_ROOM, RATE_PART * np.array(data.joint_rates)
+    data, margins = WalkerData.read(), Margins()
+    limits, rates = (
+        np.array(data.position_limits) - margins.held_angle,
+        margins.held_rate * np.array(data.joint_rates),
+    )
     less = WalkerData.read(position_limits=tuple(limits.tolist()), joint_rates=tuple(rates.tolist()))
     return wbc.robots.walker(data=less, artificial_limits=True)
 

@@ -44,7 +44,7 @@ def hands(walker: Walker, path: BodyPath, grips: Grips, grip: int) -> np.ndarray
     samples = np.arange(grips.first[grip], grips.last[grip] + 1)
     postures = grips.posture(np.full(len(samples), grip), samples)
     base = walker.arms[grips.arm[grip]].base.homogeneous
-    return np.asarray(path.poses[samples] @ base @ ArmKinematics(walker.data).forward(postures))
+    return np.asarray(path.poses[samples] @ base @ ArmKinematics(walker.arm_data).forward(postures))
 
 
 @pytest.mark.parametrize(("roll", "tilt"), [("fixed", 0.0), (4, 0.0), (4, 0.05)])
@@ -128,7 +128,7 @@ def test_ball_holds_fix_the_hands_places_exactly(
     q = np.array(machine.robot.neutral)
     q[:3], q[3:7] = body[:3, 3], pin.Quaternion(body[:3, :3]).coeffs()
     holds: dict[int, int] = {}
-    kinematics = ArmKinematics(machine.data)
+    kinematics = ArmKinematics(machine.arm_data)
     for arm in range(3):
         grip = int(next(g for g in grips.of_arm(arm) if grips.first[g] == 0 and grips.hold[g] not in holds.values()))
         holds[arm] = int(grips.hold[grip])

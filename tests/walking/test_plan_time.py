@@ -39,7 +39,7 @@ def when(found: PlanTime, places: list[float]) -> np.ndarray:
 
 def farthest(machine: Walker, structure: Structure, plan: Plan, path_time: np.ndarray, joints: np.ndarray) -> float:
     """Of holding hands from their holds [m]; joints ``[n, 18]`` at path times ``[n]``."""
-    kinematics, far = ArmKinematics(machine.data), []  # type: ignore[arg-type]
+    kinematics, far = ArmKinematics(machine.arm_data), []
     bodies = plan.path.blended(path_time / plan.path.spacing)
     for k, arm in enumerate(machine.arms):
         hands = (bodies @ arm.base.homogeneous @ kinematics.forward(joints[:, 6 * k : 6 * k + 6]))[:, :3, 3]
@@ -76,7 +76,7 @@ def test_a_body_that_has_to_wait_is_late(machine: Walker, structure: Structure) 
 
 
 def test_a_swinging_hand_follows_its_law(machine: Walker, made: Plan, found: PlanTime) -> None:
-    kinematics, data = ArmKinematics(machine.data), machine.data  # type: ignore[arg-type]
+    kinematics, data = ArmKinematics(machine.arm_data), machine.arm_data
     assert isinstance(data, WalkerData)
     for step, law in zip(made.regrasps, made.laws, strict=True):
         k = [arm.name for arm in machine.arms].index(step.arm)

@@ -49,7 +49,7 @@ def frame(pose: GridPose) -> np.ndarray:
 def check(reference: Reference, structure: Structure, path: tuple[Step, ...]) -> None:
     """Every stance and every pose between: inverse kinematics within the limits, Pinocchio at the holds, clearances."""
     machine = reference.machine
-    kinematics, model = ArmKinematics(machine.data), machine.robot.model  # type: ignore[arg-type]
+    kinematics, model = ArmKinematics(machine.arm_data), machine.robot.model
     data = model.createData()
     for k, step in enumerate(path):
         assert len(set(step.holds)) == 3
@@ -191,7 +191,7 @@ def test_fewest_along_agrees_with_a_plain_search(reference: Reference, whole: St
 def plain(reference: Reference, structure: Structure, poses: np.ndarray) -> int | None:
     """Breadth first over sets of (two grips, pose), with single inverse kinematics."""
     machine = reference.machine
-    kinematics = ArmKinematics(machine.data)  # type: ignore[arg-type]
+    kinematics = ArmKinematics(machine.arm_data)
     grips: list[dict[tuple[int, int, int], np.ndarray]] = []  # of each arm: (hold, branch, pose) -> posture
     for arm in machine.arms:
         mine = {}
@@ -246,7 +246,7 @@ def sorted_pair(i, g, k, x) -> tuple:
 def test_what_an_arm_can_do_between_poses_is_in_the_relaxed_table(reference: Reference) -> None:
     """Random poses and hands tilted by up to 0.05 rad: no hold that an arm has is missing at the nearest pose."""
     table = arm_table(reference.machine, reference.lattice, reference.relaxed).fits[0]
-    kinematics = ArmKinematics(reference.machine.data)  # type: ignore[arg-type]
+    kinematics = ArmKinematics(reference.machine.arm_data)
     rng = np.random.default_rng(0)
     cells = rng.uniform([0, 0, -18, -18], [0, 24, 18, 18], size=(20_000, 4))
     bases = reference.lattice.frames(cells) @ reference.machine.arms[0].base.homogeneous

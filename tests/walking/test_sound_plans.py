@@ -9,6 +9,7 @@ from wbc.walking import Structure
 from wbc.walking.body_path import grid_path
 from wbc.walking.holds.built_in import grid_pose, remove_fraction
 from wbc.walking.modes.drive import standing_plan
+from wbc.walking.planner import sound
 from wbc.walking.planner.planner import plan_walk
 from wbc.walking.planner.swings.law import SwingLaw
 from wbc.walking.planner.swings.move import Move
@@ -24,7 +25,7 @@ def test_a_swing_that_turns_out_impossible_is_not_in_the_plan(
     assert [law.duration + 0.24 for law in first.laws] == pytest.approx(
         [max(step.duration, step.land - step.lift) for step in first.regrasps], abs=0.1
     )
-    step, of = first.regrasps[0], SwingLaw.of
+    step, of = first.regrasps[0], sound.law_of
 
     def barred(swings: Swings, move: Move) -> SwingLaw:
         law, holds = of(swings, move), structure.ids
@@ -33,7 +34,7 @@ def test_a_swing_that_turns_out_impossible_is_not_in_the_plan(
             object.__setattr__(law, "possible", False)
         return law
 
-    monkeypatch.setattr(SwingLaw, "of", staticmethod(barred))
+    monkeypatch.setattr(sound, "law_of", barred)
     other = plan_walk(machine, structure, path)
     assert other.complete
     assert len(other.laws) == len(other.regrasps)

@@ -72,7 +72,7 @@ class BodyPath:
         return pose, (twist @ pose.rotation.T).ravel()
 
     def place(self, u: float) -> tuple[int, float]:
-        """The sample before u, clipped to the path, and the part of the way to the next one."""
+        """The sample before u, clipped to the path, and the part of the step to the next one."""
         place = min(max(u / self.spacing, 0.0), len(self.poses) - 1.0)
         k = min(int(place), len(self.poses) - 2)
         return k, place - k
@@ -165,8 +165,8 @@ def grid_path(
     radius, grid = RADIUS + height, [rows[0][None]]
     for first, last in itertools.pairwise(rows):
         step = last - first
-        way = np.hypot((grid_angle(1.0) - grid_angle(0.0)) * radius * step[0], PITCH * step[1])
-        count = int(np.ceil(max(way / speed, abs(step[2]) / turn_rate) / SPACING - 1e-9))
+        length = np.hypot((grid_angle(1.0) - grid_angle(0.0)) * radius * step[0], PITCH * step[1])
+        count = int(np.ceil(max(length / speed, abs(step[2]) / turn_rate) / SPACING - 1e-9))
         grid.append(first + step * (np.arange(1, count + 1) / max(count, 1))[:, None])
     poses = np.array([grid_pose(t, a, radius, heading).homogeneous for t, a, heading in np.concatenate(grid)])
     return BodyPath(poses if pose is None else pose.homogeneous @ poses)

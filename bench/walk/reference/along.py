@@ -142,7 +142,7 @@ def _product(one: Flags, other: Flags) -> Flags:
 
 def _held(machine: Walker, structure: Structure, frames: Array, rules: Rules, arm: int) -> _Held:
     """Grips of an arm that fit at some pose."""
-    kinematics = ArmKinematics(machine.data)  # type: ignore[arg-type]
+    kinematics = ArmKinematics(machine.arm_data)
     turn = pin.SE3(pin.utils.rotate("z", 2 * pi * arm / 3), np.zeros(3)).homogeneous
     body, base = frames @ turn, machine.arms[0].base.homogeneous
     bases = body @ base

@@ -77,7 +77,7 @@ def arm_table(walker: Walker, lattice: Lattice, rules: Rules) -> ArmTable:
 
 def _held(walker: Walker, lattice: Lattice, rules: Rules, cells: Any) -> tuple[Flags, Array, Array, Array]:
     """Whether both branches hold at cells ``[n, 2]``; postures, points in the body's frame, and body frames."""
-    kinematics = ArmKinematics(walker.data)  # type: ignore[arg-type]
+    kinematics = ArmKinematics(walker.arm_data)
     frames = lattice.frames(cells)
     base = walker.arms[0].base.homogeneous
     arm_frames = frames @ base

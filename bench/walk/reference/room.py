@@ -10,9 +10,9 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from bench.walk.reference.lattice import Ints
+from wbc.robot.geometry.segments import segment_distances
 from wbc.robots import Walker
 from wbc.validation import Array
-from wbc.walking.arms.capsules import segment_distances
 from wbc.walking.holds.structure import Structure
 from wbc.walking.holds.surface import CylinderSurface
 
@@ -33,37 +33,37 @@ def room_alone(walker: Walker, points: Array, outside: Array, surface: CylinderS
         points: named points of arm 1 in the body's frame ``[n, 6, 3]``. outside: the same in the frame of the
             surface or structure.
     """
-    data = walker.data
+    data = walker.arm_data
     radii = {
-        NECK: data.neck_radius,  # type: ignore[union-attr]
-        UPPER: data.upper_arm_radius,  # type: ignore[union-attr]
-        FOREARM: data.forearm_radius,  # type: ignore[union-attr]
-        HAND: data.hand_radius,  # type: ignore[union-attr]
+        NECK: data.neck_radius,
+        UPPER: data.upper_arm_radius,
+        FOREARM: data.forearm_radius,
+        HAND: data.hand_radius,
     }
-    clearance, thickness = data.clearance, data.body_half_thickness  # type: ignore[union-attr]
+    clearance, thickness = data.clearance, data.body_half_thickness
     out = np.full(len(points), np.inf)
     for one, other in ((NECK, FOREARM), (NECK, HAND), (UPPER, HAND)):
         least = radii[one] + radii[other] + clearance
-        gap = segment_distances(*(points[:, k] for k in (*one, *other))) - least
+        gap = segment_distances(*(points[:, k].T for k in (*one, *other))) - least
         out = np.minimum(out, gap)
     corners = [np.array(arm.base.translation) for arm in walker.arms]
     sides = [*combinations(corners, 2), (np.zeros(3), np.zeros(3))]
     for link in MOVING:
-        ends = points[:, link[0]], points[:, link[1]]
+        ends = points[:, link[0]].T, points[:, link[1]].T
         if link != UPPER:  # too short to come down to the body
             for a, b in sides:
-                wall = np.broadcast_to(a, ends[0].shape), np.broadcast_to(b, ends[0].shape)
+                wall = np.broadcast_to(a[:, None], ends[0].shape), np.broadcast_to(b[:, None], ends[0].shape)
                 out = np.minimum(out, segment_distances(*ends, *wall) - radii[link] - thickness - clearance)
         for corner in corners[1:]:
-            top = corner + np.array([0.0, 0.0, data.neck_length])  # type: ignore[union-attr]
-            neck = np.broadcast_to(corner, ends[0].shape), np.broadcast_to(top, ends[0].shape)
+            top = corner + np.array([0.0, 0.0, data.neck_length])
+            neck = np.broadcast_to(corner[:, None], ends[0].shape), np.broadcast_to(top[:, None], ends[0].shape)
             out = np.minimum(out, segment_distances(*ends, *neck) - radii[link] - radii[NECK] - clearance)
         if link != HAND:
-            ends = outside[:, link[0]], outside[:, link[1]]
+            seen = outside[:, link[0]], outside[:, link[1]]
             if isinstance(surface, Structure):
-                height = surface.segment_clearance(*ends)
+                height = surface.segment_clearance(*seen)
             else:
-                height = surface.segment_height(*ends)
+                height = surface.segment_height(*seen)
             out = np.minimum(out, height - radii[link] - clearance)
     return out
 
@@ -75,20 +75,20 @@ def clear_between(walker: Walker, points: Array, one: Ints, other: Ints) -> Flag
         points: named points of arm 1 in the body's frame ``[n, 6, 3]``. one, other: rows of it for the two arms, the
             second at the heading at which arm 1 stands as the next arm does: its points are turned by 120 degrees here.
     """
-    data = walker.data
-    radii = data.upper_arm_radius, data.forearm_radius, data.hand_radius  # type: ignore[union-attr]
-    lengths = data.upper_arm_length, data.forearm_length, data.hand_length  # type: ignore[union-attr]
+    data = walker.arm_data
+    radii = data.upper_arm_radius, data.forearm_radius, data.hand_radius
+    lengths = data.upper_arm_length, data.forearm_length, data.hand_length
     turned = points @ pin.utils.rotate("z", 2 * pi / 3).T
     out = np.ones(len(one), dtype=bool)
     for i, a in enumerate(MOVING):
         for j, b in enumerate(MOVING):
-            least = radii[i] + radii[j] + data.clearance  # type: ignore[union-attr]
+            least = radii[i] + radii[j] + data.clearance
             # Balls about both segments decide most pairs
             middle, its = points[:, a].mean(axis=1), turned[:, b].mean(axis=1)
             square = np.zeros(len(one))
             for axis in range(3):
                 square += (middle[:, axis][one] - its[:, axis][other]) ** 2
             near = np.nonzero(out & (square < (least + (lengths[i] + lengths[j]) / 2) ** 2))[0]
-            ends = [points[one[near], k] for k in a] + [turned[other[near], k] for k in b]
+            ends = [points[one[near], k].T for k in a] + [turned[other[near], k].T for k in b]
             out[near] = segment_distances(*ends) >= least
     return out

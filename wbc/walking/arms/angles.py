@@ -66,6 +66,16 @@ def _opposite(angle: Array) -> Array:
     return np.where(angle > 0, angle - pi, angle + pi)
 
 
+def hand_poses(points: Array, axes: Array, references: Array) -> Array:
+    """Homogeneous matrices ``[n, 4, 4]`` of hands at points along axes, x as near to the references as it can be."""
+    across = references - (references * axes).sum(axis=1)[:, None] * axes
+    out = np.zeros((len(points), 4, 4))
+    out[:, :3, 0] = across / np.linalg.norm(across, axis=1)[:, None]
+    out[:, :3, 1], out[:, :3, 2] = np.cross(axes, out[:, :3, 0]), axes
+    out[:, :3, 3], out[:, 3, 3] = points, 1.0
+    return out
+
+
 def zyz(a: Array, b: Array, c: Array) -> Array:
     """Rz(a) Ry(b) Rz(c), ``[..., 3, 3]``."""
     (sa, ca), (sb, cb), (sc, cc) = sines(a), sines(b), sines(c)

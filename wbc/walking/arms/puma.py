@@ -13,16 +13,26 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from math import hypot, pi
-from typing import Any
+from math import hypot, pi, radians
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from wbc.errors import ShapeError
-from wbc.robots import WalkerData
+from wbc.robots import BodyLimb, Margins, Walker, WalkerData
 from wbc.validation import Array
-from wbc.walking.arms.angles import checked_signs, frame3, sines, unit_vectors, vectors, wrapped, wrist_angles, zyz
+from wbc.walking.arms.angles import (
+    checked_signs,
+    frame3,
+    hand_poses,
+    sines,
+    unit_vectors,
+    vectors,
+    wrapped,
+    wrist_angles,
+    zyz,
+)
 from wbc.walking.arms.rates import joint_rates
 from wbc.walking.arms.reach import shoulder_span, wrist_margin
 
@@ -32,11 +42,23 @@ Flags = NDArray[np.bool_]
 LIMIT_NAMES = (*(f"joint {i} limit" for i in range(1, 7)), "elbow limit", "shoulder limit")
 #: Relative slack of reach, for rounding: a straight arm may miss by this
 ROUNDING = 1e-12
+#: Where hands wait in the air: angles about the axis of joint 1 [rad], and in parts of upper arm and forearm together
+#: their distance from that axis and how far they are beyond the neck. ``python -m bench.walk.fits`` tries others
+WAITING_ANGLES, WAITING_RADIUS, WAITING_BEYOND = (0.0, radians(40.0), radians(-40.0)), 20.0 / 34.0, 10.0 / 34.0
+
+
+def limb_of(walker: Walker) -> BodyLimb:
+    """The kinematics of a walker's arms: its own, or the closed form of a body with PUMA arms.
+
+    Raises:
+        ShapeError: a machine without arms of a body.
+    """
+    return walker.limb or ArmKinematics(walker.arm_data)
 
 
 @dataclass(frozen=True)
 class ArmKinematics:
-    """Closed-form kinematics of one PUMA 600 arm.
+    """Closed-form kinematics of one PUMA 600 arm, a :class:`wbc.robots.BodyLimb`.
 
     Attributes:
         data: lengths [m] and limits [rad]; default: those of the file.
@@ -92,11 +114,114 @@ class ArmKinematics:
         axis += out[..., 4, :]
         return out
 
+    #: Of the capsules of neck O N, which stands still, upper arm S E, forearm E W and hand W H
+    links: ClassVar[tuple[tuple[int, int], ...]] = ((0, 1), (2, 3), (3, 4), (4, 5))
+    still: ClassVar[int] = 1
+    guided: ClassVar[int] = 3
+    limit_names: ClassVar[tuple[str, ...]] = LIMIT_NAMES
+
     @property
     def radii(self) -> tuple[float, float, float, float]:
         """Radii of the capsules of neck, upper arm, forearm and hand [m]."""
         data = self.data
         return data.neck_radius, data.upper_arm_radius, data.forearm_radius, data.hand_radius
+
+    @property
+    def position_limits(self) -> tuple[float, ...]:
+        """Largest sizes of the angles [rad]."""
+        return self.data.position_limits
+
+    @property
+    def joint_rates(self) -> tuple[float, ...]:
+        """Largest rates [rad/s]."""
+        return self.data.joint_rates
+
+    @property
+    def joint_accelerations(self) -> tuple[float, ...]:
+        """Largest accelerations [rad/s^2]."""
+        return self.data.joint_accelerations
+
+    @property
+    def pivot(self) -> Array:
+        """The neck, on the axis of joint 1 ``[3]`` [m]."""
+        return np.array([0.0, 0.0, self.data.neck_length])
+
+    @property
+    def hand_span(self) -> float:
+        """No hand is farther from the neck [m]: the whole arm, straight."""
+        data = self.data
+        return data.shoulder_offset + data.upper_arm_length + data.forearm_length + data.hand_length
+
+    @property
+    def hand_length(self) -> float:
+        """From the wrist to the hand's origin [m]."""
+        return self.data.hand_length
+
+    @property
+    def waiting(self) -> tuple[tuple[float, float, float], ...]:
+        """Where a hand may wait in the air: angle about the axis of joint 1 [rad], distance from it, height [m]."""
+        data = self.data
+        reach = data.upper_arm_length + data.forearm_length
+        return tuple(
+            (angle, WAITING_RADIUS * reach, data.neck_length + WAITING_BEYOND * reach) for angle in WAITING_ANGLES
+        )
+
+    @property
+    def closed_form(self) -> WalkerData:
+        """The numbers that compiled loops take."""
+        return self.data
+
+    def held(self, points: Array, axes: Array, x: Array | None = None, /) -> tuple[Array, Flags]:
+        """Both wrist branches with the hand at ``points`` along ``axes``, see :meth:`wbc.robots.BodyLimb.held`.
+
+        Raises:
+            as :meth:`inverse_axis` and :meth:`inverse`.
+        """
+        if x is None:
+            return self.inverse_axis(points, axes, limits=False)
+        return self.inverse(hand_poses(points, axes, x), limits=False)
+
+    def wrist_bend(self, q: Array, /) -> Array:
+        """\\|sin theta5\\|: joint 4 turns the hand's axis by so much."""
+        return np.abs(np.sin(q[..., 4]))
+
+    def elbow_bend(self, q: Array, /) -> Array:
+        """-theta3 [rad]."""
+        return -q[..., 2]
+
+    def follow(self, frames: Array, places: Array, guide: Array, margins: Margins, /) -> tuple[Array, Flags]:
+        """Joints 1 to 5 or 6 ``[m, n, 5 or 6]`` [rad] with hands at ``places`` and the wrists at ``guide``.
+
+        Forearm and hand are one link from the elbow to the hand: A = WE + HW c5 along the forearm, B = HW c4 s5 across
+        it in the arm's plane, and HW s4 s5 out of the plane. So theta3 + atan2(B, A) is the angle at the elbow of an
+        arm with the lengths ES and hypot(A, B). See :meth:`wbc.robots.BodyLimb.follow`.
+        """
+        data = self.data
+        turn, origin = frames[..., :3, :3], frames[..., :3, 3]
+        points = np.einsum("mnji,mnj->mni", turn, places - origin)
+        (s4, c4), (s5, c5) = sines(guide[..., 0]), sines(guide[..., 1])
+        hand = data.hand_length
+        along, across, out = data.forearm_length + hand * c5, hand * c4 * s5, data.shoulder_offset + hand * s4 * s5
+        es, reach, tilt = data.upper_arm_length, np.hypot(along, across), np.arctan2(across, along)
+        x, y, z = points[..., 0], points[..., 1], points[..., 2] - data.neck_length
+        square, least = x * x + y * y - out * out, margins.swing_axis**2
+        r = np.sqrt(np.maximum(square, least))
+        distance = np.hypot(r, z)
+        elbow = np.arccos(np.clip((distance**2 - es * es - reach * reach) / (2 * es * reach), -1.0, 1.0))
+        angles = np.empty((*r.shape, 3 + guide.shape[2]))
+        angles[..., 0] = np.unwrap(np.arctan2(y, x) - np.arctan2(out, r), axis=1)
+        angles[..., 0] += wrapped(angles[:, :1, 0]) - angles[:, :1, 0]
+        angles[..., 1] = np.arctan2(r, z) + np.arctan2(reach * np.sin(elbow), es + reach * np.cos(elbow))
+        angles[..., 2] = -elbow - tilt
+        angles[..., 3:] = guide
+        free = np.array(data.position_limits)[: angles.shape[2]] - np.abs(angles)
+        lean = angles[..., 1] + angles[..., 2] / 2 - data.shoulder_limit
+        straight = data.elbow_limit - angles[..., 2]
+        possible = (square.min(axis=1) > least) & ((es + reach - distance).min(axis=1) > margins.swing_reach)
+        # Limits of the published robot at the ends are kept as close as holding grips keep them
+        possible &= (free.min(axis=(1, 2)) > margins.swing_angle) & (lean.min(axis=1) > margins.swing_angle)
+        possible &= straight.min(axis=1) > margins.swing_elbow
+        return angles, possible
 
     def wrist_of(self, points: Any, axes: Any) -> Array:
         """Where the wrist of a hand at ``points`` [m] is whose z axis is ``axes``: p - HW z, ``[..., 3]``."""

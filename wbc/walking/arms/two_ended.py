@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from math import pi
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,13 +34,65 @@ LEAST_ANGLE = 1e-9
 
 @dataclass(frozen=True)
 class TwoEndedKinematics:
-    """Closed-form kinematics of the two-ended arm from hand to hand.
+    """Closed-form kinematics of the two-ended arm from hand to hand, a :class:`wbc.robots.Limb` on the near hand.
 
     Attributes:
         data: lengths [m], limit and rate; default: those of the file.
     """
 
     data: TwoEndedData = field(default_factory=TwoEndedData.read)
+
+    #: Of the capsules of near tip, first boom, second boom and far tip
+    links: ClassVar[tuple[tuple[int, int], ...]] = ((0, 1), (2, 3), (4, 5), (6, 7))
+    limit_names: ClassVar[tuple[str, ...]] = tuple(f"joint {k} limit" for k in range(1, 8))
+
+    @property
+    def position_limits(self) -> tuple[float, ...]:
+        """Largest sizes of the angles [rad]."""
+        return (self.data.position_limit,) * 7
+
+    @property
+    def joint_rates(self) -> tuple[float, ...]:
+        """Largest rates [rad/s]."""
+        return (self.data.joint_rate,) * 7
+
+    @property
+    def joint_accelerations(self) -> tuple[float, ...]:
+        """Largest accelerations: rate / ``acceleration_time`` [rad/s^2]."""
+        return (self.data.joint_rate / self.data.acceleration_time,) * 7
+
+    @property
+    def radii(self) -> tuple[float, ...]:
+        """Radii of the capsules [m]."""
+        tip, boom = self.data.wrist_radius, self.data.boom_radius
+        return tip, boom, boom, tip
+
+    def margins(self, q: Any) -> Array:
+        """Angles to the limits at joints 1 to 7: ``[..., 7]`` [rad]; negative beyond.
+
+        Raises:
+            ShapeError, NotFiniteError: not seven finite numbers a posture.
+        """
+        out: Array = self.data.position_limit - np.abs(vectors("q", q, (7,)))
+        return out
+
+    def points(self, q: Any) -> Array:
+        """Ends of the capsules' cores in the near hand's frame at joints 1 to 7: ``[..., 8, 3]`` [m].
+
+        Raises:
+            ShapeError, NotFiniteError: not seven finite numbers a posture.
+        """
+        return self.points_of(self.frames(q))
+
+    def points_of(self, frames: Array) -> Array:
+        """As :meth:`points`, of :meth:`frames` that may stand elsewhere ``[..., 8, 4, 4]``: ``[..., 8, 3]`` [m]."""
+        boom, tip = self.data.boom_length, self.data.roll_offset
+        origin, x, z = frames[..., :3, 3], frames[..., :3, 0], frames[..., :3, 2]
+        along = (tip * z[..., 0, :], -boom * x[..., 3, :], -boom * x[..., 4, :], -tip * z[..., 7, :])
+        out = np.empty((*frames.shape[:-3], 8, 3))
+        out[..., ::2, :] = origin[..., [0, 3, 4, 7], :]
+        out[..., 1::2, :] = out[..., ::2, :] + np.stack(along, axis=-2)
+        return out
 
     def forward(self, q: Any) -> Array:
         """Far hand in the near hand's frame ``[..., 4, 4]`` at joints 1 to 7, ``[..., 7]`` [rad].

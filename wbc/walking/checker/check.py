@@ -57,7 +57,7 @@ def check_walk(
         WalkLogError, StructureFileError, RobotFileError, UnsupportedJointError: a file that cannot be read.
         UnknownNameError: a joint or hand that the URDF does not have. ShapeError: a log without the joints it needs.
     """
-    told = rules or Rules()
+    used = rules or Rules()
     if not isinstance(log, WalkLog):
         log = WalkLog.load(log)
     if structure is not None and not isinstance(structure, Structure):
@@ -66,29 +66,29 @@ def check_walk(
     _check_names(log, machine)
     table = HoldTable.of(log)
     for declare in (table_of_holds.declare, clock_and_joints.declare, clearances.declare):
-        declare(tally, told)
-    grasps.declare(tally, told, log)
-    _declare(tally, told)
+        declare(tally, used)
+    grasps.declare(tally, used, log)
+    _declare(tally, used)
     table_of_holds.check_table(log, table, structure, tally)
     clock_and_joints.check_time(log, tally)
     clock_and_joints.check_rates(log, machine, tally)
-    clock_and_joints.check_twist(log, told, tally)
-    grasps.check_counts(log, told, tally)
-    grasps.check_states(log, told, tally)
+    clock_and_joints.check_twist(log, used, tally)
+    grasps.check_counts(log, used, tally)
+    grasps.check_states(log, used, tally)
     grasps.check_shared(log, tally)
-    around = clearances.Surroundings.of(structure, table, told)
+    around = clearances.Surroundings.of(structure, table, used)
     at_ticks, samples, loose = _AtTicks.empty(log), 0, 0
-    for block in blocks(log, told.sub_samples):
+    for block in blocks(log, used.sub_samples):
         clock_and_joints.check_positions(block, log, machine, tally)
         placements = forward(machine, log.joints, block.q)
         hands = _hands(log, placements)
         bodies = _bodies(log, hands, table, block)
         _check_holds(log, hands, bodies, table, block, tally, at_ticks)
         _check_body(log, hands, bodies, table, block, tally)
-        clearances.check_links(machine, placements, block, told, tally)
+        clearances.check_links(machine, placements, block, used, tally)
         placed = _placed(placements, bodies)
         at = {hand: placed.position[hand] for hand in log.hands}
-        clearances.check_structure(machine, placed, block, around, at, told, tally)
+        clearances.check_structure(machine, placed, block, around, at, used, tally)
         samples, loose = samples + len(block), loose + int(bodies.open.sum())
     grasps.check_closing(log, at_ticks.distance, at_ticks.angle, at_ticks.speed, at_ticks.rate, tally)
     grasps.check_drift(log, at_ticks.distance, at_ticks.angle, tally)

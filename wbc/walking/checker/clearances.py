@@ -1,7 +1,7 @@
 """Checks of clearances: links against each other, and against the structure.
 
 Each pair is measured at every tick. Between ticks a point moves at most as far as the farther-moving end of its
-segment, so where the distance at the tick less these ways is above both the limit and the least that was found, no
+segment, so where the distance at the tick less this travel is above both the limit and the least that was found, no
 sample in between can matter; all others are measured as well.
 """
 
@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,7 +36,7 @@ class Moving:
     capsule: CapsuleOfLink
     a: Array
     b: Array
-    way: Array
+    travel: Array
 
     @classmethod
     def of(cls, capsule: CapsuleOfLink, a: Array, b: Array, samples: Samples) -> Moving:
@@ -66,7 +67,7 @@ def check_links(urdf: Urdf, placements: Placements, samples: Samples, rules: Rul
             def measure(rows: Rows, x: Moving = first, y: Moving = second, r: float = radii) -> Array:
                 return distances.between_segments(x.a[rows], x.b[rows], y.a[rows], y.b[rows]) - r
 
-            _add(tally, LINKS, measure, first.way + second.way, samples, rules, f"{one} and {two}")
+            _add(tally, LINKS, measure, first.travel + second.travel, samples, rules, f"{one} and {two}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +85,7 @@ class Surroundings:
         if surface is not None:
             parts["surface"] = lambda a, b: distances.from_surface(surface, a, b)
         for obstacle in () if structure is None else structure.obstacles:
-            parts[obstacle.id] = lambda a, b, o=obstacle: distances.from_obstacle(o, a, b)  # type: ignore[misc]
+            parts[obstacle.id] = partial(distances.from_obstacle, obstacle)
         if not parts:
             axes = table.rotation[:, :, 2]
             parts["plane of a hold"] = lambda a, b: distances.from_tangents(table.position, axes, a, b)
@@ -123,7 +124,7 @@ def check_structure(
                     return np.zeros(len(rows), dtype=bool)
                 return distances.nearest(holds, at[rows])[1] <= rules.exempt_distance
 
-            _add(tally, STRUCTURE, measure, moving.way, samples, rules, f"{link} and {name}", touches)
+            _add(tally, STRUCTURE, measure, moving.travel, samples, rules, f"{link} and {name}", touches)
 
 
 def _moving(urdf: Urdf, placements: Placements, samples: Samples) -> list[Moving]:
@@ -138,7 +139,7 @@ def _add(
     tally: Tally,
     kind: str,
     measure: Callable[[Rows], Array],
-    way: Array,
+    travel: Array,
     samples: Samples,
     rules: Rules,
     what: str,
@@ -155,7 +156,7 @@ def _add(
         tally.add(kind, at_ticks[counts], samples.t[ticks[counts]], lambda _: what)
     inside = np.ones(len(samples), dtype=bool)
     inside[ticks] = False
-    rows = np.flatnonzero(inside & (at_ticks - way <= bound)[samples.anchor])
+    rows = np.flatnonzero(inside & (at_ticks - travel <= bound)[samples.anchor])
     found = measure(rows)
     rows, found = rows[found <= bound], found[found <= bound]
     bare = ~exempt(rows)

@@ -217,8 +217,8 @@ def _hold(row: _Row) -> Hold:
 
 def _obstacle(row: _Row) -> Obstacle:
     name, kind, pose = row.name(), row.choice("shape", ("box", "capsule")), row.pose()
-    sizes = row.sizes(kind)
-    shape: Box | Capsule = row.made("d1, d2, d3", lambda: Capsule(*sizes) if kind == "capsule" else Box(tuple(sizes)))  # type: ignore[arg-type]
+    sizes: Any = row.sizes(kind)
+    shape: Box | Capsule = row.made("d1, d2, d3", lambda: Capsule(*sizes) if kind == "capsule" else Box(tuple(sizes)))
     return Obstacle(name, shape, pose)
 
 

@@ -48,7 +48,7 @@ class WalkStack:
         stack.add(tasks.Posture(), name="posture", weight=WRIST)
         stack.add(tasks.JointLimits(), name="limits")
         if collisions:
-            margin = walker.data.clearance  # type: ignore[union-attr]
+            margin = walker.tolerances.clearance
             stack.add(tasks.SelfCollision(margin=margin), name="links")
         self.stack = stack
         self.controller: Controller = stack.compile(backend=backend)

@@ -16,7 +16,7 @@ from wbc.walking.loop.state import Hand, Tick
 from wbc.walking.loop.stopping import OFF
 from wbc.walking.loop.walk import Walk
 from wbc.walking.modes.hand_motion import ArmRefused, Standing
-from wbc.walking.planner.grips.conflicts import ArmClearance
+from wbc.walking.planner.grips.conflicts import LimbShapes
 from wbc.walking.planner.grips.rolls import ANY, frame_on
 from wbc.walking.planner.swings.clearance import SwingClearance
 
@@ -133,8 +133,7 @@ class ArmMode:
 
     def _standing(self) -> Standing:
         walk = self.walk
-        arms = ArmClearance(walk.walker, walk.grips)
-        clear = SwingClearance(walk.walker, walk.structure, arms)
+        arms, clear = LimbShapes(walk.walker), SwingClearance(walk.walker, walk.structure)
         body = pin.SE3(pin.Quaternion(walk.q[3:7]).matrix(), walk.q[:3].copy())
         return Standing(walk.walker, clear, arms, self.arm, body, walk.q.copy(), walk.dt)
 
@@ -195,7 +194,7 @@ class ArmMode:
     def _places(self, rows: Array) -> Array:
         """Of the hand at rows of joints ``[n, 3]`` [m], on the body that stands."""
         walk = self.walk
-        hands = ArmClearance(walk.walker, walk.grips).points(self.arm, rows)[:, 5]
+        hands = LimbShapes(walk.walker).points(self.arm, rows)[:, 5]
         out: Array = hands @ pin.Quaternion(walk.q[3:7]).matrix().T + walk.q[:3]
         return out
 

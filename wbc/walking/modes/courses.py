@@ -17,8 +17,7 @@ from wbc.walking.loop.walk import Walk
 from wbc.walking.planner.grips.table import Grips, grip_slices
 from wbc.walking.planner.plan import NoPlanError, Plan, Regrasp
 from wbc.walking.planner.planner import plan_slices
-from wbc.walking.planner.replanning import ONWARD
-from wbc.walking.planner.stances.search import StanceSearch
+from wbc.walking.planner.stances.body import BodySearch
 from wbc.walking.planner.swings.law import SwingLaw
 from wbc.walking.planner.swings.swings import SETTLE
 
@@ -88,7 +87,7 @@ def course_slices(
     Args:
         now: the plan of which the course is. quick: yield, after some milliseconds, a plan that lifts no hand, with
             which the body goes over to the new path; hands are lifted
-            :data:`wbc.walking.planner.replanning.ONWARD` later.
+            :attr:`wbc.robots.Margins.onward` later.
 
     Raises:
         NoPlanError: a hand cannot be where it is, or is to come down.
@@ -104,10 +103,10 @@ def course_slices(
         rows = [int(old.hold[grips[-1]]) for grips in begun.hands]
         few = yield from grip_slices(walker, structure, path, rows)
         chain = _chain(structure, old, few, begun, lands, shift)
-        search = StanceSearch(walker, structure, path, few)
+        search = BodySearch(walker, structure, path, few)
         until = search.until([grips[-1] for grips in chain], max(samples[-1] for samples in lands))
         # The plan needs a stance that goes on behind it
-        sample = max(min(sample + round(ONWARD / path.spacing), until - 1), sample)
+        sample = max(min(sample + round(walker.margins.onward / path.spacing), until - 1), sample)
         start = tuple(structure.ids[few.hold[grips[0]]] for grips in chain)
         yield Plan(path, start, (), False, sample * path.spacing, "being planned", few, chain)
     grips = yield from grip_slices(walker, structure, path)

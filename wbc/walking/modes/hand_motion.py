@@ -13,7 +13,7 @@ from wbc.errors import WbcError
 from wbc.robots import Walker
 from wbc.validation import Array
 from wbc.walking.arms.puma import LIMIT_NAMES, ArmKinematics
-from wbc.walking.planner.grips.conflicts import ArmClearance
+from wbc.walking.planner.grips.conflicts import LimbShapes
 from wbc.walking.planner.swings.clearance import SwingClearance
 
 #: Parts of joint rates and accelerations that motions use, and room to the other limits [rad]
@@ -40,7 +40,7 @@ class Standing:
 
     walker: Walker
     clear: SwingClearance
-    arms: ArmClearance
+    arms: LimbShapes
     arm: int
     body: pin.SE3
     q: Array
@@ -90,7 +90,7 @@ class Standing:
 
     @property
     def _kinematics(self) -> ArmKinematics:
-        return ArmKinematics(self.walker.data)  # type: ignore[arg-type]
+        return ArmKinematics(self.walker.arm_data)
 
     @property
     def _base(self) -> pin.SE3:
@@ -171,5 +171,5 @@ class Standing:
         data, places = self._kinematics.data, points[:, 5] @ self.body.rotation.T + self.body.translation
         far = np.linalg.norm(places[:, None] - ends, axis=2).min(axis=1) - data.exempt_distance
         edge = (far > 0.0) & (far < EDGE)
-        room = self.clear.room(places[edge]) - data.hand_radius - data.clearance
+        room = self.clear.height(places[edge]) - data.hand_radius - data.clearance
         return bool((room > -SLACK).all())

@@ -1,4 +1,4 @@
-/* One arm with its first joints, forearm and bent hand in closed form, as planner/swings/joints.py and arms/puma.py. */
+/* One arm with its first joints, forearm and bent hand in closed form, as arms/puma.py. */
 #ifndef WBC_WALKING_ARM_H
 #define WBC_WALKING_ARM_H
 

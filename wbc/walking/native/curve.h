@@ -1,4 +1,4 @@
-/* Ways of hands, as wbc.walking.planner.swings.curve: arcs about the axis of the arm's first joint, raised along the normals. */
+/* Curves of hands, as planner/swings/curve.py: arcs about the axis of an arm's first joint, raised along the normals. */
 #ifndef WBC_WALKING_CURVE_H
 #define WBC_WALKING_CURVE_H
 
@@ -21,7 +21,7 @@ void curves_at(long m, long n, const double *begin, const double *end, const dou
         }
         const double angle = atan2(first[1], first[0]), far[2] = { hypot(first[0], first[1]), hypot(last[0], last[1]) };
         double change = atan2(last[1], last[0]) - angle;
-        /* The way round that joint 1 turns */
+        /* The direction in which joint 1 turns */
         change += 2.0 * PI * rint((turn[s] - change) / (2.0 * PI));
         for (long i = 0; i < n; ++i) {
             const double y = across[i], r = raised[i], at = angle + change * y;

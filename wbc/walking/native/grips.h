@@ -1,4 +1,4 @@
-/* Where along a path an arm can have its hand on holds, as wbc.walking.planner.grips.table with holds on which hands may roll. */
+/* Where along a path an arm can have its hand on holds on which it may roll, as planner/grips/table.py. */
 #ifndef WBC_WALKING_GRIPS_H
 #define WBC_WALKING_GRIPS_H
 
@@ -142,7 +142,7 @@ static int wrist_on(const Arm *arm, const Keeping *keep, const double *spans, co
 }
 
 /* Grips of an arm on m holds along n frames of its base (4 x 4): `stretches`, and their postures of six angles, joint 6
-   at 0; there is room for all. `work`: 2 n x 6. Returns the number of stretches. */
+   at 0; both are long enough for all. `work`: 2 n x 6. Returns the number of stretches. */
 long grips_along(const Arm *arm, const Keeping *keep, long n, const double *frames, long m, const double *positions,
                  const double *axes, const double *tilts, double *work, Stretch *stretches, double *rows)
 {

@@ -1,4 +1,4 @@
-/* Whether two arms are too near to each other: capsules about O N, S E, E W and W H, as wbc.walking.planner.grips.conflicts. */
+/* Whether two arms are too near to each other: capsules about O N, S E, E W and W H, as planner/grips/conflicts.py. */
 #ifndef WBC_WALKING_NEAR_H
 #define WBC_WALKING_NEAR_H
 
@@ -28,7 +28,7 @@ static double squared_distance(const double *a, const double *b, const double *c
     if (vv > 0.0)
         t = (uv * s + vw) / vv;
     const double on = clipped(t);
-    if (on != t)
+    if (on != t || vv <= 0.0)
         s = uu > 0.0 ? clipped((uv * on - uw) / uu) : 0.0;
     for (int i = 0; i < 3; ++i)
         gap[i] = w[i] + s * u[i] - on * v[i];

@@ -1,6 +1,6 @@
 /* What the planner asks thousands of times: laws of swings, points of arms, and whether arms are near each other. */
 #include "grips.h"
-#include "ways.h"
+#include "choice.h"
 
 /* Points of an arm with a base (4 x 4) at n postures of six angles: n x 6 x 3. */
 void points_of(const Arm *arm, const double *base, long n, const double *q, double *out)

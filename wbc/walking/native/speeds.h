@@ -1,14 +1,14 @@
-/* The least time along a hand's way under the limits of joints 1 to 5, as planner/swings/joints.py and least_time.py. */
+/* The least time along a curve under the limits of joints 1 to 5, as arms/puma.py and planner/swings/least_time.py. */
 #ifndef WBC_WALKING_SPEEDS_H
 #define WBC_WALKING_SPEEDS_H
 
 #include "arm.h"
 
-/* Points of a way at most; joints that limit */
+/* Points of a curve at most; joints that limit */
 enum { MOST = 128, FIVE = 5 };
 
 /* Parts of rates and accelerations, the fastest hand [m/s], the least derivative [rad], samples between which the
-   body's part of the rates is taken; room of reach [m], angles, elbow [rad] and from the axis of joint 1 [m]. */
+   body's part of the rates is taken; margins of reach [m], angles, elbow [rad] and from the axis of joint 1 [m]. */
 typedef struct {
     double rate_part, acceleration_part, fastest, least, step;
     double reach_room, angle_room, elbow_room, axis_room;
@@ -35,10 +35,10 @@ static void unwrap(double (*angles)[JOINTS], long n)
         angles[i][0] += first;
 }
 
-/* Angles of a hand at `place` with the wrist bent by `wrists` (`bends` numbers a point), the body at `samples` + step.
-   Returns whether the whole way is within reach and limits. */
+/* Angles of a hand at `place` with the wrist bent by `wrists` (`guided` numbers a point), the body at `samples` + step.
+   Returns whether the whole swing is within reach and limits. */
 static int joint_path(const Arm *arm, const Rules *rules, const double *base, const double *poses, long count, long n,
-                      int bends, const double *place, const double *wrists, const double *samples, double step,
+                      int guided, const double *place, const double *wrists, const double *samples, double step,
                       double (*angles)[JOINTS])
 {
     int possible = 1;
@@ -49,7 +49,7 @@ static int joint_path(const Arm *arm, const Rules *rules, const double *base, co
             offset[k] = place[3 * i + k] - frame.row[k][3];
         for (int k = 0; k < 3; ++k)
             p[k] = frame.row[0][k] * offset[0] + frame.row[1][k] * offset[1] + frame.row[2][k] * offset[2];
-        const double *w = wrists + bends * i, s4 = sin(w[0]), c4 = cos(w[0]), s5 = sin(w[1]), c5 = cos(w[1]);
+        const double *w = wrists + guided * i, s4 = sin(w[0]), c4 = cos(w[0]), s5 = sin(w[1]), c5 = cos(w[1]);
         /* Forearm and bent hand are one link from the elbow */
         const double along = arm->fore + arm->hand * c5, across = arm->hand * c4 * s5;
         const double out = arm->offset + arm->hand * s4 * s5;
@@ -61,14 +61,14 @@ static int joint_path(const Arm *arm, const Rules *rules, const double *base, co
         q[0] = atan2(p[1], p[0]) - atan2(out, r);
         q[1] = atan2(r, z) + atan2(reach * sin(bend), arm->upper + reach * cos(bend));
         q[2] = -bend - tilt;
-        for (int k = 0; k < bends; ++k)
+        for (int k = 0; k < guided; ++k)
             q[3 + k] = w[k];
         possible &= square > rules->axis_room * rules->axis_room && arm->upper + reach - distance > rules->reach_room;
         possible &= q[1] + q[2] / 2.0 - arm->shoulder > rules->angle_room && arm->elbow - q[2] > rules->elbow_room;
     }
     unwrap(angles, n);
     for (long i = 0; i < n && possible; ++i)
-        for (int k = 0; k < 3 + bends; ++k)
+        for (int k = 0; k < 3 + guided; ++k)
             possible &= arm->limits[k] - fabs(angles[i][k]) > rules->angle_room;
     return possible;
 }

@@ -1,4 +1,4 @@
-/* Laws of swings: the least time along ways of hands while the body moves, and where the arm is meanwhile. */
+/* Laws of swings: the least time along curves of hands while the body moves, and where the arm is meanwhile. */
 #ifndef WBC_WALKING_TRACKS_H
 #define WBC_WALKING_TRACKS_H
 
@@ -21,25 +21,25 @@ static void posture_at(const Grips *grips, long grip, double sample, int begin, 
         out[k - begin] = q[k] + (at - (double)low) * (q[JOINTS + k] - q[k]);
 }
 
-/* Laws of m swings over n points each, see wbc.walking.planner.swings.least_time. `bases` (4 x 4) are those of the swings' arms, and
-   `path` has `count` poses, `spacing` apart. `place` m x n x 3, `wrists` m x n x bends, `samples` m x n; `angles`
-   m x n x (3 + bends), `rate` and `time` m x n. Returns 1 where n is too large. */
-int swing_speeds(const Arm *arm, const Rules *rules, long m, long n, int bends, const double *bases, const double *path,
-                 long count, double spacing, const double *place, const double *wrists, const double *samples,
-                 unsigned char *possible, double *angles, double *rate, double *time)
+/* Laws of m swings over n points each, see planner/swings/least_time.py. `bases` (4 x 4) are of the swings' arms, and
+   `path` has `count` poses, `spacing` apart. `place` m x n x 3, `wrists` m x n x guided, `samples` m x n; `angles`
+   m x n x (3 + guided), `rate` and `time` m x n. Returns 1 where n is too large. */
+int swing_speeds(const Arm *arm, const Rules *rules, long m, long n, int guided, const double *bases,
+                 const double *path, long count, double spacing, const double *place, const double *wrists,
+                 const double *samples, unsigned char *possible, double *angles, double *rate, double *time)
 {
-    const int joints = 3 + bends;
+    const int joints = 3 + guided;
     const double gap = 1.0 / (double)(n - 1);
-    if (n > MOST || n < 3 || bends > 3)
+    if (n > MOST || n < 3 || guided > 3)
         return 1;
     for (long s = 0; s < m; ++s) {
-        const double *at = samples + s * n, *hand = place + s * n * 3, *bent = wrists + s * n * bends;
+        const double *at = samples + s * n, *hand = place + s * n * 3, *bent = wrists + s * n * guided;
         double here[MOST][JOINTS], further[MOST][JOINTS], first[MOST][JOINTS], second[MOST][JOINTS], most[MOST];
         double walked[MOST], slope[MOST][3], allowed[JOINTS], square[MOST];
         /* The same hand on a body that is a little further */
         const double *base = bases + 16 * s;
-        possible[s] = (unsigned char)joint_path(arm, rules, base, path, count, n, bends, hand, bent, at, 0.0, here);
-        joint_path(arm, rules, base, path, count, n, bends, hand, bent, at, rules->step, further);
+        possible[s] = (unsigned char)joint_path(arm, rules, base, path, count, n, guided, hand, bent, at, 0.0, here);
+        joint_path(arm, rules, base, path, count, n, guided, hand, bent, at, rules->step, further);
         gradient(at, n, 1, gap, 0, walked, 1);
         for (int k = 0; k < 3; ++k)
             gradient(hand + k, n, 3, gap, 0, &slope[0][k], 3);
@@ -53,7 +53,7 @@ int swing_speeds(const Arm *arm, const Rules *rules, long m, long n, int bends, 
         for (long i = 0; i < n; ++i) {
             double top = rules->fastest / larger(sqrt(dot(slope[i], slope[i])), rules->least);
             for (int k = 0; k < joints; ++k) {
-                /* Where the body goes the way of the hand, the hand may go faster */
+                /* Where the body goes where the hand does, the hand may go faster */
                 const double bias = (further[i][k] - here[i][k]) / rules->step, d = first[i][k];
                 const double with = (double)((d > 0.0) - (d < 0.0)) * bias / spacing;
                 const double most_rate = larger(rules->rate_part * arm->rates[k] - with, 0.1 * arm->rates[k]);
@@ -79,13 +79,13 @@ int swing_speeds(const Arm *arm, const Rules *rules, long m, long n, int bends, 
    least `least`, so that the hand comes when the next grip begins. `duration` is the law's. Wrists go from grips
    `source` to grips `target` by the parts `blend`. `samples` m x n, `points` m x n x 6 x 3 of the arms in the body's
    frame; the rest as above. */
-int swing_tracks(const Arm *arm, const Rules *rules, const Grips *grips, long m, long n, int bends, long passes,
+int swing_tracks(const Arm *arm, const Rules *rules, const Grips *grips, long m, long n, int guided, long passes,
                  const double *bases, const double *path, long count, double spacing, const double *place,
                  const double *blend, const long *source, const long *target, const double *begin, const long *last,
                  const double *least, unsigned char *possible, double *duration, double *samples, double *points)
 {
     double wrists[3 * MOST], angles[JOINTS * MOST], rate[MOST], time[MOST];
-    if (n > MOST || n < 3 || bends > 3)
+    if (n > MOST || n < 3 || guided > 3)
         return 1;
     for (long s = 0; s < m; ++s) {
         double *at = samples + s * n;
@@ -98,19 +98,19 @@ int swing_tracks(const Arm *arm, const Rules *rules, const Grips *grips, long m,
             for (long i = 0; i < n; ++i) {
                 double first[3], second[3];
                 at[i] = smaller(begin[s] + time[i] / spacing, (double)last[s]);
-                posture_at(grips, source[s], at[i], 3, 3 + bends, first);
-                posture_at(grips, target[s], at[i], 3, 3 + bends, second);
-                for (int k = 0; k < bends; ++k)
-                    wrists[bends * i + k] = first[k] + blend[i] * (second[k] - first[k]);
+                posture_at(grips, source[s], at[i], 3, 3 + guided, first);
+                posture_at(grips, target[s], at[i], 3, 3 + guided, second);
+                for (int k = 0; k < guided; ++k)
+                    wrists[guided * i + k] = first[k] + blend[i] * (second[k] - first[k]);
             }
-            swing_speeds(arm, rules, 1, n, bends, bases + 16 * s, path, count, spacing, place + 3 * n * s, wrists, at,
+            swing_speeds(arm, rules, 1, n, guided, bases + 16 * s, path, count, spacing, place + 3 * n * s, wrists, at,
                          possible + s, angles, rate, time);
             if (pass < passes)
                 duration[s] = time[n - 1];
         }
         for (long i = 0; i < n; ++i) {
             double q[JOINTS] = { 0.0 };
-            memcpy(q, angles + (3 + bends) * i, sizeof(double) * 5);
+            memcpy(q, angles + (3 + guided) * i, sizeof(double) * 5);
             arm_points(arm, &base, q, (double (*)[3])(points + 3 * POINTS * (s * n + i)));
         }
     }

@@ -2,7 +2,7 @@
 
 A search keeps the promising stances, and begins with some. With h_arm(g) re-grasps that an arm needs at least from its
 grip g to the end of the path, whatever the other arms do, a stance needs at least the sum h over its grips; of stances
-after d re-grasps only those with d + h <= k can be on the way to the end with k. They are few as long as k is small.
+after d re-grasps only those with d + h <= k can lead to the end with k. They are few as long as k is small.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ import numpy as np
 from wbc.walking.planner.grips.table import Grips, Ints
 from wbc.walking.planner.slices import Slices
 from wbc.walking.planner.sound import sound_slices
+from wbc.walking.planner.stances.body import BodySearch
 from wbc.walking.planner.stances.candidates import Fan
 from wbc.walking.planner.stances.nodes import Found, Node
-from wbc.walking.planner.stances.search import StanceSearch
 from wbc.walking.planner.starts import Beginning, grips_at_first
 from wbc.walking.planner.swings.law import SwingLaw
 from wbc.walking.planner.swings.move import Key
@@ -27,7 +27,7 @@ FEW, MOST = 4, 4000
 
 
 def fewer_slices(
-    known: StanceSearch, beginning: Beginning, found: Found, sample: int = 0
+    known: BodySearch, beginning: Beginning, found: Found, sample: int = 0
 ) -> Slices[tuple[Found, tuple[SwingLaw, ...]] | None]:
     """The fewest moves, and their laws, if they are fewer than those of a plan that was found; else None.
 
@@ -63,13 +63,12 @@ def least_regrasps(grips: Grips, finish: int) -> Ints:
     return out
 
 
-class _Fewer(StanceSearch):
+class _Fewer(BodySearch):
     """A search over all stances from which at most ``most`` moves may lead to the end."""
 
-    def __init__(self, known: StanceSearch, most: int) -> None:
-        path, grips = known.path, known.grips
-        wait = known.longest_wait
-        super().__init__(known.walker, known.structure, path, grips, longest_wait=wait, width=None, known=known)
+    def __init__(self, known: BodySearch, most: int) -> None:
+        path, grips, patient = known.path, known.grips, known.patient
+        super().__init__(known.walker, known.structure, path, grips, known=known, patient=patient, width=None)
         self._most, self._least = most, least_regrasps(grips, len(path) - 1)
 
     def starts(self, beginning: Beginning, sample: int) -> list[Key]:

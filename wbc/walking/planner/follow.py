@@ -1,4 +1,4 @@
-"""A plan of a file made again: the same hands go to the same holds at the same places of the way."""
+"""A plan of a file made again: the same hands go to the same holds at the same places of the path."""
 
 from __future__ import annotations
 
@@ -8,18 +8,17 @@ import numpy as np
 
 from wbc import validation
 from wbc.errors import ShapeError
-from wbc.robots import Walker, WalkerData
+from wbc.robots import Walker
+from wbc.walking.arms.puma import limb_of
 from wbc.walking.holds.structure import Structure
-from wbc.walking.planner.eased import EasedLaw
+from wbc.walking.planner.eased import eased_law
 from wbc.walking.planner.grips.table import Grips, Ints, find_grips
 from wbc.walking.planner.plan import NoPlanError, Plan, Regrasp
 from wbc.walking.planner.planner import plan_found
-from wbc.walking.planner.sound import SLOWER
+from wbc.walking.planner.stances.body import BodySearch
 from wbc.walking.planner.stances.nodes import Found
-from wbc.walking.planner.stances.search import StanceSearch
-from wbc.walking.planner.swings.law import SwingLaw
-from wbc.walking.planner.swings.move import Move
-from wbc.walking.planner.swings.swings import Swing
+from wbc.walking.planner.swings.law import SwingLaw, law_of
+from wbc.walking.planner.swings.move import Move, Swing
 
 
 def follow_plan(walker: Walker, structure: Structure, asked: Plan) -> Plan:
@@ -36,14 +35,15 @@ def follow_plan(walker: Walker, structure: Structure, asked: Plan) -> Plan:
             without a hold for each. NoPlanError: a re-grasp that is not possible here, and why.
     """
     names = [arm.name for arm in walker.arms]
-    if not isinstance(walker.data, WalkerData) or len(asked.start) != len(names):
+    limb_of(walker)
+    if len(asked.start) != len(names):
         raise ShapeError("plan.start", asked.start, f"expected holds for the {len(names)} arms of a body with arms")
     for step in asked.regrasps:
         validation.one_of("plan.arm", step.arm, names)
         structure.index(step.target)
     path = asked.path
     grips = find_grips(walker, structure, path)
-    search = StanceSearch(walker, structure, path, grips)
+    search = BodySearch(walker, structure, path, grips)
     key = [_first(structure, search, asked, arm, name) for arm, name in enumerate(names)]
     if len({int(grips.hold[g]) for g in key}) < len(key) or search.until(key, 0) <= 0:
         raise NoPlanError("plan.start", " ".join(asked.start), "the hands cannot hold them together")
@@ -60,7 +60,7 @@ def follow_plan(walker: Walker, structure: Structure, asked: Plan) -> Plan:
     return plan
 
 
-def _first(structure: Structure, search: StanceSearch, asked: Plan, arm: int, name: str) -> int:
+def _first(structure: Structure, search: BodySearch, asked: Plan, arm: int, name: str) -> int:
     """The grip of an arm at the beginning; of several the one that lasts as long as the plan says."""
     grips, spacing = search.grips, search.path.spacing
     row = structure.index(asked.start[arm])
@@ -72,7 +72,7 @@ def _first(structure: Structure, search: StanceSearch, asked: Plan, arm: int, na
     return _lasting(grips, mine, round(ends[0] / spacing) if ends else len(search.path) - 1)
 
 
-def _move(structure: Structure, search: StanceSearch, step: Regrasp, k: int, arm: int, key: Sequence[int]) -> Move:
+def _move(structure: Structure, search: BodySearch, step: Regrasp, k: int, arm: int, key: Sequence[int]) -> Move:
     """A re-grasp over the grips that there are."""
     grips, spacing = search.grips, search.path.spacing
     lift, land, row = round(step.lift / spacing), round(step.land / spacing), structure.index(step.target)
@@ -90,7 +90,7 @@ def _move(structure: Structure, search: StanceSearch, step: Regrasp, k: int, arm
 
 
 def _law(
-    structure: Structure, search: StanceSearch, step: Regrasp, k: int, move: Move, key: Sequence[int], sample: int
+    structure: Structure, search: BodySearch, step: Regrasp, k: int, move: Move, key: Sequence[int], sample: int
 ) -> SwingLaw:
     """The law of a move, which was looked at as the planner looks at its own."""
     grips, spacing = search.grips, search.path.spacing
@@ -99,23 +99,23 @@ def _law(
         raise _refused(step, k, "another hand is there")
     if not sample <= move.lift <= min(move.land, int(grips.last[move.source])):
         raise _refused(step, k, f"the hand cannot be lifted at {step.lift:g} s of the path")
-    room = search.rooms.among(others, sample)
-    if move.land > room:
-        raise _refused(step, k, f"the other hands hold until {room * spacing:.2f} s of the path")
-    if min(search.clearance.first_conflict(move.target, g, move.land) for g in others) <= move.land:
-        raise _refused(step, k, "the arms are in each other's way where it lands")
+    until = search.ends.among(others, sample)
+    if move.land > until:
+        raise _refused(step, k, f"the other hands hold until {until * spacing:.2f} s of the path")
+    if min(search.conflicts.first_conflict(move.target, g, move.land) for g in others) <= move.land:
+        raise _refused(step, k, "the arms would come too near to each other where it lands")
     # A hand that waits comes as it lands
     waits = (move.land - move.lift) * spacing > move.duration + spacing
     soonest = move.land if waits else int(search.soonest[move.target])
-    swing = Swing(move.arm, move.source, move.target, move.lift, room, others, soonest)
-    if not search.swings.clear(swing, move.way):
-        raise _refused(step, k, "the hand's way is out of reach, or another arm or the structure is in it")
-    law = SwingLaw.of(search.swings, move)
+    swing = Swing(move.arm, move.source, move.target, move.lift, until, others, soonest)
+    if not search.swings.clear(swing, move.curve):
+        raise _refused(step, k, "the hand's path is out of reach, or too near to another arm or the structure")
+    law = law_of(search.swings, move)
     planned = max(move.duration, 0.0 if move.delay else (move.land - move.lift) * spacing)
     late = move.duration - move.delay > (move.land - move.lift) * spacing + 1e-6
-    if late or not law.possible or law.duration + search.swings.extra > planned + SLOWER:
+    if late or not law.possible or law.duration + search.swings.extra > planned + search.walker.margins.slower:
         raise _refused(step, k, f"the hand cannot be there in {planned:.2f} s")
-    return EasedLaw.along(search.swings, move, others) or law
+    return eased_law(search.swings, move, others) or law
 
 
 def _lasting(grips: Grips, mine: Ints, until: int) -> int:

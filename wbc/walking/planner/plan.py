@@ -21,7 +21,7 @@ class NoPlanError(WbcError):
     """No sequence of re-grasps leads to the end of the path; the message says where it ends, which holds and why.
 
     Attributes:
-        separating: ids of the holds at which the way ends; empty where no arm reaches any.
+        separating: ids of the holds at which the path ends; empty where no arm reaches any.
     """
 
     def __init__(
@@ -48,7 +48,7 @@ class Regrasp:
         margin: path time that the source could still have held at the lift [s].
         limit: what ends the grip on the target.
         until: path time until which the target can be held [s].
-        way: of the hand, see :data:`wbc.walking.planner.swings.curve.WAYS`.
+        way: curve of the hand, see :data:`wbc.walking.planner.swings.curve.ALTERNATIVES`.
         roll: angle about the target's z axis from its x axis to the hand's [rad]; None where the hand may roll.
     """
 
@@ -77,7 +77,7 @@ class Plan:
         reason: why it is not complete; "" if it is.
         grips, chain: the table of grips, and for each arm the grips that it uses, first that of the start; for the
             controller, not in files.
-        separating: ids of the holds at which the way ends if it is not complete.
+        separating: ids of the holds at which it ends if it is not complete.
         laws: of the swings, one a re-grasp; for the controller, not in files.
     """
 
@@ -130,7 +130,7 @@ class Plan:
             "separating": list(self.separating),
             "regrasps": self.rows(),
         }
-        # The way of the body on one line, behind what is to be read
+        # The body's path on one line, behind what is to be read
         text = json.dumps(kept, indent=1).removesuffix("\n}")
         file.write_text(f'{text},\n "way": {json.dumps(way_of(self.path))}\n}}\n')
         return file
@@ -147,10 +147,10 @@ def read_plan(path: str | os.PathLike[str]) -> Plan:
         steps = tuple(_step(row) for row in kept["regrasps"])
         start, separating = tuple(map(str, kept["start"])), tuple(kept["separating"])
         whole, reached, reason = bool(kept["complete"]), float(kept["reached"]), str(kept["reason"])
-        way = path_of(kept["way"])
+        along = path_of(kept["way"])
     except (OSError, ValueError, KeyError, TypeError, WbcError) as error:
         raise StructureFileError("plan", str(path), f"not a plan: {error}") from error
-    return Plan(way, start, steps, whole, reached, reason, separating=separating)
+    return Plan(along, start, steps, whole, reached, reason, separating=separating)
 
 
 def _step(row: dict[str, Any]) -> Regrasp:

@@ -11,16 +11,15 @@ from numpy.typing import NDArray
 
 from wbc import validation
 from wbc.errors import ShapeError
-from wbc.robots import Walker, WalkerData
+from wbc.robots import BodyLimb, Walker
 from wbc.trajectory.laws.law import Law
 from wbc.trajectory.least_time.time_optimal import time_optimal
 from wbc.trajectory.paths.path import PolynomialPath
 from wbc.trajectory.paths.waypoints import cubic_spline
 from wbc.validation import Array
-from wbc.walking.arms.puma import ArmKinematics
+from wbc.walking.arms.puma import limb_of
 from wbc.walking.planner.grips.table import Grips
 from wbc.walking.planner.plan import NoPlanError, Plan
-from wbc.walking.planner.swings.joints import joint_paths
 from wbc.walking.planner.swings.law import SwingLaw
 from wbc.walking.planner.swings.swings import SETTLE
 
@@ -44,7 +43,7 @@ class PlannedJoints(NamedTuple):
     Attributes:
         time: of the plan ``[n]``, delays included, from 0 [s].
         path_time: u of the body then ``[n]`` [s].
-        joints: of all arms, one after the other ``[n, 6 arms]`` [rad].
+        joints: of all arms, one after the other ``[n, joints]`` [rad].
         kept: whether the time up to the next row is kept: a hand opens, settles or closes ``[n - 1]``.
     """
 
@@ -62,17 +61,15 @@ def planned_joints(walker: Walker, plan: Plan) -> PlannedJoints:
         ShapeError: a plan of a machine without the walker's arms, or without its grips. NoPlanError: one that is not
             complete.
     """
-    data, grips = walker.data, plan.grips
-    if not isinstance(data, WalkerData):
-        raise ShapeError("walker", walker.robot.name, "expected a body with arms")
+    limb, grips, latch = limb_of(walker), plan.grips, walker.tolerances.latch_time
     if grips is None or len(plan.chain) != len(walker.arms) or len(plan.laws) != len(plan.regrasps):
         raise ShapeError("plan", list(plan.start), "expected a plan with its grips and laws, see follow_plan")
     if not plan.complete:
         raise NoPlanError("plan", plan.reached, plan.reason)
     spacing, names = plan.path.spacing, [arm.name for arm in walker.arms]
-    time, place, kept = _times(data.latch_time, plan)
+    time, place, kept = _times(latch, plan)
     samples = place / spacing
-    joints = np.empty((len(time), len(names), 6))
+    joints = np.empty((len(time), len(names), len(limb.position_limits)))
     for arm in range(len(names)):
         mine = [k for k, step in enumerate(plan.regrasps) if names.index(step.arm) == arm]
         ends = [*(_ends(plan)[k] for k in mine), (np.inf, np.inf)]
@@ -84,7 +81,7 @@ def planned_joints(walker: Walker, plan: Plan) -> PlannedJoints:
         for k, source, target in zip(mine, plan.chain[arm], plan.chain[arm][1:], strict=False):
             lift, land = _ends(plan)[k]
             rows = (time > lift) & (time < land)
-            part = np.clip((time[rows] - lift - data.latch_time) / (land - lift - _extra(data.latch_time)), 0.0, 1.0)
+            part = np.clip((time[rows] - lift - latch) / (land - lift - _extra(latch)), 0.0, 1.0)
             joints[rows, arm] = _swung(walker, plan, arm, (source, target), plan.laws[k], part, samples[rows])
     return PlannedJoints(time, place, joints.reshape(len(time), -1), kept)
 
@@ -142,11 +139,11 @@ def _swung(
     assert plan.grips is not None
     aims = [law.at(float(x) * law.duration) for x in part]
     place, blend = np.array([aim.position for aim in aims]), np.array([aim.blend for aim in aims])
-    first, last = (_held(plan.grips, grip, samples)[:, 3:] for grip in ends)
+    limb = limb_of(walker)
+    first, last = (_held(plan.grips, grip, samples)[:, limb.guided :] for grip in ends)
     frames = plan.path.blended(samples) @ walker.arms[arm].base.homogeneous
-    wrists = first + blend[:, None] * (last - first)
-    kinematics = ArmKinematics(walker.data)  # type: ignore[arg-type]
-    angles, _ = joint_paths(kinematics, frames[None], place[None], wrists[None])
+    guide = first + blend[:, None] * (last - first)
+    angles, _ = limb.follow(frames[None], place[None], guide[None], walker.margins)
     out: Array = angles[0]
     return out
 
@@ -191,7 +188,10 @@ class PlanTime:
         assert limits.velocity is not None
         assert limits.acceleration is not None
         used = np.maximum(np.abs(state.velocity) / limits.velocity, np.abs(state.acceleration) / limits.acceleration)
-        names = [*(f"{arm} joint {k}" for arm in self.arms for k in range(1, 7)), "pace"]
+        names = [
+            *(f"{arm} joint {k}" for arm in self.arms for k in range(1, len(limits.velocity) // len(self.arms) + 1)),
+            "pace",
+        ]
         first = np.where(used.max(axis=1) >= BINDS, used.argmax(axis=1), -1)
         parts = {name: float((first == k).mean()) for k, name in enumerate(names)}
         return dict(sorted(((n, p) for n, p in parts.items() if p > 0.0), key=lambda item: -item[1]))
@@ -213,18 +213,16 @@ def least_plan_time(walker: Walker, plan: Plan) -> PlanTime:
     Source: see :func:`wbc.trajectory.time_optimal`.
     """
     table = planned_joints(walker, plan)
-    data = walker.data
-    assert isinstance(data, WalkerData)
     arms = len(walker.arms)
-    rates, accelerations = ([*(tuple(v) * arms), most] for v, most in _limits(data))
+    rates, accelerations = ([*(tuple(v) * arms), most] for v, most in _limits(limb_of(walker)))
     count = INTERVALS * (len(table.time) - 1)
     law = time_optimal(_spline(table), rates, accelerations, intervals=count)
     return PlanTime(float(table.time[-1]), law, tuple(arm.name for arm in walker.arms))
 
 
-def _limits(data: WalkerData) -> tuple[tuple[tuple[float, ...], float], ...]:
+def _limits(limb: BodyLimb) -> tuple[tuple[tuple[float, ...], float], ...]:
     """Limits of the joints of an arm, and of the coordinate that limits how fast the plan's time passes."""
-    return (tuple(data.joint_rates), 1.0), (tuple(data.joint_accelerations), STEADY)
+    return (limb.joint_rates, 1.0), (limb.joint_accelerations, STEADY)
 
 
 def _spline(table: PlannedJoints) -> PolynomialPath:

@@ -6,22 +6,22 @@ import functools
 import time
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
-from math import inf
 from typing import Literal
 
 from wbc import validation
-from wbc.errors import ShapeError
 from wbc.robots import Walker
 from wbc.validation import Array
+from wbc.walking.arms.puma import limb_of
 from wbc.walking.body_path import BodyPath
 from wbc.walking.holds.structure import Structure
-from wbc.walking.planner.detours.ways_round import ways_round
+from wbc.walking.planner.detours.route import find_routes
 from wbc.walking.planner.fewest import fewer_slices
 from wbc.walking.planner.grips.table import Grips, grip_slices
 from wbc.walking.planner.plan import NoPlanError, Plan, Regrasp
 from wbc.walking.planner.slices import Slices, drained
 from wbc.walking.planner.sound import sound_slices
-from wbc.walking.planner.stances.search import HOVER, Found, StanceSearch
+from wbc.walking.planner.stances.body import BodySearch
+from wbc.walking.planner.stances.nodes import Found
 from wbc.walking.planner.starts import ALL_STARTS, NOTHING, STARTS, Beginning, stance_slices
 from wbc.walking.planner.swings.law import SwingLaw
 
@@ -60,25 +60,25 @@ def plan_walk(
         width: stances kept for each number of re-grasps; None: all, which finds the fewest.
         time_budget: [s]; after it what is found is returned or refused.
         partial: return a plan that does not lead to the end instead of refusing.
-        detour: where the body cannot follow the path, look for a way round: lower, turned, beside it, see
-            :mod:`wbc.walking.planner.detours.ways_round`; the plan's path says what was found.
+        detour: where the body cannot follow the path, look for a detour: lower, turned, beside it, see
+            :mod:`wbc.walking.planner.detours`; the plan's path says what was found.
 
     Raises:
         UnknownNameError: another arm, hold or objective. ShapeError: a walker that is no body with PUMA arms.
-        NoPlanError: there is no way, with where it ends, holds and limits.
+        NoPlanError: there is no plan, with where it ends, holds and limits.
     """
     beginning = start or {}, postures or {}, avoid or {}
     deadline = None if time_budget is None else time.perf_counter() + time_budget
     search = functools.partial(
         plan_slices, walker, structure, width=width, deadline=deadline, thorough=time_budget is None
     )
-    # Where a way round is looked for, the widest searches come last
+    # Where a detour is looked for, the widest searches come last
     narrow = [(delay, width) for delay in (DELAYS if objective == "velocity" else DELAYS[-1:])] if detour else ()
     plan = drained(search(path, beginning, objective=objective, tries=narrow))
     if not plan.complete and detour:
         rows = {arm.name: k for k, arm in enumerate(walker.arms)}
         hands = {rows[name]: structure.index(hold) for name, hold in beginning[0].items()}
-        for route in ways_round(walker, structure, path, hands, deadline):
+        for route in find_routes(walker, structure, path, hands, deadline):
             if route.path is None:
                 plan = replace(plan, reason=f"{plan.reason}; {route.text}", separating=route.separating)
                 continue
@@ -123,8 +123,7 @@ def plan_slices(
         as :func:`plan_walk`, where no stance is possible at the beginning.
     """
     validation.one_of("objective", objective, ("velocity", "destination"))
-    if walker.robot.name == "two_ended_arm":
-        raise ShapeError("walker", walker.robot.name, "expected a body with arms")
+    limb_of(walker)
     if grips is None:
         grips = yield from grip_slices(walker, structure, path)
     best: tuple[Found, tuple[SwingLaw, ...]] | None = None
@@ -132,21 +131,12 @@ def plan_slices(
     usual: list[tuple[float, int | None]] = [(delay, width) for delay in delays]
     if width is not None:
         usual.append((delays[-1], WIDER * width))
-    search: StanceSearch | None = None
+    search: BodySearch | None = None
     thorough = thorough and objective == "destination"
-    wait, most = (inf, ALL_STARTS) if thorough else (HOVER, STARTS)
+    most = ALL_STARTS if thorough else STARTS
     for delay, wide in tries or usual:
-        search = StanceSearch(
-            walker,
-            structure,
-            path,
-            grips,
-            longest_delay=delay,
-            longest_wait=wait,
-            width=wide,
-            known=search,
-            first=first,
-        )
+        more = {"longest_delay": delay, "width": wide, "first": first}
+        search = BodySearch(walker, structure, path, grips, known=search, patient=thorough, **more)
         starts = [stance] if stance else (yield from stance_slices(walker, structure, search, beginning, sample, most))
         yield None
         found, laws = yield from sound_slices(search, starts, sample, deadline)
@@ -187,7 +177,7 @@ def plan_found(
                 round(float(grips.last[move.source] - move.lift) * spacing, 9),
                 grips.reasons[grips.ends[move.target]],
                 round(float(grips.last[move.target]) * spacing, 9),
-                move.way,
+                move.curve,
                 _roll(structure, grips, move.target),
             )
         )

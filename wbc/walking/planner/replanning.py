@@ -9,25 +9,23 @@ from typing import Protocol
 import numpy as np
 
 from wbc.errors import ShapeError
-from wbc.robots import Walker, WalkerData
+from wbc.robots import Walker
 from wbc.validation import Array
+from wbc.walking.arms.puma import limb_of
 from wbc.walking.body_path import BodyPath, straight_path
 from wbc.walking.holds.structure import Structure
 from wbc.walking.planner.grips.table import Grips, grip_slices
 from wbc.walking.planner.plan import NoPlanError, Plan
 from wbc.walking.planner.planner import Objective, plan_slices
-from wbc.walking.planner.stances.search import StanceSearch
+from wbc.walking.planner.stances.body import BodySearch
 from wbc.walking.planner.starts import Beginning, stances
 from wbc.walking.planner.swings.curve import Pivots, between
 from wbc.walking.planner.swings.joints import blend
-from wbc.walking.planner.swings.law import SwingLaw
+from wbc.walking.planner.swings.law import SwingLaw, least_time_law
 from wbc.walking.planner.swings.swings import FINE
 
 #: Yields None or, first, a plan to begin with; returns the whole one
 PlanSlices = Generator[Plan | None, None, Plan]
-#: Path time that the body may go before the plan of its hands is made [s], from rest and under way; it takes RAMP / 2
-#: to stop. The fewer seconds, the better the plan: hands that have to be lifted soon are lifted late
-HEAD, ONWARD = 0.55, 1.0
 #: A new plan begins with a body that stands for so many samples
 STANDING = 10
 #: How far the body goes back to where a hand may be lifted [m]
@@ -64,12 +62,12 @@ def plan_from_stance(
         start, postures: as of :func:`wbc.walking.planner.planner.plan_walk`; ``start`` has every arm.
 
     Raises:
-        as ``plan_walk``, also where the way does not lead to the end.
+        as ``plan_walk``, also where no plan leads to the end.
     """
     beginning: Beginning = start, postures or {}, {}
     rows = [structure.index(start[arm.name]) for arm in walker.arms]
     grips = yield from grip_slices(walker, structure, path, rows)
-    search = StanceSearch(walker, structure, path, grips)
+    search = BodySearch(walker, structure, path, grips)
     stance = stances(walker, structure, search, beginning)[0]
     # The plan that follows keeps the branches
     here = {arm.name: grips.posture_at(grip, 0) for arm, grip in zip(walker.arms, stance, strict=True)}
@@ -77,7 +75,7 @@ def plan_from_stance(
     yield None
     until = search.until(stance, 0)
     # The plan needs a stance that goes on behind it
-    head = min(round(HEAD / path.spacing), max(until - 1, 0))
+    head = min(round(walker.margins.head / path.spacing), max(until - 1, 0))
     yield _standing(path, grips, tuple(start[arm.name] for arm in walker.arms), stance, head)
     plan = yield from plan_slices(walker, structure, path, beginning, objective=objective, sample=head, soon=True)
     return _complete(structure, plan)
@@ -101,7 +99,10 @@ def plan_rest(
     landed = round(plan.regrasps[kept - 1].land / path.spacing) if kept else 0
     names = [arm.name for arm in walker.arms]
     stance = tuple(grips[-1] for grips in plan.cut(names, kept, 0.0).chain)
-    search, soonest = StanceSearch(walker, structure, path, grips), max(landed, round((here + ONWARD) / path.spacing))
+    search, soonest = (
+        BodySearch(walker, structure, path, grips),
+        max(landed, round((here + walker.margins.onward) / path.spacing)),
+    )
     # The plan needs a stance that goes on behind it
     sample = max(min(soonest, search.until(stance, landed) - 1), landed)
     begun = plan.cut(names, kept, sample * path.spacing)
@@ -149,10 +150,10 @@ def plan_from_here(
 def _asides(pose: Array, behind: Array, holds: Array) -> Iterator[Array]:
     """Where the body may go first, poses ``[n, 4, 4]``; nowhere to begin with."""
     yield behind[:0]
-    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(behind[:, :3, 3], axis=0), axis=1))])
+    length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(behind[:, :3, 3], axis=0), axis=1))])
     for back in BACK:
-        if back < way[-1]:
-            yield behind[: int(np.searchsorted(way, back)) + 1]
+        if back < length[-1]:
+            yield behind[: int(np.searchsorted(length, back)) + 1]
     for far, hold in product(TOWARDS, holds):
         offset = hold - pose[:3, 3]
         offset -= pose[:3, 2] * (pose[:3, 2] @ offset)
@@ -189,8 +190,8 @@ def _from_here(
 
 def way_to(walker: Walker, structure: Structure, plan: Plan, arm: int, hands: HandsThere, q: Array) -> SwingLaw:
     """From where a free hand is to where the plan has it at the beginning; the body stands there."""
-    grips, data = plan.grips, walker.data
-    if grips is None or not isinstance(data, WalkerData):
+    grips, guided = plan.grips, limb_of(walker).guided
+    if grips is None:
         raise ShapeError("plan", plan, "expected a plan of the planner for a body with arms")
     grip, mine = plan.chain[arm][0], q[walker.arms[arm].q]
     turn = grips.posture_at(grip, 0)[:1] - mine[:1]
@@ -200,10 +201,10 @@ def way_to(walker: Walker, structure: Structure, plan: Plan, arm: int, hands: Ha
         (now[arm][None], there[[hold]])
         for now, there in ((hands.origins, structure.positions), (hands.axes, structure.axes))
     )
-    way = between(structure, places, axes, np.array([[True, False]]), pivots, data)
-    first, last = np.array(mine[3:]), np.array(grips.wrist_at(grip, 0.0))
+    curve = between(walker, structure, places, axes, np.array([[True, False]]), pivots)
+    first, last = np.array(mine[guided:]), grips.posture_at(grip, 0)[guided:]
     bent = first + blend(np.linspace(0.0, 1.0, FINE))[None, :, None] * (last - first)
-    return SwingLaw(walker, arm, plan.path, way, np.zeros(FINE), lambda _: bent, 1.0)
+    return least_time_law(walker, arm, plan.path, curve, np.zeros(FINE), lambda _: bent, 1.0)
 
 
 def _standing(path: BodyPath, grips: Grips, start: tuple[str, ...], stance: tuple[int, ...], sample: int) -> Plan:

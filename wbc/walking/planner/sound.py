@@ -1,4 +1,4 @@
-"""Plans whose swings can be carried out: each is computed once more as it will be, with the body on its way."""
+"""Plans whose swings can be carried out: each is computed once more as it will be, while the body moves."""
 
 from __future__ import annotations
 
@@ -6,16 +6,17 @@ from collections.abc import Sequence
 
 from wbc.walking.planner.eased import eased_slices
 from wbc.walking.planner.slices import Slices
-from wbc.walking.planner.stances.search import Found, StanceSearch
-from wbc.walking.planner.swings.law import SwingLaw
+from wbc.walking.planner.stances.body import BodySearch
+from wbc.walking.planner.stances.nodes import Found
+from wbc.walking.planner.swings.law import SwingLaw, law_of
 from wbc.walking.planner.swings.move import Move
 
-#: Searches again, each without a swing that turned out to be impossible or slower by more than SLOWER [s]
-AGAIN, SLOWER = 20, 0.08
+#: Searches again, each without a swing that turned out to be impossible or slower by more than the margins allow
+AGAIN = 20
 
 
 def sound_slices(
-    search: StanceSearch, starts: Sequence[Sequence[int]], sample: int = 0, deadline: float | None = None
+    search: BodySearch, starts: Sequence[Sequence[int]], sample: int = 0, deadline: float | None = None
 ) -> Slices[tuple[Found, tuple[SwingLaw, ...]]]:
     """As :meth:`StanceSearch.slices`, and the laws of the moves.
 
@@ -32,10 +33,10 @@ def sound_slices(
             law = known.get(move)
             if law is None:
                 yield None
-                law = known[move] = SwingLaw.of(search.swings, move)
+                law = known[move] = law_of(search.swings, move)
             planned = max(move.duration, 0.0 if move.delay else (move.land - move.lift) * search.path.spacing)
             needed = law.duration + search.swings.extra
-            if not law.possible or needed > planned + SLOWER:
+            if not law.possible or needed > planned + search.walker.margins.slower:
                 search.correct(move, needed, law.possible)
                 break
             laws.append(law)

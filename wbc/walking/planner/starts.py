@@ -5,6 +5,7 @@ from __future__ import annotations
 from bisect import insort
 from collections.abc import Collection, Mapping
 from itertools import combinations, product
+from typing import Any
 
 import numpy as np
 
@@ -65,7 +66,7 @@ def grips_at_first(walker: Walker, structure: Structure, grips: Grips, beginning
 
 
 def stances(
-    walker: Walker, structure: Structure, search: StanceSearch, beginning: Beginning, sample: int = 0
+    walker: Walker, structure: Structure, search: StanceSearch[Any], beginning: Beginning, sample: int = 0
 ) -> list[tuple[int, ...]]:
     """As :func:`stance_slices`, at once."""
     return drained(stance_slices(walker, structure, search, beginning, sample))
@@ -74,7 +75,7 @@ def stances(
 def stance_slices(
     walker: Walker,
     structure: Structure,
-    search: StanceSearch,
+    search: StanceSearch[Any],
     beginning: Beginning,
     sample: int = 0,
     most: tuple[int, int] = STARTS,
@@ -93,7 +94,7 @@ def stance_slices(
     )
     pairs = [(a, b) for one, other in combinations(choices, 2) for a, b in product(one, other)]
     for begin in range(0, len(pairs), PAIRS):
-        search.clearance.prepare(pairs[begin : begin + PAIRS])
+        search.conflicts.prepare(pairs[begin : begin + PAIRS])
         yield None
     every = np.array(list(product(*choices)), dtype=np.int64)
     holds, bounds = np.sort(grips.hold[every], axis=1), grips.last[every].min(axis=1)

@@ -9,12 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wbc import style
-from wbc.robots import Walker, WalkerData
+from wbc.robots import Walker
 from wbc.validation import Array
-from wbc.walking.arms.puma import LIMIT_NAMES, ArmKinematics
+from wbc.walking.arms.puma import LIMIT_NAMES, limb_of
 from wbc.walking.body_path import BodyPath
 from wbc.walking.holds.structure import Structure
 from wbc.walking.holds.surface import CylinderSurface
+from wbc.walking.planner.grips.held import held
 from wbc.walking.report.surroundings import arm_colour
 from wbc.walking.run.perform import WalkRun
 
@@ -30,8 +31,6 @@ REASONS = {
     "elbow or shoulder limit": style.PURPLE,
     "faces away": "#b08900",
 }
-#: The hand's approach and the body's z axis enclose less than 60 degrees
-LEAST_FACING = 0.5
 
 
 def why_unusable(walker: Walker, structure: Structure, path: BodyPath) -> tuple[NDArray[np.bool_], list[str]]:
@@ -39,33 +38,24 @@ def why_unusable(walker: Walker, structure: Structure, path: BodyPath) -> tuple[
 
     The reason is that of the arm and the place that come nearest to it: a limit, else that it faces away, else reach.
     """
-    assert isinstance(walker.data, WalkerData)
-    kinematics = ArmKinematics(walker.data)
+    limb, least = limb_of(walker), walker.margins.facing
     poses = path.poses[np.unique(np.linspace(0, len(path) - 1, min(SAMPLES, len(path))).round().astype(int))]
     usable = np.zeros((len(structure), len(walker.arms)), dtype=bool)
     best = np.full(len(structure), -np.inf)
     limit = np.full(len(structure), -1)
     facing = np.zeros(len(structure), dtype=bool)
+    everywhere = np.arange(len(structure))
     for k, arm in enumerate(walker.arms):
-        frames = poses @ arm.base.homogeneous
-        turn = frames[:, None, :3, :3].swapaxes(-1, -2)
-        points = (turn @ (structure.positions - frames[:, None, :3, 3])[..., None])[..., 0]
-        axes = (turn @ structure.axes[:, :, None])[..., 0]
-        axes /= np.linalg.norm(axes, axis=-1, keepdims=True)
-        near = kinematics.wrist_reach(kinematics.wrist_of(points, axes)) > 0.0
-        ahead = axes[..., 2] > LEAST_FACING
-        facing |= (near & ~ahead).any(axis=0)
-        sample, hold = np.nonzero(near & ahead)
+        there = held(limb, structure, poses @ arm.base.homogeneous, everywhere, reach=0.0, facing=-np.inf)
+        ahead = there.axes[:, 2] > least
+        facing[there.hold[~ahead]] = True
+        margins, hold = there.margins[ahead], there.hold[ahead]
         if not len(hold):
             continue
-        postures, solved = kinematics.inverse_axis(points[sample, hold], axes[sample, hold])
-        margins = kinematics.margins(postures)
-        margins[..., 5] = np.inf
-        least = margins.min(axis=-1)
-        usable[np.unique(hold[(solved & (least > 0.0)).any(axis=1)]), k] = True
-        branch = least.argmax(axis=1)
-        rows = np.arange(len(hold))
-        _keep_best(hold, least[rows, branch], margins[rows, branch].argmin(axis=1), best, limit)
+        usable[np.unique(hold[there.within(0.0)[ahead].any(axis=1)]), k] = True
+        most = margins.min(axis=-1)
+        branch, rows = most.argmax(axis=1), np.arange(len(hold))
+        _keep_best(hold, most[rows, branch], margins[rows, branch].argmin(axis=1), best, limit)
     return usable, [_reason(usable[h], int(limit[h]), bool(facing[h])) for h in range(len(structure))]
 
 

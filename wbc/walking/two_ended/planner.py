@@ -14,9 +14,9 @@ from wbc.robots import Walker
 from wbc.validation import Array
 from wbc.walking.body_path import BodyPath
 from wbc.walking.holds.structure import Structure
-from wbc.walking.planner.grips.table import Grips
+from wbc.walking.planner.grips.table import END, Grips
 from wbc.walking.planner.plan import NoPlanError, Plan, Regrasp
-from wbc.walking.planner.stances.search import Found
+from wbc.walking.planner.stances.nodes import Found
 from wbc.walking.two_ended.postures import Grip, PairPostures
 from wbc.walking.two_ended.search import GAITS, TurnSearch
 from wbc.walking.two_ended.swing_path import Turn, TurnLaw, TurnPaths
@@ -57,13 +57,13 @@ def plan_two_ended(
     Args:
         start: hold ids of ``arm1`` and ``arm2``.
         to: id of a hold that a hand is to hold, or a place [m] that the elbow is to be as near to as it can be.
-        gait: ``inchworm``: hands keep their order along the way; ``turnaround``: each swing changes it; ``any``.
+        gait: ``inchworm``: hands keep their order along the route; ``turnaround``: each swing changes it; ``any``.
         width: stances kept for each number of re-grasps; None: all.
 
     Raises:
         UnknownNameError: another arm, hold or gait. ShapeError: another machine, or a start without both hands.
         RangeError: a hold on which a hand may roll or lean: it does not say where the arm is.
-        NoPlanError: there is no way.
+        NoPlanError: there is none.
     """
     validation.one_of("gait", gait, tuple(GAITS))
     rows = _start(structure, start)
@@ -121,9 +121,9 @@ def _goal(postures: PairPostures, to: str | Sequence[float]) -> tuple[Goal, Arra
     return (lambda near, other: far.get((near, other), np.inf) <= least), place
 
 
-def _unit(way: Array) -> Array:
-    length = float(np.linalg.norm(way))
-    return way / length if length > 0.0 else np.array([1.0, 0.0, 0.0])
+def _unit(offset: Array) -> Array:
+    length = float(np.linalg.norm(offset))
+    return offset / length if length > 0.0 else np.array([1.0, 0.0, 0.0])
 
 
 def _refused(structure: Structure, search: TurnSearch, found: Found, to: Any) -> NoPlanError:
@@ -135,7 +135,7 @@ def _refused(structure: Structure, search: TurnSearch, found: Found, to: Any) ->
 
 
 def _plan(walker: Walker, structure: Structure, paths: TurnPaths, search: TurnSearch, found: Found) -> TwoEndedPlan:
-    """The whole way: standing, swinging, standing."""
+    """The whole plan: standing, swinging, standing."""
     grips, postures = search.grips, paths.postures
     hands = [Grip(int(grips.hold[g]), int(grips.roll[g])) for g in found.start]
     first = postures.between(*hands)
@@ -179,10 +179,12 @@ def _grips(
         ends = [lift + STAND // 2 for lift in lifts] + [len(joints) - 1]
         chain.append(tuple(range(len(rows), len(rows) + len(mine))))
         for (grip, first), last in zip(mine, ends, strict=True):
-            rows.append([arm, grip.hold, 0, first, last, offset, Grips.reasons.index("end of the path"), grip.roll])
+            rows.append([arm, grip.hold, 0, first, last, offset, 0, grip.roll])
             part = np.zeros((last - first + 1, 4))
             part[:, : columns.shape[1]] = columns[first : last + 1]
             parts.append(part)
             offset += len(part)
     arms, holds, branch, firsts, lasts, offsets, ends_by, rolls = np.array(rows, dtype=np.int64).T
-    return Grips(arms, holds, branch, firsts, lasts, offsets, np.concatenate(parts), ends_by, rolls), tuple(chain)
+    return Grips(arms, holds, branch, firsts, lasts, offsets, np.concatenate(parts), ends_by, rolls, (END,)), tuple(
+        chain
+    )

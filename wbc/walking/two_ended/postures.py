@@ -2,28 +2,22 @@
 
 from __future__ import annotations
 
-from math import radians
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from wbc.errors import ShapeError
-from wbc.robots import TwoEndedData, Walker
+from wbc.robot.geometry.segments import segment_distances
+from wbc.robots import Walker
 from wbc.validation import Array
-from wbc.walking.arms.capsules import segment_distances
 from wbc.walking.arms.two_ended import TwoEndedKinematics
 from wbc.walking.holds.structure import Structure
 from wbc.walking.planner.grips.rolls import frame_on
 
-#: What the plan keeps of the clearance for feedback, besides the clearance itself [m]
-ROOM = 0.02
 #: Pairs of the capsules near tip, first boom, second boom, far tip that may meet: those of the robot's self pairs
 PAIRS = ((0, 1), (0, 2), (0, 3), (1, 3), (2, 3))
 #: Angles of joint 1 that are tried, from limit to limit
 ROLLS = 217
-#: What is kept of the joint limits [rad]
-ANGLE_ROOM = radians(2.0)
 #: What a squared angle costs: the rolls, the yaws, the pitches at the hands, the elbow
 WEIGHTS = np.array([0.1, 1.0, 0.02, 0.0, 0.02, 1.0, 0.1])
 #: Postures whose clearance is looked at together, the best first
@@ -37,9 +31,8 @@ def touching_distance(walker: Walker) -> float:
     Raises:
         ShapeError: another machine.
     """
-    if not isinstance(walker.data, TwoEndedData):
-        raise ShapeError("walker", walker.robot.name, "expected the two-ended arm")
-    return walker.data.wrist_radius + walker.tolerances.clearance + 2 * ROOM
+    radius = walker.two_ended_data.wrist_radius
+    return radius + walker.tolerances.clearance + 2 * walker.margins.held_clearance
 
 
 class ArmShapes:
@@ -49,7 +42,7 @@ class ArmShapes:
         walker: the two-ended arm. structure: what it stands on.
 
     Attributes:
-        data: lengths and radii. tolerances: clearance, latches and closing, which the two machines share.
+        kinematics: of the arm. least: distance of its links from anything but its own radius [m].
         exempt: a hand this near to its hold may touch what the hold stands on [m].
 
     Raises:
@@ -57,11 +50,10 @@ class ArmShapes:
     """
 
     def __init__(self, walker: Walker, structure: Structure) -> None:
-        self.exempt = touching_distance(walker)
-        assert isinstance(walker.data, TwoEndedData)
-        self.data, self.tolerances, self._structure = walker.data, walker.tolerances, structure
-        boom, tip = self.data.boom_radius, self.data.wrist_radius
-        self._radii = np.array([tip, boom, boom, tip])
+        self.exempt, self._structure = touching_distance(walker), structure
+        self.kinematics = TwoEndedKinematics(walker.two_ended_data)
+        self.least = walker.tolerances.clearance + walker.margins.held_clearance
+        self._radii = np.array(self.kinematics.radii)
 
     def clear(self, frames: Array, ends: Array) -> NDArray[np.bool_]:
         """Whether postures keep their clearance.
@@ -73,26 +65,18 @@ class ArmShapes:
         Returns:
             ``[n]``.
         """
-        starts, stops = self._cores(frames)
-        least = self.tolerances.clearance + ROOM
-        room = self._structure.segment_clearance(starts, stops) - self._radii - least
+        points = self.kinematics.points_of(frames)
+        starts, stops = (points[:, [link[end] for link in self.kinematics.links]] for end in (0, 1))
+        free = self._structure.segment_clearance(starts, stops) - self._radii - self.least
         for tip, hand, holds in ((0, 0, ends[0]), (3, 7, ends[1])):
             places = frames[:, hand, :3, 3]
             near = np.linalg.norm(places[:, None] - holds, axis=2).min(axis=1) <= self.exempt
-            room[near, tip] = np.inf
+            free[near, tip] = np.inf
         i, j = np.array(PAIRS).T
-        gaps = segment_distances(starts[:, i], stops[:, i], starts[:, j], stops[:, j])
-        apart = gaps - self._radii[i] - self._radii[j] - least
-        out: NDArray[np.bool_] = (room >= 0.0).all(axis=1) & (apart >= 0.0).all(axis=1)
+        gaps = segment_distances(*(np.moveaxis(side[:, k], -1, 0) for k in (i, j) for side in (starts, stops)))
+        apart = gaps - self._radii[i] - self._radii[j] - self.least
+        out: NDArray[np.bool_] = (free >= 0.0).all(axis=1) & (apart >= 0.0).all(axis=1)
         return out
-
-    def _cores(self, frames: Array) -> tuple[Array, Array]:
-        """Ends of the cores of the capsules ``[n, 4, 3]``."""
-        boom, tip = self.data.boom_length, self.data.roll_offset
-        origin, x, z = frames[..., :3, 3], frames[..., :3, 0], frames[..., :3, 2]
-        starts = origin[:, [0, 3, 4, 7]]
-        along = (tip * z[:, 0], -boom * x[:, 3], -boom * x[:, 4], -tip * z[:, 7])
-        return starts, starts + np.stack(along, axis=1)
 
 
 class Grip(NamedTuple):
@@ -111,8 +95,8 @@ class PairPostures:
 
     def __init__(self, walker: Walker, structure: Structure) -> None:
         self.shapes, self.structure = ArmShapes(walker, structure), structure
-        self.kinematics = TwoEndedKinematics(self.shapes.data)
-        self.limit = self.shapes.data.position_limit - ANGLE_ROOM
+        self.kinematics, self.margins = self.shapes.kinematics, walker.margins
+        self.limit = self.kinematics.position_limits[0] - self.margins.held_angle
         self._rolls = np.linspace(-self.limit, self.limit, ROLLS)
         self._known: dict[tuple[Grip, Grip], Array | None] = {}
 

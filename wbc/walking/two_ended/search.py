@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,15 +15,15 @@ from wbc.walking.planner.grips.conflicts import NEVER
 from wbc.walking.planner.grips.table import Grips, Ints
 from wbc.walking.planner.slices import Slices
 from wbc.walking.planner.stances.candidates import QUANTUM
-from wbc.walking.planner.stances.search import INSIDE, Node, StanceSearch
-from wbc.walking.planner.swings.move import Key
-from wbc.walking.planner.swings.swings import Chosen, Swing
+from wbc.walking.planner.stances.nodes import Node
+from wbc.walking.planner.stances.search import INSIDE, StanceSearch
+from wbc.walking.planner.swings.move import Chosen, Key, Move, Swing
 from wbc.walking.two_ended.postures import Grip, PairPostures
 from wbc.walking.two_ended.swing_path import Turn, TurnPaths
 
 #: Samples of the search count re-grasps: no swing takes longer than one [s]
 SAMPLE = 1e4
-#: Whether the hands have exchanged their order in a swing: before and after, far hand less near hand along the way [m]
+#: Whether the hands have exchanged their order in a swing: before and after, far hand less near hand along it [m]
 GAITS: dict[str, Callable[[float, float], bool]] = {
     "any": lambda before, after: True,
     "inchworm": lambda before, after: before * after > 0.0,
@@ -35,7 +34,7 @@ GAITS: dict[str, Callable[[float, float], bool]] = {
 class Pairs:
     """Which grips of the two hands go together: those with a posture; at the end those that the goal allows.
 
-    It is what :class:`wbc.walking.planner.grips.conflicts.ArmClearance` is for a body with arms.
+    It is a :class:`wbc.walking.planner.stances.nodes.Conflicts`.
 
     Args:
         grips: of the search. last: sample at which the goal counts. goal: of the grips of near and far hand.
@@ -65,14 +64,17 @@ class Pairs:
 
 
 class Turns:
-    """Swings between grips, as the search asks for them: as :class:`wbc.walking.planner.swings.swings.Swings`.
+    """Swings between grips, as the search asks for them, a :class:`wbc.walking.planner.stances.nodes.SwingTable`.
 
     Args:
-        places: of the holds along the way [m]. gait: one of :data:`GAITS`.
+        places: of the holds along the route [m]. gait: one of :data:`GAITS`.
     """
 
-    def __init__(self, paths: TurnPaths, pairs: Pairs, places: Array, gait: str) -> None:
-        self._paths, self._pairs, self._places, self._fits = paths, pairs, places, GAITS[gait]
+    #: A sample is a re-grasp: none passes while a hand closes
+    touch = 0
+
+    def __init__(self, paths: TurnPaths, pairs: Pairs, grips: Grips, places: Array, gait: str) -> None:
+        self._paths, self._pairs, self._grips, self._places, self._fits = paths, pairs, grips, places, GAITS[gait]
 
     def turn(self, swing: Swing) -> Turn:
         """What a swing of the search is."""
@@ -83,6 +85,18 @@ class Turns:
         """Times that no swing is shorter than."""
         return np.zeros(len(targets))
 
+    def soonest(self) -> Ints:
+        """Right behind the beginning of grips: no joint has to be bent."""
+        out: Ints = self._grips.first + INSIDE
+        return out
+
+    def lands(self, targets: Ints, samples: Ints) -> NDArray[np.bool_]:
+        """Hands land with all seven joints, none of which has to be bent."""
+        return np.ones(len(targets), dtype=bool)
+
+    def correct(self, move: Move, duration: float, possible: bool) -> None:
+        """Nothing: swings are looked at as they will be carried out."""
+
     def slices(self, swings: Iterable[Swing]) -> Slices[None]:
         """Look at swings one by one."""
         for swing in swings:
@@ -90,7 +104,7 @@ class Turns:
             yield None
 
     def choose(self, swing: Swing) -> Chosen | None:
-        """The way of a swing; None where none is possible, or the gait does not allow it."""
+        """How a hand swings; None where it cannot, or the gait does not allow it."""
         turn = self.turn(swing)
         before, after = (self._places[grip.hold] - self._places[turn.held.hold] for grip in (turn.source, turn.target))
         if not self._fits(before, after) or self._paths.path(turn) is None:
@@ -98,16 +112,14 @@ class Turns:
         return Chosen(0, self._paths.seconds(turn))
 
 
-class TurnSearch(StanceSearch):
+class TurnSearch(StanceSearch[Turns]):
     """The fewest re-grasps, then the least time, from a stance to one that the goal allows.
 
-    A sample is a re-grasp, and a grip ends the later the further its hold is along the way, so hands only go on.
+    A sample is a re-grasp, and a grip ends the later the further its hold is along the route, so hands only go on.
 
     Args:
-        towards: places of the holds along the way [m]. goal: whether grips of near and far hand are an end.
+        towards: places of the holds along the route [m]. goal: whether grips of near and far hand are an end.
     """
-
-    spare: ClassVar[int] = 0
 
     def __init__(
         self,
@@ -120,20 +132,11 @@ class TurnSearch(StanceSearch):
         width: int | None = 200,
     ) -> None:
         count = 4 * len(structure) + 8
-        self._goal, self._gait, self._towards, self._paths = goal, gait, towards, paths
         standing = BodyPath(np.repeat(np.eye(4)[None], count, axis=0), SAMPLE)
-        super().__init__(walker, structure, standing, grips_along(structure, towards, count), width=width)
-
-    def _landings(self) -> Ints:
-        """Right behind the beginning of grips: no joint has to be bent."""
-        out: Ints = self.grips.first + INSIDE
-        return out
-
-    def _equip(self) -> None:
-        self.pairs = Pairs(self._paths.postures, self.grips, len(self.path) - 1, self._goal)
-        # They answer what the search asks of the tables of a body with arms
-        self.clearance = self.pairs  # type: ignore[assignment]
-        self.swings = Turns(self._paths, self.pairs, self._towards, self._gait)  # type: ignore[assignment]
+        grips = grips_along(structure, towards, count)
+        self.pairs = Pairs(paths.postures, grips, len(standing) - 1, goal)
+        turns = Turns(paths, self.pairs, grips, towards, gait)
+        super().__init__(standing, grips, self.pairs, turns, hover=walker.margins.hover, width=width, spare=0)
 
     def _checked(self, level: dict[Key, Node], node: Node, swing: Swing | None) -> Node | None:
         """With the time that the swing takes, as nothing else is late."""
@@ -141,13 +144,6 @@ class TurnSearch(StanceSearch):
         if found is None or found.move is None or found.parent is None:
             return found
         return found._replace(delay=level[found.parent].delay + round(found.move.duration / QUANTUM))
-
-    def _bent(self, targets: Ints, samples: Ints) -> NDArray[np.bool_]:
-        """Hands land with all seven joints, none of which has to be bent."""
-        return np.ones(len(targets), dtype=bool)
-
-    def bent_at(self, target: int, sample: int) -> bool:
-        return True
 
 
 def grips_along(structure: Structure, towards: Array, count: int) -> Grips:

@@ -9,15 +9,13 @@ import numpy as np
 from wbc.trajectory import spline_path, time_optimal
 from wbc.validation import Array
 from wbc.walking.planner.swings.curve import step
-from wbc.walking.planner.swings.law import Aim, SwingLaw
+from wbc.walking.planner.swings.law import SwingLaw
 from wbc.walking.two_ended.postures import Grip, PairPostures
 
 #: Points of a swing, heights at which it is computed, and parts at its ends in which the hand does not go across
 POINTS, HEIGHTS, UPRIGHT = 73, 17, 0.2
-#: How high hands go along the normals of their holds [m], the first that is clear is taken
-LIFTS = (1.0, 2.0, 4.0)
-#: Parts of joint rates and accelerations that a swing is planned with; the rest is for feedback
-RATE_PART, ACCELERATION_PART = 0.9, 0.5
+#: How high hands go along the normals of their holds, with booms of BOOM [m]; the first that is clear is taken
+LIFTS, BOOM = (1.0, 2.0, 4.0), 7.11
 #: Intervals of the time law
 INTERVALS = 300
 #: From height to height no joint turns further [rad], else it is another branch
@@ -35,7 +33,7 @@ class Turn:
 
 
 class TurnPaths:
-    """Ways of swings, each made of the postures over the two holds, h above them, one after the other:
+    """Paths of swings, each made of the postures over the two holds, h above them, one after the other:
 
         q(x) = (1 - y) a(h) + y b(h),    h = L (1 - (1 - 2x)^2),    y = step((x - c) / (1 - 2c))
 
@@ -47,31 +45,32 @@ class TurnPaths:
         self._known: dict[Turn, Array | None] = {}
 
     def path(self, turn: Turn) -> Array | None:
-        """Joints 1 to 7 along the first way that is possible and clear ``[POINTS, 7]`` [rad]; None if none is."""
+        """Joints 1 to 7 along the first path that is possible and clear ``[POINTS, 7]`` [rad]; None if none is."""
         if turn not in self._known:
-            ways = (self._way(turn, lift) for lift in LIFTS)
-            self._known[turn] = next((way for way in ways if way is not None), None)
+            scale = self.postures.kinematics.data.boom_length / BOOM
+            paths = (self._made(turn, scale * lift) for lift in LIFTS)
+            self._known[turn] = next((path for path in paths if path is not None), None)
         return self._known[turn]
 
     def seconds(self, turn: Turn) -> float:
         """A time that a swing takes about [s]: what its joints turn at full rate."""
-        way = self.path(turn)
-        data = self.postures.shapes.data
-        if way is None:
+        path, limb = self.path(turn), self.postures.kinematics
+        if path is None:
             return np.inf
-        turned = float(np.abs(np.diff(way, axis=0)).max(axis=1).sum())
-        return turned / (RATE_PART * data.joint_rate) + 2.0 * data.acceleration_time
+        turned = float(np.abs(np.diff(path, axis=0)).max(axis=1).sum())
+        return turned / (self.postures.margins.swing_rate * limb.data.joint_rate) + 2.0 * limb.data.acceleration_time
 
     def timed(self, turn: Turn, spacing: float) -> Array:
         """Joints in the least time under the limits, every ``spacing`` [s], from rest to rest ``[n, 7]`` [rad]."""
-        way, data = self.path(turn), self.postures.shapes.data
-        assert way is not None
-        fastest, hardest = RATE_PART * data.joint_rate, ACCELERATION_PART * data.joint_rate / data.acceleration_time
-        law = time_optimal(spline_path(way), velocity=fastest, acceleration=hardest, intervals=INTERVALS)
+        path, limb, margins = self.path(turn), self.postures.kinematics, self.postures.margins
+        assert path is not None
+        fastest = margins.swing_rate * limb.data.joint_rate
+        hardest = margins.swing_acceleration * limb.data.joint_rate / limb.data.acceleration_time
+        law = time_optimal(spline_path(path), velocity=fastest, acceleration=hardest, intervals=INTERVALS)
         count = int(np.ceil(law.duration / spacing))
         return np.asarray(law.at(np.linspace(0.0, law.duration, count + 1)).position)
 
-    def _way(self, turn: Turn, lift: float) -> Array | None:
+    def _made(self, turn: Turn, lift: float) -> Array | None:
         before, after = self._pair(turn, turn.source), self._pair(turn, turn.target)
         first, last = self.postures.between(*before), self.postures.between(*after)
         if first is None or last is None:
@@ -84,10 +83,10 @@ class TurnPaths:
         grid = np.linspace(0.0, 1.0, HEIGHTS)
         a, b = (np.stack([np.interp(height, grid, q[:, k]) for k in range(7)], axis=1) for q in (leaving, coming))
         y = step((x - UPRIGHT) / (1.0 - 2.0 * UPRIGHT))[:, None]
-        way: Array = (1.0 - y) * a + y * b
-        if np.abs(way).max() > self.postures.limit:
+        path: Array = (1.0 - y) * a + y * b
+        if np.abs(path).max() > self.postures.limit:
             return None
-        return way if self._clear(turn, way) else None
+        return path if self._clear(turn, path) else None
 
     def _pair(self, turn: Turn, grip: Grip) -> tuple[Grip, Grip]:
         """Grips of the near and of the far hand."""
@@ -112,10 +111,10 @@ class TurnPaths:
             out[k] = last = near[best]
         return out
 
-    def _clear(self, turn: Turn, way: Array) -> bool:
+    def _clear(self, turn: Turn, path: Array) -> bool:
         postures = self.postures
         near, far = (postures.frame(grip)[:3, 3] for grip in self._pair(turn, turn.source))
-        frames = self.frames(turn, way)
+        frames = self.frames(turn, path)
         other = postures.frame(turn.target)[:3, 3]
         ends = np.array([[near, other], [far, far]] if turn.arm == 0 else [[near, near], [far, other]])
         return bool(postures.shapes.clear(frames, ends).all())
@@ -130,7 +129,7 @@ class TurnPaths:
 
 
 class TurnLaw(SwingLaw):
-    """A table of joints and of the hand that swings, from the lift to the landing; between rows straight lines.
+    """A table of the hand that swings and of all joints of its arm, from the lift to the landing.
 
     Args:
         hands: places of the hand ``[n, 3]`` [m]. joints: of its arm, from the body outwards ``[n, joints]`` [rad].
@@ -138,33 +137,13 @@ class TurnLaw(SwingLaw):
     """
 
     def __init__(self, hands: Array, joints: Array, spacing: float) -> None:
-        self.possible, self.duration = True, (len(hands) - 1) * spacing
-        self._spacing, self._hands, self._joints = spacing, hands, joints
+        times = np.linspace(0.0, (len(hands) - 1) * spacing, len(hands))
+        super().__init__(times, hands, times / times[-1])
+        self._joints = joints
 
-    @property
-    def places(self) -> Array:
-        """Of the hand at the rows ``[n, 3]`` [m]."""
-        return self._hands
-
-    @property
-    def spacing(self) -> float:
-        """From row to row [s]."""
-        return self._spacing
-
-    def at(self, time: float) -> Aim:
-        """The aim at a time since lifting, clipped to the swing."""
-        row, part = self._place(time)
-        span = self._hands[row + 1] - self._hands[row]
-        whole = min(max(time / self.duration, 0.0), 1.0)
-        return Aim(self._hands[row] + part * span, span / self._spacing, whole, whole)
-
-    def posture(self, time: float) -> tuple[Array, Array]:
-        """Joints [rad] and their rates [rad/s] at a time, clipped to the swing."""
-        row, part = self._place(time)
-        span = self._joints[row + 1] - self._joints[row]
-        return self._joints[row] + part * span, span / self._spacing
-
-    def _place(self, time: float) -> tuple[int, float]:
-        place = min(max(time / self._spacing, 0.0), len(self._hands) - 1.0)
-        row = min(int(place), len(self._hands) - 2)
-        return row, place - row
+    def posture(self, time: float) -> Array:
+        """Joints at a time, clipped to the swing ``[joints]`` [rad]."""
+        place = min(max(time / self.duration, 0.0), 1.0) * (len(self._joints) - 1)
+        row = min(int(place), len(self._joints) - 2)
+        out: Array = self._joints[row] + (place - row) * (self._joints[row + 1] - self._joints[row])
+        return out

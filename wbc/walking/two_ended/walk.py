@@ -21,7 +21,7 @@ from wbc.walking.loop.walk import Walk
 from wbc.walking.planner.plan import NoPlanError
 from wbc.walking.planner.replanning import PlanSlices
 from wbc.walking.two_ended.planner import TwoEndedPlan, plan_two_ended
-from wbc.walking.two_ended.swing_path import ACCELERATION_PART, RATE_PART, TurnLaw
+from wbc.walking.two_ended.swing_path import TurnLaw
 
 #: The last part of a swing, in which the hand comes straight down and its frame counts [s]
 NEAR = 2.0
@@ -36,7 +36,7 @@ class TwoEndedStack(WalkStack):
         """What a free hand follows: its position [m] and velocity [m/s], joints [rad] and rates [rad/s].
 
         Args:
-            at_hold: z and x axis of the hand near its hold; None on the way.
+            at_hold: z and x axis of the hand near its hold; None before.
         """
         swing, aligned, resting, mine = self._swings[arm], self._axes[arm], self._rest, self._joints(arm)
         near = at_hold is not None
@@ -97,7 +97,7 @@ class TwoEndedWalk(Walk):
         self._stop()
 
     def vanish(self, ids: Iterable[str]) -> None:
-        """Take holds away; the rest of the way is planned anew from the next stance, if the plan needs one of them.
+        """Take holds away; the rest is planned anew from the next stance, if the plan needs one of them.
 
         A hand that held one is open at once. Where a hand is in the air and its hold is gone, there is no plan.
 
@@ -130,30 +130,29 @@ class TwoEndedWalk(Walk):
             swinging.latch -= self.dt
             if swinging.latch <= 1e-9:
                 swinging.state = "open"
-        now, before = swinging.aim, law.posture(swinging.clock)[0]
+        now, before = swinging.aim, law.posture(swinging.clock)
         lifted = self.plan.regrasps[self.next].lift
         swinging.clock = min(self.path_time - lifted, law.duration)
         swinging.aim = law.at(swinging.clock)
-        speed, rates = (swinging.aim.position - now.position) / self.dt, law.posture(swinging.clock)[0] - before
+        speed, rates = (swinging.aim.position - now.position) / self.dt, law.posture(swinging.clock) - before
         near = swinging.clock > law.duration - NEAR
         at_hold = (self.structure.axes[swinging.hold], swinging.x) if near and swinging.x is not None else None
         self._turns.turn(arm, (now.position, speed), (before, rates / self.dt), at_hold)
 
     def _stands(self) -> bool:
-        """A hand that is on its way goes on to its hold, as the arm moves as one; after an abort all of it stops."""
+        """A hand that swings goes on to its hold, as the arm moves as one; after an abort all of it stops."""
         return self.halted or self.aborted or (self._changing and self.swinging is None)
 
     @property
     def still(self) -> bool:
-        """The arm does not move as it is told."""
+        """The arm does not move."""
         return self.pace == 0.0
 
     @cached_property
     def stops(self) -> Stops:
         """Laws leave half the accelerations for a stop; the hand comes to rest with the body."""
-        data = self.walker.data
-        assert isinstance(data, TwoEndedData)
-        ramp = RATE_PART / (1.0 - ACCELERATION_PART) * data.acceleration_time
+        data, margins = self.walker.two_ended_data, self.walker.margins
+        ramp = margins.swing_rate / (1.0 - margins.swing_acceleration) * data.acceleration_time
         return Stops(self.dt, ramp, ramp)
 
     def stopping(self) -> tuple[float, float]:

@@ -15,8 +15,8 @@ from wbc.walking.planner.detours.cells import Cells, Ints
 
 #: What a step counts along the path, beside it, lower, and by 15 degrees of heading [stations]
 STEPS = (1.0, 1.0, 0.25, 0.25)
-#: A cell counts more where fewer than three arms have a hold, or one of the arms has no more than one
-TWO, POOR = 4.0, 2.0
+#: A cell counts more where no arm with a hold is to spare, or one of the arms has no more than one
+NONE_SPARE, POOR = 4.0, 2.0
 
 
 def round_labels(flags: Flags) -> NDArray[np.int32]:
@@ -29,19 +29,19 @@ def round_labels(flags: Flags) -> NDArray[np.int32]:
     return out
 
 
-def distances(cells: Cells, fits: Sequence[Flags], goal: int) -> Array:
-    """How far cells are from the goal through cells at which two arms have holds [stations]; inf where no way leads.
+def distances(cells: Cells, fits: Sequence[Flags], least: int, goal: int) -> Array:
+    """How far cells are from the goal through cells at which enough arms have holds [stations]; inf where none lead.
 
     Args:
-        fits: of the grips of each arm, ``[grips, cells]``.
+        fits: of the grips of each arm, ``[grips, cells]``. least: so many arms must hold.
     """
     counts = np.array([mine.sum(axis=0) for mine in fits])
     arms = (counts > 0).sum(axis=0)
-    flags = (arms >= 2).reshape(cells.shape)
+    flags = (arms >= least).reshape(cells.shape)
     out = np.full(len(cells), np.inf)
     if not flags.reshape(-1)[goal]:
         return out
-    dear = np.where(arms == 2, TWO, np.where(counts.min(axis=0) < 2, POOR, 1.0))[flags.reshape(-1)]
+    dear = np.where(arms == least, NONE_SPARE, np.where(counts.min(axis=0) < 2, POOR, 1.0))[flags.reshape(-1)]
     number, count = _numbered(flags)
     steps = (*STEPS[:3], STEPS[3] * 24.0 / cells.shape[3])
     edges = [(*_along(number, axis), step) for axis, step in enumerate(steps)]

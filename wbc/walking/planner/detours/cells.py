@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import pi, radians
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from wbc.robots import BodyLimb
 from wbc.validation import Array
 from wbc.walking.body_path import BodyPath
 from wbc.walking.holds.structure import Structure
@@ -36,7 +37,15 @@ class Mesh:
     lower: tuple[float, ...]
     turns: int
 
+    def of(self, limb: BodyLimb) -> Mesh:
+        """As large for an arm as this one is for a PUMA 600."""
+        scale = round(limb.hand_span / HAND_SPAN, 9)
+        lower = tuple(scale * height for height in self.lower)
+        return replace(self, step=scale * self.step, side=scale * self.side, lower=lower)
 
+
+#: Reach of the arm that the meshes below were chosen for, a PUMA 600 from neck to hand [m]
+HAND_SPAN = 1.1684
 #: Along the path alone, and beside it; 54 to 44 in for a path at 52 in
 ALONG = Mesh(0.1175, 0.0, 0, tuple(inch * 0.0254 for inch in (-2.0, 0.0, 2.0, 4.0, 6.0, 8.0)), 24)
 WIDE = Mesh(0.14, 0.2, 7, tuple(inch * 0.0254 for inch in (-2.0, 0.0, 4.0, 8.0)), 18)
@@ -107,9 +116,9 @@ def stations(path: BodyPath, step: float) -> Array:
     poses = path.poses
     moved = np.linalg.norm(np.diff(poses[:, :3, 3], axis=0), axis=1)
     cosine = (np.einsum("nij,nij->n", poses[1:, :3, :3], poses[:-1, :3, :3]) - 1.0) / 2.0
-    way = np.maximum(moved / step, np.arccos(np.clip(cosine, -1.0, 1.0)) / TURN)
+    far = np.maximum(moved / step, np.arccos(np.clip(cosine, -1.0, 1.0)) / TURN)
     # Samples that stand still take no place of their own
-    total = np.concatenate([[0.0], np.cumsum(way + 1e-9)])
+    total = np.concatenate([[0.0], np.cumsum(far + 1e-9)])
     count = max(round(total[-1]), 1)
     return np.asarray(np.interp(np.linspace(0.0, total[-1], count + 1), total, np.arange(len(poses)) * path.spacing))
 

@@ -1,10 +1,11 @@
-"""A body path round what cannot be passed: a way from cell to cell, as a path."""
+"""A body path round what cannot be passed: from cell to cell, as a path."""
 
 from __future__ import annotations
 
 import heapq
 import itertools
-from collections.abc import Mapping
+import time
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from math import ceil, pi
 
@@ -13,11 +14,12 @@ import pinocchio as pin
 
 from wbc.robots import Walker
 from wbc.validation import Array
+from wbc.walking.arms.puma import limb_of
 from wbc.walking.body_path import BodyPath
 from wbc.walking.holds.structure import Structure
 from wbc.walking.planner.detours.cell_grips import cell_grips
-from wbc.walking.planner.detours.cells import ALONG, Cells, Ints, Mesh, cells_about
-from wbc.walking.planner.detours.pair_search import Node, PairSearch
+from wbc.walking.planner.detours.cell_search import CellSearch, Node
+from wbc.walking.planner.detours.cells import ALONG, WIDE, Cells, Ints, Mesh, cells_about
 
 #: How fast the body goes down [m/s] and turns [rad/s]
 DOWN_SPEED, TURN_SPEED = 0.05, 0.1
@@ -29,15 +31,19 @@ SLOW = 0.01
 DEAR = np.array([0.1, 0.2, 0.1])
 
 
+#: Cells that are looked at, in the order of trying: higher, lower and turned, then beside the path too
+MESHES = (ALONG, WIDE)
+
+
 @dataclass(frozen=True, eq=False)
 class BodyRoute:
     """What was found.
 
     Attributes:
-        path: of the body; None if there is no way.
+        path: of the body; None if there is none.
         complete: the search looked at all that it can reach, so there is none among its cells.
-        separating: ids of the holds at which the way ends; empty if there is one.
-        text: how far the body goes off its path, or why there is no way.
+        separating: ids of the holds at which it ends; empty if there is one.
+        text: how far the body goes off its path, or why there is none.
     """
 
     path: BodyPath | None
@@ -55,7 +61,7 @@ def find_route(
     start: Mapping[int, int] | None = None,
     deadline: float | None = None,
 ) -> BodyRoute:
-    """A way from a path's beginning to its end, along it, beside it, lower and turned.
+    """A detour from a path's beginning to its end, along it, beside it, lower and turned.
 
     Args:
         mesh: how far beside the path, how low, and how closely it is looked.
@@ -63,18 +69,37 @@ def find_route(
     """
     cells = cells_about(path, structure, mesh)
     grips = cell_grips(walker, structure, cells)
-    outcome = PairSearch(walker, structure, cells, grips).run(start, deadline)
+    outcome = CellSearch(walker, structure, cells, grips).run(start, deadline)
     if not outcome.nodes:
         names = tuple(structure.ids[k] for k in sorted({int(grips.hold[g]) for g in outcome.reached}))
         number = f"{outcome.expanded} landings looked at{'' if outcome.complete else ', more are left'}"
         where = f"beyond {', '.join(names)}" if names else "from the start"
-        text = f"up to {mesh.beside * mesh.side:.2f} m beside the path there is no way {where} ({number})"
+        text = f"up to {mesh.beside * mesh.side:.2f} m beside the path there is no route {where} ({number})"
         return BodyRoute(None, outcome.complete, names, text)
     chain = shortest(cells, outcome.nodes, outcome.final)
     off = cells.offsets(np.array(chain))
     far = np.abs(off[:, 1]).max(), off[:, 2].max(), np.degrees(np.abs(off[:, 3]).max())
     text = f"up to {far[0]:.2f} m beside, {far[1]:.2f} m lower, turned by {far[2]:.0f} deg"
     return BodyRoute(as_path(cells, chain, path), True, (), text)
+
+
+def find_routes(
+    walker: Walker,
+    structure: Structure,
+    path: BodyPath,
+    start: Mapping[int, int] | None = None,
+    deadline: float | None = None,
+) -> Iterator[BodyRoute]:
+    """Detours, those near the path first; the next one is looked for when asked for.
+
+    Args:
+        start, deadline: of :func:`find_route`.
+    """
+    limb = limb_of(walker)
+    for mesh in MESHES:
+        if deadline is not None and time.perf_counter() > deadline:
+            return
+        yield find_route(walker, structure, path, mesh=mesh.of(limb), start=start, deadline=deadline)
 
 
 def shortest(cells: Cells, nodes: tuple[Node, ...], final: Ints) -> list[int]:
@@ -135,8 +160,8 @@ def _rounded(poses: Array, most: int) -> Array:
 
 def _pace(path: BodyPath) -> float:
     """Mean speed of a path's origin [m/s]; of one that only turns :data:`SLOW`."""
-    way = float(np.linalg.norm(np.diff(path.poses[:, :3, 3], axis=0), axis=1).sum())
-    return max(way / path.duration, SLOW)
+    length = float(np.linalg.norm(np.diff(path.poses[:, :3, 3], axis=0), axis=1).sum())
+    return max(length / path.duration, SLOW)
 
 
 def _seconds(change: Array, pace: float) -> float:

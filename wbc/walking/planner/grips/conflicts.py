@@ -1,4 +1,4 @@
-"""Room between the arms of one body: capsules about upper arms, forearms, hands and necks, in the body's frame."""
+"""Distances between the arms of one body, whose links are capsules, in the body's frame; and which grips conflict."""
 
 from __future__ import annotations
 
@@ -9,42 +9,104 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
+from wbc.robot.geometry.segments import segment_distances
 from wbc.robots import Walker
 from wbc.validation import Array
-from wbc.walking.arms.capsules import segment_distances
-from wbc.walking.arms.puma import ArmKinematics
+from wbc.walking.arms.puma import limb_of
 from wbc.walking.native import compiled
 from wbc.walking.planner.grips.table import Grips, Ints
 
 #: Every so many samples of a path are looked at
 EVERY = 4
-#: What the plan keeps of the clearance for feedback, besides the clearance itself [m]
-ROOM = 0.01
 #: No conflict: a sample after every path
 NEVER = 1 << 40
+
+Flags = NDArray[np.bool_]
+
+
+class LimbShapes:
+    """The capsules of the arms of one body, and their distances from each other.
+
+    Args:
+        walker: its limbs, clearance and margins.
+
+    Attributes:
+        limb: kinematics of an arm. bases: of the arms in the body ``[arms, 4, 4]`` [m].
+        least: distances of pairs of links, of arms that hold ``[pairs]`` [m]: radii, clearance and margin. Two links
+            that no joint moves are no pair.
+    """
+
+    def __init__(self, walker: Walker) -> None:
+        self.limb = limb = limb_of(walker)
+        self.bases = np.array([arm.base.homogeneous for arm in walker.arms])
+        self._from, self._to = ([link[end] for link in limb.links] for end in (0, 1))
+        count = len(limb.links)
+        pairs = [(i, j) for i in range(count) for j in range(count) if max(i, j) >= limb.still]
+        self._one, self._other = [i for i, _ in pairs], [j for _, j in pairs]
+        radii = np.array(limb.radii)
+        self.least: Array = radii[self._one] + radii[self._other] + walker.tolerances.clearance
+        self.least = self.least + walker.margins.held_clearance
+
+    def points(self, arm: int, postures: Array) -> Array:
+        """Named points of an arm in the body's frame, ``[..., points, 3]``."""
+        base, limb = self.bases[arm], self.limb
+        library = compiled.library_for(limb)
+        if library is None:
+            return np.asarray(limb.points(postures) @ base[:3, :3].T + base[:3, 3])
+        out, rows = np.empty((*postures.shape[:-1], 6, 3)), compiled.packed(postures)
+        library.points_of(
+            compiled.arm_of(limb), compiled.at(base), ctypes.c_long(rows.size // 6), compiled.at(rows), compiled.at(out)
+        )
+        return out
+
+    def points_of(self, arms: Ints, postures: Array) -> Array:
+        """The same of many arms (rows ``[m]``), ``[m, ..., joints]`` each."""
+        count = 1 + max(max(link) for link in self.limb.links)
+        out = np.empty((*postures.shape[:-1], count, 3))
+        for arm in np.unique(arms):
+            out[arms == arm] = self.points(int(arm), postures[arms == arm])
+        return out
+
+    def between(self, one: Array, other: Array) -> Array:
+        """Least distance beyond radii and clearance of two arms given by their points ``[m, points, 3]``: ``[m]``."""
+        arms = (one, self._one), (other, self._other)
+        ends = [np.moveaxis(p[:, at][:, link], -1, 0) for p, link in arms for at in (self._from, self._to)]
+        out: Array = (segment_distances(*ends) - self.least).min(axis=1)
+        return out
+
+    def near(self, one: Array, other: Array, less: float = 0.0) -> Flags:
+        """Whether arms given by their points are nearer than radii and clearance less ``less`` [m] allow: ``[m]``."""
+        least, library = self.least - less, compiled.library_for(self.limb)
+        out = np.zeros(len(one), dtype=np.bool_)
+        if library is not None:
+            given = [compiled.packed(points) for points in (one, other)]
+            library.arms_near(ctypes.c_long(len(one)), *(compiled.at(array) for array in (*given, least, out)))
+            return out
+        a, b = one[:, self._from], one[:, self._to]
+        c, d = other[:, self._from], other[:, self._to]
+        # Capsules whose middles are far apart need no closer look
+        halves = [0.5 * np.sqrt(((q - p) ** 2).sum(axis=2)) for p, q in ((a, b), (c, d))]
+        gap = (0.5 * (a + b))[:, self._one] - (0.5 * (c + d))[:, self._other]
+        reach = halves[0][:, self._one] + halves[1][:, self._other] + least
+        row, pair = np.nonzero((gap * gap).sum(axis=2) < reach * reach)
+        i, j = np.array(self._one)[pair], np.array(self._other)[pair]
+        close = segment_distances(a[row, i].T, b[row, i].T, c[row, j].T, d[row, j].T) < least[pair]
+        out[row[close]] = True
+        return out
 
 
 class ArmClearance:
     """When two grips bring their arms too near to each other; answers are kept.
 
     Args:
-        walker: its capsules and clearance. grips: over one path.
+        walker: see :class:`LimbShapes`. grips: over one path.
 
     Attributes:
-        least: distances of all pairs of links but that of the necks, of arms that hold ``[15]`` [m].
+        shapes: of the arms.
     """
 
     def __init__(self, walker: Walker, grips: Grips) -> None:
-        self._grips = grips
-        self._kinematics = ArmKinematics(walker.data)  # type: ignore[arg-type]
-        self._bases = np.array([arm.base.homogeneous for arm in walker.arms])
-        neck, upper, fore, hand = self._kinematics.radii
-        # Named points O N S E W H of an arm: capsules O-N, S-E, E-W, W-H. All pairs but that of the two necks
-        self._from, self._to = [0, 2, 3, 4], [1, 3, 4, 5]
-        pairs = [(i, j) for i in range(4) for j in range(4) if i or j]
-        self._one, self._other = [i for i, _ in pairs], [j for _, j in pairs]
-        radii = np.array([neck, upper, fore, hand])
-        self.least = radii[self._one] + radii[self._other] + walker.data.clearance + ROOM  # type: ignore[union-attr]
+        self._grips, self.shapes = grips, LimbShapes(walker)
         self._conflicts: dict[tuple[int, int], list[int]] = {}
 
     def prepare(self, pairs: Iterable[tuple[int, int]]) -> None:
@@ -62,30 +124,25 @@ class ArmClearance:
         for pair, start, size, end in zip(todo, first.tolist(), count.tolist(), ends.tolist(), strict=True):
             self._conflicts[pair] = (start + EVERY * np.nonzero(near[end - size : end])[0]).tolist()
 
-    def _near_along(self, pairs: Ints, first: Ints, count: Ints) -> NDArray[np.bool_]:
+    def _near_along(self, pairs: Ints, first: Ints, count: Ints) -> Flags:
         """Whether pairs of grips are too near to each other, at ``count`` samples of each one after the other."""
-        grips, library = self._grips, compiled.library()
-        out = np.empty(int(count.sum()), dtype=np.bool_)
+        grips, shapes = self._grips, self.shapes
+        out, library = np.empty(int(count.sum()), dtype=np.bool_), compiled.library_for(shapes.limb)
         if library is not None:
-            bases = compiled.packed(self._bases[grips.arm[pairs]])
+            bases = compiled.packed(shapes.bases[grips.arm[pairs]])
             library.grips_near(
-                ctypes.byref(compiled.arm(self._kinematics.data)),
+                compiled.arm_of(shapes.limb),
                 ctypes.byref(grips.table),
                 ctypes.c_long(len(pairs)),
                 *(compiled.at(array) for array in (pairs, bases)),
                 ctypes.c_long(EVERY),
-                *(compiled.at(array) for array in (first, count, self.least, out)),
+                *(compiled.at(array) for array in (first, count, shapes.least, out)),
             )
             return out
         which = np.repeat(np.arange(len(pairs)), count)
         samples = first[which] + EVERY * (np.arange(len(which)) - (np.cumsum(count) - count)[which])
-        sides = []
-        for grip in pairs[which].T:
-            postures, points = grips.posture(grip, samples), np.empty((len(grip), 6, 3))
-            for arm in np.unique(grips.arm[grip]):
-                points[grips.arm[grip] == arm] = self.points(int(arm), postures[grips.arm[grip] == arm])
-            sides.append(points)
-        return self.near(sides[0], sides[1])
+        one, other = (shapes.points_of(grips.arm[grip], grips.posture(grip, samples)) for grip in pairs[which].T)
+        return shapes.near(one, other)
 
     def first_conflict(self, one: int, other: int, sample: int) -> int:
         """The first sample from ``sample`` on at which the arms are too near, NEVER if there is none."""
@@ -102,70 +159,25 @@ class ArmClearance:
             sample = conflict + EVERY
         return sample
 
-    def points(self, arm: int, postures: Array) -> Array:
-        """Named points of an arm in the body's frame, ``[..., 6, 3]``."""
-        base, library = self._bases[arm], compiled.library()
-        if library is None:
-            return np.asarray(self._kinematics.points(postures) @ base[:3, :3].T + base[:3, 3])
-        out, rows = np.empty((*postures.shape[:-1], 6, 3)), compiled.packed(postures)
-        library.points_of(
-            ctypes.byref(compiled.arm(self._kinematics.data)),
-            compiled.at(base),
-            ctypes.c_long(rows.size // 6),
-            compiled.at(rows),
-            compiled.at(out),
-        )
-        return out
-
-    def between(self, one: Array, other: Array) -> Array:
-        """Least distance beyond radii and clearance of two arms given by their points ``[m, 6, 3]``: ``[m]``."""
-        a, b = one[:, self._from][:, self._one], one[:, self._to][:, self._one]
-        c, d = other[:, self._from][:, self._other], other[:, self._to][:, self._other]
-        out: Array = (segment_distances(a, b, c, d) - self.least).min(axis=1)
-        return out
-
-    def near(self, one: Array, other: Array, less: float = 0.0) -> NDArray[np.bool_]:
-        """Whether arms given by their points are nearer than radii and clearance less ``less`` [m] allow: ``[m]``."""
-        least, library = self.least - less, compiled.library()
-        out = np.zeros(len(one), dtype=np.bool_)
-        if library is not None:
-            sides = [compiled.packed(side) for side in (one, other)]
-            places = [compiled.at(array) for array in (*sides, least, out)]
-            library.arms_near(ctypes.c_long(len(one)), *places)
-            return out
-        a, b = one[:, self._from], one[:, self._to]
-        c, d = other[:, self._from], other[:, self._to]
-        # Capsules whose middles are far apart need no closer look
-        halves = [0.5 * np.sqrt(((q - p) ** 2).sum(axis=2)) for p, q in ((a, b), (c, d))]
-        gap = (0.5 * (a + b))[:, self._one] - (0.5 * (c + d))[:, self._other]
-        reach = halves[0][:, self._one] + halves[1][:, self._other] + least
-        row, pair = np.nonzero((gap * gap).sum(axis=2) < reach * reach)
-        i, j = np.array(self._one)[pair], np.array(self._other)[pair]
-        close = segment_distances(a[row, i], b[row, i], c[row, j], d[row, j]) < least[pair]
-        out[row[close]] = True
-        return out
-
-    def stay_clear(self, points: Array, samples: Array, others: Ints, less: float) -> NDArray[np.bool_]:
+    def stay_clear(self, points: Array, samples: Array, others: Ints, less: float) -> Flags:
         """Whether moving arms stay clear of arms that hold.
 
         Args:
-            points: of moving arms in the body's frame ``[m, n, 6, 3]``. samples: at which they are there ``[m, n]``.
-            others: grips that hold ``[m]``. less: as of :meth:`near`.
+            points: of moving arms in the body's frame ``[m, n, points, 3]``. samples: at which they are there
+                ``[m, n]``. others: grips that hold ``[m]``. less: as of :meth:`LimbShapes.near`.
         """
-        library, grips = compiled.library(), self._grips
+        shapes, grips = self.shapes, self._grips
+        library = compiled.library_for(shapes.limb)
         out = np.zeros(len(others), dtype=np.bool_)
         if library is None:
-            postures, held = grips.between(others[:, None], samples), np.empty_like(points)
-            for arm in np.unique(grips.arm[others]):
-                rows = grips.arm[others] == arm
-                held[rows] = self.points(int(arm), postures[rows])
-            near = self.near(points.reshape(-1, 6, 3), held.reshape(-1, 6, 3), less)
+            there = shapes.points_of(grips.arm[others], grips.between(others[:, None], samples))
+            one, other = (side.reshape(-1, *side.shape[2:]) for side in (points, there))
+            near = shapes.near(one, other, less)
             return np.asarray(~near.reshape(samples.shape).any(axis=1))
-        given = [compiled.packed(array) for array in (points, samples, self._bases[grips.arm[others]])]
-        places = [compiled.at(array) for array in (*given, others, self.least - less, out)]
+        given = [compiled.packed(array) for array in (points, samples, shapes.bases[grips.arm[others]])]
+        where = [compiled.at(array) for array in (*given, others, shapes.least - less, out)]
         sizes = (ctypes.c_long(size) for size in samples.shape)
-        arm = compiled.arm(self._kinematics.data)
-        library.swings_clear(ctypes.byref(arm), ctypes.byref(grips.table), *sizes, *places)
+        library.swings_clear(compiled.arm_of(shapes.limb), ctypes.byref(grips.table), *sizes, *where)
         return out
 
 

@@ -31,20 +31,10 @@ class Turned:
     ends: str
 
 
-def hand_poses(points: Array, axes: Array, references: Array) -> Array:
-    """Homogeneous matrices ``[n, 4, 4]`` of hands at points along axes, x as near to the references as it can be."""
-    across = references - (references * axes).sum(axis=1)[:, None] * axes
-    out = np.zeros((len(points), 4, 4))
-    out[:, :3, 0] = across / np.linalg.norm(across, axis=1)[:, None]
-    out[:, :3, 1], out[:, :3, 2] = np.cross(axes, out[:, :3, 0]), axes
-    out[:, :3, 3], out[:, 3, 3] = points, 1.0
-    return out
-
-
 def turns(angles: Array, rolls: tuple[float, ...], limit: float, fastest: float, shortest: int) -> Iterator[Turned]:
     """Grips of one stretch: theta6 + roll + 2 pi w within the limit for as long as possible.
 
-    Where the whole stretch is possible in several ways the one nearest to the middle of the joint is taken; of a fixed
+    Where the whole stretch is possible at several turns the one nearest to the middle of the joint is taken; of a fixed
     roll both, as a swing may take half a turn more to the one than to the other.
 
     Args:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import ctypes
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from wbc.robots import BodyLimb, Margins
 from wbc.validation import Array
 from wbc.walking.arms.angles import ALIGNED
-from wbc.walking.arms.puma import ROUNDING, ArmKinematics
+from wbc.walking.arms.puma import ROUNDING
 from wbc.walking.holds.structure import Structure
 from wbc.walking.native import compiled
 from wbc.walking.planner.grips.tilt import LEAST_TILT, TILT_PART
@@ -19,38 +19,29 @@ from wbc.walking.planner.grips.tilt import LEAST_TILT, TILT_PART
 Stretch = tuple[int, int, int, int, int, Array]
 
 
-@dataclass(frozen=True)
-class Keeping:
-    """What is kept of limits: part of rates, angle [rad], reach [m], cosine between approach and body, samples of a
-    stretch, and the reach that hands lean for [m].
-    """
-
-    rate_part: float
-    angle_room: float
-    reach_room: float
-    facing: float
-    shortest: int
-    lean_for: float
-
-
 def stretches(
-    kinematics: ArmKinematics,
+    limb: BodyLimb,
     frames: Array,
     structure: Structure,
     among: NDArray[np.int64],
     spacing: float,
-    keep: Keeping,
+    margins: Margins,
+    shortest: int,
 ) -> list[Stretch] | None:
     """Stretches of an arm, whose base has the frames ``[n, 4, 4]``, on some holds (their rows).
 
-    None where there is no compiler, or the roll of a hold is not free.
+    None where there is no compiler, the limb has no closed form, or the roll of a hold is not free.
+
+    Args:
+        shortest: samples of a stretch at least.
     """
-    library = compiled.library()
-    if library is None or not all(structure.free_rolls[hold] for hold in among.tolist()):
+    library, data = compiled.library(), limb.closed_form
+    if library is None or data is None or not all(structure.free_rolls[hold] for hold in among.tolist()):
         return None
-    count, data = len(frames), kinematics.data
-    most = [keep.rate_part * spacing * rate for rate in data.joint_rates[:5]]
-    numbers = [keep.reach_room, keep.angle_room, *most, keep.facing, keep.shortest, keep.lean_for]
+    count = len(frames)
+    most = [margins.held_rate * spacing * rate for rate in data.joint_rates[:5]]
+    numbers = [margins.held_reach, margins.held_angle, *most, margins.facing, shortest]
+    numbers.append(margins.lean_from * margins.held_reach)
     given = [
         compiled.packed(a)
         for a in (
@@ -61,7 +52,7 @@ def stretches(
             np.empty(12 * count),
         )
     ]
-    table = np.empty((2 * count * len(among) // keep.shortest + 1, 6), dtype=np.int64)
+    table = np.empty((2 * count * len(among) // shortest + 1, 6), dtype=np.int64)
     rows = np.empty((2 * count * len(among), 6))
     where = [compiled.at(a) for a in (*given, table, rows)]
     library.grips_along.restype = ctypes.c_long

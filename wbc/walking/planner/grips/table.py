@@ -4,35 +4,34 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from math import radians
 
 import numpy as np
 from numpy.typing import NDArray
 
-from wbc.robots import Walker
+from wbc.robots import BodyLimb, Margins, Walker
 from wbc.validation import Array
-from wbc.walking.arms.puma import LIMIT_NAMES, ArmKinematics
+from wbc.walking.arms.puma import LIMIT_NAMES, limb_of
 from wbc.walking.body_path import BodyPath
 from wbc.walking.holds.structure import Structure
 from wbc.walking.native import compiled
-from wbc.walking.planner.grips.rolls import ANY, hand_poses, turns
-from wbc.walking.planner.grips.stretches import Keeping, stretches
-from wbc.walking.planner.grips.tilt import leaning
+from wbc.walking.planner.grips.held import Held, held, near_holds
+from wbc.walking.planner.grips.rolls import ANY, turns
+from wbc.walking.planner.grips.stretches import stretches
 from wbc.walking.planner.slices import Slices, drained
 
 Ints = NDArray[np.int64]
 
-#: What the plan keeps of the limits for feedback: part of a rate, angle [rad] and reach [m]
-RATE_PART, ANGLE_ROOM, REACH_ROOM = 0.85, radians(2.0), 0.3 * 0.0254
-#: Postures of a slice, and how far samples may lie apart in the first look for holds in reach [m]
-ROWS, LOOSE = 12000, 0.1
+#: Reason of a grip that lasts as long as the path
+END = "end of the path"
+#: Postures of a slice
+ROWS = 12000
 #: A grip of fewer samples is none
 SHORTEST = 3
-#: A hand leans on a compliant hold where the reach is less than this part of its room
-LEAN_FROM = 1.25
-#: The hand's approach and the body's z axis enclose less than 60 degrees: arms do not reach round the body
-LEAST_FACING = 0.5
-KEEPING = Keeping(RATE_PART, ANGLE_ROOM, REACH_ROOM, LEAST_FACING, SHORTEST, LEAN_FROM * REACH_ROOM)
+
+
+def reasons_of(limit_names: Sequence[str], joints: int) -> tuple[str, ...]:
+    """What may end a grip of a limb."""
+    return (*limit_names, "reach", *(f"joint {k} rate" for k in range(1, joints + 1)), END)
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,9 +42,10 @@ class Grips:
         arm, hold, branch: ``[grips]``; hold -1 is gone; branch 0 is theta5 >= 0, 1 is theta5 < 0.
         first, last: samples of the path, both included, ``[grips]``.
         offset: grip g's postures are ``postures[offset[g] : offset[g] + last[g] - first[g] + 1]``.
-        postures: ``[all samples, 6]`` [rad]; joint 6 is 0 where the roll is free.
+        postures: ``[all samples, joints]`` [rad]; the last joint is 0 where the roll is free.
         ends: why each ends: an index into :attr:`reasons`.
         roll: ``[grips]``, number of the hold's allowed rolls; -1 where it is free.
+        reasons: what may end a grip.
     """
 
     arm: Ints
@@ -57,11 +57,9 @@ class Grips:
     postures: Array
     ends: Ints
     roll: Ints
+    reasons: tuple[str, ...] = reasons_of(LIMIT_NAMES, 6)
     _ends: dict[float, list[float]] = field(default_factory=dict, init=False, repr=False)
     _wrists: dict[int, tuple[int, int, Array]] = field(default_factory=dict, init=False, repr=False)
-
-    #: What may end a grip
-    reasons = (*LIMIT_NAMES, "reach", *(f"joint {k} rate" for k in range(1, 7)), "end of the path")
 
     def __len__(self) -> int:
         return len(self.arm)
@@ -116,10 +114,10 @@ class Grips:
         out: Array = first + (inside - low)[..., None] * (self.postures[row + 1] - first)
         return out
 
-    def bent_from(self, angle: float) -> Ints:
-        """First samples at which the elbows are bent by an angle [rad] ``[grips]``; one behind the end for none."""
-        bent = np.append(self.postures[:, 2] <= -angle, True)
-        following = np.minimum.accumulate(np.where(bent, np.arange(len(bent)), len(bent))[::-1])[::-1]
+    def first_where(self, flags: NDArray[np.bool_]) -> Ints:
+        """First samples at which flags of :attr:`postures` hold ``[grips]``; one behind the end for none."""
+        there = np.append(flags, True)
+        following = np.minimum.accumulate(np.where(there, np.arange(len(there)), len(there))[::-1])[::-1]
         out: Ints = np.minimum(following[self.offset] - self.offset + self.first, self.last + 1)
         return out
 
@@ -145,113 +143,72 @@ def grip_slices(walker: Walker, structure: Structure, path: BodyPath, only: Sequ
     Args:
         only: one row of a hold for each arm, where others do not matter.
     """
-    kinematics = ArmKinematics(walker.data)  # type: ignore[arg-type]
+    limb, margins = limb_of(walker), walker.margins
     size, found = max(ROWS // len(path), 1), list[tuple[int, int, int, int, int, int, int, Array]]()
     for arm in range(len(walker.arms)):
         frames = path.poses @ walker.arms[arm].base.homogeneous
-        holds = np.array(only[arm : arm + 1], dtype=np.int64) if only else _near(kinematics, structure, frames)
+        holds = np.array(only[arm : arm + 1], dtype=np.int64) if only else near_holds(limb, structure, frames)
         for begin in range(0, len(holds), size):
             some = holds[begin : begin + size]
-            quick = stretches(kinematics, frames, structure, some, path.spacing, KEEPING)
+            quick = stretches(limb, frames, structure, some, path.spacing, margins, SHORTEST)
             if quick is None:
-                found += _of_arm(kinematics, arm, frames, structure, some, path.spacing)
+                found += _of_arm(limb, margins, arm, frames, structure, some, path.spacing)
             else:
                 found += [(arm, *stretch[:-1], ANY, stretch[-1]) for stretch in quick]
             yield None
     found.sort(key=lambda row: (row[0], row[2], row[1], row[3]))
     columns = list(zip(*found, strict=True)) if found else [()] * 8
-    postures = np.concatenate(columns[7]) if found else np.zeros((0, 6))
+    joints = len(limb.position_limits)
+    postures = np.concatenate(columns[7]) if found else np.zeros((0, joints))
     lengths = np.array([len(rows) for rows in columns[7]], dtype=int)
     offset = np.concatenate([[0], np.cumsum(lengths)[:-1]]) if found else np.zeros(0)
-    whole = [np.array(column, dtype=np.int64) for column in columns[:7]]
-    arms, rows, branch, first, last, ends, rolls = whole
-    return Grips(arms, rows, branch, first, last, offset.astype(np.int64), postures, ends, rolls)
-
-
-def _near(kinematics: ArmKinematics, structure: Structure, frames: Array) -> Ints:
-    """Rows of the holds that an arm may reach from some of its base's frames."""
-    far = _length(kinematics) + LOOSE
-    # From the neck, where the arm begins to move
-    necks = frames[:, :3, 3] + frames[:, :3, 2] * kinematics.data.neck_length
-    # Samples that are LOOSE apart stand for those between them
-    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(necks, axis=0), axis=1))])
-    some = np.unique(np.searchsorted(way, np.arange(0.0, way[-1] + LOOSE, LOOSE), side="right") - 1)
-    square = ((structure.positions[None] - necks[some, None]) ** 2).sum(axis=2).min(axis=0)
-    return np.nonzero(square < far**2)[0]
-
-
-def _length(kinematics: ArmKinematics) -> float:
-    data = kinematics.data
-    return data.shoulder_offset + data.upper_arm_length + data.forearm_length + data.hand_length
+    arms, rows, branch, first, last, ends, rolls = (np.array(column, dtype=np.int64) for column in columns[:7])
+    reasons = reasons_of(limb.limit_names, joints)
+    return Grips(arms, rows, branch, first, last, offset.astype(np.int64), postures, ends, rolls, reasons)
 
 
 def _of_arm(
-    kinematics: ArmKinematics, arm: int, frames: Array, structure: Structure, among: Ints, spacing: float
+    limb: BodyLimb, margins: Margins, arm: int, frames: Array, structure: Structure, among: Ints, spacing: float
 ) -> Iterator[tuple[int, int, int, int, int, int, int, Array]]:
     """(arm, hold, branch, first, last, reason of the end, roll, postures) of every grip of an arm on some holds."""
-    # In the arm's frame, hold by hold and sample by sample ``[holds, samples, 3]``
-    turn, data, count = frames[:, :3, :3], kinematics.data, len(frames)
-    flat = turn.transpose(1, 0, 2).reshape(3, -1)
-    points = (structure.positions[among] @ flat).reshape(-1, count, 3)
-    points -= np.einsum("nj,nji->ni", frames[:, :3, 3], turn)
-    axes = (structure.axes[among] @ flat).reshape(-1, count, 3)
-    x, y, z = points[..., 0], points[..., 1], points[..., 2] - data.neck_length
-    near = (axes[..., 2] > LEAST_FACING) & (x * x + y * y + z * z < _length(kinematics) ** 2)
-    points, axes, (holds, samples) = points[near], axes[near], np.nonzero(near)
-    axes = leaning(kinematics, points, axes, structure.tilts[among[holds]], LEAN_FROM * REACH_ROOM)
-    reached = kinematics.wrist_reach(kinematics.wrist_of(points, axes)) > REACH_ROOM
-    points, axes, holds, samples = points[reached], axes[reached], among[holds[reached]], samples[reached]
+    lean_for = margins.lean_from * margins.held_reach
+    there = held(limb, structure, frames, among, reach=margins.held_reach, facing=margins.facing, lean_for=lean_for)
+    holds, samples, good, count = there.hold, there.pose, there.within(margins.held_angle), len(frames)
     if not len(samples):
         return
-    postures, solved = _postures(kinematics, structure, holds, points, axes, turn[samples])
-    margins = kinematics.margins(postures)
-    margins[..., 5] = np.inf  # joint 6 turns the hand about its own axis: free, or see rolls.py
-    good = solved & np.logical_and.reduce([margins[..., k] > ANGLE_ROOM for k in range(margins.shape[-1])])
-    most = RATE_PART * spacing * np.array(data.joint_rates)[:5]
+    most = margins.held_rate * spacing * np.array(limb.joint_rates)
+    free, names = len(most) - 1, len(limb.limit_names)
     neighbours = (holds[1:] == holds[:-1]) & (samples[1:] == samples[:-1] + 1)
-    for branch in range(postures.shape[1]):
-        q, fits = postures[:, branch], good[:, branch]
-        slow = [np.abs(q[1:, k] - q[:-1, k]) <= most[k] for k in range(5)]
+    for branch in range(there.q.shape[1]):
+        q, fits = there.q[:, branch], good[:, branch]
+        slow = [np.abs(q[1:, k] - q[:-1, k]) <= most[k] for k in range(free)]
         joined = np.logical_and.reduce([neighbours, fits[1:], fits[:-1], *slow])
         begins = np.nonzero(np.concatenate([[True], ~joined]))[0]
         ends = np.concatenate([begins[1:], [len(q)]]) - 1
         long = fits[begins] & (ends - begins + 1 >= SHORTEST)
         for begin, end in zip(begins[long].tolist(), ends[long].tolist(), strict=True):
-            reason = _reason(samples, margins[:, branch], q, most, neighbours, end, count)
+            reason = _reason(there, branch, most[:free], neighbours, end, count)
             first, last = int(samples[begin]), int(samples[end])
             hold, rows = int(holds[begin]), slice(begin, end + 1)
             if structure.free_rolls[hold]:
                 yield arm, hold, branch, first, last, reason, ANY, q[rows]
                 continue
-            room, step = data.position_limits[5] - ANGLE_ROOM, RATE_PART * spacing * data.joint_rates[5]
-            for one in turns(q[rows][:, 5], structure.holds[hold].rolls, room, step, SHORTEST):
-                held = q[rows][one.first : one.last + 1].copy()
-                held[:, 5] = one.angles
-                why = {"limit": 5, "rate": len(LIMIT_NAMES) + 6}.get(one.ends, reason)
-                yield arm, hold, branch, first + one.first, first + one.last, why, one.roll, held
+            limit = limb.position_limits[free] - margins.held_angle
+            for one in turns(q[rows][:, free], structure.holds[hold].rolls, limit, most[free], SHORTEST):
+                turned = q[rows][one.first : one.last + 1].copy()
+                turned[:, free] = one.angles
+                why = {"limit": free, "rate": names + 1 + free}.get(one.ends, reason)
+                yield arm, hold, branch, first + one.first, first + one.last, why, one.roll, turned
 
 
-def _postures(
-    kinematics: ArmKinematics, structure: Structure, holds: Ints, points: Array, axes: Array, turn: Array
-) -> tuple[Array, NDArray[np.bool_]]:
-    """Postures of both branches and whether they are possible; ``turn`` are rotations of the arm's base."""
-    free = np.array(structure.free_rolls)[holds]
-    if free.all():
-        return kinematics.inverse_axis(points, axes)
-    references = np.einsum("nji,nj->ni", turn, structure.references[holds])
-    postures, solved = kinematics.inverse(hand_poses(points, axes, references))
-    postures[free, :, 5] = 0.0
-    return postures, solved
-
-
-def _reason(samples: Ints, margins: Array, q: Array, most: Array, neighbours: Array, end: int, count: int) -> int:
+def _reason(there: Held, branch: int, most: Array, neighbours: NDArray[np.bool_], end: int, count: int) -> int:
     """Why a grip ends after row ``end``: an index into ``Grips.reasons``."""
-    names = len(LIMIT_NAMES)
-    if samples[end] == count - 1:
-        return names + 7
-    if end + 1 == len(samples) or not neighbours[end]:
+    q, names = there.q[:, branch], int(there.margins.shape[-1])
+    if there.pose[end] == count - 1:
+        return names + len(q[0]) + 1
+    if end + 1 == len(q) or not neighbours[end]:
         return names
-    used = np.abs(q[end + 1, :5] - q[end, :5]) / most
+    used = np.abs(q[end + 1, : len(most)] - q[end, : len(most)]) / most
     if (used > 1.0).any():
         return names + 1 + int(np.argmax(used))
-    return int(np.argmin(margins[end + 1]))
+    return int(np.argmin(there.margins[end + 1, branch]))

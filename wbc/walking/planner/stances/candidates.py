@@ -86,9 +86,9 @@ class Outlook:
 
 
 def following(
-    fan: Fan, level: Sequence[tuple[Key, Node]], outlook: Outlook, ways: int | None
+    fan: Fan, level: Sequence[tuple[Key, Node]], outlook: Outlook, most: int | None
 ) -> Iterator[tuple[Key, list[Node]]]:
-    """Stances that moves lead to, the promising ones first, each with so many ways to it, the earliest ones first."""
+    """Stances that moves lead to, the promising ones first, each by at most so many moves, the earliest ones first."""
     if not len(fan):
         return
     keys = np.array([key for key, _ in level], dtype=np.int64)[fan.parent]
@@ -102,7 +102,7 @@ def following(
     promise = outlook.promise(keys[first], fan.land[first], delays[first])
     for place in outlook.order(keys[first], fan.land[first], promise).tolist():
         begin, end = int(heads[place]), int(ends[place])
-        mine = rows[begin : end if ways is None else min(begin + ways, end)].tolist()
+        mine = rows[begin : end if most is None else min(begin + most, end)].tolist()
         parents = [level[fan.parent[row]][0] for row in mine]
         nodes = [
             Node(int(fan.land[row]), int(delays[row]), parent, fan.move(row))

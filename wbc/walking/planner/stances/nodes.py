@@ -1,15 +1,60 @@
-"""What a search over stances is made of: stances with their way, which grips go together, and what was found."""
+"""What a search over stances is made of: stances with their moves, which grips go together, what is asked about swings,
+and what was found.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
-from wbc.walking.planner.grips.conflicts import ArmClearance
+import numpy as np
+from numpy.typing import NDArray
+
+from wbc.validation import Array
 from wbc.walking.planner.grips.table import Ints
-from wbc.walking.planner.swings.move import Key, Move
+from wbc.walking.planner.slices import Slices
+from wbc.walking.planner.swings.move import Chosen, Key, Move, Swing
+
+
+class Conflicts(Protocol):
+    """Which grips do not go together, and when."""
+
+    def prepare(self, pairs: Iterable[tuple[int, int]], /) -> None:
+        """Look at pairs of grips together, as they will be asked about."""
+
+    def first_conflict(self, one: int, other: int, sample: int, /) -> int:
+        """The first sample from ``sample`` on at which two grips do not go together; one behind every path for none."""
+
+    def free_from(self, one: int, other: int, sample: int, /) -> int:
+        """The first sample from ``sample`` on at which they do."""
+
+
+class SwingTable(Protocol):
+    """Swings between grips: how long they take, and whether there is one."""
+
+    @property
+    def touch(self) -> int:
+        """Samples from when a hand is on its hold until it holds."""
+
+    def estimate(self, sources: Ints, targets: Ints, lift: Ints, land: Ints, /) -> Array:
+        """About how long swings take that are lifted and land at about these samples ``[m]`` [s]."""
+
+    def soonest(self) -> Ints:
+        """First samples at which hands land on grips ``[grips]``."""
+
+    def lands(self, targets: Ints, samples: Ints, /) -> NDArray[np.bool_]:
+        """Whether hands can land on grips at samples ``[m]``."""
+
+    def slices(self, swings: Iterable[Swing], /) -> Slices[None]:
+        """Look at swings together, in slices of some milliseconds."""
+
+    def choose(self, swing: Swing, /) -> Chosen | None:
+        """How a hand swings; None where it cannot."""
+
+    def correct(self, move: Move, duration: float, possible: bool, /) -> None:
+        """A swing takes another time [s], or is not possible after all."""
 
 
 class Node(NamedTuple):
@@ -42,7 +87,7 @@ class Found:
     blocking: tuple[int, ...]
 
 
-def way_to(levels: Sequence[Mapping[Key, Node]], key: Key) -> tuple[Key, tuple[Move, ...]]:
+def moves_to(levels: Sequence[Mapping[Key, Node]], key: Key) -> tuple[Key, tuple[Move, ...]]:
     """The stance of the first level, and the moves from it, that lead to one of the last."""
     moves: list[Move] = []
     for level in levels[:0:-1]:
@@ -54,15 +99,15 @@ def way_to(levels: Sequence[Mapping[Key, Node]], key: Key) -> tuple[Key, tuple[M
     return key, tuple(reversed(moves))
 
 
-class StanceRooms:
-    """Last samples of stances, as their grips end or their arms come too near to each other.
+class StanceEnds:
+    """Last samples of stances, as their grips end or conflict.
 
     Args:
-        clearance: of pairs of grips. last: of each grip. spared: the same, less what is spared for landing.
+        conflicts: of pairs of grips. last: of each grip. spared: the same, less what is spared for landing.
     """
 
-    def __init__(self, clearance: ArmClearance, last: Ints, spared: Ints) -> None:
-        self._clearance, self._last, self._spared = clearance, last, spared
+    def __init__(self, conflicts: Conflicts, last: Ints, spared: Ints) -> None:
+        self._conflicts, self._last, self._spared = conflicts, last, spared
 
     def among(self, others: Sequence[int], sample: int) -> int:
         """Last sample that the grips of some arms can hold together, less what is spared."""
@@ -75,20 +120,20 @@ class StanceRooms:
     def limits(self, key: Key, sample: int) -> tuple[list[int], list[int]]:
         """For each arm the last sample that the others can hold, less what is spared, and that it can hold itself."""
         pairs, free = list(combinations(key, 2)), self._free(key, sample)
-        rooms, ends = [], []
+        until, ends = [], []
         for grip in key:
             mine = [end for pair, end in zip(pairs, free, strict=True) if grip in pair]
             rest = [end for pair, end in zip(pairs, free, strict=True) if grip not in pair]
-            rooms.append(min([*(int(self._spared[g]) for g in key if g != grip), *rest]))
+            until.append(min([*(int(self._spared[g]) for g in key if g != grip), *rest]))
             ends.append(min([int(self._last[grip]), *mine]))
-        return rooms, ends
+        return until, ends
 
     def clear_from(self, grip: int, others: Sequence[int], sample: int) -> int:
-        """The first sample from a sample on at which an arm is not in the way of others."""
-        while (after := max(self._clearance.free_from(grip, other, sample) for other in others)) > sample:
+        """The first sample from a sample on at which an arm is clear of others."""
+        while (after := max(self._conflicts.free_from(grip, other, sample) for other in others)) > sample:
             sample = after
         return sample
 
     def _free(self, grips: Sequence[int], sample: int) -> list[int]:
-        """Last samples before pairs get in each other's way."""
-        return [self._clearance.first_conflict(*pair, sample) - 1 for pair in combinations(grips, 2)]
+        """Last samples before pairs conflict."""
+        return [self._conflicts.first_conflict(*pair, sample) - 1 for pair in combinations(grips, 2)]

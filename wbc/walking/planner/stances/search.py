@@ -19,99 +19,77 @@ import time
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import combinations, islice
-from math import sin
-from typing import ClassVar
+from typing import Generic, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-from wbc.robots import Walker
 from wbc.walking.body_path import BodyPath
-from wbc.walking.holds.structure import Structure
-from wbc.walking.planner.grips.conflicts import ArmClearance
-from wbc.walking.planner.grips.table import Grips, Ints
+from wbc.walking.planner.grips.table import Grips
 from wbc.walking.planner.slices import Slices, drained
 from wbc.walking.planner.stances.candidates import QUANTUM, Fan, Outlook, following
-from wbc.walking.planner.stances.nodes import Found, Node, StanceRooms, way_to
-from wbc.walking.planner.swings.move import Key, Move
-from wbc.walking.planner.swings.swings import SETTLE, Swing, Swings
+from wbc.walking.planner.stances.nodes import Conflicts, Found, Node, StanceEnds, SwingTable, moves_to
+from wbc.walking.planner.swings.move import Key, Move, Swing
 
 __all__ = ["Found", "Node", "StanceSearch"]
 
-#: Hands land at least INSIDE samples inside a grip, wait for it at most HOVER [s], with |sin theta5| of at least BENT
-INSIDE, HOVER, BENT = 1, 0.75, 0.08
-#: and the elbow bent by at least ELBOW [rad]: joints 2 and 3 of an arm that is nearly straight correct slowly
-ELBOW = 0.5
 #: Hands land so many samples before a grip of another one ends; the body would slow down before it
 SPARE = 2
-#: What a swing usually takes, and how much more than enough time for swings is worth something [s]
+#: Hands land so many samples before the end of a grip at least
+INSIDE = 1
+#: What a swing usually takes (the median of bench.walk.fits is 2.4 s, over all grips and not those of plans), and how
+#: much more than enough time for swings is worth something [s]
 USUAL, SLACK = 2.1, 0.5
-#: Ways to one stance that are looked at, and stances that are checked together, in widths
-WAYS, PARTS = 2, 2
+#: Moves to one stance that are looked at, and stances that are checked together, in widths
+MOVES, PARTS = 2, 2
 #: Stances, and pairs of grips, of one slice of the search
 NODES, PAIRS = 16, 96
 #: Arm, grips and sample of a swing that was looked at
 Asked = tuple[int, int, int, int]
+S = TypeVar("S", bound=SwingTable)
 
 
-class StanceSearch:
-    """A search over the grips of one path.
+class StanceSearch(Generic[S]):
+    """A search over the grips of one path; it knows grips, their conflicts and their swings, and no robot.
 
     Args:
+        path, grips: of the body, and what can be held along it. conflicts: of the grips. swings: between them.
+        hover: how long a hand may be in the air longer than it needs, until its next grip begins [s].
+        patient: hands may wait in the air for any time, also for others to let them land.
         longest_delay: of one swing [s]; 0: the body never slows down.
-        longest_wait: for which a hand may be in the air longer than it needs, until its next grip begins [s].
         width: stances kept of each number of re-grasps, None: all.
         first: row of an arm and of a hold: the first move, whether it is needed or not; None: any.
-        known: a search over the same grips, whose swings and distances need not be computed again.
+        spare: samples before the end of a grip until which other hands land.
     """
-
-    spare: ClassVar[int] = SPARE
-    clearance: ArmClearance
-    swings: Swings
 
     def __init__(
         self,
-        walker: Walker,
-        structure: Structure,
         path: BodyPath,
         grips: Grips,
+        conflicts: Conflicts,
+        swings: S,
         *,
+        hover: float,
+        patient: bool = False,
         longest_delay: float = np.inf,
-        longest_wait: float = HOVER,
         width: int | None = 200,
         first: tuple[int, int] | None = None,
-        known: StanceSearch | None = None,
+        spare: int = SPARE,
     ) -> None:
-        self.walker, self.structure, self.path, self.grips = walker, structure, path, grips
-        if known is None:
-            self._equip()
-        else:
-            self.clearance, self.swings = known.clearance, known.swings
+        self.path, self.grips, self.conflicts, self.swings = path, grips, conflicts, swings
         self._usual = round(USUAL / path.spacing)
         codes = grips.hold * (1 + grips.branch.max(initial=0)) + grips.branch
         self._outlook = Outlook(grips.last, codes, len(path) - 1, self._usual, SLACK / path.spacing, path.spacing)
         # Levels of the last search, and swings (arm, source, target, lift) that each but the first asked for
         self._levels, self._asked = list[dict[Key, Node]](), list[set[Asked]]()
-        self.longest_delay, self.longest_wait, self.width, self.first = longest_delay, longest_wait, width, first
+        self.patient, self._longest_wait = patient, np.inf if patient else hover
+        self.longest_delay, self.width, self.first = longest_delay, width, first
         self.expanded = 0
         # The end of the path is no limit of the arm
         lasting = grips.last == len(path) - 1
         self.latest = np.where(lasting, grips.last, grips.last - INSIDE)
-        self.rooms = StanceRooms(self.clearance, grips.last, np.where(lasting, grips.last, grips.last - self.spare))
-        # The hand is on its hold before it is latched
-        self._touch = round((walker.tolerances.latch_time + SETTLE) / path.spacing)
-        self.soonest = self._landings()
-        self._by_arm = [grips.of_arm(k) for k in range(len(walker.arms))]
-
-    def _landings(self) -> Ints:
-        """First samples at which hands land on grips."""
-        out: Ints = np.maximum(self.grips.first + INSIDE, self.grips.bent_from(ELBOW) + self._touch)
-        return out
-
-    def _equip(self) -> None:
-        """What the search asks about conflicts of grips, and about swings."""
-        self.clearance = ArmClearance(self.walker, self.grips)
-        self.swings = Swings(self.walker, self.structure, self.path, self.grips, self.clearance)
+        self.ends = StanceEnds(conflicts, grips.last, np.where(lasting, grips.last, grips.last - spare))
+        self.soonest = swings.soonest()
+        self._by_arm = [grips.of_arm(k) for k in range(int(grips.arm.max(initial=-1)) + 1)]
 
     def run(self, starts: Sequence[Sequence[int]], sample: int = 0, deadline: float | None = None) -> Found:
         """The fewest moves from one of some stances (one grip an arm each) at a sample; after the deadline, of
@@ -143,7 +121,7 @@ class StanceSearch:
 
     def correct(self, move: Move, duration: float, possible: bool) -> None:
         """A move takes another time [s], or is not possible; what was searched without looking at it is kept."""
-        self.swings.correct(move.arm, move.source, move.target, move.lift, move.way, duration, possible)
+        self.swings.correct(move, duration, possible)
         for depth, asked in enumerate(self._asked):
             if (move.arm, move.source, move.target, move.lift) in asked:
                 self._levels, self._asked = self._levels[: depth + 1], self._asked[:depth]
@@ -155,7 +133,7 @@ class StanceSearch:
             parts += self._moves(whole, range(begin, min(begin + NODES, len(whole))))
             yield None
         self.expanded += len(whole)
-        order = following(Fan.joined(parts), whole, self._outlook, WAYS if self.width else None) if parts else iter(())
+        order = following(Fan.joined(parts), whole, self._outlook, MOVES if self.width else None) if parts else iter(())
         kept: dict[Key, Node] = {}
         while part := list(islice(order, PARTS * self.width if self.width else None)):
             found = yield from self._prepare(level, part)
@@ -171,7 +149,7 @@ class StanceSearch:
         return self._best(kept), asked
 
     def _best(self, kept: dict[Key, Node]) -> dict[Key, Node]:
-        """The promising ones of checked stances: arms that get in each other's way end them."""
+        """The promising ones of checked stances: arms that conflict end them."""
         if not kept:
             return {}
         keys = np.array(list(kept), dtype=np.int64)
@@ -187,63 +165,63 @@ class StanceSearch:
         """The swings that lead to some stances, and what their check needs, computed together."""
         pairs = [pair for key, _ in part for pair in combinations(key, 2)]
         for begin in range(0, len(pairs), PAIRS):
-            self.clearance.prepare(pairs[begin : begin + PAIRS])
+            self.conflicts.prepare(pairs[begin : begin + PAIRS])
             yield None
         found = [[self._swing(level, key, node) for node in nodes] for key, nodes in part]
         yield from self.swings.slices(swing for swings in found for swing in swings if swing is not None)
         return found
 
     def _swing(self, level: dict[Key, Node], key: Key, node: Node) -> Swing | None:
-        """The swing that leads to a stance; None where the arms are in each other's way when it lands."""
+        """The swing that leads to a stance; None where the arms conflict when it lands."""
         move, parent = node.move, node.parent
         if move is None or parent is None:
             return None
         others = tuple(g for k, g in enumerate(key) if k != move.arm)
-        room, soonest = self.rooms.among(others, level[parent].sample), int(self.soonest[move.target])
-        free = self.rooms.clear_from(move.target, others, move.land)
+        until, soonest = self.ends.among(others, level[parent].sample), int(self.soonest[move.target])
+        free = self.ends.clear_from(move.target, others, move.land)
         if free > move.land:
-            # Only a hand that may wait long lands when the others are out of its way
-            soonest = free + self._touch
-            if self.longest_wait <= HOVER or soonest > min(room, int(self.latest[move.target])):
+            # Only a hand that may wait long lands when the others let it
+            soonest = free + self.swings.touch
+            if not self.patient or soonest > min(until, int(self.latest[move.target])):
                 return None
-        return Swing(move.arm, move.source, move.target, move.lift, room, others, soonest)
+        return Swing(move.arm, move.source, move.target, move.lift, until, others, soonest)
 
     def _moves(self, level: Sequence[tuple[Key, Node]], rows: range) -> list[Fan]:
         """Moves that estimates allow from some stances of a level, arm by arm."""
         grips, spacing, some = self.grips, self.path.spacing, [level[k] for k in rows]
         keys, samples = np.array([key for key, _ in some]), np.array([node.sample for _, node in some])
-        rooms, ends = (
-            np.array(x) for x in zip(*(self.rooms.limits(key, node.sample) for key, node in some), strict=True)
+        latest, ends = (
+            np.array(x) for x in zip(*(self.ends.limits(key, node.sample) for key, node in some), strict=True)
         )
         out, first = [], self.first if level[0][1].parent is None else None
         for arm, targets in enumerate(self._by_arm):
-            room, end, source = rooms[:, arm], ends[:, arm], keys[:, arm]
+            until, end, source = latest[:, arm], ends[:, arm], keys[:, arm]
             useful = grips.last[targets] > grips.last[source][:, None]
             if first:
                 useful = np.repeat(((grips.hold[targets] == first[1]) & (arm == first[0]))[None], len(some), axis=0)
-            useful &= (grips.first[targets] < room[:, None]) & (samples <= np.minimum(room, end))[:, None]
+            useful &= (grips.first[targets] < until[:, None]) & (samples <= np.minimum(until, end))[:, None]
             for other in np.delete(keys, arm, axis=1).T:
                 useful &= grips.hold[targets] != grips.hold[other][:, None]
             row, column = np.nonzero(useful)
             if not len(row):
                 continue
-            source, target, sample, room = source[row], targets[column], samples[row], room[row]
-            stop, soonest = np.minimum(end[row], room), self.soonest[target]
+            source, target, sample, until = source[row], targets[column], samples[row], until[row]
+            stop, soonest = np.minimum(end[row], until), self.soonest[target]
             about = np.minimum(np.maximum(sample, soonest - self._usual), stop)
             duration = self.swings.estimate(source, target, about, np.maximum(about + self._usual, soonest))
             count = np.ceil(duration / spacing).astype(np.int64)
             lift = np.minimum(np.maximum(sample, soonest - count), stop)
             land = np.maximum(lift + count, soonest)
-            hovers, delay = (land - lift - count) * spacing, np.maximum(land - room, 0) * spacing
-            land = np.minimum(land, room)
+            hovers, delay = (land - lift - count) * spacing, np.maximum(land - until, 0) * spacing
+            land = np.minimum(land, until)
             fits = (land <= self.latest[target]) & (land >= soonest) & (delay <= self.longest_delay)
-            fits &= (hovers <= self.longest_wait) & self._bent(target, land)
+            fits &= (hovers <= self._longest_wait) & self.swings.lands(target, land)
             fan = Fan(row + rows.start, np.full_like(row, arm), source, target, lift, land, duration, delay)
             out.append(fan.of(np.nonzero(fits)[0]))
         return out
 
     def _checked(self, level: dict[Key, Node], node: Node, swing: Swing | None) -> Node | None:
-        """The node with its swing computed along its way, None where it is not possible."""
+        """The node with its swing computed, None where it is not possible."""
         move, parent = node.move, node.parent
         if move is None or parent is None:
             return node
@@ -251,27 +229,22 @@ class StanceSearch:
         chosen = None if swing is None else self.swings.choose(swing)
         if swing is None or chosen is None:
             return None
-        duration, room, first, last = chosen.duration, swing.room, swing.soonest, int(self.latest[move.target])
+        duration, until, first, last = chosen.duration, swing.until, swing.soonest, int(self.latest[move.target])
         land = max(move.lift + int(np.ceil(duration / self.path.spacing)), first)
-        late = max(land - room, 0) * self.path.spacing
-        land = min(land, room)
-        if late > self.longest_delay or not first <= land <= last or not self.bent_at(move.target, land):
+        late = max(land - until, 0) * self.path.spacing
+        land = min(land, until)
+        if late > self.longest_delay or not first <= land <= last or not self.lands_at(move.target, land):
             return None
-        better = Move(move.arm, move.source, move.target, move.lift, land, duration, late, chosen.way)
+        better = Move(move.arm, move.source, move.target, move.lift, land, duration, late, chosen.curve)
         return Node(land, before.delay + round(late / QUANTUM), parent, better)
 
-    def _bent(self, targets: Ints, samples: Ints) -> NDArray[np.bool_]:
-        """Whether the wrist is bent enough to land: joint 4 turns the hand's axis only then."""
-        out: NDArray[np.bool_] = np.abs(np.sin(self.grips.posture(targets, samples - self._touch)[..., 4])) >= BENT
-        return out
-
-    def bent_at(self, target: int, sample: int) -> bool:
-        """The same of one."""
-        return abs(sin(self.grips.posture_at(target, sample - self._touch).item(4))) >= BENT
+    def lands_at(self, target: int, sample: int) -> bool:
+        """Whether a hand can land on one grip at one sample."""
+        return bool(self.swings.lands(np.array([target]), np.array([sample]))[0])
 
     def until(self, key: Sequence[int], sample: int) -> int:
         """Last sample that a stance can hold, from a sample on."""
-        return self.rooms.until(key, sample)
+        return self.ends.until(key, sample)
 
     def shortened(self, found: Found, count: int) -> Found:
         """What was found up to so many moves."""
@@ -296,5 +269,5 @@ class StanceSearch:
             depth = -depth
         last = self.until(key, levels[depth][key].sample)
         blocking = tuple(g for g in key if self.grips.last[g] == last)
-        start, moves = way_to(levels[: depth + 1], key)
+        start, moves = moves_to(levels[: depth + 1], key)
         return Found(start, moves, complete, min(last, len(self.path) - 1), self.expanded, blocking)

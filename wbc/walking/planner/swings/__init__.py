@@ -1,1 +1,1 @@
-"""Swings: the way of a hand from hold to hold, its joints, least time, clearance and law."""
+"""Swings: the curve of a hand from hold to hold, its joints, least time, clearance and law."""

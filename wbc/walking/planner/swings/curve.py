@@ -1,4 +1,4 @@
-"""The way of a swinging hand: straight off its hold along the normal, across, and straight onto the next hold."""
+"""The curve of a swinging hand: straight off its hold along the normal, across, and straight onto the next hold."""
 
 from __future__ import annotations
 
@@ -7,8 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from wbc.robots import WalkerData
+from wbc.robots import Margins, Walker
 from wbc.validation import Array
+from wbc.walking.arms.puma import limb_of
 from wbc.walking.holds.structure import Structure
 from wbc.walking.native import compiled
 from wbc.walking.native.compiled import plain_surface
@@ -18,13 +19,11 @@ from wbc.walking.planner.grips.table import Ints
 UPRIGHT = 0.1
 #: The rise is h (1 - (1 - 2x)^STEEP)
 STEEP = 2
-#: How far a hand may be across its hold [m] where it comes out of the distance at which it may be near the structure,
-#: and what it then has besides the clearance [m]
-ACROSS, SPARE = 0.0015, 0.003
-#: Points at which the room above the structure is measured
+#: Points at which the height above the structure is measured
 LOOKS = 9
-#: Ways that are tried, the first that is clear is taken: how much higher in the middle [m], and what part of the arc
-WAYS = ((0.0, 1.0), (0.0, 0.6), (0.0, 0.2), (0.1, 1.0), (0.1, 0.4), (0.0, 1.4))
+#: Curves that are tried, the first that is clear is taken: how much higher in the middle, in ``Margins.higher``, and
+#: what part of the arc. ``python -m bench.walk.fits`` prints how often each is the first
+ALTERNATIVES = ((0.0, 1.0), (0.0, 0.6), (0.0, 0.2), (1.0, 1.0), (1.0, 0.4), (0.0, 1.4))
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,11 +43,11 @@ class Pivots:
 class Curves:
     """m curves in the structure's frame, over x in [0, 1]:
 
-        p = way(y) + (r ((1 - y) h_a + y h_b) + 4 y (1 - y) l) u
+        p = c(y) + (r ((1 - y) h_a + y h_b) + 4 y (1 - y) l) u
         r = 1 - (1 - 2 x)^2,     u = -(1 - y) z_a - y z_b,     y = step((x - c) / (1 - 2 c))
 
     y, a third-degree step, is 0 over the first c of the curve and 1 over the last, so that the hand leaves and arrives
-    along the normals. way(y) is the part w of the way from the chord a b to an arc round the axis of the arm's first
+    along the normals. c(y) lies the part w between the chord a b and an arc round the axis of the arm's first
     joint, on which distance and angle change evenly: there joint 1 turns evenly, and the hand comes no nearer to it.
 
     Attributes:
@@ -93,7 +92,7 @@ class Curves:
         turn, origin = self.pivots.frames[:, :3, :3], self.pivots.frames[:, :3, 3]
         first, last = (np.einsum("mji,mj->mi", turn, p - origin) for p in (self.begin, self.end))
         angle = np.arctan2(first[:, 1], first[:, 0])
-        # The way round that joint 1 turns
+        # The direction in which joint 1 turns
         change = np.arctan2(last[:, 1], last[:, 0]) - angle
         change += 2 * np.pi * np.round((self.pivots.turn - change) / (2 * np.pi))
         far = np.hypot(first[:, 0], first[:, 1]), np.hypot(last[:, 0], last[:, 1])
@@ -112,50 +111,58 @@ def step(part: Array) -> Array:
     return out
 
 
-def crossing_height(data: WalkerData) -> float:
+def crossing_height(walker: Walker) -> float:
     """How high above the structure a hand is to cross [m]: its radius and the clearance, and not under the published
     height.
     """
-    return max(data.lift_height, data.hand_radius + data.clearance) + SPARE
+    tolerances, radius = walker.tolerances, limb_of(walker).radii[-1]
+    return max(tolerances.lift_height, radius + tolerances.clearance) + walker.margins.crossing
 
 
-def curves(structure: Structure, begin: Ints, end: Ints, pivots: Pivots, data: WalkerData, way: int = 0) -> Curves:
-    """Curves between holds, given by rows of the structure; ``way`` is one of :data:`WAYS`."""
-    more, part = WAYS[way]
+def alternatives(margins: Margins) -> Array:
+    """:data:`ALTERNATIVES` with heights in m ``[alternatives, 2]``."""
+    return np.array(ALTERNATIVES) * [margins.higher, 1.0]
+
+
+def curves(
+    walker: Walker, structure: Structure, begin: Ints, end: Ints, pivots: Pivots, alternative: int = 0
+) -> Curves:
+    """Curves between holds, given by rows of the structure; one of :data:`ALTERNATIVES`."""
+    more, part = alternatives(walker.margins)[alternative].tolist()
     a, b = structure.positions[begin], structure.positions[end]
-    height = crossing_height(data)
+    height, across = crossing_height(walker), walker.margins.across
     none, surface = np.zeros((len(a), 2)), plain_surface(structure)
     flat = Curves(a, b, structure.axes[begin], structure.axes[end], none, none[:, 0], pivots, part)
     if surface is not None:
-        rise, lift = _raised(surface, flat, height)
+        rise, lift = _raised(surface, flat, height, across)
         return replace(flat, rise=rise, lift=lift + more)
-    flat = replace(flat, rise=np.repeat(_rise(flat, height)[:, None], 2, axis=1))
+    flat = replace(flat, rise=np.repeat(_rise(flat, height, across)[:, None], 2, axis=1))
     return replace(flat, lift=_lift(structure, flat, height) + more)
 
 
 def between(
+    walker: Walker,
     structure: Structure,
     ends: tuple[Array, Array],
     axes: tuple[Array, Array],
     free: Array,
     pivots: Pivots,
-    data: WalkerData,
 ) -> Curves:
-    """Ways of hands of which one end or both are in the air.
+    """Curves of hands of which one end or both are in the air.
 
     Args:
         ends, axes: places and z axes of the hands at the beginning and the end, ``[m, 3]`` each. free: which are in
             the air ``[m, 2]``.
     """
-    height, flat = crossing_height(data), Curves(*ends, *axes, np.zeros(free.shape), np.zeros(len(free)), pivots, 1.0)
+    height, flat = crossing_height(walker), Curves(*ends, *axes, np.zeros(free.shape), np.zeros(len(free)), pivots, 1.0)
     # From the air it need not rise more than it lacks, but must come down along the hold's normal
     lack = np.stack([np.maximum(height - structure.clearance(end), 0.0) for end in ends], axis=1)
-    rise = _rise(flat, height)[:, None]
+    rise = _rise(flat, height, walker.margins.across)[:, None]
     flat = replace(flat, rise=np.where(free, rise * lack / height, rise))
     return replace(flat, lift=_lift(structure, flat, height))
 
 
-def _raised(surface: compiled.Numbers, flat: Curves, height: float) -> tuple[Array, Array]:
+def _raised(surface: compiled.Numbers, flat: Curves, height: float, aside: float) -> tuple[Array, Array]:
     """Rise and lift of curves over a surface, by compiled code."""
     library, count = compiled.library(), len(flat.begin)
     assert library is not None
@@ -166,7 +173,7 @@ def _raised(surface: compiled.Numbers, flat: Curves, height: float) -> tuple[Arr
         surface,
         ctypes.c_long(count),
         *map(compiled.at, given),
-        *(ctypes.c_double(number) for number in (flat.part, height, ACROSS, UPRIGHT)),
+        *(ctypes.c_double(number) for number in (flat.part, height, aside, UPRIGHT)),
         ctypes.c_long(len(_SPAN)),
         compiled.at(_SPAN_ACROSS),
         ctypes.c_long(LOOKS),
@@ -178,11 +185,11 @@ def _raised(surface: compiled.Numbers, flat: Curves, height: float) -> tuple[Arr
     return rise, lift
 
 
-def _rise(flat: Curves, height: float) -> Array:
-    """h with which hands are at ``height`` [m] where they have come ACROSS."""
+def _rise(flat: Curves, height: float, aside: float) -> Array:
+    """h with which hands are at ``height`` [m] where they have come ``aside`` [m]."""
     points = flat.at(_SPAN)
     spans = np.sqrt((np.diff(points, axis=1) ** 2).sum(axis=2)).sum(axis=1)
-    part = np.clip(ACROSS / np.maximum(spans, 1e-9), 0.0, 0.5)
+    part = np.clip(aside / np.maximum(spans, 1e-9), 0.0, 0.5)
     x = UPRIGHT + (1 - 2 * UPRIGHT) * np.interp(part, _HALF_STEPS, _HALF)
     out: Array = height / (1.0 - (1.0 - 2.0 * x) ** STEEP)
     return out

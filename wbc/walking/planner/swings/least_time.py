@@ -1,35 +1,37 @@
-"""How fast a hand can swing along its way while the body moves: the least time under the limits of joints 1 to 5."""
+"""How fast a hand can swing along its curve while the body moves: the least time under the limits of its joints."""
 
 from __future__ import annotations
 
 import ctypes
+import functools
 from dataclasses import dataclass
 from itertools import permutations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from wbc.robots import Walker
+from wbc.robots import Margins, Walker
 from wbc.validation import Array
-from wbc.walking.arms.puma import ArmKinematics
+from wbc.walking.arms.puma import limb_of
 from wbc.walking.body_path import BodyPath
 from wbc.walking.native import compiled
 from wbc.walking.planner.grips.table import Ints
 from wbc.walking.planner.swings.curve import Curves
-from wbc.walking.planner.swings.joints import ANGLE_ROOM, AXIS_ROOM, ELBOW_ROOM, REACH_ROOM, Wrists, joint_paths
+from wbc.walking.planner.swings.joints import Guide
 
-#: Parts of joint rates and accelerations that a swing is planned with; the rest is for feedback
-RATE_PART, ACCELERATION_PART = 0.96, 0.9
-#: Fastest hand [m/s]
-FASTEST = 2.0
 #: Derivatives smaller than this [rad] limit nothing
 LEAST = 1e-6
 #: The body's part of the rates is that over so many samples
 STEP = 0.5
-#: Rules of native/speeds.h
-RULES = compiled.doubles(
-    (RATE_PART, ACCELERATION_PART, FASTEST, LEAST, STEP, REACH_ROOM, ANGLE_ROOM, ELBOW_ROOM, AXIS_ROOM)
-)
+
+
+@functools.cache
+def rules(margins: Margins) -> compiled.Numbers:
+    """Rules of native/speeds.h."""
+    to_limits = margins.swing_reach, margins.swing_angle, margins.swing_elbow, margins.swing_axis
+    return compiled.doubles(
+        (margins.swing_rate, margins.swing_acceleration, margins.hand_speed, LEAST, STEP, *to_limits)
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,8 +39,8 @@ class Speeds:
     """Laws of m swings over n points, evenly over x in [0, 1] of their curves.
 
     Attributes:
-        possible: the hand stays in reach and joints 1 to 5 within their limits ``[m]``.
-        angles: of joints 1 to 5, and 6 where the roll counts, ``[m, n, 5 or 6]`` [rad].
+        possible: the hand stays in reach and the joints within their limits ``[m]``.
+        angles: of all joints, the last where the roll counts, ``[m, n, joints]`` [rad].
         rate: dx/dt ``[m, n]`` [1/s]; its square changes evenly from point to point.
         time: at the points, from 0 ``[m, n]`` [s].
     """
@@ -55,40 +57,39 @@ class Speeds:
         return out
 
 
-def speeds(
-    kinematics: ArmKinematics, walker: Walker, arms: Ints, path: BodyPath, way: Curves, samples: Array, wrists: Wrists
-) -> Speeds:
+def speeds(walker: Walker, arms: Ints, path: BodyPath, curve: Curves, samples: Array, guide: Guide) -> Speeds:
     """Least times along m curves, each for an arm of a body that is at fractional ``samples`` ``[m, n]`` of its path:
 
         |q_x x' + q_u u'| <= part rate,     |q_x x'' + q_xx x'^2| <= part acceleration,     |p_x x'| <= fastest
 
-    for joints 1 to 5, by one pass forwards and one backwards over x'^2; q_u u' is what the body's motion asks of a hand
-    at rest.
+    for all joints that count, by one pass forwards and one backwards over x'^2; q_u u' is what the body's motion asks
+    of a hand at rest.
     """
-    place, wrist = way.at(np.linspace(0.0, 1.0, samples.shape[1])), wrists(samples)
+    places, guided = curve.at(np.linspace(0.0, 1.0, samples.shape[1])), guide(samples)
     bases = np.array([arm.base.homogeneous for arm in walker.arms])[arms]
-    found = _compiled(kinematics, bases, path, place, samples, wrist)
-    return found or _numpy(kinematics, bases, path, place, samples, wrist)
+    found = _compiled(walker, bases, path, places, samples, guided)
+    return found or _numpy(walker, bases, path, places, samples, guided)
 
 
 def _compiled(
-    kinematics: ArmKinematics, bases: Array, path: BodyPath, place: Array, samples: Array, wrist: Array
+    walker: Walker, bases: Array, path: BodyPath, places: Array, samples: Array, guide: Array
 ) -> Speeds | None:
-    """By the compiled code; None where there is none."""
-    library = compiled.library()
+    """By the compiled code; None where there is none, or it does not know the limb."""
+    limb = limb_of(walker)
+    library = compiled.library_for(limb)
     if library is None:
         return None
-    count, points, bends = wrist.shape
-    angles = np.empty((count, points, 3 + bends))
+    count, points, guided = guide.shape
+    angles = np.empty((count, points, 3 + guided))
     rate, time, possible = np.empty((count, points)), np.empty((count, points)), np.empty(count, dtype=np.bool_)
-    given = [compiled.packed(array) for array in (bases, path.poses, place, wrist, samples)]
+    given = [compiled.packed(array) for array in (bases, path.poses, places, guide, samples)]
     where = [compiled.at(array) for array in given]
     library.swing_speeds(
-        ctypes.byref(compiled.arm(kinematics.data)),
-        RULES,
+        compiled.arm_of(limb),
+        rules(walker.margins),
         ctypes.c_long(count),
         ctypes.c_long(points),
-        ctypes.c_int(bends),
+        ctypes.c_int(guided),
         *where[:2],
         ctypes.c_long(len(path)),
         ctypes.c_double(path.spacing),
@@ -100,12 +101,12 @@ def _compiled(
 
 @dataclass(frozen=True, eq=False)
 class SwingJoints:
-    """Joints 1 to 5, and 6 where the roll counts, of m swings over n points, evenly over x in [0, 1].
+    """All joints, the last where the roll counts, of m swings over n points, evenly over x in [0, 1].
 
     Attributes:
         possible: within reach and limits ``[m]``.
-        angles: ``[m, n, 5 or 6]`` [rad]. first, second: derivatives by x of a body that stands. bias: by the sample, of
-            a hand that stands; all ``[m, n, 5 or 6]``.
+        angles: ``[m, n, joints]`` [rad]. first, second: derivatives by x of a body that stands. bias: by the sample, of
+            a hand that stands; all ``[m, n, joints]``.
     """
 
     possible: NDArray[np.bool_]
@@ -116,20 +117,20 @@ class SwingJoints:
 
 
 def swing_joints(
-    kinematics: ArmKinematics, bases: Array, path: BodyPath, place: Array, samples: Array, wrist: Array
+    walker: Walker, bases: Array, path: BodyPath, places: Array, samples: Array, guide: Array
 ) -> SwingJoints:
-    """Joints of arms with bases ``[m, 4, 4]`` in the body, hands at ``place`` ``[m, n, 3]`` [m] and wrists bent by
-    ``wrist`` ``[m, n, 2 or 3]`` [rad], while the body is at ``samples`` ``[m, n]`` of its path; by differences.
+    """Joints of arms with bases ``[m, 4, 4]`` in the body, hands at ``places`` ``[m, n, 3]`` [m] and guided joints at
+    ``guide`` ``[m, n, g]`` [rad], while the body is at ``samples`` ``[m, n]`` of its path; by differences.
     """
     count, points = samples.shape
     gap = 1.0 / (points - 1)
     # The same hand on a body that is a little further
     doubled = np.concatenate([samples, samples + STEP])
-    both, possible = joint_paths(
-        kinematics,
+    both, possible = limb_of(walker).follow(
         path.blended(doubled) @ np.concatenate([bases, bases])[:, None],
-        np.concatenate([place, place]),
-        np.concatenate([wrist, wrist]),
+        np.concatenate([places, places]),
+        np.concatenate([guide, guide]),
+        walker.margins,
     )
     angles, further = both[:count], both[count:]
     bias = (further - angles) / STEP
@@ -138,22 +139,24 @@ def swing_joints(
     return SwingJoints(possible[:count], angles, first, np.gradient(first, gap, axis=1), bias)
 
 
-def _numpy(
-    kinematics: ArmKinematics, bases: Array, path: BodyPath, place: Array, samples: Array, wrist: Array
-) -> Speeds:
-    """What the compiled code does."""
-    joints = swing_joints(kinematics, bases, path, place, samples, wrist)
+def _numpy(walker: Walker, bases: Array, path: BodyPath, places: Array, samples: Array, guide: Array) -> Speeds:
+    """What the compiled code does, for any limb."""
+    limb, margins = limb_of(walker), walker.margins
+    joints = swing_joints(walker, bases, path, places, samples, guide)
     first, second, bias = joints.first, joints.second, joints.bias
     gap = 1.0 / (samples.shape[1] - 1)
-    limits, most = (
-        np.array(v)[: first.shape[2]] for v in (kinematics.data.joint_rates, kinematics.data.joint_accelerations)
+    limits, most = (np.array(v)[: first.shape[2]] for v in (limb.joint_rates, limb.joint_accelerations))
+    # Where the body goes where the hand does, the hand may go faster
+    rates = np.maximum(margins.swing_rate * limits - np.sign(first) * bias / path.spacing, 0.1 * limits)
+    slope = np.linalg.norm(np.gradient(places, gap, axis=1), axis=2)
+    top = (
+        np.minimum(
+            (rates / np.maximum(np.abs(first), LEAST)).min(axis=2), margins.hand_speed / np.maximum(slope, LEAST)
+        )
+        ** 2
     )
-    # Where the body goes the way of the hand, the hand may go faster
-    rates = np.maximum(RATE_PART * limits - np.sign(first) * bias / path.spacing, 0.1 * limits)
-    slope = np.linalg.norm(np.gradient(place, gap, axis=1), axis=2)
-    top = np.minimum((rates / np.maximum(np.abs(first), LEAST)).min(axis=2), FASTEST / np.maximum(slope, LEAST)) ** 2
     top[:, 0] = top[:, -1] = 0.0
-    square = _squares(first, second, ACCELERATION_PART * most, top, gap)
+    square = _squares(first, second, margins.swing_acceleration * most, top, gap)
     rate = np.sqrt(square)
     time = np.zeros_like(samples)
     np.cumsum(2 * gap / np.maximum(rate[:, 1:] + rate[:, :-1], 1e-6), axis=1, out=time[:, 1:])

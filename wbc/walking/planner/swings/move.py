@@ -15,7 +15,7 @@ class Move(NamedTuple):
         lift, land: samples.
         duration: of the swing, latches and settling included [s].
         delay: by which the body is late after it, because it had to slow down [s].
-        way: of the hand, see :data:`wbc.walking.planner.swings.curve.WAYS`.
+        curve: which one, see :data:`wbc.walking.planner.swings.curve.ALTERNATIVES`.
     """
 
     arm: int
@@ -25,4 +25,30 @@ class Move(NamedTuple):
     land: int
     duration: float
     delay: float
-    way: int = 0
+    curve: int = 0
+
+
+class Swing(NamedTuple):
+    """A swing that is asked about.
+
+    Attributes:
+        arm: row. source, target: grips. lift: sample of the body's path.
+        until: last sample that the other arms can hold; the body waits there for the hand.
+        others: grips of the other arms.
+        soonest: sample at which the hand may land; a faster one takes until then.
+    """
+
+    arm: int
+    source: int
+    target: int
+    lift: int
+    until: int
+    others: tuple[int, ...]
+    soonest: int
+
+
+class Chosen(NamedTuple):
+    """How a hand swings: along which of the curves, and how long, latches and settling included [s]."""
+
+    curve: int
+    duration: float

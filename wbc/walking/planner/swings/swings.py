@@ -1,4 +1,4 @@
-"""The swings of one plan: an estimate of their durations for many at once, and for each a way that is clear, with the
+"""The swings of one plan: an estimate of their durations for many at once, and for each a curve that is clear, with the
 least time along it.
 """
 
@@ -6,73 +6,48 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from wbc.robots import Walker
 from wbc.validation import Array
-from wbc.walking.arms.puma import ArmKinematics
 from wbc.walking.body_path import BodyPath
 from wbc.walking.holds.structure import Structure
 from wbc.walking.planner.grips.conflicts import ArmClearance
 from wbc.walking.planner.grips.table import Grips, Ints
 from wbc.walking.planner.slices import Slices, drained
 from wbc.walking.planner.swings.clearance import SwingClearance
-from wbc.walking.planner.swings.compiled_ways import Name, SwingWays
-from wbc.walking.planner.swings.curve import WAYS, Curves, Pivots, curves
-from wbc.walking.planner.swings.move import Move
-from wbc.walking.planner.swings.parked import PARKS, Parked, parked
-from wbc.walking.planner.swings.parked import Asked as Parking
-from wbc.walking.planner.swings.tracks import Asked, Tracks, tracks
+from wbc.walking.planner.swings.compiled_choice import CompiledChoice, Name
+from wbc.walking.planner.swings.curve import ALTERNATIVES, Curves, Pivots, curves
+from wbc.walking.planner.swings.move import Chosen, Move, Swing
+from wbc.walking.planner.swings.tracks import Asked, Tracks, points_along, tracks
+from wbc.walking.planner.swings.waiting import Asked as WaitingAsked
+from wbc.walking.planner.swings.waiting import Waiting, waiting
 
-#: Points of a way: enough for the search, and for carrying it out
+#: Points of a curve: enough for the search, and for carrying it out
 COARSE, FINE = 25, 97
 #: A law at FINE points takes so many times as long as one at COARSE points, at most
 FINER = 1.04
 #: Time to settle on the hold before the hand closes, besides the latch twice [s]
 SETTLE = 0.06
-#: Hands that are on their way for so long, latches not counted, may wait where they go with the body [s]
-LONG_WAIT = 3.0
-#: Swings that are computed together, way by way and with all ways at once
+#: Swings that are computed together, curve by curve and with all curves at once
 TOGETHER, QUICKLY = 24, 12
-#: No swing lasts so many samples, as far as the room of the others is told apart
+#: No swing lasts so many samples: that other arms hold for longer makes no difference
 LONG = 60
-#: Parts of the estimate: of every swing [s], of the slowest joint's least time, of the way [s/m]
+#: Parts of the estimate: of every swing [s], of the slowest joint's least time, of the distance [s/m]. It is low, so
+#: that the search drops no swing that would do: of ten swings between all grips of the published courses, eight last
+#: from 0.02 s less to 0.56 s more. ``python -m bench.walk.fits`` prints that, and least squares over all of them
 ESTIMATE = (1.11, 0.64, 0.59)
-#: Samples after lifting at which the body is about where the swing is halfway
+#: Samples after lifting at which the body stands that curves go by: before a swing is half over, see bench.walk.fits
 HALFWAY = 14
-
-
-class Swing(NamedTuple):
-    """A swing that is asked about.
-
-    Attributes:
-        arm: row. source, target: grips. lift: sample of the body's path.
-        room: last sample that the other arms can hold; the body waits there for the hand.
-        others: grips of the other arms.
-        soonest: sample at which the hand may land; a faster one takes until then.
-    """
-
-    arm: int
-    source: int
-    target: int
-    lift: int
-    room: int
-    others: tuple[int, ...]
-    soonest: int
-
-
-class Chosen(NamedTuple):
-    """How a hand swings: which of the ways, and how long, latches and settling included [s]."""
-
-    way: int
-    duration: float
+#: Hands land at least so many samples inside a grip
+INSIDE = 1
 
 
 @dataclass(frozen=True, eq=False)
 class _Track:
-    """A swing along one way: duration [s], points of the arm ``[n, 6, 3]``, samples ``[n]``."""
+    """A swing along one curve: duration [s], points of the arm ``[n, points, 3]``, samples ``[n]``."""
 
     duration: float
     points: Array
@@ -80,23 +55,31 @@ class _Track:
 
 
 class Swings:
-    """Swings between grips over one path; what was computed is kept."""
+    """Swings of a body's arms between grips over one path; what was computed is kept.
+
+    It is a :class:`wbc.walking.planner.stances.search.SwingTable`.
+    """
 
     def __init__(
         self, walker: Walker, structure: Structure, path: BodyPath, grips: Grips, arms: ArmClearance | None = None
     ) -> None:
         self.walker, self.structure, self.path, self.grips = walker, structure, path, grips
-        self.data = walker.data
-        self.latch: float = walker.data.latch_time  # type: ignore[union-attr]
+        self.arms = arms or ArmClearance(walker, grips)
+        self.shapes, self.limb, self.margins = self.arms.shapes, self.arms.shapes.limb, walker.margins
+        self.latch = walker.tolerances.latch_time
         self.extra = 2 * self.latch + SETTLE
-        self.kinematics = ArmKinematics(walker.data)  # type: ignore[arg-type]
-        self._rates = np.array(self.kinematics.data.joint_rates)[:5]
-        self._arms = arms or ArmClearance(walker, grips)
-        self._clear = SwingClearance(walker, structure, self._arms)
-        self._ways: SwingWays | None = None
-        if SwingWays.possible(structure):
-            times = self.extra, self.latch
-            self._ways = SwingWays(walker, structure, path, grips, self._clear, COARSE, HALFWAY, *times)
+        # The hand is on its hold before it is latched
+        self.touch = round((self.latch + SETTLE) / path.spacing)
+        # Hands that swing keep less of the others than hands that hold
+        self._less = self.margins.held_clearance - self.margins.swing_clearance
+        self._rates = np.array(self.limb.joint_rates)[:-1]
+        self._clear = SwingClearance(walker, structure)
+        self._quick: CompiledChoice | None = None
+        if CompiledChoice.possible(self.shapes, structure):
+            apart, times = self.shapes.least - self._less, (self.extra, self.latch)
+            self._quick = CompiledChoice(
+                walker, structure, path, grips, self.shapes, self._clear, apart, COARSE, HALFWAY, *times
+            )
         self._tracks: dict[tuple[Name, int], _Track | None] = {}
         self._apart: dict[tuple[Name, int, int], bool] = {}
         self._chosen: dict[Swing, Chosen | None] = {}
@@ -105,148 +88,156 @@ class Swings:
     def estimate(self, sources: Ints, targets: Ints, lift: Ints, land: Ints) -> Array:
         """About how long swings from grips take, lifted and landed at about these samples; latches included [s].
 
-        c + r max_k |dq_k| / rate_k + w |way|, fitted to swings of the published courses at 1 to 6 in/s: of ten,
-        eight last 0.12 s less to 0.17 s more.
+        c + r max_k |dq_k| / rate_k + d |p_target - p_source|, see :data:`ESTIMATE`.
         """
         places, grips = self.structure.positions, self.grips
-        way = np.linalg.norm(places[grips.hold[targets]] - places[grips.hold[sources]], axis=1)
-        turn = np.abs(grips.posture(targets, land) - grips.posture(sources, lift))[:, :5]
+        far = np.linalg.norm(places[grips.hold[targets]] - places[grips.hold[sources]], axis=1)
+        turn = np.abs(grips.posture(targets, land) - grips.posture(sources, lift))[:, :-1]
         constant, turning, going = ESTIMATE
-        out: Array = constant + turning * (turn / self._rates).max(axis=1) + going * way
+        out: Array = constant + turning * (turn / self._rates).max(axis=1) + going * far
         return np.round(out, 6)
 
+    def soonest(self) -> Ints:
+        """First samples at which hands land on grips: inside them, and with the elbow bent."""
+        bent = self.limb.elbow_bend(self.grips.postures) >= self.margins.landing_elbow
+        out: Ints = np.maximum(self.grips.first + INSIDE, self.grips.first_where(bent) + self.touch)
+        return out
+
+    def lands(self, targets: Ints, samples: Ints) -> NDArray[np.bool_]:
+        """Whether the wrist is bent enough to land: only then joints turn the hand's axis."""
+        postures = self.grips.posture(targets, samples - self.touch)
+        return np.asarray(self.limb.wrist_bend(postures) >= self.margins.landing_wrist)
+
     def prepare(self, swings: Iterable[Swing]) -> None:
-        """Find ways for swings together: the first that is possible and clear."""
+        """Find curves for swings together: the first that is possible and clear."""
         drained(self.slices(swings))
 
     def slices(self, swings: Iterable[Swing]) -> Slices[None]:
-        """As :meth:`prepare`, way by way."""
+        """As :meth:`prepare`, curve by curve."""
         left = list(dict.fromkeys(s for s in swings if s not in self._chosen))
-        quick = self._ways is not None
+        quick = self._quick is not None
         for begin in range(0, len(left) if quick else 0, QUICKLY):
             self._choose(left[begin : begin + QUICKLY])
             yield None
         left = [swing for swing in left if self._chosen.get(swing) is None]
-        for way in range(len(WAYS) if quick else 0, len(WAYS) + len(PARKS)):
+        for which in range(len(ALTERNATIVES) if quick else 0, len(ALTERNATIVES) + len(self.limb.waiting)):
             if not left:
                 return
-            if way == len(WAYS):
+            if which == len(ALTERNATIVES):
                 self._chosen.update(dict.fromkeys(left))
-                left = [s for s in left if (s.soonest - s.lift) * self.path.spacing >= self.extra + LONG_WAIT]
+                long = self.extra + self.margins.long_wait
+                left = [s for s in left if (s.soonest - s.lift) * self.path.spacing >= long]
             for begin in range(0, len(left), TOGETHER):
-                self._track(left[begin : begin + TOGETHER], way)
+                self._track(left[begin : begin + TOGETHER], which)
                 yield None
-                self._check(left[begin : begin + TOGETHER], way)
+                self._check(left[begin : begin + TOGETHER], which)
                 yield None
             rest = []
             for swing in left:
-                track = self._tracks[_name(swing), way]
-                # A time that was corrected in other room tells nothing where there is no way in this one
-                known = None if track is None else self._known.get((*_name(swing)[:4], way), track.duration)
-                if known is not None and all(self._apart[_name(swing), way, g] for g in swing.others):
-                    self._chosen[swing] = Chosen(way, known)
+                track = self._tracks[_name(swing), which]
+                # A time that was corrected for other ends tells nothing where there is no curve for these
+                known = None if track is None else self._known.get((*_name(swing)[:4], which), track.duration)
+                if known is not None and all(self._apart[_name(swing), which, g] for g in swing.others):
+                    self._chosen[swing] = Chosen(which, known)
                 else:
                     rest.append(swing)
             left = rest
         self._chosen.update(dict.fromkeys(left))
 
     def _choose(self, swings: Sequence[Swing]) -> None:
-        """As :meth:`slices`, all ways at once, by compiled code."""
-        assert self._ways is not None
+        """As :meth:`slices`, all curves at once, by compiled code."""
+        assert self._quick is not None
         names, others = [_name(swing) for swing in swings], [swing.others for swing in swings]
-        barred = np.zeros((len(swings), len(WAYS)), dtype=np.bool_)
+        count = len(ALTERNATIVES)
+        barred = np.zeros((len(swings), count), dtype=np.bool_)
         for row, name in enumerate(names) if self._known else ():
-            barred[row] = [self._known.get((*name[:4], way), 0.0) is None for way in range(len(WAYS))]
-        for swing, name, way, law in zip(swings, names, *self._ways.choose(names, others, barred), strict=True):
-            known = self._known.get((*name[:4], way))
-            self._chosen[swing] = None if way < 0 else Chosen(way, FINER * law + self.extra if known is None else known)
+            barred[row] = [self._known.get((*name[:4], which), 0.0) is None for which in range(count)]
+        for swing, name, which, law in zip(swings, names, *self._quick.choose(names, others, barred), strict=True):
+            known = self._known.get((*name[:4], which))
+            duration = FINER * law + self.extra if known is None else known
+            self._chosen[swing] = None if which < 0 else Chosen(which, duration)
 
     def choose(self, swing: Swing) -> Chosen | None:
-        """The way of a swing; None where it is not possible, or none is clear."""
+        """The curve of a swing; None where it is not possible, or none is clear."""
         if swing not in self._chosen:
             self.prepare([swing])
         return self._chosen[swing]
 
-    def clear(self, swing: Swing, way: int) -> bool:
-        """Whether a swing along one of the ways is possible, and clear of the structure and of the other arms."""
-        self._track([swing], way)
-        self._check([swing], way)
+    def clear(self, swing: Swing, which: int) -> bool:
+        """Whether a swing along one of the curves is possible, and clear of the structure and of the other arms."""
+        self._track([swing], which)
+        self._check([swing], which)
         name = _name(swing)
-        return self._tracks[name, way] is not None and all(self._apart[name, way, g] for g in swing.others)
+        return self._tracks[name, which] is not None and all(self._apart[name, which, g] for g in swing.others)
 
-    def clear_along(self, move: Move, others: Sequence[int], way: Curves, angles: Array, samples: Array) -> bool:
-        """Whether the arm of a move is clear as :meth:`clear` says, at angles ``[1, n, 5 or 6]`` [rad] and samples of
-        the path ``[1, n]``.
+    def clear_along(self, move: Move, others: Sequence[int], curve: Curves, angles: Array, samples: Array) -> bool:
+        """Whether the arm of a move is clear as :meth:`clear` says, at joints ``[1, n, joints]`` [rad], the last of
+        which may be left out, and samples of the path ``[1, n]``.
 
         Args:
             others: grips of the other arms.
         """
-        postures = np.zeros((*samples.shape, 6))
-        postures[..., :5] = angles[..., :5]
-        points, ends = self._arms.points(move.arm, postures), np.stack([way.begin, way.end], axis=1)
+        points = points_along(self.shapes, np.array([move.arm]), angles)
+        ends = np.stack([curve.begin, curve.end], axis=1)
         if not self._clear.structure(points, self.path.blended(samples), ends)[0]:
             return False
-        count = len(others)
-        grips = np.array(others, dtype=np.int64)
-        return bool(
-            self._clear.others(np.repeat(points, count, axis=0), np.repeat(samples, count, axis=0), grips).all()
-        )
+        points, samples = (np.repeat(array, len(others), axis=0) for array in (points, samples))
+        return bool(self.arms.stay_clear(points, samples, np.array(others, dtype=np.int64), self._less).all())
 
-    def correct(self, arm: int, source: int, target: int, lift: int, way: int, duration: float, possible: bool) -> None:
-        """A swing along one of the ways takes another time [s], or is not possible after all."""
-        name = arm, source, target, lift
-        self._known[*name, way] = duration if possible else None
+    def correct(self, move: Move, duration: float, possible: bool) -> None:
+        """A swing along the curve of a move takes another time [s], or is not possible after all."""
+        name = move.arm, move.source, move.target, move.lift
+        self._known[*name, move.curve] = duration if possible else None
         for swing in [s for s in self._chosen if _name(s)[:4] == name]:
             del self._chosen[swing]
 
-    def curve(self, arms: Ints, source: Ints, target: Ints, lift: Ints, way: int) -> Curves:
-        """Ways of the hands of arms from grips to grips, lifted at samples of the path; ``[m]`` each."""
+    def curve(self, arms: Ints, source: Ints, target: Ints, lift: Ints, which: int) -> Curves:
+        """Curves of the hands of arms from grips to grips, lifted at samples of the path; ``[m]`` each."""
         grips, later = self.grips, np.minimum(lift + HALFWAY, len(self.path) - 1)
-        bases = np.array([arm.base.homogeneous for arm in self.walker.arms])[arms]
         turn = grips.posture(target, later + HALFWAY)[:, 0] - grips.posture(source, lift)[:, 0]
-        pivots = Pivots(self.path.poses[later] @ bases, turn)
-        return curves(self.structure, grips.hold[source], grips.hold[target], pivots, self.data, way)  # type: ignore[arg-type]
+        pivots = Pivots(self.path.poses[later] @ self.shapes.bases[arms], turn)
+        return curves(self.walker, self.structure, grips.hold[source], grips.hold[target], pivots, which)
 
-    def _track(self, swings: Sequence[Swing], way: int) -> None:
-        """Angles, times and clearance of the structure along one of the ways."""
-        names = list(dict.fromkeys(_name(s) for s in swings if (_name(s), way) not in self._tracks))
+    def _track(self, swings: Sequence[Swing], which: int) -> None:
+        """Angles, times and clearance of the structure along one of the curves."""
+        names = list(dict.fromkeys(_name(s) for s in swings if (_name(s), which) not in self._tracks))
         if not names:
             return
         arms, source, target, lift, last, soonest = np.ascontiguousarray(np.array(names, dtype=np.int64).T)
         # The body moves on while the hand opens
         begin, least = lift + self.latch / self.path.spacing, (soonest - lift) * self.path.spacing - self.extra
-        if way < len(WAYS):
-            curve = self.curve(arms, source, target, lift, way)
+        if which < len(ALTERNATIVES):
+            curve = self.curve(arms, source, target, lift, which)
             asked = Asked(arms, source, target, begin, last, least)
-            found = tracks(self.walker, self._arms, self.path, self.grips, curve, asked, COARSE)
+            found = tracks(self.walker, self.shapes, self.path, self.grips, curve, asked, COARSE)
         else:
             whole = begin, begin + least / self.path.spacing
-            found = Tracks.of(self.waiting((arms, source, target), whole, way, COARSE), arms, self._arms)
+            found = Tracks.of(self.waiting((arms, source, target), whole, which, COARSE), arms, self.shapes)
         ends = self.structure.positions[self.grips.hold[np.stack([source, target], axis=1)]]
         bodies = self.path.blended(found.samples)
         possible = found.possible & self._clear.structure(found.points, bodies, ends)
         for k, name in enumerate(names):
             duration = FINER * float(found.duration[k]) + self.extra
             track = _Track(duration, found.points[k], found.samples[k])
-            self._tracks[name, way] = track if possible[k] else None
+            self._tracks[name, which] = track if possible[k] else None
 
-    def waiting(self, ends: tuple[Ints, Ints, Ints], times: tuple[Array, Array], way: int, n: int) -> Parked:
+    def waiting(self, ends: tuple[Ints, Ints, Ints], times: tuple[Array, Array], which: int, n: int) -> Waiting:
         """Swings of arms from grips to grips, between samples, that wait in the air."""
-        asked = Parking(*ends, *times)
-        return parked(self.walker, self.structure, self.path, self.grips, asked, way - len(WAYS), n)
+        asked = WaitingAsked(*ends, *times)
+        return waiting(self.walker, self.structure, self.path, self.grips, asked, which - len(ALTERNATIVES), n)
 
-    def _check(self, swings: Sequence[Swing], way: int) -> None:
+    def _check(self, swings: Sequence[Swing], which: int) -> None:
         """Clearance of the other arms."""
-        asked = [(_name(s), way, g) for s in swings for g in s.others if self._tracks[_name(s), way] is not None]
+        asked = [(_name(s), which, g) for s in swings for g in s.others if self._tracks[_name(s), which] is not None]
         todo = [key for key in dict.fromkeys(asked) if key not in self._apart]
-        tracks = [track for key in todo if (track := self._tracks[key[0], way]) is not None]
-        if not tracks:
+        found = [track for key in todo if (track := self._tracks[key[0], which]) is not None]
+        if not found:
             return
-        points, samples = (np.array([getattr(t, name) for t in tracks]) for name in ("points", "samples"))
-        clear = self._clear.others(points, samples, np.array([key[2] for key in todo], dtype=np.int64))
+        points, samples = np.array([t.points for t in found]), np.array([t.samples for t in found])
+        clear = self.arms.stay_clear(points, samples, np.array([key[2] for key in todo], dtype=np.int64), self._less)
         self._apart.update(zip(todo, clear.tolist(), strict=True))
 
 
 def _name(swing: Swing) -> Name:
-    last = min(swing.room, max(swing.lift + LONG, swing.soonest))
+    last = min(swing.until, max(swing.lift + LONG, swing.soonest))
     return swing.arm, swing.source, swing.target, swing.lift, last, swing.soonest

@@ -1,4 +1,4 @@
-"""The first way of a swing that is possible and clear, by compiled code: hundreds are asked for in a plan."""
+"""The first curve of a swing that is possible and clear, by compiled code: hundreds are asked for in a plan."""
 
 from __future__ import annotations
 
@@ -9,45 +9,48 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wbc.robots import Walker
+from wbc.validation import Array
 from wbc.walking.body_path import BodyPath
 from wbc.walking.holds.structure import Structure
 from wbc.walking.native import compiled
 from wbc.walking.native.compiled import plain_surface
+from wbc.walking.planner.grips.conflicts import LimbShapes
 from wbc.walking.planner.grips.rolls import ANY
 from wbc.walking.planner.grips.table import Grips
 from wbc.walking.planner.swings.clearance import ALONG, SwingClearance
-from wbc.walking.planner.swings.curve import ACROSS, RAISING, STEEP, UPRIGHT, WAYS, crossing_height, step
+from wbc.walking.planner.swings.curve import RAISING, STEEP, UPRIGHT, alternatives, crossing_height, step
 from wbc.walking.planner.swings.joints import blend
-from wbc.walking.planner.swings.least_time import RULES
+from wbc.walking.planner.swings.least_time import rules
 from wbc.walking.planner.swings.tracks import PASSES
 
 #: arm, source, target, lift, last and soonest sample of a swing
 Name = tuple[int, int, int, int, int, int]
 _POINTERS = ("bases", "path", "places", "normals", "arms", "holds", "free")
 _CURVES = ("across", "raised", "blend", "span", "look_across", "look_raised", "steps", "half")
-_ROOM = ("ways", "parts", "above", "apart")
+_CLEAR = ("alternatives", "parts", "above", "apart")
 _COUNTS = ("count", "n", "spans", "looks", "halves", "tried", "some", "halfway", "passes")
 _NUMBERS = ("spacing", "height", "aside", "upright", "touching", "extra", "latch")
 
 
 class _Scene(ctypes.Structure):
-    """Scene of native/ways.h."""
+    """Scene of native/choice.h."""
 
     _fields_ = [
         *((name, ctypes.c_void_p) for name in ("arm", "rules", "surface")),
         ("grips", compiled.Table),
-        *((name, ctypes.c_void_p) for name in (*_POINTERS, *_CURVES, *_ROOM)),
+        *((name, ctypes.c_void_p) for name in (*_POINTERS, *_CURVES, *_CLEAR)),
         *((name, ctypes.c_long) for name in _COUNTS),
         *((name, ctypes.c_double) for name in _NUMBERS),
     ]
 
 
-class SwingWays:
-    """Ways of the swings of one plan over a plain surface.
+class CompiledChoice:
+    """Choice of curves for the swings of one plan over a plain surface.
 
     Args:
-        clear: what room swings keep. points: of a way. halfway: samples after lifting at which the body is about where
-            the swing is halfway. extra: latches and settling [s]. latch: how long a hand opens [s].
+        shapes: of the arms. clear: of the structure. apart: distances of links of a swinging arm and one that holds
+            ``[15]`` [m]. points: of a curve. halfway: samples after lifting at which the body is about where the swing
+            is halfway. extra: latches and settling [s]. latch: how long a hand opens [s].
 
     Raises:
         ValueError: nothing is compiled, or the structure is more than a plane or a cylinder, see :meth:`possible`.
@@ -59,32 +62,35 @@ class SwingWays:
         structure: Structure,
         path: BodyPath,
         grips: Grips,
+        shapes: LimbShapes,
         clear: SwingClearance,
+        apart: Array,
         points: int,
         halfway: int,
         extra: float,
         latch: float,
     ) -> None:
-        surface = plain_surface(structure)
-        if surface is None:
+        surface, data = plain_surface(structure), shapes.limb.closed_form
+        if surface is None or data is None:
             raise ValueError("only over a plain surface, by compiled code")
-        x, data = np.linspace(0.0, 1.0, points), walker.data
+        x, tried = np.linspace(0.0, 1.0, points), alternatives(walker.margins)
         y = step((x - UPRIGHT) / (1 - 2 * UPRIGHT))
-        bases = np.array([arm.base.homogeneous for arm in walker.arms])
         of_grips = grips.arm, np.maximum(grips.hold, 0), (grips.roll == ANY).astype(np.int64)
         curves = y, 1.0 - (1.0 - 2.0 * x) ** STEEP, blend(x), *RAISING
-        room = WAYS, ALONG, clear.least, clear.apart
-        reals = [compiled.packed(a) for a in (bases, path.poses, structure.positions, structure.axes)]
+        distances = tried, ALONG, clear.least, apart
+        reals = [compiled.packed(a) for a in (shapes.bases, path.poses, structure.positions, structure.axes)]
         whole = [np.ascontiguousarray(a, dtype=np.int64) for a in of_grips]
-        more = [compiled.packed(a) for a in (*curves, *room)]
-        arrays = dict(zip((*_POINTERS, *_CURVES, *_ROOM), (*reals, *whole, *more), strict=True))
-        lengths = (len(arrays[name]) for name in ("path", "across", "span", "look_across", "half", "ways", "parts"))
-        numbers = path.spacing, crossing_height(data), ACROSS, UPRIGHT, clear.touching, extra, latch  # type: ignore[arg-type]
-        arm = compiled.arm(data)
+        more = [compiled.packed(a) for a in (*curves, *distances)]
+        arrays = dict(zip((*_POINTERS, *_CURVES, *_CLEAR), (*reals, *whole, *more), strict=True))
+        lengths = (
+            len(arrays[name]) for name in ("path", "across", "span", "look_across", "half", "alternatives", "parts")
+        )
+        numbers = path.spacing, crossing_height(walker), walker.margins.across, UPRIGHT, clear.touching, extra, latch
+        arm, limits = compiled.arm(data), rules(walker.margins)
         # What the pointers are to
-        self._there = arrays, arm, surface, grips
+        self._there = arrays, arm, limits, surface, grips
         self._scene = _Scene(
-            *(ctypes.cast(ctypes.pointer(a), ctypes.c_void_p) for a in (arm, RULES, surface)),
+            *(ctypes.cast(ctypes.pointer(a), ctypes.c_void_p) for a in (arm, limits, surface)),
             grips.table,
             *(compiled.at(array) for array in arrays.values()),
             *lengths,
@@ -94,26 +100,26 @@ class SwingWays:
         )
 
     @staticmethod
-    def possible(structure: Structure) -> bool:
-        """Whether there is compiled code, and the structure is a plane or a cylinder and nothing more."""
-        return plain_surface(structure) is not None
+    def possible(shapes: LimbShapes, structure: Structure) -> bool:
+        """Whether compiled code knows the limb, and the structure is a plane or a cylinder and nothing more."""
+        return compiled.library_for(shapes.limb) is not None and plain_surface(structure) is not None
 
     def choose(
         self, names: Sequence[Name], others: Sequence[tuple[int, ...]], barred: NDArray[np.bool_]
     ) -> tuple[list[int], list[float]]:
-        """Of swings the first ways that are possible and clear.
+        """Of swings the first alternatives that are possible and clear.
 
         Args:
-            others: grips of the other arms. barred: ways that are not tried ``[m, len(WAYS)]``.
+            others: grips of the other arms. barred: what is not tried ``[m, alternatives]``.
 
         Returns:
-            Ways, -1 for none, and durations of their laws [s].
+            Alternatives, -1 for none, and durations of their laws [s].
         """
         library, count = compiled.library(), len(names)
         assert library is not None
         given = np.array(names, dtype=np.int64), np.array(others, dtype=np.int64)
         chosen, duration = np.empty(count, dtype=np.int64), np.empty(count)
-        library.swing_ways(
+        library.choose_swings(
             ctypes.byref(self._scene),
             ctypes.c_long(count),
             compiled.at(given[0]),

@@ -1,6 +1,6 @@
-/* The first way of a swing that is possible and clear, of all that are tried, as wbc.walking.planner.swings.swings has it. */
-#ifndef WBC_WALKING_WAYS_H
-#define WBC_WALKING_WAYS_H
+/* The first curve of a swing that is possible and clear, of all that are tried, as planner/swings/swings.py. */
+#ifndef WBC_WALKING_CHOICE_H
+#define WBC_WALKING_CHOICE_H
 
 #include "curve.h"
 #include "near.h"
@@ -27,12 +27,12 @@ void swings_clear(const Arm *arm, const Grips *grips, long m, long n, const doub
 /* What all swings of a plan have in common. `bases` (4 x 4) of the arms; `path` has `count` poses (4 x 4), `spacing`
    apart; `places` and `normals` of the holds; `arms`, `holds` and `free` (the hand may roll) of the grips.
 
-   Ways have n points: how far `across`, how far `raised`, and the part of the wrists' way, `blend`. The numbers of
+   Curves have n points: how far `across`, how far `raised`, and the part of the wrists' change, `blend`. The numbers of
    raise_curves: `span` at `spans` places, `look_across` and `look_raised` at `looks`, `steps` and `half` at `halves`.
-   `ways` says how much higher and what part of the arc each of `tried` ways is. Room: `parts` of the links, `some` of
-   them, at which they are at least `above` the surface, unless a hand is within `touching` of a hold, and `apart` of
-   the links of two arms. The body is looked at `halfway` samples after the hand is lifted; a swing takes `extra`
-   besides its law, of which the hand opens for `latch` [s]. */
+   `alternatives` says how much higher and what part of the arc each of `tried` curves is. Clear: `parts` of the links,
+   `some` of them, at which they are at least `above` the surface, unless a hand is within `touching` of a hold, and
+   `apart` of the links of two arms. The body is looked at `halfway` samples after the hand is lifted; a swing takes
+   `extra` besides its law, of which the hand opens for `latch` [s]. */
 typedef struct {
     const Arm *arm;
     const Rules *rules;
@@ -41,7 +41,7 @@ typedef struct {
     const double *bases, *path, *places, *normals;
     const long *arms, *holds, *free;
     const double *across, *raised, *blend, *span, *look_across, *look_raised, *steps, *half;
-    const double *ways, *parts, *above, *apart;
+    const double *alternatives, *parts, *above, *apart;
     long count, n, spans, looks, halves, tried, some, halfway, passes;
     double spacing, height, aside, upright, touching, extra, latch;
 } Scene;
@@ -60,40 +60,40 @@ static double first_joint(const Grips *grips, long grip, long sample)
     return grips->postures[JOINTS * (grips->offset[grip] + since)];
 }
 
-/* The hand's way over n points. */
-static void way_of(const Scene *scene, const Swing *swing, long way, double *place)
+/* The hand's curve over n points. */
+static void curve_of(const Scene *scene, const Swing *swing, long which, double *place)
 {
     const long a = scene->holds[swing->source], b = scene->holds[swing->target];
     const long then = swing->lift + scene->halfway, later = then < scene->count - 1 ? then : scene->count - 1;
     const double turn = first_joint(&scene->grips, swing->target, later + scene->halfway)
                         - first_joint(&scene->grips, swing->source, swing->lift);
     const Frame body = frame_of(scene->path + 16 * later), frame = product(&body, scene->bases + 16 * swing->arm);
-    const double part = scene->ways[2 * way + 1], *pivot = &frame.row[0][0];
+    const double part = scene->alternatives[2 * which + 1], *pivot = &frame.row[0][0];
     const double *begin = scene->places + 3 * a, *end = scene->places + 3 * b;
     const double *leave = scene->normals + 3 * a, *arrive = scene->normals + 3 * b;
     double rise[2], lift;
     raise_curves(scene->surface, 1, begin, end, leave, arrive, pivot, &turn, part, scene->height, scene->aside,
                  scene->upright, scene->spans, scene->span, scene->looks, scene->look_across, scene->look_raised,
                  scene->halves, scene->steps, scene->half, rise, &lift);
-    lift += scene->ways[2 * way];
+    lift += scene->alternatives[2 * which];
     curves_at(1, scene->n, begin, end, leave, arrive, rise, &lift, pivot, &turn, part, scene->across, scene->raised,
               place);
 }
 
-/* Whether a swing along one way is possible and clear of the surface and of `others`, so many grips; its law's
+/* Whether a swing along one curve is possible and clear of the surface and of `others`, so many grips; its law's
    duration. */
-static int clear_along(const Scene *scene, const Swing *swing, long way, const long *others, long count,
+static int clear_along(const Scene *scene, const Swing *swing, long which, const long *others, long count,
                        double *duration)
 {
     const long n = scene->n, hold[2] = { scene->holds[swing->source], scene->holds[swing->target] };
-    const int bends = scene->free[swing->source] && scene->free[swing->target] ? 2 : 3;
+    const int guided = scene->free[swing->source] && scene->free[swing->target] ? 2 : 3;
     const double begin = (double)swing->lift + scene->latch / scene->spacing;
     const double least = (double)(swing->soonest - swing->lift) * scene->spacing - scene->extra;
     const double *base = scene->bases + 16 * swing->arm;
     double place[3 * MOST], samples[MOST], points[3 * POINTS * MOST], bodies[16 * MOST], ends[2][3];
     unsigned char fits = 0;
-    way_of(scene, swing, way, place);
-    swing_tracks(scene->arm, scene->rules, &scene->grips, 1, n, bends, scene->passes, base, scene->path, scene->count,
+    curve_of(scene, swing, which, place);
+    swing_tracks(scene->arm, scene->rules, &scene->grips, 1, n, guided, scene->passes, base, scene->path, scene->count,
                  scene->spacing, place, scene->blend, &swing->source, &swing->target, &begin, &swing->last, &least,
                  &fits, duration, samples, points);
     if (!fits)
@@ -112,19 +112,19 @@ static int clear_along(const Scene *scene, const Swing *swing, long way, const l
     return fits;
 }
 
-/* For m swings the first of the ways that is not `barred` (m x tried), possible, and clear of the surface and of the
+/* For m swings the first of the curves that is not `barred` (m x tried), possible, and clear of the surface and of the
    grips `others`, `count` of each; -1 for none. `duration` is its law's. Returns 1 where n is too large. */
-int swing_ways(const Scene *scene, long m, const Swing *swings, long count, const long *others,
+int choose_swings(const Scene *scene, long m, const Swing *swings, long count, const long *others,
                const unsigned char *barred, long *chosen, double *duration)
 {
     if (scene->n > MOST || scene->n < 3)
         return 1;
     for (long s = 0; s < m; ++s) {
         chosen[s] = -1;
-        for (long way = 0; way < scene->tried && chosen[s] < 0; ++way)
-            if (!barred[scene->tried * s + way]
-                && clear_along(scene, swings + s, way, others + count * s, count, duration + s))
-                chosen[s] = way;
+        for (long which = 0; which < scene->tried && chosen[s] < 0; ++which)
+            if (!barred[scene->tried * s + which]
+                && clear_along(scene, swings + s, which, others + count * s, count, duration + s))
+                chosen[s] = which;
     }
     return 0;
 }

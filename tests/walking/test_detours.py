@@ -1,25 +1,28 @@
-"""Ways round: routes of the body that the reference search confirms, and refusals that name holds."""
+"""Detours: routes of the body that the reference search confirms, and refusals that name holds."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
+import wbc
 from bench.walk.reference import Rules, fewest_along
 from wbc.robots import Walker
 from wbc.walking import Structure, plane, remove_rows
+from wbc.walking.arms.puma import limb_of
 from wbc.walking.body_path import BodyPath, grid_path, straight_path
 from wbc.walking.planner.detours import Mesh, find_route
 from wbc.walking.planner.detours.cell_graph import round_labels
 from wbc.walking.planner.plan import NoPlanError
 from wbc.walking.planner.planner import plan_walk
-from wbc.walking.planner.swings.curve import WAYS
-from wbc.walking.planner.swings.parked import DEPTH, RADIUS
+from wbc.walking.planner.swings.curve import ALTERNATIVES
 from wbc.walking.run.request import over_holds
 
 INCH = 0.0254
 #: One height, and as few poses as will do
 COARSE = Mesh(0.14, 0.2, 5, (0.0,), 24)
+#: Along the path alone, at its height and a little lower
+NARROW = Mesh(0.14, 0.0, 0, (0.0, 0.1), 12)
 
 
 def ends(path: BodyPath) -> np.ndarray:
@@ -27,7 +30,7 @@ def ends(path: BodyPath) -> np.ndarray:
 
 
 def confirm(machine: Walker, structure: Structure, path: BodyPath, every: int) -> None:
-    """Exact breadth-first search over all grips along the poses finds a way: arms clear, joints within their limits."""
+    """Exact breadth-first search over all grips along the poses finds one: arms clear, joints within their limits."""
     assert fewest_along(machine, structure, path.poses[::every], Rules()) is not None
 
 
@@ -49,9 +52,9 @@ def test_over_a_wide_trench_hands_wait_where_they_go_with_the_body(machine: Walk
     plan = plan_walk(machine, trench, path, objective="destination", detour=True)
     assert plan.complete
     np.testing.assert_allclose(ends(plan.path), ends(path), atol=1e-9)
-    waits = [one for one in zip(plan.regrasps, plan.laws, strict=True) if one[0].way >= len(WAYS)]
+    waits = [one for one in zip(plan.regrasps, plan.laws, strict=True) if one[0].way >= len(ALTERNATIVES)]
     assert waits
-    latch = machine.tolerances.latch_time
+    latch, (_, radius, height) = machine.tolerances.latch_time, limb_of(machine).waiting[0]
     for step, law in waits:
         assert law.possible
         base = next(arm.base.homogeneous for arm in machine.arms if arm.name == step.arm)
@@ -59,11 +62,11 @@ def test_over_a_wide_trench_hands_wait_where_they_go_with_the_body(machine: Walk
         frames = plan.path.blended((step.lift + latch + rides) / plan.path.spacing) @ base
         places = np.array([law.at(time).position for time in rides]) - frames[:, :3, 3]
         hands = np.einsum("nji,nj->ni", frames[:, :3, :3], places)
-        np.testing.assert_allclose(np.hypot(hands[:, 0], hands[:, 1]), RADIUS, atol=2e-3)
-        np.testing.assert_allclose(hands[:, 2], DEPTH, atol=2e-3)
+        np.testing.assert_allclose(np.hypot(hands[:, 0], hands[:, 1]), radius, atol=2e-3)
+        np.testing.assert_allclose(hands[:, 2], height, atol=2e-3)
 
 
-def test_a_way_round_changes_its_velocity_gradually(machine: Walker, structure: Structure) -> None:
+def test_a_detour_changes_its_velocity_gradually(machine: Walker, structure: Structure) -> None:
     path = grid_path([(13, 9), (13, 18)], 2 * INCH)
     route = find_route(machine, remove_rows(structure, "12-15"), path)
     assert route.path is not None
@@ -92,7 +95,7 @@ def test_two_islands_are_refused_with_the_holds_that_separate_them(machine: Walk
     second = {f"{t},{a}" for t in range(12, 15) for a in range(20, 24)}
     islands = structure.without([hold for hold in structure.ids if hold not in first | second])
     path = grid_path([(13, 7), (13, 21.5)], 2 * INCH)
-    with pytest.raises(NoPlanError, match="beside the path there is no way beyond") as caught:
+    with pytest.raises(NoPlanError, match="beside the path there is no route beyond") as caught:
         plan_walk(machine, islands, path, objective="destination", width=4, detour=True)
     assert caught.value.separating
     assert set(caught.value.separating) <= first
@@ -114,3 +117,17 @@ def test_connected_sets_go_on_after_a_full_turn() -> None:
     assert numbers[0, 0, 0, 0] == numbers[0, 0, 0, 5] == numbers[1, 0, 0, 5] == numbers[1, 0, 0, 0]
     assert numbers[0, 0, 0, 3] not in (0, numbers[0, 0, 0, 0])
     assert (numbers[~flags] == 0).all()
+
+
+@pytest.mark.parametrize("arms", range(2, 7))
+def test_bodies_with_two_to_six_arms_look_for_detours(structure: Structure, arms: int) -> None:
+    """As many hands as must hold do, of any number of arms; and where holds end, all of them are refused."""
+    machine = wbc.robots.walker(arms, (8 + 3 * arms) * INCH)
+    path = grid_path([(13, 9), (13, 12)], 2 * INCH)
+    route = find_route(machine, remove_rows(structure, "10-11"), path, mesh=NARROW)
+    assert route.path is not None, route.text
+    np.testing.assert_allclose(ends(route.path), ends(path), atol=1e-9)
+    few = structure.without([hold for hold in structure.ids if int(hold.split(",")[1]) > 11])
+    refused = find_route(machine, few, grid_path([(13, 9), (13, 22)], 2 * INCH), mesh=NARROW)
+    assert refused.path is None
+    assert refused.separating
