@@ -1,8 +1,8 @@
-"""The loop over ticks: command, record, integrate.
+"""The loop over ticks: command, record, let the robot move.
 
-The robot of a run is its kinematic model: the command v of each tick is held for dt and integrated on the
-manifold, q <- q (+) v dt (``pin.integrate``), open loop. So the log shows what the controller commands, without the
-tracking error, delay and noise of a real robot's joint servos; ``controller.step`` takes measured q and v as well.
+The robot of a run is a plant (:mod:`wbc.simulation`). Unless another one is given it does exactly what it is commanded,
+so that the log shows the controller's command without the lag, delay and noise of a real robot's servos. The
+configuration of each tick is read from it, the velocity is the last command, not the measured one.
 
 The target of tick k is the path's pose at t_k, the feed-forward its twist at the middle of the interval,
 t_k + dt/2, which is what v is held for.
@@ -17,11 +17,11 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 from wbc import validation
 from wbc.controller import Controller
 from wbc.shapes import Sphere
+from wbc.simulation import Connection, Plant
 from wbc.track.clearance import clearances, least_mesh_clearance
 from wbc.track.log import Log
 from wbc.track.recorder import Recorder
@@ -35,6 +35,8 @@ def track(
     progress: Callable[[int], None] | None = None,
     stop: Callable[[], bool] | None = None,
     compiled: Callable[[Controller], None] | None = None,
+    *,
+    plant: Plant | None = None,
 ) -> Log:
     """Do a run and return its log.
 
@@ -43,26 +45,32 @@ def track(
         progress: called with the number of finished ticks after each.
         stop: asked before each tick; True ends the run there, with a log of what was done.
         compiled: called once when the controller is ready.
+        plant: what moves; default: a :class:`wbc.simulation.KinematicPlant`.
 
     Raises:
-        WbcError: the stack does not fit the robot, or it does not compile.
+        WbcError: the stack does not fit the robot, or it does not compile. What
+            :class:`wbc.simulation.Connection` raises of the plant.
     """
     validation.instance("plan", plan, Plan, "a Plan")
     for name, one in (("progress", progress), ("stop", stop), ("compiled", compiled)):
         validation.function(name, one)
+    connection = Connection(plant, plan.robot, plan.dt)
     began = time.perf_counter()
     controller = plan.stack().compile(solver=plan.solver, backend=plan.backend)
     compile_time = time.perf_counter() - began
     if compiled is not None:
         validation.called("compiled", compiled, controller)
     recorder = Recorder(plan, controller)
-    _loop(plan, controller, recorder, progress, stop)
+    with connection:
+        _loop(plan, controller, connection, recorder, progress, stop)
     columns, units = recorder.columns()
     robot, obstacles, t = plan.robot, plan.obstacles, recorder.times
     gaps = clearances(robot, recorder.q, obstacles, t)
     for name, values in gaps.items():
         columns[f"clearance.{name}"], units[f"clearance.{name}"] = values, "m"
     meta = _meta(plan, controller, recorder, compile_time)
+    if plant is not None:
+        meta["integration"] = f"plant {type(plant).__name__}"
     nearest = least_mesh_clearance(robot, recorder.q, obstacles, t, gaps)
     if nearest is not None:
         meta["mesh_clearance"] = dict(zip(("least", "link", "t"), nearest, strict=True))
@@ -72,12 +80,13 @@ def track(
 def _loop(
     plan: Plan,
     controller: Controller,
+    connection: Connection,
     recorder: Recorder,
     progress: Callable[[int], None] | None,
     stop: Callable[[], bool] | None,
 ) -> None:
-    model, dt, duration = plan.robot.model, plan.dt, plan.path.duration
-    q = plan.start.copy()
+    dt, duration = plan.dt, plan.path.duration
+    q = connection.reset(plan.start).q
     controller.reset(q)
     for name in plan.obstacles:
         controller[name].rate = min(plan.approach, 1.0 / controller.stack.dt_range[1])
@@ -102,7 +111,7 @@ def _loop(
         start = clock()
         step = controller.step(q)
         recorder.add(t, q, target, angle, step, (clock() - start) * 1e-9)
-        q = pin.integrate(model, q, step.v * dt)
+        q = connection.drive(step.v).q
         if progress is not None:
             validation.called("progress", progress, k + 1)
 
