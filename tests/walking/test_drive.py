@@ -66,7 +66,7 @@ def test_there_and_back_and_stop(
     assert max(tick.body_error for tick in ticks) < 0.002
     assert max(tick.slip for tick in ticks) < 0.001
     assert np.abs(last[-1].q[:3] - last[-10].q[:3]).max() < 1e-5
-    assert sum(event.what == "lift" for event in walk.events) == len(walk.steps) >= 1
+    assert sum(event.what == "lift" for event in walk.events) == len(walk.progress.steps) >= 1
     log, _ = recorder.log()
     report = check_walk(log, machine.urdf(tmp_path / "robot.urdf"), structure, Rules(sub_samples=1))
     assert report.ok, str(report)
@@ -143,13 +143,13 @@ def test_it_slows_down_before_a_gap_and_says_why(
     assert -off[-1, 2] > 0.05
     assert len(walk.held) >= 2
     assert "no hand can be moved in time" in drive.reason
-    lifts = len(walk.steps)
+    lifts = len(walk.progress.steps)
     drive.steer(0.0, 0.0, 0.0)
     for _ in range(100):
         drive.tick()
     assert drive.standing
     assert len(walk.held) == 3
-    assert len(walk.steps) == lifts
+    assert len(walk.progress.steps) == lifts
 
 
 def test_directions_and_rates() -> None:

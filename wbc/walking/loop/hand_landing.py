@@ -38,7 +38,7 @@ class HandLanding:
         """The axes as a tick begins and their rates in it, once the aim of the hand has been moved on; None on the way.
 
         Args:
-            swinging: ``axis`` and ``side`` are those of the hand now. hold: its place [m] and z axis.
+            swinging: ``axis`` and ``x_axis`` are those of the hand now. hold: its place [m] and z axis.
             near: it comes down on it.
         """
         if not near:
@@ -57,7 +57,7 @@ class HandLanding:
 
 def _turn(swinging: Swinging, z: Array) -> Array:
     """Rotation vector that takes the axes of the hold to those of the hand [rad]."""
-    axis, side, x = swinging.axis, swinging.side, swinging.x
+    axis, side, x = swinging.axis, swinging.x_axis, swinging.x
     if x is not None:
         hand, hold = (np.column_stack([a, np.cross(b, a), b]) for a, b in ((side, axis), (x, z)))
         return np.asarray(pin.log3(hand @ hold.T))

@@ -78,7 +78,7 @@ def at_rest(
 
 def turned(swinging: Swinging, wrist: Sequence[float]) -> bool:
     """Whether joints 4 and 5, and 6 where the roll counts, are near to where they are to be [rad]."""
-    (a, b, c), (d, e, f) = wrist, swinging.bend
+    (a, b, c), (d, e, f) = wrist, swinging.wrist
     return abs(a - d) < TURNED and abs(b - e) < TURNED and (swinging.x is None or abs(c - f) < TURNED)
 
 

@@ -48,7 +48,7 @@ class Stops:
         """The most that body and hand travel after an abort anywhere in a plan [m], at full pace.
 
         The body may be :data:`OFF` behind, a hand :data:`BEHIND`. Of a hand that is brought to where a plan begins,
-        ``MovingBody.stopping`` knows.
+        ``Walk.stopping`` knows.
         """
         path = plan.path
         body = self.of_body(path.poses[:, :3, 3], path.spacing, _times(path.poses, path.spacing), 1.0, OFF)

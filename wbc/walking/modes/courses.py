@@ -62,10 +62,10 @@ def course(walk: Walk, lead: float, lifts: bool = True) -> Course:
     splice = max(min(ceil((u + lead) / spacing - 1e-9), int(end / spacing + 1e-9)) * spacing, u) if walk.pace else u
     begins = splice - int((splice - max(u - TAIL * spacing, 0.0)) / spacing + 1e-9) * spacing
     here = max(int((u - begins) / spacing + 1e-9), 0)
-    sample, swinging, since = [here] * len(walk.walker.arms), walk.swinging, walk.next
+    sample, swinging, since = [here] * len(walk.walker.arms), walk.swinging, walk.progress.next
     if swinging is not None:
         since += int(swinging.counted)
-        sample[swinging.arm] = ceil((u - begins + time_left(swinging, walk.data)) / spacing)
+        sample[swinging.arm] = ceil((u - begins + time_left(swinging, walk.hands.data)) / spacing)
     steps = []
     for step in plan.regrasps[since:]:
         if not lifts or step.lift >= splice:

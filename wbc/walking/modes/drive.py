@@ -111,7 +111,7 @@ class Drive:
         swinging = walk.swinging
         if walk.pace > 0.0 or swinging is None or walk.busy:
             return
-        if walk.grips.first[swinging.grip] * walk.plan.path.spacing > walk.path_time:
+        if walk.progress.grips.first[swinging.grip] * walk.plan.path.spacing > walk.path_time:
             walk.set_down()
 
     def _plan(self) -> None:
@@ -140,8 +140,8 @@ class Drive:
                 self.reason, swinging = str(error), walk.swinging
                 if swinging is not None and not self._waited:
                     # The body may have to wait for the hand, where it can land
-                    there = float(walk.grips.first[swinging.grip]) * walk.plan.path.spacing - walk.path_time
-                    self._begin(max(there, 0.0) + LEAD, quick=True, wait=time_left(swinging, walk.data) + SURE)
+                    there = float(walk.progress.grips.first[swinging.grip]) * walk.plan.path.spacing - walk.path_time
+                    self._begin(max(there, 0.0) + LEAD, quick=True, wait=time_left(swinging, walk.hands.data) + SURE)
                 else:
                     self._stuck = True
             else:
@@ -149,7 +149,7 @@ class Drive:
                     walk.go_over(plan, begun.begins, begun.since)
                     walk.halted = False
                     self._work = Course(0.0, 0.0, 0, (), (), (), ()), slices
-                    walk.leash = None
+                    walk.limit = None
 
     def _begin(self, lead: float, quick: bool, wait: float = 0.0) -> None:
         """Begin to plan along the command, behind what the body goes on with for ``lead`` [s].
@@ -169,7 +169,7 @@ class Drive:
         ahead = steering.ramp(rest[-1] if len(rest) else rates, part * self.command, round(HORIZON / spacing), spacing)
         led = steering.ahead(bare[-1], np.concatenate([rest, ahead]), spacing)
         way = (bare[-1][:3, :3].T @ (led[-1] - led[len(rest)])[:3, 3])[:2]
-        shift, tilt = walk.data.body_shift, walk.data.body_tilt
+        shift, tilt = walk.hands.data.body_shift, walk.hands.data.body_tilt
         wanted = displacement(way, *(m * most for m, most in zip(much, (shift, shift, tilt, tilt), strict=True)))
         still = np.repeat(off[-1][None], len(rest), axis=0)
         more = np.concatenate([still, towards(off[-1], wanted, len(ahead), spacing)])
@@ -179,7 +179,7 @@ class Drive:
         self._displaced = [*kept, (other, np.concatenate([off, more]))]
         self._work = begun, course_slices(walk.walker, walk.structure, walk.plan, begun, other, quick)
         self._asked, self._waited = self.command.copy(), wait > 0.0
-        walk.leash = begun.splice, begun.since + len(begun.kept)
+        walk.limit = begun.splice, begun.since + len(begun.kept)
 
     def _displacement(self, path: BodyPath, u: float) -> Array:
         """Of the body at a path time, from where its command has it; on a way of another origin it stays."""
@@ -200,7 +200,7 @@ class Drive:
             del self._order[0]
 
     def _drop(self) -> None:
-        self._work, self.walk.leash = None, None
+        self._work, self.walk.limit = None, None
 
 
 def _far(plan: Plan, here: float) -> float:

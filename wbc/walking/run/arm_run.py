@@ -143,7 +143,7 @@ def perform_arm(
     while (walk.busy or len(walk.held) < len(walker.arms)) and walk.time < late and doing.step():
         pass
     log, ticks = recorder.log()
-    walked, ticks = as_walked(log, ticks, walk.steps)
+    walked, ticks = as_walked(log, ticks, walk.progress.steps)
     last = stops[-1]
     ended = {"reached": "arrived", "time": "arrived", "key": "interrupted", "refused": "refused"}
     run = WalkRun(request, walker, structure, walked.path, walked, "arrived", last.message, log, ticks, planned)

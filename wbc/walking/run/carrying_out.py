@@ -79,14 +79,14 @@ class CarryingOut:
     def _look(self) -> None:
         """Take a new plan into account."""
         self._seen = self.walk.plan
-        self._most = np.maximum(self._most, self.walk.stops.longest(self._seen))
+        self._most = np.maximum(self._most, self.walk.leader.stops.longest(self._seen))
 
     def _abort(self) -> None:
         """Bring everything to rest, and keep how far it went beside what was said before."""
         walk = self.walk
         self.outcome, self.reason = "interrupted", f"stopped at {walk.time:.2f} s"
         bounds, swinging = walk.stopping(), walk.swinging
-        begin, hands, left = walk.q[:3].copy(), walk.chain.origins.copy(), REST
+        begin, hands, left = walk.q[:3].copy(), walk.machine.chain.origins.copy(), REST
         far = np.zeros(2)
         walk.abort()
         while left:
@@ -96,7 +96,7 @@ class CarryingOut:
                 break
             far[0] = max(far[0], float(np.linalg.norm(walk.q[:3] - begin)))
             if swinging is not None:
-                moved = walk.chain.origins[swinging.arm] - hands[swinging.arm]
+                moved = walk.machine.chain.origins[swinging.arm] - hands[swinging.arm]
                 far[1] = max(far[1], float(np.linalg.norm(moved)))
             left -= int(walk.still)
         self.figures = (travelled((float(far[0]), float(far[1])), bounds),)

@@ -73,7 +73,7 @@ def perform_drive(
     doing = CarryingOut(walk, recorder, tick=drive.tick, progress=report, stop=stop)
     _carry_out(drive, doing, commands)
     log, ticks = recorder.log()
-    walked, ticks = as_walked(log, ticks, walk.steps)
+    walked, ticks = as_walked(log, ticks, walk.progress.steps)
     more = (*_achieved(drive, log), *doing.summary())
     outcome = doing.outcome or "time"
     run = WalkRun(request, walker, structure, walked.path, walked, outcome, doing.reason, log, ticks, planned, compiled)

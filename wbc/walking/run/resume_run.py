@@ -22,7 +22,7 @@ from wbc.walking.holds.structure import Structure
 from wbc.walking.log.body_paths import path_of
 from wbc.walking.log.log import CLOSED, OPENING, WalkLog, WalkLogError
 from wbc.walking.loop.stack import WalkStack
-from wbc.walking.loop.state import State
+from wbc.walking.loop.state import Manual, State
 from wbc.walking.loop.walk import PATIENCE, SLACK, Walk
 from wbc.walking.modes.first_grasps import plan_from_state
 from wbc.walking.planner.plan import NoPlanError
@@ -142,7 +142,7 @@ def perform_resume(
     after, ticks = recorder.log()
     log = joined(old, row, after)
     ticks = TickColumns.load(folder / TICKS).then(row, ticks)
-    walked, ticks = as_walked(log, ticks, walk.steps)
+    walked, ticks = as_walked(log, ticks, walk.progress.steps)
     outcome = doing.outcome or ("arrived" if walk.done else "late")
     told = Figure("resumed", "resumed", {"from": str(folder), "at": state.time}, f"{folder} at {state.time:.2f} s")
     run = WalkRun(request, walker, whole, walked.path, walked, outcome, doing.reason, log, ticks, planned, compiled)
@@ -154,11 +154,11 @@ def _latch(walk: Walk, doing: CarryingOut, state: State) -> None:
     if state.opening is None:
         return
     arm, hold = state.opening
-    for _ in range(round(walk.data.latch_time / walk.dt)):
-        walk.told = arm, "opening", hold
+    for _ in range(round(walk.hands.data.latch_time / walk.dt)):
+        walk.hands.manual = Manual(arm, "opening", hold)
         if not doing.step():
             break
-    walk.told = None
+    walk.hands.manual = None
 
 
 def _request(log: WalkLog, points: tuple[str, ...]) -> WalkRequest:
