@@ -22,7 +22,8 @@ class Machine:
         dt: control period [s]. plant: what moves; None: a :class:`wbc.simulation.KinematicPlant`.
 
     Attributes:
-        q: configuration, the body's pose in the structure. v: last command; rates: the plant's velocity after it.
+        q: configuration, the body's pose in the structure. v: last command. rates: of the joints, means over the last
+            period, and the body's velocity as the plant has it.
         time: [s]. held: row of the arm -> row of the hold.
         fixed: fewer hands hold than the body needs, and have since the beginning: it is declared fixed.
         structure, chain: the holds that are there, and the hands on them.
@@ -65,6 +66,9 @@ class Machine:
             self.v[:6] = 0.0
         state = self._connection.drive(self.v)
         self.rates, self.time = state.v, state.time
+        if (state.v != self.v).any():
+            # It did something else than was commanded: what lasts for a period is its mean
+            self.rates[6:] = (state.q[7:] - self.q[7:]) / self.dt
         return self._place(state.q[7:])
 
     def rest(self) -> None:

@@ -100,8 +100,8 @@ class Tick:
     """What happened in one tick; arrays are the tick's own.
 
     Attributes:
-        time: [s]. path_time: u [s]. q: configuration after it. v: what the controller returned. rates: the velocity
-            that the plant had then; of a kinematic one the same.
+        time: [s]. path_time: u [s]. q: configuration after it. v: what the controller returned. rates: what the plant
+            made of it in this period; a kinematic one the same.
         hands: state of each hand. holds: row of the hold that each hand is at or goes to, -1 for none.
         target: pose that the body was to have: position [m] and quaternion x, y, z, w.
         body_error: its distance from it [m].

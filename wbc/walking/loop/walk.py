@@ -311,7 +311,7 @@ class Walk:
         self._stop()
 
     def close_hand(self, arm: int, hold: int, roll: int) -> bool:
-        """A hand that was moved by itself to a hold (its row) takes it at one of its rolls; whether its latch closes."""
+        """A hand that was moved by itself to a hold (its row) takes it at one of its rolls; whether it closes."""
         names, self.hands.manual = (self.walker.arms[arm].name, self.structure.ids[hold]), None
         if not self.hands.close(arm, hold, roll):
             self._say("failed", *names)
