@@ -16,7 +16,7 @@ from wbc.walking.body_path import BodyPath
 from wbc.walking.holds.structure import Structure
 from wbc.walking.holds.surface import CylinderSurface
 from wbc.walking.report.surroundings import arm_colour
-from wbc.walking.run.perform import WalkRun
+from wbc.walking.run.session import WalkRun
 
 FILE = "reach_map.png"
 #: Poses of the body's path that are looked at, at most

@@ -22,8 +22,8 @@ from wbc.walking.log.log import WalkLog
 from wbc.walking.report import surroundings
 from wbc.walking.report.parts import PALE_HAND, Part, part_poses, parts_of
 from wbc.walking.report.stills import AZIMUTH, ELEVATION, held_by
-from wbc.walking.run.perform import WalkRun
 from wbc.walking.run.recording import configuration
+from wbc.walking.run.session import WalkRun
 
 FILE = "replay.html"
 #: Poses a second, and how many there are at most

@@ -7,6 +7,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from wbc.simulation import PlantError
 from wbc.track.summary import Figure
 from wbc.walking.loop.state import Tick
 from wbc.walking.loop.walk import Walk
@@ -14,7 +15,7 @@ from wbc.walking.planner.plan import HoldLost, NoPlanError
 from wbc.walking.run.recording import WalkRecorder
 
 #: How a mode ended: where it was to go, too late, its time over, by key, aborted, or why it could not go on
-Outcome = Literal["arrived", "late", "time", "key", "interrupted", "hold lost", "refused"]
+Outcome = Literal["arrived", "late", "time", "key", "interrupted", "hold lost", "plant failed", "refused"]
 #: (what is done, how much of it from 0 to 1 or None)
 Progress = Callable[[str, float | None], None]
 #: Ticks between two reports of progress
@@ -68,6 +69,8 @@ class CarryingOut:
             self.outcome, self.reason = "hold lost", str(error)
         except NoPlanError as error:
             self.outcome, self.reason = "refused", str(error)
+        except PlantError as error:
+            self.outcome, self.reason = "plant failed", str(error)
         if len(self.recorder) % STRIDE == 0:
             self._report("walking", None if part is None else min(part, 1.0))
         return self.outcome is None
@@ -92,7 +95,7 @@ class CarryingOut:
         while left:
             try:
                 self.recorder.tick(walk.tick())
-            except HoldLost:
+            except (HoldLost, PlantError):
                 break
             far[0] = max(far[0], float(np.linalg.norm(walk.q[:3] - begin)))
             if swinging is not None:
