@@ -15,7 +15,7 @@ import pinocchio as pin
 
 from wbc.errors import WbcError
 from wbc.shapes import PlacedShape
-from wbc.track import solids
+from wbc.track import render
 from wbc.track.scene import simplified
 from wbc.validation import Array
 from wbc.walking.log.log import WalkLog
@@ -109,7 +109,7 @@ def _add_structure(scene: Any, run: WalkRun, log: WalkLog) -> None:
 
 
 def _add_part(scene: Any, number: int, part: Part) -> Any:
-    mesh = simplified(solids.triangles(PlacedShape(part.shape, pin.SE3.Identity())), DETAIL)
+    mesh = simplified(render.triangles(PlacedShape(part.shape, pin.SE3.Identity())), DETAIL)
     return _add_mesh(scene, f"/walk/machine/{number} {part.link}", mesh, part.colour)
 
 

@@ -123,7 +123,8 @@ class TwoEndedMode(PlannedMode[TwoEndedRequest]):
 
     def plan(self) -> TwoEndedPlan:
         """End over end to the goal."""
-        request, start = self.request, dict(zip(("arm1", "arm2"), self.request.start, strict=True))
+        request = self.request
+        start = dict(zip(("arm1", "arm2"), request.start, strict=True))
         return plan_two_ended(self.walker, self.structure, start, request.goal, gait=request.gait)
 
     def compiled(self, backend: str) -> TwoEndedStack:

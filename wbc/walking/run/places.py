@@ -29,7 +29,7 @@ Place = GridPlace | str
 
 
 def grid_place(field: str, value: Any) -> GridPlace:
-    """From the text ``T,A`` or ``T,A,heading`` with the heading in degrees, or from numbers with the heading in radians.
+    """From the text ``T,A`` or ``T,A,heading`` with the heading in degrees, or from numbers, the heading in radians.
 
     Raises:
         ShapeError: something else. RangeError: a place beside the grid.

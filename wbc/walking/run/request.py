@@ -121,6 +121,7 @@ class Route:
         points = tuple(validation.items("to", self.points, "places")) or ((last,) if last else ())
         places: list[Place] = [self.start or first, *points]
         if not all(places) or (self.goes and not points):
+            site.whole()  # where there is no such structure, that is what is wrong
             raise ShapeError("to", self.points, "say from which to which hold; a file has no ends of its own")
         for k, place in enumerate(places):
             if site.structure == GRID:
