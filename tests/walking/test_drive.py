@@ -89,7 +89,7 @@ def test_a_hand_that_could_not_hold_on_the_new_way_lands_first(
         drive.tick()
         reasons.append(drive.reason)
     # There is a plan at once all the same
-    assert "cannot hold it on the new way" in " ".join(reasons)
+    assert "cannot hold it on the new path" in " ".join(reasons)
     assert walk.plan.path is not path
     while walk.swinging is not None:
         drive.tick()

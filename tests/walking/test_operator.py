@@ -70,7 +70,7 @@ def test_a_body_waits_for_the_answer(
     held = {arm: structure.ids[hold] for arm, hold in walk.held.items()}
     with pytest.raises(HoldRefusedError, match="a hand holds it"):
         veto.choose(held[0])
-    with pytest.raises(HoldRefusedError, match="cannot hold it anywhere on the way"):
+    with pytest.raises(HoldRefusedError, match="cannot hold it anywhere on the path"):
         veto.choose("1,1")
     with pytest.raises(UnknownNameError):
         veto.choose("1,100")

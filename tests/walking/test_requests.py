@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from wbc.errors import RangeError, ShapeError, UnknownNameError, WbcError
+from wbc.errors import RangeError, ShapeError, StructureFileError, UnknownNameError, WbcError
 from wbc.walking import run
 from wbc.walking.log.log import WalkLogError
 from wbc.walking.run import ArmRequest, DriveRequest, GridPlace, PathRequest, ResumeRequest, Site, TwoEndedRequest
@@ -92,7 +92,8 @@ def test_what_is_no_record_is_refused(record: object) -> None:
 @pytest.mark.parametrize(
     ("make", "error", "match"),
     [
-        (lambda: PathRequest("holds.csv"), ShapeError, "no ends of its own"),
+        (lambda: PathRequest("grapples"), ShapeError, "no ends of its own"),
+        (lambda: PathRequest("holds.csv"), StructureFileError, "holds.csv"),
         (lambda: PathRequest(start="13"), ShapeError, "T,A"),
         (lambda: PathRequest(points=("13,99",)), RangeError, r"place 2\.A"),
         (lambda: PathRequest("plane", points=(3,)), ShapeError, "place 2"),

@@ -25,8 +25,8 @@ class SessionLog:
     """What happened tick by tick.
 
     Attributes:
-        time [s]. q: configurations before each tick. seen: what the operator was told. late: ticks that began more than
-        a period behind the clock. interrupted: ended by Ctrl-C.
+        time [s]. q: configurations before each tick. seen: what the operator was shown. late: ticks that began more
+        than a period behind the clock. interrupted: ended by Ctrl-C.
     """
 
     time: list[float] = field(default_factory=list)

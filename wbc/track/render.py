@@ -233,7 +233,7 @@ def tube(points: Array, radius: float, colour: tuple[float, float, float]) -> Me
     count = int(run[-1] / max(radius, 1e-6)) + 1
     if count < 2:
         return Mesh(np.zeros((0, 3, 3)), colour)
-    # At equal distances along the way: where the robot is slow, recorded points are too close for a direction
+    # At equal distances along the path: where the robot is slow, recorded points are too close for a direction
     stations = np.linspace(0.0, run[-1], count)
     line = np.column_stack([np.interp(stations, run, points[:, k]) for k in range(3)])
     along = np.gradient(line, axis=0)

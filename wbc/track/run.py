@@ -29,6 +29,8 @@ from wbc.track.setup import Plan
 from wbc.validation import Array
 
 VERSIONS = ("wbc", "casadi", "pin", "daqp", "osqp", "numpy")
+STATUSES = tuple(Status)
+POSE = ("x", "y", "z", "qx", "qy", "qz", "qw")
 
 
 def track(
@@ -160,10 +162,6 @@ def _meta(plan: Plan, controller: Controller, recorder: Recorder, compile_time: 
         "limits": {name: [None if math.isinf(x) else float(x) for x in array] for name, array in arrays.items()},
         "versions": {name: importlib.metadata.version(name) for name in VERSIONS},
     }
-
-
-STATUSES = tuple(Status)
-POSE = ("x", "y", "z", "qx", "qy", "qz", "qw")
 
 
 class Recorder:

@@ -20,10 +20,10 @@ TARGET, AFTER, POSE = slice(0, 18), slice(18, 30), slice(30, 37)
 
 
 @functools.cache
-def way_function() -> ca.Function:
+def pose_function() -> ca.Function:
     """f(now, first, last, part, rate), poses as 12 numbers: the rotation by columns, the position.
 
-    The body is at M exp(s log(M' N)) when it has come the part s of the way from M to N; its rate from where it is now
+    The body is at M exp(s log(M' N)) when it has come the part s from M to N; its rate from where it is now
     on is (p' - p, R log(R' R')) / dt in the structure's axes.
 
     Args:
@@ -41,7 +41,7 @@ def way_function() -> ca.Function:
     moved = places[1] + turns[1] @ (left_jacobian(part * angular) @ (part * linear))
     speed = ca.vertcat(moved - places[0], turns[0] @ log3(turns[0].T @ turned)) * rate
     out = ca.vertcat(now, speed, ca.vec(turned), moved, moved, to_quaternion(turned))
-    return compiled(ca.Function("way", [now, first, last, part, rate], [out]))
+    return compiled(ca.Function("pose", [now, first, last, part, rate], [out]))
 
 
 class BodyCommand:
@@ -55,7 +55,7 @@ class BodyCommand:
     """
 
     def __init__(self, dt: float) -> None:
-        self._step = SingleState(way_function())
+        self._step = SingleState(pose_function())
         self._now, self._first, self._last, self._part, rate = self._step.inputs
         rate[0] = 1.0 / dt
         self._path: BodyPath | None = None

@@ -37,8 +37,8 @@ class BodyMotion:
 
         Args:
             margin: path time until a holding hand reaches the end of its grip [s]. left: until the end of the path or
-                of what is planned [s]. landing: path time that is left until the hand on its way has to hold, and the
-                time that it needs until then [s]; None: no hand is on its way. stands: the body is to come to rest.
+                of what is planned [s]. landing: path time that is left until the swinging hand has to hold, and the
+                time that it needs until then [s]; None: no hand is swinging. stands: the body is to come to rest.
         """
         brake = self._stops.brake
         wanted = min(1.0, sqrt(2.0 * margin / brake * PART), sqrt(2.0 * left / RAMP * PART))

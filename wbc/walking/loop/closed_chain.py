@@ -28,7 +28,7 @@ SWEEPS = 6
 TINY = 1e-300
 
 _KNOWN: weakref.WeakKeyDictionary[object, ca.Function] = weakref.WeakKeyDictionary()
-#: Metres that a unit of misalignment of a hand's axis counts for: hands give way to turning before they slip
+#: Metres that a unit of misalignment of a hand's axis counts for: hands turn before they slip
 AXIS_LENGTH = 0.05
 #: The same of a compliant hold: origins keep their place to 1e-7 m against it
 BALL_LENGTH = 1e-3

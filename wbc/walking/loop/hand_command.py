@@ -31,7 +31,7 @@ def aim_function() -> ca.Function:
     Returns:
         The position of the law, joints 4 to 6 as the tick ends, the part of the wrist's path, the velocity; and place,
         velocity, joints and their rates to follow, from where things are to be as the tick begins to where they are to
-        be as it ends. A hand that cannot follow must not pull at the body: its place waits within :data:`BEHIND` of it.
+        be as it ends. A hand that cannot follow must not drag the body: its place waits within :data:`BEHIND` of it.
     """
     sizes = {"place": 3, "now": 6, "law": 14, "source": 6, "target": 6, "parts": 3, "rate": 1}
     place, now, law, source, target, parts, rate = (ca.SX.sym(name, size) for name, size in sizes.items())
@@ -49,7 +49,7 @@ def aim_function() -> ca.Function:
 
 
 class HandCommand:
-    """What the hand on its way follows in a tick.
+    """What the swinging hand follows in a tick.
 
     Args:
         dt: control period [s].

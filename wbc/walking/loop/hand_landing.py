@@ -9,9 +9,9 @@ from wbc.validation import Array
 from wbc.walking.loop.hand_pace import angle
 from wbc.walking.loop.state import Axes, Swinging
 
-#: A hand turns upright when its aim is within this of its hold [m]; until then its wrist follows its way
+#: A hand turns upright when its aim is within this of its hold [m]; until then its wrist follows its law
 UPRIGHT = 0.05
-#: A hand whose way ends within this of its hold turns at once [m]
+#: A hand whose law ends within this of its hold turns at once [m]
 THERE = 0.001
 
 
@@ -23,7 +23,7 @@ class HandLanding:
     p is its aim, p_0 that at which its wrist was let go, phi the turn that takes the axes of the hold to those which
     the hand had there; the shortest one where only z counts. As the arm brings a hand down along the normal its lean
     goes with its height. To want the hold's own axis at once turns the hand by that lean in a tenth of a second, and
-    with theta5 near 0, where joint 4 hardly turns it, off its way by centimetres.
+    with theta5 near 0, where joint 4 hardly turns it, off its path by centimetres.
 
     Args:
         dt: control period [s].
@@ -35,7 +35,7 @@ class HandLanding:
         self._turn, self._far, self._part = np.zeros(3), 0.0, 0.0
 
     def go(self, swinging: Swinging, hold: tuple[Array, Array], near: bool) -> Axes | None:
-        """The axes as a tick begins and their rates in it, once the aim of the hand has been moved on; None on the way.
+        """The axes as a tick begins and their rates in it, once the aim of the hand has been moved on; None until then.
 
         Args:
             swinging: ``axis`` and ``x_axis`` are those of the hand now. hold: its place [m] and z axis.
@@ -57,9 +57,9 @@ class HandLanding:
 
 def _turn(swinging: Swinging, z: Array) -> Array:
     """Rotation vector that takes the axes of the hold to those of the hand [rad]."""
-    axis, side, x = swinging.axis, swinging.x_axis, swinging.x
+    axis, x_axis, x = swinging.axis, swinging.x_axis, swinging.x
     if x is not None:
-        hand, hold = (np.column_stack([a, np.cross(b, a), b]) for a, b in ((side, axis), (x, z)))
+        hand, hold = (np.column_stack([a, np.cross(b, a), b]) for a, b in ((x_axis, axis), (x, z)))
         return np.asarray(pin.log3(hand @ hold.T))
     across = np.cross(z, axis)
     return np.asarray(across * (angle(z, axis) / max(float(np.linalg.norm(across)), 1e-12)))

@@ -107,7 +107,7 @@ class Hands:
         grasps: (arm, hold) -> whether the hand's latch closes.
 
     Attributes:
-        swinging: the hand on its way. manual: a hand that is moved by itself, see :mod:`wbc.walking.modes.arm_mode`.
+        swinging: the swinging hand. manual: a hand that is moved by itself, see :mod:`wbc.walking.modes.arm_mode`.
     """
 
     def __init__(self, machine: Machine, stack: WalkStack, grasps: Callable[[str, str], bool]) -> None:
@@ -152,7 +152,7 @@ class Hands:
         self.stack.rest(arm, origin, axis)
 
     def drop(self) -> None:
-        """The hand on its way stays in the air, and goes nowhere any more."""
+        """The swinging hand stays in the air, and goes nowhere any more."""
         if self.swinging is not None:
             self.stay(self.swinging.arm)
             self.swinging = None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pinocchio as pin
@@ -17,15 +17,21 @@ from wbc.walking.holds.structure import Structure
 from wbc.walking.planner.grips.rolls import frame_on
 from wbc.walking.planner.grips.tilt import LEAST_TILT, TILT_PART
 
+HoldKind = Literal["pose", "position", "axis", "roll"]
 #: Kind of ``tasks.Hold`` by (hand may roll, hand may tilt)
-KINDS = {(True, False): "axis", (False, False): "pose", (True, True): "position", (False, True): "roll"}
+KINDS: dict[tuple[bool, bool], HoldKind] = {
+    (True, False): "axis",
+    (False, False): "pose",
+    (True, True): "position",
+    (False, True): "roll",
+}
 #: Gain of holds [1/s] is 1 / (HOLD_TICKS dt)
 HOLD_TICKS = 5
 #: A hand that rolls into its hold: weight, gain [1/s]
 ROLL, ROLL_GAIN = 3.0, 12.0
 
 
-def hold_kind(structure: Structure, hold: int) -> str:
+def hold_kind(structure: Structure, hold: int) -> HoldKind:
     """How a hold (its row) is held: the kind of ``tasks.Hold``."""
     return KINDS[structure.free_rolls[hold], bool(structure.tilts[hold] >= LEAST_TILT)]
 
@@ -45,7 +51,7 @@ class HoldItems:
         self._rolls = bool({"pose", "roll"} & set(self.kinds))
         for arm in walker.arms:
             for kind in self.kinds:
-                item = tasks.Hold(arm.hand, kind=kind, gain=1.0 / (HOLD_TICKS * dt))  # type: ignore[arg-type]
+                item = tasks.Hold(arm.hand, kind=kind, gain=1.0 / (HOLD_TICKS * dt))
                 stack.add(item, name=f"{arm.name} hold {kind}")
             if self._tilts:
                 stack.add(tasks.AxisCone(arm.hand, half_angle=1.0), name=f"{arm.name} tilt")

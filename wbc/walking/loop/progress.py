@@ -15,12 +15,12 @@ from wbc.walking.loop.state import Swinging
 from wbc.walking.planner.grips.table import Grips
 from wbc.walking.planner.plan import Plan, Regrasp
 
-#: Poses behind the body that are kept, for going back
+#: Poses behind the body that are remembered, for going back
 TRAIL = 400
 
 
 class PlanProgress:
-    """The place of a walk in its plan, and its way from plan to plan.
+    """The place of a walk in its plan, also where one plan takes the place of another.
 
     Attributes:
         plan, grips: what is carried out now; path times count from its beginning.
@@ -90,7 +90,7 @@ class PlanProgress:
         """Go on with a plan that is what was done so far, and more, or begin one of another path.
 
         Args:
-            swinging: the hand on its way.
+            swinging: the swinging hand.
         """
         path = self.plan.path
         if plan.path is path:
@@ -103,7 +103,7 @@ class PlanProgress:
         """Take a plan over another path, which agrees with the present one about where the body is.
 
         Args:
-            plan: begins with re-grasps of the present plan from number ``since`` on; a hand that was on its way then
+            plan: begins with re-grasps of the present plan from number ``since`` on; a hand that was swinging then
                 is where it goes to. begins: path time at which the new path begins, a sample of it [s].
         """
         path, moving = self.plan.path, swinging is not None and swinging.counted

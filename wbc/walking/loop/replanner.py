@@ -12,7 +12,7 @@ from wbc.walking.loop.machine import Machine
 from wbc.walking.loop.progress import PlanProgress
 from wbc.walking.planner.replanning import PlanSlices, plan_from_here, plan_from_stance, plan_rest
 
-#: Speed on the way to another path [m/s]
+#: Speed towards another path [m/s]
 JOINING = 0.05
 
 

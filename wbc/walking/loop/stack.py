@@ -19,11 +19,11 @@ from wbc.walking.planner.grips.rolls import ANY
 
 #: Control period [s]
 DT = 0.01
-#: Weights: the body does not give way to a swing, a swing not to postures
+#: Weights: the body comes before a swing, a swing before postures
 BODY, SWING, AXIS, WRIST, UPRIGHT = 1e4, 10.0, 3.0, 1e-3, 100.0
 #: Gains [1/s] of body, swinging hand, its axis and the wrists
 BODY_GAIN, SWING_GAIN, AXIS_GAIN, WRIST_GAIN = 12.0, 25.0, 20.0, 12.0
-#: On the way the wrist follows its postures; near the next hold its axis counts
+#: Until then the wrist follows its postures; near the next hold its axis counts
 FREE_AXIS, FREE_WRIST, RESTING = 1e-6, 40.0, 0.1
 
 
@@ -48,8 +48,7 @@ class WalkStack:
         stack.add(tasks.Posture(), name="posture", weight=WRIST)
         stack.add(tasks.JointLimits(), name="limits")
         if collisions:
-            margin = walker.data.clearance  # type: ignore[union-attr]
-            stack.add(tasks.SelfCollision(margin=margin), name="links")
+            stack.add(tasks.SelfCollision(margin=walker.tolerances.clearance), name="links")
         self.stack = stack
         self.controller: Controller = stack.compile(backend=backend)
         self._posture = np.array(walker.robot.neutral)
@@ -105,7 +104,7 @@ class WalkStack:
 
         Args:
             followed: its position [m] and velocity [m/s], joints 4 to 6 [rad] and their rates [rad/s] ``[12]``.
-            at_hold: axes of a hand near its hold: they then count and not the wrist. None on the way.
+            at_hold: axes of a hand near its hold: they then count and not the wrist; else None.
         """
         near = at_hold is not None
         if self._near != (arm, near):

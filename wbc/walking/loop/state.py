@@ -37,7 +37,7 @@ class Axes(NamedTuple):
 
 @dataclass(eq=False)
 class Swinging:
-    """A hand on its way.
+    """A swinging hand.
 
     Attributes:
         arm: its row. hold: row of the hold that it goes to. grip: which it is to be.

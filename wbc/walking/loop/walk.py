@@ -131,7 +131,7 @@ class Walk:
 
     @property
     def swinging(self) -> Swinging | None:
-        """The hand on its way."""
+        """The swinging hand."""
         return self.hands.swinging
 
     @property
@@ -162,7 +162,7 @@ class Walk:
 
     @property
     def done(self) -> bool:
-        """The body is at the end of the path, and no hand is on its way."""
+        """The body is at the end of the path, and no hand is swinging."""
         ended = self.path_time >= self.plan.path.duration - 1e-9 and self.swinging is None and not self._changing
         if not ended or self.progress.step is not None:
             return False
@@ -218,7 +218,7 @@ class Walk:
         return Tick(machine.time, self.path_time, machine.q, machine.v, machine.rates, *state)
 
     def vanish(self, ids: Iterable[str]) -> None:
-        """Take holds away: free, targeted or held. What of the plan does not need them is kept; a hand that held one is
+        """Take holds away: free, targeted or held. What of the plan does not need them stays; a hand that held one is
         open at once, and the body stops until there is a plan.
 
         Raises:
@@ -430,12 +430,12 @@ class Walk:
         if self.halted or self.aborted:
             return True
         if self.leader.one_motion:
-            # A hand on its way goes on to its hold with the body
+            # A swinging hand goes on to its hold with the body
             return self._changing and self.swinging is None
         return self._changing or (self.swinging is not None and self.swinging.waits)
 
     def _soonest(self, swinging: Swinging) -> float:
-        """Path time from which on the hold of a hand on its way is in reach [s]."""
+        """Path time from which on the hold of a swinging hand is in reach [s]."""
         return float(self.progress.grips.first[swinging.grip]) * self.plan.path.spacing
 
     def _due(self, swinging: Swinging) -> float:
@@ -447,7 +447,7 @@ class Walk:
         return due if self.limit is None else max(min(due, self.limit[0]), soonest)
 
     def _land(self, swinging: Swinging) -> None:
-        """Close the hand on its way; when the latch is through it holds, or it has missed and tries again."""
+        """Close the swinging hand; when the latch is through it holds, or it has missed and tries again."""
         if not self.hands.settle(swinging):
             return
         names = self.walker.arms[swinging.arm].name, self.structure.ids[swinging.hold]

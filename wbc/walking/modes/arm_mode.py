@@ -1,4 +1,4 @@
-"""Arm mode: one hand moves as it is told while the others hold and the body stands still."""
+"""Arm mode: one hand moves as commanded while the others hold and the body stands still."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class ArmMode:
     """One arm of a walk that stands.
 
     Args:
-        walk: between its ticks; its body stands and no hand is on its way. arm: name. on_tick: what happens every tick.
+        walk: between its ticks; its body stands and no hand is swinging. arm: name. on_tick: what happens every tick.
         stop: asked every tick of a motion: true ends it, within :data:`wbc.walking.loop.hand_pace.HAND_STOP` seconds,
             and raises :class:`ArmStopped`.
 
@@ -63,7 +63,7 @@ class ArmMode:
         self.stopped: tuple[tuple[float, float], tuple[float, float]] | None = None
         manual = walk.hands.manual
         if walk.pace > 0.0 or walk.swinging is not None or (manual is not None and manual.arm != self.arm):
-            raise ArmRefused("walk", walk.path_time, "the body moves, or a hand is on its way")
+            raise ArmRefused("walk", walk.path_time, "the body moves, or a hand is swinging")
         others = [k for k in walk.held if k != self.arm]
         if len(others) < walk.walker.min_holds:
             raise ArmRefused("arm", arm, f"{walk.walker.min_holds} other hands must hold, {len(others)} do")
@@ -86,7 +86,7 @@ class ArmMode:
     def by_rate(self, twist: Any, seconds: float) -> None:
         """The hand moves with a twist (linear; angular) in the structure's axes [m/s, rad/s] for a time [s].
 
-        It speeds up and slows down on the way: what is covered is twist x seconds.
+        It speeds up and slows down: what is covered is twist x seconds.
 
         Raises:
             ShapeError, RangeError: bad numbers. ArmRefused: not possible; nothing has moved.
@@ -113,7 +113,7 @@ class ArmMode:
         rolls = structure.holds[row].rolls
         frames = {roll: pin.SE3(frame_on(structure, row, roll)) for roll in range(len(rolls))}
         if not frames:
-            # The roll is free: the hand turns the shortest way
+            # The roll is free: the hand turns as little as it can
             turn = pin.Quaternion.FromTwoVectors(here.rotation[:, 2], axis).toRotationMatrix()
             frames = {ANY: pin.SE3(turn @ here.rotation, structure.positions[row])}
         number = min(frames, key=lambda k: float(np.linalg.norm(pin.log3(here.rotation.T @ frames[k].rotation))))
@@ -181,7 +181,7 @@ class ArmMode:
         return then
 
     def _come_to_rest(self, rows: Array, places: Array, place: float) -> None:
-        """The pace falls to nothing; how far body and hand go is kept beside what is said before."""
+        """The pace falls to nothing; how far body and hand go is stored beside what is said before."""
         walk = self.walk
         begin, hand = walk.q[:3].copy(), walk.machine.chain.origins[self.arm].copy()
         gap = float(np.linalg.norm(_between(places, place) - hand))
@@ -190,7 +190,7 @@ class ArmMode:
         for pace in (*np.arange(1.0 - walk.dt / HAND_STOP, 0.0, -walk.dt / HAND_STOP).tolist(), *[0.0] * STILL):
             place = self._go(rows, place, pace)
             moved = walk.q[:3] - begin, walk.machine.chain.origins[self.arm] - hand
-            far = np.maximum(far, [float(np.linalg.norm(way)) for way in moved])
+            far = np.maximum(far, [float(np.linalg.norm(path)) for path in moved])
         self.stopped = (float(far[0]), float(far[1])), said
 
     def _places(self, rows: Array) -> Array:

@@ -108,7 +108,7 @@ class CarryingOut:
 def farthest(body: float, hand: float) -> Figure:
     """How far a body and a hand go after an abort, at most [m]."""
     text = f"body at most {1e3 * body:.0f} mm, hand at most {1e3 * hand:.0f} mm"
-    return Figure("stopping", "way after an abort", {"body": body, "hand": hand}, text)
+    return Figure("stopping", "travel after an abort", {"body": body, "hand": hand}, text)
 
 
 def travelled(far: tuple[float, float], bounds: tuple[float, float]) -> Figure:

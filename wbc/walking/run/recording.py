@@ -195,7 +195,7 @@ def configuration(walker: Walker, log: WalkLog, row: int) -> Array:
 
 
 def as_walked(log: WalkLog, ticks: TickColumns, steps: Sequence[Regrasp]) -> tuple[Plan, TickColumns]:
-    """A plan whose path is the way of the logged body, over the time of the log; and ticks that say so.
+    """A plan whose path is that of the logged body, over the time of the log; and ticks that say so.
 
     Args:
         steps: re-grasps that were begun.
