@@ -106,7 +106,7 @@ def test_a_body_goes_aside_and_tilts_as_far_as_it_may_and_comes_back(
     walk = Walk(machine, structure, begin, stack=stack)
     drive, recorder = Drive(walk), WalkRecorder(walk)
     with monkeypatch.context() as patch:
-        patch.setattr(driving, "WAYS", ((1.0, (0.0, 1.0, 0.0, 1.0)),))
+        patch.setattr(driving, "ALTERNATIVES", ((1.0, (0.0, 1.0, 0.0, 1.0)),))
         away = drive_on(drive, recorder, 2.2, 0.0, 0.08, 0.0)
     back = drive_on(drive, recorder, 2.2, 0.0, 0.081, 0.0)
     first = pin.XYZQUATToSE3(away[0].q[:7])
@@ -124,7 +124,7 @@ def test_it_slows_down_before_a_gap_and_says_why(
     machine: Walker, structure: Structure, stack: WalkStack, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # Slower, lower and higher are what is taken here
-    monkeypatch.setattr(driving, "WAYS", [driving.WAYS[k] for k in (0, 1, 2, 3, 4)])
+    monkeypatch.setattr(driving, "ALTERNATIVES", [driving.ALTERNATIVES[k] for k in (0, 1, 2, 3, 4)])
     gap = remove_rows(structure, "15-22")
     begin = standing_plan(machine, gap, grid_pose(13, 13, 100 * INCH + HEIGHT))
     walk = Walk(machine, gap, begin, stack=stack)

@@ -10,7 +10,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from wbc.walking.loop.hand_landing import HandLanding
+from wbc.walking.loop.hand_command import HandLanding
 from wbc.walking.loop.state import Axes, Swinging
 from wbc.walking.planner.swings.law import Aim
 

@@ -15,7 +15,7 @@ from wbc.robots import Walker
 from wbc.simulation import PlantError, PlantState
 from wbc.walking import Structure
 from wbc.walking.body_path import BodyPath, grid_path
-from wbc.walking.loop.body_motion import RAMP, BodyMotion
+from wbc.walking.loop.body_command import RAMP, BodyMotion
 from wbc.walking.loop.hands import TRIES, Hands
 from wbc.walking.loop.machine import Machine
 from wbc.walking.loop.progress import PlanProgress

@@ -12,8 +12,7 @@ import pinocchio as pin
 from wbc.errors import ShapeError
 from wbc.robots import WalkerData
 from wbc.validation import Array
-from wbc.walking.loop.hand_command import HandCommand
-from wbc.walking.loop.hand_landing import UPRIGHT, HandLanding
+from wbc.walking.loop.hand_command import UPRIGHT, HandCommand, HandLanding
 from wbc.walking.loop.hand_pace import HAND_RAMP, HAND_STOP, LANDING, at_rest, hand_pace, turned
 from wbc.walking.loop.machine import Machine
 from wbc.walking.loop.progress import PlanProgress

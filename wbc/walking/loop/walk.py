@@ -13,7 +13,7 @@ from wbc.robots import Walker
 from wbc.simulation import Plant
 from wbc.validation import Array
 from wbc.walking.holds.structure import Structure
-from wbc.walking.loop.body_motion import BodyMotion
+from wbc.walking.loop.body_command import BodyMotion
 from wbc.walking.loop.hands import ArmLeader, HandLeader, Hands
 from wbc.walking.loop.machine import Machine
 from wbc.walking.loop.progress import PlanProgress

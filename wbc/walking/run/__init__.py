@@ -1,5 +1,7 @@
 """Runs: walks as they are asked for, carried out, logged, and shown in a folder."""
 
+from __future__ import annotations
+
 from typing import Any
 
 from wbc.walking.run import old_names
