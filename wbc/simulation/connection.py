@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import contextlib
+from collections.abc import Iterator
+from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -54,8 +56,9 @@ class Connection:
         Raises:
             PlantError: the plant is not there, has no valid reading, or raised what is no error of this package.
         """
-        self._asked("reset", q, time)
-        return self._read()
+        with self._named():
+            self.plant.reset(q, time)
+            return self._checked(self.plant.read())
 
     def drive(self, v: Array) -> PlantState:
         """One period with a desired velocity ``[nv]``; the state after it.
@@ -63,25 +66,37 @@ class Connection:
         Raises:
             PlantError: no valid reading, and the plant is commanded to rest; or it raised.
         """
-        self._asked("apply", Command(CommandKind.VELOCITY, v))
-        self._asked("advance", self._dt)
-        return self._read()
-
-    def rest(self) -> None:
-        """Command zero velocity; time does not go on."""
-        self._asked("apply", Command(CommandKind.VELOCITY, np.zeros(self._nv)))
-
-    def _asked(self, method: str, *arguments: Any) -> Any:
         try:
-            return getattr(self.plant, method)(*arguments)
+            self.plant.apply(Command(CommandKind.VELOCITY, v))
+            self.plant.advance(self._dt)
+            return self._checked(self.plant.read())
         except WbcError:
             raise
         except Exception as error:
-            reason = f"it raised {type(error).__name__}: {error}"
-            raise PlantError(f"plant.{method}", type(self.plant).__name__, reason) from error
+            raise self._failed(error) from error
 
-    def _read(self) -> PlantState:
-        state = self._asked("read")
+    def rest(self) -> None:
+        """Command zero velocity; time does not go on.
+
+        Raises:
+            PlantError: the plant raised.
+        """
+        with self._named():
+            self.plant.apply(Command(CommandKind.VELOCITY, np.zeros(self._nv)))
+
+    @contextlib.contextmanager
+    def _named(self) -> Iterator[None]:
+        try:
+            yield
+        except WbcError:
+            raise
+        except Exception as error:
+            raise self._failed(error) from error
+
+    def _failed(self, error: Exception) -> PlantError:
+        return PlantError("plant", type(self.plant).__name__, f"it raised {type(error).__name__}: {error}")
+
+    def _checked(self, state: Any) -> PlantState:
         reason = self._fault(state)
         if reason:
             self.rest()
@@ -95,9 +110,11 @@ class Connection:
             return "expected a PlantState"
         if not state.valid:
             return "there is no valid reading of where the robot is"
-        if np.shape(state.q) != (self._nq,) or np.shape(state.v) != (self._nv,):
-            return f"expected q [{self._nq}] and v [{self._nv}], not {np.shape(state.q)} and {np.shape(state.v)}"
-        if not (np.isfinite(state.q).all() and np.isfinite(state.v).all() and np.isfinite(state.time)):
+        q, v = state.q, state.v
+        if q.shape != (self._nq,) or v.shape != (self._nv,):
+            return f"expected q [{self._nq}] and v [{self._nv}], not {q.shape} and {v.shape}"
+        # A sum of squares is a number where all are
+        if not isfinite(q.dot(q) + v.dot(v) + state.time):
             return "expected finite numbers"
         return ""
 

@@ -66,7 +66,7 @@ class Machine:
             self.v[:6] = 0.0
         state = self._connection.drive(self.v)
         self.rates, self.time = state.v, state.time
-        if (state.v != self.v).any():
+        if state.v.tobytes() != self.v.tobytes():
             # It did something else than was commanded: what lasts for a period is its mean
             self.rates[6:] = (state.q[7:] - self.q[7:]) / self.dt
         return self._place(state.q[7:])
