@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Any, Protocol
+from typing import Protocol
 
 from wbc.errors import WbcError
 from wbc.validation import Array
@@ -93,6 +93,3 @@ class Plant(Protocol):
 
 class PlantError(WbcError):
     """A plant that has no valid reading, or cannot do what it is to do; it was commanded to rest."""
-
-    def __init__(self, field: str, value: Any, reason: str) -> None:
-        super().__init__(field, value, reason)
