@@ -3,10 +3,10 @@
 import numpy as np
 
 import wbc
-from wbc.walking.run import WalkRequest, perform_walk
+from wbc.walking.run import PathRequest, perform_walk
 
 walker = wbc.robots.walker()
-request = WalkRequest("cylinder", speed=0.1016, start="13,9", points=("13,14",))
+request = PathRequest("cylinder", speed=0.1016, start="13,9", points=("13,14",))
 run = perform_walk(request, walker)
 
 for step in run.plan.regrasps:

@@ -24,7 +24,7 @@ from wbc.errors import RangeError
 from wbc.walking import cylinder
 from wbc.walking.body_path import grid_path
 from wbc.walking.log.recorder import versions
-from wbc.walking.loop.body_command import way_function
+from wbc.walking.loop.body_command import pose_function
 from wbc.walking.loop.closed_chain import chain_function
 from wbc.walking.loop.hand_command import aim_function
 from wbc.walking.loop.stack import WalkStack
@@ -100,7 +100,7 @@ def test_where_no_speed_is_kept_the_bisection_ends(course: Record) -> None:
 
 def test_what_belongs_to_the_robot_is_loaded_once(it: Machine) -> None:
     def parts() -> list[object]:
-        return [chain_function(it.walker), way_function(), aim_function(), versions()]
+        return [chain_function(it.walker), pose_function(), aim_function(), versions()]
 
     gc.unfreeze()
     try:

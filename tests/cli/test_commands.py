@@ -19,7 +19,7 @@ from wbc import style, track
 from wbc.cli import bench, session
 from wbc.cli.app import COMMANDS, app, command
 from wbc.errors import UnknownNameError, WbcError
-from wbc.track.picture import save_picture
+from wbc.track.plots import save_picture
 
 FAST = ["--backend", "vm", "--rate", "50", "--duration", "0.5", "--no-plots"]
 

@@ -18,14 +18,14 @@ from tests.cli.test_commands import run
 from wbc import style
 from wbc.robots import WalkerData
 from wbc.robots.walker_data import WALKER_DIGEST
-from wbc.walking import run as walking_run
 from wbc.walking.holds.built_in import plane
 from wbc.walking.log.log import WalkLog
+from wbc.walking.loop.walk import Walk
 from wbc.walking.planner.detours import ALONG
 from wbc.walking.planner.detours import route as detours
 from wbc.walking.report.folder import RunFolderError
-from wbc.walking.run import perform
-from wbc.walking.run.request import WalkRequest, over_holds
+from wbc.walking.run.places import over_holds
+from wbc.walking.run.request import Site
 
 SHORT = ["--from", "13,9", "--to", "13,14"]
 
@@ -195,7 +195,7 @@ def test_what_is_out_of_reach_is_refused_with_its_reason(tmp_path: Path, monkeyp
 
 
 def test_ctrl_c_leaves_what_there_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    tick, count = perform.Walk.tick, []
+    tick, count = Walk.tick, []
 
     def pressed(self: Any) -> Any:
         count.append(1)
@@ -203,7 +203,7 @@ def test_ctrl_c_leaves_what_there_is(tmp_path: Path, monkeypatch: pytest.MonkeyP
             os.kill(os.getpid(), signal.SIGINT)
         return tick(self)
 
-    monkeypatch.setattr(perform.Walk, "tick", pressed)
+    monkeypatch.setattr(Walk, "tick", pressed)
     folder = tmp_path / "run"
     code, out, _ = run("walk", *SHORT, "--out", folder)
     assert code == 130
@@ -237,8 +237,7 @@ def test_bodies_stand_over_holds() -> None:
 
 
 def test_removed_holds_are_gone() -> None:
-    structure = WalkRequest(rows="12-14", fraction=0.1, seed=3).build()
+    structure = Site(rows="12-14", fraction=0.1, seed=3).build()
     assert len(structure) == 25 * 21 - round(0.1 * 25 * 21)
     assert not any(hold.endswith((",12", ",13", ",14")) for hold in structure.ids)
-    assert WalkRequest(rows="12-14", fraction=0.1, seed=3).build().digest == structure.digest
-    assert walking_run.WalkRequest is WalkRequest
+    assert Site(rows="12-14", fraction=0.1, seed=3).build().digest == structure.digest

@@ -20,8 +20,7 @@ from wbc.cli.walking.keyboard import END, KeyCommands
 from wbc.terminal import terminal_keys
 from wbc.walking.checker import check_run
 from wbc.walking.log.log import WalkLog
-from wbc.walking.run.drive_run import perform_drive
-from wbc.walking.run.request import WalkRequest
+from wbc.walking.run import DriveRequest, perform_walk
 
 BARE = ["--no-pictures", "--strict"]
 
@@ -69,8 +68,9 @@ def test_a_driven_run_goes_on_to_a_place(driven: Path, tmp_path: Path) -> None:
 
 def test_keys_drive(tmp_path: Path) -> None:
     keys = iter(["ww", *[""] * 60, " ", *[""] * 30, "x"])
-    request = WalkRequest(start="13,11", commands="keyboard")
-    done = perform_drive(request, robots.walker(), KeyCommands(lambda: next(keys), real_time=False))
+    request = DriveRequest(start="13,11", commands="keyboard")
+    commands = KeyCommands(lambda: next(keys), real_time=False)
+    done = perform_walk(request, robots.walker(), commands=commands)
     assert done.outcome == "time"
     assert done.log is not None
     assert done.log.command[30, 1] == pytest.approx(2 * 0.0254)

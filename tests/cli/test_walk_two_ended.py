@@ -15,9 +15,7 @@ from wbc.robots import TwoEndedData, Walker
 from wbc.walking.report.folder import save_run
 from wbc.walking.report.plots import save_plots
 from wbc.walking.report.stills import save_overview
-from wbc.walking.run.perform import WalkRun
-from wbc.walking.run.request import WalkRequest
-from wbc.walking.run.two_ended_run import perform_two_ended
+from wbc.walking.run import TwoEndedRequest, WalkRun, perform_walk
 from wbc.walking.two_ended import TwoEndedStack, grapple_row
 
 
@@ -34,8 +32,8 @@ def stack(quick: Walker) -> TwoEndedStack:
 
 @pytest.fixture(scope="module")
 def walked(quick: Walker, stack: TwoEndedStack) -> WalkRun:
-    request = WalkRequest("grapples", points=("3",), robot="two-ended", gait="inchworm")
-    return perform_two_ended(request, quick, stack=stack)
+    request = TwoEndedRequest(goal="3", gait="inchworm")
+    return perform_walk(request, quick, stack=stack)
 
 
 def test_a_run_has_a_folder_and_the_checker_is_content(walked: WalkRun, tmp_path: Path) -> None:
@@ -64,8 +62,8 @@ def test_it_is_plotted_and_drawn(walked: WalkRun, tmp_path: Path, monkeypatch: p
 
 
 def test_an_abort_in_a_swing_goes_no_farther_than_was_said(quick: Walker, stack: TwoEndedStack) -> None:
-    request, asked = WalkRequest("grapples", points=("3",), robot="two-ended"), iter([*[False] * 400, True])
-    done = perform_two_ended(request, quick, stack=stack, stop=lambda: next(asked))
+    request, asked = TwoEndedRequest("grapples", goal="3"), iter([*[False] * 400, True])
+    done = perform_walk(request, quick, stack=stack, stop=lambda: next(asked))
     assert done.outcome == "interrupted"
     assert done.log is not None
     told = {figure.key: figure.value for figure in done.more}

@@ -26,6 +26,7 @@ FLOORS = {
     "wbc.robot": 2,
     "wbc.robots": 2,
     "wbc.proximity": 2,
+    "wbc.simulation": 3,
     "wbc.tasks": 3,
     "wbc.analysis": 4,
     "wbc.stack": 4,

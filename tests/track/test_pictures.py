@@ -19,9 +19,8 @@ from wbc import track
 from wbc.errors import NotFiniteError, RangeError, RotationError, ShapeError, UnknownNameError, WbcError
 from wbc.robot.geometry.coal_shapes import geometry_of
 from wbc.shapes import Box, Capsule, Convex, Cylinder, HalfSpace, PlacedShape, Solid, Sphere
-from wbc.track import render, solids
-from wbc.track.picture import save_picture
-from wbc.track.plots import save_plots
+from wbc.track import render
+from wbc.track.plots import save_picture, save_plots
 from wbc.track.scene import OBSTACLE, PATH, simplified
 
 CAMERA = render.Camera(np.array([4.0, 0.0, 1.0]), np.array([0.0, 0.0, 1.0]), math.radians(40.0), 160, 120)
@@ -198,7 +197,7 @@ def test_scenes_refuse_what_cannot_be_drawn(tmp_path: Path) -> None:
 def test_surface_of_every_solid(shape: Solid) -> None:
     """Corners lie on the surface that Coal sees, and the triangles reach as far as it does along every direction."""
     place = pin.SE3(pin.exp3(np.array([0.3, -0.5, 0.7])), np.array([0.1, 0.2, -0.3]))
-    points = solids.triangles(PlacedShape(shape, place)).reshape(-1, 3)
+    points = render.triangles(PlacedShape(shape, place)).reshape(-1, 3)
     geometry = geometry_of(shape)
     where = place * geometry.offset
     there = coal.Transform3s(where.rotation, where.translation)

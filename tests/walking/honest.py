@@ -84,7 +84,7 @@ def _recorded(ground: Structure, poses: list[pin.SE3], q: np.ndarray, states: li
     names = [arm.name for arm in MACHINE.arms], [arm.hand for arm in MACHINE.arms]
     joints = [joint for arm in MACHINE.arms for joint in arm.joints]
     digest = MACHINE.data.digest
-    recorder = LogRecorder(ground, joints, *names, dt=DT, seed=0, robot="walker", robot_digest=digest, room=16)
+    recorder = LogRecorder(ground, joints, *names, dt=DT, seed=0, robot="walker", robot_digest=digest, capacity=16)
     for k, pose in enumerate(poses):
         after = min(k + 1, len(poses) - 1)
         rates = (q[after] - q[k]) / DT

@@ -94,6 +94,6 @@ def test_refusals_say_why_and_nothing_moves(walk: Walk) -> None:
         ArmMode(walk, "arm9")
     assert (walk.q == q).all()
     assert len(walk.held) == 3
-    walk.pace = 0.5
+    walk.body.pace = 0.5
     with pytest.raises(ArmRefused, match="the body moves"):
         ArmMode(walk, "arm1")

@@ -10,8 +10,7 @@ from wbc.robots import Walker
 from wbc.walking import cylinder
 from wbc.walking.checker import Rules, check_walk
 from wbc.walking.loop.stack import WalkStack
-from wbc.walking.run.perform import perform_walk
-from wbc.walking.run.request import WalkRequest
+from wbc.walking.run import PathRequest, perform_walk
 
 
 @pytest.fixture(scope="module")
@@ -25,7 +24,7 @@ def compliant(machine: Walker) -> WalkStack:
 def test_it_walks_there(
     machine: Walker, compliant: WalkStack, name: str, start: str, goal: str, tmp_path: Path
 ) -> None:
-    run = perform_walk(WalkRequest(name, start=start, points=(goal,)), machine, stack=compliant)
+    run = perform_walk(PathRequest(name, start=start, points=(goal,)), machine, stack=compliant)
     assert run.outcome == "arrived", run.reason
     assert run.plan is not None
     assert run.plan.regrasps

@@ -43,24 +43,25 @@ def test_a_hand_follows_its_law_and_its_wrist_goes_from_grip_to_grip() -> None:
             arm, aim, bend, place = (
                 swinging.arm,
                 swinging.aim,
-                np.array(swinging.bend),
-                walk.chain.origins[swinging.arm],
+                np.array(swinging.wrist),
+                walk.machine.chain.origins[swinging.arm],
             )
         walk.tick()
         if arm < 0 or walk.swinging is not swinging:
             continue
         now, sample = swinging.law.at(swinging.clock), walk.path_time / walk.plan.path.spacing
-        first, last = (np.array(walk.grips.wrist_at(grip, sample)) for grip in (walk._grip[arm], swinging.grip))
+        both = walk.progress.grip[arm], swinging.grip
+        first, last = (np.array(walk.progress.grips.wrist_at(grip, sample)) for grip in both)
         assert np.allclose(swinging.aim.position, now.position, atol=1e-12)
         assert np.allclose(swinging.aim.velocity, now.velocity, atol=1e-12)
-        assert np.allclose(swinging.bend, first + now.blend * (last - first), atol=1e-12)
+        assert np.allclose(swinging.wrist, first + now.blend * (last - first), atol=1e-12)
         followed, joints = walk.stack._swings[arm], machine.arms[arm]
         gap = np.linalg.norm(aim.position - place)
         waits = place + (aim.position - place) * min(1.0, 0.02 / max(gap, 1e-9))
         assert np.allclose(followed.target, waits, atol=1e-12)
         assert np.allclose(followed.feedforward, (now.position - aim.position) / DT, atol=1e-9)
         assert np.allclose(walk.stack.controller["posture"].target[joints.q][3:], bend, atol=1e-12)
-        rates = (np.array(swinging.bend) - bend) / DT
+        rates = (np.array(swinging.wrist) - bend) / DT
         assert np.allclose(walk.stack.controller["posture"].feedforward[joints.v][3:], rates, atol=1e-9)
         seen += 1
     assert seen == 150

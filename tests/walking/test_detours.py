@@ -16,7 +16,7 @@ from wbc.walking.planner.detours.cell_graph import round_labels
 from wbc.walking.planner.plan import NoPlanError
 from wbc.walking.planner.planner import plan_walk
 from wbc.walking.planner.swings.curve import ALTERNATIVES
-from wbc.walking.run.request import over_holds
+from wbc.walking.run.places import over_holds
 
 INCH = 0.0254
 #: One height, and as few poses as will do

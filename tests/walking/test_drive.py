@@ -66,7 +66,7 @@ def test_there_and_back_and_stop(
     assert max(tick.body_error for tick in ticks) < 0.002
     assert max(tick.slip for tick in ticks) < 0.001
     assert np.abs(last[-1].q[:3] - last[-10].q[:3]).max() < 1e-5
-    assert sum(event.what == "lift" for event in walk.events) == len(walk.steps) >= 1
+    assert sum(event.what == "lift" for event in walk.events) == len(walk.progress.steps) >= 1
     log, _ = recorder.log()
     report = check_walk(log, machine.urdf(tmp_path / "robot.urdf"), structure, Rules(sub_samples=1))
     assert report.ok, str(report)
@@ -89,7 +89,7 @@ def test_a_hand_that_could_not_hold_on_the_new_way_lands_first(
         drive.tick()
         reasons.append(drive.reason)
     # There is a plan at once all the same
-    assert "cannot hold it on the new way" in " ".join(reasons)
+    assert "cannot hold it on the new path" in " ".join(reasons)
     assert walk.plan.path is not path
     while walk.swinging is not None:
         drive.tick()
@@ -106,7 +106,7 @@ def test_a_body_goes_aside_and_tilts_as_far_as_it_may_and_comes_back(
     walk = Walk(machine, structure, begin, stack=stack)
     drive, recorder = Drive(walk), WalkRecorder(walk)
     with monkeypatch.context() as patch:
-        patch.setattr(driving, "WAYS", ((1.0, (0.0, 1.0, 0.0, 1.0)),))
+        patch.setattr(driving, "ALTERNATIVES", ((1.0, (0.0, 1.0, 0.0, 1.0)),))
         away = drive_on(drive, recorder, 2.2, 0.0, 0.08, 0.0)
     back = drive_on(drive, recorder, 2.2, 0.0, 0.081, 0.0)
     first = pin.XYZQUATToSE3(away[0].q[:7])
@@ -124,7 +124,7 @@ def test_it_slows_down_before_a_gap_and_says_why(
     machine: Walker, structure: Structure, stack: WalkStack, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # Slower, lower and higher are what is taken here
-    monkeypatch.setattr(driving, "WAYS", [driving.WAYS[k] for k in (0, 1, 2, 3, 4)])
+    monkeypatch.setattr(driving, "ALTERNATIVES", [driving.ALTERNATIVES[k] for k in (0, 1, 2, 3, 4)])
     gap = remove_rows(structure, "15-22")
     begin = standing_plan(machine, gap, grid_pose(13, 13, 100 * INCH + HEIGHT))
     walk = Walk(machine, gap, begin, stack=stack)
@@ -143,13 +143,13 @@ def test_it_slows_down_before_a_gap_and_says_why(
     assert -off[-1, 2] > 0.05
     assert len(walk.held) >= 2
     assert "no hand can be moved in time" in drive.reason
-    lifts = len(walk.steps)
+    lifts = len(walk.progress.steps)
     drive.steer(0.0, 0.0, 0.0)
     for _ in range(100):
         drive.tick()
     assert drive.standing
     assert len(walk.held) == 3
-    assert len(walk.steps) == lifts
+    assert len(walk.progress.steps) == lifts
 
 
 def test_directions_and_rates() -> None:

@@ -10,7 +10,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from wbc.walking.loop.hand_landing import HandLanding
+from wbc.walking.loop.hand_command import HandLanding
 from wbc.walking.loop.state import Axes, Swinging
 from wbc.walking.planner.swings.law import Aim
 
@@ -25,7 +25,7 @@ def come_down(rolls: bool, heights: np.ndarray = HEIGHTS) -> tuple[Swinging, lis
     """A hand that follows its axes without error."""
     still = cast("Any", SimpleNamespace(at=lambda _time: Aim(PLACE, np.zeros(3), 1.0, 1.0)))
     hand = FRAME @ pin.exp3(LEAN)
-    swinging = Swinging(0, 0, 0, still, 0.0, axis=hand[:, 2], side=hand[:, 0], x=FRAME[:, 0] if rolls else None)
+    swinging = Swinging(0, 0, 0, still, 0.0, axis=hand[:, 2], x_axis=hand[:, 0], x=FRAME[:, 0] if rolls else None)
     landing, out = HandLanding(DT), []
     for height in heights:
         swinging.aim = Aim(PLACE + height * FRAME[:, 2], np.zeros(3), 0.99, 0.9)
@@ -49,7 +49,7 @@ def test_it_begins_with_the_axes_of_the_hand_and_ends_with_those_of_the_hold(rol
     if not rolls:
         assert all(axes.x is None and axes.x_rate is None for axes in found)
         return
-    assert np.allclose(found[0].x, swinging.side, atol=1e-12)
+    assert np.allclose(found[0].x, swinging.x_axis, atol=1e-12)
     last = found[-1]
     assert last.x is not None
     assert last.x_rate is not None

@@ -145,7 +145,7 @@ def test_ball_holds_fix_the_hands_places_exactly(
     count = np.array([0 if roll == "free" else roll] * len(held))
     table = HoldTable(held.positions, held.frames[:, :3, :3], count, held.tilts)
     here = pin.Quaternion(out[3:7]).matrix()
-    turns_of = [np.column_stack([x, np.cross(z, x), z]) for x, z in zip(chain.sides, chain.axes, strict=True)]
+    turns_of = [np.column_stack([x, np.cross(z, x), z]) for x, z in zip(chain.x_axes, chain.axes, strict=True)]
     local_hands = Hands((chain.origins - out[:3]) @ here, here.T @ np.array(turns_of))
     near = Hands(local_hands.position[None], local_hands.rotation[None])
     rows, yes = np.array([[holds[arm] for arm in range(3)]]), np.ones((1, 3), dtype=bool)

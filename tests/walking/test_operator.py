@@ -32,20 +32,20 @@ def test_nothing_goes_farther_after_an_abort_than_was_said(
 ) -> None:
     walk, rng = Walk(machine, structure, plan, stack=stack), np.random.default_rng(5)
     recorder = WalkRecorder(walk)
-    most, swung = walk.stops.longest(plan), 0
+    most, swung = walk.leader.stops.longest(plan), 0
     for _ in range(12):
         for _ in range(int(rng.integers(20, 90))):
             if not walk.done:
                 recorder.tick(walk.tick())
         bounds, arm = walk.stopping(), walk.swinging and walk.swinging.arm
-        body, hands = walk.q[:3].copy(), walk.chain.origins.copy()
+        body, hands = walk.q[:3].copy(), walk.machine.chain.origins.copy()
         walk.abort()
         for _ in range(50):
             recorder.tick(walk.tick())
             assert np.linalg.norm(walk.q[:3] - body) <= bounds[0] <= most[0]
             if arm is not None:
-                assert np.linalg.norm(walk.chain.origins[arm] - hands[arm]) <= bounds[1] <= most[1]
-        swung += arm is not None and np.linalg.norm(walk.chain.origins[arm] - hands[arm]) > 0.01
+                assert np.linalg.norm(walk.machine.chain.origins[arm] - hands[arm]) <= bounds[1] <= most[1]
+        swung += arm is not None and np.linalg.norm(walk.machine.chain.origins[arm] - hands[arm]) > 0.01
         assert walk.still
         assert np.abs(walk.v).max() < 0.02
         walk.carry_on()
@@ -70,7 +70,7 @@ def test_a_body_waits_for_the_answer(
     held = {arm: structure.ids[hold] for arm, hold in walk.held.items()}
     with pytest.raises(HoldRefusedError, match="a hand holds it"):
         veto.choose(held[0])
-    with pytest.raises(HoldRefusedError, match="cannot hold it anywhere on the way"):
+    with pytest.raises(HoldRefusedError, match="cannot hold it anywhere on the path"):
         veto.choose("1,1")
     with pytest.raises(UnknownNameError):
         veto.choose("1,100")
@@ -92,7 +92,7 @@ def test_a_body_waits_for_the_answer(
         veto.accept()
         recorder.tick(walk.tick())
         assert walk.time < 40.0
-    assert walk.steps[0].target == name
+    assert walk.progress.steps[0].target == name
     assert veto.proposal is None
     with pytest.raises(HoldRefusedError, match="no re-grasp is proposed"):
         veto.choose("13,13")

@@ -13,8 +13,8 @@ from wbc.robots import Walker
 from wbc.walking import Hold, Structure
 from wbc.walking.body_path import BodyPath, grid_path
 from wbc.walking.report.reach_map import REASONS, save_reach_map, why_unusable
-from wbc.walking.run.perform import WalkRun
-from wbc.walking.run.request import WalkRequest
+from wbc.walking.run.request import PathRequest
+from wbc.walking.run.session import WalkRun
 
 INCH = 0.0254
 
@@ -52,5 +52,5 @@ def test_every_hold_has_its_arms_or_its_reason(
     assert told["1,1"] == "out of reach"
     # What one arm can use the others cannot where they are too far away
     assert usable[holds.index("13,15")].tolist() == [True, False, False]
-    run = WalkRun(WalkRequest(), machine, holds, path, None, "refused", "")
+    run = WalkRun(PathRequest(), machine, holds, path, None, "refused", "")
     assert save_reach_map(run, tmp_path).stat().st_size > 5000

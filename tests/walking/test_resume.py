@@ -22,11 +22,9 @@ from wbc.walking.modes.first_grasps import free_state, plan_from_state
 from wbc.walking.planner.plan import Plan
 from wbc.walking.planner.planner import plan_walk
 from wbc.walking.report.folder import save_run
-from wbc.walking.run import perform
-from wbc.walking.run.perform import WalkRun, perform_walk
+from wbc.walking.run import PathRequest, ResumeRequest, Site, WalkRun, path_mode, perform_walk
 from wbc.walking.run.recording import WalkRecorder
-from wbc.walking.run.request import WalkRequest
-from wbc.walking.run.resume_run import perform_resume, resumed_state
+from wbc.walking.run.resume_mode import resumed_state
 
 INCH = 0.0254
 
@@ -55,7 +53,7 @@ def test_first_grasps(machine: Walker, structure: Structure, stack: WalkStack, t
 @pytest.fixture(scope="module")
 def walked(machine: Walker, stack: WalkStack, tmp_path_factory: pytest.TempPathFactory) -> tuple[WalkRun, pathlib.Path]:
     folder = tmp_path_factory.mktemp("run")
-    request = WalkRequest(start="13,9", points=("13,13",), rigid=True)
+    request = PathRequest(Site(rigid=True), "13,9", ("13,13",))
     run = perform_walk(request, machine, stack=stack)
     save_run(run, folder, check=False)
     return run, folder
@@ -69,7 +67,7 @@ def test_a_walk_goes_on_from_any_state(
     assert run.log is not None
     rows = np.flatnonzero((run.log.hand_state == state).any(axis=1))
     row = int(rows[len(rows) // 2])
-    again = perform_resume(folder, machine, at=float(run.log.t[row]), stack=stack)
+    again = perform_walk(ResumeRequest(folder, float(run.log.t[row])), machine, stack=stack)
     assert again.outcome == "arrived"
     assert again.log is not None
     assert (again.log.q[: row + 1] == run.log.q[: row + 1]).all()
@@ -90,7 +88,7 @@ def walks(
     out = []
     for free in (False, True):
         folder = tmp_path_factory.mktemp("walks")
-        request = WalkRequest(start="13,9", points=("13,12",), rigid=True, free_start=free)
+        request = PathRequest(Site(rigid=True), "13,9", ("13,12",), free_start=free)
         run = perform_walk(request, machine, stack=stack)
         save_run(run, folder, check=False)
         assert run.log is not None
@@ -105,7 +103,7 @@ def test_a_walk_goes_on_from_any_instant(
 ) -> None:
     log, folder = walks[free]
     row = 1 + round(part * (len(log) - 2))
-    again = perform_resume(folder, machine, at=float(log.t[row]), stack=stack)
+    again = perform_walk(ResumeRequest(folder, float(log.t[row])), machine, stack=stack)
     assert again.outcome == "arrived", again.reason
     assert again.log is not None
     assert again.ticks is not None
@@ -123,16 +121,16 @@ def test_a_walk_goes_on_from_any_instant(
 def test_a_walk_that_went_round_goes_on_round(
     machine: Walker, stack: WalkStack, tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    request = WalkRequest(start="13,10", points=("13,12",), rigid=True)
+    request = PathRequest(Site(rigid=True), "13,10", ("13,12",))
     round_about = grid_path([(13, 10), (13.5, 11), (13, 12)], 4 * INCH)
 
     def found(walker: Walker, structure: Structure, path: BodyPath, **more: object) -> Plan:
         return plan_walk(walker, structure, round_about, objective="destination")
 
-    monkeypatch.setattr(perform, "plan_walk", found)
-    run = perform.perform_walk(request, machine, stack=stack)
+    monkeypatch.setattr(path_mode, "plan_walk", found)
+    run = perform_walk(request, machine, stack=stack)
     save_run(run, tmp_path, check=False)
-    again = perform_resume(tmp_path, machine, at=1.0, stack=stack)
+    again = perform_walk(ResumeRequest(tmp_path, 1.0), machine, stack=stack)
     assert again.outcome == "arrived"
     assert again.log is not None
     corner = round_about.poses[:, :3, 3][np.abs(round_about.poses[:, 0, 3] - round_about.poses[0, 0, 3]).argmax()]
@@ -148,9 +146,9 @@ def test_what_cannot_be_resumed_is_named(
     run, folder = walked
     assert run.log is not None
     with pytest.raises(RangeError, match=r"resume.at: expected a time from 0.01"):
-        perform_resume(folder, machine, at=1e3)
+        perform_walk(ResumeRequest(folder, 1e3), machine)
     with pytest.raises(WalkLogError, match=r"there is no run\.npz"):
-        perform_resume(tmp_path, machine)
+        perform_walk(ResumeRequest(tmp_path), machine)
     gone = [run.log.hold_id[hold] for hold in run.log.hand_hold[5][:2]]
     with pytest.raises(RangeError, match="1 hands hold there, 2 must"):
         resumed_state(run.log, 5, machine, structure.without(gone))

@@ -22,7 +22,7 @@ POSE = np.array([1.0, 2.0, 3.0, 0.0, 0.0, 0.6, 0.8])
 
 
 def recorder(**changes: Any) -> LogRecorder:
-    settings: dict[str, Any] = {"dt": 0.01, "seed": 7, "robot": "two", "robot_digest": "0123", "room": 2}
+    settings: dict[str, Any] = {"dt": 0.01, "seed": 7, "robot": "two", "robot_digest": "0123", "capacity": 2}
     return LogRecorder(structure(4, 0.1), JOINTS, ARMS, HANDS, **{**settings, **changes})
 
 
@@ -201,6 +201,6 @@ def test_a_recorder_refuses_what_does_not_fit_and_keeps_what_it_has() -> None:
     append(made, 1, q=[np.nan, 0.0])
     with pytest.raises(NotFiniteError, match=r"WalkLog\.q"):
         made.log()
-    for name, value in (("dt", 0.0), ("room", 0), ("room", 1.5)):
+    for name, value in (("dt", 0.0), ("capacity", 0), ("capacity", 1.5)):
         with pytest.raises(RangeError, match=name):
             recorder(**{name: value})

@@ -17,9 +17,8 @@ from wbc.walking.loop.stack import WalkStack
 from wbc.walking.loop.walk import Tick, Walk
 from wbc.walking.planner.plan import NoPlanError, Plan
 from wbc.walking.planner.planner import plan_walk
-from wbc.walking.run.perform import perform_walk
+from wbc.walking.run import PathRequest, Site, perform_walk
 from wbc.walking.run.recording import WalkRecorder
-from wbc.walking.run.request import WalkRequest
 
 INCH = 0.0254
 PATHS = {"+A": [(13, 9), (13, 14)], "-T": [(16, 12), (11, 12)]}
@@ -37,7 +36,7 @@ def walked(
         hand = walk.swinging
         if hand is not None and hand.state == "open":
             # What comes down is not turned off its way: 2.5 mm at most on these, 5.6 mm where it turned all at once
-            assert np.linalg.norm(walk.chain.origins[hand.arm] - hand.aim.position) < 0.004
+            assert np.linalg.norm(walk.machine.chain.origins[hand.arm] - hand.aim.position) < 0.004
         recorder.tick(tick)
 
     assert walk.run(keep) == "arrived"
@@ -123,12 +122,12 @@ def test_a_budget_ends_the_search_with_what_is_found(machine: Walker, structure:
 def test_a_walk_that_takes_too_long_is_given_up_and_says_so(
     machine: Walker, structure: Structure, stack: WalkStack, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    for name in ("wbc.walking.loop.walk", "wbc.walking.run.perform"):
+    for name in ("wbc.walking.loop.walk", "wbc.walking.run.path_mode"):
         monkeypatch.setattr(f"{name}.PATIENCE", 0.0)
         monkeypatch.setattr(f"{name}.SLACK", 0.3)
     walk = Walk(machine, structure, plan_walk(machine, structure, grid_path([(13, 12), (13, 13)], 0.1)), stack=stack)
     assert walk.run() == "late"
-    run = perform_walk(WalkRequest(start="13,12", points=("13,13",), rigid=True), machine, stack=stack)
+    run = perform_walk(PathRequest(Site(rigid=True), "13,12", ("13,13",)), machine, stack=stack)
     assert run.outcome == "late"
     assert "not there after" in run.reason
     assert run.log is not None

@@ -1,4 +1,4 @@
-"""What ``wbc track``, ``wbc export`` and ``wbc ik`` are told, and the plan that their options make."""
+"""What ``wbc track``, ``wbc export`` and ``wbc ik`` take, and the plan that their options make."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def planned(
     hold: list[str] | None,
     obstacles: dict[str, Moving],
     *,
-    way: tuple[str, float | None, float | None] = ("circle", None, None),
+    follow: tuple[str, float | None, float | None] = ("circle", None, None),
     plane: tuple[str, float] = ("off", 0.0),
     rate: float = 200.0,
     **settings: Any,
@@ -37,7 +37,7 @@ def planned(
     """The plan that options mean. A plan has a path, on which its stack does not depend.
 
     Args:
-        obstacles: beside those of the path. way: path, duration [s] and size [m], see :func:`scene`.
+        obstacles: beside those of the path. follow: path, duration [s] and size [m], see :func:`scene`.
         plane: what to do with the elbow plane, and the amplitude of its swing [rad]. rate: commands a second.
         settings: fields of the plan as they are.
 
@@ -48,7 +48,7 @@ def planned(
     frequency = validation.scalar("rate", rate, low=0.0, open_low=True, unit="Hz")
     tip = tip_frame(machine, frame)
     first = machine.neutral if start is None else configuration(machine, start)
-    path, own, label = scene(machine, tip, first, *way)
+    path, own, label = scene(machine, tip, first, *follow)
     return Plan(
         machine,
         tip,
@@ -101,17 +101,17 @@ def scene(
         raise UnknownNameError("path", path, PRESETS)
     if size is not None:
         raise WbcError("size", size, "belongs to a preset, not to a path file", PRESETS)
-    way = read_path(path)
+    timed = read_path(path)
     if duration is not None:
-        way = way.stretched(validation.scalar("duration", duration, low=0.0, open_low=True, unit="s"))
-    first = way.sample(0.0).pose
+        timed = timed.stretched(validation.scalar("duration", duration, low=0.0, open_low=True, unit="s"))
+    first = timed.sample(0.0).pose
     away = pin.log6(here.actInv(first))
     label = Path(path).stem
     if float(np.abs(away.vector).max()) < 1e-9:
-        return way, {}, label
+        return timed, {}, label
     # Half a second, or as long as 0.25 m/s and 1 rad/s need
     time = max(0.5, float(np.linalg.norm(away.linear)) / 0.25, float(np.linalg.norm(away.angular)))
-    return Approach(here, way, time), {}, label
+    return Approach(here, timed, time), {}, label
 
 
 def given_obstacles(sphere: list[str] | None, floor: float | None) -> dict[str, Moving]:

@@ -20,8 +20,7 @@ from wbc.controller import Controller
 from wbc.interrupts import interrupts
 from wbc.record.recording import RecordingError
 from wbc.track.log import FORMATS, Log, save
-from wbc.track.picture import save_picture
-from wbc.track.plots import save_plots
+from wbc.track.plots import save_picture, save_plots
 from wbc.track.run import track
 from wbc.track.setup import Plan
 from wbc.track.summary import Figure, save_summary, summarise

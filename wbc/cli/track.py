@@ -40,7 +40,7 @@ def track(
         start,
         hold,
         given_obstacles(sphere, floor),
-        way=(path, duration, size),
+        follow=(path, duration, size),
         plane=(plane, swing),
         rate=rate,
         margin=margin,

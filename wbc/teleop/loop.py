@@ -1,4 +1,4 @@
-"""A session run against a source of orders, with a robot that follows its commands."""
+"""A session run against a source of orders and a plant."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 from wbc import validation
 from wbc.errors import RobotFileError, ShapeError
+from wbc.simulation import Connection, Plant
 from wbc.teleop.order import AT_ONCE, Source
 from wbc.teleop.session import Seen, Teleoperation
 from wbc.validation import Array
@@ -25,8 +25,8 @@ class SessionLog:
     """What happened tick by tick.
 
     Attributes:
-        time [s]. q: configurations before each tick. seen: what the operator was told. late: ticks that began more than
-        a period behind the clock. interrupted: ended by Ctrl-C.
+        time [s]. q: configurations before each tick. seen: what the operator was shown. late: ticks that began more
+        than a period behind the clock. interrupted: ended by Ctrl-C.
     """
 
     time: list[float] = field(default_factory=list)
@@ -110,16 +110,19 @@ def run_session(
     realtime: bool = False,
     tell: Callable[[float, Seen], None] | None = None,
     log: SessionLog | None = None,
+    plant: Plant | None = None,
 ) -> SessionLog:
-    """Orders from a source until it ends, for some seconds, or until Ctrl-C; the robot follows its commands exactly.
+    """Orders from a source until it ends, for some seconds, or until Ctrl-C.
 
     Args:
         realtime: wait for the clock, 50 ticks a second; else as fast as it goes.
         tell: called after every tick with its time and what was seen.
         log: written tick by tick, so that it has what there was when an error ends the run; default: a new one.
+        plant: what moves; default: a :class:`wbc.simulation.KinematicPlant`, which does exactly what it is commanded.
 
     Raises:
-        WbcError: a bad order or configuration; the session is at rest then and can be reset.
+        WbcError: a bad order or configuration, or what :class:`wbc.simulation.Connection` raises of the plant. The
+            plant and the session are at rest then, and the session can be reset.
     """
     validation.instance("session", session, Teleoperation, "a Teleoperation")
     if not callable(getattr(source, "order", None)):
@@ -130,9 +133,12 @@ def run_session(
     realtime = validation.flag("realtime", realtime)
     q, log = session.robot.configuration("q", q), SessionLog() if log is None else log
     limit = validation.real_array("seconds", seconds, (), finite=False)
+    connection = Connection(plant, session.robot, session.control.dt)
     session.reset(q)
+    q = connection.reset(q).q
     try:
-        _run(session, source, q, float(limit), realtime, tell, log)
+        with connection:
+            _run(session, source, q, connection, float(limit), realtime, tell, log)
     except KeyboardInterrupt:
         log.interrupted = True
     finally:
@@ -144,6 +150,7 @@ def _run(
     session: Teleoperation,
     source: Source,
     q: Array,
+    connection: Connection,
     limit: float,
     realtime: bool,
     tell: Callable[[float, Seen], None] | None,
@@ -164,5 +171,5 @@ def _run(
         log.add(now, q, seen)
         if tell is not None:
             validation.called("tell", tell, now, seen)
-        q = pin.integrate(session.robot.model, q, period * seen.step.v)
+        q = connection.drive(seen.step.v).q
         tick += 1

@@ -46,7 +46,7 @@ NOTHING = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class Seen:
-    """What an operator is told after a tick.
+    """What an operator is shown after a tick.
 
     Attributes:
         step: the tick. active: pair in use. blending: a change is under way. stale: the last order is too old, rates
@@ -207,7 +207,7 @@ class Teleoperation:
         if joints:
             out.append(f"at limits of {', '.join(joints)}")
         if step.relaxed:
-            out.append(f"gave way: {', '.join(dict.fromkeys(slack.item for slack in step.relaxed))}")
+            out.append(f"relaxed: {', '.join(dict.fromkeys(slack.item for slack in step.relaxed))}")
         if step.status is not Status.SOLVED:
             out.append(f"the tick is {step.status}")
         return tuple(out) or ("other constraints, or the pair has no full rank here",)

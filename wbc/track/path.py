@@ -18,7 +18,7 @@ from wbc import validation
 from wbc.errors import RangeError, ShapeError
 from wbc.validation import Array
 
-#: Consecutive orientations may be at most this far apart [rad]; beyond it, the way round is ambiguous.
+#: Consecutive orientations may be at most this far apart [rad]; beyond it, the direction of the turn is ambiguous.
 LARGEST_TURN = math.radians(170.0)
 
 #: Shortest time between poses, and longest path [s]: powers up to the fifth of times are added
@@ -133,17 +133,17 @@ class Approach:
     """First a path from a pose to the start of another path, then that path. Both are at rest where they meet."""
 
     def __init__(self, start: pin.SE3, path: Path, duration: float) -> None:
-        self._way = SplinePath([0.0, duration], [start, path.sample(0.0).pose])
+        self._first = SplinePath([0.0, duration], [start, path.sample(0.0).pose])
         self._path = path
 
     @property
     def duration(self) -> float:
         """Duration of both [s]."""
-        return self._way.duration + self._path.duration
+        return self._first.duration + self._path.duration
 
     def sample(self, t: float) -> Sample:
         """Pose and twist at time t [s]."""
-        return self._way.sample(t) if t < self._way.duration else self._path.sample(t - self._way.duration)
+        return self._first.sample(t) if t < self._first.duration else self._path.sample(t - self._first.duration)
 
 
 def smooth_step(t: float, duration: float) -> tuple[float, float]:

@@ -102,11 +102,11 @@ class _There:
 
 
 def around_obstacle(start: pin.SE3, duration: float, size: float) -> Preset:
-    """To the other side of a sphere of radius ``size``, round it in front, and back the same way.
+    """To the other side of a sphere of radius ``size``, round it in front, and back along the same path.
 
-    With s the start position and r = size, the far end is s + (0, -7 r, 0), so the straight way passes through the
+    With s the start position and r = size, the far end is s + (0, -7 r, 0), so the straight line passes through the
     sphere at s + (-r/3, -7 r/2, 0), and the path goes by s + (2 r/3 + 0.1 m, -7 r/2, 0) instead. The hand turns by
-    -0.6 rad about the world's z axis on the way there. The spline is at rest only at the start and at the end.
+    -0.6 rad about the world's z axis until there. The spline is at rest only at the start and at the end.
     """
     across = 7.0 * size
 

@@ -12,8 +12,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 from numpy.typing import NDArray
 
+from wbc.shapes import Box, Capsule, Convex, Cylinder, PlacedShape, Solid, Sphere
 from wbc.validation import Array
 
 #: Arrays of other kinds of numbers: single precision, indices, masks
@@ -231,7 +233,7 @@ def tube(points: Array, radius: float, colour: tuple[float, float, float]) -> Me
     count = int(run[-1] / max(radius, 1e-6)) + 1
     if count < 2:
         return Mesh(np.zeros((0, 3, 3)), colour)
-    # At equal distances along the way: where the robot is slow, recorded points are too close for a direction
+    # At equal distances along the path: where the robot is slow, recorded points are too close for a direction
     stations = np.linspace(0.0, run[-1], count)
     line = np.column_stack([np.interp(stations, run, points[:, k]) for k in range(3)])
     along = np.gradient(line, axis=0)
@@ -313,3 +315,46 @@ def _crossings(triangles: Array, y: Array) -> tuple[Array, Array]:
         left[meets] = np.minimum(left, x)[meets]
         right[meets] = np.maximum(right, x)[meets]
     return left, right
+
+
+#: Points round a circle, and circles on a half sphere
+AROUND, RINGS = 48, 12
+
+
+def triangles(placed: PlacedShape) -> Array:
+    """The shape's surface in the link's frame, m x 3 x 3 [m]."""
+    place: pin.SE3 = placed.placement
+    return np.asarray(_surface(placed.shape) @ place.rotation.T + place.translation)
+
+
+def _surface(shape: Solid) -> Array:
+    if isinstance(shape, Box):
+        corners = np.array(np.meshgrid(*([-0.5, 0.5],) * 3)).reshape(3, -1).T
+        return _hull(corners * np.array(shape.size))
+    if isinstance(shape, Convex):
+        return _hull(shape.points)
+    if isinstance(shape, Cylinder):
+        half = shape.length / 2
+        return _turned(np.array([[0.0, -half], [shape.radius, -half], [shape.radius, half], [0.0, half]]))
+    assert isinstance(shape, (Sphere, Capsule))
+    half = shape.length / 2 if isinstance(shape, Capsule) else 0.0
+    angle = np.linspace(0.0, math.pi / 2, RINGS + 1)
+    cap = shape.radius * np.stack([np.cos(angle), np.sin(angle)], axis=1) + np.array([0.0, half])
+    return _turned(np.concatenate([cap[::-1] * np.array([1.0, -1.0]), cap]))
+
+
+def _hull(points: Array) -> Array:
+    from scipy.spatial import ConvexHull
+
+    return np.asarray(points[ConvexHull(points).simplices])
+
+
+def _turned(profile: Array) -> Array:
+    """The surface that points (distance from z, height), n x 2, sweep round the z axis."""
+    angle = 2.0 * math.pi * np.arange(AROUND) / AROUND
+    wide, height = profile[:, :1], np.broadcast_to(profile[:, 1:], (len(profile), AROUND))
+    rings = np.stack([wide * np.cos(angle), wide * np.sin(angle), height], axis=2)
+    a, b = rings[:-1], rings[1:]
+    c, d = np.roll(a, -1, axis=1), np.roll(b, -1, axis=1)
+    both = [np.stack(corners, axis=2).reshape(-1, 3, 3) for corners in ([a, b, d], [a, d, c])]
+    return np.concatenate(both)

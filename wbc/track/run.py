@@ -1,8 +1,8 @@
-"""The loop over ticks: command, record, integrate.
+"""The loop over ticks: command, record, let the robot move.
 
-The robot of a run is its kinematic model: the command v of each tick is held for dt and integrated on the
-manifold, q <- q (+) v dt (``pin.integrate``), open loop. So the log shows what the controller commands, without the
-tracking error, delay and noise of a real robot's joint servos; ``controller.step`` takes measured q and v as well.
+The robot of a run is a plant (:mod:`wbc.simulation`). Unless another one is given it does exactly what it is commanded,
+so that the log shows the controller's command without the lag, delay and noise of a real robot's servos. The
+configuration of each tick is read from it, the velocity is the last command, not the measured one.
 
 The target of tick k is the path's pose at t_k, the feed-forward its twist at the middle of the interval,
 t_k + dt/2, which is what v is held for.
@@ -20,14 +20,17 @@ import numpy as np
 import pinocchio as pin
 
 from wbc import validation
-from wbc.controller import Controller
+from wbc.controller import Controller, Status, Step, core_of
 from wbc.shapes import Sphere
+from wbc.simulation import Connection, Plant
 from wbc.track.clearance import clearances, least_mesh_clearance
 from wbc.track.log import Log
-from wbc.track.recorder import RunRecorder
 from wbc.track.setup import Plan
+from wbc.validation import Array
 
 VERSIONS = ("wbc", "casadi", "pin", "daqp", "osqp", "numpy")
+STATUSES = tuple(Status)
+POSE = ("x", "y", "z", "qx", "qy", "qz", "qw")
 
 
 def track(
@@ -35,6 +38,8 @@ def track(
     progress: Callable[[int], None] | None = None,
     stop: Callable[[], bool] | None = None,
     compiled: Callable[[Controller], None] | None = None,
+    *,
+    plant: Plant | None = None,
 ) -> Log:
     """Do a run and return its log.
 
@@ -43,26 +48,32 @@ def track(
         progress: called with the number of finished ticks after each.
         stop: asked before each tick; True ends the run there, with a log of what was done.
         compiled: called once when the controller is ready.
+        plant: what moves; default: a :class:`wbc.simulation.KinematicPlant`.
 
     Raises:
-        WbcError: the stack does not fit the robot, or it does not compile.
+        WbcError: the stack does not fit the robot, or it does not compile. What
+            :class:`wbc.simulation.Connection` raises of the plant.
     """
     validation.instance("plan", plan, Plan, "a Plan")
     for name, one in (("progress", progress), ("stop", stop), ("compiled", compiled)):
         validation.function(name, one)
+    connection = Connection(plant, plan.robot, plan.dt)
     began = time.perf_counter()
     controller = plan.stack().compile(solver=plan.solver, backend=plan.backend)
     compile_time = time.perf_counter() - began
     if compiled is not None:
         validation.called("compiled", compiled, controller)
     recorder = RunRecorder(plan, controller)
-    _loop(plan, controller, recorder, progress, stop)
+    with connection:
+        _loop(plan, controller, connection, recorder, progress, stop)
     columns, units = recorder.columns()
     robot, obstacles, t = plan.robot, plan.obstacles, recorder.times
     gaps = clearances(robot, recorder.q, obstacles, t)
     for name, values in gaps.items():
         columns[f"clearance.{name}"], units[f"clearance.{name}"] = values, "m"
     meta = _meta(plan, controller, recorder, compile_time)
+    if plant is not None:
+        meta["integration"] = f"plant {type(plant).__name__}"
     nearest = least_mesh_clearance(robot, recorder.q, obstacles, t, gaps)
     if nearest is not None:
         meta["mesh_clearance"] = dict(zip(("least", "link", "t"), nearest, strict=True))
@@ -72,12 +83,13 @@ def track(
 def _loop(
     plan: Plan,
     controller: Controller,
+    connection: Connection,
     recorder: RunRecorder,
     progress: Callable[[int], None] | None,
     stop: Callable[[], bool] | None,
 ) -> None:
-    model, dt, duration = plan.robot.model, plan.dt, plan.path.duration
-    q = plan.start.copy()
+    dt, duration = plan.dt, plan.path.duration
+    q = connection.reset(plan.start).q
     controller.reset(q)
     for name in plan.obstacles:
         controller[name].rate = min(plan.approach, 1.0 / controller.stack.dt_range[1])
@@ -102,7 +114,7 @@ def _loop(
         start = clock()
         step = controller.step(q)
         recorder.add(t, q, target, angle, step, (clock() - start) * 1e-9)
-        q = pin.integrate(model, q, step.v * dt)
+        q = connection.drive(step.v).q
         if progress is not None:
             validation.called("progress", progress, k + 1)
 
@@ -150,3 +162,105 @@ def _meta(plan: Plan, controller: Controller, recorder: RunRecorder, compile_tim
         "limits": {name: [None if math.isinf(x) else float(x) for x in array] for name, array in arrays.items()},
         "versions": {name: importlib.metadata.version(name) for name in VERSIONS},
     }
+
+
+class RunRecorder:
+    """Columns of a run that grow by one tick with each :meth:`add`."""
+
+    def __init__(self, plan: Plan, controller: Controller) -> None:
+        n, robot = plan.ticks, plan.robot
+        self._plan = plan
+        self._data = robot.model.createData()
+        self._frame = int(robot.model.getFrameId(plan.frame))
+        blocks = core_of(controller).layout.blocks
+        self._tasks = {name: b.rows for name, b in blocks.items() if b.form == "task"}
+        self._margins = {name: b.rows for name, b in blocks.items() if b.form == "margins"}
+        self.count = 0
+        self._t = np.zeros(n)
+        self._q, self._v = np.zeros((n, robot.nq)), np.zeros((n, robot.nv))
+        self._pose, self._target = np.zeros((n, 7)), np.zeros((n, 7))
+        self._errors = {name: np.zeros((n, len(rows))) for name, rows in self._tasks.items()}
+        self._heights = {name: np.zeros((n, len(rows))) for name, rows in self._margins.items()}
+        self._plane = np.full(n, math.nan)
+        self._faded = np.zeros(n, dtype=bool)
+        self._status, self._iterations = np.zeros(n, dtype=np.int8), np.zeros(n, dtype=np.int32)
+        self._bound, self._tick = np.zeros(n), np.zeros(n)
+        self._binding: dict[str, Array] = {}
+        self._relaxed: dict[str, Array] = {}
+        self._relaxed_units: dict[str, str] = {}
+
+    @property
+    def q(self) -> Array:
+        """Configurations so far."""
+        return self._q[: self.count]
+
+    @property
+    def times(self) -> Array:
+        """Times so far [s]."""
+        return self._t[: self.count]
+
+    def add(self, t: float, q: Array, target: pin.SE3, angle: float, step: Step, seconds: float) -> None:
+        """Record a tick; it counts only when all of it is written."""
+        k, n = self.count, len(self._t)
+        self._t[k], self._q[k], self._v[k] = t, q, step.v
+        pin.framesForwardKinematics(self._plan.robot.model, self._data, q)
+        self._pose[k] = pin.SE3ToXYZQUAT(self._data.oMf[self._frame])
+        self._target[k] = pin.SE3ToXYZQUAT(target)
+        for name, residual in step.residuals.items():
+            self._errors[name][k] = residual.values
+        for name, margins in step.margins.items():
+            self._heights[name][k] = margins
+        self._plane[k] = angle
+        self._faded[k] = "plane" in step.faded
+        self._status[k] = STATUSES.index(step.status)
+        self._iterations[k] = step.iterations
+        self._bound[k], self._tick[k] = step.certificate.error_bound, seconds
+        for row in step.binding:
+            self._binding.setdefault(str(row), np.zeros(n, dtype=bool))[k] = True
+        for slack in step.relaxed:
+            label = f"{slack.item}/{slack.row}"
+            self._relaxed_units[label] = slack.unit
+            self._relaxed.setdefault(label, np.zeros(n))[k] = slack.amount
+        self.count = k + 1
+
+    def columns(self) -> tuple[dict[str, np.ndarray], dict[str, str]]:
+        """(columns, units) of the ticks so far; see :class:`wbc.track.Log`."""
+        robot, dt = self._plan.robot, self._plan.dt
+        out: dict[str, np.ndarray] = {}
+        units: dict[str, str] = {}
+
+        def put(name: str, values: np.ndarray, unit: str = "") -> None:
+            out[name], units[name] = values[: self.count].copy(), unit
+
+        put("t", self._t, "s")
+        coordinates = {int(i): k for k, i in enumerate(robot.position_index) if i >= 0}
+        for i in range(robot.nq):
+            dof = coordinates.get(i)
+            name = str(i) if dof is None else robot.dof_names[dof]
+            put(f"q.{name}", self._q[:, i], "" if dof is None else robot.dof_units[dof])
+        before = np.vstack([np.zeros(robot.nv), self._v[:-1]])
+        for k, (name, unit) in enumerate(zip(robot.dof_names, robot.dof_units, strict=True)):
+            put(f"v.{name}", self._v[:, k], f"{unit}/s")
+            put(f"a.{name}", (self._v[:, k] - before[:, k]) / dt, f"{unit}/s^2")
+        for k, name in enumerate(POSE):
+            put(f"pose.{name}", self._pose[:, k], "m" if k < 3 else "")
+            put(f"target.{name}", self._target[:, k], "m" if k < 3 else "")
+        for task, rows in self._tasks.items():
+            for k, row in enumerate(rows):
+                put(f"error.{task}.{row.label}", self._errors[task][:, k], row.unit)
+        if self._plan.plane is not None:
+            put("plane.command", self._plane, "rad")
+            put("plane.angle", self._plane + self._errors["plane"][:, 0], "rad")
+            put("plane.faded", self._faded)
+        for item, rows in self._margins.items():
+            for k, row in enumerate(rows):
+                put(f"margin.{item}.{row.label}", self._heights[item][:, k], row.unit)
+        put("status", self._status)
+        put("iterations", self._iterations)
+        put("error_bound", self._bound, "rad/s")
+        put("tick", self._tick, "s")
+        for label, flags in sorted(self._binding.items()):
+            put(f"binding.{label}", flags)
+        for label, amounts in sorted(self._relaxed.items()):
+            put(f"relaxed.{label}", amounts, self._relaxed_units[label])
+        return out, units

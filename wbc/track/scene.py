@@ -17,7 +17,7 @@ from wbc.errors import RangeError, RobotFileError, ShapeError
 from wbc.robot import Robot
 from wbc.robot.robot import checked_robot
 from wbc.shapes import Box, Capsule, Convex, Cylinder, PlacedShape, Solid, Sphere
-from wbc.track import render, solids
+from wbc.track import render
 from wbc.track.clearance import bodies_of
 from wbc.validation import Array
 
@@ -219,7 +219,7 @@ def link_meshes(robot: Robot) -> list[tuple[str, Array]]:
             out.append((link, vertices[np.array(faces, dtype=np.int64)]))
     if out:
         return out
-    return [(link, solids.triangles(placed)) for link, shapes in robot.shapes.items() for placed in shapes]
+    return [(link, render.triangles(placed)) for link, shapes in robot.shapes.items() for placed in shapes]
 
 
 def _matching(robot: Robot, field: str, patterns: Sequence[str]) -> set[str]:
@@ -251,7 +251,7 @@ def _surface(shape: Solid, pose: pin.SE3, colour: Colour) -> render.Mesh:
         raise ShapeError("Scene.shape", shape, "expected a shape", [kind.__name__ for kind in SOLIDS])
     if isinstance(shape, Sphere):
         return render.sphere(np.array(pose.translation), shape.radius, colour)
-    return render.Mesh(solids.triangles(PlacedShape(shape, pose)), colour)
+    return render.Mesh(render.triangles(PlacedShape(shape, pose)), colour)
 
 
 def _camera(points: Array, size: tuple[int, int], azimuth: float, elevation: float) -> render.Camera:

@@ -21,6 +21,7 @@ MOVED = {
     "wbc.walking.plan_time": "wbc.walking.planner.plan_time",
     "wbc.walking.published": "wbc.published.three_arm_walker",
     "wbc.walking.replanning": "wbc.walking.planner.replanning",
+    "wbc.walking.run.perform": "wbc.walking.run.session",
     "wbc.walking.run_log": "wbc.walking.log.log",
     "wbc.walking.run_recorder": "wbc.walking.log.recorder",
     "wbc.walking.structures": "wbc.walking.holds.built_in",

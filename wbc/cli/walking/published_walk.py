@@ -15,7 +15,8 @@ from wbc.walking.holds.built_in import PITCH, RADIUS, grid_angle
 from wbc.walking.holds.structure import Structure
 from wbc.walking.report.plots import spans
 from wbc.walking.report.surroundings import arm_colour
-from wbc.walking.run.request import WalkRequest, grid_point
+from wbc.walking.run.places import GridPlace
+from wbc.walking.run.request import PublishedRequest, Site
 
 FILE, PLOT = "published.npz", "holds.png"
 #: The body is there when it is this near [grid units]
@@ -31,7 +32,7 @@ class PublishedRun:
         arrived: the body ended where it was to go. reason: why not, else "".
     """
 
-    request: WalkRequest
+    request: PublishedRequest
     structure: Structure
     log: PublishedLog
     outcomes: tuple[PublishedOutcome, ...]
@@ -39,22 +40,19 @@ class PublishedRun:
     reason: str
 
 
-def perform_published(request: WalkRequest) -> PublishedRun:
+def perform_published(request: PublishedRequest) -> PublishedRun:
     """Walks as the source does: destination control, or velocity control from point to point at the speed.
 
     Raises:
-        RangeError: a request for another structure. What the request's methods and the walker raise.
+        What the request's site and the walker raise.
     """
-    if request.structure != "cylinder":
-        raise RangeError("planner", request.planner, "the published planner knows only the structure 'cylinder'")
-    structure = request.build()
-    points = [grid_point(f"place {k + 1}", text) for k, text in enumerate(request.places())]
-    whole = WalkRequest().build()
+    structure, whole = request.site.build(), Site().build()
+    points = [place for place in (request.start, *request.points) if isinstance(place, GridPlace)]
     there = set(structure.ids)
     removed = [tuple(int(part) for part in hold.split(",")) for hold in whole.ids if hold not in there]
     walker = PublishedWalker(points[0][:2], points[0][2], removed=removed)
     outcomes = list[PublishedOutcome]()
-    if request.mode == "destination":
+    if request.objective == "destination":
         outcomes.append(walker.to(points[1:]))
     else:
         for point in points[1:]:
@@ -116,7 +114,7 @@ def save_published(run: PublishedRun, folder: pathlib.Path) -> list[pathlib.Path
     return [file, folder / PLOT]
 
 
-def _driven(walker: PublishedWalker, request: WalkRequest, point: tuple[float, float, float]) -> PublishedOutcome:
+def _driven(walker: PublishedWalker, request: PublishedRequest, point: tuple[float, float, float]) -> PublishedOutcome:
     """Velocity control straight towards a point, for as long as that takes."""
     now = np.array(walker.place)
     off = np.array(point) - now

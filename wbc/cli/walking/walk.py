@@ -23,9 +23,9 @@ from wbc.track.summary import Figure
 from wbc.walking.planner.plan import differences, read_plan
 from wbc.walking.report.figures import figures_of, save_figures
 from wbc.walking.report.folder import make_folder, save_pictures, save_run
+from wbc.walking.run import WalkRun
 from wbc.walking.run.compiling import keep
-from wbc.walking.run.perform import WalkRun
-from wbc.walking.run.request import GRAPPLES, SPEED, WalkRequest
+from wbc.walking.run.request import SPEED, TURN_RATE, PublishedRequest, Request, read_request
 
 #: Exit codes: the walk is not possible or did not arrive, and what a check of it violates
 REFUSED, VIOLATED = 3, 4
@@ -39,7 +39,7 @@ def walk(
     gait: options.Gait = "any",
     mode: options.Mode = "velocity",
     speed: options.Speed = SPEED,
-    turn_rate: options.TurnRate = 0.05,
+    turn_rate: options.TurnRate = TURN_RATE,
     start: options.From = "",
     to: options.To = None,
     remove_rows: options.RemoveRows = "",
@@ -70,8 +70,7 @@ def walk(
     written all the same.
     """
     two_ended = robot == "two-ended"
-    structure = structure or (GRAPPLES if two_ended else "cylinder")
-    request = WalkRequest(
+    request = read_request(
         structure,
         mode,
         speed,
@@ -95,13 +94,21 @@ def walk(
     if change and planner == "published":
         raise RangeError("set", change, "the published planner has numbers of its own, three_arm_walker.Calibration")
     machine = robots.walker(data=changed_data(change or [], two_ended), two_ended=two_ended)
-    perform = performance(request, machine, resume, ask, least_time)  # bad input shows before a folder is made
+    # Bad input shows before a folder is made
+    if isinstance(request, PublishedRequest):
+        if resume or ask or least_time:
+            raise RangeError("planner", planner, "resuming, asking and the least time are of the planner 'free'")
+        _published(request, _folder(request, output, force))
+        return
+    perform = performance(request, machine, resume, ask, least_time, tuple(to or ()))
+    folder = _folder(request, output, force)
+    _free(perform, machine, folder, backend, check or strict, pictures, strict)
+
+
+def _folder(request: Request, output: Path | None, force: bool) -> Path:
     stamp = datetime.datetime.now().strftime("%Y%m%d-%H%M%S")
-    folder = make_folder(output or Path("runs") / f"walk-{Path(structure).stem}-{stamp}", force)
-    if planner == "published":
-        _published(request, folder)
-    else:
-        _free(perform, machine, folder, backend, check or strict, pictures, strict)
+    name = Path(request.site.structure).stem
+    return make_folder(output or Path("runs") / f"walk-{name}-{stamp}", force)
 
 
 def plans(
@@ -144,17 +151,17 @@ def _free(
     with progress_bar() as bar:
         stage = bar.add_task("planning", total=None)
 
-        def told(what: str, part: float | None) -> None:
+        def report_progress(what: str, part: float | None) -> None:
             bar.update(stage, description=what, total=None if part is None else 1.0, completed=part or 0.0)
 
         with stopper.listening():
             keep()  # a full collection would look at all modules of the program in the middle of a tick
-            run = perform(backend, told, stopper)
-            told("checking and writing", None)
+            run = perform(backend, report_progress, stopper)
+            report_progress("checking and writing", None)
             files, report = save_run(run, folder, check)
             missing = list[str]()
             if pictures and not stopper():
-                shown, missing = save_pictures(run, folder, told, stopper)
+                shown, missing = save_pictures(run, folder, report_progress, stopper)
                 files += shown
     _report(f"{machine.robot.name} on {run.structure.name}", figures_of(run, report), folder, files)
     for text in missing:
@@ -176,7 +183,7 @@ def _end(run: WalkRun, interrupted: bool) -> None:
         raise typer.Exit(REFUSED)
 
 
-def _published(request: WalkRequest, folder: Path) -> None:
+def _published(request: PublishedRequest, folder: Path) -> None:
     run = perform_published(request)
     figures = published_figures(run)
     _report(

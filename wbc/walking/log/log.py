@@ -57,8 +57,8 @@ class WalkLog:
         q: joint angles [n, m]. v: joint rates [n, m]; those of tick k last until tick k + 1.
         twist_body: linear and angular velocity of the body along the body's axes, [n, 6]; lasts like ``v``.
         hand_state: [n, a] indices into :data:`HAND_STATES`.
-        hand_hold: [n, a] rows of the holds' table: what a hand holds, closes on or opens from, what an open hand is on
-            its way to; -1 none.
+        hand_hold: [n, a] rows of the holds' table: what a hand holds, closes on or opens from, what an open hand
+            swings to; -1 none.
         body_fixed: [n] whether the body is declared fixed, before enough hands hold.
         command: [n, 7] and command_kind: [n], an index into :data:`COMMANDS`; numbers beyond the kind's are 0.
         hold_id: [h]. hold_pose: [h, 7]. hold_roll: [h], 0 free, 1 fixed, n n-fold. hold_max_tilt: [h] rad.

@@ -58,10 +58,10 @@ class LogRecorder:
         robot: str,
         robot_digest: str,
         meta: Mapping[str, Any] | None = None,
-        room: int = 2048,
+        capacity: int = 2048,
     ) -> None:
-        if isinstance(room, bool) or not isinstance(room, int) or room < 1:
-            raise RangeError("room", room, "expected a whole number of at least 1")
+        if isinstance(capacity, bool) or not isinstance(capacity, int) or capacity < 1:
+            raise RangeError("capacity", capacity, "expected a whole number of at least 1")
         self._structure, self._names = structure, (tuple(joints), tuple(arms), tuple(hands))
         m, a = len(self._names[0]), len(self._names[1])
         self._meta: dict[str, Any] = {
@@ -79,8 +79,8 @@ class LogRecorder:
         _, self._pose, self._q, self._v, self._twist, self._command = (
             slice(int(i), int(j)) for i, j in itertools.pairwise(ends)
         )
-        self._reals, self._least = np.zeros((room, int(ends[-1]))), int(ends[-2])
-        self._whole = np.zeros((room, 2 * a + 2), dtype=np.int64)
+        self._reals, self._least = np.zeros((capacity, int(ends[-1]))), int(ends[-2])
+        self._whole = np.zeros((capacity, 2 * a + 2), dtype=np.int64)
         self._arms, self._count, self._lengths = a, 0, (7, m, m, 6, a, a)
         self._spans: list[list[float]] = [[k, -inf, inf] for k in range(len(structure))]
 
@@ -110,7 +110,7 @@ class LogRecorder:
             ShapeError: arrays of another length; the tick is then not recorded.
         """
         k = self._count
-        self._make_room(1)
+        self._grow(1)
         numbers = pin.SE3ToXYZQUAT(pose) if isinstance(pose, pin.SE3) else pose
         given = () if command is None else command
         lengths = (len(numbers), len(q), len(v), len(twist), len(states), len(holds))
@@ -148,13 +148,13 @@ class LogRecorder:
         wanted = ((n,), *((n, length) for length in self._lengths), (n, width), (n,))
         if found != wanted or width not in (6, 7):
             raise ShapeError("ticks", found, f"expected {wanted}, a command of 6 or 7 numbers")
-        self._make_room(n)
+        self._grow(n)
         rows = slice(self._count, self._count + n)
         np.concatenate((t[:, None], pose, q, v, twist, command), axis=1, out=self._reals[rows, : self._least + width])
         self._whole[rows] = np.column_stack((states, holds, np.full(n, _KINDS[width]), body_fixed))
         self._count += n
 
-    def _make_room(self, count: int) -> None:
+    def _grow(self, count: int) -> None:
         """Arrays that are full double."""
         while self._count + count > len(self._reals):
             self._reals = np.concatenate([self._reals, np.zeros_like(self._reals)])
@@ -196,7 +196,7 @@ class LogRecorder:
             twist_body=reals[:, self._twist],
             hand_state=whole[:, :a],
             hand_hold=whole[:, a : 2 * a],
-            body_fixed=whole[:, 2 * a + 1],  # type: ignore[arg-type]
+            body_fixed=whole[:, 2 * a + 1].astype(bool),
             command=reals[:, self._command],
             command_kind=whole[:, 2 * a],
             hold_id=self._structure.ids,

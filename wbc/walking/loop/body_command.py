@@ -1,8 +1,9 @@
-"""The body's command from tick to tick along its path."""
+"""The body along its path: its command from tick to tick, and how fast it goes on."""
 
 from __future__ import annotations
 
 import functools
+from math import sqrt
 
 import casadi as ca
 import numpy as np
@@ -13,6 +14,7 @@ from wbc.stack.evaluation import SingleState
 from wbc.symbolic.rotations import exp3, from_quaternion, left_jacobian, left_jacobian_inverse, log3, to_quaternion
 from wbc.validation import Array
 from wbc.walking.body_path import BodyPath
+from wbc.walking.loop.stopping import Stops
 
 #: Where things are in the output: the target and its rate, and where it is afterwards as numbers and as position and
 #: quaternion
@@ -20,10 +22,10 @@ TARGET, AFTER, POSE = slice(0, 18), slice(18, 30), slice(30, 37)
 
 
 @functools.cache
-def way_function() -> ca.Function:
+def pose_function() -> ca.Function:
     """f(now, first, last, part, rate), poses as 12 numbers: the rotation by columns, the position.
 
-    The body is at M exp(s log(M' N)) when it has come the part s of the way from M to N; its rate from where it is now
+    The body is at M exp(s log(M' N)) when it has come the part s from M to N; its rate from where it is now
     on is (p' - p, R log(R' R')) / dt in the structure's axes.
 
     Args:
@@ -41,7 +43,7 @@ def way_function() -> ca.Function:
     moved = places[1] + turns[1] @ (left_jacobian(part * angular) @ (part * linear))
     speed = ca.vertcat(moved - places[0], turns[0] @ log3(turns[0].T @ turned)) * rate
     out = ca.vertcat(now, speed, ca.vec(turned), moved, moved, to_quaternion(turned))
-    return compiled(ca.Function("way", [now, first, last, part, rate], [out]))
+    return compiled(ca.Function("pose", [now, first, last, part, rate], [out]))
 
 
 class BodyCommand:
@@ -55,7 +57,7 @@ class BodyCommand:
     """
 
     def __init__(self, dt: float) -> None:
-        self._step = SingleState(way_function())
+        self._step = SingleState(pose_function())
         self._now, self._first, self._last, self._part, rate = self._step.inputs
         rate[0] = 1.0 / dt
         self._path: BodyPath | None = None
@@ -92,3 +94,49 @@ def pose_numbers(pose: pin.SE3) -> Array:
     """A pose as 12 numbers, rotation by columns, then position."""
     out: Array = pose.homogeneous[:3].ravel(order="F")
     return out
+
+
+#: From rest to the commanded speed [s]; back, where hands would lose their holds, as of :class:`Stops`
+RAMP = 0.5
+#: Part of the pace from which a body that brakes steadily comes to rest in time
+PART = 0.9
+
+
+class BodyMotion:
+    """The pace of the body, 1 the path's own, and its command.
+
+    Attributes:
+        pace: now. wanted: that it should have. pose: where the body is to be as the tick ends: position [m] and
+            quaternion x, y, z, w.
+    """
+
+    def __init__(self, dt: float, stops: Stops) -> None:
+        self._dt, self._stops, self._command = dt, stops, BodyCommand(dt)
+        self.pace, self.wanted = 0.0, 1.0
+
+    @property
+    def pose(self) -> Array:
+        return self._command.pose
+
+    def choose(self, margin: float, left: float, landing: tuple[float, float] | None, stands: bool) -> None:
+        """The pace of this tick: as fast as asked, as slow as the hands need. Braking from p in a time T takes
+        p^2 T / 2 of path time.
+
+        Args:
+            margin: path time until a holding hand reaches the end of its grip [s]. left: until the end of the path or
+                of what is planned [s]. landing: path time that is left until the swinging hand has to hold, and the
+                time that it needs until then [s]; None: no hand is swinging. stands: the body is to come to rest.
+        """
+        brake = self._stops.brake
+        wanted = min(1.0, sqrt(2.0 * margin / brake * PART), sqrt(2.0 * left / RAMP * PART))
+        if landing is not None and landing[0] < landing[1]:
+            wanted = min(wanted, landing[0] / landing[1])
+        self.wanted = 0.0 if stands else wanted
+        self.pace = max(self.pace + min(max(self.wanted - self.pace, -self._dt / brake), self._dt / RAMP), 0.0)
+
+    def go(self, path: BodyPath, begin: float) -> tuple[Array, float]:
+        """A tick along a path from a path time on [s]: what the stack follows, as of :meth:`BodyCommand.go`, and the
+        path time as it ends.
+        """
+        end = min(begin + self.pace * self._dt, path.duration)
+        return self._command.go(path, begin, end), end

@@ -28,21 +28,21 @@ SWEEPS = 6
 TINY = 1e-300
 
 _KNOWN: weakref.WeakKeyDictionary[object, ca.Function] = weakref.WeakKeyDictionary()
-#: Metres that a unit of misalignment of a hand's axis counts for: hands give way to turning before they slip
+#: Metres that a unit of misalignment of a hand's axis counts for: hands turn before they slip
 AXIS_LENGTH = 0.05
 #: The same of a compliant hold: origins keep their place to 1e-7 m against it
 BALL_LENGTH = 1e-3
 
 
 def chain_function(walker: Walker) -> ca.Function:
-    """f(q, v, dt, weights, mean, centre, mask, holds): see :class:`wbc.walking.loop.closed_chain.ClosedChain`.
+    """f(q, weights, mean, centre, mask, holds): see :class:`wbc.walking.loop.closed_chain.ClosedChain`.
 
-    The joints move on from q by v dt. Of n arms, with 3 n rows of numbers for origins, z axes and x axes of the hands:
-    ``weights`` ``[9 n]`` by rows, ``mean`` ``[n]``, ``centre`` ``[3]`` [m], ``mask`` ``[n]``, ``holds`` ``[3 n]`` [m].
+    Of n arms, with 3 n rows of numbers for origins, z axes and x axes of the hands: ``weights`` ``[9 n]`` by rows,
+    ``mean`` ``[n]``, ``centre`` ``[3]`` [m], ``mask`` ``[n]``, ``holds`` ``[3 n]`` [m].
 
     Returns:
-        q with the joints moved on and the body where the holds have it, its quaternion with the sign nearest to the one
-        given; the slip [m]; and the 3 n rows in the structure ``[9 n]``.
+        q with the body where the holds have it, its quaternion with the sign nearest to the one given; the slip [m];
+        and the 3 n rows in the structure ``[9 n]``.
     """
     known = _KNOWN.get(walker.robot)
     if known is None:
@@ -52,8 +52,8 @@ def chain_function(walker: Walker) -> ca.Function:
 
 def _function(walker: Walker) -> ca.Function:
     n, rows = len(walker.arms), _hands(walker)
-    q, v, dt = ca.SX.sym("q", walker.robot.nq), ca.SX.sym("v", walker.robot.nv), ca.SX.sym("dt")
-    joints = q[7:] + v[6:] * dt
+    q = ca.SX.sym("q", walker.robot.nq)
+    joints = q[7:]
     sizes = {"weights": 9 * n, "mean": n, "centre": 3, "mask": n, "holds": 3 * n}
     weights, mean, centre, mask, holds = (ca.SX.sym(name, size) for name, size in sizes.items())
     ours = ca.reshape(rows(joints), 3, 3 * n).T
@@ -65,7 +65,7 @@ def _function(walker: Walker) -> ca.Function:
     gaps = moved[:n, :] - ca.reshape(holds, 3, n).T
     slip = ca.sqrt(ca.mmax(mask * ca.sum2(gaps**2)))
     out = ca.vertcat(place, quaternion, joints, slip, ca.vec(moved.T))
-    return ca.Function("chain", [q, v, dt, weights, mean, centre, mask, holds], [out])
+    return ca.Function("chain", [q, weights, mean, centre, mask, holds], [out])
 
 
 def _hands(walker: Walker) -> ca.Function:
@@ -133,7 +133,7 @@ class ClosedChain:
         walker: its joints are what moves. structure: whose holds are meant.
 
     Attributes:
-        origins, axes, sides: of all hands in the structure, and their z and x axes, after the last :meth:`settle`:
+        origins, axes, x_axes: of all hands in the structure, and their z and x axes, after the last :meth:`settle`:
             ``[arms, 3]`` each, origins in m.
     """
 
@@ -146,22 +146,21 @@ class ClosedChain:
         frames = [self._data.oMf[model.getFrameId(arm.hand)] for arm in walker.arms]
         self._rows = [*(f.translation for f in frames), *(f.rotation[:, k] for k in (2, 0) for f in frames)]
         count = len(walker.arms)
-        self.origins, self.axes, self.sides = np.zeros((3, count, 3))
+        self.origins, self.axes, self.x_axes = np.zeros((3, count, 3))
         self._fit = SingleState(chain_function(walker))
-        self._q, self._v, self._dt, *self._fitted = self._fit.inputs
-        self._none = np.zeros(model.nv)
+        self._q, *self._fitted = self._fit.inputs
         self._held: dict[int, int] | None = None
         self._leans = False
 
     def on(self, structure: Structure) -> ClosedChain:
         """The same robot, at the same place, on another structure."""
         out = ClosedChain(self.walker, structure)
-        out.origins, out.axes, out.sides = self.origins, self.axes, self.sides
+        out.origins, out.axes, out.x_axes = self.origins, self.axes, self.x_axes
         return out
 
     def place(self, q: Array) -> None:
         """Where the hands are, of a body that is where a configuration has it."""
-        origins, self.axes, self.sides = self._hands(q)
+        origins, self.axes, self.x_axes = self._hands(q)
         self.origins = origins + q[:3]
 
     def slip(self, held: Mapping[int, int]) -> float:
@@ -169,12 +168,12 @@ class ClosedChain:
         gaps = [self.origins[arm] - self.structure.positions[hold] for arm, hold in held.items()]
         return max((sqrt(gap.dot(gap)) for gap in gaps), default=0.0)
 
-    def settle(self, q: Array, held: Mapping[int, int]) -> tuple[Array, float]:
-        """A configuration with the same joints and the body where the held hands put it.
+    def settle(self, q: Array, held: Mapping[int, int], joints: Array | None = None) -> tuple[Array, float]:
+        """A configuration with the body where the held hands put it.
 
         Args:
-            q: its joints count; its body pose only says which of the allowed rolls a hand has.
-            held: row of the arm -> row of the hold.
+            q: the one before, which says which of the allowed rolls a hand has, and the sign of the body's quaternion.
+            held: row of the arm -> row of the hold. joints: where they are now; None: as in ``q``.
 
         Returns:
             (q, slip): slip is the largest distance of a held hand from its hold [m].
@@ -182,21 +181,15 @@ class ClosedChain:
         Raises:
             RangeError: nothing is held, or by one hand that may roll: the body's pose is not determined.
         """
-        return self.move(q, self._none, 0.0, held)
-
-    def move(self, q: Array, v: Array, dt: float, held: Mapping[int, int]) -> tuple[Array, float]:
-        """As :meth:`settle`, with the joints moved on for a time by their rates: q + v dt.
-
-        Args:
-            q: before. v: rates; those of the body do not count. dt: [s].
-        """
         if held != self._held or self._leans:
             self._take(held, q)
-        self._q[:], self._v[:], self._dt[0] = q, v, dt
+        self._q[:] = q
+        if joints is not None:
+            self._q[7:] = joints
         self._fit.run()
         found, nq, count = self._fit.output.copy(), len(q), len(self.origins)
         moved = found[nq + 1 :].reshape(-1, 3)
-        self.origins, self.axes, self.sides = moved[:count], moved[count : 2 * count], moved[2 * count :]
+        self.origins, self.axes, self.x_axes = moved[:count], moved[count : 2 * count], moved[2 * count :]
         return found[:nq], found.item(nq)
 
     def _take(self, held: Mapping[int, int], q: Array) -> None:
@@ -219,9 +212,9 @@ class ClosedChain:
         lengths = np.where(structure.tilts[holds] < LEAST_TILT, AXIS_LENGTH, BALL_LENGTH)
         weights[[count + arm for arm in arms]] = lengths[:, None] ** 2 * structure.axes[holds]
         if rolled:
-            _, axes, sides = self._hands(q)
+            _, axes, x_axes = self._hands(q)
         for arm in rolled:
-            weights[2 * count + arm] = AXIS_LENGTH**2 * allowed_x(structure, held[arm], sides[arm], axes[arm])
+            weights[2 * count + arm] = AXIS_LENGTH**2 * allowed_x(structure, held[arm], x_axes[arm], axes[arm])
         self._leans = any(structure.tilts[held[arm]] >= LEAST_TILT for arm in rolled)
         # The weights of the origins sum to nothing, so their mean does not count in A = weights' ours
         for numbers, given in zip(self._fitted, (weights, mean, centre, mask, theirs), strict=True):

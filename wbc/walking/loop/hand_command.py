@@ -1,22 +1,24 @@
-"""The command of a swinging hand from tick to tick along its law."""
+"""The command of a swinging hand: along its law, and turned upright where it comes down."""
 
 from __future__ import annotations
 
 import functools
 
 import casadi as ca
+import numpy as np
+import pinocchio as pin
 
 from wbc.native.compiled_function import compiled
 from wbc.stack.evaluation import SingleState
 from wbc.validation import Array
-from wbc.walking.loop.hand_pace import BEHIND
-from wbc.walking.loop.state import Swinging
+from wbc.walking.loop.hand_pace import BEHIND, angle
+from wbc.walking.loop.state import Axes, Swinging
 from wbc.walking.planner.grips.table import Grips
 from wbc.walking.planner.swings.law import Aim
 
-#: Where things are in the output: what is `now` in the next tick, joints 4 to 6 with the part of the wrist's way, the
+#: Where things are in the output: what is `now` in the next tick, joints 4 to 6 with the part of the wrist's path, the
 #: velocity, and what the stack follows
-NOW, BEND, VELOCITY, FOLLOWED = slice(0, 6), slice(3, 7), slice(7, 10), slice(10, 22)
+NOW, WRIST, VELOCITY, FOLLOWED = slice(0, 6), slice(3, 7), slice(7, 10), slice(10, 22)
 
 
 @functools.cache
@@ -26,12 +28,12 @@ def aim_function() -> ca.Function:
     Args:
         now: its aim and joints 4 to 6 as the tick begins ``[6]``. law: two rows of its law ``[14]``.
         source, target: joints 4 to 6 of the grips that it leaves and comes to, at two samples of the body's path
-            ``[6]``. parts: of the ways between those rows and samples ``[3]``. rate: 1 / dt [1/s].
+            ``[6]``. parts: of the segments between those rows and samples ``[3]``. rate: 1 / dt [1/s].
 
     Returns:
-        The position of the law, joints 4 to 6 as the tick ends, the part of the wrist's way, the velocity; and place,
+        The position of the law, joints 4 to 6 as the tick ends, the part of the wrist's path, the velocity; and place,
         velocity, joints and their rates to follow, from where things are to be as the tick begins to where they are to
-        be as it ends. A hand that cannot follow must not pull at the body: its place waits within :data:`BEHIND` of it.
+        be as it ends. A hand that cannot follow must not drag the body: its place waits within :data:`BEHIND` of it.
     """
     sizes = {"place": 3, "now": 6, "law": 14, "source": 6, "target": 6, "parts": 3, "rate": 1}
     place, now, law, source, target, parts, rate = (ca.SX.sym(name, size) for name, size in sizes.items())
@@ -39,17 +41,17 @@ def aim_function() -> ca.Function:
         rows[: rows.numel() // 2] + parts[k] * (rows[rows.numel() // 2 :] - rows[: rows.numel() // 2])
         for k, rows in enumerate((law, source, target))
     )
-    bend = first + row[6] * (last - first)
+    wrist = first + row[6] * (last - first)
     gap = now[:3] - place
     far = ca.norm_2(gap)
     waits = place + gap * (BEHIND / ca.fmax(far, BEHIND))
     followed = ca.vertcat(ca.if_else(far <= BEHIND, now[:3], waits), (row[:3] - now[:3]) * rate)
-    out = ca.vertcat(row[:3], bend, row[6], row[3:6], followed, now[3:], (bend - now[3:]) * rate)
+    out = ca.vertcat(row[:3], wrist, row[6], row[3:6], followed, now[3:], (wrist - now[3:]) * rate)
     return compiled(ca.Function("aim", [place, now, law, source, target, parts, rate], [out]))
 
 
 class HandCommand:
-    """What the hand on its way follows in a tick.
+    """What the swinging hand follows in a tick.
 
     Args:
         dt: control period [s].
@@ -64,7 +66,7 @@ class HandCommand:
         self._known: list[tuple[Grips | None, int, int]] = [(None, -1, -1)] * 2
 
     def go(self, swinging: Swinging, place: Array, grips: Grips, source: int, sample: float) -> Array:
-        """Move the hand's aim and the bend of its wrist on to its clock.
+        """Move the hand's aim and its wrist on to its clock.
 
         Args:
             place: of the hand [m]. source: the grip that it leaves. sample: of the body's path.
@@ -76,23 +78,23 @@ class HandCommand:
         if swinging is self._swinging:
             self._now[:] = self._step.output[NOW]
         else:
-            self._now[:], self._swinging = (*swinging.aim.position, *swinging.bend), swinging
+            self._now[:], self._swinging = (*swinging.aim.position, *swinging.wrist), swinging
         self._place[:] = place
         self._law[:], parts[0], whole = swinging.law.rows_at(swinging.clock)
-        if swinging.wrist is None:
+        if swinging.first_wrist is None:
             parts[1] = self._between(0, grips, source, sample)
         else:
-            self._source[:3] = self._source[3:] = swinging.wrist
+            self._source[:3] = self._source[3:] = swinging.first_wrist
             self._known[0] = None, -1, -1
         parts[2] = self._between(1, grips, swinging.grip, sample)
         self._step.run()
         out = self._step.output.copy()
-        a, b, c, blend = out[BEND].tolist()
-        swinging.aim, swinging.bend = Aim(out[:3], out[VELOCITY], blend, whole), (a, b, c)
+        a, b, c, blend = out[WRIST].tolist()
+        swinging.aim, swinging.wrist = Aim(out[:3], out[VELOCITY], blend, whole), (a, b, c)
         return out[FOLLOWED]
 
     def _between(self, which: int, grips: Grips, grip: int, sample: float) -> float:
-        """Write joints 4 to 6 of a grip at two samples; the part of the way between them."""
+        """Write joints 4 to 6 of a grip at two samples; the part of the segment between them."""
         first, last, rows = grips.wrists(grip)
         inside = min(max(sample, first), last) - first
         low = min(int(inside), last - first - 1)
@@ -101,3 +103,59 @@ class HandCommand:
             of[:] = rows[low : low + 2].reshape(6)
             self._known[which] = key
         return inside - low
+
+
+#: A hand turns upright when its aim is within this of its hold [m]; until then its wrist follows its law
+UPRIGHT = 0.05
+#: A hand whose law ends within this of its hold turns at once [m]
+THERE = 0.001
+
+
+class HandLanding:
+    """The axes of a hand that comes down, in the structure's frame:
+
+        z(s) = exp(s phi) z_hold,     x(s) = exp(s phi) x_hold,     s = |p - p_hold| / |p_0 - p_hold|
+
+    p is its aim, p_0 that at which its wrist was let go, phi the turn that takes the axes of the hold to those which
+    the hand had there; the shortest one where only z counts. As the arm brings a hand down along the normal its lean
+    goes with its height. To want the hold's own axis at once turns the hand by that lean in a tenth of a second, and
+    with theta5 near 0, where joint 4 hardly turns it, off its path by centimetres.
+
+    Args:
+        dt: control period [s].
+    """
+
+    def __init__(self, dt: float) -> None:
+        self._dt = dt
+        self._swinging: Swinging | None = None
+        self._turn, self._far, self._part = np.zeros(3), 0.0, 0.0
+
+    def go(self, swinging: Swinging, hold: tuple[Array, Array], near: bool) -> Axes | None:
+        """The axes as a tick begins and their rates in it, once the aim of the hand has been moved on; None until then.
+
+        Args:
+            swinging: ``axis`` and ``x_axis`` are those of the hand now. hold: its place [m] and z axis.
+            near: it comes down on it.
+        """
+        if not near:
+            self._swinging = None
+            return None
+        place, z = hold
+        far, x = float(np.linalg.norm(swinging.aim.position - place)), swinging.x
+        if swinging is not self._swinging:
+            self._swinging, self._turn, self._far = swinging, _turn(swinging, z), far
+            self._part = 1.0 if far > THERE else 0.0
+        before, self._part = self._part, min(self._part, far / self._far if self._far > THERE else 0.0)
+        now, later = (pin.exp3(part * self._turn) for part in (before, self._part))
+        rate = (later - now) / self._dt
+        return Axes(now @ z, rate @ z, None if x is None else now @ x, None if x is None else rate @ x)
+
+
+def _turn(swinging: Swinging, z: Array) -> Array:
+    """Rotation vector that takes the axes of the hold to those of the hand [rad]."""
+    axis, x_axis, x = swinging.axis, swinging.x_axis, swinging.x
+    if x is not None:
+        hand, hold = (np.column_stack([a, np.cross(b, a), b]) for a, b in ((x_axis, axis), (x, z)))
+        return np.asarray(pin.log3(hand @ hold.T))
+    across = np.cross(z, axis)
+    return np.asarray(across * (angle(z, axis) / max(float(np.linalg.norm(across)), 1e-12)))

@@ -14,7 +14,7 @@ from wbc.walking.loop.state import Swinging
 
 #: A swing waits for a hand that is this far behind its aim [m]: full pace below half of it, least pace beyond
 BEHIND, LEAST_PACE = 0.02, 0.05
-#: A hand is near its hold from this part of the wrist's way on; its joints are then this near to theirs [rad]
+#: A hand is near its hold from this part of the wrist's motion on; its joints are then this near to theirs [rad]
 LANDING, TURNED = 0.97, 0.5
 #: Part of the tolerances within which a hand closes: it is still moving a little as it does
 SURE = 0.7
@@ -62,15 +62,15 @@ def at_rest(
         before, hand: its place [m], z axis and x axis a tick ago and now. hold: place and z axis.
         x: the x axis that it is to have, None if it may roll. tilt: ``max_tilt`` of the hold [rad].
     """
-    (place, axis, side), (there, wanted) = hand, hold
+    (place, axis, x_axis), (there, wanted) = hand, hold
     # A hand at the turning point of an overshoot is slow, but what is left brings it up to speed again
     near, slow = SURE * data.close_distance, SURE * data.close_speed
     if dist(place, there) >= min(near, slow / SWING_GAIN) or dist(place, before[0]) / dt >= slow:
         return False
     turn = angle(axis, before[1])
     if x is not None:
-        turn = hypot(turn, angle(side, before[2]))
-        if abs(np.arctan2(side @ np.cross(wanted, x), side @ x)) >= SURE * data.close_angle:
+        turn = hypot(turn, angle(x_axis, before[2]))
+        if abs(np.arctan2(x_axis @ np.cross(wanted, x), x_axis @ x)) >= SURE * data.close_angle:
             return False
     leaned = max(SURE * data.close_angle, CLOSING_TILT * tilt)
     return turn / dt < SURE * data.close_rate and angle(axis, wanted) < leaned
@@ -78,7 +78,7 @@ def at_rest(
 
 def turned(swinging: Swinging, wrist: Sequence[float]) -> bool:
     """Whether joints 4 and 5, and 6 where the roll counts, are near to where they are to be [rad]."""
-    (a, b, c), (d, e, f) = wrist, swinging.bend
+    (a, b, c), (d, e, f) = wrist, swinging.wrist
     return abs(a - d) < TURNED and abs(b - e) < TURNED and (swinging.x is None or abs(c - f) < TURNED)
 
 

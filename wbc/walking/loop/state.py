@@ -18,6 +18,14 @@ Wrist = tuple[float, float, float]
 What = Literal["lift", "land", "failed", "vanished", "replanned", "refused"]
 
 
+class Manual(NamedTuple):
+    """A hand that is moved by hand commands and not by the plan: its arm's row, its state, its hold's row or -1."""
+
+    arm: int
+    state: Hand
+    hold: int
+
+
 class Axes(NamedTuple):
     """z axis of a hand and its rate [1/s], its x axis and the rate of that; None where the roll does not count."""
 
@@ -29,16 +37,16 @@ class Axes(NamedTuple):
 
 @dataclass(eq=False)
 class Swinging:
-    """A hand on its way.
+    """A swinging hand.
 
     Attributes:
         arm: its row. hold: row of the hold that it goes to. grip: which it is to be.
         law: the aims. clock: time on the law [s]. aim: the one at that time.
         pace: part of full speed. latch: time until the latch is through [s].
-        place, axis, side: of the hand one tick before and its z and x axes, for speeds.
+        place, axis, x_axis: of the hand one tick before and its z and x axes, for speeds.
         x: the x axis that the hand has on its hold; None if it may roll there.
-        wrist: joints 4 to 6 of a hand that was in the air when it was sent [rad]; None: those of the grip it leaves.
-        bend: joints 4 to 6 as they are to be now [rad].
+        first_wrist: joints 4 to 6 of a hand that was in the air when it was sent [rad]; None: those of the grip that it
+            leaves. wrist: joints 4 to 6 as they are to be now [rad].
         counted: it is a move of the plan, not one of an earlier plan, or one that brings a free hand to it.
         waits: the body stands until the hand has landed.
     """
@@ -56,14 +64,20 @@ class Swinging:
     tries: int = 0
     place: Array = field(default_factory=lambda: np.zeros(3))
     axis: Array = field(default_factory=lambda: np.zeros(3))
-    side: Array = field(default_factory=lambda: np.zeros(3))
+    x_axis: Array = field(default_factory=lambda: np.zeros(3))
     x: Array | None = None
-    wrist: Wrist | None = None
-    bend: Wrist = (0.0, 0.0, 0.0)
+    first_wrist: Wrist | None = None
+    wrist: Wrist = (0.0, 0.0, 0.0)
     aim: Aim = field(init=False)
 
     def __post_init__(self) -> None:
         self.aim = self.law.at(self.clock)
+
+    def open_on(self, dt: float) -> None:
+        """The latch of an opening hand goes on for a tick [s]; when it is through, the hand is open."""
+        self.latch -= dt
+        if self.latch <= 1e-9:
+            self.state = "open"
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,7 +100,8 @@ class Tick:
     """What happened in one tick; arrays are the tick's own.
 
     Attributes:
-        time: [s]. path_time: u [s]. q, v: configuration after it, and what the controller returned.
+        time: [s]. path_time: u [s]. q: configuration after it. v: what the controller returned. rates: what the plant
+            made of it in this period; a kinematic one the same.
         hands: state of each hand. holds: row of the hold that each hand is at or goes to, -1 for none.
         target: pose that the body was to have: position [m] and quaternion x, y, z, w.
         body_error: its distance from it [m].
@@ -99,6 +114,7 @@ class Tick:
     path_time: float
     q: Array
     v: Array
+    rates: Array
     hands: tuple[Hand, ...]
     holds: tuple[int, ...]
     target: Array

@@ -12,7 +12,7 @@ from wbc.walking.planner.plan import Plan
 
 #: A body comes to rest from full pace in [s]
 BRAKE = 0.25
-#: What a body may be off its way at the end of a stop [m]
+#: What a body may be off its path at the end of a stop [m]
 OFF = 0.002
 
 
@@ -29,33 +29,33 @@ class Stops:
     hand: float = HAND_STOP
 
     def of_body(self, places: Array, spacing: float, at: Array, pace: float, behind: float) -> Array:
-        """How far a body's origin travels [m]: its way while the pace p falls to 0, which is p^2 T / 2 of path time,
-        and a tick; what it is behind now; and :data:`OFF`.
+        """How far a body's origin travels [m]: along its path while the pace p falls to 0, which is p^2 T / 2 of path
+        time, and a tick; what it is behind now; and :data:`OFF`.
 
         Args:
             places: of the body ``[n, 3]`` [m], ``spacing`` [s] of path time apart. at: path times of the abort [s].
             behind: [m].
         """
-        return _way(places, spacing, at, 0.5 * pace**2 * self.brake + pace * self.dt) + behind + OFF
+        return _length(places, spacing, at, 0.5 * pace**2 * self.brake + pace * self.dt) + behind + OFF
 
     def of_hand(self, places: Array, spacing: float, at: Array, pace: float, behind: float) -> Array:
         """How far a hand travels [m]: as :meth:`of_body` with T' for T, and at the end :data:`BEHIND`, as the arm was
-        planned for the way at full pace and not for the stop.
+        planned for full pace and not for the stop.
         """
-        return _way(places, spacing, at, 0.5 * pace**2 * self.hand + pace * self.dt) + behind + BEHIND
+        return _length(places, spacing, at, 0.5 * pace**2 * self.hand + pace * self.dt) + behind + BEHIND
 
     def longest(self, plan: Plan) -> tuple[float, float]:
         """The most that body and hand travel after an abort anywhere in a plan [m], at full pace.
 
         The body may be :data:`OFF` behind, a hand :data:`BEHIND`. Of a hand that is brought to where a plan begins,
-        ``MovingBody.stopping`` knows.
+        ``Walk.stopping`` knows.
         """
         path = plan.path
         body = self.of_body(path.poses[:, :3, 3], path.spacing, _times(path.poses, path.spacing), 1.0, OFF)
         return float(body.max()), max((self.longest_of_hand(law.places, law.spacing) for law in plan.laws), default=0.0)
 
     def longest_of_hand(self, places: Array, spacing: float) -> float:
-        """The most that :meth:`of_hand` says anywhere on a hand's way [m], at full pace and :data:`BEHIND` behind."""
+        """The most that :meth:`of_hand` says anywhere on a hand's path [m], at full pace and :data:`BEHIND` behind."""
         return float(self.of_hand(places, spacing, _times(places, spacing), 1.0, BEHIND).max())
 
 
@@ -63,8 +63,8 @@ def _times(places: Array, spacing: float) -> Array:
     return np.arange(len(places), dtype=np.float64) * spacing
 
 
-def _way(places: Array, spacing: float, at: Array, left: float) -> Array:
-    """Lengths [m] of the ways that are covered in ``left`` [s] from some times on."""
+def _length(places: Array, spacing: float, at: Array, left: float) -> Array:
+    """Lengths [m] that are covered in ``left`` [s] from some times on."""
     steps = np.linalg.norm(np.diff(places, axis=0), axis=1)
     times, lengths = _times(places, spacing), np.concatenate([[0.0], np.cumsum(steps)])
     out: Array = np.interp(at + left, times, lengths) - np.interp(at, times, lengths)

@@ -1,4 +1,4 @@
-"""Carrying out a plan: the loop of controller, hands and simulated robot."""
+"""Carrying out a plan: the loop of controller, hands and robot."""
 
 from __future__ import annotations
 
@@ -10,13 +10,19 @@ from typing import Any
 import numpy as np
 
 from wbc.robots import Walker
-from wbc.walking.body_path import BodyPath, standing_path, straight_path
+from wbc.simulation import Plant
+from wbc.validation import Array
 from wbc.walking.holds.structure import Structure
-from wbc.walking.loop.moving_body import MovingBody
+from wbc.walking.loop.body_command import BodyMotion
+from wbc.walking.loop.hands import ArmLeader, HandLeader, Hands
+from wbc.walking.loop.machine import Machine
+from wbc.walking.loop.progress import PlanProgress
+from wbc.walking.loop.replanner import BodyReplanner, Replanner
 from wbc.walking.loop.stack import DT, WalkStack
-from wbc.walking.loop.state import Event, Hand, State, Tick
-from wbc.walking.planner.plan import HoldLost, NoPlanError, Plan
-from wbc.walking.planner.replanning import PlanSlices, plan_from_here, plan_from_stance, plan_rest
+from wbc.walking.loop.state import Event, Hand, State, Swinging, Tick, What
+from wbc.walking.planner.plan import HoldLost, NoPlanError, Plan, Regrasp
+from wbc.walking.planner.replanning import PlanSlices, way_to
+from wbc.walking.planner.swings.swings import SETTLE
 
 __all__ = ["Event", "Hand", "Tick", "Walk"]
 
@@ -24,15 +30,14 @@ __all__ = ["Event", "Hand", "Tick", "Walk"]
 ARRIVED = 0.002
 #: A walk that takes this many times its path's duration and SLACK seconds more is given up
 PATIENCE, SLACK = 4.0, 20.0
-#: Speed on the way to another path [m/s]
-JOINING = 0.05
 #: Slices of planning between two ticks
 SLICES = 3
+#: A hand may land so much path time later than planned [s]
+LATE = 0.2
 
 
-class Walk(MovingBody):
-    """A simulated walk. The simulator's only inputs are the joint rates that the controller returns; where the body is
-    follows from the holds of its closed hands.
+class Walk:
+    """A walk: machine, hands and body follow a plan on one stack; where it does not lead on it is planned anew.
 
     Args:
         walker, structure: what walks where.
@@ -41,13 +46,21 @@ class Walk(MovingBody):
         collisions, backend: see :class:`WalkStack`. stack: a compiled one, of the same walker.
         grasps: (arm, hold) -> whether the hand's latch closes; default: always.
         state: where it begins; default: on the holds of the plan, all hands closed.
+        plant: the robot that moves; default: a :class:`wbc.simulation.KinematicPlant`. Its inputs are the joint rates
+            of the controller, see :class:`wbc.walking.loop.machine.Machine`.
+        leader, replanner: what leads hands and what plans anew, of another kind of machine.
 
     Attributes:
-        plan: the one that is carried out now; path times count from its beginning.
+        machine, progress, body, hands, replanner, leader, stack: its parts, each one with a job of its own.
         events: what happened so far.
+        halted: the body stands, and no hand is lifted. aborted: no hand moves either.
+        opens: row of an arm that was opening at the beginning, and of its hold; None: none was.
+        approve: asked before every lift; the body waits at the lift until it says yes. None: nobody is asked.
+        limit: path time that the body does not pass, and how many re-grasps of the plan may be lifted; None: all of it.
 
     Raises:
-        ShapeError: a plan that was read from a file, without its grips. NoPlanError: slices that find no beginning.
+        ShapeError: a plan that was read from a file, without its grips, or of another machine; no plant, or one of
+            another robot. RangeError: a plant with another period. NoPlanError: slices that find no beginning.
     """
 
     def __init__(
@@ -62,20 +75,96 @@ class Walk(MovingBody):
         stack: WalkStack | None = None,
         grasps: Callable[[str, str], bool] | None = None,
         state: State | None = None,
+        plant: Plant | None = None,
+        leader: Callable[[Machine, PlanProgress, WalkStack], HandLeader] = ArmLeader,
+        replanner: Callable[[Machine, PlanProgress], Replanner] = BodyReplanner,
     ) -> None:
         self._planning: PlanSlices | None = None
         if not isinstance(plan, Plan):
             self._planning, plan = plan, next(first for first in plan if first is not None)
-        stack = stack or WalkStack(walker, structure, dt, collisions=collisions, backend=backend)
-        super().__init__(walker, structure, plan, stack, grasps, state)
-        self._wanted: BodyPath | None = None
-        self._quick = True
+        self.stack = stack or WalkStack(walker, structure, dt, collisions=collisions, backend=backend)
+        self.stack.structure = structure
+        self.walker, self.dt = walker, self.stack.dt
+        self.machine = machine = Machine(walker, structure, self.dt, plant)
+        self.progress = PlanProgress(walker, plan)
+        self.leader, self.replanner = leader(machine, self.progress, self.stack), replanner(machine, self.progress)
+        self.body = BodyMotion(self.dt, self.leader.stops)
+        self.hands = Hands(machine, self.stack, grasps or (lambda _arm, _hold: True))
+        self.events: list[Event] = []
+        self.halted = self.aborted = self._changing = False
+        self.approve: Callable[[Regrasp], bool] | None = None
+        self.limit: tuple[float, int] | None = None
+        self.opens = None if state is None else state.opening
+        grips, mine = self.progress.grips, self.progress.grip
+        if state is None:
+            # Hands that hold first: where the arm moves as one, they place its body
+            machine.held = {arm: int(grips.hold[grip]) for arm, grip in enumerate(mine)}
+            machine.begin(self.leader.first(), machine.held)
+        else:
+            machine.begin(state.q, state.held, state.time)
+        self.hands.begin([int(grips.roll[grip]) for grip in mine])
+
+    @property
+    def q(self) -> Array:
+        """Configuration, the body's pose in the structure."""
+        return self.machine.q
+
+    @property
+    def v(self) -> Array:
+        """The last command [m/s, rad/s]."""
+        return self.machine.v
+
+    @property
+    def time(self) -> float:
+        """[s]."""
+        return self.machine.time
+
+    @property
+    def structure(self) -> Structure:
+        """The holds that are there."""
+        return self.machine.structure
+
+    @property
+    def held(self) -> dict[int, int]:
+        """Row of the arm -> row of the hold."""
+        return self.machine.held
+
+    @property
+    def swinging(self) -> Swinging | None:
+        """The swinging hand."""
+        return self.hands.swinging
+
+    @property
+    def plan(self) -> Plan:
+        """The one that is carried out now; path times count from its beginning."""
+        return self.progress.plan
+
+    @property
+    def path_time(self) -> float:
+        """Of the body on the plan's path [s]."""
+        return self.progress.path_time
+
+    @property
+    def pace(self) -> float:
+        """Of the body, 1 the path's own."""
+        return self.body.pace
+
+    @property
+    def still(self) -> bool:
+        """Neither the body nor a hand is commanded to move."""
+        swinging = None if self.leader.one_motion else self.swinging
+        return self.pace == 0.0 and (swinging is None or (swinging.state == "open" and swinging.pace == 0.0))
+
+    @property
+    def busy(self) -> bool:
+        """It is planning by itself, or brings a hand to where a plan begins."""
+        return self._changing or self._planning is not None or (self.swinging is not None and self.swinging.waits)
 
     @property
     def done(self) -> bool:
-        """The body is at the end of the path, and no hand is on its way."""
+        """The body is at the end of the path, and no hand is swinging."""
         ended = self.path_time >= self.plan.path.duration - 1e-9 and self.swinging is None and not self._changing
-        if not ended or self.next < len(self.plan.regrasps):
+        if not ended or self.progress.step is not None:
             return False
         return dist(self.q[:3], self.plan.path.poses[-1][:3, 3]) < ARRIVED
 
@@ -86,7 +175,7 @@ class Walk(MovingBody):
             "arrived", or "late" when it takes more than four times as long as the path.
 
         Raises:
-            HoldLost, NoPlanError: as of :meth:`tick`.
+            HoldLost, NoPlanError, PlantError: as of :meth:`tick`.
         """
         longest = self.time + PATIENCE * self.plan.path.duration + SLACK
         while not self.done:
@@ -97,99 +186,136 @@ class Walk(MovingBody):
                 on_tick(tick)
         return "arrived"
 
-    def vanish(self, ids: Iterable[str]) -> None:
-        """Take holds away: free, targeted or held. What of the plan does not need them is kept; a hand that held one is
-        open at once, and the body stops until there is a plan.
-
-        Raises:
-            UnknownNameError: no such hold; nothing is changed.
-        """
-        gone = {self.structure.index(hold) for hold in ids}
-        names = [self.structure.ids[k] for k in sorted(gone)]
-        rest = self.structure.without(names)
-        for name in names:
-            self._say("vanished", "", name)
-        open_now = [arm for arm, hold in self.held.items() if hold in gone]
-        for arm in open_now:
-            self._open(arm)
-        if self.swinging is not None and self.swinging.hold in gone:
-            self._stay(self.swinging.arm)
-            self.swinging = None
-            open_now.append(-1)
-        self._renumber(rest)
-        done = self.next + int(self.swinging is not None and self.swinging.counted)
-        lost = [k for k, step in enumerate(self.plan.regrasps) if k >= done and step.target in names]
-        if open_now or self._planning is not None or (self.swinging is not None and not self.swinging.counted):
-            self._stop()
-        elif lost and not self._changing:
-            self._planning = plan_rest(self.walker, rest, self.plan, lost[0], self.path_time)
-
-    def go(self, path: BodyPath) -> None:
-        """Follow another path: the body stops, goes straight to where the path begins, and on."""
-        self._wanted, self._quick = path, True
-        self._stop()
-
-    @property
-    def busy(self) -> bool:
-        """It is planning by itself, or brings a hand to where a plan begins."""
-        return self._changing or self._planning is not None or (self.swinging is not None and self.swinging.waits)
-
-    def set_down(self) -> None:
-        """The body stops where it is, and a hand in the air goes to a hold that it can keep there."""
-        pose = self.plan.path.at(self.path_time)[0]
-        if self.swinging is not None:
-            self._stay(self.swinging.arm)
-            self.swinging = None
-        self._wanted, self._quick = standing_path(pose), False
-        self._stop()
-
     def tick(self) -> Tick:
         """One control period: hands, body, controller, robot.
 
         Raises:
             HoldLost: fewer hands hold than the robot needs; all rates are zero, and the robot stays as it is.
-            NoPlanError: the walk has to be planned anew, and there is no plan.
+            NoPlanError: the walk has to be planned anew, and there is no plan. PlantError: the plant has no valid
+                reading.
         """
-        if len(self.held) < self.walker.min_holds and not self.fixed:
-            self.v, self.pace = np.zeros(len(self.v)), 0.0
-            raise HoldLost("hands", len(self.held), f"at least {self.walker.min_holds} must hold")
-        if self.told is None and not self.aborted:
+        machine, hands = self.machine, self.hands
+        if len(machine.held) < self.walker.min_holds and not machine.fixed:
+            self.body.pace = 0.0
+            machine.rest()
+            raise HoldLost("hands", len(machine.held), f"at least {self.walker.min_holds} must hold")
+        if hands.manual is None and not self.aborted:
             self._think()
             self._lift()
-        command = self._advance()
-        if self.swinging is not None:
-            self._aim(self.swinging)
+        self._advance()
+        if hands.swinging is not None:
+            early = self._due(hands.swinging) - self.path_time
+            self.leader.lead(hands.swinging, early, self.body.wanted, self.aborted)
         begin = time.perf_counter()
-        step = self.stack.controller.step(self.q, self.v)
+        step = self.stack.controller.step(machine.q, machine.v)
         cost = time.perf_counter() - begin
-        self.v = step.v.copy()
-        slip, fixed = self._move(), self.fixed
-        self.time += self.dt
-        if self.swinging is not None:
-            self._land(self.swinging)
-        error = dist(self.q[:3], command[:3])
-        state = self._hands(), self._holds(), command, error, slip, step.status, cost, fixed
-        return Tick(self.time, self.path_time, self.q, self.v, *state)
+        slip, fixed = machine.move(step.v), machine.fixed
+        if hands.swinging is not None:
+            self._land(hands.swinging)
+        pose = self.body.pose
+        error = dist(machine.q[:3], pose[:3])
+        state = hands.states(), hands.holds(), pose, error, slip, step.status, cost, fixed
+        return Tick(machine.time, self.path_time, machine.q, machine.v, machine.rates, *state)
+
+    def vanish(self, ids: Iterable[str]) -> None:
+        """Take holds away: free, targeted or held. What of the plan does not need them stays; a hand that held one is
+        open at once, and the body stops until there is a plan.
+
+        Raises:
+            UnknownNameError: no such hold; nothing is changed.
+        """
+        structure, progress = self.structure, self.progress
+        gone = {structure.index(hold) for hold in ids}
+        names = [structure.ids[k] for k in sorted(gone)]
+        rest = structure.without(names)
+        for name in names:
+            self._say("vanished", "", name)
+        lost = [arm for arm, hold in self.held.items() if hold in gone]
+        stops = bool(lost) or self._planning is not None
+        for arm in lost:
+            self.hands.open(arm)
+        if self.swinging is not None and self.swinging.hold in gone:
+            self.hands.drop()
+            stops = True
+        self._renumber(rest)
+        swinging = self.swinging
+        first = progress.next + int(swinging is not None and swinging.counted)
+        later = [k for k, step in enumerate(self.plan.regrasps) if k >= first and step.target in names]
+        if stops or (swinging is not None and not swinging.counted):
+            self._stop()
+        elif later and not self._changing:
+            self._planning = self.replanner.without(later[0])
+            if self._planning is None:
+                self._stop()
+
+    def go(self, goal: Any) -> None:
+        """Go somewhere else: the body stops, goes straight to where another path begins, and on along it.
+
+        Args:
+            goal: a :class:`wbc.walking.body_path.BodyPath`; of another machine what its replanner takes.
+
+        Raises:
+            ShapeError: it is none for this machine; nothing is changed.
+        """
+        self.replanner.go(goal)
+        self._stop()
+
+    def set_down(self) -> None:
+        """The body stops where it is, and a hand in the air goes to a hold that it can keep there."""
+        self.replanner.stand()
+        self.hands.drop()
+        self._stop()
+
+    def abort(self) -> None:
+        """Stop: the body and the hand in the air slow down along their paths; nothing is lifted, nothing planned."""
+        self.aborted = True
+        if self.swinging is not None and self.swinging.state == "opening":
+            self.swinging.pace = 0.0
+
+    def carry_on(self) -> None:
+        """Go on after an abort."""
+        self.aborted = False
+
+    def stopping(self) -> tuple[float, float]:
+        """How far the body's origin and the hand in the air can travel after an abort now [m].
+
+        What :mod:`wbc.walking.loop.stopping` says of the places and paces that they have now.
+        """
+        path, u, stops = self.plan.path, self.path_time, self.leader.stops
+        off = float(np.linalg.norm(self.q[:3] - path.at(u)[0].translation))
+        body = float(stops.of_body(path.poses[:, :3, 3], path.spacing, np.array(u), self.pace, off))
+        swinging = self.swinging
+        if swinging is None:
+            return body, 0.0
+        law, pace = swinging.law, swinging.pace if swinging.state == "open" else 0.0
+        if self.leader.one_motion:
+            pace = self.pace
+        gap = float(np.linalg.norm(swinging.aim.position - self.machine.chain.origins[swinging.arm]))
+        return body, float(stops.of_hand(law.places, law.spacing, np.array(swinging.clock), pace, gap))
+
+    def take(self, plan: Plan) -> None:
+        """Go on with a plan, or begin one of another path."""
+        self.progress.take(plan, self.swinging)
+        self.replanner.taken()
+        self._changing = False
+
+    def go_over(self, plan: Plan, begins: float, since: int) -> None:
+        """Take a plan over another path, see :meth:`PlanProgress.go_over`."""
+        self.progress.go_over(plan, begins, since, self.swinging)
 
     def open_hand(self, arm: int) -> None:
-        """A hand lets go, to do what it is told (arm mode); the body stands, and the rest is planned anew later."""
+        """A hand lets go, to be moved by itself (arm mode); the body stands, and the rest is planned anew later."""
         self._say("lift", self.walker.arms[arm].name, self.structure.ids[self.held[arm]])
-        self._open(arm)
-        self._quick = True
+        self.hands.open(arm)
+        self.replanner.from_stance(True)
         self._stop()
 
     def close_hand(self, arm: int, hold: int, roll: int) -> bool:
-        """A hand that was told to go to a hold (its row) holds it at one of its rolls.
-
-        Returns:
-            Whether its latch closes.
-        """
-        names, self.told = (self.walker.arms[arm].name, self.structure.ids[hold]), None
-        if not self.grasps(*names):
+        """A hand that was moved by itself to a hold (its row) takes it at one of its rolls; whether it closes."""
+        names, self.hands.manual = (self.walker.arms[arm].name, self.structure.ids[hold]), None
+        if not self.hands.close(arm, hold, roll):
             self._say("failed", *names)
             return False
-        self.held[arm] = hold
-        self.stack.hold(arm, hold, roll)
         self._stop()
         self._say("land", *names)
         return True
@@ -199,7 +325,7 @@ class Walk(MovingBody):
         if self._changing and self._planning is None and self.pace == 0.0:
             self._give_up()
             if self.swinging is None:
-                self._planning = self._replan()
+                self._planning = self.replanner.rest()
         if self._planning is None:
             return
         try:
@@ -214,35 +340,140 @@ class Walk(MovingBody):
             self._say("replanned", "", "")
         except NoPlanError:
             if not self._changing:
-                # What was begun leads nowhere: from where the body stands there may be another way
+                # What was begun leads nowhere: from where the body stands there may be another path
                 self._stop()
-                self._quick = False
+                self.replanner.from_stance(False)
             else:
                 self._planning = None
                 self._say("refused", "", "")
                 raise
 
-    def take(self, plan: Plan) -> None:
-        """Go on with a plan, or begin one of another path."""
-        if plan.path is self.plan.path:
-            self._go_on(plan)
-        else:
-            self._follow(plan)
-        self._wanted, self._changing = None, False
+    def _give_up(self) -> None:
+        """A hand whose hold is out of reach from where the body stopped stays in the air, until there is a plan."""
+        swinging = self.swinging
+        if swinging is None or not swinging.counted or swinging.state != "open":
+            return
+        if self.path_time < self._soonest(swinging):
+            self.hands.drop()
 
-    def _replan(self) -> PlanSlices:
-        """Plan the rest of the way from where the body stands; a free hand goes to where the plan has it."""
-        path, u = self.plan.path, self.path_time
-        pose, place = path.at(u)[0], int(u / path.spacing)
-        if self._wanted is None:
-            rest = path.poses[place + 1 :]
-        else:
-            between = straight_path([pose, self._wanted.poses[0]], JOINING).poses
-            rest = np.concatenate([between, self._wanted.poses])
-        way = BodyPath(np.concatenate([pose.homogeneous[None], rest]), path.spacing)
-        if self._quick and len(self.held) == len(self.walker.arms):
-            names = [arm.name for arm in self.walker.arms]
-            start = {names[arm]: self.structure.ids[hold] for arm, hold in self.held.items()}
-            postures = {arm.name: self.q[arm.q] for arm in self.walker.arms}
-            return plan_from_stance(self.walker, self.structure, way, start, postures=postures)
-        return plan_from_here(self.walker, self.structure, way, self.held, self.q, self.chain, self._behind())
+    def _lift(self) -> None:
+        """Send a free hand to its hold, or open that of the next re-grasp when the body is where the plan lifts it."""
+        if self.swinging is not None or self._changing:
+            return
+        free = [arm for arm in range(len(self.walker.arms)) if arm not in self.held]
+        if free:
+            self._bring(free[0])
+            return
+        step = self._may_lift()
+        if step is None or self.path_time < step.lift - 1e-9:
+            return
+        if len(self.held) <= self.walker.min_holds:
+            raise HoldLost("hands", len(self.held), f"more than {self.walker.min_holds} must hold before one is lifted")
+        if self.approve is not None and not self.approve(step):
+            return
+        arm = self.progress.arm_of(step)
+        if self.hands.just_landed(arm):
+            return
+        law = self.plan.laws[self.progress.next]
+        grip = self.progress.lift(arm)
+        self.hands.open(arm)
+        swinging = self.hands.send(arm, self._grip(grip), law, latch=self.hands.data.latch_time)
+        swinging.wrist = self.leader.wrist(arm)
+        self._say("lift", step.arm, step.source)
+
+    def _bring(self, arm: int) -> None:
+        """A hand that is in the air goes to where the plan begins, while the body stands still."""
+        machine = self.machine
+        _, _, _, a, b, c = machine.q[self.walker.arms[arm].q].tolist()
+        law = way_to(self.walker, self.structure, self.plan, arm, machine.chain, machine.q)
+        more: dict[str, Any] = {"counted": False, "waits": True, "state": "open", "first_wrist": (a, b, c)}
+        self.hands.send(arm, self._grip(self.progress.grip[arm]), law, latch=0.0, wrist=(a, b, c), **more)
+
+    def _grip(self, grip: int) -> tuple[int, int, int]:
+        """A grip's number, the row of its hold and the number of its roll."""
+        grips = self.progress.grips
+        return grip, int(grips.hold[grip]), int(grips.roll[grip])
+
+    def _may_lift(self) -> Regrasp | None:
+        """The next re-grasp, if its hand may be lifted when the body is there."""
+        if self._changing or self.halted or self.swinging is not None:
+            return None
+        if self.limit is not None and self.progress.next >= self.limit[1]:
+            return None
+        return self.progress.step
+
+    def _advance(self) -> None:
+        """Move the body's command on: as fast as asked, as slow as the grips of the holding hands need."""
+        progress, swinging, limit = self.progress, self.swinging, self.limit
+        plan, path, u, step = self.plan, self.plan.path, self.path_time, self.progress.step
+        lifted, lasts = self._may_lift(), progress.grips.ends_at(path.spacing)
+        leaving = -1 if lifted is None else progress.arm_of(lifted)
+        end = path.duration if plan.complete else plan.reached
+        end = end if limit is None else min(end, limit[0])
+        if self.approve is not None and swinging is None and step is not None:
+            end = min(end, step.lift)
+        soonest = min([end, *[lasts[progress.grip[arm]] for arm in self.held if arm != leaving]])
+        margin, landing = max(soonest - u, 0.0), None
+        if swinging is not None:
+            needed = swinging.law.duration - swinging.clock + self.hands.data.latch_time + SETTLE
+            until = margin
+            if swinging.counted and not self._changing:
+                # A hand that is late makes the body late too: the next ones then swing where they were planned to
+                until = min(until, max(plan.regrasps[progress.next].land + LATE - u, 0.0))
+            landing = until, needed
+        self.body.choose(margin, max(end - u, 0.0), landing, self._stands())
+        aim, progress.path_time = self.body.go(path, u)
+        self.stack.body(aim)
+
+    def _stands(self) -> bool:
+        """The body is to stop, or not to move on."""
+        if self.halted or self.aborted:
+            return True
+        if self.leader.one_motion:
+            # A swinging hand goes on to its hold with the body
+            return self._changing and self.swinging is None
+        return self._changing or (self.swinging is not None and self.swinging.waits)
+
+    def _soonest(self, swinging: Swinging) -> float:
+        """Path time from which on the hold of a swinging hand is in reach [s]."""
+        return float(self.progress.grips.first[swinging.grip]) * self.plan.path.spacing
+
+    def _due(self, swinging: Swinging) -> float:
+        """Path time at which a hand is to be on its hold [s]: the plan's; as soon as possible where the body stops."""
+        soonest = self._soonest(swinging)
+        if self._changing or self.halted or not swinging.counted:
+            return soonest
+        due = self.plan.regrasps[self.progress.next].land - self.hands.data.latch_time - SETTLE
+        return due if self.limit is None else max(min(due, self.limit[0]), soonest)
+
+    def _land(self, swinging: Swinging) -> None:
+        """Close the swinging hand; when the latch is through it holds, or it has missed and tries again."""
+        if not self.hands.settle(swinging):
+            return
+        names = self.walker.arms[swinging.arm].name, self.structure.ids[swinging.hold]
+        if self.hands.close(swinging.arm, swinging.hold, int(self.progress.grips.roll[swinging.grip])):
+            self.hands.swinging = None
+            self.progress.land(swinging)
+            self._say("land", *names)
+            return
+        enough = self.hands.missed(swinging)
+        self._say("failed", *names)
+        if enough:
+            self.vanish([names[1]])
+
+    def _stop(self) -> None:
+        """The body stops, and the rest is planned from there."""
+        self._planning, self._changing = None, True
+
+    def _renumber(self, rest: Structure) -> None:
+        """Go on with a structure that has lost holds: rows of holds change, hands stay where they are."""
+        old, there = self.structure, set(rest.ids)
+        rows = np.array([rest.index(name) if name in there else -1 for name in old.ids], dtype=np.int64)
+        self.stack.structure = rest
+        self.machine.renumber(rest, rows)
+        if self.swinging is not None:
+            self.swinging.hold = int(rows[self.swinging.hold])
+        self.progress.renumber(rows, self.swinging)
+
+    def _say(self, what: What, arm: str, hold: str) -> None:
+        self.events.append(Event(self.time, what, arm, hold, self.path_time))

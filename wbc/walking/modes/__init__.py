@@ -1,1 +1,1 @@
-"""What a walk can do besides a plan: drive as told, move one hand, refuse moves, begin with nothing held."""
+"""What a walk can do besides a plan: be driven, move one hand, refuse moves, begin with nothing held."""

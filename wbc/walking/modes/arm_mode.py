@@ -1,4 +1,4 @@
-"""Arm mode: one hand moves as it is told while the others hold and the body stands still."""
+"""Arm mode: one hand moves as commanded while the others hold and the body stands still."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from wbc import validation
 from wbc.errors import WbcError
 from wbc.validation import Array
 from wbc.walking.loop.hand_pace import HAND_STOP
-from wbc.walking.loop.state import Hand, Tick
+from wbc.walking.loop.state import Hand, Manual, Tick
 from wbc.walking.loop.stopping import OFF
 from wbc.walking.loop.walk import Walk
 from wbc.walking.modes.hand_motion import ArmRefused, Standing
@@ -36,7 +36,7 @@ class ArmMode:
     """One arm of a walk that stands.
 
     Args:
-        walk: between its ticks; its body stands and no hand is on its way. arm: name. on_tick: what happens every tick.
+        walk: between its ticks; its body stands and no hand is swinging. arm: name. on_tick: what happens every tick.
         stop: asked every tick of a motion: true ends it, within :data:`wbc.walking.loop.hand_pace.HAND_STOP` seconds,
             and raises :class:`ArmStopped`.
 
@@ -61,8 +61,9 @@ class ArmMode:
         self._stop = stop or (lambda: False)
         self.farthest: tuple[float, float] = (0.0, 0.0)
         self.stopped: tuple[tuple[float, float], tuple[float, float]] | None = None
-        if walk.pace > 0.0 or walk.swinging is not None or (walk.told is not None and walk.told[0] != self.arm):
-            raise ArmRefused("walk", walk.path_time, "the body moves, or a hand is on its way")
+        manual = walk.hands.manual
+        if walk.pace > 0.0 or walk.swinging is not None or (manual is not None and manual.arm != self.arm):
+            raise ArmRefused("walk", walk.path_time, "the body moves, or a hand is swinging")
         others = [k for k in walk.held if k != self.arm]
         if len(others) < walk.walker.min_holds:
             raise ArmRefused("arm", arm, f"{walk.walker.min_holds} other hands must hold, {len(others)} do")
@@ -85,7 +86,7 @@ class ArmMode:
     def by_rate(self, twist: Any, seconds: float) -> None:
         """The hand moves with a twist (linear; angular) in the structure's axes [m/s, rad/s] for a time [s].
 
-        It speeds up and slows down on the way: what is covered is twist x seconds.
+        It speeds up and slows down: what is covered is twist x seconds.
 
         Raises:
             ShapeError, RangeError: bad numbers. ArmRefused: not possible; nothing has moved.
@@ -112,7 +113,7 @@ class ArmMode:
         rolls = structure.holds[row].rolls
         frames = {roll: pin.SE3(frame_on(structure, row, roll)) for roll in range(len(rolls))}
         if not frames:
-            # The roll is free: the hand turns the shortest way
+            # The roll is free: the hand turns as little as it can
             turn = pin.Quaternion.FromTwoVectors(here.rotation[:, 2], axis).toRotationMatrix()
             frames = {ANY: pin.SE3(turn @ here.rotation, structure.positions[row])}
         number = min(frames, key=lambda k: float(np.linalg.norm(pin.log3(here.rotation.T @ frames[k].rotation))))
@@ -128,8 +129,8 @@ class ArmMode:
     @property
     def pose(self) -> pin.SE3:
         """Of the hand in the structure."""
-        x, z = self.walk.chain.sides[self.arm], self.walk.chain.axes[self.arm]
-        return pin.SE3(np.column_stack([x, np.cross(z, x), z]), self.walk.chain.origins[self.arm].copy())
+        x, z = self.walk.machine.chain.x_axes[self.arm], self.walk.machine.chain.axes[self.arm]
+        return pin.SE3(np.column_stack([x, np.cross(z, x), z]), self.walk.machine.chain.origins[self.arm].copy())
 
     def _standing(self) -> Standing:
         walk = self.walk
@@ -139,13 +140,13 @@ class ArmMode:
 
     def leave(self) -> None:
         """A hand in the air goes back to what the walk plans for it, with the next ticks of the walk."""
-        if self.walk.told is not None:
+        if self.walk.hands.manual is not None:
             pose = self.pose
             self.walk.stack.settle(self.arm, pose.translation, pose.rotation[:, 2], None)
-            self.walk.told = None
+            self.walk.hands.manual = None
 
     def _tick(self, state: Hand, hold: int = -1) -> None:
-        self.walk.told = self.arm, state, hold
+        self.walk.hands.manual = Manual(self.arm, state, hold)
         self._on_tick(self.walk.tick())
 
     def _release(self) -> None:
@@ -154,7 +155,7 @@ class ArmMode:
             return
         hold = self.walk.held[self.arm]
         self.walk.open_hand(self.arm)
-        for _ in range(round(self.walk.data.latch_time / self.walk.dt)):
+        for _ in range(round(self.walk.hands.data.latch_time / self.walk.dt)):
             self._tick("opening", hold)
 
     def _follow(self, rows: Array) -> None:
@@ -162,7 +163,7 @@ class ArmMode:
         walk, place = self.walk, 0.0
         places = self._places(rows)
         body, hand = self.farthest
-        self.farthest = max(body, OFF), max(hand, walk.stops.longest_of_hand(places, walk.dt))
+        self.farthest = max(body, OFF), max(hand, walk.leader.stops.longest_of_hand(places, walk.dt))
         while place < len(rows) - 1:
             if self._stop():
                 self._come_to_rest(rows, places, place)
@@ -179,16 +180,16 @@ class ArmMode:
         return then
 
     def _come_to_rest(self, rows: Array, places: Array, place: float) -> None:
-        """The pace falls to nothing; how far body and hand go is kept beside what is said before."""
+        """The pace falls to nothing; how far body and hand go is stored beside what is said before."""
         walk = self.walk
-        begin, hand = walk.q[:3].copy(), walk.chain.origins[self.arm].copy()
+        begin, hand = walk.q[:3].copy(), walk.machine.chain.origins[self.arm].copy()
         gap = float(np.linalg.norm(_between(places, place) - hand))
-        said = OFF, float(walk.stops.of_hand(places, walk.dt, np.array(place * walk.dt), 1.0, gap))
+        said = OFF, float(walk.leader.stops.of_hand(places, walk.dt, np.array(place * walk.dt), 1.0, gap))
         far = np.zeros(2)
         for pace in (*np.arange(1.0 - walk.dt / HAND_STOP, 0.0, -walk.dt / HAND_STOP).tolist(), *[0.0] * STILL):
             place = self._go(rows, place, pace)
-            moved = walk.q[:3] - begin, walk.chain.origins[self.arm] - hand
-            far = np.maximum(far, [float(np.linalg.norm(way)) for way in moved])
+            moved = walk.q[:3] - begin, walk.machine.chain.origins[self.arm] - hand
+            far = np.maximum(far, [float(np.linalg.norm(path)) for path in moved])
         self.stopped = (float(far[0]), float(far[1])), said
 
     def _places(self, rows: Array) -> Array:
@@ -206,11 +207,11 @@ class ArmMode:
         for _ in range(REST):
             before = self.pose
             self._tick("open")
-            if walk.rests(self.arm, row, (before.translation, before.rotation[:, 2], before.rotation[:, 0]), x):
+            if walk.hands.rests(self.arm, row, (before.translation, before.rotation[:, 2], before.rotation[:, 0]), x):
                 break
         else:
             raise ArmRefused("hold", name, "the hand does not come to rest on it")
-        for _ in range(round(walk.data.latch_time / walk.dt)):
+        for _ in range(round(walk.hands.data.latch_time / walk.dt)):
             self._tick("closing", row)
         if not walk.close_hand(self.arm, row, number):
             raise ArmRefused("hold", name, "the latch does not close")

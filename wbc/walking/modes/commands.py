@@ -1,4 +1,4 @@
-"""What a driven body is told: rates over time, from a file or a function; and tables of numbers as files."""
+"""What drives a body: rates over time, from a file or a function; and tables of numbers as files."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Another way for a body that moves: it begins as the present one, with the hands and swings that there are."""
+"""Another path for a body that moves: it begins as the present one, with the hands and swings that there are."""
 
 from __future__ import annotations
 
@@ -29,14 +29,14 @@ TRIES = ((0.0, 16), (0.5, 16), (inf, 16))
 
 @dataclass(frozen=True, eq=False)
 class Course:
-    """What of a walk goes on while another way is planned.
+    """What of a walk goes on while another path is planned.
 
     Attributes:
         begins: path time of the present plan at which the new path begins, and splice: until which both agree [s].
         since: number of the present plan's re-grasp that comes next.
         kept: re-grasps of the present plan that are lifted before the splice, by the path time of the new one.
         laws: of ``kept``.
-        hands: for each arm the grips of the present plan that it has, or is on its way to, and then those of ``kept``.
+        hands: for each arm the grips of the present plan that it has, or swings to, and then those of ``kept``.
         sample: of the new path, at which the first of each arm's grips holds.
     """
 
@@ -57,14 +57,14 @@ def course(walk: Walk, lead: float, lifts: bool = True) -> Course:
     """
     plan, spacing, u = walk.plan, walk.plan.path.spacing, walk.path_time
     end = plan.path.duration if plan.complete else plan.reached
-    # On a sample; but a body that stands has its own way from where it is
+    # On a sample; but a body that stands has a path of its own from where it is
     splice = max(min(ceil((u + lead) / spacing - 1e-9), int(end / spacing + 1e-9)) * spacing, u) if walk.pace else u
     begins = splice - int((splice - max(u - TAIL * spacing, 0.0)) / spacing + 1e-9) * spacing
     here = max(int((u - begins) / spacing + 1e-9), 0)
-    sample, swinging, since = [here] * len(walk.walker.arms), walk.swinging, walk.next
+    sample, swinging, since = [here] * len(walk.walker.arms), walk.swinging, walk.progress.next
     if swinging is not None:
         since += int(swinging.counted)
-        sample[swinging.arm] = ceil((u - begins + time_left(swinging, walk.data)) / spacing)
+        sample[swinging.arm] = ceil((u - begins + time_left(swinging, walk.hands.data)) / spacing)
     steps = []
     for step in plan.regrasps[since:]:
         if not lifts or step.lift >= splice:
@@ -126,13 +126,13 @@ def _chain(
         found = [same_grip(old, grip, new, at, shift) for grip, at in zip(hands, samples, strict=True)]
         if min(found) < 0:
             hold = structure.ids[old.hold[hands[found.index(-1)]]]
-            raise NoPlanError("course", hold, "the hand that is there, or on its way, cannot hold it on the new way")
+            raise NoPlanError("course", hold, "the hand that is there, or swings there, cannot hold it on the new path")
         out.append(tuple(found))
     return tuple(out)
 
 
 def time_left(swinging: Swinging, data: WalkerData) -> float:
-    """Until a hand on its way holds [s]."""
+    """Until a swinging hand holds [s]."""
     return swinging.law.duration - swinging.clock + data.latch_time + SETTLE
 
 

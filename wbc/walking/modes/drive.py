@@ -1,4 +1,4 @@
-"""Velocity mode: the body moves as it is told, and hands are planned over the seconds ahead, again and again."""
+"""Velocity mode: the body moves as commanded, and hands are planned over the seconds ahead, again and again."""
 
 from __future__ import annotations
 
@@ -25,8 +25,9 @@ HORIZON, LEFT, LEAD, AHEAD = 8.0, 6.0, 0.1, 1.0
 #: Slices of planning between two ticks
 SLICES = 2
 #: What is tried in turn where hands cannot be planned over the horizon: parts of the commanded rates, and how much
-#: the body is lower and aside, in its data's ``body_shift``, and tilted about its way and across it, in ``body_tilt``
-WAYS = (
+#: the body is lower and aside, in its data's ``body_shift``, and tilted about its direction and across it, in its
+#: ``body_tilt``
+ALTERNATIVES = (
     *((part, (0.0, 0.0, 0.0, 0.0)) for part in (1.0, 0.7, 0.45)),
     *((0.7, (low, side, 0.0, 0.0)) for low, side in ((1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0))),
     *((0.7, (0.0, 0.0, roll, pitch)) for roll, pitch in ((0.0, 1.0), (0.0, -1.0), (1.0, 0.0), (-1.0, 0.0))),
@@ -62,7 +63,7 @@ class Drive:
         self.steering = Steering.on(walk.structure, pose)
         self.command = np.zeros(3)
         self._asked = np.zeros(3)
-        self._order, self._settled, self._stuck, self._waited = list(range(len(WAYS))), True, False, False
+        self._order, self._settled, self._stuck, self._waited = list(range(len(ALTERNATIVES))), True, False, False
         self._work: tuple[Course, Generator[Plan | None, None, Plan]] | None = None
         # Displacements of the paths that were planned last, sample by sample, and the last one that the body had
         self._displaced: list[tuple[BodyPath, Array]] = []
@@ -80,7 +81,7 @@ class Drive:
 
     @property
     def standing(self) -> bool:
-        """The body stands as it is told, and no hand is on its way."""
+        """The body stands as commanded, and no hand is swinging."""
         return not self.command.any() and self.walk.pace == 0.0 and self.walk.swinging is None
 
     def tick(self) -> Tick:
@@ -111,20 +112,20 @@ class Drive:
         swinging = walk.swinging
         if walk.pace > 0.0 or swinging is None or walk.busy:
             return
-        if walk.grips.first[swinging.grip] * walk.plan.path.spacing > walk.path_time:
+        if walk.progress.grips.first[swinging.grip] * walk.plan.path.spacing > walk.path_time:
             walk.set_down()
 
     def _plan(self) -> None:
         """Some slices of planning, begun anew where the command has changed or the horizon comes near."""
         walk = self.walk
         if (self.command != self._asked).any():
-            self._order = list(range(len(WAYS)))
+            self._order = list(range(len(ALTERNATIVES)))
             self._begin(LEAD, quick=True)
         elif self._work is None and not self._settled:
             self._begin(LEAD, quick=False)
         elif self._work is None and walk.plan.path.duration - walk.path_time < LEFT and not self.reason:
             # The least deviation first, then the one that has led on
-            self._order = list(dict.fromkeys([0, self._order[0], *range(len(WAYS))]))
+            self._order = list(dict.fromkeys([0, self._order[0], *range(len(ALTERNATIVES))]))
             self._begin(AHEAD, quick=False)
         for _ in range(SLICES):
             if self._work is None:
@@ -140,8 +141,8 @@ class Drive:
                 self.reason, swinging = str(error), walk.swinging
                 if swinging is not None and not self._waited:
                     # The body may have to wait for the hand, where it can land
-                    there = float(walk.grips.first[swinging.grip]) * walk.plan.path.spacing - walk.path_time
-                    self._begin(max(there, 0.0) + LEAD, quick=True, wait=time_left(swinging, walk.data) + SURE)
+                    there = float(walk.progress.grips.first[swinging.grip]) * walk.plan.path.spacing - walk.path_time
+                    self._begin(max(there, 0.0) + LEAD, quick=True, wait=time_left(swinging, walk.hands.data) + SURE)
                 else:
                     self._stuck = True
             else:
@@ -149,13 +150,13 @@ class Drive:
                     walk.go_over(plan, begun.begins, begun.since)
                     walk.halted = False
                     self._work = Course(0.0, 0.0, 0, (), (), (), ()), slices
-                    walk.leash = None
+                    walk.limit = None
 
     def _begin(self, lead: float, quick: bool, wait: float = 0.0) -> None:
         """Begin to plan along the command, behind what the body goes on with for ``lead`` [s].
 
         Args:
-            wait: for so long the body stops on its way [s].
+            wait: for so long the body stops on its path [s].
         """
         walk, steering = self.walk, self.steering
         path = walk.plan.path
@@ -164,13 +165,13 @@ class Drive:
         tail, off = [path.at(u)[0].homogeneous for u in times], [self._displacement(path, u) for u in times]
         bare = [undisplaced(*pair) for pair in zip(tail, off, strict=True)]
         rates = steering.rates(bare[-2], bare[-1], spacing) if walk.pace and len(bare) > 1 else np.zeros(4)
-        part, much = WAYS[self._order[0]]
+        part, much = ALTERNATIVES[self._order[0]]
         rest = steering.ramp(rates, np.zeros(3), round(wait / spacing), spacing)
         ahead = steering.ramp(rest[-1] if len(rest) else rates, part * self.command, round(HORIZON / spacing), spacing)
         led = steering.ahead(bare[-1], np.concatenate([rest, ahead]), spacing)
-        way = (bare[-1][:3, :3].T @ (led[-1] - led[len(rest)])[:3, 3])[:2]
-        shift, tilt = walk.data.body_shift, walk.data.body_tilt
-        wanted = displacement(way, *(m * most for m, most in zip(much, (shift, shift, tilt, tilt), strict=True)))
+        direction = (bare[-1][:3, :3].T @ (led[-1] - led[len(rest)])[:3, 3])[:2]
+        shift, tilt = walk.hands.data.body_shift, walk.hands.data.body_tilt
+        wanted = displacement(direction, *(m * most for m, most in zip(much, (shift, shift, tilt, tilt), strict=True)))
         still = np.repeat(off[-1][None], len(rest), axis=0)
         more = np.concatenate([still, towards(off[-1], wanted, len(ahead), spacing)])
         poses = [displaced(*pair) for pair in zip(led, more, strict=True)]
@@ -179,10 +180,10 @@ class Drive:
         self._displaced = [*kept, (other, np.concatenate([off, more]))]
         self._work = begun, course_slices(walk.walker, walk.structure, walk.plan, begun, other, quick)
         self._asked, self._waited = self.command.copy(), wait > 0.0
-        walk.leash = begun.splice, begun.since + len(begun.kept)
+        walk.limit = begun.splice, begun.since + len(begun.kept)
 
     def _displacement(self, path: BodyPath, u: float) -> Array:
-        """Of the body at a path time, from where its command has it; on a way of another origin it stays."""
+        """Of the body at a path time, from where its command has it; on a path of another origin it stays."""
         for known, rows in self._displaced:
             if known is path:
                 self._last = rows[min(round(u / path.spacing), len(rows) - 1)]
@@ -200,7 +201,7 @@ class Drive:
             del self._order[0]
 
     def _drop(self) -> None:
-        self._work, self.walk.leash = None, None
+        self._work, self.walk.limit = None, None
 
 
 def _far(plan: Plan, here: float) -> float:

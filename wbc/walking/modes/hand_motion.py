@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from math import ceil
 
 import numpy as np
@@ -16,8 +17,8 @@ from wbc.walking.arms.puma import LIMIT_NAMES, ArmKinematics
 from wbc.walking.planner.grips.conflicts import LimbShapes
 from wbc.walking.planner.swings.clearance import SwingClearance
 
-#: Parts of joint rates and accelerations that motions use, and room to the other limits [rad]
-PART, ROOM = 0.9, 0.01
+#: Parts of joint rates and accelerations that motions use, and margin to the other limits [rad]
+PART, MARGIN = 0.9, 0.01
 #: Motions that ask too much of a joint are made slower, by this factor and at most so often
 SLOWER, TRIES = 1.25, 12
 #: Width of the edge of that distance, and what the checker leaves of the clearance, less a half [m]
@@ -53,7 +54,7 @@ class Standing:
         speed is 15 / 8 of the mean; it stops at each. Slower than asked where a joint needs it.
 
         Raises:
-            ArmRefused: a pose out of reach, a limit, the structure or another arm in the way.
+            ArmRefused: a pose out of reach, a limit, the structure or another arm is too near.
         """
         out = self._through(self.q[self.walker.arms[self.arm].q][None], poses, speed, turn_rate)
         self._check_clear(out)
@@ -77,9 +78,9 @@ class Standing:
         for q, branch, _ in sorted(choices, key=lambda choice: float(choice[2][0])):
             if branch[0] < 0:
                 continue
-            begin, change = rows[-1], q[0] - rows[-1]
+            line = partial(_line, rows[-1], q[0] - rows[-1])
             try:
-                across = self._timed(lambda x, a=begin, d=change: a + x[:, None] * d, 0.5, "hold", on[0])  # type: ignore[misc]
+                across = self._timed(line, 0.5, "hold", on[0])
                 out = self._through(np.concatenate([rows, across[1:]]), on[1:], speed, turn_rate)
                 self._check_clear(out)
             except ArmRefused as error:
@@ -103,17 +104,17 @@ class Standing:
             step = pin.log3(here.rotation.T @ pose.rotation)
             least = max(np.linalg.norm(pose.translation - here.translation) / speed, np.linalg.norm(step) / turn_rate)
             if least >= THERE:
-                way = here, pose, step, rows[-1], f"poses[{k}]"
-                more = self._timed(lambda x, way=way: self._straight(x, *way), 15 / 8 * float(least), way[4], pose)  # type: ignore[misc]
+                straight = partial(self._straight, (here, pose, step), rows[-1], f"poses[{k}]")
+                more = self._timed(straight, 15 / 8 * float(least), f"poses[{k}]", pose)
                 rows = np.concatenate([rows, more[1:]])
             here = pose
         return rows
 
     def _timed(self, make: Callable[[Array], Array], duration: float, field: str, pose: pin.SE3) -> Array:
-        """Rows of one part of the way, in the duration [s] or in what its joints need.
+        """Rows of one part of the motion, in the duration [s] or in what its joints need.
 
         Args:
-            make: parts of the way in [0, 1] -> rows.
+            make: parts of the motion in [0, 1] -> rows.
         """
         data = self._kinematics.data
         for _ in range(TRIES):
@@ -128,9 +129,9 @@ class Standing:
         joint = int(worst.argmax()) + 1
         raise ArmRefused(field, pose.translation.tolist(), f"joint {joint} would have to turn too fast")
 
-    def _straight(self, x: Array, here: pin.SE3, pose: pin.SE3, step: Array, start: Array, field: str) -> Array:
-        """Joints at parts x of the way from a pose to another that is turned by ``step``."""
-        kinematics, base = self._kinematics, self._base
+    def _straight(self, line: tuple[pin.SE3, pin.SE3, Array], start: Array, field: str, x: Array) -> Array:
+        """Joints at parts x of the line from a pose to another that is turned by a step, (pose, other, step)."""
+        (here, pose, step), kinematics, base = line, self._kinematics, self._base
         hands = [
             pin.SE3(here.rotation @ pin.exp3(step * part), here.translation * (1 - part) + pose.translation * part)
             for part in x.tolist()
@@ -144,9 +145,9 @@ class Standing:
             rows.append(near[0])
         out = np.array(rows)
         margins = kinematics.margins(out[1:])
-        if margins.min() < min(ROOM, float(kinematics.margins(start).min())):
+        if margins.min() < min(MARGIN, float(kinematics.margins(start).min())):
             name = LIMIT_NAMES[int(margins.min(axis=0).argmin())]
-            raise ArmRefused(field, pose.translation.tolist(), f"the way leads beyond the {name}")
+            raise ArmRefused(field, pose.translation.tolist(), f"the motion leads beyond the {name}")
         return out
 
     def _check_clear(self, rows: Array) -> None:
@@ -171,5 +172,10 @@ class Standing:
         data, places = self._kinematics.data, points[:, 5] @ self.body.rotation.T + self.body.translation
         far = np.linalg.norm(places[:, None] - ends, axis=2).min(axis=1) - data.exempt_distance
         edge = (far > 0.0) & (far < EDGE)
-        room = self.clear.height(places[edge]) - data.hand_radius - data.clearance
-        return bool((room > -SLACK).all())
+        margin = self.clear.height(places[edge]) - data.hand_radius - data.clearance
+        return bool((margin > -SLACK).all())
+
+
+def _line(begin: Array, change: Array, x: Array) -> Array:
+    """begin + x change."""
+    return np.asarray(begin + x[:, None] * change)

@@ -23,15 +23,15 @@ ROUND, ALONG, SPIN, NEARER = range(4)
 ACCELERATIONS = np.array([0.25, 0.25, 0.25])
 
 
-def displacement(way: Array, lower: float, aside: float, roll: float, pitch: float) -> Array:
-    """A displacement ``[5]`` of a body that goes along ``way`` ``[2]`` in its own x and y axes; any way counts as x if
-    it has no length.
+def displacement(direction: Array, lower: float, aside: float, roll: float, pitch: float) -> Array:
+    """A displacement ``[5]`` of a body that goes in a direction ``[2]`` of its own x and y axes; one of no length
+    counts as x.
 
     Args:
-        lower, aside: [m], aside is to the left of the way seen along z. roll, pitch: about the way and across it [rad].
+        lower, aside: [m], aside is to the left of the direction seen along z. roll, pitch: about it, across it [rad].
     """
-    length = float(np.linalg.norm(way))
-    ahead = way / length if length > 1e-9 else np.array([1.0, 0.0])
+    length = float(np.linalg.norm(direction))
+    ahead = direction / length if length > 1e-9 else np.array([1.0, 0.0])
     left = np.array([-ahead[1], ahead[0]])
     return np.concatenate([aside * left, [lower], roll * ahead + pitch * left])
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from math import inf
+from typing import Any
 
 import numpy as np
 
@@ -30,29 +31,29 @@ class Veto:
     def __init__(self, walk: Walk) -> None:
         self.walk = walk
         self._accepted = -1
-        walk.approve = lambda step: self._accepted == len(walk.steps)
+        walk.approve = lambda step: self._accepted == len(walk.progress.steps)
 
     @property
     def proposal(self) -> Regrasp | None:
         """The next re-grasp, if it waits for an answer."""
         walk = self.walk
-        if walk.swinging is not None or walk.busy or walk.next >= len(walk.plan.regrasps):
+        if walk.swinging is not None or walk.busy or walk.progress.next >= len(walk.plan.regrasps):
             return None
-        return None if self._accepted == len(walk.steps) else walk.plan.regrasps[walk.next]
+        return None if self._accepted == len(walk.progress.steps) else walk.plan.regrasps[walk.progress.next]
 
     def accept(self) -> None:
         """Yes to the proposal, if there is one."""
         if self.proposal is not None:
-            self._accepted = len(self.walk.steps)
+            self._accepted = len(self.walk.progress.steps)
 
     def choose(self, hold: str) -> Regrasp:
-        """Another hold for the arm of the proposal; the rest of the way is planned anew behind it.
+        """Another hold for the arm of the proposal; the rest of the path is planned anew behind it.
 
         Returns:
             The re-grasp that is made instead.
 
         Raises:
-            UnknownNameError: no such hold. HoldRefusedError: there is no proposal, or the way does not go on with it.
+            UnknownNameError: no such hold. HoldRefusedError: there is no proposal, or no plan goes on with it.
         """
         walk, step = self.walk, self.proposal
         row = walk.structure.index(hold)
@@ -61,14 +62,14 @@ class Veto:
         if row in walk.held.values():
             raise HoldRefusedError("hold", hold, "a hand holds it")
         names = [arm.name for arm in walk.walker.arms]
-        arm, plan, grips = names.index(step.arm), walk.plan, walk.grips
+        arm, plan, grips = names.index(step.arm), walk.plan, walk.progress.grips
         if not len(np.nonzero((grips.arm == arm) & (grips.hold == row))[0]):
-            raise HoldRefusedError("hold", hold, f"{step.arm} cannot hold it anywhere on the way")
+            raise HoldRefusedError("hold", hold, f"{step.arm} cannot hold it anywhere on the path")
         sample = int(np.ceil(walk.path_time / plan.path.spacing - 1e-9))
-        begun = plan.cut(names, walk.next, sample * plan.path.spacing)
+        begun = plan.cut(names, walk.progress.next, sample * plan.path.spacing)
         stance = tuple(chain[-1] for chain in begun.chain)
-        more = {"grips": grips, "stance": stance, "sample": sample, "tries": TRIES, "first": (arm, row)}
-        asked = plan_slices(walk.walker, walk.structure, plan.path, **more)  # type: ignore[arg-type]
+        onward: dict[str, Any] = {"grips": grips, "stance": stance, "sample": sample, "tries": TRIES}
+        asked = plan_slices(walk.walker, walk.structure, plan.path, first=(arm, row), **onward)
         try:
             rest = drained(asked)
         except NoPlanError as error:
@@ -76,10 +77,10 @@ class Veto:
         if not rest.regrasps or rest.regrasps[0].target != hold:
             raise HoldRefusedError("hold", hold, f"{step.arm} cannot be moved there from {step.source}")
         if not rest.complete:
-            raise HoldRefusedError("hold", hold, f"the way does not go on with it: {rest.reason}")
+            raise HoldRefusedError("hold", hold, f"no plan goes on with it: {rest.reason}")
         walk.take(begun.then(rest))
-        self._accepted = len(walk.steps)
-        return walk.plan.regrasps[walk.next]
+        self._accepted = len(walk.progress.steps)
+        return walk.plan.regrasps[walk.progress.next]
 
     def end(self) -> None:
         """Nobody is asked any more."""

@@ -17,8 +17,8 @@ from wbc.walking.report.capsule_picture import Capsules, Ground
 from wbc.walking.report.parts import PALE_HAND, Part, part_poses, parts_of
 from wbc.walking.report.stills import AZIMUTH, ELEVATION, SHOWN, held_by
 from wbc.walking.report.surroundings import arm_colour, mixed
-from wbc.walking.run.perform import WalkRun
 from wbc.walking.run.recording import configuration
+from wbc.walking.run.session import WalkRun
 
 FILE = "walk.gif"
 #: Width and height [pixels]

@@ -15,8 +15,8 @@ from wbc.walking.log.log import CLOSED, OPENING, WalkLog
 from wbc.walking.planner.eased import JERK
 from wbc.walking.planner.plan import Plan
 from wbc.walking.planner.swings.law import SwingLaw
-from wbc.walking.run.perform import WalkRun
 from wbc.walking.run.recording import TickColumns
+from wbc.walking.run.session import WalkRun
 
 #: Time over which speeds are means [s]
 WINDOW = 0.1

@@ -16,7 +16,7 @@ from wbc.walking.report.reach_map import save_reach_map
 from wbc.walking.report.replay_page import ReplayPageError, save_replay_page
 from wbc.walking.report.stills import save_stills
 from wbc.walking.run.carrying_out import Progress
-from wbc.walking.run.perform import WalkRun
+from wbc.walking.run.session import WalkRun
 from wbc.walking.two_ended import touching_distance
 
 PLAN, STRUCTURE, URDF = "plan.json", "structure.csv", "robot.urdf"

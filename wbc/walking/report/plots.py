@@ -14,8 +14,9 @@ from wbc.robots import TwoEndedData
 from wbc.walking.log.log import CLOSED, OPENING, WalkLog
 from wbc.walking.report.figures import body_speed, wrist_angles
 from wbc.walking.report.surroundings import arm_colour
-from wbc.walking.run.perform import WalkRun
 from wbc.walking.run.recording import TickColumns
+from wbc.walking.run.request import DriveRequest
+from wbc.walking.run.session import WalkRun
 
 INCH = 0.0254
 Draw = Callable[[Any, WalkRun, WalkLog, TickColumns], Any]
@@ -210,9 +211,8 @@ def _speed(plt: Any, run: WalkRun, log: WalkLog, ticks: TickColumns) -> Any:
     asked = np.linalg.norm(np.diff(poses[:, :3, 3], axis=0), axis=1) / spacing
     at = np.interp(time, log.t[1:], ticks.path_time)
     command = asked[np.clip((at / spacing).astype(int), 0, len(asked) - 1)]
-    if run.request.commands:
-        told = np.linalg.norm(log.command[:, :2], axis=1)
-        command = np.interp(time, log.t, told)
+    if isinstance(run.request, DriveRequest):
+        command = np.interp(time, log.t, np.linalg.norm(log.command[:, :2], axis=1))
     figure, panel = plt.subplots(figsize=(9.2, 3.6), layout="constrained")
     panel.plot(time, command, color=style.GREY, ls=(0, (4, 2)), label="commanded")
     panel.plot(time, speed, color=style.BLUE, lw=1.8, label="achieved")

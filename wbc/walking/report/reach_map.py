@@ -17,7 +17,7 @@ from wbc.walking.holds.structure import Structure
 from wbc.walking.holds.surface import CylinderSurface
 from wbc.walking.planner.grips.held import held
 from wbc.walking.report.surroundings import arm_colour
-from wbc.walking.run.perform import WalkRun
+from wbc.walking.run.session import WalkRun
 
 FILE = "reach_map.png"
 #: Poses of the body's path that are looked at, at most

@@ -15,15 +15,15 @@ import pinocchio as pin
 
 from wbc.errors import WbcError
 from wbc.shapes import PlacedShape
-from wbc.track import solids
+from wbc.track import render
 from wbc.track.scene import simplified
 from wbc.validation import Array
 from wbc.walking.log.log import WalkLog
 from wbc.walking.report import surroundings
 from wbc.walking.report.parts import PALE_HAND, Part, part_poses, parts_of
 from wbc.walking.report.stills import AZIMUTH, ELEVATION, held_by
-from wbc.walking.run.perform import WalkRun
 from wbc.walking.run.recording import configuration
+from wbc.walking.run.session import WalkRun
 
 FILE = "replay.html"
 #: Poses a second, and how many there are at most
@@ -109,7 +109,7 @@ def _add_structure(scene: Any, run: WalkRun, log: WalkLog) -> None:
 
 
 def _add_part(scene: Any, number: int, part: Part) -> Any:
-    mesh = simplified(solids.triangles(PlacedShape(part.shape, pin.SE3.Identity())), DETAIL)
+    mesh = simplified(render.triangles(PlacedShape(part.shape, pin.SE3.Identity())), DETAIL)
     return _add_mesh(scene, f"/walk/machine/{number} {part.link}", mesh, part.colour)
 
 

@@ -13,8 +13,8 @@ from wbc.track.scene import Scene
 from wbc.walking.log.log import CLOSED, OPENING, WalkLog
 from wbc.walking.report import surroundings
 from wbc.walking.report.parts import joining_pieces, link_colours, part_poses
-from wbc.walking.run.perform import WalkRun
 from wbc.walking.run.recording import configuration
+from wbc.walking.run.session import WalkRun
 
 #: Where pictures look from [rad]: 0 is ahead of the body, and above level
 AZIMUTH, ELEVATION = np.radians(-58.0), np.radians(30.0)

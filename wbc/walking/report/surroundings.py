@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from wbc.robots import TwoEndedData, Walker
 from wbc.shapes import PlacedShape
 from wbc.style import BLUE, ORANGE, PURPLE, TEAL
-from wbc.track import solids
+from wbc.track import render
 from wbc.validation import Array
 from wbc.walking.holds.structure import Structure
 from wbc.walking.holds.surface import CylinderSurface, PlaneSurface
@@ -98,7 +98,7 @@ def obstacle_triangles(structure: Structure, rows: NDArray[np.int64]) -> Array:
     places, parts = structure.positions[rows], []
     for obstacle in structure.obstacles:
         if structure.surface is None or (len(rows) and obstacle.distance(places).min() < EDGE + PATCH):
-            parts.append(solids.triangles(PlacedShape(obstacle.shape, obstacle.placement)))
+            parts.append(render.triangles(PlacedShape(obstacle.shape, obstacle.placement)))
     return np.concatenate(parts) if parts else np.zeros((0, 3, 3))
 
 

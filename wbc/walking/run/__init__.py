@@ -1,6 +1,27 @@
 """Runs: walks as they are asked for, carried out, logged, and shown in a folder."""
 
-from wbc.walking.run.perform import WalkRun, perform_walk
-from wbc.walking.run.request import WalkRequest
+from __future__ import annotations
 
-__all__ = ["WalkRequest", "WalkRun", "perform_walk"]
+from typing import Any
+
+from wbc.walking.run import old_names
+from wbc.walking.run.places import GridPlace
+from wbc.walking.run.request import ArmRequest, DriveRequest, PathRequest, Site, TwoEndedRequest
+from wbc.walking.run.resume_mode import ResumeRequest
+from wbc.walking.run.session import WalkRun, perform_walk
+
+__all__ = [
+    "ArmRequest",
+    "DriveRequest",
+    "GridPlace",
+    "PathRequest",
+    "ResumeRequest",
+    "Site",
+    "TwoEndedRequest",
+    "WalkRun",
+    "perform_walk",
+]
+
+
+def __getattr__(name: str) -> Any:
+    return old_names.found(__name__, name)

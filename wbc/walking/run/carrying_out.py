@@ -7,6 +7,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from wbc.simulation import PlantError
 from wbc.track.summary import Figure
 from wbc.walking.loop.state import Tick
 from wbc.walking.loop.walk import Walk
@@ -14,7 +15,7 @@ from wbc.walking.planner.plan import HoldLost, NoPlanError
 from wbc.walking.run.recording import WalkRecorder
 
 #: How a mode ended: where it was to go, too late, its time over, by key, aborted, or why it could not go on
-Outcome = Literal["arrived", "late", "time", "key", "interrupted", "hold lost", "refused"]
+Outcome = Literal["arrived", "late", "time", "key", "interrupted", "hold lost", "plant failed", "refused"]
 #: (what is done, how much of it from 0 to 1 or None)
 Progress = Callable[[str, float | None], None]
 #: Ticks between two reports of progress
@@ -68,6 +69,8 @@ class CarryingOut:
             self.outcome, self.reason = "hold lost", str(error)
         except NoPlanError as error:
             self.outcome, self.reason = "refused", str(error)
+        except PlantError as error:
+            self.outcome, self.reason = "plant failed", str(error)
         if len(self.recorder) % STRIDE == 0:
             self._report("walking", None if part is None else min(part, 1.0))
         return self.outcome is None
@@ -79,24 +82,24 @@ class CarryingOut:
     def _look(self) -> None:
         """Take a new plan into account."""
         self._seen = self.walk.plan
-        self._most = np.maximum(self._most, self.walk.stops.longest(self._seen))
+        self._most = np.maximum(self._most, self.walk.leader.stops.longest(self._seen))
 
     def _abort(self) -> None:
         """Bring everything to rest, and keep how far it went beside what was said before."""
         walk = self.walk
         self.outcome, self.reason = "interrupted", f"stopped at {walk.time:.2f} s"
         bounds, swinging = walk.stopping(), walk.swinging
-        begin, hands, left = walk.q[:3].copy(), walk.chain.origins.copy(), REST
+        begin, hands, left = walk.q[:3].copy(), walk.machine.chain.origins.copy(), REST
         far = np.zeros(2)
         walk.abort()
         while left:
             try:
                 self.recorder.tick(walk.tick())
-            except HoldLost:
+            except (HoldLost, PlantError):
                 break
             far[0] = max(far[0], float(np.linalg.norm(walk.q[:3] - begin)))
             if swinging is not None:
-                moved = walk.chain.origins[swinging.arm] - hands[swinging.arm]
+                moved = walk.machine.chain.origins[swinging.arm] - hands[swinging.arm]
                 far[1] = max(far[1], float(np.linalg.norm(moved)))
             left -= int(walk.still)
         self.figures = (travelled((float(far[0]), float(far[1])), bounds),)
@@ -105,7 +108,7 @@ class CarryingOut:
 def farthest(body: float, hand: float) -> Figure:
     """How far a body and a hand go after an abort, at most [m]."""
     text = f"body at most {1e3 * body:.0f} mm, hand at most {1e3 * hand:.0f} mm"
-    return Figure("stopping", "way after an abort", {"body": body, "hand": hand}, text)
+    return Figure("stopping", "travel after an abort", {"body": body, "hand": hand}, text)
 
 
 def travelled(far: tuple[float, float], bounds: tuple[float, float]) -> Figure:

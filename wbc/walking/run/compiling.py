@@ -7,7 +7,7 @@ import gc
 from wbc.robots import Walker
 from wbc.walking.holds.structure import Structure
 from wbc.walking.log.recorder import versions
-from wbc.walking.loop.body_command import way_function
+from wbc.walking.loop.body_command import pose_function
 from wbc.walking.loop.closed_chain import chain_function
 from wbc.walking.loop.hand_command import aim_function
 from wbc.walking.loop.stack import WalkStack
@@ -24,7 +24,7 @@ def compiled_stack(
     """
     stack = WalkStack(walker, structure, collisions=collisions, backend=backend)
     chain_function(walker)
-    way_function()
+    pose_function()
     aim_function()
     compiled.library()
     versions()

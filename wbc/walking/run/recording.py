@@ -106,7 +106,7 @@ class WalkRecorder:
         # Ticks as they come; they are put together by :meth:`log`, which takes a tenth of the time
         self._kept: list[_Kept] = []
         # Hands that change, with the row from which on
-        self._hands: list[tuple[int, _Hands]] = [(0, (self._states, self._holds, walk.fixed))]
+        self._hands: list[tuple[int, _Hands]] = [(0, (self._states, self._holds, walk.machine.fixed))]
         self._rows: list[tuple[float, float, float, float, bool]] = []
         self._last: tuple[Any, Any, Any] = ((), (), None)
 
@@ -125,8 +125,8 @@ class WalkRecorder:
                 self._happened(event)
             self._seen = len(walk.events)
         self._command = tick.target if command is None else command
-        self._keep(tick.v, tick.fixed)
-        self._rows.append((walk.travelled, tick.body_error, tick.slip, tick.cost, tick.status == "solved"))
+        self._keep(tick.rates, tick.fixed)
+        self._rows.append((walk.progress.travelled, tick.body_error, tick.slip, tick.cost, tick.status == "solved"))
         self._time, self._q = tick.time, tick.q
         found = tick.hands, tick.holds, walk.structure
         if found != self._last:
@@ -140,7 +140,7 @@ class WalkRecorder:
             ShapeError: no tick was recorded.
         """
         rest = np.zeros(self._walk.walker.robot.nv)
-        self._keep(rest, self._walk.fixed)
+        self._keep(rest, self._walk.machine.fixed)
         rows, hands = zip(*self._hands, strict=True)
         lasting = np.diff([*rows, len(self._kept)])
         states, holds, fixed = (np.repeat(np.array(column), lasting, axis=0) for column in zip(*hands, strict=True))
@@ -195,7 +195,7 @@ def configuration(walker: Walker, log: WalkLog, row: int) -> Array:
 
 
 def as_walked(log: WalkLog, ticks: TickColumns, steps: Sequence[Regrasp]) -> tuple[Plan, TickColumns]:
-    """A plan whose path is the way of the logged body, over the time of the log; and ticks that say so.
+    """A plan whose path is that of the logged body, over the time of the log; and ticks that say so.
 
     Args:
         steps: re-grasps that were begun.

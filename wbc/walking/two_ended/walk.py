@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from functools import cached_property
-from typing import ClassVar
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
+from wbc import validation
 from wbc.errors import ShapeError
-from wbc.robots import TwoEndedData, Walker
+from wbc.robots import Walker
+from wbc.simulation import Plant
 from wbc.validation import Array
 from wbc.walking.body_path import BodyPath
 from wbc.walking.holds.structure import Structure
+from wbc.walking.loop.machine import Machine
+from wbc.walking.loop.progress import PlanProgress
 from wbc.walking.loop.stack import AXIS, DT, FREE_AXIS, FREE_WRIST, WalkStack
 from wbc.walking.loop.state import Swinging, Wrist
 from wbc.walking.loop.stopping import Stops
@@ -21,6 +24,7 @@ from wbc.walking.loop.walk import Walk
 from wbc.walking.planner.plan import NoPlanError
 from wbc.walking.planner.replanning import PlanSlices
 from wbc.walking.two_ended.planner import TwoEndedPlan, plan_two_ended
+from wbc.walking.two_ended.search import GAITS
 from wbc.walking.two_ended.swing_path import TurnLaw
 
 #: The last part of a swing, in which the hand comes straight down and its frame counts [s]
@@ -53,18 +57,108 @@ class TwoEndedStack(WalkStack):
         resting.target, resting.feedforward = self._posture, self._turning
 
 
+class TurnLeader:
+    """Leads the swinging hand of the two-ended arm: it is where the body's path has it, as both are one motion.
+
+    Raises:
+        ShapeError: another machine.
+    """
+
+    one_motion = True
+
+    def __init__(self, machine: Machine, progress: PlanProgress, stack: TwoEndedStack) -> None:
+        data, margins = machine.walker.two_ended_data, machine.walker.margins
+        self._machine, self._progress, self._stack = machine, progress, stack
+        # Laws leave half the accelerations for a stop; the hand comes to rest with the body
+        ramp = margins.swing_rate / (1.0 - margins.swing_acceleration) * data.acceleration_time
+        self.stops = Stops(machine.dt, ramp, ramp)
+
+    def first(self) -> Array:
+        """The body where the path begins, the arm on its grips, and then where the held hands have it."""
+        machine, progress = self._machine, self._progress
+        q, begin = np.array(machine.walker.robot.neutral), pin.SE3(progress.plan.path.poses[0])
+        q[:3], q[3:7] = begin.translation, pin.Quaternion(begin.rotation).coeffs()
+        for arm, grip in zip(machine.walker.arms, progress.grip, strict=True):
+            q[arm.q] = progress.grips.posture_at(grip, 0)[: len(arm.joints)]
+        return machine.chain.settle(q, machine.held)[0]
+
+    def wrist(self, arm: int) -> Wrist:
+        """Nothing: all joints of the arm follow the law."""
+        return 0.0, 0.0, 0.0
+
+    def lead(self, swinging: Swinging, early: float, pace: float, aborted: bool) -> None:
+        """To the body's path time; near its hold the hand's frame counts."""
+        machine, progress, arm, law = self._machine, self._progress, swinging.arm, swinging.law
+        assert isinstance(law, TurnLaw)
+        swinging.place, swinging.axis, swinging.x_axis = machine.hand(arm)
+        if swinging.state == "opening":
+            swinging.open_on(machine.dt)
+        now, before = swinging.aim, law.posture(swinging.clock)
+        lifted = progress.plan.regrasps[progress.next].lift
+        swinging.clock = min(progress.path_time - lifted, law.duration)
+        swinging.aim = law.at(swinging.clock)
+        dt = machine.dt
+        speed, rates = (swinging.aim.position - now.position) / dt, law.posture(swinging.clock) - before
+        near = swinging.clock > law.duration - NEAR
+        at_hold = (machine.structure.axes[swinging.hold], swinging.x) if near and swinging.x is not None else None
+        self._stack.turn(arm, (now.position, speed), (before, rates / dt), at_hold)
+
+
+class TurnReplanner:
+    """Plans from the stance that the arm comes to next, to a hold or a place.
+
+    Args:
+        to, gait: of :func:`wbc.walking.two_ended.planner.plan_two_ended`.
+    """
+
+    def __init__(self, machine: Machine, to: str | Sequence[float], gait: str) -> None:
+        self._machine, self._to, self.gait = machine, to, gait
+
+    def go(self, goal: Any) -> None:
+        """To a hold, so that the elbow is near a place [m], or near the end of a body's path."""
+        structure = self._machine.structure
+        if isinstance(goal, BodyPath):
+            goal = goal.poses[-1][:3, 3]
+        if isinstance(goal, str):
+            structure.index(goal)
+            self._to = goal
+        else:
+            self._to = validation.real_array("to", goal, (3,)).tolist()
+
+    def stand(self) -> None:
+        """The arm stands on both hands only: it goes on to its goal."""
+
+    def from_stance(self, wanted: bool) -> None:
+        """Every plan of this arm begins with a stance."""
+
+    def rest(self) -> PlanSlices:
+        """From the stance that the arm has now."""
+        machine = self._machine
+        walker, held = machine.walker, machine.held
+        if len(held) < len(walker.arms):
+            raise NoPlanError("hands", len(held), "one hand is in the air, and its hold is gone")
+        start = {walker.arms[arm].name: machine.structure.ids[hold] for arm, hold in held.items()}
+        return _at_once(plan_two_ended(walker, machine.structure, start, self._to, gait=self.gait))
+
+    def without(self, kept: int) -> PlanSlices | None:
+        """The arm stops at its next stance."""
+        return None
+
+    def taken(self) -> None:
+        """The goal stays."""
+
+
 class TwoEndedWalk(Walk):
-    """A simulated walk of the two-ended arm; one hand holds while the other one swings.
+    """A walk of the two-ended arm; one hand holds while the other one swings. Where a hand is in the air and its hold
+    vanishes, there is no plan.
 
     Args:
         walker, structure, plan: the two-ended arm, the holds, and a plan of :func:`plan_two_ended`.
-        dt, backend, stack, grasps: as of :class:`wbc.walking.loop.walk.Walk`.
+        dt, backend, stack, grasps, plant: as of :class:`wbc.walking.loop.walk.Walk`.
 
     Raises:
-        ShapeError: another machine, or a plan without its grips.
+        ShapeError: another machine, or a plan without its grips; of a plant as ``Walk``.
     """
-
-    machine: ClassVar[type] = TwoEndedData
 
     def __init__(
         self,
@@ -76,101 +170,33 @@ class TwoEndedWalk(Walk):
         backend: str = "auto",
         stack: TwoEndedStack | None = None,
         grasps: Callable[[str, str], bool] | None = None,
+        plant: Plant | None = None,
     ) -> None:
         if not isinstance(plan, TwoEndedPlan):
             raise ShapeError("plan", plan, "expected a plan of plan_two_ended")
-        self._to, self._gait = plan.to, plan.gait
-        self._turns = stack or TwoEndedStack(walker, structure, dt, collisions=False, backend=backend)
-        super().__init__(walker, structure, plan, stack=self._turns, grasps=grasps)
+        stack = stack or TwoEndedStack(walker, structure, dt, collisions=False, backend=backend)
 
-    def go(self, path: BodyPath) -> None:
-        """Bodies follow paths; this arm goes to a hold or a place.
+        def replanner(machine: Machine, _: PlanProgress) -> TurnReplanner:
+            self._turns = TurnReplanner(machine, plan.to, plan.gait)
+            return self._turns
 
-        Raises:
-            ShapeError: always; see :meth:`go_to`.
-        """
-        raise ShapeError("path", path, "the two-ended arm goes to a hold or a place: go_to")
+        def leader(machine: Machine, progress: PlanProgress, _: WalkStack) -> TurnLeader:
+            return TurnLeader(machine, progress, stack)
 
-    def go_to(self, to: str | list[float], gait: str = "any") -> None:
-        """Go somewhere else, from the stance that the arm comes to next."""
-        self._to, self._gait = to, gait
-        self._stop()
+        more: dict[str, Any] = {"stack": stack, "grasps": grasps, "plant": plant}
+        super().__init__(walker, structure, plan, leader=leader, replanner=replanner, **more)
 
-    def vanish(self, ids: Iterable[str]) -> None:
-        """Take holds away; the rest is planned anew from the next stance, if the plan needs one of them.
+    def go_to(self, to: str | Sequence[float], gait: str = "any") -> None:
+        """Go somewhere else, from the stance that the arm comes to next: to a hold, or with the elbow to a place [m].
 
-        A hand that held one is open at once. Where a hand is in the air and its hold is gone, there is no plan.
+        :meth:`go` does so with the gait that there is, and takes a body's path, too, whose end is then the place.
 
         Raises:
-            UnknownNameError: no such hold; nothing is changed.
+            UnknownNameError: no such hold or gait. ShapeError, NotFiniteError: no place. Nothing is changed.
         """
-        names = list(ids)
-        later = [step.target for step in self.plan.regrasps[self.next :]]
-        super().vanish(names)
-        if any(name in later for name in names):
-            self._stop()
-
-    def _start(self) -> Array:
-        """The first configuration: the body where the path begins, the arm on its grips."""
-        q = np.array(self.walker.robot.neutral)
-        first = pin.SE3(self.plan.path.poses[0])
-        q[:3], q[3:7] = first.translation, pin.Quaternion(first.rotation).coeffs()
-        for arm, grip in zip(self.walker.arms, self._grip, strict=True):
-            q[arm.q] = self.grips.posture_at(grip, 0)[: len(arm.joints)]
-        return self.chain.settle(q, self.held)[0]
-
-    def _aim(self, swinging: Swinging) -> None:
-        """The hand is where the body's path has it: both are one motion of the arm."""
-        arm, law = swinging.arm, swinging.law
-        assert isinstance(law, TurnLaw)
-        swinging.place, swinging.axis, swinging.side = (
-            rows[arm] for rows in (self.chain.origins, self.chain.axes, self.chain.sides)
-        )
-        if swinging.state == "opening":
-            swinging.latch -= self.dt
-            if swinging.latch <= 1e-9:
-                swinging.state = "open"
-        now, before = swinging.aim, law.posture(swinging.clock)
-        lifted = self.plan.regrasps[self.next].lift
-        swinging.clock = min(self.path_time - lifted, law.duration)
-        swinging.aim = law.at(swinging.clock)
-        speed, rates = (swinging.aim.position - now.position) / self.dt, law.posture(swinging.clock) - before
-        near = swinging.clock > law.duration - NEAR
-        at_hold = (self.structure.axes[swinging.hold], swinging.x) if near and swinging.x is not None else None
-        self._turns.turn(arm, (now.position, speed), (before, rates / self.dt), at_hold)
-
-    def _stands(self) -> bool:
-        """A hand that swings goes on to its hold, as the arm moves as one; after an abort all of it stops."""
-        return self.halted or self.aborted or (self._changing and self.swinging is None)
-
-    @property
-    def still(self) -> bool:
-        """The arm does not move."""
-        return self.pace == 0.0
-
-    @cached_property
-    def stops(self) -> Stops:
-        """Laws leave half the accelerations for a stop; the hand comes to rest with the body."""
-        data, margins = self.walker.two_ended_data, self.walker.margins
-        ramp = margins.swing_rate / (1.0 - margins.swing_acceleration) * data.acceleration_time
-        return Stops(self.dt, ramp, ramp)
-
-    def stopping(self) -> tuple[float, float]:
-        """As of ``MovingBody.stopping``; the hand's time is the path's."""
-        if self.swinging is not None:
-            self.swinging.pace = self.pace
-        return super().stopping()
-
-    def _bend(self, arm: int) -> Wrist:
-        """Nothing: all joints of the arm follow the law."""
-        return 0.0, 0.0, 0.0
-
-    def _replan(self) -> PlanSlices:
-        """From the stance that the arm has now."""
-        if len(self.held) < len(self.walker.arms):
-            raise NoPlanError("hands", len(self.held), "one hand is in the air, and its hold is gone")
-        start = {self.walker.arms[arm].name: self.structure.ids[hold] for arm, hold in self.held.items()}
-        return _at_once(plan_two_ended(self.walker, self.structure, start, self._to, gait=self._gait))
+        validation.one_of("gait", gait, tuple(GAITS))
+        self.go(to)
+        self._turns.gait = gait
 
 
 def _at_once(plan: TwoEndedPlan) -> PlanSlices:

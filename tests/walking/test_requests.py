@@ -1,0 +1,144 @@
+"""Requests: parsed once, with typed errors, and the same again from the log of their run."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from wbc.errors import RangeError, ShapeError, StructureFileError, UnknownNameError, WbcError
+from wbc.walking import run
+from wbc.walking.log.log import WalkLogError
+from wbc.walking.run import ArmRequest, DriveRequest, GridPlace, PathRequest, ResumeRequest, Site, TwoEndedRequest
+from wbc.walking.run.request import PublishedRequest, Request, read_request, record_of, request_of
+from wbc.walking.run.resume_mode import read_resume
+from wbc.walking.run.session import mode_of
+
+REQUESTS = [
+    PathRequest(),
+    PathRequest(Site(rows="12-14", fraction=0.1, seed=3, rigid=True), "13,9,10", ("13,13", "14,14,-5"), 0.2, 0.1),
+    PathRequest("plane", objective="destination", free_start=True),
+    PathRequest("truss", "L2,6", ("L2,8",), plan="plan.json"),
+    PublishedRequest(start="13,9"),
+    DriveRequest(start="13,11", commands="keyboard"),
+    DriveRequest("holds.csv", "hold 7", commands="rates.csv"),
+    ArmRequest(arm="arm2", tasks=("hold 13,12", "rate 0,0,-0.05,0,0,0.1 for 2")),  # type: ignore[arg-type]
+    TwoEndedRequest(),
+    TwoEndedRequest(goal=(14.0, 0.0, 4.0), gait="inchworm"),
+]
+
+
+@pytest.mark.parametrize("request_", REQUESTS)
+def test_a_request_is_the_same_from_its_record(request_: Request) -> None:
+    record = json.loads(json.dumps(record_of(request_)))
+    again = request_of(record)
+    assert again == request_
+    assert type(again) is type(request_)
+
+
+def test_poses_of_a_file_are_in_the_record(tmp_path: Path) -> None:
+    file = tmp_path / "poses.csv"
+    file.write_text("x,y,z,ax,ay,az,rx,ry,rz\n1,2,3,0,0,-1,1,0,0\n")
+    request = ArmRequest(tasks=(f"poses {file}",))  # type: ignore[arg-type]
+    file.unlink()
+    again = request_of(json.loads(json.dumps(record_of(request))))
+    assert again == request
+    assert isinstance(again, ArmRequest)
+    assert again.tasks[0].poses[0][:3] == (1.0, 2.0, 3.0)
+
+
+def test_texts_are_parsed_once() -> None:
+    request = PathRequest(start="13,9,90", points=("13,13",))
+    assert request.start == GridPlace(13.0, 9.0, np.pi / 2)
+    assert request.points == (GridPlace(13.0, 13.0),)
+    assert PathRequest(start=request.start, points=request.points) == request
+    assert PathRequest(start=(13, 9, np.pi / 2), points=((13, 13),)) == request  # type: ignore[arg-type]
+    assert PathRequest("plane").points == ("8,17",)
+
+
+@pytest.mark.parametrize(
+    ("options", "kind"),
+    [
+        ({}, PathRequest),
+        ({"mode": "destination", "free_start": True}, PathRequest),
+        ({"planner": "published"}, PublishedRequest),
+        ({"commands": "keyboard"}, DriveRequest),
+        ({"mode": "arm", "tasks": ["hold 13,12"]}, ArmRequest),
+        ({"robot": "two-ended", "points": ["14,0,4"]}, TwoEndedRequest),
+    ],
+)
+def test_options_make_the_request_of_their_mode(options: dict[str, Any], kind: type[Any]) -> None:
+    assert type(read_request(**options)) is kind
+
+
+def test_records_of_older_logs_are_read() -> None:
+    texts = {"structure": "cylinder", "mode": "velocity", "speed": 0.1, "start": "13,9", "points": ["13,13"]}
+    texts |= {"rows": "", "planner": "free", "commands": "", "tasks": [], "robot": "three-armed", "gait": "any"}
+    assert request_of(texts) == PathRequest(start="13,9", points=("13,13",), speed=0.1)
+
+
+@pytest.mark.parametrize(
+    "record",
+    [None, 3, {"kind": "fly"}, {"kind": "path"}, {"speed": "fast"}, {"kind": "path", "site": {"hue": 1}}],
+)
+def test_what_is_no_record_is_refused(record: object) -> None:
+    with pytest.raises(WalkLogError, match="what the run was asked to do"):
+        request_of(record)
+
+
+@pytest.mark.parametrize(
+    ("make", "error", "match"),
+    [
+        (lambda: PathRequest("grapples"), ShapeError, "no ends of its own"),
+        (lambda: PathRequest("holds.csv"), StructureFileError, "holds.csv"),
+        (lambda: PathRequest(start="13"), ShapeError, "T,A"),
+        (lambda: PathRequest(points=("13,99",)), RangeError, r"place 2\.A"),
+        (lambda: PathRequest("plane", points=(3,)), ShapeError, "place 2"),
+        (lambda: PathRequest(site=3), ShapeError, "site"),
+        (lambda: PathRequest(objective="fast"), UnknownNameError, "mode"),
+        (lambda: PathRequest(speed=0.0), RangeError, "speed"),
+        (lambda: PublishedRequest("plane"), RangeError, "cylinder"),
+        (ArmRequest, RangeError, "do"),
+        (lambda: ArmRequest(tasks=("jump",)), ShapeError, "hold ID"),
+        (lambda: TwoEndedRequest(start=("1",)), ShapeError, "two holds"),
+        (lambda: TwoEndedRequest(goal=(1.0, 2.0)), ShapeError, "to"),
+        (lambda: TwoEndedRequest(gait="gallop"), UnknownNameError, "gait"),
+        (lambda: read_resume("nowhere@3"), RangeError, "FOLDER@SECONDS"),
+        (lambda: read_request(robot="crab"), UnknownNameError, "robot"),
+    ],
+)
+def test_bad_requests_are_named(make: Any, error: type[WbcError], match: str) -> None:
+    with pytest.raises(error, match=match):
+        make()
+
+
+def test_a_resumed_run_is_named_by_folder_and_time(tmp_path: Path) -> None:
+    assert read_resume(str(tmp_path)) == ResumeRequest(tmp_path)
+    assert read_resume(f"{tmp_path}@2.5", ("13,9",)) == ResumeRequest(tmp_path, 2.5, ("13,9",))
+    odd = tmp_path / "a@home"
+    odd.mkdir()
+    assert read_resume(str(odd)) == ResumeRequest(odd)
+
+
+def test_modes_refuse_what_they_do_not_do(machine: Any) -> None:
+    with pytest.raises(RangeError, match="only walks along a path ask"):
+        mode_of(DriveRequest(), machine, ask=lambda step, refused: "")
+    with pytest.raises(RangeError, match="driven"):
+        mode_of(PathRequest(), machine, commands=object())  # type: ignore[arg-type]
+    with pytest.raises(ShapeError, match="request"):
+        mode_of(PublishedRequest(), machine)
+    with pytest.raises(ShapeError, match="two-ended arm"):
+        mode_of(TwoEndedRequest(), machine)
+    with pytest.raises(UnknownNameError, match="13,99"):
+        mode_of(ArmRequest(tasks=("hold 13,99",)), machine)  # type: ignore[arg-type]
+
+
+def test_the_old_name_still_makes_requests() -> None:
+    with pytest.warns(DeprecationWarning, match="PathRequest"):
+        old = run.WalkRequest
+    assert old("cylinder", points=("13,14",)) == PathRequest(points=("13,14",))
+    with pytest.raises(AttributeError, match="perform_dance"):
+        _ = run.perform_dance

@@ -1,0 +1,136 @@
+"""A control loop's end of the seam: a plant that fits the robot, driven by desired velocities."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterator
+from math import isfinite
+from typing import Any
+
+import numpy as np
+
+from wbc import validation
+from wbc.errors import RangeError, ShapeError, WbcError
+from wbc.robot import Robot
+from wbc.simulation.kinematic import KinematicPlant
+from wbc.simulation.plant import Command, CommandKind, Plant, PlantError, PlantState
+from wbc.validation import Array
+
+#: What a plant has
+MEMBERS = ("nq", "nv", "time_step", "commands", "reset", "read", "apply", "advance")
+#: How far a period may be from a whole multiple of a plant's time step, as a part of that step
+MULTIPLE = 1e-6
+
+
+class Connection:
+    """Drives a plant tick by tick and checks what it says.
+
+        with Connection(plant, robot, dt) as connection:      # at its end the plant is commanded to rest
+            state = connection.reset(q)
+            state = connection.drive(controller.step(state.q).v)
+
+    Args:
+        plant: None: a :class:`KinematicPlant`. dt: control period [s].
+
+    Raises:
+        ShapeError: it is no plant, or one of another robot. RangeError: it does not advance by such periods, or takes
+            no velocities.
+    """
+
+    def __init__(self, plant: Plant | None, robot: Robot, dt: float) -> None:
+        self.plant: Plant = KinematicPlant(robot) if plant is None else plant
+        self._nq, self._nv, self._dt = robot.nq, robot.nv, dt
+        _check(self.plant, robot, dt)
+
+    def __enter__(self) -> Connection:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        # Where something else went wrong, that is what is to be said
+        with contextlib.suppress(*(() if kind is None else (WbcError,))):
+            self.rest()
+
+    def reset(self, q: Array, time: float = 0.0) -> PlantState:
+        """At rest at a configuration.
+
+        Raises:
+            PlantError: the plant is not there, has no valid reading, or raised what is no error of this package.
+        """
+        with self._named():
+            self.plant.reset(q, time)
+            return self._checked(self.plant.read())
+
+    def drive(self, v: Array) -> PlantState:
+        """One period with a desired velocity ``[nv]``; the state after it.
+
+        Raises:
+            PlantError: no valid reading, and the plant is commanded to rest; or it raised.
+        """
+        try:
+            self.plant.apply(Command(CommandKind.VELOCITY, v))
+            self.plant.advance(self._dt)
+            return self._checked(self.plant.read())
+        except WbcError:
+            raise
+        except Exception as error:
+            raise self._failed(error) from error
+
+    def rest(self) -> None:
+        """Command zero velocity; time does not go on.
+
+        Raises:
+            PlantError: the plant raised.
+        """
+        with self._named():
+            self.plant.apply(Command(CommandKind.VELOCITY, np.zeros(self._nv)))
+
+    @contextlib.contextmanager
+    def _named(self) -> Iterator[None]:
+        try:
+            yield
+        except WbcError:
+            raise
+        except Exception as error:
+            raise self._failed(error) from error
+
+    def _failed(self, error: Exception) -> PlantError:
+        return PlantError("plant", type(self.plant).__name__, f"it raised {type(error).__name__}: {error}")
+
+    def _checked(self, state: Any) -> PlantState:
+        reason = self._fault(state)
+        if reason:
+            self.rest()
+            raise PlantError("plant.state", state, reason)
+        # Arrays of the loop's own: a plant may write into its
+        return PlantState(np.array(state.q, dtype=np.float64), np.array(state.v, dtype=np.float64), float(state.time))
+
+    def _fault(self, state: Any) -> str:
+        """What is wrong with a reading; "": nothing."""
+        if not isinstance(state, PlantState):
+            return "expected a PlantState"
+        if not state.valid:
+            return "there is no valid reading of where the robot is"
+        q, v = state.q, state.v
+        if q.shape != (self._nq,) or v.shape != (self._nv,):
+            return f"expected q [{self._nq}] and v [{self._nv}], not {q.shape} and {v.shape}"
+        # A sum of squares is a number where all are
+        if not isfinite(q.dot(q) + v.dot(v) + state.time):
+            return "expected finite numbers"
+        return ""
+
+
+def _check(plant: Any, robot: Robot, dt: float) -> None:
+    missing = [name for name in MEMBERS if not hasattr(plant, name)]
+    if missing or isinstance(plant, type):
+        why = "an instance, not the class" if not missing else f"it has no {', '.join(missing)}"
+        raise ShapeError("plant", plant, f"expected a wbc.simulation.Plant: {why}")
+    for name, count in (("nq", robot.nq), ("nv", robot.nv)):
+        if getattr(plant, name) != count:
+            raise ShapeError(f"plant.{name}", getattr(plant, name), f"expected {count}, as {robot.name} has")
+    step = validation.scalar("plant.time_step", plant.time_step, low=0.0, unit="s")
+    periods = dt / step if step > 0.0 else 1.0
+    if round(periods) < 1 or abs(periods - round(periods)) > MULTIPLE:
+        raise RangeError("plant.time_step", step, f"expected a step that divides the control period of {dt:g} s")
+    kinds = tuple(str(kind) for kind in validation.items("plant.commands", plant.commands, "kinds of commands"))
+    if CommandKind.VELOCITY not in kinds:
+        raise RangeError("plant.commands", kinds, "the loop commands velocities, which this plant does not take")

@@ -1,0 +1,108 @@
+"""A walking machine as its control loop sees it: joints that a plant moves, and a body that the held hands place."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wbc.robots import Walker
+from wbc.simulation import Connection, Plant
+from wbc.validation import Array
+from wbc.walking.holds.structure import Structure
+from wbc.walking.loop.closed_chain import ClosedChain
+
+
+class Machine:
+    """Where the joints are is what the plant reads; where the body is follows from the holds of the closed hands
+    (:class:`ClosedChain`), as no sensor of the machine measures it. What a plant says of the body does not count.
+
+    Args:
+        dt: control period [s]. plant: what moves; None: a :class:`wbc.simulation.KinematicPlant`.
+
+    Attributes:
+        q: configuration, the body's pose in the structure. v: last command. rates: of the joints, means over the last
+            period, and the body's velocity as the plant has it.
+        time: [s]. held: row of the arm -> row of the hold.
+        fixed: fewer hands hold than the body needs, and have since the beginning: it is declared fixed.
+        structure, chain: the holds that are there, and the hands on them.
+
+    Raises:
+        what :class:`wbc.simulation.Connection` raises of a plant that does not fit.
+    """
+
+    def __init__(self, walker: Walker, structure: Structure, dt: float, plant: Plant | None = None) -> None:
+        self.walker, self.structure, self.dt = walker, structure, dt
+        self.chain = ClosedChain(walker, structure)
+        self._connection = Connection(plant, walker.robot, dt)
+        self.q = np.array(walker.robot.neutral)
+        self.v = self.rates = np.zeros(walker.robot.nv)
+        self.time, self.fixed = 0.0, False
+        self.held: dict[int, int] = {}
+
+    def begin(self, q: Array, held: Mapping[int, int], time: float = 0.0) -> None:
+        """At rest in a configuration, with some hands closed on holds.
+
+        Raises:
+            PlantError: the plant is not there, or has no valid reading. RangeError: as of :class:`ClosedChain`.
+        """
+        self.held, self.q = dict(held), q.copy()
+        self.fixed = len(self.held) < self.walker.min_holds
+        self._place(q[7:])
+        state = self._connection.reset(self.q, time)
+        self.time = state.time
+        if (state.q[7:] != self.q[7:]).any():
+            self._place(state.q[7:])
+
+    def move(self, v: Array) -> float:
+        """One period with desired rates ``[nv]``; the worst slip of a held hand after it [m].
+
+        Raises:
+            PlantError: the plant has no valid reading; it was commanded to rest.
+        """
+        self.v = v.copy()
+        if self.fixed:
+            self.v[:6] = 0.0
+        state = self._connection.drive(self.v)
+        self.rates, self.time = state.v, state.time
+        if state.v.tobytes() != self.v.tobytes():
+            # It did something else than was commanded: what lasts for a period is its mean
+            self.rates[6:] = (state.q[7:] - self.q[7:]) / self.dt
+        return self._place(state.q[7:])
+
+    def rest(self) -> None:
+        """Command rest; time does not go on."""
+        self.v = np.zeros(len(self.v))
+        self._connection.rest()
+
+    def close(self, arm: int, hold: int) -> None:
+        """A hand holds a hold (its row)."""
+        self.held[arm] = hold
+        self.fixed = self.fixed and len(self.held) < self.walker.min_holds
+
+    def open(self, arm: int) -> None:
+        """A hand holds nothing."""
+        del self.held[arm]
+
+    def hand(self, arm: int) -> tuple[Array, Array, Array]:
+        """Origin [m], z axis and x axis of a hand in the structure."""
+        return self.chain.origins[arm], self.chain.axes[arm], self.chain.x_axes[arm]
+
+    def renumber(self, rest: Structure, rows: NDArray[np.int64]) -> None:
+        """Go on with a structure that has lost holds.
+
+        Args:
+            rows: of the present holds in the new structure, -1 for those that are gone; hands hold none of these.
+        """
+        self.structure, self.chain = rest, self.chain.on(rest)
+        self.held = {arm: int(rows[hold]) for arm, hold in self.held.items()}
+
+    def _place(self, joints: Array) -> float:
+        """The joints are there; the body where the hands have it, or where it was if it is fixed."""
+        if not self.fixed:
+            self.q, slip = self.chain.settle(self.q, self.held, joints)
+            return slip
+        self.q = np.concatenate([self.q[:7], joints])
+        self.chain.place(self.q)
+        return self.chain.slip(self.held)

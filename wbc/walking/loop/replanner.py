@@ -1,0 +1,93 @@
+"""What a walk does next when its plan does not lead on: it differs from machine to machine."""
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+import numpy as np
+
+from wbc import validation
+from wbc.walking.body_path import BodyPath, standing_path, straight_path
+from wbc.walking.loop.machine import Machine
+from wbc.walking.loop.progress import PlanProgress
+from wbc.walking.planner.replanning import PlanSlices, plan_from_here, plan_from_stance, plan_rest
+
+#: Speed towards another path [m/s]
+JOINING = 0.05
+
+
+class Replanner(Protocol):
+    """Plans, in slices, from where a machine stands."""
+
+    def go(self, goal: Any) -> None:
+        """Plan to another goal from now on.
+
+        Raises:
+            ShapeError: it is none for this machine; nothing is changed.
+        """
+
+    def stand(self) -> None:
+        """Plan to stand where the body is, all hands on holds that it can keep."""
+
+    def from_stance(self, wanted: bool) -> None:
+        """Whether hands that all hold may be taken as the first stance, which is the quickest plan."""
+
+    def rest(self) -> PlanSlices:
+        """Plan the rest from where the machine stands.
+
+        Raises:
+            NoPlanError: there is no plan.
+        """
+
+    def without(self, kept: int) -> PlanSlices | None:
+        """Plan anew all but some re-grasps while the body goes on; None: it has to stop first."""
+
+    def taken(self) -> None:
+        """What was planned last is carried out now."""
+
+
+class BodyReplanner:
+    """Of a body that follows a path: the rest of it, or the straight line to another one and then that."""
+
+    def __init__(self, machine: Machine, progress: PlanProgress) -> None:
+        self._machine, self._progress = machine, progress
+        self._wanted: BodyPath | None = None
+        self._quick = True
+
+    def go(self, goal: Any) -> None:
+        """Follow another path."""
+        self._wanted, self._quick = validation.instance("path", goal, BodyPath, "a BodyPath"), True
+
+    def stand(self) -> None:
+        """Stay where the body is on its path."""
+        self._wanted, self._quick = standing_path(self._progress.pose), False
+
+    def from_stance(self, wanted: bool) -> None:
+        """See :class:`Replanner`."""
+        self._quick = wanted
+
+    def rest(self) -> PlanSlices:
+        """From where the body stands; a free hand goes to where the plan has it."""
+        machine, progress = self._machine, self._progress
+        walker, path, pose = machine.walker, progress.plan.path, progress.pose
+        if self._wanted is None:
+            rest = path.poses[int(progress.sample) + 1 :]
+        else:
+            between = straight_path([pose, self._wanted.poses[0]], JOINING).poses
+            rest = np.concatenate([between, self._wanted.poses])
+        whole = BodyPath(np.concatenate([pose.homogeneous[None], rest]), path.spacing)
+        if self._quick and len(machine.held) == len(walker.arms):
+            start = {progress.names[arm]: machine.structure.ids[hold] for arm, hold in machine.held.items()}
+            postures = {arm.name: machine.q[arm.q] for arm in walker.arms}
+            return plan_from_stance(walker, machine.structure, whole, start, postures=postures)
+        behind = progress.behind()
+        return plan_from_here(walker, machine.structure, whole, machine.held, machine.q, machine.chain, behind)
+
+    def without(self, kept: int) -> PlanSlices | None:
+        """Along the same path."""
+        machine, progress = self._machine, self._progress
+        return plan_rest(machine.walker, machine.structure, progress.plan, kept, progress.path_time)
+
+    def taken(self) -> None:
+        """It is the path of the plan now."""
+        self._wanted = None

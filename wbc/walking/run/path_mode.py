@@ -1,0 +1,152 @@
+"""A plan is carried out from its beginning to its end: of a body with arms along a path, or of the two-ended arm."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from wbc.errors import ShapeError, WbcError
+from wbc.robots import TwoEndedData, Walker
+from wbc.simulation import Plant
+from wbc.track.summary import Figure
+from wbc.walking.body_path import standing_path
+from wbc.walking.log.body_paths import way_of
+from wbc.walking.log.log import WalkLog
+from wbc.walking.loop.stack import WalkStack
+from wbc.walking.loop.state import State
+from wbc.walking.loop.walk import PATIENCE, SLACK, Walk
+from wbc.walking.modes.first_grasps import free_state, plan_from_state
+from wbc.walking.modes.veto import Veto
+from wbc.walking.planner.follow import follow_plan
+from wbc.walking.planner.plan import Plan, Regrasp, read_plan
+from wbc.walking.planner.planner import plan_walk
+from wbc.walking.run.carrying_out import CarryingOut, Progress
+from wbc.walking.run.mode import Asked, Ending, Mode, arms_of
+from wbc.walking.run.recording import WalkRecorder
+from wbc.walking.run.request import PathRequest, TwoEndedRequest
+from wbc.walking.two_ended import TwoEndedPlan, TwoEndedStack, TwoEndedWalk, plan_two_ended
+
+#: (the next re-grasp, why the last answer was refused or "") -> "" for yes, or another hold
+Ask = Callable[[Regrasp, str], str]
+
+
+class PlannedMode(Mode[Asked]):
+    """Ticks until a plan is carried out.
+
+    Args:
+        ask: proposes every re-grasp; None: nobody is asked.
+    """
+
+    def __init__(self, walker: Walker, ask: Ask | None = None) -> None:
+        super().__init__(walker)
+        self._ask = ask
+        self._figures: tuple[Figure, ...] = ()
+
+    def carry_out(
+        self, walk: Walk, recorder: WalkRecorder, report: Progress, stop: Callable[[], bool] | None
+    ) -> Ending:
+        """Until the walk is done, or takes too long."""
+        duration, doing = walk.plan.path.duration, CarryingOut(walk, recorder, progress=report, stop=stop)
+        veto, late = None if self._ask is None else Veto(walk), PATIENCE * duration + SLACK
+        ending = Ending("arrived", "")
+        while not walk.done:
+            if veto is not None and self._ask is not None:
+                _approved(veto, self._ask)
+            if walk.time > late:
+                reason = f"not there after {walk.time:.0f} s, the path takes {duration:.0f} s"
+                ending = Ending("late", reason)
+                break
+            if not doing.step(walk.path_time / duration):
+                ending = Ending(doing.outcome or "interrupted", doing.reason)
+                break
+        self._figures = doing.summary()
+        return ending
+
+    def figures(self, log: WalkLog | None) -> tuple[Figure, ...]:
+        """How far things go after an abort."""
+        return self._figures
+
+
+class PathMode(PlannedMode[PathRequest]):
+    """A body with arms goes over places.
+
+    Raises:
+        ShapeError: another machine. What the request's methods, ``read_plan`` and ``structure.index`` raise.
+    """
+
+    def __init__(self, request: PathRequest, walker: Walker, ask: Ask | None = None) -> None:
+        super().__init__(walker, ask)
+        data = arms_of(walker)
+        self.request, self.structure = request, request.site.build()
+        self._given = read_plan(request.plan) if request.plan else None
+        for step in () if self._given is None else self._given.regrasps:
+            self.structure.index(step.target)
+        self.path = request.path(data) if self._given is None else self._given.path
+        self._state: State | None = None
+
+    def plan(self) -> Plan:
+        """The file's, one from nothing held, or the planner's."""
+        if self.request.free_start:
+            self._state = free_state(self.walker, self.path.poses[0])
+            return plan_from_state(self.walker, self.structure, self.path, self._state)
+        if self._given is not None:
+            return follow_plan(self.walker, self.structure, self._given)
+        objective = self.request.objective
+        return plan_walk(self.walker, self.structure, self.path, objective=objective, partial=True, detour=True)
+
+    def walk(self, plan: Plan, stack: WalkStack, plant: Plant | None) -> Walk:
+        """On the plan's holds, or with nothing held."""
+        return Walk(self.walker, self.structure, plan, stack=stack, state=self._state, plant=plant)
+
+    def meta(self, plan: Plan) -> dict[str, Any]:
+        """A detour that was found, or the path of a file, goes with the log, so that the walk can be resumed on it."""
+        way = {} if plan.path is self.path and self._given is None else {"way": way_of(plan.path)}
+        return {**super().meta(plan), **way}
+
+
+class TwoEndedMode(PlannedMode[TwoEndedRequest]):
+    """The two-ended arm goes end over end.
+
+    Raises:
+        ShapeError: another machine. UnknownNameError: no such hold. What the site raises.
+    """
+
+    def __init__(self, request: TwoEndedRequest, walker: Walker) -> None:
+        super().__init__(walker)
+        if not isinstance(walker.data, TwoEndedData):
+            raise ShapeError("walker", walker.robot.name, "expected the two-ended arm")
+        self.request, self.structure = request, request.site.build()
+        first = [self.structure.index(name) for name in request.start]
+        if isinstance(request.goal, str):
+            self.structure.index(request.goal)
+        self.path = standing_path(self.structure.holds[first[0]].pose)
+
+    def plan(self) -> TwoEndedPlan:
+        """End over end to the goal."""
+        request = self.request
+        start = dict(zip(("arm1", "arm2"), request.start, strict=True))
+        return plan_two_ended(self.walker, self.structure, start, request.goal, gait=request.gait)
+
+    def compiled(self, backend: str) -> TwoEndedStack:
+        """With swings by all joints of half the arm."""
+        return TwoEndedStack(self.walker, self.structure, collisions=False, backend=backend)
+
+    def walk(self, plan: Plan, stack: WalkStack, plant: Plant | None) -> TwoEndedWalk:
+        """One hand holds, the other one swings."""
+        if not isinstance(plan, TwoEndedPlan) or not isinstance(stack, TwoEndedStack):
+            raise ShapeError("stack", stack, "expected a TwoEndedStack")
+        return TwoEndedWalk(self.walker, self.structure, plan, stack=stack, plant=plant)
+
+
+def _approved(veto: Veto, ask: Ask) -> None:
+    """Answers to the proposal, until one is possible."""
+    refused = ""
+    while (step := veto.proposal) is not None:
+        answer = ask(step, refused)
+        if not answer:
+            veto.accept()
+            return
+        try:
+            veto.choose(answer)
+        except WbcError as error:
+            refused = str(error)

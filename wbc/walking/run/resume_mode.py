@@ -1,0 +1,234 @@
+"""Going on with a walk from any state of its log."""
+
+from __future__ import annotations
+
+import os
+import pathlib
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+from math import inf
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from wbc import validation
+from wbc.errors import RangeError, ShapeError
+from wbc.robots import Walker, WalkerData
+from wbc.simulation import Plant
+from wbc.track.summary import Figure
+from wbc.validation import Array
+from wbc.walking.body_path import BodyPath, straight_path
+from wbc.walking.holds.files import read_structure
+from wbc.walking.holds.structure import Structure
+from wbc.walking.log.body_paths import path_of
+from wbc.walking.log.log import CLOSED, OPENING, WalkLog
+from wbc.walking.loop.stack import WalkStack
+from wbc.walking.loop.state import Manual, State
+from wbc.walking.loop.walk import PATIENCE, SLACK, Walk
+from wbc.walking.modes.first_grasps import plan_from_state
+from wbc.walking.planner.plan import Plan
+from wbc.walking.planner.planner import Objective
+from wbc.walking.run.carrying_out import CarryingOut, Progress
+from wbc.walking.run.compiling import compiled_stack
+from wbc.walking.run.mode import Ending, Mode, Result
+from wbc.walking.run.places import Place
+from wbc.walking.run.recording import TICKS, TickColumns, WalkRecorder, as_walked, configuration
+from wbc.walking.run.request import PathRequest, Request, TwoEndedRequest, request_of
+
+STRUCTURE = "structure.csv"
+
+
+def resumed_state(log: WalkLog, row: int, walker: Walker, structure: Structure) -> State:
+    """The state of a row of a log: a body at rest with the hands that hold there.
+
+    Args:
+        structure: with the holds that are there.
+
+    Raises:
+        RangeError: fewer hands hold than the body needs, and it was not declared fixed.
+    """
+    held, opening = dict[int, int](), None
+    for arm in range(len(log.arms)):
+        state, hold = int(log.hand_state[row, arm]), int(log.hand_hold[row, arm])
+        if state == CLOSED and log.hold_id[hold] in structure:
+            held[arm] = structure.index(log.hold_id[hold])
+        elif state == OPENING and log.hold_id[hold] in structure:
+            opening = arm, structure.index(log.hold_id[hold])
+    if len(held) < walker.min_holds and not log.body_fixed[row]:
+        raise RangeError("resume.at", float(log.t[row]), f"{len(held)} hands hold there, {walker.min_holds} must")
+    return State(configuration(walker, log, row), held, float(log.t[row]), opening)
+
+
+def joined(before: WalkLog, row: int, after: WalkLog) -> WalkLog:
+    """A log up to a row, and from there on another one of the same holds or fewer.
+
+    Raises:
+        ShapeError: other arms or joints.
+    """
+    if before.joints != after.joints or before.arms != after.arms:
+        raise ShapeError("joined", after.arms, "expected a log of the same machine")
+    rows = np.array([before.hold_id.index(name) for name in after.hold_id])
+    hold = np.where(after.hand_hold >= 0, rows[after.hand_hold], -1)
+    parts: dict[str, Any] = {}
+    for name in (*("t", "pose_body_in_structure", "q", "v", "twist_body", "hand_state", "body_fixed"),):
+        parts[name] = np.concatenate([getattr(before, name)[:row], getattr(after, name)])
+    for name in ("command", "command_kind"):
+        parts[name] = np.concatenate([getattr(before, name)[:row], getattr(after, name)])
+    parts["hand_hold"] = np.concatenate([before.hand_hold[:row], hold])
+    # What vanished before the row stays gone; what would have vanished later has not
+    begin = float(after.t[0])
+    spans = before.presence_span.copy()
+    spans[spans[:, 1] > begin, 1] = inf
+    for gone, span in zip(after.presence_hold, after.presence_span, strict=True):
+        mine = (before.presence_hold == rows[gone]) & (spans[:, 1] == inf)
+        spans[mine, 1] = span[1]
+    there = spans[:, 0] <= begin
+    parts |= {"presence_hold": before.presence_hold[there], "presence_span": spans[there]}
+    kept = {f.name: getattr(before, f.name) for f in fields(before)}
+    meta = {**before.meta, "resumed": [*before.meta.get("resumed", []), begin]}
+    return WalkLog(**{**kept, **parts, "meta": meta})
+
+
+@dataclass(frozen=True)
+class ResumeRequest:
+    """A run goes on, at rest in the state that its log has at a time, to its end.
+
+    Attributes:
+        folder: of the run. at: [s]; None: the last state.
+        points: where to go, as of :class:`wbc.walking.run.request.Route`; (): where the run was to go, by the path that
+            it had found.
+    """
+
+    folder: str | os.PathLike[str]
+    at: float | None = None
+    points: tuple[Place, ...] = ()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "folder", validation.file_path("resume", self.folder))
+        object.__setattr__(self, "points", tuple(validation.items("to", self.points, "places")))
+        if self.at is not None:
+            validation.scalar("resume.at", self.at, unit="s")
+
+
+def read_resume(text: str, points: tuple[str, ...] = ()) -> ResumeRequest:
+    """From ``FOLDER`` or ``FOLDER@SECONDS``.
+
+    Raises:
+        RangeError: no such folder.
+    """
+    name, sign, seconds = text.rpartition("@")
+    try:
+        at = float(seconds) if sign else None
+    except ValueError:
+        at = None
+    folder = pathlib.Path(text if at is None else name)
+    if not folder.is_dir():
+        raise RangeError("resume", text, "expected the folder of a run, or FOLDER@SECONDS")
+    return ResumeRequest(folder, at, points)
+
+
+class ResumeMode(Mode[PathRequest]):
+    """Reads a run's folder, and goes on with it.
+
+    Raises:
+        WalkLogError: no log of a walk. RangeError: a time that it does not have, another robot, a state that is not
+            legal, or a run that has no goal.
+    """
+
+    def __init__(self, resume: ResumeRequest, walker: Walker) -> None:
+        super().__init__(walker)
+        self._folder = pathlib.Path(resume.folder)
+        self._old = WalkLog.load(self._folder)
+        old, at = self._old, resume.at
+        self.request = request = _goal(request_of(old.meta.get("request")), resume.points)
+        if not isinstance(walker.data, WalkerData) or walker.data.digest != old.meta["robot_digest"]:
+            raise RangeError("resume", old.meta["robot_digest"], "the run has another robot; use the same --set")
+        row = len(old) - 1 if at is None else int(np.searchsorted(old.t, at + 1e-9, side="right")) - 1
+        if row < 1 or (at is not None and at > old.t[-1] + 1e-9):
+            raise RangeError("resume.at", at, f"expected a time from {old.t[1]:g} to {old.t[-1]:g} s")
+        self._row, self.structure = row, read_structure(self._folder / STRUCTURE)
+        here = old.present(np.arange(len(old.hold_id)), float(old.t[row]))
+        gone = [name for name, there in zip(old.hold_id, here, strict=True) if not there]
+        self._there = self.structure.without(gone)
+        self._state = resumed_state(old, row, walker, self._there)
+        asked = resume.points or "way" not in old.meta
+        whole = request.path(walker.data) if asked else path_of(old.meta["way"])
+        self.path = _rest(pin.XYZQUATToSE3(old.pose_body_in_structure[row]), whole, request)
+
+    def plan(self) -> Plan:
+        """From the state of the log."""
+        return plan_from_state(self.walker, self._there, self.path, self._state)
+
+    def compiled(self, backend: str) -> WalkStack:
+        """For the holds that are there."""
+        return compiled_stack(self.walker, self._there, backend)
+
+    def walk(self, plan: Plan, stack: WalkStack, plant: Plant | None) -> Walk:
+        """From the state of the log."""
+        return Walk(self.walker, self._there, plan, stack=stack, state=self._state, plant=plant)
+
+    def meta(self, plan: Plan) -> dict[str, Any]:
+        """Nothing: the old log has it."""
+        return {}
+
+    def carry_out(
+        self, walk: Walk, recorder: WalkRecorder, report: Progress, stop: Callable[[], bool] | None
+    ) -> Ending:
+        """To the end of the path."""
+        self._doing = doing = CarryingOut(walk, recorder, progress=report, stop=stop)
+        _latch(walk, doing, self._state)
+        duration = walk.plan.path.duration
+        late = walk.time + PATIENCE * duration + SLACK
+        while not walk.done and walk.time < late and doing.step(walk.path_time / duration):
+            pass
+        return Ending(doing.outcome or ("arrived" if walk.done else "late"), doing.reason)
+
+    def figures(self, log: WalkLog | None) -> tuple[Figure, ...]:
+        """From where it went on, and how far things go after an abort."""
+        value = {"from": str(self._folder), "at": self._state.time}
+        resumed = Figure("resumed", "resumed", value, f"{self._folder} at {self._state.time:.2f} s")
+        return (resumed, *self._doing.summary())
+
+    def result(self, walk: Walk, log: WalkLog, ticks: TickColumns) -> Result:
+        """The log of the run up to then and of the new walk."""
+        whole = joined(self._old, self._row, log)
+        ticks = TickColumns.load(self._folder / TICKS).then(self._row, ticks)
+        plan, ticks = as_walked(whole, ticks, walk.progress.steps)
+        return Result(plan, whole, ticks, self.figures(whole))
+
+
+def _latch(walk: Walk, doing: CarryingOut, state: State) -> None:
+    """A hand that was opening opens."""
+    if state.opening is None:
+        return
+    arm, hold = state.opening
+    for _ in range(round(walk.hands.data.latch_time / walk.dt)):
+        walk.hands.manual = Manual(arm, "opening", hold)
+        if not doing.step():
+            break
+    walk.hands.manual = None
+
+
+def _goal(request: Request, points: tuple[Place, ...]) -> PathRequest:
+    """What the rest of a run is asked to do.
+
+    Raises:
+        RangeError: it has no goal.
+    """
+    if isinstance(request, TwoEndedRequest):
+        raise RangeError("resume", "two-ended", "runs of the two-ended arm are not resumed")
+    if not points and not request.goes:
+        raise RangeError("to", points, "the run was driven and has no goal; say where to go")
+    goes = points or request.points, request.speed, request.turn_rate
+    objective: Objective = getattr(request, "objective", "destination")
+    return PathRequest(request.site, request.start, *goes, objective)
+
+
+def _rest(pose: pin.SE3, path: BodyPath, request: PathRequest) -> BodyPath:
+    """From a pose straight to the nearest place of a path, and on along it."""
+    off = np.linalg.norm(path.poses[:, :3, 3] - pose.translation, axis=1)
+    turned = np.linalg.norm(path.poses[:, :3, 0] - pose.rotation[:, 0], axis=1)
+    nearest = int((off + turned).argmin())
+    begin: Array = straight_path([pose, pin.SE3(path.poses[nearest])], request.speed, request.turn_rate).poses
+    return BodyPath(np.concatenate([begin, path.poses[nearest + 1 :]]), path.spacing)

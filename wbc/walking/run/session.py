@@ -1,0 +1,154 @@
+"""A walk as it is asked for: planned, compiled, carried out and recorded, in every mode alike."""
+
+from __future__ import annotations
+
+import contextlib
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+from wbc.errors import RangeError, ShapeError
+from wbc.robots import Walker
+from wbc.simulation import Plant, PlantError
+from wbc.track.summary import Figure
+from wbc.walking.body_path import BodyPath
+from wbc.walking.holds.structure import Structure
+from wbc.walking.log.log import WalkLog
+from wbc.walking.loop.stack import WalkStack
+from wbc.walking.modes.commands import Commands
+from wbc.walking.planner.plan import NoPlanError, Plan
+from wbc.walking.run.arm_tasks_mode import ArmTasksMode
+from wbc.walking.run.carrying_out import Outcome, Progress
+from wbc.walking.run.drive_mode import DriveMode
+from wbc.walking.run.mode import Mode
+from wbc.walking.run.path_mode import Ask, PathMode, TwoEndedMode
+from wbc.walking.run.recording import TickColumns, WalkRecorder
+from wbc.walking.run.request import ArmRequest, DriveRequest, PathRequest, Request, TwoEndedRequest, record_of
+from wbc.walking.run.resume_mode import ResumeMode, ResumeRequest
+
+
+@dataclass(frozen=True, eq=False)
+class WalkRun:
+    """A walk as it was carried out, or refused.
+
+    Attributes:
+        request, walker, structure: what walks where. path: where the body is asked to be, or goes round.
+        plan: None if no stance is possible where the walk begins.
+        outcome, reason: how it ended; the reason is "" where all is well.
+        log, ticks: None if nothing was carried out.
+        more: figures of its mode, for the summary.
+        plan_time, compile_time, walk_time: of the computer [s]; walking has controller, plant and log.
+    """
+
+    request: Request
+    walker: Walker
+    structure: Structure
+    path: BodyPath
+    plan: Plan | None
+    outcome: Outcome
+    reason: str
+    log: WalkLog | None = None
+    ticks: TickColumns | None = None
+    plan_time: float = 0.0
+    compile_time: float = 0.0
+    walk_time: float = 0.0
+    more: tuple[Figure, ...] = ()
+
+
+def perform_walk(
+    request: Request | ResumeRequest,
+    walker: Walker,
+    *,
+    stack: WalkStack | None = None,
+    backend: str = "auto",
+    progress: Progress | None = None,
+    stop: Callable[[], bool] | None = None,
+    ask: Ask | None = None,
+    commands: Commands | None = None,
+    plant: Plant | None = None,
+) -> WalkRun:
+    """Plans and walks with our planner, as the request says.
+
+    Args:
+        stack: a compiled one for the same walker and structure; None: compiles one.
+        backend: as of ``Stack.compile``.
+        stop: asked before every tick; the body then comes to rest, and the log ends there.
+        ask: (the next re-grasp, why the last answer was refused or "") -> "" for yes, or another hold; of paths.
+        commands: what drives the body, asked every tick; default: the file of the :class:`DriveRequest`.
+        plant: what moves; default: a :class:`wbc.simulation.KinematicPlant`.
+
+    Raises:
+        What the mode of the request and :class:`wbc.walking.loop.walk.Walk` raise for bad input.
+    """
+    mode = mode_of(request, walker, ask, commands)
+    return perform(mode, stack=stack, backend=backend, progress=progress, stop=stop, plant=plant)
+
+
+def mode_of(
+    request: Request | ResumeRequest, walker: Walker, ask: Ask | None = None, commands: Commands | None = None
+) -> Mode[Any]:
+    """The mode that does a request; what is wrong with it shows here. Arguments as of :func:`perform_walk`.
+
+    Raises:
+        RangeError: questions or commands for a mode that has none. ShapeError: no request that is carried out here.
+            What the mode raises.
+    """
+    if ask is not None and not isinstance(request, PathRequest):
+        raise RangeError("ask", type(request).__name__, "only walks along a path ask")
+    if commands is not None and not isinstance(request, DriveRequest):
+        raise RangeError("commands", type(request).__name__, "only a DriveRequest is driven")
+    if isinstance(request, PathRequest):
+        return PathMode(request, walker, ask)
+    if isinstance(request, DriveRequest):
+        return DriveMode(request, walker, commands)
+    if isinstance(request, ArmRequest):
+        return ArmTasksMode(request, walker)
+    if isinstance(request, TwoEndedRequest):
+        return TwoEndedMode(request, walker)
+    if isinstance(request, ResumeRequest):
+        return ResumeMode(request, walker)
+    raise ShapeError("request", request, "expected a request of a walk by the planner 'free'")
+
+
+def perform(
+    mode: Mode[Any],
+    *,
+    stack: WalkStack | None = None,
+    backend: str = "auto",
+    progress: Progress | None = None,
+    stop: Callable[[], bool] | None = None,
+    plant: Plant | None = None,
+) -> WalkRun:
+    """Plans, compiles, walks and records. Arguments as of :func:`perform_walk`."""
+    report, clock = progress or (lambda what, part: None), time.perf_counter
+    run = WalkRun(mode.request, mode.walker, mode.structure, mode.path, None, "refused", "")
+    report("planning", None)
+    begin = clock()
+    try:
+        plan = mode.plan()
+    except NoPlanError as error:
+        return replace(run, reason=str(error), plan_time=clock() - begin)
+    run = replace(run, path=plan.path, plan=plan, reason=plan.reason, plan_time=clock() - begin)
+    if not plan.complete:
+        return run
+    report("compiling", None)
+    begin = clock()
+    stack = stack or mode.compiled(backend)
+    run, begin = replace(run, compile_time=clock() - begin), clock()
+    walk = mode.walk(plan, stack, plant)
+    meta = {"request": record_of(mode.request), **mode.meta(plan)}
+    recorder = WalkRecorder(walk, mode.request.site.seed, meta)
+    try:
+        ending = mode.carry_out(walk, recorder, report, stop)
+    finally:
+        with contextlib.suppress(PlantError):
+            walk.machine.rest()
+    run = replace(run, outcome=ending.outcome, reason=ending.reason)
+    if not len(recorder):
+        return replace(run, more=mode.figures(None))
+    result = mode.result(walk, *recorder.log())
+    run = replace(run, log=result.log, ticks=result.ticks, more=result.figures)
+    if result.plan is not None:
+        run = replace(run, path=result.plan.path, plan=result.plan)
+    return replace(run, walk_time=clock() - begin)
