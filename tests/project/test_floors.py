@@ -25,6 +25,7 @@ FLOORS = {
     "wbc.robot": 2,
     "wbc.robots": 2,
     "wbc.proximity": 2,
+    "wbc.clearance": 3,
     "wbc.tasks": 3,
     "wbc.analysis": 4,
     "wbc.stack": 4,
@@ -66,7 +67,7 @@ OLD_NAMES = "wbc.walking.old_names"
 #: Parts that may import only the listed floors, whatever stands below them
 ONLY = {"wbc.qp": {0}, "wbc.resolvers": {0}}
 #: Packages without a circle of imports among their files, imports for types counted
-STRAIGHT = ("controller", "explain", "export", "ik", "native", "proximity", "qp", "record", "stack")
+STRAIGHT = ("clearance", "controller", "explain", "export", "ik", "native", "proximity", "qp", "record", "stack")
 #: A module in a string, as importlib takes it; f-strings end where their first value begins
 NAMED = re.compile(r"wbc(\.[a-z_]+)+\.?")
 #: Modules in strings that are not imported by who names them: classes that a pickle may ask for
