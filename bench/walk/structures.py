@@ -78,7 +78,7 @@ def _on_plane(name: str, obstacles: list[Obstacle], rows: int = 15, columns: int
 
 
 def _ends(rng: np.random.Generator, structure: Structure, apart: float = 1.2, margin: float = 0.75) -> tuple[str, str]:
-    """Two holds at least ``apart``, and ``margin`` from the outline of all holds, in the plane of the first axes [m]."""
+    """Two holds at least ``apart``, and at least ``margin`` from the outline of all holds [m]."""
     points = structure.positions
     low, high = points.min(axis=0), points.max(axis=0)
     flat = high - low <= 2 * margin
@@ -121,11 +121,17 @@ def _bars(rng: np.random.Generator, name: str) -> tuple[Structure, str, str]:
 
 def _ladder(rng: np.random.Generator, name: str) -> tuple[Structure, str, str]:
     """A ladder that leans or lies among the holds: two rails and their rungs."""
-    foot, angle, lean = np.append(rng.uniform([0.8, 0.8], [3.2, 2.5]), 0.08), rng.uniform(0, 2 * pi), rng.uniform(0, 1.4)
+    foot, angle, lean = (
+        np.append(rng.uniform([0.8, 0.8], [3.2, 2.5]), 0.08),
+        rng.uniform(0, 2 * pi),
+        rng.uniform(0, 1.4),
+    )
     up = np.array([cos(angle) * cos(lean), sin(angle) * cos(lean), sin(lean)])
     across, half, length = np.array([-sin(angle), cos(angle), 0.0]), rng.uniform(0.15, 0.3), rng.uniform(1.0, 2.0)
     parts = [
-        capsule_between(f"rail {side:+d}", foot + side * half * across, foot + side * half * across + length * up, 0.025)
+        capsule_between(
+            f"rail {side:+d}", foot + side * half * across, foot + side * half * across + length * up, 0.025
+        )
         for side in (-1, 1)
     ]
     for k, at in enumerate(np.arange(0.15, length, 0.3)):

@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 import wbc
 from bench.walk.second_checker import second_check
@@ -39,7 +38,12 @@ from wbc.walking.run.resume_run import perform_resume
 Record = dict[str, Any]
 
 #: What is walked on where a part has no structure of its own, with the places between which
-GROUNDS = (("cylinder", "13,6", "13,12"), ("plane", "8,6", "8,13"), ("truss", "L2,6", "L2,14"), ("module", "15,4", "15,10"))
+GROUNDS = (
+    ("cylinder", "13,6", "13,12"),
+    ("plane", "8,6", "8,13"),
+    ("truss", "L2,6", "L2,14"),
+    ("module", "15,4", "15,10"),
+)
 #: Commanded rates of velocity trials: largest [m/s, m/s, rad/s], how many and how long each [s]
 RATES, LEGS, LEG = np.array([0.12, 0.12, 0.1]), 4, 3.0
 
@@ -114,7 +118,13 @@ def vanish(name: str, walker: Walker, folder: Path) -> Record:
         end, reason = type(error).__name__, str(error)
     log = recorder.log()[0]
     log.save(folder)
-    return {"outcome": end, "reason": reason, "plan_s": planned, "walk_s": walk.time, **checked(log, walker, structure, folder)}
+    return {
+        "outcome": end,
+        "reason": reason,
+        "plan_s": planned,
+        "walk_s": walk.time,
+        **checked(log, walker, structure, folder),
+    }
 
 
 def kept(run: WalkRun, folder: Path) -> Record:
@@ -134,7 +144,7 @@ def checked(log: Any, walker: Walker, structure: Structure, folder: Path) -> Rec
     report = check_walk(log, robot, structure, rules_of(walker))
     return {
         "violations": [f"{f.kind}: {f.worst:.4g} at {f.time:.2f} s, {f.where}" for f in report.violations],
-        "second": second_check(folder / "run.npz", robot, structure),
+        "second": second_check(folder / "run.npz", walker, robot, structure),
     }
 
 
@@ -165,7 +175,10 @@ def tried(part: str, name: str, folder: Path) -> Record:
         out = {"outcome": "error", "reason": f"{type(error).__name__}: {error}"}
     except Exception as error:  # noqa: BLE001 (an error of a trial is what the benchmark looks for)
         where = traceback.extract_tb(error.__traceback__)[-1]
-        out = {"outcome": "crash", "reason": f"{type(error).__name__}: {error} ({Path(where.filename).name}:{where.lineno})"}
+        out = {
+            "outcome": "crash",
+            "reason": f"{type(error).__name__}: {error} ({Path(where.filename).name}:{where.lineno})",
+        }
     return {"trial": name, "cpu_s": time.process_time() - cpu, **out}
 
 

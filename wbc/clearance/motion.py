@@ -22,8 +22,8 @@ DEGREE = 7
 class Motion:
     """A motion of a :class:`Tree` over k knots.
 
-    Between two knots the scalar c is sum_i B_i(s) ``controls[., c, i]`` with Bernstein's polynomials of s = 0 .. 1; a free
-    pose has p + s (p' - p) and R exp(s log(R^T R')).
+    Between two knots the scalar c is sum_i B_i(s) ``controls[., c, i]`` with Bernstein's polynomials of s = 0 .. 1; a
+    free pose has p + s (p' - p) and R exp(s log(R^T R')).
 
     Attributes:
         times: of the knots [k], rising [s].
@@ -112,7 +112,7 @@ class Motion:
     @property
     def degree(self) -> int:
         """Of the polynomials."""
-        return self.controls.shape[2] - 1
+        return int(self.controls.shape[2]) - 1
 
     @cached_property
     def rates(self) -> Array:
@@ -122,7 +122,7 @@ class Motion:
     @cached_property
     def variation(self) -> Array:
         """No less than the way of every scalar from the first knot on, [k, scalars]: the coefficients' way."""
-        return _summed(np.abs(np.diff(self.controls, axis=2)).sum(axis=2)[None])[0]
+        return np.asarray(_summed(np.abs(np.diff(self.controls, axis=2)).sum(axis=2)[None])[0])
 
     @cached_property
     def turns(self) -> Array:

@@ -26,7 +26,7 @@ log = logging.getLogger("wbc")
 
 _SOURCES = Path(__file__).parent / "native"
 _SHAPES = Path(wbc.proximity.__file__).parent / "native"
-_FILES = (
+_FILES: tuple[str | Path, ...] = (
     *(_SHAPES / name for name in ("scene.h", "vectors.h", "steps.h", "shapes.h", "gjk.h", "epa.h", "pair.h")),
     *("sweep.h", "motion.h", "distance.h", "sweep.c"),
 )
@@ -37,7 +37,18 @@ _ARRAYS = (
     *("body_frame", "body_place", "body_pose", "line", "world_line", "shape", "hull", "size", "points"),
     *("chain", "chain_length", "moved", "stamp", "tree", "box", "triangle"),
     *("first", "second", "stop_first", "stop_second", "required"),
-    *("exempt_start", "exempt_from", "exempt_to", "exempt_side", "exempt_point", "low", "high", "when", "chosen", "list"),
+    *(
+        "exempt_start",
+        "exempt_from",
+        "exempt_to",
+        "exempt_side",
+        "exempt_point",
+        "low",
+        "high",
+        "when",
+        "chosen",
+        "list",
+    ),
 )
 #: Triangles of a leaf of a tree of boxes; how often a motion is halved at most, in ``native/sweep.c`` and to its knots
 LEAF, HALVINGS = 4, 128
@@ -77,8 +88,8 @@ class NativeSweep:
     """A scene in memory; see :class:`wbc.clearance.plain.PlainSweep` for the same in numpy.
 
     Attributes:
-        low, high, when: of every pair at the last sweep: the proven least of what counts, the least that was found, and when
-            [knots].
+        low, high, when: of every pair at the last sweep: the proven least of what counts, the least that was found, and
+            when [knots].
     """
 
     def __init__(self, functions: ctypes.PyDLL, scene: Scene) -> None:
@@ -97,8 +108,8 @@ class NativeSweep:
             **_shapes(scene), parent=[f.parent for f in tree], kind=[int(f.moves) for f in tree],
             coordinate=[f.coordinate for f in tree], place=scene.tree.places, axis=np.array(axes).reshape(-1, 5),
             pose=np.zeros((frames, 12)), deviation=np.zeros((frames, 4)), body_frame=scene.frame,
-            body_place=np.array([place(pose) for pose in scene.place]).reshape(-1, 12), body_pose=np.zeros((bodies, 12)),
-            line=scene.line, world_line=np.zeros((bodies, 6)), chain=chain,
+            body_place=np.array([place(pose) for pose in scene.place]).reshape(-1, 12),
+            body_pose=np.zeros((bodies, 12)), line=scene.line, world_line=np.zeros((bodies, 6)), chain=chain,
             chain_length=[len(links) for links in scene.chain], moved=np.zeros((bodies, depth + 1, 2)),
             stamp=np.zeros(bodies, dtype=np.int32), first=scene.first, second=scene.second,
             stop_first=scene.stops[:, 0], stop_second=scene.stops[:, 1], required=scene.required,
@@ -137,9 +148,19 @@ class NativeSweep:
 
     def _hold(self, **arrays: Any) -> None:
         """Keep arrays as the code wants them; what it fills is contiguous already, and stays the same."""
-        integers = ("parent", "kind", "coordinate", "hull", "chain", "chain_length", "tree", "stop_first", "stop_second")
+        integers = (
+            "parent",
+            "kind",
+            "coordinate",
+            "hull",
+            "chain",
+            "chain_length",
+            "tree",
+            "stop_first",
+            "stop_second",
+        )
         for name, array in arrays.items():
-            kind = np.int32 if name in integers or name.startswith("exempt_") and name != "exempt_point" else None
+            kind = np.int32 if name in integers or (name.startswith("exempt_") and name != "exempt_point") else None
             kept = np.ascontiguousarray(array, dtype=kind)
             self._arrays[name] = kept if kept.dtype == np.int32 else np.ascontiguousarray(kept, dtype=np.float64)
 

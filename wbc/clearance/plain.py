@@ -19,13 +19,16 @@ from wbc.clearance.scene import INSIDE, OUTSIDE, PLANE, SUM, TRIANGLES, Scene, s
 from wbc.clearance.tree import Moves
 from wbc.proximity.geometry import geometry_of
 from wbc.proximity.judge import declared
+from wbc.proximity.scene import Index
 from wbc.proximity.support import Supports, clearance
-from wbc.shapes import Convex, Cylinder, Shape
+from wbc.shapes import Convex, Cylinder
 from wbc.validation import Array
 
 #: As in native/sweep.c and native/distance.h
 HALVES, EDGES = 48, 256
 ANY, LEAST = 2, 1
+#: What Coal's distances of triangles, which no normal proves here, may be too large by [m]
+SLOP = 1e-6
 
 
 class PlainSweep:
@@ -70,11 +73,13 @@ class PlainSweep:
         return np.array([gap, *points.ravel(), self._margin(here, 0, pair, gap, knots, knots)])
 
     def _look(
-        self, here: _Pieces, piece: Array, pair: Array, aim: int, tolerance: float, far: float
+        self, here: _Pieces, piece: Index, pair: Index, aim: int, tolerance: float, far: float
     ) -> tuple[Array, int]:
         """Which rows (of a piece and a pair) must be looked at in halves, and how many exact distances that took."""
-        scene, i, j = self.scene, self.scene.first[pair], self.scene.second[pair]
-        one, two = (here.moved(piece, body, stop) for body, stop in ((i, scene.stops[pair, 0]), (j, scene.stops[pair, 1])))
+        scene, i, j = self.scene, self.scene.first[pair].astype(np.intp), self.scene.second[pair].astype(np.intp)
+        one, two = (
+            here.moved(piece, body, stop) for body, stop in ((i, scene.stops[pair, 0]), (j, scene.stops[pair, 1]))
+        )
         off, rest = one[:, 0] + two[:, 0], one[:, 0] + two[:, 0] - one[:, 1] - two[:, 1]
         segment = segment_points(*(here.ends[body, piece, end] for body in (i, j) for end in (0, 1)))
         between = np.linalg.norm(segment[0] - segment[1], axis=1)
@@ -181,7 +186,7 @@ class _Pieces:
 
         def off_of(way: Array, rate: Array) -> Array:
             both = np.maximum(way[knot] - way[first], way[last] - way[knot])
-            return np.where(self.whole[:, None], both, rate[first] * half[:, None])
+            return np.asarray(np.where(self.whole[:, None], both, rate[first] * half[:, None]))
 
         q, off = bernstein(motion.controls[knot], part), off_of(motion.variation, motion.rates)
         count = len(pieces)
@@ -231,7 +236,7 @@ class _Pieces:
         """A frame's pose in the world."""
         return pin.SE3.Identity() if frame < 0 else pin.SE3(self.rotation[frame, n], self.position[frame, n])
 
-    def moved(self, piece: Array, body: Array, stop: Array) -> Array:
+    def moved(self, piece: Index, body: Index, stop: Index) -> Array:
         """How far points may be off the middle, and the slack in it, row by row [rows, 2]."""
         out = np.zeros((len(piece), 2))
         for b in np.unique(body).tolist():
@@ -260,11 +265,12 @@ class Solids:
     """Distances of solids by Coal, each proven by its normal."""
 
     def __init__(self) -> None:
+        self._meshes: dict[Any, Any] = {}
         self._known: dict[Any, tuple[Any, Supports, Array]] = {}
         self._request, self._result = coal.DistanceRequest(), coal.DistanceResult()
         self._request.gjk_tolerance, self._request.epa_tolerance = 1e-8, 1e-6
 
-    def between(self, a: Shape, at: pin.SE3, b: Shape, there: pin.SE3) -> tuple[float, Array]:
+    def between(self, a: Any, at: pin.SE3, b: Any, there: pin.SE3) -> tuple[float, Array]:
         """Signed distance and nearest points of two solids, whose poses are their centres'."""
         (one, first, _), (two, second, _) = self._of(a), self._of(b)
         supports = _joined(first, second)
@@ -278,26 +284,31 @@ class Solids:
         turns = tuple(np.broadcast_to(pose.rotation, (len(n), 3, 3)) for pose in (at, there))
         values = clearance(supports, which, (turns[0], turns[1]), np.broadcast_to(offset, n.shape), n)
         best = int(np.argmax(values))
-        point = self.farthest(a, at, n[best])
+        # Where the two are apart Coal's point is right also on an edge or a face
+        point = self.farthest(a, at, n[best]) if len(normals) > 1 else self._result.getNearestPoint1()
         return float(values[best]), np.array([point, point + values[best] * n[best]])
 
-    def farthest(self, a: Shape, at: pin.SE3, direction: Array) -> Array:
+    def farthest(self, a: Any, at: pin.SE3, direction: Array) -> Array:
         """A point of a solid that reaches farthest along a direction."""
         supports = self._of(a)[1]
         return np.asarray(at * supports.point(0, at.rotation.T @ direction))
 
-    def surface(self, a: Shape, at: pin.SE3, surface: Any, there: pin.SE3) -> tuple[float, Array]:
+    def surface(self, a: Any, at: pin.SE3, surface: Any, there: pin.SE3) -> tuple[float, Array]:
         """A solid and triangles; as far as the balls on the solid's core, where that goes through one."""
         geometry, supports, _ = self._of(a)
-        ball = float(supports.ball[0])
-        least, points = inf, np.zeros((2, 3))
-        for corners in surface.corners:
-            gap, _ = self._coal(geometry, at, coal.TriangleP(*corners), there)
-            gap = max(gap, -ball)
-            if gap < least:
-                least = gap
-                points = np.array([self._result.getNearestPoint1(), self._result.getNearestPoint2()])
-        return least, points
+        gap, normal = self._coal(geometry, at, self._mesh(surface), there)
+        gap, point = max(gap - SLOP, -float(supports.ball[0])), self._result.getNearestPoint1()
+        return gap, np.array([point, point + gap * normal])
+
+    def _mesh(self, surface: Any) -> Any:
+        if surface not in self._meshes:
+            mesh = coal.BVHModelOBBRSS()
+            mesh.beginModel(len(surface.corners), 3 * len(surface.corners))
+            for corners in surface.corners:
+                mesh.addTriangle(*corners)
+            mesh.endModel()
+            self._meshes[surface] = mesh
+        return self._meshes[surface]
 
     def _coal(self, a: Any, at: pin.SE3, b: Any, there: pin.SE3) -> tuple[float, Array]:
         self._result.clear()
@@ -305,7 +316,7 @@ class Solids:
         gap = float(coal.distance(a, poses[0], b, poses[1], self._request, self._result))
         return gap, np.array(self._result.normal)
 
-    def _of(self, shape: Shape) -> tuple[Any, Supports, Array]:
+    def _of(self, shape: Any) -> tuple[Any, Supports, Array]:
         if shape not in self._known:
             made = geometry_of(shape)
             self._known[shape] = made.geometry, Supports([shape], [made.center]), made.center
@@ -316,12 +327,12 @@ def _joined(a: Supports, b: Supports) -> Supports:
     out = Supports([], [])
     for name in ("ball", "disc", "box", "is_hull"):
         setattr(out, name, np.concatenate([getattr(a, name), getattr(b, name)]))
-    out.hulls = {**a.hulls, **{1: points for points in b.hulls.values()}}
+    out.hulls = {k: one.hulls[0] for k, one in enumerate((a, b)) if one.hulls}
     return out
 
 
 def corners_of(shape: Any, size: Array) -> Array:
-    """Points of a solid without its ball whose hull holds it, about the centre; of lids the edges of a polygon about them."""
+    """Points of a solid without its ball whose hull holds it, about the centre; of lids a polygon about them."""
     if isinstance(shape, Convex):
         return np.asarray(shape.points - shape.points.mean(axis=0))
     if size[3] > 0.0:
@@ -387,5 +398,3 @@ def _halves(pieces: Array, side: int) -> Array:
     out[cut, 3 - side] = (out[cut, 2] + out[cut, 3]) / 2
     out[cut, 4] += 1
     return out
-
-

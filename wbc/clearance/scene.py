@@ -12,7 +12,7 @@ import pinocchio as pin
 
 from wbc import validation
 from wbc.clearance.tree import Moves, Tree
-from wbc.errors import DuplicateNameError, RangeError, ShapeError, UnknownNameError
+from wbc.errors import DuplicateNameError, ShapeError, UnknownNameError
 from wbc.proximity.scene import sphere_round
 from wbc.robot.segments import bounding_capsule
 from wbc.shapes import Box, Capsule, Convex, Cylinder, HalfSpace, PlacedShape, Solid, Sphere
@@ -43,9 +43,9 @@ class EndlessCylinder:
 
 @dataclass(frozen=True, eq=False)
 class Triangles:
-    """A surface of triangles ``corners`` [n, 3, 3] m, in any order and turn. It has no inside: a body that begins beside
-    it cannot come through without touching, one that begins behind it is not seen. Where the core of a body (of a capsule
-    its segment) goes through the surface, the distance is what the balls on the core give, -radius.
+    """A surface of triangles ``corners`` [n, 3, 3] m, in any order and turn. It has no inside: a body that begins
+    beside it cannot come through without touching, one that begins behind it is not seen. Where the core of a body (of
+    a capsule its segment) goes through the surface, the distance is what the balls on the core give, -radius.
     """
 
     corners: Array
@@ -92,8 +92,8 @@ class Pair:
 
 @dataclass(frozen=True, eq=False)
 class Exemption:
-    """A hand may be nearer to what its hold is mounted on: while its grasp point is within ``radius`` [m] of ``point`` (the
-    hold's, in the world), a distance of -``depth`` [m] is enough.
+    """A hand may be nearer to what its hold is mounted on: while its grasp point is within ``radius`` [m] of ``point``
+    (the hold's, in the world), a distance of -``depth`` [m] is enough.
 
     Attributes:
         hand, mount: bodies, the first with a grasp point, the second fixed in the world.
@@ -120,14 +120,16 @@ class Scene:
         tree, bodies, pairs: as given.
         kind: of the bodies' shapes. frame: numbers of their frames, -1: the world. place: poses on them, moved to the
             shapes' centres. center: of those in the shapes' frames.
-        line: [bodies, 8]: ends of a capsule about the body in its frame, its radius, and one that its grasp point is within,
-            too.
+        line: [bodies, 8]: ends of a capsule about the body in its frame, its radius, and one that its grasp point is
+            within, too.
         chain: frames with joints from the body's on, up to the world.
-        first, second: numbers of the pairs' bodies. stops: how many frames of the chains move the two apart, [pairs, 2].
+        first, second: numbers of the pairs' bodies. stops: how many frames of the chains move the two apart, [pairs,
+            2].
 
     Raises:
-        DuplicateNameError: two bodies of a name. UnknownNameError: no such link or body. ShapeError: a shape without end on a
-            link that moves; a pair of which neither is a solid. RangeError: a required distance that is no number.
+        DuplicateNameError: two bodies of a name. UnknownNameError: no such link or body. ShapeError: a shape without
+            end on a link that moves; a pair of which neither is a solid. RangeError: a required distance that is no
+        number.
     """
 
     def __init__(self, tree: Tree, bodies: Sequence[Body], pairs: Sequence[Pair]) -> None:
@@ -152,6 +154,7 @@ class Scene:
             if isinstance(body.shape, Unbounded) and self.chain[k]:
                 raise ShapeError(f"{body.name}.shape", body.shape, "a shape without end is fixed in the world")
         ends = [(self._known("pairs", pair.first), self._known("pairs", pair.second)) for pair in self.pairs]
+        self._rows = {end: k for k, end in enumerate(ends)}
         self.first, self.second = (np.array([end[k] for end in ends], dtype=np.int32) for k in (0, 1))
         for pair, (i, j) in zip(self.pairs, ends, strict=True):
             if max(self.kind[i], self.kind[j]) >= PLANE and min(self.kind[i], self.kind[j]) >= PLANE:
@@ -171,7 +174,6 @@ class Scene:
             UnknownNameError, ShapeError, RangeError: an exemption that names no pair or has no such numbers.
         """
         found = []
-        known = {(int(i), int(j)): k for k, (i, j) in enumerate(zip(self.first, self.second, strict=True))}
         for e, exemption in enumerate(exemptions):
             field = f"exemptions[{e}]"
             hand, mount = (self._known(field, name) for name in (exemption.hand, exemption.mount))
@@ -179,7 +181,7 @@ class Scene:
                 raise ShapeError(f"{field}.hand", exemption.hand, "this body has no grasp point")
             if self.chain[mount]:
                 raise ShapeError(f"{field}.mount", exemption.mount, "expected a body that is fixed in the world")
-            pair = known.get((hand, mount), known.get((mount, hand)))
+            pair = self._rows.get((hand, mount), self._rows.get((mount, hand)))
             if pair is None:
                 names = [f"{self.pairs[k].first} and {self.pairs[k].second}" for k in range(len(self.pairs))]
                 raise UnknownNameError(field, f"{exemption.hand} and {exemption.mount}", names)
@@ -206,7 +208,9 @@ class Scene:
 
     def _place(self, body: Body) -> tuple[int, pin.SE3, Array]:
         if not isinstance(body.shape, Shape):
-            raise ShapeError(f"{body.name}.shape", body.shape, "expected a solid, a surface of triangles or one without end")
+            raise ShapeError(
+                f"{body.name}.shape", body.shape, "expected a solid, a surface of triangles or one without end"
+            )
         if body.placement is not None:
             validation.pose(f"{body.name}.placement", body.placement)
         frame, _ = self.tree.link(f"{body.name}.link", body.link)
@@ -222,14 +226,15 @@ class Scene:
 
 def _kind(shape: Shape) -> int:
     kinds: tuple[tuple[Any, int], ...] = (
-        (Convex, HULL), (HalfSpace, PLANE), (CylinderInside, INSIDE), (EndlessCylinder, OUTSIDE), (Triangles, TRIANGLES),
+        (Convex, HULL), (HalfSpace, PLANE), (CylinderInside, INSIDE), (EndlessCylinder, OUTSIDE),
+        (Triangles, TRIANGLES),
     )  # fmt: skip
     return next((number for kind, number in kinds if isinstance(shape, kind)), SUM)
 
 
 def sizes_of(shape: Shape) -> list[float]:
-    """Half sides [3], disc, ball and radius of the sphere about the centre of native/shapes.h; of shapes without end the
-    radius in place of the disc.
+    """Half sides [3], disc, ball and radius of the sphere about the centre of native/shapes.h; of shapes without end
+    the radius in place of the disc.
     """
     if isinstance(shape, (Sphere, Capsule)):
         half = shape.length / 2 if isinstance(shape, Capsule) else 0.0

@@ -46,7 +46,8 @@ class Nearest:
 
 @dataclass(frozen=True, eq=False)
 class Sweep:
-    """What is proven over a motion. A margin is a distance less what is required; where an exemption holds, what is left of it.
+    """What is proven over a motion. A margin is a distance less what is required; where an exemption holds, what is
+    left of it.
 
     Attributes:
         pairs: numbers of those that were looked at [p].
@@ -68,7 +69,7 @@ class Sweep:
 
     @property
     def clear(self) -> bool:
-        """Proven: no instant was found at which a pair is nearer than it may be, and none is by more than the tolerance."""
+        """At no instant that was looked at is a pair too near; proven, at none by more than the tolerance."""
         return self.violation is None and bool((self.bound >= -self.tolerance * (1.0 + 1e-9)).all())
 
     @property
@@ -87,15 +88,17 @@ class Sweeper:
         if not swept.clear:
             print(swept.nearest)
 
-    With d the distance of two bodies in the middle of a piece of the motion, and m no less than the way of any of their points
-    from there, d - m is a lower bound over the piece; where it is not enough, both halves are looked at (conservative
-    advancement: Mirtich, Impulse-based dynamic simulation, 1996). m is added up along the chain from the body to what carries
-    both: sum_j |q_j - q_j(middle)| r_j, with r_j the reach of the body about joint j, itself in the middle, and what was added
-    before.
+    With d the distance of two bodies in the middle of a piece of the motion, and m no less than the way of any of their
+    points from there, d - m is a lower bound over the piece; where it is not enough, both halves are looked at
+    (conservative
+    advancement: Mirtich, Impulse-based dynamic simulation, 1996). m is added up along the chain from the body to what
+        carries
+    both: sum_j |q_j - q_j(middle)| r_j, with r_j the reach of the body about joint j, itself in the middle, and what
+    was added before.
 
     Args:
-        native: compiled C; None: where there is a compiler. Numpy and Coal give the same, some 100 times slower; distances of
-            cylinders, boxes and hulls within 2e-5 m.
+        native: compiled C; None: where there is a compiler. Numpy and Coal give the same, some 100 times slower;
+            distances of cylinders, boxes and hulls within 2e-5 m.
     """
 
     def __init__(self, scene: Scene, native: bool | None = None) -> None:
@@ -122,14 +125,14 @@ class Sweeper:
 
         Args:
             pairs: numbers of those that count; None: all.
-            aim: ``any`` stops at the first instant found at which a pair is nearer than it may be; ``least``: the least margin of
-                all pairs, within the tolerance; ``every``: of each pair.
+            aim: ``any`` stops at the first instant found at which a pair is nearer than it may be; ``least``: the least
+                margin of all pairs, within the tolerance; ``every``: of each pair.
             tolerance: of the proof [m].
             far: margins above this are not looked at more closely [m]; the bounds are at least that, then.
 
         Raises:
-            ShapeError: a motion of another tree. RangeError: a pair that is not there, a tolerance that is not positive.
-            What :meth:`Scene.exempt` raises. UnknownNameError: no such aim.
+            ShapeError: a motion of another tree. RangeError: a pair that is not there, a tolerance that is not
+            positive. What :meth:`Scene.exempt` raises. UnknownNameError: no such aim.
         """
         number = AIMS.index(validation.one_of("aim", aim, AIMS))
         tolerance = validation.scalar("tolerance", tolerance, low=0.0, open_low=True, unit="m")
