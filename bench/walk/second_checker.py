@@ -1,8 +1,8 @@
 """A second checker: the log and the robot read anew, through numpy and Pinocchio, and clearances proven between ticks.
 
-It shares nothing with ``wbc.walking.checker`` but the numbers of the rules. A hand may be nearer than the clearance to what a
-hold is mounted on while it is about to grasp, holds or leaves that hold, and no deeper in it than :data:`DEPTH` beyond its
-own roundness.
+It shares nothing with ``wbc.walking.checker`` but the numbers of the rules. A hand may be nearer than the clearance to
+what a hold is mounted on while it is about to grasp, holds or leaves that hold, and no deeper in it than :data:`DEPTH`
+beyond its own roundness.
 """
 
 from __future__ import annotations
@@ -82,16 +82,16 @@ def _parts(model: pin.Model, urdf: Path, hands: dict[str, int]) -> list[Body]:
     shapes = pin.buildGeomFromUrdf(model, str(urdf), pin.GeometryType.COLLISION)
     found: list[Body] = []
     balls = []
-    for k, one in enumerate(shapes.geometryObjects):
+    for one in shapes.geometryObjects:
         frame = model.frames[one.parentFrame]
         # In the frame of its joint, as links without a joint of their own have it too
         at, name = frame.placement.inverse() * one.placement, str(frame.name)
         if type(one.geometry).__name__ == "Sphere":
-            balls.append((k, name, at, float(one.geometry.radius)))
+            balls.append((name, at, float(one.geometry.radius)))
             continue
         body = Capsule(float(one.geometry.radius), 2.0 * float(one.geometry.halfLength))
-        found.append(Body(f"{name} {k}", body, name, at))
-    for k, name, at, radius in balls:
+        found.append(Body(name, body, name, at))
+    for name, at, radius in balls:
         ends = [
             body.placement * np.array([0.0, 0.0, side * body.shape.length / 2])
             for body in found
@@ -99,27 +99,29 @@ def _parts(model: pin.Model, urdf: Path, hands: dict[str, int]) -> list[Body]:
             if body.link == name and isinstance(body.shape, Capsule) and body.placement is not None
         ]
         if not any(np.linalg.norm(at.translation - end) < 1e-9 for end in ends):
-            found.append(Body(f"{name} {k}", Sphere(radius), name, at))
+            found.append(Body(name, Sphere(radius), name, at))
     # What moves with a hand's frame is the hand
     carried = {int(model.frames[model.getFrameId(hand)].parentJoint): hand for hand in hands}
-    out = []
+    out, count = list[Body](), dict[str, int]()
     for body in found:
+        count[body.name] = count.get(body.name, 0) + 1
+        name = body.name if count[body.name] == 1 else f"{body.name}, body {count[body.name]}"
         frame = model.frames[model.getFrameId(body.link)]
         hand = carried.get(int(frame.parentJoint))
         grasp = None
         if hand is not None:
             grasp = (frame.placement.inverse() * model.frames[model.getFrameId(hand)].placement).translation
-        out.append(Body(body.name, body.shape, body.link, body.placement, grasp))
+        out.append(Body(name, body.shape, body.link, body.placement, grasp))
     return out
 
 
 def _things(structure: Structure) -> list[Body]:
     """Surface and obstacles."""
-    out = [Body(f"{one.id} ", one.shape, "world", one.placement) for one in structure.obstacles]
+    out = [Body(one.id, one.shape, "world", one.placement) for one in structure.obstacles]
     surface = structure.surface
     if surface is not None:
         shape = HalfSpace() if isinstance(surface, PlaneSurface) else EndlessCylinder(surface.radius)
-        out.append(Body("surface ", shape, "world", surface.pose))
+        out.append(Body("surface", shape, "world", surface.pose))
     return out
 
 
@@ -160,10 +162,10 @@ def _exemptions(log: Columns, model: pin.Model, parts: list[Body], structure: St
 
 def _mounts(structure: Structure, point: Array) -> Iterator[str]:
     if structure.surface is not None and abs(float(structure.surface.height(point))) <= MOUNTED:
-        yield "surface "
+        yield "surface"
     for one in structure.obstacles:
         if abs(float(one.distance(point))) <= MOUNTED:
-            yield f"{one.id} "
+            yield one.id
 
 
 def _loose(log: Columns, model: pin.Model) -> Iterator[str]:
@@ -182,7 +184,10 @@ def _loose(log: Columns, model: pin.Model) -> Iterator[str]:
                 continue
             off = pin.XYZQUATToSE3(log["hold_pose"][row]).actInv(body * data.oMf[frame])
             tilt = float(np.arccos(np.clip(off.rotation[2, 2], -1.0, 1.0))) - float(log["hold_max_tilt"][row])
-            for kind, value in (("hand off its hold [m]", float(np.linalg.norm(off.translation))), ("tilt [rad]", tilt)):
+            for kind, value in (
+                ("hand off its hold [m]", float(np.linalg.norm(off.translation))),
+                ("tilt [rad]", tilt),
+            ):
                 if value > worst.get(kind, (-1.0, 0.0, ""))[0]:
                     worst[kind] = value, float(t), str(log["arms"][arm])
     for kind, limit in (("hand off its hold [m]", OFF), ("tilt [rad]", TURNED)):
@@ -194,10 +199,10 @@ def _loose(log: Columns, model: pin.Model) -> Iterator[str]:
 def _hard(log: Columns, limits: Array) -> Iterator[str]:
     """Joints that change their rates faster than they can."""
     before = np.vstack([np.zeros_like(log["v"][:1]), log["v"][:-1]])
-    parts = np.abs(log["v"] - before) / np.diff(log["t"], prepend=log["t"][0] - log["t"][1] + log["t"][0])[:, None] / limits
+    parts = (
+        np.abs(log["v"] - before) / np.diff(log["t"], prepend=log["t"][0] - log["t"][1] + log["t"][0])[:, None] / limits
+    )
     k, joint = np.unravel_index(int(np.argmax(parts)), parts.shape)
     if parts[k, joint] > HARDER:
         name = str(log["joints"][joint])
         yield f"acceleration: {parts[k, joint]:.1f} times the limit at {float(log['t'][k]):.3f} s, {name}"
-
-

@@ -156,11 +156,15 @@ PARTS: dict[str, Callable[[str, Walker, Path], Record]] = {
 }
 
 
+#: How many trials of a part there are for each random structure
+SHARES = {"structures": 1.0, "velocity": 0.4, "resume": 0.4, "vanish": 0.2}
+
+
 def names(part: str, count: int) -> list[str]:
-    """Names of the trials of a part, ``count`` of them, or so many a family."""
-    if part == "structures":
-        return [f"{family} {seed}" for seed in range(count) for family in FAMILIES]
-    return [str(seed) for seed in range(count)]
+    """Names of the trials of a part, where there are ``count`` structures, family by family in turn."""
+    seeds = range(round(SHARES[part] * count))
+    families = list(FAMILIES)
+    return [f"{families[k % 7]} {k // 7}" if part == "structures" else str(k) for k in seeds]
 
 
 def tried(part: str, name: str, folder: Path) -> Record:

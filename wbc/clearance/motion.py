@@ -104,9 +104,11 @@ class Motion:
         return cls(
             times,
             controls,
-            np.concatenate([quaternion_matrices(given[:, :, 3:]).reshape(count, -1, 9), given[:, :, :3]], axis=2),
-            np.broadcast_to(np.asarray(slack, dtype=float), (controls.shape[1],)),
-            np.broadcast_to(np.asarray(free_slack, dtype=float), (count, 2)),
+            np.concatenate(
+                [quaternion_matrices(given[:, :, 3:]).reshape(*given.shape[:2], 9), given[:, :, :3]], axis=2
+            ),
+            _for_all("slack", slack, (controls.shape[1],)),
+            _for_all("free_slack", free_slack, (count, 2)),
         )
 
     @property
@@ -159,6 +161,12 @@ def quaternion_matrices(x: Array) -> Array:
         [2 * (i * k - w * j), 2 * (j * k + w * i), 1 - 2 * (i * i + j * j)],
     ]
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def _for_all(field: str, value: Any, shape: tuple[int, ...]) -> Array:
+    """A number counts for all."""
+    array = validation.real_array(field, value)
+    return np.full(shape, array) if array.ndim == 0 else array
 
 
 def _coordinates(tree: Tree, times: Any, field: str, value: Any) -> Array:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import IntEnum
 from functools import cached_property
 
@@ -55,10 +55,10 @@ class Tree:
         links: name -> (number of its frame, pose of the link on it); "world" is on -1.
     """
 
-    frames: tuple[Frame, ...]
+    frames: tuple[Frame, ...] = field(repr=False)
     coordinates: tuple[str, ...]
     free: tuple[str, ...]
-    links: dict[str, tuple[int, pin.SE3]]
+    links: dict[str, tuple[int, pin.SE3]] = field(repr=False)
 
     @classmethod
     def of_model(cls, model: pin.Model, floating: bool = False) -> Tree:
@@ -112,13 +112,13 @@ class Tree:
             links.setdefault(str(frame.name), (last[int(frame.parentJoint)], pin.SE3(frame.placement)))
         return cls(tuple(frames), tuple(names), tuple(free), links)
 
-    def link(self, field: str, name: str) -> tuple[int, pin.SE3]:
+    def link(self, what: str, name: str) -> tuple[int, pin.SE3]:
         """(number of the frame, pose of the link on it).
 
         Raises:
             UnknownNameError: no such link.
         """
-        return self.links[validation.one_of(field, name, tuple(self.links))]
+        return self.links[validation.one_of(what, name, tuple(self.links))]
 
     @cached_property
     def places(self) -> Array:
