@@ -12,7 +12,7 @@ from rich.console import Console
 
 import wbc
 from bench.sheet import Sheet
-from wbc.clearance import Body, Motion, Pair, Scene, Sweep, Sweeper, Tree
+from wbc.clearance import Body, Motion, Pair, Scene, Sweep, Sweeper, Tree, bodies_of, self_pairs
 from wbc.shapes import Box, Capsule, Cylinder, HalfSpace
 from wbc.validation import Array
 
@@ -24,11 +24,7 @@ def scene_of(arms: int, far: float) -> Scene:
     """A walker of so many arms over a plane, among obstacles that begin ``far`` from its middle [m]."""
     robot, rng = wbc.robots.walker(arms=arms).robot, np.random.default_rng(arms)
     tree = Tree.of_model(robot.model)
-    links = [
-        Body(f"{link} {k}", placed.shape, link, placed.placement)
-        for link, group in robot.shapes.items()
-        for k, placed in enumerate(group)
-    ]
+    links = bodies_of(robot)
     things = [Body("plane", HalfSpace(), "world", pin.SE3(np.eye(3), np.array([0.0, 0.0, -far])))]
     for k in range(AROUND):
         shape = (Capsule(0.03, 1.0), Box((0.3, 0.2, 0.2)), Cylinder(0.05, 0.8))[k % 3]
@@ -37,9 +33,7 @@ def scene_of(arms: int, far: float) -> Scene:
         turn = pin.Quaternion(*(x := rng.normal(size=4)) / np.linalg.norm(x)).matrix()
         things.append(Body(f"thing {k}", shape, "world", pin.SE3(turn, place)))
     pairs = [Pair(a.name, b.name, CLEARANCE) for a in links for b in things]
-    for first, second in robot.self_pairs or ():
-        pairs += [Pair(a.name, b.name, CLEARANCE) for a in links if a.link == first for b in links if b.link == second]
-    return Scene(tree, [*links, *things], pairs)
+    return Scene(tree, [*links, *things], [*pairs, *self_pairs(robot, CLEARANCE)])
 
 
 def motion_of(scene: Scene, duration: float, arms: int) -> tuple[Array, Array, Array]:

@@ -23,6 +23,7 @@ from wbc.clearance import (
     Triangles,
 )
 from wbc.errors import (
+    ContinuityError,
     DuplicateNameError,
     NotFiniteError,
     RangeError,
@@ -45,6 +46,12 @@ def scene(**changes: Any) -> Scene:
     """A hand and a table."""
     given = {"bodies": [HAND, TABLE], "pairs": [Pair("hand", "table", 0.01)], **changes}
     return Scene(TREE, given["bodies"], given["pairs"])
+
+
+def jumping() -> Motion:
+    """A scalar that is elsewhere after the knot in the middle."""
+    controls = np.array([[[0.0, 1.0]], [[1.1, 2.0]]])
+    return Motion(np.arange(3.0), controls, np.zeros((0, 3, 12)), np.zeros(1), np.zeros((0, 2)))
 
 
 def exempt(**changes: Any) -> Any:
@@ -74,6 +81,7 @@ BAD: list[tuple[Callable[[], Any], type[WbcError], str]] = [
     (lambda: Motion.linear(TREE, [0.0, np.nan], NONE, POSES), NotFiniteError, "times"),
     (lambda: Motion.linear(TREE, [0.0, 1.0], NONE, POSES, free_slack=-1.0), RangeError, "free_slack"),
     (lambda: Motion.linear(TREE, [0.0, 1.0], NONE, POSES, slack=[1.0, 2.0]), ShapeError, "slack"),
+    (jumping, ContinuityError, r"Motion.controls\[1, 0\]"),
     (lambda: Sweeper("scene"), ShapeError, "Scene"),  # type: ignore[arg-type]
     (lambda: Sweeper(scene()).sweep("motion"), ShapeError, "Motion"),  # type: ignore[arg-type]
     (lambda: Sweeper(scene()).sweep(still(pin.SE3.Identity()), aim="al"), UnknownNameError, "any"),

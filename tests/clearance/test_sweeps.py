@@ -8,6 +8,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+import wbc
 from tests.clearance.world import (
     configuration,
     free_tree,
@@ -19,9 +20,21 @@ from tests.clearance.world import (
     still,
 )
 from tests.repeats import repeats
-from wbc.clearance import Body, CylinderInside, EndlessCylinder, Exemption, Motion, Pair, Scene, Sweeper, Tree
+from wbc.clearance import (
+    Body,
+    CylinderInside,
+    EndlessCylinder,
+    Exemption,
+    Motion,
+    Pair,
+    Scene,
+    Sweeper,
+    Tree,
+    bodies_of,
+    self_pairs,
+)
 from wbc.clearance.motion import quaternion_matrices
-from wbc.shapes import Box, Capsule, Convex, Cylinder, HalfSpace, Sphere
+from wbc.shapes import Box, Capsule, Convex, Cylinder, HalfSpace, Solid, Sphere
 from wbc.validation import Array
 
 TOLERANCE = 1e-3
@@ -148,6 +161,67 @@ def test_what_a_sample_at_every_knot_misses_is_found(native: bool) -> None:
         assert least.times[0] == pytest.approx(0.25, abs=1e-2)
 
 
+#: Rods of a metre along x, on either side of what they turn about
+ALONG = pin.utils.rotate("y", np.pi / 2)
+RODS = (
+    *((Capsule(0.01, 1.0), side) for side in (-0.5, 0.0, 0.5)),
+    *((Cylinder(0.01, 1.0), side) for side in (-0.5, 0.0, 0.5)),
+    *((Box((0.02, 0.02, 1.0)), side) for side in (-0.5, 0.0, 0.5)),
+    (Convex(np.array([[x, y, z] for x in (-0.01, 0.01) for y in (-0.01, 0.01) for z in (-0.5, 0.5)])), 0.0),
+)
+
+
+def jointed(kind: object) -> Tree:
+    """A link "rod" on one joint."""
+    model = pin.Model()
+    joint = model.addJoint(0, kind, pin.SE3.Identity(), "joint")
+    model.addFrame(pin.Frame("rod", joint, pin.SE3.Identity(), pin.FrameType.BODY))
+    return Tree.of_model(model)
+
+
+def flown(angle: float, way: float) -> tuple[Tree, Motion]:
+    """A free body that turns from -angle to angle about z and goes from -way to way along y, in one piece."""
+    turns = [pin.Quaternion(pin.utils.rotate("z", side * angle)).coeffs() for side in (-1.0, 1.0)]
+    poses = np.array([[0.0, side * way, 0.0, *turn] for side, turn in zip((-1.0, 1.0), turns, strict=True)])
+    return free_tree(), Motion.linear(free_tree(), [0.0, 1.0], np.zeros((2, 0)), poses)
+
+
+@pytest.mark.parametrize("native", [True, False], ids=["C", "numpy"])
+@pytest.mark.parametrize("rod", RODS, ids=lambda rod: f"{type(rod[0]).__name__} {rod[1]}")
+def test_rods_that_come_by_a_thin_post_between_two_knots(rod: tuple[Solid, float], native: bool) -> None:
+    """One end or both go round, or the body slides or flies past; where the post stands is nowhere near the middle."""
+    shape, side = rod
+    tip = (0.45 + abs(side)) * (1.0 if side >= 0.0 else -1.0)
+    turning, sliding = jointed(pin.JointModelRZ()), jointed(pin.JointModelPY())
+    rows = np.array([[-1.0], [1.0]])
+    for link, turns, (tree, motion) in (
+        ("rod", True, (turning, Motion.linear(turning, [0.0, 1.0], rows))),
+        ("rod", False, (sliding, Motion.linear(sliding, [0.0, 1.0], rows))),
+        ("universe", True, flown(1.0, 0.0)),
+        ("universe", False, flown(0.0, 1.0)),
+    ):
+        for at in (-0.6, 0.55):
+            place = tip * np.array([np.cos(at), np.sin(at), 0.0]) if turns else np.array([tip, at, 0.0])
+            body = Body("rod", shape, link, pin.SE3(ALONG, np.array([side, 0.0, 0.0])))
+            post = Body("post", Capsule(0.002, 0.5), "world", pin.SE3(np.eye(3), place))
+            swept = Sweeper(Scene(tree, [body, post], [Pair("rod", "post", 0.001)]), native).sweep(motion)
+            assert swept.violation is not None, (link, turns, at)
+            assert abs(swept.violation.time - 0.5) > 0.1
+
+
+@pytest.mark.parametrize("native", [True, False], ids=["C", "numpy"])
+def test_a_cubic_that_begins_fast_is_bound_by_its_fastest(native: bool) -> None:
+    tree = jointed(pin.JointModelRZ())
+    body = Body("rod", Capsule(0.01, 1.0), "rod", pin.SE3(ALONG, np.zeros(3)))
+    post = Body(
+        "post", Capsule(0.002, 0.5), "world", pin.SE3(np.eye(3), 0.45 * np.array([np.cos(0.2), np.sin(0.2), 0]))
+    )
+    motion = Motion.cubic(tree, [0.0, 1.0], [[0.0], [1.0]], [[2.7], [0.0]])
+    swept = Sweeper(Scene(tree, [body, post], [Pair("rod", "post")]), native).sweep(motion)
+    assert swept.violation is not None
+    assert swept.violation.time < 0.15
+
+
 def test_clear_is_a_proof_on_motions_that_are_just_so() -> None:
     """Required is what a fine sample finds least, a little less or more."""
     rng = np.random.default_rng(2)
@@ -243,6 +317,29 @@ def test_a_hand_may_go_to_its_hold_and_so_deep_while_it_holds(native: bool) -> N
     assert not clear(down(0.003), since=0.0, until=3.5)
 
 
+@pytest.mark.parametrize("native", [True, False], ids=["C", "numpy"])
+def test_a_grasp_point_that_leaves_its_hold_ends_the_exemption(native: bool) -> None:
+    """A ball on the axis stands still in the mount, while its grasp point goes round by the hold."""
+    tree = jointed(pin.JointModelRZ())
+    hand = Body("hand", Sphere(0.1), "rod", grasp=np.array([1.0, 0.0, 0.0]))
+    scene = Scene(tree, [hand, Body("table", HalfSpace())], [Pair("hand", "table", 0.01)])
+    held = Exemption("hand", "table", np.array([1.0, 0.0, 0.0]), 0.05, 0.2)
+    for turn, clear in ((1.0, False), (0.06, False), (0.04, True)):
+        motion = Motion.linear(tree, [0.0, 1.0], [[-turn], [turn]])
+        assert Sweeper(scene, native).sweep(motion, exemptions=[held]).clear is clear
+
+
+@pytest.mark.parametrize("native", [True, False], ids=["C", "numpy"])
+def test_a_body_that_rests_longer_than_it_may_is_seen(native: bool) -> None:
+    tree = free_tree()
+    hand = Body("hand", Sphere(0.02), "universe", grasp=np.zeros(3))
+    scene = Scene(tree, [hand, Body("table", HalfSpace())], [Pair("hand", "table", 0.01)])
+    motion = Motion.linear(tree, np.arange(9.0), np.zeros((9, 0)), np.tile([0, 0, 0.02, 0, 0, 0, 1.0], (9, 1)))
+    for since, until, clear in ((0.0, 8.0, True), (2.0, 6.0, False), (0.0, 7.0, False), (1.0, 8.0, False)):
+        held = Exemption("hand", "table", np.zeros(3), 0.1, 0.001, since, until)
+        assert Sweeper(scene, native).sweep(motion, exemptions=[held]).clear is clear
+
+
 def test_times_of_an_exemption_are_those_of_the_hold() -> None:
     """A hand that rests deep from 2 to 6 s of 8 is looked at in pieces that end there."""
     tree, times = free_tree(), np.arange(9.0)
@@ -278,6 +375,26 @@ def test_pairs_can_be_chosen_and_far_ones_cost_one_bound() -> None:
     assert sweeper.sweep(motion, []).clear
     lenient = Scene(scene.tree, scene.bodies, [Pair(p.first, p.second, -100.0) for p in scene.pairs])
     assert Sweeper(lenient, native=True).sweep(motion).measured == (0, 1)
+
+
+def test_links_of_a_robot_are_bodies_and_its_pairs_are_pairs() -> None:
+    """The walker's initial posture, as the sensor of a controller measures it."""
+    robot = wbc.robots.walker(body_shape="prism").robot
+    bodies, pairs = bodies_of(robot), self_pairs(robot, 0.01)
+    assert {body.link for body in bodies} == set(robot.shapes)
+    q = np.tile(robot.neutral[7:], (2, 1))
+    poses = np.tile([0.3, 0.2, 0.1, 0.0, 0.0, 0.0, 1.0], (2, 1))
+    tree = Tree.of_model(robot.model)
+    found = Sweeper(Scene(tree, bodies, pairs)).at(Motion.linear(tree, [0.0, 1.0], q, poses), 0.5)
+    data = robot.model.createData()
+    pin.framesForwardKinematics(robot.model, data, np.concatenate([poses[0], q[0]]))
+    shapes = {body.name: body for body in bodies}
+    for near in found:
+        one, other = shapes[near.first], shapes[near.second]
+        at, there = (
+            data.oMf[robot.model.getFrameId(b.link)] * (b.placement or pin.SE3.Identity()) for b in (one, other)
+        )
+        assert near.distance == pytest.approx(judged(one.shape, at, other.shape, there), abs=3e-6)  # type: ignore[arg-type]
 
 
 def test_quaternions_become_rotations() -> None:

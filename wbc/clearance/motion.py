@@ -11,11 +11,11 @@ from scipy.spatial.transform import Rotation
 
 from wbc import validation
 from wbc.clearance.tree import Tree
-from wbc.errors import RangeError, ShapeError
+from wbc.errors import ContinuityError, RangeError, ShapeError
 from wbc.validation import Array
 
-#: Highest degree of the polynomials
-DEGREE = 7
+#: Highest degree of the polynomials; what rounding may leave between two of them, in parts of the greatest scalar
+DEGREE, JUMP = 7, 1e-12
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +34,7 @@ class Motion:
 
     Raises:
         ShapeError, NotFiniteError: arrays of other shapes. RangeError: times that do not rise, slack below 0.
-        RotationError: a pose that is none.
+        RotationError: a pose that is none. ContinuityError: polynomials that do not meet at a knot.
     """
 
     times: Array
@@ -54,6 +54,10 @@ class Motion:
         if controls.ndim != 3 or len(controls) != len(times) - 1 or not 2 <= controls.shape[2] <= DEGREE + 1:
             reason = f"expected {len(times) - 1} x scalars x 2 to {DEGREE + 1} coefficients"
             raise ShapeError("Motion.controls", np.shape(self.controls), reason)
+        jumps = np.abs(controls[1:, :, 0] - controls[:-1, :, -1])
+        if jumps.size and jumps.max() > JUMP * max(1.0, float(np.abs(controls).max())):
+            k, c = (int(i) for i in np.unravel_index(int(jumps.argmax()), jumps.shape))
+            raise ContinuityError(f"Motion.controls[{k + 1}, {c}]", float(jumps[k, c]), "the scalar jumps at this knot")
         poses = validation.real_array("Motion.poses", self.poses)
         if poses.ndim != 3 or poses.shape[1:] != (len(times), 12):
             raise ShapeError("Motion.poses", np.shape(self.poses), f"expected free joints x {len(times)} x 12")

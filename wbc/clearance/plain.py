@@ -254,7 +254,7 @@ class _Pieces:
             if frame.moves != Moves.FREE:
                 axis = self.rotation[f] @ np.array(frame.axis)
                 d = d - (d * axis[:, None]).sum(axis=2, keepdims=True) * axis[:, None]
-            reach = np.linalg.norm(d, axis=2).max(axis=1) + self._scene.line[b, 7] + rows[-1][:, 0]
+            reach = np.linalg.norm(d, axis=2).max(axis=1) + self._scene.line[b, 7]
             off = self._off[f]
             steps = [off[:, k] + np.minimum(off[:, k + 1], 2.0) * reach for k in (0, 2)]
             rows.append(rows[-1] + np.stack(steps, axis=1))

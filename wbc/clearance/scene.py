@@ -14,6 +14,7 @@ from wbc import validation
 from wbc.clearance.tree import Moves, Tree
 from wbc.errors import DuplicateNameError, ShapeError, UnknownNameError
 from wbc.proximity.scene import sphere_round
+from wbc.robot import Robot
 from wbc.robot.segments import bounding_capsule
 from wbc.shapes import Box, Capsule, Convex, Cylinder, HalfSpace, PlacedShape, Solid, Sphere
 from wbc.validation import Array
@@ -113,6 +114,31 @@ class Exemption:
 SUM, HULL, PLANE, INSIDE, OUTSIDE, TRIANGLES = range(6)
 
 
+def bodies_of(robot: Robot) -> list[Body]:
+    """The collision shapes of a robot's links, by the link's name; from a link's second on with ", body 2" and so
+    on.
+    """
+    return [
+        Body(link if k == 0 else f"{link}, body {k + 1}", placed.shape, link, placed.placement)
+        for link, group in robot.shapes.items()
+        for k, placed in enumerate(group)
+    ]
+
+
+def self_pairs(robot: Robot, required: float = 0.0) -> list[Pair]:
+    """Pairs of :func:`bodies_of` on links that must not touch (``robot.self_pairs``).
+
+    Raises:
+        ShapeError: the robot's are not chosen yet.
+    """
+    if robot.self_pairs is None:
+        raise ShapeError("robot.self_pairs", None, "pairs of links are not chosen yet, see find_self_pairs")
+    on: dict[str, list[str]] = {}
+    for body in bodies_of(robot):
+        on.setdefault(body.link, []).append(body.name)
+    return [Pair(a, b, required) for one, other in robot.self_pairs for a in on.get(one, ()) for b in on.get(other, ())]
+
+
 class Scene:
     """Bodies of a tree and their pairs, as arrays; kept, and swept again and again.
 
@@ -120,8 +146,9 @@ class Scene:
         tree, bodies, pairs: as given.
         kind: of the bodies' shapes. frame: numbers of their frames, -1: the world. place: poses on them, moved to the
             shapes' centres. center: of those in the shapes' frames.
-        line: [bodies, 8]: ends of a capsule about the body in its frame, its radius, and one that its grasp point is
-            within, too.
+        line: [bodies, 8]: ends of a capsule about the body in its frame, its radius, and the radius about the ends of
+            what
+            turns with the body: 0 where its core is all, more where there is a grasp point.
         chain: frames with joints from the body's on, up to the world.
         first, second: numbers of the pairs' bodies. stops: how many frames of the chains move the two apart, [pairs,
             2].
@@ -261,9 +288,10 @@ def _line(body: Body, shape: pin.SE3, link: pin.SE3) -> Array:
         radius = float(np.linalg.norm(points - middle, axis=1).max())
     else:
         a, b, radius = bounding_capsule(PlacedShape(body.shape, shape))
-    most = radius
+    # The ball on a core is the same however it is turned
+    most = 0.0 if isinstance(body.shape, (Sphere, Capsule)) else radius
     if body.grasp is not None:
         x, span = link * validation.real_array(f"{body.name}.grasp", body.grasp, (3,)), b - a
         part = np.clip((x - a) @ span / max(span @ span, 1e-300), 0.0, 1.0)
-        most = max(radius, float(np.linalg.norm(x - a - part * span)))
+        most = max(most, float(np.linalg.norm(x - a - part * span)))
     return np.array([*a, *b, radius, most])

@@ -108,8 +108,9 @@ static double gone(double shift, double angle, double reach) { return shift + fm
 
 /* A body in the middle, and how far its points may be off it, frame by frame up its chain.
  *
- * Joints are taken to where they are from the last to the first: what is before a joint is then still in the middle, so that
- * the axis is known, and what is after it has moved by what was added up so far. */
+ * Joints are taken to where they are from the last to the first: what is before a joint is then still in the middle. With g the
+ * rigid motion about the axis there, a point x of the middle that is at y so far gets to g(y), and |g(y) - x| is no more than
+ * |g(y) - g(x)| + |g(x) - x| = |y - x| + the way of x about the axis. The ball of a capsule has no turn: its core counts. */
 static void place_body(sweep_t *s, int b) {
     static const double still[12] = {1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0};
     const double *frame = s->body_frame[b] < 0 ? still : s->pose + 12 * s->body_frame[b], *line = s->line + 8 * b;
@@ -124,8 +125,8 @@ static void place_body(sweep_t *s, int b) {
         const int f = s->chain[s->depth * b + k];
         const double *off = s->deviation + 4 * f;
         reach_ = farthest_from(s->pose + 12 * f, s->kind[f] == FREE ? 0 : s->axis + 5 * f, ends, line[7]);
-        moved[2] = moved[0] + gone(off[0], off[1], reach_ + moved[0]);
-        moved[3] = moved[1] + gone(off[2], off[3], reach_ + moved[0]);
+        moved[2] = moved[0] + gone(off[0], off[1], reach_);
+        moved[3] = moved[1] + gone(off[2], off[3], reach_);
     }
     s->stamp[b] = s->node;
 }

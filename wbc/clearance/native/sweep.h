@@ -35,7 +35,7 @@ typedef struct {
     const int *body_frame; /* -1: the world */
     const double *body_place;
     double *body_pose;
-    const double *line; /* 8 each: ends of a capsule about the body in its frame, its radius, and that of what else counts */
+    const double *line; /* 8 each: ends of a capsule about the body in its frame, its radius, and that of what turns beside its core */
     double *world_line; /* 6 each */
     const int *shape, *hull;
     const double *size, *points;
