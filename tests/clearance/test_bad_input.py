@@ -20,13 +20,14 @@ from wbc.clearance import (
     Scene,
     Sweeper,
     Tree,
-    Triangles,
+    TriangleMesh,
 )
 from wbc.errors import (
     ContinuityError,
     DuplicateNameError,
     NotFiniteError,
     RangeError,
+    RobotFileError,
     RotationError,
     ShapeError,
     UnknownNameError,
@@ -71,8 +72,9 @@ BAD: list[tuple[Callable[[], Any], type[WbcError], str]] = [
     (lambda: scene(bodies=[HAND, Body("table", "box")]), ShapeError, "table.shape"),  # type: ignore[arg-type]
     (lambda: CylinderInside(0.0), RangeError, "CylinderInside.radius"),
     (lambda: EndlessCylinder(float("inf")), WbcError, "EndlessCylinder.radius"),
-    (lambda: Triangles(np.zeros((2, 3))), ShapeError, "Triangles.corners"),
-    (lambda: Triangles(np.full((1, 3, 3), np.nan)), NotFiniteError, "Triangles.corners"),
+    (lambda: TriangleMesh.read("no.stl"), RobotFileError, "no.stl"),
+    (lambda: TriangleMesh(np.zeros((2, 3))), ShapeError, "TriangleMesh.corners"),
+    (lambda: TriangleMesh(np.full((1, 3, 3), np.nan)), NotFiniteError, "TriangleMesh.corners"),
     (lambda: Motion.linear(TREE, [0.0], NONE[:1], POSES[:1]), ShapeError, "two knots"),
     (lambda: Motion.linear(TREE, [0.0, 0.0], NONE, POSES), RangeError, r"Motion.times\[1\]"),
     (lambda: Motion.linear(TREE, [0.0, 1.0], np.zeros((2, 1)), POSES), ShapeError, "q"),

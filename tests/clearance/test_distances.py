@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from itertools import combinations_with_replacement
 from math import pi
+from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
@@ -11,7 +12,8 @@ import pytest
 
 from tests.clearance.world import free_tree, judged, numbers, random_pose, solids, still
 from tests.repeats import repeats
-from wbc.clearance import Body, CylinderInside, EndlessCylinder, Motion, Pair, Scene, Sweeper, Triangles
+from wbc.clearance import Body, CylinderInside, EndlessCylinder, Motion, Pair, Scene, Sweeper, TriangleMesh
+from wbc.errors import ShapeError
 from wbc.shapes import Box, Capsule, Convex, Cylinder, HalfSpace, Shape, Solid, Sphere
 from wbc.validation import Array
 
@@ -149,11 +151,42 @@ def test_surfaces_of_triangles_against_the_hull_of_a_box(native: bool) -> None:
         for solid in solids(rng):
             at = random_pose(rng, 2.0)
             expected = judged(solid, at, box, there)
-            found, _ = measured(solid, at, Triangles(corners), there, native)
+            found, _ = measured(solid, at, TriangleMesh(corners), there, native)
             if expected > 0.0:
                 assert expected - UNDER <= found <= expected + OVER
             else:
                 assert found <= 1e-8 or encloses(box, there, solid, at)
+
+
+@NATIVE
+def test_a_closed_mesh_has_an_inside(native: bool, tmp_path: Path) -> None:
+    """The triangles of a box as a solid, from a file: a ball outside, wholly within, and in the wall."""
+    rng = np.random.default_rng(6)
+    box = Box((0.8, 0.5, 0.3))
+    corners = box_triangles(box)
+    path = tmp_path / "box.stl"
+    path.write_text(stl(corners * 1e3))
+    mesh = TriangleMesh.read(path, 1e-3)
+    assert mesh.solid
+    assert len(mesh.corners) == 12
+    # 6 mm from the side, 60 mm across; in the middle; outside; through the wall
+    for x, expected in ((0.394 - 0.03, -0.036 - 0.03), (0.0, -0.15 - 0.03), (0.5, 0.1 - 0.03), (0.4, -0.03)):
+        there = random_pose(rng, 1.0)
+        found, points = measured(Sphere(0.03), there * up(x), mesh, there, native)
+        assert found == pytest.approx(expected, abs=3e-6)
+        assert np.linalg.norm(points[1] - points[0]) == pytest.approx(abs(found), abs=1e-5)
+    for wrong in (corners[1:], np.concatenate([corners[:1, ::-1], corners[1:]])):
+        with pytest.raises(ShapeError, match="solid"):
+            TriangleMesh(wrong, solid=True)
+
+
+def stl(corners: Array) -> str:
+    """A text of triangles."""
+    lines = ["solid box"]
+    for face in corners:
+        points = "\n".join(f"vertex {x:.9g} {y:.9g} {z:.9g}" for x, y, z in face)
+        lines.append(f"facet normal 0 0 0\nouter loop\n{points}\nendloop\nendfacet")
+    return "\n".join([*lines, "endsolid box", ""])
 
 
 def encloses(box: Box, there: pin.SE3, solid: Solid, at: pin.SE3) -> bool:
@@ -169,7 +202,7 @@ def box_triangles(box: Box) -> Array:
         u, v = (np.roll(np.eye(3)[axis], k) * half for k in (1, 2))
         for side in (-1.0, 1.0):
             middle = side * np.eye(3)[axis] * half
-            quad = [middle - u - v, middle + u - v, middle + u + v, middle - u + v]
+            quad = [middle - u - v, middle + u - v, middle + u + v, middle - u + v][:: int(side)]
             out += [[quad[0], quad[1], quad[2]], [quad[0], quad[2], quad[3]]]
     return np.array(out)
 
@@ -179,8 +212,8 @@ def test_many_triangles_in_their_tree_are_as_far_as_one_by_one() -> None:
     corners = rng.normal(size=(100, 1, 3)) * 2.0 + 0.2 * rng.normal(size=(100, 3, 3))
     for _ in range(repeats(3)):
         at, capsule = random_pose(rng, 2.0), Capsule(0.05, float(rng.uniform(0.0, 1.0)))
-        found, points = measured(capsule, at, Triangles(corners), pin.SE3.Identity(), True)
-        each = [measured(capsule, at, Triangles(one[None]), pin.SE3.Identity(), True)[0] for one in corners]
+        found, points = measured(capsule, at, TriangleMesh(corners), pin.SE3.Identity(), True)
+        each = [measured(capsule, at, TriangleMesh(one[None]), pin.SE3.Identity(), True)[0] for one in corners]
         assert found == pytest.approx(min(each), abs=1e-12)
         if found > 0.0:
             assert np.linalg.norm(points[1] - points[0]) == pytest.approx(found, abs=1e-9)

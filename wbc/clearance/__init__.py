@@ -8,7 +8,7 @@ from wbc.clearance.scene import (
     Exemption,
     Pair,
     Scene,
-    Triangles,
+    TriangleMesh,
     bodies_of,
     self_pairs,
 )
@@ -17,5 +17,5 @@ from wbc.clearance.tree import Tree
 
 __all__ = [
     "Body", "CylinderInside", "EndlessCylinder", "Exemption", "Motion", "Nearest", "Pair", "Scene", "Sweep", "Sweeper",
-    "Tree", "Triangles", "bodies_of", "self_pairs",
+    "Tree", "TriangleMesh", "bodies_of", "self_pairs",
 ]  # fmt: skip

@@ -13,7 +13,7 @@ import numpy as np
 
 import wbc.proximity
 from wbc.clearance.motion import Motion
-from wbc.clearance.scene import Scene, Triangles, sizes_of
+from wbc.clearance.scene import Scene, TriangleMesh, sizes_of
 from wbc.errors import CompileError
 from wbc.native import toolchain
 from wbc.native.kernel import kernel
@@ -50,7 +50,7 @@ _ARRAYS = (
         "list",
     ),
 )
-#: Triangles of a leaf of a tree of boxes; how often a motion is halved at most, in ``native/sweep.c`` and to its knots
+#: TriangleMesh of a leaf of a tree of boxes; how often a motion is halved at most, in ``native/sweep.c`` and to its
 LEAF, HALVINGS = 4, 128
 
 
@@ -192,8 +192,8 @@ def _shapes(scene: Scene) -> dict[str, Any]:
             filled = np.vstack([shape.points, np.tile(shape.points[-1], (-len(shape.points) % 8, 1))]) - center
             start, count = sum(len(p) // 3 for p in points), len(filled)
             points.append(filled.T.ravel())
-        elif isinstance(shape, Triangles):
-            start = len(tree)
+        elif isinstance(shape, TriangleMesh):
+            start, count = len(tree), len(shape.corners) if shape.solid else 0
             _grow(shape.corners, np.arange(len(shape.corners)), tree, box, triangle)
         hull.append([start, count])
     return {

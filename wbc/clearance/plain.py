@@ -297,7 +297,12 @@ class Solids:
         """A solid and triangles; as far as the balls on the solid's core, where that goes through one."""
         geometry, supports, _ = self._of(a)
         gap, normal = self._coal(geometry, at, self._mesh(surface), there)
-        gap, point = max(gap - SLOP, -float(supports.ball[0])), self._result.getNearestPoint1()
+        ball = float(supports.ball[0])
+        if not abs(float(normal @ normal) - 1.0) < 1e-6:  # a core goes through the surface
+            normal = np.array([0.0, 0.0, 1.0])
+        gap, point = max(gap - SLOP, -ball), self._result.getNearestPoint1()
+        if surface.solid and gap > -ball and enclosed(surface.corners, there.actInv(at).translation):
+            return -gap - 2.0 * ball, np.array([point - 2.0 * ball * normal, point + gap * normal])
         return gap, np.array([point, point + gap * normal])
 
     def _mesh(self, surface: Any) -> Any:
@@ -329,6 +334,15 @@ def _joined(a: Supports, b: Supports) -> Supports:
         setattr(out, name, np.concatenate([getattr(a, name), getattr(b, name)]))
     out.hulls = {k: one.hulls[0] for k, one in enumerate((a, b)) if one.hulls}
     return out
+
+
+def enclosed(corners: Array, point: Array) -> bool:
+    """Whether a point is within a closed surface of triangles, as native/distance.h."""
+    a, b, c = np.moveaxis(corners - point, 1, 0)
+    la, lb, lc = (np.linalg.norm(x, axis=1) for x in (a, b, c))
+    under = la * lb * lc + (a * b).sum(axis=1) * lc + (b * c).sum(axis=1) * la + (c * a).sum(axis=1) * lb
+    angle = 2.0 * np.arctan2((a * np.cross(b, c)).sum(axis=1), under).sum()
+    return bool(abs(angle) > 2.0 * pi)
 
 
 def corners_of(shape: Any, size: Array) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import inf
@@ -15,6 +16,7 @@ from wbc.clearance.tree import Moves, Tree
 from wbc.errors import DuplicateNameError, ShapeError, UnknownNameError
 from wbc.proximity.scene import sphere_round
 from wbc.robot import Robot
+from wbc.robot.meshes import read_mesh
 from wbc.robot.segments import bounding_capsule
 from wbc.shapes import Box, Capsule, Convex, Cylinder, HalfSpace, PlacedShape, Solid, Sphere
 from wbc.validation import Array
@@ -43,24 +45,55 @@ class EndlessCylinder:
 
 
 @dataclass(frozen=True, eq=False)
-class Triangles:
-    """A surface of triangles ``corners`` [n, 3, 3] m, in any order and turn. It has no inside: a body that begins
-    beside it cannot come through without touching, one that begins behind it is not seen. Where the core of a body (of
-    a capsule its segment) goes through the surface, the distance is what the balls on the core give, -radius.
+class TriangleMesh:
+    """A surface of triangles.
+
+    Where the core of a body (of a capsule its segment) goes through the surface, the distance is what the ball on the
+    core gives, -radius. A body whose core is wholly within a solid is as deep in it as its farthest point is below the
+    surface next to the core.
+
+    Attributes:
+        corners: [n, 3, 3] m.
+        solid: the surface is closed and its corners go round it one way, so that it has an inside; else it is a sheet,
+            and what begins behind it is not seen.
+
+    Raises:
+        ShapeError, NotFiniteError: not n x 3 x 3 finite numbers; a solid whose surface is open or turns over.
     """
 
     corners: Array
+    solid: bool = False
 
     def __post_init__(self) -> None:
-        corners = validation.real_array("Triangles.corners", self.corners)
+        corners = validation.real_array("TriangleMesh.corners", self.corners)
         if corners.ndim != 3 or corners.shape[1:] != (3, 3) or not len(corners):
-            raise ShapeError("Triangles.corners", np.shape(self.corners), "expected n x 3 x 3, n at least 1")
+            raise ShapeError("TriangleMesh.corners", np.shape(self.corners), "expected n x 3 x 3, n at least 1")
         object.__setattr__(self, "corners", corners)
+        object.__setattr__(self, "solid", validation.flag("TriangleMesh.solid", self.solid))
+        if self.solid:
+            _, row = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)
+            ring = row.reshape(-1, 3)
+            edges = np.concatenate([ring[:, [k, (k + 1) % 3]] for k in range(3)])
+            edges = edges[edges[:, 0] != edges[:, 1]]
+            one, other = (np.unique(edges[:, order], axis=0) for order in ([0, 1], [1, 0]))
+            if len(one) != len(edges) or not np.array_equal(one, other):
+                raise ShapeError("TriangleMesh.solid", True, "the surface is open, or its triangles turn over")
+
+    @classmethod
+    def read(cls, path: str | os.PathLike[str], scale: float = 1.0, solid: bool = True) -> TriangleMesh:
+        """The surface in a file (STL, OBJ, DAE), its lengths times ``scale``.
+
+        Raises:
+            RobotFileError: a file that cannot be read. RangeError: no scale. ShapeError: as of the class.
+        """
+        factor = validation.scalar("scale", scale, low=0.0, open_low=True)
+        mesh = read_mesh(validation.file_path("path", path), np.full(3, factor))
+        return cls(mesh.vertices[mesh.triangles], solid)
 
 
 #: Those that have no end, and are fixed in the world
 Unbounded = HalfSpace | CylinderInside | EndlessCylinder
-Shape = Solid | Unbounded | Triangles
+Shape = Solid | Unbounded | TriangleMesh
 
 
 @dataclass(frozen=True, eq=False)
@@ -254,7 +287,7 @@ class Scene:
 def _kind(shape: Shape) -> int:
     kinds: tuple[tuple[Any, int], ...] = (
         (Convex, HULL), (HalfSpace, PLANE), (CylinderInside, INSIDE), (EndlessCylinder, OUTSIDE),
-        (Triangles, TRIANGLES),
+        (TriangleMesh, TRIANGLES),
     )  # fmt: skip
     return next((number for kind, number in kinds if isinstance(shape, kind)), SUM)
 
@@ -270,7 +303,7 @@ def sizes_of(shape: Shape) -> list[float]:
         return [*(side / 2 for side in shape.size), 0.0, 0.0, float(np.linalg.norm(shape.size)) / 2]
     if isinstance(shape, Cylinder):
         return [0.0, 0.0, shape.length / 2, shape.radius, 0.0, float(np.hypot(shape.radius, shape.length / 2))]
-    if isinstance(shape, Triangles):
+    if isinstance(shape, TriangleMesh):
         middle = np.linalg.norm(shape.corners, axis=2).max()
         return [0.0, 0.0, 0.0, 0.0, 0.0, float(middle)]
     if isinstance(shape, Convex):
@@ -281,7 +314,7 @@ def sizes_of(shape: Shape) -> list[float]:
 def _line(body: Body, shape: pin.SE3, link: pin.SE3) -> Array:
     if isinstance(body.shape, Unbounded):
         return np.zeros(8)
-    if isinstance(body.shape, Triangles):
+    if isinstance(body.shape, TriangleMesh):
         points = body.shape.corners.reshape(-1, 3)
         middle = (points.min(axis=0) + points.max(axis=0)) / 2
         a = b = shape * middle

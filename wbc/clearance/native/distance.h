@@ -143,6 +143,31 @@ static double boxes(const double *ends, const double *box) {
     return sqrt(square);
 }
 
+/* Whether a point is within a closed surface: the solid angles of its triangles add up to the whole (Van Oosterom and
+ * Strackee, The solid angle of a plane triangle, 1983) */
+static int enclosed(const sweep_t *s, int mesh, const double *point) {
+    const int root = s->hull[2 * mesh], count = s->hull[2 * mesh + 1];
+    const double *box = s->box + 6 * root;
+    int node = root;
+    double angle = 0.0;
+    for (int k = 0; k < 3; k++)
+        if (!(point[k] > box[k] && point[k] < box[3 + k])) return 0;
+    while (s->tree[2 * node] >= 0) node = s->tree[2 * node];
+    const double *triangle = s->triangle + 24 * (-1 - s->tree[2 * node]);
+    for (int f = 0; f < count; f++, triangle += 24) {
+        double x[3][3], n[3][3], length[3];
+        for (int i = 0; i < 3; i++) {
+            for (int k = 0; k < 3; k++) x[i][k] = triangle[8 * k + i] - point[k];
+            length[i] = sqrt(dot3(x[i], x[i]));
+        }
+        cross3(x[1], x[2], n[0]);
+        const double under = length[0] * length[1] * length[2] + dot3(x[0], x[1]) * length[2] +
+                             dot3(x[1], x[2]) * length[0] + dot3(x[2], x[0]) * length[1];
+        angle += 2.0 * atan2(dot3(x[0], n[0]), under);
+    }
+    return fabs(angle) > 2.0 * M_PI;
+}
+
 /* A solid, in a capsule about `ends` (world) of this radius, and a surface of triangles; where it goes through one, the balls
  * on it count and nothing else */
 static void triangles(const sweep_t *s, const shape_t *a, const double *A, const double *ends, double radius, int mesh,
@@ -188,6 +213,17 @@ static void triangles(const sweep_t *s, const shape_t *a, const double *A, const
             along3(out->a, out->gap, d, out->b);
         }
     }
+    const double ball = a->size[4], core = out->gap + ball;
+    double center[3];
+    if (!s->hull[2 * mesh + 1] || !(core > 0.0)) return;
+    minus3(A + 9, M + 9, d);
+    turn_back(M, d, center);
+    if (!enclosed(s, mesh, center)) return;
+    /* Wholly within: as deep as the far side of its ball; from the surface back to there */
+    for (int k = 0; k < 3 && out->gap != 0.0; k++) d[k] = (out->b[k] - out->a[k]) / out->gap;
+    along3(out->a, -2.0 * ball, d, out->a);
+    out->gap = -core - ball;
+    along3(out->a, -out->gap, d, out->b);
 }
 
 static void swapped(found_t *out) {

@@ -37,7 +37,7 @@ typedef struct {
     double *body_pose;
     const double *line; /* 8 each: ends of a capsule about the body in its frame, its radius, and that of what turns beside its core */
     double *world_line; /* 6 each */
-    const int *shape, *hull;
+    const int *shape, *hull; /* of triangles: the root of their tree, and how many they are where they close round a solid */
     const double *size, *points;
     const int *chain, *chain_length; /* depth each: frames with joints, from the body's on */
     double *moved;                   /* 2 (depth + 1) each: how far points may be off the middle, and the slack in it */
