@@ -397,6 +397,18 @@ def test_links_of_a_robot_are_bodies_and_its_pairs_are_pairs() -> None:
         assert near.distance == pytest.approx(judged(one.shape, at, other.shape, there), abs=3e-6)  # type: ignore[arg-type]
 
 
+def test_turns_from_knot_to_knot() -> None:
+    """From none to half a turn."""
+    axis = np.array([0.6, 0.0, 0.8])
+    angles = [0.0, 1e-12, 1e-8, 1e-3, 1.0, 3.0, np.pi - 1e-3, np.pi - 1e-7]
+    rows = [numbers(pin.SE3(pin.exp3(angle * axis), np.zeros(3))) for angle in np.cumsum(angles)]
+    motion = Motion.linear(free_tree(), np.arange(8.0), np.zeros((8, 0)), np.array(rows))
+    for k, turn in enumerate(motion.turns[0]):
+        there = motion.poses[0, k, :9].reshape(3, 3) @ pin.exp3(turn)
+        assert there == pytest.approx(motion.poses[0, k + 1, :9].reshape(3, 3), abs=1e-9)
+        assert np.linalg.norm(turn) == pytest.approx(angles[k + 1], abs=1e-7)
+
+
 def test_quaternions_become_rotations() -> None:
     rng = np.random.default_rng(7)
     poses = [random_pose(rng, 1.0) for _ in range(20)]

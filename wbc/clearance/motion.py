@@ -7,7 +7,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
+import pinocchio as pin
 
 from wbc import validation
 from wbc.clearance.tree import Tree
@@ -135,8 +135,15 @@ class Motion:
         """Turn from every knot to the next, in the axes of the frame there, [free, k - 1, 3] rad."""
         rotation = self.poses[:, :, :9].reshape(*self.poses.shape[:2], 3, 3)
         relative = rotation[:, :-1].transpose(0, 1, 3, 2) @ rotation[:, 1:]
-        out = Rotation.from_matrix(relative.reshape(-1, 3, 3)).as_rotvec() if relative.size else np.zeros(0)
-        return np.ascontiguousarray(out.reshape(*relative.shape[:2], 3))
+        sine = np.stack([relative[..., (k + 2) % 3, (k + 1) % 3] for k in range(3)], axis=-1)
+        sine -= np.stack([relative[..., (k + 1) % 3, (k + 2) % 3] for k in range(3)], axis=-1)
+        length, cosine = np.linalg.norm(sine, axis=-1), np.trace(relative, axis1=-2, axis2=-1) - 1.0
+        angle = np.arctan2(length, cosine)
+        out = sine * np.divide(angle, length, out=np.full_like(angle, 0.5), where=length > 1e-9)[..., None]
+        # Towards half a turn the sine says nothing of the axis
+        for f, k in np.argwhere(cosine < -1.9).tolist():
+            out[f, k] = pin.log3(relative[f, k])
+        return np.ascontiguousarray(out)
 
     @cached_property
     def free_variation(self) -> Array:
