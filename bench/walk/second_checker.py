@@ -8,7 +8,7 @@ beyond its own roundness.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import combinations
+from itertools import combinations, pairwise
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +29,8 @@ NEAR, MOUNTED, DEPTH = 0.0762, 0.005, 0.005
 LEAVING = 3.0
 #: Of hands at their holds [m, rad], and of joints' accelerations, in parts of their limits
 OFF, TURNED, HARDER = 0.002, np.radians(0.5), 1.01
+#: By which the velocity of the body may change from tick to tick: ten times the ramp to 0.1 m/s in 0.5 s [m/s, rad/s]
+JUMP, SPIN_JUMP = 0.02, 0.02
 #: States of hands in a log, and rolls
 CLOSED, FREE_ROLL = 2, 0
 
@@ -45,7 +47,7 @@ def second_check(file: Path, walker: Walker, urdf: Path, structure: Structure) -
         log = {name: data[name] for name in data.files}
     model = pin.buildModelFromUrdf(str(urdf))
     limits = walker.robot.limits.acceleration[6:]
-    return [*_touched(log, model, urdf, structure), *_loose(log, model), *_hard(log, limits)]
+    return [*_touched(log, model, urdf, structure), *_loose(log, model), *_jumps(log), *_hard(log, limits)]
 
 
 def _touched(log: Columns, model: pin.Model, urdf: Path, structure: Structure) -> Iterator[str]:
@@ -194,6 +196,19 @@ def _loose(log: Columns, model: pin.Model) -> Iterator[str]:
         value, time, arm_name = worst.get(kind, (0.0, 0.0, ""))
         if value > limit:
             yield f"{kind}: {value:.4g} at {time:.3f} s, {arm_name}"
+
+
+def _jumps(log: Columns) -> Iterator[str]:
+    """A body whose velocity is not continuous; it comes from rest."""
+    poses = [pin.XYZQUATToSE3(row) for row in log["pose_body_in_structure"]]
+    gap = np.diff(log["t"])[:, None]
+    rates = np.diff(log["pose_body_in_structure"][:, :3], axis=0) / gap
+    spins = np.array([pin.log3(a.rotation.T @ b.rotation) for a, b in pairwise(poses)]) / gap
+    for kind, values, limit in (("velocity [m/s]", rates, JUMP), ("turn rate [rad/s]", spins, SPIN_JUMP)):
+        steps = np.linalg.norm(np.diff(values, axis=0, prepend=0.0 * values[:1]), axis=1)
+        k = int(np.argmax(steps))
+        if steps[k] > limit:
+            yield f"jump of the body's {kind}: {steps[k]:.3f} at {float(log['t'][k]):.3f} s"
 
 
 def _hard(log: Columns, limits: Array) -> Iterator[str]:

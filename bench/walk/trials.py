@@ -44,6 +44,8 @@ GROUNDS = (
     ("truss", "L2,6", "L2,14"),
     ("module", "15,4", "15,10"),
 )
+#: Arms of the walkers on random structures, seed by seed in turn
+ARMS = (3, 3, 3, 4, 3, 3, 6, 3, 5, 3)
 #: Commanded rates of velocity trials: largest [m/s, m/s, rad/s], how many and how long each [s]
 RATES, LEGS, LEG = np.array([0.12, 0.12, 0.1]), 4, 3.0
 
@@ -172,7 +174,8 @@ def tried(part: str, name: str, folder: Path) -> Record:
     folder.mkdir(parents=True, exist_ok=True)
     cpu = time.process_time()
     try:
-        out = PARTS[part](name, wbc.robots.walker(), folder)
+        arms = ARMS[int(name.split()[1]) % len(ARMS)] if part == "structures" else 3
+        out = {"arms": arms, **PARTS[part](name, wbc.robots.walker(arms=arms), folder)}
     except UnsupportedStructureError as error:
         out = {"outcome": "not supported", "reason": str(error)}
     except WbcError as error:

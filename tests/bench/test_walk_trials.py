@@ -104,9 +104,9 @@ def test_the_second_checker_finds_hands_off_their_holds_and_jumps(
     log, structure = walked
     poses = log.pose_body_in_structure.copy()
     poses[50:, 0] += 0.003
-    assert any(
-        "off its hold" in t for t in found(replace(log, pose_body_in_structure=poses), structure, machine, tmp_path)
-    )
+    said = found(replace(log, pose_body_in_structure=poses), structure, machine, tmp_path)
+    assert any("off its hold" in text for text in said)
+    assert any(text.startswith("jump of the body's velocity [m/s]: 0.3") for text in said)
     rates = log.v.copy()
     rates[60, 4] += 2.0
     said = found(replace(log, v=rates), structure, machine, tmp_path)
