@@ -30,7 +30,7 @@ from wbc.walking.run.recording import WalkRecorder
 @pytest.mark.parametrize("family", [name for name in FAMILIES if name != "mesh"])
 def test_structures_are_those_of_their_seeds(family: str, tmp_path: Path) -> None:
     digests = set()
-    for seed in range(12):
+    for seed in range(4):
         trial = random_structure(family, seed)
         structure = trial.structure
         assert structure.digest == random_structure(family, seed).structure.digest
@@ -43,7 +43,7 @@ def test_structures_are_those_of_their_seeds(family: str, tmp_path: Path) -> Non
         assert read.ids == structure.ids
         assert read.positions == pytest.approx(structure.positions, abs=1e-12)
         assert [one.id for one in read.obstacles] == [one.id for one in structure.obstacles]
-    assert len(digests) == 12
+    assert len(digests) == 4
 
 
 def test_structures_of_meshes_wait_for_obstacles_that_are_such() -> None:
