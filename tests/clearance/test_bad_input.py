@@ -83,6 +83,7 @@ BAD: list[tuple[Callable[[], Any], type[WbcError], str]] = [
     (lambda: Motion.linear(TREE, [0.0, np.nan], NONE, POSES), NotFiniteError, "times"),
     (lambda: Motion.linear(TREE, [0.0, 1.0], NONE, POSES, free_slack=-1.0), RangeError, "free_slack"),
     (lambda: Motion.linear(TREE, [0.0, 1.0], NONE, POSES, slack=[1.0, 2.0]), ShapeError, "slack"),
+    (lambda: Tree.of_model(pin.Model(), things=("cart", "cart")), DuplicateNameError, "cart"),
     (jumping, ContinuityError, r"Motion.controls\[1, 0\]"),
     (lambda: Sweeper("scene"), ShapeError, "Scene"),  # type: ignore[arg-type]
     (lambda: Sweeper(scene()).sweep("motion"), ShapeError, "Motion"),  # type: ignore[arg-type]

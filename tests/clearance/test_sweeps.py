@@ -409,6 +409,25 @@ def test_turns_from_knot_to_knot() -> None:
         assert np.linalg.norm(turn) == pytest.approx(angles[k + 1], abs=1e-7)
 
 
+@pytest.mark.parametrize("native", [True, False], ids=["C", "numpy"])
+def test_two_things_that_fly_past_each_other(native: bool) -> None:
+    """They meet between two knots, both under way; a rod on a joint is on neither."""
+    model = pin.Model()
+    model.addJoint(0, pin.JointModelRZ(), pin.SE3.Identity(), "joint")
+    tree = Tree.of_model(model, things=("cart", "drone"))
+    assert tree.free == ("cart", "drone")
+    scene = Scene(tree, [Body("a", Sphere(0.1), "cart"), Body("b", Sphere(0.1), "drone")], [Pair("a", "b")])
+    for off, clear in ((0.19, False), (0.21, True)):
+        still_turn = [0.0, 0.0, 0.0, 1.0]
+        cart = [[-1.0, 0.0, 0.0, *still_turn], [1.0, 0.0, 0.0, *still_turn]]
+        drone = [[0.0, off, -2.0, *still_turn], [0.0, off, 2.0, *still_turn]]
+        motion = Motion.linear(tree, [0.0, 1.0], np.zeros((2, 1)), [cart, drone])
+        swept = Sweeper(scene, native).sweep(motion)
+        assert swept.clear is clear
+        least = Sweeper(scene, native).sweep(motion, aim="least", far=inf, tolerance=1e-6)
+        assert least.found[0] == pytest.approx(off - 0.2, abs=1e-6)
+
+
 def test_quaternions_become_rotations() -> None:
     rng = np.random.default_rng(7)
     poses = [random_pose(rng, 1.0) for _ in range(20)]

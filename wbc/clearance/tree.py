@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum
 from functools import cached_property
@@ -10,7 +11,7 @@ import numpy as np
 import pinocchio as pin
 
 from wbc import validation
-from wbc.errors import UnsupportedJointError
+from wbc.errors import DuplicateNameError, UnsupportedJointError
 from wbc.symbolic.joint_steps import Kind, joint_steps, place
 from wbc.validation import Array
 
@@ -61,13 +62,15 @@ class Tree:
     links: dict[str, tuple[int, pin.SE3]] = field(repr=False)
 
     @classmethod
-    def of_model(cls, model: pin.Model, floating: bool = False) -> Tree:
+    def of_model(cls, model: pin.Model, floating: bool = False, things: Sequence[str] = ()) -> Tree:
         """The joints of a model; of a joint without end its angle is the scalar.
 
         Args:
             floating: the model has a base that is fixed, and that a free pose carries here.
+            things: what moves beside the model, each a link with a free pose; in a motion they come last.
 
         Raises:
+            DuplicateNameError: a thing that is called as a link or as another thing.
             UnsupportedJointError: a joint that is neither free nor a row of turns and shifts by scalars.
         """
         frames: list[Frame] = []
@@ -110,6 +113,12 @@ class Tree:
         links = {"world": (-1, pin.SE3.Identity())}
         for frame in model.frames:
             links.setdefault(str(frame.name), (last[int(frame.parentJoint)], pin.SE3(frame.placement)))
+        for thing in validation.strings("things", things):
+            if thing in links:
+                raise DuplicateNameError("things", thing, "a link of this name is there already")
+            links[thing] = (len(frames), pin.SE3.Identity())
+            frames.append(Frame(-1, pin.SE3.Identity(), Moves.FREE, len(free)))
+            free.append(thing)
         return cls(tuple(frames), tuple(names), tuple(free), links)
 
     def link(self, what: str, name: str) -> tuple[int, pin.SE3]:
