@@ -64,6 +64,17 @@ def exempt(**changes: Any) -> Any:
 BAD: list[tuple[Callable[[], Any], type[WbcError], str]] = [
     (lambda: scene(bodies=[HAND, HAND]), DuplicateNameError, "hand"),
     (lambda: scene(bodies=["hand"]), ShapeError, "Body"),
+    (lambda: scene(bodies=[HAND, Body(3, HalfSpace())]), WbcError, "name"),  # type: ignore[arg-type]
+    (lambda: scene(bodies=[HAND, Body("table", HalfSpace(), "world", "here")]), WbcError, "table.placement"),  # type: ignore[arg-type]
+    (lambda: scene(bodies=[HAND, Body("table", HalfSpace(), [])]), WbcError, "table.link"),  # type: ignore[arg-type]
+    (lambda: scene(bodies=[Body("hand", Sphere(0.1), "universe", grasp=[1, 2]), TABLE]), ShapeError, "hand.grasp"),
+    (lambda: scene(pairs=[("hand", "table")]), ShapeError, "a Pair"),
+    (lambda: scene(pairs=[Pair(["hand"], "table")]), WbcError, "pairs"),  # type: ignore[arg-type]
+    (lambda: Scene("tree", [], []), ShapeError, "a Tree"),  # type: ignore[arg-type]
+    (lambda: Sweeper(scene()).sweep(still(pin.SE3.Identity()), exemptions=["hand"]), ShapeError, "an Exemption"),  # type: ignore[list-item]
+    (lambda: Sweeper(scene()).sweep(still(pin.SE3.Identity()), "all"), ShapeError, "pairs"),
+    (lambda: Sweeper(scene()).sweep(still(pin.SE3.Identity()), [[0], [0, 1]]), ShapeError, "pairs"),
+    (lambda: Sweeper(scene()).sweep(still(pin.SE3.Identity()), [0.5]), ShapeError, "pairs"),
     (lambda: scene(pairs=[Pair("hand", "tabel")]), UnknownNameError, "table"),
     (lambda: scene(pairs=[Pair("hand", "table", float("nan"))]), NotFiniteError, "hand and table"),
     (lambda: scene(pairs=[Pair("table", "table")]), ShapeError, "solid"),

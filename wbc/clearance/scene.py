@@ -193,12 +193,12 @@ class Scene:
     """
 
     def __init__(self, tree: Tree, bodies: Sequence[Body], pairs: Sequence[Pair]) -> None:
-        self.tree = tree
+        self.tree = validation.instance("tree", tree, Tree, "a Tree")
         self.bodies: tuple[Body, ...] = validation.items("bodies", bodies, "Bodies")
         self.pairs: tuple[Pair, ...] = validation.items("pairs", pairs, "Pairs")
         self.number: dict[str, int] = {}
         for k, body in enumerate(self.bodies):
-            validation.instance(f"bodies[{k}]", body, Body, "a Body")
+            validation.name(f"bodies[{k}].name", validation.instance(f"bodies[{k}]", body, Body, "a Body").name)
             if body.name in self.number:
                 raise DuplicateNameError("bodies", body.name, "two of this name")
             self.number[body.name] = k
@@ -213,6 +213,8 @@ class Scene:
         for k, body in enumerate(self.bodies):
             if isinstance(body.shape, Unbounded) and self.chain[k]:
                 raise ShapeError(f"{body.name}.shape", body.shape, "a shape without end is fixed in the world")
+        for k, pair in enumerate(self.pairs):
+            validation.instance(f"pairs[{k}]", pair, Pair, "a Pair")
         ends = [(self._known("pairs", pair.first), self._known("pairs", pair.second)) for pair in self.pairs]
         self._rows = {end: k for k, end in enumerate(ends)}
         self.first, self.second = (np.array([end[k] for end in ends], dtype=np.int32) for k in (0, 1))
@@ -234,8 +236,9 @@ class Scene:
             UnknownNameError, ShapeError, RangeError: an exemption that names no pair or has no such numbers.
         """
         found = []
-        for e, exemption in enumerate(exemptions):
+        for e, exemption in enumerate(validation.items("exemptions", exemptions, "Exemptions")):
             field = f"exemptions[{e}]"
+            validation.instance(field, exemption, Exemption, "an Exemption")
             hand, mount = (self._known(field, name) for name in (exemption.hand, exemption.mount))
             if self.bodies[hand].grasp is None:
                 raise ShapeError(f"{field}.hand", exemption.hand, "this body has no grasp point")
@@ -257,22 +260,20 @@ class Scene:
         return sorted(found, key=lambda entry: entry[0])
 
     def _known(self, field: str, name: str) -> int:
-        if name not in self.number:
-            raise UnknownNameError(field, name, list(self.number))
-        return self.number[name]
+        return self.number[validation.one_of(field, name, tuple(self.number))]
 
     def _on_frame(self, body: Body) -> tuple[pin.SE3, pin.SE3]:
         """(pose of the shape, pose of the link) on the frame."""
         _, link = self.tree.link(f"{body.name}.link", body.link)
-        return link * (body.placement or pin.SE3.Identity()), link
+        if body.placement is None:
+            return link, link
+        return link * validation.pose(f"{body.name}.placement", body.placement), link
 
     def _place(self, body: Body) -> tuple[int, pin.SE3, Array]:
         if not isinstance(body.shape, Shape):
             raise ShapeError(
                 f"{body.name}.shape", body.shape, "expected a solid, a surface of triangles or one without end"
             )
-        if body.placement is not None:
-            validation.pose(f"{body.name}.placement", body.placement)
         frame, _ = self.tree.link(f"{body.name}.link", body.link)
         center = sphere_round(body.shape)[0] if isinstance(body.shape, Convex) else np.zeros(3)
         return frame, self._on_frame(body)[0] * pin.SE3(np.eye(3), center), center

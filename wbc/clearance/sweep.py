@@ -169,8 +169,14 @@ class Sweeper:
 
     def _chosen(self, pairs: Any) -> NDArray[np.intp]:
         count = len(self.scene.pairs)
-        chosen = np.arange(count) if pairs is None else np.asarray(pairs)
-        if not len(chosen):
+        if pairs is None:
+            return np.arange(count)
+        given = pairs if isinstance(pairs, np.ndarray) else validation.items("pairs", pairs, "numbers")
+        try:
+            chosen = np.asarray(given)
+        except ValueError as error:
+            raise ShapeError("pairs", pairs, "expected numbers of pairs, each once") from error
+        if not chosen.size:
             return np.zeros(0, dtype=np.intp)
         if chosen.ndim != 1 or chosen.dtype.kind not in "iu" or len(np.unique(chosen)) != len(chosen):
             raise ShapeError("pairs", pairs, "expected numbers of pairs, each once")
