@@ -111,8 +111,10 @@ def vanish(name: str, walker: Walker, folder: Path) -> Record:
         recorder.tick(tick)
         if when and walk.time >= when[0]:
             when.pop(0)
-            targets = [walk.swinging.hold] if walk.swinging is not None else []
-            walk.vanish([walk.structure.ids[int(rng.choice([*walk.held.values(), *targets]))]])
+            # Not so many that the body would fall
+            some = list(walk.held.values()) if len(walk.held) > walker.min_holds else []
+            some += [walk.swinging.hold] if walk.swinging is not None else []
+            walk.vanish([walk.structure.ids[int(rng.choice(some))]] if some else [])
 
     try:
         end, reason = walk.run(on_tick), ""
