@@ -23,7 +23,8 @@ from wbc.errors import RangeError, WbcError
 from wbc.interrupts import obey_kill
 from wbc.robots import Walker
 from wbc.validation import Array
-from wbc.walking import Structure
+from wbc.walking import Structure, save_structure
+from wbc.walking.checker import check_walk
 from wbc.walking.loop.walk import Tick, Walk
 from wbc.walking.planner.plan import HoldLost, NoPlanError
 from wbc.walking.planner.planner import plan_walk
@@ -122,6 +123,7 @@ def vanish(name: str, walker: Walker, folder: Path) -> Record:
         end, reason = type(error).__name__, str(error)
     log = recorder.log()[0]
     log.save(folder)
+    save_structure(structure, folder / "structure.csv")
     return {
         "outcome": end,
         "reason": reason,
@@ -142,8 +144,6 @@ def kept(run: WalkRun, folder: Path) -> Record:
 
 def checked(log: Any, walker: Walker, structure: Structure, folder: Path) -> Record:
     """What both checkers find in a log."""
-    from wbc.walking.checker import check_walk
-
     robot = walker.urdf(folder / "robot.urdf")
     report = check_walk(log, robot, structure, rules_of(walker))
     return {
