@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from wbc.analysis import (
-    Branch,
     Budget,
     Exact,
     ExactModel,
+    LocusBranch,
     Notation,
     Rows,
     Value,
@@ -20,8 +20,8 @@ from wbc.analysis import (
     sub_determinant_locus,
     symbolic_jacobian,
 )
-from wbc.analysis.numeric import NumericRows, rank
-from wbc.analysis.points import real_point
+from wbc.analysis.algebra.points import real_point
+from wbc.analysis.jacobians.numeric import NumericRows, rank
 
 #: Robot, set ("" for the task alone), and the lines of its locus
 LOCI = (
@@ -73,7 +73,7 @@ def test_a_locus_that_the_budget_cuts_short_says_so() -> None:
 def test_subsets_of_branches() -> None:
     exact, _, _ = problem("spherical_4r", "")
     arithmetic = exact.branches
-    wide, narrow = Branch((Value(1, Fraction(0)),)), Branch((Value(1, Fraction(0)), Value(3, None)))
+    wide, narrow = LocusBranch((Value(1, Fraction(0)),)), LocusBranch((Value(1, Fraction(0)), Value(3, None)))
     assert arithmetic.within(narrow, wide)
     assert not arithmetic.within(wide, narrow)
     assert arithmetic.with_condition(wide, Value(1, None)) == []

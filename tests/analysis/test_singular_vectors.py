@@ -11,17 +11,17 @@ from tests.analysis.jacobians import jacobians
 from wbc.analysis import (
     ALGORITHMS,
     Analysis,
-    Branch,
     Budget,
     Exact,
     ExactModel,
+    LocusBranch,
     Notation,
     analyse,
     candidate_rows,
     published_sets,
 )
-from wbc.analysis.loci import Loci, loci
-from wbc.analysis.numeric import rank
+from wbc.analysis.jacobians.numeric import rank
+from wbc.analysis.loci.loci import Loci, loci
 from wbc.errors import RangeError
 
 
@@ -78,10 +78,10 @@ def test_a_budget_leaves_branches_open_and_keeps_what_is_known(algorithm: str) -
 def test_a_keyboard_interrupt_is_answered_with_what_is_known(
     algorithm: str, after: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    original: Callable[..., list[Branch]] = Exact.extended
+    original: Callable[..., list[LocusBranch]] = Exact.extended
     calls = 0  # of the process that searches
 
-    def extended(self: Exact, *arguments: object) -> list[Branch]:
+    def extended(self: Exact, *arguments: object) -> list[LocusBranch]:
         nonlocal calls
         calls += 1
         if calls == after + 1:

@@ -11,7 +11,7 @@ import pinocchio as pin
 import coal
 
 from wbc.clearance import Motion, Tree
-from wbc.proximity.geometry import geometry_of
+from wbc.robot.geometry.coal_shapes import geometry_of
 from wbc.shapes import Box, Capsule, Convex, Cylinder, Solid, Sphere
 from wbc.validation import Array
 

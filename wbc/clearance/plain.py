@@ -17,10 +17,10 @@ import coal
 from wbc.clearance.motion import Motion
 from wbc.clearance.scene import INSIDE, OUTSIDE, PLANE, SUM, TRIANGLES, Scene, sizes_of
 from wbc.clearance.tree import Moves
-from wbc.proximity.geometry import geometry_of
 from wbc.proximity.judge import declared
 from wbc.proximity.scene import Index
 from wbc.proximity.support import Supports, clearance
+from wbc.robot.geometry.coal_shapes import geometry_of
 from wbc.shapes import Convex, Cylinder
 from wbc.validation import Array
 

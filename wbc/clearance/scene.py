@@ -14,10 +14,10 @@ import pinocchio as pin
 from wbc import validation
 from wbc.clearance.tree import Moves, Tree
 from wbc.errors import DuplicateNameError, ShapeError, UnknownNameError
-from wbc.proximity.scene import sphere_round
 from wbc.robot import Robot
-from wbc.robot.meshes import read_mesh
-from wbc.robot.segments import bounding_capsule
+from wbc.robot.geometry.coal_shapes import sphere_round
+from wbc.robot.geometry.meshes import read_mesh
+from wbc.robot.geometry.segments import bounding_capsule
 from wbc.shapes import Box, Capsule, Convex, Cylinder, HalfSpace, PlacedShape, Solid, Sphere
 from wbc.validation import Array
 

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from wbc import tasks
-from wbc.controller.controller import Controller
-from wbc.controller.input_group import InputGroup
+from wbc.controller.controller import Controller, core_of
+from wbc.controller.handle import InputGroup
 from wbc.controller.stack import Stack
-from wbc.robots import Arm, Walker
+from wbc.robots import Walker, WalkerArm
 from wbc.validation import Array
 from wbc.walking.holds.structure import Structure
 from wbc.walking.loop.hold_items import HoldItems
@@ -57,7 +57,7 @@ class WalkStack:
         self._turning = np.zeros(walker.robot.nv)
         self._near = (-1, False)
         items: Any = self.controller
-        self._body = InputGroup(self.controller, [("body", "target", None), ("body", "feedforward", None)])
+        self._body = InputGroup(core_of(self.controller), [("body", "target", None), ("body", "feedforward", None)])
         self._rest = items["posture"]
         self._holds.of(self.controller)
         self._swings, self._axes = ([items[f"{arm.name} {kind}"] for arm in walker.arms] for kind in ("swing", "axis"))
@@ -159,9 +159,9 @@ class WalkStack:
         of = self.walker.arms[arm].v
         return slice(of.start - 6, of.stop - 6)
 
-    def _hand(self, arm: Arm) -> InputGroup:
+    def _hand(self, arm: WalkerArm) -> InputGroup:
         """What a swinging hand follows: its place and velocity, joints 4 to 6 and their rates."""
         name = f"{arm.name} swing"
         wrist, turning = slice(arm.q.start + 3, arm.q.stop), slice(arm.v.start + 3, arm.v.stop)
         posture = ("posture", "target", wrist), ("posture", "feedforward", turning)
-        return InputGroup(self.controller, [(name, "target", None), (name, "feedforward", None), *posture])
+        return InputGroup(core_of(self.controller), [(name, "target", None), (name, "feedforward", None), *posture])
