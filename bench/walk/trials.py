@@ -174,17 +174,18 @@ def names(part: str, count: int) -> list[str]:
 def tried(part: str, name: str, folder: Path) -> Record:
     """The record of one trial; an error of the package is its outcome."""
     folder.mkdir(parents=True, exist_ok=True)
-    cpu = time.process_time()
+    cpu, out = time.process_time(), Record()
     try:
         arms = ARMS[int(name.split()[1]) % len(ARMS)] if part == "structures" else 3
-        out = {"arms": arms, **PARTS[part](name, wbc.robots.walker(arms=arms), folder)}
+        out["arms"] = arms
+        out |= PARTS[part](name, wbc.robots.walker(arms=arms), folder)
     except UnsupportedStructureError as error:
-        out = {"outcome": "not supported", "reason": str(error)}
+        out |= {"outcome": "not supported", "reason": str(error)}
     except WbcError as error:
-        out = {"outcome": "error", "reason": f"{type(error).__name__}: {error}"}
+        out |= {"outcome": "error", "reason": f"{type(error).__name__}: {error}"}
     except Exception as error:  # noqa: BLE001 (an error of a trial is what the benchmark looks for)
         where = traceback.extract_tb(error.__traceback__)[-1]
-        out = {
+        out |= {
             "outcome": "crash",
             "reason": f"{type(error).__name__}: {error} ({Path(where.filename).name}:{where.lineno})",
         }
