@@ -50,16 +50,21 @@ def arguments(given: list[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--layouts", type=int, help=f"how many; default: {whole.layouts}")
     parser.add_argument("--walked", type=int, help=f"of these carried out; default: {whole.walked}")
     parser.add_argument("--patches", type=int, help=f"how many; default: {whole.patches}")
+    parser.add_argument("--trials", type=int, help=f"random structures, more of other trials; default: {whole.trials}")
+    parser.add_argument("--parallel", type=int, default=1, help="trials at a time, each a process; default: 1")
     parser.add_argument("--resume", action="store_true", help="keep what an earlier run measured with these sources")
     parser.add_argument("--collisions", action="store_true", help="with self-collision rows in the controller")
     parser.add_argument("--output", type=Path, default=ROOT / "build" / "bench", help="folder; default: build/bench")
     chosen = parser.parse_args(given)
     usual = QUICK if chosen.quick else whole
-    counts = [getattr(chosen, name) for name in ("layouts", "walked", "patches")]
+    counts = [getattr(chosen, name) for name in ("layouts", "walked", "patches", "trials")]
     if any(count is not None and count < 0 for count in counts):
-        parser.error("--layouts, --walked and --patches are at least 0")
-    known = (usual.layouts, usual.walked, usual.patches)
-    chosen.sizes = Sizes(*(size if count is None else count for count, size in zip(counts, known, strict=True)))
+        parser.error("--layouts, --walked, --patches and --trials are at least 0")
+    known = (usual.layouts, usual.walked, usual.patches, usual.trials)
+    if chosen.parallel < 1:
+        parser.error("--parallel is at least 1")
+    given_sizes = (size if count is None else count for count, size in zip(counts, known, strict=True))
+    chosen.sizes = Sizes(*given_sizes, chosen.output / "trials")
     return chosen
 
 
@@ -85,7 +90,7 @@ def main(given: list[str] | None = None) -> None:
     bars = (TextColumn("{task.description:10}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
     with Progress(*bars, TimeRemainingColumn(), console=errors) as progress:
         jobs = {name: part.jobs(it) for name, part in parts_of(chosen.sizes).items() if name in chosen.parts}
-        work = {name: (len(mine), records(name, mine, kept)) for name, mine in jobs.items() if mine}
+        work = {name: (len(mine), records(name, mine, kept, chosen.parallel)) for name, mine in jobs.items() if mine}
         parts, interrupted = measure(work, progress)
     parts = others([*work], kept) | parts
     lines = [

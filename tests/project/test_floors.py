@@ -27,6 +27,7 @@ FLOORS = {
     "wbc.robots": 2,
     "wbc.proximity": 2,
     "wbc.simulation": 3,
+    "wbc.clearance": 3,
     "wbc.tasks": 3,
     "wbc.analysis": 4,
     "wbc.stack": 4,

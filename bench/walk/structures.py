@@ -1,0 +1,235 @@
+"""Random structures of seven families, from seeds: what stands in the way is where a walk may hit it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import ceil, cos, pi, radians, sin
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+
+from wbc import validation
+from wbc.errors import WbcError
+from wbc.shapes import Box, Capsule, Convex
+from wbc.validation import Array
+from wbc.walking import Hold, Obstacle, PlaneSurface, Structure, save_structure
+from wbc.walking.holds.hold import FIXED, FREE, frame_of
+
+#: Distance between holds, and height of the body over them [m]
+PITCH, HEIGHT = 0.235, 1.32
+#: Holds are left out that are this near to an obstacle [m]
+FREE_OF = 0.12
+#: Tilt that the holds allow [rad]
+TILT = 0.05
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """A random structure, and the holds over which a body begins and ends on it."""
+
+    family: str
+    seed: int
+    structure: Structure
+    start: str
+    goal: str
+
+    @property
+    def name(self) -> str:
+        """Family and seed."""
+        return f"{self.family} {self.seed}"
+
+    def save(self, folder: Path) -> Path:
+        """Writes the structure's file; returns it."""
+        folder.mkdir(parents=True, exist_ok=True)
+        return save_structure(self.structure, folder / f"{self.family}-{self.seed}.csv")
+
+
+class UnsupportedStructureError(WbcError):
+    """A structure that the package has no objects for."""
+
+
+def random_structure(family: str, seed: int) -> Trial:
+    """The structure of a seed.
+
+    Raises:
+        UnknownNameError: no such family. UnsupportedStructureError: the package refuses its shapes.
+    """
+    make = FAMILIES[validation.one_of("family", family, tuple(FAMILIES))]
+    rng = np.random.default_rng([list(FAMILIES).index(family), seed])
+    structure, start, goal = make(rng, f"{family}-{seed}")
+    return Trial(family, seed, structure, start, goal)
+
+
+def _lattice(rows: int, columns: int) -> dict[str, Array]:
+    """Grasp points "T,A" on the plane z = 0 [m]."""
+    return {f"{t},{a}": np.array([PITCH * a, PITCH * t, 0.0]) for t in range(rows) for a in range(columns)}
+
+
+def _on_plane(name: str, obstacles: list[Obstacle], rows: int = 15, columns: int = 18) -> Structure:
+    """A plane with a lattice, less the holds that obstacles stand on or are close to."""
+    holds = [
+        Hold(key, frame_of("hold", at, (0, 0, -1), (1, 0, 0)), FREE, TILT)
+        for key, at in _lattice(rows, columns).items()
+        if all(obstacle.distance(at) >= FREE_OF for obstacle in obstacles)
+    ]
+    return Structure(name, tuple(holds), tuple(obstacles), PlaneSurface(pin.SE3.Identity()))
+
+
+def _ends(rng: np.random.Generator, structure: Structure, apart: float = 1.2, margin: float = 0.75) -> tuple[str, str]:
+    """Two holds at least ``apart``, and at least ``margin`` from the outline of all holds [m]."""
+    points = structure.positions
+    low, high = points.min(axis=0), points.max(axis=0)
+    flat = high - low <= 2 * margin
+    inner = np.all(((points >= low + margin) & (points <= high - margin)) | flat, axis=1)
+    rows = np.flatnonzero(inner)
+    gaps = np.linalg.norm(points[rows, None] - points[rows], axis=2)
+    first, last = np.nonzero((gaps >= apart) & (gaps <= apart + 0.8))
+    k = int(rng.integers(len(first)))
+    return structure.ids[rows[first[k]]], structure.ids[rows[last[k]]]
+
+
+def capsule_between(name: str, a: Array, b: Array, radius: float) -> Obstacle:
+    """A capsule about the segment a b [m]."""
+    length = float(np.linalg.norm(b - a))
+    turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), (b - a) / length).matrix()
+    return Obstacle(name, Capsule(radius, length), pin.SE3(turn, (a + b) / 2))
+
+
+def _posts(rng: np.random.Generator, name: str) -> tuple[Structure, str, str]:
+    """Posts of any height that stand among the holds."""
+    posts = []
+    for k in range(int(rng.integers(3, 9))):
+        foot = np.append(rng.uniform([0.3, 0.3], [3.7, 3.0]), 0.0)
+        top = foot + [0.0, 0.0, rng.uniform(0.3, 1.7)]
+        posts.append(capsule_between(f"post {k}", foot, top, float(rng.uniform(0.02, 0.06))))
+    structure = _on_plane(name, posts)
+    return structure, *_ends(rng, structure)
+
+
+def _bars(rng: np.random.Generator, name: str) -> tuple[Structure, str, str]:
+    """Bars at any height that cross the holds."""
+    bars = []
+    for k in range(int(rng.integers(2, 6))):
+        angle, middle = rng.uniform(0, pi), np.append(rng.uniform([0.5, 0.5], [3.5, 2.8]), rng.uniform(0.15, 1.5))
+        along = np.array([cos(angle), sin(angle), rng.uniform(-0.2, 0.2)]) * rng.uniform(0.3, 1.2)
+        bars.append(capsule_between(f"bar {k}", middle - along, middle + along, float(rng.uniform(0.02, 0.05))))
+    structure = _on_plane(name, bars)
+    return structure, *_ends(rng, structure)
+
+
+def _ladder(rng: np.random.Generator, name: str) -> tuple[Structure, str, str]:
+    """A ladder that leans or lies among the holds: two rails and their rungs."""
+    foot, angle, lean = (
+        np.append(rng.uniform([0.8, 0.8], [3.2, 2.5]), 0.08),
+        rng.uniform(0, 2 * pi),
+        rng.uniform(0, 1.4),
+    )
+    up = np.array([cos(angle) * cos(lean), sin(angle) * cos(lean), sin(lean)])
+    across, half, length = np.array([-sin(angle), cos(angle), 0.0]), rng.uniform(0.15, 0.3), rng.uniform(1.0, 2.0)
+    parts = [
+        capsule_between(
+            f"rail {side:+d}", foot + side * half * across, foot + side * half * across + length * up, 0.025
+        )
+        for side in (-1, 1)
+    ]
+    for k, at in enumerate(np.arange(0.15, length, 0.3)):
+        parts.append(capsule_between(f"rung {k}", *(foot + at * up + s * half * across for s in (-1, 1)), 0.018))
+    structure = _on_plane(name, parts)
+    return structure, *_ends(rng, structure)
+
+
+def _corner(rng: np.random.Generator, name: str) -> tuple[Structure, str, str]:
+    """Two planes that meet in a corner or an edge; the body goes from the one to the other."""
+    angle = float(rng.choice([-1.0, 1.0]) * rng.uniform(radians(15), radians(75)))  # > 0: a corner
+    rows, columns, thick, holds, slabs = 11, 8, 0.1, [], []
+    for side, turn in ((-1, 0.0), (1, angle)):
+        rotation = pin.utils.rotate("y", -turn) if side > 0 else np.eye(3)
+        # Holds begin where a hand has place beside the other plane
+        first = 0.25 + max(angle, 0.0) * 0.2
+        for key, point in _lattice(rows, columns).items():
+            at = rotation @ (side * np.array([first, 0, 0]) + [side * point[0], point[1], 0.0])
+            pose = frame_of("hold", at, -rotation[:, 2], rotation[:, 0])
+            holds.append(Hold(f"{'abc'[side + 1]}{key}", pose, FREE, TILT))
+        long = first + PITCH * columns
+        middle = rotation @ np.array([side * long / 2, PITCH * (rows - 1) / 2, -thick / 2])
+        sizes = (long, PITCH * (rows + 2), thick)
+        slabs.append(Obstacle("slab a" if side < 0 else "slab c", Box(sizes), pin.SE3(rotation, middle)))
+    structure = Structure(name, tuple(holds), tuple(slabs))
+    row = int(rng.integers(4, 7))
+    return structure, f"a{row},{int(rng.integers(3, 5))}", f"c{int(rng.integers(4, 7))},{int(rng.integers(3, 5))}"
+
+
+def _inside(rng: np.random.Generator, name: str) -> tuple[Structure, str, str]:
+    """The inside of a cylinder about x, of staves; holds on the wall."""
+    radius, length, half = float(rng.uniform(2.4, 4.0)), 18 * PITCH, radians(75)
+    count = ceil(2 * half * radius / PITCH)
+    angles, holds = np.linspace(-half, half, count), []
+    for t, angle in enumerate(angles):
+        outward = np.array([0.0, sin(angle), -cos(angle)])
+        for a in range(18):
+            pose = frame_of("hold", radius * outward + [PITCH * a, 0, 0], outward, (1, 0, 0))
+            holds.append(Hold(f"{t},{a}", pose, FREE, TILT))
+    staves = []
+    step = angles[1] - angles[0]
+    for k, angle in enumerate(np.arange(-half - step, half + 1.5 * step, step)):
+        turn = pin.utils.rotate("x", angle)
+        width = 2 * (radius + 0.1) * np.tan(step / 2)
+        at = turn @ np.array([0.0, 0.0, -(radius + 0.05)]) + [length / 2, 0, 0]
+        staves.append(Obstacle(f"stave {k}", Box((length + 2 * PITCH, float(width), 0.1)), pin.SE3(turn, at)))
+    structure = Structure(name, tuple(holds), tuple(staves))
+    t = sorted(rng.integers(count // 3, count - count // 3, 2).tolist())
+    a = (int(rng.integers(4, 6)), int(rng.integers(10, 13)))
+    return structure, f"{t[0]},{a[0]}", f"{t[1]},{a[1]}"
+
+
+def _tilted(rng: np.random.Generator, name: str) -> tuple[Structure, str, str]:
+    """A lattice on a plane in any attitude, jittered, with holds of every kind that lean a little."""
+    attitude = pin.SE3(pin.Quaternion(*_unit(rng.normal(size=4))).matrix(), rng.uniform(-2, 2, 3))
+    jitter, lean = rng.uniform(0.0, 0.06), rng.uniform(0.0, radians(12))
+    roll = [FREE, FIXED, 2, 4, 6][int(rng.integers(5))]
+    holds = []
+    for key, at in _lattice(15, 18).items():
+        axis = _unit(np.append(np.tan(lean) * rng.uniform(-1, 1, 2), -1.0))
+        place = at + np.append(rng.uniform(-jitter, jitter, 2), 0.0)
+        holds.append(Hold(key, frame_of("hold", place, axis, (1, 0, 0)), roll, float(rng.choice([0.0, TILT]))))
+    flat = Structure(name, tuple(holds), (), PlaneSurface(pin.SE3.Identity()))
+    start, goal = _ends(rng, flat)
+    return flat.moved(attitude), start, goal
+
+
+def rock(rng: np.random.Generator, size: float) -> Array:
+    """Corners of a convex rock about the origin, [n, 3] m."""
+    return np.array([_unit(rng.normal(size=3)) * size * rng.uniform(0.6, 1.0) for _ in range(24)])
+
+
+def _mesh(rng: np.random.Generator, name: str) -> tuple[Structure, str, str]:
+    """Rocks as meshes, on the plane and above it."""
+    rocks = []
+    for k in range(int(rng.integers(2, 6))):
+        place = rng.uniform([0.5, 0.5, 0.0], [3.5, 2.8, 1.0])
+        shape = Convex(rock(rng, float(rng.uniform(0.1, 0.3))))
+        try:
+            rocks.append(Obstacle(f"rock {k}", shape, pin.SE3(np.eye(3), place)))  # type: ignore[arg-type]
+        except WbcError as error:
+            raise UnsupportedStructureError("structure", "mesh", str(error)) from error
+    structure = _on_plane(name, rocks)
+    return structure, *_ends(rng, structure)
+
+
+def _unit(vector: Array) -> Array:
+    out: Array = vector / np.linalg.norm(vector)
+    return out
+
+
+#: Family -> (generator, name) -> structure, and the holds over which a walk begins and ends
+FAMILIES: dict[str, Callable[[np.random.Generator, str], tuple[Structure, str, str]]] = {
+    "posts": _posts,
+    "bars": _bars,
+    "ladder": _ladder,
+    "corner": _corner,
+    "inside": _inside,
+    "tilted": _tilted,
+    "mesh": _mesh,
+}

@@ -1,0 +1,103 @@
+"""The parts of the benchmark that are trials from seeds: each in a process of its own, and the table of what came
+out.
+"""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from bench.goals import Goal
+from bench.pool import ROOT, user_environment
+from bench.sheet import Sheet
+from bench.walk.machine import Job, Machine, Record
+from bench.walk.trials import PARTS, names
+
+#: What a trial may take [s]
+LONGEST = 900.0
+#: Ends of a walk that did what it was to do, and of one that was refused with a reason
+WELL, REFUSED = ("arrived", "time"), ("refused", "not supported", "hold lost", "HoldLost", "NoPlanError", "late")
+
+
+def trial_jobs(it: Machine, part: str, count: int, folder: Path) -> list[Job]:
+    """Trials of a part, where there are ``count`` structures; their runs are left in the folder."""
+    return [Job(name, partial(apart, part, name, folder)) for name in names(part, count)]
+
+
+def apart(part: str, name: str, folder: Path) -> Record:
+    """The record of a trial that ran in a process of its own; one that dies or takes too long is a crash."""
+    where = folder / f"{part}-{name.replace(' ', '-')}"
+    command = [sys.executable, "-m", "bench.walk.trials", part, name, str(where)]
+    environment = {**user_environment(), "OMP_NUM_THREADS": "1"}
+    told: dict[str, Any] = {"trial": name}
+    try:
+        done = subprocess.run(
+            command, capture_output=True, text=True, cwd=ROOT, env=environment, timeout=LONGEST, check=False
+        )
+    except subprocess.TimeoutExpired:
+        return {**told, "outcome": "crash", "reason": f"not done after {LONGEST:g} s"}
+    lines = done.stdout.splitlines()
+    if done.returncode or not lines:
+        last = (done.stderr.splitlines() or [""])[-1]
+        return {**told, "outcome": "crash", "reason": f"exit status {done.returncode}: {last}"}
+    found: Record = json.loads(lines[-1])
+    return found
+
+
+def touching(record: Record, checker: str) -> bool:
+    """Whether a checker finds two bodies too near in a walk."""
+    return any(text.startswith("clearance") for text in record.get(checker, ()))
+
+
+def group(record: Record) -> str:
+    """The family of a structure; "" of other trials."""
+    first, *rest = str(record["trial"]).split()
+    return first if rest else ""
+
+
+def trial_sheet(part: str, records: list[Record]) -> Sheet:
+    """Counts a family, then the trials that went wrong, each with its seed."""
+    rows = []
+    for family in dict.fromkeys(group(r) for r in records):
+        mine = [r for r in records if group(r) == family]
+        well = [r for r in mine if r["outcome"] in WELL]
+        bad = [r for r in well if r.get("violations")]
+        other = [r for r in well if r.get("second")]
+        times = sorted(r["plan_s"] for r in mine if "plan_s" in r)
+        counts = (len(mine), len(well), len(bad), len(other), sum(touching(r, "second") for r in well))
+        refused, crashed = (
+            sum(r["outcome"] in REFUSED for r in mine),
+            sum(r["outcome"] in ("crash", "error") for r in mine),
+        )
+        spent = f"{times[len(times) // 2]:.1f}, {times[-1]:.1f}" if times else "-"
+        rows.append((f"{family or part}", *(str(n) for n in counts), str(refused), str(crashed), spent, ""))
+    for r in records:
+        wrong = [*r.get("violations", ())[:1], *r.get("second", ())[:1]]
+        if r["outcome"] not in WELL:
+            wrong.append(f"{r['outcome']}: {r['reason']}")
+        if wrong:
+            spent = f"{r['plan_s']:.1f}" if "plan_s" in r else "-"
+            rows.append((f"{part} {r['trial']}", *[""] * 7, spent, "; ".join(wrong)))
+    columns = (
+        *("", "trials", "arrived", "violate", "violate, 2nd checker", "touch, 2nd", "refused", "crashed"),
+        *("plan: median, most, s", "what"),
+    )
+    return Sheet(f"Trials from seeds: {part}", columns, rows)
+
+
+def trial_goals(part: str, records: list[Record]) -> list[Goal]:
+    """Nothing that arrived violates, by either checker, and nothing crashes."""
+    well = [r for r in records if r["outcome"] in WELL]
+    bad = sum(bool(r.get("violations") or r.get("second")) for r in well)
+    crashed = sum(r["outcome"] in ("crash", "error") for r in records)
+    return [
+        Goal(f"{part}: walks of {len(well)} that arrived and violate", bad, 0, ""),
+        Goal(f"{part}: trials of {len(records)} that crash", crashed, 0, ""),
+    ]
+
+
+__all__ = ["PARTS", "trial_goals", "trial_jobs", "trial_sheet"]

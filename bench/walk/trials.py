@@ -1,0 +1,205 @@
+"""Trials of walks from seeds: among random structures, by random rates, resumed at random instants, as holds vanish.
+
+``python -m bench.walk.trials PART NAME FOLDER`` carries out one and prints its record: a process of its own, so that
+what hangs or dies costs one trial.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+import traceback
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import wbc
+from bench.walk.second_checker import second_check
+from bench.walk.structures import FAMILIES, UnsupportedStructureError, random_structure
+from wbc.errors import RangeError, WbcError
+from wbc.interrupts import obey_kill
+from wbc.robots import Walker
+from wbc.validation import Array
+from wbc.walking import Structure, save_structure
+from wbc.walking.checker import check_walk
+from wbc.walking.loop.walk import Tick, Walk
+from wbc.walking.planner.plan import HoldLost, NoPlanError
+from wbc.walking.planner.planner import Objective, plan_walk
+from wbc.walking.report.folder import rules_of, save_run
+from wbc.walking.run.compiling import compiled_stack
+from wbc.walking.run.recording import WalkRecorder
+from wbc.walking.run.request import DriveRequest, PathRequest, Site
+from wbc.walking.run.resume_mode import ResumeRequest
+from wbc.walking.run.session import WalkRun, perform_walk
+
+Record = dict[str, Any]
+
+#: What is walked on where a part has no structure of its own, with the places between which
+GROUNDS = (
+    ("cylinder", "13,6", "13,12"),
+    ("plane", "8,6", "8,13"),
+    ("truss", "L2,6", "L2,14"),
+    ("module", "15,4", "15,10"),
+)
+#: Arms of the walkers on random structures, seed by seed in turn
+ARMS = (3, 3, 3, 4, 3, 3, 6, 3, 5, 3)
+#: Commanded rates of velocity trials: largest [m/s, m/s, rad/s], how many and how long each [s]
+RATES, LEGS, LEG = np.array([0.12, 0.12, 0.1]), 4, 3.0
+
+
+def structures(name: str, walker: Walker, folder: Path) -> Record:
+    """A walk on ``FAMILY SEED``."""
+    family, seed = name.split()
+    trial = random_structure(family, int(seed))
+    file = trial.save(folder)
+    rng = np.random.default_rng(int(seed))
+    speed = float(rng.uniform(0.05, 0.15))
+    objective: Objective = "velocity" if rng.random() < 0.5 else "destination"
+    request = PathRequest(Site(str(file)), trial.start, (trial.goal,), speed, 0.1, objective)
+    return kept(perform_walk(request, walker), folder)
+
+
+class RandomRates:
+    """Rates that change every :data:`LEG` seconds, then none."""
+
+    def __init__(self, rng: np.random.Generator) -> None:
+        self._legs = rng.uniform(-1.0, 1.0, (LEGS, 3)) * RATES
+
+    def rates(self, t: float) -> Array | None:
+        """At a time [s]."""
+        leg = int(t / LEG)
+        return self._legs[leg] if leg < LEGS else None
+
+
+def velocity(name: str, walker: Walker, folder: Path) -> Record:
+    """A body that is driven; ``SEED``."""
+    rng = np.random.default_rng([1, int(name)])
+    asked = _request(rng)
+    request = DriveRequest(asked.site, asked.start, asked.points, asked.speed, asked.turn_rate, "seed")
+    return kept(perform_walk(request, walker, commands=RandomRates(rng)), folder)
+
+
+def resume(name: str, walker: Walker, folder: Path) -> Record:
+    """A walk that goes on from a random instant of its log; ``SEED``."""
+    rng = np.random.default_rng([2, int(name)])
+    first = perform_walk(_request(rng), walker)
+    if first.log is None:
+        return kept(first, folder)
+    save_run(first, folder, check=False)
+    at = float(rng.uniform(first.log.t[1], first.log.t[-1]))
+    again = folder / "resumed"
+    again.mkdir(exist_ok=True)
+    return {"at": at, **kept(perform_walk(ResumeRequest(folder, at), walker), again)}
+
+
+def vanish(name: str, walker: Walker, folder: Path) -> Record:
+    """A walk on which holds vanish that are held, or that a hand is on its way to; ``SEED``."""
+    rng = np.random.default_rng([3, int(name)])
+    request = _request(rng)
+    structure = request.site.build()
+    cpu = time.process_time()
+    try:
+        plan = plan_walk(walker, structure, request.path(walker.data), detour=True)  # type: ignore[arg-type]
+    except NoPlanError as error:
+        return {"outcome": "refused", "reason": str(error), "plan_s": time.process_time() - cpu}
+    planned = time.process_time() - cpu
+    walk = Walk(walker, structure, plan, stack=compiled_stack(walker, structure))
+    recorder, when = WalkRecorder(walk), list(np.sort(rng.uniform(0.5, plan.path.duration, int(rng.integers(1, 4)))))
+
+    def on_tick(tick: Tick) -> None:
+        recorder.tick(tick)
+        if when and walk.time >= when[0]:
+            when.pop(0)
+            # Not so many that the body would fall
+            some = list(walk.held.values()) if len(walk.held) > walker.min_holds else []
+            some += [walk.swinging.hold] if walk.swinging is not None else []
+            walk.vanish([walk.structure.ids[int(rng.choice(some))]] if some else [])
+
+    try:
+        end, reason = walk.run(on_tick), ""
+    except (NoPlanError, HoldLost) as error:
+        end, reason = type(error).__name__, str(error)
+    log = recorder.log()[0]
+    log.save(folder)
+    save_structure(structure, folder / "structure.csv")
+    return {
+        "outcome": end,
+        "reason": reason,
+        "plan_s": planned,
+        "walk_s": walk.time,
+        **checked(log, walker, structure, folder),
+    }
+
+
+def kept(run: WalkRun, folder: Path) -> Record:
+    """What is to be said of a run, which is left in the folder."""
+    save_run(run, folder, check=False)
+    out = {"outcome": run.outcome, "reason": run.reason, "plan_s": run.plan_time}
+    if run.log is None:
+        return out
+    return {**out, "walk_s": float(run.log.t[-1]), **checked(run.log, run.walker, run.structure, folder)}
+
+
+def checked(log: Any, walker: Walker, structure: Structure, folder: Path) -> Record:
+    """What both checkers find in a log."""
+    robot = walker.urdf(folder / "robot.urdf")
+    report = check_walk(log, robot, structure, rules_of(walker))
+    return {
+        "violations": [f"{f.kind}: {f.worst:.4g} at {f.time:.2f} s, {f.where}" for f in report.violations],
+        "second": second_check(folder / "run.npz", walker, robot, structure),
+    }
+
+
+PARTS: dict[str, Callable[[str, Walker, Path], Record]] = {
+    "structures": structures,
+    "velocity": velocity,
+    "resume": resume,
+    "vanish": vanish,
+}
+
+
+#: How many trials of a part there are for each random structure
+SHARES = {"structures": 1.0, "velocity": 0.4, "resume": 0.4, "vanish": 0.2}
+
+
+def names(part: str, count: int) -> list[str]:
+    """Names of the trials of a part, where there are ``count`` structures, family by family in turn."""
+    seeds = range(round(SHARES[part] * count))
+    families = list(FAMILIES)
+    return [f"{families[k % 7]} {k // 7}" if part == "structures" else str(k) for k in seeds]
+
+
+def tried(part: str, name: str, folder: Path) -> Record:
+    """The record of one trial; an error of the package is its outcome."""
+    folder.mkdir(parents=True, exist_ok=True)
+    cpu, out = time.process_time(), Record()
+    try:
+        arms = ARMS[int(name.split()[1]) % len(ARMS)] if part == "structures" else 3
+        out["arms"] = arms
+        out |= PARTS[part](name, wbc.robots.walker(arms=arms), folder)
+    except UnsupportedStructureError as error:
+        out |= {"outcome": "not supported", "reason": str(error)}
+    except WbcError as error:
+        out |= {"outcome": "error", "reason": f"{type(error).__name__}: {error}"}
+    except Exception as error:  # noqa: BLE001 (an error of a trial is what the benchmark looks for)
+        where = traceback.extract_tb(error.__traceback__)[-1]
+        out |= {
+            "outcome": "crash",
+            "reason": f"{type(error).__name__}: {error} ({Path(where.filename).name}:{where.lineno})",
+        }
+    return {"trial": name, "cpu_s": time.process_time() - cpu, **out}
+
+
+def _request(rng: np.random.Generator) -> PathRequest:
+    ground, start, goal = GROUNDS[int(rng.integers(len(GROUNDS)))]
+    return PathRequest(Site(ground), start, (goal,), float(rng.uniform(0.05, 0.15)), 0.1)
+
+
+if __name__ == "__main__":
+    obey_kill()
+    if len(sys.argv) != 4 or sys.argv[1] not in PARTS:
+        raise RangeError("arguments", sys.argv[1:], f"expected PART NAME FOLDER, a part of {', '.join(PARTS)}")
+    print(json.dumps(tried(sys.argv[1], sys.argv[2], Path(sys.argv[3]))))

@@ -1,0 +1,160 @@
+"""Random structures are those of their seeds, and the second checker finds what a log is given."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import wbc
+from bench.walk import swept, trial_parts
+from bench.walk.second_checker import second_check
+from bench.walk.structures import FAMILIES, UnsupportedStructureError, capsule_between, random_structure
+from bench.walk.trial_parts import apart, trial_goals, trial_sheet
+from bench.walk.trials import names, tried
+from wbc.errors import UnknownNameError
+from wbc.robots import Walker
+from wbc.walking import Structure, cylinder, read_structure
+from wbc.walking.body_path import grid_path
+from wbc.walking.log.log import WalkLog
+from wbc.walking.loop.stack import WalkStack
+from wbc.walking.loop.walk import Walk
+from wbc.walking.planner.planner import plan_walk
+from wbc.walking.run.recording import WalkRecorder
+
+
+@pytest.mark.parametrize("family", [name for name in FAMILIES if name != "mesh"])
+def test_structures_are_those_of_their_seeds(family: str, tmp_path: Path) -> None:
+    digests = set()
+    for seed in range(4):
+        trial = random_structure(family, seed)
+        structure = trial.structure
+        assert structure.digest == random_structure(family, seed).structure.digest
+        digests.add(structure.digest)
+        first, last = (structure[hold].position for hold in (trial.start, trial.goal))
+        assert 0.8 < np.linalg.norm(last - first) < 4.0
+        # No hold is inside of anything, and the file gives them back
+        assert structure.clearance(structure.positions).min() > -1e-9
+        read = read_structure(trial.save(tmp_path))
+        assert read.ids == structure.ids
+        assert read.positions == pytest.approx(structure.positions, abs=1e-12)
+        assert [one.id for one in read.obstacles] == [one.id for one in structure.obstacles]
+    assert len(digests) == 4
+
+
+def test_structures_of_meshes_wait_for_obstacles_that_are_such() -> None:
+    with pytest.raises(UnsupportedStructureError, match="mesh"):
+        random_structure("mesh", 0)
+    with pytest.raises(UnknownNameError, match="posts"):
+        random_structure("post", 0)
+
+
+def test_names_of_trials() -> None:
+    assert names("structures", 9) == [*(f"{family} 0" for family in FAMILIES), "posts 1", "bars 1"]
+    assert [len(names(part, 500)) for part in ("structures", "velocity", "resume", "vanish")] == [500, 200, 200, 100]
+
+
+@pytest.fixture(scope="module")
+def machine() -> Walker:
+    return wbc.robots.walker()
+
+
+@pytest.fixture(scope="module")
+def walked(machine: Walker) -> tuple[WalkLog, Structure]:
+    """A short walk on the cylinder."""
+    structure = cylinder(rigid=True)
+    plan = plan_walk(machine, structure, grid_path([(13, 12), (13, 13)], 0.1))
+    walk = Walk(machine, structure, plan, stack=WalkStack(machine, structure, collisions=False))
+    recorder = WalkRecorder(walk)
+    assert walk.run(recorder.tick) == "arrived"
+    return recorder.log()[0], structure
+
+
+def found(log: WalkLog, structure: Structure, machine: Walker, folder: Path) -> list[str]:
+    """What the second checker says."""
+    log.save(folder / "run.npz")
+    return second_check(folder / "run.npz", machine, machine.urdf(folder / "robot.urdf"), structure)
+
+
+def test_the_second_checker_finds_nothing_in_a_sound_walk(
+    walked: tuple[WalkLog, Structure], machine: Walker, tmp_path: Path
+) -> None:
+    assert found(*walked, machine, tmp_path) == []
+
+
+def test_the_second_checker_finds_a_thin_post_and_names_it(
+    walked: tuple[WalkLog, Structure], machine: Walker, tmp_path: Path
+) -> None:
+    """It stands where the body's middle passes between two ticks."""
+    log, bare = walked
+    middle = (log.pose_body_in_structure[100, :3] + log.pose_body_in_structure[101, :3]) / 2
+    across = pin.XYZQUATToSE3(log.pose_body_in_structure[100]).rotation[:, 2] * 0.3
+    post = capsule_between("thin post", middle - across, middle + across, 1e-4)
+    said = found(log, Structure("post", bare.holds, (post,), bare.surface), machine, tmp_path)
+    assert any(text.startswith("clearance: -") and "body" in text and text.endswith("thin post") for text in said)
+
+
+def test_the_second_checker_finds_hands_off_their_holds_and_jumps(
+    walked: tuple[WalkLog, Structure], machine: Walker, tmp_path: Path
+) -> None:
+    log, structure = walked
+    poses = log.pose_body_in_structure.copy()
+    poses[50:, 0] += 0.003
+    said = found(replace(log, pose_body_in_structure=poses), structure, machine, tmp_path)
+    assert any("off its hold" in text for text in said)
+    assert any(text.startswith("jump of the body's velocity [m/s]: 0.3") for text in said)
+    rates = log.v.copy()
+    rates[60, 4] += 2.0
+    said = found(replace(log, v=rates), structure, machine, tmp_path)
+    assert any(text.startswith("acceleration: ") and log.joints[4] in text for text in said)
+
+
+def test_hands_go_no_deeper_than_they_may(walked: tuple[WalkLog, Structure], machine: Walker, tmp_path: Path) -> None:
+    """The same walk over surfaces that are 4 mm and 14 mm higher, with its holds."""
+    log, bare = walked
+    assert bare.surface is not None
+    higher = replace(bare.surface, radius=bare.surface.radius + 0.004)  # type: ignore[call-arg]
+    assert found(log, Structure("higher", bare.holds, (), higher), machine, tmp_path) == []
+    higher = replace(bare.surface, radius=bare.surface.radius + 0.014)  # type: ignore[call-arg]
+    assert found(log, Structure("higher", bare.holds, (), higher), machine, tmp_path) != []
+
+
+def test_a_trial_that_fails_is_a_record(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    assert tried("structures", "mesh 0", tmp_path)["outcome"] == "not supported"
+    assert tried("structures", "posts x", tmp_path)["outcome"] == "crash"
+    died = apart("structures", "posts x y", tmp_path)
+    assert died["outcome"] == "crash"
+    monkeypatch.setattr(trial_parts, "LONGEST", 1e-3)
+    assert "not done" in apart("structures", "posts 0", tmp_path)["reason"]
+
+
+def test_costs_of_proofs_are_printed(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.setattr(
+        swept,
+        "CASES",
+        (("short", 3, 0.1, 6.0, 1e-3, "any", True, 2), ("least", 3, 0.1, 2.0, float("inf"), "least", True, 1)),
+    )
+    swept.main()
+    shown = capsys.readouterr().out
+    assert "short" in shown
+    assert [row[3] for row in swept.rows()] == ["yes", "yes"]
+
+
+def test_tables_count_what_came_out() -> None:
+    records = [
+        {"trial": "posts 0", "outcome": "arrived", "reason": "", "plan_s": 1.0, "violations": [], "second": []},
+        {"trial": "posts 1", "outcome": "arrived", "reason": "", "plan_s": 3.0, "violations": ["a: 1"],
+         "second": ["clearance: 2"]},
+        {"trial": "bars 0", "outcome": "refused", "reason": "reach", "plan_s": 2.0},
+        {"trial": "bars 1", "outcome": "crash", "reason": "ValueError"},
+    ]  # fmt: skip
+    sheet = trial_sheet("structures", records)
+    assert sheet.rows[0] == ("posts", "2", "2", "1", "1", "1", "0", "0", "3.0, 3.0", "")
+    assert sheet.rows[1] == ("bars", "2", "0", "0", "0", "0", "1", "1", "2.0, 2.0", "")
+    assert [row[0] for row in sheet.rows[2:]] == ["structures posts 1", "structures bars 0", "structures bars 1"]
+    assert [goal.value for goal in trial_goals("structures", records)] == [1, 1]
+    assert json.dumps(records)

@@ -1,0 +1,106 @@
+"""Random shapes, poses and machines for the tests of clearances, and Coal as the judge of distances."""
+
+from __future__ import annotations
+
+import numpy as np
+
+# isort: split
+import pinocchio as pin
+
+# isort: split
+import coal
+
+from wbc.clearance import Motion, Tree
+from wbc.robot.geometry.coal_shapes import geometry_of
+from wbc.shapes import Box, Capsule, Convex, Cylinder, Solid, Sphere
+from wbc.validation import Array
+
+
+def unit(rng: np.random.Generator, count: int) -> Array:
+    """A random direction."""
+    x = rng.normal(size=count)
+    return np.asarray(x / np.linalg.norm(x))
+
+
+def random_pose(rng: np.random.Generator, far: float) -> pin.SE3:
+    """Anywhere."""
+    return pin.SE3(pin.Quaternion(*unit(rng, 4)).matrix(), far * rng.normal(size=3))
+
+
+def solids(rng: np.random.Generator) -> list[Solid]:
+    """One of every kind, sizes from 1 cm to 3 m."""
+
+    def size() -> float:
+        return float(10 ** rng.uniform(-2.0, 0.5))
+
+    hull = rng.normal(size=(12, 3)) * [size(), size(), size()]
+    return [
+        Sphere(size()), Capsule(size(), size()), Capsule(size(), 0.0), Capsule(0.0, size()),
+        Box((size(), size(), size())), Cylinder(size(), size()), Convex(hull),
+    ]  # fmt: skip
+
+
+def judged(a: Solid, at: pin.SE3, b: Solid, there: pin.SE3) -> float:
+    """The signed distance that Coal finds [m]."""
+    request, result = coal.DistanceRequest(), coal.DistanceResult()
+    request.gjk_tolerance, request.epa_tolerance = 1e-9, 1e-8
+    made = [geometry_of(shape) for shape in (a, b)]
+    poses = [pose * one.offset for pose, one in zip((at, there), made, strict=True)]
+    places = [coal.Transform3s(pose.rotation, pose.translation) for pose in poses]
+    return float(coal.distance(made[0].geometry, places[0], made[1].geometry, places[1], request, result))
+
+
+def numbers(pose: pin.SE3) -> Array:
+    """Position and quaternion."""
+    return np.array(pin.SE3ToXYZQUAT(pose))
+
+
+def free_tree() -> Tree:
+    """One free base, and nothing on it."""
+    return Tree.of_model(pin.Model(), floating=True)
+
+
+def still(pose: pin.SE3) -> Motion:
+    """A base that stays somewhere."""
+    return Motion.linear(free_tree(), [0.0, 1.0], np.zeros((2, 0)), np.tile(numbers(pose), (2, 1)))
+
+
+def random_arms(rng: np.random.Generator, arms: int = 2, joints: int = 4) -> pin.Model:
+    """Arms of turning and sliding joints on one base, links "a0" to "b3"."""
+    model = pin.Model()
+    kinds = (pin.JointModelRX, pin.JointModelRY, pin.JointModelRZ, pin.JointModelPX, pin.JointModelRUBZ)
+    for arm in range(arms):
+        parent = 0
+        for k in range(joints):
+            axis = unit(rng, 3)
+            kind = [*(made() for made in kinds), pin.JointModelRevoluteUnaligned(axis)][int(rng.integers(6))]
+            name = f"{'abcdef'[arm]}{k}"
+            parent = model.addJoint(parent, kind, random_pose(rng, 0.3), name)
+            model.addFrame(pin.Frame(f"{name}_link", parent, random_pose(rng, 0.1), pin.FrameType.BODY))
+    return model
+
+
+def configuration(model: pin.Model, scalars: Array) -> Array:
+    """q of a model from one scalar a joint: joints without end have cosine and sine."""
+    q = np.zeros(model.nq)
+    for joint, x in enumerate(scalars, start=1):
+        at = model.idx_qs[joint]
+        if model.nqs[joint] == 2:
+            q[at], q[at + 1] = np.cos(x), np.sin(x)
+        else:
+            q[at] = x
+    return q
+
+
+def random_motion(rng: np.random.Generator, tree: Tree, knots: int, cubic: bool = False) -> tuple[Motion, Array, Array]:
+    """A motion with a base, and the numbers it was made of: q and poses (rows) at the knots."""
+    times = np.cumsum(rng.uniform(0.01, 0.3, knots))
+    q = np.cumsum(rng.normal(size=(knots, len(tree.coordinates))) * 0.15, axis=0)
+    pose, rows = random_pose(rng, 0.2), []
+    for _ in range(knots):
+        pose = pose * pin.exp6(pin.Motion(0.05 * rng.normal(size=3), 0.1 * rng.normal(size=3)))
+        rows.append(numbers(pose))
+    poses = np.array(rows)
+    if cubic:
+        return Motion.cubic(tree, times, q, rng.normal(size=q.shape), poses), q, poses
+    return Motion.linear(tree, times, q, poses), q, poses

@@ -1,0 +1,21 @@
+"""Proven clearances of moving bodies: exact distances, and bounds on motion between instants (floor 3)."""
+
+from wbc.clearance.motion import Motion
+from wbc.clearance.scene import (
+    Body,
+    CylinderInside,
+    EndlessCylinder,
+    Exemption,
+    Pair,
+    Scene,
+    TriangleMesh,
+    bodies_of,
+    self_pairs,
+)
+from wbc.clearance.sweep import Nearest, Sweep, Sweeper
+from wbc.clearance.tree import Tree
+
+__all__ = [
+    "Body", "CylinderInside", "EndlessCylinder", "Exemption", "Motion", "Nearest", "Pair", "Scene", "Sweep", "Sweeper",
+    "Tree", "TriangleMesh", "bodies_of", "self_pairs",
+]  # fmt: skip

@@ -1,0 +1,223 @@
+"""Sweeps in C: one call for all pairs over a whole motion."""
+
+from __future__ import annotations
+
+import ctypes
+import functools
+import logging
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import wbc.proximity
+from wbc.clearance.motion import Motion
+from wbc.clearance.scene import Scene, TriangleMesh, sizes_of
+from wbc.errors import CompileError
+from wbc.native import toolchain
+from wbc.native.kernel import kernel
+from wbc.native.library import load_library
+from wbc.shapes import Convex
+from wbc.symbolic.joint_steps import place
+from wbc.validation import Array
+
+log = logging.getLogger("wbc")
+
+_SOURCES = Path(__file__).parent / "native"
+_SHAPES = Path(wbc.proximity.__file__).parent / "native"
+_FILES: tuple[str | Path, ...] = (
+    *(_SHAPES / name for name in ("scene.h", "vectors.h", "steps.h", "shapes.h", "gjk.h", "epa.h", "pair.h")),
+    *("sweep.h", "motion.h", "distance.h", "sweep.c"),
+)
+_INTEGERS = ("knots", "degree", "scalars", "frees", "frames", "bodies", "pairs", "depth", "aim")
+_ARRAYS = (
+    *("control", "variation", "rate", "slack", "free_pose", "free_turn", "free_variation", "free_slack"),
+    *("parent", "kind", "coordinate", "place", "axis", "pose", "deviation"),
+    *("body_frame", "body_place", "body_pose", "line", "world_line", "shape", "hull", "size", "points"),
+    *("chain", "chain_length", "moved", "stamp", "tree", "box", "triangle"),
+    *("first", "second", "stop_first", "stop_second", "required"),
+    *(
+        "exempt_start",
+        "exempt_from",
+        "exempt_to",
+        "exempt_side",
+        "exempt_point",
+        "low",
+        "high",
+        "when",
+        "chosen",
+        "list",
+    ),
+)
+#: TriangleMesh of a leaf of a tree of boxes; how often a motion is halved at most, in ``native/sweep.c`` and to its
+LEAF, HALVINGS = 4, 128
+
+
+class _Sweep(ctypes.Structure):
+    """``sweep_t`` of ``native/sweep.h``."""
+
+    _fields_ = [
+        *((name, ctypes.c_int) for name in _INTEGERS),
+        *((name, ctypes.c_double) for name in ("tolerance", "far", "least")),
+        *((name, ctypes.c_void_p) for name in _ARRAYS),
+        *((name, ctypes.c_int) for name in ("node", "stopped", "measured", "nodes")),
+    ]
+
+
+@functools.cache
+def library() -> ctypes.PyDLL | None:
+    """The compiled code, or None where there is no compiler, or it fails; the log says so once."""
+    if toolchain.compiler() is None:
+        log.warning("no C compiler: clearances are proven in numpy, some 100 times slower")
+        return None
+    try:
+        found = load_library(kernel(_SOURCES, _FILES))
+    except CompileError as error:
+        log.warning("%s: clearances are proven in numpy, some 100 times slower", error)
+        return None
+    found.wbc_sweep_size.restype = ctypes.c_longlong
+    if found.wbc_sweep_size() != ctypes.sizeof(_Sweep):
+        raise CompileError("wbc_sweep_size", found.wbc_sweep_size(), f"expected {ctypes.sizeof(_Sweep)} bytes")
+    found.wbc_sweep.argtypes = [ctypes.c_void_p, ctypes.c_int]
+    found.wbc_sweep_at.argtypes = [ctypes.c_void_p, ctypes.c_int, ctypes.c_double, ctypes.c_void_p]
+    return found
+
+
+class NativeSweep:
+    """A scene in memory; see :class:`wbc.clearance.plain.PlainSweep` for the same in numpy.
+
+    Attributes:
+        low, high, when: of every pair at the last sweep: the proven least of what counts, the least that was found, and
+            when [knots].
+    """
+
+    def __init__(self, functions: ctypes.PyDLL, scene: Scene) -> None:
+        self.scene, self._functions = scene, functions
+        bodies, pairs, frames = len(scene.bodies), len(scene.pairs), len(scene.tree.frames)
+        depth = max([1, *(len(chain) for chain in scene.chain)])
+        chain = np.full((bodies, depth), -1)
+        for k, links in enumerate(scene.chain):
+            chain[k, : len(links)] = links
+        self.low, self.high, self.when = (np.zeros(pairs) for _ in range(3))
+        self._chosen = np.zeros(pairs, dtype=np.int32)
+        tree = scene.tree.frames
+        axes = [[*frame.axis, frame.scale, frame.offset] for frame in tree]
+        self._arrays: dict[str, Array] = {}
+        self._hold(
+            **_shapes(scene), parent=[f.parent for f in tree], kind=[int(f.moves) for f in tree],
+            coordinate=[f.coordinate for f in tree], place=scene.tree.places, axis=np.array(axes).reshape(-1, 5),
+            pose=np.zeros((frames, 12)), deviation=np.zeros((frames, 4)), body_frame=scene.frame,
+            body_place=np.array([place(pose) for pose in scene.place]).reshape(-1, 12),
+            body_pose=np.zeros((bodies, 12)), line=scene.line, world_line=np.zeros((bodies, 6)), chain=chain,
+            chain_length=[len(links) for links in scene.chain], moved=np.zeros((bodies, depth + 1, 2)),
+            stamp=np.zeros(bodies, dtype=np.int32), first=scene.first, second=scene.second,
+            stop_first=scene.stops[:, 0], stop_second=scene.stops[:, 1], required=scene.required,
+            list=np.zeros(HALVINGS * max(pairs, 1), dtype=np.int32), low=self.low, high=self.high, when=self.when,
+            chosen=self._chosen,
+        )  # fmt: skip
+        self._sweep = _Sweep(
+            frames=frames, bodies=bodies, pairs=pairs, depth=depth, scalars=len(scene.tree.coordinates),
+            frees=len(scene.tree.free), **{name: array.ctypes.data for name, array in self._arrays.items()},
+        )  # fmt: skip
+        self._at = ctypes.c_void_p(ctypes.addressof(self._sweep))
+        self._motion: Motion | None = None
+
+    @property
+    def measured(self) -> tuple[int, int]:
+        """Exact distances and pieces of the motion of the last sweep."""
+        return int(self._sweep.measured), int(self._sweep.nodes)
+
+    def sweep(
+        self, motion: Motion, chosen: Array, exempt: Sequence[Any], aim: int, tolerance: float, far: float
+    ) -> int | None:
+        """Fill ``low``, ``high`` and ``when`` of the ``chosen`` pairs; the pair at which it stopped, None: at none."""
+        self._take(motion, exempt)
+        it = self._sweep
+        it.aim, it.tolerance, it.far = aim, tolerance, far
+        self._chosen[: len(chosen)] = chosen
+        self.low[chosen], self.high[chosen], self.when[chosen] = np.inf, np.inf, 0.0
+        self._functions.wbc_sweep(self._at, len(chosen))
+        return None if it.stopped < 0 else int(it.stopped)
+
+    def at(self, pair: int, knots: float) -> Array:
+        """Distance, nearest points and what counts of a pair of the last motion, [8]."""
+        out = np.zeros(8)
+        self._functions.wbc_sweep_at(self._at, pair, knots, out.ctypes.data)
+        return out
+
+    def _hold(self, **arrays: Any) -> None:
+        """Keep arrays as the code wants them; what it fills is contiguous already, and stays the same."""
+        integers = (
+            "parent",
+            "kind",
+            "coordinate",
+            "hull",
+            "chain",
+            "chain_length",
+            "tree",
+            "stop_first",
+            "stop_second",
+        )
+        for name, array in arrays.items():
+            kind = np.int32 if name in integers or (name.startswith("exempt_") and name != "exempt_point") else None
+            kept = np.ascontiguousarray(array, dtype=kind)
+            self._arrays[name] = kept if kept.dtype == np.int32 else np.ascontiguousarray(kept, dtype=np.float64)
+
+    def _take(self, motion: Motion, exempt: Sequence[Any]) -> None:
+        start = np.searchsorted([entry[0] for entry in exempt], np.arange(len(self.scene.pairs) + 1))
+        new: dict[str, Any] = {
+            "exempt_start": start, "exempt_from": [e[1] for e in exempt], "exempt_to": [e[2] for e in exempt],
+            "exempt_side": [e[3] for e in exempt], "exempt_point": np.array([e[4] for e in exempt]).reshape(-1, 8),
+        }  # fmt: skip
+        if motion is not self._motion:
+            new |= {
+                "control": motion.controls, "variation": motion.variation, "rate": motion.rates, "slack": motion.slack,
+                "free_pose": motion.poses, "free_turn": motion.turns, "free_variation": motion.free_variation,
+                "free_slack": motion.free_slack,
+            }  # fmt: skip
+            self._motion = motion
+            self._sweep.knots, self._sweep.degree = len(motion.times), motion.degree
+        self._hold(**new)
+        for name in new:
+            setattr(self._sweep, name, self._arrays[name].ctypes.data)
+
+
+def _shapes(scene: Scene) -> dict[str, Any]:
+    """Shapes, hulls' points and trees of boxes, as native/sweep.h has them."""
+    hull, points, tree, box, triangle = [], list[Array](), list[list[int]](), list[Array](), list[Array]()
+    for body, center in zip(scene.bodies, scene.center, strict=True):
+        shape, start, count = body.shape, 0, 0
+        if isinstance(shape, Convex):
+            filled = np.vstack([shape.points, np.tile(shape.points[-1], (-len(shape.points) % 8, 1))]) - center
+            start, count = sum(len(p) // 3 for p in points), len(filled)
+            points.append(filled.T.ravel())
+        elif isinstance(shape, TriangleMesh):
+            start, count = len(tree), len(shape.corners) if shape.solid else 0
+            _grow(shape.corners, np.arange(len(shape.corners)), tree, box, triangle)
+        hull.append([start, count])
+    return {
+        "shape": scene.kind,
+        "hull": np.array(hull).reshape(-1, 2),
+        "size": np.array([sizes_of(body.shape) for body in scene.bodies]).reshape(-1, 6),
+        "points": np.concatenate([np.zeros(0), *points]),
+        "tree": np.array(tree).reshape(-1, 2),
+        "box": np.array(box).reshape(-1, 6),
+        "triangle": np.array(triangle).reshape(-1, 24),
+    }
+
+
+def _grow(corners: Array, rows: Any, tree: list[list[int]], box: list[Array], triangle: list[Array]) -> int:
+    """A tree of boxes over some triangles, halved across the longest side; returns the number of its root."""
+    mine, here = corners[rows], len(tree)
+    low, high = mine.min(axis=(0, 1)), mine.max(axis=(0, 1))
+    tree.append([0, 0])
+    box.append(np.concatenate([low, high]))
+    if len(rows) <= LEAF:
+        tree[here] = [-1 - len(triangle), -len(triangle) - len(rows)]
+        triangle += [np.vstack([face, np.tile(face[-1], (5, 1))]).T.ravel() for face in mine]
+        return here
+    order = np.argsort(mine.mean(axis=1)[:, int(np.argmax(high - low))])
+    half = len(rows) // 2
+    tree[here] = [_grow(corners, rows[order[k]], tree, box, triangle) for k in (slice(half), slice(half, None))]
+    return here

@@ -1,0 +1,331 @@
+"""Bodies on the frames of a tree, and which of them must keep which distance."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import inf
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from wbc import validation
+from wbc.clearance.tree import Moves, Tree
+from wbc.errors import DuplicateNameError, ShapeError, UnknownNameError
+from wbc.robot import Robot
+from wbc.robot.geometry.coal_shapes import sphere_round
+from wbc.robot.geometry.meshes import read_mesh
+from wbc.robot.geometry.segments import bounding_capsule
+from wbc.shapes import Box, Capsule, Convex, Cylinder, HalfSpace, PlacedShape, Solid, Sphere
+from wbc.validation import Array
+
+
+@dataclass(frozen=True)
+class CylinderInside:
+    """The wall round the endless cylinder of ``radius`` [m] about z: distances count from the wall inwards."""
+
+    radius: float
+
+    def __post_init__(self) -> None:
+        radius = validation.scalar("CylinderInside.radius", self.radius, low=0.0, open_low=True, unit="m")
+        object.__setattr__(self, "radius", radius)
+
+
+@dataclass(frozen=True)
+class EndlessCylinder:
+    """Points within ``radius`` [m] of the z axis."""
+
+    radius: float
+
+    def __post_init__(self) -> None:
+        radius = validation.scalar("EndlessCylinder.radius", self.radius, low=0.0, open_low=True, unit="m")
+        object.__setattr__(self, "radius", radius)
+
+
+@dataclass(frozen=True, eq=False)
+class TriangleMesh:
+    """A surface of triangles.
+
+    Where the core of a body (of a capsule its segment) goes through the surface, the distance is what the ball on the
+    core gives, -radius. A body whose core is wholly within a solid is as deep in it as its farthest point is below the
+    surface next to the core.
+
+    Attributes:
+        corners: [n, 3, 3] m.
+        solid: the surface is closed and its corners go round it one way, so that it has an inside; else it is a sheet,
+            and what begins behind it is not seen.
+
+    Raises:
+        ShapeError, NotFiniteError: not n x 3 x 3 finite numbers; a solid whose surface is open or turns over.
+    """
+
+    corners: Array
+    solid: bool = False
+
+    def __post_init__(self) -> None:
+        corners = validation.real_array("TriangleMesh.corners", self.corners)
+        if corners.ndim != 3 or corners.shape[1:] != (3, 3) or not len(corners):
+            raise ShapeError("TriangleMesh.corners", np.shape(self.corners), "expected n x 3 x 3, n at least 1")
+        object.__setattr__(self, "corners", corners)
+        object.__setattr__(self, "solid", validation.flag("TriangleMesh.solid", self.solid))
+        if self.solid:
+            _, row = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)
+            ring = row.reshape(-1, 3)
+            edges = np.concatenate([ring[:, [k, (k + 1) % 3]] for k in range(3)])
+            edges = edges[edges[:, 0] != edges[:, 1]]
+            one, other = (np.unique(edges[:, order], axis=0) for order in ([0, 1], [1, 0]))
+            if len(one) != len(edges) or not np.array_equal(one, other):
+                raise ShapeError("TriangleMesh.solid", True, "the surface is open, or its triangles turn over")
+
+    @classmethod
+    def read(cls, path: str | os.PathLike[str], scale: float = 1.0, solid: bool = True) -> TriangleMesh:
+        """The surface in a file (STL, OBJ, DAE), its lengths times ``scale``.
+
+        Raises:
+            RobotFileError: a file that cannot be read. RangeError: no scale. ShapeError: as of the class.
+        """
+        factor = validation.scalar("scale", scale, low=0.0, open_low=True)
+        mesh = read_mesh(validation.file_path("path", path), np.full(3, factor))
+        return cls(mesh.vertices[mesh.triangles], solid)
+
+
+#: Those that have no end, and are fixed in the world
+Unbounded = HalfSpace | CylinderInside | EndlessCylinder
+Shape = Solid | Unbounded | TriangleMesh
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """A shape on a link.
+
+    Attributes:
+        name: unique in a scene.
+        shape: solid, a surface of triangles, or one without end, which is fixed in the world.
+        link: of the tree; "world": fixed.
+        placement: on the link; None: its frame.
+        grasp: where the body, a hand, grasps [3] m in the link's frame; what exemptions are about.
+    """
+
+    name: str
+    shape: Shape
+    link: str = "world"
+    placement: pin.SE3 | None = None
+    grasp: Any = None
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Two bodies, by name, and the distance that they must keep [m]."""
+
+    first: str
+    second: str
+    required: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Exemption:
+    """A hand may be nearer to what its hold is mounted on: while its grasp point is within ``radius`` [m] of ``point``
+    (the hold's, in the world), a distance of -``depth`` [m] is enough.
+
+    Attributes:
+        hand, mount: bodies, the first with a grasp point, the second fixed in the world.
+        since, until: from when to when it holds [s]; taken to the whole knots within.
+    """
+
+    hand: str
+    mount: str
+    point: Any
+    radius: float
+    depth: float = 0.0
+    since: float = -inf
+    until: float = inf
+
+
+#: What a shape is in native/sweep.h
+SUM, HULL, PLANE, INSIDE, OUTSIDE, TRIANGLES = range(6)
+
+
+def bodies_of(robot: Robot) -> list[Body]:
+    """The collision shapes of a robot's links, by the link's name; from a link's second on with ", body 2" and so
+    on.
+    """
+    return [
+        Body(link if k == 0 else f"{link}, body {k + 1}", placed.shape, link, placed.placement)
+        for link, group in robot.shapes.items()
+        for k, placed in enumerate(group)
+    ]
+
+
+def self_pairs(robot: Robot, required: float = 0.0) -> list[Pair]:
+    """Pairs of :func:`bodies_of` on links that must not touch (``robot.self_pairs``).
+
+    Raises:
+        ShapeError: the robot's are not chosen yet.
+    """
+    if robot.self_pairs is None:
+        raise ShapeError("robot.self_pairs", None, "pairs of links are not chosen yet, see find_self_pairs")
+    on: dict[str, list[str]] = {}
+    for body in bodies_of(robot):
+        on.setdefault(body.link, []).append(body.name)
+    return [Pair(a, b, required) for one, other in robot.self_pairs for a in on.get(one, ()) for b in on.get(other, ())]
+
+
+class Scene:
+    """Bodies of a tree and their pairs, as arrays; kept, and swept again and again.
+
+    Attributes:
+        tree, bodies, pairs: as given.
+        kind: of the bodies' shapes. frame: numbers of their frames, -1: the world. place: poses on them, moved to the
+            shapes' centres. center: of those in the shapes' frames.
+        line: [bodies, 8]: ends of a capsule about the body in its frame, its radius, and the radius about the ends of
+            what
+            turns with the body: 0 where its core is all, more where there is a grasp point.
+        chain: frames with joints from the body's on, up to the world.
+        first, second: numbers of the pairs' bodies. stops: how many frames of the chains move the two apart, [pairs,
+            2].
+
+    Raises:
+        DuplicateNameError: two bodies of a name. UnknownNameError: no such link or body. ShapeError: a shape without
+            end on a link that moves; a pair of which neither is a solid. RangeError: a required distance that is no
+        number.
+    """
+
+    def __init__(self, tree: Tree, bodies: Sequence[Body], pairs: Sequence[Pair]) -> None:
+        self.tree = validation.instance("tree", tree, Tree, "a Tree")
+        self.bodies: tuple[Body, ...] = validation.items("bodies", bodies, "Bodies")
+        self.pairs: tuple[Pair, ...] = validation.items("pairs", pairs, "Pairs")
+        self.number: dict[str, int] = {}
+        for k, body in enumerate(self.bodies):
+            validation.name(f"bodies[{k}].name", validation.instance(f"bodies[{k}]", body, Body, "a Body").name)
+            if body.name in self.number:
+                raise DuplicateNameError("bodies", body.name, "two of this name")
+            self.number[body.name] = k
+        placed = [self._place(body) for body in self.bodies]
+        self.kind = np.array([_kind(body.shape) for body in self.bodies], dtype=np.int32)
+        self.frame = np.array([frame for frame, _, _ in placed], dtype=np.int32)
+        self.place = [pose for _, pose, _ in placed]
+        self.center = [center for _, _, center in placed]
+        self.line = np.array([_line(body, *self._on_frame(body)) for body in self.bodies]).reshape(-1, 8)
+        moving = {k for k, frame in enumerate(tree.frames) if frame.moves != Moves.FIXED}
+        self.chain = [[f for f in tree.up(int(frame)) if f in moving] for frame in self.frame]
+        for k, body in enumerate(self.bodies):
+            if isinstance(body.shape, Unbounded) and self.chain[k]:
+                raise ShapeError(f"{body.name}.shape", body.shape, "a shape without end is fixed in the world")
+        for k, pair in enumerate(self.pairs):
+            validation.instance(f"pairs[{k}]", pair, Pair, "a Pair")
+        ends = [(self._known("pairs", pair.first), self._known("pairs", pair.second)) for pair in self.pairs]
+        self._rows = {end: k for k, end in enumerate(ends)}
+        self.first, self.second = (np.array([end[k] for end in ends], dtype=np.int32) for k in (0, 1))
+        for pair, (i, j) in zip(self.pairs, ends, strict=True):
+            if max(self.kind[i], self.kind[j]) >= PLANE and min(self.kind[i], self.kind[j]) >= PLANE:
+                raise ShapeError("pairs", (pair.first, pair.second), "one of the two must be a solid")
+            validation.scalar(f"required of {pair.first} and {pair.second}", pair.required, unit="m")
+        self.required = np.array([float(pair.required) for pair in self.pairs])
+        self.stops = np.array([self._stops(*end) for end in ends], dtype=np.int32).reshape(-1, 2)
+
+    def named(self, pair: int) -> str:
+        """Both bodies of a pair."""
+        return f"{self.pairs[pair].first} and {self.pairs[pair].second}"
+
+    def exempt(self, exemptions: Sequence[Exemption], times: Array) -> list[tuple[int, int, int, int, Array]]:
+        """(pair, first and last knot, which of the two is the hand, numbers of native/sweep.h), pair by pair.
+
+        Raises:
+            UnknownNameError, ShapeError, RangeError: an exemption that names no pair or has no such numbers.
+        """
+        found = []
+        for e, exemption in enumerate(validation.items("exemptions", exemptions, "Exemptions")):
+            field = f"exemptions[{e}]"
+            validation.instance(field, exemption, Exemption, "an Exemption")
+            hand, mount = (self._known(field, name) for name in (exemption.hand, exemption.mount))
+            if self.bodies[hand].grasp is None:
+                raise ShapeError(f"{field}.hand", exemption.hand, "this body has no grasp point")
+            if self.chain[mount]:
+                raise ShapeError(f"{field}.mount", exemption.mount, "expected a body that is fixed in the world")
+            pair = self._rows.get((hand, mount), self._rows.get((mount, hand)))
+            if pair is None:
+                names = [f"{self.pairs[k].first} and {self.pairs[k].second}" for k in range(len(self.pairs))]
+                raise UnknownNameError(field, f"{exemption.hand} and {exemption.mount}", names)
+            point = validation.real_array(f"{field}.point", exemption.point, (3,))
+            radius = validation.scalar(f"{field}.radius", exemption.radius, low=0.0, unit="m")
+            depth = validation.scalar(f"{field}.depth", exemption.depth, low=0.0, unit="m")
+            since = int(np.searchsorted(times, exemption.since))
+            until = int(np.searchsorted(times, exemption.until, side="right")) - 1
+            _, on_frame = self._on_frame(self.bodies[hand])
+            grasp = on_frame * validation.real_array("grasp", self.bodies[hand].grasp, (3,))
+            numbers = np.concatenate([grasp, point, [radius, depth]])
+            found.append((pair, since, until, int(self.first[pair] != hand), numbers))
+        return sorted(found, key=lambda entry: entry[0])
+
+    def _known(self, field: str, name: str) -> int:
+        return self.number[validation.one_of(field, name, tuple(self.number))]
+
+    def _on_frame(self, body: Body) -> tuple[pin.SE3, pin.SE3]:
+        """(pose of the shape, pose of the link) on the frame."""
+        _, link = self.tree.link(f"{body.name}.link", body.link)
+        if body.placement is None:
+            return link, link
+        return link * validation.pose(f"{body.name}.placement", body.placement), link
+
+    def _place(self, body: Body) -> tuple[int, pin.SE3, Array]:
+        if not isinstance(body.shape, Shape):
+            raise ShapeError(
+                f"{body.name}.shape", body.shape, "expected a solid, a surface of triangles or one without end"
+            )
+        frame, _ = self.tree.link(f"{body.name}.link", body.link)
+        center = sphere_round(body.shape)[0] if isinstance(body.shape, Convex) else np.zeros(3)
+        return frame, self._on_frame(body)[0] * pin.SE3(np.eye(3), center), center
+
+    def _stops(self, i: int, j: int) -> tuple[int, int]:
+        """What carries both moves neither against the other."""
+        one, other = self.chain[i], self.chain[j]
+        both = set(one) & set(other)
+        return sum(f not in both for f in one), sum(f not in both for f in other)
+
+
+def _kind(shape: Shape) -> int:
+    kinds: tuple[tuple[Any, int], ...] = (
+        (Convex, HULL), (HalfSpace, PLANE), (CylinderInside, INSIDE), (EndlessCylinder, OUTSIDE),
+        (TriangleMesh, TRIANGLES),
+    )  # fmt: skip
+    return next((number for kind, number in kinds if isinstance(shape, kind)), SUM)
+
+
+def sizes_of(shape: Shape) -> list[float]:
+    """Half sides [3], disc, ball and radius of the sphere about the centre of native/shapes.h; of shapes without end
+    the radius in place of the disc.
+    """
+    if isinstance(shape, (Sphere, Capsule)):
+        half = shape.length / 2 if isinstance(shape, Capsule) else 0.0
+        return [0.0, 0.0, half, 0.0, shape.radius, half]
+    if isinstance(shape, Box):
+        return [*(side / 2 for side in shape.size), 0.0, 0.0, float(np.linalg.norm(shape.size)) / 2]
+    if isinstance(shape, Cylinder):
+        return [0.0, 0.0, shape.length / 2, shape.radius, 0.0, float(np.hypot(shape.radius, shape.length / 2))]
+    if isinstance(shape, TriangleMesh):
+        middle = np.linalg.norm(shape.corners, axis=2).max()
+        return [0.0, 0.0, 0.0, 0.0, 0.0, float(middle)]
+    if isinstance(shape, Convex):
+        return [0.0, 0.0, 0.0, 0.0, 0.0, sphere_round(shape)[1]]
+    return [0.0, 0.0, 0.0, 0.0 if isinstance(shape, HalfSpace) else shape.radius, 0.0, 0.0]
+
+
+def _line(body: Body, shape: pin.SE3, link: pin.SE3) -> Array:
+    if isinstance(body.shape, Unbounded):
+        return np.zeros(8)
+    if isinstance(body.shape, TriangleMesh):
+        points = body.shape.corners.reshape(-1, 3)
+        middle = (points.min(axis=0) + points.max(axis=0)) / 2
+        a = b = shape * middle
+        radius = float(np.linalg.norm(points - middle, axis=1).max())
+    else:
+        a, b, radius = bounding_capsule(PlacedShape(body.shape, shape))
+    # The ball on a core is the same however it is turned
+    most = 0.0 if isinstance(body.shape, (Sphere, Capsule)) else radius
+    if body.grasp is not None:
+        x, span = link * validation.real_array(f"{body.name}.grasp", body.grasp, (3,)), b - a
+        part = np.clip((x - a) @ span / max(span @ span, 1e-300), 0.0, 1.0)
+        most = max(most, float(np.linalg.norm(x - a - part * span)))
+    return np.array([*a, *b, radius, most])

@@ -1,0 +1,143 @@
+"""Frames that joints move, out of a ``pin.Model``."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from enum import IntEnum
+from functools import cached_property
+
+import numpy as np
+import pinocchio as pin
+
+from wbc import validation
+from wbc.errors import DuplicateNameError, UnsupportedJointError
+from wbc.symbolic.joint_steps import Kind, joint_steps, place
+from wbc.validation import Array
+
+SUPPORTED = ("revolute", "continuous", "prismatic", "helical", "universal", "free flyer", "fixed")
+
+
+class Moves(IntEnum):
+    """What a frame does on its parent; the same numbers stand in ``native/sweep.h``."""
+
+    FIXED = 0
+    TURNING = 1
+    SHIFTING = 2
+    FREE = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """A frame: at ``place`` on its parent, then moved.
+
+    Attributes:
+        parent: number of a frame before this one; -1: the world.
+        coordinate: number of the scalar (a turn [rad] or shift [m] by scale q + offset) or of the free pose.
+    """
+
+    parent: int
+    place: pin.SE3
+    moves: Moves
+    coordinate: int = 0
+    axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    scale: float = 1.0
+    offset: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Tree:
+    """Frames, parents first.
+
+    Attributes:
+        frames: of all joints.
+        coordinates: names of the joints whose scalars a motion has, in its order.
+        free: names of the joints with a free pose.
+        links: name -> (number of its frame, pose of the link on it); "world" is on -1.
+    """
+
+    frames: tuple[Frame, ...] = field(repr=False)
+    coordinates: tuple[str, ...]
+    free: tuple[str, ...]
+    links: dict[str, tuple[int, pin.SE3]] = field(repr=False)
+
+    @classmethod
+    def of_model(cls, model: pin.Model, floating: bool = False, things: Sequence[str] = ()) -> Tree:
+        """The joints of a model; of a joint without end its angle is the scalar.
+
+        Args:
+            floating: the model has a base that is fixed, and that a free pose carries here.
+            things: what moves beside the model, each a link with a free pose; in a motion they come last.
+
+        Raises:
+            DuplicateNameError: a thing that is called as a link or as another thing.
+            UnsupportedJointError: a joint that is neither free nor a row of turns and shifts by scalars.
+        """
+        frames: list[Frame] = []
+        names, free = list[str](), list[str]()
+        scalar_of: dict[int, int] = {}
+        top = -1
+        if floating:
+            frames.append(Frame(-1, pin.SE3.Identity(), Moves.FREE, 0))
+            free.append("base")
+            top = 0
+        last = {0: top}
+        for joint in range(1, model.njoints):
+            name, parent = str(model.names[joint]), last[int(model.parents[joint])]
+            at = pin.SE3(model.jointPlacements[joint])
+            if model.joints[joint].shortname() == "JointModelFreeFlyer":
+                frames.append(Frame(parent, at, Moves.FREE, len(free)))
+                free.append(name)
+                last[joint] = len(frames) - 1
+                continue
+            for step in joint_steps(model, joint):
+                if step.kind == Kind.PLACE:
+                    at = at * pin.SE3(step.numbers[:9].reshape(3, 3), step.numbers[9:])
+                    continue
+                if step.kind == Kind.QUATERNION:
+                    raise UnsupportedJointError(
+                        f"joint {name!r}", model.joints[joint].shortname(), "a swept tree has", SUPPORTED
+                    )
+                if step.q not in scalar_of:
+                    scalar_of[step.q] = len(names)
+                    names.append(name)
+                moves = Moves.SHIFTING if step.kind == Kind.SHIFT else Moves.TURNING
+                scale, offset = (1.0, 0.0) if step.kind == Kind.CIRCLE else (step.numbers[3], step.numbers[4])
+                axis = (float(step.numbers[0]), float(step.numbers[1]), float(step.numbers[2]))
+                frames.append(Frame(parent, at, moves, scalar_of[step.q], axis, float(scale), float(offset)))
+                parent, at = len(frames) - 1, pin.SE3.Identity()
+            if parent == last[int(model.parents[joint])]:
+                frames.append(Frame(parent, at, Moves.FIXED))
+                parent = len(frames) - 1
+            last[joint] = parent
+        links = {"world": (-1, pin.SE3.Identity())}
+        for frame in model.frames:
+            links.setdefault(str(frame.name), (last[int(frame.parentJoint)], pin.SE3(frame.placement)))
+        for thing in validation.strings("things", things):
+            if thing in links:
+                raise DuplicateNameError("things", thing, "a link of this name is there already")
+            links[thing] = (len(frames), pin.SE3.Identity())
+            frames.append(Frame(-1, pin.SE3.Identity(), Moves.FREE, len(free)))
+            free.append(thing)
+        return cls(tuple(frames), tuple(names), tuple(free), links)
+
+    def link(self, what: str, name: str) -> tuple[int, pin.SE3]:
+        """(number of the frame, pose of the link on it).
+
+        Raises:
+            UnknownNameError: no such link.
+        """
+        return self.links[validation.one_of(what, name, tuple(self.links))]
+
+    @cached_property
+    def places(self) -> Array:
+        """Poses on the parents ``[frames, 12]``: rotation row by row, then position [m]."""
+        return np.array([place(frame.place) for frame in self.frames]).reshape(-1, 12)
+
+    def up(self, frame: int) -> list[int]:
+        """A frame and those that carry it, up to the world."""
+        out = []
+        while frame >= 0:
+            out.append(frame)
+            frame = self.frames[frame].parent
+        return out
