@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from bench.figures import __main__ as command
-from bench.figures import index, pages, store
+from bench.figures import floors, index, pages, store
 from bench.figures.index import FIGURES, Figure, render
 from bench.sheet import Sheet
 
@@ -41,6 +41,10 @@ def test_every_figure_is_on_a_page_and_measures_what_exists() -> None:
         if not figure.command:
             assert (ROOT / "bench" / "measured" / f"{name}.py").is_file()
     assert {name for name, _ in shown} == set(FIGURES)
+
+
+def test_the_picture_of_the_floors_is_that_of_the_table() -> None:
+    assert floors.PICTURE.read_text() == floors.picture()
 
 
 def test_what_stands_in_no_block_is_found() -> None:
