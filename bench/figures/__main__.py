@@ -29,7 +29,7 @@ def measure(figure: Figure) -> None:
 
 
 def age(figure: Figure) -> str:
-    """ "" if the code is that which was measured."""
+    """Why it is old; empty if the code is that which was measured."""
     if not figure.path.is_file():
         return "never measured"
     commit = store.read(figure.path)["stamp"]["commit"]

@@ -23,7 +23,8 @@ def draw(floors: Mapping[str, int], rooms: Mapping[str, int]) -> str:
         text(33, 20, "wbc: imports only point down", "start"),
         text(713, 20, "inside wbc.walking", "start"),
     ]
-    head = f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {height}" font-family="sans-serif" font-size="12">'
+    size = f'viewBox="0 0 {WIDTH} {height}" font-family="sans-serif" font-size="12"'
+    head = f'<svg xmlns="http://www.w3.org/2000/svg" {size}>'
     return "\n".join([head, f'<rect width="{WIDTH}" height="{height}" fill="white"/>', *body, "</svg>"]) + "\n"
 
 

@@ -63,7 +63,10 @@ _ALL = (
         "bench", (*TICK, "wbc/proximity", "wbc/export", "bench/ours.py"), 20.0, ("make", "bench"),
         "bench/results.json", {"readme": report.readme, "export": report.export_page},
     ),
-    Figure("ik", (*TICK, "wbc/ik", "bench/ik/chains.py", "bench/ik/contenders.py"), 15.0, ("make", "bench-ik"), "bench/ik.json", {"chains": ik.summary}),
+    Figure(
+        "ik", (*TICK, "wbc/ik", "bench/ik/chains.py", "bench/ik/contenders.py"), 15.0, ("make", "bench-ik"),
+        "bench/ik.json", {"chains": ik.summary},
+    ),
     Figure(
         "time_laws", ("wbc/trajectory",), 25.0, ("make", "bench-time-laws"),
         "bench/time_laws.json", laws.VIEWS,

@@ -37,7 +37,7 @@ def parts() -> dict[str, Sheet | str]:
 
 
 def sense_us(kind: str, pairs: int, rows: int) -> float:
-    """A body on every joint's frame, on a path of the joints; pairs of different frames, the same for every kind [us]."""
+    """A body on every joint, on a path of the joints; the same pairs for every kind [us]."""
     robot = wbc.robots.load("talos", shapes="none")
     frames = [
         frame.name for frame in robot.model.frames if frame.type == pin.FrameType.JOINT and "root" not in frame.name

@@ -8,9 +8,11 @@ import wbc.robots
 from bench.sheet import Sheet
 
 FITS = {"1 capsule": ("capsule", 1), "2 capsules": ("capsule", 2), "3 capsules": ("capsule", 3),
-        "4 spheres": ("sphere", 4), "8 spheres": ("sphere", 8)}  # fmt: skip
-ARMS = {"Panda": ("panda", [f"panda_link{k}" for k in range(1, 8)] + ["panda_hand"]),
-        "UR5": ("ur5", ["shoulder_link", "upper_arm_link", "forearm_link", "wrist_1_link", "wrist_2_link", "wrist_3_link"])}  # fmt: skip
+        "4 spheres": ("spheres", 4), "8 spheres": ("spheres", 8)}  # fmt: skip
+ARMS = {
+    "Panda": ("panda", [f"panda_link{k}" for k in range(1, 8)] + ["panda_hand"]),
+    "UR5": ("ur5", ["shoulder_link", "upper_arm_link", "forearm_link"] + [f"wrist_{k}_link" for k in (1, 2, 3)]),
+}
 #: Robots whose pairs are searched, with the shapes that they are loaded with
 SEARCHED = {"panda": None, "ur5": None, "baxter": "description", "g1": "fit", "talos": "fit"}
 
@@ -24,12 +26,12 @@ def parts() -> dict[str, Sheet | str]:
             robot = wbc.robots.fit_shapes(
                 wbc.robots.load(name, shapes="none"), links, kind=kind, count=count, tolerance=0.0
             )
-            shapes = [s for s in robot.shapes if s.link in links]
+            shapes = [shape for link in links for shape in robot.shapes.get(link, ())]
             cells.append(f"{1e3 * max(s.excess for s in shapes):.1f} mm ({len(shapes)})")
         rows.append((label, *cells))
     found = []
     for name, shapes in SEARCHED.items():
-        robot = wbc.robots.load(name, srdf=None, **({} if shapes is None else {"shapes": shapes}))
+        robot = wbc.robots.load(name, **({} if shapes is None else {"shapes": shapes}))
         began = perf_counter()
         pairs = wbc.robots.find_self_pairs(robot, samples=10000)
         spent = perf_counter() - began

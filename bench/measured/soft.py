@@ -101,5 +101,5 @@ def line() -> Sheet:
     plain, kept = found
     return Sheet("", ("", "least squares", "scaled"), [
         ("furthest from the straight line", plain[0], kept[0]),
-        ("angle between a step and the way to the target, at most", plain[1], kept[1]),
+        ("angle between a step and the direction to the target, at most", plain[1], kept[1]),
     ])  # fmt: skip
