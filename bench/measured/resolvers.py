@@ -10,7 +10,7 @@ COLUMNS = (
     "one resolution [us]",
     "fastest joint [rad/s]",
     "twist lost [m/s, rad/s]",
-    "after the motion back [rad]",
+    "after the return [rad]",
 )
 
 
