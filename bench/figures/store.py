@@ -6,6 +6,7 @@ import json
 import os
 import platform
 import subprocess
+import sys
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
@@ -19,14 +20,16 @@ Data = dict[str, Any]
 
 
 def stamp() -> dict[str, str]:
-    """Commit, date and machine, to be asked for before anything is measured."""
+    """Command, commit, date and machine, to be asked for before anything is measured."""
     processor = next(
         (line.split(":")[1].strip() for line in Path("/proc/cpuinfo").read_text().splitlines() if "model name" in line),
         platform.machine(),
     )
     load, cores = Path("/proc/loadavg").read_text().split()[0], len(os.sched_getaffinity(0))
     machine = f"{processor}, {cores} cores, load {load} before the run"
-    return {"commit": git("rev-parse", "--short", "HEAD"), "date": f"{datetime.now(UTC):%Y-%m-%d}", "machine": machine}
+    command = " ".join(["python", *sys.orig_argv[1:]]).replace(f"{ROOT}/", "")
+    commit, date = git("rev-parse", "--short", "HEAD"), f"{datetime.now(UTC):%Y-%m-%d}"
+    return {"command": command, "commit": commit, "date": date, "machine": machine}
 
 
 def write(path: Path, about: Mapping[str, str], parts: Mapping[str, Sheet | str]) -> None:
@@ -53,8 +56,8 @@ def shown(part: str | Data) -> str:
 
 
 def signed(about: Mapping[str, str], command: str) -> str:
-    """The line under a block."""
-    return f"*`{command}`, {about['date']}, commit {about['commit']}; {about['machine']}.*"
+    """The line under a block; the command is the usual one where the stamp has none."""
+    return f"*`{about.get('command', command)}`, {about['date']}, commit {about['commit']}; {about['machine']}.*"
 
 
 def changed(commit: str, paths: Sequence[str]) -> list[str] | None:
