@@ -2,8 +2,8 @@
 
 A Panda with a hand's pose, a posture, joint limits, a speed limit and a ball, as a linear model (``calm=False``); the
 posture's weight spreads the eigenvalues of H. Errors are those of the commands against the exact minimiser of
-:mod:`wbc.qp.reference`, whose optimality conditions are verified with 60 digits. Ticks with rows that give way are left
-out.
+:mod:`bench.qp.reference`, whose optimality conditions are verified with 60 digits. Ticks with rows that give way are
+left out.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ import pinocchio as pin
 from rich.console import Console
 
 import wbc
+from bench.qp.reference import reference
 from bench.sheet import Sheet, us
 from wbc.controller import Controller
 from wbc.errors import SolverError
 from wbc.explain.past import past_of
 from wbc.qp import make_solver
-from wbc.qp.reference import reference
 from wbc.shapes import Sphere
 from wbc.tasks import EndEffector, FrameVelocityLimit, JointLimits, Obstacle, Posture
 

@@ -16,7 +16,8 @@ from bench.contender import Contender, exact_solution
 from bench.problems import Array, Case
 from bench.reference import Referee
 from bench.solids import keep_clear, link_shapes
-from wbc.controller.native import NativeTick
+from wbc.controller import core_of
+from wbc.controller.tick.native import NativeTick
 
 
 class Ours(Contender):
@@ -81,7 +82,7 @@ class Ours(Contender):
         self.velocity = self.controller.step(self.q).v
 
     def native(self) -> int | None:
-        tick = self.controller.tick
+        tick = core_of(self.controller).tick
         if not isinstance(tick, NativeTick):
             return None
         tick.q[:] = self.q
@@ -93,11 +94,11 @@ class Ours(Contender):
         """``export``: the tick as C; ``path.bin``: configuration, run-time inputs and command of every tick."""
         self.reset()
         self.controller.export(folder / "export", states=100)
-        layout = self.controller.layout
+        layout = core_of(self.controller).layout
         path = [np.array([self.case.ticks, layout.nq, layout.nv, layout.parameters], dtype=np.float64)]
         for k in range(self.case.ticks):
             self.aim(k)
-            path += [self.q.copy(), self.controller.tick.p.copy()]
+            path += [self.q.copy(), core_of(self.controller).tick.p.copy()]
             self.call()
             path.append(self.velocity)
             self.settle()
@@ -116,7 +117,7 @@ class Ours(Contender):
         return self.q
 
     def phases(self) -> dict[str, float]:
-        tick = self.controller.tick
+        tick = core_of(self.controller).tick
         start = perf_counter_ns()
         self.call()
         whole = perf_counter_ns() - start
@@ -142,7 +143,7 @@ class Ours(Contender):
         return spent
 
     def reference_error(self) -> float | None:
-        tick = self.controller.tick
+        tick = core_of(self.controller).tick
         tick.q[:] = self.q
         qp = tick.qp()
         eye = np.eye(len(qp.g))

@@ -1,10 +1,10 @@
 """Robots by name, from files, from models and from Denavit-Hartenberg rows; machines that walk on holds."""
 
-from wbc.robot.collision_pairs import LinkPair, SelfPairs
-from wbc.robot.convex_parts import ConvexParts
-from wbc.robot.dh import DHRow
-from wbc.robot.geometry import convex_parts, fit_shapes
-from wbc.robot.pairs_file import read_self_pairs, save_self_pairs
+from wbc.robot.geometry.convex_parts import ConvexParts
+from wbc.robot.geometry.link_shapes import convex_parts, fit_shapes
+from wbc.robot.pairs.collision_pairs import LinkPair, SelfPairs
+from wbc.robot.pairs.pairs_file import read_self_pairs, save_self_pairs
+from wbc.robot.sources.dh import DHRow
 from wbc.robots.catalogue import from_dh, load, names, table
 from wbc.robots.operator_arms import OperatorArm, operator_arm
 from wbc.robots.pairs import find_self_pairs

@@ -12,12 +12,12 @@ from typing import Any
 import pinocchio as pin
 
 from wbc import validation
-from wbc.robot.dh import DHRow, read_dh
-from wbc.robot.files import example_data_folder
 from wbc.robot.loading import build, finish, looks_like_path, unknown
 from wbc.robot.recipe import Recipe, lock_mapping
 from wbc.robot.robot import Robot
-from wbc.robot.table import read_table
+from wbc.robot.sources.dh import DHRow, read_dh
+from wbc.robot.sources.files import example_data_folder
+from wbc.robot.sources.table import read_table
 from wbc.robots.operator_arms import OPERATOR_ARMS, operator_recipe
 from wbc.robots.walker_robot import MADE, as_made, made_here, recipe_of
 

@@ -14,7 +14,7 @@ import pinocchio as pin
 from wbc import validation
 from wbc.errors import RobotFileError
 from wbc.robot import Robot
-from wbc.robot.description import ROOT
+from wbc.robot.sources.description import ROOT
 from wbc.shapes import Capsule, Convex, PlacedShape, Sphere
 
 Z = (0.0, 0.0, 1.0)

@@ -16,9 +16,9 @@ import pinocchio as pin
 
 from wbc import validation
 from wbc.robot import Robot
-from wbc.robot.description import Description
 from wbc.robot.loading import finish
 from wbc.robot.recipe import LinkShape, Recipe
+from wbc.robot.sources.description import Description
 from wbc.robots import operator_chains as chains
 from wbc.robots.link_tree import Link, build_model, write_urdf
 from wbc.robots.operator_chains import ChainJoint, Triple

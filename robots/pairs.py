@@ -7,10 +7,10 @@ from typing import Any
 
 from wbc import validation
 from wbc.robot import Robot
-from wbc.robot.collision_pairs import SelfPairs
-from wbc.robot.collision_pairs import find_self_pairs as find
-from wbc.robot.files import example_data_folder
-from wbc.robot.pair_search import Progress
+from wbc.robot.pairs.collision_pairs import SelfPairs
+from wbc.robot.pairs.collision_pairs import find_self_pairs as find
+from wbc.robot.pairs.search import Progress
+from wbc.robot.sources.files import example_data_folder
 from wbc.robots.catalogue import table
 
 
@@ -24,7 +24,7 @@ def find_self_pairs(
     progress: Progress | None = None,
 ) -> SelfPairs:
     """Chooses the pairs of links that must not touch each other, among all links with shapes; see
-    :func:`wbc.robot.collision_pairs.find_self_pairs`, which states the rules, the errors and what it cannot do.
+    :func:`wbc.robot.pairs.collision_pairs.find_self_pairs`, which states the rules, the errors and what it cannot do.
 
     Args:
         robot: with shapes.

@@ -15,9 +15,9 @@ import pinocchio as pin
 from wbc import validation
 from wbc.errors import RangeError, ShapeError
 from wbc.robot import Robot
-from wbc.robot.description import Description
 from wbc.robot.loading import finish
 from wbc.robot.recipe import LinkShape, Recipe
+from wbc.robot.sources.description import Description
 from wbc.robots.link_tree import Link, build_model, write_urdf
 from wbc.robots.walker_arms import BODY, Arm, chain, puma_rows, reversed_chain, two_ended_rows
 from wbc.robots.walker_data import TwoEndedData, WalkerData

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 
 from wbc import validation
 from wbc.errors import RangeError
-from wbc.symbolic.centroidal import Centroidal
-from wbc.symbolic.dynamics import Dynamics
+from wbc.symbolic.dynamics import Centroidal, Dynamics
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks.base import Input, Row, Task, Values
 from wbc.tasks.frames import checked_weights, weights_of_rows

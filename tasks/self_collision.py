@@ -12,8 +12,8 @@ import casadi as ca
 from wbc import validation
 from wbc.errors import DuplicateNameError, MissingShapeError, RangeError, ShapeError
 from wbc.proximity import Body, PairSensor
-from wbc.robot.link_pairs import link_pairs as every_link_pair
-from wbc.robot.link_pairs import neighbours, shaped_links
+from wbc.robot.pairs.link_pairs import link_pairs as every_link_pair
+from wbc.robot.pairs.link_pairs import neighbours, shaped_links
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks import _bodies as bodies
 from wbc.tasks import _gap as gap

@@ -8,44 +8,65 @@ controller = stack.compile()
 step = controller.step(robot.neutral)
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from wbc import lazy
+
 __version__ = "0.1.0"
 
-from wbc import controller, explain, ik, record
-from wbc import robots as robots
-from wbc import shapes as shapes
-from wbc import tasks as tasks
-from wbc import trajectory as trajectory
-from wbc.controller import Certificate, Controller, Policy, Stack, Status, Step
-from wbc.errors import WbcError
-from wbc.explain import Explanation
-from wbc.ik import Solution, Solver
-from wbc.record import Recording, Replay, replay
+if TYPE_CHECKING:
+    from wbc import analysis as analysis
+    from wbc import coordinates as coordinates
+    from wbc import errors as errors
+    from wbc import proximity as proximity
+    from wbc import resolvers as resolvers
+    from wbc import robots as robots
+    from wbc import shapes as shapes
+    from wbc import tasks as tasks
+    from wbc import teleop as teleop
+    from wbc import track as track
+    from wbc import trajectory as trajectory
+    from wbc import walking as walking
+    from wbc.controller import Certificate, Controller, Policy, Stack, Status, Step
+    from wbc.errors import WbcError
+    from wbc.explain import Explanation
+    from wbc.ik import InverseKinematics, Solution
+    from wbc.ik import Solver as Solver
+    from wbc.record import Recording, replay
+    from wbc.record import Replay as Replay
+else:
+    __getattr__ = lazy.attach(__name__, __file__)
 
 __all__ = [
     "Certificate",
     "Controller",
     "Explanation",
+    "InverseKinematics",
     "Policy",
     "Recording",
-    "Replay",
     "Solution",
-    "Solver",
     "Stack",
     "Status",
     "Step",
     "WbcError",
     "__version__",
+    "analysis",
+    "coordinates",
+    "errors",
+    "proximity",
     "replay",
+    "resolvers",
     "robots",
     "shapes",
     "tasks",
+    "teleop",
+    "track",
     "trajectory",
+    "walking",
 ]
 
-# These stood in wbc.controller before they had packages of their own; they are found there for one version more
-_MOVED = {
-    explain: ("Explanation",),
-    ik: ("Branch", "Branches", "Ending", "Solution", "Solver"),
-    record: ("Recorder", "Recording", "Replay", "replay", "replayed"),
-}
-vars(controller).update({name: getattr(room, name) for room, names in _MOVED.items() for name in names})
+
+def __dir__() -> list[str]:
+    return __all__

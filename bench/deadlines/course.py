@@ -9,6 +9,7 @@ import pinocchio as pin
 
 import wbc
 from bench.problems import Array, Case
+from wbc.controller import core_of
 
 DT, TICKS, HOLD = 0.005, 4000, 200
 RADIUS, MARGIN, GAIN = 0.05, 0.02, 40.0
@@ -75,7 +76,7 @@ class Course:
         kind, c = self.kind, self.controller
         middles = self._middles(rng)
         phases = rng.uniform(0.0, 2.0 * np.pi, middles.shape)
-        inputs, wanted = np.zeros((TICKS, c.layout.parameters)), np.zeros((TICKS, len(kind.hands), 3))
+        inputs, wanted = np.zeros((TICKS, core_of(c).layout.parameters)), np.zeros((TICKS, len(kind.hands), 3))
         for k in range(TICKS):
             if k % HOLD == 0:
                 goals = self._goals(rng)
@@ -85,7 +86,7 @@ class Course:
             places, speeds = middles + SWING * np.sin(angles), 2.0 * np.pi * FREQUENCY * SWING * np.cos(angles)
             for name, place, speed in zip(self.balls, places, speeds, strict=True):
                 c[name].set(pose=pin.SE3(np.eye(3), place), velocity=np.concatenate([speed, np.zeros(3)]))
-            inputs[k] = c.tick.p
+            inputs[k] = core_of(c).tick.p
             wanted[k] = [goal.translation for goal in goals]
         return inputs, wanted
 

@@ -22,6 +22,7 @@ import pinocchio as pin
 
 from bench.deadlines.course import DT, HOLD, KINDS, TICKS, Course
 from bench.problems import load
+from wbc.controller import core_of
 
 
 def walk(course: Course, cap: int | None) -> dict[str, Any]:
@@ -30,7 +31,7 @@ def walk(course: Course, cap: int | None) -> dict[str, Any]:
     statuses: Counter[str] = Counter()
     iterations, errors, least = [], np.zeros(TICKS), np.inf
     for k in range(TICKS):
-        c.tick.p[:] = course.inputs[k]
+        core_of(c).tick.p[:] = course.inputs[k]
         step = c.step(q)
         statuses[str(step.status)] += 1
         iterations.append(int(step.iterations))
@@ -39,14 +40,14 @@ def walk(course: Course, cap: int | None) -> dict[str, Any]:
         places = [course.place(q, hand).translation for hand in course.kind.hands]
         errors[k] = np.linalg.norm(np.array(places) - course.wanted[k], axis=1).mean()
     found = {"error": float(errors.mean()), "settled": float(errors[HOLD - 1 :: HOLD].mean()), "margin": float(least)}
-    sizes = {"rows": c.layout.general_rows, "dofs": c.layout.nv}
+    sizes = {"rows": core_of(c).layout.general_rows, "dofs": core_of(c).layout.nv}
     return {"statuses": statuses, "iterations": iterations, **found, **sizes}
 
 
 def durations(course: Course, cap: int | None) -> list[int]:
     """Durations of the native call in the same closed loop [ns]."""
     c, q = begin(course, cap)
-    tick, out = c.tick, []
+    tick, out = core_of(c).tick, []
     for k in range(TICKS):
         tick.p[:] = course.inputs[k]
         tick.q[:] = q

@@ -31,11 +31,11 @@ def wbc_stack(given: dict) -> Any:
     stack = wbc.Stack(robot, dt=0.005)
     stack.add(wbc.tasks.EndEffector(given["tip"]), name="hand")
     stack.add(wbc.tasks.JointLimits())
-    return stack.solver()
+    return stack.inverse_kinematics()
 
 
 def wbc_solver(given: dict, budget: float, tolerance: float) -> Solve:
-    """``Solver.solve``, the whole Python call."""
+    """``InverseKinematics.solve``, the whole Python call."""
     import pinocchio as pin
 
     solver, start = wbc_stack(given), np.array(given["q0"])
@@ -113,7 +113,7 @@ CONTENDERS = {"wbc": wbc_solver, "pink": pink_loop, "mink": mink_loop}
 
 
 def wbc_batch(given: dict, poses: Array) -> dict:
-    """``Solver.solve_batch`` for all poses at once, on all cores."""
+    """``InverseKinematics.solve_batch`` for all poses at once, on all cores."""
     import pinocchio as pin
 
     solver, start = wbc_stack(given), np.array(given["q0"])

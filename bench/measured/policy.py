@@ -13,8 +13,9 @@ import wbc
 from bench.measured.ticks import median_us
 from bench.sheet import Sheet, us
 from wbc.controller import Controller, Policy
+from wbc.controller.controller import core_of
 from wbc.controller.policy import CHAIN
-from wbc.controller.report import UNSOUND
+from wbc.controller.tick.buffers import UNSOUND
 from wbc.shapes import Sphere
 from wbc.tasks import EndEffector, JointLimits, Obstacle, Posture
 
@@ -56,14 +57,15 @@ def after(arm: Controller, chain: tuple[str, ...]) -> tuple[float, float]:
     """(median, first) time of ticks whose first answer counts as not certified [us]."""
     arm.reset(arm.stack.robot.neutral)
     arm.policy = Policy(chain=chain)
-    real, fail = arm._call, [True]
+    core = core_of(arm)
+    real, fail = core.call, [True]
 
     def call() -> int:
         flag, fail[0] = real() | (UNSOUND if fail[0] else 0), False
         return flag
 
     spent = np.empty(TICKS)
-    arm._call = call
+    core.call = call
     try:
         for k in range(TICKS):
             fail[0] = True
@@ -71,7 +73,7 @@ def after(arm: Controller, chain: tuple[str, ...]) -> tuple[float, float]:
             arm.step(arm.stack.robot.neutral)
             spent[k] = perf_counter() - began
     finally:
-        arm._call = real
+        core.call = real
     return 1e6 * float(np.median(spent)), 1e6 * float(spent[0])
 
 

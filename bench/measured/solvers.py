@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from bench.conditioning import sheet as by_conditioning
+from bench.qp.samples import whole_body
+from bench.qp.survey import survey
 from bench.sheet import Sheet
 from wbc.qp import QP, make_solver
-from wbc.qp.samples import whole_body
 from wbc.qp.solvers import available_solvers
-from wbc.qp.survey import survey
 
 #: Problems of each kind, states of each weight
 PROBLEMS, STATES = 40, 60

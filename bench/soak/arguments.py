@@ -127,7 +127,7 @@ GOOD: dict[str, Callable[[Any], Any]] = {
     "Timing.other": lambda g: trajectory.Timing.identity(1.0), "Online.target.position": lambda g: 5.0 * Q,
     "proximity.distances.pairs": lambda g: _bodies(), "proximity.witnesses.pairs": lambda g: _bodies(),
     "Body.frame": lambda g: "link3", "Body.name": lambda g: "body",
-    "Solver.along.targets": lambda g: {"hand": [np.array([0.2, 0.6, 0.0]), np.array([0.3, 0.6, 0.0])]},
+    "InverseKinematics.along.targets": lambda g: {"hand": [np.array([0.2, 0.6, 0.0]), np.array([0.3, 0.6, 0.0])]},
     "Stack.solve.targets": lambda g: {"hand": np.array([0.2, 0.6, 0.0])},
     "Stack.solve.options": lambda g: {"restarts": 2}, "Step.derivative.name": lambda g: "hand",
     "Controller.__getitem__.name": lambda g: "hand", "Controller.pairs.name": lambda g: "box",
@@ -151,7 +151,7 @@ GOOD: dict[str, Callable[[Any], Any]] = {
     "PitchPlane.reference_width": lambda g: 0.05, "Law.timing": lambda g: trajectory.Timing.identity(0.9),
     "Law.limits": lambda g: _limits(), "moving": lambda g: (False, False), "Timing.knots": lambda g: [0.0, 1.0],
     "trajectory.arc_through.via": lambda g: np.array([0.5, 0.6, 0.0]), "Stack.__getitem__.name": lambda g: "hand",
-    "trajectory.online.velocity": lambda g: np.ones(3), "Solver.__getitem__.name": lambda g: "hand",
+    "trajectory.online.velocity": lambda g: np.ones(3), "InverseKinematics.__getitem__.name": lambda g: "hand",
     "Law.with_limits.limits": lambda g: _limits(), "Timing.coefficients": lambda g: [[0.0], [1.0]],
 }  # fmt: skip
 

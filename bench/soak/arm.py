@@ -96,6 +96,6 @@ def compiled() -> wbc.Controller:
 
 
 @cache
-def solvers() -> wbc.Solver:
+def solvers() -> wbc.InverseKinematics:
     """On the virtual machine, with one goal."""
-    return wbc.Solver(plain(), ["hand"], "vm")
+    return wbc.InverseKinematics(plain(), ["hand"], "vm")

@@ -8,6 +8,7 @@ import numpy as np
 import pinocchio as pin
 from scipy.optimize import linprog
 
+from bench.qp.reference import reference
 from bench.soak.episodes import label
 from bench.soak.levels import with_levels
 from bench.soak.machines import configuration, machine
@@ -16,7 +17,6 @@ from wbc.controller import Status, Step
 from wbc.errors import SolverError
 from wbc.explain.past import past_of
 from wbc.qp import QP, make_solver
-from wbc.qp.reference import reference
 from wbc.validation import Array
 
 #: Ticks from one start on

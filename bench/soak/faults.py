@@ -17,7 +17,7 @@ from bench.soak.machines import machine
 from bench.soak.stacks import DT, random_stack
 from wbc.controller import Controller
 from wbc.errors import RangeError
-from wbc.qp import daqp
+from wbc.qp.solvers import daqp
 from wbc.validation import Array
 
 Given = tuple[Array, Array | None, float | None]

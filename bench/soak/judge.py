@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from bench.soak.referee import SAME, distance
-from wbc.controller import Controller, Status, Step
+from wbc.controller import Controller, Status, Step, core_of
 from wbc.explain.past import past_of
 from wbc.robot import Robot
 from wbc.validation import Array
@@ -30,7 +30,7 @@ class Judge:
         scales = [1.0, controller.stack.length]
         self.longest = max(scales)
         self.loose = self.compared = 0
-        blocks = controller.layout.of_form("margins", "rows")
+        blocks = core_of(controller).layout.of_form("margins", "rows")
         self.kinds = np.array([type(b.entry.item).__name__ for b in blocks for _ in b.rows])
 
     def gave_way(self, step: Step) -> set[str]:

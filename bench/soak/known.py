@@ -11,7 +11,7 @@ from bench.soak.episodes import label
 from bench.soak.machines import configuration, machine
 from bench.soak.referee import SAME, distance
 from bench.soak.stacks import DT, pose, weight
-from wbc.controller import Controller, Stack
+from wbc.controller import Controller, Stack, core_of
 from wbc.robot import Robot
 from wbc.shapes import Sphere
 from wbc.tasks import EndEffector, FrameVelocityLimit, Hold, JointLimits, Obstacle, Posture
@@ -44,7 +44,7 @@ def pose_problem(controller: Controller, rng: np.random.Generator) -> tuple[Arra
     controller["ball"].pose = pin.SE3(np.eye(3), np.array([50.0, 0.0, 0.0]))
     controller["hold"].enabled = False
     # The bounds are those of the configuration in the buffers, which is that of the last step until the next one
-    controller.tick.q[:] = q
+    core_of(controller).tick.q[:] = q
     bounds = controller.qp()
     low, high = np.maximum(bounds.lower[: robot.nv], -1.0), np.minimum(bounds.upper[: robot.nv], 1.0)
     v: Array = low + (high - low) * rng.uniform(0.25, 0.75, robot.nv)
@@ -68,7 +68,7 @@ def problems(seed: int, k: int, backend: str, states: int) -> list[tuple[str, Co
         step = controller.step(q)
         counts[label(step)] += 1
         # the buffers still hold the tick, but for the velocity that accelerations count from
-        controller.tick.v_last[:] = 0.0
+        core_of(controller).tick.v_last[:] = 0.0
         qp = controller.qp()
         if qp.violation(v).max() > 1e-9:
             counts["wrong: the known velocity is not feasible"] += 1

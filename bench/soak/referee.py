@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import quadprog
 
+from bench.qp.reference import reference
 from wbc.errors import SolverError
 from wbc.qp import QP, make_solver
-from wbc.qp.reference import reference
 from wbc.validation import Array
 
 #: Largest difference from the referee [rad/s]
@@ -16,7 +16,7 @@ SAME = 1e-6
 
 def distance(qp: QP, x: Array) -> float | None:
     """How far x, the first variables, is from the minimiser: quadprog's or, if that is further away than :data:`SAME`,
-    the exact one of :func:`wbc.qp.reference.reference`, whose optimality conditions are verified with 60 digits. None:
+    the exact one of :func:`bench.qp.reference.reference`, verified with 60 digits. None:
     both give up.
 
     Where the smallest eigenvalue of H is 10^-12 of the largest, as weights of 1e-6 make it, quadprog is off by 1e-5.

@@ -6,7 +6,7 @@ import numpy as np
 import pinocchio as pin
 
 import wbc
-from wbc.controller import Controller
+from wbc.controller import Controller, core_of
 from wbc.robot import Robot
 from wbc.shapes import HalfSpace, Sphere
 from wbc.tasks import (
@@ -80,7 +80,7 @@ def provoke(controller: Controller, rng: np.random.Generator) -> None:
     for entry in controller.stack.entries:
         handle, item = controller[entry.name], entry.item
         if isinstance(item, (EndEffector, Hold)):
-            kind = controller.layout.blocks[entry.name].slots["target"].input.kind
+            kind = core_of(controller).layout.blocks[entry.name].slots["target"].input.kind
             place = pose(rng, 0.5 if rng.random() < 0.8 else 50.0)
             handle.target = {"pose": place, "rotation": place.rotation, "vector": place.translation}[kind]
             handle.gain = float(10.0 ** rng.uniform(-1.0, 2.0))

@@ -16,8 +16,8 @@ from bench.time_laws import raw
 from bench.time_laws.suite import INSTANCES, PROBLEMS
 from wbc.errors import WbcError
 from wbc.trajectory import Law, Limits, PolynomialPath, jerk_limited_along, spline_path, time_optimal
-from wbc.trajectory.checks import TorqueCheck
-from wbc.trajectory.waypoints import Ends
+from wbc.trajectory.least_time.checks import TorqueCheck
+from wbc.trajectory.paths.waypoints import Ends
 from wbc.validation import Array
 
 Record = dict[str, Any]

@@ -13,7 +13,7 @@ from bench.time_laws import raw
 from bench.time_laws.families import FAMILIES, drawn, misses
 from wbc.errors import BoundsError
 from wbc.trajectory import jerk_limited
-from wbc.trajectory.braking import reach
+from wbc.trajectory.jerk.braking import reach
 from wbc.validation import Array
 
 Record = dict[str, Any]

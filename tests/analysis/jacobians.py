@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from wbc.analysis import published_sets
-from wbc.analysis.numeric import NumericRows
+from wbc.analysis.jacobians.numeric import NumericRows
 from wbc.validation import Array
 
 

@@ -9,7 +9,7 @@ import pinocchio as pin
 import pytest
 
 from wbc.analysis import BodyRows, ExactModel, JointRows, analyse_blocks, certify, certify_blocks
-from wbc.analysis.numeric import NumericRows, rank, singular_values
+from wbc.analysis.jacobians.numeric import NumericRows, rank, singular_values
 from wbc.errors import RangeError, RobotFileError
 from wbc.robot import Limits, Robot
 

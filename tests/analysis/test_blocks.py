@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from wbc.analysis import BodyRows, ExactModel, JointRows, PitchPlaneRows, Rows, analyse_blocks, joint_blocks
-from wbc.analysis.numeric import NumericRows, rank
+from wbc.analysis.jacobians.numeric import NumericRows, rank
 from wbc.coordinates import tree_sets
 from wbc.errors import RangeError, ShapeError, UnknownNameError
 from wbc.robots import operator_arm

@@ -8,22 +8,14 @@ import numpy as np
 import pytest
 
 from tests.analysis.jacobians import jacobians
-from wbc.analysis import (
-    BodyRows,
-    ExactModel,
-    JointRows,
-    candidate_rows,
-    certify,
-    published_sets,
-    screen,
-    symbolic_jacobian,
-)
-from wbc.analysis.block_proofs import block_proofs
-from wbc.analysis.boxes import BoxSearch
-from wbc.analysis.numeric import rank
-from wbc.analysis.rank_matrix import rank_matrices
-from wbc.analysis.symmetry import fundamental_box, symmetries
-from wbc.analysis.trig_form import TrigForm, trig_form, used_joints
+from wbc.analysis import BodyRows, ExactModel, JointRows, candidate_rows, certify, published_sets, symbolic_jacobian
+from wbc.analysis.algebra.trig_form import TrigForm, trig_form, used_joints
+from wbc.analysis.certificates.block_proofs import block_proofs
+from wbc.analysis.certificates.boxes import BoxSearch
+from wbc.analysis.certificates.screen import screen
+from wbc.analysis.certificates.symmetry import fundamental_box, symmetries
+from wbc.analysis.jacobians.numeric import rank
+from wbc.analysis.jacobians.rank_matrix import rank_matrices
 from wbc.errors import RangeError, RobotFileError, UnknownNameError, UnsupportedJointError
 from wbc.robots import operator_arm
 

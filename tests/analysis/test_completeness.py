@@ -7,8 +7,8 @@ import pytest
 
 from tests.analysis.jacobians import jacobians
 from wbc.analysis import ExactModel, JointRows, analyse, published_sets
-from wbc.analysis.equivalent_rows import split_twists
-from wbc.analysis.numeric import NumericRows, rank
+from wbc.analysis.jacobians.equivalent_rows import split_twists
+from wbc.analysis.jacobians.numeric import NumericRows, rank
 from wbc.errors import RangeError, ShapeError, UnknownNameError
 
 VERDICTS = {

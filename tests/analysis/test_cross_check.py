@@ -10,11 +10,11 @@ import pytest
 
 from tests.analysis.jacobians import jacobians
 from wbc.analysis import Analysis, ExactModel, analyse, published_sets, symbolic_jacobian
-from wbc.analysis.boxes import BoxSearch
-from wbc.analysis.numeric import rank
-from wbc.analysis.points import angle, form_value, joint_roots, real_point
-from wbc.analysis.rank_matrix import rank_matrices
-from wbc.analysis.trig_form import TrigForm, trig_form, used_joints
+from wbc.analysis.algebra.points import angle, form_value, joint_roots, real_point
+from wbc.analysis.algebra.trig_form import TrigForm, trig_form, used_joints
+from wbc.analysis.certificates.boxes import BoxSearch
+from wbc.analysis.jacobians.numeric import rank
+from wbc.analysis.jacobians.rank_matrix import rank_matrices
 from wbc.validation import Array
 
 SETS = published_sets("ssrms")

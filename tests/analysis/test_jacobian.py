@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from wbc.analysis import BodyRows, ExactModel, JointRows, PitchPlaneRows, Rows, symbolic_jacobian
-from wbc.analysis.numeric import NumericRows, rank
+from wbc.analysis.jacobians.numeric import NumericRows, rank
 from wbc.errors import RangeError, ShapeError, UnknownNameError
 from wbc.robots import operator_arm
 

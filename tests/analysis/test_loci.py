@@ -20,8 +20,8 @@ from wbc.analysis import (
     sub_determinant_locus,
     symbolic_jacobian,
 )
-from wbc.analysis.numeric import NumericRows, rank
-from wbc.analysis.points import real_point
+from wbc.analysis.algebra.points import real_point
+from wbc.analysis.jacobians.numeric import NumericRows, rank
 
 #: Robot, set ("" for the task alone), and the lines of its locus
 LOCI = (

@@ -24,14 +24,14 @@ from wbc.analysis import (
     certify,
     published_sets,
 )
-from wbc.analysis.child import Child
-from wbc.analysis.emptiness import proved_empty
-from wbc.analysis.equivalent_rows import split_twists
-from wbc.analysis.half_angles import HalfAngles
-from wbc.analysis.numeric import NumericRows
-from wbc.analysis.points import angle, form_grid, form_value, real_point
-from wbc.analysis.ring import Coordinate, Poly, TrigRing
-from wbc.analysis.transforms import exact_placement
+from wbc.analysis.algebra.emptiness import proved_empty
+from wbc.analysis.algebra.half_angles import HalfAngles
+from wbc.analysis.algebra.points import angle, form_grid, form_value, real_point
+from wbc.analysis.algebra.ring import Coordinate, Poly, TrigRing
+from wbc.analysis.algebra.transforms import exact_placement
+from wbc.analysis.jacobians.equivalent_rows import split_twists
+from wbc.analysis.jacobians.numeric import NumericRows
+from wbc.analysis.loci.child import Child
 from wbc.errors import RangeError
 from wbc.robot import DHRow
 from wbc.robots import from_dh, load, operator_arm

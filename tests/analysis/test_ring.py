@@ -10,10 +10,10 @@ import pinocchio as pin
 import pytest
 
 from wbc.analysis import ExactModel, Relation, Value
-from wbc.analysis.half_angles import HalfAngles
-from wbc.analysis.points import joint_roots, univariate_roots
-from wbc.analysis.ring import Coordinate, Poly, TrigRing, written
-from wbc.analysis.transforms import dot
+from wbc.analysis.algebra.half_angles import HalfAngles
+from wbc.analysis.algebra.points import joint_roots, univariate_roots
+from wbc.analysis.algebra.ring import Coordinate, Poly, TrigRing, written
+from wbc.analysis.algebra.transforms import dot
 from wbc.errors import DuplicateNameError, NotFiniteError, RangeError, RotationError, UnsupportedJointError
 from wbc.robot import Limits, Robot
 from wbc.robots import operator_arm

@@ -20,8 +20,8 @@ from wbc.analysis import (
     candidate_rows,
     published_sets,
 )
-from wbc.analysis.loci import Loci, loci
-from wbc.analysis.numeric import rank
+from wbc.analysis.jacobians.numeric import rank
+from wbc.analysis.loci.loci import Loci, loci
 from wbc.errors import RangeError
 
 

@@ -11,6 +11,7 @@ from bench import prepare
 from bench.deadlines import course, run, worker
 from bench.deadlines.course import Course
 from bench.problems import load
+from wbc.controller import core_of
 
 TICKS = 150
 
@@ -58,7 +59,7 @@ def test_what_is_timed_is_the_same_loop(short: Course, monkeypatch: pytest.Monke
     assert len(spent) == TICKS
     assert min(spent) > 0
     c = short.controller
-    np.testing.assert_allclose(c.tick.q + course.DT * c.last_command, seen[-1], atol=1e-12)
+    np.testing.assert_allclose(core_of(c).tick.q + course.DT * c.last_command, seen[-1], atol=1e-12)
 
 
 def test_the_table_tells_shares_and_tails() -> None:

@@ -7,7 +7,7 @@ from importlib import resources
 
 import pytest
 
-from wbc.controller import reach
+from wbc.controller.tick import reach
 from wbc.ik import descent, search
 
 NAMES = ("TRUSTED", "AT_LIMIT", "PUSHED", "NEGLIGIBLE", "LEAST_PIVOT", "BRAKING", "REMOVED", "TOO_FAR", "CORRECTIONS")

@@ -19,7 +19,7 @@ from wbc.cli.app import app
 CHILD = """
 import sys, time
 from pathlib import Path
-from wbc.analysis.boxes import BoxSearch
+from wbc.analysis.certificates.boxes import BoxSearch
 from wbc.cli import main
 
 run, begun = BoxSearch.run, Path(sys.argv[1])

@@ -9,8 +9,7 @@ from unittest import mock
 import casadi as ca
 
 from wbc.robot import Robot
-from wbc.symbolic.centroidal import Centroidal
-from wbc.symbolic.dynamics import Dynamics
+from wbc.symbolic.dynamics import Centroidal, Dynamics
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks import AxisAlign, Distance, Input, LookAt, Momentum, Values, axis_align, look_at
 

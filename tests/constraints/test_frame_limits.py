@@ -14,7 +14,7 @@ import wbc
 from tests.evaluation import Numbers, numbers
 from tests.refusals import assert_refused
 from tests.tasks.robots import FRAMES, placement, random_configuration, robot
-from wbc.controller import Controller
+from wbc.controller import Controller, core_of
 from wbc.errors import BoundsError, NotFiniteError, RangeError, RotationError, ShapeError, UnknownNameError, WbcError
 from wbc.tasks import AxisCone, GazeCone, Item, JointLimits, Posture, WorkspaceBox, WorkspacePolyhedron
 from wbc.tasks._cone import COINCIDENT
@@ -276,7 +276,7 @@ VALUES: dict[str, tuple[str, dict[str, Any], type[WbcError], str]] = {
 def test_bad_value_changes_nothing(case: str) -> None:
     name, values, error, text = VALUES[case]
     controller = fresh("vm")
-    before = controller.tick.p.copy()
+    before = core_of(controller).tick.p.copy()
     ways: list[Callable[[], None]] = [lambda: controller[name].set(**values)]
     if len(values) == 1 and "enabled" not in values:
         ((key, value),) = values.items()
@@ -286,7 +286,7 @@ def test_bad_value_changes_nothing(case: str) -> None:
             way()
         assert isinstance(caught.value, error)
         assert text in str(caught.value)
-        assert np.array_equal(controller.tick.p, before)
+        assert np.array_equal(core_of(controller).tick.p, before)
 
 
 def test_a_box_moves_past_itself() -> None:

@@ -11,7 +11,7 @@ import pinocchio as pin
 import wbc
 from tests.constraints.robots import robot as limited_robot
 from tests.tasks.robots import FRAMES, random_configuration
-from wbc.controller import Controller, Stack
+from wbc.controller import Controller, Stack, core_of
 from wbc.native import toolchain
 from wbc.robot import Robot
 from wbc.shapes import HalfSpace, Sphere
@@ -130,7 +130,7 @@ def sample(bot: Robot, declared: Any, rng: np.random.Generator) -> Any:
 def randomise(controller: Controller, rng: np.random.Generator) -> dict[str, dict[str, Any]]:
     """Write a random value to every input, weight, mask and switch; what was written, by item."""
     written: dict[str, dict[str, Any]] = {}
-    for name, block in controller.layout.blocks.items():
+    for name, block in core_of(controller).layout.blocks.items():
         given = [slot.input for slot in block.slots.values() if not slot.input.sensed]
         values = {declared.name: sample(controller.stack.robot, declared, rng) for declared in given}
         rows = len(block.rows)
@@ -167,7 +167,7 @@ def inside(bot: Robot, rng: np.random.Generator, share: float = 0.6) -> np.ndarr
 
 def aim(controller: Controller, rng: np.random.Generator) -> None:
     """Move every target that the first configuration has set; put the ball somewhere, moving."""
-    for name, block in controller.layout.blocks.items():
+    for name, block in core_of(controller).layout.blocks.items():
         item = controller[name]
         slot = block.slots.get("target")
         if slot is None or "foot" in name:

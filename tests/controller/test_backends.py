@@ -11,7 +11,7 @@ import pytest
 
 from tests.controller.stacks import DT, aim, controller, inside, near_limits, quarrel, randomise
 from tests.stack.small import stack as small
-from wbc.controller import Controller, Status, Step
+from wbc.controller import Controller, Status, Step, core_of
 from wbc.errors import SolverError
 
 Setup = Callable[[Controller, np.random.Generator], Any]
@@ -105,7 +105,7 @@ def test_certificate_of_a_relaxed_native_tick_is_about_what_was_left() -> None:
 
 
 def test_rows_of_levels_are_refused_by_code_that_has_none() -> None:
-    native, vm = (small().compile(backend=backend).tick for backend in ("native", "vm"))
+    native, vm = (core_of(small().compile(backend=backend)).tick for backend in ("native", "vm"))
     native.qp()
     for name in ("task_rows", "bent"):
         with pytest.raises(SolverError, match="strict levels"):

@@ -11,7 +11,7 @@ import pytest
 
 import wbc
 from tests.tasks.robots import FRAMES, robot
-from wbc.controller import Controller
+from wbc.controller import Controller, core_of
 from wbc.shapes import Box, Capsule, PlacedShape, Sphere
 from wbc.tasks import EndEffector, JointLimits, Obstacle, Posture
 
@@ -73,10 +73,10 @@ def test_rows_are_those_of_the_expressions(name: str) -> None:
         for controller in controllers:
             controller.reset(q)
             steps.append(controller.step(q))
-        native, vm = (controller.tick.qp() for controller in controllers)
+        native, vm = (core_of(controller).tick.qp() for controller in controllers)
         # q is what the last step left in the buffers
         assert np.abs(native.A - vm.A).max() < 1e-12
-        n = controllers[0].layout.nv
+        n = core_of(controllers[0]).layout.nv
         assert np.abs(native.lower - vm.lower)[n:][np.isfinite(vm.lower[n:])].max() < 1e-11
         assert (np.isfinite(native.lower) == np.isfinite(vm.lower)).all()
         for k in range(BALLS):
@@ -106,7 +106,7 @@ def test_a_ball_on_the_core_of_a_link_has_a_direction_to_leave_in(place: tuple[f
                 controller.reset(q)
                 step = controller.step(q)
                 assert np.isfinite(step.v).all()
-                matrices.append(controller.tick.qp().A)
+                matrices.append(core_of(controller).tick.qp().A)
             assert np.isfinite(matrices[0]).all()
             assert np.abs(matrices[0] - matrices[1]).max() < 1e-5
             assert np.abs(matrices[0]).max() > 0.05
@@ -128,13 +128,13 @@ def test_rows_that_are_left_out_hold_whatever_the_joints_do(name: str, calm: boo
             controller.reset(q)
             controller["hand"].target = target
         for tick in range(150):
-            vm.tick.v_last[:] = native.tick.v_last
+            core_of(vm).tick.v_last[:] = core_of(native).tick.v_last
             step = native.step(q)
             bound += any(b.item.startswith("ball") for b in step.binding)
             # Three ticks do not differ in more than one does
             if tick % 3 == 0:
-                low = native.tick._low[n:].copy()
-                full = native.tick.qp()
+                low = core_of(native).tick._low[n:].copy()
+                full = core_of(native).tick.qp()
                 far = (low <= -1e29) & np.isfinite(full.lower[n:])
                 least = np.minimum(full.A[far] * full.lower[:n], full.A[far] * full.upper[:n]).sum(axis=1)
                 assert (least >= full.lower[n:][far]).all()

@@ -11,11 +11,12 @@ import pytest
 PROGRAM = """
 import json, sys
 import numpy as np
+from wbc.controller import core_of
 import wbc
 from tests.stack import small
 from wbc.controller.policy import CHAIN
-from wbc.controller.report import UNSOUND
-from wbc.qp.backend import Backend
+from wbc.controller.tick.buffers import UNSOUND
+from wbc.qp.solvers.backend import Backend
 
 made = [0]
 real_init = Backend.__init__
@@ -43,11 +44,11 @@ def ticks(controller):
 
     def tick(name, one=controller, unsound=False):
         known, made[0] = set(sys.modules), 0
-        call = one._call
+        call = core_of(one).call
         if unsound:
-            one._call = lambda: call() | UNSOUND
+            core_of(one).call = lambda: call() | UNSOUND
         step = one.step(q)
-        one._call = call
+        core_of(one).call = call
         rows[name] = [str(step.status), step.answered_by, sorted(set(sys.modules) - known), made[0]]
 
     controller["grip"].enabled = False

@@ -14,6 +14,7 @@ import pytest
 from tests.controller.stacks import DT, inside, robot
 from tests.controller.twins import BACKENDS, POSE, make, next_ticks, state
 from wbc import Stack
+from wbc.controller import core_of
 from wbc.errors import NotFiniteError, RotationError, SolverError
 from wbc.robot import Robot
 from wbc.symbolic.tracer import Tracer
@@ -145,13 +146,13 @@ def test_step_before_a_target_without_default() -> None:
 def test_poses_are_taken_and_refused_alike_by_both_backends() -> None:
     """The native check of a pose that is set every tick, against the one in Python."""
     native, vm = make("panda", "native"), make("panda", "vm")
-    slot = native.layout.blocks["hand"].slots["target"]
+    slot = core_of(native).layout.blocks["hand"].slots["target"]
     rng, taken = np.random.default_rng(11), 0
     for size in (0.0, 1e-8, 1e-7, 2e-7, 3e-7, 4e-7, 6e-7, 1e-6, 1e-3):
         for _ in range(20):
             pose = pin.SE3.Random().homogeneous
             pose[:3] += size * rng.standard_normal((3, 4))
-            before, refused = native.tick.p[slot.span].copy(), []
+            before, refused = core_of(native).tick.p[slot.span].copy(), []
             for controller in (native, vm):
                 try:
                     controller["hand"].target = pose
@@ -159,12 +160,12 @@ def test_poses_are_taken_and_refused_alike_by_both_backends() -> None:
                     refused.append(controller)
             assert len(refused) in (0, 2)
             written = before if refused else pose[:3].ravel(order="F")
-            assert np.array_equal(native.tick.p[slot.span], written)
+            assert np.array_equal(core_of(native).tick.p[slot.span], written)
             taken += not refused
             # the same numbers in another order in memory
             if not refused:
                 native["hand"].target = np.asfortranarray(pose)
-                assert np.array_equal(native.tick.p[slot.span], written)
+                assert np.array_equal(core_of(native).tick.p[slot.span], written)
     assert 60 < taken < 170
     for spoil in ((3, 3, 2.0), (3, 0, 1e-9), (0, 3, np.nan), (1, 3, np.inf), (0, 0, np.nan)):
         bad = np.eye(4)
@@ -174,4 +175,4 @@ def test_poses_are_taken_and_refused_alike_by_both_backends() -> None:
     mirrored = np.diag([1.0, 1.0, -1.0, 1.0])
     with pytest.raises(RotationError):
         native["hand"].target = mirrored
-    assert np.array_equal(native.tick.p[slot.span], before if refused else written)
+    assert np.array_equal(core_of(native).tick.p[slot.span], before if refused else written)

@@ -10,6 +10,7 @@ import pytest
 PROGRAM = """
 import sys
 from tests.stack import small
+from wbc.controller import core_of
 controller = small.stack().compile(backend={backend!r})
 q = controller.stack.robot.neutral
 statuses = {{str(controller.step(q).status) for _ in range(50)}}
@@ -17,8 +18,8 @@ assert statuses == {{"solved"}}, statuses
 asked_for = ("explaining", "losses", "naming", "past", "sensitivity")
 loaded = {{name for name in sys.modules if name.startswith("wbc.")}}
 print(sorted(loaded & {{"wbc.explain." + name for name in asked_for}}), end=" ")
-print(sorted(loaded & {{"wbc.qp.conflict", "wbc.qp.sensitivity", "wbc.qp.level_sensitivity"}}), end=" ")
-print(sorted(controller._fallback._links))
+print(sorted(loaded & {{"wbc.qp.conflict", "wbc.qp.sensitivity", "wbc.qp.levels.sensitivity"}}), end=" ")
+print(sorted(core_of(controller).fallback._links))
 controller.step(q).explain()
 assert "wbc.explain.losses" in sys.modules
 """

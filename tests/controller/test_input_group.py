@@ -7,8 +7,9 @@ import pinocchio as pin
 import pytest
 
 import wbc
+from wbc.controller import core_of
 from wbc.controller.controller import Controller
-from wbc.controller.input_group import InputGroup
+from wbc.controller.handle import InputGroup
 from wbc.errors import NotFiniteError
 
 
@@ -23,7 +24,8 @@ def controller() -> Controller:
 def test_a_group_is_written_as_its_inputs_are(controller: Controller) -> None:
     pose, rate, angles = pin.SE3.Random(), np.arange(6.0), np.array([0.1, 0.2])
     group = InputGroup(
-        controller, [("hand", "target", None), ("hand", "feedforward", None), ("posture", "target", slice(1, 3))]
+        core_of(controller),
+        [("hand", "target", None), ("hand", "feedforward", None), ("posture", "target", slice(1, 3))],
     )
     controller.reset(np.full(6, 0.5))
     group.write(np.concatenate([pose.homogeneous[:3].ravel(order="F"), rate, angles]))
@@ -35,9 +37,9 @@ def test_a_group_is_written_as_its_inputs_are(controller: Controller) -> None:
 
 
 def test_numbers_that_are_not_finite_change_nothing(controller: Controller) -> None:
-    group = InputGroup(controller, [("hand", "feedforward", None), ("posture", "feedforward", None)])
+    group = InputGroup(core_of(controller), [("hand", "feedforward", None), ("posture", "feedforward", None)])
     group.write(np.ones(12))
-    before = controller.tick.p.copy()
+    before = core_of(controller).tick.p.copy()
     with pytest.raises(NotFiniteError, match=r"hand\.feedforward, posture\.feedforward"):
         group.write(np.array([2.0] * 11 + [np.nan]))
-    assert (controller.tick.p == before).all()
+    assert (core_of(controller).tick.p == before).all()

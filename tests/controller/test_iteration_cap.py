@@ -10,7 +10,7 @@ import pinocchio as pin
 import pytest
 
 from tests.controller.stacks import aim, arm, controller, inside, robot
-from wbc.controller import Controller, Status
+from wbc.controller import Controller, Status, core_of
 from wbc.errors import RangeError, SolverError
 from wbc.qp.problem import QP
 from wbc.record import replay
@@ -36,8 +36,8 @@ def hard(c: Controller, rng: np.random.Generator) -> np.ndarray:
 def at(c: Controller, q: np.ndarray) -> QP:
     """The QP of the next step."""
     other = c.clone()
-    other.tick.q[:] = q
-    assert other.tick.check() == 0
+    core_of(other).tick.q[:] = q
+    assert core_of(other).tick.check() == 0
     return other.qp()
 
 
@@ -46,7 +46,7 @@ def test_a_capped_answer_keeps_bounds_and_misses_no_row_more_than_braking(cap: i
     rng = np.random.default_rng(cap)
     c = arm("panda").compile(backend="native")
     c.iteration_cap = cap
-    nv, seen = c.layout.nv, {Status.CAPPED: 0, Status.SOLVED: 0, Status.RELAXED: 0}
+    nv, seen = core_of(c).layout.nv, {Status.CAPPED: 0, Status.SOLVED: 0, Status.RELAXED: 0}
     between = 0
     for _ in range(60):
         q = hard(c, rng)
@@ -73,7 +73,7 @@ def test_ticks_go_on_where_the_last_one_was_stopped() -> None:
     waited = 0
     for _ in range(20):
         c.iteration_cap = None
-        q, v = hard(c, rng), rng.normal(0.0, 0.3, c.layout.nv)
+        q, v = hard(c, rng), rng.normal(0.0, 0.3, core_of(c).layout.nv)
         c.reset(q)
         best = c.step(q, v)
         if best.status is not Status.SOLVED:
@@ -100,7 +100,7 @@ def test_held_feet_stay_held() -> None:
         if step.status is Status.CAPPED:
             capped += 1
             A = at(c, q).A
-            feet = [c.layout.blocks[name].span for name in ("left_foot", "right_foot")]
+            feet = [core_of(c).layout.blocks[name].span for name in ("left_foot", "right_foot")]
             assert max(float(np.abs(A[span] @ step.v).max()) for span in feet) < 1e-8
     assert capped > 2
 

@@ -8,6 +8,7 @@ import pytest
 
 from bench.soak.faults import corrupt, delete
 from tests.stack import small
+from wbc.controller import core_of
 from wbc.native.library import load_library
 
 
@@ -22,7 +23,7 @@ def test_a_lost_library_changes_nothing(cache: Path, monkeypatch: pytest.MonkeyP
     monkeypatch.setenv("WBC_CACHE", str(cache))
     controller = small.stack().compile(backend="native")
     (library,) = cache.glob("*/tick.so")
-    assert controller.tick._library._name != str(library)
+    assert core_of(controller).tick._library._name != str(library)
     before = small.command(controller)
     content = library.read_bytes()
     library.parent.chmod(0o700)

@@ -17,6 +17,7 @@ import pytest
 from tests.controller.stacks import arm, controller, near_limits, randomise, robot
 from tests.stack import small
 from wbc import Controller, Stack
+from wbc.controller import core_of
 from wbc.errors import BusyError
 from wbc.shapes import Box
 from wbc.stack import artifact
@@ -99,7 +100,7 @@ def test_a_clone_goes_on_as_its_original_would(backend: str) -> None:
     assert str(other) == str(one)
     assert np.array_equal(other.last_command, one.last_command)
     path = [near_limits(bot, rng) for _ in range(4)]
-    one.tick.reset()
+    core_of(one).tick.reset()
     assert [other.step(q)._data for q in path] == [one.step(q)._data for q in path]
     # and does not touch it
     text = str(one)
@@ -136,8 +137,8 @@ def test_a_clone_reads_nothing_and_builds_nothing(monkeypatch: pytest.MonkeyPatc
     other = first.clone()
     assert small.command(other) == small.command(first)
     maps = Path("/proc/self/maps").read_text()
-    assert maps.count(first.tick._library._name) in range(1, 8), "one library, however many controllers"
-    assert other.tick._library._handle == first.tick._library._handle
+    assert maps.count(core_of(first).tick._library._name) in range(1, 8), "one library, however many controllers"
+    assert core_of(other).tick._library._handle == core_of(first).tick._library._handle
 
 
 # One controller in two threads
@@ -146,14 +147,14 @@ def test_a_clone_reads_nothing_and_builds_nothing(monkeypatch: pytest.MonkeyPatc
 def test_one_controller_in_two_threads_is_an_error() -> None:
     one = small.stack().compile(backend="vm")
     inside, go_on = threading.Event(), threading.Event()
-    call = one._call
+    call = core_of(one).call
 
     def slow() -> int:
         inside.set()
         assert go_on.wait(20.0)
         return call()
 
-    one._call = slow
+    core_of(one).call = slow
     found: list[Any] = []
     other = threading.Thread(target=lambda: found.append(one.step(small.Q)))
     other.start()
@@ -165,7 +166,7 @@ def test_one_controller_in_two_threads_is_an_error() -> None:
     # the tick that was under way is as if nobody had come
     fresh = small.stack().compile(backend="vm")
     assert found[0]._data == fresh.step(small.Q)._data
-    one._call = call
+    core_of(one).call = call
     assert one.step(small.Q)._data == fresh.step(small.Q)._data
 
 

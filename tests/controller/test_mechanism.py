@@ -10,7 +10,7 @@ import pytest
 
 import wbc.robots
 from tests.controller.stacks import DT, robot
-from wbc.controller import Controller, Stack, Status
+from wbc.controller import Controller, Stack, Status, core_of
 from wbc.errors import DuplicateNameError
 from wbc.robot import Robot
 from wbc.robot.robot import Coupling
@@ -46,7 +46,7 @@ def test_rows_are_there_and_hold(name: str) -> None:
     tick = build(name)
     bot, rng = tick.stack.robot, np.random.default_rng(1)
     assert isinstance(tick.stack["mechanism"].item, Mechanism)
-    assert len(tick.layout.blocks["mechanism"].rows) == len(bot.couplings) + len(bot.locked_dofs) > 0
+    assert len(core_of(tick).layout.blocks["mechanism"].rows) == len(bot.couplings) + len(bot.locked_dofs) > 0
     moved = 0.0
     for _ in range(8):
         q = coupled(bot, rng)

@@ -16,7 +16,7 @@ import pinocchio as pin
 import pytest
 
 import wbc
-from wbc.robot.files import example_data_folder
+from wbc.robot.sources.files import example_data_folder
 from wbc.tasks import Expression, Input, JointLimits, Posture
 
 KNOWN = json.loads((Path(__file__).parent / "data" / "pink.json").read_text())

@@ -12,13 +12,13 @@ import pytest
 import wbc
 from tests.controller.stacks import DT, FRAMES, arm, robot
 from tests.controller.test_sacrifice import within_actuators
-from wbc.controller import Controller, Policy, Status
+from wbc.controller import Controller, Policy, Status, core_of
 from wbc.controller.policy import CHAIN
-from wbc.controller.report import UNSOUND
+from wbc.controller.tick.buffers import UNSOUND
 from wbc.errors import DuplicateNameError, ShapeError, SolverError, UnknownNameError
 from wbc.qp import QP, Solution, make_solver
-from wbc.qp import daqp as daqp_module
 from wbc.qp.certificate import certify
+from wbc.qp.solvers import daqp as daqp_module
 from wbc.tasks import Hold
 
 
@@ -54,7 +54,7 @@ def contradict(tick: Controller) -> None:
 
 def unsound(tick: Controller, times: int) -> Any:
     """The next answers of the tick as if their certificates failed."""
-    real, left = tick._call, [times]
+    real, left = core_of(tick).call, [times]
 
     def call() -> int:
         flag = real()
@@ -67,7 +67,7 @@ def unsound(tick: Controller, times: int) -> Any:
 def spread(tick: Controller, monkeypatch: pytest.MonkeyPatch, link: str) -> None:
     """Only one link of the chain, after an answer that is not certified."""
     tick.policy = Policy(chain=(link,))
-    monkeypatch.setattr(tick, "_call", unsound(tick, 1))
+    monkeypatch.setattr(core_of(tick), "call", unsound(tick, 1))
 
 
 @pytest.mark.parametrize("link", CHAIN)
@@ -103,7 +103,7 @@ def test_every_link_gives_a_certified_answer(
 def test_an_empty_chain_brakes(tick: Controller, monkeypatch: pytest.MonkeyPatch) -> None:
     bot, v = robot("panda"), np.array([1.0, -0.5, 0.02, 0.8, -1.2, 0.0, 0.3])
     tick.policy = Policy(chain=())
-    monkeypatch.setattr(tick, "_call", unsound(tick, 1))
+    monkeypatch.setattr(core_of(tick), "call", unsound(tick, 1))
     step = tick.step(bot.neutral, v)
     assert (step.status, step.answered_by) == (Status.BRAKED, "braking")
     limit = bot.limits.acceleration * DT

@@ -12,7 +12,7 @@ import pytest
 import wbc
 from tests.controller.softness import Soft, Wish, jacobian, optimum
 from tests.controller.stacks import DT, robot
-from wbc.controller import Controller, Stack, Status
+from wbc.controller import Controller, Stack, Status, core_of
 from wbc.errors import NotFiniteError, RangeError, UnknownNameError
 from wbc.tasks import EndEffector, Fixed, FrameVelocityLimit, Hold, JointLimits, Obstacle, Posture
 
@@ -166,7 +166,7 @@ def test_a_clone_and_a_recording_have_the_prices(tick: Controller, tmp_path: Pat
     assert found.identical
     recording = wbc.Recording(tmp_path / "run.npz")
     assert recording["v"].shape == (5, 7)
-    place = tick.layout.blocks["slow"].slots["price"].start
+    place = core_of(tick).layout.blocks["slow"].slots["price"].start
     assert recording["p"][:, place].tolist() == [0.5 + k for k in range(5)]
 
 
@@ -218,4 +218,4 @@ def test_bad_prices_are_refused() -> None:
     assert len(out) == 0
     out.add(EndEffector(TIP), name="hand").add(Obstacle(wbc.shapes.Sphere(0.1)), name="ball", soft=1.0)
     with pytest.raises(RangeError, match=r"ball.*inverse kinematics"):
-        out.solver()
+        out.inverse_kinematics()

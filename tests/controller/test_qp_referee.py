@@ -8,6 +8,7 @@ import pytest
 
 from tests.controller.referee import Referee
 from tests.controller.stacks import DT, NAMES, controller, everything, near_limits, randomise
+from wbc.controller import core_of
 
 STATES = 12
 
@@ -21,7 +22,7 @@ def check(name: str, backend: str, states: int, solver: str = "daqp") -> float:
         written = randomise(tick, rng)
         step = tick.step(q, v, dt)
         # the step has moved the last command on: the QP of the step is the one about v
-        tick.tick.v_last[:] = v
+        core_of(tick).tick.v_last[:] = v
         found = tick.qp()
         wanted = Referee(everything(name), q, v, dt).qp(written)
         errors = np.concatenate([r.values for r in step.residuals.values()])

@@ -9,7 +9,7 @@ import pytest
 
 import wbc
 from tests.controller.stacks import DT, robot
-from wbc.controller import Controller, Stack
+from wbc.controller import Controller, Stack, core_of
 from wbc.errors import RangeError, UnknownNameError
 from wbc.tasks import JointLimits, Posture
 
@@ -55,10 +55,10 @@ def test_ramps_end_exactly_and_cost_nothing_afterwards(tick: Controller) -> None
     tick["down"].ramp(3.0, 2 * DT)
     assert run(tick, 1).size == 1
     assert 0.0 < tick["down"].weight < 3.0
-    assert tick._slow
+    assert core_of(tick).waits
     run(tick, 1)
     assert tick["down"].weight == 3.0
-    assert not tick._slow
+    assert not core_of(tick).waits
     assert run(tick, 1)[0] == pytest.approx(-0.5, abs=1e-6)
     tick["down"].ramp(1.0, 0.0)
     assert run(tick, 1)[0] == pytest.approx(0.0, abs=1e-6)
@@ -103,7 +103,7 @@ def test_bad_ramps_are_refused(tick: Controller) -> None:
         tick["down"].ramp(1.0, -1.0)
     with pytest.raises(UnknownNameError):
         tick["limits"].ramp(1.0, 1.0)
-    assert not tick.ramps
+    assert not core_of(tick).ramps
 
 
 def test_a_clone_goes_on_with_the_ramps(tick: Controller) -> None:

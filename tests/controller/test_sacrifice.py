@@ -11,7 +11,7 @@ import pinocchio as pin
 import pytest
 
 from tests.controller.stacks import DT, controller, inside, near_limits, quarrel, robot
-from wbc.controller import Controller, Stack, Status, Step
+from wbc.controller import Controller, Stack, Status, Step, core_of
 from wbc.shapes import HalfSpace
 from wbc.tasks import Constraint, EndEffector, Fixed, Hold, JointLimits, Obstacle, Order, Posture, Row, Rows
 
@@ -84,8 +84,10 @@ def test_a_collision_margin_gives_way_to_a_hold(both: Controller) -> None:
     assert np.abs(J @ step.v).max() < 1e-8
     # the amount is the violation of dh/dt >= -rate h, here with dh/dt = 0
     asked = -both["floor"].rate * step.margins["floor"]
+    rows = core_of(both).layout.blocks["floor"].rows
     assert {s.row: s.amount for s in step.relaxed} == pytest.approx(
-        {row.label: a for row, a in zip(both.layout.blocks["floor"].rows, asked, strict=True) if a > 0}, abs=1e-6
+        {row.label: a for row, a in zip(rows, asked, strict=True) if a > 0},
+        abs=1e-6,
     )
     # without the hold the margin is recovered as fast as the joints may
     both["hold"].enabled = False
@@ -256,7 +258,7 @@ def test_feasible_again_is_solved_again() -> None:
             each["hold"].gain = 30.0 if conflict else 1.0
             each["hold"].target = pin.SE3(np.eye(3), np.array([0.0, 0.0, 3.0]))
         step = tick.step(q, np.zeros(7))
-        fresh.tick.reset()
+        core_of(fresh).tick.reset()
         assert np.abs(step.v - fresh.step(q, np.zeros(7)).v).max() < 1e-9
         seen.append(step.status)
     assert seen == [Status.RELAXED if k % 3 == 1 else Status.SOLVED for k in range(30)]

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from tests.controller.stacks import DT, FRAMES, aim, controller, near_limits, quarrel, random_configuration, robot
 from tests.controller.test_sacrifice import within_actuators
-from wbc.controller import Stack, Status, Step
+from wbc.controller import Stack, Status, Step, core_of
 from wbc.shapes import Capsule, PlacedShape, Sphere
 from wbc.tasks import (
     Bounds,
@@ -210,7 +210,7 @@ def test_an_item_without_finite_numbers_brakes_until_it_is_off(backend: str) -> 
             tick[name].enabled = True
             setattr(tick[name], value, before)
             # the tick that braked has left nothing behind
-            tick.tick.reset()
+            core_of(tick).tick.reset()
             assert tick.step(q, v).v == pytest.approx(good.v, abs=1e-12)
 
 

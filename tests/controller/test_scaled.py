@@ -9,7 +9,7 @@ import pytest
 import wbc
 from tests.controller.softness import Wish, jacobian, optimum
 from tests.controller.stacks import DT, robot
-from wbc.controller import Controller, Stack, Status
+from wbc.controller import Controller, Stack, Status, core_of
 from wbc.errors import DuplicateNameError, RangeError, ShapeError
 from wbc.tasks import Damping, Elbow, EndEffector, Hold, JointLimits, Posture
 
@@ -101,7 +101,7 @@ def test_nothing_changes_where_nothing_limits() -> None:
     step = kept.step(q)
     assert step.v == pytest.approx(plain.step(q).v, abs=1e-5)
     assert step.scales == {"hand": pytest.approx(1.0, abs=1e-4)}
-    assert plain.layout.variables == 7
+    assert core_of(plain).layout.variables == 7
     assert plain.step(q).scales == {}
 
 
@@ -189,7 +189,7 @@ def test_bad_declarations_are_refused() -> None:
     assert [e.name for e in out.entries] == ["hand direction"]
     other = wbc.Stack(robot("panda"), DT).add(EndEffector(TIP), name="hand", scaled=True)
     with pytest.raises(RangeError, match=r"hand direction.*inverse kinematics"):
-        other.solver()
+        other.inverse_kinematics()
 
 
 @pytest.mark.parametrize(("place", "gain"), [((2.0, 0.6, 0.3), 5.0), ((60.0, 20.0, 5.0), 100.0)])

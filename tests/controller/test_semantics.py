@@ -8,6 +8,7 @@ import pytest
 
 from tests.controller.stacks import DT, FRAMES, controller, inside, robot
 from wbc import Controller, Stack, Step
+from wbc.controller import core_of
 from wbc.shapes import HalfSpace
 from wbc.tasks import EndEffector, Hold, Obstacle, PitchPlane, Posture
 
@@ -234,7 +235,7 @@ def test_binding_rows_of_constraints_have_names() -> None:
     one["table"].pose = pin.SE3(np.eye(3), np.array([0.0, 0.0, lowest]))
     one["posture"].target = START + [0, 1, 0, 0, 0, 0, 0]
     below = [str(b) for b in one.step(START).binding]
-    labels = [row.label for row in one.layout.blocks["table"].rows]
+    labels = [row.label for row in core_of(one).layout.blocks["table"].rows]
     assert len(below) == 1
     assert below[0] in {f"table/{label} lower" for label in labels}
     assert all(label.startswith("panda_link8[") for label in labels)
@@ -269,12 +270,12 @@ def test_the_table_shows_every_item_with_its_weight_and_unit(capsys: pytest.Capt
         assert text in head
     assert columns.split()[:4] == ["item", "kind", "level", "weight"]
     rows = {line.split()[0]: line.split() for line in lines}
-    assert list(rows) == list(one.layout.blocks)
+    assert list(rows) == list(core_of(one).layout.blocks)
     for name, words in rows.items():
         entry = one.stack[name]
         assert words[1:3] == [type(entry.item).__name__, "0"]
         assert words[3] == (f"{one[name].weight:g}" if entry.is_task else "hard")
-        units = {row.unit for row in one.layout.blocks[name].rows}
+        units = {row.unit for row in core_of(one).layout.blocks[name].rows}
         assert units <= {word.rstrip(",") for word in words}
         assert words[-1] == ("no" if name == "limits" else "yes")
     assert rows["hand"][3:9] == ["0.125", "7.25", "1/s", "3", "of", "6"]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.stack.small import DT, Q, arm
-from wbc.controller import Controller, Stack
+from wbc.controller import Controller, Stack, core_of
 from wbc.shapes import Box, Capsule, PlacedShape
 from wbc.tasks import EndEffector, JointLimits, Obstacle, Posture
 
@@ -35,11 +35,11 @@ class Broken:
 
 def fail(controller: Controller, **given: object) -> None:
     """One step whose sensor raises."""
-    good = controller._sensors
-    controller._sensors = [(Broken(), handle) for _, handle in good]
+    good = core_of(controller).sensors
+    core_of(controller).sensors = [(Broken(), handle) for _, handle in good]
     with pytest.raises(OSError, match="camera"):
         controller.step(np.array([1.0, -1.0]), **given)
-    controller._sensors = good
+    core_of(controller).sensors = good
 
 
 @pytest.mark.parametrize("given", [{"v": [0.5, -0.5]}, {"dt": 2 * DT}, {}])

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from tests.controller.stacks import DT, robot
-from wbc.controller import Controller, Stack, Status
+from wbc.controller import Controller, Stack, Status, core_of
 from wbc.errors import RangeError, ShapeError
 from wbc.tasks import Constraint, EndEffector, Fixed, Input, JointLimits, Posture, Row, Rows
 
@@ -66,7 +66,7 @@ def test_hard_rows_of_one_class_share(tick: Controller) -> None:
     both.reset(q)
     assert both.step(q).v[0] == pytest.approx(0.02, abs=1e-8)
     assert stack(True).key_data() != stack(False).key_data()
-    assert np.array_equal(both.layout.parameters, tick.layout.parameters)
+    assert np.array_equal(core_of(both).layout.parameters, core_of(tick).layout.parameters)
 
 
 @pytest.mark.parametrize("item", [JointLimits(), Fixed("panda_joint1"), EndEffector("panda_hand_tcp")])

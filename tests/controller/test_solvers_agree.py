@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from bench.qp.reference import reference
 from tests.controller.stacks import aim, controller, inside
 from tests.qp.problems import quadprog_solution
-from wbc.controller import Controller, Status
+from wbc.controller import Controller, Status, core_of
 from wbc.qp import Solution
-from wbc.qp.reference import reference
 
 WEIGHTS = (1.0, 1e-2, 1e-4, 1e-6)
 SOLVERS = ("daqp", "osqp", "qpoases")
@@ -48,7 +48,7 @@ def test_solvers_agree_and_know_their_error(name: str, weight: float) -> None:
             continue
         solved += 1
         judge = controllers["vm daqp"]
-        judge.tick.v_last[:] = v
+        core_of(judge).tick.v_last[:] = v
         qp, guess = judge.qp(), steps["vm daqp"]
         exact = reference(qp, Solution(guess.v.copy(), guess._part("multipliers").copy(), "solved")).x
         for label, step in steps.items():
@@ -90,7 +90,7 @@ def test_a_warm_start_changes_nothing() -> None:
     active = set()
     for _ in range(40):
         steps = {label: each.step(q) for label, each in warm.items()}
-        fresh.tick.reset()
+        core_of(fresh).tick.reset()
         wanted = fresh.step(q)
         active.add(tuple(b.row for b in wanted.binding))
         for label, step in steps.items():

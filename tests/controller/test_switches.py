@@ -9,7 +9,7 @@ import pinocchio as pin
 import pytest
 
 from tests.controller.stacks import DT, FRAMES, controller, everything, near_limits, randomise, robot
-from wbc.controller import Controller, Stack
+from wbc.controller import Controller, Stack, core_of
 from wbc.qp import QP
 from wbc.tasks import CenterOfMass, Damping, Elbow, EndEffector, Obstacle, Posture
 
@@ -25,7 +25,7 @@ def without(stack: Stack, name: str) -> Stack:
 
 def copy_values(source: Controller, target: Controller) -> None:
     """All run-time values, by name."""
-    for name in target.layout.blocks:
+    for name in core_of(target).layout.blocks:
         for value in target[name].names:
             setattr(target[name], value, getattr(source[name], value))
 
@@ -55,7 +55,7 @@ def test_disabled_is_as_if_not_declared(full: Controller, name: str) -> None:
     rng = np.random.default_rng(len(name))
     q, v = near_limits(full.stack.robot, rng), rng.normal(size=7)
     randomise(full, rng)
-    for each in full.layout.blocks:
+    for each in core_of(full).layout.blocks:
         full[each].enabled = True
     full[name].enabled = False
     smaller = without(full.stack, name).compile(backend="vm")
@@ -63,11 +63,11 @@ def test_disabled_is_as_if_not_declared(full: Controller, name: str) -> None:
     full.step(q, v)
     smaller.step(q, v)
     for each in (full, smaller):
-        each.tick.v_last[:] = v
+        core_of(each).tick.v_last[:] = v
     same(full.qp(), smaller.qp())
     # what is off is still measured
     if name in full.step(q, v).residuals:
-        assert full.step(q, v).residuals[name].values.size == len(full.layout.blocks[name].rows)
+        assert full.step(q, v).residuals[name].values.size == len(core_of(full).layout.blocks[name].rows)
 
 
 def test_masked_rows_are_as_if_not_there(full: Controller) -> None:
@@ -75,15 +75,15 @@ def test_masked_rows_are_as_if_not_there(full: Controller) -> None:
     rng = np.random.default_rng(5)
     q, v = near_limits(full.stack.robot, rng), rng.normal(size=7)
     randomise(full, rng)
-    for name, block in full.layout.blocks.items():
+    for name, block in core_of(full).layout.blocks.items():
         full[name].enabled = True
         full[name].mask = 1.0
         if block.form == "task":
             full[name].weight = 1.0
     full.step(q, v)
-    full.tick.v_last[:] = v
+    core_of(full).tick.v_last[:] = v
     whole = full.qp()
-    for name, block in full.layout.blocks.items():
+    for name, block in core_of(full).layout.blocks.items():
         for k in range(len(block.rows)):
             mask = np.ones(len(block.rows))
             mask[k] = 0.0

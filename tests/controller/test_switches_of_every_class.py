@@ -10,6 +10,7 @@ import pytest
 from tests.tasks.items import FACTORIES
 from tests.tasks.robots import random_configuration, robot
 from wbc import Controller, Stack
+from wbc.controller import core_of
 from wbc.errors import RangeError, ShapeError
 from wbc.robot import Robot
 from wbc.tasks import JointLimits, Posture
@@ -60,7 +61,7 @@ def is_as_without(one: Controller) -> None:
 def test_switched_off_is_not_declared(class_name: str) -> None:
     one = declared(class_name)
     one.reset(machine().neutral)
-    it, block = one["it"], one.layout.blocks["it"]
+    it, block = one["it"], core_of(one).layout.blocks["it"]
     rows = len(block.rows)
     before = one.step(plain()[0][0], plain()[0][1])._data
     it.enabled = False
@@ -77,20 +78,20 @@ def test_switched_off_is_not_declared(class_name: str) -> None:
         it.weight = 1.0
         # half the weight in the mask is half the weight
         it.mask = 0.5
-        halved = one.tick.weight[block.span].copy()
+        halved = core_of(one).tick.weight[block.span].copy()
         it.mask, it.weight = 1.0, 0.5
-        assert np.array_equal(one.tick.weight[block.span], halved)
+        assert np.array_equal(core_of(one).tick.weight[block.span], halved)
         it.weight = 1.0
     # and on again is as before
-    one.tick.reset()
+    core_of(one).tick.reset()
     assert np.allclose(np.frombuffer(one.step(*plain()[0][:2])._data), np.frombuffer(before), rtol=1e-6, atol=1e-9)
 
 
 @pytest.mark.parametrize("class_name", SHIPPED)
 def test_bad_switches_change_nothing(class_name: str) -> None:
     one = declared(class_name)
-    it, rows = one["it"], len(one.layout.blocks["it"].rows)
-    buffers = [getattr(one.tick, name) for name in ("weight", "enabled", "bound_enabled", "p")]
+    it, rows = one["it"], len(core_of(one).layout.blocks["it"].rows)
+    buffers = [getattr(core_of(one).tick, name) for name in ("weight", "enabled", "bound_enabled", "p")]
     before = [b.copy() for b in buffers]
     for name, bad, kind in (
         ("mask", -1.0, RangeError),
@@ -101,7 +102,7 @@ def test_bad_switches_change_nothing(class_name: str) -> None:
     ):
         with pytest.raises(kind, match=rf"^it\.{name}"):
             setattr(it, name, bad)
-    if one.layout.blocks["it"].form == "task":
+    if core_of(one).layout.blocks["it"].form == "task":
         with pytest.raises(RangeError, match=r"^it\.weight"):
             it.weight = -1.0
     else:

@@ -20,7 +20,7 @@ from tests.closed_loop.machines import anywhere, near
 from tests.evaluation import numbers, sample
 from tests.tasks.items import FACTORIES
 from tests.tasks.robots import FRAMES, robot
-from wbc.controller import Controller, Step
+from wbc.controller import Controller, Step, core_of
 from wbc.robot import Robot
 from wbc.tasks import Constraint, EndEffector, Item, JointLimits, Posture
 
@@ -111,7 +111,7 @@ def scene(where: str, name: str) -> tuple[Motion, np.random.Generator]:
 def test_switched_while_moving(name: str, where: str) -> None:
     """Random values, which may ask for the impossible, come and go as a whole and row by row."""
     moving, rng = scene(where, name)
-    handle, rows = moving.controller[name], len(moving.controller.layout.blocks[name].rows)
+    handle, rows = moving.controller[name], len(core_of(moving.controller).layout.blocks[name].rows)
     statuses = []
     q = anywhere(moving.machine, rng)
     moving.begin(q, near(moving.machine, rng, q, 0.8))

@@ -10,12 +10,13 @@ from scipy.optimize import linprog
 from bench.soak import machines, stacks
 from bench.soak.levels import with_levels
 from tests.controller.stacks import DT, robot
-from wbc.controller import Controller, Stack, Status
-from wbc.controller.native import NativeTick
-from wbc.controller.report import BRAKED, SOLVED, UNSOUND, ReportLayout
+from wbc.controller import Controller, Stack, Status, core_of
+from wbc.controller.tick.buffers import BRAKED, SOLVED, UNSOUND
+from wbc.controller.tick.native import NativeTick
 from wbc.qp.polish import polish
 from wbc.qp.problem import QP, Solution
 from wbc.stack.layout import Layout
+from wbc.stack.memory import ReportLayout
 from wbc.tasks import EndEffector, FrameVelocityLimit, JointLimits, Posture, WorkspacePolyhedron
 
 TIP, MIDDLE = "panda_hand_tcp", "panda_link5"
@@ -77,7 +78,7 @@ def provoke(controller: Controller, rng: np.random.Generator) -> None:
     controller["slow"].price = float(10.0 ** rng.uniform(-9.0, 9.0))
     controller["hand"].target = pin.SE3(pin.exp3(rng.normal(size=3)), rng.normal(0.0, 0.5, 3))
     controller["elbow"].target = rng.normal(0.0, 0.5, 3)
-    controller.begin(q, rng.normal(0.0, 0.3, 7))
+    core_of(controller).begin(q, rng.normal(0.0, 0.3, 7))
 
 
 def feasible(qp: QP) -> bool:
@@ -93,7 +94,7 @@ def feasible(qp: QP) -> bool:
 
 def test_weights_of_every_size_are_solved_within_the_stated_bound() -> None:
     controller, rng = wild(0), np.random.default_rng(3)
-    tick, places, compared = controller.tick, ReportLayout(controller.layout), 0
+    tick, places, compared = core_of(controller).tick, ReportLayout(core_of(controller).layout), 0
     assert isinstance(tick, NativeTick)
     for _ in range(300):
         provoke(controller, rng)
@@ -114,7 +115,7 @@ def test_weights_of_every_size_are_solved_within_the_stated_bound() -> None:
 
 def test_a_step_without_other_solvers_brakes_and_says_so() -> None:
     controller, rng = wild(1), np.random.default_rng(0)
-    tick, places = controller.tick, ReportLayout(controller.layout)
+    tick, places = core_of(controller).tick, ReportLayout(core_of(controller).layout)
     assert isinstance(tick, NativeTick)
     safe = tick._library.wbc_tick_safe_step
     seen = dict.fromkeys((SOLVED, RECOVERED, UNCERTIFIED), 0)
@@ -161,7 +162,7 @@ def test_many_soft_rows_at_once(backend: str) -> None:
         controller["hand"].target = pin.SE3(reached(q).rotation, reached(q).translation + rng.normal(0.0, 0.2, 3))
         step = controller.step(q)
         assert step.status is Status.SOLVED
-        tick = getattr(controller.tick, "assembly", controller.tick)
+        tick = getattr(core_of(controller).tick, "assembly", core_of(controller).tick)
         tick.v_last[:] = 0.0
         wide = tick.qp().with_slacks()
         found = polish(wide, Solution(np.zeros(wide.n), np.zeros(wide.n + wide.m), "failed"), 400)
@@ -194,5 +195,7 @@ def test_the_virtual_machine_raises_nothing_whatever_the_weights() -> None:
     controller, rng, statuses = wild(1, "vm"), np.random.default_rng(0), []
     for _ in range(120):
         provoke(controller, rng)
-        statuses.append(controller.step(controller.tick.q.copy(), controller.tick.v_last[:7].copy()).status)
+        statuses.append(
+            controller.step(core_of(controller).tick.q.copy(), core_of(controller).tick.v_last[:7].copy()).status
+        )
     assert statuses.count(Status.SOLVED) > 100

@@ -10,6 +10,7 @@ import pinocchio as pin
 
 from tests.controller.stacks import DT, FRAMES, inside, robot
 from wbc import Controller, Stack
+from wbc.controller import core_of
 from wbc.shapes import Sphere
 from wbc.tasks import EndEffector, JointLimits, Obstacle, PitchPlane, Posture
 
@@ -60,13 +61,15 @@ def prepare(controller: Controller, ticks: int) -> None:
 def state(controller: Controller) -> dict[str, Any]:
     """Everything that a later answer may depend on, as bytes."""
     names = ("q", "v_last", "use_v", "p", "dt", "weight", "enabled", "bound_enabled", "report")
-    buffers = {name: getattr(controller.tick, name).tobytes() for name in names}
+    buffers = {name: getattr(core_of(controller).tick, name).tobytes() for name in names}
     return buffers | {"last_command": controller.last_command.tobytes(), "table": table(controller)}
 
 
 def table(controller: Controller) -> str:
     """The table that users see, and what each handle says about its switches."""
-    handles = [(name, controller[name].enabled, controller[name].mask.tolist()) for name in controller.layout.blocks]
+    handles = [
+        (name, controller[name].enabled, controller[name].mask.tolist()) for name in core_of(controller).layout.blocks
+    ]
     return f"{controller}{handles}"
 
 

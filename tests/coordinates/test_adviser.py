@@ -27,7 +27,7 @@ from wbc.coordinates import (
     smallest_complete_sets,
     survey_pairs,
 )
-from wbc.coordinates.singular import LeastSingular
+from wbc.coordinates.control.singular import LeastSingular
 from wbc.errors import DuplicateNameError, RangeError, ShapeError, UnknownNameError
 from wbc.robots import DHRow, from_dh
 

@@ -26,8 +26,8 @@ from wbc.coordinates import (
 from wbc.coordinates.expressions import rate_function
 from wbc.errors import ShapeError, UnknownNameError
 from wbc.robot import Robot
-from wbc.robot.files import example_data_folder
 from wbc.robot.sampling import configuration, draw
+from wbc.robot.sources.files import example_data_folder
 from wbc.robots import DHRow, from_dh, load
 from wbc.teleop import Order, Teleoperation
 

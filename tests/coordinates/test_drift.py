@@ -9,8 +9,8 @@ import pytest
 
 from tests.published.arm_machine import STATE, Machine
 from wbc.coordinates import Coordinate, CoordinatePair, PairController, expressions, mode_pairs, parts
-from wbc.coordinates.conditioning import Conditioning
-from wbc.coordinates.easing import STATES, Easing
+from wbc.coordinates.control.conditioning import Conditioning
+from wbc.coordinates.control.easing import STATES, Easing
 from wbc.coordinates.rate_matrices import RateMatrices
 from wbc.coordinates.samples import states_of
 from wbc.robots import DHRow, from_dh

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from wbc import WbcError
-from wbc.analysis.numeric import NumericRows
+from wbc.analysis.jacobians.numeric import NumericRows
 from wbc.coordinates import (
     BodyRows,
     CoordinatePair,
@@ -21,9 +21,9 @@ from wbc.coordinates import (
     PitchPlaneRows,
     mode_pairs,
     mode_table,
-    pair_stack,
     parts,
 )
+from wbc.coordinates.control.pair_controller import pair_stack
 from wbc.errors import DuplicateNameError, RangeError, ShapeError, UnknownNameError
 from wbc.robots import operator_arm
 from wbc.robots.operator_arms import OPERATOR_ARMS

@@ -51,11 +51,11 @@ def test_only_declarations_are_looked_up() -> None:
     careful = _Careful(io.BytesIO(b""))
     assert careful.find_class("wbc.coordinates.items", "KeepRows").__name__ == "KeepRows"
     for module, name in (
-        ("wbc.coordinates.control", "PairController"),
+        ("wbc.coordinates.control.pair_controller", "PairController"),
         ("wbc.coordinates.items", "expressions"),
-        ("wbc.coordinates.pair_stack", "PairStack"),
+        ("wbc.coordinates.control.pair_stack", "PairStack"),
         ("wbc.coordinates.rows", "coordinates"),
-        ("wbc.analysis.screen", "screen"),
+        ("wbc.analysis.certificates.screen", "screen"),
     ):
         with pytest.raises(PicklingError):
             careful.find_class(module, name)

@@ -10,7 +10,7 @@ import pinocchio as pin
 import pytest
 
 from wbc import WbcError
-from wbc.analysis.numeric import NumericRows
+from wbc.analysis.jacobians.numeric import NumericRows
 from wbc.coordinates import (
     AxisRows,
     BodyRows,

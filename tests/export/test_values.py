@@ -12,7 +12,7 @@ import pytest
 import wbc
 from tests.export.cases import CASES, STRICT, build, exported, panda, run
 from tests.stack import small
-from wbc.controller import Controller
+from wbc.controller import Controller, core_of
 from wbc.export.memory import bytes_of_tick
 from wbc.shapes import Box
 
@@ -53,13 +53,13 @@ def test_the_functions_do_what_attributes_do(root: Path) -> None:
     moved = pin.integrate(c.stack.robot.model, q, 0.5 * changed.v)
     assert np.abs(np.array(said["moved"][1:]) - moved).max() < 1e-12
     assert said["refused"] == [-1, -4, -4, -4, -4]
-    assert said["weights"] == [-4, c.tick.weight[c.layout.blocks["posture"].start]]
+    assert said["weights"] == [-4, core_of(c).tick.weight[core_of(c).layout.blocks["posture"].start]]
 
 
 @pytest.mark.parametrize("name", CASES)
 def test_places_and_sizes_are_those_of_the_layout(name: str, root: Path) -> None:
     folder, c = exported(name, root), CASES[name]()
-    told, layout = defines(folder), c.layout
+    told, layout = defines(folder), core_of(c).layout
     sizes = {"NQ": layout.nq, "NV": layout.nv, "NP": layout.parameters, "TASK_ROWS": layout.task_rows}
     sizes |= {"ROWS": layout.general_rows, "MARGINS": layout.margin_rows, "BOUND_BLOCKS": layout.bound_blocks}
     assert {key: int(told[f"WBC_{key}"]) for key in sizes} == sizes
@@ -69,7 +69,7 @@ def test_places_and_sizes_are_those_of_the_layout(name: str, root: Path) -> None
             assert int(told[f"WBC_P_{item}_{slot.input.name.upper()}"]) == slot.start
         kind = {"task": "TASK", "bounds": "BOUND"}.get(block.form, "ROW")
         assert int(told[f"WBC_{kind}_{item}"]) == block.start * (layout.nv if kind == "BOUND" else 1)
-    size = int(c.tick._library.wbc_tick_size())
+    size = int(core_of(c).tick._library.wbc_tick_size())
     assert size <= int(told["WBC_BYTES"]) < size + 4096
 
 

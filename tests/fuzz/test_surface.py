@@ -31,7 +31,8 @@ def test_the_walk_meets_what_users_call(tmp_path) -> None:
     # One of every kind: functions, classes, methods, setters, operators of objects that the walk makes
     assert found >= {
         "robots.load", "trajectory.load", "proximity.distances", "DHRow", "PlacedShape", "Input", "EndEffector",
-        "Robot.with_self_pairs", "Controller.step", "Controller.__contains__", "Handle.target=", "Solver.along",
+        "Robot.with_self_pairs", "Controller.step", "Controller.__contains__", "Handle.target=",
+        "InverseKinematics.along",
         "Adviser", "PairController.step", "analysis.certify", "track.track", "Teleoperation.step",
         "TaskPriority.resolve",
         "Step.derivative", "Law.then", "PolynomialPath.evaluate", "Online.step", "Recording.__getitem__",

@@ -7,8 +7,8 @@ import pytest
 from numpy.typing import NDArray
 
 from tests.levels.reference import Array, Goal, hierarchy
-from wbc.qp.cascade import ONSET, Cascade
-from wbc.qp.hierarchy import Answer, Hierarchy, Level
+from wbc.qp.levels.cascade import ONSET, Cascade
+from wbc.qp.levels.hierarchy import Answer, Hierarchy, Level
 
 THRESHOLD, DAMPING = 1.6e-7, 1e-8
 NONE: NDArray[np.intp] = np.zeros(0, dtype=np.intp)

@@ -12,7 +12,7 @@ import pytest
 import wbc
 from tests.levels import arms
 from tests.levels.reference import Goal, hierarchy
-from wbc.controller import Controller, Status
+from wbc.controller import Controller, Status, core_of
 from wbc.errors import LevelError
 from wbc.stack.codegen import row_units
 from wbc.tasks import EndEffector, Fixed, FrameVelocityLimit, Hold, JointLimits, Posture
@@ -36,8 +36,8 @@ def calm() -> tuple[Controller, Controller]:
 
 def goals(controller: Controller) -> list[Goal]:
     """The levels of the last tick, written down anew."""
-    tick: Any = controller.tick
-    rows, layout = tick.assembly.task_rows(), controller.layout
+    tick: Any = core_of(controller).tick
+    rows, layout = tick.assembly.task_rows(), core_of(controller).layout
     out = []
     for place, number in enumerate(layout.levels):
         blocks = [b for b in layout.of_form("task") if b.entry.level == number]
@@ -52,9 +52,9 @@ def goals(controller: Controller) -> list[Goal]:
 
 def wanted(controller: Controller, v: np.ndarray) -> np.ndarray:
     """The optimum by the reference, from any velocity that the hard rows allow."""
-    tick: Any = controller.tick
+    tick: Any = core_of(controller).tick
     qp, (low, high) = controller.qp(), tick.assembly.row_sides()
-    n, unit = qp.n, np.array(row_units(controller.stack, controller.layout))
+    n, unit = qp.n, np.array(row_units(controller.stack, core_of(controller).layout))
     lower, upper = np.concatenate((qp.lower[:n], low / unit)), np.concatenate((qp.upper[:n], high / unit))
     return hierarchy(v, lower, upper, qp.A / unit[:, None], goals(controller))
 
@@ -98,7 +98,7 @@ def test_later_levels_never_disturb_earlier_ones(native: Controller) -> None:
         upper.reset(q)
         upper["tip"].target = native["tip"].target
         reference = upper.step(q, v)
-        tick: Any = upper.tick
+        tick: Any = core_of(upper).tick
         J = tick.assembly.task_rows().J
         if step.status == Status.SOLVED and not any(b.item == "ball" for b in step.binding):
             assert np.abs(J @ (step.v - reference.v)).max() <= 2e-6
@@ -115,11 +115,11 @@ def test_sensible_words_for_every_level(vm: Controller) -> None:
     dropped = [d for x in step.levels for d in x.dropped]
     assert {d.unit for d in dropped} <= {"m/s", "rad/s"}
     # what a dropped row misses is what its task asks for and does not get
-    tick: Any = vm.tick
+    tick: Any = core_of(vm).tick
     rows = tick.assembly.task_rows()
     missed = np.abs(rows.J @ step.v - rows.wish)
     knee = next(d for d in dropped if (d.item, d.row) == ("knee", "x"))
-    assert knee.inconsistency == pytest.approx(missed[vm.layout.blocks["knee"].start])
+    assert knee.inconsistency == pytest.approx(missed[core_of(vm).layout.blocks["knee"].start])
 
 
 def test_contradicting_and_redundant_equalities_are_named() -> None:
@@ -148,7 +148,7 @@ def test_a_braked_tick_has_no_levels(vm: Controller) -> None:
 def test_one_level_by_another_number_is_one_level() -> None:
     stack = wbc.Stack(arms.arm(), arms.DT).add(Posture(), level=4).add(JointLimits())
     controller = stack.compile(backend="vm")
-    assert not controller.layout.cascade
+    assert not core_of(controller).layout.cascade
     assert controller.step(np.full(5, 0.1)).levels == ()
 
 
@@ -166,11 +166,11 @@ def test_bounds_have_no_level(item: Any, says: str) -> None:
 def test_inverse_kinematics_refuses_levels() -> None:
     stack = arms.levels(soft=False)
     with pytest.raises(LevelError, match="one level"):
-        stack.solver()
+        stack.inverse_kinematics()
     soft = wbc.Stack(arms.arm(), arms.DT).add(EndEffector("tip", kind="position"))
     soft.add(FrameVelocityLimit("link2", linear=0.1), level=1)
     with pytest.raises(LevelError, match="one level"):
-        soft.solver()
+        soft.inverse_kinematics()
 
 
 def test_clones_pickles_and_replays(native: Controller, tmp_path: pathlib.Path) -> None:

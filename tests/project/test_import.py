@@ -1,4 +1,4 @@
-"""Importing the package is quick, because what only some users need is imported when it is used."""
+"""The package and its commands start quickly, because what only some need is imported when it is used."""
 
 from __future__ import annotations
 
@@ -9,12 +9,53 @@ import sys
 import pytest
 
 HEAVY = ("matplotlib", "typer", "rich", "scipy", "pyarrow", "toppra", "ruckig", "osqp")
+#: What robots are made of, besides
+NUMBERS = ("numpy", "casadi", "pinocchio", "coal", "daqp", "flint")
+#: Parts of the package that commands about robots and coordinates do without
+UPPER = tuple(f"wbc.{name}" for name in ("controller", "qp", "export", "ik", "track", "walking", "trajectory"))
+#: Arguments of a command -> what it must not import
+BUDGETS = {
+    "--help": (*HEAVY[3:], "matplotlib", *NUMBERS, *UPPER, "wbc.robot", "wbc.tasks"),
+    "--version": (*HEAVY[2:], "matplotlib", *NUMBERS, *UPPER, "wbc.robot", "wbc.tasks"),
+    "robots": (*HEAVY[3:], "matplotlib", *UPPER, "wbc.coordinates", "flint"),
+    "modes": (*HEAVY[3:], "matplotlib", *UPPER, "flint"),
+}
 
 
 def run(code: str) -> str:
     """Standard output of a fresh interpreter, outside the repository's folder."""
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd="/")
     return done.stdout
+
+
+@pytest.mark.parametrize("arguments", BUDGETS)
+def test_small_commands_import_little(arguments: str) -> None:
+    code = (
+        "import contextlib, io, json, sys\n"
+        f"sys.argv = ['wbc', *{arguments.split()}]\n"
+        "from wbc.cli import main\n"
+        "with contextlib.suppress(SystemExit), contextlib.redirect_stdout(io.StringIO()):\n"
+        "    main()\n"
+        "print(json.dumps(list(sys.modules)))"
+    )
+    loaded = set(json.loads(run(code)))
+    assert "wbc.cli.app" in loaded
+    assert not loaded & set(BUDGETS[arguments])
+
+
+def test_completion_imports_no_command() -> None:
+    code = "import atexit, sys; atexit.register(lambda: print(*sys.modules)); from wbc.cli import main; main()"
+    words = {"_WBC_COMPLETE": "complete_bash", "COMP_WORDS": "wbc tr", "COMP_CWORD": "1"}
+    program = f"import os, sys; os.environ |= {words}; sys.argv = ['wbc']; {code}"
+    found, loaded = run(program).split("\n", 1)
+    assert found.split() == ["track"]
+    assert not set(loaded.split()) & {*NUMBERS, *UPPER, "wbc.cli.track"}
+
+
+def test_import_of_the_package_imports_none_of_its_floors() -> None:
+    loaded = json.loads(run("import json, sys, wbc; print(json.dumps(list(sys.modules)))"))
+    assert {name for name in loaded if name.startswith("wbc.")} == {"wbc.lazy"}
+    assert not set(loaded) & {*HEAVY, *NUMBERS}
 
 
 @pytest.mark.parametrize("module", ["wbc", "wbc.tasks", "wbc.robots", "wbc.trajectory"])
@@ -33,4 +74,4 @@ def test_names_that_left_the_controller_are_still_found_there() -> None:
     code = (
         "from wbc.controller import Branches, Ending, Explanation, Recorder, Solver, replayed; print(Solver.__module__)"
     )
-    assert run(code).strip() == "wbc.ik.solver"
+    assert run(code).strip() == "wbc.ik.inverse_kinematics"

@@ -30,8 +30,8 @@ from wbc.analysis import (
     sub_determinant_locus,
     symbolic_jacobian,
 )
-from wbc.analysis.numeric import NumericRows, rank
-from wbc.analysis.points import real_point
+from wbc.analysis.algebra.points import real_point
+from wbc.analysis.jacobians.numeric import NumericRows, rank
 
 STATE = np.array([0.3, 0.4, -0.5, 1.2, 0.7, -0.6, 0.9])
 L, D = 7.11, -0.7026

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 from tests.published.via_walker import place
 from wbc.trajectory import Law, via_points
-from wbc.trajectory.via_speeds import Bounds, Corners, corner_speeds
+from wbc.trajectory.jerk.via_speeds import Bounds, Corners, corner_speeds
 
 #: In m, s; the rotation of the middle segment in rad
 SPEED, ACCELERATION, DEVIATION, TURN = 1.2, 1.0, 0.05, 1.0

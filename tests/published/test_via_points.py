@@ -15,8 +15,8 @@ import pytest
 
 from tests.published.via_walker import INCH, inches, place, rot_z, swing
 from wbc.trajectory import via_points
-from wbc.trajectory.turning import quaternion, turn_between
-from wbc.trajectory.via_speeds import Bounds, corner_speeds
+from wbc.trajectory.jerk.via_speeds import Bounds, corner_speeds
+from wbc.trajectory.paths.turning import quaternion, turn_between
 
 AXIAL, ROUND = swing((13, 12), (13, 16)), swing((13, 12), (17, 12))
 

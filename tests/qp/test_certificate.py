@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from bench.qp.reference import reference
+from bench.qp.samples import SIZES, WEIGHTS, whole_body
 from tests.repeats import repeats
 from wbc.qp import QP, Solution, certify, make_solver
 from wbc.qp.polish import polish
-from wbc.qp.reference import reference
-from wbc.qp.samples import SIZES, WEIGHTS, whole_body
 
 COUNT = {7: repeats(48), 12: repeats(16), 25: repeats(5), 38: repeats(2), 40: repeats(2)}
 

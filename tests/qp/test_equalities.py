@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from bench.qp.samples import whole_body
 from wbc.qp import QP, independent, make_solver
 from wbc.qp.equalities import orthonormal, restore
-from wbc.qp.samples import whole_body
 
 
 def equality_problem(A, right, fixed=None):

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from bench.qp.reference import reference
+from bench.qp.samples import whole_body
 from wbc.qp import QP, Solution, make_solver, polish
-from wbc.qp.reference import reference
-from wbc.qp.samples import whole_body
 
 
 @pytest.mark.parametrize("noise", [0.0, 1e-9, 1e-6, 1e-4])

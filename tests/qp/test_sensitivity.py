@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from bench.qp.samples import whole_body
 from wbc.errors import SolverError
 from wbc.qp import QP, Solution, make_solver
-from wbc.qp.samples import whole_body
 from wbc.qp.sensitivity import Sensitivity
 
 STEP = 1e-6

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from wbc.qp.survey import survey, table
+from bench.qp.survey import survey, table
 
 
 def test_supported_solver_passes_and_the_others_are_reported():

@@ -5,7 +5,7 @@ from __future__ import annotations
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
-from wbc.robot.files import example_data_folder
+from wbc.robot.sources.files import example_data_folder
 
 DATA = Path(__file__).parent / "data"
 

@@ -11,7 +11,7 @@ import wbc.robots
 from tests.robots.files import example
 from tests.robots.test_shapes import urdf_points
 from wbc.errors import NotFiniteError, RobotFileError, ShapeError
-from wbc.robot.meshes import box_mesh
+from wbc.robot.geometry.meshes import box_mesh
 from wbc.shapes import Convex
 
 CORNERS = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-import wbc.robot.table
+import wbc.robot.sources.table
 import wbc.robots
 from wbc.errors import (
     DuplicateNameError,
@@ -18,7 +18,7 @@ from wbc.errors import (
     WbcError,
 )
 from wbc.robot import Robot
-from wbc.robot.collision_pairs import LinkPair, SelfPairs
+from wbc.robot.pairs.collision_pairs import LinkPair, SelfPairs
 from wbc.robots import catalogue
 
 PAIR = '{ links = ["forearm_link", "base_link"], keep = true }'
@@ -125,4 +125,4 @@ def test_missing_and_unwritable_files(ur5: Robot, tmp_path: Path) -> None:
 def test_pairs_in_the_table_need_shapes(line: str, tmp_path: Path) -> None:
     (tmp_path / "x.toml").write_text(f'[arm]\nfile = "a/b.urdf"\n{line}\n')
     with pytest.raises((RangeError, ShapeError), match="pairs"):
-        wbc.robot.table.read_table(tmp_path)
+        wbc.robot.sources.table.read_table(tmp_path)

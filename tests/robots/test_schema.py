@@ -15,7 +15,7 @@ from wbc.errors import (
     UnknownNameError,
     WbcError,
 )
-from wbc.robot.table import read_table
+from wbc.robot.sources.table import read_table
 
 GOOD = '[arm]\nfile = "a/b.urdf"\n'
 BAD = {

@@ -16,11 +16,11 @@ from tests import models
 from tests.robots.files import joints
 from wbc.errors import MissingShapeError, RangeError, RobotFileError, ShapeError
 from wbc.robot import Limits, Robot
-from wbc.robot.collision_pairs import REASONS, find_self_pairs
-from wbc.robot.pair_descent import Descent
-from wbc.robot.pair_distances import Links
+from wbc.robot.geometry.segments import bounding_capsule, segment_distances
+from wbc.robot.pairs.collision_pairs import REASONS, find_self_pairs
+from wbc.robot.pairs.descent import Descent
+from wbc.robot.pairs.distances import Links
 from wbc.robot.sampling import configuration, draw
-from wbc.robot.segments import bounding_capsule, segment_distances
 from wbc.shapes import Box, Capsule, Convex, Cylinder, PlacedShape, Sphere
 
 HERE = pin.SE3.Identity()

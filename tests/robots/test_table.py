@@ -15,7 +15,7 @@ import wbc.robots
 from tests.robots.files import example, joints
 from wbc.errors import RobotFileError
 from wbc.robot import Recipe, Robot
-from wbc.robot.files import example_data_folder
+from wbc.robot.sources.files import example_data_folder
 
 TABLE = {recipe.name: recipe for recipe in wbc.robots.table()}
 LOADABLE = [name for name, recipe in TABLE.items() if not recipe.problem]

@@ -8,8 +8,8 @@ import pytest
 
 import wbc
 from wbc.native import toolchain
-from wbc.stack.many import CHUNK, ManyStates
-from wbc.trajectory.checks import inverse_dynamics
+from wbc.stack.evaluation import CHUNK, ManyStates
+from wbc.trajectory.least_time.checks import inverse_dynamics
 
 
 @pytest.mark.parametrize("name", ["panda", "ur5"])

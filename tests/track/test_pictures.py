@@ -17,7 +17,7 @@ from matplotlib.image import imread
 import wbc
 from wbc import track
 from wbc.errors import NotFiniteError, RangeError, RotationError, ShapeError, UnknownNameError, WbcError
-from wbc.proximity.geometry import geometry_of
+from wbc.robot.geometry.coal_shapes import geometry_of
 from wbc.shapes import Box, Capsule, Convex, Cylinder, HalfSpace, PlacedShape, Solid, Sphere
 from wbc.track import render, solids
 from wbc.track.picture import save_picture

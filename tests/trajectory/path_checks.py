@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 import pinocchio as pin
 
-from wbc.trajectory.path import Index, Path
+from wbc.trajectory.paths.path import Index, Path
 from wbc.validation import Array
 
 #: Central differences of order 4: f'(x) h is near the sum of weight f(x + step h)

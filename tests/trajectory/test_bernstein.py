@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.trajectory.random_laws import powers
-from wbc.trajectory import bernstein
+from wbc.trajectory.paths import bernstein
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(0, 15))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from wbc.trajectory.between import highest
+from wbc.trajectory.laws.between import highest
 
 
 def waves(seed):

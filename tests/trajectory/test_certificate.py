@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from tests.trajectory.random_laws import ragged, smooth
 from wbc import trajectory
 from wbc.trajectory import Certificate, Law, Limits, Path, PolynomialPath, Timing
-from wbc.trajectory.certificate import ORDERS, Pieces
+from wbc.trajectory.laws.certificate import ORDERS, Pieces
 
 seeds = st.integers(0, 2**32 - 1)
 

@@ -17,7 +17,8 @@ from hypothesis import strategies as st
 from tests.trajectory.random_laws import ragged, smooth
 from wbc import trajectory
 from wbc.errors import LawFileError
-from wbc.trajectory import Law, Limits, Path, Timing, files
+from wbc.trajectory import Law, Limits, Path, Timing
+from wbc.trajectory.laws import files
 
 
 def poses() -> list[np.ndarray]:

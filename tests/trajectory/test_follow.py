@@ -14,7 +14,7 @@ from wbc.errors import ContinuityError, InfeasibleError, RangeError, ShapeError,
 from wbc.shapes import Sphere
 from wbc.tasks import EndEffector, JointLimits, Obstacle, Posture
 from wbc.trajectory import follow
-from wbc.trajectory.path import Path, PolynomialPath
+from wbc.trajectory.paths.path import Path, PolynomialPath
 
 TIP = "panda_hand_tcp"
 ROBOT = wbc.robots.load("panda")

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from wbc.errors import BoundsError, NotFiniteError, RangeError, ShapeError
 from wbc.trajectory import Limits, PolynomialPath
-from wbc.trajectory.path import JoinedPath
+from wbc.trajectory.paths.path import JoinedPath
 
 
 @pytest.mark.parametrize(

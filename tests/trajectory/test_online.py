@@ -7,7 +7,7 @@ import pytest
 
 from wbc import errors
 from wbc.trajectory import online
-from wbc.trajectory.braking import reach
+from wbc.trajectory.jerk.braking import reach
 
 DOF, DT = 7, 0.004
 

@@ -38,7 +38,9 @@ class Rows:
 
     def __init__(self, machine: Walker, structure: Structure) -> None:
         self.machine, self.structure = machine, structure
-        self.solver = WalkStack(machine, structure, collisions=False, backend="vm").stack.solver(goals=("body",))
+        self.solver = WalkStack(machine, structure, collisions=False, backend="vm").stack.inverse_kinematics(
+            goals=("body",)
+        )
         self.solver["posture"].enabled = False
         for arm in machine.arms:
             self.solver[f"{arm.name} swing"].enabled = self.solver[f"{arm.name} axis"].enabled = False

@@ -2,29 +2,36 @@
 
 from __future__ import annotations
 
-from wbc.analysis.block_certificates import TreeCertificate, certify_blocks
-from wbc.analysis.blocks import BlockAnalysis, TreeAnalysis, analyse_blocks
-from wbc.analysis.boxes import Counts
-from wbc.analysis.branches import Branch
-from wbc.analysis.budget import Budget
-from wbc.analysis.certificate import Certificate, certify
-from wbc.analysis.completeness import Analysis, Witness, analyse
-from wbc.analysis.deficiency import Exact
-from wbc.analysis.determinants import Determinant, factored_determinant
-from wbc.analysis.half_angles import Relation, Value
-from wbc.analysis.jacobian import Cost, SymbolicJacobian, symbolic_jacobian
-from wbc.analysis.loci import ALGORITHMS
-from wbc.analysis.locus import Locus
-from wbc.analysis.model import ExactModel
-from wbc.analysis.notation import Notation
-from wbc.analysis.points import joint_roots
-from wbc.analysis.published import PublishedSets, candidate_rows, published_sets
-from wbc.analysis.rows import BodyRows, JointRows, PitchPlaneRows, Rows
-from wbc.analysis.screen import Screened, screen
-from wbc.analysis.singular_vectors import singular_vector_locus
-from wbc.analysis.sub_determinants import sub_determinant_locus
-from wbc.analysis.tree_joints import JointBlock, joint_blocks
-from wbc.analysis.weakest import NumericWitness
+from typing import TYPE_CHECKING
+
+from wbc import lazy
+
+if TYPE_CHECKING:
+    from wbc.analysis.algebra.branches import Branch
+    from wbc.analysis.algebra.deficiency import Exact
+    from wbc.analysis.algebra.half_angles import Relation, Value
+    from wbc.analysis.algebra.locus import Locus
+    from wbc.analysis.algebra.notation import Notation
+    from wbc.analysis.algebra.points import joint_roots
+    from wbc.analysis.block_certificates import TreeCertificate, certify_blocks
+    from wbc.analysis.blocks import BlockAnalysis, TreeAnalysis, analyse_blocks
+    from wbc.analysis.certificates.boxes import Counts
+    from wbc.analysis.certificates.certificate import Certificate, certify
+    from wbc.analysis.certificates.screen import Screened, screen
+    from wbc.analysis.certificates.weakest import NumericWitness
+    from wbc.analysis.completeness import Analysis, Witness, analyse
+    from wbc.analysis.jacobians.jacobian import Cost, SymbolicJacobian, symbolic_jacobian
+    from wbc.analysis.jacobians.model import ExactModel
+    from wbc.analysis.jacobians.tree_joints import JointBlock, joint_blocks
+    from wbc.analysis.loci.budget import Budget
+    from wbc.analysis.loci.determinants import Determinant, factored_determinant
+    from wbc.analysis.loci.loci import ALGORITHMS
+    from wbc.analysis.loci.singular_vectors import singular_vector_locus
+    from wbc.analysis.loci.sub_determinants import sub_determinant_locus
+    from wbc.analysis.published import PublishedSets, candidate_rows, published_sets
+    from wbc.analysis.rows import BodyRows, JointRows, PitchPlaneRows, Rows
+else:
+    __getattr__ = lazy.attach(__name__, __file__)
 
 __all__ = [
     "ALGORITHMS",
@@ -68,3 +75,7 @@ __all__ = [
     "sub_determinant_locus",
     "symbolic_jacobian",
 ]
+
+
+def __dir__() -> list[str]:
+    return __all__

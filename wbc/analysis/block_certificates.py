@@ -12,13 +12,13 @@ import numpy as np
 
 from wbc import validation
 from wbc.analysis.blocks import block_model, lift, parted_task, problem
-from wbc.analysis.certificate import COMPLETE, INCOMPLETE, UNDECIDED, Certificate, certify
+from wbc.analysis.certificates.certificate import COMPLETE, INCOMPLETE, UNDECIDED, Certificate, certify
+from wbc.analysis.certificates.weakest import NumericWitness, descended, joint_values
 from wbc.analysis.completeness import TRIES
-from wbc.analysis.model import ExactModel, checked_model
-from wbc.analysis.numeric import NumericRows, rank, singular_values
+from wbc.analysis.jacobians.model import ExactModel, checked_model
+from wbc.analysis.jacobians.numeric import NumericRows, rank, singular_values
+from wbc.analysis.jacobians.tree_joints import JointBlock, joint_blocks
 from wbc.analysis.rows import Rows, checked
-from wbc.analysis.tree_joints import JointBlock, joint_blocks
-from wbc.analysis.weakest import NumericWitness, descended, joint_values
 from wbc.errors import ShapeError
 from wbc.validation import Array
 

@@ -9,15 +9,15 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
-from wbc.analysis.budget import Budget, processor_seconds
-from wbc.analysis.certificate import INCOMPLETE
+from wbc.analysis.certificates.certificate import INCOMPLETE
 from wbc.analysis.completeness import Witness, find_witness
-from wbc.analysis.jacobian import symbolic_jacobian
-from wbc.analysis.loci import LOOSE, STRICT, UNDECIDED, Loci, loci
-from wbc.analysis.model import ExactModel, checked_model
-from wbc.analysis.numeric import NumericRows, check_task
+from wbc.analysis.jacobians.jacobian import symbolic_jacobian
+from wbc.analysis.jacobians.model import ExactModel, checked_model
+from wbc.analysis.jacobians.numeric import NumericRows, check_task
+from wbc.analysis.jacobians.tree_joints import JointBlock, TreeJoints, joint_blocks
+from wbc.analysis.loci.budget import Budget, processor_seconds
+from wbc.analysis.loci.loci import LOOSE, STRICT, UNDECIDED, Loci, loci
 from wbc.analysis.rows import Rows, checked
-from wbc.analysis.tree_joints import JointBlock, TreeJoints, joint_blocks
 from wbc.robots import load
 from wbc.validation import Array
 

@@ -10,16 +10,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from wbc import validation
-from wbc.analysis.branches import Branch
-from wbc.analysis.budget import Budget, processor_seconds
-from wbc.analysis.certificate import COMPLETE, INCOMPLETE, Certificate, certify
-from wbc.analysis.deficiency import Exact
-from wbc.analysis.jacobian import SymbolicJacobian, symbolic_jacobian
-from wbc.analysis.loci import STRICT, UNDECIDED, Loci, LocusSearch
-from wbc.analysis.locus import Locus
-from wbc.analysis.model import ExactModel, checked_model
-from wbc.analysis.numeric import NumericRows, check_task, rank, singular_values
-from wbc.analysis.points import real_point
+from wbc.analysis.algebra.branches import Branch
+from wbc.analysis.algebra.deficiency import Exact
+from wbc.analysis.algebra.locus import Locus
+from wbc.analysis.algebra.points import real_point
+from wbc.analysis.certificates.certificate import COMPLETE, INCOMPLETE, Certificate, certify
+from wbc.analysis.jacobians.jacobian import SymbolicJacobian, symbolic_jacobian
+from wbc.analysis.jacobians.model import ExactModel, checked_model
+from wbc.analysis.jacobians.numeric import NumericRows, check_task, rank, singular_values
+from wbc.analysis.loci.budget import Budget, processor_seconds
+from wbc.analysis.loci.loci import STRICT, UNDECIDED, Loci, LocusSearch
 from wbc.analysis.rows import Rows, checked
 from wbc.errors import CompileError, RangeError, UnsupportedJointError
 from wbc.robot import Robot

@@ -26,10 +26,10 @@ from wbc.analysis import (
     factored_determinant,
     published_sets,
 )
-from wbc.analysis.child import Child
-from wbc.analysis.half_angles import HalfAngles
-from wbc.analysis.locus import Located
-from wbc.analysis.pictures import save_pictures
+from wbc.analysis.algebra.half_angles import HalfAngles
+from wbc.analysis.algebra.locus import Located
+from wbc.analysis.loci.child import Child
+from wbc.analysis.loci.pictures import save_pictures
 from wbc.analysis.published import ROBOTS
 from wbc.cli.certificates import Subdivision, certified, record, show_certificate, winner
 from wbc.cli.console import out

@@ -11,8 +11,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from wbc import validation
-from wbc.cli.console import err, out
-from wbc.cli.session import OutputError
+from wbc.cli.console import OutputError, err, out
 from wbc.ik import Solution
 from wbc.robot import Robot
 

@@ -1,29 +1,123 @@
-"""The application: its commands, and what happens to errors."""
+"""The application: its commands, and what happens to errors.
+
+A command's module is imported when the command is used; help and completion need only the table below.
+"""
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+import functools
+import importlib
+from typing import Annotated, Any, NamedTuple
 
 import typer
-from typer.core import TyperGroup
+from typer.core import TyperCommand, TyperGroup
 
 from wbc import __version__
-from wbc.cli import advise, analyse, bench, demo, docs, drive, export, ik, modes, replay, robots, track, walk
-from wbc.cli.console import complain
 from wbc.errors import WbcError
 
 #: Exit codes besides 0 and 1, which commands give
 BAD_INPUT, INTERRUPTED = 2, 130
 
 
+class Entry(NamedTuple):
+    """A command: module of this package and function, its line in the list of commands, settings of its parser."""
+
+    module: str
+    function: str
+    line: str
+    settings: dict[str, bool] | None = None
+
+
+COMMANDS = {
+    "robots": Entry("robots", "table", "List the robots that load by name."),
+    "robot": Entry("robots", "show", "Show a robot: joints, limits, frames, shapes and where the numbers come from."),
+    "track": Entry("track", "track", "Follow a timed Cartesian path, and leave a log, plots and a summary."),
+    "demo": Entry(
+        "demo",
+        "demo",
+        "Do the main job: a Panda follows a timed path round an obstacle with its elbow plane commanded.",
+    ),
+    "walk": Entry(
+        "walk",
+        "walk",
+        "Walk on a structure of holds with three arms, or end over end, and leave log, "
+        "plan, check, pictures and a page.",
+    ),
+    "plans": Entry(
+        "walk", "plans", "Show what two plans do differently, one line each; exit code 1 if there is anything."
+    ),
+    "replay": Entry("replay", "replay", "Do the ticks of a recording again and compare every bit of their commands."),
+    "export": Entry(
+        "export",
+        "export",
+        "Write one control cycle of a robot, QP solver included, as C99 with a header, build files and a check.",
+    ),
+    "ik": Entry(
+        "ik",
+        "ik",
+        "Find joint positions that put a frame at a pose or a position, clear of obstacles and within the limits.",
+    ),
+    "analyse": Entry(
+        "analyse", "analyse_", "Say where task and constraint coordinates lose rank, and whether they always suffice."
+    ),
+    "advise": Entry(
+        "advise",
+        "advise",
+        "Say which pairs are well conditioned at a configuration, where the next locus is, and which pair to use.",
+    ),
+    "modes": Entry(
+        "modes",
+        "modes",
+        "Say in which modes arms can be commanded: how many pairs, or what is missing; of one robot, which pairs.",
+    ),
+    "drive": Entry(
+        "drive",
+        "drive",
+        "Drive an arm by rates: the pair of coordinates that is chosen, at most six "
+        "rates at a time, 50 times a second.",
+    ),
+    "bench": Entry(
+        "bench",
+        "bench",
+        "Compare with pink, mink and placo on the same problems (needs the repository).",
+        {"allow_extra_args": True, "ignore_unknown_options": True},
+    ),
+    "docs": Entry(
+        "docs", "docs", "Write what the code declares into the pages of tasks and constraints (needs the repository)."
+    ),
+}
+
+
+@functools.cache
+def command(name: str) -> Any:
+    """A command with its options."""
+    entry = COMMANDS[name]
+    function = getattr(importlib.import_module(f"wbc.cli.{entry.module}"), entry.function)
+    single = typer.Typer(add_completion=False, rich_markup_mode="rich")
+    single.command(name, context_settings=entry.settings)(function)
+    return typer.main.get_command(single)
+
+
 class Commands(TyperGroup):
-    """Commands whose errors of this package become one line and exit code 2."""
+    """The commands of the table; an error of this package becomes one line and exit code 2."""
+
+    def __init__(self, **settings: Any) -> None:
+        super().__init__(**settings)
+        for name, entry in COMMANDS.items():
+            self.add_command(TyperCommand(name, help=entry.line, rich_markup_mode="rich"))
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """The command that was asked for, imported."""
+        name, found, rest = super().resolve_command(ctx, args)
+        return name, found and command(str(name)), rest
 
     def invoke(self, ctx: Any) -> Any:
         """Run the chosen command."""
         try:
             return super().invoke(ctx)
         except WbcError as error:
+            from wbc.cli.console import complain
+
             complain(error)
             raise typer.Exit(BAD_INPUT) from error
 
@@ -53,20 +147,3 @@ def wbc(
     [bold]wbc walk[/bold] has a three-armed robot walk on a structure of holds, [bold]wbc demo[/bold] a Panda follow a
     timed path round an obstacle.
     """
-
-
-app.command("robots")(robots.table)
-app.command("robot")(robots.show)
-app.command("track")(track.track)
-app.command("demo")(demo.demo)
-app.command("walk")(walk.walk)
-app.command("plans")(walk.plans)
-app.command("replay")(replay.replay)
-app.command("export")(export.export)
-app.command("ik")(ik.ik)
-app.command("analyse")(analyse.analyse_)
-app.command("advise")(advise.advise)
-app.command("modes")(modes.modes)
-app.command("drive")(drive.drive)
-app.command("bench", context_settings={"allow_extra_args": True, "ignore_unknown_options": True})(bench.bench)
-app.command("docs")(docs.docs)

@@ -23,10 +23,10 @@ from wbc.analysis import (
     candidate_rows,
     certify,
     certify_blocks,
-    screen,
 )
+from wbc.analysis.certificates.screen import screen
 from wbc.cli.console import out, progress_bar
-from wbc.coordinates.published_trees import TreeSet
+from wbc.coordinates.arms.published_trees import TreeSet
 from wbc.errors import RobotFileError
 
 

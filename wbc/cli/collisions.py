@@ -10,11 +10,10 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from wbc import robots
-from wbc.cli.console import err, out
-from wbc.cli.session import OutputError
+from wbc.cli.console import OutputError, err, out
 from wbc.errors import RangeError
 from wbc.robot import Robot
-from wbc.robot.collision_pairs import REASONS, LinkPair, SelfPairs
+from wbc.robot.pairs.collision_pairs import REASONS, LinkPair, SelfPairs
 from wbc.shapes import Box, Convex, PlacedShape, Sphere
 
 #: Random configurations, where nobody says how many.

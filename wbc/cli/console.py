@@ -9,6 +9,10 @@ from rich.text import Text
 from wbc.errors import WbcError
 
 
+class OutputError(WbcError):
+    """A file or folder that cannot be written, or a folder that has a run already."""
+
+
 def out() -> Console:
     """For results. Made when needed, so that redirected streams are honoured."""
     return Console(highlight=False)

@@ -10,6 +10,7 @@ import typer
 
 from wbc.cli import options
 from wbc.cli.planning import given_obstacles, planned
+from wbc.controller import core_of
 
 _WHAT, _CONTROL = "What it writes", "How it is controlled"
 
@@ -62,8 +63,9 @@ def export(
     )
     controller = plan.stack().compile(backend=plan.backend)
     controller.reset(plan.start)
-    controller.tick.q[:] = plan.start
-    controller.tick.check()
+    tick = core_of(controller).tick
+    tick.q[:] = plan.start
+    tick.check()
     for name, obstacle in plan.obstacles.items():
         controller[name].velocity = np.concatenate([obstacle.velocity, np.zeros(3)])
     if iteration_cap:
@@ -71,4 +73,4 @@ def export(
     place = Path(f"{plan.robot.name}_tick") if output is None else output
     source: bool | Path = solver_source if solver_archive is None else solver_archive
     controller.export(place, overwrite=force, solver_source=source, states=states)
-    typer.echo(f"{place}: {plan.robot.name}, {controller.layout.nv} degrees of freedom; try `make -C {place} run`")
+    typer.echo(f"{place}: {plan.robot.name}, {plan.robot.nv} degrees of freedom; try `make -C {place} run`")

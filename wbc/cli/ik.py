@@ -14,7 +14,7 @@ from wbc.cli.answers import Answer, check_output, report, save
 from wbc.cli.planning import given_obstacles, planned
 from wbc.cli.targets import Target, given_targets
 from wbc.errors import InfeasibleError, RangeError
-from wbc.ik import Solution, Solver
+from wbc.ik import InverseKinematics, Solution
 from wbc.track.setup import Moving
 from wbc.validation import Array
 
@@ -79,7 +79,7 @@ def ik(
     check_output(out, force)
     wanted = given_targets(target, targets)
     plan = planned(robot, frame, start, hold, _standing(given_obstacles(sphere, floor)), margin=margin)
-    solver = plan.stack().solver(goals=("hand",), backend=backend)
+    solver = plan.stack().inverse_kinematics(goals=("hand",), backend=backend)
     given: dict[str, Any] = {"seed": seed, "budget": budget, "tolerance": tolerance}
     if restarts is not None:
         given["restarts"] = restarts
@@ -94,7 +94,7 @@ def ik(
 
 
 def _answers(
-    solver: Solver, first: Array, number: int, target: Target, every: bool, given: dict[str, Any]
+    solver: InverseKinematics, first: Array, number: int, target: Target, every: bool, given: dict[str, Any]
 ) -> list[Answer]:
     """What was found for one target, or the nearest configuration."""
     hand = solver["hand"]

@@ -9,7 +9,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from wbc.cli.console import err, out
-from wbc.coordinates.modes import Mode, mode_row, mode_table, table_text
+from wbc.coordinates.advice.modes import Mode, mode_row, mode_table, table_text
 
 #: M1 to M8
 SHORT_NAMES = tuple(mode.name for mode in Mode)

@@ -15,9 +15,8 @@ from rich.progress import Progress
 from rich.table import Table
 
 from wbc import validation
-from wbc.cli.console import err, out, progress_bar
+from wbc.cli.console import OutputError, err, out, progress_bar
 from wbc.controller import Controller
-from wbc.errors import WbcError
 from wbc.interrupts import interrupts
 from wbc.record.recording import RecordingError
 from wbc.track.log import FORMATS, Log, save
@@ -32,10 +31,6 @@ INTERRUPTED = 130
 RECORDING = "ticks.npz"
 #: Ticks between two moves of the progress bar, so that the bar costs nothing
 STRIDE = 25
-
-
-class OutputError(WbcError):
-    """A run folder that cannot be written, or that has a run already."""
 
 
 @dataclass(frozen=True)

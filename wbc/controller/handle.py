@@ -1,18 +1,19 @@
-"""Run-time values of one item: ``controller["hand"].target = pose``."""
+"""Run-time values: of one item, ``controller["hand"].target = pose``, and of several that are written together."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from math import hypot
-from typing import Any, Protocol
+from collections.abc import Mapping, Sequence
+from math import hypot, isfinite
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 import pinocchio as pin
 
 from wbc import validation
 from wbc.controller.ramps import Ramps
-from wbc.controller.tick import Buffers
-from wbc.errors import RangeError, UnknownNameError
+from wbc.controller.tick.buffers import Buffers
+from wbc.errors import NotFiniteError, RangeError, UnknownNameError
+from wbc.robot import Robot
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Block, Layout, Slot
 from wbc.tasks import inputs
@@ -24,7 +25,7 @@ _MATRIX, _SE3 = (4, 4), pin.SE3
 
 
 class Owner(Protocol):
-    """What a handle needs of its controller."""
+    """What a handle needs of what it belongs to: :class:`wbc.controller.core.Core`."""
 
     @property
     def stack(self) -> Declaration: ...
@@ -40,13 +41,13 @@ class Owner(Protocol):
     def directions(self) -> Directions: ...
 
     def write(self, slot: Slot, numbers: Array) -> None:
-        """See :meth:`Controller.write`."""
+        """See :meth:`Core.write`."""
 
     def write_pose(self, slot: Slot, matrix: Array) -> bool:
-        """See :meth:`Controller.write_pose`."""
+        """See :meth:`Core.write_pose`."""
 
     def require_value(self, slot: Slot, field: str) -> None:
-        """See :meth:`Controller.require_value`."""
+        """See :meth:`Core.require_value`."""
 
     def start_ramp(self, handle: Handle, weight: float, seconds: float) -> None:
         """See :meth:`Handle.ramp`."""
@@ -65,11 +66,11 @@ class Handle:
 
     __slots__ = (
         "_block",
-        "_controller",
         "_enabled",
         "_fields",
         "_mask",
         "_ordered",
+        "_owner",
         "_plain",
         "_poses",
         "_ramped",
@@ -79,11 +80,28 @@ class Handle:
         "_weight",
     )
 
-    def __init__(self, controller: Owner, block: Block) -> None:
+    _block: Block
+    _enabled: bool
+    _fields: Mapping[str, str]
+    _mask: Array
+    _ordered: Mapping[str, tuple[Slot, Slot]]
+    _owner: Owner
+    _plain: Mapping[str, tuple[int, ...]]
+    _poses: frozenset[str]
+    _ramped: Slot | None
+    _rate: Slot | None
+    _robot: Robot
+    _row_weights: Array
+    _weight: float
+    # For type checkers; the methods below answer. Values of items: see wbc/controller/handles.py
+    enabled: bool
+    mask: Any
+
+    def __init__(self, owner: Owner, block: Block) -> None:
         put = super().__setattr__
-        put("_controller", controller)
+        put("_owner", owner)
         put("_block", block)
-        put("_robot", controller.stack.robot)
+        put("_robot", owner.stack.robot)
         # the one input with a limit that the item does not know: rate dt <= 1
         put("_rate", block.slots.get("rate") if block.form == "margins" else None)
         put("_ramped", None if isinstance(block.entry.item, Direction) else block.slots.get("price"))
@@ -94,7 +112,7 @@ class Handle:
         # inputs of any finite numbers, with their shapes
         plain = {name: slot.input for name, slot in block.slots.items() if name != "rate" and name not in self._ordered}
         put("_plain", {name: (inputs.size(self._robot, i),) for name, i in plain.items() if inputs.is_plain(i)})
-        put("_poses", {name for name, slot in block.slots.items() if slot.input.kind == "pose"})
+        put("_poses", frozenset(name for name, slot in block.slots.items() if slot.input.kind == "pose"))
         put("_enabled", True)
         put("_weight", block.entry.weight)
         put("_mask", np.ones(len(block.rows)))
@@ -108,9 +126,10 @@ class Handle:
         return (*given, *own, "enabled", "mask")
 
     def __dir__(self) -> list[str]:
-        return [*self.names, "names", "ramp", "set"]
+        return [*self.names, "get", "names", "ramp", "set"]
 
-    def __getattr__(self, name: str) -> Any:
+    def _get(self, name: str) -> Any:
+        """Not an attribute that is there: a run-time value."""
         if name.startswith("__"):
             raise AttributeError(name)
         if name == "enabled":
@@ -120,21 +139,22 @@ class Handle:
         if name == "weight" and self._block.form == "task":
             return self._weight
         slot = self.slot(name)
-        self._controller.require_value(slot, self._field(name))
-        return _as_written(slot, self._controller.tick.p[slot.span])
+        self._owner.require_value(slot, self._field(name))
+        return _as_written(slot, self._owner.tick.p[slot.span])
 
-    def __setattr__(self, name: str, value: Any) -> None:
+    def _set(self, name: str, value: Any) -> None:
+        """A run-time value; other attributes do not change."""
         slot = self._block.slots.get(name)
         if slot is not None:
             # Set every tick, so with as few calls as can be
             numbers = value.homogeneous if type(value) is _SE3 else value
             if type(numbers) is _ARRAY and numbers.dtype is _FLOAT:
                 if name in self._poses:
-                    if numbers.shape == _MATRIX and self._controller.write_pose(slot, numbers):
+                    if numbers.shape == _MATRIX and self._owner.write_pose(slot, numbers):
                         return
                 # not for NaN; numpy would warn where squares overflow
                 elif numbers.shape == self._plain.get(name) and hypot(*numbers.tolist()) < LARGEST:
-                    self._controller.write(slot, numbers)
+                    self._owner.write(slot, numbers)
                     return
             if slot.input.sensed:
                 raise RangeError(self._field(name), value, "is measured in every tick and cannot be set")
@@ -150,11 +170,23 @@ class Handle:
             super().__setattr__("_mask", self._checked_mask(field, value))
         elif name == "weight" and self._block.form == "task":
             weight = validation.scalar(field, value, low=0.0)
-            self._controller.ramps.stop(self.item_name)
+            self._owner.ramps.stop(self.item_name)
             super().__setattr__("_weight", weight)
         else:
             raise UnknownValueError(field, name, self.names)
         self.apply()
+
+    if not TYPE_CHECKING:
+        # Hidden from type checkers, which would take any name for a value
+        __getattr__, __setattr__ = _get, _set
+
+    def get(self, name: str) -> Any:
+        """A run-time value by its name.
+
+        Raises:
+            UnknownNameError: there is none of that name.
+        """
+        return self._get(name)
 
     def ramp(self, weight: float, seconds: float) -> None:
         """Let a task's weight, or a soft constraint's price, change smoothly to ``weight`` over ``seconds`` of ticks:
@@ -169,14 +201,12 @@ class Handle:
         last = validation.scalar(self._field("ramp.weight"), weight, low=0.0)
         if self._ramped is not None:
             last = float(self._checked(self._ramped, last)[0])
-        self._controller.start_ramp(
-            self, last, validation.scalar(self._field("ramp.seconds"), seconds, low=0.0, unit="s")
-        )
+        self._owner.start_ramp(self, last, validation.scalar(self._field("ramp.seconds"), seconds, low=0.0, unit="s"))
 
     @property
     def ramped(self) -> float:
         """What a ramp changes: the weight of a task, the price of a soft constraint."""
-        return self._weight if self._ramped is None else float(self._controller.tick.p[self._ramped.start])
+        return self._weight if self._ramped is None else float(self._owner.tick.p[self._ramped.start])
 
     def put_ramped(self, value: float) -> None:
         """A checked weight or price on its way along a ramp."""
@@ -184,7 +214,7 @@ class Handle:
             super().__setattr__("_weight", value)
             self.apply()
         else:
-            self._controller.tick.p[self._ramped.start] = value
+            self._owner.tick.p[self._ramped.start] = value
 
     def set(self, **values: Any) -> None:
         """Set several of the item's inputs at once: all are checked, bounds against each other, before any is written.
@@ -203,11 +233,11 @@ class Handle:
 
     def _write(self, slot: Slot, numbers: Array) -> None:
         if slot is self._ramped:
-            self._controller.ramps.stop(self.item_name)
-        self._controller.write(slot, numbers)
+            self._owner.ramps.stop(self.item_name)
+        self._owner.write(slot, numbers)
 
     def _check_order(self, numbers: Mapping[str, Array]) -> None:
-        p = self._controller.tick.p
+        p = self._owner.tick.p
         for name in numbers:
             if name in self._ordered:
                 low, high = self._ordered[name]
@@ -233,7 +263,7 @@ class Handle:
         numbers = inputs.flat(self._robot, field, slot.input, value)
         if slot is not self._rate:
             return numbers
-        longest = self._controller.stack.dt_range[1]
+        longest = self._owner.stack.dt_range[1]
         if not 0.0 < numbers[0] * longest <= 1.0:
             reason = (
                 f"rate * dt must be in (0, 1] for every dt up to {longest:g} s, so rate in (0, {1 / longest:g}] 1/s"
@@ -249,16 +279,16 @@ class Handle:
 
     def apply(self) -> None:
         """Write weights or row switches to the buffers."""
-        tick, block, form = self._controller.tick, self._block, self._block.form
+        tick, block, form = self._owner.tick, self._block, self._block.form
         on = self._mask * float(self._enabled)
         if form == "task":
-            tick.weight[block.span] = self._weight * on * self._row_weights * self._controller.row_costs[block.span]
+            tick.weight[block.span] = self._weight * on * self._row_weights * self._owner.row_costs[block.span]
         elif form == "bounds":
-            start = block.start * self._controller.layout.variables
+            start = block.start * self._owner.layout.variables
             tick.bound_enabled[start : start + len(on)] = on
         else:
             tick.enabled[block.span] = on
-        self._controller.directions.follow(block.entry.name)
+        self._owner.directions.follow(block.entry.name)
 
     def _checked_mask(self, field: str, value: Any) -> Array:
         raw = validation.real_array(field, value)
@@ -321,4 +351,45 @@ class Directions:
         counts = (self._tick.weight[block.span] > 0.0) & self._handles[kept].enabled
         on = np.append(counts, counts.any()) * self._handles[kept].mask
         self._tick.enabled[keeper.span] = on
-        self._tick.p[keeper.slots["price"].span] = DIRECTION_PRICE * self._handles[task].weight
+        self._tick.p[keeper.slots["price"].span] = DIRECTION_PRICE * self._handles[task].get("weight")
+
+
+class InputGroup:
+    """Parts of a buffer of inputs as one array, for the packages above; users' values are checked by :class:`Handle`.
+
+    Args:
+        inputs: (item, input, which of its numbers; None: all), in the order of the array. Poses are rotations by
+            columns, then positions.
+
+    Attributes:
+        size: how many numbers it has. written: the last ones, None before the first.
+    """
+
+    def __init__(self, owner: Owner, inputs: Sequence[tuple[str, str, slice | None]]) -> None:
+        self._owner, self._p = owner, owner.tick.p
+        self._slots = [owner.layout.blocks[item].slots[name] for item, name, _ in inputs]
+        self._field = ", ".join(f"{item}.{name}" for item, name, _ in inputs)
+        spans = [np.arange(slot.span.start, slot.span.stop) for slot in self._slots]
+        index = np.concatenate(
+            [span if part is None else span[part] for span, (*_, part) in zip(spans, inputs, strict=True)]
+        )
+        self.size = len(index)
+        whole = self.size == index[-1] - index[0] + 1 and bool((np.diff(index) == 1).all())
+        # Numbers that lie side by side are written in half the time
+        self._index: slice | np.ndarray = slice(int(index[0]), int(index[-1]) + 1) if whole else index
+        self.written: Array | None = None
+
+    def write(self, numbers: Array) -> None:
+        """Write all numbers ``[size]``; that rotations are rotations and directions of length 1 is up to the caller.
+
+        Raises:
+            NotFiniteError: nothing is written.
+        """
+        if not isfinite(numbers.dot(numbers)):
+            raise NotFiniteError(self._field, numbers, "expected finite numbers")
+        self._p[self._index] = numbers
+        if self.written is None:
+            # They no longer follow the first configuration
+            for slot in self._slots:
+                self._owner.write(slot, self._p[slot.span].copy())
+        self.written = numbers

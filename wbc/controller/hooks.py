@@ -1,19 +1,43 @@
-"""What a controller, its steps and its stack offer and packages above this one do.
-
-Each of them puts its function here when it is imported, which ``import wbc`` does, so that no import points up.
-"""
+"""What a controller, its steps and its stack offer and packages above this one do: imported when it is used."""
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Callable
 from typing import Any
 
-#: By ``wbc.explain``, for :meth:`wbc.Step.explain`: (a step's copy of its tick, what its controller's steps share,
-#: status, what gave the command) -> Explanation
-explain: Callable[..., Any]
-#: By ``wbc.explain``, for :meth:`wbc.Step.derivative`: (the same two, item, value) -> numbers [nv, k]
-derivative: Callable[..., Any]
-#: By ``wbc.record``, for :meth:`wbc.Controller.record`: (controller, file, overwrite) -> Recorder
-record: Callable[..., Any]
-#: By ``wbc.ik``, for :meth:`wbc.Stack.solver`: (stack, goals, back end) -> Solver
-solver: Callable[..., Any]
+
+def _above(module: str, name: str) -> Callable[..., Any]:
+    """A function or class of a package above, which is imported when it is called."""
+
+    def call(*arguments: Any) -> Any:
+        return getattr(importlib.import_module(module), name)(*arguments)
+
+    return call
+
+
+#: For :meth:`wbc.Step.explain`: (a step's copy of its tick, what its controller's steps share, status, what gave the
+#: command) -> Explanation
+explain = _above("wbc.explain", "explain")
+#: For :meth:`wbc.Step.derivative`: (the same two, item, value) -> numbers [nv, k]
+derivative = _above("wbc.explain", "derivative")
+#: For :meth:`wbc.Controller.record`: (controller, file, overwrite) -> Recorder
+record = _above("wbc.record", "record")
+#: For :meth:`wbc.Stack.inverse_kinematics`: (stack, goals, back end) -> InverseKinematics
+inverse_kinematics = _above("wbc.ik", "InverseKinematics")
+#: For :meth:`wbc.Controller.export`: (controller, and its arguments) -> folder
+export = _above("wbc.export", "export")
+
+#: Names that stood in ``wbc.controller`` before they had packages of their own, found there for one version more
+MOVED = {
+    **dict.fromkeys(("Explanation",), "wbc.explain"),
+    **dict.fromkeys(("Branch", "Branches", "Ending", "InverseKinematics", "Solution", "Solver"), "wbc.ik"),
+    **dict.fromkeys(("Recorder", "Recording", "Replay", "replay", "replayed"), "wbc.record"),
+}
+
+
+def moved(name: str) -> Any:
+    """The ``__getattr__`` of ``wbc.controller``."""
+    if name not in MOVED:
+        raise AttributeError(f"module 'wbc.controller' has no attribute {name!r}")
+    return getattr(importlib.import_module(MOVED[name]), name)

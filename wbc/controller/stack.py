@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from wbc import validation
 from wbc.controller import hooks
-from wbc.controller.controller import Controller
+from wbc.controller.controller import Controller, core_of
 from wbc.qp.solvers import available_solvers
 from wbc.stack.artifact import compile_stack
 from wbc.stack.declaration import Declaration
 
 if TYPE_CHECKING:
-    from wbc.ik import Solution, Solver
+    from wbc.ik import InverseKinematics, Solution
 
 
-#: What :meth:`Stack.solve` hands on to :meth:`wbc.Solver.solve`
+#: What :meth:`Stack.solve` hands on to :meth:`wbc.InverseKinematics.solve`
 OPTIONS = ("seed", "budget", "restarts", "tolerance")
 
 
@@ -54,22 +55,27 @@ class Stack(Declaration):
 
         validation.one_of("solver", solver, available_solvers(experimental=True))
         controller = Controller(self, compile_stack(self, backend, __version__), solver)
-        controller.prepare()
+        core_of(controller).fallback.prepare()
         return controller
 
-    def solver(self, goals: Iterable[str] | None = None, backend: str = "auto") -> Solver:
-        """Inverse kinematics of these tasks and constraints, compiled; see :class:`wbc.Solver`.
+    def inverse_kinematics(self, goals: Iterable[str] | None = None, backend: str = "auto") -> InverseKinematics:
+        """Inverse kinematics of these tasks and constraints, compiled; see :class:`wbc.InverseKinematics`.
 
         Args:
-            goals: names of the tasks to be met within the tolerance, all others are wishes; default: those of the
-                greatest weight, postures and damping left out.
+            goals: names of the tasks to be met within the tolerance, all others are followed as far as that costs these
+                nothing; default: those of the greatest weight, postures and damping left out.
             backend: as for :meth:`compile`.
 
         Raises:
             UnknownNameError: unknown task or backend. RangeError: no goal is left. CompileError: see :meth:`compile`.
         """
-        solver: Solver = hooks.solver(self, goals, backend)
-        return solver
+        kinematics: InverseKinematics = hooks.inverse_kinematics(self, goals, backend)
+        return kinematics
+
+    def solver(self, goals: Iterable[str] | None = None, backend: str = "auto") -> InverseKinematics:
+        """The old name of :meth:`inverse_kinematics`, for one version."""
+        warnings.warn("Stack.solver is called Stack.inverse_kinematics now", DeprecationWarning, stacklevel=2)
+        return self.inverse_kinematics(goals, backend)
 
     def solve(
         self,
@@ -80,13 +86,13 @@ class Stack(Declaration):
         backend: str = "auto",
         **options: Any,
     ) -> Solution:
-        """One configuration that meets the tasks: :meth:`solver` and :meth:`wbc.Solver.solve` in one.
+        """One configuration that meets the tasks: :meth:`inverse_kinematics` and its ``solve`` in one.
 
         Args:
             q0: where the search begins [nq].
             targets: name of a task -> its ``target``; others stay where q0 has them.
-            goals, backend: as for :meth:`solver`.
-            options: ``seed``, ``budget``, ``restarts`` and ``tolerance`` of :meth:`wbc.Solver.solve`.
+            goals, backend: as for :meth:`inverse_kinematics`.
+            options: ``seed``, ``budget``, ``restarts`` and ``tolerance`` of :meth:`wbc.InverseKinematics.solve`.
 
         Raises:
             WbcError: as these two.
@@ -94,7 +100,7 @@ class Stack(Declaration):
         chosen = {} if targets is None else validation.mapping("targets", targets, "tasks to targets")
         for option in options:
             validation.one_of("option", option, OPTIONS)
-        solver = self.solver(goals, backend)
+        kinematics = self.inverse_kinematics(goals, backend)
         for name, target in chosen.items():
-            solver[name].target = target
-        return solver.solve(q0, **options)
+            kinematics[name].target = target
+        return kinematics.solve(q0, **options)

@@ -10,13 +10,22 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from wbc.controller import hooks
-from wbc.controller.level_report import LevelCertificate, certificates
-from wbc.controller.outcome import ANSWERED, STATUSES, Binding, Certificate, Residual, Slack, Status
-from wbc.controller.report import INFINITE, ReportLayout
-from wbc.controller.soft import scales
-from wbc.controller.tick import Assembly
+from wbc.controller.outcome import (
+    ANSWERED,
+    STATUSES,
+    Binding,
+    Certificate,
+    LevelCertificate,
+    Residual,
+    Slack,
+    Status,
+    certificates,
+    scales,
+)
+from wbc.controller.tick.buffers import INFINITE, Assembly
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Block, Layout
+from wbc.stack.memory import ReportLayout
 from wbc.validation import Array
 
 if TYPE_CHECKING:

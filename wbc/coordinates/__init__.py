@@ -2,29 +2,35 @@
 
 from __future__ import annotations
 
-from wbc.analysis.rows import BodyRows, JointRows, PitchPlaneRows
-from wbc.coordinates.adviser import Advice, Adviser, Basis, Condition
-from wbc.coordinates.arm_parts import Arm, MissingPartError, Parts
-from wbc.coordinates.automatic import AutomaticPairs
-from wbc.coordinates.carrying import CarriedMotion, Leg, carry
-from wbc.coordinates.complete_sets import CompleteSet, smallest_complete_sets
-from wbc.coordinates.conditioning import Conditioning
-from wbc.coordinates.control import PairController
-from wbc.coordinates.cues import MotionCue, motion_cue
-from wbc.coordinates.determinant_places import ClosedForm, closed_form
-from wbc.coordinates.items import FollowRows, KeepRows
-from wbc.coordinates.modes import Mode, mode_pairs, mode_row, mode_table, modes_of
-from wbc.coordinates.pair import CoordinatePair
-from wbc.coordinates.pair_stack import PairStack, pair_stack
-from wbc.coordinates.pair_survey import PairSurvey, advice_time, survey_pairs
-from wbc.coordinates.plots import DriveLog, plot_drives
-from wbc.coordinates.point_sets import OnCircle, OnCylinder, OnLine, OnPlane, OnSphere, PointSet
-from wbc.coordinates.published_trees import TREES, TreeSet, TreeSets, tree_sets
-from wbc.coordinates.restrictions import restriction_table
-from wbc.coordinates.rows import AxisRows, Coordinate, PlaneAngleRows, PointRows
-from wbc.coordinates.starts import regular_start
-from wbc.coordinates.system_motion import PairCount, SystemMotion, count_pairs, system_coordinates
-from wbc.coordinates.which_parts import parts
+from typing import TYPE_CHECKING
+
+from wbc import lazy
+
+if TYPE_CHECKING:
+    from wbc.analysis.rows import BodyRows, JointRows, PitchPlaneRows
+    from wbc.coordinates.advice.adviser import Advice, Adviser, Basis, Condition
+    from wbc.coordinates.advice.automatic import AutomaticPairs
+    from wbc.coordinates.advice.complete_sets import CompleteSet, smallest_complete_sets
+    from wbc.coordinates.advice.determinant_places import ClosedForm, closed_form
+    from wbc.coordinates.advice.modes import Mode, mode_pairs, mode_row, mode_table, modes_of, restriction_table
+    from wbc.coordinates.advice.pair_survey import PairSurvey, advice_time, survey_pairs
+    from wbc.coordinates.arms.arm_parts import Arm, MissingPartError, Parts
+    from wbc.coordinates.arms.published_trees import TREES, TreeSet, TreeSets, tree_sets
+    from wbc.coordinates.arms.which_parts import parts
+    from wbc.coordinates.control.conditioning import Conditioning
+    from wbc.coordinates.control.cues import MotionCue, motion_cue
+    from wbc.coordinates.control.pair_controller import PairController
+    from wbc.coordinates.control.pair_stack import PairStack, pair_stack
+    from wbc.coordinates.control.starts import regular_start
+    from wbc.coordinates.items import FollowRows, KeepRows
+    from wbc.coordinates.pair import CoordinatePair
+    from wbc.coordinates.plots import DriveLog, plot_drives
+    from wbc.coordinates.point_sets import OnCircle, OnCylinder, OnLine, OnPlane, OnSphere, PointSet
+    from wbc.coordinates.rows import AxisRows, Coordinate, PlaneAngleRows, PointRows
+    from wbc.coordinates.system.carrying import CarriedMotion, Leg, carry
+    from wbc.coordinates.system.system_motion import PairCount, SystemMotion, count_pairs, system_coordinates
+else:
+    __getattr__ = lazy.attach(__name__, __file__)
 
 __all__ = [
     "TREES",
@@ -86,3 +92,7 @@ __all__ = [
     "system_coordinates",
     "tree_sets",
 ]
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -107,7 +107,7 @@ class KeepRows(Constraint):
     Inputs:
         speed: one number a row, 0 by default. gain: how fast drift decays [1/s], at most 1/dt.
         reference: pose, coordinate or angle that is held. Default: the one at the first step. Not for pure rates.
-        drift: e of rows that are rates only, one number a row (:class:`wbc.coordinates.integrals.RateIntegrals`).
+        drift: e of rows that are rates only, one number a row (``RateIntegrals``).
 
     Attributes:
         coordinate: what is held. gain: first value of the input. pull: fastest return [m/s, rad/s].

@@ -5,7 +5,6 @@ What works that out is imported when somebody asks.
 
 from __future__ import annotations
 
-from wbc.controller import hooks
 from wbc.controller.step import Context
 from wbc.explain.explanation import Explanation
 from wbc.validation import Array
@@ -27,6 +26,3 @@ def derivative(data: bytes, context: Context, name: str, value: str | None) -> A
     from wbc.explain.past import past_of
 
     return sensitivity.derivative(past_of(data, context), name, value)
-
-
-hooks.explain, hooks.derivative = explain, derivative

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from wbc.controller.level_report import certificates
-from wbc.controller.soft import scales
+from wbc.controller.outcome import certificates, scales
 from wbc.explain.explanation import Contradiction, Explanation, Give, Residue, Side
 from wbc.explain.losses import groups, losses, prices
 from wbc.explain.naming import Naming

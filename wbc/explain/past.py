@@ -8,17 +8,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wbc.controller.report import ReportLayout
-from wbc.controller.solved import SolvedTick
 from wbc.controller.step import Context
-from wbc.controller.tick import Assembly
+from wbc.controller.tick.buffers import Assembly
+from wbc.controller.tick.solved import SolvedTick
 from wbc.errors import SolverError
-from wbc.qp.hierarchy import Answer, Hierarchy
-from wbc.qp.level_sensitivity import FrozenLevels
+from wbc.qp.levels.hierarchy import Answer, Hierarchy
+from wbc.qp.levels.sensitivity import FrozenLevels
 from wbc.qp.problem import QP
 from wbc.qp.relax import Relaxed
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Block, Layout
+from wbc.stack.memory import ReportLayout
 from wbc.tasks._direction import Direction
 from wbc.tasks.mechanism import Mechanism
 from wbc.validation import Array

@@ -28,7 +28,7 @@ _FREE = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Branches:
-    """Answer of :meth:`wbc.Solver.branches`.
+    """Answer of :meth:`wbc.InverseKinematics.branches`.
 
     Attributes:
         solutions: one a branch, those nearest to q0 first (Euclidean, rad or characteristic lengths).
@@ -172,8 +172,8 @@ def branches(
 
 def _refuse_free_directions(engine: Engine, first: Array) -> None:
     """Answers are points only where the rows of all tasks, holds and couplings leave no direction free."""
-    weight = (engine.tick.weight > 0.0) * engine.controller.row_costs
-    for block in engine.controller.layout.of_form("task"):
+    weight = (engine.tick.weight > 0.0) * engine.core.row_costs
+    for block in engine.core.layout.of_form("task"):
         if isinstance(block.entry.item, (Damping, Momentum)):
             weight[block.span] = 0.0
     qp = engine.qp(np.where(engine.starts.chosen != 0.0, engine.random(1, 0)[0], first), weight)

@@ -29,7 +29,7 @@ LOOKS = 100
 
 @dataclass(frozen=True, eq=False)
 class Branch:
-    """Answer of :meth:`wbc.Solver.along`.
+    """Answer of :meth:`wbc.InverseKinematics.along`.
 
     Attributes:
         s: path coordinates that were asked for [count].

@@ -9,14 +9,14 @@ from time import perf_counter
 import numpy as np
 import pinocchio as pin
 
-from wbc.controller.report import ReportLayout
-from wbc.controller.solved import SolvedTick
-from wbc.controller.tick import Assembly
+from wbc.controller.tick.buffers import Assembly
+from wbc.controller.tick.solved import SolvedTick
 from wbc.ik.search import EXHAUSTED, FOUND, OUT_OF_TIME, REFUSED, Found, Query
 from wbc.qp.problem import QP
 from wbc.stack.codegen import row_units
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Layout
+from wbc.stack.memory import ReportLayout
 from wbc.validation import Array
 
 #: As in ``native/converge.h``

@@ -8,12 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from wbc.controller.controller import Controller
+from wbc.controller.controller import Controller, core_of
+from wbc.controller.core import Core
 from wbc.controller.handle import Handle
-from wbc.controller.native import NativeTick
-from wbc.controller.solved import SolvedTick
 from wbc.controller.step import Step
-from wbc.controller.tick import Assembly
+from wbc.controller.tick.buffers import Assembly
+from wbc.controller.tick.native import NativeTick
+from wbc.controller.tick.solved import SolvedTick
 from wbc.ik.descent import Search
 from wbc.ik.search import FOUND, Found, NativeSearch, Query
 from wbc.ik.solution import Ending
@@ -21,7 +22,7 @@ from wbc.ik.starts import Starts
 from wbc.ik.timeless import FIRST, TICK, chosen_goals, goal_rows, hasten, searching, timeless
 from wbc.qp.problem import QP
 from wbc.stack.declaration import Declaration
-from wbc.stack.places import stops
+from wbc.stack.tables import stops
 from wbc.tasks.base import Constraint, Sensor
 from wbc.validation import Array
 
@@ -40,15 +41,15 @@ class Sensing:
     parameters; false where there are none.
     """
 
-    def __init__(self, controller: Controller, tick: Assembly) -> None:
-        robot, self._tick = controller.stack.robot, tick
+    def __init__(self, core: Core, tick: Assembly) -> None:
+        robot, self._tick = core.stack.robot, tick
         self._sensors: list[tuple[Sensor, Handle]] = []
-        for entry in controller.stack.entries:
+        for entry in core.stack.entries:
             item = entry.item
             if isinstance(item, Constraint) and item.sensed_rows(robot) > 0:
-                slots = controller.layout.blocks[entry.name].slots
+                slots = core.layout.blocks[entry.name].slots
                 places = {name: tick.p[slot.span] for name, slot in slots.items()}
-                self._sensors.append((item.sensor(robot, places), controller[entry.name]))
+                self._sensors.append((item.sensor(robot, places), core.handles[entry.name]))
 
     def __bool__(self) -> bool:
         return bool(self._sensors)
@@ -61,11 +62,11 @@ class Sensing:
 
 
 class Engine:
-    """A timeless stack with the memory of its tick; see :class:`wbc.Solver`.
+    """A timeless stack with the memory of its tick; see :class:`wbc.InverseKinematics`.
 
     Attributes:
         goals: names of the tasks to be met. rows: 1 for their task rows, 0 for those of wishes.
-        stack: the items without time. controller: their controller, whose tick is :attr:`tick`.
+        stack: the items without time. controller: theirs. core: what that is inside, whose tick is :attr:`tick`.
     """
 
     def __init__(self, stack: Declaration, goals: Iterable[str] | None, backend: str) -> None:
@@ -73,7 +74,8 @@ class Engine:
         self.stack = timeless(stack)
         self.controller: Controller = searching(self.stack, backend)
         hasten(self.controller)
-        layout, tick = self.controller.layout, self.controller.tick
+        self.core = core_of(self.controller)
+        layout, tick = self.core.layout, self.core.tick
         self.rows = goal_rows(self.controller, self.goals)
         self.dof_scales = layout.dof_scales(self.stack)
         #: unit of each task row in one metre or radian, in which tolerances are given
@@ -86,7 +88,7 @@ class Engine:
         self._limited = self.stack.robot.position_index[dofs], at[dofs], lower[dofs], upper[dofs]
         self._switches: bytes | None = None
         self._limits = np.zeros(0), np.zeros(0)
-        self._sensing = Sensing(self.controller, self.tick)
+        self._sensing = Sensing(self.core, self.tick)
         self.search: NativeSearch | Search
         if isinstance(tick, NativeTick) and not self._sensing:
             self.search = NativeSearch(tick)
@@ -100,7 +102,7 @@ class Engine:
     def begin(self, q0: Any) -> Array:
         """Checked, as the first configuration of a search: targets that wait are taken from q0, then limits hold."""
         q = self.stack.robot.configuration("q0", q0)
-        self.controller.begin(q, self._rest)
+        self.core.begin(q, self._rest)
         self.tick.dt[0] = TICK
         self.tick.q[:] = self.within_limits(q)
         return self.tick.q.copy()
@@ -118,7 +120,7 @@ class Engine:
             step = self.controller.step(q, self._rest, dt=TICK)
         else:
             tick.q[:], tick.v_last[:] = q, 0.0
-            step = self.controller.again()
+            step = self.core.again()
         tick.weight[:] = before
         return step
 
@@ -137,7 +139,7 @@ class Engine:
                 self._queries.clear()
             rows = goal_rows(self.controller, goals)
             aims, wishes = weight * rows, weight * (1.0 - self.rows)
-            heaviest = float((wishes / self.controller.row_costs).max(initial=0.0))
+            heaviest = float((wishes / self.core.row_costs).max(initial=0.0))
             self._queries[key] = Query(
                 starts=self.random(restarts, seed),
                 chosen=self.starts.chosen,

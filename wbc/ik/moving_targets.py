@@ -10,7 +10,7 @@ import numpy as np
 import pinocchio as pin
 
 from wbc import validation
-from wbc.controller.controller import Controller
+from wbc.controller.controller import Controller, core_of
 from wbc.errors import ShapeError
 from wbc.robot import Robot
 from wbc.tasks.base import Input
@@ -36,7 +36,7 @@ class MovingTargets:
     """
 
     def __init__(self, controller: Controller, targets: Mapping[str, Any], s: Array) -> None:
-        self._p = controller.tick.p
+        self._p = core_of(controller).tick.p
         targets = validation.mapping("targets", targets, "tasks to targets")
         #: between neighbouring coordinates all targets go straight
         self.smooth = not any(callable(given) for given in targets.values())
@@ -52,8 +52,8 @@ class MovingTargets:
                 if len(given) != len(s):
                     raise ShapeError(f"targets[{name}]", len(given), f"expected a function of s, or {len(s)} targets")
                 values = np.array([handle.checked("target", value) for value in given])
-                numbers = _between(robot, controller.layout.blocks[name].slots["target"].input, s, values)
-            self._parts.append((controller.layout.blocks[name].slots["target"].span, numbers))
+                numbers = _between(robot, core_of(controller).layout.blocks[name].slots["target"].input, s, values)
+            self._parts.append((core_of(controller).layout.blocks[name].slots["target"].span, numbers))
 
     def aim(self, s: float) -> None:
         """Write the targets of a coordinate."""

@@ -28,7 +28,7 @@ class Ending(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """Answer of :meth:`wbc.Solver.solve`.
+    """Answer of :meth:`wbc.InverseKinematics.solve`.
 
     Attributes:
         q: the configuration, within the position limits [nq].
@@ -91,7 +91,7 @@ class Solution:
 
 @dataclass(frozen=True, eq=False)
 class Batch:
-    """Answers of :meth:`wbc.Solver.solve_batch`, one for each target.
+    """Answers of :meth:`wbc.InverseKinematics.solve_batch`, one for each target.
 
     Attributes:
         q: configurations [count, nq].

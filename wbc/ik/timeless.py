@@ -8,7 +8,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from wbc import validation
-from wbc.controller.controller import Controller
+from wbc.controller.controller import Controller, core_of
 from wbc.controller.stack import Stack
 from wbc.errors import LevelError, RangeError
 from wbc.stack.artifact import compile_stack
@@ -72,7 +72,7 @@ def hasten(controller: Controller) -> None:
         for name in ("gain", "rate", "return_rate"):
             if name in handle.names:
                 handle.set(**{name: 1.0 / TICK})
-        block = controller.layout.blocks[entry.name]
+        block = core_of(controller).layout.blocks[entry.name]
         if isinstance(item, Constraint) and block.form == "rows" and not item.equality:
             handle.enabled = False
 
@@ -100,7 +100,7 @@ def chosen_goals(stack: Declaration, goals: Iterable[str] | None) -> tuple[str, 
 
 def goal_rows(controller: Controller, goals: Iterable[str]) -> Array:
     """1 for the task rows of goals, 0 for those of wishes."""
-    out = np.zeros(controller.layout.task_rows)
+    out = np.zeros(core_of(controller).layout.task_rows)
     for name in goals:
-        out[controller.layout.blocks[name].span] = 1.0
+        out[core_of(controller).layout.blocks[name].span] = 1.0
     return out

@@ -14,10 +14,10 @@ import coal
 
 from wbc.proximity.choice import Choice
 from wbc.proximity.corners import NEAR, Corners
-from wbc.proximity.geometry import geometry_of
 from wbc.proximity.judge import Judge
 from wbc.proximity.rows import Rows
 from wbc.proximity.scene import Index, Scene
+from wbc.robot.geometry.coal_shapes import geometry_of
 from wbc.shapes import FAR, HalfSpace, Shape
 from wbc.validation import Array
 

@@ -9,9 +9,8 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from wbc.proximity.body import Body, Pair, joint_of
-from wbc.shapes import Box, Capsule, Convex, Cylinder, HalfSpace, Shape, Sphere
+from wbc.robot.geometry.coal_shapes import sphere_round
 from wbc.symbolic.kinematics import WORLD, frame_index
-from wbc.validation import Array
 
 if TYPE_CHECKING:
     from wbc.robot import Robot
@@ -59,21 +58,3 @@ class Scene:
             return body.placement
         frame = self.robot.model.frames[frame_index(self.robot.model, body.frame)]
         return frame.placement * body.placement
-
-
-def sphere_round(shape: Shape) -> tuple[Array, float]:
-    """(centre in the shape's frame, radius) of a sphere round a shape [m]; infinite round a half-space."""
-    if isinstance(shape, Convex):
-        center = shape.points.mean(axis=0)
-        return center, float(np.linalg.norm(shape.points - center, axis=1).max())
-    return np.zeros(3), _radius(shape)
-
-
-def _radius(shape: Sphere | Capsule | Box | Cylinder | HalfSpace) -> float:
-    if isinstance(shape, Sphere):
-        return shape.radius
-    if isinstance(shape, Capsule):
-        return shape.radius + shape.length / 2
-    if isinstance(shape, Box):
-        return float(np.linalg.norm(shape.size)) / 2
-    return np.inf if isinstance(shape, HalfSpace) else float(np.hypot(shape.radius, shape.length / 2))

@@ -15,8 +15,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wbc.qp.daqp import Daqp
 from wbc.qp.problem import QP
+from wbc.qp.solvers.daqp import Daqp
 from wbc.validation import Array
 
 #: Sides that are missed by no more than this count as met; the weight of |x|^2 against |slack|^2; steps at most, and

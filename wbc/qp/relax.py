@@ -21,10 +21,9 @@ from numpy.typing import NDArray
 
 from wbc import validation
 from wbc.errors import BoundsError
-from wbc.qp.backend import Backend
-from wbc.qp.daqp import Daqp
-from wbc.qp.prepared import Prepared
 from wbc.qp.problem import QP, Solution
+from wbc.qp.solvers.backend import Backend, Prepared
+from wbc.qp.solvers.daqp import Daqp
 from wbc.validation import Array
 
 #: Weight of the proximal term, steps at most, and the change of s at which the sequence ends

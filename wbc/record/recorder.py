@@ -16,7 +16,7 @@ from importlib import metadata
 from typing import Any
 
 from wbc import validation
-from wbc.controller.controller import Controller
+from wbc.controller.controller import Controller, core_of
 from wbc.record.recording import FORMAT, RecordingError, Writer
 from wbc.stack.declaration import Declaration
 
@@ -51,9 +51,10 @@ class Recorder:
     def __init__(self, controller: Controller, path: str | os.PathLike[str], overwrite: bool) -> None:
         self.path = validation.file_path("path", path)
         self.count = 0
-        self._controller, self._tick = controller, controller.tick
+        self._core = core = core_of(controller)
+        self._tick = core.tick
         views = {name: getattr(self._tick, name) for name in INPUTS}
-        layout = controller.layout
+        layout = core.layout
         sizes = {name: view.size for name, view in views.items()} | {"reset": 1, "v": layout.nv}
         if layout.variables > layout.nv:
             sizes["others"] = layout.variables - layout.nv
@@ -69,9 +70,9 @@ class Recorder:
         #: resets of the controller before the last tick that was recorded whole
         self._seen = UNKNOWN
         self._problem: OSError | None = None
-        self._call = controller._call
-        controller._call = functools.partial(_recorded, self)
-        controller._recorder = self
+        self._call = core.call
+        core.call = functools.partial(_recorded, self)
+        core.recording = self.path
         atexit.register(self._leave)
 
     def close(self) -> None:
@@ -122,8 +123,8 @@ class Recorder:
 
     def _detach(self) -> None:
         self._writer = None
-        self._controller._call = self._call
-        self._controller._recorder = None
+        self._core.call = self._call
+        self._core.recording = None
 
     def __enter__(self) -> Recorder:
         return self
@@ -134,7 +135,7 @@ class Recorder:
 
 def _recorded(recorder: Recorder) -> int:
     """A tick, recorded."""
-    resets, seen = recorder._controller._resets, recorder._seen
+    resets, seen = recorder._core.resets, recorder._seen
     if seen == UNKNOWN:
         # the first one, or the one before was interrupted between its call and its record
         recorder._tick.reset()
@@ -143,7 +144,7 @@ def _recorded(recorder: Recorder) -> int:
     recorder._seen = UNKNOWN
     flag = recorder._call()
     if flag:
-        flag = recorder._controller.finish(flag)
+        flag = recorder._core.finish(flag)
     if flag < 0:
         recorder._seen = seen
         return flag
@@ -157,8 +158,8 @@ def _recorded(recorder: Recorder) -> int:
 
 def record(controller: Controller, path: str | os.PathLike[str], overwrite: bool) -> Recorder:
     """See :meth:`wbc.Controller.record`."""
-    if controller._recorder is not None:
-        raise RecordingError("path", str(path), f"the controller records into {controller._recorder.path} already")
+    if (other := core_of(controller).recording) is not None:
+        raise RecordingError("path", str(path), f"the controller records into {other} already")
     return Recorder(controller, path, validation.flag("overwrite", overwrite))
 
 

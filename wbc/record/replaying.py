@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wbc import validation
-from wbc.controller.controller import Controller
+from wbc.controller.controller import Controller, core_of
 from wbc.controller.outcome import STATUSES
 from wbc.controller.policy import Policy
 from wbc.controller.stack import Stack
@@ -140,7 +140,7 @@ def compiled(
     controller = stack.compile(solver=told["solver"], backend=chosen)
     conflict, chain = told["policy"]
     controller.policy = Policy(conflict, tuple(chain))
-    sizes = {name: getattr(controller.tick, name).size for name in INPUTS}
+    sizes = {name: getattr(core_of(controller).tick, name).size for name in INPUTS}
     expected = {name: told["sizes"][name] for name in INPUTS}
     if sizes != expected:
         raise RecordingError("recording", expected, f"is of another layout, this version's is {sizes}")
@@ -154,7 +154,8 @@ def replayed(recording: Recording, controller: Controller | None = None) -> Iter
         controller: whose buffers are used, see :func:`compiled`; default: one of the stack in the recording.
     """
     controller = compiled(recording) if controller is None else controller
-    tick, parts = controller.tick, recording.parts
+    core, parts = core_of(controller), recording.parts
+    tick = core.tick
     buffers = [(getattr(tick, name), parts[name]) for name in INPUTS]
     reset, v, flag = parts["reset"].start, parts["v"], parts["flag"].start
     number = 0
@@ -164,7 +165,7 @@ def replayed(recording: Recording, controller: Controller | None = None) -> Iter
                 buffer[:] = row[part]
             if row[reset]:
                 tick.reset()
-            yield Tick(number, row[v].copy(), STATUSES[int(row[flag])], controller.again())
+            yield Tick(number, row[v].copy(), STATUSES[int(row[flag])], core.again())
             number += 1
 
 

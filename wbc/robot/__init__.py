@@ -1,8 +1,8 @@
 """Robot models (floor 2)."""
 
-from wbc.robot.dh import DHRow
 from wbc.robot.limits import Limits
 from wbc.robot.recipe import Recipe
 from wbc.robot.robot import Coupling, Robot
+from wbc.robot.sources.dh import DHRow
 
 __all__ = ["Coupling", "DHRow", "Limits", "Recipe", "Robot"]

@@ -11,11 +11,11 @@ import pinocchio as pin
 
 from wbc import validation
 from wbc.errors import RangeError, ShapeError
-from wbc.robot.description import Description, Mimic, finite_or_unlimited
 from wbc.robot.frames import make_frames_unique, restore_joint_names
 from wbc.robot.limits import Limits
 from wbc.robot.recipe import Recipe, expand
 from wbc.robot.robot import Coupling, Robot
+from wbc.robot.sources.description import Description, Mimic, finite_or_unlimited
 from wbc.symbolic.joints import symbolic_joint
 from wbc.validation import Array
 

@@ -13,22 +13,22 @@ import pinocchio as pin
 from wbc import validation
 from wbc.errors import RobotFileError, ShapeError, UnknownNameError
 from wbc.robot.assembly import assemble, override_limits
-from wbc.robot.collision_pairs import find_self_pairs
-from wbc.robot.description import Description, with_base
-from wbc.robot.dh import DHRow, read_dh
-from wbc.robot.files import example_data_folder, read_xml
-from wbc.robot.geometry import description_shapes, fit_shapes
-from wbc.robot.link_pairs import shaped_links
-from wbc.robot.mjcf import read_mjcf
-from wbc.robot.pairs_file import read_self_pairs
+from wbc.robot.geometry.link_shapes import description_shapes, fit_shapes
+from wbc.robot.pairs.collision_pairs import find_self_pairs
+from wbc.robot.pairs.link_pairs import shaped_links
+from wbc.robot.pairs.pairs_file import read_self_pairs
 from wbc.robot.recipe import Recipe
 from wbc.robot.robot import Robot
-from wbc.robot.srdf import read_states
-from wbc.robot.urdf import read_urdf
+from wbc.robot.sources.description import Description, with_base
+from wbc.robot.sources.dh import DHRow, read_dh
+from wbc.robot.sources.files import example_data_folder, read_xml
+from wbc.robot.sources.mjcf import read_mjcf
+from wbc.robot.sources.srdf import read_states
+from wbc.robot.sources.urdf import read_urdf
 
 SHAPES = ("auto", "description", "exact", "fit", "spheres", "convex", "none")
 
-#: Choices of :data:`SHAPES` that read meshes -> kind of :func:`~wbc.robot.geometry.fit_shapes`.
+#: Choices of :data:`SHAPES` that read meshes -> kind of :func:`~wbc.robot.geometry.link_shapes.fit_shapes`.
 _FITTED = {"fit": "capsule", "spheres": "spheres", "convex": "convex"}
 
 

@@ -11,8 +11,8 @@ import numpy as np
 from wbc.shapes import FAR
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Layout
-from wbc.stack.pattern import sparsity_rows
-from wbc.stack.places import (
+from wbc.stack.program import Program, sparsity_rows
+from wbc.stack.tables import (
     brakes,
     gain_places,
     kept_rows,
@@ -23,7 +23,6 @@ from wbc.stack.places import (
     stops,
     told_slacks,
 )
-from wbc.stack.program import Program
 from wbc.symbolic.kinematics import Kinematics
 
 #: Numbers that a tick reports of each level, see ``native/tick.h``

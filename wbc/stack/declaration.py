@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import dataclasses
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Self
 
 from wbc import pickling, validation
 from wbc.errors import DuplicateNameError, LevelError, PicklingError, RangeError, ShapeError, UnknownNameError
 from wbc.robot import Robot
-from wbc.stack.parts import inner_items
 from wbc.tasks import inputs
 from wbc.tasks._direction import DIRECTION_PRICE, Direction
 from wbc.tasks.base import Constraint, Item, Order, Task
@@ -286,3 +287,13 @@ def _check_softened(level: int, item: Constraint) -> None:
 
 def _snake(name: str) -> str:
     return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", name).lower()
+
+
+def inner_items(item: Item) -> Iterator[Item]:
+    """An item and the items that it is made from."""
+    yield item
+    for field in dataclasses.fields(item):
+        value = getattr(item, field.name)
+        for part in value if isinstance(value, tuple) else (value,):
+            if isinstance(part, Item):
+                yield from inner_items(part)

@@ -13,8 +13,7 @@ from importlib import metadata
 
 import numpy as np
 
-from wbc.stack.declaration import Declaration
-from wbc.stack.parts import inner_items
+from wbc.stack.declaration import Declaration, inner_items
 
 #: Everything that runs when a program is built: all parts that this one imports, and what those import. A test compares
 #: this with the imports themselves, and with what runs. The robots' data are not here: they are in the key.

@@ -34,7 +34,7 @@ class Block:
 
     ``start`` counts within the rows of the same form: task rows, general constraint rows, or, for
     bounds, blocks of nv. ``margin_start`` counts margin rows only (-1: none). ``share`` is the variable of the QP that
-    says how much of its command a scaled task is given (-1: none), see :mod:`wbc.stack.soft`.
+    says how much of its command a scaled task is given (-1: none), see :mod:`wbc.stack.shares`.
     """
 
     entry: Entry

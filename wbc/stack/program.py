@@ -13,7 +13,7 @@ Outputs of ``rows(q, v, p, dt)`` (MT task rows, MC general rows, NB bound blocks
     margin_factor  MH  factor in [0, 1] by which a margin row is faded
     bound_low, bound_high   nv x NB
 
-nv counts the variables of the QP here, which may be more than the velocities, see :mod:`wbc.stack.soft`.
+nv counts the variables of the QP here, which may be more than the velocities, see :mod:`wbc.stack.shares`.
 The tick forms H = sum w (factor J)'J + damping and g from these, so that the compiled expression stays
 small and levels have their rows. ``ahead(q, v, p, dt)`` is h(q (+) v dt) with moving
 inputs advanced by their rates. ``bend(q, v, p, dt, pull)`` is the upper triangle of sum_k pull_k d2(e_k)/dq2, the
@@ -33,14 +33,13 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import casadi as ca
+import numpy as np
 
 from wbc.errors import ShapeError
-from wbc.stack.balls import Balls
 from wbc.stack.declaration import Declaration
+from wbc.stack.distances import Balls, Sensed
 from wbc.stack.layout import Block, Layout, Slot
-from wbc.stack.pattern import checked_function, shared_pattern
-from wbc.stack.sensed import Sensed
-from wbc.stack.soft import kept_direction, speeds, unlimited, widened
+from wbc.stack.shares import kept_direction, speeds, unlimited, widened
 from wbc.symbolic import rotations as rot
 from wbc.symbolic.curvature import Pull, curvature
 from wbc.symbolic.kinematics import Kinematics, Pose
@@ -291,3 +290,31 @@ def build(stack: Declaration, layout: Layout, loops: bool = False) -> Program:
     if bent.nnz():
         bend = checked_function("bend", [*inputs, b.pull], [bent], ["bend"])
     return Program(rows, ahead, bend, balls, sensed)
+
+
+def shared_pattern(transposed: ca.SX) -> ca.SX:
+    """Give all rows of a task the same columns, if that at most doubles the entries: they are then one dense block."""
+    rows = transposed.shape[1]
+    columns = sorted(set(transposed.sparsity().row()))
+    if rows < 2 or len(columns) * rows > 2 * transposed.nnz():
+        return transposed
+    return ca.project(transposed, ca.Sparsity.rowcol(columns, list(range(rows)), transposed.shape[0], rows))
+
+
+def sparsity_rows(transposed: ca.Sparsity) -> tuple[np.ndarray, np.ndarray]:
+    """(starts, columns) of the rows of J from the sparsity of its transpose (compressed columns)."""
+    return np.array(transposed.colind(), dtype=np.int64), np.array(transposed.row(), dtype=np.int64)
+
+
+def checked_function(name: str, inputs: list[ca.SX], outputs: list[ca.SX], labels: list[str]) -> ca.Function:
+    """A function of (q, v, p, dt, pull), as many of them as there are inputs.
+
+    Raises:
+        ShapeError: symbols that are no inputs.
+    """
+    free = ca.symvar(ca.veccat(*outputs))
+    known = {s.__hash__() for s in ca.symvar(ca.veccat(*inputs))}
+    stray = [s.name() for s in free if s.__hash__() not in known]
+    if stray:
+        raise ShapeError(f"stack.{name}", stray, "an item's expression contains symbols that are not its inputs")
+    return ca.Function(name, inputs, ca.cse(outputs), ["q", "v", "p", "dt", "pull"][: len(inputs)], labels)

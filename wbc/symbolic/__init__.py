@@ -1,7 +1,6 @@
 """Symbolic kinematics and dynamics from a ``pin.Model`` (floor 1: imports nothing above it)."""
 
-from wbc.symbolic.centroidal import Centroidal
-from wbc.symbolic.dynamics import Dynamics
+from wbc.symbolic.dynamics import Centroidal, Dynamics
 from wbc.symbolic.kinematics import WORLD, Kinematics, Pose
 from wbc.symbolic.tracer import Tracer
 from wbc.symbolic.velocity import Motion

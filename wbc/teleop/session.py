@@ -21,9 +21,9 @@ from wbc.coordinates import (
     parts,
     regular_start,
 )
-from wbc.coordinates.modes import mode
+from wbc.coordinates.advice.modes import mode
+from wbc.coordinates.control.pair_stack import row_count
 from wbc.coordinates.pair import pairs_of
-from wbc.coordinates.pair_stack import row_count
 from wbc.coordinates.scales import scales
 from wbc.errors import RangeError
 from wbc.robot import Robot

@@ -14,10 +14,10 @@ import pinocchio as pin
 
 from wbc import validation
 from wbc.errors import MissingShapeError, ShapeError
-from wbc.proximity.geometry import geometry_of
 from wbc.robot import Robot
-from wbc.robot.files import captured_stderr
+from wbc.robot.geometry.coal_shapes import geometry_of
 from wbc.robot.robot import checked_robot
+from wbc.robot.sources.files import captured_stderr
 from wbc.shapes import Shape
 from wbc.track.setup import Moving
 from wbc.validation import Array

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pinocchio as pin
 
-from wbc.controller import Controller, Status, Step
+from wbc.controller import Controller, Status, Step, core_of
 from wbc.track.setup import Plan
 from wbc.validation import Array
 
@@ -23,7 +23,7 @@ class Recorder:
         self._plan = plan
         self._data = robot.model.createData()
         self._frame = int(robot.model.getFrameId(plan.frame))
-        blocks = controller.layout.blocks
+        blocks = core_of(controller).layout.blocks
         self._tasks = {name: b.rows for name, b in blocks.items() if b.form == "task"}
         self._margins = {name: b.rows for name, b in blocks.items() if b.form == "margins"}
         self.count = 0

@@ -1,55 +1,66 @@
-"""Laws of motion: paths, timings, and certificates of the limits that they keep.
-
-Names are imported when they are first used, so that toppra and ruckig cost nothing until then.
-"""
+"""Laws of motion: paths, timings, and certificates of the limits that they keep."""
 
 from __future__ import annotations
 
-import importlib
-from typing import Any
+from typing import TYPE_CHECKING
 
-#: Public name -> module that defines it
-_WHERE = {
-    "Law": "law",
-    "State": "law",
-    "Limits": "limits",
-    "Certificate": "certificate",
-    "Worst": "certificate",
-    "Path": "path",
-    "PolynomialPath": "path",
-    "Timing": "timing",
-    "follow": "following",
-    "Followed": "following",
-    "time_optimal": "least_time",
-    "jerk_limited": "between_states",
-    "jerk_limited_along": "along",
-    "online": "online_filter",
-    "Online": "online_filter",
-    "standing_path": "joint_paths",
-    "straight_path": "joint_paths",
-    "spline_path": "joint_paths",
-    "blend_path": "joint_paths",
-    "FunctionPath": "from_function",
-    "function_path": "from_function",
-    "PosePath": "pose_path",
-    "geodesic_path": "pose_paths",
-    "pose_polyline": "pose_paths",
-    "pose_spline": "pose_paths",
-    "arc_path": "arcs",
-    "arc_through": "arcs",
-    "via_points": "via_poses",
-    "load": "files",
-    "plot": "plots",
-}
+from wbc import lazy
 
-__all__ = sorted(_WHERE)  # noqa: PLE0605
+if TYPE_CHECKING:
+    from wbc.trajectory.following import Followed, follow
+    from wbc.trajectory.jerk.along import jerk_limited_along
+    from wbc.trajectory.jerk.between_states import jerk_limited
+    from wbc.trajectory.jerk.online_filter import Online, online
+    from wbc.trajectory.jerk.via_poses import via_points
+    from wbc.trajectory.laws.certificate import Certificate, Worst
+    from wbc.trajectory.laws.law import Law, State, load
+    from wbc.trajectory.laws.limits import Limits
+    from wbc.trajectory.laws.plots import plot
+    from wbc.trajectory.laws.timing import Timing
+    from wbc.trajectory.least_time.time_optimal import time_optimal
+    from wbc.trajectory.paths.arcs import arc_path, arc_through
+    from wbc.trajectory.paths.from_function import FunctionPath, function_path
+    from wbc.trajectory.paths.joint_paths import blend_path, spline_path, standing_path, straight_path
+    from wbc.trajectory.paths.path import Path, PolynomialPath
+    from wbc.trajectory.paths.pose_path import PosePath
+    from wbc.trajectory.paths.pose_paths import geodesic_path, pose_polyline, pose_spline
+else:
+    # toppra, ruckig and matplotlib cost nothing until they are used
+    __getattr__ = lazy.attach(__name__, __file__)
 
-
-def __getattr__(name: str) -> Any:
-    if name not in _WHERE:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(importlib.import_module(f"{__name__}.{_WHERE[name]}"), name)
+__all__ = [
+    "Certificate",
+    "Followed",
+    "FunctionPath",
+    "Law",
+    "Limits",
+    "Online",
+    "Path",
+    "PolynomialPath",
+    "PosePath",
+    "State",
+    "Timing",
+    "Worst",
+    "arc_path",
+    "arc_through",
+    "blend_path",
+    "follow",
+    "function_path",
+    "geodesic_path",
+    "jerk_limited",
+    "jerk_limited_along",
+    "load",
+    "online",
+    "plot",
+    "pose_polyline",
+    "pose_spline",
+    "spline_path",
+    "standing_path",
+    "straight_path",
+    "time_optimal",
+    "via_points",
+]
 
 
 def __dir__() -> list[str]:
-    return sorted(_WHERE)
+    return __all__

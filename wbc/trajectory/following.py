@@ -16,7 +16,7 @@ from wbc.ik.continuation import Tracker
 from wbc.ik.engine import Engine
 from wbc.stack.declaration import Declaration
 from wbc.tasks import EndEffector
-from wbc.trajectory.path import Path, PolynomialPath
+from wbc.trajectory.paths.path import Path, PolynomialPath
 from wbc.validation import Array
 
 #: The pose's errors at the samples [m, rad], far below any tolerance: a law's jerk sees the spline's third derivative

@@ -1,5 +1,5 @@
 /* What one step along the Jacobians cannot do: errors that no step removes, and speeds that no joint can stop.
- * The formulas are in docs/reach.md; wbc/controller/reach.py is the same in numpy. */
+ * The formulas are in docs/reach.md; wbc/controller/tick/reach.py is the same in numpy. */
 #ifndef WBC_REACH_H
 #define WBC_REACH_H
 

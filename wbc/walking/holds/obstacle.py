@@ -10,7 +10,7 @@ import pinocchio as pin
 
 from wbc import validation
 from wbc.errors import ShapeError
-from wbc.robot.segments import segment_distances
+from wbc.robot.geometry.segments import segment_distances
 from wbc.shapes import Box, Capsule
 from wbc.validation import Array
 from wbc.walking.holds.hold import checked_id

@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from wbc.native.compiled_function import compiled
-from wbc.stack.single import SingleState
+from wbc.stack.evaluation import SingleState
 from wbc.symbolic.rotations import exp3, from_quaternion, left_jacobian, left_jacobian_inverse, log3, to_quaternion
 from wbc.validation import Array
 from wbc.walking.body_path import BodyPath

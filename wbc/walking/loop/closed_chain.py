@@ -14,7 +14,7 @@ import pinocchio as pin
 from wbc.errors import RangeError
 from wbc.native.compiled_function import compiled
 from wbc.robots import Walker
-from wbc.stack.single import SingleState
+from wbc.stack.evaluation import SingleState
 from wbc.symbolic.kinematics import Kinematics
 from wbc.symbolic.rotations import from_quaternion
 from wbc.validation import Array

@@ -7,7 +7,7 @@ import functools
 import casadi as ca
 
 from wbc.native.compiled_function import compiled
-from wbc.stack.single import SingleState
+from wbc.stack.evaluation import SingleState
 from wbc.validation import Array
 from wbc.walking.loop.hand_pace import BEHIND
 from wbc.walking.loop.state import Swinging

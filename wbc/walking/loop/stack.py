@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from wbc import tasks
-from wbc.controller.controller import Controller
-from wbc.controller.input_group import InputGroup
+from wbc.controller.controller import Controller, core_of
+from wbc.controller.handle import InputGroup
 from wbc.controller.stack import Stack
 from wbc.robots import Arm, Walker
 from wbc.validation import Array
@@ -57,7 +57,7 @@ class WalkStack:
         self._turning = np.zeros(walker.robot.nv)
         self._near = (-1, False)
         items: Any = self.controller
-        self._body = InputGroup(self.controller, [("body", "target", None), ("body", "feedforward", None)])
+        self._body = InputGroup(core_of(self.controller), [("body", "target", None), ("body", "feedforward", None)])
         self._rest = items["posture"]
         self._holds.of(self.controller)
         self._swings, self._axes = ([items[f"{arm.name} {kind}"] for arm in walker.arms] for kind in ("swing", "axis"))
@@ -164,4 +164,4 @@ class WalkStack:
         name = f"{arm.name} swing"
         wrist, turning = slice(arm.q.start + 3, arm.q.stop), slice(arm.v.start + 3, arm.v.stop)
         posture = ("posture", "target", wrist), ("posture", "feedforward", turning)
-        return InputGroup(self.controller, [(name, "target", None), (name, "feedforward", None), *posture])
+        return InputGroup(core_of(self.controller), [(name, "target", None), (name, "feedforward", None), *posture])

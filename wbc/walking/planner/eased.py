@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wbc.trajectory.between_states import jerk_limited
-from wbc.trajectory.law import Law
+from wbc.trajectory.jerk.between_states import jerk_limited
+from wbc.trajectory.laws.law import Law
 from wbc.validation import Array
 from wbc.walking.planner.slices import Slices
 from wbc.walking.planner.stances.search import Found, StanceSearch

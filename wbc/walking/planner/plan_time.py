@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from wbc import validation
 from wbc.errors import ShapeError
 from wbc.robots import Walker, WalkerData
-from wbc.trajectory.law import Law
-from wbc.trajectory.least_time import time_optimal
-from wbc.trajectory.path import PolynomialPath
-from wbc.trajectory.waypoints import cubic_spline
+from wbc.trajectory.laws.law import Law
+from wbc.trajectory.least_time.time_optimal import time_optimal
+from wbc.trajectory.paths.path import PolynomialPath
+from wbc.trajectory.paths.waypoints import cubic_spline
 from wbc.validation import Array
 from wbc.walking.arms.puma import ArmKinematics
 from wbc.walking.planner.grips.table import Grips

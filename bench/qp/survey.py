@@ -1,0 +1,160 @@
+"""Every solver on one set of problems, each in its own process: ``python -m bench.qp.survey``.
+
+Some plugins of ``casadi.conic`` crash, hang, or call a wrong answer solved. A child process keeps that
+from the caller, and the exact minimiser (:mod:`bench.qp.reference`) tells the rest.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+
+from bench.qp.reference import reference
+from bench.qp.samples import sample_set
+from wbc.errors import WbcError
+from wbc.qp.certificate import certify
+from wbc.qp.problem import QP
+from wbc.qp.solvers import make_solver
+from wbc.qp.solvers.backend import Backend
+from wbc.qp.solvers.conic import PLUGINS
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What one solver did with the set.
+
+    Attributes:
+        solver: its name.
+        problems: feasible problems given to it.
+        solved: how many it called solved.
+        error: largest and median |x - x*| of those, in rad/s.
+        bound: largest certified bound of those.
+        wrong: how many of those were off by more than 1e-6.
+        refused: infeasible problems that it did not call solved, out of ``infeasible``.
+        microseconds: median time of a call, preparation of equality rows included.
+        note: how the process ended, if not well.
+    """
+
+    solver: str
+    problems: int = 0
+    solved: int = 0
+    error: tuple[float, float] = (0.0, 0.0)
+    bound: float = 0.0
+    wrong: int = 0
+    refused: int = 0
+    infeasible: int = 0
+    microseconds: float = 0.0
+    note: str = ""
+
+
+def measure(name: str, count: int) -> Finding:
+    """Run one solver, in this process, on ``count`` problems of every size and weight."""
+    solvers: dict[tuple[int, int], tuple[Backend, Backend]] = {}
+    errors, bounds, times = [], [], []
+    problems = refused = infeasible = 0
+    for _, qp in sample_set(count):
+        key = (qp.n, qp.m)
+        if key not in solvers:
+            solvers[key] = make_solver(name, *key), make_solver("daqp", *key)
+        solver, guess = solvers[key]
+        problems += 1
+        began = time.perf_counter()
+        answer = solver.solve(qp)
+        times.append(time.perf_counter() - began)
+        if answer.solved:
+            errors.append(float(np.abs(answer.x - reference(qp, guess.solve(qp)).x).max()))
+            bounds.append(certify(qp, answer).error_bound)
+        if qp.m:
+            infeasible += 1
+            refused += not solver.solve(_contradict(qp)).solved
+    return Finding(
+        name,
+        problems,
+        len(errors),
+        (max(errors, default=0.0), float(np.median(errors)) if errors else 0.0),
+        max(bounds, default=0.0),
+        sum(error > 1e-6 for error in errors),
+        refused,
+        infeasible,
+        1e6 * float(np.median(times)),
+    )
+
+
+def survey(names: Sequence[str], count: int = 2, timeout: float = 300.0) -> list[Finding]:
+    """One child process a solver; a crash, a hang and a missing plugin become notes."""
+    found = []
+    for name in names:
+        with tempfile.TemporaryDirectory() as folder:
+            result = Path(folder) / "finding.json"
+            command = [sys.executable, "-m", "bench.qp.survey", "--worker", name, str(result), "--count", str(count)]
+            try:
+                child = subprocess.run(command, capture_output=True, timeout=timeout, check=False)
+                end = f"ended with code {child.returncode}"
+            except subprocess.TimeoutExpired:
+                end = f"not done after {timeout:g} s"
+            if result.exists():
+                found.append(Finding(**json.loads(result.read_text())))
+            else:
+                found.append(Finding(name, note=end))
+    return found
+
+
+def table(findings: Sequence[Finding]) -> str:
+    """The findings as a Markdown table."""
+    lines = [
+        "| solver | solved | largest error | median error | largest bound | > 1e-6 | infeasible refused | median µs |",
+        "|---|---|---|---|---|---|---|---|",
+    ]
+    for f in findings:
+        if f.note:
+            lines.append(f"| {f.solver} | {f.note} | | | | | | |")
+            continue
+        lines.append(
+            f"| {f.solver} | {f.solved} of {f.problems} | {f.error[0]:.1e} | {f.error[1]:.1e} | {f.bound:.1e} "
+            f"| {f.wrong} | {f.refused} of {f.infeasible} | {f.microseconds:.0f} |"
+        )
+    return "\n".join(lines)
+
+
+def _contradict(qp: QP) -> QP:
+    """The same problem with one row that its simple bounds cannot reach."""
+    out = qp.copy()
+    out.lower[-1], out.upper[-1] = 50.0, 60.0
+    return out
+
+
+def _worker(name: str, result: Path, count: int) -> None:
+    try:
+        finding = measure(name, count)
+    except WbcError as error:
+        finding = Finding(name, note=str(error))
+    result.write_text(json.dumps(asdict(finding)))
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(
+        prog="python -m bench.qp.survey", description="every QP solver on one set of problems"
+    )
+    parser.add_argument("names", nargs="*", help="solvers; default: all")
+    parser.add_argument("--count", type=int, default=2, help="problems of every size and weight")
+    parser.add_argument("--timeout", type=float, default=300.0, help="seconds a solver may take")
+    parser.add_argument("--worker", nargs=2, metavar=("NAME", "FILE"), help=argparse.SUPPRESS)
+    given = parser.parse_args(arguments)
+    if given.worker:
+        _worker(given.worker[0], Path(given.worker[1]), given.count)
+        return
+    print(table(survey(given.names or ["daqp", "osqp", *PLUGINS], given.count, given.timeout)))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,131 @@
+"""Typed handles: the checker knows the values of every class, misspelt ones fail there and when they are set."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+from typing import get_overloads
+
+import pytest
+
+import wbc
+from tests.controller.stacks import robot
+from tests.tasks.items import FACTORIES
+from wbc.controller.handle import UnknownValueError
+from wbc.controller.handles import KINDS, Handles, kind_of
+from wbc.errors import DuplicateNameError, UnknownNameError
+from wbc.stack.layout import Layout
+from wbc.tasks import EndEffector, JointLimits, Posture, SelfCollision, registry
+
+TOP = Path(__file__).parents[2]
+#: Classes whose inputs their declaration names, and what only stacks add
+OPEN = {"Expression", "Limit", "Direction"}
+#: Modules that the checker looks into; all others are Any to it, which costs a second in place of a minute
+MODULES = (
+    *(f"wbc.controller.{name}" for name in ("controller", "handle", "handles")),
+    *(f"wbc.tasks.{path.stem}" for path in (TOP / "tasks").glob("*.py") if path.stem != "__init__"),
+    "wbc.tasks",
+)
+USE = """
+from wbc.controller.controller import Controller
+from wbc.tasks.end_effector import EndEffector
+from wbc.tasks.joint_limits import JointLimits
+
+def use(c: Controller, hand: EndEffector, limits: JointLimits) -> float:
+    c["hand"].target = 3
+    c["hand"].taget = 3
+    c[hand].target = 3
+    c[hand].feedforward, c[hand].weight, c[hand].mask = 1, 2.0, 0
+    c[hand].taget = 3
+    c[limits].velocity_scale = 0.5
+    c[limits].target = 3
+    c[hand].gain = "fast"
+    c["hand"].set(anything=3)
+    return c[hand].gian
+"""
+#: Lines of it that are wrong
+WRONG = {8, 11, 13, 14, 16}
+
+
+def declared(kind: type) -> set[str]:
+    """Values that a class of handles has for type checkers."""
+    return {name for base in kind.__mro__ for name in getattr(base, "__annotations__", ()) if not name.startswith("_")}
+
+
+@pytest.mark.parametrize("name", sorted(registry().keys() - OPEN))
+def test_every_value_of_an_item_is_declared(name: str) -> None:
+    seen: set[str] = set()
+    bot = robot("panda")
+    for item, _ in FACTORIES[name](bot):
+        stack = wbc.Stack(bot, 0.01)
+        entry = stack.add(item, name="it")["it"]
+        slots = set(Layout(stack).blocks["it"].slots)
+        seen |= slots
+        assert slots <= declared(kind_of(entry.item)), item
+    # Nothing that no item of a class has, but what items of it may have elsewhere
+    rest = declared(KINDS[registry()[name]]) - seen - {"enabled", "mask", "weight", "price"}
+    assert rest <= {"distance", "drift", "line", "side", "target"}
+
+
+def test_the_checker_and_the_program_have_the_same_classes() -> None:
+    overloads = [o.__annotations__ for o in get_overloads(Handles.__getitem__)]
+    kinds = {k.__name__ for k in KINDS.values()}
+    assert kinds == {o["return"] for o in overloads} - {"NamedHandle", "Any"}
+    named = {k.__name__ for kind in KINDS for k in kind.__mro__}
+    for o in overloads[1:-1]:
+        if o["item"] != "_Follower":
+            assert set(o["item"].split(" | ")) <= named
+
+
+def test_a_misspelt_value_fails_in_the_checker(tmp_path: Path) -> None:
+    place = tmp_path / "types" / "wbc"
+    place.mkdir(parents=True)
+    for source in (*(TOP / "wbc").iterdir(), TOP / "tasks", TOP / "robots"):
+        (place / source.name).symlink_to(source)
+    (place.parent / "use.py").write_text(USE)
+    command = [sys.executable, "-m", "mypy", "--strict", "--config-file=", f"--cache-dir={tmp_path / 'cache'}"]
+    command += ["--follow-imports=skip", "--allow-subclassing-any", "--allow-untyped-decorators", "-m", "use"]
+    command += [word for module in MODULES for word in ("-m", module)]
+    environment = {**os.environ, "MYPYPATH": str(place.parent)}
+    done = subprocess.run(command, cwd=place.parent, env=environment, capture_output=True, text=True, check=False)
+    wrong = {int(n) for n in re.findall(r"^use\.py:(\d+): error", done.stdout, re.MULTILINE)}
+    assert wrong == WRONG, done.stdout + done.stderr
+
+
+def test_a_misspelt_value_fails_with_the_nearest_name() -> None:
+    hand = EndEffector("panda_hand_tcp")
+    controller = wbc.Stack(robot("panda"), 0.01).add(hand, name="hand").compile(backend="vm")
+    for handle in (controller["hand"], controller[hand]):
+        with pytest.raises(UnknownValueError, match="did you mean 'target'"):
+            handle.taget = 3
+        with pytest.raises(UnknownValueError, match="did you mean 'gain'"):
+            handle.get("gian")
+    controller[hand].gain = 3.0
+    assert controller["hand"].get("gain") == 3.0
+
+
+def test_an_item_is_found_as_it_was_added() -> None:
+    hand, posture, other = EndEffector("panda_hand_tcp"), Posture(), EndEffector("panda_link5")
+    stack = wbc.Stack(robot("panda"), 0.01).add(hand, name="hand").add(posture, name="a").add(posture, name="b")
+    for items in (stack.compile(backend="vm"), stack.inverse_kinematics(goals=["hand"], backend="vm")):
+        assert items[hand] is items["hand"]
+        assert hand in items
+        assert other not in items
+        with pytest.raises(UnknownNameError, match="hand"):
+            items[other]
+        with pytest.raises(DuplicateNameError, match="as a, b"):
+            items[posture]
+        with pytest.raises(UnknownNameError):
+            items[dataclasses.replace(hand)]
+
+
+def test_a_class_of_the_users_own_has_the_handle_of_what_it_is_made_from() -> None:
+    class Mine(JointLimits):
+        pass
+
+    assert kind_of(Mine()) is KINDS[JointLimits]
+    assert kind_of(SelfCollision()) is KINDS[SelfCollision]

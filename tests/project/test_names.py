@@ -1,0 +1,47 @@
+"""What ``wbc.`` offers to somebody who types it, and what stands behind the names that are imported late."""
+
+from __future__ import annotations
+
+import importlib
+import types
+
+import pytest
+
+import wbc
+from wbc import lazy
+
+#: Everything that ``dir(wbc)`` shows
+NAMES = {
+    *("Controller", "Policy", "Stack", "Status", "Step", "Certificate", "Explanation", "Recording", "replay"),
+    *("InverseKinematics", "Solution", "WbcError", "__version__"),
+    *("analysis", "coordinates", "errors", "proximity", "resolvers", "robots", "shapes", "tasks"),
+    *("teleop", "track", "trajectory", "walking"),
+}
+
+
+def test_dir_shows_every_name_once() -> None:
+    assert set(dir(wbc)) == NAMES
+    assert len({name.lower().rstrip("s") for name in dir(wbc)}) == len(dir(wbc))
+    assert all(getattr(wbc, name) is not None for name in dir(wbc))
+
+
+@pytest.mark.parametrize("name", ["wbc", "wbc.analysis", "wbc.coordinates", "wbc.trajectory"])
+def test_late_names_are_there_and_hide_no_module(name: str) -> None:
+    package = importlib.import_module(name)
+    assert sorted(dir(package)) == sorted(package.__all__)
+    for public in set(package.__all__) - {"__version__"}:
+        found = getattr(package, public)
+        inner = f"{name}.{public}"
+        assert isinstance(found, types.ModuleType) == (importlib.util.find_spec(inner) is not None), inner
+
+
+def test_modules_are_found_without_being_listed() -> None:
+    assert wbc.ik is importlib.import_module("wbc.ik")
+    assert "ik" not in dir(wbc)
+
+
+def test_an_unknown_name_is_an_attribute_error() -> None:
+    with pytest.raises(AttributeError, match="module 'wbc' has no attribute 'Stak'"):
+        _ = wbc.Stak
+    with pytest.raises(AttributeError):
+        lazy.attach("wbc", wbc.__file__)("__wrapped__")

@@ -1,0 +1,1 @@
+"""Exact algebra of joint angles: polynomials in sines and cosines, their roots and branches."""

@@ -1,0 +1,1 @@
+"""Proofs that a set of coordinates has full rank everywhere, by subdivision with bounds."""

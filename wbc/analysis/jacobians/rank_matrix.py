@@ -1,0 +1,95 @@
+"""Matrices that have full column rank where a stacked Jacobian has, with fewer columns and shorter entries."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from wbc.analysis.algebra.minors import without
+from wbc.analysis.algebra.ring import Matrix, Poly, TrigRing
+from wbc.analysis.algebra.transforms import cross
+from wbc.analysis.jacobians.equivalent_rows import split_twists, whole_twist
+from wbc.analysis.jacobians.jacobian import symbolic_jacobian
+from wbc.analysis.jacobians.model import ExactModel
+from wbc.analysis.rows import BodyRows, Rows
+
+
+def equivalent_matrices(model: ExactModel, rows: Sequence[Rows]) -> Iterator[Matrix]:
+    """Matrices of the rank of the rows at every configuration, their columns the joints.
+
+    A whole twist (v; omega) of a body is taken in the axes of any frame and at its origin or that of a neighbour, which
+    is a regular change of its six rows, or split at a point of another body, see :func:`split_twists`.
+    """
+    whole = [r for r in rows if whole_twist(r)]
+    rest = [r for r in rows if not whole_twist(r)]
+    fixed = symbolic_jacobian(model, rest).matrix if rest else []
+    if not whole:
+        yield fixed
+        return
+    frames = model.distinct_frames()
+    for i, axes in enumerate(frames):
+        for point in frames[max(i - 1, 0) : i + 2]:
+            yield [row for r in whole for row in _twist(model, r, point, axes)] + fixed
+    for equivalent in split_twists(model, rows):
+        yield symbolic_jacobian(model, equivalent).matrix
+
+
+def rank_matrices(model: ExactModel, rows: Sequence[Rows]) -> Iterator[Matrix]:
+    """Matrices M(q), each for all q: J has rank m where M has full column rank; no columns: J has it everywhere.
+
+    They are what pivots that are numbers leave of the equivalents, see :func:`reduced`.
+    """
+    for matrix in equivalent_matrices(model, rows):
+        yield reduced(model.ring, matrix)
+
+
+def _twist(model: ExactModel, rows: Rows, point: str, axes: str) -> Matrix:
+    """(v; omega) of the body, v at the origin of another frame."""
+    assert isinstance(rows, BodyRows)
+    ring = model.ring
+    joint, _ = model.frame(rows.frame)
+    origin = model.frame_in(axes, point).position
+    matrix = [[ring.zero] * model.robot.nv for _ in range(6)]
+    for j in model.support(joint):
+        axis = model.axis_in(axes, j)
+        if ring.coordinates[j - 1].slides:
+            column = [*axis, ring.zero, ring.zero, ring.zero]
+        else:
+            place = model.joint_in(axes, j).position
+            column = [*cross(axis, [a - b for a, b in zip(origin, place, strict=True)], ring), *axis]
+        for row, entry in zip(matrix, column, strict=True):
+            row[j - 1] = entry
+    return matrix
+
+
+def reduced(ring: TrigRing, matrix: Matrix) -> Matrix:
+    """What pivots that are numbers leave. Only those whose row or column has nothing but numbers are taken: no entry
+    becomes a product of two others.
+    """
+    left = [list(row) for row in matrix if any(len(p) for p in row)]
+    width = len(matrix[0])
+    while left:
+        places = [(i, j) for i, row in enumerate(left) for j, p in enumerate(row) if _pivot(left, i, j, p)]
+        if not places:
+            break
+        i, j = min(places, key=lambda place: _alone(left, *place))
+        left = [row for row in without(ring, left, i, j) if any(len(p) for p in row)]
+        width -= 1
+    # Columns without a row are a loss of rank, and no columns are none
+    return left or [[ring.zero] * width for _ in range(width > 0)]
+
+
+def _number(p: Poly) -> bool:
+    return len(p) == 0 or bool(p.is_constant())
+
+
+def _pivot(matrix: Matrix, i: int, j: int, p: Poly) -> bool:
+    if not len(p) or not p.is_constant():
+        return False
+    return all(map(_number, matrix[i])) or all(_number(row[j]) for row in matrix)
+
+
+def _alone(matrix: Matrix, i: int, j: int) -> tuple[bool, float]:
+    """Pivots alone in their row or column first, then large ones."""
+    alone = sum(len(p) > 0 for p in matrix[i]) == 1 or sum(len(row[j]) > 0 for row in matrix) == 1
+    number = matrix[i][j].leading_coefficient()
+    return not alone, -abs(int(number.p) / int(number.q))

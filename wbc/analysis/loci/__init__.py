@@ -1,0 +1,1 @@
+"""Where coordinates lose rank: loci as equations, and pictures of them."""

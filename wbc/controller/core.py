@@ -1,0 +1,220 @@
+"""What a controller is inside: a tick's memory, what gives it its values, and what follows where it has no answer."""
+
+from __future__ import annotations
+
+import functools
+import pathlib
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+from wbc import validation
+from wbc.controller.handle import Directions, Handle
+from wbc.controller.handles import kind_of
+from wbc.controller.policy import Fallback
+from wbc.controller.ramps import Ramps
+from wbc.controller.step import Context, Step
+from wbc.controller.tick.buffers import BAD_V, Assembly
+from wbc.controller.tick.native import NativeTick
+from wbc.controller.tick.solved import SolvedTick
+from wbc.controller.tick.vm import VmAssembly
+from wbc.errors import SolverError
+from wbc.stack.artifact import Artifact
+from wbc.stack.declaration import Declaration
+from wbc.stack.layout import Slot
+from wbc.tasks.base import Constraint, Sensor
+from wbc.validation import Array
+
+
+def assembly_of(stack: Declaration, artifact: Artifact) -> Assembly:
+    """The native tick, or the virtual machine's.
+
+    Raises:
+        SolverError: the artifact has neither.
+    """
+    if artifact.library is not None:
+        return NativeTick(artifact.library, artifact.layout)
+    if artifact.program is not None:
+        return VmAssembly(artifact.program, stack, artifact.layout)
+    raise SolverError("artifact", artifact, "has neither a library nor a program")
+
+
+class Core:
+    """The memory of one controller and what works on it. Nothing here checks what a user says: :class:`wbc.Controller`
+    and :class:`wbc.controller.handle.Handle` do. Packages above have it from :func:`wbc.controller.core_of`.
+
+    Attributes:
+        stack, layout: the declaration and its buffers. assembly: rows and QP. tick: the whole cycle on its buffers.
+        fallback: what follows a tick without a certified answer. context: what all steps share.
+        handles: run-time values of the items by name. row_costs: of each task row at weight 1.
+        directions, ramps: of scaled tasks, and of weights that change.
+        call: one tick on the buffers as they are, returns its flag; a recorder puts its own in place.
+        resets: how many there were. recording: the file that ticks are recorded into, or None.
+        waits: the next step has more to do than to copy q: defaults to take from it, ramps, or dt to set back.
+    """
+
+    def __init__(self, stack: Declaration, artifact: Artifact, solver: str, assembly: Assembly | None = None) -> None:
+        self.stack, self.layout = stack, artifact.layout
+        layout = self.layout
+        self.row_costs: Array = 1.0 / layout.row_scales(stack) ** 2
+        self.assembly = assembly_of(stack, artifact) if assembly is None else assembly
+        native = self.assembly if isinstance(self.assembly, NativeTick) and solver == "daqp" else None
+        self.tick: NativeTick | SolvedTick = native or SolvedTick(self.assembly, stack, layout, solver)
+        self.fallback = Fallback(self.tick, self.assembly, stack, layout)
+        self.call: Callable[[], int] = self.tick.step
+        if isinstance(self.tick, NativeTick):
+            self.call = functools.partial(self.tick.step_function, self.tick.pointer)
+        self.context = Context(stack, layout, self.assembly)
+        # of all ways to copy some hundred numbers into something immutable, the fastest
+        self.snapshot: Callable[[], bytes] = self.tick.state.data.cast("B").tobytes
+        self.resets, self.ramps = 0, Ramps()
+        self.recording: pathlib.Path | None = None
+        #: inputs that follow the first configuration, with their items, and those of them that it still has to fill
+        self._first: dict[Slot, str] = {}
+        self.waiting: dict[Slot, str] = {}
+        self.handles = {name: kind_of(block.entry.item)(self, block) for name, block in layout.blocks.items()}
+        self.directions = Directions(layout, self.tick, self.handles)
+        #: sensors with the handles of their items
+        self.sensors = [(self._sensor(name), self.handles[name]) for name in layout.blocks if self._is_sensed(name)]
+        self.tick.dt[0] = stack.dt
+        self.tick.q[:] = stack.robot.neutral
+        self.tick.check()
+        self.waits = True
+        for name, handle in self.handles.items():
+            handle.apply()
+            for slot in layout.blocks[name].slots.values():
+                self._set_default(name, slot)
+
+    def assume(self, other: Core) -> None:
+        """Take the values and the last command of another core of the same compiled stack over."""
+        for name, handle in self.handles.items():
+            handle.assume(other.handles[name])
+        for name in ("q", "v_last", "p", "cap", "dt", "weight", "enabled", "bound_enabled"):
+            getattr(self.tick, name)[:] = getattr(other.tick, name)
+        self.tick.check()
+        self.fallback.policy = other.fallback.policy
+        self.ramps.assume(other.ramps, self.handles)
+        if other.fallback.prepared:
+            self.fallback.prepare()
+        self._first, self.waiting, self.waits = dict(other._first), dict(other.waiting), other.waits
+
+    def again(self) -> Step:
+        """A tick on the buffers as they are."""
+        if (flag := self.call()) and self.finish(flag) < 0:
+            self.refuse(self.tick.q.copy(), self.tick.v_in[: self.layout.nv].copy())
+        return Step(self.snapshot(), self.context)
+
+    def finish(self, flag: int) -> int:
+        """What the policy adds to a tick that ended with ``flag``; negative: refused."""
+        return self.fallback.finish(flag)
+
+    def refuse(self, q: Any, v: Any) -> None:
+        """Say what was wrong with inputs that the tick refused."""
+        self.stack.robot.configuration("q", q)
+        validation.real_array("v", v, (self.stack.robot.nv,))
+        raise SolverError("step", BAD_V, "the tick refused its inputs")
+
+    def begin(self, configuration: Array | None, velocity: Array) -> None:
+        """A reset with checked values."""
+        if configuration is not None:
+            self.initialise(self._first, configuration)
+        self.waiting = {} if configuration is not None else dict(self._first)
+        self.tick.v_last[: self.layout.nv] = velocity
+        self.tick.reset()
+        for sensor, _ in self.sensors:
+            sensor.reset()
+        self.resets += 1
+        self.waits = True
+
+    def advance(self, dt: float | None) -> None:
+        """Another dt than the last, and the ramps' next values."""
+        step = self.stack.dt if dt is None else float(dt)
+        self.tick.dt[0] = step
+        self.ramps.advance(step)
+        self.waits = dt is not None or bool(self.ramps)
+
+    # Values of items
+
+    def write(self, slot: Slot, numbers: Array) -> None:
+        """Write validated numbers of an input; it no longer follows the first configuration."""
+        self.tick.p[slot.span] = numbers
+        if slot in self._first:
+            self._let_go(slot)
+
+    def write_pose(self, slot: Slot, matrix: Array) -> bool:
+        """Write a pose from its homogeneous matrix [4, 4]; False, and nothing written, where :meth:`write` has to."""
+        if not self.assembly.put_pose(slot.start, matrix):
+            return False
+        if slot in self._first:
+            self._let_go(slot)
+        return True
+
+    def _let_go(self, slot: Slot) -> None:
+        """An input was set, so it no longer follows the first configuration."""
+        del self._first[slot]
+        self.waiting.pop(slot, None)
+
+    def start_ramp(self, handle: Handle, weight: float, seconds: float) -> None:
+        """See :meth:`Handle.ramp`."""
+        self.ramps.start(handle, weight, seconds)
+        self.waits = True
+
+    def require_value(self, slot: Slot, field: str) -> None:
+        """Values that wait for the first configuration cannot be read before it."""
+        if slot in self.waiting:
+            raise SolverError(field, None, "is taken from the first configuration; call step(q) or reset(q) first")
+
+    def require_values(self) -> None:
+        """No value waits for the first configuration."""
+        for slot, name in self.waiting.items():
+            self.require_value(slot, f"{name}.{slot.input.name}")
+
+    def _set_default(self, name: str, slot: Slot) -> None:
+        value = slot.input.default
+        if value is None:
+            self.waiting[slot] = self._first[slot] = name
+            return
+        if slot.input.name == "rate":
+            value = min(float(value), 1.0 / self.stack.dt_range[1])
+        self.tick.p[slot.span] = self.handles[name].checked(slot.input.name, value)
+
+    def take_first(self, q: Array) -> None:
+        """What waits for the first configuration is taken from q."""
+        self.initialise(self.waiting, q)
+        self.waiting = {}
+
+    def initialise(self, slots: Mapping[Slot, str], q: Array) -> None:
+        """Values of inputs at a configuration.
+
+        Raises:
+            SolverError: an item has no value for one; nothing is written.
+        """
+        values: list[tuple[Slot, Array]] = []
+        initial = {name: self.stack[name].item.initial(self.stack.robot, q) for name in set(slots.values())}
+        for slot, name in slots.items():
+            wanted = slot.input.name
+            if wanted not in initial[name]:
+                raise SolverError(f"{name}.{wanted}", None, "has no default value; set it before step")
+            values.append((slot, self.handles[name].checked(wanted, initial[name][wanted])))
+        for slot, numbers in values:
+            self.tick.p[slot.span] = numbers
+
+    # What is measured
+
+    def _is_sensed(self, name: str) -> bool:
+        item = self.stack[name].item
+        return isinstance(item, Constraint) and item.sensed_rows(self.stack.robot) > 0
+
+    def _sensor(self, name: str) -> Sensor:
+        item, slots = self.stack[name].item, self.layout.blocks[name].slots
+        assert isinstance(item, Constraint)
+        return item.sensor(self.stack.robot, {key: self.tick.p[slot.span] for key, slot in slots.items()})
+
+    def sense(self, q: Array) -> None:
+        """Measure what enabled items sense; not at numbers that the tick will refuse."""
+        if not np.isfinite(q).all():
+            return
+        for sensor, handle in self.sensors:
+            if handle.enabled:
+                sensor.sense(q)

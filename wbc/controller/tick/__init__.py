@@ -1,0 +1,1 @@
+"""One tick, in C or in numpy: rows, the QP, its answer, the certificate and the report."""

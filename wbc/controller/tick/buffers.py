@@ -1,0 +1,130 @@
+"""What ticks have in common: flat buffers that the controller writes, the report that it reads, flags, tolerances."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+
+from wbc.qp.problem import QP
+from wbc.validation import Array
+
+#: Flags of a tick
+SOLVED, RELAXED, BRAKED, CAPPED = 0, 1, 2, 3
+#: In the report in place of these: the first of the links of a chain that may have given the answer; braked at its end;
+#: braked because the policy wants it
+RECOVERED, CHAIN_BRAKED, POLICY_BRAKED = 4, 8, 9
+#: Added to what a tick returns, not to what it reports: the certificate fails, or a solver has found no answer
+UNSOUND = 4
+#: Refusals: nothing was changed
+BAD_Q, BAD_UNIT, BAD_V = -1, -2, -3
+
+#: Stand-in for infinity in bounds and in the error bound of a tick without a certificate
+INFINITE = 1e30
+
+#: Violations up to this, in row units, are rounding; squared lengths of quaternions may be off by the other
+#: (both as in ``native/settings.h``)
+TOLERANCE, UNIT_TOLERANCE = 1e-9, 2.00001e-6
+
+#: A certificate fails where a violation is above the first, or where both the bound on the error of v is above the
+#: second (a length of the characteristic one counts as 1 rad) and the optimality conditions are off by more than the
+#: third; as in ``native/settings.h``
+SOUND, KNOWN, OPTIMAL = 1e-6, 1e-3, 1e-9
+
+#: Paths to another answer, in the order in which they are tried by default; braking is always the last
+CHAIN = ("cold", "daqp", "osqp", "elastic")
+
+
+class Buffers:
+    """Flat float64 arrays, written in place.
+
+    Attributes:
+        q: configuration. v_in, use_v: a measured velocity, taken where ``use_v`` is not 0.
+        cap: iterations of the native solver a tick at most, 0 for no cap.
+        v_last: the velocity that accelerations are counted from.
+        p: run-time inputs, see :class:`wbc.stack.layout.Layout`. dt: one number.
+        weight: of each task row, scale included. enabled: 1 or 0 for each general row.
+        bound_enabled: the same for each entry of each bound block.
+        report: see :class:`wbc.stack.memory.ReportLayout`.
+        state: all of these in one piece of memory that begins with the report. ``v_in`` in it is, after a tick, the
+            velocity that the tick counted accelerations from.
+    """
+
+    q: Array
+    v_in: Array
+    use_v: Array
+    cap: Array
+    v_last: Array
+    p: Array
+    dt: Array
+    weight: Array
+    enabled: Array
+    bound_enabled: Array
+    report: Array
+    state: Array
+
+    def share(self, other: Buffers) -> None:
+        """Use the arrays of ``other``."""
+        for name in Buffers.__annotations__:
+            setattr(self, name, getattr(other, name))
+
+
+@dataclass(frozen=True, eq=False)
+class TaskRows:
+    """Rows of all tasks in the last QP: J [rows, nv], wished rates and fading factors [rows]."""
+
+    J: Array
+    wish: Array
+    factor: Array
+
+
+class Assembly(Buffers, ABC):
+    """Buffers and the QP at their values; ``plain``: not 0 for the linear model as it is, without curvature."""
+
+    plain: Array
+
+    @abstractmethod
+    def check(self) -> int:
+        """Take q and a measured velocity over, or put the last good q back; negative for refused inputs."""
+
+    @property
+    @abstractmethod
+    def usable(self) -> bool:
+        """Numbers of the last QP are finite and every simple bound leaves an interval."""
+
+    @abstractmethod
+    def qp(self) -> QP:
+        """The QP at the buffers' values, before any relaxation: of the first level, where there are several."""
+
+    @abstractmethod
+    def task_rows(self) -> TaskRows:
+        """Rows of all levels in the last QP.
+
+        Raises:
+            SolverError: a native tick of one level, whose code does not keep them.
+        """
+
+    @abstractmethod
+    def bent(self) -> Array | None:
+        """Curvature in H of the last QP [nv, nv], before anything made H positive definite; None for none.
+
+        Raises:
+            SolverError: a native tick of one level, whose code does not keep it.
+        """
+
+    @abstractmethod
+    def row_sides(self) -> tuple[Array, Array]:
+        """Sides of the general rows in the last QP, those that are minimised at a level included."""
+
+    @abstractmethod
+    def look_ahead(self) -> None:
+        """Margins after the step, into the report."""
+
+    def put_pose(self, start: int, matrix: Array) -> bool:
+        """Check a homogeneous matrix [4, 4] and write it to ``p`` from ``start`` on; False, nothing written,
+        where it is not a pose or that cannot be done quicker here than in Python.
+        """
+        return False
+
+    @abstractmethod
+    def twin(self) -> Assembly:
+        """Another one of the same code, with memory of its own."""

@@ -1,0 +1,180 @@
+"""The native tick: one library, one block of memory, one call."""
+
+from __future__ import annotations
+
+import ctypes
+import functools
+import pathlib
+from typing import Any
+
+import numpy as np
+
+from wbc.controller.tick.buffers import INFINITE, Assembly, TaskRows
+from wbc.errors import CompileError, SolverError
+from wbc.native.library import load_library
+from wbc.qp.problem import QP
+from wbc.stack.layout import Layout
+from wbc.stack.memory import ReportLayout
+from wbc.validation import Array
+
+_FIELDS = (
+    "q",
+    "v_last",
+    "v_in",
+    "use_v",
+    "p",
+    "dt",
+    "weight",
+    "enabled",
+    "bound_enabled",
+    "report",
+    "H",
+    "g",
+    "A",
+    "low",
+    "high",
+    "unusable",
+    "plain",
+    "cap",
+    "wish",
+    "free_low",
+    "free_high",
+    "given",
+    "give",
+)
+
+
+class NativeTick(Assembly):
+    """Memory of one controller and the functions of its library; see :class:`wbc.controller.tick.Buffers`.
+
+    The report's size in memory is checked against the layout, so that a library of another layout is refused.
+    """
+
+    def __init__(self, library: pathlib.Path | ctypes.PyDLL, layout: Layout) -> None:
+        # Not CDLL: releasing the interpreter lock costs more than it can give a call of a few microseconds
+        self._library = library if isinstance(library, ctypes.PyDLL) else load_library(library)
+        self._library.wbc_tick_size.restype = ctypes.c_longlong
+        size = int(self._library.wbc_tick_size())
+        raw = np.zeros(size // 8 + 8)
+        shift = (-raw.ctypes.data % 64) // 8
+        self._memory = raw[shift : shift + size // 8]
+        self.pointer = ctypes.c_void_p(self._memory.ctypes.data)
+        offsets = (ctypes.c_longlong * len(_FIELDS))()
+        self._library.wbc_tick_layout(offsets)
+        places = dict(zip(_FIELDS, (int(o) // 8 for o in offsets), strict=True))
+        report = ReportLayout(layout)
+        if places["q"] - places["report"] != report.size:
+            raise CompileError("library", self._library._name, "was built for another layout")
+        nv, rows = layout.variables, layout.general_rows
+        self._layout = layout
+        self._wide = (nv + 7) // 8 * 8
+
+        def view(name: str, count: int) -> Array:
+            return self._memory[places[name] : places[name] + count]
+
+        self._library.wbc_tick_init(self.pointer)
+        self.q = view("q", layout.nq)
+        self.v_last, self.v_in = view("v_last", nv), view("v_in", nv)
+        self.use_v = view("use_v", 1)
+        self.cap = view("cap", 1)
+        self.p = view("p", layout.parameters)
+        self.dt = view("dt", 1)
+        self.weight = view("weight", layout.task_rows)
+        self.enabled = view("enabled", rows)
+        self.bound_enabled = view("bound_enabled", layout.bound_blocks * nv)
+        self.report = view("report", report.size)
+        self.state = self._memory[places["report"] : places["H"]]
+        self._H = view("H", nv * self._wide).reshape(nv, self._wide)
+        self._g = view("g", nv)
+        self._A = view("A", rows * nv).reshape(rows, nv)
+        self._low, self._high = view("low", nv + rows), view("high", nv + rows)
+        self._unusable, self.plain = view("unusable", 1), view("plain", 1)
+        self._wish, self._factor = view("wish", layout.task_rows), self.report[report["factor"]]
+        self._sides = view("free_low", rows), view("free_high", rows)
+        self._given = view("given", 16).reshape(4, 4)
+        self._give = view("give", rows)
+        self.step_function = self._library.wbc_tick_step
+        self._take_pose = functools.partial(self._library.wbc_tick_pose, self.pointer)
+
+    @functools.cached_property
+    def converge_function(self) -> Any:
+        """One search; of a library that was compiled with inverse kinematics."""
+        function = self._library.wbc_tick_converge
+        function.restype = None
+        return function
+
+    @functools.cached_property
+    def converge_many(self) -> Any:
+        """Thousands of searches in one call, which are worth releasing the lock for."""
+        function = ctypes.CDLL(self._library._name, handle=self._library._handle).wbc_tick_converge_many
+        function.restype = None
+        return function
+
+    def twin(self) -> NativeTick:
+        return NativeTick(self._library, self._layout)
+
+    def step(self) -> int:
+        return int(self.step_function(self.pointer))
+
+    def put_pose(self, start: int, matrix: Array) -> bool:
+        self._given[:] = matrix
+        return bool(self._take_pose(start))
+
+    def reset(self) -> None:
+        self._library.wbc_tick_reset(self.pointer)
+
+    def assemble(self) -> None:
+        """Rows and QP only."""
+        self._library.wbc_tick_assemble(self.pointer)
+
+    def solve(self) -> int:
+        """Active-set solution of the assembled QP only."""
+        return int(self._library.wbc_tick_solve(self.pointer))
+
+    def certify(self) -> None:
+        """Certificate of the solved QP only."""
+        self._library.wbc_tick_certify(self.pointer)
+
+    def look_ahead(self) -> None:
+        """Margins after the step only."""
+        self._library.wbc_tick_look_ahead(self.pointer)
+
+    def check(self) -> int:
+        """Only refuse bad inputs, and take over a measured velocity."""
+        return int(self._library.wbc_tick_check(self.pointer))
+
+    @property
+    def usable(self) -> bool:
+        """Numbers of the last assembly are finite and every simple bound leaves an interval."""
+        return bool(self._unusable[0] == 0.0)
+
+    def task_rows(self) -> TaskRows:
+        self._require_levels("task_rows")
+        J = np.zeros((self._layout.task_rows, self._layout.variables))
+        self._library.wbc_tick_task_rows(self.pointer, ctypes.c_void_p(J.ctypes.data))
+        return TaskRows(J, self._wish.copy(), self._factor.copy())
+
+    def bent(self) -> Array | None:
+        self._require_levels("bent")
+        out = np.zeros((self._layout.variables, self._layout.variables))
+        bends = self._library.wbc_tick_bent(self.pointer, ctypes.c_void_p(out.ctypes.data))
+        return out if bends else None
+
+    def _require_levels(self, asked: str) -> None:
+        """Code of one level makes H of its rows, and keeps no rows."""
+        if not self._layout.cascade:
+            raise SolverError(asked, "one level", "only stacks with strict levels keep this; see qp()")
+
+    def row_sides(self) -> tuple[Array, Array]:
+        low, high = (side.copy() for side in self._sides)
+        low[low <= -INFINITE], high[high >= INFINITE] = -np.inf, np.inf
+        return low, high
+
+    def qp(self) -> QP:
+        self.assemble()
+        nv = self._layout.variables
+        upper = np.triu(self._H[:, :nv])
+        H = upper + np.triu(upper, 1).T
+        low, high = self._low.copy(), self._high.copy()
+        low[low <= -INFINITE], high[high >= INFINITE] = -np.inf, np.inf
+        return QP(H, self._g.copy(), low, high, self._A.copy(), self._give.copy())

@@ -1,0 +1,228 @@
+"""A tick whose QP is solved by a Python-level solver: the virtual machine, or another solver than the native one."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wbc.controller.tick.buffers import (
+    BRAKED,
+    INFINITE,
+    KNOWN,
+    OPTIMAL,
+    RELAXED,
+    SOLVED,
+    SOUND,
+    TOLERANCE,
+    UNSOUND,
+    Assembly,
+    Buffers,
+)
+from wbc.controller.tick.levels import Levels
+from wbc.qp.certificate import Certificate, certify
+from wbc.qp.levels.hierarchy import Answer
+from wbc.qp.polish import polish
+from wbc.qp.problem import QP, Solution
+from wbc.qp.relax import Relaxation, Relaxed
+from wbc.qp.solvers import make_solver
+from wbc.stack.codegen import row_orders, row_units
+from wbc.stack.declaration import Declaration
+from wbc.stack.layout import Layout
+from wbc.stack.memory import ReportLayout
+from wbc.stack.tables import told_slacks
+from wbc.validation import Array
+
+#: What an equality row in its unit may be missed by through the rounding of its own numbers
+_ROUNDING = 1e-12
+#: Corrections of the active set where a solver's answer has no certificate
+POLISH_ROUNDS = 200
+#: Of a tick that brakes
+_NONE = Certificate(INFINITE, INFINITE, INFINITE, INFINITE)
+
+
+class SolvedTick(Buffers):
+    """Assembly, then a kept solver with its relaxation, then the certificate; see ``wbc/stack/native``."""
+
+    def __init__(self, assembly: Assembly, stack: Declaration, layout: Layout, solver: str) -> None:
+        self.assembly = assembly
+        self.share(assembly)
+        self._nv, self._velocities = layout.variables, layout.nv
+        self._places = ReportLayout(layout)
+        self._solver = make_solver(solver, layout.with_slacks, layout.general_rows)
+        self._relaxation = Relaxation(layout.with_slacks, layout.general_rows, self._solver)
+        self._orders = np.array(row_orders(layout), dtype=np.int_)
+        self._units = np.array(row_units(stack, layout), dtype=np.float64)
+        scales = layout.dof_scales(stack)
+        self._longest = max(1.0, float(scales.max(initial=1.0)), float(self._units.max(initial=1.0)))
+        wide = np.concatenate((scales, np.ones(layout.with_slacks - layout.variables)))
+        self._dof_scales = None if (scales == 1.0).all() else wide
+        self._soft = SoftRows(stack, layout)
+        self._hard = (np.array(layout.row_levels) < 0) & (np.array(layout.price_at) < 0)
+        #: strict levels, None where there is one
+        self.levels = Levels(assembly, stack, layout) if layout.cascade else None
+
+    def reset(self) -> None:
+        self._solver.reset()
+        if self.levels is not None:
+            self.levels.reset()
+
+    def check(self) -> int:
+        return self.assembly.check()
+
+    def qp(self) -> QP:
+        return self.assembly.qp()
+
+    @np.errstate(over="ignore", invalid="ignore")
+    def step(self) -> int:
+        refused = self.assembly.check()
+        if refused:
+            return refused
+        self.v_in[:] = self.v_last
+        return self.finish(self.assembly.qp())
+
+    def finish(self, qp: QP) -> int:
+        """Solve a QP of this layout and write the report; the flag, with ``UNSOUND`` where the certificate fails."""
+        wide = qp.with_slacks().definite()
+        flag, x, answer = self.answer(wide)
+        v, levels = self.below(qp, x[: self._nv], answer)
+        slack = qp.violation(v)[self._nv :] if flag == RELAXED else np.zeros(self._units.size)
+        if self.levels is not None:
+            slack = self.levels.with_soft(qp, v, slack)
+        slack = self._soft.told(qp, v, self.assembly.row_sides(), slack) if answer is not None else slack
+        slack = np.where(slack > 2.0 * TOLERANCE * self._units, slack, 0.0)
+        if flag == RELAXED and not slack[self._hard].any():
+            flag = SOLVED  # the rows contradict each other by rounding only
+        places, report = self._places, self.report
+        certificate, multipliers = _NONE, np.zeros(qp.lower.size)
+        if answer is not None:
+            self._name_frozen_bounds(qp, answer)
+            if levels is None:
+                multipliers = qp.rows_of(answer.multipliers)
+                sides = QP(wide.H, wide.g, *self._met(wide, answer, x), wide.A)
+                certificate = certify(sides, Solution(x, answer.multipliers, "solved"), self._velocities)
+                if not self._sound(certificate):
+                    found = polish(sides, Solution(x, answer.multipliers, "solved"), POLISH_ROUNDS)
+                    better = certify(sides, found.solution, self._velocities)
+                    if found.exact and self._sound(better):
+                        certificate, x = better, np.clip(found.solution.x, sides.lower[: wide.n], sides.upper[: wide.n])
+                        v, multipliers = x[: self._nv], qp.rows_of(found.solution.multipliers)
+            else:
+                multipliers = levels.multipliers
+                sides = QP(qp.H, qp.g, *self._met(qp, answer, v), qp.A)
+                certificate = Levels.certified(levels, float(sides.violation(v).max(initial=0.0)))
+        for name in ("stationarity", "violation", "complementarity", "error_bound"):
+            report[places[name]] = min(getattr(certificate, name), INFINITE)
+        report[places["v"]] = v
+        report[places["flag"]] = flag
+        iterations = 0 if levels is None else levels.iterations
+        report[places["iterations"]] = iterations + (answer.iterations if answer is not None else 0)
+        report[places["multipliers"]] = multipliers
+        report[places["slack"]] = slack
+        self.assembly.look_ahead()
+        self.v_last[:] = v
+        if answer is None:
+            return BRAKED + UNSOUND if self.assembly.usable else BRAKED
+        return flag if self._sound(certificate) else flag + UNSOUND
+
+    def _sound(self, certificate: Certificate) -> bool:
+        """Whether a certificate holds, as ``unsound`` in ``native/tick.c`` decides it."""
+        optimal = max(certificate.stationarity, certificate.complementarity) <= OPTIMAL
+        known = optimal or certificate.error_bound <= KNOWN * self._longest
+        return bool(known and certificate.violation <= SOUND * self._longest)
+
+    def brake(self, qp: QP) -> None:
+        """Every joint comes to rest as fast as its bounds allow; the report says so."""
+        places, report, v = self._places, self.report, self.rest(qp)
+        for name in ("stationarity", "violation", "complementarity", "error_bound"):
+            report[places[name]] = INFINITE
+        report[places["v"]], report[places["flag"]] = v, BRAKED
+        report[places["iterations"]] = 0.0
+        report[places["multipliers"]], report[places["slack"]] = 0.0, 0.0
+        self.assembly.look_ahead()
+        self.v_last[:] = v
+
+    def rest(self, qp: QP) -> Array:
+        """The velocity within the simple bounds that is nearest to rest."""
+        return np.minimum(np.maximum(0.0, qp.lower[: self._nv]), qp.upper[: self._nv])
+
+    def _met(self, qp: QP, answer: Relaxed, v: Array) -> tuple[Array, Array]:
+        """Sides of the answer's problem without equality rows that v meets to rounding and that do not push.
+
+        Rows that depend on each other have no common point to the last digit, so no bound could be stated with all of
+        them. A minimiser over fewer rows that meets the others is the minimiser over all.
+        """
+        at = np.concatenate((v, qp.A @ v))
+        rounding = _ROUNDING * np.concatenate((np.zeros(qp.n), self._units))
+        met = (answer.lower == answer.upper) & (np.abs(at - answer.lower) <= rounding) & (answer.multipliers == 0.0)
+        met[: qp.n] = False
+        return np.where(met, -np.inf, answer.lower), np.where(met, np.inf, answer.upper)
+
+    def below(self, qp: QP, v: Array, first: Relaxed | None) -> tuple[Array, Answer | None]:
+        """The command with all levels below the first, whose answer is v, and their answer; v where there are none."""
+        if self.levels is None:
+            return v, None
+        return self.levels.below(qp, v, first, self.report)
+
+    def _name_frozen_bounds(self, qp: QP, answer: Relaxed) -> None:
+        """Of a bound that a relaxation holds, the other side is not what binds, whatever sign its multiplier has."""
+        n = self._nv
+        frozen = (answer.lower[:n] == answer.upper[:n]) & (qp.lower[:n] != qp.upper[:n])
+        at_lower = answer.lower[:n] == qp.lower[:n]
+        self.report[self._places["owner_high"]][frozen & at_lower] = -1.0
+        self.report[self._places["owner_low"]][frozen & ~at_lower] = -1.0
+
+    def answer(self, qp: QP) -> tuple[int, Array, Relaxed | None]:
+        """Flag, point and, unless the tick brakes, what the solver answered to a QP whose soft rows have slacks."""
+        if self.assembly.usable:
+            sides, crossed = self._uncrossed(qp)
+            if crossed[self._orders == 0].any():
+                return BRAKED, self.rest(qp), None
+            answer = self._relaxation.solve(sides, self._orders, self._units, self._dof_scales)
+            if answer.flag != "failed":
+                answer = self._soft.polished(qp, answer)
+                return RELAXED if crossed.any() or answer.flag == "relaxed" else SOLVED, answer.x, answer
+        return BRAKED, self.rest(qp), None
+
+    def _uncrossed(self, qp: QP) -> tuple[QP, NDArray[np.bool_]]:
+        """Rows whose sides have crossed are met half-way; and which of them give way by more than rounding."""
+        n = qp.n
+        gap = qp.lower[n:] - qp.upper[n:]
+        if not (gap > 0.0).any():
+            return qp, np.zeros(gap.size, dtype=np.bool_)
+        out = qp.copy()
+        middle = 0.5 * (qp.lower[n:] + qp.upper[n:])
+        out.lower[n:], out.upper[n:] = np.where(gap > 0, middle, qp.lower[n:]), np.where(gap > 0, middle, qp.upper[n:])
+        return out, gap > 4.0 * TOLERANCE * self._units
+
+
+class SoftRows:
+    """Soft rows of one layout."""
+
+    def __init__(self, stack: Declaration, layout: Layout) -> None:
+        self._rows = np.flatnonzero(np.array(layout.price_at, dtype=np.intp) >= 0)
+        self._told = np.array(told_slacks(stack, layout))[self._rows]
+
+    def told(self, qp: QP, v: Array, sides: tuple[Array, Array], slack: Array) -> Array:
+        """``slack`` of the general rows with the violations of those that are soft."""
+        rows = self._rows
+        if not rows.size:
+            return slack
+        at = qp.A[rows] @ v
+        missed = np.maximum(sides[0][rows] - at, at - sides[1][rows])
+        out = slack.copy()
+        out[rows] = np.where(missed > self._told, missed, 0.0)
+        return out
+
+    def polished(self, qp: QP, answer: Relaxed) -> Relaxed:
+        """The answer at rounding level, where there are soft rows: nearly dependent ones leave solvers less."""
+        if not self._rows.size:
+            return answer
+        sides = QP(qp.H, qp.g, answer.lower, answer.upper, qp.A)
+        found = polish(sides, Solution(answer.x, answer.multipliers, "solved"))
+        if not found.exact:
+            return answer
+        n = qp.n
+        x = np.clip(found.solution.x, answer.lower[:n], answer.upper[:n])
+        return replace(answer, x=x, multipliers=found.solution.multipliers)

@@ -1,0 +1,267 @@
+"""Which pair of coordinates is well conditioned here, how far the next locus is, and when to change."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Any, TypeAlias
+
+import numpy as np
+import pinocchio as pin
+
+from wbc import validation
+from wbc.coordinates.advice.determinant_places import ClosedForm, closed_form
+from wbc.coordinates.chains import Braked, braked
+from wbc.coordinates.control.conditioning import Conditioning, checked_configuration
+from wbc.coordinates.pair import CoordinatePair, pairs_of
+from wbc.coordinates.rows import Coordinate
+from wbc.coordinates.samples import ROUNDING
+from wbc.errors import DuplicateNameError
+from wbc.robot import Robot
+from wbc.validation import Array
+
+#: A change is recommended where another pair is better by this factor
+FACTOR = 1.5
+#: A rank counts as lost where it is lost within this distance in the space of joints [rad, part of the arm's length].
+#: Unlike a threshold on a singular value it does not depend on units, on the scale of rows or on how large the arm is.
+NEAR = 0.02
+#: Of a pair and its task, the one whose locus is this much nearer than the other's is to blame
+NEARER = 0.5
+#: Newton steps to a locus at most
+STEPS = 15
+
+
+class Condition(StrEnum):
+    """What is wrong with a pair at a configuration: what loses its rank within :data:`NEAR` of it."""
+
+    REGULAR = "regular"
+    #: Task and constraint have full rank each, but not together: another pair may do
+    ALGORITHMIC = "algorithmic"
+    #: The task itself loses rank: no constraint helps
+    TASK = "task"
+    #: The constraint rows depend on each other
+    CONSTRAINT = "constraint"
+
+
+class Basis(StrEnum):
+    """Where a distance comes from."""
+
+    #: sigma / |d sigma / dq|: what it would be if sigma fell as it does here
+    FIRST_ORDER = "first-order estimate"
+    #: one joint at one angle, from the factors of the determinant
+    EXACT = "exact"
+
+
+@dataclass(frozen=True, eq=False)
+class Advice:
+    """One pair at one configuration.
+
+    Attributes:
+        pair: its name. sigma: least singular value of the scaled rows of task and constraint; task, constraint: of
+            either alone. condition: see :class:`Condition`.
+        distance: to the nearest locus, in the space of joints [rad, part of the arm's length for sliding ones]; basis:
+            what it is. direction: direction * distance is the way there [nv]. locus: the exact one as text, or empty.
+    """
+
+    pair: str
+    sigma: float
+    task: float
+    constraint: float
+    condition: Condition
+    distance: float
+    basis: Basis
+    direction: Array
+    locus: str
+
+    @property
+    def ratio(self) -> float:
+        """sigma over the task's own: how much the constraint costs."""
+        return self.sigma / self.task if self.task > 0.0 else 0.0
+
+
+#: Coordinates, and joints that are locked
+_Group: TypeAlias = tuple[tuple[Coordinate, ...], tuple[str, ...]]
+
+
+def _groups(some: Braked) -> tuple[_Group, _Group, _Group]:
+    """Of a pair, of its task alone, of its constraint; the task's for a constraint of brakes."""
+    task = some.task, ()
+    return (some.task + some.held, some.joints), task, (some.held, some.joints) if some.held else task
+
+
+class Adviser:
+    """Advice on some pairs of a robot.
+
+        adviser = Adviser(robot, mode_pairs("ssrms", "M1"))
+        for advice in adviser.advise(q): ...
+        name = adviser.recommend(q, current="xi | alpha")
+
+    Singular values are those of D_r [J_T; J_C] D_c, see :class:`Conditioning`, without the rows and columns of joints
+    that the constraint locks on other arms than the task's, see :func:`braked`: the rank that is lost is the same. For
+    over-determined pairs the matrix is tall.
+
+    Args:
+        length: characteristic length [m]; default: the robot's. near: see :data:`NEAR`.
+        factor: how much better another pair must be for a change, > 1: the hysteresis.
+        exact: factor the determinants of square pairs, which takes some seconds when it is first needed.
+        backend: ``native``, ``vm`` (numpy), or ``auto``.
+
+    Raises:
+        ShapeError, DuplicateNameError, RangeError, UnknownNameError: bad pairs, numbers, names.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        pairs: Iterable[CoordinatePair],
+        *,
+        length: float | None = None,
+        near: float = NEAR,
+        factor: float = FACTOR,
+        exact: bool = True,
+        backend: str = "auto",
+    ) -> None:
+        given = pairs_of(pairs)
+        self.pairs: dict[str, CoordinatePair] = {}
+        for pair in given:
+            pair.counts(robot)
+            if pair.name in self.pairs:
+                raise DuplicateNameError("pairs", pair.name, "two pairs of one name")
+            self.pairs[pair.name] = pair
+        self.robot = robot
+        self.near = validation.scalar("near", near, low=0.0, unit="rad")
+        self.factor = validation.scalar("factor", factor, low=1.0)
+        self._exact = validation.flag("exact", exact)
+        groups: dict[_Group, int] = {}
+        self._braked = [braked(robot, pair) for pair in given]
+        self._places = np.array([[groups.setdefault(g, len(groups)) for g in _groups(some)] for some in self._braked])
+        self.conditioning = Conditioning(
+            robot, [g[0] for g in groups], brakes=[g[1] for g in groups], length=length, backend=backend
+        )
+        self._names = list(self.pairs)
+        self._wholes = self.conditioning.chosen(self._places[:, 0].tolist())
+        self._wholes_and_tasks = self.conditioning.chosen(self._places[:, :2].ravel().tolist())
+        alike = [[k for k, other in enumerate(given) if other.task == pair.task] for pair in given]
+        #: Of each pair: those with its task, itself among them, and singular values of all these and of the task
+        self._siblings = {
+            pair.name: (some, self.conditioning.chosen([*self._places[some, 0].tolist(), int(self._places[k, 1])]))
+            for k, (pair, some) in enumerate(zip(given, alike, strict=True))
+        }
+
+    def sigmas(self, q: Any) -> Array:
+        """The least singular value of each pair, in their order: what a control loop asks for.
+
+        Raises:
+            ShapeError, NotFiniteError, RotationError: no configuration.
+        """
+        return self._wholes(checked_configuration(self.robot, q))
+
+    def singular_values(self, q: Any) -> tuple[Array, Array]:
+        """(the least singular value of each pair, that of its task alone), in their order.
+
+        Raises:
+            ShapeError, NotFiniteError, RotationError: no configuration.
+        """
+        both = self._wholes_and_tasks(checked_configuration(self.robot, q)).reshape(-1, 2)
+        return both[:, 0], both[:, 1]
+
+    def advise(self, q: Any) -> tuple[Advice, ...]:
+        """All about every pair, in their order.
+
+        Raises:
+            ShapeError, NotFiniteError, RotationError: no configuration.
+        """
+        q = self.robot.configuration("q", q)
+        sigmas, slopes, _ = self.conditioning.slopes(q)
+        lost: dict[int, float] = {}
+        out = []
+        for (whole, task, constraint), name, some in zip(self._places, self._names, self._braked, strict=True):
+            known = closed_form(self.robot, self.pairs[name]) if self._exact else None
+            distance, basis, direction, locus = self._nearest(q, float(sigmas[whole]), slopes[whole], known)
+            for group in (whole, task, constraint):
+                if group not in lost:
+                    lost[group] = self._way(q, group, float(sigmas[group]), slopes[group])
+            pair = min(lost[whole], distance) if basis is Basis.EXACT else lost[whole]
+            # Brakes by themselves do not depend on each other
+            held = lost[constraint] if some.held else np.inf
+            condition = self._condition(pair, lost[task], held)
+            alone, by_itself = float(sigmas[task]), float(sigmas[constraint]) if some.held else 1.0
+            sigma = float(sigmas[whole])
+            out.append(Advice(name, sigma, alone, by_itself, condition, distance, basis, direction, locus))
+        return tuple(out)
+
+    def recommend(self, q: Any, current: str | None = None) -> str:
+        """The name of the pair to use: the best conditioned one, or the current one where none is better by the factor.
+
+        Only pairs that command the same can be compared: with ``current`` those with its task.
+
+        Raises:
+            UnknownNameError: no such pair. ShapeError, NotFiniteError, RotationError: no configuration.
+        """
+        if current is None:
+            return self._names[int(np.argmax(self.sigmas(q)))]
+        return self.look(q, current)[2]
+
+    def look(self, q: Any, current: str) -> tuple[float, float, str]:
+        """(sigma of a pair, that of its task alone, the pair to use), what driving asks for in every tick.
+
+        Raises:
+            UnknownNameError: no such pair. ShapeError, NotFiniteError, RotationError: no configuration.
+        """
+        validation.one_of("current", current, self.pairs)
+        alike, asked = self._siblings[current]
+        found = asked(checked_configuration(self.robot, q))
+        sigmas, task = found[:-1], float(found[-1])
+        best, own = int(np.argmax(sigmas)), alike.index(self._names.index(current))
+        stay = sigmas[best] < self.factor * sigmas[own] or best == own
+        return float(sigmas[own]), task, current if stay else self._names[alike[best]]
+
+    def _condition(self, pair: float, task: float, constraint: float) -> Condition:
+        """What loses its rank near here, by the distances to the loci of the pair, its task and its constraint."""
+        if pair >= self.near:
+            return Condition.REGULAR
+        # On a locus of the pair the task's own may be near, too, and yet another pair does there
+        if task < self.near and NEARER * task <= pair:
+            return Condition.TASK
+        own = constraint < self.near and NEARER * constraint <= pair
+        return Condition.CONSTRAINT if own else Condition.ALGORITHMIC
+
+    def _way(self, q: Array, group: int, sigma: float, slope: Array) -> float:
+        """How far it is to a configuration where a group has lost a rank, by Newton's method; inf beyond ``near``."""
+        scale = self.conditioning.dof_scale
+        here, gone = q, np.zeros(self.robot.nv)
+        for _ in range(STEPS):
+            if sigma <= ROUNDING * self.conditioning.size(here, group):
+                return float(np.linalg.norm(gone))
+            # In coordinates in which a sliding joint counts by the arm's length
+            along = slope * scale
+            steep = float(along @ along)
+            if steep == 0.0 or sigma > 2.0 * self.near * np.sqrt(steep):
+                return np.inf
+            gone = gone - sigma / steep * along
+            if np.linalg.norm(gone) > self.near:
+                return np.inf
+            here = pin.integrate(self.robot.model, q, scale * gone)
+            sigmas, slopes, _ = self.conditioning.slopes(here)
+            sigma, slope = float(sigmas[group]), slopes[group]
+        return np.inf
+
+    def _nearest(
+        self, q: Array, sigma: float, slope: Array, known: ClosedForm | None
+    ) -> tuple[float, Basis, Array, str]:
+        """(distance, basis, direction, text) of the locus that is nearest."""
+        scale = self.conditioning.dof_scale
+        along = slope * scale
+        steep = float(np.linalg.norm(along))
+        guess = sigma / steep if steep > 0.0 else (0.0 if sigma == 0.0 else np.inf)
+        found = known.nearest(q) if known is not None else None
+        if found is not None:
+            place, way = found
+            away = abs(way) / float(scale[place.dof])
+            if away <= guess:
+                direction = np.zeros(self.robot.nv)
+                direction[place.dof] = np.sign(way) * scale[place.dof]
+                return away, Basis.EXACT, direction, str(place)
+        direction = -along / steep * scale if steep > 0.0 else np.zeros(self.robot.nv)
+        return guess, Basis.FIRST_ORDER, direction, ""

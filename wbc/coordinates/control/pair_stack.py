@@ -1,0 +1,112 @@
+"""One stack for several pairs: every coordinate once as a wish and once as an equality, switched at run time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+from wbc import validation
+from wbc.controller import Stack
+from wbc.coordinates import expressions
+from wbc.coordinates.items import FollowRows, KeepRows
+from wbc.coordinates.pair import CoordinatePair, is_pose, pairs_of
+from wbc.coordinates.rows import Coordinate
+from wbc.errors import DuplicateNameError
+from wbc.robot import Robot
+from wbc.tasks import Damping, Item, JointLimits
+
+#: Cost of joint speed against a task row of weight 1, less than that of other stacks: operators' rates are to be met
+DAMPING = 1e-11
+#: Name of the item that lets the task give way near a locus, see :class:`wbc.coordinates.control.easing.Easing`
+EASE = "ease near a locus"
+#: Part of the drift of what is held that one step takes back
+SHARE = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class PairStack:
+    """A stack with the items of its pairs.
+
+    Attributes:
+        stack: the declaration. pairs: by name.
+        coordinates: all of them, each once. follow, keep: name of the item by coordinate.
+    """
+
+    stack: Stack
+    pairs: dict[str, CoordinatePair]
+    coordinates: tuple[Coordinate, ...]
+    follow: dict[tuple[Coordinate, float | None], str]
+    keep: dict[Coordinate, str]
+
+
+def pair_stack(
+    robot: Robot,
+    pairs: CoordinatePair | Iterable[CoordinatePair],
+    dt: float = 0.02,
+    *,
+    items: Sequence[Item] = (),
+    limits: bool = True,
+    gain: float | None = None,
+    length: float | None = None,
+) -> PairStack:
+    """The stack of one pair or several.
+
+    Args:
+        dt: time between commands [s].
+        items: further constraints (obstacles, boxes) or wishes. limits: keep the joint limits, in the order of
+            sacrifice before what is held; False: those of the rates only, without which a step beside a locus would
+            leave what it is linear for.
+        gain: how fast drift of what is held decays [1/s]; default: half of it in one step.
+        length: characteristic length [m], as of :class:`wbc.Stack`.
+
+    Raises:
+        ShapeError, DuplicateNameError: no pairs, two of one name. UnknownNameError, RangeError: as of
+            :meth:`CoordinatePair.counts`.
+    """
+    given = pairs_of(pairs)
+    named: dict[str, CoordinatePair] = {}
+    for pair in given:
+        pair.counts(robot)
+        if pair.name in named:
+            raise DuplicateNameError("pairs", pair.name, "two pairs of one name")
+        named[pair.name] = pair
+    every = tuple(dict.fromkeys(one for pair in given for one in pair.rows))
+    labels = _labels(every)
+    stack = Stack(robot, dt, damping=DAMPING, length=length, calm=False)
+    follow: dict[tuple[Coordinate, float | None], str] = {}
+    keep: dict[Coordinate, str] = {}
+    for pair in given:
+        for one in pair.task:
+            metric = metric_of(pair, one)
+            if (one, metric) not in follow:
+                name = f"follow {labels[one]}" + ("" if metric is None else f" by points at {metric:g} m")
+                stack.add(FollowRows(one, metric), name=name)
+                follow[one, metric] = name
+        for one in pair.constraint:
+            if one not in keep:
+                keep[one] = f"keep {labels[one]}"
+                stack.add(KeepRows(one, SHARE / dt if gain is None else gain), name=keep[one])
+    stack.add(Damping(), name=EASE)
+    for item in validation.items("items", items, "items of a stack"):
+        stack.add(item)
+    stack.add(JointLimits() if validation.flag("limits", limits) else JointLimits(position=False, acceleration=False))
+    return PairStack(stack, named, every, follow, keep)
+
+
+def metric_of(pair: CoordinatePair, one: Coordinate) -> float | None:
+    """The metric that a pair serves a coordinate with."""
+    return pair.metric if is_pose(one) else None
+
+
+def row_count(robot: Robot, rows: Iterable[Coordinate]) -> int:
+    """Rows of several coordinates."""
+    return sum(len(expressions.labels(robot, one)) for one in rows)
+
+
+def _labels(every: Sequence[Coordinate]) -> dict[Coordinate, str]:
+    """Names of coordinates, numbered where two would be the same."""
+    texts = [str(one) for one in every]
+    out = {}
+    for k, (one, text) in enumerate(zip(every, texts, strict=True)):
+        out[one] = text if texts.count(text) == 1 else f"{text} ({texts[: k + 1].count(text)})"
+    return out

@@ -1,0 +1,1 @@
+"""Coordinates of several arms that move one thing, or stand on one."""

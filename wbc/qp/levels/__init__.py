@@ -1,0 +1,1 @@
+"""Strict levels: one least-squares problem after the other, and their derivatives."""

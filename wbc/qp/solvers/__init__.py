@@ -1,0 +1,43 @@
+"""Kept solvers, built once for a size and called in every tick, by name."""
+
+from __future__ import annotations
+
+import importlib
+
+from wbc import validation
+from wbc.qp.solvers.backend import Backend, Prepared
+
+#: Solvers that are held to one answer by the tests, and the module and class of each
+_SUPPORTED = {"daqp": ("wbc.qp.solvers.daqp", "Daqp"), "osqp": ("wbc.qp.solvers.osqp", "Osqp")}
+
+
+def available_solvers(experimental: bool = False) -> tuple[str, ...]:
+    """Names that :func:`make_solver` takes on this machine; with ``experimental`` also the unproven ones."""
+    import casadi as ca
+
+    from wbc.qp.solvers.conic import EXPERIMENTAL
+
+    names = [*_SUPPORTED, "qpoases", *(EXPERIMENTAL if experimental else ())]
+    return tuple(name for name in names if name in _SUPPORTED or ca.has_conic(name))
+
+
+def make_solver(name: str, n: int, m: int, prepared: bool = True) -> Backend:
+    """A kept solver for ``n`` variables and ``m`` general rows.
+
+    Args:
+        name: one of ``available_solvers(experimental=True)``.
+        prepared: equality rows are made independent and orthonormal first (:class:`Prepared`).
+
+    Raises:
+        UnknownNameError: no solver of that name here.
+        SolverError: the solver cannot take problems of this form.
+    """
+    validation.one_of("solver", name, available_solvers(experimental=True))
+    if name in _SUPPORTED:
+        module, kind = _SUPPORTED[name]
+        inner: Backend = getattr(importlib.import_module(module), kind)(n, m)
+    else:
+        from wbc.qp.solvers.conic import Conic
+
+        inner = Conic(n, m, name)
+    return Prepared(inner) if prepared else inner

@@ -1,0 +1,175 @@
+"""Collision bodies of a description, as URDF files and Pinocchio's geometry models give them."""
+
+from __future__ import annotations
+
+import pathlib
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import coal
+import numpy as np
+import pinocchio as pin
+
+from wbc import validation
+from wbc.errors import RobotFileError, ShapeError
+from wbc.robot.geometry.meshes import Mesh, hull_mesh, mesh_of, read_mesh
+from wbc.robot.robot import Robot
+from wbc.robot.sources.files import read_xml
+from wbc.robot.sources.mjcf import read_mjcf_geometry
+from wbc.shapes import Capsule, Sphere
+from wbc.validation import Array
+
+
+@dataclass(frozen=True, eq=False)
+class RawBox:
+    """A box of half sides ``half`` [m], which may be 0."""
+
+    half: Array
+
+
+@dataclass(frozen=True)
+class RawCylinder:
+    """A cylinder about z of half length ``half`` [m]; both numbers may be 0."""
+
+    radius: float
+    half: float
+
+
+@dataclass(frozen=True, eq=False)
+class RawEllipsoid:
+    """An ellipsoid of semi-axes ``radii`` [m]."""
+
+    radii: Array
+
+
+Raw = Sphere | Capsule | RawBox | RawCylinder | RawEllipsoid | Mesh
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """One collision body of a link.
+
+    Attributes:
+        link: frame of the link.
+        mesh: whether a mesh must be read for it.
+        placement: pose of the body in that frame.
+        read: the body in its own frame, or :class:`RobotFileError` with the reason why there is none.
+    """
+
+    link: str
+    mesh: bool
+    placement: pin.SE3
+    read: Callable[[], Raw]
+
+
+def bodies_of(robot: Robot, package_dirs: Iterable[Any] = (), geometry: pin.GeometryModel | None = None) -> list[Body]:
+    """The collision bodies of the file that a robot was read from, or of a Pinocchio collision model.
+
+    Raises:
+        RobotFileError: no file and no ``geometry``, or the file cannot be read any more.
+    """
+    if geometry is not None:
+        return _geometry_bodies(robot.model, geometry)
+    if not robot.source:
+        raise RobotFileError("robot.source", robot.source, "the robot was not read from a file: there are no bodies")
+    path = pathlib.Path(robot.source)
+    _, tree = read_xml(path)
+    if tree.tag == "mujoco":
+        return _geometry_bodies(*read_mjcf_geometry(path))
+    folders = [
+        validation.file_path("package_dirs", folder)
+        for folder in validation.items("package_dirs", package_dirs, "folders")
+    ]
+    return [
+        _urdf_body(str(link.get("name")), collision, path, folders)
+        for link in tree.findall("link")
+        for collision in link.findall("collision")
+        if collision.find("geometry") is not None and len(collision.find("geometry") or ())
+    ]
+
+
+def _urdf_body(link: str, collision: ElementTree.Element, path: pathlib.Path, folders: list[pathlib.Path]) -> Body:
+    """The body of one <collision> element."""
+    origin, shape = collision.find("origin"), collision.find("geometry")[0]  # type: ignore[index]
+    xyz = _numbers(origin.get("xyz", "0 0 0") if origin is not None else "0 0 0", link)
+    rpy = _numbers(origin.get("rpy", "0 0 0") if origin is not None else "0 0 0", link)
+
+    def number(key: str) -> float:
+        return validation.scalar(f"{link}.{key}", float(shape.get(key, "nan")), low=0.0, unit="m")
+
+    def read() -> Raw:
+        if shape.tag == "sphere":
+            return Sphere(number("radius"))
+        if shape.tag == "capsule":
+            return Capsule(number("radius"), number("length"))
+        if shape.tag == "cylinder":
+            return RawCylinder(number("radius"), number("length") / 2)
+        if shape.tag == "box":
+            return RawBox(_numbers(shape.get("size", ""), link) / 2)
+        if shape.tag == "mesh":
+            file = resolve_mesh(shape.get("filename", ""), path, folders)
+            return read_mesh(file, _numbers(shape.get("scale", "1 1 1"), link))
+        raise RobotFileError("geometry", shape.tag, "neither sphere, capsule, cylinder, box nor mesh")
+
+    return Body(link, shape.tag == "mesh", pin.SE3(pin.rpy.rpyToMatrix(rpy), xyz), read)
+
+
+def _numbers(text: str, link: str) -> Array:
+    try:
+        return validation.real_array(f"{link}.geometry", [float(x) for x in text.split()], (3,))
+    except (ValueError, ShapeError) as error:
+        raise RobotFileError(f"{link}.geometry", text, "expected three numbers") from error
+
+
+def resolve_mesh(name: str, source: pathlib.Path, folders: Sequence[pathlib.Path]) -> pathlib.Path:
+    """Where a mesh file is that a description names as ``package://NAME/...``, ``file://...`` or a path.
+
+    Packages are looked for in ``folders``, then in every folder above the description.
+
+    Raises:
+        RobotFileError: nowhere.
+    """
+    if name.startswith("package://"):
+        relative = name.removeprefix("package://").lstrip("/")
+        for folder in [*folders, *source.parents]:
+            if (folder / relative).is_file():
+                return folder / relative
+        raise RobotFileError("mesh", name, "not found in the package folders or above the description")
+    path = pathlib.Path(name.removeprefix("file://"))
+    return path if path.is_absolute() else source.parent / path
+
+
+def _geometry_bodies(model: pin.Model, geometry: pin.GeometryModel) -> list[Body]:
+    """Bodies of a Pinocchio collision model, placed in the frames of their links."""
+    bodies = []
+    for item in geometry.geometryObjects:
+        frame = model.frames[item.parentFrame]
+        local = frame.placement.inverse() * item.placement
+        mesh = isinstance(item.geometry, (coal.BVHModelBase, coal.ConvexBase))
+        bodies.append(Body(str(frame.name), mesh, local, lambda g=item.geometry: _from_coal(g)))  # type: ignore[misc]
+    return bodies
+
+
+def _from_coal(geometry: Any) -> Raw:
+    """The body of a Coal geometry.
+
+    Raises:
+        RobotFileError: an unbounded body, or a kind that is not known here.
+    """
+    if isinstance(geometry, coal.Sphere):
+        return Sphere(geometry.radius)
+    if isinstance(geometry, coal.Capsule):
+        return Capsule(geometry.radius, 2 * geometry.halfLength)
+    if isinstance(geometry, coal.Cylinder):
+        return RawCylinder(geometry.radius, geometry.halfLength)
+    if isinstance(geometry, coal.Box):
+        return RawBox(np.array(geometry.halfSide))
+    if isinstance(geometry, coal.Ellipsoid):
+        return RawEllipsoid(np.array(geometry.radii))
+    if isinstance(geometry, coal.BVHModelBase):
+        return mesh_of(geometry)
+    if isinstance(geometry, coal.ConvexBase):
+        return hull_mesh(np.array(geometry.points()))
+    raise RobotFileError("geometry", type(geometry).__name__, "no shape is fitted to this kind of body")

@@ -1,0 +1,136 @@
+"""What a collision body becomes: the capsule around it, several capsules or spheres, or itself."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pinocchio as pin
+
+from wbc import validation
+from wbc.errors import RangeError, ShapeError
+from wbc.robot.geometry import fitting
+from wbc.robot.geometry.bodies import Raw, RawBox, RawCylinder, RawEllipsoid
+from wbc.robot.geometry.convex_parts import parts_of
+from wbc.robot.geometry.covering import cover
+from wbc.robot.geometry.meshes import Mesh, box_mesh, cylinder_mesh, ellipsoid_mesh
+from wbc.shapes import Box, Capsule, Convex, Cylinder, PlacedShape, Sphere
+from wbc.validation import Array
+
+#: Kind of shapes -> how many a body gets at most, where nobody says.
+COUNTS = {"capsule": 1, "spheres": 4, "convex": 1}
+
+
+#: Shapes around one body at most
+MOST = 32
+
+
+@dataclass(frozen=True)
+class Style:
+    """How bodies become shapes.
+
+    Attributes:
+        kind: one of :data:`COUNTS`.
+        count: most shapes a body; None: as in :data:`COUNTS`. Convex parts are as many as the mesh has.
+        tolerance: fewer shapes do where they stand out by at most this [m].
+
+    Raises:
+        UnknownNameError, ShapeError, RangeError: a kind, count or tolerance that makes no sense.
+    """
+
+    kind: str = "capsule"
+    count: int | None = None
+    tolerance: float = 0.0
+
+    def __post_init__(self) -> None:
+        validation.one_of("kind", self.kind, COUNTS)
+        if self.count is not None:
+            if isinstance(self.count, bool) or not isinstance(self.count, int):
+                raise ShapeError("count", self.count, "expected a whole number")
+            if not 1 <= self.count <= MOST:
+                raise RangeError("count", self.count, f"expected 1 to {MOST}")
+            if self.kind == "convex":
+                raise RangeError("count", self.count, "convex parts are as many as the mesh has")
+        validation.scalar("tolerance", self.tolerance, low=0.0, unit="m")
+
+    def shapes(self, raw: Raw, placement: pin.SE3) -> tuple[tuple[PlacedShape, ...], tuple[str, ...]]:
+        """(shapes of a body in its link's frame, remarks about components without volume).
+
+        Together the shapes contain the body. Spheres and capsules stay themselves.
+
+        Raises:
+            RobotFileError: a mesh without a volume, for convex parts. RangeError: a box or cylinder of size 0, for
+                exact ones.
+        """
+        if self.kind == "convex" and isinstance(raw, Mesh):
+            found = parts_of(raw)
+            return tuple(PlacedShape(part, placement) for part in found.parts), found.remarks
+        return self._fitted(raw, placement), ()
+
+    def _fitted(self, raw: Raw, placement: pin.SE3) -> tuple[PlacedShape, ...]:
+        if isinstance(raw, (Sphere, Capsule)):
+            return (PlacedShape(raw, placement),)
+        count = COUNTS[self.kind] if self.count is None else self.count
+        if isinstance(raw, Mesh):
+            return cover(raw.moved(placement), self.kind, count, self.tolerance)
+        if self.kind == "convex":
+            return (_exact(raw, placement),)
+        if self.kind == "spheres":
+            return _covered(raw, placement, self, count)
+        one = (_capsule(raw, placement),)
+        if count == 1 or _worst(one) <= self.tolerance:
+            return one
+        return min(one, _covered(raw, placement, self, count), key=_worst)
+
+
+def _worst(shapes: tuple[PlacedShape, ...]) -> float:
+    return max(shape.excess for shape in shapes)
+
+
+def _covered(
+    raw: RawBox | RawCylinder | RawEllipsoid, placement: pin.SE3, style: Style, count: int
+) -> tuple[PlacedShape, ...]:
+    """Shapes around the polyhedron around a body; what that stands out by is added to their excess, a bound then."""
+    mesh, slack = _polyhedron(raw)
+    found = cover(mesh.moved(placement), style.kind, count, max(style.tolerance - slack, 0.0))
+    return tuple(replace(shape, excess=shape.excess + slack) for shape in found)
+
+
+def _polyhedron(raw: RawBox | RawCylinder | RawEllipsoid) -> tuple[Mesh, float]:
+    if isinstance(raw, RawBox):
+        return box_mesh(raw.half), 0.0
+    if isinstance(raw, RawCylinder):
+        return cylinder_mesh(raw.radius, raw.half)
+    return ellipsoid_mesh(raw.radii)
+
+
+def _exact(raw: RawBox | RawCylinder | RawEllipsoid, placement: pin.SE3) -> PlacedShape:
+    if isinstance(raw, RawBox):
+        return PlacedShape(Box((2 * raw.half[0], 2 * raw.half[1], 2 * raw.half[2])), placement)
+    if isinstance(raw, RawCylinder):
+        return PlacedShape(Cylinder(raw.radius, 2 * raw.half), placement)
+    mesh, slack = ellipsoid_mesh(raw.radii)
+    return PlacedShape(Convex(mesh.vertices), placement, slack)
+
+
+def _capsule(raw: RawBox | RawCylinder | RawEllipsoid, placement: pin.SE3) -> PlacedShape:
+    """The least capsule on the body's longest axis, with the exact excess."""
+    if isinstance(raw, RawCylinder):
+        radius, half, gap = fitting.around_cylinder(raw.radius, raw.half)
+        turn = pin.SE3.Identity()
+    elif isinstance(raw, RawBox):
+        longest = int(np.argmax(raw.half))
+        across: Array = np.delete(raw.half, longest)
+        size = float(np.hypot(*across))
+        radius, half, gap = fitting.around_cylinder(size, float(raw.half[longest]), float(across.min()))
+        turn = _axis_to_z(longest)
+    else:
+        radius, half, gap = fitting.around_ellipsoid(raw.radii)
+        turn = _axis_to_z(int(np.argmax(raw.radii)))
+    shape = Sphere(radius) if half <= 0.0 else Capsule(radius, 2 * half)
+    return PlacedShape(shape, placement * turn, gap)
+
+
+def _axis_to_z(axis: int) -> pin.SE3:
+    """A rotation whose z axis is the given axis."""
+    return pin.SE3(np.roll(np.eye(3), 2 - axis, axis=1), np.zeros(3))

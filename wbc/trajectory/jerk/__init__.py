@@ -1,0 +1,1 @@
+"""Laws of bounded jerk: from state to state, along a path, through poses, and from tick to tick."""

@@ -1,0 +1,1 @@
+"""The fastest law along a path under limits of velocity, acceleration, speed and torque."""

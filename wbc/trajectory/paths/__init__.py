@@ -1,0 +1,1 @@
+"""Paths: joint coordinates or poses over a path coordinate s, without time."""
