@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 from pathlib import Path
 
@@ -11,6 +12,7 @@ from bench.figures import __main__ as command
 from bench.figures import floors, index, pages, store
 from bench.figures.index import FIGURES, Figure, render
 from bench.sheet import Sheet
+from tests.project.test_floors import FLOORS, WALKING
 
 ROOT = Path(__file__).parents[2]
 PAGES = pages.all_pages()
@@ -45,6 +47,13 @@ def test_every_figure_is_on_a_page_and_measures_what_exists() -> None:
 
 def test_the_picture_of_the_floors_is_that_of_the_table() -> None:
     assert floors.PICTURE.read_text() == floors.picture()
+
+
+def test_the_page_of_the_architecture_has_every_part_on_its_floor() -> None:
+    page = (ROOT / "docs" / "architecture.md").read_text()
+    rows = re.findall(r"^\| (\d+) \| (`[^|]+) \|", page, flags=re.MULTILINE)
+    found = {name: int(floor) for floor, names in rows for name in re.findall(r"`([a-z_.]+)`", names)}
+    assert found == FLOORS | WALKING
 
 
 def test_what_stands_in_no_block_is_found() -> None:
