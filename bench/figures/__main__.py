@@ -22,7 +22,8 @@ from wbc.interrupts import obey_kill
 def measure(figure: Figure) -> None:
     """Run what a figure is made by."""
     if figure.command:
-        subprocess.run(figure.command, cwd=ROOT, check=True)
+        command = [sys.executable if word == "python" else word for word in figure.command]
+        subprocess.run(command, cwd=ROOT, check=True)
         return
     about = store.stamp()
     store.write(figure.path, about, importlib.import_module(f"bench.measured.{figure.name}").parts())
