@@ -1,19 +1,27 @@
 """Robots by name, from files, from models and from Denavit-Hartenberg rows; machines that walk on holds."""
 
-from wbc.robot.geometry.convex_parts import ConvexParts
-from wbc.robot.geometry.link_shapes import convex_parts, fit_shapes
-from wbc.robot.pairs.collision_pairs import LinkPair, SelfPairs
-from wbc.robot.pairs.pairs_file import read_self_pairs, save_self_pairs
-from wbc.robot.sources.dh import DHRow
-from wbc.robots.catalogue import from_dh, load, names, table
-from wbc.robots.operator_arms import OperatorArm, operator_arm
-from wbc.robots.pairs import find_self_pairs
-from wbc.robots.walker_arms import Arm
-from wbc.robots.walker_data import TwoEndedData, WalkerData
-from wbc.robots.walker_robot import Walker, walker
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from wbc import lazy
+
+if TYPE_CHECKING:
+    from wbc.robot.geometry.convex_parts import ConvexParts
+    from wbc.robot.geometry.link_shapes import convex_parts, fit_shapes
+    from wbc.robot.pairs.collision_pairs import LinkPair, SelfPairs
+    from wbc.robot.pairs.pairs_file import read_self_pairs, save_self_pairs
+    from wbc.robot.sources.dh import DHRow
+    from wbc.robots.catalogue import from_dh, load, names, table
+    from wbc.robots.operator_arms import OperatorArm, operator_arm
+    from wbc.robots.pairs import find_self_pairs
+    from wbc.robots.walker_arms import WalkerArm
+    from wbc.robots.walker_data import TwoEndedData, WalkerData
+    from wbc.robots.walker_robot import Walker, walker
+else:
+    __getattr__ = lazy.attach(__name__, __file__, {"Arm": "WalkerArm"})
 
 __all__ = [
-    "Arm",
     "ConvexParts",
     "DHRow",
     "LinkPair",
@@ -21,6 +29,7 @@ __all__ = [
     "SelfPairs",
     "TwoEndedData",
     "Walker",
+    "WalkerArm",
     "WalkerData",
     "convex_parts",
     "find_self_pairs",
@@ -34,3 +43,7 @@ __all__ = [
     "table",
     "walker",
 ]
+
+
+def __dir__() -> list[str]:
+    return __all__

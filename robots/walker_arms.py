@@ -18,7 +18,7 @@ BODY = "body"
 
 
 @dataclass(frozen=True, eq=False)
-class Arm:
+class WalkerArm:
     """One arm of a walking machine.
 
     Attributes:

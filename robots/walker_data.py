@@ -26,6 +26,7 @@ _UNITS = {"_deg_s": pi / 180, "_m_s": 1.0, "_deg": pi / 180, "_in": INCH, "_m": 
 _SIGNED = ("elbow_limit", "shoulder_limit", "initial_posture", "elbow_offset")
 
 
+@dataclass(frozen=True)
 class _Numbers:
     """What both data classes do: read their numbers, check and hash them."""
 
@@ -36,7 +37,7 @@ class _Numbers:
 
     def __post_init__(self) -> None:
         kind = type(self).__name__
-        for f in fields(self):  # type: ignore[arg-type]
+        for f in fields(self):
             label, value, signed = f"{kind}.{f.name}", getattr(self, f.name), f.name in _SIGNED
             if "tuple" in str(f.type):
                 numbers = validation.real_array(label, value, (self.joints,))
@@ -50,14 +51,14 @@ class _Numbers:
     @property
     def digest(self) -> str:
         """First 12 digits of the SHA-256 of all fields, names and exact values; runs print it."""
-        lines = [f"{f.name} {_exact(getattr(self, f.name))}" for f in fields(self)]  # type: ignore[arg-type]
+        lines = [f"{f.name} {_exact(getattr(self, f.name))}" for f in fields(self)]
         return hashlib.sha256("\n".join(lines).encode()).hexdigest()[:12]
 
     def origins(self) -> dict[str, str]:
         """Field -> ``published`` or ``assumed``, as the file says, or ``changed`` where the value is not the file's."""
         groups = _read(FILE)
         out: dict[str, str] = {}
-        for f in fields(self):  # type: ignore[arg-type]
+        for f in fields(self):
             group = next(name for name in self.groups if f.name in groups[name])
             same = groups[group][f.name] == getattr(self, f.name)
             out[f.name] = ("assumed" if group.endswith("assumed") else "published") if same else "changed"
@@ -76,7 +77,7 @@ class _Numbers:
         Raises:
             UnknownNameError: no such field. RobotFileError: a file that cannot be read or lacks a number.
         """
-        known = [f.name for f in fields(cls)]  # type: ignore[arg-type]
+        known = [f.name for f in fields(cls)]
         values = {k: v for group in cls.groups for k, v in _read(validation.file_path("path", path))[group].items()}
         for key in values:
             if key not in known:

@@ -19,7 +19,7 @@ from wbc.robot.loading import finish
 from wbc.robot.recipe import LinkShape, Recipe
 from wbc.robot.sources.description import Description
 from wbc.robots.link_tree import Link, build_model, write_urdf
-from wbc.robots.walker_arms import BODY, Arm, chain, puma_rows, reversed_chain, two_ended_rows
+from wbc.robots.walker_arms import BODY, WalkerArm, chain, puma_rows, reversed_chain, two_ended_rows
 from wbc.robots.walker_data import TwoEndedData, WalkerData
 from wbc.robots.walker_shapes import body_shapes, link_pairs, puma_shapes, two_ended_shapes
 from wbc.shapes import Capsule, PlacedShape, Sphere
@@ -43,12 +43,12 @@ class Walker:
     """
 
     robot: Robot
-    arms: tuple[Arm, ...]
+    arms: tuple[WalkerArm, ...]
     min_holds: int
     data: WalkerData | TwoEndedData
     links: tuple[Link, ...] = field(repr=False)
 
-    def arm(self, name: str) -> Arm:
+    def arm(self, name: str) -> WalkerArm:
         """The arm of a name.
 
         Raises:
@@ -236,11 +236,11 @@ def _with_shapes(
     return replace(robot.with_shapes(shapes).with_self_pairs(pairs), notes={**robot.notes, **notes})
 
 
-def _arm(robot: Robot, name: str, base: pin.SE3, joints: Sequence[str], links: Sequence[str]) -> Arm:
+def _arm(robot: Robot, name: str, base: pin.SE3, joints: Sequence[str], links: Sequence[str]) -> WalkerArm:
     model = robot.model
     first, last = robot.dofs(joints[0]), robot.dofs(joints[-1])
     start = int(model.idx_qs[model.getJointId(joints[0])])
     q = slice(start, start + len(joints))
-    return Arm(
+    return WalkerArm(
         name, base, tuple(joints), q, slice(first.start, last.stop), f"{name}_base", f"{name}_hand", tuple(links)
     )

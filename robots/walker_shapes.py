@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from wbc.robot.recipe import segment_shape
-from wbc.robots.walker_arms import BODY, Arm
+from wbc.robots.walker_arms import BODY, WalkerArm
 from wbc.robots.walker_data import TwoEndedData, WalkerData
 from wbc.shapes import Convex, PlacedShape
 from wbc.validation import Array
@@ -48,7 +48,7 @@ def body_shapes(corners: Sequence[Array], data: WalkerData, kind: str) -> dict[s
     return {BODY: tuple(segment_shape(a, b, half, 0.0) for a, b in edges)}
 
 
-def link_pairs(arms: Sequence[Arm], body: bool, data: WalkerData) -> list[tuple[str, str]]:
+def link_pairs(arms: Sequence[WalkerArm], body: bool, data: WalkerData) -> list[tuple[str, str]]:
     """Links that must not touch: all but those next to each other, the necks, which no joint moves apart, and upper
     arms that are too short to come down to the body.
     """

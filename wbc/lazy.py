@@ -11,20 +11,26 @@ import importlib
 import importlib.util
 import pathlib
 import sys
-from collections.abc import Callable
+import warnings
+from collections.abc import Callable, Mapping
 from typing import Any
 
 
-def attach(package: str, file: str) -> Callable[[str], Any]:
+def attach(package: str, file: str, renamed: Mapping[str, str] | None = None) -> Callable[[str], Any]:
     """The ``__getattr__`` of a package: its public names, then its modules.
 
     Args:
         package: its ``__name__``.
         file: its ``__file__``.
+        renamed: names of the version before this one -> what they are now; whoever uses one is told so.
     """
+    now = renamed or {}
     places = _places(ast.parse(pathlib.Path(file).read_text(encoding="utf-8")))
 
     def find(name: str) -> Any:
+        if name in now:
+            warnings.warn(f"{package}.{name} is {package}.{now[name]} now", DeprecationWarning, stacklevel=2)
+            return find(now[name])
         if name in places:
             module, original = places[name]
             whole = module == package

@@ -157,7 +157,7 @@ GOOD: dict[str, Callable[[Any], Any]] = {
 
 
 def _limits() -> Any:
-    return trajectory.Limits(velocity=np.ones(3), acceleration=np.ones(3), jerk=np.ones(3))
+    return trajectory.MotionLimits(velocity=np.ones(3), acceleration=np.ones(3), jerk=np.ones(3))
 
 
 def _zigzag() -> Any:

@@ -51,6 +51,7 @@ MADE = (
     *("PublishedSets", "Relation", "Screened", "SymbolicJacobian", "TreeAnalysis", "TreeCertificate", "Value", "Seen"),
     *("Sample", "Basis", "Condition", "Mode", "MissingPartError", "RateFileError", "PointSet", "Resolver", "Source"),
     *("Coordinate", "TREES", "PRESETS", "ALGORITHMS"),
+    *("WalkerArm", "LawCertificate", "RankCertificate", "RankWitness", "LocusBranch"),
     # Algebra of polynomials that only the package makes
     *("Exact", "Notation", "factored_determinant", "joint_roots", "singular_vector_locus", "sub_determinant_locus"),
 )  # fmt: skip

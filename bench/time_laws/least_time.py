@@ -15,7 +15,7 @@ import wbc.robots
 from bench.time_laws import raw
 from bench.time_laws.suite import INSTANCES, PROBLEMS
 from wbc.errors import WbcError
-from wbc.trajectory import Law, Limits, PolynomialPath, jerk_limited_along, spline_path, time_optimal
+from wbc.trajectory import Law, MotionLimits, PolynomialPath, jerk_limited_along, spline_path, time_optimal
 from wbc.trajectory.least_time.checks import TorqueCheck
 from wbc.trajectory.paths.waypoints import Ends
 from wbc.validation import Array
@@ -53,7 +53,7 @@ class Problem:
 
     def law(self, trajectory: Any, instance: Any, path: Any) -> Law | None:
         """toppra's trajectory as a law."""
-        limits = Limits(velocity=self.velocity, acceleration=self.acceleration)
+        limits = MotionLimits(velocity=self.velocity, acceleration=self.acceleration)
         return None if trajectory is None else raw.law_of(trajectory, instance, path, limits)
 
     def ours(self) -> Law:
@@ -130,7 +130,7 @@ def compared(
 ) -> Record:
     """Raw toppra (waypoints evenly over s in [0, 1]) and ours on one problem, refusals as None."""
     path = raw.spline(np.linspace(0.0, 1.0, len(waypoints)), waypoints, ends)
-    limits = Limits(velocity=np.array(velocity, float), acceleration=np.array(acceleration, float))
+    limits = MotionLimits(velocity=np.array(velocity, float), acceleration=np.array(acceleration, float))
     constraints = [raw.velocity_limits(velocity), raw.acceleration_limits(acceleration)]
     found, _ = raw.solve(constraints, path, points, asked)
     theirs: Record = {"duration": None, "ratio": None}
@@ -164,7 +164,9 @@ def torques(rng: np.random.Generator, count: int) -> Iterator[Record]:
         ):
             asked = [raw.velocity_limits(velocity), raw.torque_limits(dynamics, effort, scheme)]
             spent, (found, instance) = timed(partial(raw.solve, asked, path, points, **how), 1)
-            law = None if found is None else raw.law_of(found, instance, path, Limits(velocity=velocity), (check,))
+            law = (
+                None if found is None else raw.law_of(found, instance, path, MotionLimits(velocity=velocity), (check,))
+            )
             record[name] = {"ms": spent, **_torque(law)}
         spent, law = timed(partial(time_optimal, raw.polynomial(path), velocity, torque=effort, robot=robot), 1)
         record["ours"] = {"ms": spent, **_torque(law)}

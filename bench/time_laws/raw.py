@@ -11,7 +11,7 @@ import toppra
 from toppra import algorithm, constraint
 from toppra.constraint import DiscretizationType
 
-from wbc.trajectory import Law, Limits, PolynomialPath, Timing
+from wbc.trajectory import Law, MotionLimits, PolynomialPath, Timing
 from wbc.validation import Array
 
 # Every refusal of toppra would be a line on the terminal
@@ -70,7 +70,7 @@ def solve(limits: list[Any], path: Any, points: int | None = None, duration: flo
     return instance.compute_trajectory(0, 0), instance
 
 
-def law_of(trajectory: Any, instance: Any, path: Any, limits: Limits, checks: tuple[Any, ...] = ()) -> Law:
+def law_of(trajectory: Any, instance: Any, path: Any, limits: MotionLimits, checks: tuple[Any, ...] = ()) -> Law:
     """toppra's output as a law: polynomials either way, so that what it does between grid points is known exactly."""
     if hasattr(trajectory, "cspl"):
         own = polynomial(trajectory)

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from wbc.analysis import (
-    Branch,
     Budget,
     Exact,
     ExactModel,
+    LocusBranch,
     Notation,
     Rows,
     Value,
@@ -73,7 +73,7 @@ def test_a_locus_that_the_budget_cuts_short_says_so() -> None:
 def test_subsets_of_branches() -> None:
     exact, _, _ = problem("spherical_4r", "")
     arithmetic = exact.branches
-    wide, narrow = Branch((Value(1, Fraction(0)),)), Branch((Value(1, Fraction(0)), Value(3, None)))
+    wide, narrow = LocusBranch((Value(1, Fraction(0)),)), LocusBranch((Value(1, Fraction(0)), Value(3, None)))
     assert arithmetic.within(narrow, wide)
     assert not arithmetic.within(wide, narrow)
     assert arithmetic.with_condition(wide, Value(1, None)) == []

@@ -12,11 +12,11 @@ from tests.analysis.random_arms import Case, Judge, random_case
 from wbc.analysis import (
     Analysis,
     BodyRows,
-    Branch,
     Budget,
     Exact,
     ExactModel,
     JointRows,
+    LocusBranch,
     Notation,
     Relation,
     Value,
@@ -51,7 +51,7 @@ def case_of(seed: int) -> Case:
     return random_case(rng, int(rng.integers(4, 8)))
 
 
-def holds(half: HalfAngles, branch: Branch, q: Array) -> bool:
+def holds(half: HalfAngles, branch: LocusBranch, q: Array) -> bool:
     """Whether a configuration is on a branch."""
     off = [abs(np.angle(np.exp(1j * (q[v.joint] - angle(v, half))))) for v in branch.values]
     for r in branch.relations:
@@ -122,7 +122,7 @@ def test_a_point_near_the_tip_does_not_lose_rank_everywhere(robot: str, tip: str
     model = ExactModel(arm)
     found = analyse(model, task, rows)
     assert found.verdict == "incomplete"
-    assert Branch() not in (*found.locus.branches, *found.locus.open)
+    assert LocusBranch() not in (*found.locus.branches, *found.locus.open)
     numeric, rng = NumericRows(arm), np.random.default_rng(0)
     splits = list(split_twists(model, (*task, *rows)))
     assert splits
@@ -170,7 +170,7 @@ def test_a_root_at_pi_stays_when_another_joint_gets_a_value() -> None:
     """2 s1 - 3 s2 + s12 = 0 at q1 = pi: -4 s2 = 0, which has the root pi as well as 0."""
     c, s = RING.cosine, RING.sine
     one = relation(2 * s(0) - 3 * s(1) + s(0) * c(1) + c(0) * s(1))
-    found = EXACT.branches.with_condition(Branch((), (one,)), Value(0, None))
+    found = EXACT.branches.with_condition(LocusBranch((), (one,)), Value(0, None))
     assert {b.values[1].value for b in found} == {0, None}
 
 

@@ -11,10 +11,10 @@ from tests.analysis.jacobians import jacobians
 from wbc.analysis import (
     ALGORITHMS,
     Analysis,
-    Branch,
     Budget,
     Exact,
     ExactModel,
+    LocusBranch,
     Notation,
     analyse,
     candidate_rows,
@@ -78,10 +78,10 @@ def test_a_budget_leaves_branches_open_and_keeps_what_is_known(algorithm: str) -
 def test_a_keyboard_interrupt_is_answered_with_what_is_known(
     algorithm: str, after: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    original: Callable[..., list[Branch]] = Exact.extended
+    original: Callable[..., list[LocusBranch]] = Exact.extended
     calls = 0  # of the process that searches
 
-    def extended(self: Exact, *arguments: object) -> list[Branch]:
+    def extended(self: Exact, *arguments: object) -> list[LocusBranch]:
         nonlocal calls
         calls += 1
         if calls == after + 1:

@@ -17,7 +17,7 @@ from typer.testing import CliRunner
 import wbc
 from wbc import style, track
 from wbc.cli import bench, session
-from wbc.cli.app import app
+from wbc.cli.app import COMMANDS, app, command
 from wbc.errors import UnknownNameError, WbcError
 from wbc.track.picture import save_picture
 
@@ -41,6 +41,19 @@ def test_help_names_every_command() -> None:
     assert code == 0
     for option in ("--path", "--sphere", "--solver", "--rate", "--duration", "--backend", "--log"):
         assert option in out
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_the_list_of_commands_says_what_their_own_help_says(name: str) -> None:
+    """The list does not import the commands."""
+    first = str(command(name).help).split("\n\n")[0]
+    assert " ".join(first.split()) == COMMANDS[name].line
+
+
+def test_an_unknown_command_names_the_nearest() -> None:
+    code, out, err = run("rbots")
+    assert (code, out) == (2, "")
+    assert "Did you mean 'robots'" in err
 
 
 def test_version() -> None:

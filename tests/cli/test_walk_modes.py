@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 from tests.cli.test_commands import run
 from wbc import robots
 from wbc.cli.app import app
-from wbc.cli.keyboard import END, KeyCommands
+from wbc.cli.walking.keyboard import END, KeyCommands
 from wbc.terminal import terminal_keys
 from wbc.walking.checker import check_run
 from wbc.walking.log.log import WalkLog

@@ -122,7 +122,7 @@ CALLS: dict[str, tuple[Callable[[], Any], type[WbcError], str]] = {
     "evaluate order": (lambda: law().path.evaluate([0.0], 7), RangeError, "order"),
     "evaluate piece": (lambda: law().path.evaluate([0.0], 0, [99]), RangeError, "piece"),
     "evaluate far away": (lambda: law().path.evaluate([1e200]), RangeError, "s"),
-    "subnormal limits": (lambda: trajectory.Limits(velocity=[1e-320]), RangeError, "limits.velocity"),
+    "subnormal limits": (lambda: trajectory.MotionLimits(velocity=[1e-320]), RangeError, "limits.velocity"),
     "subnormal jerk": (lambda: trajectory.jerk_limited(0 * Q, Q, **BOUNDS | {"jerk": 1e-320}), RangeError, "jerk"),
     "huge waypoints": (lambda: trajectory.spline_path([[0.0], [1e200]]), RangeError, "waypoints"),
     "subnormal dt": (lambda: wbc.Stack(robot(), 1e-320), RangeError, "dt"),

@@ -25,7 +25,7 @@ def test_dir_shows_every_name_once() -> None:
     assert all(getattr(wbc, name) is not None for name in dir(wbc))
 
 
-@pytest.mark.parametrize("name", ["wbc", "wbc.analysis", "wbc.coordinates", "wbc.trajectory"])
+@pytest.mark.parametrize("name", ["wbc", "wbc.analysis", "wbc.coordinates", "wbc.robots", "wbc.trajectory"])
 def test_late_names_are_there_and_hide_no_module(name: str) -> None:
     package = importlib.import_module(name)
     assert sorted(dir(package)) == sorted(package.__all__)
@@ -45,3 +45,22 @@ def test_an_unknown_name_is_an_attribute_error() -> None:
         _ = wbc.Stak
     with pytest.raises(AttributeError):
         lazy.attach("wbc", wbc.__file__)("__wrapped__")
+
+
+@pytest.mark.parametrize(
+    ("package", "old", "new"),
+    [
+        ("trajectory", "Limits", "MotionLimits"),
+        ("trajectory", "Certificate", "LawCertificate"),
+        ("analysis", "Certificate", "RankCertificate"),
+        ("analysis", "Witness", "RankWitness"),
+        ("analysis", "Branch", "LocusBranch"),
+        ("robots", "Arm", "WalkerArm"),
+    ],
+)
+def test_old_names_are_found_and_said_to_be_old(package: str, old: str, new: str) -> None:
+    room = importlib.import_module(f"wbc.{package}")
+    with pytest.warns(DeprecationWarning, match=f"wbc.{package}.{old} is wbc.{package}.{new} now"):
+        found = getattr(room, old)
+    assert found is getattr(room, new)
+    assert old not in dir(room)

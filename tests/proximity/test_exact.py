@@ -20,7 +20,7 @@ from tests.proximity.world import place
 from wbc.proximity import Body, Witness, witnesses
 from wbc.proximity.body import checked_pairs
 from wbc.proximity.plain import PlainSensing
-from wbc.proximity.scene import Scene
+from wbc.proximity.scene import PairScene
 from wbc.shapes import Box, Capsule, Convex, Cylinder, HalfSpace, Shape, Sphere
 
 KINDS = ("ball", "capsule", "box", "cylinder", "hull", "prism")
@@ -89,7 +89,7 @@ def measured(a: tuple[Shape, pin.SE3], b: tuple[Shape, pin.SE3]) -> tuple[Witnes
     bodies = Body("a", "world", a[1], a[0]), Body("b", "world", b[1], b[0])
     there, back = witnesses(BOT, [bodies, bodies[::-1]], BOT.neutral)
     none: frozenset[str] = frozenset()
-    coal = PlainSensing(Scene(BOT, checked_pairs("pairs", BOT, [bodies], none), none))
+    coal = PlainSensing(PairScene(BOT, checked_pairs("pairs", BOT, [bodies], none), none))
     coal.measure(BOT.neutral, HERE)
     return there, back, float(coal.distances[0]), clear(a, b, coal.normals[0])
 

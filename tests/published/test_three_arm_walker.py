@@ -11,14 +11,14 @@ import numpy as np
 import pytest
 
 from tests.published.three_arms import INCH, along, driven, hold_offsets, rows, shared
-from wbc.published.three_arm_walker import Outcome, PublishedWalker
-from wbc.published.three_arm_walker.reach import reach_radius
+from wbc.published.three_arm_walker import PublishedOutcome, PublishedWalker
+from wbc.published.three_arm_walker.machine.reach import reach_radius
 
 #: A turn of a column [in] at the body
 COLUMN = 152.0 * np.radians(5.0)
 
 
-def check_held(walker: PublishedWalker, outcome: Outcome) -> None:
+def check_held(walker: PublishedWalker, outcome: PublishedOutcome) -> None:
     """Two arms hold in every cycle, within the tolerance."""
     log = walker.log.part(outcome.rows)
     assert len(log.times) > 10
@@ -134,7 +134,7 @@ def test_16_a_wider_trench_is_not_crossed() -> None:
     check_held(walker, outcome)
 
 
-def reversal(time: float) -> tuple[PublishedWalker, Outcome]:
+def reversal(time: float) -> tuple[PublishedWalker, PublishedOutcome]:
     return driven((13, 6), lambda t: (0.0, 3.0 if t < time - 1e-9 else -3.0, 0.0), duration=20.0)
 
 

@@ -14,7 +14,7 @@ from tests.published.three_arms import INCH, along, driven, hold_offsets
 from wbc.errors import NotFiniteError, RangeError, ShapeError, UnknownNameError, WbcError
 from wbc.published.three_arm_walker import Calibration, PublishedWalker
 from wbc.published.three_arm_walker.commands import DestinationCommand, Line, joystick
-from wbc.published.three_arm_walker.grid import frame
+from wbc.published.three_arm_walker.machine.grid import frame
 
 
 def hands_at(walker: PublishedWalker) -> list[Any]:

@@ -12,16 +12,17 @@ import numpy as np
 import pytest
 
 from tests.published.three_arms import INCH
-from wbc.published.three_arm_walker import Calibration, grid
-from wbc.published.three_arm_walker.body import body_twist
-from wbc.published.three_arm_walker.gait import Gait
-from wbc.published.three_arm_walker.grid import Place, Terrain, frame
-from wbc.published.three_arm_walker.holds import handholds
-from wbc.published.three_arm_walker.margin import margins
-from wbc.published.three_arm_walker.motion import CYCLE, Motion
-from wbc.published.three_arm_walker.plant import IdealPlant
-from wbc.published.three_arm_walker.reach import Shoulders, View, reach_radius
-from wbc.published.three_arm_walker.swing import swing_poses
+from wbc.published.three_arm_walker import Calibration
+from wbc.published.three_arm_walker.gait.gait import Gait
+from wbc.published.three_arm_walker.gait.holds import handholds
+from wbc.published.three_arm_walker.gait.margin import margins
+from wbc.published.three_arm_walker.gait.swing import swing_poses
+from wbc.published.three_arm_walker.machine import grid
+from wbc.published.three_arm_walker.machine.body import body_twist
+from wbc.published.three_arm_walker.machine.grid import Place, Terrain, frame
+from wbc.published.three_arm_walker.machine.motion import CYCLE, BodyMotion
+from wbc.published.three_arm_walker.machine.plant import IdealPlant
+from wbc.published.three_arm_walker.machine.reach import Shoulders, View, reach_radius
 
 SHOULDERS = Shoulders(12.0, 52.0)
 BODY = frame(13, 12, 152.0)
@@ -134,7 +135,7 @@ def test_10_swings(goal: Place, bounds: tuple[float, ...], duration: float) -> N
         hand_angular_acceleration=turning,
     )
     poses = swing_poses(frame(13, 12), (13, 12), goal)
-    motion = Motion(poses, known)
+    motion = BodyMotion(poses, known)
     assert motion.duration == pytest.approx(duration, abs=1e-3)
     assert [round(float(np.hypot(*pose[:2, 3])), 9) for pose in poses] == [100.0, 103.0, 103.0, 100.0]
     cycles = range(int(np.ceil(duration / CYCLE)) + 3)
@@ -160,7 +161,7 @@ def test_10_long_swings_dip_below_the_surface(columns: int, clearance: float) ->
 def test_11_slow_rotations_stretch_the_swing() -> None:
     """Each straight part lasts as long as its rotation; the generator's five cases are tests of their own."""
     poses = swing_poses(frame(13, 12), (13, 12), (17, 12))
-    slow = Motion(poses, Calibration(hand_angular_acceleration=0.05))
+    slow = BodyMotion(poses, Calibration(hand_angular_acceleration=0.05))
     turn = np.radians(20.0)
     assert slow.duration > 2.0 * np.sqrt(turn / 0.05)
     assert np.array_equal(slow.at(int(slow.duration / CYCLE) + 1)[0], poses[-1])

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 from tests.published.via_walker import place
 from wbc.trajectory import Law, via_points
-from wbc.trajectory.jerk.via_speeds import Bounds, Corners, corner_speeds
+from wbc.trajectory.jerk.via_speeds import SpeedBounds, ViaCorners, corner_speeds
 
 #: In m, s; the rotation of the middle segment in rad
 SPEED, ACCELERATION, DEVIATION, TURN = 1.2, 1.0, 0.05, 1.0
@@ -39,10 +39,12 @@ def law_of(poses: list[np.ndarray], turning: float) -> Law:
     return via_points(poses, speed=SPEED, acceleration=ACCELERATION, deviation=DEVIATION, angular_acceleration=turning)
 
 
-def corners_of(poses: list[np.ndarray], turns: list[float]) -> Corners:
+def corners_of(poses: list[np.ndarray], turns: list[float]) -> ViaCorners:
     steps = np.diff([pose[:3, 3] for pose in poses], axis=0)
     lengths = np.linalg.norm(steps, axis=1)
-    return corner_speeds(lengths, steps / lengths[:, None], np.array(turns), Bounds(SPEED, ACCELERATION, DEVIATION))
+    return corner_speeds(
+        lengths, steps / lengths[:, None], np.array(turns), SpeedBounds(SPEED, ACCELERATION, DEVIATION)
+    )
 
 
 def straight_part(law: Law, poses: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -58,7 +60,7 @@ def straight_part(law: Law, poses: list[np.ndarray]) -> tuple[np.ndarray, np.nda
     return times - begin, state.velocity[:, :3] @ along, state.acceleration[:, :3] @ along
 
 
-def case_of(case: int, falling: bool) -> tuple[list[np.ndarray], float, Corners, float]:
+def case_of(case: int, falling: bool) -> tuple[list[np.ndarray], float, ViaCorners, float]:
     """(poses, angular acceleration, corners, mean speed) with a rotation that takes as long as the case wants."""
     poses = bent(6.0 if case == 1 else 1.5, falling)
     corners = corners_of(poses, [0.0, 0.0, 0.0])
@@ -129,7 +131,7 @@ def test_a_corner_is_slowed_where_a_hand_must_wait() -> None:
     kept = corners_of(poses, [0.0, 0.999 * longest, 0.0])
     assert np.array_equal(kept.squares, free.squares)
     slowed = corners_of(poses, [0.0, 1.001 * longest, 0.0])
-    bends = free.bends[1] + free.bends[2]
+    bends = free.deflections[1] + free.deflections[2]
     assert slowed.squares[1:3] == pytest.approx(ACCELERATION * 0.5 / (1.0 + bends), rel=1e-12)
     # A stop takes v^2 / a of the straight part; the printed speeds leave room, and these would leave none
     assert slowed.squares[1] / ACCELERATION < slowed.straight[1]
@@ -154,7 +156,7 @@ def test_segments_are_too_short_for_a_change_of_speed() -> None:
     poses = bent(0.2, False, bends=(2.6, 0.1))
     corners = corners_of(poses, [0.0, 0.0, 0.0])
     low, high = corners.squares[1:3]
-    length, bend = 0.2, corners.bends[2]
+    length, bend = 0.2, corners.deflections[2]
     assert high == pytest.approx((low + 2.0 * ACCELERATION * (length - corners.reaches[1])) / (1.0 + bend), rel=1e-12)
     assert high - low == pytest.approx(2.0 * ACCELERATION * corners.straight[1], rel=1e-9)
 

@@ -15,7 +15,7 @@ import pytest
 
 from tests.published.via_walker import INCH, inches, place, rot_z, swing
 from wbc.trajectory import via_points
-from wbc.trajectory.jerk.via_speeds import Bounds, corner_speeds
+from wbc.trajectory.jerk.via_speeds import SpeedBounds, corner_speeds
 from wbc.trajectory.paths.turning import quaternion, turn_between
 
 AXIAL, ROUND = swing((13, 12), (13, 16)), swing((13, 12), (17, 12))
@@ -196,7 +196,7 @@ def test_points_on_a_line_are_passed_within_the_speed() -> None:
     whole = via_points([points[0], points[-1]], speed=0.7, acceleration=1.0, deviation=0.1, angular_acceleration=1.0)
     assert law.duration == pytest.approx(whole.duration, rel=1e-12)
     assert law.certificate.ratio == pytest.approx(1.0, abs=1e-12)
-    printed = corner_speeds(np.ones(2), np.array([[1.0, 0.0, 0.0]] * 2), np.zeros(2), Bounds(10.0, 1.0, 0.1))
+    printed = corner_speeds(np.ones(2), np.array([[1.0, 0.0, 0.0]] * 2), np.zeros(2), SpeedBounds(10.0, 1.0, 0.1))
     assert np.sqrt(printed.squares[1]) == pytest.approx(np.sqrt(2.0))
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from wbc.published.three_arm_walker import Log, Outcome, PublishedWalker
+from wbc.published.three_arm_walker import PublishedLog, PublishedOutcome, PublishedWalker
 
 INCH = 0.0254
 
@@ -23,7 +23,7 @@ def driven(
     until: Callable[[tuple[float, float, float]], bool] = lambda place: False,
     duration: float = 300.0,
     **options: Any,
-) -> tuple[PublishedWalker, Outcome]:
+) -> tuple[PublishedWalker, PublishedOutcome]:
     """A walker after one velocity command, round, along [in/s] and spin [rad/s], or a function of the time."""
     walker = PublishedWalker(place, **options)
 
@@ -36,7 +36,7 @@ def driven(
 
 def along(
     speed: float, start: int, goal: int, removed: Iterable[Any] = (), **options: Any
-) -> tuple[PublishedWalker, Outcome]:
+) -> tuple[PublishedWalker, PublishedOutcome]:
     """Along column 13 from a row to another."""
     way = float(np.sign(goal - start))
     return driven(
@@ -44,13 +44,13 @@ def along(
     )
 
 
-def shared(log: Log) -> np.ndarray:
+def shared(log: PublishedLog) -> np.ndarray:
     """Cycles in which two arms have one place."""
     pairs = [(log.places[:, a] == log.places[:, b]).all(axis=1) for a, b in ((0, 1), (0, 2), (1, 2))]
     return np.asarray(np.any(pairs, axis=0))
 
 
-def hold_offsets(log: Log) -> np.ndarray:
+def hold_offsets(log: PublishedLog) -> np.ndarray:
     """Distances of supporting hands from their holds [in]."""
     angle = np.radians(25.0 + 5.0 * log.places[..., 0])
     points = np.stack([-100.0 * np.cos(angle), 100.0 * np.sin(angle), -9.25 * log.places[..., 1]], axis=-1)

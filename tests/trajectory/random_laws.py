@@ -7,11 +7,11 @@ from math import comb
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from wbc.trajectory import Law, Limits, PolynomialPath, Timing
+from wbc.trajectory import Law, MotionLimits, PolynomialPath, Timing
 
 
-def limits_of(random: np.random.Generator, dof: int, jerk: bool = True) -> Limits:
-    return Limits(
+def limits_of(random: np.random.Generator, dof: int, jerk: bool = True) -> MotionLimits:
+    return MotionLimits(
         lower=-random.uniform(0.5, 2.0, dof),
         upper=random.uniform(0.5, 2.0, dof),
         velocity=random.uniform(0.5, 3.0, dof),

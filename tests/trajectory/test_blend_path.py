@@ -10,7 +10,7 @@ from hypothesis.extra.numpy import arrays
 
 from tests.trajectory.path_checks import steps_at_knots, worst_derivative
 from wbc.errors import NotFiniteError, RangeError
-from wbc.trajectory import Law, Limits, PolynomialPath, Timing, blend_path
+from wbc.trajectory import Law, MotionLimits, PolynomialPath, Timing, blend_path
 from wbc.validation import Array
 
 #: Waypoints some of which are equal, on one line, straight back, or far apart
@@ -106,7 +106,7 @@ def test_derivatives_against_differences() -> None:
 
 def test_laws_along_it_have_exact_certificates() -> None:
     path = blend_path([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]], 0.05)
-    limits = Limits(velocity=np.ones(2), acceleration=np.full(2, 100.0))
+    limits = MotionLimits(velocity=np.ones(2), acceleration=np.full(2, 100.0))
     worst = Law(path, Timing.identity(2.0), limits).certificate.worst
     assert worst["velocity"].kind == "exact"
     assert worst["velocity"].ratio == pytest.approx(1.0, abs=1e-12)

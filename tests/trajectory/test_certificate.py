@@ -12,15 +12,15 @@ from hypothesis import strategies as st
 
 from tests.trajectory.random_laws import ragged, smooth
 from wbc import trajectory
-from wbc.trajectory import Certificate, Law, Limits, Path, PolynomialPath, Timing
-from wbc.trajectory.laws.certificate import ORDERS, Pieces
+from wbc.trajectory import Law, LawCertificate, MotionLimits, Path, PolynomialPath, Timing
+from wbc.trajectory.laws.certificate import ORDERS, LawPieces
 
 seeds = st.integers(0, 2**32 - 1)
 
 
 def ratios(law: Law, count: int = 20001) -> dict[str, float]:
     """The largest ratios among so many samples, both sides of every break among them."""
-    pieces = Pieces.of(law.path, law.timing)
+    pieces = LawPieces.of(law.path, law.timing)
     places = np.linspace(0.0, 1.0, count // len(pieces.start) + 1)
     out = {}
     for name, order in ORDERS.items():
@@ -39,7 +39,7 @@ def test_polynomials_of_time_are_exact(seed: int, degree: int) -> None:
     """Within 1e-9 of the largest value, which is at an end or where the derivative has a root."""
     random = np.random.default_rng(seed)
     path = PolynomialPath([0.0, 1.0], random.normal(size=(degree + 1, 1, 2)))
-    limits = Limits(-np.ones(2), np.ones(2), np.ones(2), np.ones(2), np.ones(2))
+    limits = MotionLimits(-np.ones(2), np.ones(2), np.ones(2), np.ones(2), np.ones(2))
     law = Law(path, Timing.identity(1.0), limits, moving=(True, True))
     for name, order in ORDERS.items():
         worst = law.certificate.worst[name]
@@ -105,7 +105,7 @@ def pose_laws() -> list[Law]:
     laws = []
     for path in paths:
         s = np.linspace(path.knots[0], path.knots[-1], 4)
-        limits = Limits(velocity=np.ones(6), acceleration=np.ones(6), jerk=np.ones(6))
+        limits = MotionLimits(velocity=np.ones(6), acceleration=np.ones(6), jerk=np.ones(6))
         laws.append(Law(path, Timing.accelerations(s, np.array([0.5, 1.0, 2.0, 0.7])), limits))
         length = path.length
         laws.append(Law(path, Timing.identity(length), limits))
@@ -143,7 +143,7 @@ class Wave(Path):
 @given(st.floats(0.1, 20.0))
 @settings(max_examples=30)
 def test_functions_are_sampled_with_a_bound(rate: float) -> None:
-    law = Law(Wave(rate), Timing.identity(1.0), Limits(velocity=[1.0], acceleration=[1.0]), moving=(True, True))
+    law = Law(Wave(rate), Timing.identity(1.0), MotionLimits(velocity=[1.0], acceleration=[1.0]), moving=(True, True))
     for name, ratio in (("velocity", rate), ("acceleration", rate**2)):
         worst = law.certificate.worst[name]
         seen = float(np.abs(getattr(law.at(np.linspace(0.0, 1.0, 20001)), name)).max())
@@ -155,7 +155,9 @@ def test_functions_are_sampled_with_a_bound(rate: float) -> None:
 
 def line(low: float, high: float) -> Law:
     """q = t for t in [0, 1], with position limits."""
-    return Law(PolynomialPath([0.0, 1.0], [[[1.0]], [[0.0]]]), Timing.identity(1.0), Limits(lower=[low], upper=[high]))
+    return Law(
+        PolynomialPath([0.0, 1.0], [[[1.0]], [[0.0]]]), Timing.identity(1.0), MotionLimits(lower=[low], upper=[high])
+    )
 
 
 @pytest.mark.parametrize(
@@ -191,12 +193,12 @@ def test_no_limits_no_quantities() -> None:
     assert set(law.certificate.worst) == {"jerk"}
     assert law.certificate.ratio == 0.0
     assert law.certificate.kept
-    assert str(Certificate({})) == "no limits"
+    assert str(LawCertificate({})) == "no limits"
 
 
 def test_infinite_limits_are_none() -> None:
     law = smooth(0)
-    limits = Limits(velocity=[np.inf, np.inf, 2.0], acceleration=np.full(3, np.inf))
+    limits = MotionLimits(velocity=[np.inf, np.inf, 2.0], acceleration=np.full(3, np.inf))
     worst = law.with_limits(limits).certificate.worst
     assert worst["velocity"].joint == 2
     assert worst["acceleration"].ratio == pytest.approx(0.0, abs=1e-12)
@@ -206,7 +208,7 @@ def test_accelerations_that_jump() -> None:
     """At a break, and at a beginning and an end that are at rest before and after."""
     bang = Timing([0.0, 1.0, 2.0], [[0.5, -0.5], [0.0, 1.0], [0.0, 0.5]])
     path = PolynomialPath([0.0, 1.0], [[[1.0]], [[0.0]]])
-    law = Law(path, bang, Limits(acceleration=[1.0], jerk=[1.0]))
+    law = Law(path, bang, MotionLimits(acceleration=[1.0], jerk=[1.0]))
     worst = law.certificate.worst["jerk"]
     assert (worst.ratio, worst.kind, worst.time) == (np.inf, "unbounded", 1.0)
     assert not law.certificate.kept
@@ -216,13 +218,13 @@ def test_accelerations_that_jump() -> None:
     inner = law.sliced(0.2, 0.8)
     assert inner.certificate.worst["jerk"].kind == "exact"
     assert inner.certificate.worst["jerk"].ratio == pytest.approx(0.0, abs=1e-12)
-    without = Law(path, bang, Limits(acceleration=[1.0]))
+    without = Law(path, bang, MotionLimits(acceleration=[1.0]))
     assert without.certificate.worst["jerk"].kind == "unbounded"
     assert without.certificate.kept
 
 
 def test_the_certificate_in_words() -> None:
-    law = line(-2.0, 2.0).with_limits(Limits(lower=[-2.0], upper=[2.0], velocity=[4.0]))
+    law = line(-2.0, 2.0).with_limits(MotionLimits(lower=[-2.0], upper=[2.0], velocity=[4.0]))
     assert str(law.certificate) == (
         "position 0.5000000 at 1 s, joint 0, exact; velocity 0.2500000 at 0 s, joint 0, exact"
     )

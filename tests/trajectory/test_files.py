@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from tests.trajectory.random_laws import ragged, smooth
 from wbc import trajectory
 from wbc.errors import LawFileError
-from wbc.trajectory import Law, Limits, Path, Timing
+from wbc.trajectory import Law, MotionLimits, Path, Timing
 from wbc.trajectory.laws import files
 
 
@@ -29,7 +29,7 @@ def poses() -> list[np.ndarray]:
 def along(path: Path) -> Law:
     """At a speed of 1."""
     length = path.length
-    return Law(path, Timing([0.0, length], [[1.0], [path.knots[0]]]), Limits(velocity=np.full(path.dof, 2.0)))
+    return Law(path, Timing([0.0, length], [[1.0], [path.knots[0]]]), MotionLimits(velocity=np.full(path.dof, 2.0)))
 
 
 def joined() -> Law:
@@ -63,7 +63,7 @@ LAWS: dict[str, Callable[[], Law]] = {
 def assert_same(ours: Law, theirs: Law) -> None:
     assert type(ours.path) is type(theirs.path)
     assert ours.moving == theirs.moving
-    for field in fields(Limits):
+    for field in fields(MotionLimits):
         assert np.array_equal(getattr(ours.limits, field.name), getattr(theirs.limits, field.name))
     assert np.array_equal(ours.timing.times, theirs.timing.times)
     assert np.array_equal(ours.path.knots, theirs.path.knots)

@@ -9,7 +9,7 @@ import pytest
 
 from tests.trajectory.path_checks import steps_at_knots, worst_derivative
 from wbc.errors import ContinuityError, NotFiniteError, RangeError, ShapeError
-from wbc.trajectory import Law, Limits, Timing, function_path
+from wbc.trajectory import Law, MotionLimits, Timing, function_path
 from wbc.validation import Array
 
 
@@ -86,7 +86,7 @@ def test_a_constant_stands() -> None:
 
 def test_laws_along_it_have_exact_certificates() -> None:
     path = function_path(curve, 0.0, 1.0)
-    law = Law(path, Timing.identity(path.length), Limits(velocity=np.full(3, 10.0)))
+    law = Law(path, Timing.identity(path.length), MotionLimits(velocity=np.full(3, 10.0)))
     assert law.certificate.worst["velocity"].kind == "exact"
     assert law.certificate.kept
 

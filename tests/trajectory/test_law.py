@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from tests.trajectory.random_laws import inner_times, ragged, smooth
 from wbc.errors import ContinuityError, NotFiniteError, RangeError, ShapeError
-from wbc.trajectory import Law, Limits, PolynomialPath, State, Timing
+from wbc.trajectory import Law, MotionLimits, PolynomialPath, State, Timing
 
 seeds = st.integers(0, 2**32 - 1)
 factors = st.floats(0.05, 20.0)
@@ -257,4 +257,4 @@ def test_a_timing_that_leaves_its_path() -> None:
         with pytest.raises(RangeError, match=r"law\.timing"):
             Law(path, timing)
     with pytest.raises(ShapeError, match="limits"):
-        Law(path, Timing.identity(1.0), Limits(velocity=np.ones(2)))
+        Law(path, Timing.identity(1.0), MotionLimits(velocity=np.ones(2)))

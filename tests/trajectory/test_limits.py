@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from wbc.errors import BoundsError, NotFiniteError, RangeError, ShapeError
-from wbc.trajectory import Limits, PolynomialPath
+from wbc.trajectory import MotionLimits, PolynomialPath
 from wbc.trajectory.paths.path import JoinedPath
 
 
@@ -31,20 +31,20 @@ from wbc.trajectory.paths.path import JoinedPath
 )
 def test_bad_limits(given: dict[str, Any], error: type[Exception], field: str) -> None:
     with pytest.raises(error, match=field.replace(".", r"\.")):
-        Limits(**given)
+        MotionLimits(**given)
 
 
 def test_limits_of_one_joint_may_be_a_number() -> None:
-    assert Limits(velocity=2.0).velocity.tolist() == [2.0]
-    assert Limits(velocity=[1, 2]).dof == 2
-    assert Limits().dof is None
-    assert Limits().for_dof(7).dof is None
+    assert MotionLimits(velocity=2.0).velocity.tolist() == [2.0]
+    assert MotionLimits(velocity=[1, 2]).dof == 2
+    assert MotionLimits().dof is None
+    assert MotionLimits().for_dof(7).dof is None
     with pytest.raises(ShapeError, match="limits"):
-        Limits(velocity=[1.0, 2.0]).for_dof(3)
+        MotionLimits(velocity=[1.0, 2.0]).for_dof(3)
 
 
 def test_scaled_limits() -> None:
-    limits = Limits([-1.0], [np.inf], [2.0], None, [np.inf]).scaled(0.5)
+    limits = MotionLimits([-1.0], [np.inf], [2.0], None, [np.inf]).scaled(0.5)
     assert (limits.lower.tolist(), limits.upper.tolist(), limits.velocity.tolist()) == ([-1.0], [np.inf], [1.0])
     assert limits.acceleration is None
     assert limits.jerk.tolist() == [np.inf]
@@ -52,7 +52,7 @@ def test_scaled_limits() -> None:
 
 def test_limits_keep_their_own_numbers() -> None:
     numbers = np.ones(2)
-    limits = Limits(velocity=numbers)
+    limits = MotionLimits(velocity=numbers)
     numbers[0] = 5.0
     assert limits.velocity.tolist() == [1.0, 1.0]
 
@@ -101,7 +101,7 @@ def test_joined_paths_are_their_parts(seed: int) -> None:
             begin += len(part.knots)
         gap = joined.knots[joined.gaps]
         assert joined.pieces_at(gap + 1e-9).tolist() == (joined.gaps - 1).tolist()
-        assert joined.pieces_at(gap + JoinedPath.ROOM - 1e-9).tolist() == (joined.gaps + 1).tolist()
+        assert joined.pieces_at(gap + JoinedPath.GAP - 1e-9).tolist() == (joined.gaps + 1).tolist()
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ from tests.published.via_walker import swing
 from tests.trajectory.random_laws import smooth
 from wbc import trajectory
 from wbc.errors import LawFileError, ShapeError
-from wbc.trajectory import Law, Limits, PolynomialPath, Timing
+from wbc.trajectory import Law, MotionLimits, PolynomialPath, Timing
 
 
 def poses() -> Law:
@@ -27,7 +27,7 @@ def gentle() -> Law:
     path = PolynomialPath([0.0, 1.0], [[[1.0, -2.0]], [[0.0, 0.0]]])
     powers = np.array([-20.0, 70.0, -84.0, 35.0, 0.0, 0.0, 0.0, 0.0]) / 2.0 ** np.arange(7, -1, -1)
     timing = Timing([0.0, 2.0], powers[:, None])
-    return Law(path, timing, Limits(velocity=np.full(2, 3.0), acceleration=[8.0, 4.0], jerk=np.full(2, 99.0)))
+    return Law(path, timing, MotionLimits(velocity=np.full(2, 3.0), acceleration=[8.0, 4.0], jerk=np.full(2, 99.0)))
 
 
 @pytest.fixture
@@ -101,7 +101,7 @@ def test_jumps_are_drawn_upright_and_jerk_is_left_out(figures: list[Figure]) -> 
 
 
 def test_position_limits_of_one_side(figures: list[Figure]) -> None:
-    law = gentle().with_limits(Limits(lower=[-np.inf, -2.1], upper=[1.05, np.inf]))
+    law = gentle().with_limits(MotionLimits(lower=[-np.inf, -2.1], upper=[1.05, np.inf]))
     trajectory.plot(law, "unused.png")
     assert dashed(figures[0].axes[0]) == [-2.1, 1.05]
 

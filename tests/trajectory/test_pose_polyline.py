@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from tests.trajectory.path_checks import off_orthonormal, random_poses
 from wbc.errors import NotFiniteError, RangeError, RotationError, ShapeError
-from wbc.trajectory import Law, Limits, Path, PosePath, Timing, geodesic_path, pose_polyline
+from wbc.trajectory import Law, MotionLimits, Path, PosePath, Timing, geodesic_path, pose_polyline
 from wbc.validation import Array
 
 SEEDS = st.integers(0, 10**6)
@@ -139,7 +139,7 @@ def test_certificates_are_exact_where_each_corner_turns_about_one_axis() -> None
     b = pin.SE3(pin.exp3(np.array([0.0, 0.0, 1.0])), np.array([1.0, 0.0, 0.0]))
     c = pin.SE3(pin.exp3(np.array([0.0, 0.0, 1.5])), np.array([1.0, 1.0, 0.0]))
     d = pin.SE3(pin.exp3(np.array([0.7, 0.0, 0.0])) @ c.rotation, np.array([1.0, 1.0, 1.0]))
-    limits = Limits(velocity=np.ones(6), acceleration=np.full(6, 10.0))
+    limits = MotionLimits(velocity=np.ones(6), acceleration=np.full(6, 10.0))
     kinds = []
     for poses in ([a, b, c], [a, b, c, d]):
         path = pose_polyline(poses, 0.05)

@@ -10,7 +10,7 @@ import pytest
 
 from tests.trajectory.path_checks import off_orthonormal, random_poses
 from wbc.errors import RangeError, ShapeError, UnknownNameError
-from wbc.trajectory import Law, Limits, Timing, geodesic_path, pose_spline
+from wbc.trajectory import Law, MotionLimits, Timing, geodesic_path, pose_spline
 
 ENDS = ("not-a-knot", "clamped", "natural")
 
@@ -78,7 +78,7 @@ def test_repeated_poses_are_dropped_and_equal_ones_stand() -> None:
 
 def test_certificates_are_sampled() -> None:
     path = pose_spline(random_poses(8, 4))
-    law = Law(path, Timing.identity(path.length), Limits(velocity=np.full(6, 10.0)))
+    law = Law(path, Timing.identity(path.length), MotionLimits(velocity=np.full(6, 10.0)))
     worst = law.certificate.worst["velocity"]
     assert worst.kind == "sampled"
     seen = np.abs(law.at(np.linspace(0.0, law.duration, 20001)).velocity).max() / 10.0

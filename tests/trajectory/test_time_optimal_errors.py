@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from wbc.errors import BoundsError, InfeasibleError, NotFiniteError, RangeError, ShapeError
-from wbc.trajectory import Limits, PolynomialPath, time_optimal
+from wbc.trajectory import MotionLimits, PolynomialPath, time_optimal
 
 LINE = np.array([[0.0, 0.0], [1.0, 2.0], [2.0, 1.0]])
 
@@ -24,8 +24,8 @@ CASES = [
     ({"acceleration": None}, RangeError, "path"),
     ({"acceleration": np.inf}, RangeError, "path"),
     ({"acceleration": [np.inf, 1.0], "path": [[0.0, 0.0], [1.0, 0.0]]}, RangeError, "path"),
-    ({"limits": Limits(velocity=np.ones(3))}, ShapeError, "limits"),
-    ({"limits": Limits(jerk=np.ones(2))}, RangeError, "limits.jerk"),
+    ({"limits": MotionLimits(velocity=np.ones(3))}, ShapeError, "limits"),
+    ({"limits": MotionLimits(jerk=np.ones(2))}, RangeError, "limits.jerk"),
     ({"torque": 10.0}, ShapeError, "robot"),
     ({"cartesian_speed": {"tip": 1.0}}, ShapeError, "robot"),
     ({"inequality": (1, 2)}, ShapeError, "inequality"),
@@ -55,21 +55,21 @@ def test_knots_of_paths_increase():
 
 def test_paths_beyond_position_limits_are_refused_with_joint_and_place():
     # The parabola through 0, 1, 0 over s = 0, 1, 2 peaks at s = 1
-    limits = Limits(lower=[-1.0, -1.0], upper=[1.0, 0.9])
+    limits = MotionLimits(lower=[-1.0, -1.0], upper=[1.0, 0.9])
     with pytest.raises(BoundsError, match=r"joint 1 .* at s = 1") as caught:
         time_optimal([[0.0, 0.0], [0.0, 1.0], [0.0, 0.0]], 1.0, 1.0, limits=limits)
     assert caught.value.value == pytest.approx(1.0)
 
 
 def test_paths_that_touch_position_limits_are_welcome():
-    limits = Limits([-1.0, -1.0], [1.0, 0.9], np.ones(2), np.ones(2))
+    limits = MotionLimits([-1.0, -1.0], [1.0, 0.9], np.ones(2), np.ones(2))
     law = time_optimal([[0.0, 0.0], [0.0, 0.9], [0.0, 0.0]], limits=limits)
     assert law.certificate.worst["position"].ratio == pytest.approx(1.0, abs=1e-9)
     assert law.certificate.kept
 
 
 def test_arguments_go_before_limits():
-    limits = Limits(velocity=np.ones(2), acceleration=np.ones(2))
+    limits = MotionLimits(velocity=np.ones(2), acceleration=np.ones(2))
     law = time_optimal(LINE, acceleration=4.0, limits=limits)
     np.testing.assert_array_equal(law.limits.velocity, [1.0, 1.0])
     np.testing.assert_array_equal(law.limits.acceleration, [4.0, 4.0])

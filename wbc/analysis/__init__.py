@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from wbc import lazy
 
 if TYPE_CHECKING:
-    from wbc.analysis.algebra.branches import Branch
+    from wbc.analysis.algebra.branches import LocusBranch
     from wbc.analysis.algebra.deficiency import Exact
     from wbc.analysis.algebra.half_angles import Relation, Value
     from wbc.analysis.algebra.locus import Locus
@@ -16,10 +16,10 @@ if TYPE_CHECKING:
     from wbc.analysis.block_certificates import TreeCertificate, certify_blocks
     from wbc.analysis.blocks import BlockAnalysis, TreeAnalysis, analyse_blocks
     from wbc.analysis.certificates.boxes import Counts
-    from wbc.analysis.certificates.certificate import Certificate, certify
+    from wbc.analysis.certificates.certificate import RankCertificate, certify
     from wbc.analysis.certificates.screen import Screened, screen
     from wbc.analysis.certificates.weakest import NumericWitness
-    from wbc.analysis.completeness import Analysis, Witness, analyse
+    from wbc.analysis.completeness import Analysis, RankWitness, analyse
     from wbc.analysis.jacobians.jacobian import Cost, SymbolicJacobian, symbolic_jacobian
     from wbc.analysis.jacobians.model import ExactModel
     from wbc.analysis.jacobians.tree_joints import JointBlock, joint_blocks
@@ -31,16 +31,16 @@ if TYPE_CHECKING:
     from wbc.analysis.published import PublishedSets, candidate_rows, published_sets
     from wbc.analysis.rows import BodyRows, JointRows, PitchPlaneRows, Rows
 else:
-    __getattr__ = lazy.attach(__name__, __file__)
+    __getattr__ = lazy.attach(
+        __name__, __file__, {"Certificate": "RankCertificate", "Witness": "RankWitness", "Branch": "LocusBranch"}
+    )
 
 __all__ = [
     "ALGORITHMS",
     "Analysis",
     "BlockAnalysis",
     "BodyRows",
-    "Branch",
     "Budget",
-    "Certificate",
     "Cost",
     "Counts",
     "Determinant",
@@ -49,10 +49,13 @@ __all__ = [
     "JointBlock",
     "JointRows",
     "Locus",
+    "LocusBranch",
     "Notation",
     "NumericWitness",
     "PitchPlaneRows",
     "PublishedSets",
+    "RankCertificate",
+    "RankWitness",
     "Relation",
     "Rows",
     "Screened",
@@ -60,7 +63,6 @@ __all__ = [
     "TreeAnalysis",
     "TreeCertificate",
     "Value",
-    "Witness",
     "analyse",
     "analyse_blocks",
     "candidate_rows",

@@ -12,7 +12,7 @@ import numpy as np
 
 from wbc import validation
 from wbc.analysis.blocks import block_model, lift, parted_task, problem
-from wbc.analysis.certificates.certificate import COMPLETE, INCOMPLETE, UNDECIDED, Certificate, certify
+from wbc.analysis.certificates.certificate import COMPLETE, INCOMPLETE, UNDECIDED, RankCertificate, certify
 from wbc.analysis.certificates.weakest import NumericWitness, descended, joint_values
 from wbc.analysis.completeness import TRIES
 from wbc.analysis.jacobians.model import ExactModel, checked_model
@@ -42,7 +42,7 @@ class TreeCertificate:
 
     verdict: str
     parted: bool
-    blocks: tuple[tuple[JointBlock, Certificate], ...]
+    blocks: tuple[tuple[JointBlock, RankCertificate], ...]
     everywhere: bool
     left: float
     eps: float
@@ -90,8 +90,8 @@ def certify_blocks(
         raise ShapeError("state", state, "expected the name of a file")
     minutes = validation.scalar("minutes", minutes, low=0.0, open_low=True, unit="min")
     parted = parted_task(model, wanted, blocks)
-    found: list[tuple[JointBlock, ExactModel, Certificate]] = []
-    known: dict[tuple[object, ...], Certificate] = {}
+    found: list[tuple[JointBlock, ExactModel, RankCertificate]] = []
+    known: dict[tuple[object, ...], RankCertificate] = {}
     for number, block in enumerate(blocks):
         alone = block_model(model, block)
         own = [r for r in block.rows if parted and any(r is t for t in wanted)]

@@ -10,7 +10,7 @@ import numpy as np
 import pinocchio as pin
 
 from wbc.analysis.certificates.certificate import INCOMPLETE
-from wbc.analysis.completeness import Witness, find_witness
+from wbc.analysis.completeness import RankWitness, find_witness
 from wbc.analysis.jacobians.jacobian import symbolic_jacobian
 from wbc.analysis.jacobians.model import ExactModel, checked_model
 from wbc.analysis.jacobians.numeric import NumericRows, check_task
@@ -53,7 +53,7 @@ class TreeAnalysis:
     blocks: tuple[BlockAnalysis, ...]
     parted: bool
     verdict: str
-    witness: Witness | None
+    witness: RankWitness | None
     lost: JointBlock | None
     seconds: float
     processor: float
@@ -100,7 +100,7 @@ def analyse_blocks(
         for number, block in enumerate(blocks)
     )
     verdicts = {one.verdict for one in analysed}
-    witness: Witness | None = None
+    witness: RankWitness | None = None
     lost: JointBlock | None = None
     for one in analysed:
         if one.verdict == UNDECIDED and witness is None:

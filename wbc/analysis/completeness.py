@@ -10,11 +10,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from wbc import validation
-from wbc.analysis.algebra.branches import Branch
+from wbc.analysis.algebra.branches import LocusBranch
 from wbc.analysis.algebra.deficiency import Exact
 from wbc.analysis.algebra.locus import Locus
 from wbc.analysis.algebra.points import real_point
-from wbc.analysis.certificates.certificate import COMPLETE, INCOMPLETE, Certificate, certify
+from wbc.analysis.certificates.certificate import COMPLETE, INCOMPLETE, RankCertificate, certify
 from wbc.analysis.jacobians.jacobian import SymbolicJacobian, symbolic_jacobian
 from wbc.analysis.jacobians.model import ExactModel, checked_model
 from wbc.analysis.jacobians.numeric import NumericRows, check_task, rank, singular_values
@@ -34,7 +34,7 @@ _AFTER = 1.0
 
 
 @dataclass(frozen=True, eq=False)
-class Witness:
+class RankWitness:
     """A configuration where the task has full rank and task and constraints together have not.
 
     Attributes:
@@ -43,7 +43,7 @@ class Witness:
     """
 
     q: Array
-    branch: Branch | None
+    branch: LocusBranch | None
     task: Array
     augmented: Array
 
@@ -68,10 +68,10 @@ class Analysis:
     task: SymbolicJacobian
     augmented: SymbolicJacobian
     locus: Locus
-    algorithmic: tuple[Branch, ...]
+    algorithmic: tuple[LocusBranch, ...]
     verdict: str
-    witness: Witness | None
-    certificate: Certificate | None
+    witness: RankWitness | None
+    certificate: RankCertificate | None
     seconds: float
     processor: float
 
@@ -83,7 +83,7 @@ def analyse(
     *,
     algorithm: str = "sub_determinants",
     budget: Budget | None = None,
-    certificate: Certificate | None = None,
+    certificate: RankCertificate | None = None,
     told: Callable[[str], None] | None = None,
 ) -> Analysis:
     """Completeness of task and constraint coordinates: { q : rank J_R < m } within { q : rank J_T < n }.
@@ -112,7 +112,7 @@ def analyse(
     checked_model(model)
     budget = Budget() if budget is None else validation.instance("budget", budget, Budget, "a Budget")
     if certificate is not None:
-        validation.instance("certificate", certificate, Certificate, "a Certificate of certify")
+        validation.instance("certificate", certificate, RankCertificate, "a Certificate of certify")
     validation.function("told", told)
     budget.start()
     rows = (*wanted, *added)
@@ -120,7 +120,7 @@ def analyse(
     witness = None
     if certificate is not None and certificate.witness is not None:
         at = certificate.witness
-        witness = Witness(at.q, None, at.task, at.augmented)
+        witness = RankWitness(at.q, None, at.task, at.augmented)
     elif found.verdict == UNDECIDED:
         witness = find_witness(model.robot, found, wanted, rows, model.configuration, budget)
     verdict = found.verdict
@@ -151,9 +151,9 @@ def _searched(
     added: tuple[Rows, ...],
     algorithm: str,
     budget: Budget,
-    certificate: Certificate | None,
+    certificate: RankCertificate | None,
     told: Callable[[str], None] | None,
-) -> tuple[Loci, Certificate | None, bool]:
+) -> tuple[Loci, RankCertificate | None, bool]:
     """(loci, certificate if it was asked for, whether the search came to its end)."""
     done = False
     with LocusSearch(model, task, (*task, *added), algorithm, budget) as search:
@@ -177,7 +177,7 @@ def _searched(
 
 def _certified(
     model: ExactModel, task: tuple[Rows, ...], added: tuple[Rows, ...], budget: Budget, ended: Callable[[], bool]
-) -> Certificate | None:
+) -> RankCertificate | None:
     """What numbers say within the budget, beside the search of the locus; None where they do not take the robot."""
     workers = max(1, (os.cpu_count() or 1) - 1)
     minutes = max(_LEAST, budget.seconds / 60.0)
@@ -187,7 +187,7 @@ def _certified(
         return None
 
 
-def _verdict(found: Certificate | None) -> str | None:
+def _verdict(found: RankCertificate | None) -> str | None:
     """Of a certificate, in the words of :class:`Analysis`; None: it decides nothing."""
     if found is None:
         return None
@@ -203,7 +203,7 @@ def find_witness(
     rows: Sequence[Rows],
     configuration: Callable[[Array], Array],
     budget: Budget,
-) -> Witness | None:
+) -> RankWitness | None:
     """The best of random points on the first branch that has one: its task is farthest from a loss of rank.
 
     Args:
@@ -212,7 +212,7 @@ def find_witness(
     numeric, rng = NumericRows(robot), np.random.default_rng(0)
     until = time.monotonic() + max(budget.seconds, _AFTER)
     for branch in found.algorithmic:
-        best: Witness | None = None
+        best: RankWitness | None = None
         for _ in range(TRIES):
             if time.monotonic() > until:
                 return best
@@ -225,7 +225,7 @@ def find_witness(
                 continue
             sigma, every = singular_values(J_T), singular_values(J_R)
             if best is None or sigma[-1] > best.task[-1]:
-                best = Witness(q, branch, sigma, every)
+                best = RankWitness(q, branch, sigma, every)
         if best is not None:
             return best
     return None

@@ -19,7 +19,7 @@ from wbc.errors import WbcError
 BAD_INPUT, INTERRUPTED = 2, 130
 
 
-class Entry(NamedTuple):
+class Listed(NamedTuple):
     """A command: module of this package and function, its line in the list of commands, settings of its parser."""
 
     module: str
@@ -29,60 +29,64 @@ class Entry(NamedTuple):
 
 
 COMMANDS = {
-    "robots": Entry("robots", "table", "List the robots that load by name."),
-    "robot": Entry("robots", "show", "Show a robot: joints, limits, frames, shapes and where the numbers come from."),
-    "track": Entry("track", "track", "Follow a timed Cartesian path, and leave a log, plots and a summary."),
-    "demo": Entry(
+    "robots": Listed("robot.robots", "table", "List the robots that load by name."),
+    "robot": Listed(
+        "robot.robots", "show", "Show a robot: joints, limits, frames, shapes and where the numbers come from."
+    ),
+    "track": Listed("track", "track", "Follow a timed Cartesian path, and leave a log, plots and a summary."),
+    "demo": Listed(
         "demo",
         "demo",
         "Do the main job: a Panda follows a timed path round an obstacle with its elbow plane commanded.",
     ),
-    "walk": Entry(
-        "walk",
+    "walk": Listed(
+        "walking.walk",
         "walk",
         "Walk on a structure of holds with three arms, or end over end, and leave log, "
         "plan, check, pictures and a page.",
     ),
-    "plans": Entry(
-        "walk", "plans", "Show what two plans do differently, one line each; exit code 1 if there is anything."
+    "plans": Listed(
+        "walking.walk", "plans", "Show what two plans do differently, one line each; exit code 1 if there is anything."
     ),
-    "replay": Entry("replay", "replay", "Do the ticks of a recording again and compare every bit of their commands."),
-    "export": Entry(
+    "replay": Listed("replay", "replay", "Do the ticks of a recording again and compare every bit of their commands."),
+    "export": Listed(
         "export",
         "export",
         "Write one control cycle of a robot, QP solver included, as C99 with a header, build files and a check.",
     ),
-    "ik": Entry(
-        "ik",
+    "ik": Listed(
+        "ik.ik",
         "ik",
         "Find joint positions that put a frame at a pose or a position, clear of obstacles and within the limits.",
     ),
-    "analyse": Entry(
-        "analyse", "analyse_", "Say where task and constraint coordinates lose rank, and whether they always suffice."
+    "analyse": Listed(
+        "analysis.analyse",
+        "analyse_",
+        "Say where task and constraint coordinates lose rank, and whether they always suffice.",
     ),
-    "advise": Entry(
-        "advise",
+    "advise": Listed(
+        "analysis.advise",
         "advise",
         "Say which pairs are well conditioned at a configuration, where the next locus is, and which pair to use.",
     ),
-    "modes": Entry(
-        "modes",
+    "modes": Listed(
+        "analysis.modes",
         "modes",
         "Say in which modes arms can be commanded: how many pairs, or what is missing; of one robot, which pairs.",
     ),
-    "drive": Entry(
+    "drive": Listed(
         "drive",
         "drive",
         "Drive an arm by rates: the pair of coordinates that is chosen, at most six "
         "rates at a time, 50 times a second.",
     ),
-    "bench": Entry(
+    "bench": Listed(
         "bench",
         "bench",
         "Compare with pink, mink and placo on the same problems (needs the repository).",
         {"allow_extra_args": True, "ignore_unknown_options": True},
     ),
-    "docs": Entry(
+    "docs": Listed(
         "docs", "docs", "Write what the code declares into the pages of tasks and constraints (needs the repository)."
     ),
 }
@@ -98,7 +102,7 @@ def command(name: str) -> Any:
     return typer.main.get_command(single)
 
 
-class Commands(TyperGroup):
+class CommandGroup(TyperGroup):
     """The commands of the table; an error of this package becomes one line and exit code 2."""
 
     def __init__(self, **settings: Any) -> None:
@@ -124,7 +128,7 @@ class Commands(TyperGroup):
 
 app = typer.Typer(
     name="wbc",
-    cls=Commands,
+    cls=CommandGroup,
     no_args_is_help=True,
     rich_markup_mode="rich",
     context_settings={"help_option_names": ["-h", "--help"]},

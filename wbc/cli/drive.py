@@ -10,7 +10,7 @@ import numpy as np
 import typer
 from rich.markup import escape
 
-from wbc.cli.advise import configuration_of
+from wbc.cli.analysis.advise import configuration_of
 from wbc.cli.console import err, out
 from wbc.cli.options import Backend
 from wbc.coordinates import Condition, parts

@@ -64,13 +64,13 @@ def replay(
 
 def report(recording: record.Recording, found: record.Replay) -> None:
     """Print what was replayed and what came of it."""
-    told = recording.about
-    table = Table(title=f"{told['robot']}: {recording.path}", title_justify="left", title_style="bold")
+    about = recording.about
+    table = Table(title=f"{about['robot']}: {recording.path}", title_justify="left", title_style="bold")
     table.box, table.show_header, table.pad_edge = None, False, False
     table.add_column(style="cyan", no_wrap=True)
     table.add_column()
-    table.add_row("stack", escape(", ".join(f"{name} ({kind})" for name, kind in told["items"])))
-    table.add_row("recorded", f"{found.ticks} ticks, dt {told['dt']:g} s, {told['solver']} ({told['backend']})")
-    table.add_row("replayed", f"{told['solver']} ({found.backend})")
+    table.add_row("stack", escape(", ".join(f"{name} ({kind})" for name, kind in about["items"])))
+    table.add_row("recorded", f"{found.ticks} ticks, dt {about['dt']:g} s, {about['solver']} ({about['backend']})")
+    table.add_row("replayed", f"{about['solver']} ({found.backend})")
     table.add_row("result", escape(str(found)))
     out().print(table)

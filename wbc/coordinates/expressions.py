@@ -105,7 +105,7 @@ def reference(robot: Robot, rows: Coordinate) -> Input | None:
 
 
 def rate_only(robot: Robot, rows: Coordinate) -> NDArray[np.bool_]:
-    """Which rows have no drift of their own: their integral depends on the way."""
+    """Which rows have no drift of their own: their integral depends on the path."""
     if isinstance(rows, BodyRows):
         moved, turned = _corrected(robot, rows)
         return np.array([not moved] * len(rows.translation) + [not turned] * len(rows.rotation))

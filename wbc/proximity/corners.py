@@ -28,7 +28,7 @@ RIM = 8
 INSIDE = 1e-6
 
 
-class Corners:
+class CornerDistances:
     """Distances of the corners of each body of some pairs from the other one; in C ``native/corners.h``.
 
     Corners are those of boxes and hulls, the centres of the balls at a capsule's ends, and points on a cylinder's rims;

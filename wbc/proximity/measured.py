@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, Protocol
 
-from wbc.proximity.scene import Index, Scene
+from wbc.proximity.scene import Index, PairScene
 from wbc.proximity.support import Supports
 from wbc.validation import Array
 
@@ -15,7 +15,7 @@ class Measured(Protocol):
     measured: int
 
     @property
-    def scene(self) -> Scene: ...
+    def scene(self) -> PairScene: ...
     @property
     def distances(self) -> Array: ...
     @property

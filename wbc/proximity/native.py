@@ -18,8 +18,8 @@ from wbc.native.kernel import kernel
 from wbc.native.library import load_library
 from wbc.proximity.choice import KEEP_LENGTH, KEEP_SHARE
 from wbc.proximity.corners import NEAR, corners_of
-from wbc.proximity.rows import Rows
-from wbc.proximity.scene import TIE, TRUST, Scene
+from wbc.proximity.rows import PairRows
+from wbc.proximity.scene import TIE, TRUST, PairScene
 from wbc.shapes import FAR, Box, Capsule, Convex, Cylinder, HalfSpace, Shape, Sphere
 from wbc.symbolic.joint_steps import Step, joint_steps, place
 from wbc.validation import Array
@@ -97,7 +97,7 @@ class NativeSensing:
         distances, normals, points, doubtful: of every pair at its last measurement.
     """
 
-    def __init__(self, functions: ctypes.PyDLL, scene: Scene, rows: Rows | None = None) -> None:
+    def __init__(self, functions: ctypes.PyDLL, scene: PairScene, rows: PairRows | None = None) -> None:
         length = scene.robot.characteristic_length
         count, pairs = (0 if rows is None else rows.count), len(scene.first)
         self._q, self._pose = np.zeros(scene.robot.nq), np.zeros(12)
@@ -156,7 +156,7 @@ class NativeSensing:
         self._measure(self._at)
 
 
-def _kinematics(scene: Scene) -> dict[str, Array]:
+def _kinematics(scene: PairScene) -> dict[str, Array]:
     """Steps of the joints that bodies stand on, and of those below them."""
     model = scene.robot.model
     needed = {int(j) for joint in scene.joints for j in model.supports[joint]}
@@ -181,7 +181,7 @@ def _kinematics(scene: Scene) -> dict[str, Array]:
     }
 
 
-def _bodies(scene: Scene) -> dict[str, Array]:
+def _bodies(scene: PairScene) -> dict[str, Array]:
     count, shapes = len(scene.bodies), [body.shape for body in scene.bodies]
     corners = [corners_of(shape, center) for shape, center in zip(shapes, scene.centers, strict=True)]
     corner = np.zeros((count, max(1, *(len(points) for points in corners)), 3))

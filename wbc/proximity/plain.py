@@ -13,10 +13,10 @@ import pinocchio as pin
 import coal
 
 from wbc.proximity.choice import Choice
-from wbc.proximity.corners import NEAR, Corners
+from wbc.proximity.corners import NEAR, CornerDistances
 from wbc.proximity.judge import Judge
-from wbc.proximity.rows import Rows
-from wbc.proximity.scene import Index, Scene
+from wbc.proximity.rows import PairRows
+from wbc.proximity.scene import Index, PairScene
 from wbc.robot.geometry.coal_shapes import geometry_of
 from wbc.shapes import FAR, HalfSpace, Shape
 from wbc.validation import Array
@@ -44,7 +44,7 @@ class PlainSensing:
         supports: support functions of the bodies.
     """
 
-    def __init__(self, scene: Scene, rows: Rows | None = None) -> None:
+    def __init__(self, scene: PairScene, rows: PairRows | None = None) -> None:
         self.scene, self.rows = scene, rows
         pairs = len(scene.first)
         self.distances, self.normals, self.points = np.zeros(pairs), np.zeros((pairs, 3)), np.zeros((pairs, 3))
@@ -66,7 +66,7 @@ class PlainSensing:
         self.doubtful, self.supports = self._judge.doubtful, self._judge.supports
         self._choice = Choice(self, 0 if rows is None else rows.count)
         self.pairs = self._choice.pairs
-        self._corners = Corners(self, rows.corners) if rows is not None and rows.corners else None
+        self._corners = CornerDistances(self, rows.corners) if rows is not None and rows.corners else None
 
     def reset(self) -> None:
         """Forget the rows."""
@@ -122,7 +122,7 @@ class PlainSensing:
             self.rotations[k], self.centers[k] = pose.rotation, pose.translation
             self._transforms[k] = coal.Transform3s(pose.rotation, pose.translation)
 
-    def _write(self, rows: Rows) -> None:
+    def _write(self, rows: PairRows) -> None:
         at = np.flatnonzero(self.pairs >= 0)
         pairs = self.pairs[at]
         rows.distance[at] = self.distances[pairs]
@@ -152,7 +152,7 @@ def twist_at_origin(velocity: Array, origin: Array) -> Array:
     return np.concatenate([velocity[:3] + np.cross(origin, velocity[3:]), velocity[3:]])
 
 
-def _geometries(scene: Scene) -> list[Any]:
+def _geometries(scene: PairScene) -> list[Any]:
     """Equal shapes share a geometry."""
     known: dict[Shape, Any] = {}
     for body in scene.bodies:

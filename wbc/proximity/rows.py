@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from wbc.errors import RangeError, ShapeError, UnknownNameError, UnsupportedJointError
-from wbc.proximity.scene import Scene
+from wbc.proximity.scene import PairScene
 from wbc.shapes import FAR
 from wbc.validation import Array
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class Rows:
+class PairRows:
     """Views of the numbers of an item with sensed rows; one row a pair, then ``corners`` rows for each of them.
 
     Attributes:
@@ -41,7 +41,7 @@ class Rows:
     margin: Array
 
     @classmethod
-    def of(cls, scene: Scene, count: int, corners: int, numbers: Mapping[str, Array]) -> Rows:
+    def of(cls, scene: PairScene, count: int, corners: int, numbers: Mapping[str, Array]) -> PairRows:
         """Those of a scene.
 
         Raises:
@@ -73,7 +73,7 @@ def _view(numbers: Mapping[str, Array], name: str, size: int) -> Array:
     return view
 
 
-def sides(robot: Robot, scene: Scene) -> Array:
+def sides(robot: Robot, scene: PairScene) -> Array:
     """Pairs x nv: 1 for degrees of freedom that move B only, -1 for A only, 0 for both and for none.
 
     Raises:

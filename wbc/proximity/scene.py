@@ -24,7 +24,7 @@ TRUST = 1e-5
 TIE = 1e-9
 
 
-class Scene:
+class PairScene:
     """Bodies and their pairs.
 
     Attributes:

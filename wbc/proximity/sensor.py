@@ -12,8 +12,8 @@ from wbc.errors import RangeError
 from wbc.proximity import native
 from wbc.proximity.body import OBSTACLE, Body, checked_pairs
 from wbc.proximity.native import NativeSensing
-from wbc.proximity.rows import Rows
-from wbc.proximity.scene import Scene
+from wbc.proximity.rows import PairRows
+from wbc.proximity.scene import PairScene
 from wbc.validation import Array
 
 if TYPE_CHECKING:
@@ -60,9 +60,9 @@ class PairSensor:
             raise RangeError("count", count, "expected an integer >= 1")
         if isinstance(corners, bool) or not isinstance(corners, int) or corners < 0:
             raise RangeError("corners", corners, "expected an integer >= 0")
-        scene = Scene(robot, checked, outside)
+        scene = PairScene(robot, checked, outside)
         self._names = [(a.name, b.name) for a, b in checked]
-        self._rows = Rows.of(scene, count, corners, numbers)
+        self._rows = PairRows.of(scene, count, corners, numbers)
         self._sensing = sensing(scene, self._rows)
         self.count, self._robot, self._shape = count, robot, (robot.nq,)
         self.reset()
@@ -99,7 +99,7 @@ class PairSensor:
         return tuple((*self._names[k], d) for k, d in rows if k >= 0)
 
 
-def sensing(scene: Scene, rows: Rows | None = None) -> NativeSensing | PlainSensing:
+def sensing(scene: PairScene, rows: PairRows | None = None) -> NativeSensing | PlainSensing:
     """What measures a scene: compiled where there is a compiler."""
     functions = native.library()
     if functions is not None:

@@ -11,7 +11,7 @@ import pinocchio as pin
 
 from wbc import validation
 from wbc.proximity.body import OBSTACLE, Body, checked_pairs
-from wbc.proximity.scene import Scene
+from wbc.proximity.scene import PairScene
 from wbc.proximity.sensor import sensing
 from wbc.validation import Array
 
@@ -68,7 +68,7 @@ def witnesses(robot: Robot, pairs: Sequence[tuple[Body, Body]], q: Any, pose: An
     where = pin.SE3.Identity() if pose is None else validation.pose("pose", pose)
     if not checked:
         return ()
-    found = sensing(Scene(robot, checked, outside))
+    found = sensing(PairScene(robot, checked, outside))
     found.measure(configuration, where)
     out = []
     for k in range(len(checked)):

@@ -12,9 +12,9 @@ if TYPE_CHECKING:
     from wbc.trajectory.jerk.between_states import jerk_limited
     from wbc.trajectory.jerk.online_filter import Online, online
     from wbc.trajectory.jerk.via_poses import via_points
-    from wbc.trajectory.laws.certificate import Certificate, Worst
+    from wbc.trajectory.laws.certificate import LawCertificate, Worst
     from wbc.trajectory.laws.law import Law, State, load
-    from wbc.trajectory.laws.limits import Limits
+    from wbc.trajectory.laws.limits import MotionLimits
     from wbc.trajectory.laws.plots import plot
     from wbc.trajectory.laws.timing import Timing
     from wbc.trajectory.least_time.time_optimal import time_optimal
@@ -26,14 +26,14 @@ if TYPE_CHECKING:
     from wbc.trajectory.paths.pose_paths import geodesic_path, pose_polyline, pose_spline
 else:
     # toppra, ruckig and matplotlib cost nothing until they are used
-    __getattr__ = lazy.attach(__name__, __file__)
+    __getattr__ = lazy.attach(__name__, __file__, {"Limits": "MotionLimits", "Certificate": "LawCertificate"})
 
 __all__ = [
-    "Certificate",
     "Followed",
     "FunctionPath",
     "Law",
-    "Limits",
+    "LawCertificate",
+    "MotionLimits",
     "Online",
     "Path",
     "PolynomialPath",

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import islice
 
-from wbc.analysis.algebra.branches import Branch, BranchArithmetic, unique
+from wbc.analysis.algebra.branches import BranchArithmetic, LocusBranch, unique
 from wbc.analysis.algebra.emptiness import proved_empty
 from wbc.analysis.algebra.half_angles import Factor, Factors, HalfAngles, Relation
 from wbc.analysis.algebra.minors import eliminated, maximal_minors, transposed
@@ -41,7 +41,7 @@ class Exact:
         self.branches = BranchArithmetic(self.half)
         self._real: dict[Relation, bool] = {}
 
-    def minors(self, matrix: Matrix, branch: Branch = Branch()) -> Minors:  # noqa: B008
+    def minors(self, matrix: Matrix, branch: LocusBranch = LocusBranch()) -> Minors:  # noqa: B008
         """Of a matrix with the values of a branch put in, after elimination of pivots that are numbers."""
         put = [[self.branches.put(p, branch) for p in row] for row in matrix]
         tall = put if len(put) >= len(put[0]) else transposed(put)
@@ -56,7 +56,7 @@ class Exact:
         full = any(p.is_constant() for p in found)
         return Minors(full, () if full else tuple(found))
 
-    def deficient(self, matrix: Matrix, branch: Branch) -> bool:
+    def deficient(self, matrix: Matrix, branch: LocusBranch) -> bool:
         """Whether the matrix is proved to be short of full rank on the whole branch."""
         found = self.minors(matrix, branch)
         return not found.full and all(self.branches.vanishes(p, branch) for p in found.polys)
@@ -70,7 +70,7 @@ class Exact:
                 break
         return min(tried, key=lambda item: _effort(item[1]))
 
-    def extended(self, branch: Branch, conditions: Iterable[Factor]) -> list[Branch]:
+    def extended(self, branch: LocusBranch, conditions: Iterable[Factor]) -> list[LocusBranch]:
         """The branch with each one of the conditions, where some configuration can satisfy it."""
         out = [child for c in conditions for child in self.branches.with_condition(branch, c)]
         return [child for child in unique(out) if all(self.may_vanish(r) for r in child.relations)]
@@ -86,7 +86,7 @@ class Exact:
             )
         return self._real[relation]
 
-    def real(self, branches: Iterable[Branch]) -> tuple[Branch, ...]:
+    def real(self, branches: Iterable[LocusBranch]) -> tuple[LocusBranch, ...]:
         """The branches without those whose relations are proved to have no real solution together."""
         return tuple(b for b in branches if len(b.relations) < 2 or not self._empty(b.relations))
 
@@ -94,9 +94,9 @@ class Exact:
         """Whether bounds prove it; long relations are left alone."""
         return sum(len(r.poly) for r in relations) <= TERMS and proved_empty(self.half, relations)
 
-    def without_redundant(self, branches: Iterable[Branch]) -> list[Branch]:
+    def without_redundant(self, branches: Iterable[LocusBranch]) -> list[LocusBranch]:
         """The branches without those that lie within another one, larger sets first."""
-        kept: list[Branch] = []
+        kept: list[LocusBranch] = []
         for branch in sorted(unique(map(self.branches.simplified, branches)), key=_order):
             if not any(self.branches.within(branch, other) for other in kept):
                 kept = [other for other in kept if not self.branches.within(other, branch)]
@@ -109,6 +109,6 @@ def _effort(factors: Factors) -> tuple[int, int]:
     return relations, len(factors.conditions)
 
 
-def _order(branch: Branch) -> tuple[object, ...]:
+def _order(branch: LocusBranch) -> tuple[object, ...]:
     values = tuple((v.joint, v.value is None, v.value or 0) for v in branch.values)
     return branch.codimension, len(branch.relations), values, tuple(r.key for r in branch.relations)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol
 
-from wbc.analysis.algebra.branches import Branch
+from wbc.analysis.algebra.branches import LocusBranch
 from wbc.analysis.algebra.deficiency import Exact
 
 
@@ -18,8 +18,8 @@ class Locus:
         open: branches that the budget left undecided; the locus may reach into them. Empty: the locus is complete.
     """
 
-    branches: tuple[Branch, ...]
-    open: tuple[Branch, ...] = ()
+    branches: tuple[LocusBranch, ...]
+    open: tuple[LocusBranch, ...] = ()
 
 
 class Located(Protocol):

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from math import gcd, lcm
 
-from wbc.analysis.algebra.branches import Branch
+from wbc.analysis.algebra.branches import LocusBranch
 from wbc.analysis.algebra.fourier import Term, fourier
 from wbc.analysis.algebra.half_angles import HalfAngles, HalfPoly, Relation, Value
 
@@ -148,14 +148,14 @@ class Notation:
         top, bottom = (self.form(p, degrees, common) for p in (above, below))
         return rf"\tan({angle}) = \frac{{{top}}}{{{bottom}}}" if self.latex else f"tan({angle}) = ({top}) / ({bottom})"
 
-    def branch(self, branch: Branch) -> str:
+    def branch(self, branch: LocusBranch) -> str:
         """The conditions, joined."""
         both = r" \wedge " if self.latex else " and "
         parts = [f"{self.label(v.joint)} = {self.value(v)}" for v in branch.values]
         parts += [self.relation(r) for r in branch.relations]
         return both.join(parts) or ("\\text{everywhere}" if self.latex else "everywhere")
 
-    def branches(self, branches: Iterable[Branch]) -> list[str]:
+    def branches(self, branches: Iterable[LocusBranch]) -> list[str]:
         """Branches with the values that a joint takes gathered: one line for q2 = -pi/2 and q2 = pi/2."""
         return [self._gathered(choice, relations) for choice, relations in gathered(branches)]
 
@@ -227,7 +227,7 @@ def coefficients(half: HalfAngles, relation: Relation, joint: int) -> list[HalfP
     return [half.ctx.from_dict(terms) for terms in out]
 
 
-def gathered(branches: Iterable[Branch]) -> list[tuple[dict[int, tuple[Value, ...]], tuple[Relation, ...]]]:
+def gathered(branches: Iterable[LocusBranch]) -> list[tuple[dict[int, tuple[Value, ...]], tuple[Relation, ...]]]:
     """Branches that differ in the value of one joint alone, put together as long as there are any."""
     sets: list[tuple[dict[int, tuple[Value, ...]], tuple[Relation, ...]]]
     sets = [({v.joint: (v,) for v in b.values}, b.relations) for b in branches]

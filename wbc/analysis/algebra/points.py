@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from flint import fmpz_poly
 
-from wbc.analysis.algebra.branches import Branch
+from wbc.analysis.algebra.branches import LocusBranch
 from wbc.analysis.algebra.half_angles import HalfAngles, HalfPoly, Relation, Value
 from wbc.analysis.algebra.notation import coefficients
 from wbc.validation import Array
@@ -68,8 +68,8 @@ def changes_sign(half: HalfAngles, relation: Relation) -> bool:
     """Whether a relation has both signs among some configurations, so that it has zeros; False proves nothing."""
     rng = np.random.default_rng(0)
     value = form_grid(half, relation, [rng.uniform(-pi, pi, SAMPLES) for _ in range(half.size)])
-    room = ZERO * float(np.abs(value).max())
-    return bool(value.min() < -room and value.max() > room)
+    tolerance = ZERO * float(np.abs(value).max())
+    return bool(value.min() < -tolerance and value.max() > tolerance)
 
 
 def form_value(half: HalfAngles, relation: Relation, q: Array) -> float:
@@ -101,12 +101,12 @@ def univariate_roots(half: HalfAngles, relation: Relation) -> tuple[float, ...]:
     for powers, number in relation.poly.terms():
         numbers[int(powers[joint])] = int(number)
     # Roots come with their powers, which the annotations of python-flint leave out
-    found: list[tuple[Any, int]] = fmpz_poly(numbers).complex_roots()  # type: ignore[assignment]
+    found: Any = fmpz_poly(numbers).complex_roots()
     roots = [float(r.real) for r, _ in found if r.imag == 0]
     return tuple(sorted(r if joint in half.ring.slides else 2.0 * atan(r) for r in roots))
 
 
-def real_point(half: HalfAngles, branch: Branch, rng: np.random.Generator) -> Array | None:
+def real_point(half: HalfAngles, branch: LocusBranch, rng: np.random.Generator) -> Array | None:
     """A random configuration on a branch, one number a joint, or None where this try found none."""
     q: Array = rng.uniform(-pi, pi, half.size)
     for value in branch.values:

@@ -17,7 +17,7 @@ from wbc.analysis.algebra.ring import Matrix
 from wbc.analysis.algebra.trig_form import TrigForm, trig_form, used_joints
 from wbc.analysis.certificates.block_proofs import block_proofs
 from wbc.analysis.certificates.boxes import BoxSearch, Counts
-from wbc.analysis.certificates.pieces import Pieces
+from wbc.analysis.certificates.pieces import BoxPieces
 from wbc.analysis.certificates.symmetry import Symmetry, fundamental_box, symmetries
 from wbc.analysis.certificates.weakest import NumericWitness, numeric_witness, peak, weakest
 from wbc.analysis.jacobians.jacobian import symbolic_jacobian
@@ -42,7 +42,7 @@ Progress = Callable[[float], None]
 
 
 @dataclass(frozen=True, eq=False)
-class Certificate:
+class RankCertificate:
     """What subdivision proved.
 
     Attributes:
@@ -77,7 +77,7 @@ def certify(
     state: str | os.PathLike[str] | None = None,
     progress: Progress | None = None,
     ended: Callable[[], bool] | None = None,
-) -> Certificate:
+) -> RankCertificate:
     """Completeness outside a tube around the task's singularities, by branch and bound over joint space:
 
         sigma_min(J_T(q)) >= eps  implies  rank J_R(q) = m,     eps = part * max sigma_min(J_T)
@@ -135,7 +135,7 @@ def certify(
         verdict = verdict if witness is None else INCOMPLETE
     tubed = counts.tube > 0
     cut, everywhere = used_joints(both) if tubed else chosen.joints, verdict == COMPLETE and not tubed
-    return Certificate(verdict, eps, highest, everywhere, counts, left, cut, len(found), pieces.seconds, witness)
+    return RankCertificate(verdict, eps, highest, everywhere, counts, left, cut, len(found), pieces.seconds, witness)
 
 
 def _task(task: Any) -> tuple[Rows, ...]:
@@ -152,10 +152,10 @@ def _means(workers: Any, state: Any, progress: Any, ended: Any) -> tuple[int, Pa
 
 def _without_boxes(
     verdict: str, began: float, eps: float = 0.0, highest: float = 0.0, witness: NumericWitness | None = None
-) -> Certificate:
+) -> RankCertificate:
     """What is known before subdivision."""
     done, seconds = verdict == COMPLETE, time.monotonic() - began
-    return Certificate(verdict, eps, highest, done, Counts(), 1.0 - done, (), 1, seconds, witness)
+    return RankCertificate(verdict, eps, highest, done, Counts(), 1.0 - done, (), 1, seconds, witness)
 
 
 def _matrices(model: ExactModel, task: tuple[Rows, ...], constraints: tuple[Rows, ...]) -> tuple[Matrix, Matrix]:
@@ -220,7 +220,7 @@ def _pieces(
     eps: float,
     found: Sequence[Symmetry],
     file: Path | None,
-) -> Pieces:
+) -> BoxPieces:
     """Joint space in boxes to be searched: halves along the joints of the augmented matrix in turn, shuffled."""
     augmented = proofs[-1][0]
     joints = used_joints(_both(augmented, task))
@@ -240,4 +240,4 @@ def _pieces(
         boxes = np.concatenate((low, high))
     forms = [form for proof in proofs for form in proof]
     order = np.random.default_rng(2).permutation(len(boxes))
-    return Pieces(search, boxes[order], file, (*forms, *_both(augmented, task)[1:]), eps)
+    return BoxPieces(search, boxes[order], file, (*forms, *_both(augmented, task)[1:]), eps)

@@ -28,7 +28,7 @@ _TURN, _SAVE = 0.3, 20.0
 _Done: TypeAlias = tuple[Counts, Array, Array]
 
 
-class Pieces:
+class BoxPieces:
     """Boxes that wait, and what became of the others.
 
     Attributes:

@@ -9,7 +9,7 @@ from types import TracebackType
 from typing import TypeAlias
 
 from wbc import validation
-from wbc.analysis.algebra.branches import Branch
+from wbc.analysis.algebra.branches import LocusBranch
 from wbc.analysis.algebra.deficiency import Exact
 from wbc.analysis.algebra.locus import Locus
 from wbc.analysis.algebra.ring import Matrix
@@ -48,8 +48,8 @@ class Loci:
     exact: Exact
     augmented: SymbolicJacobian
     locus: Locus
-    algorithmic: tuple[Branch, ...]
-    doubtful: tuple[Branch, ...]
+    algorithmic: tuple[LocusBranch, ...]
+    doubtful: tuple[LocusBranch, ...]
 
     @property
     def verdict(self) -> str:
@@ -102,7 +102,7 @@ class LocusSearch:
         """What is known now; ends the search."""
         self._child.stop()
         told = self._child.told
-        locus = next((what for what in reversed(told) if isinstance(what, Locus)), Locus((), (Branch(),)))
+        locus = next((what for what in reversed(told) if isinstance(what, Locus)), Locus((), (LocusBranch(),)))
         deficient = {branch for branch, lost in (what for what in told if isinstance(what, tuple)) if lost}
         kept, doubtful = (tuple(b for b in some if b not in deficient) for some in (locus.branches, locus.open))
         return Loci(self._exact, self.augmented, locus, kept, doubtful)

@@ -10,7 +10,7 @@ import numpy as np
 import pinocchio as pin
 
 from wbc import style
-from wbc.analysis.algebra.branches import Branch
+from wbc.analysis.algebra.branches import LocusBranch
 from wbc.analysis.algebra.locus import Located
 from wbc.analysis.algebra.notation import Notation
 from wbc.analysis.algebra.points import angle, form_grid, real_point
@@ -58,9 +58,9 @@ def save_pictures(model: ExactModel, found: Located, folder: Path, name: str) ->
     return files
 
 
-def _groups(found: Located) -> list[tuple[str, list[Branch]]]:
+def _groups(found: Located) -> list[tuple[str, list[LocusBranch]]]:
     """Lines of the text and the branches of each: those with conditions on the same joints."""
-    kinds: dict[tuple[object, ...], list[Branch]] = {}
+    kinds: dict[tuple[object, ...], list[LocusBranch]] = {}
     for branch in found.locus.branches:
         key = (tuple(v.joint for v in branch.values), tuple(r.joints for r in branch.relations))
         kinds.setdefault(key, []).append(branch)
@@ -81,14 +81,14 @@ def _joints(found: Located) -> list[int]:
     return sorted(chosen)
 
 
-def _points(found: Located, branches: list[Branch], count: int) -> Array:
+def _points(found: Located, branches: list[LocusBranch], count: int) -> Array:
     rng = np.random.default_rng(0)
     tries = (real_point(found.exact.half, b, rng) for b in branches for _ in range(count))
     points = [p for p in tries if p is not None]
     return np.array(points).reshape(-1, found.exact.half.size)
 
 
-def _locus(plt: Any, model: ExactModel, found: Located, groups: list[tuple[str, list[Branch]]]) -> Any:
+def _locus(plt: Any, model: ExactModel, found: Located, groups: list[tuple[str, list[LocusBranch]]]) -> Any:
     joints = _joints(found)
     notation = Notation(found.exact.half)
     solid = len(joints) == 3
@@ -131,7 +131,7 @@ def _plane(axes: Any, across: int, at: float, colour: str) -> None:
     axes.plot_surface(*sides, color=colour, alpha=0.3, edgecolor=colour)
 
 
-def _relation(found: Located, branch: Branch, joints: list[int], ticks: Array) -> Array:
+def _relation(found: Located, branch: LocusBranch, joints: list[int], ticks: Array) -> Array:
     """The relation of a branch on a grid of some joints; it has no others."""
     grid = np.meshgrid(*[ticks] * len(joints), indexing="ij")
     q = [np.zeros_like(grid[0])] * found.exact.half.size
@@ -140,7 +140,7 @@ def _relation(found: Located, branch: Branch, joints: list[int], ticks: Array) -
     return form_grid(found.exact.half, branch.relations[0], q)
 
 
-def _surface(axes: Any, found: Located, branch: Branch, joints: list[int], colour: str) -> None:
+def _surface(axes: Any, found: Located, branch: LocusBranch, joints: list[int], colour: str) -> None:
     ticks = np.linspace(-np.pi, np.pi, _GRID)
     triangles = zero_surface(_relation(found, branch, joints, ticks), ticks)
     if len(triangles):
@@ -149,12 +149,12 @@ def _surface(axes: Any, found: Located, branch: Branch, joints: list[int], colou
         axes.plot_trisurf(*vertices[:, :2].T, vertices[:, 2], triangles=rows, color=colour, alpha=0.55)
 
 
-def _curve(axes: Any, found: Located, branch: Branch, joints: list[int], colour: str) -> None:
+def _curve(axes: Any, found: Located, branch: LocusBranch, joints: list[int], colour: str) -> None:
     ticks = np.linspace(-np.pi, np.pi, _FINE)
     axes.contour(ticks, ticks, _relation(found, branch, joints, ticks).T, levels=[0.0], colors=[colour])
 
 
-def _poses(plt: Any, model: ExactModel, found: Located, groups: list[tuple[str, list[Branch]]]) -> Any:
+def _poses(plt: Any, model: ExactModel, found: Located, groups: list[tuple[str, list[LocusBranch]]]) -> Any:
     columns = min(3, len(groups))
     figure = plt.figure(figsize=(4.6 * columns, 4.6 * -(-len(groups) // columns)))
     for place, (text, branches) in enumerate(groups, start=1):

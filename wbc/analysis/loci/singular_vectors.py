@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from itertools import combinations
 
-from wbc.analysis.algebra.branches import Branch, unique
+from wbc.analysis.algebra.branches import LocusBranch, unique
 from wbc.analysis.algebra.deficiency import Exact
 from wbc.analysis.algebra.locus import Locus
 from wbc.analysis.algebra.minors import determinant, eliminated, maximal_minors, transposed
@@ -62,18 +62,18 @@ class _Search:
     exact: Exact
     budget: Budget
     told: Callable[[Locus], None] | None
-    open: list[Branch] = field(default_factory=list)
+    open: list[LocusBranch] = field(default_factory=list)
     depth: int = 0
 
-    def started(self, matrix: Matrix) -> list[Branch]:
+    def started(self, matrix: Matrix) -> list[LocusBranch]:
         """The branches of the locus of a wide matrix."""
         try:
-            return self.locus(matrix, Branch(), [])
+            return self.locus(matrix, LocusBranch(), [])
         except KeyboardInterrupt:
-            self.open = [Branch()]
+            self.open = [LocusBranch()]
             return []
 
-    def locus(self, matrix: Matrix, parent: Branch, known: list[Branch]) -> list[Branch]:
+    def locus(self, matrix: Matrix, parent: LocusBranch, known: list[LocusBranch]) -> list[LocusBranch]:
         """Branches within ``parent`` where a wide matrix is deficient; those within ``known`` may be missing."""
         exact = self.exact
         put = [[exact.branches.put(p, parent) for p in row] for row in matrix]
@@ -99,10 +99,10 @@ class _Search:
         sorted_columns = [[row[j] for j in (*chosen, *others)] for row in here]
         return self._accepted(sorted_columns, waiting, known)
 
-    def _accepted(self, matrix: Matrix, waiting: list[Branch], known: list[Branch]) -> list[Branch]:
+    def _accepted(self, matrix: Matrix, waiting: list[LocusBranch], known: list[LocusBranch]) -> list[LocusBranch]:
         """Of branches on which the square part, the first columns, is deficient those parts where the matrix is."""
-        accepted: list[Branch] = []
-        seen: set[Branch] = set()
+        accepted: list[LocusBranch] = []
+        seen: set[LocusBranch] = set()
         self.depth += 1
         while waiting:
             waiting.sort(key=lambda b: (-b.codimension, -b.terms))
@@ -126,7 +126,9 @@ class _Search:
         self.depth -= 1
         return self.exact.without_redundant(accepted)
 
-    def _on_branch(self, matrix: Matrix, branch: Branch, known: list[Branch]) -> tuple[list[Branch], list[Branch]]:
+    def _on_branch(
+        self, matrix: Matrix, branch: LocusBranch, known: list[LocusBranch]
+    ) -> tuple[list[LocusBranch], list[LocusBranch]]:
         """(branches where the whole matrix may be deficient, branches where the square part loses more rank)."""
         exact, n = self.exact, len(matrix)
         put = [[exact.branches.put(p, branch) for p in row] for row in matrix]
@@ -147,7 +149,7 @@ class _Search:
         return self.locus(product, branch, known), deeper
 
 
-def _largest_block(exact: Exact, square: Matrix, branch: Branch) -> _Block:
+def _largest_block(exact: Exact, square: Matrix, branch: LocusBranch) -> _Block:
     """A block as large as the rank on the branch; of several the one with the shortest determinant."""
     for size in range(len(square) - 1, 0, -1):
         blocks: list[_Block] = []

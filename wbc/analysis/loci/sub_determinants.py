@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from wbc.analysis.algebra.branches import Branch, unique
+from wbc.analysis.algebra.branches import LocusBranch, unique
 from wbc.analysis.algebra.deficiency import Exact
 from wbc.analysis.algebra.locus import Locus
 from wbc.analysis.algebra.ring import Matrix
@@ -30,9 +30,9 @@ def sub_determinant_locus(
     Source: E. Dupuis, PhD thesis, McGill University, 2001, section 3.6.
     """
     budget = budget or Budget()
-    accepted: list[Branch] = []
-    seen: set[Branch] = set()
-    waiting = [Branch()]
+    accepted: list[LocusBranch] = []
+    seen: set[LocusBranch] = set()
+    waiting = [LocusBranch()]
     while waiting:
         branch = waiting[-1]
         if branch in seen or any(exact.branches.within(branch, known) for known in accepted):
@@ -56,7 +56,7 @@ def sub_determinant_locus(
     return Locus(tuple(exact.without_redundant(accepted)), tuple(unique(waiting)))
 
 
-def _children(exact: Exact, matrix: Matrix, branch: Branch) -> list[Branch] | None:
+def _children(exact: Exact, matrix: Matrix, branch: LocusBranch) -> list[LocusBranch] | None:
     """Branches within one to go on with; None: the matrix is deficient on all of it."""
     minors = exact.minors(matrix, branch)
     if minors.full:

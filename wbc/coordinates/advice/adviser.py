@@ -61,7 +61,7 @@ class Advice:
         pair: its name. sigma: least singular value of the scaled rows of task and constraint; task, constraint: of
             either alone. condition: see :class:`Condition`.
         distance: to the nearest locus, in the space of joints [rad, part of the arm's length for sliding ones]; basis:
-            what it is. direction: direction * distance is the way there [nv]. locus: the exact one as text, or empty.
+            what it is. direction: direction * distance leads there [nv]. locus: the exact one as text, or empty.
     """
 
     pair: str
@@ -257,11 +257,11 @@ class Adviser:
         guess = sigma / steep if steep > 0.0 else (0.0 if sigma == 0.0 else np.inf)
         found = known.nearest(q) if known is not None else None
         if found is not None:
-            place, way = found
-            away = abs(way) / float(scale[place.dof])
+            place, distance = found
+            away = abs(distance) / float(scale[place.dof])
             if away <= guess:
                 direction = np.zeros(self.robot.nv)
-                direction[place.dof] = np.sign(way) * scale[place.dof]
+                direction[place.dof] = np.sign(distance) * scale[place.dof]
                 return away, Basis.EXACT, direction, str(place)
         direction = -along / steep * scale if steep > 0.0 else np.zeros(self.robot.nv)
         return guess, Basis.FIRST_ORDER, direction, ""

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from math import pi
+from typing import Any
 
 import numpy as np
 
@@ -128,7 +129,8 @@ def _hunted(screen: Conditioning, group: int, states: Array, sigma: Array, usual
 
 def _certified(robot: Robot, task: tuple[Coordinate, ...], subset: tuple[Coordinate, ...]) -> str:
     """The verdict of exact analysis; ``screened`` where it does not take the rows or the robot."""
+    rows: Any = (task, subset)  # those that it does not take are refused
     try:
-        return analyse(ExactModel(robot), task, subset).verdict  # type: ignore[arg-type]
+        return analyse(ExactModel(robot), *rows).verdict
     except WbcError:
         return SCREENED

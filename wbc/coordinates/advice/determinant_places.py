@@ -15,11 +15,11 @@ from typing import TypeAlias
 from wbc import validation
 from wbc.analysis import (
     BodyRows,
-    Branch,
     Exact,
     ExactModel,
     JointBlock,
     JointRows,
+    LocusBranch,
     Notation,
     PitchPlaneRows,
     Relation,
@@ -57,7 +57,7 @@ class Place:
     value: float
     turning: bool
 
-    def way(self, q: Array) -> float:
+    def distance(self, q: Array) -> float:
         """How far the joint is to go, with its sign; every joint has one coordinate."""
         off = self.value - float(q[self.dof])
         return math.remainder(off, 2.0 * math.pi) if self.turning else off
@@ -77,7 +77,7 @@ class ClosedForm:
 
     places: tuple[Place, ...]
     always: bool = False
-    branches: tuple[Branch, ...] = ()
+    branches: tuple[LocusBranch, ...] = ()
     exact: Exact | None = None
 
     @cached_property
@@ -93,13 +93,13 @@ class ClosedForm:
         return (*Notation(self.exact.half).branches(short), *(f"a relation of {n} terms = 0" for n in counted))
 
     def nearest(self, q: Array) -> tuple[Place, float] | None:
-        """The nearest place and the way to it, or None where there is none."""
+        """The nearest place and the distance to it, or None where there is none."""
         if self.places:
             q = validation.ordinary_array("q", q)
             least = 1 + max(place.dof for place in self.places)
             if q.ndim != 1 or len(q) < least:
                 raise ShapeError("q", q, f"expected {least} numbers or more, one a joint")
-        found = [(place, place.way(q)) for place in self.places]
+        found = [(place, place.distance(q)) for place in self.places]
         return min(found, key=lambda item: abs(item[1]), default=None)
 
 
@@ -148,7 +148,7 @@ def _factored(robot: Robot, block: JointBlock) -> ClosedForm | None:
         return ClosedForm((), always=True)
     values = [f for f, _ in factors.conditions if isinstance(f, Value)]
     relations = [f for f, _ in factors.conditions if isinstance(f, Relation) and _vanishes(rings, f)]
-    branches = [Branch(values=(v,)) for v in values] + [Branch(relations=(r,)) for r in relations]
+    branches = [LocusBranch(values=(v,)) for v in values] + [LocusBranch(relations=(r,)) for r in relations]
     return ClosedForm(tuple(_place(robot, model, v) for v in values), branches=tuple(branches), exact=rings)
 
 

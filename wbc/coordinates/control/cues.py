@@ -1,4 +1,4 @@
-"""What an operator is told of a motion with more rows than joints: which part of a command can be met, and where."""
+"""What an operator sees of a motion with more rows than joints: which part of a command can be met, and where."""
 
 from __future__ import annotations
 

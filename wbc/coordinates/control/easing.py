@@ -72,7 +72,7 @@ class Easing:
         self._least = LeastSingular(native=native)
         usual = np.array([self._scales * rates.whole(q) for q in states_of(robot, STATES)])
         self._parts = {pair.name: self._part(robot, pair, rows, length, usual) for pair in pairs}
-        #: The pair, the matrix of all coordinates and the room of the singular value looked at last
+        #: The pair, the matrix of all coordinates and the interval of the singular value looked at last
         self._name, self._room = "", 0.0
         self._matrix, self._change = np.zeros_like(self._scales), np.zeros_like(self._scales)
         self._flat = self._change.ravel()

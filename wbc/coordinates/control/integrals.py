@@ -1,4 +1,4 @@
-"""Integrals of rates that are the derivative of nothing, along the way that the robot goes: what drift is for them."""
+"""Integrals of rates that are the derivative of nothing, along the robot's path: what drift is for them."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ Rows: TypeAlias = NDArray[np.intp]
 
 
 class RateIntegrals:
-    """How far coordinates have gone on the way from configuration to configuration, less what they were to go:
+    """How far coordinates have gone on the path from configuration to configuration, less what they were to go:
 
         off = int A(q) dq - int rate dt                                      [m, rad]
 
     by the trapezoidal rule on the geodesic between two ticks: (A(q0) + A(q1)) / 2 times the step. The pitch plane's
     rate alpha, beta, gamma, rotation about an axis and parts of a rotation have no other drift than this one, which
-    depends on the way.
+    depends on the path.
 
     Attributes:
         masked: coordinates with rows that are rates only; only these count. off: see above, one number a row of all
@@ -62,7 +62,7 @@ class RateIntegrals:
         self.rows = np.intersect1d(self.rows, rows)
 
     def advance(self, q: Array, every: Array) -> None:
-        """The robot is at ``q`` now, on the shortest way from where it was; ``every``: A(q) of all coordinates."""
+        """The robot is at ``q`` now, on the shortest path from where it was; ``every``: A(q) of all coordinates."""
         rows = self.rows
         if self._q is not None:
             step = q - self._q if self._plain else pin.difference(self._model, self._q, q)

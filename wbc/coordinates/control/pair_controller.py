@@ -23,7 +23,7 @@ from wbc.tasks import Item
 from wbc.validation import Array
 
 #: A blend's acceleration is at most this part of a joint's limit
-ROOM = 0.8
+SHARE = 0.8
 
 
 class PairController:
@@ -36,7 +36,7 @@ class PairController:
         control.switch("second")
 
     **Held rows** have rate zero, or the one given to :meth:`prescribe`, exactly; drift from where they came to rest is
-    taken back, for rates without an integral (alpha, beta, gamma) the drift along the way that the robot went. Of
+    taken back, for rates without an integral (alpha, beta, gamma) the drift along the path that the robot took. Of
     those, commanded ones follow their integral, too. **Near a locus** of the active pair the task gives way, see
     :class:`wbc.coordinates.control.easing.Easing`.
 
@@ -50,7 +50,7 @@ class PairController:
 
     Attributes:
         declared: the pairs' stack. controller: its compiled controller.
-        active: name of the active pair. blending: whether a switch is under way.
+        active: name of the active pair. blending: whether a switch is going on.
     """
 
     def __init__(
@@ -296,4 +296,4 @@ class PairController:
         change = np.abs(np.linalg.lstsq(every[rows], self._command[rows], rcond=1e-6)[0] - v)
         limit = self.robot.limits.acceleration
         slow = np.isfinite(limit) & (limit > 0.0)
-        return float((1.5 * change[slow] / (ROOM * limit[slow])).max(initial=0.0))
+        return float((1.5 * change[slow] / (SHARE * limit[slow])).max(initial=0.0))

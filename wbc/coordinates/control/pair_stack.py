@@ -1,4 +1,4 @@
-"""One stack for several pairs: every coordinate once as a wish and once as an equality, switched at run time."""
+"""One stack for several pairs: every coordinate once as a task and once as an equality, switched at run time."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def pair_stack(
 
     Args:
         dt: time between commands [s].
-        items: further constraints (obstacles, boxes) or wishes. limits: keep the joint limits, in the order of
+        items: further constraints (obstacles, boxes) or tasks. limits: keep the joint limits, in the order of
             sacrifice before what is held; False: those of the rates only, without which a step beside a locus would
             leave what it is linear for.
         gain: how fast drift of what is held decays [1/s]; default: half of it in one step.

@@ -55,6 +55,6 @@ def _inside(robot: Robot, q: Array) -> bool:
     x = q[where[known]]
     low, high = robot.limits.position_lower[known], robot.limits.position_upper[known]
     both = np.isfinite(low) & np.isfinite(high)
-    room = np.where(both, MARGIN * (np.where(both, high, 0.0) - np.where(both, low, 0.0)), 0.0)
+    margin = np.where(both, MARGIN * (np.where(both, high, 0.0) - np.where(both, low, 0.0)), 0.0)
     free = np.arange(robot.nv)[known] >= robot.base_nv
-    return bool(((x >= low + room) & (x <= high - room) | ~free).all())
+    return bool(((x >= low + margin) & (x <= high - margin) | ~free).all())

@@ -27,7 +27,7 @@ from wbc.validation import Array
 
 #: Intervals of the first look, and rounds of setting samples closer at most
 FIRST, ROUNDS = 64, 40
-#: A joint goes this far at most [rad, m]: the way is sampled closely all along
+#: A joint goes this far at most [rad, m]: the path is sampled closely all along
 FARTHEST = 1e3
 #: Functions of rows that are kept
 KEPT = 64
@@ -56,7 +56,7 @@ class Leg:
 
 @dataclass(frozen=True, eq=False)
 class CarriedMotion:
-    """A motion q(t) from q0 to q1 on the straight way, and the legs that carry it one after another.
+    """A motion q(t) from q0 to q1 on the straight path, and the legs that carry it one after another.
 
     Attributes:
         robot, q0, q1, seconds: as given. velocity: constant rates of the joints [nv]. legs: in order of time.
@@ -124,7 +124,7 @@ def carry(
     as they can be, so changes are as few as the pairs allow. Where no given pair is regular, one is made of single
     system coordinates, of the last body's first.
 
-    A pair counts between two samples of the way if its scaled rows change by less than half of its least singular
+    A pair counts between two samples of the path if its scaled rows change by less than half of its least singular
     value at both (from one matrix to another no singular value changes by more than the norm of the difference, H.
     Weyl, 1912); if that is at least ``share`` of the best given pair's; and at least 0.01 of that of the system
     Jacobian, which is never zero. Samples are set closer until one does.
@@ -155,7 +155,7 @@ def carry(
 
 
 class _Search:
-    """Candidates along the way; rows of all of them come from one function."""
+    """Candidates along the path; rows of all of them come from one function."""
 
     def __init__(self, robot: Robot, q0: Array, step: Array, pairs: Sequence[CoordinatePair], share: float) -> None:
         self._robot, self._q0, self.step, self._share = robot, q0, step, share
@@ -185,7 +185,7 @@ class _Search:
             if low:
                 self._make(middles[low[len(low) // 2]])
             grid = sorted({*grid, *middles.values()})
-        raise RangeError("q1", self._q0.tolist(), "the way is too long or too wild to be looked at")
+        raise RangeError("q1", self._q0.tolist(), "the path is too long, or changes too fast, to be examined")
 
     def _matrix(self, s: float) -> Array:
         found = self._kept.get(s)

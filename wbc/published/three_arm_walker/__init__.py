@@ -6,9 +6,9 @@ there and the listing is the default. What neither prints is :class:`Calibration
 
 from __future__ import annotations
 
-from wbc.published.three_arm_walker.calibration import Calibration
-from wbc.published.three_arm_walker.record import Log
-from wbc.published.three_arm_walker.supervisor import Outcome
+from wbc.published.three_arm_walker.machine.calibration import Calibration
+from wbc.published.three_arm_walker.record import PublishedLog
+from wbc.published.three_arm_walker.supervisor import PublishedOutcome
 from wbc.published.three_arm_walker.walker import PublishedWalker
 
-__all__ = ["Calibration", "Log", "Outcome", "PublishedWalker"]
+__all__ = ["Calibration", "PublishedLog", "PublishedOutcome", "PublishedWalker"]

@@ -14,21 +14,21 @@ from typing import Protocol
 
 import numpy as np
 
-from wbc.published.three_arm_walker.body import moved
-from wbc.published.three_arm_walker.gait import Gait
-from wbc.published.three_arm_walker.grid import Place
-from wbc.published.three_arm_walker.motion import Motion
-from wbc.published.three_arm_walker.plant import Fault, Order, Plant
+from wbc.published.three_arm_walker.gait.gait import Gait
+from wbc.published.three_arm_walker.machine.body import moved
+from wbc.published.three_arm_walker.machine.grid import Place
+from wbc.published.three_arm_walker.machine.motion import BodyMotion
+from wbc.published.three_arm_walker.machine.plant import CycleCommand, Fault, Plant
 from wbc.validation import Array
 
 
-class ArmTask(Protocol):
+class ArmMotion(Protocol):
     """A sub-mode of arm control."""
 
     def start(self, gait: Gait, plant: Plant) -> None:
         """The arm lets go."""
 
-    def step(self, gait: Gait, plant: Plant) -> Order | Fault | None:
+    def step(self, gait: Gait, plant: Plant) -> CycleCommand | Fault | None:
         """What the arms do in this cycle; None once it is done."""
 
 
@@ -41,7 +41,7 @@ class Handhold:
     def start(self, gait: Gait, plant: Plant) -> None:
         gait.start(self.arm, gait.swing(self.arm, plant, self.place), self.place)
 
-    def step(self, gait: Gait, plant: Plant) -> Order | Fault | None:
+    def step(self, gait: Gait, plant: Plant) -> CycleCommand | Fault | None:
         command = gait.track(self.arm, plant)
         if gait.supporting[self.arm]:
             return None
@@ -55,10 +55,10 @@ class Destination:
         self.arm, self.poses = arm, list(poses)
 
     def start(self, gait: Gait, plant: Plant) -> None:
-        motion = Motion([plant.hands[self.arm], *self.poses], gait.calibration)
+        motion = BodyMotion([plant.hands[self.arm], *self.poses], gait.calibration)
         gait.start(self.arm, motion, None)
 
-    def step(self, gait: Gait, plant: Plant) -> Order | Fault | None:
+    def step(self, gait: Gait, plant: Plant) -> CycleCommand | Fault | None:
         command = gait.track(self.arm, plant)
         if gait.arrived:
             return None
@@ -74,12 +74,12 @@ class Velocity:
     def start(self, gait: Gait, plant: Plant) -> None:
         gait.start(self.arm, None, None)
 
-    def step(self, gait: Gait, plant: Plant) -> Order | Fault | None:
+    def step(self, gait: Gait, plant: Plant) -> CycleCommand | Fault | None:
         twist = np.asarray(self.given(gait.time), dtype=float)
         joint = plant.place(self.arm, moved(plant.hands[self.arm], twist))
         return gait.order(self.arm, twist) if joint is None else Fault(joint, self.arm + 1)
 
 
-def _tracked(gait: Gait, arm: int, order: Order) -> Order | Fault:
+def _tracked(gait: Gait, arm: int, order: CycleCommand) -> CycleCommand | Fault:
     """The order, or the joint that keeps an ideally tracked hand from its motion."""
     return order if gait.blocked is None else Fault(gait.blocked, arm + 1)

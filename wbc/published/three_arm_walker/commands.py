@@ -11,7 +11,7 @@ from typing import Protocol
 
 import numpy as np
 
-from wbc.published.three_arm_walker.motion import CYCLE
+from wbc.published.three_arm_walker.machine.motion import CYCLE
 from wbc.validation import Array
 
 #: Largest rates of destination control: T and A [grid units/s], heading [rad/s]

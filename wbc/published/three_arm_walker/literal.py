@@ -12,14 +12,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from wbc.published.three_arm_walker.arm import START, forward, joint_beyond
-from wbc.published.three_arm_walker.calibration import Calibration, Variant
-from wbc.published.three_arm_walker.motion import CYCLE
-from wbc.published.three_arm_walker.plant import Fault, Order
-from wbc.published.three_arm_walker.rates import joint_rates, saturated
-from wbc.published.three_arm_walker.reach import ARMS, Shoulders
-from wbc.published.three_arm_walker.rigid import cross, inverse
-from wbc.published.three_arm_walker.tracking import pose_error
+from wbc.published.three_arm_walker.gait.tracking import pose_error
+from wbc.published.three_arm_walker.machine.arm import START, forward, joint_beyond
+from wbc.published.three_arm_walker.machine.calibration import Calibration, Variant
+from wbc.published.three_arm_walker.machine.motion import CYCLE
+from wbc.published.three_arm_walker.machine.plant import CycleCommand, Fault
+from wbc.published.three_arm_walker.machine.rates import joint_rates, saturated
+from wbc.published.three_arm_walker.machine.reach import ARMS, Shoulders
+from wbc.published.three_arm_walker.machine.rigid import cross, inverse
 from wbc.validation import Array
 
 
@@ -50,7 +50,7 @@ class LiteralPlant:
         """Hands are where their joints put them."""
         return None
 
-    def move(self, twist: Array, order: Order) -> Fault | None:
+    def move(self, twist: Array, order: CycleCommand) -> Fault | None:
         hands = self.hands
         for arm in range(ARMS):
             self._latch(arm, order.supporting[arm], hands[arm])

@@ -7,16 +7,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from wbc.published.three_arm_walker.gait import Gait
-from wbc.published.three_arm_walker.grid import INCH, PITCH, STEP
-from wbc.published.three_arm_walker.motion import RATE
-from wbc.published.three_arm_walker.plant import Plant
-from wbc.published.three_arm_walker.reach import ARMS
+from wbc.published.three_arm_walker.gait.gait import Gait
+from wbc.published.three_arm_walker.machine.grid import INCH, PITCH, STEP
+from wbc.published.three_arm_walker.machine.motion import RATE
+from wbc.published.three_arm_walker.machine.plant import Plant
+from wbc.published.three_arm_walker.machine.reach import ARMS
 from wbc.validation import Array
 
 
 @dataclass(frozen=True, eq=False)
-class Log:
+class PublishedLog:
     """n cycles of 0.1 s, each as it begins.
 
     Attributes:
@@ -32,12 +32,12 @@ class Log:
     places: NDArray[np.int64]
     commands: Array
 
-    def part(self, rows: slice) -> Log:
+    def part(self, rows: slice) -> PublishedLog:
         """Some of its cycles."""
-        return Log(*(getattr(self, name)[rows] for name in self.__dataclass_fields__))
+        return PublishedLog(*(getattr(self, name)[rows] for name in self.__dataclass_fields__))
 
 
-class Recorder:
+class WalkerRecorder:
     """Cycles in the source's units, collected."""
 
     def __init__(self) -> None:
@@ -48,7 +48,7 @@ class Recorder:
         places = [place or (0, 0) for place in gait.places]
         self.rows.append((plant.body.copy(), plant.hands.copy(), list(gait.supporting), places, rates))
 
-    def log(self) -> Log:
+    def log(self) -> PublishedLog:
         """All cycles."""
         n = len(self.rows)
         bodies = np.array([row[0] for row in self.rows]).reshape(n, 4, 4)
@@ -58,7 +58,7 @@ class Recorder:
         commands[:, 1] *= PITCH * INCH
         for poses in (bodies, hands):
             poses[..., :3, 3] *= INCH
-        return Log(
+        return PublishedLog(
             np.asarray(np.arange(n) / RATE),
             bodies,
             hands,

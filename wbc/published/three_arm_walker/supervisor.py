@@ -17,16 +17,16 @@ from typing import Literal
 
 import numpy as np
 
-from wbc.published.three_arm_walker.arm_control import ArmTask
-from wbc.published.three_arm_walker.body import body_place, body_twist
+from wbc.published.three_arm_walker.arm_control import ArmMotion
 from wbc.published.three_arm_walker.commands import Command
-from wbc.published.three_arm_walker.gait import LATE, Gait, Lift
-from wbc.published.three_arm_walker.grid import Place
-from wbc.published.three_arm_walker.holds import handholds
-from wbc.published.three_arm_walker.motion import CYCLE
-from wbc.published.three_arm_walker.plant import Fault, Plant
-from wbc.published.three_arm_walker.reach import ARMS, INNER, View
-from wbc.published.three_arm_walker.record import Recorder
+from wbc.published.three_arm_walker.gait.gait import LATE, Gait, Lift
+from wbc.published.three_arm_walker.gait.holds import handholds
+from wbc.published.three_arm_walker.machine.body import body_place, body_twist
+from wbc.published.three_arm_walker.machine.grid import Place
+from wbc.published.three_arm_walker.machine.motion import CYCLE
+from wbc.published.three_arm_walker.machine.plant import Fault, Plant
+from wbc.published.three_arm_walker.machine.reach import ARMS, INNER, View
+from wbc.published.three_arm_walker.record import WalkerRecorder
 from wbc.validation import Array
 
 Reason = Literal["key", "time", "reached", "limits", "no hold"]
@@ -36,7 +36,7 @@ Key = Callable[[float, Array], bool]
 
 
 @dataclass(frozen=True)
-class Outcome:
+class PublishedOutcome:
     """How a mode ended.
 
     Attributes:
@@ -63,14 +63,14 @@ class Supervisor:
 
     def __init__(self, gait: Gait, plant: Plant) -> None:
         self.gait, self.plant = gait, plant
-        self.recorder = Recorder()
+        self.recorder = WalkerRecorder()
 
     @property
     def place(self) -> Array:
         """(T, A, heading [rad]) of the body."""
         return np.array(body_place(self.plant.body))
 
-    def walk(self, command: Command, key: Key, duration: float = np.inf) -> Outcome:
+    def walk(self, command: Command, key: Key, duration: float = np.inf) -> PublishedOutcome:
         """A mode of walking, until it ends by itself, by key, or by time [s]."""
 
         def cycle(place: Array) -> Fault | Reason | None:
@@ -83,7 +83,7 @@ class Supervisor:
 
         return self._mode(cycle, key, duration)
 
-    def control_arm(self, task: ArmTask, key: Key, duration: float = np.inf) -> Outcome:
+    def control_arm(self, task: ArmMotion, key: Key, duration: float = np.inf) -> PublishedOutcome:
         """Arm control with the body standing, until the arm is done, by key, or by time [s]."""
         started = False
 
@@ -136,7 +136,7 @@ class Supervisor:
         column, row = found[int(np.hypot(*(found - target).T).argmin())]
         return int(column), int(row)
 
-    def _mode(self, cycle: Callable[[Array], Fault | Reason | None], key: Key, duration: float) -> Outcome:
+    def _mode(self, cycle: Callable[[Array], Fault | Reason | None], key: Key, duration: float) -> PublishedOutcome:
         fault = self.set_down()
         self.gait.restart()
         first = len(self.recorder.rows)
@@ -158,7 +158,7 @@ class Supervisor:
                 return self._ended(result, "TERMINAL POSITION REACHED", first)
             self.gait.cycle += 1
 
-    def _ended(self, reason: Reason, message: str, first: int, fault: Fault | None = None) -> Outcome:
+    def _ended(self, reason: Reason, message: str, first: int, fault: Fault | None = None) -> PublishedOutcome:
         """The mode's outcome, all arms being set down."""
         gait = self.gait
         time, rows = gait.time, slice(first, len(self.recorder.rows))
@@ -166,7 +166,7 @@ class Supervisor:
         arm = gait.in_air if reason == "no hold" else None if fault is None else fault.arm - 1
         if reason != "no hold":
             self.set_down()
-        return Outcome(
+        return PublishedOutcome(
             reason,
             time,
             message,

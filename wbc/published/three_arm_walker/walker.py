@@ -9,18 +9,28 @@ import numpy as np
 
 from wbc import validation
 from wbc.errors import RangeError, ShapeError
-from wbc.published.three_arm_walker.arm_control import ArmTask, Destination, Handhold, Velocity
-from wbc.published.three_arm_walker.body import moved
-from wbc.published.three_arm_walker.calibration import Calibration, Variant
+from wbc.published.three_arm_walker.arm_control import ArmMotion, Destination, Handhold, Velocity
 from wbc.published.three_arm_walker.commands import DestinationCommand, VelocityCommand, joystick
-from wbc.published.three_arm_walker.gait import Gait
-from wbc.published.three_arm_walker.grid import COLUMNS, INCH, PITCH, RADIUS, ROWS, STEP, Terrain, checked_place, frame
+from wbc.published.three_arm_walker.gait.gait import Gait
 from wbc.published.three_arm_walker.literal import LiteralPlant
-from wbc.published.three_arm_walker.motion import CYCLE
-from wbc.published.three_arm_walker.plant import IdealPlant, Plant
-from wbc.published.three_arm_walker.reach import ARMS, Shoulders
-from wbc.published.three_arm_walker.record import Log
-from wbc.published.three_arm_walker.supervisor import Outcome, Supervisor
+from wbc.published.three_arm_walker.machine.body import moved
+from wbc.published.three_arm_walker.machine.calibration import Calibration, Variant
+from wbc.published.three_arm_walker.machine.grid import (
+    COLUMNS,
+    INCH,
+    PITCH,
+    RADIUS,
+    ROWS,
+    STEP,
+    Terrain,
+    checked_place,
+    frame,
+)
+from wbc.published.three_arm_walker.machine.motion import CYCLE
+from wbc.published.three_arm_walker.machine.plant import IdealPlant, Plant
+from wbc.published.three_arm_walker.machine.reach import ARMS, Shoulders
+from wbc.published.three_arm_walker.record import PublishedLog
+from wbc.published.three_arm_walker.supervisor import PublishedOutcome, Supervisor
 from wbc.validation import Array
 
 #: A value, or one for each time of the mode [s]
@@ -90,11 +100,11 @@ class PublishedWalker:
         return column, row, heading
 
     @property
-    def log(self) -> Log:
+    def log(self) -> PublishedLog:
         """Everything since the start, the setting down of arms included."""
         return self.supervisor.recorder.log()
 
-    def to(self, points: Sequence[Sequence[float]], key: Callable[[float], bool] | None = None) -> Outcome:
+    def to(self, points: Sequence[Sequence[float]], key: Callable[[float], bool] | None = None) -> PublishedOutcome:
         """Robot destination control: past places (T, A, heading [rad]), at most 0.059 m/s along and 1 degree/s.
 
         Args:
@@ -112,7 +122,7 @@ class PublishedWalker:
 
     def drive(
         self, velocity: Given, duration: float | None = None, key: Callable[[float], bool] | None = None
-    ) -> Outcome:
+    ) -> PublishedOutcome:
         """Robot velocity control, until a key or for a duration [s].
 
         Args:
@@ -126,14 +136,14 @@ class PublishedWalker:
 
     def joystick(
         self, counts: Given, duration: float | None = None, key: Callable[[float], bool] | None = None
-    ) -> Outcome:
+    ) -> PublishedOutcome:
         """Robot velocity control by three axes of -32768 to 32767 counts: T, A, spin."""
         given = _function("counts", counts, 3)
         return self.supervisor.walk(
             VelocityCommand(lambda time: joystick(given(time).tolist())), _pressed(key), _ending(duration, key)
         )
 
-    def handhold(self, arm: int, place: Sequence[int], key: Callable[[float], bool] | None = None) -> Outcome:
+    def handhold(self, arm: int, place: Sequence[int], key: Callable[[float], bool] | None = None) -> PublishedOutcome:
         """Arm control: an arm, 1 to 3, goes to a hold and grasps, the body standing.
 
         Raises:
@@ -144,7 +154,7 @@ class PublishedWalker:
             raise RangeError("place", place, "there is no hold")
         return self._arm(Handhold(_arm(arm), wanted), key)
 
-    def hand_to(self, arm: int, poses: Sequence[Any], key: Callable[[float], bool] | None = None) -> Outcome:
+    def hand_to(self, arm: int, poses: Sequence[Any], key: Callable[[float], bool] | None = None) -> PublishedOutcome:
         """Arm control: the hand of an arm, 1 to 3, past poses in the frame of the structure [m], the body standing.
 
         Raises:
@@ -160,7 +170,7 @@ class PublishedWalker:
 
     def hand_at(
         self, arm: int, twist: Given, duration: float | None = None, key: Callable[[float], bool] | None = None
-    ) -> Outcome:
+    ) -> PublishedOutcome:
         """Arm control: the hand of an arm, 1 to 3, at a twist in the axes of the structure, the body standing.
 
         Args:
@@ -170,7 +180,7 @@ class PublishedWalker:
         scale = np.repeat([1.0 / INCH, 1.0], 3)
         return self._arm(Velocity(_arm(arm), lambda time: given(time) * scale), key, _ending(duration, key))
 
-    def _arm(self, task: ArmTask, key: Callable[[float], bool] | None, duration: float = np.inf) -> Outcome:
+    def _arm(self, task: ArmMotion, key: Callable[[float], bool] | None, duration: float = np.inf) -> PublishedOutcome:
         return self.supervisor.control_arm(task, _pressed(key), duration)
 
 

@@ -6,6 +6,7 @@ import pathlib
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import coal
@@ -48,7 +49,7 @@ Raw = Sphere | Capsule | RawBox | RawCylinder | RawEllipsoid | Mesh
 
 
 @dataclass(frozen=True, eq=False)
-class Body:
+class CollisionBody:
     """One collision body of a link.
 
     Attributes:
@@ -64,7 +65,9 @@ class Body:
     read: Callable[[], Raw]
 
 
-def bodies_of(robot: Robot, package_dirs: Iterable[Any] = (), geometry: pin.GeometryModel | None = None) -> list[Body]:
+def bodies_of(
+    robot: Robot, package_dirs: Iterable[Any] = (), geometry: pin.GeometryModel | None = None
+) -> list[CollisionBody]:
     """The collision bodies of the file that a robot was read from, or of a Pinocchio collision model.
 
     Raises:
@@ -83,16 +86,22 @@ def bodies_of(robot: Robot, package_dirs: Iterable[Any] = (), geometry: pin.Geom
         for folder in validation.items("package_dirs", package_dirs, "folders")
     ]
     return [
-        _urdf_body(str(link.get("name")), collision, path, folders)
+        _urdf_body(str(link.get("name")), collision, shape, path, folders)
         for link in tree.findall("link")
         for collision in link.findall("collision")
-        if collision.find("geometry") is not None and len(collision.find("geometry") or ())
+        if (shape := collision.find("geometry/*")) is not None
     ]
 
 
-def _urdf_body(link: str, collision: ElementTree.Element, path: pathlib.Path, folders: list[pathlib.Path]) -> Body:
-    """The body of one <collision> element."""
-    origin, shape = collision.find("origin"), collision.find("geometry")[0]  # type: ignore[index]
+def _urdf_body(
+    link: str,
+    collision: ElementTree.Element,
+    shape: ElementTree.Element,
+    path: pathlib.Path,
+    folders: list[pathlib.Path],
+) -> CollisionBody:
+    """The body of one <collision> element, whose geometry is ``shape``."""
+    origin = collision.find("origin")
     xyz = _numbers(origin.get("xyz", "0 0 0") if origin is not None else "0 0 0", link)
     rpy = _numbers(origin.get("rpy", "0 0 0") if origin is not None else "0 0 0", link)
 
@@ -113,7 +122,7 @@ def _urdf_body(link: str, collision: ElementTree.Element, path: pathlib.Path, fo
             return read_mesh(file, _numbers(shape.get("scale", "1 1 1"), link))
         raise RobotFileError("geometry", shape.tag, "neither sphere, capsule, cylinder, box nor mesh")
 
-    return Body(link, shape.tag == "mesh", pin.SE3(pin.rpy.rpyToMatrix(rpy), xyz), read)
+    return CollisionBody(link, shape.tag == "mesh", pin.SE3(pin.rpy.rpyToMatrix(rpy), xyz), read)
 
 
 def _numbers(text: str, link: str) -> Array:
@@ -141,14 +150,14 @@ def resolve_mesh(name: str, source: pathlib.Path, folders: Sequence[pathlib.Path
     return path if path.is_absolute() else source.parent / path
 
 
-def _geometry_bodies(model: pin.Model, geometry: pin.GeometryModel) -> list[Body]:
+def _geometry_bodies(model: pin.Model, geometry: pin.GeometryModel) -> list[CollisionBody]:
     """Bodies of a Pinocchio collision model, placed in the frames of their links."""
     bodies = []
     for item in geometry.geometryObjects:
         frame = model.frames[item.parentFrame]
         local = frame.placement.inverse() * item.placement
         mesh = isinstance(item.geometry, (coal.BVHModelBase, coal.ConvexBase))
-        bodies.append(Body(str(frame.name), mesh, local, lambda g=item.geometry: _from_coal(g)))  # type: ignore[misc]
+        bodies.append(CollisionBody(str(frame.name), mesh, local, partial(_from_coal, item.geometry)))
     return bodies
 
 

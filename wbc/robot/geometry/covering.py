@@ -17,7 +17,7 @@ from wbc.robot.geometry.ball import least_excess_ball, quick_ball
 from wbc.robot.geometry.fitting import fit_capsule, quick_capsule
 from wbc.robot.geometry.hull import Hull
 from wbc.robot.geometry.meshes import Mesh
-from wbc.shapes import PlacedShape
+from wbc.shapes import Capsule, PlacedShape, Sphere
 from wbc.validation import Array
 
 #: Fractions of a slab's width by which its borders are moved in search of better ones.
@@ -28,7 +28,7 @@ GAIN = 0.02
 
 
 @dataclass(frozen=True)
-class Kind:
+class CoverKind:
     """A kind of shape: ``fit`` makes a good one around points, ``guess`` a quick one (end, end, radius)."""
 
     fit: Callable[[Array, Hull], PlacedShape]
@@ -62,7 +62,7 @@ def _flat(hull: Hull) -> bool:
     return len(hull.facets) == 0
 
 
-def _slabs(mesh: Mesh, number: int, how: Kind, hull: Hull) -> list[Array]:
+def _slabs(mesh: Mesh, number: int, how: CoverKind, hull: Hull) -> list[Array]:
     """Slabs across the principal axis on which equal ones do best, whose borders then move where that helps."""
 
     def equal(axis: Array) -> tuple[float, list[Array], Array, Array]:
@@ -73,9 +73,9 @@ def _slabs(mesh: Mesh, number: int, how: Kind, hull: Hull) -> list[Array]:
     axes = np.linalg.svd(hull.vertices - hull.vertices.mean(axis=0), full_matrices=False)[2]
     worst, slabs, axis, cuts = min((equal(axis) for axis in axes), key=lambda found: found[0])
     width = (cuts[-1] - cuts[0]) / number
-    for move, k, way in itertools.product(MOVES, range(1, number), (-1.0, 1.0)):
+    for move, k, sign in itertools.product(MOVES, range(1, number), (-1.0, 1.0)):
         moved = cuts.copy()
-        moved[k] += way * move * width
+        moved[k] += sign * move * width
         if (np.diff(moved) <= 0.0).any():
             continue
         new, pieces = _judged(mesh, axis, moved[1:-1], how, hull)
@@ -84,7 +84,7 @@ def _slabs(mesh: Mesh, number: int, how: Kind, hull: Hull) -> list[Array]:
     return slabs
 
 
-def _judged(mesh: Mesh, axis: Array, cuts: Array, how: Kind, hull: Hull) -> tuple[float, list[Array]]:
+def _judged(mesh: Mesh, axis: Array, cuts: Array, how: CoverKind, hull: Hull) -> tuple[float, list[Array]]:
     """(largest excess of quick shapes, slabs with something in them)."""
     slabs = [points for points in mesh.slabs(axis, cuts) if len(points)]
     worst = 0.0
@@ -95,8 +95,9 @@ def _judged(mesh: Mesh, axis: Array, cuts: Array, how: Kind, hull: Hull) -> tupl
 
 
 def _capsule(points: Array, hull: Hull) -> PlacedShape:
-    shape = fit_capsule(points)
-    return replace(shape, excess=hull.excess(*shape.ends(), shape.shape.radius))  # type: ignore[union-attr]
+    placed = fit_capsule(points)
+    assert isinstance(placed.shape, (Capsule, Sphere))
+    return replace(placed, excess=hull.excess(*placed.ends(), placed.shape.radius))
 
 
-KINDS = {"capsule": Kind(_capsule, quick_capsule), "spheres": Kind(least_excess_ball, quick_ball)}
+KINDS = {"capsule": CoverKind(_capsule, quick_capsule), "spheres": CoverKind(least_excess_ball, quick_ball)}

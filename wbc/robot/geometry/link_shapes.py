@@ -11,7 +11,7 @@ import pinocchio as pin
 
 from wbc import validation
 from wbc.errors import RobotFileError, ShapeError
-from wbc.robot.geometry.bodies import Body, bodies_of
+from wbc.robot.geometry.bodies import CollisionBody, bodies_of
 from wbc.robot.geometry.convex_parts import ConvexParts, parts_of
 from wbc.robot.geometry.meshes import Mesh, read_mesh
 from wbc.robot.geometry.styles import Style
@@ -137,7 +137,7 @@ def convex_parts(mesh: Any, triangles: Any = None, *, scale: Any = 1.0) -> Conve
     return parts_of(Mesh(vertices * factor, faces.astype(np.intp)))
 
 
-def _collect(bodies: Iterable[Body], style: Style) -> tuple[dict[str, tuple[PlacedShape, ...]], list[str]]:
+def _collect(bodies: Iterable[CollisionBody], style: Style) -> tuple[dict[str, tuple[PlacedShape, ...]], list[str]]:
     """Shapes by link, and one sentence for each body that has none, or a component without a part of its own."""
     shapes: dict[str, tuple[PlacedShape, ...]] = {}
     problems = []

@@ -38,8 +38,8 @@ class Mesh:
     @cached_property
     def edges(self) -> Triangles:
         """Both ends of every edge, once [k x 2]."""
-        sides = np.vstack([self.triangles[:, [0, 1]], self.triangles[:, [1, 2]], self.triangles[:, [2, 0]]])
-        return np.unique(np.sort(sides, axis=1), axis=0)
+        edges = np.vstack([self.triangles[:, [0, 1]], self.triangles[:, [1, 2]], self.triangles[:, [2, 0]]])
+        return np.unique(np.sort(edges, axis=1), axis=0)
 
     def slabs(self, axis: Array, cuts: Array) -> list[Array]:
         """The mesh cut by the planes axis . x = cut: for each slab the corners [n x 3] of the triangles' pieces in it.

@@ -11,7 +11,7 @@ from wbc import validation
 from wbc.errors import MissingShapeError, RangeError, ShapeError
 from wbc.robot.pairs.distances import Links
 from wbc.robot.pairs.link_pairs import link_pairs, neighbours
-from wbc.robot.pairs.search import Finding, Progress, search
+from wbc.robot.pairs.search import PairFinding, Progress, search
 from wbc.robot.robot import Robot
 from wbc.robot.sources.srdf import CollisionRules, read_collisions
 
@@ -136,7 +136,7 @@ def find_self_pairs(
     links, near = Links(robot), neighbours(robot)
     settled = {pair: _without_measure(pair, near.get(pair), rules) for pair in pairs}
     neutral = links.at_neutral([pair for pair in pairs if samples or settled[pair] is None])
-    found: dict[tuple[str, str], Finding] = {}
+    found: dict[tuple[str, str], PairFinding] = {}
     if samples:
         moving = [pair for pair in pairs if near.get(pair) != "same body"]
         done = {pair for pair in moving if settled[pair] is not None or neutral[pair] <= clearance}
@@ -162,7 +162,7 @@ def _judged(
     pair: tuple[str, str],
     settled: tuple[bool, str, str] | None,
     neutral: float | None,
-    found: Finding | None,
+    found: PairFinding | None,
     clearance: float,
 ) -> LinkPair:
     measured = [x for x in (neutral, None if found is None else found.distance) if x is not None]

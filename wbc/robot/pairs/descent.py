@@ -44,13 +44,13 @@ class Descent:
         here, size = start, FIRST_STEP
         distance, gradient = self._slope(first, second, here)
         for _ in range(STEPS):
-            # at a limit, only the way back is open
+            # at a limit, only the step back is open
             blocked = ((here <= lower) & (gradient > 0.0)) | ((here >= upper) & (gradient < 0.0))
-            way = np.where(blocked, 0.0, gradient * scale**2)
-            length = float(np.linalg.norm(way / scale))
+            step = np.where(blocked, 0.0, gradient * scale**2)
+            length = float(np.linalg.norm(step / scale))
             if not length > 0.0 or distance <= self._clearance or size < LAST_STEP:
                 break
-            there = np.clip(here - size / length * way, lower, upper)
+            there = np.clip(here - size / length * step, lower, upper)
             reached, slope = self._slope(first, second, there)
             if reached < distance:
                 here, distance, gradient = there, reached, slope

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
+class LinkPart:
     """A shape of a link: as Coal has it, where it sits on its joint, and the capsule that bounds it.
 
     Attributes:
@@ -58,7 +58,7 @@ class Links:
 
     def __init__(self, robot: Robot) -> None:
         self.robot = robot
-        self.parts: dict[str, tuple[Part, ...]] = {
+        self.parts: dict[str, tuple[LinkPart, ...]] = {
             link: tuple(_part(robot, link, placed) for placed in shapes)
             for link, shapes in robot.shapes.items()
             if shapes
@@ -135,7 +135,7 @@ class Scenes:
             for part in group
         }
 
-    def ends(self, part: Part) -> tuple[Array, Array]:
+    def ends(self, part: LinkPart) -> tuple[Array, Array]:
         """The ends of a shape's bounding capsule at each configuration [3 x n each]."""
         a, b = self._ends[id(part)]
         return a, b
@@ -162,13 +162,13 @@ def _moved(turn: Array, shift: Array, point: Array) -> Array:
     return np.asarray(turn[:, 0] * point[0] + turn[:, 1] * point[1] + turn[:, 2] * point[2] + shift)
 
 
-def _part(robot: Robot, link: str, placed: PlacedShape) -> Part:
+def _part(robot: Robot, link: str, placed: PlacedShape) -> LinkPart:
     above = pin.SE3.Identity() if link == WORLD else robot.model.frames[frame_index(robot.model, link)].placement
     geometry = geometry_of(placed.shape)
     a, b, radius = bounding_capsule(placed)
     place = above * placed.placement * geometry.offset
     exact = isinstance(placed.shape, (Sphere, Capsule))
-    return Part(joint_of(robot, link), geometry.geometry, place, (above * a, above * b), radius, exact)
+    return LinkPart(joint_of(robot, link), geometry.geometry, place, (above * a, above * b), radius, exact)
 
 
 def _transform(pose: pin.SE3) -> Any:

@@ -27,7 +27,7 @@ Progress = Callable[[int, int], None]
 
 
 @dataclass
-class Finding:
+class PairFinding:
     """What the search knows of a pair of links.
 
     Attributes:
@@ -53,14 +53,14 @@ def search(
     clearance: float,
     progress: Progress,
     settled: Container[tuple[str, str]] = (),
-) -> dict[tuple[str, str], Finding]:
+) -> dict[tuple[str, str], PairFinding]:
     """Least distances of pairs over samples of the joint range, then over descents from the closest of them; no
     descents for pairs that are ``settled`` whatever the answer.
 
     Descents find touching configurations that random samples miss, see :class:`~wbc.robot.pairs.descent.Descent`.
     """
     rng = np.random.default_rng(seed)
-    descent, found = Descent(robot, links, clearance), {pair: Finding() for pair in pairs}
+    descent, found = Descent(robot, links, clearance), {pair: PairFinding() for pair in pairs}
     chunks = [CHUNK] * (samples // CHUNK) + [samples % CHUNK] * (samples % CHUNK > 0)
     total, done = len(pairs) * (len(chunks) + 1), 0
     for count in chunks:
@@ -82,7 +82,7 @@ def search(
     return found
 
 
-def _scan(finding: Finding, scenes: Scenes, pair: tuple[str, str], steps: Array, clearance: float) -> None:
+def _scan(finding: PairFinding, scenes: Scenes, pair: tuple[str, str], steps: Array, clearance: float) -> None:
     """Adds a chunk of samples to what is known of a pair."""
     bounds = scenes.bounds(*pair)
     exact = scenes.links.is_exact(*pair)

@@ -24,7 +24,7 @@ STEP = 1e-9
 #: Parts into which a path may be cut at most
 MOST_CELLS = 20_000.0
 #: Laws are slowed down by this share more than the certificate asks for
-ROOM = 1e-9
+MARGIN = 1e-9
 
 
 def jerk_limited_along(
@@ -78,7 +78,7 @@ def jerk_limited_along(
     law = Law(path, timing, limits)
     slower = _slower(law)
     if slower > 1.0:
-        law = law.scaled(slower * (1.0 + ROOM))
+        law = law.scaled(slower * (1.0 + MARGIN))
     position = law.certificate.worst.get("position")
     if position is not None and position.ratio > 1.0 + TOLERANCE:
         value = float(law.at(position.time).position[position.joint])
@@ -98,9 +98,9 @@ def _part(path: Path, start: float, end: float, sizes: tuple[Array, Array, Array
 def _slower(law: Law, sizes: tuple[Array, Array, Array] | None = None) -> float:
     """The factor of time at which the limits are just kept, at least 1."""
     if sizes is not None:
-        from wbc.trajectory.laws.limits import Limits
+        from wbc.trajectory.laws.limits import MotionLimits
 
-        law = law.with_limits(Limits(velocity=sizes[0], acceleration=sizes[1], jerk=sizes[2]))
+        law = law.with_limits(MotionLimits(velocity=sizes[0], acceleration=sizes[1], jerk=sizes[2]))
     worst = law.certificate.worst
     factor = 1.0
     for order, name in enumerate(("velocity", "acceleration", "jerk"), 1):

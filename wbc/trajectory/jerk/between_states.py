@@ -10,9 +10,9 @@ from wbc import validation
 from wbc.errors import BoundsError, ContinuityError, InfeasibleError, RangeError
 from wbc.trajectory.jerk.course import Course
 from wbc.trajectory.jerk.joined_courses import along_line, law_of, standing
-from wbc.trajectory.jerk.state_to_state import Task, by_ruckig, by_stops, others, plan
+from wbc.trajectory.jerk.state_to_state import StateTask, by_ruckig, by_stops, others, plan
 from wbc.trajectory.laws.law import Law
-from wbc.trajectory.laws.limits import Limits
+from wbc.trajectory.laws.limits import MotionLimits
 from wbc.validation import Array
 
 Synchronisation = Literal["time", "phase", "none"]
@@ -21,7 +21,7 @@ Synchronisation = Literal["time", "phase", "none"]
 ACROSS = 1e-9
 
 #: Positions outside their limits by less than this share of the range are rounding
-ROOM = 1e-10
+TOLERANCE = 1e-10
 
 
 def jerk_limited(
@@ -45,8 +45,8 @@ def jerk_limited(
 
         q(0), dq(0), d2q(0) = start,    q(T), dq(T), d2q(T) = target,    |dq| <= V, |d2q| <= A, |d3q| <= J
 
-    A joint that leaves its position limits on the way is driven otherwise: as fast as it can where it may wait at its
-    target, else it stops (first in the shortest time, then with the least way), and goes on from rest to rest.
+    A joint that leaves its position limits in between is driven otherwise: as fast as it can where it may wait at its
+    target, else it stops (first in the shortest time, then over the least distance), and goes on from rest to rest.
 
     Args:
         start, target: n joint coordinates [rad or m].
@@ -72,7 +72,7 @@ def jerk_limited(
     limits = limits_of(begin.shape[1], velocity, acceleration, jerk, lower, upper)
     _check_inside("start", begin, limits, 1.0)
     _check_inside("target", end, limits, -1.0)
-    task = Task(begin, end, *sizes_of(limits))
+    task = StateTask(begin, end, *sizes_of(limits))
     if synchronisation == "none" and not task.ends_at_rest:
         raise RangeError("synchronisation", synchronisation, "joints that arrive one by one must arrive at rest")
     if straight:
@@ -81,11 +81,11 @@ def jerk_limited(
     return law_of(courses, end, limits) if any(c.spans for c in courses) else standing(begin[0], limits)
 
 
-def limits_of(dof: int, velocity: Any, acceleration: Any, jerk: Any, lower: Any, upper: Any) -> Limits:
+def limits_of(dof: int, velocity: Any, acceleration: Any, jerk: Any, lower: Any, upper: Any) -> MotionLimits:
     """Limits of so many joints, from numbers for all of them or one for each; sizes must be finite.
 
     Raises:
-        ShapeError, NotFiniteError, RangeError, BoundsError: as of :class:`~wbc.trajectory.laws.limits.Limits`.
+        ShapeError, NotFiniteError, RangeError, BoundsError: as of :class:`~wbc.trajectory.laws.limits.MotionLimits`.
     """
     sizes = {}
     for name, value in (("velocity", velocity), ("acceleration", acceleration), ("jerk", jerk)):
@@ -96,10 +96,10 @@ def limits_of(dof: int, velocity: Any, acceleration: Any, jerk: Any, lower: Any,
     places = {} if lower is None else {"lower": _for_all("limits.lower", lower, dof)}
     if upper is not None:
         places["upper"] = _for_all("limits.upper", upper, dof)
-    return Limits(**sizes, **places)
+    return MotionLimits(**sizes, **places)
 
 
-def sizes_of(limits: Limits) -> tuple[Array, Array, Array]:
+def sizes_of(limits: MotionLimits) -> tuple[Array, Array, Array]:
     """Limits of velocity, acceleration and jerk, all of which there are."""
     assert limits.velocity is not None
     assert limits.acceleration is not None
@@ -121,7 +121,7 @@ def _state(name: str, position: Any, velocity: Any, acceleration: Any, dof: int 
     return np.stack(rows)
 
 
-def _check_inside(name: str, state: Array, limits: Limits, towards: float) -> None:
+def _check_inside(name: str, state: Array, limits: MotionLimits, towards: float) -> None:
     """Ends within the limits, also of what their acceleration makes of the velocity (towards the future: 1)."""
     v, a, j = sizes_of(limits)
     if limits.lower is not None and limits.upper is not None:
@@ -139,16 +139,16 @@ def _check_inside(name: str, state: Array, limits: Limits, towards: float) -> No
     out = np.flatnonzero(peak > v * (1.0 + 1e-9))
     if out.size:
         i = int(out[0])
-        room = max(float(v[i] - 0.5 * state[2, i] ** 2 / j[i]), 0.0)
+        largest = max(float(v[i] - 0.5 * state[2, i] ** 2 / j[i]), 0.0)
         raise InfeasibleError(
             f"{name}_velocity",
             float(state[1, i]),
             f"joint {i}: with its acceleration of {state[2, i]:g} the velocity passes {v[i]:g}; largest that works: "
-            f"{room:g}",
+            f"{largest:g}",
         )
 
 
-def _within(task: Task, courses: list[Course], limits: Limits) -> list[Course]:
+def _within(task: StateTask, courses: list[Course], limits: MotionLimits) -> list[Course]:
     """Courses that keep the position limits, the given ones where they do."""
     if limits.lower is None or limits.upper is None:
         return courses
@@ -171,7 +171,7 @@ def _within(task: Task, courses: list[Course], limits: Limits) -> list[Course]:
     raise InfeasibleError("target_velocity", task.target[1].tolist(), f"joint {i} finds no common time of arrival")
 
 
-def _kept(task: Task, i: int, first: Course, duration: float, limits: Limits) -> Course:
+def _kept(task: StateTask, i: int, first: Course, duration: float, limits: MotionLimits) -> Course:
     for course in others(task, i, duration):
         if _escape(course, limits, i) is None:
             return course
@@ -181,28 +181,29 @@ def _kept(task: Task, i: int, first: Course, duration: float, limits: Limits) ->
     raise BoundsError(
         f"position of joint {i}",
         value,
-        f"leaves its limits at {time:.6g} s; tried: the shortest course, stops in the shortest time and with the least "
-        "way at either end",
+        f"leaves its limits at {time:.6g} s; tried: the shortest course, stops in the shortest time and over the least "
+        "distance at either end",
     )
 
 
-def _escape(course: Course, limits: Limits, i: int) -> tuple[float, float] | None:
+def _escape(course: Course, limits: MotionLimits, i: int) -> tuple[float, float] | None:
     """(position, time) farthest outside the limits of the joint, None where it stays within them."""
     assert limits.lower is not None
     assert limits.upper is not None
     low, high = float(limits.lower[i]), float(limits.upper[i])
     below, above = course.extrema()
     size = high - low if np.isfinite(high - low) else max(abs(x) for x in (low, high, 1.0) if np.isfinite(x))
-    if above[0] > high + ROOM * size:
+    if above[0] > high + TOLERANCE * size:
         return above
-    return below if below[0] < low - ROOM * size else None
+    return below if below[0] < low - TOLERANCE * size else None
 
 
-def _on_line(task: Task, limits: Limits) -> Law:
+def _on_line(task: StateTask, limits: MotionLimits) -> Law:
     """One course along start + s u, |u| = 1."""
-    way = task.target[0] - task.start[0]
-    lengths = [float(np.linalg.norm(x)) for x in (way, *task.start[1:], *task.target[1:])]
-    along = next((x for x, size in zip((way, *task.start[1:], *task.target[1:]), lengths, strict=True) if size), None)
+    displacement = task.target[0] - task.start[0]
+    vectors = (displacement, *task.start[1:], *task.target[1:])
+    lengths = [float(np.linalg.norm(x)) for x in vectors]
+    along = next((x for x, size in zip(vectors, lengths, strict=True) if size), None)
     if along is None:
         return standing(task.start[0], limits)
     u = along / np.abs(along).max()
@@ -217,8 +218,8 @@ def _on_line(task: Task, limits: Limits) -> Law:
         np.array([float(np.min(x[moving] / np.abs(u[moving])))]) for x in (task.velocity, task.acceleration, task.jerk)
     ]
     first = np.array([0.0, task.start[1] @ u, task.start[2] @ u])
-    last = np.array([way @ u, task.target[1] @ u, task.target[2] @ u])
-    scalar = Task(first[:, None], last[:, None], *sizes)
+    last = np.array([displacement @ u, task.target[1] @ u, task.target[2] @ u])
+    scalar = StateTask(first[:, None], last[:, None], *sizes)
     course = plan(scalar, "none")[0]
     law = along_line(course, u, task.start, task.target, limits)
     for i in range(task.dof):

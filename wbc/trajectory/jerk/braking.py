@@ -8,7 +8,7 @@ from wbc.trajectory.jerk.course import Course, Point, hard_stop, moved, stop
 
 
 def reach(v: float, a: float, acceleration: float, jerk: float) -> tuple[float, float]:
-    """(lowest, highest) displacement on the shortest way to rest of a joint with velocity v and acceleration a.
+    """(lowest, highest) displacement on the shortest course to rest of a joint with velocity v and acceleration a.
 
     While it only slows down, one is 0 and the other
 
@@ -32,9 +32,9 @@ def reach(v: float, a: float, acceleration: float, jerk: float) -> tuple[float, 
     else:
         deepest = sqrt(square)
     down = max(a + deepest, 0.0) / jerk
-    way = down * (v + down * (0.5 * a - jerk * down / 6.0))
-    way += hold * 0.5 * deepest * (deepest / jerk + hold) + deepest * deepest * deepest / (6.0 * jerk * jerk)
-    return (-way, 0.0) if backwards else (0.0, way)
+    distance = down * (v + down * (0.5 * a - jerk * down / 6.0))
+    distance += hold * 0.5 * deepest * (deepest / jerk + hold) + deepest * deepest * deepest / (6.0 * jerk * jerk)
+    return (-distance, 0.0) if backwards else (0.0, distance)
 
 
 def after(course: Course, time: float) -> Point:
@@ -48,25 +48,25 @@ def after(course: Course, time: float) -> Point:
 
 
 def guarded(
-    now: Point, wanted: Point, low: float, high: float, acceleration: float, jerk: float, dt: float, room: float
+    now: Point, wanted: Point, low: float, high: float, acceleration: float, jerk: float, dt: float, tolerance: float
 ) -> Point | None:
     """What a joint does instead of going to ``wanted`` in the next tick, None where it may.
 
     It may go where its shortest stop stays within [low, high], or goes no farther outside than the one from ``now``.
-    Otherwise it takes a tick of that stop, or of the one with the least way, from where the former leaves the limits.
+    Otherwise it takes a tick of that stop, or of the one over the least distance once the former leaves the limits.
     Stops from states on a stop are its rest: who starts with a stop within the limits keeps having one.
     """
     below, above = reach(wanted[1], wanted[2], acceleration, jerk)
     below, above = wanted[0] + below, wanted[0] + above
-    if below >= low - room and above <= high + room:
+    if below >= low - tolerance and above <= high + tolerance:
         return None
     lowest, highest = reach(now[1], now[2], acceleration, jerk)
     lowest, highest = now[0] + lowest, now[0] + highest
-    if below >= min(low, lowest) - room and above <= max(high, highest) + room:
+    if below >= min(low, lowest) - tolerance and above <= max(high, highest) + tolerance:
         return None
-    inside = lowest >= low - room and highest <= high + room
-    way = stop(now, acceleration, jerk) if inside else hard_stop(now, acceleration, jerk)
-    p, v, a = after(way, dt)
-    if dt >= way.duration:
+    inside = lowest >= low - tolerance and highest <= high + tolerance
+    course = stop(now, acceleration, jerk) if inside else hard_stop(now, acceleration, jerk)
+    p, v, a = after(course, dt)
+    if dt >= course.duration:
         v = a = 0.0
     return p, v, a

@@ -120,10 +120,10 @@ def stop(point: Point, acceleration: float, jerk: float) -> Course:
 
 
 def hard_stop(point: Point, acceleration: float, jerk: float, left: float = math.inf) -> Course:
-    """To v = 0 with the least way, with a deceleration of at most ``left`` then, and from there to rest.
+    """To v = 0 over the least distance, with a deceleration of at most ``left`` then, and from there to rest.
 
-    The least way: jerk against the motion down to the deceleration d, d^2 = min(A^2, j v + (a^2 + left^2)/2), hold, and
-    up to ``left`` where v = 0. Taking that back moves the joint at up to left^2/2j the other way.
+    The least distance: jerk against the motion down to the deceleration d, d^2 = min(A^2, j v + (a^2 + left^2)/2),
+    hold, and up to ``left`` where v = 0. Taking that back moves the joint at up to left^2/2j in the other direction.
     """
     _, v, a = point
     if v == 0.0 or abs(a) > acceleration:
@@ -143,24 +143,24 @@ def hard_stop(point: Point, acceleration: float, jerk: float, left: float = math
     return first.then(after.spans, after.jerks)
 
 
-def rest_to_rest(way: float, velocity: float, acceleration: float, jerk: float) -> Course:
-    """The shortest course over ``way`` from rest to rest from position 0; no phases where there is no way.
+def rest_to_rest(distance: float, velocity: float, acceleration: float, jerk: float) -> Course:
+    """The shortest course over a ``distance`` from rest to rest from position 0; no phases where it is 0.
 
     Jerk phases of u, acceleration held for h, cruise for c:
 
-        way = (2 u + h + c) v,    v = j u (u + h) <= V,    j u <= A
+        distance = (2 u + h + c) v,    v = j u (u + h) <= V,    j u <= A
     """
-    size = abs(way)
+    size = abs(distance)
     u = min(math.cbrt(size / (2.0 * jerk)), math.sqrt(velocity / jerk), acceleration / jerk)
     hold = cruise = 0.0
     if u == acceleration / jerk:
-        # way = A (u + h)(2 u + h) for the hold, as far as the speed A (u + h) may grow
+        # distance = A (u + h)(2 u + h) for the hold, as far as the speed A (u + h) may grow
         hold = 0.5 * (math.sqrt(u * u + 4.0 * size / acceleration) - 3.0 * u)
         hold = max(min(hold, velocity / acceleration - u), 0.0)
     speed = jerk * u * (u + hold)
     if speed > 0.0:
         cruise = max(size / speed - 2.0 * u - hold, 0.0)
-    j = math.copysign(jerk, way)
+    j = math.copysign(jerk, distance)
     return Course((0.0, 0.0, 0.0), (), ()).then((u, hold, u, cruise, u, hold, u), (j, 0.0, -j, 0.0, -j, 0.0, j))
 
 
@@ -181,9 +181,9 @@ def backwards(course: Course) -> tuple[tuple[float, ...], tuple[float, ...]]:
     return course.spans[::-1], tuple(-j for j in reversed(course.jerks))
 
 
-def polished(course: Course, end: Point, room: float = 0.0, rounds: int = 2) -> Course:
+def polished(course: Course, end: Point, tolerance: float = 0.0, rounds: int = 2) -> Course:
     """The same jerks with durations changed by the least that ends in ``end``, the sum of durations kept; as it is
-    where that is nearer than ``room``, velocities counted over the duration of the course.
+    where that is nearer than ``tolerance``, velocities counted over the duration of the course.
 
     ruckig's last position is off by up to 1e-8 of its unit. A longer phase k moves the end by what its own end moves,
     (v, a, j) dt, carried over the time R that is left: (v + a R + j R^2/2, a + j R, j) dt.
@@ -192,7 +192,7 @@ def polished(course: Course, end: Point, room: float = 0.0, rounds: int = 2) -> 
         points, span = course.points(), course.duration
         weight = (1.0, span, span * span)
         before = max(abs(x - y) * w for x, y, w in zip(end, points[-1], weight, strict=True))
-        if before <= room or len(course.spans) < 4:
+        if before <= tolerance or len(course.spans) < 4:
             return course
         off = np.subtract(end, points[-1])
         left = span - np.cumsum(course.spans)

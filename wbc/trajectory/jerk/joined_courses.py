@@ -6,7 +6,7 @@ import numpy as np
 
 from wbc.trajectory.jerk.course import Course, Point, moved
 from wbc.trajectory.laws.law import Law
-from wbc.trajectory.laws.limits import Limits
+from wbc.trajectory.laws.limits import MotionLimits
 from wbc.trajectory.laws.timing import Timing
 from wbc.trajectory.paths.path import PolynomialPath
 from wbc.validation import Array
@@ -18,12 +18,12 @@ STILL = 1e-6
 NEARLY = 1e-9
 
 
-def standing(position: Array, limits: Limits) -> Law:
+def standing(position: Array, limits: MotionLimits) -> Law:
     """The law that stays where it is, for a microsecond."""
     return Law(PolynomialPath([0.0, STILL], position[None, None, :]), Timing.identity(STILL), limits)
 
 
-def law_of(courses: list[Course], end: Array, limits: Limits) -> Law:
+def law_of(courses: list[Course], end: Array, limits: MotionLimits) -> Law:
     """Cubics in time between the union of all phases; a joint that arrives early waits at its ``end`` (3 x n)."""
     duration = max(c.duration for c in courses)
     tables = [_table(c, end[:, i], duration) for i, c in enumerate(courses)]
@@ -57,17 +57,17 @@ def _table(course: Course, end: Array, duration: float) -> tuple[Array, Array, A
     return starts, np.array(points), np.array(jerks)
 
 
-def along_line(course: Course, direction: Array, begin: Array, end: Array, limits: Limits) -> Law:
+def along_line(course: Course, direction: Array, begin: Array, end: Array, limits: MotionLimits) -> Law:
     """q = start + s direction, with s the course, between two states (3 x n each)."""
     start, ends_moving = begin[0], bool(end[1:].any())
     (lowest, _), (highest, _) = course.extrema()
-    room = 1e-12 * (1.0 + abs(lowest) + abs(highest))
+    tolerance = 1e-12 * (1.0 + abs(lowest) + abs(highest))
     point, rows, times = course.start, [], [0.0]
     for span, jerk in zip(course.spans, course.jerks, strict=True):
         rows.append([jerk / 6.0, 0.5 * point[2], point[1], point[0]])
         point = moved(point, jerk, span)
         times.append(times[-1] + span)
-    low, high = lowest - room, highest + room
+    low, high = lowest - tolerance, highest + tolerance
     # Rounding of the course is made up for by the direction, unless its end is so near the start that little would
     # be much: limits along the line are those of the direction
     if abs(point[0]) > NEARLY * (high - low):

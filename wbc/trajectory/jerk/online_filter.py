@@ -11,10 +11,10 @@ from wbc.errors import BoundsError, RangeError
 from wbc.trajectory.jerk.between_states import limits_of, sizes_of
 from wbc.trajectory.jerk.braking import after
 from wbc.trajectory.jerk.course import Course, Point, stop
-from wbc.trajectory.jerk.state_to_state import Task, plan
+from wbc.trajectory.jerk.state_to_state import StateTask, plan
 from wbc.trajectory.jerk.walls import Walls
 from wbc.trajectory.laws.law import State
-from wbc.trajectory.laws.limits import Limits
+from wbc.trajectory.laws.limits import MotionLimits
 from wbc.validation import Array
 
 Status = Literal["moving", "reached", "guarded", "recovered"]
@@ -27,7 +27,7 @@ FAR = 1e3
 
 
 def online(
-    dof: int | Limits,
+    dof: int | MotionLimits,
     dt: float,
     *,
     velocity: Any = None,
@@ -54,7 +54,7 @@ def online(
     dt = validation.scalar("dt", dt, low=0.0, open_low=True, unit="s")
     validation.one_of("synchronisation", synchronisation, ("time", "phase", "none"))
     given = {"velocity": velocity, "acceleration": acceleration, "jerk": jerk, "lower": lower, "upper": upper}
-    if isinstance(dof, Limits):
+    if isinstance(dof, MotionLimits):
         given = {k: getattr(dof, k) if v is None else v for k, v in given.items()}
         count = dof.dof or 0
     else:
@@ -73,7 +73,7 @@ class Online:
         clipped: whether the target was outside the position limits, and the nearest position within them is meant.
     """
 
-    def __init__(self, limits: Limits, dt: float, synchronisation: str) -> None:
+    def __init__(self, limits: MotionLimits, dt: float, synchronisation: str) -> None:
         import ruckig
 
         self.dof = len(sizes_of(limits)[0])
@@ -103,7 +103,7 @@ class Online:
         self.reset(np.clip(np.zeros(self.dof), self._walls.lower, self._walls.upper))
 
     @property
-    def current_limits(self) -> Limits:
+    def current_limits(self) -> MotionLimits:
         """The limits in force."""
         return self._limits
 
@@ -229,7 +229,7 @@ class Online:
         asked = self._asked
         return asked.current_position, asked.current_velocity, asked.current_acceleration
 
-    def _take(self, limits: Limits) -> None:
+    def _take(self, limits: MotionLimits) -> None:
         v, a, j = sizes_of(limits)
         self._limits = limits
         self._asked.max_acceleration, self._asked.max_jerk = a, j
@@ -252,7 +252,7 @@ class Online:
             self._goal, self._aims = goal, (pace, limit, np.ones(self.dof, dtype=bool))
             return
         self.clipped = False
-        # Towards a wall, a velocity is a way to the wall that is no faster: so the joint comes to rest there in time
+        # Towards a wall, a velocity becomes a course to it that is no faster: so the joint comes to rest there in time
         wall = np.where(pace > 0.0, self._walls.upper, self._walls.lower)
         here = np.array(self._asked.current_position)
         to_wall = (pace != 0.0) & np.isfinite(wall)
@@ -272,7 +272,7 @@ class Online:
         now = np.array(self._now())
         if self._kind == "position":
             aim = np.stack([self._goal, pace, np.zeros(self.dof)])
-            courses = plan(Task(now, aim, top, acceleration_limit, jerk_limit), "time")
+            courses = plan(StateTask(now, aim, top, acceleration_limit, jerk_limit), "time")
         else:
             courses = [self._alone_to(i, now) for i in range(self.dof)]
         points: list[Point] = [after(c, self.dt) for c in courses]
@@ -288,7 +288,7 @@ class Online:
         pace, top, by_place = self._aims
         if by_place[i]:
             aim = np.array([[place[i]], [pace[i]], [0.0]])
-            return plan(Task(now[:, i : i + 1], aim, top[i : i + 1], a[i : i + 1], j[i : i + 1]), "none")[0]
+            return plan(StateTask(now[:, i : i + 1], aim, top[i : i + 1], a[i : i + 1], j[i : i + 1]), "none")[0]
         # In axes that move with the wanted velocity, taking it is a stop
         p, speed, push = (float(x) for x in now[:, i])
         relative = stop((0.0, speed - float(pace[i]), push), float(a[i]), float(j[i]))

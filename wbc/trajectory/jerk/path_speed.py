@@ -5,7 +5,7 @@ With x = (ds/dt)^2 and y = d2s/dt2 over the path coordinate s, dx/ds = 2 y, and
     dq/dt = q' sqrt(x),    d2q/dt2 = q'' x + q' y,    d3q/dt3 = sqrt(x) (q''' x + 3 q'' y + q' dy/ds)
 
 Velocities and accelerations bound x and y linearly. The jerk's limit J / sqrt(x) is convex in x, so its tangent at any
-speed lies below it: what keeps the tangent keeps the limit, and the tangent at the last solution gives room for a
+speed lies below it: what keeps the tangent keeps the limit, and the tangent at the last solution leaves a margin for a
 faster one. Between grid points y is linear in u, where s = start + L g(u): beside rest s goes with u^3 and constant
 jerk makes y go with u. So dx/du = 2 y L g'(u) is integrated exactly.
 """
@@ -49,7 +49,7 @@ class Stretch:
 
     @classmethod
     def of(cls, path: Path, start: float, end: float, limits: tuple[Array, Array, Array], cells: int) -> Stretch:
-        """Even in u, but that grid points beside knots give way to them."""
+        """Even in u, but that grid points beside knots are left out."""
         u = np.linspace(0.0, 1.0, cells + 1)
         s = start + (end - start) * _grade(u)
         knots = path.knots[(path.knots > start) & (path.knots < end)]

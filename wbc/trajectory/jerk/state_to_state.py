@@ -43,7 +43,7 @@ NEAR = 1e-8
 
 
 @dataclass(frozen=True, eq=False)
-class Task:
+class StateTask:
     """Two states (3 x n: positions, velocities, accelerations) and the sizes allowed between them (n each)."""
 
     start: Array
@@ -62,10 +62,10 @@ class Task:
         """Whether joints may arrive early and wait."""
         return not self.target[1:].any()
 
-    def joint(self, i: int) -> Task:
+    def joint(self, i: int) -> StateTask:
         """The task of one joint."""
         k = slice(i, i + 1)
-        return Task(self.start[:, k], self.target[:, k], self.velocity[k], self.acceleration[k], self.jerk[k])
+        return StateTask(self.start[:, k], self.target[:, k], self.velocity[k], self.acceleration[k], self.jerk[k])
 
     def points(self, i: int) -> tuple[Point, Point]:
         """Start and target of a joint."""
@@ -75,22 +75,22 @@ class Task:
     @cached_property
     def units(self) -> tuple[float, float]:
         """A length P and a time tau of the size of the motion."""
-        way = np.abs(self.target[0] - self.start[0])
+        distance = np.abs(self.target[0] - self.start[0])
         speed = np.maximum(np.abs(self.start[1]), np.abs(self.target[1]))
         push = np.maximum(np.abs(self.start[2]), np.abs(self.target[2]))
         times = (
-            np.cbrt(way / self.jerk),
-            np.sqrt(way / self.acceleration),
-            way / self.velocity,
+            np.cbrt(distance / self.jerk),
+            np.sqrt(distance / self.acceleration),
+            distance / self.velocity,
             np.sqrt(speed / self.jerk),
             speed / self.acceleration,
             push / self.jerk,
         )
         tau = float(np.max(times))
-        return float(np.max([way, speed * tau, push * tau * tau])), tau
+        return float(np.max([distance, speed * tau, push * tau * tau])), tau
 
 
-def by_ruckig(task: Task, synchronisation: str, duration: float = 0.0) -> list[Course] | None:
+def by_ruckig(task: StateTask, synchronisation: str, duration: float = 0.0) -> list[Course] | None:
     """A course a joint, None where ruckig refuses; ``synchronisation``: time, phase, none; ``duration``: at least."""
     import ruckig
 
@@ -124,7 +124,7 @@ def by_ruckig(task: Task, synchronisation: str, duration: float = 0.0) -> list[C
     return _repaired(task, courses)
 
 
-def _repaired(task: Task, courses: list[Course]) -> list[Course] | None:
+def _repaired(task: StateTask, courses: list[Course]) -> list[Course] | None:
     """Courses of joints that ruckig missed the target of, because it is measured in the units of a larger motion, in
     their own units; None where that does not help.
     """
@@ -142,35 +142,35 @@ def _repaired(task: Task, courses: list[Course]) -> list[Course] | None:
     return courses
 
 
-def _in_time(task: Task, duration: float, longest: float) -> bool:
+def _in_time(task: StateTask, duration: float, longest: float) -> bool:
     """Whether a course may stand beside others: who arrives at rest may wait."""
     early = task.ends_at_rest and duration <= longest
     return early or math.isclose(duration, longest, rel_tol=1e-12)
 
 
-def arrives(task: Task, i: int, course: Course) -> bool:
+def arrives(task: StateTask, i: int, course: Course) -> bool:
     """Whether a joint's course ends in its target, to rounding, and keeps its limits of velocity and acceleration."""
     length, tau = task.joint(i).units
     here, there = course.points()[-1], task.points(i)[1]
     v, a = float(task.velocity[i]), float(task.acceleration[i])
-    room = (
+    tolerance = (
         NEAR * length + 1e-14 * abs(there[0]),
         NEAR * length / tau if tau else 0.0,
         min(NEAR * length / (tau * tau), 0.5 * STEP * a) if tau else 0.0,
     )
-    if not all(abs(x - y) <= r for x, y, r in zip(here, there, room, strict=True)):
+    if not all(abs(x - y) <= r for x, y, r in zip(here, there, tolerance, strict=True)):
         return False
     pushes = [abs(point[2]) for point in course.points()]
     return course.fastest() <= v * (1.0 + NEAR) and max(pushes) <= a * (1.0 + NEAR)
 
 
 def by_stops(
-    task: Task, i: int, duration: float, hard: tuple[bool, bool] = (False, False), left: float = math.inf
+    task: StateTask, i: int, duration: float, hard: tuple[bool, bool] = (False, False), left: float = math.inf
 ) -> Course:
     """A joint's course that always exists: stop, from rest to rest, and the stop of the mirrored target backwards.
 
-    It takes ``duration``, or its own least time where that is longer. ``hard``: stop with the least way, at either end;
-    ``left``: the largest deceleration at the end of that way.
+    It takes ``duration``, or its own least time where that is longer. ``hard``: stop over the least distance, at either
+    end; ``left``: the largest deceleration at the end of that stop.
     """
     sizes = float(task.acceleration[i]), float(task.jerk[i])
     first, last = task.points(i)
@@ -178,15 +178,15 @@ def by_stops(
         hard_stop(end, *sizes, left) if h else stop(end, *sizes)
         for h, end in zip(hard, (first, (last[0], -last[1], last[2])), strict=True)
     )
-    way = arrive.points()[-1][0] - leave.points()[-1][0]
-    middle = rest_to_rest(way, float(task.velocity[i]), *sizes)
-    room = duration - leave.duration - arrive.duration
-    if room > middle.duration:
-        middle = stretched(middle, room) if middle.spans else Course(middle.start, (room,), (0.0,))
+    distance = arrive.points()[-1][0] - leave.points()[-1][0]
+    middle = rest_to_rest(distance, float(task.velocity[i]), *sizes)
+    left_over = duration - leave.duration - arrive.duration
+    if left_over > middle.duration:
+        middle = stretched(middle, left_over) if middle.spans else Course(middle.start, (left_over,), (0.0,))
     return leave.then(middle.spans, middle.jerks).then(*backwards(arrive))
 
 
-def plan(task: Task, synchronisation: str) -> list[Course]:
+def plan(task: StateTask, synchronisation: str) -> list[Course]:
     """Courses of all joints, of one duration but for ``none``; never refused for a task within its limits."""
     for how in dict.fromkeys((synchronisation, "time")):
         courses = by_ruckig(task, how)
@@ -200,9 +200,9 @@ def plan(task: Task, synchronisation: str) -> list[Course]:
     return [by_stops(task, i, longest) for i in range(task.dof)]
 
 
-def others(task: Task, i: int, duration: float) -> Iterator[Course]:
+def others(task: StateTask, i: int, duration: float) -> Iterator[Course]:
     """Further courses of one joint, tried where the first leaves its position limits: the fastest one, if it may wait
-    for the rest, then stops at both ends, then stops of the least way.
+    for the rest, then stops at both ends, then stops over the least distance.
     """
     alone = by_ruckig(task.joint(i), "none")
     if alone is not None and _in_time(task, alone[0].duration, duration):

@@ -19,14 +19,14 @@ import numpy as np
 from wbc import validation
 from wbc.errors import ShapeError
 from wbc.trajectory.jerk.joined_courses import STILL
-from wbc.trajectory.jerk.via_speeds import Bounds, Corners, corner_speeds
+from wbc.trajectory.jerk.via_speeds import SpeedBounds, ViaCorners, corner_speeds
 from wbc.trajectory.laws.law import Law
-from wbc.trajectory.laws.limits import Limits
+from wbc.trajectory.laws.limits import MotionLimits
 from wbc.trajectory.laws.timing import Timing
 from wbc.trajectory.paths.path import PolynomialPath
 from wbc.trajectory.paths.pose_path import PosePath
 from wbc.trajectory.paths.pose_paths import standing_pose
-from wbc.trajectory.paths.turning import Turns, matrices, quaternion, turn_between
+from wbc.trajectory.paths.turning import TwoTurns, matrices, quaternion, turn_between
 from wbc.validation import Array
 
 #: Segments below this length are rotations on the spot [m]
@@ -70,7 +70,7 @@ def via_points(
         ShapeError, NotFiniteError, RotationError: what is no pose; less than two.
         RangeError: a bound that is not positive.
     """
-    bounds = Bounds(
+    bounds = SpeedBounds(
         validation.scalar("speed", speed, low=0.0, open_low=True, unit="m/s"),
         validation.scalar("acceleration", acceleration, low=0.0, open_low=True, unit="m/s^2"),
         validation.scalar("deviation", deviation, low=0.0, unit="m"),
@@ -80,7 +80,7 @@ def via_points(
     if angular_speed is not None:
         turn_speed = validation.scalar("angular_speed", angular_speed, low=0.0, open_low=True, unit="rad/s")
     points, quaternions = _poses(poses)
-    limits = Limits(
+    limits = MotionLimits(
         velocity=np.repeat([bounds.speed, turn_speed], 3), acceleration=np.repeat([bounds.acceleration, turning], 3)
     )
     path = _path(points, quaternions, bounds, turning, turn_speed)
@@ -99,7 +99,7 @@ def _poses(poses: Sequence[Any]) -> tuple[Array, Array]:
     return np.array([p.translation for p in checked]), np.array([quaternion(p.rotation) for p in checked])
 
 
-def _path(points: Array, quaternions: Array, bounds: Bounds, turning: float, turn_speed: float) -> PosePath:
+def _path(points: Array, quaternions: Array, bounds: SpeedBounds, turning: float, turn_speed: float) -> PosePath:
     steps = np.diff(points, axis=0)
     lengths = np.linalg.norm(steps, axis=1)
     lengths[lengths < LEAST_LENGTH] = 0.0
@@ -121,9 +121,9 @@ def _path(points: Array, quaternions: Array, bounds: Bounds, turning: float, tur
     for i, span in enumerate(spans):
         if reaches[i] > 0.0:
             blend = 2.0 * reaches[i] / speeds[i]
-            pull = speeds[i] / blend * (directions[i] - directions[i - 1])
+            push = speeds[i] / blend * (directions[i] - directions[i - 1])
             start = points[i] - reaches[i] * directions[i - 1]
-            build.add(blend, start, speeds[i] * directions[i - 1], pull, rotations[i])
+            build.add(blend, start, speeds[i] * directions[i - 1], push, rotations[i])
         if turns[i] <= times[i]:
             along = _quick(corners, i, float(times[i]), float(tops[i]))
         else:
@@ -139,7 +139,7 @@ def _path(points: Array, quaternions: Array, bounds: Bounds, turning: float, tur
     return build.path()
 
 
-def _quick(corners: Corners, i: int, time: float, top: float) -> list[Piece]:
+def _quick(corners: ViaCorners, i: int, time: float, top: float) -> list[Piece]:
     """Step 8(a), the least time: match the speeds, up, cruise, down."""
     a, fast = corners.acceleration, float(corners.fast[i])
     matching = (fast - float(corners.slow[i])) / a
@@ -149,10 +149,10 @@ def _quick(corners: Corners, i: int, time: float, top: float) -> list[Piece]:
     return [(first, match), (ramp, a), (time - matching - 2.0 * ramp, 0.0), (ramp, -a), (last, match)]
 
 
-def _slowed(corners: Corners, i: int, time: float, bounds: Bounds) -> list[Piece]:
+def _slowed(corners: ViaCorners, i: int, time: float, bounds: SpeedBounds) -> list[Piece]:
     """Step 8(c): the straight part in the time of its rotation, by the mean speed that is left to it (4-48).
 
-    Five cases: above half way from the higher corner speed to the largest speed; above the higher; between both;
+    Five cases: above half-way from the higher corner speed to the largest speed; above the higher; between both;
     above half the lower; below it, where the hand stops.
     """
     a, slow, fast = corners.acceleration, float(corners.slow[i]), float(corners.fast[i])
@@ -179,7 +179,7 @@ def _slowed(corners: Corners, i: int, time: float, bounds: Bounds) -> list[Piece
     return [(first, match), (ramp, push), (rest - 2.0 * ramp, 0.0), (ramp, -push), (last, match)]
 
 
-def _rise(corners: Corners, i: int) -> float:
+def _rise(corners: ViaCorners, i: int) -> float:
     """1 where the speed at the end of a segment is at least that at its beginning, else -1."""
     return 1.0 if corners.squares[i + 1] >= corners.squares[i] else -1.0
 
@@ -233,11 +233,11 @@ class _Build:
                 kept.append(float(time))
         for begin, end in pairwise(kept):
             middle = 0.5 * (begin + end)
-            push, v, way = _moved(moving, middle, begin)
+            push, v, travelled = _moved(moving, middle, begin)
             twist, w, angle = _moved(turning, middle, begin)
             self.add(
                 end - begin,
-                origin + way * direction,
+                origin + travelled * direction,
                 v * direction,
                 push * direction,
                 rotation,
@@ -252,24 +252,24 @@ class _Build:
         angles[:, :, 0] = np.array(self.angles).T
         position = PolynomialPath(knots, np.array(self.origins).transpose(1, 0, 2))
         return PosePath(
-            position, Turns(PolynomialPath(knots, angles), axes, np.zeros_like(axes), np.array(self.rotations))
+            position, TwoTurns(PolynomialPath(knots, angles), axes, np.zeros_like(axes), np.array(self.rotations))
         )
 
 
 def _table(pieces: list[Piece], speed: float) -> Array:
-    """Rows (start, acceleration, speed, way) of pieces of constant acceleration."""
-    rows, time, way = [], 0.0, 0.0
+    """Rows (start, acceleration, speed, travelled) of pieces of constant acceleration."""
+    rows, time, travelled = [], 0.0, 0.0
     for span, push in pieces:
-        rows.append((time, push, speed, way))
-        way += span * (speed + 0.5 * push * span)
+        rows.append((time, push, speed, travelled))
+        travelled += span * (speed + 0.5 * push * span)
         speed += push * span
         time += span
     return np.array(rows)
 
 
 def _moved(table: Array, within: float, time: float) -> tuple[float, float, float]:
-    """(acceleration, speed, way) at a time, of the piece that ``within`` lies in."""
+    """(acceleration, speed, travelled) at a time, of the piece that ``within`` lies in."""
     row = table[max(int(np.searchsorted(table[:, 0], within, side="right")) - 1, 0)]
-    start, push, speed, way = (float(x) for x in row)
+    start, push, speed, travelled = (float(x) for x in row)
     e = time - start
-    return push, speed + push * e, way + e * (speed + 0.5 * push * e)
+    return push, speed + push * e, travelled + e * (speed + 0.5 * push * e)

@@ -13,7 +13,7 @@ from wbc.trajectory.jerk.course import Point
 from wbc.validation import Array
 
 #: Positions beyond their limits by less than this [rad or m] are rounding
-ROOM = 1e-9
+TOLERANCE = 1e-9
 #: Accelerations beyond their limits by less than this share are rounding
 SHARE = 1e-12
 #: The most ticks for which a state is known to be clear
@@ -67,12 +67,12 @@ class Walls:
         short = (0.5 / acceleration).tolist(), (0.5 * acceleration / jerk).tolist(), (1.0 / jerk).tolist()
         near = (self.lower + far).tolist(), (self.upper - far).tolist()
         self._rows = list(zip(*near, self._low, self._high, self._acceleration, *short, strict=True))
-        # Changes of these rooms in a tick are bounded, so a state that has enough of them is clear for a while
+        # Changes of these clearances in a tick are bounded, so a state with large ones is clear for a while
         top = fastest + acceleration * acceleration / jerk
-        way = 3.0 * (top + acceleration * acceleration / jerk)
-        self._changes = (dt * top).tolist(), (dt * (top + way)).tolist()
+        stop = 3.0 * (top + acceleration * acceleration / jerk)
+        self._changes = (dt * top).tolist(), (dt * (top + stop)).tolist()
         self.state = np.zeros(3 * len(far))
-        self._room = memoryview(self.state.data)
+        self._memory = memoryview(self.state.data)
         self._pack = Struct(f"{len(self.state)}d").pack_into
         self._ticks_clear = Kernel(self._ticks(), self.state)
 
@@ -85,7 +85,7 @@ class Walls:
 
     def put(self, p: list[float], v: list[float], a: list[float]) -> None:
         """Write :attr:`state`."""
-        self._pack(self._room, 0, *p, *v, *a)
+        self._pack(self._memory, 0, *p, *v, *a)
 
     def clear(self) -> int:
         """For how many ticks, this one and those after it, every joint can surely stop within; 0: see :meth:`guard`.
@@ -96,22 +96,22 @@ class Walls:
         return 1 + int(ticks) if ticks >= 0.0 else 0
 
     def _ticks(self) -> ca.Function:
-        """Least room of a joint, in ticks: what is left of the way to a wall after a stop, or to where it counts.
+        """Least clearance of a joint, in ticks: to a wall after a stop, or to where a wall counts.
 
         From w = |v| + a^2/2j, the highest speed to come, a stop is no longer than w (w/2A + A/2j + |a|/j). In a tick,
         with W = V + A^2/j at least w, its change is at most 3 (W + A^2/j) dt and that of the position W dt.
         """
         state = ca.SX.sym("state", 3 * len(self._rows))
         place, rate, push = ca.vertsplit(state, len(self._rows))
-        rooms = []
+        clearances = []
         for i, (near_low, near_high, low, high, most, slow, ramp, soft) in enumerate(self._rows):
             size = ca.fabs(push[i])
             speed = ca.fabs(rate[i]) + 0.5 * soft * size * size
-            way = speed * (speed * slow + ramp + size * soft) - ROOM
+            stop = speed * (speed * slow + ramp + size * soft) - TOLERANCE
             far = ca.fmin(place[i] - near_low, near_high - place[i]) / self._changes[0][i]
-            left = ca.fmin(place[i] - low - way, high - way - place[i]) / self._changes[1][i]
-            rooms.append(ca.if_else(size > most * (1.0 + SHARE), -1.0, ca.fmax(far, left)))
-        return ca.Function("ticks", [state], [ca.fmin(ca.mmin(ca.vertcat(*rooms)), TICKS)])
+            left = ca.fmin(place[i] - low - stop, high - stop - place[i]) / self._changes[1][i]
+            clearances.append(ca.if_else(size > most * (1.0 + SHARE), -1.0, ca.fmax(far, left)))
+        return ca.Function("ticks", [state], [ca.fmin(ca.mmin(ca.vertcat(*clearances)), TICKS)])
 
     def nearest(self, place: list[float]) -> list[float]:
         """The nearest position within."""
@@ -134,4 +134,6 @@ class Walls:
 
     def held_back(self, i: int, now: Point, wanted: Point) -> Point | None:
         """See :func:`guarded`, for one joint."""
-        return guarded(now, wanted, self._low[i], self._high[i], self._acceleration[i], self._jerk[i], self._dt, ROOM)
+        return guarded(
+            now, wanted, self._low[i], self._high[i], self._acceleration[i], self._jerk[i], self._dt, TOLERANCE
+        )

@@ -17,7 +17,7 @@ import numpy as np
 from wbc import validation
 from wbc.errors import ShapeError
 from wbc.trajectory.laws.between import Highest, highest
-from wbc.trajectory.laws.limits import Limits
+from wbc.trajectory.laws.limits import MotionLimits
 from wbc.trajectory.laws.timing import Timing
 from wbc.trajectory.paths import bernstein
 from wbc.trajectory.paths.path import Index, Path
@@ -92,7 +92,7 @@ class Worst:
 
 
 @dataclass(frozen=True)
-class Certificate:
+class LawCertificate:
     """Worst places by quantity: ``position``, ``velocity``, ``acceleration``, ``jerk``, and what else was asked for.
 
     Quantities without a limit are not in it, but for jerk, which is in it as ``unbounded`` where accelerations jump.
@@ -126,7 +126,7 @@ class Certificate:
 
 
 @dataclass(frozen=True, eq=False)
-class Pieces:
+class LawPieces:
     """Intervals of time on which a law is smooth, with the pieces of its timing and of its path."""
 
     start: Array
@@ -135,7 +135,7 @@ class Pieces:
     path: Index
 
     @classmethod
-    def of(cls, path: Path, timing: Timing) -> Pieces:
+    def of(cls, path: Path, timing: Timing) -> LawPieces:
         """Breaks of the timing, and times at which s passes a knot."""
         inside = timing.crossings(path.knots[1:-1])
         times = np.unique(np.concatenate([timing.times, inside]))
@@ -154,9 +154,9 @@ class Pieces:
         out = chain(path, s, on_path, order)
         return out.reshape(count, places, *out.shape[1:])
 
-    def some(self, numbers: Index) -> Pieces:
+    def some(self, numbers: Index) -> LawPieces:
         """Those of some numbers."""
-        return Pieces(self.start[numbers], self.span[numbers], self.timing[numbers], self.path[numbers])
+        return LawPieces(self.start[numbers], self.span[numbers], self.timing[numbers], self.path[numbers])
 
     def states(self, path: Path, timing: Timing, count: int = SAMPLES) -> list[Array]:
         """Position, velocity and acceleration at both ends and between, count + 1 times in every piece."""
@@ -182,15 +182,15 @@ def chain(path: Path, s: list[Array], piece: Index, order: int) -> Array:
 def certify(
     path: Path,
     timing: Timing,
-    limits: Limits,
+    limits: MotionLimits,
     checks: Sequence[Check] = (),
     samples: int = 16,
     moving: tuple[bool, bool] = (False, False),
-) -> Certificate:
+) -> LawCertificate:
     """Worst places of a law; ``samples``: of each piece, at first, where it is no polynomial or one of a degree above
     24; ``moving``: as of the law.
     """
-    pieces = Pieces.of(path, timing)
+    pieces = LawPieces.of(path, timing)
     worst: dict[str, Worst] = {}
     limited = set()
     for name, order in ORDERS.items():
@@ -214,17 +214,17 @@ def certify(
     for check in checks:
         limited.add(check.name)
         worst[check.name] = checked(path, timing, pieces, check)
-    return Certificate(worst, frozenset(limited))
+    return LawCertificate(worst, frozenset(limited))
 
 
 def _sampling(
-    path: Path, timing: Timing, pieces: Pieces, order: int, scaled: Callable[[Array], Array]
+    path: Path, timing: Timing, pieces: LawPieces, order: int, scaled: Callable[[Array], Array]
 ) -> Callable[[Index, int], Array]:
     """Numbers of pieces, and a count -> what is to be at most 1, at count + 1 places of each."""
     return lambda some, count: scaled(pieces.some(some).at(path, timing, order, np.linspace(0.0, 1.0, count + 1)))
 
 
-def checked(path: Path, timing: Timing, pieces: Pieces, check: Check) -> Worst:
+def checked(path: Path, timing: Timing, pieces: LawPieces, check: Check) -> Worst:
     """The worst place of a quantity that is known by its values, at samples of each piece, more of them at need."""
 
     def evaluate(some: Index, count: int) -> Array:
@@ -246,16 +246,16 @@ def _worst(start: Array, span: Array, top: Highest, joints: int) -> Worst:
     return Worst(top.bound, top.column % joints, time, "sampled", top.bound - top.seen, top.spacing)
 
 
-def _exact(pieces: Pieces, c: Array, joints: int) -> Worst:
+def _exact(pieces: LawPieces, c: Array, joints: int) -> Worst:
     count, size, columns = c.shape
-    room = max(bernstein.CLOSE, bernstein.rounding(size - 1))
-    ratio, number, place = bernstein.largest(c.transpose(0, 2, 1).reshape(count * columns, size), room)
+    tolerance = max(bernstein.CLOSE, bernstein.rounding(size - 1))
+    ratio, number, place = bernstein.largest(c.transpose(0, 2, 1).reshape(count * columns, size), tolerance)
     piece, column = divmod(number, columns)
     time = float(pieces.start[piece] + place * pieces.span[piece])
     return Worst(ratio, column % joints, time, "exact")
 
 
-def _scaled(name: str, limits: Limits, path: Path) -> Callable[[Array], Array] | None:
+def _scaled(name: str, limits: MotionLimits, path: Path) -> Callable[[Array], Array] | None:
     """Values of a quantity -> numbers that are at most 1 where its limits are kept, both signs side by side."""
     if name != "position":
         limit = getattr(limits, name)
@@ -275,7 +275,9 @@ def _scaled(name: str, limits: Limits, path: Path) -> Callable[[Array], Array] |
     return beyond
 
 
-def _jump(path: Path, timing: Timing, pieces: Pieces, limits: Limits, moving: tuple[bool, bool]) -> Worst | None:
+def _jump(
+    path: Path, timing: Timing, pieces: LawPieces, limits: MotionLimits, moving: tuple[bool, bool]
+) -> Worst | None:
     """The largest step of the acceleration at a break, its beginning and its end from and to rest included."""
     ends = pieces.at(path, timing, 2, np.array([0.0, 1.0]))
     if limits.acceleration is not None:

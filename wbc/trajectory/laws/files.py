@@ -14,12 +14,12 @@ import numpy as np
 
 from wbc import validation
 from wbc.errors import LawFileError, WbcError
-from wbc.trajectory.laws.limits import Limits
+from wbc.trajectory.laws.limits import MotionLimits
 from wbc.trajectory.laws.timing import Timing
 from wbc.trajectory.paths.from_function import FunctionPath
 from wbc.trajectory.paths.path import JoinedPath, Path, PolynomialPath
 from wbc.trajectory.paths.pose_path import Circle, PosePath
-from wbc.trajectory.paths.turning import QuaternionSpline, Turns
+from wbc.trajectory.paths.turning import QuaternionSpline, TwoTurns
 
 #: What this version writes and reads
 FORMAT = 1
@@ -28,7 +28,7 @@ Parts = dict[str, Any]
 
 
 @dataclass(frozen=True)
-class Kind:
+class SavedKind:
     """Paths, or parts of them, of one class.
 
     Attributes:
@@ -48,13 +48,15 @@ def _from_function(make: type[FunctionPath], p: Parts) -> FunctionPath:
 
 #: Every kind of path that a file can hold, by the word for it in the file
 KINDS = {
-    "polynomial": Kind(PolynomialPath, ("knots", "coefficients")),
-    "joined": Kind(JoinedPath, ("first", "second")),
-    "function": Kind(FunctionPath, ("knots", "coefficients", "start", "end", "deviation", "intervals"), _from_function),
-    "poses": Kind(PosePath, ("position", "turning")),
-    "circle": Kind(Circle, ("center", "x", "y", "rate", "knots")),
-    "turns": Kind(Turns, ("angles", "first", "second", "base")),
-    "quaternions": Kind(QuaternionSpline, ("spline",), lambda make, parts: make(parts["spline"], "path.poses")),
+    "polynomial": SavedKind(PolynomialPath, ("knots", "coefficients")),
+    "joined": SavedKind(JoinedPath, ("first", "second")),
+    "function": SavedKind(
+        FunctionPath, ("knots", "coefficients", "start", "end", "deviation", "intervals"), _from_function
+    ),
+    "poses": SavedKind(PosePath, ("position", "turning")),
+    "circle": SavedKind(Circle, ("center", "x", "y", "rate", "knots")),
+    "turns": SavedKind(TwoTurns, ("angles", "first", "second", "base")),
+    "quaternions": SavedKind(QuaternionSpline, ("spline",), lambda make, parts: make(parts["spline"], "path.poses")),
 }
 
 
@@ -64,7 +66,7 @@ class Saved:
 
     path: Path
     timing: Timing
-    limits: Limits
+    limits: MotionLimits
     moving: tuple[bool, bool]
 
 
@@ -117,10 +119,10 @@ def read(file: str | os.PathLike[str]) -> Saved:
     if arrays["format"].shape != () or arrays["format"] != FORMAT:
         raise LawFileError("file", name, f"of format {arrays['format']}, expected {FORMAT}")
     try:
-        limits = {field.name: arrays.get(f"limits.{field.name}") for field in fields(Limits)}
+        limits = {field.name: arrays.get(f"limits.{field.name}") for field in fields(MotionLimits)}
         timing = Timing(arrays["timing.times"], arrays["timing.coefficients"])
         before, after = (bool(x) for x in arrays["moving"])
-        return Saved(_taken(arrays, "path"), timing, Limits(**limits), (before, after))
+        return Saved(_taken(arrays, "path"), timing, MotionLimits(**limits), (before, after))
     except (WbcError, AttributeError, KeyError, TypeError, ValueError, IndexError) as error:
         raise LawFileError("file", name, f"damaged: {error}") from error
 

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from wbc import validation
 from wbc.errors import ContinuityError, LawFileError, RangeError, ShapeError, WbcError
 from wbc.trajectory.laws import files
-from wbc.trajectory.laws.certificate import Certificate, Check, all_checks, certify, chain
-from wbc.trajectory.laws.limits import Limits
+from wbc.trajectory.laws.certificate import Check, LawCertificate, all_checks, certify, chain
+from wbc.trajectory.laws.limits import MotionLimits
 from wbc.trajectory.laws.timing import Timing
 from wbc.trajectory.paths.path import Index, JoinedPath, Path, Space
 from wbc.validation import Array
@@ -59,14 +59,18 @@ class Law:
         self,
         path: Path,
         timing: Timing,
-        limits: Limits | None = None,
+        limits: MotionLimits | None = None,
         checks: Sequence[Check] = (),
         moving: tuple[bool, bool] = (False, False),
     ) -> None:
         self.path = validation.instance("law.path", path, Path, "a Path")
         self.timing = validation.instance("law.timing", timing, Timing, "a Timing")
         self.checks, self.moving = all_checks(checks), _two_flags("law.moving", moving)
-        given = Limits() if limits is None else validation.instance("limits", limits, Limits, "trajectory.Limits")
+        given = (
+            MotionLimits()
+            if limits is None
+            else validation.instance("limits", limits, MotionLimits, "trajectory.MotionLimits")
+        )
         self.limits = given.for_dof(path.dof)
         _check_within(path, timing)
 
@@ -122,11 +126,11 @@ class Law:
         return np.where(back, self.path.pieces_before(s[0], pieces), pieces)
 
     @cached_property
-    def certificate(self) -> Certificate:
+    def certificate(self) -> LawCertificate:
         """How much of :attr:`limits` and of :attr:`checks` the law uses at worst."""
         return certify(self.path, self.timing, self.limits, self.checks, moving=self.moving)
 
-    def with_limits(self, limits: Limits) -> Law:
+    def with_limits(self, limits: MotionLimits) -> Law:
         """The same law, to be compared with other limits."""
         return Law(self.path, self.timing, limits, self.checks, self.moving)
 
@@ -210,15 +214,15 @@ def _check_within(path: Path, timing: Timing) -> None:
     """Every piece of a timing stays on one stretch of a path without gaps."""
     starts = path.knots[np.concatenate([[0], path.gaps + 1])]
     ends = path.knots[np.concatenate([path.gaps, [-1]])]
-    room = 1e-9 * (1.0 + np.abs(path.knots[[0, -1]]).max())
-    low, high = timing.ranges(lambda low, high: _within(starts, ends, room, low, high))
-    bad = np.flatnonzero(~_within(starts, ends, room, low, high))
+    tolerance = 1e-9 * (1.0 + np.abs(path.knots[[0, -1]]).max())
+    low, high = timing.ranges(lambda low, high: _within(starts, ends, tolerance, low, high))
+    bad = np.flatnonzero(~_within(starts, ends, tolerance, low, high))
     if bad.size:
         reached = (float(low[bad[0]]), float(high[bad[0]]))
         stretches = " or ".join(f"{a:g} to {b:g}" for a, b in zip(starts, ends, strict=True))
         raise RangeError("law.timing", reached, f"s must stay within the path, {stretches}")
 
 
-def _within(starts: Array, ends: Array, room: float, low: Array, high: Array) -> NDArray[np.bool_]:
+def _within(starts: Array, ends: Array, tolerance: float, low: Array, high: Array) -> NDArray[np.bool_]:
     stretch = np.clip(np.searchsorted(starts, 0.5 * (low + high), side="right") - 1, 0, None)
-    return np.asarray((low >= starts[stretch] - room) & (high <= ends[stretch] + room))
+    return np.asarray((low >= starts[stretch] - tolerance) & (high <= ends[stretch] + tolerance))

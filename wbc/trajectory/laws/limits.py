@@ -13,7 +13,7 @@ from wbc.validation import Array
 
 
 @dataclass(frozen=True, eq=False)
-class Limits:
+class MotionLimits:
     """Largest sizes by joint (or by component, for poses: three linear, three angular). None: no limit.
 
     Attributes:
@@ -60,7 +60,7 @@ class Limits:
                 return len(value)
         return None
 
-    def for_dof(self, dof: int) -> Limits:
+    def for_dof(self, dof: int) -> MotionLimits:
         """Themselves, if they are for so many joints.
 
         Raises:
@@ -71,7 +71,7 @@ class Limits:
             raise ShapeError("limits", self.dof, f"expected limits of {dof} joints")
         return self
 
-    def scaled(self, factor: float) -> Limits:
+    def scaled(self, factor: float) -> MotionLimits:
         """Velocities, accelerations and jerks times a factor, positions as they are.
 
         Raises:
@@ -79,7 +79,7 @@ class Limits:
         """
         factor = validation.scalar("factor", factor, low=0.0, open_low=True)
         parts = {name: getattr(self, name) for name in ("velocity", "acceleration", "jerk")}
-        return Limits(self.lower, self.upper, **{k: None if v is None else v * factor for k, v in parts.items()})
+        return MotionLimits(self.lower, self.upper, **{k: None if v is None else v * factor for k, v in parts.items()})
 
 
 def _vector(name: str, value: Any) -> Array:

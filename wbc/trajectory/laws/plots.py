@@ -14,7 +14,7 @@ import numpy as np
 
 from wbc import style, validation
 from wbc.errors import LawFileError, ShapeError
-from wbc.trajectory.laws.certificate import ORDERS, Pieces, Worst
+from wbc.trajectory.laws.certificate import ORDERS, LawPieces, Worst
 from wbc.trajectory.laws.law import Law
 from wbc.trajectory.paths.turning import quaternion
 from wbc.validation import Array
@@ -59,7 +59,7 @@ def plot(law: Law, file: str | os.PathLike[str], names: Sequence[str] | None = N
     validation.instance("title", title, str, "a string")
     if names is not None and len(validation.strings("names", names)) != law.dof:
         raise ShapeError("names", names, f"expected {law.dof} names")
-    pieces = Pieces.of(law.path, law.timing)
+    pieces = LawPieces.of(law.path, law.timing)
     share = np.linspace(0.0, 1.0, max(2, math.ceil(POINTS / len(pieces.start))))
     times = (pieces.start[:, None] + pieces.span[:, None] * share).ravel()
     columns = _pose_panels(law, pieces, share) if law.space == "poses" else [_joint_panels(law, pieces, share, names)]
@@ -108,7 +108,7 @@ def _orders(law: Law) -> list[tuple[str, int]]:
     return [(name, order) for name, order in ORDERS.items() if not (name == "jerk" and jumps)]
 
 
-def _joint_panels(law: Law, pieces: Pieces, share: Array, names: Sequence[str] | None) -> list[Panel]:
+def _joint_panels(law: Law, pieces: LawPieces, share: Array, names: Sequence[str] | None) -> list[Panel]:
     labels = [f"joint {k}" for k in range(law.dof)] if names is None else list(names)
     panels = []
     for name, order in _orders(law):
@@ -119,7 +119,7 @@ def _joint_panels(law: Law, pieces: Pieces, share: Array, names: Sequence[str] |
     return panels
 
 
-def _pose_panels(law: Law, pieces: Pieces, share: Array) -> list[list[Panel]]:
+def _pose_panels(law: Law, pieces: LawPieces, share: Array) -> list[list[Panel]]:
     origin, turning = [], []
     for name, order in _orders(law):
         values = pieces.at(law.path, law.timing, order, share)
@@ -159,8 +159,8 @@ def _draw(axis: Any, times: Array, panel: Panel) -> None:
     for k, label in enumerate(panel.names):
         axis.plot(times, panel.values[:, k], color=_colour(k), label=label)
     low, high = float(panel.values.min()), float(panel.values.max())
-    room = 0.08 * (high - low) or 0.1 * max(abs(high), 1e-9)
-    bottom, top = low - room, high + room
+    margin = 0.08 * (high - low) or 0.1 * max(abs(high), 1e-9)
+    bottom, top = low - margin, high + margin
     for bounds in (panel.lower, panel.upper):
         if bounds is None:
             continue
@@ -171,7 +171,7 @@ def _draw(axis: Any, times: Array, panel: Panel) -> None:
             axis.axhline(bounds[k], color=style.INK if same else _colour(k), lw=1.1, ls="--", zorder=1.5)
             extreme = panel.values[:, k].min() if bounds[k] < 0.0 else panel.values[:, k].max()
             if extreme / bounds[k] > NEAR if bounds[k] else True:
-                bottom, top = min(bottom, bounds[k] - room), max(top, bounds[k] + room)
+                bottom, top = min(bottom, bounds[k] - margin), max(top, bounds[k] + margin)
     axis.set_ylim(bottom, top)
     axis.set_xlim(times[0], times[-1])
     axis.set_title(panel.title)

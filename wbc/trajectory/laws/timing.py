@@ -87,8 +87,8 @@ class Timing:
         """s or a derivative of it along t, at m times; ``piece`` decides on what side of a break it is taken."""
         t = times_row("t", t)
         validation.integer("order", order, 0, 3)
-        room = self.duration
-        if t.size and not (t.min() >= -room and t.max() <= 2.0 * room):
+        margin = self.duration
+        if t.size and not (t.min() >= -margin and t.max() <= 2.0 * margin):
             raise RangeError("t", t, f"expected times of the timing, 0 to {self.duration:g} s")
         at = self.pieces_at(t) if piece is None else pieces_of(piece, t, len(self.times) - 1)
         local, out = t - self.times[at], np.zeros(len(t))
@@ -177,8 +177,8 @@ class Timing:
         hull = self.hull()
         # What only touches a break is not inside; roots of straight lines are exact
         edge = 1e-12 if self.degree > 1 else 1e-15
-        room = edge * (1.0 + np.abs(hull).max(axis=1))
-        low, high = hull.min(axis=1) + room, hull.max(axis=1) - room
+        tolerance = edge * (1.0 + np.abs(hull).max(axis=1))
+        low, high = hull.min(axis=1) + tolerance, hull.max(axis=1) - tolerance
         ordered = np.sort(places)
         some = np.searchsorted(ordered, low) < np.searchsorted(ordered, high)
         powers = np.arange(self.degree, -1, -1)

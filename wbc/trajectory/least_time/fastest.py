@@ -10,15 +10,15 @@ import numpy as np
 
 from wbc.errors import InfeasibleError, RangeError, SolverError
 from wbc.trajectory.laws.certificate import Check
-from wbc.trajectory.laws.limits import Limits
+from wbc.trajectory.laws.limits import MotionLimits
 from wbc.trajectory.laws.timing import Timing
 from wbc.trajectory.least_time.checks import Force, at_rest
-from wbc.trajectory.least_time.rows import Grid, Rows, accelerations, squared_speed
+from wbc.trajectory.least_time.rows import Grid, PathRows, accelerations, squared_speed
 from wbc.trajectory.paths.path import Path
 from wbc.validation import Array
 
 if TYPE_CHECKING:
-    from wbc.trajectory.least_time.reachability import Program
+    from wbc.trajectory.least_time.reachability import SpeedProgram
 
 #: Intervals: at least so many in all, so many for each piece of a path, and on each piece
 LEAST, PER_PIECE, LEAST_ON_PIECE = 500, 125, 8
@@ -38,7 +38,7 @@ class Shrunk:
 
 
 @dataclass(frozen=True, eq=False)
-class Task:
+class FastestTask:
     """What is asked: the fastest motion along a path within limits, from one path speed to another.
 
     Attributes:
@@ -47,7 +47,7 @@ class Task:
     """
 
     path: Path
-    limits: Limits
+    limits: MotionLimits
     speeds: tuple[Check, ...] = ()
     forces: tuple[Force, ...] = ()
     start: float = 0.0
@@ -89,9 +89,9 @@ class Task:
         rows = self._rows(grid, shrunk)
         _limited(grid, rows)
         # toppra brings matplotlib with it, which takes longer than all else that a command loads
-        from wbc.trajectory.least_time.reachability import Program
+        from wbc.trajectory.least_time.reachability import SpeedProgram
 
-        program = Program(grid.s, rows, self._squared(grid, shrunk))
+        program = SpeedProgram(grid.s, rows, self._squared(grid, shrunk))
         found = program.fastest(start, end)
         if found.speed is not None:
             return found.speed
@@ -99,7 +99,7 @@ class Task:
             raise SolverError("path", grid.s[[0, -1]].tolist(), "no path speeds were found between these coordinates")
         raise _unreachable(program, start, end)
 
-    def _rows(self, grid: Grid, shrunk: Shrunk) -> list[Rows]:
+    def _rows(self, grid: Grid, shrunk: Shrunk) -> list[PathRows]:
         rows = []
         if self.limits.acceleration is not None:
             rows.append(accelerations(self.path, grid, self.limits.acceleration / shrunk.acceleration))
@@ -110,7 +110,7 @@ class Task:
                 rows.append(self._force_rows(force, grid, flat).shrunk(shrunk.force))
         return rows
 
-    def _force_rows(self, force: Force, grid: Grid, state: list[Array]) -> Rows:
+    def _force_rows(self, force: Force, grid: Grid, state: list[Array]) -> PathRows:
         position, first, second = state
         rest = at_rest(force, position)
         if rest.max() > 1.0 + 1e-9:
@@ -124,7 +124,7 @@ class Task:
         a = force.ratios(position, np.zeros_like(first), first) - rest
         b = force.ratios(position, first, second) - rest
         shape = (len(grid.piece), 2, -1)
-        return Rows(a.reshape(shape), b.reshape(shape), np.minimum(rest, 1.0).reshape(shape), both=False)
+        return PathRows(a.reshape(shape), b.reshape(shape), np.minimum(rest, 1.0).reshape(shape), both=False)
 
     def _squared(self, grid: Grid, shrunk: Shrunk) -> Array:
         """Upper bounds of the squared path speed at the places of the grid."""
@@ -151,7 +151,7 @@ def _corners(path: Path) -> list[int]:
     return [0, *(int(k) + 1 for k in np.flatnonzero(jump > SMOOTH * size)), len(path.knots) - 1]
 
 
-def _limited(grid: Grid, rows: list[Rows]) -> None:
+def _limited(grid: Grid, rows: list[PathRows]) -> None:
     """Refuses intervals on which no row bounds the path acceleration.
 
     Raises:
@@ -169,7 +169,7 @@ def _limited(grid: Grid, rows: list[Rows]) -> None:
         )
 
 
-def _unreachable(program: Program, start: float, end: float) -> InfeasibleError:
+def _unreachable(program: SpeedProgram, start: float, end: float) -> InfeasibleError:
     """What to say when no motion leads from one path speed to another."""
     reach = program.fastest(start, end).start
     if reach is not None and start > reach[1]:

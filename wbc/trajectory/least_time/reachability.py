@@ -16,7 +16,7 @@ import numpy as np
 from toppra.constraint import LinearConstraint
 from toppra.solverwrapper import seidelWrapper
 
-from wbc.trajectory.least_time.rows import Rows
+from wbc.trajectory.least_time.rows import PathRows
 from wbc.validation import Array
 
 #: Shares by which a squared speed is lowered when rounding leaves no path acceleration
@@ -46,7 +46,7 @@ class _Coefficients(LinearConstraint):  # type: ignore[misc]  # toppra has no ty
 
 
 @dataclass(frozen=True, eq=False)
-class Speeds:
+class PathSpeeds:
     """Path speeds at the places of a grid, or None with the speeds from which the end could be reached.
 
     Attributes:
@@ -58,7 +58,7 @@ class Speeds:
     start: tuple[float, float] | None
 
 
-class Program:
+class SpeedProgram:
     """The linear programs of one grid.
 
     Args:
@@ -66,7 +66,7 @@ class Program:
         squared: upper bounds of the squared path speed at the N + 1 places, inf where there is none.
     """
 
-    def __init__(self, s: Array, rows: Sequence[Rows], squared: Array) -> None:
+    def __init__(self, s: Array, rows: Sequence[PathRows], squared: Array) -> None:
         self.length = float(s[-1] - s[0])
         sigma = (s - s[0]) / self.length
         sigma[-1] = 1.0
@@ -83,29 +83,29 @@ class Program:
         self._solver = seidelWrapper(constraints, _Path(), sigma, 1)
         self._up, self._down = np.array([1e-9, -1.0]), np.array([-1e-9, 1.0])
 
-    def fastest(self, start: float = 0.0, end: float = 0.0) -> Speeds:
+    def fastest(self, start: float = 0.0, end: float = 0.0) -> PathSpeeds:
         """The largest path speeds between given ones at the ends."""
         factor = self.unit / self.length
         first, last = (start * factor) ** 2, (end * factor) ** 2
         low, high = self._backwards(last)
         if np.isnan(high[0]):
-            return Speeds(None, None)
+            return PathSpeeds(None, None)
         reach = float(np.sqrt(low[0])) / factor, float(np.sqrt(high[0])) / factor
-        room = 1e-9 * (1.0 + first)
-        if not low[0] - room <= first <= high[0] + room:
-            return Speeds(None, reach)
+        tolerance = 1e-9 * (1.0 + first)
+        if not low[0] - tolerance <= first <= high[0] + tolerance:
+            return PathSpeeds(None, reach)
         squared = self._forwards(min(max(first, low[0]), high[0]), low, high)
         if squared is None:
-            return Speeds(None, reach)
+            return PathSpeeds(None, reach)
         speed = np.sqrt(squared) / factor
         speed[0], speed[-1] = start, end
-        return Speeds(speed, reach)
+        return PathSpeeds(speed, reach)
 
-    def reversed(self) -> Program:
+    def reversed(self) -> SpeedProgram:
         """The same path from its end to its beginning."""
         s, rows, squared = self._given
-        back = [Rows(-r.a[::-1, ::-1], r.b[::-1, ::-1], r.c[::-1, ::-1], r.both) for r in rows]
-        return Program(-s[::-1], back, squared[::-1])
+        back = [PathRows(-r.a[::-1, ::-1], r.b[::-1, ::-1], r.c[::-1, ::-1], r.both) for r in rows]
+        return SpeedProgram(-s[::-1], back, squared[::-1])
 
     def _backwards(self, last: float) -> tuple[Array, Array]:
         """Lowest and highest squared speeds from which the end can be reached; NaN at the beginning if from nowhere."""
@@ -143,7 +143,7 @@ class Program:
         return out
 
 
-def _parameters(rows: Rows, spans: Array, scale: float, length: float) -> tuple[Any, ...]:
+def _parameters(rows: PathRows, spans: Array, scale: float, length: float) -> tuple[Any, ...]:
     """Rows at both ends of each interval in terms of u and of x at its beginning, in units of length and time.
 
     Each row is divided by its largest factor, because the tolerances of the linear programs are absolute.
@@ -161,12 +161,12 @@ def _parameters(rows: Rows, spans: Array, scale: float, length: float) -> tuple[
     return (*parts, np.eye(width), np.zeros(width), None, None)
 
 
-def _unit_of_time(rows: Sequence[Rows], squared: Array, spans: Array) -> float:
+def _unit_of_time(rows: Sequence[PathRows], squared: Array, spans: Array) -> float:
     """About the time that the path takes."""
     length = float(spans.sum())
     slopes = max((float(np.abs(r.a).max(initial=0.0)) * length for r in rows), default=0.0)
-    bends = [float((np.sqrt(np.abs(r.b).max(axis=(1, 2), initial=0.0)) * spans).sum()) for r in rows]
-    quick = float(np.sqrt(slopes)) + max(bends, default=0.0)
+    curvatures = [float((np.sqrt(np.abs(r.b).max(axis=(1, 2), initial=0.0)) * spans).sum()) for r in rows]
+    quick = float(np.sqrt(slopes)) + max(curvatures, default=0.0)
     speeds = np.sqrt(np.minimum(squared[:-1], squared[1:]))
     slow = float((spans / speeds).sum())
     if quick == 0.0:

@@ -6,10 +6,10 @@ import numpy as np
 
 from wbc.errors import InfeasibleError
 from wbc.trajectory.laws.between import highest
-from wbc.trajectory.laws.certificate import SAMPLES, TOLERANCE, Certificate, Check, Pieces
+from wbc.trajectory.laws.certificate import SAMPLES, TOLERANCE, Check, LawCertificate, LawPieces
 from wbc.trajectory.laws.law import Law
 from wbc.trajectory.least_time.checks import at_rest
-from wbc.trajectory.least_time.fastest import Shrunk, Task
+from wbc.trajectory.least_time.fastest import FastestTask, Shrunk
 from wbc.trajectory.paths.path import Index
 from wbc.validation import Array
 
@@ -23,13 +23,13 @@ GRIDS = 4
 ROUNDS = 6
 
 #: What is kept beyond the tolerance of a certificate
-ROOM = 1e-9
+MARGIN = 1e-9
 
 #: Largest factor of time by which forces are repaired
 SLOWEST = 4.0
 
 
-def repaired(task: Task, count: int | None = None) -> Law:
+def repaired(task: FastestTask, count: int | None = None) -> Law:
     """The fastest law of a task that its certificate finds within limits.
 
     From rest to rest time is stretched evenly, by max(v, sqrt a) for velocities and accelerations and by bisection for
@@ -41,12 +41,12 @@ def repaired(task: Task, count: int | None = None) -> Law:
     return _stretched(task, count) if task.rests else _shrunk(task, count)
 
 
-def _law(task: Task, refined: int, count: int | None, shrunk: Shrunk | None = None) -> Law:
+def _law(task: FastestTask, refined: int, count: int | None, shrunk: Shrunk | None = None) -> Law:
     total = None if count is None else count * refined
     return Law(task.path, task.timing(refined, total, shrunk), task.limits, task.checks)
 
 
-def _stretched(task: Task, count: int | None) -> Law:
+def _stretched(task: FastestTask, count: int | None) -> Law:
     law, factor = _law(task, 1, count), np.inf
     # What a finer grid gains with checks is less than what it costs to sample them
     for k in range(2 if task.checks else GRIDS):
@@ -62,7 +62,7 @@ def _stretched(task: Task, count: int | None) -> Law:
     return law.scaled(factor)
 
 
-def _factor(task: Task, law: Law) -> float:
+def _factor(task: FastestTask, law: Law) -> float:
     """Factor of time at which all limits are kept, inf if there is none below :data:`SLOWEST`."""
     worst = Law(law.path, law.timing, task.limits, task.speeds).certificate.worst
     linear = ["velocity", *(check.name for check in task.speeds)]
@@ -73,7 +73,7 @@ def _factor(task: Task, law: Law) -> float:
     if not task.forces:
         return factor
     factor = max(factor, 1.0)
-    pieces = Pieces.of(law.path, law.timing)
+    pieces = LawPieces.of(law.path, law.timing)
     for force in task.forces:
         factor = _slower(law, pieces, force, factor)
     return factor
@@ -82,7 +82,7 @@ def _factor(task: Task, law: Law) -> float:
 class _Forces:
     """Forces of a law by the factor k of its time, c + (f - c) / k^2 with c those at rest; sampled once a place."""
 
-    def __init__(self, law: Law, pieces: Pieces, force: Check) -> None:
+    def __init__(self, law: Law, pieces: LawPieces, force: Check) -> None:
         self.law, self.pieces, self.force = law, pieces, force
         self._known: dict[tuple[int, int], tuple[Array, Array]] = {}
 
@@ -102,7 +102,7 @@ class _Forces:
         return np.stack([c + f / factor**2 for c, f in known])
 
 
-def _slower(law: Law, pieces: Pieces, force: Check, factor: float) -> float:
+def _slower(law: Law, pieces: LawPieces, force: Check, factor: float) -> float:
     """The smallest factor of time from ``factor`` on at which sampled forces keep their limits, by bisection."""
     forces = _Forces(law, pieces, force)
     low, high, step = factor, factor, 1e-3
@@ -116,7 +116,7 @@ def _slower(law: Law, pieces: Pieces, force: Check, factor: float) -> float:
     return high
 
 
-def _shrunk(task: Task, count: int | None) -> Law:
+def _shrunk(task: FastestTask, count: int | None) -> Law:
     """Between given path speeds: limits on the grid are shrunk by what the certificate finds beyond them."""
     failed: InfeasibleError | None = None
     for k in range(GRIDS):
@@ -135,11 +135,11 @@ def _shrunk(task: Task, count: int | None) -> Law:
     raise failed or InfeasibleError("start_speed", (task.start, task.end), "no law between these path speeds was found")
 
 
-def _more(task: Task, shrunk: Shrunk, certificate: Certificate) -> Shrunk:
+def _more(task: FastestTask, shrunk: Shrunk, certificate: LawCertificate) -> Shrunk:
     def over(*names: str) -> float:
         ratios = [certificate.worst[name].ratio for name in names if name in certificate.worst]
         worst = max(ratios, default=0.0)
-        return worst + ROOM if worst > 1.0 + TOLERANCE else 1.0
+        return worst + MARGIN if worst > 1.0 + TOLERANCE else 1.0
 
     return Shrunk(
         shrunk.velocity * over("velocity"),

@@ -1,7 +1,8 @@
 """Limits along a path as rows that are linear in the path acceleration and in the square of the path speed.
 
 With u = d2s/dt2 and x = (ds/dt)^2 a joint's acceleration is q' u + q'' x, and a torque M q' u + (M q'' + C(q, q') q') x
-+ g. Both are taken at both ends of each interval of a grid, from inside of it, because the path may bend at a knot.
++ g. Both are taken at both ends of each interval of a grid, from inside of it,
+because the path may have a corner at a knot.
 """
 
 from __future__ import annotations
@@ -48,7 +49,7 @@ class Grid:
 
 
 @dataclass(frozen=True, eq=False)
-class Rows:
+class PathRows:
     """a u + b x + c <= 1, with c <= 1, at both ends of N intervals: N x 2 x m each; >= -1 too where ``both``, with
     c = 0.
     """
@@ -58,17 +59,17 @@ class Rows:
     c: Array
     both: bool = True
 
-    def shrunk(self, factor: float) -> Rows:
+    def shrunk(self, factor: float) -> PathRows:
         """The same with limits that are smaller by a factor; what is there without motion stays inside."""
-        room = np.maximum(1.0 / factor, self.c)
-        return Rows(self.a / room, self.b / room, self.c / room, self.both)
+        bound = np.maximum(1.0 / factor, self.c)
+        return PathRows(self.a / bound, self.b / bound, self.c / bound, self.both)
 
 
-def accelerations(path: Path, grid: Grid, limit: Array) -> Rows:
+def accelerations(path: Path, grid: Grid, limit: Array) -> PathRows:
     """|q' u + q'' x| <= limit, for the joints that have one."""
     has = np.isfinite(limit)
     a = grid.at_ends(path, 1)[..., has] / limit[has]
-    return Rows(a, grid.at_ends(path, 2)[..., has] / limit[has], np.zeros_like(a))
+    return PathRows(a, grid.at_ends(path, 2)[..., has] / limit[has], np.zeros_like(a))
 
 
 def squared_speed(slope: Array, limit: Array) -> Array:

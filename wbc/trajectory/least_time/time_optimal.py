@@ -13,10 +13,10 @@ from wbc.errors import BoundsError, InfeasibleError, RangeError, ShapeError
 from wbc.robot.robot import Robot
 from wbc.trajectory.laws.certificate import TOLERANCE, Check, certify
 from wbc.trajectory.laws.law import Law
-from wbc.trajectory.laws.limits import Limits
+from wbc.trajectory.laws.limits import MotionLimits
 from wbc.trajectory.laws.timing import Timing
 from wbc.trajectory.least_time.checks import Force, FrameSpeed, Inequality, PoseSpeed, TorqueCheck
-from wbc.trajectory.least_time.fastest import Task
+from wbc.trajectory.least_time.fastest import FastestTask
 from wbc.trajectory.least_time.repair import repaired
 from wbc.trajectory.paths.joint_paths import spline_path, standing_path
 from wbc.trajectory.paths.path import JoinedPath, Path
@@ -35,7 +35,7 @@ def time_optimal(
     torque: Any = None,
     cartesian_speed: Mapping[str, float] | None = None,
     *,
-    limits: Limits | None = None,
+    limits: MotionLimits | None = None,
     robot: Robot | None = None,
     inequality: Any = None,
     start_speed: float = 0.0,
@@ -78,19 +78,19 @@ def time_optimal(
     Source: H. Pham, Q.-C. Pham, A new approach to time-optimal path parameterization based on reachability analysis,
     IEEE T-RO 34, 2018.
     """
-    way = path if isinstance(path, Path) else spline_path(path)
-    kept = _limits(way, limits, velocity, acceleration)
-    speeds, forces = _checks(way, robot, torque, cartesian_speed, inequality)
+    curve = path if isinstance(path, Path) else spline_path(path)
+    kept = _limits(curve, limits, velocity, acceleration)
+    speeds, forces = _checks(curve, robot, torque, cartesian_speed, inequality)
     start = validation.scalar("start_speed", start_speed, low=0.0)
     end = validation.scalar("end_speed", end_speed, low=0.0)
-    task = Task(way, kept, speeds, forces, start, end)
+    task = FastestTask(curve, kept, speeds, forces, start, end)
     longer = None if duration is None else validation.scalar("duration", duration, low=0.0, open_low=True, unit="s")
     if longer is not None and not task.rests:
         raise RangeError("duration", duration, "a duration can only be asked for from rest to rest")
     count = None if intervals is None else validation.scalar("intervals", intervals, low=2.0, high=MOST_INTERVALS)
     if count is not None and count != int(count):
         raise RangeError("intervals", intervals, "expected a whole number")
-    _within_positions(way, kept)
+    _within_positions(curve, kept)
     law = _law(task, None if count is None else int(count), longer)
     if longer is None:
         return law
@@ -99,7 +99,7 @@ def time_optimal(
     return law.scaled(longer / law.duration)
 
 
-def _law(task: Task, intervals: int | None, duration: float | None) -> Law:
+def _law(task: FastestTask, intervals: int | None, duration: float | None) -> Law:
     if isinstance(task.path, JoinedPath):
         # Between the two coordinates there is no path, so the law rests where they meet
         first = _law(replace(task, path=task.path.first, end=0.0), intervals, None)
@@ -117,7 +117,7 @@ def _stands(path: Path) -> bool:
     return not path.evaluate(places.ravel(), 1, np.repeat(np.arange(len(places)), 9)).any()
 
 
-def _standing(task: Task, duration: float | None) -> Law:
+def _standing(task: FastestTask, duration: float | None) -> Law:
     """A law that stays where its path is."""
     for name in ("start", "end"):
         if getattr(task, name) > 0.0:
@@ -134,9 +134,13 @@ def _standing(task: Task, duration: float | None) -> Law:
     return law
 
 
-def _limits(path: Path, limits: Limits | None, velocity: Any, acceleration: Any) -> Limits:
+def _limits(path: Path, limits: MotionLimits | None, velocity: Any, acceleration: Any) -> MotionLimits:
     """Limits with numbers spread over the joints."""
-    given = Limits() if limits is None else validation.instance("limits", limits, Limits, "trajectory.Limits")
+    given = (
+        MotionLimits()
+        if limits is None
+        else validation.instance("limits", limits, MotionLimits, "trajectory.MotionLimits")
+    )
     out = given.for_dof(path.dof)
     if out.jerk is not None and np.isfinite(out.jerk).any():
         raise RangeError("limits.jerk", out.jerk, "laws of least time step in acceleration, see jerk_limited")
@@ -189,7 +193,7 @@ def _robot(name: str, path: Path, robot: Robot | None) -> Robot:
     return robot
 
 
-def _within_positions(path: Path, limits: Limits) -> None:
+def _within_positions(path: Path, limits: MotionLimits) -> None:
     """Refuses paths that leave the position limits.
 
     Raises:
@@ -201,7 +205,7 @@ def _within_positions(path: Path, limits: Limits) -> None:
             _within_positions(path.second, limits)
         return
     begin = float(path.knots[0])
-    worst = certify(path, Timing.identity(path.length, begin), Limits(limits.lower, limits.upper)).worst
+    worst = certify(path, Timing.identity(path.length, begin), MotionLimits(limits.lower, limits.upper)).worst
     if "position" in worst and worst["position"].ratio > 1.0 + TOLERANCE:
         joint, where = worst["position"].joint, begin + worst["position"].time
         there = path.evaluate(np.array([where]))[0, joint]

@@ -12,7 +12,7 @@ from wbc.errors import RangeError
 from wbc.trajectory.paths.path import Path, PolynomialPath
 from wbc.trajectory.paths.pose_path import Circle, PosePath
 from wbc.trajectory.paths.pose_paths import LARGEST_TURN, RADIUS, standing_pose
-from wbc.trajectory.paths.turning import Turns, matrices, quaternion, turn_between
+from wbc.trajectory.paths.turning import TwoTurns, matrices, quaternion, turn_between
 from wbc.trajectory.paths.waypoints import SMALLEST, distance
 from wbc.validation import Array
 
@@ -68,7 +68,7 @@ def arc_through(start: Any, via: Any, end: Any, radius: float = RADIUS) -> PoseP
 
     Raises:
         ShapeError, NotFiniteError, RotationError: bad poses or via. RangeError: radius not positive; the three points
-        on one line, or two of them equal, which is no circle; half a turn, whose way round is not given.
+        on one line, or two of them equal, which is no circle; half a turn, whose direction is not given.
     """
     radius = validation.scalar("path.radius", radius, low=0.0, open_low=True, unit="m")
     first, last = validation.pose("path.start", start), validation.pose("path.end", end)
@@ -80,12 +80,12 @@ def arc_through(start: Any, via: Any, end: Any, radius: float = RADIUS) -> PoseP
     quaternions = quaternion(first.rotation), quaternion(last.rotation)
     turn = turn_between(*quaternions)
     if np.linalg.norm(turn) > LARGEST_TURN:
-        raise RangeError("path.end", end, "half a turn from the first orientation: both ways round are as long")
+        raise RangeError("path.end", end, "half a turn from the first orientation: both directions are as long")
     return _arc(middle, x, normal, angle, turn, matrices(quaternions[0][None]), radius)
 
 
 def _circle(a: Array, b: Array, c: Array) -> tuple[Array, Array]:
-    """(center, unit normal such that a, b, c follow each other the positive way round).
+    """(center, unit normal such that a, b, c follow each other counter-clockwise).
 
     With u = b - a and v = c - a:    center - a = (|v|^2 (u x v) x u + |u|^2 v x (u x v)) / (2 |u x v|^2)
     """
@@ -128,4 +128,4 @@ def _arc(center: Array, x: Array, normal: Array, angle: float, turn: Array, rota
     angles = np.zeros((2, pieces, 2))
     angles[0, :, 1], angles[1, :, 1] = 1.0, knots[:-1]
     parts = (np.zeros((pieces, 3)), np.tile(turn / length, (pieces, 1)), np.repeat(rotation, pieces, axis=0))
-    return PosePath(position, Turns(PolynomialPath(knots, angles), *parts))
+    return PosePath(position, TwoTurns(PolynomialPath(knots, angles), *parts))

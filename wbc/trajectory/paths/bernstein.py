@@ -58,12 +58,12 @@ def largest(c: Array, tolerance: float = CLOSE) -> tuple[float, int, float]:
 
     ``c``: polynomials x coefficients.
     """
-    room = tolerance * float(np.abs(c).max(initial=0.0))
+    slack = tolerance * float(np.abs(c).max(initial=0.0))
     number, start, width = np.arange(len(c)), np.zeros(len(c)), 1.0
     best, which, place = _highest_end(c, number, start, width)
     for _ in range(60):
         bound = c.max(axis=1)
-        above = bound > best + room
+        above = bound > best + slack
         if not above.any():
             break
         low, high = halves(c[above])
@@ -74,7 +74,7 @@ def largest(c: Array, tolerance: float = CLOSE) -> tuple[float, int, float]:
         top, owner, at = _highest_end(c, number, start, width)
         if top > best:
             best, which, place = top, owner, at
-    return best + room, which, place
+    return best + slack, which, place
 
 
 def _highest_end(c: Array, number: NDArray[np.intp], start: Array, width: float) -> tuple[float, int, float]:

@@ -28,7 +28,7 @@ SHORTEST = 1e-10
 
 
 @dataclass(frozen=True, eq=False)
-class Corners:
+class RoundedCorners:
     """Pieces of a polyline with rounded corners.
 
     Attributes:
@@ -54,7 +54,7 @@ class Corners:
         return out if self.behind[:-2].any() else out[-2:]
 
 
-def rounded(field: str, value: float, lengths: Array, reach: Array) -> Corners:
+def rounded(field: str, value: float, lengths: Array, reach: Array) -> RoundedCorners:
     """Corners between segments of these lengths, each of the reach given or of half of the shorter segment beside it.
 
     Raises:
@@ -83,4 +83,4 @@ def rounded(field: str, value: float, lengths: Array, reach: Array) -> Corners:
             b = np.array([-1.0 / (16.0 * d[k] ** 3), 1.0 / (4.0 * d[k] ** 2), 0.0, 0.0, 0.0])
             before.append(np.array([0.0, 0.0, 0.0, 1.0, -d[k]]) - b)
             behind.append(b)
-    return Corners(np.array(knots), np.array(corner, dtype=np.intp), np.array(before).T, np.array(behind).T)
+    return RoundedCorners(np.array(knots), np.array(corner, dtype=np.intp), np.array(before).T, np.array(behind).T)

@@ -56,7 +56,7 @@ def function_path(
         |path - function| <= tolerance        at three places within each interval, none of them a sample
 
     and until q' has settled: it changes by at most 1e-3 of its largest value from one spline to the next. s runs from
-    0 to the length of the way, in proportion to x. Limits are kept and certified for the path, which is what moves;
+    0 to the length of the curve, in proportion to x. Limits are kept and certified for the path, which is what moves;
     how far it is from the function is its ``deviation``.
 
     Args:
@@ -71,7 +71,7 @@ def function_path(
         ContinuityError: the spline does not come near enough (a step, a corner, a root), with where it is farthest.
 
     A function that does not change gives a path that stands, over s in [0, 1]. Cannot do: find what lies between all
-    samples and all places of comparison. Where q'' jumps, the path has a continuous q'' that swings on both sides.
+    samples and all places of comparison. Where q'' jumps, the path has a continuous q'' that oscillates on both sides.
     """
     if not callable(function):
         raise ShapeError("path.function", function, "expected a function of one number")

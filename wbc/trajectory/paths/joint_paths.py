@@ -95,15 +95,15 @@ def blend_path(waypoints: Any, deviation: float) -> PolynomialPath:
 
     Raises:
         ShapeError, NotFiniteError: of other shapes, or not finite. RangeError: not positive, or so small that corners
-        vanish in rounding (then the smallest that works is told); waypoints too far apart.
+        vanish in rounding (then the smallest that works is named); waypoints too far apart.
     """
     deviation = validation.scalar("path.deviation", deviation, low=0.0, open_low=True, unit="rad or m")
     points, lengths = joint_waypoints("path.waypoints", waypoints)
     if len(points) == 1:
         return standing_path(points[0])
     directions = np.diff(points, axis=0) / lengths[:, None]
-    bends = np.array([distance(u, v) for u, v in pairwise(directions)])
+    deflections = np.array([distance(u, v) for u, v in pairwise(directions)])
     with np.errstate(divide="ignore", over="ignore"):
-        reach = deviation / (DEEPEST * bends)
+        reach = deviation / (DEEPEST * deflections)
     corners = rounded("path.deviation", deviation, lengths, reach)
     return PolynomialPath(corners.knots, corners.combined(points, directions))

@@ -62,8 +62,8 @@ class Path(ABC):
             s = validation.ordinary_array("s", s)
             if s.ndim != 1:
                 raise ShapeError("s", s.shape, "expected numbers in one row")
-        room = self.length
-        if s.size and not (s.min() >= self.knots[0] - room and s.max() <= self.knots[-1] + room):
+        margin = self.length
+        if s.size and not (s.min() >= self.knots[0] - margin and s.max() <= self.knots[-1] + margin):
             raise RangeError("s", s, f"expected coordinates of the path, {self.knots[0]:g} to {self.knots[-1]:g}")
         if piece is None:
             return s, self.pieces_at(s)
@@ -152,19 +152,19 @@ class PolynomialPath(Path):
 
 
 class JoinedPath(Path):
-    """One path after another: the second's coordinate is moved behind the first's, with room between them, so that
+    """One path after another: the second's coordinate is moved behind the first's, with a gap between them, so that
     every coordinate belongs to one of the two.
     """
 
     #: Between the end of one path and the beginning of the next
-    ROOM = 1.0
+    GAP = 1.0
 
     def __init__(self, first: Path, second: Path) -> None:
         if not first.same_kind(second):
             kinds = ((first.space, first.dof), (second.space, second.dof))
             raise ShapeError("path", kinds, "paths of one space and one number of joints can be joined")
         self.first, self.second = first, second
-        self.shift = float(first.knots[-1] + self.ROOM - second.knots[0])
+        self.shift = float(first.knots[-1] + self.GAP - second.knots[0])
         self.knots = np.concatenate([first.knots, second.knots + self.shift])
         behind = len(first.knots)
         self.gaps = np.concatenate([first.gaps, [behind - 1], second.gaps + behind]).astype(np.intp)

@@ -1,7 +1,7 @@
 """Paths of poses: straight lines, polylines with rounded corners, and splines; arcs are in ``arcs``.
 
 The coordinate s is metres of travel plus ``radius`` times the turn [rad], so that turns on the spot have a length, and
-(p'; w) is bounded by 1 and by 1 / ``radius``. ``radius`` is 0.5 m unless told: one radian counts as half a metre.
+(p'; w) is bounded by 1 and by 1 / ``radius``. ``radius`` is 0.5 m unless given: one radian counts as half a metre.
 
 Poses that repeat the one before are dropped (nearer than 1e-9 of the whole, than 1e-14 m, or than the rounding of the
 coordinates); the last one is always reached. Where all are equal, the path stands: it is of degree 0 over s in [0, 1].
@@ -19,18 +19,18 @@ import numpy as np
 
 from wbc import validation
 from wbc.errors import RangeError, ShapeError
-from wbc.trajectory.paths.corners import DEEPEST, Corners, rounded
+from wbc.trajectory.paths.corners import DEEPEST, RoundedCorners, rounded
 from wbc.trajectory.paths.joint_paths import standing_path
 from wbc.trajectory.paths.path import PolynomialPath
 from wbc.trajectory.paths.pose_path import PosePath
-from wbc.trajectory.paths.turning import QuaternionSpline, Turns, matrices, quaternion, turn_between
+from wbc.trajectory.paths.turning import QuaternionSpline, TwoTurns, matrices, quaternion, turn_between
 from wbc.trajectory.paths.waypoints import ENDS, Ends, cubic_spline, distance, kept, summed
 from wbc.validation import Array
 
 #: A radian of turn counts as so many metres
 RADIUS = 0.5
 
-#: Neighbouring orientations may be at most this far apart [rad]: at half a turn both ways round are as long
+#: Neighbouring orientations may be at most this far apart [rad]: at half a turn both directions are as long
 LARGEST_TURN = pi - 1e-6
 
 #: and those of a spline not more than this
@@ -100,7 +100,7 @@ def geodesic_path(start: Any, end: Any, radius: float = RADIUS) -> PosePath:
         radius: metres that a radian counts for, positive.
 
     Raises:
-        ShapeError, NotFiniteError, RotationError: no poses. RangeError: half a turn, whose way round is not given;
+        ShapeError, NotFiniteError, RotationError: no poses. RangeError: half a turn, whose direction is not given;
         radius not positive.
     """
     return pose_polyline([start, end], 1.0, radius=radius)
@@ -121,12 +121,12 @@ def pose_polyline(
     Args:
         poses: at least two (``pin.SE3``, 4 x 4, or position and quaternion x, y, z, w).
         deviation: [m], positive. Less where d would be more than half of a segment.
-        turn_deviation: [rad], positive; deviation / radius unless told.
+        turn_deviation: [rad], positive; deviation / radius unless given.
         radius: metres that a radian counts for, positive.
 
     Raises:
         ShapeError, NotFiniteError, RotationError: no poses. RangeError: numbers not positive, or deviations so small
-        that corners vanish in rounding; half a turn between neighbours, whose way round is not given.
+        that corners vanish in rounding; half a turn between neighbours, whose direction is not given.
     """
     radius = validation.scalar("path.radius", radius, low=0.0, open_low=True, unit="m")
     deviation = validation.scalar("path.deviation", deviation, low=0.0, open_low=True, unit="m")
@@ -138,10 +138,10 @@ def pose_polyline(
         return known.standing()
     directions = np.diff(known.points, axis=0) / known.lengths[:, None]
     rates = known.turns / known.lengths[:, None]
-    bends, twists = (np.linalg.norm(np.diff(x, axis=0), axis=1) for x in (directions, rates))
+    deflections, twists = (np.linalg.norm(np.diff(x, axis=0), axis=1) for x in (directions, rates))
     with np.errstate(divide="ignore", over="ignore"):
         by_turn = turn_deviation / (DEEPEST * twists)
-        by_place = deviation / (DEEPEST * bends)
+        by_place = deviation / (DEEPEST * deflections)
     if (by_turn < by_place).any():
         corners = rounded("path.turn_deviation", turn_deviation, known.lengths, np.minimum(by_turn, by_place))
     else:
@@ -189,12 +189,12 @@ def standing_pose(point: Array, rotation: Array) -> PosePath:
     """Of degree 0, over s in [0, 1]; ``rotation``: 1 x 3 x 3."""
     none = np.zeros((1, 3))
     angles = PolynomialPath([0.0, 1.0], np.zeros((1, 1, 2)))
-    return PosePath(standing_path(point), Turns(angles, none, none, rotation))
+    return PosePath(standing_path(point), TwoTurns(angles, none, none, rotation))
 
 
-def _turns(corners: Corners, rates: Array, rotations: Array) -> Turns:
+def _turns(corners: RoundedCorners, rates: Array, rotations: Array) -> TwoTurns:
     angles = np.stack([corners.before, corners.behind], axis=2)
     if not corners.behind[:-2].any():
         angles = angles[-2:]
     first, second = corners.directions(rates)
-    return Turns(PolynomialPath(corners.knots, angles), first, second, rotations[corners.corner])
+    return TwoTurns(PolynomialPath(corners.knots, angles), first, second, rotations[corners.corner])

@@ -34,7 +34,7 @@ class Turning(Protocol):
         """R (order 0: m x 3 x 3), w, w' or w'' (order 1 to 3: m x 3)."""
 
 
-class Turns:
+class TwoTurns:
     """Two turns about axes that stand still in the world, the first by a(s) and the second by b(s):
 
         R = exp([v]x b) exp([u]x a) R_0,        w = v b' + u~ a',        u~ = exp([v]x b) u

@@ -54,14 +54,14 @@ def kept(field: str, count: int, between: Callable[[int, int], float], size: flo
         whole = sum(between(k - 1, k) for k in range(1, count))
     if not np.isfinite(whole):
         raise RangeError(field, whole, "waypoints too far apart: the sum of their distances is no finite number")
-    room = max(NEAREST * whole, SMALLEST, 8.0 * float(np.finfo(float).eps) * size)
+    tolerance = max(NEAREST * whole, SMALLEST, 8.0 * float(np.finfo(float).eps) * size)
     out = [0]
     for k in range(1, count):
-        if between(out[-1], k) > room:
+        if between(out[-1], k) > tolerance:
             out.append(k)
     last = count - 1
     if len(out) > 1 and out[-1] != last:
-        while len(out) > 1 and between(out[-1], last) <= room:
+        while len(out) > 1 and between(out[-1], last) <= tolerance:
             out.pop()
         out.append(last)
     return out

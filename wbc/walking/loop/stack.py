@@ -10,7 +10,7 @@ from wbc import tasks
 from wbc.controller.controller import Controller, core_of
 from wbc.controller.handle import InputGroup
 from wbc.controller.stack import Stack
-from wbc.robots import Arm, Walker
+from wbc.robots import Walker, WalkerArm
 from wbc.validation import Array
 from wbc.walking.holds.structure import Structure
 from wbc.walking.loop.hold_items import HoldItems
@@ -159,7 +159,7 @@ class WalkStack:
         of = self.walker.arms[arm].v
         return slice(of.start - 6, of.stop - 6)
 
-    def _hand(self, arm: Arm) -> InputGroup:
+    def _hand(self, arm: WalkerArm) -> InputGroup:
         """What a swinging hand follows: its place and velocity, joints 4 to 6 and their rates."""
         name = f"{arm.name} swing"
         wrist, turning = slice(arm.q.start + 3, arm.q.stop), slice(arm.v.start + 3, arm.v.stop)

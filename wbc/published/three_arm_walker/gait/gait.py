@@ -17,15 +17,15 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from wbc.published.three_arm_walker.calibration import Calibration, Variant
-from wbc.published.three_arm_walker.grid import Place, Terrain
-from wbc.published.three_arm_walker.holds import handholds
-from wbc.published.three_arm_walker.margin import margins
-from wbc.published.three_arm_walker.motion import RATE, Motion
-from wbc.published.three_arm_walker.plant import Order, Plant
-from wbc.published.three_arm_walker.reach import ARMS, Shoulders, View
-from wbc.published.three_arm_walker.swing import swing_poses
-from wbc.published.three_arm_walker.tracking import has_arrived, tracking_command
+from wbc.published.three_arm_walker.gait.holds import handholds
+from wbc.published.three_arm_walker.gait.margin import margins
+from wbc.published.three_arm_walker.gait.swing import swing_poses
+from wbc.published.three_arm_walker.gait.tracking import has_arrived, tracking_command
+from wbc.published.three_arm_walker.machine.calibration import Calibration, Variant
+from wbc.published.three_arm_walker.machine.grid import Place, Terrain
+from wbc.published.three_arm_walker.machine.motion import RATE, BodyMotion
+from wbc.published.three_arm_walker.machine.plant import CycleCommand, Plant
+from wbc.published.three_arm_walker.machine.reach import ARMS, Shoulders, View
 from wbc.validation import Array
 
 #: How long after its expected end a swing is given up [s]
@@ -82,7 +82,7 @@ class Gait:
     least: list[float] = field(default_factory=list)
     blocked: int | None = None
     arrived: bool = False
-    _motion: Motion | None = None
+    _motion: BodyMotion | None = None
     _since: int = 0
 
     @property
@@ -101,7 +101,7 @@ class Gait:
         for record in (self.lifts, self.replans, self.late, self.least):
             record.clear()
 
-    def step(self, plant: Plant, twist: Array) -> Order:
+    def step(self, plant: Plant, twist: Array) -> CycleCommand:
         """One cycle, with the body's twist in fixed axes [in/s, rad/s]; the clock is not moved on."""
         arm = self.in_air
         if arm is not None:
@@ -116,9 +116,9 @@ class Gait:
             self._consider(plant, twist)
         return self.order()
 
-    def order(self, arm: int | None = None, command: Array | None = None) -> Order:
+    def order(self, arm: int | None = None, command: Array | None = None) -> CycleCommand:
         """What goes to the arms."""
-        return Order(tuple(self.supporting), arm, command)
+        return CycleCommand(tuple(self.supporting), arm, command)
 
     def track(self, arm: int, plant: Plant) -> Array:
         """The hand's twist on its way; once it has arrived it holds."""
@@ -133,16 +133,16 @@ class Gait:
         self.supporting[arm] = self.arrived and self.places[arm] is not None
         return command
 
-    def start(self, arm: int, motion: Motion | None, place: Place | None) -> None:
+    def start(self, arm: int, motion: BodyMotion | None, place: Place | None) -> None:
         """An arm lets go and follows a motion from now on, to a place or to none."""
         self.blocked, self.arrived = None, False
         self._motion, self._since = motion, self.cycle
         self.places[arm], self.supporting[arm] = place, False
 
-    def swing(self, arm: int, plant: Plant, place: Place) -> Motion:
+    def swing(self, arm: int, plant: Plant, place: Place) -> BodyMotion:
         """The motion from where a hand is to a place."""
         old = self.places[arm] if self.supporting[arm] else None
-        return Motion(swing_poses(plant.hands[arm], old, place), self.calibration)
+        return BodyMotion(swing_poses(plant.hands[arm], old, place), self.calibration)
 
     def plan(self, arm: int, plant: Plant, twist: Array, least: float | None) -> bool:
         """Send an arm to the hold where its margin is largest, if it exceeds ``least``; whether it goes."""

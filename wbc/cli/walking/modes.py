@@ -9,7 +9,7 @@ from pathlib import Path
 
 from wbc import validation
 from wbc.cli.console import err
-from wbc.cli.keyboard import HELP, KeyCommands
+from wbc.cli.walking.keyboard import HELP, KeyCommands
 from wbc.errors import RangeError
 from wbc.robots import Walker, WalkerData
 from wbc.terminal import terminal, terminal_keys

@@ -11,9 +11,9 @@ from rich.markup import escape
 from rich.table import Table
 
 from wbc import robots
-from wbc.cli.collisions import SAMPLES, Collisions
-from wbc.cli.collisions import show as show_collisions
 from wbc.cli.console import err, out
+from wbc.cli.robot.collisions import SAMPLES, Collisions
+from wbc.cli.robot.collisions import show as show_collisions
 from wbc.robot import Robot
 from wbc.robot.loading import SHAPES
 

@@ -15,9 +15,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from wbc.published.three_arm_walker.arm import ES, HW, SN, forward
-from wbc.published.three_arm_walker.calibration import Variant
-from wbc.published.three_arm_walker.rigid import cross
+from wbc.published.three_arm_walker.machine.arm import ES, HW, SN, forward
+from wbc.published.three_arm_walker.machine.calibration import Variant
+from wbc.published.three_arm_walker.machine.rigid import cross
 from wbc.validation import Array
 
 #: Below this |sin theta5|, axes 4 and 6 count as aligned

@@ -9,7 +9,7 @@ import numpy as np
 
 from wbc import style
 from wbc.errors import RangeError
-from wbc.published.three_arm_walker import Calibration, Log, Outcome, PublishedWalker
+from wbc.published.three_arm_walker import Calibration, PublishedLog, PublishedOutcome, PublishedWalker
 from wbc.track.summary import Figure
 from wbc.walking.holds.built_in import PITCH, RADIUS, grid_angle
 from wbc.walking.holds.structure import Structure
@@ -33,8 +33,8 @@ class PublishedRun:
 
     request: WalkRequest
     structure: Structure
-    log: Log
-    outcomes: tuple[Outcome, ...]
+    log: PublishedLog
+    outcomes: tuple[PublishedOutcome, ...]
     arrived: bool
     reason: str
 
@@ -53,7 +53,7 @@ def perform_published(request: WalkRequest) -> PublishedRun:
     there = set(structure.ids)
     removed = [tuple(int(part) for part in hold.split(",")) for hold in whole.ids if hold not in there]
     walker = PublishedWalker(points[0][:2], points[0][2], removed=removed)
-    outcomes = list[Outcome]()
+    outcomes = list[PublishedOutcome]()
     if request.mode == "destination":
         outcomes.append(walker.to(points[1:]))
     else:
@@ -73,12 +73,12 @@ def perform_published(request: WalkRequest) -> PublishedRun:
 
 def published_figures(run: PublishedRun) -> list[Figure]:
     """The figures in the order in which they are shown."""
-    told = "arrived" if run.arrived else f"stopped: {run.reason}"
+    text = "arrived" if run.arrived else f"stopped: {run.reason}"
     lifts = sum(len(outcome.lifts) for outcome in run.outcomes)
     last = float(run.log.times[-1]) if len(run.log.times) else 0.0
     time = sum(outcome.time for outcome in run.outcomes)
     return [
-        Figure("outcome", "outcome", "arrived" if run.arrived else "stopped", told),
+        Figure("outcome", "outcome", "arrived" if run.arrived else "stopped", text),
         Figure("reason", "", run.reason, ""),
         Figure("planner", "planner", "published", "published, ideal tracking, wrist reach only"),
         Figure("robot", "robot", Calibration().digest, f"published walker, Calibration {Calibration().digest}"),
@@ -116,14 +116,14 @@ def save_published(run: PublishedRun, folder: pathlib.Path) -> list[pathlib.Path
     return [file, folder / PLOT]
 
 
-def _driven(walker: PublishedWalker, request: WalkRequest, point: tuple[float, float, float]) -> Outcome:
+def _driven(walker: PublishedWalker, request: WalkRequest, point: tuple[float, float, float]) -> PublishedOutcome:
     """Velocity control straight towards a point, for as long as that takes."""
     now = np.array(walker.place)
     off = np.array(point) - now
     radius = RADIUS + 52 * 0.0254
-    way = np.array([(grid_angle(1.0) - grid_angle(0.0)) * radius * off[0], PITCH * off[1]])
+    offset = np.array([(grid_angle(1.0) - grid_angle(0.0)) * radius * off[0], PITCH * off[1]])
     spin = (off[2] + np.pi) % (2.0 * np.pi) - np.pi
-    time = max(float(np.linalg.norm(way)) / request.speed, abs(spin) / request.turn_rate)
+    time = max(float(np.linalg.norm(offset)) / request.speed, abs(spin) / request.turn_rate)
     if time <= 0.0:
         raise RangeError("to", point, "the body is there already")
-    return walker.drive([way[0] / time, way[1] / time, spin / time], time)
+    return walker.drive([offset[0] / time, offset[1] / time, spin / time], time)

@@ -9,7 +9,7 @@ Source: M. R. Patterson's thesis, Fig. 13 and the listing HHDPTH.
 
 from __future__ import annotations
 
-from wbc.published.three_arm_walker.grid import RADIUS, Place, frame
+from wbc.published.three_arm_walker.machine.grid import RADIUS, Place, frame
 from wbc.validation import Array
 
 #: Radius of the via points [in]

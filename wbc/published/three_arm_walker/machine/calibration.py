@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 
 from wbc import validation
-from wbc.published.three_arm_walker.grid import INCH
+from wbc.published.three_arm_walker.machine.grid import INCH
 
 #: Where the text and the listing disagree both are there; the listing is what ran
 Variant = Literal["listing", "text"]

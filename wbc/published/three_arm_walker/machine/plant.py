@@ -9,15 +9,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol
 
-from wbc.published.three_arm_walker.arm import START, forward, joint_beyond_reach
-from wbc.published.three_arm_walker.body import moved
-from wbc.published.three_arm_walker.reach import ARMS, Shoulders
-from wbc.published.three_arm_walker.rigid import inverse
+from wbc.published.three_arm_walker.machine.arm import START, forward, joint_beyond_reach
+from wbc.published.three_arm_walker.machine.body import moved
+from wbc.published.three_arm_walker.machine.reach import ARMS, Shoulders
+from wbc.published.three_arm_walker.machine.rigid import inverse
 from wbc.validation import Array
 
 
 @dataclass(frozen=True)
-class Order:
+class CycleCommand:
     """What the arms do in a cycle: those that support hold on, one in the air may get a command.
 
     Attributes:
@@ -53,7 +53,7 @@ class Plant(Protocol):
     def place(self, arm: int, pose: Array) -> int | None:
         """Put a hand in the air where tracking is ideal; the joint that keeps it from there, if one does."""
 
-    def move(self, twist: Array, order: Order) -> Fault | None:
+    def move(self, twist: Array, order: CycleCommand) -> Fault | None:
         """One cycle: the body's twist, the order to the arms. With a fault nothing has moved."""
 
 
@@ -74,7 +74,7 @@ class IdealPlant:
             self.hands[arm] = pose
         return joint
 
-    def move(self, twist: Array, order: Order) -> Fault | None:
+    def move(self, twist: Array, order: CycleCommand) -> Fault | None:
         body = moved(self.body, twist)
         for arm in range(ARMS):
             joint = self._beyond(body, arm, self.hands[arm]) if order.supporting[arm] else None

@@ -13,10 +13,10 @@ from rich.markup import escape
 from rich.progress import TaskID
 
 from wbc.analysis import (
-    Certificate,
     ExactModel,
     JointBlock,
     NumericWitness,
+    RankCertificate,
     Rows,
     Screened,
     TreeCertificate,
@@ -59,7 +59,7 @@ def certified(
     rows: Sequence[Rows],
     how: Subdivision,
     minutes: float,
-) -> Certificate:
+) -> RankCertificate:
     """The certificate of one set, with a progress bar."""
     with progress_bar() as bar:
         shown = bar.add_task(f"{name}, decided", total=1.0)
@@ -73,7 +73,7 @@ def certified(
         )
 
 
-def show_certificate(found: Certificate) -> None:
+def show_certificate(found: RankCertificate) -> None:
     """Printed."""
     console = out()
     for line in lines(found):
@@ -118,7 +118,7 @@ def _witness(found: NumericWitness) -> list[str]:
     ]
 
 
-def lines(found: Certificate) -> list[str]:
+def lines(found: RankCertificate) -> list[str]:
     """A certificate as text."""
     tube = f"sigma_min(J_T) < {found.eps:.4g} ({found.eps / found.peak:.3g} of its maximum)" if found.peak else ""
     if found.verdict == "incomplete" and found.witness is not None:
@@ -146,7 +146,7 @@ def _witness_record(found: NumericWitness | None) -> dict[str, Any] | None:
     return None if found is None else {"q": found.q.tolist(), "task": found.task.tolist()}
 
 
-def record(found: Certificate) -> dict[str, Any]:
+def record(found: RankCertificate) -> dict[str, Any]:
     """A certificate as data."""
     return {
         "verdict": found.verdict,

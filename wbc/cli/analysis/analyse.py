@@ -31,11 +31,11 @@ from wbc.analysis.algebra.locus import Located
 from wbc.analysis.loci.child import Child
 from wbc.analysis.loci.pictures import save_pictures
 from wbc.analysis.published import ROBOTS
-from wbc.cli.certificates import Subdivision, certified, record, show_certificate, winner
+from wbc.cli.analysis.certificates import Subdivision, certified, record, show_certificate, winner
+from wbc.cli.analysis.trees import analyse_tree
 from wbc.cli.console import out
 from wbc.cli.options import RobotName
 from wbc.cli.planning import tip_frame
-from wbc.cli.trees import analyse_tree
 from wbc.coordinates import TREES
 from wbc.errors import RangeError, RobotFileError
 

@@ -10,7 +10,7 @@ from rich.markup import escape
 from wbc import validation
 from wbc.analysis import BlockAnalysis, Budget, ExactModel, Notation, TreeAnalysis, analyse_blocks
 from wbc.analysis.algebra.locus import Located
-from wbc.cli.certificates import Subdivision, certified_tree, record_tree
+from wbc.cli.analysis.certificates import Subdivision, certified_tree, record_tree
 from wbc.cli.console import out
 from wbc.coordinates import tree_sets
 from wbc.errors import RangeError

@@ -9,8 +9,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from wbc.published.three_arm_walker.calibration import Calibration
-from wbc.published.three_arm_walker.grid import INCH
+from wbc.published.three_arm_walker.machine.calibration import Calibration
+from wbc.published.three_arm_walker.machine.grid import INCH
 from wbc.trajectory import via_points
 from wbc.validation import Array
 
@@ -19,7 +19,7 @@ RATE = 10.0
 CYCLE = 1.0 / RATE
 
 
-class Motion:
+class BodyMotion:
     """From rest at the first pose past all others to rest at the last.
 
     Args:

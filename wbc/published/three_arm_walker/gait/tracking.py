@@ -11,9 +11,9 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
-from wbc.published.three_arm_walker.calibration import Calibration
-from wbc.published.three_arm_walker.grid import INCH
-from wbc.published.three_arm_walker.motion import CYCLE, RATE, Motion
+from wbc.published.three_arm_walker.machine.calibration import Calibration
+from wbc.published.three_arm_walker.machine.grid import INCH
+from wbc.published.three_arm_walker.machine.motion import CYCLE, RATE, BodyMotion
 from wbc.validation import Array
 
 
@@ -23,13 +23,13 @@ def pose_error(desired: Array, actual: Array) -> Array:
     return np.concatenate([desired[:3, 3] - actual[:3, 3], turn])
 
 
-def tracking_command(motion: Motion, cycles: int, actual: Array) -> Array:
+def tracking_command(motion: BodyMotion, cycles: int, actual: Array) -> Array:
     """VELCOM: the hand's twist, fixed axes, some cycles after a motion began [in/s, rad/s]."""
     desired, twist = motion.at(cycles)
     return np.asarray(twist + pose_error(desired, actual) / CYCLE)
 
 
-def has_arrived(motion: Motion, cycles: int, actual: Array, command: Array, tolerances: Calibration) -> bool:
+def has_arrived(motion: BodyMotion, cycles: int, actual: Array, command: Array, tolerances: Calibration) -> bool:
     """Whether the hand may grasp."""
     if cycles / RATE < motion.duration:
         return False

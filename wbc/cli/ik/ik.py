@@ -10,9 +10,9 @@ import numpy as np
 import typer
 
 from wbc.cli import options
-from wbc.cli.answers import Answer, check_output, report, save
+from wbc.cli.ik.answers import TargetAnswer, check_output, report, save
+from wbc.cli.ik.targets import Target, given_targets
 from wbc.cli.planning import given_obstacles, planned
-from wbc.cli.targets import Target, given_targets
 from wbc.errors import InfeasibleError, RangeError
 from wbc.ik import InverseKinematics, Solution
 from wbc.track.setup import Moving
@@ -95,7 +95,7 @@ def ik(
 
 def _answers(
     solver: InverseKinematics, first: Array, number: int, target: Target, every: bool, given: dict[str, Any]
-) -> list[Answer]:
+) -> list[TargetAnswer]:
     """What was found for one target, or the nearest configuration."""
     hand = solver["hand"]
     hand.target = target.pose
@@ -105,7 +105,7 @@ def _answers(
         # Where the time ends before the first of all branches, there is the one answer
         with contextlib.suppress(InfeasibleError):
             found = solver.branches(first, **given).solutions
-    return [Answer(number, k, solution, target.oriented) for k, solution in enumerate(found, 1)]
+    return [TargetAnswer(number, k, solution, target.oriented) for k, solution in enumerate(found, 1)]
 
 
 def _standing(obstacles: dict[str, Moving]) -> dict[str, Moving]:

@@ -8,8 +8,8 @@ import typer
 from rich.markup import escape
 from rich.table import Table
 
+from wbc.cli.analysis.modes import SHORT_NAMES
 from wbc.cli.console import err, out
-from wbc.cli.modes import SHORT_NAMES
 from wbc.coordinates import Adviser, advice_time, mode_pairs, parts, restriction_table, survey_pairs
 from wbc.errors import ShapeError
 from wbc.robot import Robot
@@ -44,8 +44,8 @@ def advise(
         rows.add_column(name)
     for found in adviser.advise(q):
         turn = found.direction * found.distance
-        way = ", ".join(f"{n} {x:+.2f}" for n, x in zip(machine.dof_names, turn, strict=True) if abs(x) > 0.05)
-        where = found.locus or f"{found.basis}: {way}"
+        turns = ", ".join(f"{n} {x:+.2f}" for n, x in zip(machine.dof_names, turn, strict=True) if abs(x) > 0.05)
+        where = found.locus or f"{found.basis}: {turns}"
         numbers = f"{found.sigma:.4f}", f"{found.ratio:.3f}", str(found.condition), f"{found.distance:.3f}"
         rows.add_row(escape(found.pair), *numbers, escape(where))
     out().print(rows)

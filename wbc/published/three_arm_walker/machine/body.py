@@ -14,9 +14,9 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
-from wbc.published.three_arm_walker.grid import PITCH, RADIUS, STEP, coordinates, euler_angles
-from wbc.published.three_arm_walker.motion import CYCLE
-from wbc.published.three_arm_walker.rigid import cross
+from wbc.published.three_arm_walker.machine.grid import PITCH, RADIUS, STEP, coordinates, euler_angles
+from wbc.published.three_arm_walker.machine.motion import CYCLE
+from wbc.published.three_arm_walker.machine.rigid import cross
 from wbc.validation import Array
 
 

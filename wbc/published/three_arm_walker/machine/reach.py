@@ -18,8 +18,8 @@ from functools import cached_property
 import numpy as np
 
 from wbc.errors import RangeError
-from wbc.published.three_arm_walker.arm import ES, HW, NO, SN
-from wbc.published.three_arm_walker.grid import PITCH, RADIUS, coordinates, rotation
+from wbc.published.three_arm_walker.machine.arm import ES, HW, NO, SN
+from wbc.published.three_arm_walker.machine.grid import PITCH, RADIUS, coordinates, rotation
 from wbc.validation import Array
 
 ARMS = 3

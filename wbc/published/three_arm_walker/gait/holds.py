@@ -17,9 +17,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from wbc.published.three_arm_walker.arm import SN
-from wbc.published.three_arm_walker.grid import PITCH, Place, Terrain
-from wbc.published.three_arm_walker.reach import INNER, View
+from wbc.published.three_arm_walker.machine.arm import SN
+from wbc.published.three_arm_walker.machine.grid import PITCH, Place, Terrain
+from wbc.published.three_arm_walker.machine.reach import INNER, View
 from wbc.validation import Array
 
 #: Cosine at the edge of the wedge that faces the centre

@@ -19,7 +19,7 @@ SUFFIXES = (".csv", ".npz")
 
 
 @dataclass(frozen=True, eq=False)
-class Answer:
+class TargetAnswer:
     """A configuration for a target; both, and the branches of a target, are counted from 1."""
 
     target: int
@@ -69,7 +69,7 @@ def check_output(file: Path | None, force: bool) -> None:
         raise OutputError("out", str(file), "there is no such folder")
 
 
-def report(robot: Robot, frame: str, answers: list[Answer]) -> None:
+def report(robot: Robot, frame: str, answers: list[TargetAnswer]) -> None:
     """Print a line for each answer, then the configurations; why a target is not reached goes to standard error."""
     console, several = out(), len({a.target for a in answers}) < len(answers)
     title = f"{robot.name}: configurations for {frame}"
@@ -98,7 +98,7 @@ def report(robot: Robot, frame: str, answers: list[Answer]) -> None:
             err().print(f"target {a.target}: {escape(a.reason)}", soft_wrap=True)
 
 
-def save(file: Path, robot: Robot, answers: list[Answer]) -> None:
+def save(file: Path, robot: Robot, answers: list[TargetAnswer]) -> None:
     """Write all answers.
 
     CSV: target, branch, status, position_error [m], rotation_error [rad], binding, then a column for each coordinate.
@@ -139,7 +139,7 @@ def _line(solution: Solution) -> str:
     return ",".join(f"{x:.9g}" for x in solution.q)
 
 
-def _joints(robot: Robot, answer: Answer) -> Table:
+def _joints(robot: Robot, answer: TargetAnswer) -> Table:
     rows = Table(header_style="bold", box=None, pad_edge=False)
     rows.add_column("joint", no_wrap=True)
     for head in ("unit", "position", "lower", "upper"):

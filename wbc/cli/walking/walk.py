@@ -12,11 +12,11 @@ from rich.markup import escape
 from rich.table import Table
 
 from wbc import robots
-from wbc.cli import walk_options as options
 from wbc.cli.console import err, out, progress_bar
-from wbc.cli.published_walk import perform_published, published_figures, save_published
 from wbc.cli.session import INTERRUPTED, Stopper
-from wbc.cli.walk_modes import Perform, performance
+from wbc.cli.walking import options
+from wbc.cli.walking.modes import Perform, performance
+from wbc.cli.walking.published_walk import perform_published, published_figures, save_published
 from wbc.errors import RangeError, ShapeError
 from wbc.robots import TwoEndedData, Walker, WalkerData
 from wbc.track.summary import Figure

@@ -18,10 +18,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wbc.published.three_arm_walker.calibration import Variant
-from wbc.published.three_arm_walker.grid import PITCH
-from wbc.published.three_arm_walker.reach import ARMS, INNER, View
-from wbc.published.three_arm_walker.rigid import cross
+from wbc.published.three_arm_walker.machine.calibration import Variant
+from wbc.published.three_arm_walker.machine.grid import PITCH
+from wbc.published.three_arm_walker.machine.reach import ARMS, INNER, View
+from wbc.published.three_arm_walker.machine.rigid import cross
 from wbc.validation import Array
 
 #: What a limit that is not met counts as

@@ -1,0 +1,1 @@
+"""Commands that show robots and the pairs of links that must not touch."""

@@ -1,0 +1,1 @@
+"""Walks on the command line: options, modes, keys, the published planner."""

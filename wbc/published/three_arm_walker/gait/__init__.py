@@ -1,0 +1,1 @@
+"""The free gait: holds, margins, swings and their tracking."""

@@ -1,0 +1,1 @@
+"""The machine: its grid, arms and body, what they can reach, and what a cycle does to them."""
