@@ -17,7 +17,7 @@ TYPES := build/types
 SOURCES := wbc tasks robots tests bench examples
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test check slow lint format types docs bench bench-ik bench-time-laws soak lock clean
+.PHONY: help setup demo test check slow lint format types docs figures bench bench-ik bench-time-laws soak lock clean
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 18
@@ -53,6 +53,9 @@ types: $(READY)  ## mypy --strict on the package
 
 docs: $(READY)  ## write what the code declares into the pages of tasks and constraints
 	$(BIN)/wbc docs
+
+figures: $(READY)  ## measure again what pages say, where it takes at most 5 minutes and is older than its code
+	$(BIN)/python -m bench.figures --stale
 
 bench: $(READY) $(PEERS_READY)  ## compare with pink, mink and placo on the same problems, inverse kinematics, and a quick run of the laws
 	$(BIN)/python -m bench --peers-python $(PEERS_VENV)/bin/python

@@ -9,11 +9,14 @@ from pathlib import Path
 
 from rich.console import Console
 
-from bench import figure, report
+from bench import report
 from bench.code.run import measure as measure_code
+from bench.curve_report import draw
 from bench.curve_run import measure_curves
 from bench.deadlines.course import KINDS
 from bench.deadlines.run import measure as measure_deadlines
+from bench.figures.index import write_blocks
+from bench.figures.store import stamp
 from bench.harness import Plan, machine, measure, measure_startup
 from bench.pool import ROOT
 from bench.prepare import prepare
@@ -36,18 +39,23 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, help="rounds a problem")
     parser.add_argument("--problems", nargs="+", default=PARTS, choices=PARTS)
     parser.add_argument("--work", type=Path, default=ROOT / "build" / "bench", help="folder for the problems")
-    parser.add_argument("--output", type=Path, default=ROOT / "bench", help="folder for results.json and results.md")
+    parser.add_argument(
+        "--output", type=Path, help="folder for results.json and results.md; default: bench for whole runs, else build"
+    )
     chosen = parser.parse_args()
+    whole = chosen.output is None and chosen.peers_python and chosen.rounds is None and set(chosen.problems) == {*PARTS}
+    chosen.output = chosen.output or ROOT / ("bench" if whole else "build/bench")
     # Not resolved: a virtual environment's interpreter is a link
     peers = str(Path(chosen.peers_python).absolute()) if chosen.peers_python else None
     plan = Plan(sys.executable, peers, chosen.work, chosen.rounds, [n for n in PROBLEMS if n in chosen.problems])
     console, progress = Console(), Console(stderr=True)
     if not console.is_terminal:
         console = Console(width=160)
-    about = machine()
+    about, begun = machine(), stamp()
     prepare(plan.folder)
     with progress.status("") as status:
         results = {
+            "stamp": begun,
             "machine": about,
             "versions": versions(plan.python, OWN, plan.peers_python, PEERS),
             "startup": measure_startup(plan, status.update),
@@ -62,14 +70,10 @@ def main() -> None:
     chosen.output.mkdir(parents=True, exist_ok=True)
     (chosen.output / "results.json").write_text(json.dumps(results, indent=1) + "\n")
     (chosen.output / "results.md").write_text(report.markdown(results))
-    complete = CURVES in results and peers is not None
-    picture = ROOT / "docs" / "images" if chosen.output == ROOT / "bench" else chosen.output
-    if complete:
-        figure.draw(results[CURVES], picture / "bench_curves.png")
-    if complete and len(plan.names) == len(PROBLEMS) and chosen.output == ROOT / "bench":
-        report.put_between(ROOT / "README.md", "bench", report.readme(results))
-    if CODE in results and DEADLINES in results and chosen.output == ROOT / "bench":
-        report.put_between(ROOT / "docs" / "export.md", "bench", report.export_page(results))
+    if CURVES in results and peers is not None:
+        draw(results[CURVES], (ROOT / "docs" / "images" if whole else chosen.output) / "bench_curves.png")
+    if whole:
+        write_blocks()
     report.show(results, console)
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from pathlib import Path
 from typing import Any
 
 from rich.console import Console
@@ -58,9 +57,7 @@ def code_notes(results: dict[str, Any]) -> list[str]:
 
 def export_page(results: dict[str, Any]) -> str:
     """The tables of docs/export.md."""
-    about = results["machine"]
-    told = f"{about['processor']}, {about['cores']}, load {about['load']}."
-    return "\n\n".join([*(sheet.markdown() for sheet in code_sheets(results)), *code_notes(results), told])
+    return "\n\n".join([*(sheet.markdown() for sheet in code_sheets(results)), *code_notes(results)])
 
 
 def ticks(problem: dict[str, Any]) -> Sheet:
@@ -167,25 +164,13 @@ def readme(results: dict[str, Any]) -> str:
             parts = [us(found["durations"][part]["median"]) for part in ("call", "cycle")] if found else ["-"]
             cells.append(" / ".join(parts))
         lines.append(line([name, *cells]))
-    about = results["machine"]
-    lines += [
-        "",
-        f"{about['processor']}, Python {about['python']}, {about['cores']}. All reach the same pose to the same error.",
-    ]
+    lines += ["", "All reach the same pose to the same error."]
     if results.get("curves"):
         lines += ["", *curve_readme(results["curves"]), "", "![Tick against size](docs/images/bench_curves.png)", ""]
     lines.append(
         "What each call contains, percentiles, phases, compile times and goals: [bench/results.md](bench/results.md)."
     )
     return "\n".join(lines)
-
-
-def put_between(path: Path, name: str, text: str) -> None:
-    """Put text between the marks ``<!-- name -->`` and ``<!-- /name -->`` of a page."""
-    head, mark, rest = path.read_text().partition(f"<!-- {name} -->")
-    _, end, tail = rest.partition(f"<!-- /{name} -->")
-    if mark and end:
-        path.write_text(f"{head}{mark}\n\n{text}\n\n{end}{tail}")
 
 
 def _tails(durations: dict[str, float]) -> list[str]:

@@ -20,7 +20,7 @@ TICK, JUMP, KEPT = 1e3 * DT, HOLD * DT, 1e3 * MARGIN
 NOTE = f"""\
 Deadlines: {TICKS} ticks of {TICK:g} ms in closed loop. The target of the hand (of both hands of Talos, whose feet \
 and centre of mass have targets, too) jumps every {JUMP:g} s, spheres swing through the workspace with their \
-velocities told, joint accelerations are limited, and the solver starts from the active set of the last tick. \
+velocities given, joint accelerations are limited, and the solver starts from the active set of the last tick. \
 Durations are of the native call, all turns together; the loop is the same in every turn, so that the least of the \
 turns is a tick's own time, without what the machine did besides. The error is the distance of hands from their \
 targets, over all ticks and before each jump; the least margin is the least distance to a sphere less the {KEPT:g} mm \

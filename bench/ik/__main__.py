@@ -14,12 +14,13 @@ from typing import Any
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
+from bench.figures.index import write_blocks
+from bench.figures.store import stamp
 from bench.harness import machine
 from bench.ik import tables
 from bench.ik.chains import CHAINS, Chain, prepare
 from bench.ik.run import BLOCKS, OURS, PEERS, Protocol, about, many, measure, rows, write
 from bench.pool import ROOT
-from bench.report import put_between
 from bench.versions import versions
 from wbc.interrupts import obey_kill
 
@@ -58,7 +59,7 @@ def run(chosen: argparse.Namespace, progress: Progress) -> dict[str, Any]:
     protocol = Protocol(chosen.seed, chosen.budget, chosen.tolerance)
     pythons = {OURS: sys.executable} | dict.fromkeys(PEERS if chosen.peers_python else (), chosen.peers_python)
     results: dict[str, Any] = {
-        "machine": machine(), "versions": versions(sys.executable, OWN, chosen.peers_python, THEIRS),
+        "stamp": stamp(), "machine": machine(), "versions": versions(sys.executable, OWN, chosen.peers_python, THEIRS),
         "protocol": vars(protocol), "interrupted": None, "rows": [], "batches": [], "chains": [],
     }  # fmt: skip
     chains = [chain for chain in CHAINS if chain.name in chosen.chains]
@@ -116,7 +117,7 @@ def main(given: list[str] | None = None) -> None:
     (chosen.output / "ik.json").write_text(json.dumps(results, indent=1) + "\n")
     complete = results["interrupted"] is None and len(results["chains"]) == len(CHAINS) and chosen.peers_python
     if complete and chosen.full and chosen.output == ROOT / "bench":
-        put_between(ROOT / "docs" / "ik.md", "bench", tables.summary(results))
+        write_blocks()
     console.print(f"Written to {chosen.output / 'ik.md'}", markup=False, highlight=False)
 
 

@@ -112,9 +112,8 @@ def summary(results: Results) -> str:
             beside = (other.get((row["chain"], peer), "-") for peer in names)
             rows.append((*cells[:2], *cells[4:], *beside))
     count = {row["solver"]: row["poses"] for row in results["rows"]}
-    host, asked = results["machine"], results["protocol"]
     told = ", ".join(f"{n} for {name}" for name, n in count.items())
-    after = f"Poses a chain: {told} (seed {asked['seed']}). {host['processor']}, {host['cores']}; load {host['load']}."
+    after = f"Poses a chain: {told} (seed {results['protocol']['seed']})."
     batches = [
         f"{b['chain']}, `solve_batch` of {b['poses']} poses, {b['threads']} threads: {b['seconds']:.2f} s."
         for b in results["batches"][:1]

@@ -7,7 +7,7 @@ import argparse
 from bench.resolvers.drives import DT, SECONDS, Outcome, drive, methods
 from wbc.interrupts import obey_kill
 
-HEAD = "| method | one resolution [us] | fastest joint [rad/s] | twist lost [m/s, rad/s] | after the way back [rad] |"
+HEAD = "| method | one resolution [us] | fastest joint [rad/s] | twist lost [m/s, rad/s] | after the return [rad] |"
 
 
 def line(found: Outcome) -> str:

@@ -16,6 +16,8 @@ import numpy as np
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
+from bench.figures.index import write_blocks
+from bench.figures.store import stamp
 from bench.harness import machine
 from bench.pool import ROOT
 from bench.records import measure
@@ -126,12 +128,12 @@ def sizes_of(chosen: argparse.Namespace) -> dict[str, int]:
     return sizes
 
 
-def write(folder: Path, parts: Parts, about: list[str], interrupted: str | None) -> None:
+def write(folder: Path, parts: Parts, about: list[str], interrupted: str | None, begun: dict[str, str]) -> None:
     """time_laws.md and time_laws.json."""
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "time_laws.md").write_text(markdown(parts, about))
     kept = {
-        "about": about, "interrupted": interrupted,
+        "stamp": begun, "about": about, "interrupted": interrupted,
         "tables": [{"title": s.title, "columns": s.columns, "rows": s.rows} for s in sheets(parts)],
         "goals": [{"text": g.text, "value": float(g.value), "limit": g.limit, "unit": g.unit, "met": bool(g.met)}
                   for g in goals(parts)],
@@ -149,7 +151,7 @@ def main(given: list[str] | None = None) -> None:
     console, errors = Console(), Console(stderr=True)
     if not console.is_terminal:
         console = Console(width=160)
-    about = setting(chosen, sizes)
+    about, begun = setting(chosen, sizes), stamp()
     bars = (TextColumn("{task.description:12}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
     with Progress(*bars, TimeRemainingColumn(), console=errors) as progress:
         parts, interrupted = measure(work, progress)
@@ -160,7 +162,9 @@ def main(given: list[str] | None = None) -> None:
         console.print()
     for note in about:
         console.print(note, markup=False, highlight=False)
-    write(chosen.output, parts, about, interrupted)
+    write(chosen.output, parts, about, interrupted, begun)
+    if chosen.output == ROOT / "bench" and not interrupted:
+        write_blocks()
     console.print(f"Written to {chosen.output / 'time_laws.md'}", markup=False, highlight=False)
 
 

@@ -14,6 +14,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 import wbc
+from bench.figures.store import stamp
 from bench.harness import machine as host
 from bench.kept import Kept, sources
 from bench.pool import ROOT
@@ -82,7 +83,7 @@ def main(given: list[str] | None = None) -> None:
     if not chosen.resume:
         path.unlink(missing_ok=True)
     version = {"sources": sources(SOURCES), "data": data.digest, "collisions": chosen.collisions}
-    kept, about = Kept(path, version), host()
+    kept, about, begun = Kept(path, version), host(), stamp()
     it = Machine(wbc.robots.walker(), collisions=chosen.collisions)
     console, errors = Console(), Console(stderr=True)
     if not console.is_terminal:
@@ -107,16 +108,16 @@ def main(given: list[str] | None = None) -> None:
         console.print()
     for text in lines:
         console.print(text, markup=False, highlight=False)
-    write(chosen.output, parts, chosen.sizes, lines)
+    write(chosen.output, parts, chosen.sizes, lines, begun)
     console.print(f"Written to {chosen.output / 'walk.md'}", markup=False, highlight=False)
 
 
-def write(folder: Path, parts: Parts, sizes: Sizes, lines: list[str]) -> None:
+def write(folder: Path, parts: Parts, sizes: Sizes, lines: list[str], begun: dict[str, str]) -> None:
     """walk.md and walk.json."""
     folder.mkdir(parents=True, exist_ok=True)
     tables = [sheet.markdown() for sheet in (*sheets(parts, sizes), goal_sheet(goals(parts, sizes)))]
     (folder / "walk.md").write_text("\n\n".join([*tables, *lines]) + "\n")
-    (folder / "walk.json").write_text(json.dumps({"about": lines, "parts": parts}, indent=1) + "\n")
+    (folder / "walk.json").write_text(json.dumps({"stamp": begun, "about": lines, "parts": parts}, indent=1) + "\n")
 
 
 if __name__ == "__main__":

@@ -52,12 +52,3 @@ def test_counters_are_taken_in_order_and_what_a_pass_adds_is_told(
     tool(tmp_path, "perf", "")
     tool(tmp_path, "valgrind", "vex: unhandled instruction")
     assert counting.per_pass("x", "y", tmp_path, 3) == ("none", {})
-
-
-def test_text_goes_between_the_marks_of_a_page(tmp_path: Path) -> None:
-    page = tmp_path / "page.md"
-    page.write_text("a\n<!-- bench -->\nold\n<!-- /bench -->\nb <!-- other -->\n")
-    report.put_between(page, "bench", "new")
-    assert page.read_text() == "a\n<!-- bench -->\n\nnew\n\n<!-- /bench -->\nb <!-- other -->\n"
-    report.put_between(page, "other", "lost")
-    assert "lost" not in page.read_text()

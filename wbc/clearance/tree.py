@@ -12,7 +12,7 @@ import pinocchio as pin
 
 from wbc import validation
 from wbc.errors import DuplicateNameError, UnsupportedJointError
-from wbc.symbolic.joint_steps import Kind, joint_steps, place
+from wbc.symbolic.joint_steps import JointKind, joint_steps, place
 from wbc.validation import Array
 
 SUPPORTED = ("revolute", "continuous", "prismatic", "helical", "universal", "free flyer", "fixed")
@@ -91,18 +91,18 @@ class Tree:
                 last[joint] = len(frames) - 1
                 continue
             for step in joint_steps(model, joint):
-                if step.kind == Kind.PLACE:
+                if step.kind == JointKind.PLACE:
                     at = at * pin.SE3(step.numbers[:9].reshape(3, 3), step.numbers[9:])
                     continue
-                if step.kind == Kind.QUATERNION:
+                if step.kind == JointKind.QUATERNION:
                     raise UnsupportedJointError(
                         f"joint {name!r}", model.joints[joint].shortname(), "a swept tree has", SUPPORTED
                     )
                 if step.q not in scalar_of:
                     scalar_of[step.q] = len(names)
                     names.append(name)
-                moves = Moves.SHIFTING if step.kind == Kind.SHIFT else Moves.TURNING
-                scale, offset = (1.0, 0.0) if step.kind == Kind.CIRCLE else (step.numbers[3], step.numbers[4])
+                moves = Moves.SHIFTING if step.kind == JointKind.SHIFT else Moves.TURNING
+                scale, offset = (1.0, 0.0) if step.kind == JointKind.CIRCLE else (step.numbers[3], step.numbers[4])
                 axis = (float(step.numbers[0]), float(step.numbers[1]), float(step.numbers[2]))
                 frames.append(Frame(parent, at, moves, scalar_of[step.q], axis, float(scale), float(offset)))
                 parent, at = len(frames) - 1, pin.SE3.Identity()

@@ -1,0 +1,62 @@
+"""The picture of the floors in docs/architecture.md, drawn from the table that a test holds imports to."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+from bench.pool import ROOT
+
+PICTURE = ROOT / "docs" / "images" / "floors.svg"
+WIDTH, ROW, BOX = 1000, 44, 30
+#: Colours of parts: what everybody uses, models, what is wanted, solving, what is built on it, the user's seat
+COLOURS = ("#eceff1", "#e3f2fd", "#e8f5e9", "#fff8e1", "#fce4ec", "#ede7f6")
+OF_FLOOR = (0, 0, 1, 2, 2, 3, 3, 4, 4, 4, 5)
+
+
+def draw(floors: Mapping[str, int], rooms: Mapping[str, int]) -> str:
+    """SVG: a row a floor, the top one first; the rooms of wbc.walking in a house of their own at the right."""
+    height = ROW * (max(floors.values()) + 1) + 60
+    body = [
+        *house(floors, 30, 630, height - 20, lambda floor: COLOURS[OF_FLOOR[min(floor, len(OF_FLOOR) - 1)]]),
+        *house(rooms, 710, 270, height - 20, lambda _: COLOURS[4]),
+        text(33, 20, "wbc: imports only point down", "start"),
+        text(713, 20, "inside wbc.walking", "start"),
+    ]
+    size = f'viewBox="0 0 {WIDTH} {height}" font-family="sans-serif" font-size="12"'
+    head = f'<svg xmlns="http://www.w3.org/2000/svg" {size}>'
+    return "\n".join([head, f'<rect width="{WIDTH}" height="{height}" fill="white"/>', *body, "</svg>"]) + "\n"
+
+
+def house(parts: Mapping[str, int], x: int, width: int, base: int, colour: Callable[[int], str]) -> list[str]:
+    """A row a floor above a base line."""
+    out = []
+    for floor in range(max(parts.values()) + 1):
+        names = [name.removeprefix("wbc.") for name, level in parts.items() if level == floor]
+        y, step = base - ROW * (floor + 1), width / max(len(names), 1)
+        out.append(text(x - 6, y + 19, str(floor), "end"))
+        for k, name in enumerate(names):
+            place = x + k * step
+            out.append(
+                f'<rect x="{place + 3:.0f}" y="{y}" width="{step - 6:.0f}" height="{BOX}" rx="4" '
+                f'fill="{colour(floor)}" stroke="#90a4ae"/>'
+            )
+            out.append(text(place + step / 2, y + 19, name, "middle"))
+    return out
+
+
+def text(x: float, y: float, words: str, anchor: str) -> str:
+    """A line of text."""
+    return f'<text x="{x:.0f}" y="{y:.0f}" text-anchor="{anchor}">{words}</text>'
+
+
+def picture() -> str:
+    """The picture as it should be."""
+    from tests.project.test_floors import FLOORS, WALKING
+
+    return draw(FLOORS, WALKING)
+
+
+def write(path: Path = PICTURE) -> None:
+    """Write it."""
+    path.write_text(picture())

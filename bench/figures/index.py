@@ -1,0 +1,134 @@
+"""All figures of the pages: by which command each is made, what it measures, and how it is shown."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+from bench import report
+from bench.figures import pages, store
+from bench.ik import tables as ik
+from bench.pool import ROOT
+from bench.sheet import Sheet
+from bench.walk import layout_tables, planning_tables
+from bench.walk import tables as walks
+
+View = Callable[[Any], str]
+#: What a tick consists of
+TICK = ("wbc/controller", "wbc/stack", "wbc/qp", "wbc/symbolic", "tasks")
+#: What a walk consists of
+WALK = (*TICK, "wbc/walking", "robots")
+
+
+@dataclass(frozen=True)
+class Figure:
+    """What one command measures.
+
+    Attributes:
+        name: of the file in bench/data, and of the module of bench.measured unless there is a command.
+        measures: files and folders of the repository whose change makes it old.
+        minutes: that it takes on two quiet cores, about.
+        command: with a file of its own, which has the stamp under "stamp".
+        views: part -> how it is shown; none: the parts of :func:`bench.figures.store.write`.
+    """
+
+    name: str
+    measures: tuple[str, ...]
+    minutes: float
+    command: tuple[str, ...] = ()
+    file: str = ""
+    views: Mapping[str, View] = field(default_factory=lambda: MappingProxyType({}))
+
+    @property
+    def path(self) -> Path:
+        """The file."""
+        return ROOT / self.file if self.file else store.FOLDER / f"{self.name}.json"
+
+    @property
+    def told(self) -> str:
+        """The command as a reader would type it."""
+        return " ".join(self.command) if self.command else f"python -m bench.figures --only {self.name}"
+
+
+def walk_view(part: str, sheet: Callable[[Any], Sheet]) -> View:
+    """A table of the walker's bench."""
+    return lambda data: store.shown(vars(sheet(data["parts"][part])))
+
+
+def law_view(number: int) -> View:
+    """A table of the laws of motion under its title."""
+    return lambda data: f"**{data['tables'][number]['title']}**\n\n{store.shown(data['tables'][number])}"
+
+
+#: Tables of bench/time_laws.json in their order
+LAWS = ("random", "small", "suite", "torques", "states", "straight", "walls", "ticks", "along")
+
+_ALL = (
+    Figure(
+        "bench", (*TICK, "wbc/proximity", "wbc/export", "bench/ours.py"), 15.0, ("make", "bench"),
+        "bench/results.json", {"readme": report.readme, "export": report.export_page},
+    ),
+    Figure(
+        "ik", (*TICK, "wbc/ik", "bench/ik/chains.py", "bench/ik/contenders.py"), 6.0, ("make", "bench-ik"),
+        "bench/ik.json", {"chains": ik.summary},
+    ),
+    Figure(
+        "time_laws", ("wbc/trajectory",), 25.0, ("make", "bench-time-laws"),
+        "bench/time_laws.json", {name: law_view(k) for k, name in enumerate(LAWS)},
+    ),
+    Figure(
+        "walk", (*WALK, "bench/walk"), 20.0,
+        ("python", "-m", "bench.walk", "--layouts", "30", "--walked", "3", "--output", "bench/data"),
+        "bench/data/walk.json",
+        {
+            "courses": walk_view("courses", walks.course_sheet), "spins": walk_view("spins", walks.spin_sheet),
+            "trenches": walk_view("trenches", walks.trench_sheet), "highest": walk_view("highest", walks.highest_sheet),
+            "planning": walk_view("planning", planning_tables.planning_sheet),
+            "patches": walk_view("patches", planning_tables.patch_sheet),
+            "layouts": walk_view("layouts", layout_tables.layout_sheet),
+        },
+    ),
+    Figure("soak", (*TICK, "bench/soak"), 20.0),
+    Figure("analysis", ("wbc/analysis",), 2.0),
+    Figure("demo", (*TICK, "wbc/track", "wbc/cli/demo.py"), 0.5),
+    Figure("examples", (*TICK, "wbc/proximity", "examples"), 1.0),
+    Figure("levels", TICK, 0.5),
+    Figure("pairs", (*TICK, "wbc/coordinates"), 0.5),
+    Figure("policy", (*TICK, "wbc/record", "wbc/explain"), 0.5),
+    Figure("reach", (*TICK, "tests/calm"), 0.5),
+    Figure("resolvers", (*TICK, "wbc/resolvers", "wbc/coordinates", "bench/resolvers"), 1.0),
+    Figure("sensing", ("wbc/proximity",), 1.0),
+    Figure("shapes", ("wbc/robot",), 0.5),
+    Figure("soft", TICK, 1.0),
+    Figure("solvers", (*TICK, "bench/conditioning.py"), 2.0),
+    Figure("symbolic", ("wbc/symbolic",), 0.2),
+    Figure("two_ended", WALK, 0.5),
+    Figure("walks", (*WALK, "bench/walk/reference"), 1.5),
+)  # fmt: skip
+FIGURES = {figure.name: figure for figure in _ALL}
+
+
+def render(name: str, part: str) -> str:
+    """A block: the part, and a line that says where it comes from."""
+    figure = FIGURES[name]
+    data = store.read(figure.path) if figure.path.is_file() else {}
+    try:
+        text = figure.views[part](data) if figure.views else store.shown(data["parts"][part])
+    except KeyError:  # the file, or this part of it, is still to be written
+        return f"*Not measured yet: `{figure.told}`.*"
+    return f"{text}\n\n{store.signed(data['stamp'], figure.told)}"
+
+
+def write_blocks() -> list[str]:
+    """Write every block; names of the pages that changed."""
+    out = []
+    for page in pages.all_pages():
+        text = page.read_text()
+        new = pages.rendered(text, render)
+        if new != text:
+            page.write_text(new)
+            out.append(page.relative_to(ROOT).as_posix())
+    return out
