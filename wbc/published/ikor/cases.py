@@ -1,0 +1,63 @@
+"""The published runs: what is known of their trajectories, and the norms that are printed."""
+
+from __future__ import annotations
+
+import csv
+import functools
+import pathlib
+from dataclasses import dataclass
+
+import numpy as np
+
+from wbc import validation
+from wbc.published.ikor.driver import Driver, Method, Run, Settings, straight
+from wbc.published.ikor.legacy import legacy_hermies
+from wbc.published.ikor.machines import hermies
+from wbc.validation import Array
+
+FILE = pathlib.Path(__file__).with_name("norms.csv")
+#: Trajectory -> (steps, metres a step). The report prints neither: three numbers fitted to the norms of each, from home
+KNOWN = {
+    "1": (195, (0.00109315, -0.00329651, -0.00428364)),
+    "3": (241, (0.00251716, 0.00050234, -0.00371982)),
+}
+CONFIGS = ("3x7", "3x10")
+
+
+@dataclass(frozen=True, eq=False)
+class Printed:
+    """Norms of one run that are legible: steps from 1, by FSP and by the pseudo-inverse."""
+
+    steps: Array
+    fsp: Array
+    pseudo_inverse: Array
+
+
+@functools.cache
+def printed() -> dict[tuple[str, str], Printed]:
+    """(trajectory, configuration) -> what is printed; NaN for one of two that is not legible."""
+    rows: dict[tuple[str, str], list[tuple[float, ...]]] = {}
+    with FILE.open() as stream:
+        for row in csv.DictReader(stream):
+            numbers = (float(row[name] or "nan") for name in ("step", "fsp", "pseudo_inverse"))
+            rows.setdefault((row["trajectory"], row["config"]), []).append(tuple(numbers))
+    return {key: Printed(*np.array(found).T) for key, found in rows.items()}
+
+
+def case(trajectory: str, config: str, *, legacy: bool = True, method: Method = Method.FSP) -> Run:
+    """A published run again: legacy with the two defects of the printed norms, else with consistent kinematics.
+
+    Raises:
+        UnknownNameError: a run that is not known.
+    """
+    steps, step = KNOWN[validation.one_of("trajectory", trajectory, KNOWN)]
+    base = "none" if validation.one_of("config", config, CONFIGS) == "3x7" else "holonomic"
+    machine = legacy_hermies(base) if legacy else hermies(base)
+    return Driver(machine, Settings(method=method)).run(straight(machine, step, steps))
+
+
+def differences(run: Run, trajectory: str, config: str) -> Array:
+    """ln(measured / printed) at the legible steps."""
+    found = printed()[trajectory, config]
+    good = np.isfinite(found.fsp)
+    return np.asarray(np.log(run.norms[found.steps[good].astype(int) - 1] / found.fsp[good]))
