@@ -136,10 +136,10 @@ class _Search:
 
     def _neighbours(self, basis: Array) -> Iterator[Array]:
         """For each blocked column the basis in which it replaces the one that moves most, by a sound pivot."""
-        _, _, table, _ = lapack.dgesv(self.A[:, basis], np.column_stack((self.b, self.A)))
-        moving = np.abs(table[:, 0]) * self.size[basis]
+        inverse = np.linalg.inv(self.A[:, basis])
+        moving, table = np.abs(inverse @ self.b) * self.size[basis], inverse @ self.A
         for j in np.setdiff1d(np.arange(self.m), basis):
-            pivots = np.abs(table[:, 1 + j]) * self.size[basis]
+            pivots = np.abs(table[:, j]) * self.size[basis]
             sound = pivots > SOUND * pivots.max()
             other = basis.copy()
             other[int(np.argmax(np.where(sound, moving, -1.0)))] = j
@@ -158,7 +158,7 @@ class _Search:
         if not self.found:
             self._new(start)
             missing -= 1
-        table = np.linalg.solve(self.A[:, basis], self.A)
+        table = np.linalg.inv(self.A[:, basis]) @ self.A
         length = float(np.abs(start * self.size).max()) or 1.0
         for j in np.setdiff1d(np.arange(self.m), basis):
             if self.enough():

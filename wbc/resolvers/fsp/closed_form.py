@@ -119,8 +119,9 @@ def best(
     L, failed = lapack.dpotrf(weighted @ D.T, lower=1)
     if failed:
         raise RangeError("vectors", space.vectors, "the vectors of the space are dependent")
-    y = lapack.dtrtrs(L, weighted @ start, lower=1)[0]
-    E = lapack.dtrtrs(L, D, lower=1)[0]
+    # By the inverse: small triangular systems of many right sides wake all threads of the library
+    back = np.tril(lapack.dtrtri(L, lower=1)[0])
+    y, E = back @ (weighted @ start), back @ D
     names: tuple[tuple[str, ...], ...] = ((), (), ())
     if rows:
         if any(len(row.a) != m for row in rows):
@@ -136,7 +137,7 @@ def best(
         else:
             names = tuple(row.name for row in rows), (), ()
         y = y + solved
-    z = lapack.dtrtrs(L, y, lower=1, trans=1)[0]
+    z = y @ back
     return Optimum(g + z @ D, np.concatenate(([1.0 - z.sum()], z)), *names)
 
 
@@ -157,7 +158,7 @@ def one_shot(J: Array, x: Array, A: Array, values: Array, criterion: Criterion =
         F = F / root
     elif criterion.weight is not None:
         root = np.linalg.cholesky(criterion.weight)
-        F = lapack.dtrtrs(root, F.T, lower=1)[0].T
+        F = F @ np.linalg.inv(root).T
     u = _least(F, b, np.sqrt((F * F).sum(axis=1)))
     if u is None:
         return None
