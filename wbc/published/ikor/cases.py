@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wbc import validation
-from wbc.published.ikor.driver import Driver, Method, Run, Settings, straight
+from wbc.published.ikor.driver import AXES, Driver, Method, Run, Settings, straight
 from wbc.published.ikor.legacy import legacy_hermies
 from wbc.published.ikor.machines import hermies
 from wbc.validation import Array
@@ -21,7 +21,9 @@ KNOWN = {
     "1": (195, (0.00109315, -0.00329651, -0.00428364)),
     "3": (241, (0.00251716, 0.00050234, -0.00371982)),
 }
-CONFIGS = ("3x7", "3x10")
+#: Turn of yaw, pitch and roll a step [rad]: three numbers fitted to 6x7 of each; 6x10 has none of its own
+TURNS = {"1": (0.00349193, 0.00232499, 0.01754320), "3": (-0.01130479, 0.00264447, 0.01750863)}
+CONFIGS = ("3x7", "3x10", "6x7", "6x10")
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,9 +53,11 @@ def case(trajectory: str, config: str, *, legacy: bool = True, method: Method = 
         UnknownNameError: a run that is not known.
     """
     steps, step = KNOWN[validation.one_of("trajectory", trajectory, KNOWN)]
-    base = "none" if validation.one_of("config", config, CONFIGS) == "3x7" else "holonomic"
+    base = "none" if validation.one_of("config", config, CONFIGS).endswith("x7") else "holonomic"
     machine = legacy_hermies(base) if legacy else hermies(base)
-    return Driver(machine, Settings(method=method)).run(straight(machine, step, steps))
+    rows = AXES[: int(config[0])]
+    path = straight(machine, step, steps, turn=TURNS[trajectory])
+    return Driver(machine, Settings(method, rows, euler=legacy)).run(path)
 
 
 def differences(run: Run, trajectory: str, config: str) -> Array:

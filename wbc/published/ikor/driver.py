@@ -64,7 +64,8 @@ class Settings:
 
     Attributes:
         method: a code; obstacles and limits are constraints of FSP and of the stack as it says.
-        rows: of :data:`AXES`. All three angles are controlled as a rotation, one or two as Euler angles.
+        rows: of :data:`AXES`. euler: all three angles are Euler angles, as published, and not a rotation; one or two
+            always are.
         resolver: ``fsp``, ``pseudo_inverse`` or ``stack``: levels of a QP with inequalities.
         generator: ``blocked``, as published, or ``orthogonal``.
         two_step: constraints in a second step, by self-motion, where the first broke them; else in one shot.
@@ -79,6 +80,7 @@ class Settings:
 
     method: Method = Method.FSP
     rows: tuple[str, ...] = AXES[:3]
+    euler: bool = False
     resolver: str = "fsp"
     generator: str = "blocked"
     two_step: bool = False
@@ -91,7 +93,9 @@ class Settings:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "method", _method(self.method))
-        object.__setattr__(self, "rows", tuple(sorted({validation.one_of("rows", r, AXES) for r in self.rows}, key=AXES.index)))
+        object.__setattr__(
+            self, "rows", tuple(sorted({validation.one_of("rows", r, AXES) for r in self.rows}, key=AXES.index))
+        )
         if not self.rows:
             raise RangeError("rows", self.rows, "expected at least one row")
         validation.one_of("resolver", self.resolver, ("fsp", "pseudo_inverse", "stack"))
@@ -179,7 +183,9 @@ def intrusions(machine: Machine, q: Array, spheres: Array, margin: float = 0.0, 
         if whole and machine.base != "none":
             middle = np.array([q[-3], q[-2], z])
             if abs(z) <= radius + margin:
-                out.append((*_away(middle, centre, radius + margin + machine.plate, np.array([0.0, 0.0, 1.0])), -1, number))
+                out.append(
+                    (*_away(middle, centre, radius + margin + machine.plate, np.array([0.0, 0.0, 1.0])), -1, number)
+                )
     return [(gap, link, point, normal, number) for gap, point, normal, link, number in out]
 
 
@@ -215,7 +221,8 @@ class Driver:
         if euler is None:
             euler = np.tile(euler_angles(machine.place(q)[1]), (len(trajectory.points), 1))
         out: list[Any] = []
-        path, k, held, loops, stop, message = [q], 0, {}, 0, Stop.DONE, ""
+        path, k, loops, stop, message = [q], 0, 0, Stop.DONE, ""
+        held: dict[int, int] = {}
         tried: set[int] = set()
         if not len(trajectory.points):
             stop = Stop.NOTHING
@@ -245,10 +252,11 @@ class Driver:
             held = {joint: last for joint, last in held.items() if k <= last}
         if stop is Stop.DONE and trajectory.dropped:
             stop = Stop.TRUNCATED
-        columns = list(zip(*out, strict=True)) if out else [()] * 6
-        numbers = (np.array(column, dtype=float) for column in columns[:4])
+        columns: Any = zip(*out, strict=True) if out else ((),) * 6
+        norms, misses, gaps, seconds, acted, given_up = columns
         code = Code.OK if stop in (Stop.DONE, Stop.NOTHING) else Code.PARTIAL
-        return Run(np.array(path), *numbers, columns[4], columns[5], code, stop, message, loops)
+        norms, misses, gaps, seconds = (np.array(column, dtype=float) for column in (norms, misses, gaps, seconds))
+        return Run(np.array(path), norms, misses, gaps, seconds, acted, given_up, code, stop, message, loops)
 
     def step(
         self, q: Array, point: Array, euler: Array, held: Sequence[int] = (), before: tuple[Array, Array] | None = None
@@ -292,7 +300,7 @@ class Driver:
         J = self.machine.jacobian(q).copy()
         x = np.concatenate((point - place, np.zeros(3)))
         angles = [r for r in self.settings.rows if r in AXES[3:]]
-        if len(angles) == 3:
+        if len(angles) == 3 and not self.settings.euler:
             x[3:] = pin.log3(rotation_of(euler) @ rotation.T)
         elif angles:
             yaw, pitch, _ = now = euler_angles(rotation)
@@ -352,11 +360,15 @@ class Driver:
                 row = joint_row(f"joint {joint + 1}", int(joint), len(q), step)
                 out.append((abs(step - float(v[joint])), row))
         if settings.obstacles:
-            for gap, link, point, normal, number in intrusions(machine, q, self.spheres, settings.margin, settings.ahead):
+            for gap, link, point, normal, number in intrusions(
+                machine, q, self.spheres, settings.margin, settings.ahead
+            ):
                 if gap > np.abs(v).sum() * 10.0 if ahead else gap >= 0.0:
                     continue
                 J = machine.point_jacobian(q, link, point) if link >= 0 else _plate_jacobian(machine, q)
-                row = point_row(f"{f'link {link + 1}' if link >= 0 else 'platform'}, sphere {number + 1}", J, normal, -gap)
+                row = point_row(
+                    f"{f'link {link + 1}' if link >= 0 else 'platform'}, sphere {number + 1}", J, normal, -gap
+                )
                 if float(row.a @ v) < -gap - 1e-12:
                     out.append((-gap - float(row.a @ v), row))
         return [row for _, row in sorted(out, key=lambda one: -one[0])]
@@ -378,4 +390,6 @@ def _method(value: Any) -> Method:
     try:
         return Method(value)
     except ValueError:
-        raise RangeError("method", value, f"expected a code: {', '.join(f'{m.value} {m.name}' for m in Method)}") from None
+        raise RangeError(
+            "method", value, f"expected a code: {', '.join(f'{m.value} {m.name}' for m in Method)}"
+        ) from None

@@ -125,7 +125,7 @@ def read_spheres(file: Any) -> Array:
     Raises:
         IkorFileError: a bad line.
     """
-    lines, out = _Lines(file), []
+    lines, out = _Lines(file), list[Array]()
     while lines.left:
         line = lines.left[0][0]
         sphere = lines.numbers(4, "a sphere: x, y, z, radius")
@@ -147,7 +147,7 @@ def read_angles(file: Any, machine: Machine) -> Array:
     Raises:
         IkorFileError: a bad line.
     """
-    lines, out = _Lines(file), []
+    lines, out = _Lines(file), list[Array]()
     while lines.left:
         out.append(lines.numbers(machine.joints, f"joints of step {len(out) + 1}"))
     return np.array(out).reshape(-1, machine.joints) / _units(machine)
@@ -206,7 +206,7 @@ def read_robot(file: Any, base: str = "none") -> Machine:
         if name in makers:
             machine = makers[name](base if on else "none", links, offset)
         elif name == "PLANAR":
-            machine = planar(links)
+            machine = planar(links.tolist())
         elif reference.lower().endswith(".urdf"):
             robot = robots.load(lines.path.parent / reference, shapes="none")
             machine = machine_of(robot, str(robot.frame_names[-1]))
@@ -222,18 +222,17 @@ def read_robot(file: Any, base: str = "none") -> Machine:
 
 def _with_rows(machine: Machine, rows: Array, flags: list[bool], lines: _Lines, line: int) -> Machine:
     """The machine with a file's limits, weights and home; rows of a platform may be there and not be used."""
-    count = machine.joints
+    count, units = machine.joints, _units(machine)
     if len(rows) < count and machine.base != "none":
         # A platform whose rows are left out keeps its own
-        rows = np.vstack((rows, np.column_stack((machine.upper, machine.lower, machine.weights, machine.home))[len(rows) :] * np.column_stack((_units(machine),) * 4)[len(rows) :] ** [1, 1, 0, 1]))  # noqa: E501
-        flags = [*flags, *machine.prismatic[len(flags) :]]
+        own = np.column_stack((machine.upper * units, machine.lower * units, machine.weights, machine.home * units))
+        rows, flags = np.vstack((rows, own[len(rows) :])), [*flags, *machine.prismatic[len(flags) :]]
     if len(rows) < count:
         raise lines.error(line, str(len(rows)), f"expected {count} joints for these kinematics")
     if tuple(flags[:count]) != machine.prismatic:
         wrong = next(k for k in range(count) if flags[k] != machine.prismatic[k])
         raise lines.error(line, f"joint {wrong + 1}", "prismatic in the file or in the kinematics, not in both")
     most, least, weights, home = rows[:count].T
-    units = _units(machine)
     return replace(machine, upper=most / units, lower=least / units, weights=weights, home=home / units)
 
 

@@ -2,6 +2,8 @@
 
 D1  The tool's 0.029 m stand behind joint 3 as an offset of the elbow; the forward kinematics have them along the hand.
 D2  The platform's turn is computed with a position in which one cos 5 cos 6 stands for cos 5 sin 6.
+
+Its orientation is that of the hand: the quarter turn that ends the chain of the listing is not in the printed norms.
 """
 
 from __future__ import annotations
@@ -14,6 +16,8 @@ import numpy as np
 from wbc.published.ikor.machines import HERMIES_BASE, HERMIES_LINKS, Machine, hermies
 from wbc.validation import Array
 
+_QUARTER = np.array([[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])
+
 
 @dataclass(frozen=True, eq=False)
 class LegacyHermies(Machine):
@@ -23,6 +27,11 @@ class LegacyHermies(Machine):
     def _other(self) -> Machine:
         *others, tool = HERMIES_LINKS
         return hermies(self.base, (*others, 0.0), elbow=tool)
+
+    def place(self, q: Array) -> tuple[Array, Array]:
+        """Position of the tool and rotation of the hand."""
+        place, rotation = super().place(q)
+        return place, rotation @ _QUARTER
 
     def jacobian(self, q: Array) -> Array:
         """With both defects [6, M]."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -210,13 +211,24 @@ def machine_of(robot: Robot, tip: str) -> Machine:
     model, frame = robot.model, robot.model.frames[robot.model.getFrameId(robot.check_frame("tip", tip))]
     chain = [int(k) for k in model.supports[frame.parentJoint]][1:]
     places = [(0, model.jointPlacements[chain[0]].translation)]
-    places += [(a, model.jointPlacements[b].translation) for a, b in zip(chain, chain[1:], strict=False)]
-    ends = tuple((j, tuple(map(float, p))) for j, p in [*places, (chain[-1], frame.placement.translation)])
-    low, high = (np.where(np.isfinite(x), x, np.sign(x) * 1e3) for x in (_lower(robot), _upper(robot)))
+    places += [(a, model.jointPlacements[b].translation) for a, b in pairwise(chain)]
+    ends = tuple((j, _triple(p)) for j, p in [*places, (chain[-1], frame.placement.translation)])
+    bounds = robot.limits.position_lower, robot.limits.position_upper
+    low, high = (np.where(np.isfinite(x), x, np.sign(x) * 1e3) for x in bounds)
     still = tuple(unit == "m" for unit in robot.dof_units)
     one, none = np.ones(robot.nv), np.zeros(robot.nv)
     return Machine(
-        robot.name, robot, tip, np.eye(robot.nv), none, ends, robot.neutral.copy(), low, high, one, still  # type: ignore[arg-type]
+        robot.name,
+        robot,
+        tip,
+        np.eye(robot.nv),
+        none,
+        ends,
+        robot.neutral.copy(),
+        low,
+        high,
+        one,
+        still,
     )
 
 
@@ -229,12 +241,9 @@ def without_platform(machine: Machine) -> Machine:
     return replace(machine, spread=machine.spread[:, keep], base="none", **parts)
 
 
-def _lower(robot: Robot) -> Array:
-    return robot.limits.position_lower
-
-
-def _upper(robot: Robot) -> Array:
-    return robot.limits.position_upper
+def _triple(place: Any) -> tuple[float, float, float]:
+    x, y, z = (float(c) for c in place)
+    return x, y, z
 
 
 def _lengths(links: Sequence[float], count: int) -> list[float]:
@@ -275,10 +284,10 @@ def _machine(
     free = [100.0, 100.0, 2.0 * math.pi][:first]
     upper = np.concatenate((most, free))
     sliding = tuple(k in prismatic or arm <= k < arm + 2 for k in range(model.nv))
-    ends = tuple((j + first if j else 0, tuple(map(float, p))) for j, p in ends)
+    ends = tuple((j + first if j else 0, _triple(p)) for j, p in ends)
     if first:
         # The arm's base rides on the platform
-        ends = ((first, tuple(map(float, model.jointPlacements[first + 1].translation))), *ends[1:])
+        ends = ((first, _triple(model.jointPlacements[first + 1].translation)), *ends[1:])
     limits = whole @ upper, whole @ -upper
     bounds = {"position_lower": np.minimum(*limits), "position_upper": np.maximum(*limits)}
     robot = robots.load(model, name=name, **bounds)

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from wbc.published.ikor.driver import Settings
 
 #: A step lasts so long [s]; links are capsules of this radius [m]
-DT, RADIUS = 0.1, 1e-3
+DT, RADIUS = 0.1, 1e-6
 
 
 @dataclass(frozen=True)
@@ -58,28 +58,36 @@ class StackSteps:
             raise RangeError("base", machine.base, "a stack takes a holonomic or differential platform")
         if settings.loop_back:
             raise RangeError("loop_back", True, "a stack keeps the limit of its steps and needs no loop back")
-        self.machine, self.pose, self.binding = machine, bool(angles), ()
+        self.machine, self.pose = machine, bool(angles)
+        self.binding: tuple[str, ...] = ()
         robot = machine.robot
         if np.isfinite(settings.step_limit):
             robot = robot.with_limits(velocity=settings.step_limit / DT)
-        bounds = np.sort(machine.spread @ np.stack((machine.lower, machine.upper), axis=1), axis=1) + machine.shift[:, None]
+        bounds = (
+            np.sort(machine.spread @ np.stack((machine.lower, machine.upper), axis=1), axis=1) + machine.shift[:, None]
+        )
         robot = robot.with_limits(position_lower=bounds[:, 0], position_upper=bounds[:, 1])
         if settings.obstacles and len(spheres):
             robot = robot.with_shapes(_shapes(machine))
-        stack = wbc.Stack(robot, DT, damping=max(1e-12, settings.damping**2), length=1.0, calm=False)
+        # A margin may vanish within the longest tick that a stack takes, twice its own
+        stack = wbc.Stack(robot, DT / 2.0, damping=max(1e-12, settings.damping**2), length=1.0, calm=False)
         stack.add(tasks.EndEffector("tip", kind="pose" if self.pose else "position", gain=1.0 / DT), name="tool")
         slaved = _slaved(machine)
         if slaved:
             stack.add(tasks.JointCoupling(slaved, gain=1.0 / DT), name="slaved")
-        weights = np.linalg.pinv(machine.spread).T @ machine.weights**2
-        stack.add(tasks.Damping(weights=tuple(np.maximum(np.abs(weights), 1e-6))), name="least", level=1)
+        # A slaved joint is no column of its own, and costs nothing
+        own = (machine.spread != 0.0).sum(axis=1) == 1
+        weights = np.where(own, np.abs(machine.spread) @ machine.weights**2, 0.0)
+        stack.add(tasks.Damping(weights=tuple(weights)), name="least", level=1)
         stack.add(tasks.JointLimits(position=settings.limits, acceleration=False, return_rate=1.0 / DT), name="limits")
         for k, (x, y, z, radius) in enumerate(spheres if settings.obstacles else ()):
             pose = pin.SE3(np.eye(3), np.array([x, y, z]))
             stack.add(tasks.Obstacle(Sphere(radius), margin=settings.margin, pose=pose), name=f"sphere {k + 1}")
         if machine.base == "differential":
             stack.add(_FixedAxle(), name="wheels")
-        self.controller = stack.compile(backend="auto")
+        self.controller = stack.compile()
+        for k in range(len(spheres) if settings.obstacles else 0):
+            self.controller[f"sphere {k + 1}"].rate = 1.0 / DT
 
     def step(self, q: Array, point: Array, rotation: Array) -> Array:
         """The step of the columns.
@@ -89,7 +97,7 @@ class StackSteps:
         """
         tool = self.controller["tool"]
         tool.target = pin.SE3(rotation, point) if self.pose else point
-        found = self.controller.step(self.machine.of_robot(q))
+        found = self.controller.step(self.machine.of_robot(q), dt=DT)
         if found.relaxed:
             raise InfeasibleError("stack", [str(s) for s in found.relaxed], str(found.explain()))
         self.binding = tuple(str(b) for b in found.binding)
