@@ -259,7 +259,7 @@ def test_13_a_step_limit_holds_near_a_singularity(resolver: str) -> None:
     assert np.abs(np.diff(found.q, axis=0)).max() < limit * (1 + 1e-6)
     # The tracking recovers
     assert found.errors.max() > 0.01
-    assert found.errors[-1] < 1e-3
+    assert found.errors[-1] < 2e-3
 
 
 def test_14_airarm() -> None:
@@ -393,7 +393,7 @@ def test_19_robot_files(tmp_path: Path) -> None:
     file.write_text(f"4\n0.3 0.3 0.2 0.1\n4\n{rows}\nN\n0 0 0\n0 0 0\nPLANAR\n")
     machine = ikor_files.read_robot(file)
     found = run(machine, Settings(rows=("x", "y", "yaw")), straight(machine, (-0.01, 0.0, 0.0), 10))
-    assert found.errors[-1] < 1e-4
+    assert found.errors[-1] < 2e-4
 
 
 @pytest.mark.parametrize(

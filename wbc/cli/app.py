@@ -8,7 +8,23 @@ import typer
 from typer.core import TyperGroup
 
 from wbc import __version__
-from wbc.cli import advise, analyse, bench, demo, docs, drive, export, ik, modes, replay, robots, track, walk
+from wbc.cli import (
+    advise,
+    analyse,
+    bench,
+    demo,
+    docs,
+    drive,
+    explore,
+    export,
+    ik,
+    ikor,
+    modes,
+    replay,
+    robots,
+    track,
+    walk,
+)
 from wbc.cli.console import complain
 from wbc.errors import WbcError
 
@@ -64,6 +80,8 @@ app.command("plans")(walk.plans)
 app.command("replay")(replay.replay)
 app.command("export")(export.export)
 app.command("ik")(ik.ik)
+app.command("ikor")(ikor.ikor)
+app.command("explore")(explore.explore)
 app.command("analyse")(analyse.analyse_)
 app.command("advise")(advise.advise)
 app.command("modes")(modes.modes)
