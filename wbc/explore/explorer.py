@@ -257,7 +257,7 @@ class Explorer:
             if k == 0:
                 costs, parent = own, np.full(len(others), -1)
             else:
-                ways = np.array([[rows.between(a, b) for a in population] for b in others])
+                ways = self._ways(population, others)
                 steps = np.where(np.abs(ways).max(axis=2) <= step, (ways**2).sum(axis=2), np.inf) + costs
                 parent = np.argmin(steps, axis=1)
                 costs = steps[np.arange(len(others)), parent] + own
@@ -368,6 +368,12 @@ class Explorer:
         turns = np.array([unit == "rad" for unit in self.robot.dof_units])
         ways[:, turns] = (ways[:, turns] + np.pi) % (2.0 * np.pi) - np.pi
         return float(np.linalg.norm(ways, axis=1).min())
+
+    def _ways(self, before: Array, after: Array) -> Array:
+        """Tangents from each of some configurations to each of others [after, before, nv]."""
+        if self.robot.nq == self.robot.nv:
+            return np.asarray(after[:, None] - before)
+        return np.array([[self.rows.between(a, b) for a in before] for b in after])
 
     def _ranges(self, space: SolutionSpace, q: Array, dt: float) -> tuple[Array, Array]:
         """Least and largest rate of each joint: two linear programs a joint."""

@@ -5,14 +5,14 @@ from __future__ import annotations
 import csv
 import functools
 import pathlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from wbc import validation
-from wbc.published.ikor.driver import AXES, Driver, Method, Run, Settings, straight
-from wbc.published.ikor.legacy import legacy_hermies
-from wbc.published.ikor.machines import hermies
+from wbc.published.ikor.driver import AXES, Driver, Method, Run, Settings, euler_angles, rotation_of, straight
+from wbc.published.ikor.legacy import QUARTER, legacy_hermies
+from wbc.published.ikor.machines import Machine, hermies
 from wbc.validation import Array
 
 FILE = pathlib.Path(__file__).with_name("norms.csv")
@@ -54,10 +54,13 @@ def case(trajectory: str, config: str, *, legacy: bool = True, method: Method = 
     """
     steps, step = KNOWN[validation.one_of("trajectory", trajectory, KNOWN)]
     base = "none" if validation.one_of("config", config, CONFIGS).endswith("x7") else "holonomic"
-    machine = legacy_hermies(base) if legacy else hermies(base)
-    rows = AXES[: int(config[0])]
+    machine: Machine = legacy_hermies(base)
     path = straight(machine, step, steps, turn=TURNS[trajectory])
-    return Driver(machine, Settings(method, rows, euler=legacy)).run(path)
+    if not legacy:
+        machine = hermies(base)
+        assert path.euler is not None
+        path = replace(path, euler=np.array([euler_angles(rotation_of(e) @ QUARTER.T) for e in path.euler]))
+    return Driver(machine, Settings(method, AXES[: int(config[0])], euler=legacy)).run(path)
 
 
 def differences(run: Run, trajectory: str, config: str) -> Array:

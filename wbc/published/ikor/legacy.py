@@ -16,7 +16,8 @@ import numpy as np
 from wbc.published.ikor.machines import HERMIES_BASE, HERMIES_LINKS, Machine, hermies
 from wbc.validation import Array
 
-_QUARTER = np.array([[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])
+#: From the frame of the listing to that of the printed norms
+QUARTER = np.array([[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +32,7 @@ class LegacyHermies(Machine):
     def place(self, q: Array) -> tuple[Array, Array]:
         """Position of the tool and rotation of the hand."""
         place, rotation = super().place(q)
-        return place, rotation @ _QUARTER
+        return place, rotation @ QUARTER
 
     def jacobian(self, q: Array) -> Array:
         """With both defects [6, M]."""
