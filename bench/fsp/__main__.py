@@ -49,6 +49,7 @@ def blocks(found: dict[str, Any]) -> dict[str, str]:
         "orthogonal_free": "the same without constraints",
         "blocked": "blocked columns, then the closed form, the same constraints",
         "blocked_free": "the same without constraints",
+        "two_steps": "blocked columns in two steps, three limits",
         "pseudo_inverse": "`PseudoInverse().resolve`, without constraints",
     }
     obstacle = []

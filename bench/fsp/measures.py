@@ -15,7 +15,7 @@ from wbc.explore import Explorer
 from wbc.published.ikor import Driver, Method, Settings, case, differences, hermies, printed, straight
 from wbc.published.ikor.cases import CONFIGS, KNOWN
 from wbc.resolvers import FullSpace, PseudoInverse, RateProblem
-from wbc.resolvers.fsp import best, blocked, joint_row, orthogonal, point_row
+from wbc.resolvers.fsp import best, blocked, joint_row, orthogonal, parametric, point_row
 
 #: Of every timing the median over so many calls
 CALLS = 200
@@ -73,6 +73,12 @@ def steps() -> dict[str, float]:
         rows += [joint_row(f"joint {k}", k, 10, value) for k, value in zip((0, 2, 5), values[2:], strict=True)]
         return best(make(J, x, free=True), rows=rows[:count])
 
+    def two_steps() -> Any:
+        spaces(blocked, 0)
+        rows = [joint_row(f"joint {k}", k, 10, value) for k, value in zip((0, 2, 5), values[2:], strict=True)]
+        space = blocked(J, x, free=True)
+        return space.at(parametric(space, rows, null=True))
+
     same = [spaces(make, 5).v for make in (orthogonal, blocked)]
     assert max(np.abs(v - fused()).max() for v in same) < 1e-9
     return {
@@ -81,6 +87,7 @@ def steps() -> dict[str, float]:
         "orthogonal_free": microseconds(lambda: spaces(orthogonal, 0)),
         "blocked": microseconds(lambda: spaces(blocked, 5)),
         "blocked_free": microseconds(lambda: spaces(blocked, 0)),
+        "two_steps": microseconds(two_steps),
         "pseudo_inverse": microseconds(lambda: plain.resolve(RateProblem(J, x))),
     }
 

@@ -39,7 +39,7 @@ def test_a_run_from_files(resolver: str, tmp_path: Path) -> None:
     points.write_text(POINTS)
     spheres.write_text("-0.5 -0.356 0.55 0.08\n0 0 0 0\n")
     files = ["--trajectory", str(points), "--spheres", str(spheres), "--out", str(out)]
-    done = RUN.invoke(app, ["ikor", *files, "--method", "3", "--resolver", resolver])
+    done = RUN.invoke(app, ["ikor", *files, "--method", "3", "--resolver", resolver, "--ahead", "--margin", "0.002"])
     assert done.exit_code == 0, done.output
     figures = json.loads((out / "summary.json").read_text())
     assert (figures["stop"], figures["steps"]) == ("all points done", 10)

@@ -43,10 +43,11 @@ def explore(
     import numpy as np
     from rich.table import Table
 
-    from wbc import Stack, robots, tasks, validation
+    from wbc import robots, tasks, validation
     from wbc.cli.advise import configuration_of
     from wbc.cli.console import out as console
     from wbc.cli.planning import given_obstacles, tip_frame
+    from wbc.controller import Stack
     from wbc.errors import ShapeError
     from wbc.explore import Explorer
     from wbc.explore.pictures import save_pieces
@@ -61,7 +62,7 @@ def explore(
         stack.add(tasks.Obstacle(one.shape, margin=margin, pose=one.pose), name=label)
     explorer = Explorer(stack, q)
     wanted = None if rates is None else _numbers("rates", rates)
-    found = explorer.tick(q, wanted if wanted is not None else np.zeros(len(explorer.rows.errors(q)[0])))
+    found = explorer.tick(q, wanted if wanted is not None else np.zeros(6 if kind == "pose" else 3))
     console().print(f"{machine.name}, {kind} of {name}: rank {found.space.rank}, {found.space.span - 1} self-motions")
     table = Table(header_style="bold", box=None, pad_edge=False)
     for head in ("joint", *found.optima, "least", "largest"):

@@ -147,17 +147,7 @@ def _published(case: str | None, config: str | None, legacy: bool, method: int, 
 
     chosen = [(t, c) for t in ([case] if case else cases.KNOWN) for c in ([config] if config else cases.CONFIGS)]
     table = Table(header_style="bold", box=None, pad_edge=False)
-    for name in (
-        "run",
-        "steps",
-        "printed",
-        "rms [1]",
-        "largest [1]",
-        "first: printed",
-        "measured",
-        "last: printed",
-        "measured",
-    ):
+    for name in ("run", "values", "rms", "largest", "first", "measured", "last", "measured"):
         table.add_column(name, justify="right", no_wrap=True)
     figures: dict[str, Any] = {"legacy": legacy}
     runs: dict[str, Any] = {}
@@ -168,12 +158,13 @@ def _published(case: str | None, config: str | None, legacy: bool, method: int, 
         ends = [(float(table_of.fsp[k]), float(run.norms[int(table_of.steps[k]) - 1])) for k in (good[0], good[-1])]
         rms, worst = float(np.sqrt(np.mean(off**2))), float(np.abs(off).max())
         cells = [f"{x:.6f}" for pair in ends for x in pair]
-        table.add_row(f"{t} {c}", str(len(run.norms)), str(len(off)), f"{rms:.1e}", f"{worst:.1e}", *cells)
+        table.add_row(f"{t} {c}", str(len(off)), f"{rms:.1e}", f"{worst:.1e}", *cells)
         key = f"{t}-{c}"
         figures[key] = {"values": len(off), "rms": rms, "largest": worst, "last_error": float(run.errors[-1])}
         runs[key] = (run, table_of)
     folder = _folder(out, force)
     console().print(table)
+    console().print("differences: ln(measured / printed)", style="dim")
     if len(chosen) == 1:
         _steps(*runs[key])
     _written(folder, figures, runs)

@@ -117,7 +117,7 @@ class Explorer:
         """
         q = self.robot.configuration("q", q)
         J = self.rows.errors(q)[1]
-        x = self.rows.rates(q) if rates is None else rates
+        x = self.rows.task_rates(self.rows.rates(q) if rates is None else rates)
         space = orthogonal(J, x, free=True)
         if criteria is None:
             criteria = {"least norm": Criterion()}

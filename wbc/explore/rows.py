@@ -13,6 +13,7 @@ from wbc import validation
 from wbc.errors import RangeError, UnknownNameError
 from wbc.stack.declaration import Declaration, Entry
 from wbc.symbolic import Kinematics, Tracer
+from wbc.tasks import Fixed, Mechanism
 from wbc.tasks import inputs as run_time
 from wbc.tasks.base import Constraint, Task
 from wbc.validation import Array
@@ -56,8 +57,14 @@ class StackRows:
         self.goals = tuple(entry.name for entry in chosen)
         self._tasks = [_Item(self.robot, e, "error", q, values.get(e.name, {})) for e in chosen]
         self._margins = []
+        self._held = _held_rows(self.robot)
         for entry in stack.constraints:
             item: Any = entry.item
+            if isinstance(item, Fixed):
+                still = [k for joint in item.joints for k in range(self.robot.nv)[self.robot.dofs(joint)]]
+                self._held = np.vstack((self._held, np.eye(self.robot.nv)[still]))
+            elif getattr(item, "equality", False) and not isinstance(item, Mechanism):
+                raise RangeError("stack", entry.name, "what holds exactly cannot be explored, but for Fixed joints")
             if item.sensed_rows(self.robot):
                 raise RangeError("stack", entry.name, "its distances are measured, and cannot be explored")
             if type(item).margins is not Constraint.margins:
@@ -73,13 +80,23 @@ class StackRows:
         self._tasks[self.goals.index(name)].put("target", value)
 
     def errors(self, q: Array) -> tuple[Array, Array]:
-        """e [rows] and its Jacobian [rows, nv] of all goals."""
+        """e [rows] and its Jacobian [rows, nv] of all goals, then of joints that are coupled, locked or fixed."""
         parts = [task(q) for task in self._tasks]
-        return np.concatenate([e for e, _ in parts]), np.vstack([J for _, J in parts])
+        none = np.zeros(len(self._held))
+        return np.concatenate([*(e for e, _ in parts), none]), np.vstack([*(J for _, J in parts), self._held])
 
     def rates(self, q: Array) -> Array:
         """What the goals ask of their rows in a tick: -gain e."""
         return np.concatenate([-task.gain * task(q)[0] for task in self._tasks])
+
+    def task_rates(self, rates: Any) -> Array:
+        """Rates of the goals, and none of the other rows.
+
+        Raises:
+            ShapeError, NotFiniteError: not one number a row of the goals.
+        """
+        count = sum(len(task.labels) for task in self._tasks)
+        return np.concatenate((validation.ordinary_array("rates", rates, (count,)), np.zeros(len(self._held))))
 
     def margins(self, q: Array) -> tuple[Array, Array]:
         """h [rows] and its Jacobian [rows, nv] of all margins."""
@@ -178,6 +195,16 @@ class _Item:
     def __call__(self, q: Array) -> tuple[Array, Array]:
         value, J = self._function(q, self._vector)
         return np.asarray(value.full())[:, 0], np.asarray(J.full())
+
+
+def _held_rows(robot: Any) -> Array:
+    """Rows of v that the mechanism keeps at zero: couplings, and what the base cannot drive."""
+    rows = np.zeros((len(robot.couplings) + len(robot.locked_dofs), robot.nv))
+    for k, one in enumerate(robot.couplings):
+        rows[k, one.follower], rows[k, one.leader] = 1.0, -one.ratio
+    for k, dof in enumerate(robot.locked_dofs, len(robot.couplings)):
+        rows[k, dof] = 1.0
+    return rows
 
 
 def _states_an_error(item: Any) -> bool:

@@ -9,8 +9,8 @@ import casadi as ca
 import numpy as np
 import pinocchio as pin
 
-import wbc
 from wbc import tasks
+from wbc.controller import Stack
 from wbc.errors import InfeasibleError, RangeError
 from wbc.published.ikor.machines import Machine
 from wbc.shapes import Capsule, PlacedShape, Sphere
@@ -70,7 +70,7 @@ class StackSteps:
         if settings.obstacles and len(spheres):
             robot = robot.with_shapes(_shapes(machine))
         # A margin may vanish within the longest tick that a stack takes, twice its own
-        stack = wbc.Stack(robot, DT / 2.0, damping=max(1e-12, settings.damping**2), length=1.0, calm=False)
+        stack = Stack(robot, DT / 2.0, damping=max(1e-12, settings.damping**2), length=1.0, calm=False)
         stack.add(tasks.EndEffector("tip", kind="pose" if self.pose else "position", gain=1.0 / DT), name="tool")
         slaved = _slaved(machine)
         if slaved:
