@@ -47,6 +47,20 @@ def test_a_run_from_files(resolver: str, tmp_path: Path) -> None:
     assert len((out / "CheezyAngles").read_text().splitlines()) == 11
 
 
+def test_a_line_and_a_jacobian(tmp_path: Path) -> None:
+    done = RUN.invoke(app, ["ikor", "--line", "-0.8,-0.356,0.6", "--out", str(tmp_path / "run")])
+    assert done.exit_code == 0, done.output
+    assert len((tmp_path / "run" / "CheezyAngles").read_text().splitlines()) == 10
+    data = tmp_path / "FSP_data"
+    data.write_text("2 3\n1 0 0\n0 1 1\n0.5\n0.25\n")
+    done = RUN.invoke(app, ["ikor", "--jacobian", str(data)])
+    assert done.exit_code == 0
+    assert "blocked: rank 2, 2 vectors" in done.output
+    assert "0.50000000   0.12500000   0.12500000" in done.output
+    data.write_text("2 3\n1 0 0\n0 1\n0.5\n0.25\n")
+    assert "FSP_data:3" in RUN.invoke(app, ["ikor", "--jacobian", str(data)]).output
+
+
 def test_a_bad_line_is_named(tmp_path: Path) -> None:
     points = tmp_path / "TrajectoryPts"
     points.write_text(POINTS.replace("10\n", "10\n-0.88 O.1 0.6\n", 1))
@@ -114,6 +128,7 @@ def test_explore_panda(tmp_path: Path) -> None:
         (["explore", "panda", "--rates", "1,2"], "shape"),
         (["explore", "panda", "--rates", "1,x"], "numbers"),
         (["ikor", "--case", "2"], "valid: 1, 3"),
+        (["ikor", "--line", "1,2"], "X,Y,Z"),
         (["ikor", "--trajectory", "no_such_file"], "no_such_file"),
         (["ikor", "--robot", "hermes", "--trajectory", "x"], "hermes"),
     ],

@@ -29,6 +29,7 @@ from wbc.published.ikor import (
     case,
     differences,
     hermies,
+    line_to,
     machine_of,
     planar,
     printed,
@@ -38,7 +39,7 @@ from wbc.published.ikor import (
 from wbc.published.ikor import files as ikor_files
 from wbc.published.ikor.cases import KNOWN, TURNS
 from wbc.published.ikor.driver import AXES, euler_angles, intrusions, rotation_of
-from wbc.resolvers.fsp import best, blocked, joint_row, orthogonal
+from wbc.resolvers.fsp import best, blocked, joint_row, orthogonal, pattern_counts
 
 BENT = np.radians([10, 150, 20, 30, -15, 60, 25])
 LINE = np.array(KNOWN["1"][1])
@@ -453,6 +454,43 @@ def test_19_codes(tmp_path: Path) -> None:
     file.write_text("0 180 0 0 0 90 0\n0\n")
     found = run(hermies(), Settings(), ikor_files.read_trajectory(file, hermies()))
     assert (found.code, found.stop) == (Code.OK, Stop.NOTHING)
+
+
+def test_20_counts_of_patterns() -> None:
+    """The report prints 840 261 910 994 for the last."""
+    assert [pattern_counts(m, n)[::2] for m, n in ((4, 2), (7, 6), (10, 3))] == [(6, 20), (7, 21), (120, 840261910995)]
+
+
+def test_21_a_line_in_published_increments() -> None:
+    machine = hermies()
+    place, rotation = machine.place(machine.home)
+    first = euler_angles(rotation)
+    path = line_to(machine, place + [0.1, 0.0, -0.05])
+    assert len(path.points) == 12
+    turned = line_to(machine, place + [0.1, 0.0, -0.05], first + np.radians([0.0, 20.0, 5.0]))
+    assert len(turned.points) == 20
+    np.testing.assert_allclose(turned.points[-1], place + [0.1, 0.0, -0.05], atol=1e-12)
+    np.testing.assert_allclose(turned.euler[-1] - turned.euler[-2], np.radians([0.0, 1.0, 0.25]), atol=1e-9)
+    assert run(machine, Settings(rows=AXES), turned).errors[-1] < 1e-3
+
+
+def test_weights_set_the_platform_against_the_arm() -> None:
+    machine = hermies("holonomic")
+    moved = []
+    for b in (0.1, 1.0, 10.0):
+        weighted = replace(machine, weights=np.concatenate((np.ones(7), np.full(3, b))))
+        q = run(weighted, Settings(), straight(machine, LINE, 60)).q
+        moved.append(np.abs(q[-1, 7:]).max())
+    assert moved[0] > 1.3 * moved[1] > 13 * moved[2]
+
+
+def test_what_the_stack_cannot_do_is_explained() -> None:
+    """A link within a sphere, and all joints at their limits."""
+    machine = hermies()
+    stuck = replace(machine, upper=machine.home + 1e-6, lower=machine.home - 1e-6)
+    found = run(stuck, Settings(Method.BOTH, resolver="stack"), straight(machine, LINE, 3), FOREARM)
+    assert (found.code, found.stop, len(found.q)) == (Code.PARTIAL, Stop.NO_STEP, 1)
+    assert "sphere 1" in found.message
 
 
 def test_any_robot_runs() -> None:

@@ -25,6 +25,13 @@ Consistent = Annotated[
 ]
 Machine = Annotated[str, typer.Option(help="hermies, airarm, planar or a file ROBOT.dat.", rich_help_panel=_WHAT)]
 Points = Annotated[Path | None, typer.Option(help="File TrajectoryPts, instead of a case.", rich_help_panel=_WHAT)]
+Line = Annotated[
+    str | None,
+    typer.Option(help="X,Y,Z[,YAW,PITCH,ROLL] in m and degrees: a line from home, instead.", rich_help_panel=_WHAT),
+]
+Jacobian = Annotated[
+    Path | None, typer.Option(help="File FSP_data: only the vectors of its solution space.", rich_help_panel=_WHAT)
+]
 Angles = Annotated[Path | None, typer.Option(help="File EulerAngles; controls them, too.", rich_help_panel=_WHAT)]
 Spheres = Annotated[Path | None, typer.Option(help="File sphere_data.", rich_help_panel=_WHAT)]
 Base = Annotated[str, typer.Option(help="Platform: none, holonomic, differential or car.", rich_help_panel=_WHAT)]
@@ -63,6 +70,8 @@ def ikor(
     consistent: Consistent = False,
     robot: Machine = "hermies",
     trajectory: Points = None,
+    line: Line = None,
+    jacobian: Jacobian = None,
     angles: Angles = None,
     spheres: Spheres = None,
     base: Base = "none",
@@ -90,19 +99,27 @@ def ikor(
 
     from wbc.published.ikor import Method, Settings
 
-    if trajectory is None:
+    if jacobian is not None:
+        _vectors(jacobian)
+        return
+    if trajectory is None and line is None:
         _published(case, config, not consistent, method, out, force)
         return
     from wbc.published.ikor import driver, files
 
-    axes = tuple(rows.split(",")) if rows else driver.AXES if angles else driver.AXES[:3]
+    numbers = None if line is None else _numbers(line)
+    oriented = angles is not None or (numbers is not None and len(numbers) == 6)
+    axes = tuple(rows.split(",")) if rows else driver.AXES if oriented else driver.AXES[:3]
     settings = Settings(
         Method(method), axes, resolver=resolver, two_step=two_step, ahead=ahead, margin=margin, damping=damping,
         generator="orthogonal" if ahead else "blocked", loop_back=loop_back,
         step_limit=inf if step_limit is None else radians(step_limit),
     )  # fmt: skip
     machine = _machine(robot, base)
-    path = files.read_trajectory(trajectory, machine, angles)
+    if numbers is not None:
+        path = driver.line_to(machine, numbers[:3], np.radians(numbers[3:]) if oriented else None)
+    else:
+        path = files.read_trajectory(trajectory, machine, angles)
     balls = files.read_spheres(spheres) if spheres else np.zeros((0, 4))
     folder = _folder(out, force)
     run = driver.Driver(machine, settings, balls).run(path)
@@ -134,6 +151,34 @@ def _machine(robot: str, base: str) -> Any:
     if robot in makers:
         return makers[robot](base)
     return published.planar() if robot == "planar" else files.read_robot(robot, base)
+
+
+def _numbers(text: str) -> list[float]:
+    from wbc.errors import ShapeError
+
+    try:
+        numbers = [float(part) for part in text.split(",")]
+    except ValueError:
+        numbers = []
+    if len(numbers) not in (3, 6):
+        raise ShapeError("line", text, "expected X,Y,Z or X,Y,Z,YAW,PITCH,ROLL")
+    return numbers
+
+
+def _vectors(file: Path) -> None:
+    """The space of one Jacobian by both generators."""
+    from wbc.published.ikor import files
+    from wbc.resolvers.fsp import best, blocked, orthogonal
+
+    J, x = files.read_jacobian(file)
+    for make in (blocked, orthogonal):
+        space = make(J, x)
+        typer.echo(
+            f"{make.__name__}: rank {space.rank}, {space.span} vectors, {space.status}, cond G {space.condition():.3g}"
+        )
+        for g in space.vectors:
+            typer.echo("  " + " ".join(f"{value:12.8f}" for value in g))
+    typer.echo("least norm\n  " + " ".join(f"{value:12.8f}" for value in best(space).v))
 
 
 def _published(case: str | None, config: str | None, legacy: bool, method: int, out: Path | None, force: bool) -> None:

@@ -7,7 +7,7 @@ Source: IKOR, inverse kinematics on redundant systems; ORNL/TM-13096. What its l
 from __future__ import annotations
 
 from wbc.published.ikor.cases import case, differences, printed
-from wbc.published.ikor.driver import Code, Driver, Method, Run, Settings, Stop, straight
+from wbc.published.ikor.driver import Code, Driver, Method, Run, Settings, Stop, line_to, straight
 from wbc.published.ikor.files import IkorFileError, Trajectory
 from wbc.published.ikor.legacy import legacy_hermies
 from wbc.published.ikor.machines import Machine, airarm, hermies, machine_of, planar, without_platform
@@ -27,6 +27,7 @@ __all__ = [
     "differences",
     "hermies",
     "legacy_hermies",
+    "line_to",
     "machine_of",
     "planar",
     "printed",

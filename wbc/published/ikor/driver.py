@@ -23,6 +23,8 @@ from wbc.validation import Array
 
 #: Rows of a task, in their order
 AXES = ("x", "y", "z", "yaw", "pitch", "roll")
+#: Of a line that is created: [m], [rad], as the published program shows them
+INCREMENTS = 0.01, math.radians(1.0)
 #: Smallest cosine of the pitch at which yaw and roll are told apart
 GIMBAL = 1e-6
 #: Steps that a loop back goes back by, and holds its joint beyond the step that was too long
@@ -148,6 +150,24 @@ def straight(machine: Machine, step: Any, count: int, start: Any = None, turn: A
     ways = np.arange(1, count + 1)[:, None]
     euler = euler_angles(rotation) + ways * (np.zeros(3) if turn is None else np.asarray(turn))
     return Trajectory(q, place + ways * validation.ordinary_array("step", step, (3,)), euler)
+
+
+def line_to(machine: Machine, point: Any, euler: Any = None, start: Any = None) -> Trajectory:
+    """A line from where the tool is to a point [m], turning to yaw, pitch, roll [rad] on the way, in equal steps of at
+    most :data:`INCREMENTS`.
+
+    Raises:
+        ShapeError, NotFiniteError: no point or angles.
+    """
+    q = machine.home if start is None else machine.checked("start", start)
+    place, rotation = machine.place(q)
+    way = validation.ordinary_array("point", point, (3,)) - place
+    first = euler_angles(rotation)
+    turn = np.zeros(3)
+    if euler is not None:
+        turn = (validation.ordinary_array("euler", euler, (3,)) - first + math.pi) % (2.0 * math.pi) - math.pi
+    count = max(1, math.ceil(max(np.linalg.norm(way) / INCREMENTS[0], np.abs(turn).max() / INCREMENTS[1]) - 1e-9))
+    return straight(machine, way / count, count, q, turn / count)
 
 
 def euler_angles(rotation: Array) -> Array:
