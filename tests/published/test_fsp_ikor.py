@@ -493,6 +493,39 @@ def test_what_the_stack_cannot_do_is_explained() -> None:
     assert "sphere 1" in found.message
 
 
+def test_random_settings_end_with_a_reason() -> None:
+    """Whatever is asked of whichever machine: finite steps within their limit, and a reason where it stops."""
+    rng = np.random.default_rng(5)
+    makers = (hermies, airarm)
+    for _ in range(60):
+        machine: Any = makers[rng.integers(2)](("none", "holonomic", "differential", "car")[rng.integers(4)])
+        near = rng.random(machine.joints) < 0.3
+        tight = np.where(near, machine.home + rng.uniform(0, 0.1, machine.joints), machine.upper)
+        machine = replace(machine, upper=tight, weights=10.0 ** rng.uniform(-1, 1, machine.joints))
+        settings = Settings(
+            Method(rng.integers(5)),
+            (AXES[:3], AXES, ("x", "y"), ("x", "z", "yaw"), ("x", "y", "z", "pitch"))[rng.integers(5)],
+            euler=bool(rng.random() < 0.2),
+            generator=("blocked", "orthogonal")[rng.integers(2)],
+            two_step=bool(rng.random() < 0.3),
+            ahead=bool(rng.random() < 0.4),
+            margin=0.01,
+            step_limit=(math.inf, 0.05)[rng.integers(2)],
+            loop_back=bool(rng.random() < 0.3),
+        )
+        points = machine.points(machine.home)
+        count = int(rng.integers(0, 8))
+        middle = points[rng.integers(len(points), size=count)] + rng.normal(size=(count, 3)) * 0.2
+        spheres = np.column_stack((middle, rng.uniform(0, 0.2, count)))
+        start = machine.home + rng.normal(size=machine.joints) * 0.3
+        path = straight(machine, rng.normal(size=3) * 0.01, 12, start, rng.normal(size=3) * 0.01)
+        found = run(machine, settings, path, spheres)
+        assert np.isfinite(found.q).all()
+        assert np.abs(np.diff(found.q, axis=0)).max(initial=0.0) <= settings.step_limit * (1 + 1e-9)
+        assert (found.stop is Stop.DONE) == (len(found.norms) == 12)
+        assert bool(found.message) == (found.stop is not Stop.DONE)
+
+
 def test_any_robot_runs() -> None:
     robot = wbc.robots.load("panda", shapes="none")
     machine = machine_of(robot, robot.frames["tip"])

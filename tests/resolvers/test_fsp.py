@@ -274,6 +274,22 @@ def test_zero_rows_zero_columns_and_zero_rates() -> None:
         assert not fixed.vectors[:, [0, 2, 5]].any()
 
 
+@pytest.mark.parametrize("make", [orthogonal, blocked])
+def test_a_row_of_rounding_is_no_row(make: Any) -> None:
+    """A level wrist never pitches, and its row has 1e-17 where algebra has 0."""
+    rng = np.random.default_rng(12)
+    J = rng.normal(size=(4, 7))
+    J[2] = 1e-17 * rng.normal(size=7)
+    x = J @ rng.normal(size=7)
+    space = make(J, x)
+    assert (space.rows, space.span, space.status) == ((0, 1, 3), 5, Status.REDUCED)
+    assert np.abs(space.vectors).max() < 1e3
+    with pytest.raises(InfeasibleError, match="row 2"):
+        make(J, x + [0, 0, 0.01, 0])
+    problem = RateProblem(J[:3], x[:3], J[3:], x[3:])
+    np.testing.assert_allclose(FullSpace().resolve(problem), np.linalg.pinv(J, rcond=1e-12) @ x, atol=1e-9)
+
+
 def test_blocked_solutions_alone_do_not_always_span() -> None:
     """Joints 2 and 3 move the second row alone, of which no rate is asked: every block leaves them still."""
     J, x = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 1.0]]), np.array([1.0, 0.0])

@@ -58,7 +58,10 @@ Ahead = Annotated[
 ]
 Margin = Annotated[float, typer.Option(help="Kept from spheres, in m.", rich_help_panel=_HOW)]
 Damping = Annotated[float, typer.Option(help="Of the inverse, near singularities.", rich_help_panel=_HOW)]
-StepLimit = Annotated[float | None, typer.Option(help="Longest step, in degrees or cm.", rich_help_panel=_HOW)]
+StepLimit = Annotated[
+    float | None,
+    typer.Option(help="Longest step of a joint, in degrees; pi/180 m for each where it slides.", rich_help_panel=_HOW),
+]
 LoopBack = Annotated[bool, typer.Option("--loop-back", help="Back by some steps, a joint held.", rich_help_panel=_HOW)]
 Out = Annotated[Path | None, typer.Option(help="Run folder. Default: runs/ikor-TIME.", rich_help_panel=_OUTPUT)]
 Force = Annotated[bool, typer.Option("--force", help="Write into a folder that has a run.", rich_help_panel=_OUTPUT)]

@@ -12,7 +12,15 @@ import numpy as np
 from scipy.linalg import lapack, qr
 
 from wbc import validation
-from wbc.resolvers.fsp.space import RANK, SolutionSpace, checked_held, checked_system, consistency, split_columns
+from wbc.resolvers.fsp.space import (
+    RANK,
+    SolutionSpace,
+    checked_held,
+    checked_system,
+    consistency,
+    row_scales,
+    split_columns,
+)
 from wbc.validation import Array
 
 SEARCHES = ("exchange", "exhaustive")
@@ -136,10 +144,15 @@ class _Search:
 
     def _neighbours(self, basis: Array) -> Iterator[Array]:
         """For each blocked column the basis in which it replaces the one that moves most, by a sound pivot."""
-        inverse = np.linalg.inv(self.A[:, basis])
+        factors, pivoted, singular = lapack.dgetrf(self.A[:, basis])
+        if singular:
+            return
+        inverse = lapack.dgetri(factors, pivoted)[0]
         moving, table = np.abs(inverse @ self.b) * self.size[basis], inverse @ self.A
         for j in np.setdiff1d(np.arange(self.m), basis):
             pivots = np.abs(table[:, j]) * self.size[basis]
+            if pivots.max() <= RANK * self.size[j] or not np.isfinite(pivots).all():
+                continue
             sound = pivots > SOUND * pivots.max()
             other = basis.copy()
             other[int(np.argmax(np.where(sound, moving, -1.0)))] = j
@@ -165,7 +178,7 @@ class _Search:
                 break
             turn = np.zeros(self.m)
             turn[j], turn[basis] = 1.0, -table[:, j]
-            self._new(start + turn * (length / np.abs(turn * self.size).max()))
+            self._new(start + turn * (length / (float(np.abs(turn * self.size).max()) or 1.0)))
         return missing
 
     def _new(self, v: Array) -> bool:
@@ -188,9 +201,7 @@ class _Search:
 
 def _independent(A: Array) -> list[int]:
     """Indices of independent rows, those that pivoting takes first."""
-    norms = np.linalg.norm(A, axis=1)
-    scaled = A / np.where(norms > 0.0, norms, 1.0)[:, None]
-    R, order = qr(scaled.T, mode="r", pivoting=True, check_finite=False)
+    R, order = qr((A * row_scales(A)[:, None]).T, mode="r", pivoting=True, check_finite=False)
     diagonal = np.abs(R.diagonal())
     return sorted(order[: int((diagonal > RANK * diagonal[0]).sum())].tolist())
 

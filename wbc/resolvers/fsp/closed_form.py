@@ -12,7 +12,7 @@ from scipy.linalg import lapack
 from wbc import validation
 from wbc.errors import InfeasibleError, RangeError, ShapeError
 from wbc.resolvers.fsp.criteria import Criterion
-from wbc.resolvers.fsp.space import RANK, SolutionSpace
+from wbc.resolvers.fsp.space import NOISE, RANK, SolutionSpace
 from wbc.validation import Array
 
 PLAIN = Criterion()
@@ -180,7 +180,7 @@ def _least(C: Array, off: Array, sizes: Array) -> Array | None:
     if not k:
         return np.zeros(n)
     factors, tau, _, _ = lapack.dgeqrf(C.T)
-    if (np.abs(factors.diagonal()) <= RANK * sizes).any():
+    if (np.abs(factors.diagonal()) <= np.maximum(RANK * sizes, NOISE * sizes.max())).any():
         return None
     y = np.zeros((n, 1))
     y[:k, 0] = lapack.dtrtrs(factors[:k], off, trans=1)[0]

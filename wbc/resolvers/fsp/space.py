@@ -17,6 +17,8 @@ from wbc.validation import Array
 
 #: A row is dependent where less than this share of it is left after the others
 RANK = 1e-10
+#: A row below this share of the largest is rounding
+NOISE = 1e-14
 #: A column is idle below this share of the largest, each row counted against its own size
 IDLE = 1e-15
 #: What a consistent system may leave of its rates, against the rates themselves
@@ -131,8 +133,7 @@ def _orthogonal(J: Array, x: Array, held: tuple[int, ...], free: bool, project: 
     idle, active = split_columns(J, held, free)
     A = J if len(active) == J.shape[1] else J[:, active]
     n, m = A.shape
-    norms = np.sqrt((A * A).sum(axis=1))
-    scale = 1.0 / np.where(norms > 0.0, norms, 1.0)
+    scale = row_scales(A)
     factors, pivots, tau, _, _ = lapack.dgeqp3((A * scale[:, None]).T)
     diagonal = np.abs(factors.diagonal())
     rank = int((diagonal > RANK * diagonal[0]).sum()) if diagonal[0] > 0.0 else 0
@@ -163,8 +164,8 @@ def consistency(J: Array, x: Array, v: Array, rank: int, project: bool) -> tuple
         return Status.FULL, 0.0, x
     off = np.abs(J @ v - x)
     # Each row against its own size, for rows in mm and in rad stand side by side; what moves most counts for all
-    norms = np.linalg.norm(J, axis=1)
-    norms[norms == 0.0] = 1.0
+    scales = row_scales(J)
+    norms = 1.0 / np.where(scales > 0.0, scales, 1.0)
     sizes = norms * float(((np.abs(J) @ np.abs(v) + np.abs(x)) / norms).max())
     if (off <= CONSISTENT * sizes).all():
         return Status.REDUCED, float(off.max(initial=0.0)), x
@@ -202,14 +203,20 @@ def checked_held(held: Iterable[int], joints: int) -> tuple[int, ...]:
     return out
 
 
+def row_scales(J: Array) -> Array:
+    """1 / |row|, and 0 for rows that are rounding beside the others."""
+    norms = np.sqrt((J * J).sum(axis=1))
+    norms[norms <= NOISE * norms.max()] = np.inf
+    return np.asarray(1.0 / norms)
+
+
 def split_columns(J: Array, held: tuple[int, ...], free: bool) -> tuple[tuple[int, ...], list[int]]:
     """(idle joints, the others): those held, and, if they are not free, columns of zeros to working precision.
 
     Raises:
         RangeError: none is left.
     """
-    norms = np.abs(J).max(axis=1)
-    sizes = (np.abs(J) / np.where(norms > 0.0, norms, 1.0)[:, None]).max(axis=0)
+    sizes = (np.abs(J) * row_scales(J)[:, None]).max(axis=0)
     zero = sizes <= IDLE * sizes.max()
     still = np.zeros_like(zero) if free else zero.copy()
     still[list(held)] = True
