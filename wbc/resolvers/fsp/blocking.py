@@ -56,8 +56,8 @@ def blocked(
 
     Args:
         J, x, held, free, project: as of :func:`orthogonal`.
-        search: ``exchange``: from the best conditioned block, one column is exchanged at a time, so that a block costs
-            a pivot and no inversion; ``exhaustive``: every pattern in lexicographic order until there are enough.
+        search: ``exchange``: from the best conditioned block, one column is exchanged at a time, for one that leaves a
+            sound block and a new solution; ``exhaustive``: every pattern in lexicographic order until there are enough.
 
     Raises:
         InfeasibleError: an inconsistent task. RangeError: no column that moves. UnknownNameError: no such search.
