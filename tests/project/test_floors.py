@@ -40,6 +40,7 @@ FLOORS = {
     "wbc.record": 7,
     "wbc.trajectory": 8,
     "wbc.coordinates": 8,
+    "wbc.explore": 9,
     "wbc.teleop": 9,
     "wbc.track": 9,
     "wbc.published": 9,

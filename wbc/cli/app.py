@@ -59,6 +59,17 @@ COMMANDS = {
         "ik",
         "Find joint positions that put a frame at a pose or a position, clear of obstacles and within the limits.",
     ),
+    "ikor": Listed(
+        "ikor",
+        "ikor",
+        "Run the published driver of redundant arms: its own trajectories, "
+        "printed norms beside, or one from its files.",
+    ),
+    "explore": Listed(
+        "explore",
+        "explore",
+        "Show all rates that serve a frame, the self-motion of the arm there, and its best configuration.",
+    ),
     "analyse": Listed(
         "analysis.analyse",
         "analyse_",

@@ -14,7 +14,13 @@ from wbc.errors import WbcError
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 
 #: First argument -> the module that measures something else than the tick
-OTHERS = {"time-laws": "bench.time_laws", "ik": "bench.ik", "walk": "bench.walk", "resolvers": "bench.resolvers"}
+OTHERS = {
+    "time-laws": "bench.time_laws",
+    "ik": "bench.ik",
+    "walk": "bench.walk",
+    "resolvers": "bench.resolvers",
+    "fsp": "bench.fsp",
+}
 
 
 class BenchError(WbcError):
@@ -33,6 +39,8 @@ def bench(context: typer.Context) -> None:
     wbc bench walk plans and walks courses, turns, trenches and layouts: wbc bench walk --quick
 
     wbc bench resolvers drives the Space Station arm by classical rate resolution and by pairs
+
+    wbc bench fsp measures solution spaces, printed norms, and paths resolved as a whole: wbc bench fsp --quick
     """
     if not (ROOT / "bench" / "__main__.py").is_file():
         reason = "the benchmark is not installed with the package; run it from a clone of the repository"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from wbc.resolvers.extended import ExtendedJacobian
+from wbc.resolvers.full_space import FullSpace
 from wbc.resolvers.gradient import GradientProjection
 from wbc.resolvers.problem import RateProblem, Resolver
 from wbc.resolvers.pseudo_inverse import PseudoInverse
@@ -12,6 +13,7 @@ from wbc.resolvers.virtual_arms import VirtualArms
 
 __all__ = [
     "ExtendedJacobian",
+    "FullSpace",
     "GradientProjection",
     "PseudoInverse",
     "RankReduction",

@@ -1,0 +1,140 @@
+"""``wbc ikor`` and ``wbc explore``: what they print and write, and what they refuse."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from wbc.cli.app import app
+
+RUN = CliRunner(env={"COLUMNS": "200"})
+LINE = "\n".join(f"{-0.88 + 0.002 * k} -0.356 {0.635 - 0.002 * k}" for k in range(1, 11))
+POINTS = f"0 180 0 0 0 90 0\n10\n{LINE}\n"
+
+
+def test_a_published_run_has_printed_norms_beside(tmp_path: Path) -> None:
+    done = RUN.invoke(app, ["ikor", "--case", "1", "--config", "3x7", "--out", str(tmp_path)])
+    assert done.exit_code == 0
+    assert "0.103820" in done.output
+    assert "0.103807" in done.output
+    figures = json.loads((tmp_path / "summary.json").read_text())
+    assert figures["1-3x7"]["values"] == 191
+    assert figures["1-3x7"]["rms"] < 3e-4
+    with (tmp_path / "norms.csv").open() as stream:
+        assert len(list(csv.DictReader(stream))) == 195
+    assert (tmp_path / "norms.png").stat().st_size > 5000
+    again = RUN.invoke(app, ["ikor", "--case", "1", "--config", "3x7", "--out", str(tmp_path)])
+    assert again.exit_code == 2
+    assert "--force" in again.output
+
+
+@pytest.mark.parametrize("resolver", ["fsp", "stack"])
+def test_a_run_from_files(resolver: str, tmp_path: Path) -> None:
+    points, spheres, out = tmp_path / "TrajectoryPts", tmp_path / "sphere_data", tmp_path / "run"
+    points.write_text(POINTS)
+    spheres.write_text("-0.5 -0.356 0.55 0.08\n0 0 0 0\n")
+    files = ["--trajectory", str(points), "--spheres", str(spheres), "--out", str(out)]
+    done = RUN.invoke(app, ["ikor", *files, "--method", "3", "--resolver", resolver, "--ahead", "--margin", "0.002"])
+    assert done.exit_code == 0, done.output
+    figures = json.loads((out / "summary.json").read_text())
+    assert (figures["stop"], figures["steps"]) == ("all points done", 10)
+    assert figures["clearance"] > 0.0
+    assert len((out / "CheezyAngles").read_text().splitlines()) == 11
+
+
+def test_a_line_and_a_jacobian(tmp_path: Path) -> None:
+    done = RUN.invoke(app, ["ikor", "--line", "-0.8,-0.356,0.6", "--out", str(tmp_path / "run")])
+    assert done.exit_code == 0, done.output
+    assert len((tmp_path / "run" / "CheezyAngles").read_text().splitlines()) == 10
+    data = tmp_path / "FSP_data"
+    data.write_text("2 3\n1 0 0\n0 1 1\n0.5\n0.25\n")
+    done = RUN.invoke(app, ["ikor", "--jacobian", str(data)])
+    assert done.exit_code == 0
+    assert "blocked: rank 2, 2 vectors" in done.output
+    assert "0.50000000   0.12500000   0.12500000" in done.output
+    data.write_text("2 3\n1 0 0\n0 1\n0.5\n0.25\n")
+    assert "FSP_data:3" in RUN.invoke(app, ["ikor", "--jacobian", str(data)]).output
+
+
+def test_a_bad_line_is_named(tmp_path: Path) -> None:
+    points = tmp_path / "TrajectoryPts"
+    points.write_text(POINTS.replace("10\n", "10\n-0.88 O.1 0.6\n", 1))
+    done = RUN.invoke(app, ["ikor", "--trajectory", str(points), "--out", str(tmp_path / "run")])
+    assert done.exit_code == 2
+    assert "TrajectoryPts:3" in done.output
+    assert "O.1" in done.output
+    assert not (tmp_path / "run").exists()
+
+
+def test_a_run_that_ends_early_says_why(tmp_path: Path) -> None:
+    points = tmp_path / "TrajectoryPts"
+    points.write_text("0 0 0 0\n1\n2.0 0 0\n")
+    arguments = [
+        "ikor",
+        "--robot",
+        "planar",
+        "--rows",
+        "x,y",
+        "--trajectory",
+        str(points),
+        "--out",
+        str(tmp_path / "run"),
+    ]
+    done = RUN.invoke(app, arguments)
+    assert done.exit_code == 1
+    assert "the task contradicts itself" in done.output
+
+
+def test_explore_panda(tmp_path: Path) -> None:
+    at = "0.3,0.2,0.1,-1.8,0.2,1.9,0.4"
+    done = RUN.invoke(
+        app,
+        [
+            "explore",
+            "panda",
+            "--at",
+            at,
+            "--seeds",
+            "0",
+            "--to",
+            "0.5,0.3,0.5",
+            "--points",
+            "8",
+            "--out",
+            str(tmp_path),
+        ],
+    )
+    assert done.exit_code == 0, done.output
+    assert "rank 6, 1 self-motions" in done.output
+    figures = json.loads((tmp_path / "summary.json").read_text())
+    assert figures["self_motions"] == 1
+    assert figures["along"]["duration"] > 0.0
+    curve = np.load(tmp_path / "self_motion.npz")["piece1"]
+    assert curve.shape[1] == 7
+    assert (tmp_path / "self_motion.png").stat().st_size > 5000
+    assert (tmp_path / "law.npz").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "word"),
+    [
+        (["explore", "pnda"], "panda"),
+        (["explore", "panda", "--kind", "place"], "position"),
+        (["explore", "panda", "--rates", "1,2"], "shape"),
+        (["explore", "panda", "--rates", "1,x"], "numbers"),
+        (["ikor", "--case", "2"], "valid: 1, 3"),
+        (["ikor", "--line", "1,2"], "X,Y,Z"),
+        (["ikor", "--trajectory", "no_such_file"], "no_such_file"),
+        (["ikor", "--robot", "hermes", "--trajectory", "x"], "hermes"),
+    ],
+)
+def test_refused(arguments: list[str], word: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    done = RUN.invoke(app, arguments)
+    assert done.exit_code == 2
+    assert word in " ".join(done.output.split())

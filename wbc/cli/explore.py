@@ -1,0 +1,127 @@
+"""``wbc explore``: what else a robot could have done at a configuration."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from wbc.cli import options
+
+At = Annotated[str, typer.Option(help="Joint coordinates with commas [rad, m]. Default: neutral.")]
+Kind = Annotated[str, typer.Option(help="What the frame holds: position, orientation or pose.")]
+Rates = Annotated[str | None, typer.Option(help="Rates of these rows with commas. Default: it stands still.")]
+Seeds = Annotated[int, typer.Option(help="Random configurations that pieces are searched from.", min=0)]
+Through = Annotated[bool, typer.Option("--through", help="Trace beyond limits, which are windows then.")]
+To = Annotated[str | None, typer.Option(help="X,Y,Z: where the frame goes straight to, resolved as a whole.")]
+Points = Annotated[int, typer.Option(help="Targets on the way there.", min=2)]
+Anywhere = Annotated[bool, typer.Option("--anywhere", help="On the way there, start on any branch.")]
+Out = Annotated[Path, typer.Option(help="Folder for picture, curves and figures.")]
+
+
+def explore(
+    robot: options.RobotName,
+    frame: options.FrameName = None,
+    at: At = "",
+    kind: Kind = "pose",
+    sphere: options.Spheres = None,
+    rates: Rates = None,
+    seeds: Seeds = 20,
+    through: Through = False,
+    to: To = None,
+    points: Points = 25,
+    anywhere: Anywhere = False,
+    margin: options.Margin = 0.02,
+    out: Out = Path("runs/explore"),
+) -> None:
+    """Show all rates that serve a frame, the self-motion of the arm there, and its best configuration.
+
+    Example: [bold]wbc explore panda --kind pose --sphere 0.3,0.3,0.5,0.1[/bold]
+    """
+    import numpy as np
+    from rich.table import Table
+
+    from wbc import robots, tasks, validation
+    from wbc.cli.analysis.advise import configuration_of
+    from wbc.cli.console import out as console
+    from wbc.cli.planning import given_obstacles, tip_frame
+    from wbc.controller import Stack
+    from wbc.errors import ShapeError
+    from wbc.explore import Explorer
+    from wbc.explore.pictures import save_pieces
+
+    machine = robots.load(robot)
+    name = machine.check_frame("frame", frame) if frame else tip_frame(machine, None)
+    q = np.array(configuration_of(machine, at))
+    stack = Stack(machine, dt=0.01)
+    chosen: Any = validation.one_of("kind", kind, ("pose", "position", "orientation"))
+    stack.add(tasks.EndEffector(name, kind=chosen), name="hand")
+    for label, one in given_obstacles(sphere, None).items():
+        stack.add(tasks.Obstacle(one.shape, margin=margin, pose=one.pose), name=label)
+    explorer = Explorer(stack, q)
+    wanted = None if rates is None else _numbers("rates", rates)
+    found = explorer.tick(q, wanted if wanted is not None else np.zeros(6 if kind == "pose" else 3))
+    console().print(f"{machine.name}, {kind} of {name}: rank {found.space.rank}, {found.space.span - 1} self-motions")
+    table = Table(header_style="bold", box=None, pad_edge=False)
+    for head in ("joint", *found.optima, "least", "largest"):
+        table.add_column(head, justify="right")
+    for k, joint in enumerate(machine.dof_names):
+        cells = [*(v[k] for v in found.optima.values()), found.lower[k], found.upper[k]]
+        table.add_row(joint, *(f"{x:.4f}" for x in cells))
+    console().print(table)
+    out.mkdir(parents=True, exist_ok=True)
+    figures: dict[str, Any] = {"robot": machine.name, "frame": name, "kind": kind, "rank": found.space.rank,
+                               "self_motions": found.space.span - 1}  # fmt: skip
+    if found.space.span > 1:
+        pieces = explorer.pieces(q, seeds=seeds, through=through)
+        best, room = explorer.best(pieces)
+        for number, piece in enumerate(pieces, 1):
+            kept = sum(not text for text in piece.broken)
+            how = "closed" if piece.closed else f"from {piece.ends[0]} to {piece.ends[1]}"
+            console().print(
+                f"piece {number}: {len(piece.q)} configurations, {kept} within all limits, {how}", highlight=False
+            )
+        console().print(f"farthest from limits: {room:.3f} of half a range at " + ",".join(f"{x:.4f}" for x in best))
+        figures["pieces"] = [{"count": len(p.q), "closed": p.closed, "ends": p.ends, "free": p.free} for p in pieces]
+        figures["best"] = {"q": best.tolist(), "share": room}
+        np.savez_compressed(out / "self_motion.npz", **{f"piece{k}": p.q for k, p in enumerate(pieces, 1)})  # type: ignore[arg-type]
+        save_pieces(machine, pieces, out / "self_motion.png", best)
+    if to is not None:
+        end = _numbers("to", to)
+        if len(end) != 3:
+            raise ShapeError("to", to, "expected X,Y,Z")
+        targets = _line(machine, q, name, kind, end, points)
+        way = explorer.along({"hand": targets}, q, anywhere=anywhere)
+        law = way.law(np.minimum(machine.limits.velocity, 10.0), np.minimum(machine.limits.acceleration, 10.0))
+        law.save(out / "law.npz")
+        _, stopped = explorer.step_by_step({"hand": targets}, q)
+        console().print(
+            f"along: {way.nodes} configurations compared, {law.duration:.3f} s; step by step {stopped or 'done'}"
+        )
+        figures["along"] = {"cost": way.cost, "nodes": way.nodes, "duration": law.duration, "step_by_step": stopped}
+    (out / "summary.json").write_text(json.dumps(figures, indent=1) + "\n")
+    console().print(str(out))
+
+
+def _numbers(field: str, text: str) -> Any:
+    import numpy as np
+
+    from wbc.errors import ShapeError
+
+    try:
+        return np.array([float(part) for part in text.split(",")])
+    except ValueError:
+        raise ShapeError(field, text, "expected numbers with commas") from None
+
+
+def _line(machine: Any, q: Any, frame: str, kind: str, end: Any, points: int) -> list[Any]:
+    import numpy as np
+    import pinocchio as pin
+
+    data = machine.model.createData()
+    pin.framesForwardKinematics(machine.model, data, q)
+    pose = data.oMf[machine.model.getFrameId(frame)]
+    places = [pose.translation + s * (end - pose.translation) for s in np.linspace(0.0, 1.0, points)]
+    return places if kind == "position" else [pin.SE3(pose.rotation, p) for p in places]

@@ -1,0 +1,36 @@
+"""The published driver of redundant arms by Full Space Parameterization, and its runs.
+
+Source: IKOR, inverse kinematics on redundant systems; ORNL/TM-13096. What its listing has wrong is in
+:mod:`wbc.published.ikor.legacy`, what is not legible is assumed in :mod:`wbc.published.ikor.machines`.
+"""
+
+from __future__ import annotations
+
+from wbc.published.ikor.cases import case, differences, printed
+from wbc.published.ikor.driver import Code, Driver, Method, Run, Settings, Stop, line_to, straight
+from wbc.published.ikor.files import IkorFileError, Trajectory
+from wbc.published.ikor.legacy import legacy_hermies
+from wbc.published.ikor.machines import Machine, airarm, hermies, machine_of, planar, without_platform
+
+__all__ = [
+    "Code",
+    "Driver",
+    "IkorFileError",
+    "Machine",
+    "Method",
+    "Run",
+    "Settings",
+    "Stop",
+    "Trajectory",
+    "airarm",
+    "case",
+    "differences",
+    "hermies",
+    "legacy_hermies",
+    "line_to",
+    "machine_of",
+    "planar",
+    "printed",
+    "straight",
+    "without_platform",
+]
