@@ -9,7 +9,7 @@ import pytest
 from tests.controller.referee import Referee
 from tests.controller.stacks import DT, NAMES, controller, everything, near_limits, randomise
 
-STATES = 12
+STATES = 6
 
 
 def check(name: str, backend: str, states: int, solver: str = "daqp") -> float:

@@ -11,7 +11,7 @@ from wbc.qp.polish import polish
 from wbc.qp.reference import reference
 from wbc.qp.samples import SIZES, WEIGHTS, whole_body
 
-COUNT = {7: repeats(48), 12: repeats(16), 25: repeats(5), 38: repeats(2), 40: repeats(2)}
+COUNT = {7: repeats(24), 12: repeats(8), 25: repeats(3), 38: repeats(1), 40: repeats(1)}
 
 
 def disturbed(rng: np.random.Generator, answer: Solution) -> list[Solution]:
