@@ -41,7 +41,7 @@ class Numbers:
         self, q: np.ndarray, values: dict[str, Any], v: np.ndarray | None = None, dt: float = 0.005
     ) -> dict[str, np.ndarray]:
         """All outputs; columns as vectors."""
-        buffer, run, given, found = self._kept
+        _, run, given, found = self._kept
         for place, value in zip(given, (q, 0.0 if v is None else v, self.flat(values), dt), strict=True):
             place[:] = value
         run()

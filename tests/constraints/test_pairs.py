@@ -111,7 +111,7 @@ def test_margins_are_those_of_coal(solid: Solid, other: Shape) -> None:
     item, rng = Obstacle(other), np.random.default_rng(21)
     clear, inside, outside = probe(item, bot), 0, 0
     (_, _, placed), rows = item.pairs(bot)[0], len(item.rows(bot))
-    for _ in range(25):
+    for _ in range(60):
         q = random_configuration(bot, rng)
         pose = near(bot, q, link, rng)
         h = clear(q, pose=pose)[0]

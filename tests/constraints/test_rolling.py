@@ -149,7 +149,7 @@ def test_four_fixed_wheels_turn_only_if_they_may_skid(skids: bool) -> None:
     q = machine.neutral
     controller.reset(q)
     controller["base"].target = pin.exp3(np.array([0.0, 0.0, 0.5]))
-    for _ in range(80):
+    for _ in range(200):
         step = controller.step(q)
         assert step.status == "solved"
         q = pin.integrate(machine.model, q, 0.01 * step.v)

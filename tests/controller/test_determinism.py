@@ -100,7 +100,7 @@ def test_open_loop_reaches_the_target(name: str, seed: int) -> None:
     q, goal = reachable(name, np.random.default_rng(seed))
     one["hand"].target = goal
     start, last = distance(name, q, goal), np.zeros(bot.nv)
-    for _ in range(200):
+    for _ in range(500):
         step = one.step(q)
         assert step.status == "solved"
         assert (np.abs(step.v - last) <= bot.limits.acceleration * DT + 1e-9).all()

@@ -95,7 +95,7 @@ def test_weights_of_every_size_are_solved_within_the_stated_bound() -> None:
     controller, rng = wild(0), np.random.default_rng(3)
     tick, places, compared = controller.tick, ReportLayout(controller.layout), 0
     assert isinstance(tick, NativeTick)
-    for _ in range(50):
+    for _ in range(120):
         provoke(controller, rng)
         qp = tick.qp()
         assert tick.step() == SOLVED or not feasible(qp)
@@ -109,7 +109,7 @@ def test_weights_of_every_size_are_solved_within_the_stated_bound() -> None:
         compared += 1
         off = np.abs(tick.report[places["v"]] - found.solution.x[: qp.n]).max()
         assert off <= float(tick.report[places["error_bound"]][0]) + 1e-15 * spread
-    assert compared > 100
+    assert compared > 40
 
 
 def test_a_step_without_other_solvers_brakes_and_says_so() -> None:
@@ -195,4 +195,4 @@ def test_the_virtual_machine_raises_nothing_whatever_the_weights() -> None:
     for _ in range(50):
         provoke(controller, rng)
         statuses.append(controller.step(controller.tick.q.copy(), controller.tick.v_last[:7].copy()).status)
-    assert statuses.count(Status.SOLVED) > 100
+    assert statuses.count(Status.SOLVED) > 40
