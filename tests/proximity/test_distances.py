@@ -62,7 +62,7 @@ def test_every_pair_is_as_coal_says(name: str) -> None:
     pairs, referee, pose = all_pairs(bot, rng), Referee(bot), place(rng, 0.4)
     sensing, numbers = sensor(bot, pairs, len(pairs), pose)
     overlapping = 0
-    for _ in range(6):
+    for _ in range(12):
         q = random_configuration(bot, rng)
         sensing.sense(q)
         line = numbers["line"].reshape(-1, 6)
