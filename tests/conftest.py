@@ -49,6 +49,7 @@ settings.register_profile(
     "wbc",
     derandomize=True,
     deadline=None,
+    max_examples=40,
     database=None,
     print_blob=False,
     suppress_health_check=[HealthCheck.too_slow],

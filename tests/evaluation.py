@@ -41,10 +41,25 @@ class Numbers:
         self, q: np.ndarray, values: dict[str, Any], v: np.ndarray | None = None, dt: float = 0.005
     ) -> dict[str, np.ndarray]:
         """All outputs; columns as vectors."""
-        speed = np.zeros(self.robot.nv) if v is None else v
-        out = self.function(q, speed, self.flat(values), dt)
-        arrays = dict(zip(self.function.name_out(), [np.array(o) for o in out], strict=True))
+        _, run, given, found = self._kept
+        for place, value in zip(given, (q, 0.0 if v is None else v, self.flat(values), dt), strict=True):
+            place[:] = value
+        run()
+        arrays = {name: a.reshape(shape, order="F").copy() for name, (a, shape) in found.items()}
         return {name: a if name in ("jacobian", "matrix") else a[:, 0] for name, a in arrays.items()}
+
+    @cached_property
+    def _kept(self) -> tuple[Any, Callable[[], None], list[np.ndarray], dict[str, tuple[np.ndarray, tuple[int, int]]]]:
+        """The function on kept arrays, which takes a fifth of the time of a call that makes its own."""
+        buffer, run = self.function.buffer()
+        given = [np.zeros(self.function.nnz_in(k)) for k in range(self.function.n_in())]
+        names = self.function.name_out()
+        found = {n: (np.zeros(self.function.nnz_out(n)), self.function.size_out(n)) for n in names}
+        for k, array in enumerate(given):
+            buffer.set_arg(k, memoryview(array))
+        for k, (array, _) in enumerate(found.values()):
+            buffer.set_res(k, memoryview(array))
+        return buffer, run, given, found
 
 
 def numbers(item: Item, robot: Robot) -> Numbers:

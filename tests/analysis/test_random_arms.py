@@ -41,7 +41,7 @@ RING = TrigRing([Coordinate(k, k, str(k + 1)) for k in range(4)])
 EXACT = Exact(RING)
 HALF = EXACT.half
 #: Minutes of one analysis, and what it may be late by where others work on the same cores [s]
-MINUTES, LATE = 0.04, 10.0
+MINUTES, LATE = 0.02, 10.0
 #: Arms that were judged wrongly before, and some more
 SEEDS = (8, 29, 30, 47, 48, 49, 141, 192)
 

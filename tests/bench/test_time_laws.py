@@ -32,7 +32,7 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, dict[str, An
     folder = tmp_path_factory.mktemp("laws")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(least_time, "REFERENCE", 1601)
-        run.main(["--problems", "1", "--count", "40", "--processes", "1", "--seed", "3", "--output", str(folder)])
+        run.main(["--problems", "1", "--count", "16", "--processes", "1", "--seed", "3", "--output", str(folder)])
     return (folder / "time_laws.md").read_text(), json.loads((folder / "time_laws.json").read_text())
 
 
@@ -103,10 +103,10 @@ def test_ctrl_c_ends_a_run_with_its_workers(background: bool, tmp_path: Path) ->
 
 
 def test_states_hang_on_the_seed_only() -> None:
-    one = list(states.random_states(5, 40, 1))
-    other = sorted(states.random_states(5, 40, 2), key=lambda r: families.FAMILIES.index(r["family"]))
+    one = list(states.random_states(5, 16, 1))
+    other = sorted(states.random_states(5, 16, 2), key=lambda r: families.FAMILIES.index(r["family"]))
     assert [r["raw"] for r in one] == [r["raw"] for r in other]
-    assert sum(r["states"] for r in one) == 40
+    assert sum(r["states"] for r in one) == 16
     assert not any(r["ours"] for r in one)
 
 

@@ -58,7 +58,7 @@ def test_comes_to_rest_at_the_best(name: str, direction: int, gain: float | None
     assert np.abs(done.v[900:]).max() < 1e-3
     assert (np.abs(done.acceleration) <= robot.limits.acceleration * (1 + 1e-9)).all()
     reached = float(np.linalg.norm(tip_pose(robot, done.q[-1], name).translation - target.translation))
-    least, distance = best(robot, name, target, kind, [done.q[-1], *random_starts(robot, 12)])
+    least, distance = best(robot, name, target, kind, [done.q[-1], *random_starts(robot, 6)])
     here = cost(robot, name, target, done.q[-1], kind)[0]
     assert here <= least * (1 + 1e-3)
     assert abs(reached - distance) < 1e-3

@@ -66,9 +66,9 @@ def test_angles_are_solved_for_in_printed_loci() -> None:
 def test_minutes_are_kept_where_the_locus_takes_long() -> None:
     """The elbow alone on the Space Station arm: what is open is said, or a witness ends the question."""
     began = time.monotonic()
-    code, out, _ = run("ssrms", "--point", "end3", "--minutes", 0.05)
+    code, out, _ = run("ssrms", "--point", "end3", "--minutes", 0.02)
     assert code == 0
-    # 3 s, and what a shared machine may hold up
+    # 1.2 s, and what a shared machine may hold up
     assert time.monotonic() - began < 20.0
     assert "end3: 9 x 7, " in out
     assert "  open     " in out or "end3: incomplete" in out

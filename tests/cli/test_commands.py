@@ -227,6 +227,8 @@ def test_interrupt_leaves_a_valid_run_folder(tmp_path: Path, monkeypatch: pytest
     monkeypatch.setattr(session, "track", interrupted)
     monkeypatch.setattr(session, "save_picture", functools.partial(save_picture, size=(96, 60)))
     monkeypatch.setitem(style.SETTINGS, "savefig.dpi", 50)
+    monkeypatch.setattr("wbc.track.scene.SUPERSAMPLING", 1)
+    monkeypatch.setattr("wbc.track.render.SHADOW_MAP", 300)
     handler = signal.getsignal(signal.SIGINT)
     code, out, _ = run("demo", "--backend", "vm", "--rate", "50", "--output", tmp_path)
     assert code == 130

@@ -83,7 +83,7 @@ def build(name: str, mutations: dict[str, Any] | None = None) -> Loop:
     return Loop(robot, items, DT, name, backend_of(mutations))
 
 
-def climb(loop: Loop, name: str, seed: int = 41, count: int = 20, ticks: int = 400) -> Figures:
+def climb(loop: Loop, name: str, seed: int = 41, count: int = 8, ticks: int = 400) -> Figures:
     """A target beyond reach, at a gain of 1/dt: w never falls, and ends where it has no slope, without a sign flip."""
     value, rng = SUBJECTS[name].measure, np.random.default_rng(seed)
     loop.only(name)

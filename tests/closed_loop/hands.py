@@ -92,7 +92,7 @@ def subject(kind: str, error: Any) -> Subject:
 
 
 SUBJECTS: dict[str, Subject] = {
-    "object": replace(subject("pose", midway), starts=2 * STARTS),
+    "object": replace(subject("pose", midway), starts=4 * STARTS),
     "pivot": subject("position", apart),
     "parallel": subject("orientation", turned),
 }

@@ -19,7 +19,7 @@ TASK_ROBOTS = ("panda", "kinova", "talos")
 CONSTRAINT_ROBOTS = ("panda", "ur5", "talos")
 
 #: Random starts of a check, and of one that repeats what another shows, or whose robot takes longer
-STARTS, FEWER = repeats(24), repeats(16)
+STARTS, FEWER = repeats(12), repeats(8)
 
 
 @cache

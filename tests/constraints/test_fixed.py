@@ -45,7 +45,7 @@ def test_within_joint_limits_from_every_viable_state(name: str) -> None:
     """Braking fully is what JointLimits always allows, to the last bit."""
     bot, rng = robot(name), np.random.default_rng(41)
     limits, fixed = probe(JointLimits(), bot), probe(Fixed(bot.joint_names), bot)
-    for _ in range(20):
+    for _ in range(8):
         q, v = random_configuration(bot, rng), np.zeros(bot.nv)
         for _ in range(30):
             lower, upper = (np.clip(b, -100.0, 100.0) for b in limits(q, v))

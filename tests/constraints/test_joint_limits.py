@@ -55,7 +55,7 @@ VARIANTS = [
 def test_bounds_of_every_degree_of_freedom(name: str, item: JointLimits) -> None:
     bot, rng = robot(name), np.random.default_rng(5)
     limits = probe(item, bot)
-    for _ in range(8):
+    for _ in range(4):
         q, v = random_configuration(bot, rng), rng.normal(0.0, 1.0, bot.nv)
         for i, k in enumerate(bot.position_index):
             if k >= 0 and rng.random() < 0.5:

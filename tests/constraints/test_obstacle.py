@@ -68,7 +68,7 @@ def test_margins_are_those_of_coal(name: str, shape: Sphere | HalfSpace) -> None
     clear = probe(item, bot)
     links = np.array([label.split(".")[0] for label in (r.label for r in item.rows(bot))])
     inside = 0
-    for k in range(40):
+    for k in range(20):
         q, margin = random_configuration(bot, rng), rng.uniform(0.0, 0.05)
         pose = random_pose(rng) if k % 2 else pose_near(bot, q, rng)
         h = clear(q, pose=pose, margin=margin)[0]

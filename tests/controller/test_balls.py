@@ -66,7 +66,7 @@ def scatter(controllers: tuple[Controller, ...], rng: np.random.Generator, size:
 @pytest.mark.parametrize("name", ROBOTS)
 def test_rows_are_those_of_the_expressions(name: str) -> None:
     rng, controllers = np.random.default_rng(0), pair(name)
-    for _ in range(40):
+    for _ in range(20):
         q = configuration(controllers[0].stack.robot, rng)
         scatter(controllers, rng, 1.0, 0.5)
         steps = []
@@ -112,16 +112,15 @@ def test_a_ball_on_the_core_of_a_link_has_a_direction_to_leave_in(place: tuple[f
             assert np.abs(matrices[0]).max() > 0.05
 
 
-@pytest.mark.parametrize("calm", [True, False])
-@pytest.mark.parametrize("name", ROBOTS)
+@pytest.mark.parametrize(("name", "calm"), [*((name, True) for name in ROBOTS), ("panda", False)])
 def test_rows_that_are_left_out_hold_whatever_the_joints_do(name: str, calm: bool) -> None:
     """In motion: for every velocity within the bounds, with the limit for braking in front of a margin."""
     rng, (native, vm) = np.random.default_rng(1), pair(name, calm)
     machine, left_out, kept, bound = stack(name, calm).robot, 0, 0, 0
     n = machine.nv
-    for trial in range(6):
+    for trial in range(3):
         q = configuration(machine, rng)
-        scatter((native, vm), rng, 0.8, 0.1 * (trial % 3))
+        scatter((native, vm), rng, 0.8, 0.1 * trial)
         # Into one of the balls that the hand keeps clear of
         target = native["ball5"].pose.translation
         for controller in (native, vm):

@@ -22,7 +22,7 @@ def test_solved_means_held(backend: str) -> None:
     stack = Stack(machine, 0.01).add(Limit(CenterOfMass(), upper=0.3, only="z"), name="height")
     stack.add(Posture(), name="rest").add(JointLimits()).add(EndEffector(FRAMES["panda"].tip, kind="position"))
     controller, rng, relaxed = stack.compile(backend=backend), np.random.default_rng(0), 0
-    for _ in range(150 if backend == "native" else 40):
+    for _ in range(80 if backend == "native" else 25):
         q, v = anywhere(machine, rng), rng.uniform(-0.3, 0.3, machine.nv) * speed
         controller.reset(q)
         controller["height"].set(target=np.zeros(3), upper=rng.uniform(-2, 1, 1), rate=rng.uniform(5, 49))

@@ -48,7 +48,7 @@ def test_a_capped_answer_keeps_bounds_and_misses_no_row_more_than_braking(cap: i
     c.iteration_cap = cap
     nv, seen = core_of(c).layout.nv, {Status.CAPPED: 0, Status.SOLVED: 0, Status.RELAXED: 0}
     between = 0
-    for _ in range(60):
+    for _ in range(30):
         q = hard(c, rng)
         c.reset(q, rng.normal(0.0, 0.3, nv))
         qp = at(c, q)

@@ -24,7 +24,7 @@ from wbc.stack import artifact
 from wbc.tasks import Damping, Expression, Obstacle
 
 BACKENDS = ("vm", "native")
-TICKS = {"vm": 30, "native": 150}
+TICKS = {"vm": 15, "native": 60}
 #: Small enough that threads take turns within most ticks
 SWITCH = 1e-6
 
@@ -54,7 +54,7 @@ def work(one: Controller, seed: int, count: int) -> list[bytes]:
 
 @pytest.mark.parametrize("backend", BACKENDS)
 def test_threads_give_the_bits_of_one_after_the_other(backend: str) -> None:
-    count, threads = TICKS[backend], 8
+    count, threads = TICKS[backend], 5
     first = controller("arm", "panda", backend=backend)
     wanted = [work(first.clone(), seed, count) for seed in range(threads)]
     crew = [first.clone() for _ in range(threads - 1)] + [first.stack.compile(backend=backend)]
@@ -200,7 +200,7 @@ def test_inputs_may_be_written_while_another_thread_steps() -> None:
 
     writer = threading.Thread(target=write)
     writer.start()
-    found = {one.step(q).residuals["posture"].values.tobytes() for _ in range(3000)}
+    found = {one.step(q).residuals["posture"].values.tobytes() for _ in range(1000)}
     stop.set()
     writer.join()
     assert found == wanted

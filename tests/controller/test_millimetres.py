@@ -133,7 +133,7 @@ def test_millimetres_change_no_joint_rate(name: str) -> None:
     ticks = [stack(small, name, 1.0).compile(backend="vm"), stack(large, name, FACTOR).compile(backend="vm")]
     rng, seen = np.random.default_rng(9), set()
     size = np.where(np.array(small.dof_units) == "m", FACTOR, 1.0)
-    for k in range(12):
+    for k in range(8):
         q = inside(small, rng) if k % 3 else near_limits(small, rng)
         v, own = 0.2 * rng.normal(size=small.nv), int(rng.integers(1 << 30))
         steps = []

@@ -18,7 +18,7 @@ def optimised(rows: str, tick: str) -> Controller:
 def test_answers_are_the_same_bits() -> None:
     plain, quick = optimised("-O0", "-O0"), optimised("-O1", "-O3")
     statuses = set()
-    for k in range(60):
+    for k in range(30):
         q = near_limits(robot("panda"), np.random.default_rng(k))
         steps = []
         for one in (plain, quick):

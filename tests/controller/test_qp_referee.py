@@ -10,7 +10,7 @@ from tests.controller.referee import Referee
 from tests.controller.stacks import DT, NAMES, controller, everything, near_limits, randomise
 from wbc.controller import core_of
 
-STATES = 12
+STATES = 6
 
 
 def check(name: str, backend: str, states: int, solver: str = "daqp") -> float:

@@ -33,7 +33,7 @@ CLASSES = sorted(name for name in FACTORIES if name != "Mechanism")
 #: Violations that are switched on [m, rad], and how far from there the configurations are that have none
 SHALLOW, DEEP, REACH = 0.01, 0.2, 0.6
 
-TRIALS = 3
+TRIALS = 2
 
 
 @dataclass(frozen=True, eq=False)

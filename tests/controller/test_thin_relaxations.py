@@ -19,7 +19,7 @@ def test_both_back_ends_find_the_optimum_of_a_thin_rest() -> None:
     native, vm = stack.compile(backend="auto"), stack.compile(backend="vm")
     rng = np.random.default_rng(0)
     home = np.array([0.0, -0.5, 0.0, -2.0, 0.0, 1.6, 0.7])
-    for _ in range(150):
+    for _ in range(60):
         q = pin.integrate(robot.model, home, 0.03 * rng.normal(size=robot.nv))
         shift = 0.2 * rng.normal(size=3)
         answers = []

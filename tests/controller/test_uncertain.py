@@ -96,7 +96,7 @@ def test_weights_of_every_size_are_solved_within_the_stated_bound() -> None:
     controller, rng = wild(0), np.random.default_rng(3)
     tick, places, compared = core_of(controller).tick, Memory(core_of(controller).layout), 0
     assert isinstance(tick, NativeTick)
-    for _ in range(300):
+    for _ in range(120):
         provoke(controller, rng)
         qp = tick.qp()
         assert tick.step() == SOLVED or not feasible(qp)
@@ -110,7 +110,7 @@ def test_weights_of_every_size_are_solved_within_the_stated_bound() -> None:
         compared += 1
         off = np.abs(tick.report[places["v"]] - found.solution.x[: qp.n]).max()
         assert off <= float(tick.report[places["error_bound"]][0]) + 1e-15 * spread
-    assert compared > 100
+    assert compared > 40
 
 
 def test_a_step_without_other_solvers_brakes_and_says_so() -> None:
@@ -155,7 +155,7 @@ def test_soft_rows_add_no_variables() -> None:
 def test_many_soft_rows_at_once(backend: str) -> None:
     controller, rng = faces(60, 1.0).compile(backend=backend), np.random.default_rng(4)
     offsets, given = controller["planes"].offsets.copy(), 0
-    for k in range(12 if backend == "vm" else 60):
+    for k in range(6 if backend == "vm" else 30):
         q = np.asarray(pin.integrate(robot("panda").model, robot("panda").neutral, rng.uniform(-0.05, 0.05, 7)))
         controller.reset(q)
         controller["planes"].set(price=float(10.0 ** rng.uniform(-4.0, 7.0)), offsets=offsets + 0.1 * (k % 3))
@@ -193,9 +193,9 @@ def test_levels_are_within_their_bounds_on_both_back_ends() -> None:
 
 def test_the_virtual_machine_raises_nothing_whatever_the_weights() -> None:
     controller, rng, statuses = wild(1, "vm"), np.random.default_rng(0), []
-    for _ in range(120):
+    for _ in range(50):
         provoke(controller, rng)
         statuses.append(
             controller.step(core_of(controller).tick.q.copy(), core_of(controller).tick.v_last[:7].copy()).status
         )
-    assert statuses.count(Status.SOLVED) > 100
+    assert statuses.count(Status.SOLVED) > 40

@@ -67,7 +67,7 @@ def test_regular_pairs_are_those_of_full_rank() -> None:
     assert (found.coordinates, found.pairs, found.regular) == (48, count_pairs(8, 2), count)
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(4))
 def test_the_system_jacobian_never_loses_its_rank(seed: int) -> None:
     """Claim 1 of the generality theorem, at random and at special configurations of random arms."""
     arm = random_arm(seed)

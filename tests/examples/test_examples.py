@@ -25,7 +25,7 @@ NUMBER = r"([-+0-9.e]+)"
 
 
 #: Examples with so many ticks that compiling them takes less time than the virtual machine
-LONG = ("space_arm", "time_laws")
+LONG = ("space_arm", "time_laws", "mobile_base")
 
 
 def output(name: str) -> str:

@@ -57,15 +57,15 @@ def run(*command: str | Path, folder: Path) -> subprocess.CompletedProcess[str]:
 
 
 def build(folder: Path, *options: str) -> None:
-    """Both libraries; the rows, minutes of optimisation on large robots, without any."""
+    """Both libraries; the rows, minutes of optimisation on large robots, without any, and the tick as asked for."""
     flags = f"CFLAGS={' '.join(STRICT)}"
-    done = run("make", "libwbc_tick.a", flags, "ROWS_FLAGS=-O0", *options, folder=folder)
+    done = run("make", "libwbc_tick.a", flags, "ROWS_FLAGS=-O0", "TICK_FLAGS=-O0", *options, folder=folder)
     assert done.returncode == 0, done.stderr
 
 
 @cache
 def exported(name: str, root: Path) -> Path:
-    """The folder of a case, built."""
+    """The folder of a case, built; that of the Panda as users build it."""
     folder = CASES[name]().export(root / name)
-    build(folder)
+    build(folder, *(["TICK_FLAGS=-O3"] if name == "panda" else []))
     return folder

@@ -26,8 +26,17 @@ def made(kind: str) -> wbc.Stack:
     return stack
 
 
-@pytest.mark.parametrize("kind", ["only rows", "only bounds", "only a posture", "linear", "curved"])
-@pytest.mark.parametrize("flags", ["-O0", "-O2"])
+@pytest.mark.parametrize(
+    ("kind", "flags"),
+    [
+        ("only rows", "-O2"),
+        ("only bounds", "-O2"),
+        ("only a posture", "-O2"),
+        ("linear", "-O2"),
+        ("curved", "-O2"),
+        ("curved", "-O0"),
+    ],
+)
 def test_parts_that_are_missing_leave_no_warning(kind: str, flags: str, tmp_path: Path) -> None:
     c = made(kind).compile(backend="vm")
     c.reset(small.Q)

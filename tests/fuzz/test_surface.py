@@ -18,7 +18,7 @@ from bench.soak.surface import MODULES, Callee, Hang, attempt, calls, impatient,
 
 
 def test_every_call_answers_or_refuses() -> None:
-    ((_, counts),) = calls(0, 0, 3)
+    ((_, counts),) = calls(0, 0, 2)
     assert {key: n for key, n in counts.items() if key.startswith("wrong")} == {}
     ends = Counter({end: sum(n for key, n in counts.items() if key.startswith(end)) for end in ("answered", "refused")})
     assert min(ends.values()) > 100, ends

@@ -76,6 +76,7 @@ LISTED |= {("wbc.controller.hooks", f"wbc.{package}") for package in ("explain",
 #: The package's own __init__ collects names from every floor
 ROOF = "wbc"
 PACKAGE_FILES = sources("wbc", "tasks", "robots")
+MODULES = frozenset(map(module_name, PACKAGE_FILES))
 
 
 def part_of(module: str) -> str:
@@ -151,8 +152,7 @@ def mentioned(path: Path) -> list[tuple[int, str]]:
             found += [(node.lineno, f"{node.module}.{alias.name}") for alias in node.names]
         elif isinstance(node, ast.Constant) and isinstance(node.value, str) and node.value.startswith("wbc."):
             found.append((node.lineno, node.value))
-    known = {module_name(file) for file in PACKAGE_FILES}
-    return [(line, target) for line, target in found if target in known]
+    return [(line, target) for line, target in found if target in MODULES]
 
 
 def package_circles(package: str, arrows: set[tuple[str, str]]) -> set[str]:

@@ -99,7 +99,7 @@ def test_distances_prove_themselves(first: str, second: str, back_end: str) -> N
     if back_end == "plain":
         return
     inside = 0
-    for case in range(60):
+    for case in range(25):
         rng = np.random.default_rng([KINDS.index(first), KINDS.index(second), case])
         size = float(rng.choice([0.01, 0.3, 3.0]))
         a, b = shape_of(first, rng, size), shape_of(second, rng, size)

@@ -33,7 +33,7 @@ def steps(bot: Robot, rng: np.random.Generator, ticks: int) -> np.ndarray:
 
 
 @pytest.mark.parametrize("name", NAMES)
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", [1, 2])
 def test_rows_are_those_of_measuring_everything(name: str, seed: int) -> None:
     """Tick by tick the rule applied to the distances of all pairs gives the same pairs in the same rows."""
     bot, rng, count = robot(name), np.random.default_rng([20, seed]), 6

@@ -60,7 +60,7 @@ def sensed() -> Stack:
 @pytest.mark.parametrize(
     ("builder", "backend", "solver", "ticks"),
     [
-        ("arm", "native", "daqp", 300),
+        ("arm", "native", "daqp", 120),
         ("arm", "native", "osqp", 40),
         ("arm", "native", "qpoases", 40),
         ("arm", "vm", "daqp", 60),

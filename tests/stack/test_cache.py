@@ -425,7 +425,7 @@ print(json.dumps([controller.cached, controller.backend, small.command(controlle
 
 @pytest.mark.parametrize("backend", ["vm", "native"])
 def test_parallel_builds_end_in_one_entry(backend: str, folder: Folder, tmp_path: Folder) -> None:
-    count = 3
+    count = 2
     workers = [
         subprocess.Popen(
             [sys.executable, "-c", WORKER, str(tmp_path), backend, str(k)],

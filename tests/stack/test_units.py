@@ -23,7 +23,7 @@ from wbc.shapes import Capsule, PlacedShape, Sphere
 from wbc.tasks import CenterOfMass, EndEffector, Expression, FrameVelocityLimit, JointLimits, Obstacle, Posture, Row
 
 DT = 0.005
-STATES = repeats(150)
+STATES = repeats(60)
 RADIUS, MARGIN, SPEED = 0.08, 0.02, 0.25
 
 
@@ -117,7 +117,7 @@ def test_units_change_no_answer(name: str, backend: str, scale: float) -> None:
             np.testing.assert_allclose(two.residuals[task].values, factor * residual.values, rtol=0, atol=1e-9 * scale)
         seen.update({b.item for b in one.binding})
     # the answers are those of limits at work, not of free motion alone
-    assert min(seen[item] for item in ("ball", "speed", "limits", "solved", "relaxed")) >= 5, seen
+    assert min(seen[item] for item in ("ball", "speed", "limits", "solved", "relaxed")) >= 3, seen
 
 
 def test_a_fixed_length_would_change_the_answer() -> None:
@@ -139,7 +139,7 @@ def test_a_fixed_length_would_change_the_answer() -> None:
 def test_relaxation_does_not_depend_on_units() -> None:
     """Contradicting rows in metres and in millimetres, some variables metres: the same compromise."""
     rng, given = np.random.default_rng(8), 0
-    for _ in range(60):
+    for _ in range(30):
         n, m = 6, 5
         size, unit = np.where(rng.random(n) < 0.5, 1000.0, 1.0), np.where(rng.random(m) < 0.5, 1000.0, 1.0)
         J, A = rng.normal(size=(n, n)), rng.normal(size=(m, n))
@@ -161,7 +161,7 @@ def test_relaxation_does_not_depend_on_units() -> None:
             kept = getattr(wanted, side)[:n] == getattr(one, side)[:n]
             assert (getattr(found, side)[:n] == getattr(two, side)[:n])[kept].all()
         given += wanted.flag == "relaxed"
-    assert given > 20
+    assert given > 10
 
 
 #: Unit of a row -> how many of it are a metre or a radian

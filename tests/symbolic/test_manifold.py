@@ -16,7 +16,7 @@ from wbc.symbolic import Kinematics
 
 #: Where the mixed model's planar joint stands in q; it has a test of its own.
 PLANAR = slice(7, 11)
-few = settings(max_examples=40)
+few = settings(max_examples=20)
 
 
 @cache

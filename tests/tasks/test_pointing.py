@@ -21,7 +21,7 @@ from wbc.errors import NotFiniteError, RangeError, ShapeError, UnknownNameError,
 from wbc.robot import Limits, Robot
 from wbc.tasks import AxisAlign, Distance, Item, LookAt, Momentum
 
-STATES = 4
+STATES = 2
 HAND = "panda_hand"
 
 

@@ -21,8 +21,8 @@ from tests.tasks.robots import NAMES, placement, random_configuration, robot, ve
 from wbc.robot import Robot
 from wbc.tasks import Damping, FrameVelocityLimit, Hold, Item, Mechanism, PitchPlane, Task, registry
 
-STATES = 3
-DIRECTIONS = 4
+STATES = 2
+DIRECTIONS = 2
 SHIPPED = sorted(name for name, cls in registry().items() if cls.__module__.startswith("wbc."))
 
 

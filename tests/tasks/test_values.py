@@ -17,7 +17,7 @@ from wbc.symbolic import Kinematics, Tracer
 from wbc.tasks import CenterOfMass, Elbow, EndEffector, Posture
 from wbc.tasks import inputs as run_time
 
-STATES = 5
+STATES = 2
 
 
 def states(name: str) -> tuple[Robot, list[np.ndarray], np.random.Generator]:

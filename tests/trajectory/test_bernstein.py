@@ -12,7 +12,7 @@ from wbc.trajectory.paths import bernstein
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(0, 15))
-@settings(max_examples=40)
+@settings(max_examples=20)
 def test_coefficients_make_the_polynomial_again(seed: int, degree: int) -> None:
     wanted = np.random.default_rng(seed).normal(size=degree + 1)
     values = np.polyval(powers(wanted), bernstein.nodes(degree))
@@ -21,7 +21,7 @@ def test_coefficients_make_the_polynomial_again(seed: int, degree: int) -> None:
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(0, 9), st.integers(1, 20))
-@settings(max_examples=60)
+@settings(max_examples=30)
 def test_largest(seed: int, degree: int, count: int) -> None:
     c = np.random.default_rng(seed).normal(size=(count, degree + 1))
     bound, number, place = bernstein.largest(c)

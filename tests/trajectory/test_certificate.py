@@ -34,7 +34,7 @@ def ratios(law: Law, count: int = 20001) -> dict[str, float]:
 
 
 @given(seeds, st.integers(1, 9))
-@settings(max_examples=40)
+@settings(max_examples=20)
 def test_polynomials_of_time_are_exact(seed: int, degree: int) -> None:
     """Within 1e-9 of the largest value, which is at an end or where the derivative has a root."""
     random = np.random.default_rng(seed)
@@ -58,7 +58,7 @@ def _highest(p: np.poly1d) -> float:
 
 
 @given(seeds, st.integers(0, 9), st.integers(1, 4))
-@settings(max_examples=40)
+@settings(max_examples=20)
 def test_paths_and_timings_of_any_degree(seed: int, path_degree: int, timing_degree: int) -> None:
     law = ragged(seed, path_degree, timing_degree)
     certificate, seen = law.certificate, ratios(law)
@@ -73,7 +73,7 @@ def test_paths_and_timings_of_any_degree(seed: int, path_degree: int, timing_deg
 
 
 @given(seeds)
-@settings(max_examples=20)
+@settings(max_examples=10)
 def test_smooth_laws_and_the_place_that_is_named(seed: int) -> None:
     law = smooth(seed)
     for name, ratio in ratios(law).items():
@@ -141,7 +141,7 @@ class Wave(Path):
 
 
 @given(st.floats(0.1, 20.0))
-@settings(max_examples=30)
+@settings(max_examples=15)
 def test_functions_are_sampled_with_a_bound(rate: float) -> None:
     law = Law(Wave(rate), Timing.identity(1.0), MotionLimits(velocity=[1.0], acceleration=[1.0]), moving=(True, True))
     for name, ratio in (("velocity", rate), ("acceleration", rate**2)):

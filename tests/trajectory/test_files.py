@@ -96,7 +96,7 @@ def test_every_kind_of_path_is_saved_by_a_test(tmp_path: FilePath) -> None:
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(0, 9), st.integers(1, 4))
-@settings(max_examples=20)
+@settings(max_examples=10)
 def test_random_laws(tmp_path_factory: pytest.TempPathFactory, seed: int, path_degree: int, timing_degree: int) -> None:
     law = ragged(seed, path_degree, timing_degree)
     file = tmp_path_factory.mktemp("laws") / "law.npz"

@@ -28,7 +28,7 @@ def least(way, v, a, j):
 
 def test_rest_to_rest_takes_the_closed_form():
     rng = np.random.default_rng(3)
-    for _ in range(1500):
+    for _ in range(400):
         way, v, a, j = np.exp(rng.normal(size=(4, 3)) * 2.0)
         way *= rng.choice([-1.0, 1.0], 3)
         law = jerk_limited(np.zeros(3), way, velocity=v, acceleration=a, jerk=j)
@@ -54,7 +54,7 @@ def test_tiny_moves_and_none_at_all(synchronisation):
 def test_jerk_of_ten_accelerations_in_slow_motion():
     """States of teleoperation: small speeds beside limits whose jerk is ten times the acceleration."""
     rng = np.random.default_rng(7)
-    for _ in range(300):
+    for _ in range(100):
         push = rng.uniform(0.1, 3.0, 6)
         state = rng.normal(size=(3, 6)) * np.array([1.0, 1e-7, 1e-7])[:, None]
         law = jerk_limited(
@@ -71,7 +71,7 @@ def test_jerk_of_ten_accelerations_in_slow_motion():
 
 def test_straight_lines_are_straight_whatever_the_limits_are():
     rng = np.random.default_rng(5)
-    for k in range(300):
+    for k in range(100):
         start, target = rng.normal(size=(2, 5))
         target[rng.integers(5)] = start[rng.integers(5)]
         v, a, j = np.exp(rng.normal(size=(3, 5)))
@@ -102,7 +102,7 @@ def test_straight_with_speeds_along_the_line():
 
 def test_phase_needs_the_same_time_as_time():
     rng = np.random.default_rng(6)
-    for _ in range(100):
+    for _ in range(40):
         start, target = rng.normal(size=(2, 4))
         sizes = dict(zip(("velocity", "acceleration", "jerk"), np.exp(rng.normal(size=(3, 4))), strict=True))
         laws = [jerk_limited(start, target, synchronisation=s, **sizes) for s in ("time", "phase", "none")]
@@ -115,7 +115,7 @@ def test_position_limits_are_kept_where_they_can_be():
     rng = np.random.default_rng(12)
     walls = {"lower": -1.0, "upper": 1.0}
     mended = refused = 0
-    for k in range(500):
+    for k in range(150):
         v, a, j = rng.uniform((0.1, 2.0, 20.0), (1.5, 8.0, 80.0))
         start = np.array([1.0 - least_way(v, a, j) + (2e-3 if k % 10 == 0 else -1e-6), -1.0])
         target, away = rng.uniform(-1.0, 1.0, 2), np.array([rng.uniform(-1.0, 1.0) * (k % 2), 0.0])
@@ -136,7 +136,7 @@ def test_position_limits_are_kept_where_they_can_be():
         end = law.at(law.duration)
         assert np.abs(end.position - target).max() < 1e-11
         assert np.abs(end.velocity - away).max() < 1e-9
-    assert refused > 50
+    assert refused > 15
     assert mended > 5, mended
 
 

@@ -9,7 +9,7 @@ from bench.time_laws.families import FAMILIES, drawn
 from tests.trajectory.families import judged
 
 #: Members of a family; `wbc bench time-laws --full` judges 10^6
-MANY = {"random": 1500, "near rest": 1500, "one joint far": 500, "speeds only": 500}
+MANY = {"random": 500, "near rest": 500, "one joint far": 500, "speeds only": 500}
 
 
 @pytest.mark.parametrize("name", FAMILIES)

@@ -28,7 +28,7 @@ def assert_states(state: State, position: Any, velocity: Any, acceleration: Any,
 
 
 @given(seeds)
-@settings(max_examples=30)
+@settings(max_examples=15)
 def test_velocity_and_acceleration_are_derivatives(seed: int) -> None:
     law = smooth(seed)
     times = inner_times(law, 50)
@@ -44,7 +44,7 @@ def test_velocity_and_acceleration_are_derivatives(seed: int) -> None:
 
 
 @given(seeds, factors)
-@settings(max_examples=30)
+@settings(max_examples=15)
 def test_scaling(seed: int, factor: float) -> None:
     law = smooth(seed)
     slow = law.scaled(factor)
@@ -57,7 +57,7 @@ def test_scaling(seed: int, factor: float) -> None:
 
 
 @given(seeds, st.integers(1, 5), st.integers(1, 3), factors)
-@settings(max_examples=30)
+@settings(max_examples=15)
 def test_certificates_scale(seed: int, path_degree: int, timing_degree: int, factor: float) -> None:
     """v / k, a / k^2, j / k^3; positions stay."""
     law = ragged(seed, path_degree, timing_degree)
@@ -69,7 +69,7 @@ def test_certificates_scale(seed: int, path_degree: int, timing_degree: int, fac
 
 
 @given(seeds)
-@settings(max_examples=30)
+@settings(max_examples=15)
 def test_reversal(seed: int) -> None:
     law = smooth(seed)
     back = law.reversed()
@@ -84,7 +84,7 @@ def test_reversal(seed: int) -> None:
 
 
 @given(seeds, st.floats(0.0, 0.9), st.floats(0.05, 1.0))
-@settings(max_examples=30)
+@settings(max_examples=15)
 def test_slicing(seed: int, first: float, share: float) -> None:
     law = smooth(seed)
     start = first * law.duration
@@ -104,7 +104,7 @@ def test_slicing(seed: int, first: float, share: float) -> None:
 
 
 @given(seeds, st.floats(0.05, 0.95))
-@settings(max_examples=30)
+@settings(max_examples=15)
 def test_parts_joined_are_the_whole(seed: int, share: float) -> None:
     """Also a start in motion: velocities match where they meet."""
     law = smooth(seed)
@@ -122,7 +122,7 @@ def test_parts_joined_are_the_whole(seed: int, share: float) -> None:
 
 
 @given(seeds, st.integers(2, 6))
-@settings(max_examples=15)
+@settings(max_examples=7)
 def test_there_and_back_many_times(seed: int, count: int) -> None:
     law = smooth(seed)
     rest = Law(law.path, _eased(law), law.limits)
@@ -144,7 +144,7 @@ def _eased(law: Law) -> Timing:
 
 
 @given(seeds)
-@settings(max_examples=20)
+@settings(max_examples=10)
 def test_the_algebra_goes_together(seed: int) -> None:
     """Scaling and slicing commute, and reversal turns joined laws round."""
     law = smooth(seed)
@@ -161,7 +161,7 @@ def test_the_algebra_goes_together(seed: int) -> None:
 
 
 @given(seeds)
-@settings(max_examples=20)
+@settings(max_examples=10)
 def test_a_law_stands_before_and_after(seed: int) -> None:
     law = smooth(seed)
     state = law.at([-1e-9, -5.0, law.duration + 1e-9, law.duration + 1e6])

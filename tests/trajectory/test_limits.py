@@ -58,7 +58,7 @@ def test_limits_keep_their_own_numbers() -> None:
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(0, 9), st.integers(1, 4), st.integers(1, 3))
-@settings(max_examples=30)
+@settings(max_examples=15)
 def test_polynomial_paths(seed: int, degree: int, pieces: int, dof: int) -> None:
     random = np.random.default_rng(seed)
     knots = np.cumsum(random.uniform(0.1, 1.0, pieces + 1)) - 3.0
@@ -77,7 +77,7 @@ def test_polynomial_paths(seed: int, degree: int, pieces: int, dof: int) -> None
 
 
 @given(st.integers(0, 2**32 - 1))
-@settings(max_examples=30)
+@settings(max_examples=15)
 def test_joined_paths_are_their_parts(seed: int) -> None:
     """However they are nested: knots are on the side that they belong to, and the gaps between are of nobody."""
     random = np.random.default_rng(seed)

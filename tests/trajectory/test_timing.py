@@ -22,7 +22,7 @@ def random_timing(seed: int, degree: int) -> Timing:
 
 
 @given(seeds, st.integers(1, 6))
-@settings(max_examples=30)
+@settings(max_examples=15)
 def test_derivatives_are_those_of_the_polynomials(seed: int, degree: int) -> None:
     timing = random_timing(seed, degree)
     times = np.linspace(0.0, timing.duration, 101)
@@ -35,7 +35,7 @@ def test_derivatives_are_those_of_the_polynomials(seed: int, degree: int) -> Non
 
 
 @given(seeds, st.integers(1, 6), st.floats(0.01, 100.0))
-@settings(max_examples=30)
+@settings(max_examples=15)
 def test_the_algebra(seed: int, degree: int, factor: float) -> None:
     timing = random_timing(seed, degree)
     times = np.linspace(0.0, timing.duration, 57)
@@ -52,7 +52,7 @@ def test_the_algebra(seed: int, degree: int, factor: float) -> None:
 
 
 @given(seeds, st.integers(1, 5))
-@settings(max_examples=40)
+@settings(max_examples=20)
 def test_crossings_are_all_found(seed: int, degree: int) -> None:
     """Between two neighbours of a dense grid on both sides of a place, there is one."""
     timing = random_timing(seed, degree)
@@ -88,7 +88,7 @@ def test_what_only_touches_a_place_does_not_cross_it() -> None:
 
 
 @given(seeds, st.integers(1, 6))
-@settings(max_examples=30)
+@settings(max_examples=15)
 def test_ranges(seed: int, degree: int) -> None:
     timing = random_timing(seed, degree)
 

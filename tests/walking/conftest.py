@@ -10,16 +10,16 @@ from wbc.walking import Structure, cylinder
 from wbc.walking.loop.stack import WalkStack
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def machine() -> Walker:
     return wbc.robots.walker()
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def structure() -> Structure:
     return cylinder(rigid=True)
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def stack(machine: Walker, structure: Structure) -> WalkStack:
     return WalkStack(machine, structure, collisions=False)
