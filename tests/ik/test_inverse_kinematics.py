@@ -165,10 +165,6 @@ def test_constraints_that_no_configuration_keeps(backend: str) -> None:
     robot = arm("panda")
     declared = stack(kind="position").add(Hold("panda_link7", kind="position"), name="hold")
     held = declared.inverse_kinematics(backend=backend)
-        stack(kind="position")
-        .add(Hold("panda_link7", kind="position"), name="hold")
-        .inverse_kinematics(backend=backend)
-    )
     held["hold"].target = pin.SE3(np.eye(3), np.array([3.0, 0.0, 0.0]))
     solution = held.solve(robot.neutral, budget=None, restarts=3)
     assert solution.status == "contradictory"
