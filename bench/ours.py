@@ -136,7 +136,7 @@ class Ours(Contender):
             spent = {name: max(0.0, value - crossing) for name, value in spent.items()}
         if self.problem.sensed:
             start = perf_counter_ns()
-            self.controller._sense(tick.q)
+            core_of(self.controller).sense(tick.q)
             spent = {"sense": float(perf_counter_ns() - start)} | spent
         spent["python"] = whole - sum(spent.values())
         self.settle()
