@@ -53,14 +53,14 @@ def drive(
     if given is None:
         err().print(f"from --at={','.join(f'{x:.4f}' for x in q)}", soft_wrap=True, markup=False)
     _warn(session, q)
-    found, tell = SessionLog(), _Teller()
+    found, progress = SessionLog(), _Teller()
     try:
         if source is not None:
-            run_session(session, source, q, realtime=realtime, tell=tell, log=found)
+            run_session(session, source, q, realtime=realtime, progress=progress, log=found)
         else:
             err().print(HELP, soft_wrap=True)
             with Keyboard().terminal() as keyboard:
-                run_session(session, keyboard, q, realtime=True, tell=tell, log=found)
+                run_session(session, keyboard, q, realtime=True, progress=progress, log=found)
     finally:
         _report(found, session, log)
     if found.interrupted:

@@ -46,7 +46,7 @@ class Moving:
 
 
 @dataclass(frozen=True)
-class Swing:
+class ElbowSwing:
     """A commanded angle of the elbow plane:
 
         psi(t) = psi_0 + amplitude w(t) sin(2 pi cycles t / T),    w the quintic step, up and down in T / 8,
@@ -97,7 +97,7 @@ class Plan:
     obstacles: dict[str, Moving] = field(default_factory=dict)
     margin: float = 0.02
     approach: float = 10.0
-    plane: Swing | None = None
+    plane: ElbowSwing | None = None
     holds: tuple[str, ...] = ()
     gain: float = 10.0
     solver: str = "daqp"
@@ -110,7 +110,7 @@ class Plan:
         for name, one in validation.mapping("obstacles", self.obstacles, "names to Movings").items():
             validation.instance(f"obstacles[{name}]", one, Moving, "a Moving")
         if self.plane is not None:
-            validation.instance("plane", self.plane, Swing, "a Swing")
+            validation.instance("plane", self.plane, ElbowSwing, "a ElbowSwing")
         for frame in validation.items("holds", self.holds, "frames"):
             self.robot.check_frame("holds", frame)
         object.__setattr__(self, "label", validation.name("label", self.label))

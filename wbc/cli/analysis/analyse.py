@@ -177,7 +177,7 @@ def _one_set(
     if how is not None:
         proof = certified(model, robot, name, task, rows, how, _PROOF * budget.seconds / 60.0)
     early = functools.partial(_known, name)
-    found = analyse(model, task, rows, algorithm=algorithm, budget=budget, certificate=proof, told=early)
+    found = analyse(model, task, rows, algorithm=algorithm, budget=budget, certificate=proof, progress=early)
     _show(name, found, latex, budget)
     entry = _record(name, found)
     if proof is not None:

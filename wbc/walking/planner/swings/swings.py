@@ -21,9 +21,8 @@ from wbc.walking.planner.swings.clearance import SwingClearance
 from wbc.walking.planner.swings.compiled_choice import CompiledChoice, Name
 from wbc.walking.planner.swings.curve import ALTERNATIVES, Curves, Pivots, curves
 from wbc.walking.planner.swings.move import Chosen, Move, Swing
-from wbc.walking.planner.swings.tracks import Asked, Tracks, points_along, tracks
-from wbc.walking.planner.swings.waiting import Asked as WaitingAsked
-from wbc.walking.planner.swings.waiting import Waiting, waiting
+from wbc.walking.planner.swings.tracks import TrackRequests, Tracks, points_along, tracks
+from wbc.walking.planner.swings.waiting import Waiting, WaitRequests, waiting
 
 #: Points of a curve: enough for the search, and for carrying it out
 COARSE, FINE = 25, 97
@@ -208,7 +207,7 @@ class Swings:
         begin, least = lift + self.latch / self.path.spacing, (soonest - lift) * self.path.spacing - self.extra
         if which < len(ALTERNATIVES):
             curve = self.curve(arms, source, target, lift, which)
-            asked = Asked(arms, source, target, begin, last, least)
+            asked = TrackRequests(arms, source, target, begin, last, least)
             found = tracks(self.walker, self.shapes, self.path, self.grips, curve, asked, COARSE)
         else:
             whole = begin, begin + least / self.path.spacing
@@ -223,7 +222,7 @@ class Swings:
 
     def waiting(self, ends: tuple[Ints, Ints, Ints], times: tuple[Array, Array], which: int, n: int) -> Waiting:
         """Swings of arms from grips to grips, between samples, that wait in the air."""
-        asked = WaitingAsked(*ends, *times)
+        asked = WaitRequests(*ends, *times)
         return waiting(self.walker, self.structure, self.path, self.grips, asked, which - len(ALTERNATIVES), n)
 
     def _check(self, swings: Sequence[Swing], which: int) -> None:

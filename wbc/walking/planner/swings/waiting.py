@@ -32,7 +32,7 @@ PASSES, GUESS = 4, 1.0
 
 
 @dataclass(frozen=True, eq=False)
-class Asked:
+class WaitRequests:
     """Swings of arms between grips, ``[m]`` each, that may move from sample ``begin`` of the body to sample ``end``."""
 
     arms: Ints
@@ -82,7 +82,7 @@ class Waiting:
 
 
 def waiting(
-    walker: Walker, structure: Structure, path: BodyPath, grips: Grips, asked: Asked, place: int, n: int
+    walker: Walker, structure: Structure, path: BodyPath, grips: Grips, asked: WaitRequests, place: int, n: int
 ) -> Waiting:
     """Swings that wait at one of :attr:`wbc.robots.BodyLimb.waiting`, at n points of each of their three parts."""
     limb = limb_of(walker)
@@ -99,7 +99,14 @@ def waiting(
 
 
 def _half(
-    walker: Walker, structure: Structure, path: BodyPath, grips: Grips, asked: Asked, place: int, n: int, leaves: bool
+    walker: Walker,
+    structure: Structure,
+    path: BodyPath,
+    grips: Grips,
+    asked: WaitRequests,
+    place: int,
+    n: int,
+    leaves: bool,
 ) -> Half:
     """From the holds, or onto them."""
     arms, limb = asked.arms, limb_of(walker)
@@ -132,7 +139,7 @@ def _place(limb: BodyLimb, place: int) -> Array:
     return np.array([radius * cos(angle), radius * sin(angle), height])
 
 
-def _frames(walker: Walker, path: BodyPath, asked: Asked, samples: Array) -> Array:
+def _frames(walker: Walker, path: BodyPath, asked: WaitRequests, samples: Array) -> Array:
     """Of the arms' bases at samples of the path ``[m]`` or ``[m, n]``: ``[..., 4, 4]``."""
     bases = np.array([arm.base.homogeneous for arm in walker.arms])[asked.arms]
     out: Array = path.blended(samples) @ (bases if samples.ndim == 1 else bases[:, None])
