@@ -100,8 +100,8 @@ def analyse(
     ``locus.open``.
 
     Args:
-        certificate: of this set, if there is one already. progress: called with the verdict where it is known before the
-            locus is.
+        certificate: of this set, if there is one already.
+        progress: called with the verdict where it is known before the locus is.
 
     Source: E. Dupuis, PhD thesis, McGill University, 2001, section 3.1.
 

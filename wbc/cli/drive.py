@@ -19,7 +19,7 @@ from wbc.teleop import Keyboard, RateFile, Seen, SessionLog, Teleoperation, run_
 from wbc.teleop.keyboard import HELP
 from wbc.teleop.session import NOTHING
 
-#: Parts of a command between which losses are told apart, and the exit code after Ctrl-C
+#: Parts of a command between which losses are distinguished, and the exit code after Ctrl-C
 STEPS, INTERRUPTED = (NOTHING, 0.01, 0.1, 0.5), 130
 #: While only the loss changes, a line after so long [s]
 PAUSE = 0.5

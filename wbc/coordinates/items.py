@@ -1,4 +1,4 @@
-"""Coordinates as items of a stack: followed in the least-squares sense, or kept exactly."""
+"""Coordinates as items of a stack: followed in the least-squares sense, or held exactly."""
 
 from __future__ import annotations
 
@@ -103,8 +103,8 @@ class KeepRows(Constraint):
     """Coordinates have a prescribed rate, exactly: A(q) v = speed - gain e                       [m/s, rad/s]
 
     e is the drift from ``reference`` where the coordinates have one (see :mod:`wbc.coordinates.expressions`), so that
-    what is held does not wander, and ``drift`` in rows that are rates only. gain e counts up to ``fastest_return``: what is far
-    off, after a push or beside a locus, comes back at that speed.
+    what is held does not wander, and ``drift`` in rows that are rates only. gain e counts up to
+    ``fastest_return``: what is far off, after a push or beside a locus, comes back at that speed.
 
     Inputs:
         speed: one number a row, 0 by default. gain: how fast drift decays [1/s], at most 1/dt.
@@ -112,7 +112,8 @@ class KeepRows(Constraint):
         drift: e of rows that are rates only, one number a row (``RateIntegrals``).
 
     Attributes:
-        coordinate: what is held. gain: first value of the input. fastest_return: largest rate at which drift is taken back [m/s, rad/s].
+        coordinate: what is held. gain: first value of the input.
+        fastest_return: largest rate at which drift is taken back [m/s, rad/s].
     """
 
     #: Made by pairs, so it is not in the table of items

@@ -248,10 +248,10 @@ def _show(name: str, found: Analysis, latex: bool, budget: Budget) -> None:
 def _determinant(found: Analysis, latex: bool, seconds: float) -> str:
     """The determinant in factors, if it takes no longer than this."""
     with Child(
-        lambda tell: tell(factored_determinant(found.exact, found.augmented).text(latex=latex)), seconds
+        lambda report: report(factored_determinant(found.exact, found.augmented).text(latex=latex)), seconds
     ) as work:
         work.wait(seconds)
-        return str(work.told[0]) if work.told else "not expanded within the minutes"
+        return str(work.reports[0]) if work.reports else "not expanded within the minutes"
 
 
 def _record(name: str, found: Analysis) -> dict[str, Any]:
