@@ -6,7 +6,7 @@
 
 enum { BRANCHES = 2, LIMITS = 8, FREE = 5 };
 
-/* What is kept of reach [m] and angles [rad], largest steps of joints 1 to 5 [rad], least cosine between approach and
+/* Margins of reach [m] and angles [rad], largest steps of joints 1 to 5 [rad], least cosine between approach and
    body, samples of a grip at least, reach that hands lean for [m], the part of a tilt that they use, and the least
    [rad]; rounding of reach, and |sin theta5| of aligned axes. */
 typedef struct {

@@ -63,7 +63,8 @@ static int joint_path(const Arm *arm, const Rules *rules, const double *base, co
         q[2] = -bend - tilt;
         for (int k = 0; k < guided; ++k)
             q[3 + k] = w[k];
-        possible &= square > rules->axis_margin * rules->axis_margin && arm->upper + reach - distance > rules->reach_margin;
+        possible &= square > rules->axis_margin * rules->axis_margin;
+        possible &= arm->upper + reach - distance > rules->reach_margin;
         possible &= q[1] + q[2] / 2.0 - arm->shoulder > rules->angle_margin && arm->elbow - q[2] > rules->elbow_margin;
     }
     unwrap(angles, n);

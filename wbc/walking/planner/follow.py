@@ -1,4 +1,4 @@
-"""A plan of a file made again: the same hands go to the same holds at the same places of the path."""
+"""A plan of a file made again: the same hands go to the same holds at the same points of the path."""
 
 from __future__ import annotations
 

@@ -74,7 +74,7 @@ class Outcome:
 
 
 class CellSearch:
-    """A search over the cells about one path; what was computed is kept."""
+    """A search over the cells about one path; results are cached."""
 
     def __init__(self, walker: Walker, structure: Structure, cells: Cells, grips: CellGrips) -> None:
         self.cells, self.grips, self._structure = cells, grips, structure

@@ -117,7 +117,7 @@ def stations(path: BodyPath, step: float) -> Array:
     moved = np.linalg.norm(np.diff(poses[:, :3, 3], axis=0), axis=1)
     cosine = (np.einsum("nij,nij->n", poses[1:, :3, :3], poses[:-1, :3, :3]) - 1.0) / 2.0
     far = np.maximum(moved / step, np.arccos(np.clip(cosine, -1.0, 1.0)) / TURN)
-    # Samples that stand still take no place of their own
+    # Samples that stand still add (nearly) no length
     total = np.concatenate([[0.0], np.cumsum(far + 1e-9)])
     count = max(round(total[-1]), 1)
     return np.asarray(np.interp(np.linspace(0.0, total[-1], count + 1), total, np.arange(len(poses)) * path.spacing))

@@ -90,7 +90,7 @@ def find_routes(
     start: Mapping[int, int] | None = None,
     deadline: float | None = None,
 ) -> Iterator[BodyRoute]:
-    """Detours, those near the path first; the next one is looked for when asked for.
+    """Detours, those near the path first; the next one is looked for on demand.
 
     Args:
         start, deadline: of :func:`find_route`.

@@ -56,7 +56,7 @@ class StanceSearch(Generic[S]):
         hover: how long a hand may be in the air longer than it needs, until its next grip begins [s].
         patient: hands may wait in the air for any time, also for others to let them land.
         longest_delay: of one swing [s]; 0: the body never slows down.
-        width: stances kept of each number of re-grasps, None: all.
+        width: stances stored for each number of re-grasps, None: all.
         first: row of an arm and of a hold: the first move, whether it is needed or not; None: any.
         spare: samples before the end of a grip until which other hands land.
     """
@@ -79,7 +79,7 @@ class StanceSearch(Generic[S]):
         self._usual = round(USUAL / path.spacing)
         codes = grips.hold * (1 + grips.branch.max(initial=0)) + grips.branch
         self._outlook = Outlook(grips.last, codes, len(path) - 1, self._usual, SLACK / path.spacing, path.spacing)
-        # Levels of the last search, and swings (arm, source, target, lift) that each but the first asked for
+        # Levels of the last search, and swings (arm, source, target, lift) that each but the first needed
         self._levels, self._asked = list[dict[Key, Node]](), list[set[SwingKey]]()
         self.patient, self._longest_wait = patient, np.inf if patient else hover
         self.longest_delay, self.width, self.first = longest_delay, width, first
@@ -120,7 +120,7 @@ class StanceSearch(Generic[S]):
         return self._result(levels, None, False)
 
     def correct(self, move: Move, duration: float, possible: bool) -> None:
-        """A move takes another time [s], or is not possible; what was searched without looking at it is kept."""
+        """A move takes another time [s], or is not possible; what was searched without it stays."""
         self.swings.correct(move, duration, possible)
         for depth, asked in enumerate(self._asked):
             if (move.arm, move.source, move.target, move.lift) in asked:

@@ -54,7 +54,7 @@ class _Track:
 
 
 class Swings:
-    """Swings of a body's arms between grips over one path; what was computed is kept.
+    """Swings of a body's arms between grips over one path; results are cached.
 
     It is a :class:`wbc.walking.planner.stances.search.SwingTable`.
     """
@@ -134,7 +134,7 @@ class Swings:
             rest = []
             for swing in left:
                 track = self._tracks[_name(swing), which]
-                # A time that was corrected for other ends tells nothing where there is no curve for these
+                # A time that was corrected for other ends says nothing where there is no curve for these
                 known = None if track is None else self._known.get((*_name(swing)[:4], which), track.duration)
                 if known is not None and all(self._apart[_name(swing), which, g] for g in swing.others):
                     self._chosen[swing] = Chosen(which, known)

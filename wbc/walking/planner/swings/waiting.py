@@ -1,4 +1,4 @@
-"""Swings in which the hand waits: off its hold to a place that goes with the body, and from there onto the next hold.
+"""Swings in which the hand waits: off its hold to a point that moves with the body, and from there onto the next hold.
 
 A hand whose next hold comes into reach long after it had to leave the last one cannot swing all the time: the
 body would carry the arm past it. It is drawn in at once, rides with the body, and goes on as late as it can.
@@ -62,7 +62,7 @@ class Waiting:
 
     Attributes:
         away, onto: off the holds, and onto the next ones.
-        samples: of the bodies while the hands ride ``[m, n]``. places: where the hands are then ``[m, n, 3]`` [m].
+        samples: of the bodies while the hands ride ``[m, n]``. places: positions of the hands then ``[m, n, 3]`` [m].
         angles: of the joints in all three parts ``[m, 3 n, joints]`` [rad].
         possible: within reach and limits, and in time ``[m]``.
     """
