@@ -80,7 +80,7 @@ def straight_moves(rng: np.random.Generator, count: int) -> Iterator[Record]:
             "raw": _bend(np.array(phase), start, target),
             "ours": _bend(ours, start, target),
             "longer": law.duration / theirs.duration - 1.0,
-            "kept": law.certificate.kept,
+            "kept": law.certificate.satisfied,
         }
 
 

@@ -210,7 +210,7 @@ def test_work_in_a_process_ends_at_its_time() -> None:
     with Child(endless, 0.3) as child:
         assert child.wait(5.0)
     assert time.monotonic() - began < 3.0
-    assert (child.told, child.done) == (["begun"], False)
+    assert (child.reports, child.done) == (["begun"], False)
 
     def wrong(tell: object) -> None:
         raise RangeError("symbols", 1, "wrong")

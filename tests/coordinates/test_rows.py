@@ -183,7 +183,7 @@ def test_three_points_stand_for_a_pose() -> None:
         (lambda: KeepRows(PitchPlaneRows("F3", "F3")).validate(ROBOT), RangeError),
         (lambda: KeepRows(PlaneAngleRows("F3", "F4", "F9")).validate(ROBOT), UnknownNameError),
         (lambda: KeepRows(JointRows("joint1"), gain=-1.0), RangeError),
-        (lambda: KeepRows(JointRows("joint1"), pull=0.0), RangeError),
+        (lambda: KeepRows(JointRows("joint1"), fastest_return=0.0), RangeError),
         (lambda: AxisRows("F3", (0.0, 0.0, 0.0)), RangeError),
         (lambda: PointRows("tip", "plane"), ShapeError),
         (lambda: OnSphere((0, 0, 0), 0.0), RangeError),

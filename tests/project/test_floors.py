@@ -17,6 +17,7 @@ FLOORS = {
     "wbc.interrupts": 0,
     "wbc.lazy": 0,
     "wbc.pickling": 0,
+    "wbc.renamed": 0,
     "wbc.validation": 0,
     "wbc.shapes": 0,
     "wbc.style": 0,

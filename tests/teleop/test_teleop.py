@@ -65,7 +65,7 @@ def test_a_file_drives_and_changes_pairs(session: Teleoperation, tmp_path: Path)
     lines = ["time,pair,r1,r2,r3,r4,r5,r6", "0,tip | alpha,0.05", "", "1,alpha | tip", "2.0,,0.05", "5"]
     file.write_text("\n".join(lines))
     source, told = RateFile(file), []
-    log = run_session(session, source, Q, tell=lambda time, seen: told.append((time, seen.active)))
+    log = run_session(session, source, Q, progress=lambda time, seen: told.append((time, seen.active)))
     assert source.seconds == 5.0
     assert len(log.time) == len(told) == 250
     assert (log.active[49], log.active[51]) == ("tip | alpha", "alpha | tip")

@@ -17,7 +17,7 @@ from wbc.errors import MissingShapeError, UnknownNameError, WbcError
 from wbc.shapes import PlacedShape
 from wbc.track.clearance import clearances, self_clearances
 from wbc.track.log import LogFileError
-from wbc.track.setup import Moving, Swing
+from wbc.track.setup import ElbowSwing, Moving
 from wbc.track.summary import save_summary, summarise
 
 
@@ -148,7 +148,7 @@ def _rotation(row: np.ndarray) -> np.ndarray:
 
 
 def test_swing_rate_is_its_derivative() -> None:
-    swing, h = Swing(0.7, 3.0), 1e-6
+    swing, h = ElbowSwing(0.7, 3.0), 1e-6
     assert swing.at(0.0, 8.0) == (0.0, 0.0)
     assert swing.at(8.0, 8.0)[0] == pytest.approx(0.0, abs=1e-12)
     for t in np.linspace(0.1, 7.9, 23):
@@ -172,6 +172,6 @@ def test_stopping_leaves_the_ticks_that_were_done() -> None:
 def test_a_robot_without_an_elbow_plane_is_told() -> None:
     robot = wbc.robots.load("double_pendulum")
     path = track.preset("circle", pin.SE3.Identity(), 1.0).path
-    plan = track.Plan(robot, robot.frame_names[-1], path, "circle", robot.neutral, plane=Swing())
+    plan = track.Plan(robot, robot.frame_names[-1], path, "circle", robot.neutral, plane=ElbowSwing())
     with pytest.raises(WbcError, match="knows no shoulder, elbow and wrist"):
         plan.stack()

@@ -87,7 +87,7 @@ def test_smooth_laws_and_the_place_that_is_named(seed: int) -> None:
             near = np.abs(getattr(state, name)[:, worst.joint]) / getattr(law.limits, name)[worst.joint]
             assert near.max() == pytest.approx(worst.ratio, rel=1e-5)
     assert law.certificate.ratio == max(w.ratio for w in law.certificate.worst.values())
-    assert law.certificate.kept == (law.certificate.ratio <= 1.0 + 1e-6)
+    assert law.certificate.satisfied == (law.certificate.ratio <= 1.0 + 1e-6)
 
 
 def pose_laws() -> list[Law]:
@@ -192,7 +192,7 @@ def test_no_limits_no_quantities() -> None:
     law = Law(smooth(0).path, smooth(0).timing)
     assert set(law.certificate.worst) == {"jerk"}
     assert law.certificate.ratio == 0.0
-    assert law.certificate.kept
+    assert law.certificate.satisfied
     assert str(LawCertificate({})) == "no limits"
 
 
@@ -211,7 +211,7 @@ def test_accelerations_that_jump() -> None:
     law = Law(path, bang, MotionLimits(acceleration=[1.0], jerk=[1.0]))
     worst = law.certificate.worst["jerk"]
     assert (worst.ratio, worst.kind, worst.time) == (np.inf, "unbounded", 1.0)
-    assert not law.certificate.kept
+    assert not law.certificate.satisfied
     assert "jerk: unbounded" in str(law.certificate)
     half = law.sliced(0.0, 0.5)
     assert half.certificate.worst["jerk"].time == 0.0
@@ -220,7 +220,7 @@ def test_accelerations_that_jump() -> None:
     assert inner.certificate.worst["jerk"].ratio == pytest.approx(0.0, abs=1e-12)
     without = Law(path, bang, MotionLimits(acceleration=[1.0]))
     assert without.certificate.worst["jerk"].kind == "unbounded"
-    assert without.certificate.kept
+    assert without.certificate.satisfied
 
 
 def test_the_certificate_in_words() -> None:

@@ -92,6 +92,6 @@ def test_duration_is_for_motion_from_rest_to_rest():
     with pytest.raises(RangeError) as caught:
         time_optimal([[0.0], [1.0]], 1.0, 1.0, start_speed=0.1, duration=5.0)
     assert caught.value.field == "duration"
-    with pytest.raises(InfeasibleError, match="shortest that keeps the limits is 2") as late:
+    with pytest.raises(InfeasibleError, match="shortest that satisfies the limits is 2") as late:
         time_optimal([[0.0], [1.0]], 1.0, 1.0, duration=1.9)
     assert late.value.field == "duration"

@@ -65,7 +65,7 @@ def test_paths_that_touch_position_limits_are_welcome():
     limits = MotionLimits([-1.0, -1.0], [1.0, 0.9], np.ones(2), np.ones(2))
     law = time_optimal([[0.0, 0.0], [0.0, 0.9], [0.0, 0.0]], limits=limits)
     assert law.certificate.worst["position"].ratio == pytest.approx(1.0, abs=1e-9)
-    assert law.certificate.kept
+    assert law.certificate.satisfied
 
 
 def test_arguments_go_before_limits():

@@ -77,7 +77,7 @@ def test_arms_that_cannot_be_held_are_refused_with_joint_and_torque():
     with pytest.raises(InfeasibleError, match="standing still"):
         time_optimal(path[[0, 0]], 2.0, 10.0, torque=limit, robot=robot)
     limit[1] = 1.5 * resting
-    assert time_optimal(path[[0, 0]], 2.0, 10.0, torque=limit, robot=robot).certificate.kept
+    assert time_optimal(path[[0, 0]], 2.0, 10.0, torque=limit, robot=robot).certificate.satisfied
 
 
 def test_a_pendulum_against_gravity_has_the_closed_form():
@@ -92,7 +92,7 @@ def test_a_pendulum_against_gravity_has_the_closed_form():
     up, down = (30.0 - weight) / 2.0, (30.0 + weight) / 2.0
     law = time_optimal([[0.0], [1.0]], 100.0, torque=30.0, robot=lift)
     assert law.duration == pytest.approx(np.sqrt(2.0 * (1.0 / up + 1.0 / down)), rel=2e-3)
-    assert law.certificate.kept
+    assert law.certificate.satisfied
 
 
 def frame_speeds(robot, state):
@@ -122,7 +122,7 @@ def test_forces_between_speeds_at_the_ends():
     arguments = {"torque": 0.6 * robot.limits.effort, "robot": robot, "cartesian_speed": {TIP: 1.5}}
     path = spline_path(waypoints(6))
     law = time_optimal(path, 2.0, 20.0, start_speed=0.3, end_speed=0.2, **arguments)
-    assert law.certificate.kept
+    assert law.certificate.satisfied
     tangents = path.evaluate(path.knots[[0, -1]], 1)
     reached = law.at([0.0, law.duration]).velocity
     np.testing.assert_allclose(reached, tangents * np.array([[0.3], [0.2]]), atol=1e-9)
@@ -136,7 +136,7 @@ def test_a_cup_on_a_tray_does_not_slip():
     cone = np.array([[-0.3, 1.0], [-0.3, -1.0]])
     law = time_optimal([[0.0], [2.0]], 10.0, 50.0, inequality={"cup": (contact, cone, [0.0, 0.0])})
     assert law.certificate.worst["cup"].kind == "sampled"
-    assert law.certificate.kept
+    assert law.certificate.satisfied
     assert law.duration == pytest.approx(2.0 * np.sqrt(2.0 / (0.3 * 9.81)), rel=1e-3)
     assert np.abs(law.at(np.linspace(0.0, law.duration, 999)).acceleration).max() <= 0.3 * 9.81 * KEPT
     bounded = time_optimal([[0.0], [2.0]], 10.0, inequality=(lambda q, v, a: a, [[1.0], [-1.0]], [2.0, 4.0]))

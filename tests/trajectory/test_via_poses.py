@@ -25,7 +25,7 @@ def test_turns_keep_an_angular_speed(angle: float) -> None:
     law = law_of([place(0.0), place(0.01, turn=angle)], angular_speed=1.0)
     time = angle / 1.0 + 1.0 / 4.0 if angle > 0.25 else 2.0 * np.sqrt(angle / 4.0)
     assert law.duration == pytest.approx(time, rel=1e-9)
-    assert law.certificate.kept
+    assert law.certificate.satisfied
     assert law.at(law.duration / 2.0).velocity[5] == pytest.approx(min(1.0, np.sqrt(4.0 * angle)), rel=1e-9)
     assert law.at(law.duration).position == pytest.approx(place(0.01, turn=angle), abs=1e-12)
 
@@ -65,7 +65,7 @@ def test_straight_back_is_turned_before_the_pose() -> None:
     law = law_of([place(0.0), place(0.5), place(0.0)])
     x = law.at(np.linspace(0.0, law.duration, 20001)).position[:, 0, 3]
     assert x.max() == pytest.approx(0.48, abs=1e-6)
-    assert law.certificate.kept
+    assert law.certificate.satisfied
 
 
 @pytest.mark.parametrize("count", [2, 5])
@@ -89,7 +89,7 @@ def test_moves_of_every_size(size: float) -> None:
         small[:3, :3] = pin.exp3(size * k * np.array([0.0, 0.6, 0.8]))
         poses.append(small)
     law = law_of(poses, deviation=0.02 * size)
-    assert law.certificate.kept
+    assert law.certificate.satisfied
     assert np.abs(law.at(law.duration).position - poses[-1]).max() < 1e-9 * size + 2e-16
     # Times go with the root of the size, where no speed is reached
     large = law_of([place(*(1e-3 * p[:3, 3])) for p in unit], deviation=0.02e-3)
@@ -103,7 +103,7 @@ def test_laws_of_poses_can_be_joined_reversed_and_scaled() -> None:
     back = there.reversed().scaled(2.0)
     both = there.then(back)
     assert both.duration == pytest.approx(3.0 * there.duration, rel=1e-12)
-    assert both.certificate.kept
+    assert both.certificate.satisfied
     assert both.at(both.duration).position == pytest.approx(place(0.0), abs=1e-12)
     time = 0.4 * there.duration
     assert both.at(both.duration - 2.0 * time).position == pytest.approx(there.at(time).position, abs=1e-12)

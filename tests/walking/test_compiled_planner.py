@@ -22,7 +22,7 @@ from wbc.walking.planner.swings.curve import ALTERNATIVES
 from wbc.walking.planner.swings.least_time import speeds
 from wbc.walking.planner.swings.move import Chosen, Move, Swing
 from wbc.walking.planner.swings.swings import Swings
-from wbc.walking.planner.swings.tracks import Asked, Tracks, tracks
+from wbc.walking.planner.swings.tracks import TrackRequests, Tracks, tracks
 
 Both = Callable[[Callable[[], Any]], tuple[Any, Any]]
 COUNT, N = 120, 25
@@ -52,7 +52,7 @@ def both(monkeypatch: pytest.MonkeyPatch) -> Both:
     return results
 
 
-def drawn(grips: Grips, path: BodyPath) -> tuple[Asked, Any, Any]:
+def drawn(grips: Grips, path: BodyPath) -> tuple[TrackRequests, Any, Any]:
     """Swings of one arm each between grips at random."""
     rng = np.random.default_rng(4)
     source, target = (rng.integers(0, len(grips), 20 * COUNT) for _ in range(2))
@@ -61,7 +61,7 @@ def drawn(grips: Grips, path: BodyPath) -> tuple[Asked, Any, Any]:
     lift = rng.integers(0, len(path), len(source))
     last = np.minimum(lift + rng.integers(5, 60, len(source)), len(path) - 1)
     least = rng.uniform(0.0, 3.0, len(source))
-    asked = Asked(grips.arm[source], source, target, lift + 2.0, last, least)
+    asked = TrackRequests(grips.arm[source], source, target, lift + 2.0, last, least)
     return asked, lift, rng.integers(0, len(grips), len(source))
 
 

@@ -11,7 +11,7 @@ from wbc.robots import Walker
 from wbc.walking import Structure, plane, remove_rows
 from wbc.walking.arms.puma import limb_of
 from wbc.walking.body_path import BodyPath, grid_path, straight_path
-from wbc.walking.planner.detours import Mesh, find_route
+from wbc.walking.planner.detours import CellSpacing, find_route
 from wbc.walking.planner.detours.cell_graph import round_labels
 from wbc.walking.planner.plan import NoPlanError
 from wbc.walking.planner.planner import plan_walk
@@ -20,9 +20,9 @@ from wbc.walking.run.places import over_holds
 
 INCH = 0.0254
 #: One height, and as few poses as will do
-COARSE = Mesh(0.14, 0.2, 5, (0.0,), 24)
+COARSE = CellSpacing(0.14, 0.2, 5, (0.0,), 24)
 #: Along the path alone, at its height and a little lower
-NARROW = Mesh(0.14, 0.0, 0, (0.0, 0.1), 12)
+NARROW = CellSpacing(0.14, 0.0, 0, (0.0, 0.1), 12)
 
 
 def ends(path: BodyPath) -> np.ndarray:
@@ -52,7 +52,7 @@ def test_over_a_wide_trench_hands_wait_where_they_go_with_the_body(machine: Walk
     plan = plan_walk(machine, trench, path, objective="destination", detour=True)
     assert plan.complete
     np.testing.assert_allclose(ends(plan.path), ends(path), atol=1e-9)
-    waits = [one for one in zip(plan.regrasps, plan.laws, strict=True) if one[0].way >= len(ALTERNATIVES)]
+    waits = [one for one in zip(plan.regrasps, plan.laws, strict=True) if one[0].curve >= len(ALTERNATIVES)]
     assert waits
     latch, (_, radius, height) = machine.tolerances.latch_time, limb_of(machine).waiting[0]
     for step, law in waits:

@@ -98,6 +98,15 @@ def test_holds_that_are_gone_are_named(machine: Walker, structure: Structure, ma
         follow_plan(machine, structure.without([gone]), made)
 
 
+def test_files_of_the_version_before_are_read(file: Path, tmp_path: Path) -> None:
+    """They have ``way`` where re-grasps have ``curve`` now."""
+    good, old = json.loads(file.read_text()), tmp_path / "old.json"
+    good["regrasps"] = [{"way" if name == "curve" else name: x for name, x in row.items()} for row in good["regrasps"]]
+    assert "way" in good["regrasps"][0]
+    old.write_text(json.dumps(good))
+    assert read_plan(old).regrasps == read_plan(file).regrasps
+
+
 def test_files_that_are_no_plans_are_refused(file: Path, tmp_path: Path) -> None:
     good = json.loads(file.read_text())
     step = good["regrasps"][0]

@@ -99,10 +99,10 @@ def certify_blocks(
         key = problem(alone, own, rest)
         if key not in known:
             left = (minutes - (time.monotonic() - began) / 60.0) / (len(blocks) - number)
-            told = None if progress is None else _told(progress, block)
+            within = None if progress is None else _of_block(progress, block)
             file = None if state is None else _file(validation.file_path("state", state), block)
             known[key] = certify(
-                alone, own, rest, part=part, minutes=max(left, _LAST), workers=workers, state=file, progress=told
+                alone, own, rest, part=part, minutes=max(left, _LAST), workers=workers, state=file, progress=within
             )
         found.append((block, alone, known[key]))
     certificates = tuple((block, one) for block, _, one in found)
@@ -118,7 +118,7 @@ def certify_blocks(
     )
 
 
-def _told(progress: Callable[[JointBlock, float], None], block: JointBlock) -> Callable[[float], None]:
+def _of_block(progress: Callable[[JointBlock, float], None], block: JointBlock) -> Callable[[float], None]:
     return lambda share: progress(block, share)
 
 

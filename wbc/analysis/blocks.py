@@ -156,11 +156,11 @@ def block_model(model: ExactModel, block: JointBlock) -> ExactModel:
 def lift(model: ExactModel, part: ExactModel) -> Callable[[Array], Array]:
     """Configurations of the whole robot from points of a block: the other joints are anywhere."""
     rng = np.random.default_rng(1)
-    places = [model.robot.dofs(str(name)).start for name in part.robot.model.names[1:]]
+    indices = [model.robot.dofs(str(name)).start for name in part.robot.model.names[1:]]
 
     def lifted(point: Array) -> Array:
         values = rng.uniform(-np.pi, np.pi, model.robot.nv)
-        values[places] = point
+        values[indices] = point
         return model.configuration(values)
 
     return lifted

@@ -22,6 +22,7 @@ from wbc.analysis.loci.budget import Budget, processor_seconds
 from wbc.analysis.loci.loci import STRICT, UNDECIDED, Loci, LocusSearch
 from wbc.analysis.rows import Rows, checked
 from wbc.errors import CompileError, RangeError, UnsupportedJointError
+from wbc.renamed import renamed
 from wbc.robot import Robot
 from wbc.validation import Array
 
@@ -76,6 +77,7 @@ class Analysis:
     processor: float
 
 
+@renamed(told="progress")
 def analyse(
     model: ExactModel,
     task: Sequence[Rows],
@@ -84,7 +86,7 @@ def analyse(
     algorithm: str = "sub_determinants",
     budget: Budget | None = None,
     certificate: RankCertificate | None = None,
-    told: Callable[[str], None] | None = None,
+    progress: Callable[[str], None] | None = None,
 ) -> Analysis:
     """Completeness of task and constraint coordinates: { q : rank J_R < m } within { q : rank J_T < n }.
 
@@ -98,8 +100,8 @@ def analyse(
     ``locus.open``.
 
     Args:
-        certificate: of this set, if there is one already. told: called with the verdict where it is known before the
-            locus is.
+        certificate: of this set, if there is one already.
+        progress: called with the verdict where it is known before the locus is.
 
     Source: E. Dupuis, PhD thesis, McGill University, 2001, section 3.1.
 
@@ -113,10 +115,10 @@ def analyse(
     budget = Budget() if budget is None else validation.instance("budget", budget, Budget, "a Budget")
     if certificate is not None:
         validation.instance("certificate", certificate, RankCertificate, "a Certificate of certify")
-    validation.function("told", told)
+    validation.function("progress", progress)
     budget.start()
     rows = (*wanted, *added)
-    found, certificate, done = _searched(model, wanted, added, algorithm, budget, certificate, told)
+    found, certificate, done = _searched(model, wanted, added, algorithm, budget, certificate, progress)
     witness = None
     if certificate is not None and certificate.witness is not None:
         at = certificate.witness
@@ -152,7 +154,7 @@ def _searched(
     algorithm: str,
     budget: Budget,
     certificate: RankCertificate | None,
-    told: Callable[[str], None] | None,
+    progress: Callable[[str], None] | None,
 ) -> tuple[Loci, RankCertificate | None, bool]:
     """(loci, certificate if it was asked for, whether the search came to its end)."""
     done = False
@@ -162,8 +164,8 @@ def _searched(
             if not search.wait(min(HEAD, budget.seconds)) and certificate is None:
                 certificate = _certified(model, task, added, budget, lambda: search.done)
             decided = _verdict(certificate)
-            if decided is not None and told is not None and not search.done:
-                told(decided)
+            if decided is not None and progress is not None and not search.done:
+                progress(decided)
             if decided != STRICT:
                 search.wait(budget.seconds)
             done = search.done

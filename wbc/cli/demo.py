@@ -13,7 +13,7 @@ from wbc import robots, shapes
 from wbc.cli import options
 from wbc.cli.session import Output, perform
 from wbc.track.presets import preset
-from wbc.track.setup import Moving, Plan, Swing
+from wbc.track.setup import ElbowSwing, Moving, Plan
 
 #: The hand points down at (0.48, 0.42, 0.30) m, the elbow is up
 START = (1.0579, 0.3132, -0.38, -1.7484, 0.1283, 2.0373, 1.4223)
@@ -43,7 +43,7 @@ def plan(duration: float = 12.0, rate: float = 200.0, solver: str = "daqp", back
             "ball": Moving(ball, pin.SE3(np.eye(3), center)),
             "lamp": Moving(shapes.Sphere(0.10), pin.SE3(np.eye(3), np.array(LAMP))),
         },
-        plane=Swing(0.5),
+        plane=ElbowSwing(0.5),
         solver=solver,
         backend=backend,
     )

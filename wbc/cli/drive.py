@@ -19,7 +19,7 @@ from wbc.teleop import Keyboard, RateFile, Seen, SessionLog, Teleoperation, run_
 from wbc.teleop.keyboard import HELP
 from wbc.teleop.session import NOTHING
 
-#: Parts of a command between which losses are told apart, and the exit code after Ctrl-C
+#: Parts of a command between which losses are distinguished, and the exit code after Ctrl-C
 STEPS, INTERRUPTED = (NOTHING, 0.01, 0.1, 0.5), 130
 #: While only the loss changes, a line after so long [s]
 PAUSE = 0.5
@@ -53,14 +53,14 @@ def drive(
     if given is None:
         err().print(f"from --at={','.join(f'{x:.4f}' for x in q)}", soft_wrap=True, markup=False)
     _warn(session, q)
-    found, tell = SessionLog(), _Teller()
+    found, progress = SessionLog(), _Teller()
     try:
         if source is not None:
-            run_session(session, source, q, realtime=realtime, tell=tell, log=found)
+            run_session(session, source, q, realtime=realtime, progress=progress, log=found)
         else:
             err().print(HELP, soft_wrap=True)
             with Keyboard().terminal() as keyboard:
-                run_session(session, keyboard, q, realtime=True, tell=tell, log=found)
+                run_session(session, keyboard, q, realtime=True, progress=progress, log=found)
     finally:
         _report(found, session, log)
     if found.interrupted:

@@ -76,16 +76,16 @@ def explore(
                                "self_motions": found.space.span - 1}  # fmt: skip
     if found.space.span > 1:
         pieces = explorer.pieces(q, seeds=seeds, through=through)
-        best, room = explorer.best(pieces)
+        best, margin = explorer.best(pieces)
         for number, piece in enumerate(pieces, 1):
             kept = sum(not text for text in piece.broken)
             how = "closed" if piece.closed else f"from {piece.ends[0]} to {piece.ends[1]}"
             console().print(
                 f"piece {number}: {len(piece.q)} configurations, {kept} within all limits, {how}", highlight=False
             )
-        console().print(f"farthest from limits: {room:.3f} of half a range at " + ",".join(f"{x:.4f}" for x in best))
+        console().print(f"farthest from limits: {margin:.3f} of half a range at " + ",".join(f"{x:.4f}" for x in best))
         figures["pieces"] = [{"count": len(p.q), "closed": p.closed, "ends": p.ends, "free": p.free} for p in pieces]
-        figures["best"] = {"q": best.tolist(), "share": room}
+        figures["best"] = {"q": best.tolist(), "share": margin}
         np.savez_compressed(out / "self_motion.npz", **{f"piece{k}": p.q for k, p in enumerate(pieces, 1)})  # type: ignore[arg-type]
         save_pieces(machine, pieces, out / "self_motion.png", best)
     if to is not None:
@@ -93,14 +93,14 @@ def explore(
         if len(end) != 3:
             raise ShapeError("to", to, "expected X,Y,Z")
         targets = _line(machine, q, name, kind, end, points)
-        way = explorer.along({"hand": targets}, q, anywhere=anywhere)
-        law = way.law(np.minimum(machine.limits.velocity, 10.0), np.minimum(machine.limits.acceleration, 10.0))
+        path = explorer.along({"hand": targets}, q, anywhere=anywhere)
+        law = path.law(np.minimum(machine.limits.velocity, 10.0), np.minimum(machine.limits.acceleration, 10.0))
         law.save(out / "law.npz")
         _, stopped = explorer.step_by_step({"hand": targets}, q)
         console().print(
-            f"along: {way.nodes} configurations compared, {law.duration:.3f} s; step by step {stopped or 'done'}"
+            f"along: {path.nodes} configurations compared, {law.duration:.3f} s; step by step {stopped or 'done'}"
         )
-        figures["along"] = {"cost": way.cost, "nodes": way.nodes, "duration": law.duration, "step_by_step": stopped}
+        figures["along"] = {"cost": path.cost, "nodes": path.nodes, "duration": law.duration, "step_by_step": stopped}
     (out / "summary.json").write_text(json.dumps(figures, indent=1) + "\n")
     console().print(str(out))
 

@@ -16,7 +16,7 @@ from wbc.track.path import Approach
 from wbc.track.path import Path as TimedPath
 from wbc.track.path_file import SUFFIXES, read_path
 from wbc.track.presets import PRESETS, preset
-from wbc.track.setup import Moving, Plan, Swing
+from wbc.track.setup import ElbowSwing, Moving, Plan
 from wbc.validation import Array
 
 PLANES = ("auto", "off", "hold", "swing")
@@ -132,7 +132,7 @@ def parse_sphere(text: str) -> Moving:
     return Moving(shapes.Sphere(float(numbers[3])), pin.SE3(np.eye(3), numbers[:3]), velocity)
 
 
-def plane_command(robot: Robot, plane: str, swing: float) -> Swing | None:
+def plane_command(robot: Robot, plane: str, swing: float) -> ElbowSwing | None:
     """The command of the elbow plane that an option means."""
     validation.one_of("plane", plane, PLANES)
     known = all(role in robot.frames for role in ("shoulder", "elbow", "wrist"))
@@ -140,7 +140,7 @@ def plane_command(robot: Robot, plane: str, swing: float) -> Swing | None:
     if plane == "off" or (plane == "auto" and not (known and robot.nv > 6)):
         return None
     amplitude = validation.scalar("swing", swing, low=-math.pi, high=math.pi, unit="rad")
-    return Swing(amplitude if plane == "swing" else 0.0)
+    return ElbowSwing(amplitude if plane == "swing" else 0.0)
 
 
 def feet(robot: Robot) -> tuple[str, ...]:

@@ -59,8 +59,8 @@ def labels(robot: Robot, rows: Coordinate) -> tuple[Row, ...]:
         moved = [Row("xyz"[k], "m") for k in rows.translation]
         return (*moved, *(Row(f"r{'xyz'[k]}", "rad") for k in rows.rotation))
     if isinstance(rows, JointRows):
-        place = robot.dofs(rows.joint)
-        return tuple(Row(robot.dof_names[k], robot.dof_units[k]) for k in range(place.start, place.stop))
+        dofs = robot.dofs(rows.joint)
+        return tuple(Row(robot.dof_names[k], robot.dof_units[k]) for k in range(dofs.start, dofs.stop))
     if isinstance(rows, PointRows):
         return tuple(Row(f"f{k}", "m") for k in range(rows.on.count))
     return (Row({PitchPlaneRows: "alpha", AxisRows: "axis", PlaneAngleRows: "psi"}[type(rows)], "rad"),)
@@ -70,8 +70,8 @@ def matrix(robot: Robot, kin: Tracer, rows: Coordinate) -> ca.SX:
     """A(q), rows x nv: what the coordinates' rates are by v."""
     kinematics = kin.kinematics
     if isinstance(rows, JointRows):
-        place = robot.dofs(rows.joint)
-        return ca.SX(ca.DM.eye(robot.nv))[place.start : place.stop, :]
+        dofs = robot.dofs(rows.joint)
+        return ca.SX(ca.DM.eye(robot.nv))[dofs.start : dofs.stop, :]
     if isinstance(rows, PlaneAngleRows):
         return kin.jacobian(rows.task.error(robot, kin, {"target": ca.SX(0)}))
     if isinstance(rows, PointRows):
@@ -98,9 +98,9 @@ def reference(robot: Robot, rows: Coordinate) -> Input | None:
     if isinstance(rows, BodyRows):
         return Input(REFERENCE, "pose", unit="m, rad") if any(_corrected(robot, rows)) else None
     if isinstance(rows, JointRows):
-        place = robot.dofs(rows.joint)
-        single = place.stop - place.start == 1
-        return Input(REFERENCE, unit=robot.dof_units[place.start]) if single else None
+        dofs = robot.dofs(rows.joint)
+        single = dofs.stop - dofs.start == 1
+        return Input(REFERENCE, unit=robot.dof_units[dofs.start]) if single else None
     return Input(REFERENCE, unit="rad") if isinstance(rows, PlaneAngleRows) else None
 
 

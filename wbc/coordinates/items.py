@@ -1,4 +1,4 @@
-"""Coordinates as items of a stack: followed in the least-squares sense, or kept exactly."""
+"""Coordinates as items of a stack: followed in the least-squares sense, or held exactly."""
 
 from __future__ import annotations
 
@@ -14,13 +14,14 @@ from wbc.coordinates import expressions
 from wbc.coordinates.expressions import DRIFT, REFERENCE
 from wbc.coordinates.rows import KINDS, Coordinate
 from wbc.errors import RangeError
+from wbc.renamed import renamed
 from wbc.robot import Robot
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks.base import Constraint, Input, Order, Row, Rows, Task, Values
 from wbc.validation import Array
 
-#: Fastest return of what is held [m/s, rad/s]
-PULL = 0.05
+#: Largest rate at which the drift of what is held is taken back [m/s, rad/s]
+FASTEST_RETURN = 0.05
 
 
 @dataclass(frozen=True)
@@ -96,13 +97,14 @@ class FollowRows(Task):
         return ca.SX(ca.vertcat(*whole)[:, order])
 
 
+@renamed(pull="fastest_return")
 @dataclass(frozen=True)
 class KeepRows(Constraint):
     """Coordinates have a prescribed rate, exactly: A(q) v = speed - gain e                       [m/s, rad/s]
 
     e is the drift from ``reference`` where the coordinates have one (see :mod:`wbc.coordinates.expressions`), so that
-    what is held does not wander, and ``drift`` in rows that are rates only. gain e counts up to ``pull``: what is far
-    off, after a push or beside a locus, comes back at that speed.
+    what is held does not wander, and ``drift`` in rows that are rates only. gain e counts up to
+    ``fastest_return``: what is far off, after a push or beside a locus, comes back at that speed.
 
     Inputs:
         speed: one number a row, 0 by default. gain: how fast drift decays [1/s], at most 1/dt.
@@ -110,7 +112,8 @@ class KeepRows(Constraint):
         drift: e of rows that are rates only, one number a row (``RateIntegrals``).
 
     Attributes:
-        coordinate: what is held. gain: first value of the input. pull: fastest return [m/s, rad/s].
+        coordinate: what is held. gain: first value of the input.
+        fastest_return: largest rate at which drift is taken back [m/s, rad/s].
     """
 
     #: Made by pairs, so it is not in the table of items
@@ -121,12 +124,12 @@ class KeepRows(Constraint):
 
     coordinate: Coordinate
     gain: float = 10.0
-    pull: float = PULL
+    fastest_return: float = FASTEST_RETURN
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "gain", validation.scalar("gain", self.gain, low=0.0, unit="1/s"))
-        fastest = validation.scalar("pull", self.pull, low=0.0, open_low=True, unit="m/s, rad/s")
-        object.__setattr__(self, "pull", fastest)
+        fastest = validation.scalar("fastest_return", self.fastest_return, low=0.0, open_low=True, unit="m/s, rad/s")
+        object.__setattr__(self, "fastest_return", fastest)
 
     def validate(self, robot: Robot) -> None:
         """See :func:`expressions.check`."""
@@ -162,5 +165,5 @@ class KeepRows(Constraint):
         off = ca.SX(0) if off is None else off
         if DRIFT in inputs:
             off = off + inputs[DRIFT]
-        wanted = inputs["speed"] - ca.fmax(-self.pull, ca.fmin(self.pull, inputs["gain"] * off))
+        wanted = inputs["speed"] - ca.fmax(-self.fastest_return, ca.fmin(self.fastest_return, inputs["gain"] * off))
         return Rows(expressions.matrix(robot, kin, self.coordinate), wanted, wanted)

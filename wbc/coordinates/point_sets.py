@@ -27,7 +27,7 @@ class PointSet(Protocol):
         """f(x) [m], a column of ``count`` rows, zero on the set."""
 
 
-def _place(x: Any) -> ca.SX:
+def _column(x: Any) -> ca.SX:
     """Three expressions, or numbers, as a column."""
     if isinstance(x, ca.SX):
         if x.shape != (3, 1):
@@ -82,7 +82,7 @@ class OnPlane:
 
     def values(self, x: ca.SX) -> ca.SX:
         """See the class."""
-        x = _place(x)
+        x = _column(x)
         return ca.dot(_constant(self.normal), x - _constant(self.point))
 
 
@@ -100,7 +100,7 @@ class OnSphere:
 
     def values(self, x: ca.SX) -> ca.SX:
         """See the class."""
-        x = _place(x)
+        x = _column(x)
         return _length(x - _constant(self.point)) - self.radius
 
 
@@ -120,7 +120,7 @@ class OnCylinder:
 
     def values(self, x: ca.SX) -> ca.SX:
         """See the class."""
-        x = _place(x)
+        x = _column(x)
         off, along = x - _constant(self.point), _constant(self.axis)
         return _length(off - along * ca.dot(along, off)) - self.radius
 
@@ -139,7 +139,7 @@ class OnLine:
 
     def values(self, x: ca.SX) -> ca.SX:
         """See the class."""
-        x = _place(x)
+        x = _column(x)
         off = x - _constant(self.point)
         return ca.vertcat(*[ca.dot(side, off) for side in _across(self.axis)])
 
@@ -160,6 +160,6 @@ class OnCircle:
 
     def values(self, x: ca.SX) -> ca.SX:
         """See the class."""
-        x = _place(x)
+        x = _column(x)
         off = x - _constant(self.point)
         return ca.vertcat(ca.dot(_constant(self.normal), off), _length(off) - self.radius)

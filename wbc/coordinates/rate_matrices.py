@@ -23,7 +23,7 @@ class RateMatrices:
         native: compile to C, where a compiler is there; else the virtual machine evaluates.
 
     Attributes:
-        robot: as given. places: coordinate -> its rows in the matrix of all.
+        robot: as given. row_slices: coordinate -> its rows in the matrix of all.
         units: m or rad of every row, of its integral.
     """
 
@@ -32,7 +32,7 @@ class RateMatrices:
         every = tuple(coordinates)
         labels = [expressions.labels(robot, one) for one in every]
         ends = np.cumsum([0, *map(len, labels)]).tolist()
-        self.places = {one: slice(a, b) for one, (a, b) in zip(every, pairwise(ends), strict=True)}
+        self.row_slices = {one: slice(a, b) for one, (a, b) in zip(every, pairwise(ends), strict=True)}
         self.units = tuple(row.unit for some in labels for row in some)
         rates = expressions.rate_function(robot, every)
         q = ca.SX.sym("q", robot.nq)

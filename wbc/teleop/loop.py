@@ -14,6 +14,7 @@ import numpy as np
 
 from wbc import validation
 from wbc.errors import RobotFileError, ShapeError
+from wbc.renamed import renamed
 from wbc.simulation import Connection, Plant
 from wbc.teleop.order import AT_ONCE, Source
 from wbc.teleop.session import Seen, Teleoperation
@@ -101,6 +102,7 @@ def _padded(rates: Array) -> list[str]:
     return given + [""] * (AT_ONCE - len(given))
 
 
+@renamed(tell="progress")
 def run_session(
     session: Teleoperation,
     source: Source,
@@ -108,7 +110,7 @@ def run_session(
     *,
     seconds: float = np.inf,
     realtime: bool = False,
-    tell: Callable[[float, Seen], None] | None = None,
+    progress: Callable[[float, Seen], None] | None = None,
     log: SessionLog | None = None,
     plant: Plant | None = None,
 ) -> SessionLog:
@@ -116,7 +118,7 @@ def run_session(
 
     Args:
         realtime: wait for the clock, 50 ticks a second; else as fast as it goes.
-        tell: called after every tick with its time and what was seen.
+        progress: called after every tick with its time and what was seen.
         log: written tick by tick, so that it has what there was when an error ends the run; default: a new one.
         plant: what moves; default: a :class:`wbc.simulation.KinematicPlant`, which does exactly what it is commanded.
 
@@ -129,7 +131,7 @@ def run_session(
         raise ShapeError("source", source, "expected a source of orders: RateFile, Keyboard, ...")
     if log is not None:
         validation.instance("log", log, SessionLog, "a SessionLog")
-    validation.function("tell", tell)
+    validation.function("progress", progress)
     realtime = validation.flag("realtime", realtime)
     q, log = session.robot.configuration("q", q), SessionLog() if log is None else log
     limit = validation.real_array("seconds", seconds, (), finite=False)
@@ -138,7 +140,7 @@ def run_session(
     q = connection.reset(q).q
     try:
         with connection:
-            _run(session, source, q, connection, float(limit), realtime, tell, log)
+            _run(session, source, q, connection, float(limit), realtime, progress, log)
     except KeyboardInterrupt:
         log.interrupted = True
     finally:
@@ -153,7 +155,7 @@ def _run(
     connection: Connection,
     limit: float,
     realtime: bool,
-    tell: Callable[[float, Seen], None] | None,
+    progress: Callable[[float, Seen], None] | None,
     log: SessionLog,
 ) -> None:
     period, began, tick = session.control.dt, time.monotonic(), 0
@@ -169,7 +171,7 @@ def _run(
             return
         seen = session.step(q, order)
         log.add(now, q, seen)
-        if tell is not None:
-            validation.called("tell", tell, now, seen)
+        if progress is not None:
+            validation.called("progress", progress, now, seen)
         q = connection.drive(seen.step.v).q
         tick += 1

@@ -31,7 +31,7 @@ LIGHT = np.array([0.35, -0.45, 0.82]) / np.linalg.norm([0.35, -0.45, 0.82])
 
 
 @dataclass(frozen=True, eq=False)
-class Mesh:
+class ColouredMesh:
     """Triangles in the world, m x 3 x 3 [m], of one colour (r, g, b in 0..1)."""
 
     triangles: Array
@@ -100,7 +100,7 @@ class Layer:
     colour: Array
 
 
-def draw(meshes: Sequence[Mesh], camera: Camera) -> Layer:
+def draw(meshes: Sequence[ColouredMesh], camera: Camera) -> Layer:
     """The nearest surfaces."""
     size = camera.width * camera.height
     nearness = np.full(size, np.inf, dtype=np.float32)
@@ -131,7 +131,7 @@ def draw(meshes: Sequence[Mesh], camera: Camera) -> Layer:
 class Shadows:
     """Depth of the scene as seen from the light (parallel rays)."""
 
-    def __init__(self, meshes: Sequence[Mesh]) -> None:
+    def __init__(self, meshes: Sequence[ColouredMesh]) -> None:
         side = np.cross([0.0, 0.0, 1.0], LIGHT)
         side /= np.linalg.norm(side)
         self._axes = np.array([side, np.cross(LIGHT, side), -LIGHT])
@@ -219,20 +219,20 @@ def reduced(image: Array, factor: int) -> Array:
     return np.asarray(blocks.mean(axis=(1, 3)))
 
 
-def sphere(center: Array, radius: float, colour: tuple[float, float, float]) -> Mesh:
+def sphere(center: Array, radius: float, colour: tuple[float, float, float]) -> ColouredMesh:
     """A sphere of 64 x 32 faces."""
     polar, angles = np.linspace(0.0, math.pi, 65), np.array(_angles(128))
     around = np.stack([np.cos(angles), np.sin(angles), np.zeros(128)], axis=1)
     rings = np.sin(polar)[:, None, None] * around + np.cos(polar)[:, None, None] * np.array([0.0, 0.0, 1.0])
-    return Mesh(_quads(center + radius * rings), colour)
+    return ColouredMesh(_quads(center + radius * rings), colour)
 
 
-def tube(points: Array, radius: float, colour: tuple[float, float, float]) -> Mesh:
+def tube(points: Array, radius: float, colour: tuple[float, float, float]) -> ColouredMesh:
     """A tube along a polyline, n x 3."""
     run = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
     count = int(run[-1] / max(radius, 1e-6)) + 1
     if count < 2:
-        return Mesh(np.zeros((0, 3, 3)), colour)
+        return ColouredMesh(np.zeros((0, 3, 3)), colour)
     # At equal distances along the path: where the robot is slow, recorded points are too close for a direction
     stations = np.linspace(0.0, run[-1], count)
     line = np.column_stack([np.interp(stations, run, points[:, k]) for k in range(3)])
@@ -246,7 +246,7 @@ def tube(points: Array, radius: float, colour: tuple[float, float, float]) -> Me
     rings = line[:, None] + radius * (
         np.cos(angles)[:, None] * side[:, None] + np.sin(angles)[:, None] * other[:, None]
     )
-    return Mesh(_quads(rings), colour)
+    return ColouredMesh(_quads(rings), colour)
 
 
 def _angles(count: int) -> list[float]:

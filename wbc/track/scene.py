@@ -99,8 +99,8 @@ class Scene:
         self._meshes = [(link, simplified(m, detail)) for link, m in link_meshes(robot) if link not in unseen]
         self._dark = {int(robot.model.frames[frame].parentJoint) for frame in frames} - {0}
         self._stands: list[list[pin.SE3]] = [[] for _ in self._meshes]
-        self._solid: list[render.Mesh] = []
-        self._pale: list[list[render.Mesh]] = []
+        self._solid: list[render.ColouredMesh] = []
+        self._pale: list[list[render.ColouredMesh]] = []
         self._key: list[tuple[Colour, str]] = []
 
     def add_robot(self, q: Array, pale: bool = False, pieces: Sequence[tuple[Solid, pin.SE3, Colour]] = ()) -> None:
@@ -123,7 +123,7 @@ class Scene:
             stands.append(pose)
             plain = DARK if int(model.frames[index].parentJoint) in self._dark else WHITE
             colour = self._colours.get(link, plain)
-            meshes.append(render.Mesh(triangles @ pose.rotation.T + pose.translation, colour))
+            meshes.append(render.ColouredMesh(triangles @ pose.rotation.T + pose.translation, colour))
         meshes += extra
         if pale:
             self._pale.append(meshes)
@@ -153,7 +153,7 @@ class Scene:
         corners = validation.ordinary_array("Scene.triangles", triangles)
         if corners.ndim != 3 or corners.shape[1:] != (3, 3):
             raise ShapeError("Scene.triangles", triangles, f"expected m x 3 x 3, not {corners.shape}")
-        self._solid.append(render.Mesh(corners, colour))
+        self._solid.append(render.ColouredMesh(corners, colour))
         self._label(colour, label)
 
     def add_path(self, points: Array, label: str = "", colour: Colour = PATH, radius: float = 0.006) -> None:
@@ -246,12 +246,12 @@ def simplified(triangles: Array, detail: float) -> Array:
     return np.asarray(middles[faces[kept]])
 
 
-def _surface(shape: Solid, pose: pin.SE3, colour: Colour) -> render.Mesh:
+def _surface(shape: Solid, pose: pin.SE3, colour: Colour) -> render.ColouredMesh:
     if not isinstance(shape, SOLIDS):
         raise ShapeError("Scene.shape", shape, "expected a shape", [kind.__name__ for kind in SOLIDS])
     if isinstance(shape, Sphere):
         return render.sphere(np.array(pose.translation), shape.radius, colour)
-    return render.Mesh(render.triangles(PlacedShape(shape, pose)), colour)
+    return render.ColouredMesh(render.triangles(PlacedShape(shape, pose)), colour)
 
 
 def _camera(points: Array, size: tuple[int, int], azimuth: float, elevation: float) -> render.Camera:
@@ -272,7 +272,9 @@ def _camera(points: Array, size: tuple[int, int], azimuth: float, elevation: flo
     return render.Camera(target + distance * direction, target, view, width, height)
 
 
-def _render(camera: render.Camera, solid: list[render.Mesh], pale: list[list[render.Mesh]], floor: bool) -> Array:
+def _render(
+    camera: render.Camera, solid: list[render.ColouredMesh], pale: list[list[render.ColouredMesh]], floor: bool
+) -> Array:
     points = _points(solid)
     shadows = render.Shadows(solid)
     base = min(0.0, float(points[:, 2].min()))
@@ -286,7 +288,7 @@ def _render(camera: render.Camera, solid: list[render.Mesh], pale: list[list[ren
     # What is behind everything, as the horizon, casts no dark on anything
     far = float(layer.depth[seen].max()) + 1.0
     for meshes in pale:
-        tinted = [render.Mesh(m.triangles, _tinted(m.colour)) for m in meshes]
+        tinted = [render.ColouredMesh(m.triangles, _tinted(m.colour)) for m in meshes]
         layer = render.draw(tinted, camera)
         seen, colours = render.shade(layer, camera, shadows)
         front = seen & (layer.depth < depth - BIAS)
@@ -296,7 +298,7 @@ def _render(camera: render.Camera, solid: list[render.Mesh], pale: list[list[ren
     return render.reduced(image, SUPERSAMPLING)
 
 
-def _piece(piece: Any) -> render.Mesh:
+def _piece(piece: Any) -> render.ColouredMesh:
     """(shape, pose, colour) as triangles."""
     three = validation.items("Scene.pieces", piece, "shape, pose and colour")
     if len(three) != 3:
@@ -317,7 +319,7 @@ def _tinted(colour: Colour) -> Colour:
     return TINT if colour in (WHITE, DARK) else colour
 
 
-def _points(meshes: Sequence[render.Mesh]) -> Array:
+def _points(meshes: Sequence[render.ColouredMesh]) -> Array:
     return np.concatenate([m.triangles.reshape(-1, 3) for m in meshes])
 
 

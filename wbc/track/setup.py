@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+import warnings
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -46,7 +48,7 @@ class Moving:
 
 
 @dataclass(frozen=True)
-class Swing:
+class ElbowSwing:
     """A commanded angle of the elbow plane:
 
         psi(t) = psi_0 + amplitude w(t) sin(2 pi cycles t / T),    w the quintic step, up and down in T / 8,
@@ -97,7 +99,7 @@ class Plan:
     obstacles: dict[str, Moving] = field(default_factory=dict)
     margin: float = 0.02
     approach: float = 10.0
-    plane: Swing | None = None
+    plane: ElbowSwing | None = None
     holds: tuple[str, ...] = ()
     gain: float = 10.0
     solver: str = "daqp"
@@ -110,7 +112,7 @@ class Plan:
         for name, one in validation.mapping("obstacles", self.obstacles, "names to Movings").items():
             validation.instance(f"obstacles[{name}]", one, Moving, "a Moving")
         if self.plane is not None:
-            validation.instance("plane", self.plane, Swing, "a Swing")
+            validation.instance("plane", self.plane, ElbowSwing, "a ElbowSwing")
         for frame in validation.items("holds", self.holds, "frames"):
             self.robot.check_frame("holds", frame)
         object.__setattr__(self, "label", validation.name("label", self.label))
@@ -155,3 +157,11 @@ def plane_task(robot: Robot) -> tasks.PitchPlane:
         raise WbcError("plane", robot.name, "the table knows no shoulder, elbow and wrist of this robot", ("off",))
     shoulder, elbow, wrist = (str(role) for role in roles)
     return tasks.PitchPlane(shoulder, elbow, wrist, reference=REFERENCE, gain=5.0)
+
+
+def __getattr__(name: str) -> Any:
+    """The name of the version before."""
+    if name == "Swing":
+        warnings.warn("wbc.track.setup.Swing is wbc.track.setup.ElbowSwing now", DeprecationWarning, stacklevel=2)
+        return ElbowSwing
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -52,7 +52,7 @@ def follow(
 
         q(s) = the configuration at which the stack comes to rest with the task's target at pose(s),
 
-    found from the one before, so that the branch is kept. The other tasks (elbow, posture) decide what the pose leaves
+    found from the one before, so that the branch stays. The other tasks (elbow, posture) decide what the pose leaves
     open, the constraints (limits, obstacles) hold. A cubic spline through so many q(s) that between them the frame is
     within the tolerance of pose(s).
 
@@ -80,21 +80,21 @@ def follow(
     q = [tracker.at(s[0], first)]
     for before, here in itertools.pairwise(s):
         q.append(tracker.go(before, here, q[-1]))
-    places, found = s, np.array(q)
+    at, found = s, np.array(q)
     while True:
-        path = _spline(places, found)
-        middle = 0.5 * (places[:-1] + places[1:])
+        path = _spline(at, found)
+        middle = 0.5 * (at[:-1] + at[1:])
         bad, error = seeker.errors(path, middle)
         if not bad.any():
-            return Followed(path, error, len(places))
-        if len(places) + bad.sum() > MOST:
+            return Followed(path, error, len(at))
+        if len(at) + bad.sum() > MOST:
             raise RangeError(
                 "tolerance", tolerance, f"needs more than {MOST} samples; the error is {max(error):.2g} now"
             )
         more = middle[bad]
-        new = [tracker.go(a, m, x) for a, m, x in zip(places[:-1][bad], more, found[:-1][bad], strict=True)]
-        order = np.argsort(np.concatenate([places, more]), kind="stable")
-        places = np.concatenate([places, more])[order]
+        new = [tracker.go(a, m, x) for a, m, x in zip(at[:-1][bad], more, found[:-1][bad], strict=True)]
+        order = np.argsort(np.concatenate([at, more]), kind="stable")
+        at = np.concatenate([at, more])[order]
         found = np.concatenate([found, np.array(new)])[order]
 
 
@@ -134,9 +134,9 @@ class _Seeker:
         error = pin.SE3(self.poses.evaluate(np.array([s]))[0]).actInv(self.data.oMf[self.frame])
         return float(np.linalg.norm(error.translation)), float(np.linalg.norm(pin.log3(error.rotation)))
 
-    def errors(self, path: PolynomialPath, places: Array) -> tuple[np.ndarray, tuple[float, float]]:
-        """Which places are off by more than the tolerance, and by how much they are off at worst."""
-        found = np.array([self.off(s, q) for s, q in zip(places, path.evaluate(places), strict=True)])
+    def errors(self, path: PolynomialPath, at: Array) -> tuple[np.ndarray, tuple[float, float]]:
+        """Which points are off by more than the tolerance, and by how much they are off at worst."""
+        found = np.array([self.off(s, q) for s, q in zip(at, path.evaluate(at), strict=True)])
         bad = (found[:, 0] > self.near) | (found[:, 1] > self.turned)
         return bad, (float(found[:, 0].max()), float(found[:, 1].max()))
 

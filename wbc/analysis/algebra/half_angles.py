@@ -109,8 +109,8 @@ class HalfAngles:
         images = [one] * len(ring.names)
         for k, (s, c, _) in ring.circles.items():
             images[s], images[c] = 2 * self.gens[k], one - self.gens[k] ** 2
-        for k, place in ring.slides.items():
-            images[place] = self.gens[k]
+        for k, index in ring.slides.items():
+            images[index] = self.gens[k]
         start = len(ring.names) - len(ring.symbols)
         for i in range(len(ring.symbols)):
             images[start + i] = self.gens[self.size + i]

@@ -23,10 +23,10 @@ def eliminated(ring: TrigRing, matrix: Matrix, columns: int | None = None) -> tu
     count = 0
     while left and left[0]:
         first = None if columns is None else columns - count
-        places = [(i, j) for i, row in enumerate(left) for j, p in enumerate(row[:first]) if len(p) and p.is_constant()]
-        if not places:
+        pivots = [(i, j) for i, row in enumerate(left) for j, p in enumerate(row[:first]) if len(p) and p.is_constant()]
+        if not pivots:
             break
-        i, j = min(places, key=lambda place: _fill(left, *place))
+        i, j = min(pivots, key=lambda pivot: _fill(left, *pivot))
         left = [row for row in without(ring, left, i, j) if any(len(p) for p in row)]
         count += 1
     return left, count

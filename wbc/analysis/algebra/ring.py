@@ -77,8 +77,8 @@ class TrigRing:
                 self.slides[k] = self.names.index(f"d{joint.label}")
                 continue
             s, c = gens[f"s{joint.label}"], gens[f"c{joint.label}"]
-            place = self.names.index(f"s{joint.label}")
-            self.circles[k] = place, place + 1, s * s + c * c - 1
+            index = self.names.index(f"s{joint.label}")
+            self.circles[k] = index, index + 1, s * s + c * c - 1
 
     def number(self, value: float | Fraction) -> Poly:
         """A number of a model as a constant; a length that equals a symbol, or its opposite, becomes that symbol."""
@@ -124,7 +124,7 @@ class TrigRing:
             return ()
         degrees = p.degrees()
         turning = [k for k, (s, c, _) in self.circles.items() if degrees[s] or degrees[c]]
-        return tuple(sorted(turning + [k for k, place in self.slides.items() if degrees[place]]))
+        return tuple(sorted(turning + [k for k, index in self.slides.items() if degrees[index]]))
 
     def substitution(self, values: Mapping[int, tuple[fmpq, fmpq]]) -> dict[str | int, int | fmpq]:
         """What :meth:`at` puts in: (cos, sin) of some joints, or (displacement, anything), by place."""

@@ -67,12 +67,12 @@ def trig_form(ring: TrigRing, matrix: Matrix) -> TrigForm:
     """
     entries = [_waves(ring, p) for row in matrix for p in row]
     order = sorted({wave for entry in entries for wave in entry})
-    place = {wave: k for k, wave in enumerate(order)}
+    index = {wave: k for k, wave in enumerate(order)}
     cosine, sine = np.zeros((2, len(entries), len(order)))
     for e, entry in enumerate(entries):
         for wave, (real, imaginary) in entry.items():
             double = 2 if any(wave) else 1
-            cosine[e, place[wave]], sine[e, place[wave]] = float(double * real), float(-double * imaginary)
+            cosine[e, index[wave]], sine[e, index[wave]] = float(double * real), float(-double * imaginary)
     shape = len(matrix), len(matrix[0]) if matrix else 0
     return TrigForm(shape, np.array(order, float).reshape(-1, len(ring.coordinates)), cosine, sine)
 
@@ -83,8 +83,8 @@ def _waves(ring: TrigRing, p: Poly) -> dict[Wave, tuple[Fraction, Fraction]]:
     start = len(ring.names) - len(lengths)
     sums: dict[Wave, tuple[Fraction, Fraction]] = {}
     for powers, number in p.terms():
-        for k, place in ring.slides.items():
-            if powers[place]:
+        for k, index in ring.slides.items():
+            if powers[index]:
                 raise UnsupportedJointError(
                     f"joint {ring.coordinates[k].label}", "sliding", "subdivision needs entries in turning joints alone"
                 )

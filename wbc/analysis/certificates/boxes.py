@@ -70,8 +70,8 @@ class BoxSearch:
     A box is a row: centre, half widths, and 1 where it is known to be outside the tube.
 
     Args:
-        proofs: ways to prove full rank of M: forms that must all have it, such as (M,). task: J, or None with ``eps``
-            = 0. smallest: width at which a box is left [rad]. volume: of all.
+        proofs: alternatives that prove full rank of M: forms that must all have it, such as (M,).
+            task: J, or None with ``eps`` = 0. smallest: width at which a box is left [rad]. volume: of all.
 
     Raises:
         RangeError: a matrix larger than the compiled code allows. CompileError: no C compiler, or it fails.
@@ -127,8 +127,8 @@ class BoxSearch:
             form.sine[entries, waves],
         ]
         self._keep += arrays
-        places = [array.ctypes.data for array in arrays]
-        return _Form(*form.shape, form.waves.shape[1], len(form.waves), len(entries), *places)
+        pointers = [array.ctypes.data for array in arrays]
+        return _Form(*form.shape, form.waves.shape[1], len(form.waves), len(entries), *pointers)
 
 
 @functools.cache

@@ -36,7 +36,7 @@ class ExactModel:
         Raises:
             UnsupportedJointError: a joint that neither turns about nor slides along one axis.
             RotationError: a rotation that is not exact, without ``approximate``.
-            DuplicateNameError, RangeError: symbols that cannot be told apart, or that are zero.
+            DuplicateNameError, RangeError: symbols that cannot be distinguished, or that are zero.
         """
         self.robot, self.notes = checked_robot(robot), list[str]()
         self.approximate = approximate = validation.flag("approximate", approximate)
@@ -58,7 +58,7 @@ class ExactModel:
         self._seen: dict[tuple[str, int], Transform] = {}
 
     def frame(self, name: str) -> tuple[int, Transform]:
-        """The joint that moves a frame (0: none) and the frame's place on it.
+        """The joint that moves a frame (0: none) and the frame's placement on it.
 
         Raises:
             UnknownNameError: no such frame. RotationError: see :class:`ExactModel`.
@@ -66,8 +66,8 @@ class ExactModel:
         self.robot.check_frame("frame", name)
         if name not in self._frames:
             frame = self.robot.model.frames[frame_index(self.robot.model, name)]
-            place = exact_placement(self.ring, frame.placement, f"frame {name!r}", self.approximate, self.notes)
-            self._frames[name] = int(frame.parentJoint), place
+            placement = exact_placement(self.ring, frame.placement, f"frame {name!r}", self.approximate, self.notes)
+            self._frames[name] = int(frame.parentJoint), placement
         return self._frames[name]
 
     def support(self, joint: int) -> tuple[int, ...]:
@@ -80,9 +80,9 @@ class ExactModel:
         joint = validation.integer("joint", joint, high=self.robot.model.njoints - 1)
         key = self.robot.check_frame("frame", seen_from), joint
         if key not in self._seen:
-            start, place = self.frame(seen_from)
+            start, placement = self.frame(seen_from)
             if joint == start:
-                self._seen[key] = place.inverse(self.ring)
+                self._seen[key] = placement.inverse(self.ring)
             elif joint in (0, *self.support(start)):
                 above = next(j for j in (*self.support(start),) if self._parent(j) == joint)
                 step = self._step(above).inverse(self.ring)
@@ -94,8 +94,8 @@ class ExactModel:
 
     def frame_in(self, seen_from: str, name: str) -> Transform:
         """Where a frame is, seen from another."""
-        joint, place = self.frame(name)
-        return self.joint_in(seen_from, joint).times(place, self.ring)
+        joint, placement = self.frame(name)
+        return self.joint_in(seen_from, joint).times(placement, self.ring)
 
     def axis_in(self, seen_from: str, joint: int) -> Vector:
         """The axis of a joint, seen from a frame."""

@@ -35,23 +35,23 @@ class NumericRows:
         if isinstance(declared, JointRows):
             return np.eye(self.robot.nv)[self.robot.dofs(declared.joint)]
         if isinstance(declared, BodyRows):
-            carrier, moved = (self._place(name) for name in (declared.base, declared.frame))
+            carrier, moved = (self._placement(name) for name in (declared.base, declared.frame))
             below, above = (self._jacobian(name) for name in (declared.base, declared.frame))
             arm = moved.translation - carrier.translation
             linear = above[:3] - below[:3] + pin.skew(arm) @ below[3:]
             angular = above[3:] - below[3:]
-            turn = self._place(declared.expressed or WORLD).rotation.T
+            turn = self._placement(declared.expressed or WORLD).rotation.T
             return np.vstack(((turn @ linear)[list(declared.translation)], (turn @ angular)[list(declared.rotation)]))
         return self._pitch_plane(declared.shoulder, declared.wrist)
 
     def _pitch_plane(self, shoulder: str, wrist: str) -> Array:
         joint = int(self.robot.model.frames[frame_index(self.robot.model, shoulder)].parentJoint)
         axis = self._data.J[3:, int(self.robot.model.idx_vs[joint])]
-        span = self._place(wrist).translation - self._place(shoulder).translation
+        span = self._placement(wrist).translation - self._placement(shoulder).translation
         row: Array = (span - axis * (axis @ span)) @ self._jacobian(shoulder)[3:]
         return row[None]
 
-    def _place(self, name: str) -> pin.SE3:
+    def _placement(self, name: str) -> pin.SE3:
         return pin.SE3.Identity() if name == WORLD else self._data.oMf[frame_index(self.robot.model, name)]
 
     def _jacobian(self, name: str) -> Array:

@@ -54,8 +54,8 @@ def _twist(model: ExactModel, rows: Rows, point: str, axes: str) -> Matrix:
         if ring.coordinates[j - 1].slides:
             column = [*axis, ring.zero, ring.zero, ring.zero]
         else:
-            place = model.joint_in(axes, j).position
-            column = [*cross(axis, [a - b for a, b in zip(origin, place, strict=True)], ring), *axis]
+            on_axis = model.joint_in(axes, j).position
+            column = [*cross(axis, [a - b for a, b in zip(origin, on_axis, strict=True)], ring), *axis]
         for row, entry in zip(matrix, column, strict=True):
             row[j - 1] = entry
     return matrix
@@ -68,10 +68,10 @@ def reduced(ring: TrigRing, matrix: Matrix) -> Matrix:
     left = [list(row) for row in matrix if any(len(p) for p in row)]
     width = len(matrix[0])
     while left:
-        places = [(i, j) for i, row in enumerate(left) for j, p in enumerate(row) if _pivot(left, i, j, p)]
-        if not places:
+        pivots = [(i, j) for i, row in enumerate(left) for j, p in enumerate(row) if _pivot(left, i, j, p)]
+        if not pivots:
             break
-        i, j = min(places, key=lambda place: _alone(left, *place))
+        i, j = min(pivots, key=lambda pivot: _alone(left, *pivot))
         left = [row for row in without(ring, left, i, j) if any(len(p) for p in row)]
         width -= 1
     # Columns without a row are a loss of rank, and no columns are none

@@ -12,8 +12,8 @@ from collections.abc import Callable
 from types import TracebackType
 from typing import Any, TypeAlias
 
-#: Given to the work, which tells by it what it has found
-Tell: TypeAlias = Callable[[Any], None]
+#: Given to the work, which reports by it what it has found
+Report: TypeAlias = Callable[[Any], None]
 #: What a process gets to answer an interrupt before it is killed [s]
 GRACE = 1.0
 #: prctl(PR_SET_PDEATHSIG, ...): the signal that a process gets when its parent ends
@@ -21,7 +21,7 @@ _PARENT_DIED = 1
 
 
 class Child:
-    """A forked copy of this process that works and tells what it finds, until its time is over.
+    """A forked copy of this process that works and reports what it finds, until its time is over.
 
     python-flint holds the interpreter while it factors one polynomial, which can take hours, and hears of no limit
     meanwhile. A process can be ended by the kernel: at its time, with its parent, or by :meth:`stop`.
@@ -29,16 +29,16 @@ class Child:
     Use as a context. Where processes cannot be forked, the work is done at once, without a limit.
 
     Attributes:
-        told: everything that was told so far, in order. done: whether the work was ended by itself.
+        reports: everything that was reported so far, in order. done: whether the work was ended by itself.
     """
 
-    def __init__(self, work: Callable[[Tell], None], seconds: float) -> None:
-        self.told: list[Any] = []
+    def __init__(self, work: Callable[[Report], None], seconds: float) -> None:
+        self.reports: list[Any] = []
         self.done = False
         self._pid = 0
         self._error: Exception | None = None
         if not hasattr(os, "fork"):
-            work(self.told.append)
+            work(self.reports.append)
             self.done = True
             return
         read, write = os.pipe()
@@ -71,7 +71,7 @@ class Child:
         self.stop()
 
     def stop(self) -> None:
-        """The end of the process; what it told stays."""
+        """The end of the process; what it reported stays."""
         if not self._pid:
             return
         if not self._ended.is_set():
@@ -95,8 +95,8 @@ class Child:
                     kind, what = pickle.load(pipe)
                 except (EOFError, pickle.UnpicklingError):
                     break
-                if kind == "told":
-                    self.told.append(what)
+                if kind == "report":
+                    self.reports.append(what)
                 elif kind == "error":
                     self._error = what
                 else:
@@ -104,11 +104,11 @@ class Child:
         self._ended.set()
 
 
-def _worked(work: Callable[[Tell], None], write: int, seconds: float) -> None:
+def _worked(work: Callable[[Report], None], write: int, seconds: float) -> None:
     """The life of the process: it leaves without any of its parent's last words."""
     with open(write, "wb") as pipe:
 
-        def tell(kind: str, what: Any = None) -> None:
+        def send(kind: str, what: Any = None) -> None:
             pickle.dump((kind, what), pipe)
             pipe.flush()
 
@@ -118,9 +118,9 @@ def _worked(work: Callable[[Tell], None], write: int, seconds: float) -> None:
             signal.setitimer(signal.ITIMER_REAL, max(seconds, 1e-3))
             if sys.platform == "linux":
                 ctypes.CDLL(None).prctl(_PARENT_DIED, signal.SIGKILL)
-            work(lambda what: tell("told", what))
-            tell("done")
+            work(lambda what: send("report", what))
+            send("done")
         except Exception as error:  # noqa: BLE001 - the parent raises it
-            tell("error", error)
+            send("error", error)
         finally:
             os._exit(0)  # a keyboard interrupt as well ends here

@@ -93,8 +93,8 @@ class Determinant:
         values: list[fmpq] = [fmpq(0)] * len(ring.names)
         for k, (s, c, _) in ring.circles.items():
             values[c], values[s] = cosine_sine(t[k])
-        for k, place in ring.slides.items():
-            values[place] = fmpq(t[k].numerator, t[k].denominator)
+        for k, index in ring.slides.items():
+            values[index] = fmpq(t[k].numerator, t[k].denominator)
         start = len(ring.names) - len(lengths)
         values[start:] = [fmpq(x.numerator, x.denominator) for x in lengths]
         number = fraction(self.poly(*values))

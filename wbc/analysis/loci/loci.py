@@ -17,7 +17,7 @@ from wbc.analysis.jacobians.equivalent_rows import split_twists
 from wbc.analysis.jacobians.jacobian import SymbolicJacobian, symbolic_jacobian
 from wbc.analysis.jacobians.model import ExactModel
 from wbc.analysis.loci.budget import Budget
-from wbc.analysis.loci.child import Child, Tell
+from wbc.analysis.loci.child import Child, Report
 from wbc.analysis.loci.singular_vectors import singular_vector_locus
 from wbc.analysis.loci.sub_determinants import sub_determinant_locus
 from wbc.analysis.rows import Rows
@@ -101,28 +101,28 @@ class LocusSearch:
     def found(self) -> Loci:
         """What is known now; ends the search."""
         self._child.stop()
-        told = self._child.told
-        locus = next((what for what in reversed(told) if isinstance(what, Locus)), Locus((), (LocusBranch(),)))
-        deficient = {branch for branch, lost in (what for what in told if isinstance(what, tuple)) if lost}
+        reports = self._child.reports
+        locus = next((what for what in reversed(reports) if isinstance(what, Locus)), Locus((), (LocusBranch(),)))
+        deficient = {branch for branch, lost in (what for what in reports if isinstance(what, tuple)) if lost}
         kept, doubtful = (tuple(b for b in some if b not in deficient) for some in (locus.branches, locus.open))
         return Loci(self._exact, self.augmented, locus, kept, doubtful)
 
-    def _work(self, tell: Tell) -> None:
+    def _work(self, report: Report) -> None:
         last = time.monotonic()
 
-        def told(locus: Locus) -> None:
+        def progress(locus: Locus) -> None:
             nonlocal last
             if time.monotonic() - last > _NEWS:
-                tell(locus)
+                report(locus)
                 last = time.monotonic()
 
         exact = self._exact
-        locus = self._algorithm(exact, _shortest(self._model, self._rows, self.augmented), self._budget, told)
-        tell(locus)
+        locus = self._algorithm(exact, _shortest(self._model, self._rows, self.augmented), self._budget, progress)
+        report(locus)
         locus = Locus(exact.real(locus.branches), locus.open)
-        tell(locus)
+        report(locus)
         for branch in (*locus.branches, *locus.open) if self._task else ():
-            tell((branch, exact.deficient(self._task, branch)))
+            report((branch, exact.deficient(self._task, branch)))
 
     def __enter__(self) -> LocusSearch:
         return self

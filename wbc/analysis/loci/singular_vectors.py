@@ -13,6 +13,7 @@ from wbc.analysis.algebra.minors import determinant, eliminated, maximal_minors,
 from wbc.analysis.algebra.ring import Matrix, Poly
 from wbc.analysis.algebra.transforms import dot
 from wbc.analysis.loci.budget import Budget
+from wbc.renamed import renamed
 
 #: Blocks of full rank that are compared before the cheapest is taken
 BLOCKS = 8
@@ -29,8 +30,9 @@ class _Block:
     det: Poly
 
 
+@renamed(told="progress")
 def singular_vector_locus(
-    exact: Exact, matrix: Matrix, budget: Budget | None = None, told: Callable[[Locus], None] | None = None
+    exact: Exact, matrix: Matrix, budget: Budget | None = None, progress: Callable[[Locus], None] | None = None
 ) -> Locus:
     """The locus { q : rank J(q) < min(rows, columns) } as branches without redundant ones.
 
@@ -41,7 +43,7 @@ def singular_vector_locus(
     interrupt or the length of relations cuts off is among the open branches.
 
     Args:
-        told: called after each step of the outermost matrix with what is known.
+        progress: called after each step of the outermost matrix with what is known.
 
     What differs from the published form: pivots that are numbers are eliminated first, null vectors are minors, not
     orthogonal (the rank of U' J_r is the same), branches within accepted ones are left out at once, and every accepted
@@ -50,7 +52,7 @@ def singular_vector_locus(
     Source: E. Dupuis, PhD thesis, McGill University, 2001, section 3.4.
     """
     wide = matrix if len(matrix) <= len(matrix[0]) else transposed(matrix)
-    search = _Search(exact, budget or Budget(), told)
+    search = _Search(exact, budget or Budget(), progress)
     found = search.started(wide)
     return Locus(tuple(exact.without_redundant(found)), tuple(unique(search.open)))
 
@@ -61,7 +63,7 @@ class _Search:
 
     exact: Exact
     budget: Budget
-    told: Callable[[Locus], None] | None
+    progress: Callable[[Locus], None] | None
     open: list[LocusBranch] = field(default_factory=list)
     depth: int = 0
 
@@ -121,8 +123,8 @@ class _Search:
                 continue
             accepted += [b for b in inner if self.exact.deficient(matrix, b)]
             waiting += deeper
-            if self.told is not None and self.depth == 1:
-                self.told(Locus(tuple(unique(accepted)), tuple(unique([*waiting, *self.open]))))
+            if self.progress is not None and self.depth == 1:
+                self.progress(Locus(tuple(unique(accepted)), tuple(unique([*waiting, *self.open]))))
         self.depth -= 1
         return self.exact.without_redundant(accepted)
 
@@ -164,9 +166,9 @@ def _largest_block(exact: Exact, square: Matrix, branch: LocusBranch) -> _Block:
 
 
 def _blocks(exact: Exact, square: Matrix, size: int) -> Iterator[_Block]:
-    places = range(len(square))
-    for rows in combinations(places, size):
-        for columns in combinations(places, size):
+    indices = range(len(square))
+    for rows in combinations(indices, size):
+        for columns in combinations(indices, size):
             yield _Block(rows, columns, determinant(exact.ring, [[square[i][j] for j in columns] for i in rows]))
 
 

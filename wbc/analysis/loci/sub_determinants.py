@@ -9,10 +9,12 @@ from wbc.analysis.algebra.deficiency import Exact
 from wbc.analysis.algebra.locus import Locus
 from wbc.analysis.algebra.ring import Matrix
 from wbc.analysis.loci.budget import Budget
+from wbc.renamed import renamed
 
 
+@renamed(told="progress")
 def sub_determinant_locus(
-    exact: Exact, matrix: Matrix, budget: Budget | None = None, told: Callable[[Locus], None] | None = None
+    exact: Exact, matrix: Matrix, budget: Budget | None = None, progress: Callable[[Locus], None] | None = None
 ) -> Locus:
     """The locus { q : rank J(q) < min(rows, columns) } as branches without redundant ones.
 
@@ -22,7 +24,7 @@ def sub_determinant_locus(
     is among the open branches.
 
     Args:
-        told: called after each step with what is known.
+        progress: called after each step with what is known.
 
     What differs from the published form: pivots that are numbers are eliminated before minors are formed, minors are
     ordered by their length after simplification, and zero is decided exactly.
@@ -51,8 +53,8 @@ def sub_determinant_locus(
             accepted.append(branch)
         else:
             waiting += sorted(children, key=lambda child: -len(child.relations))
-        if told is not None:
-            told(Locus(tuple(unique(accepted)), tuple(unique(waiting))))
+        if progress is not None:
+            progress(Locus(tuple(unique(accepted)), tuple(unique(waiting))))
     return Locus(tuple(exact.without_redundant(accepted)), tuple(unique(waiting)))
 
 

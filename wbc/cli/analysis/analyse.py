@@ -177,7 +177,7 @@ def _one_set(
     if how is not None:
         proof = certified(model, robot, name, task, rows, how, _PROOF * budget.seconds / 60.0)
     early = functools.partial(_known, name)
-    found = analyse(model, task, rows, algorithm=algorithm, budget=budget, certificate=proof, told=early)
+    found = analyse(model, task, rows, algorithm=algorithm, budget=budget, certificate=proof, progress=early)
     _show(name, found, latex, budget)
     entry = _record(name, found)
     if proof is not None:
@@ -248,10 +248,10 @@ def _show(name: str, found: Analysis, latex: bool, budget: Budget) -> None:
 def _determinant(found: Analysis, latex: bool, seconds: float) -> str:
     """The determinant in factors, if it takes no longer than this."""
     with Child(
-        lambda tell: tell(factored_determinant(found.exact, found.augmented).text(latex=latex)), seconds
+        lambda report: report(factored_determinant(found.exact, found.augmented).text(latex=latex)), seconds
     ) as work:
         work.wait(seconds)
-        return str(work.told[0]) if work.told else "not expanded within the minutes"
+        return str(work.reports[0]) if work.reports else "not expanded within the minutes"
 
 
 def _record(name: str, found: Analysis) -> dict[str, Any]:

@@ -87,13 +87,13 @@ def certified_tree(
     with progress_bar() as bar:
         shown: dict[str, TaskID] = {}
 
-        def told(block: JointBlock, part: float) -> None:
+        def within(block: JointBlock, part: float) -> None:
             if str(block) not in shown:
                 shown[str(block)] = bar.add_task(f"{name}, {block}, decided", total=1.0)
             bar.update(shown[str(block)], completed=part)
 
         state = how.state(robot, name)
-        found = certify_blocks(model, one.task, one.constraints, minutes=minutes, state=state, progress=told)
+        found = certify_blocks(model, one.task, one.constraints, minutes=minutes, state=state, progress=within)
     console = out()
     where = {True: " everywhere", False: " outside the tubes of the blocks"}[found.everywhere]
     said = {"complete": where, "undecided": f": {found.left:.3g} of the volume is left", "incomplete": ""}

@@ -135,17 +135,22 @@ class Adviser:
         self._exact = validation.flag("exact", exact)
         groups: dict[_Group, int] = {}
         self._braked = [braked(robot, pair) for pair in given]
-        self._places = np.array([[groups.setdefault(g, len(groups)) for g in _groups(some)] for some in self._braked])
+        self._group_numbers = np.array(
+            [[groups.setdefault(g, len(groups)) for g in _groups(some)] for some in self._braked]
+        )
         self.conditioning = Conditioning(
             robot, [g[0] for g in groups], brakes=[g[1] for g in groups], length=length, backend=backend
         )
         self._names = list(self.pairs)
-        self._wholes = self.conditioning.chosen(self._places[:, 0].tolist())
-        self._wholes_and_tasks = self.conditioning.chosen(self._places[:, :2].ravel().tolist())
+        self._wholes = self.conditioning.chosen(self._group_numbers[:, 0].tolist())
+        self._wholes_and_tasks = self.conditioning.chosen(self._group_numbers[:, :2].ravel().tolist())
         alike = [[k for k, other in enumerate(given) if other.task == pair.task] for pair in given]
         #: Of each pair: those with its task, itself among them, and singular values of all these and of the task
         self._siblings = {
-            pair.name: (some, self.conditioning.chosen([*self._places[some, 0].tolist(), int(self._places[k, 1])]))
+            pair.name: (
+                some,
+                self.conditioning.chosen([*self._group_numbers[some, 0].tolist(), int(self._group_numbers[k, 1])]),
+            )
             for k, (pair, some) in enumerate(zip(given, alike, strict=True))
         }
 
@@ -176,12 +181,12 @@ class Adviser:
         sigmas, slopes, _ = self.conditioning.slopes(q)
         lost: dict[int, float] = {}
         out = []
-        for (whole, task, constraint), name, some in zip(self._places, self._names, self._braked, strict=True):
+        for (whole, task, constraint), name, some in zip(self._group_numbers, self._names, self._braked, strict=True):
             known = closed_form(self.robot, self.pairs[name]) if self._exact else None
             distance, basis, direction, locus = self._nearest(q, float(sigmas[whole]), slopes[whole], known)
             for group in (whole, task, constraint):
                 if group not in lost:
-                    lost[group] = self._way(q, group, float(sigmas[group]), slopes[group])
+                    lost[group] = self._distance_to_loss(q, group, float(sigmas[group]), slopes[group])
             pair = min(lost[whole], distance) if basis is Basis.EXACT else lost[whole]
             # Brakes by themselves do not depend on each other
             held = lost[constraint] if some.held else np.inf
@@ -227,7 +232,7 @@ class Adviser:
         own = constraint < self.near and NEARER * constraint <= pair
         return Condition.CONSTRAINT if own else Condition.ALGORITHMIC
 
-    def _way(self, q: Array, group: int, sigma: float, slope: Array) -> float:
+    def _distance_to_loss(self, q: Array, group: int, sigma: float, slope: Array) -> float:
         """How far it is to a configuration where a group has lost a rank, by Newton's method; inf beyond ``near``."""
         scale = self.conditioning.dof_scale
         here, gone = q, np.zeros(self.robot.nv)

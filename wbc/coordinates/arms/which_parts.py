@@ -15,7 +15,7 @@ from wbc.robot import Robot
 from wbc.robots import load
 from wbc.robots.operator_arms import OPERATOR_ARMS
 
-#: Robots whose parts are kept
+#: Robots whose parts are cached
 KEPT = 32
 
 

@@ -22,7 +22,7 @@ from wbc.symbolic.kinematics import Kinematics
 from wbc.symbolic.tracer import Tracer
 from wbc.validation import Array
 
-#: Pairs whose functions are kept
+#: Pairs whose functions are cached
 KEPT = 64
 
 

@@ -30,7 +30,7 @@ STATES = 64
 class _Part:
     """A pair's share: rows and columns of its matrix, the threshold of sigma, and lambda at most."""
 
-    place: tuple[Array, Array]
+    entries: tuple[Array, Array]
     least: float
     most: float
 
@@ -67,18 +67,18 @@ class Easing:
         native: bool = True,
     ) -> None:
         self._rates = rates
-        rows, columns = scales(robot, rates.places)
+        rows, columns = scales(robot, rates.row_slices)
         self._scales = rows[:, None] * columns
         self._least = LeastSingular(native=native)
         usual = np.array([self._scales * rates.whole(q) for q in states_of(robot, STATES)])
         self._parts = {pair.name: self._part(robot, pair, rows, length, usual) for pair in pairs}
-        #: The pair, the matrix of all coordinates and the interval of the singular value looked at last
-        self._name, self._room = "", 0.0
+        #: The pair, the matrix of all coordinates and how far its singular value was above the threshold
+        self._name, self._margin = "", 0.0
         self._matrix, self._change = np.zeros_like(self._scales), np.zeros_like(self._scales)
         self._flat = self._change.ravel()
 
     def at(self, name: str, every: Array) -> float:
-        """lambda^2 of a pair where the rates of all coordinates have the matrix ``every``, which is kept.
+        """lambda^2 of a pair where the rates of all coordinates have the matrix ``every``, which is not copied.
 
         Singular values are computed only where they may be below the threshold: from one matrix to another none
         changes by more than the Frobenius norm of the difference (H. Weyl, 1912), that of all coordinates' rows for
@@ -87,17 +87,17 @@ class Easing:
         if name == self._name:
             np.subtract(every, self._matrix, out=self._change)
             self._change *= self._scales
-            if sqrt(self._flat.dot(self._flat)) < self._room:
+            if sqrt(self._flat.dot(self._flat)) < self._margin:
                 return 0.0
         part = self._parts[name]
         sigma = self.sigma(name, every)
-        self._name, self._matrix, self._room = name, every, sigma - CLEAR * part.least
+        self._name, self._matrix, self._margin = name, every, sigma - CLEAR * part.least
         return _weight(sigma, part)
 
     def sigma(self, name: str, every: Array) -> float:
         """The least singular value of a pair's scaled rows."""
         part = self._parts[name]
-        return self._least((self._scales * every)[part.place])
+        return self._least((self._scales * every)[part.entries])
 
     def weight(self, name: str, sigma: float) -> float:
         """lambda^2 of a pair with a least singular value."""
@@ -108,17 +108,17 @@ class Easing:
         return self._parts[name].least
 
     def _part(self, robot: Robot, pair: CoordinatePair, scale: Array, length: float, usual: Array) -> _Part:
-        some, places = braked(robot, pair), self._rates.places
+        some, slices = braked(robot, pair), self._rates.row_slices
         task, held = (
-            np.r_[tuple(places[one] for one in side)] if side else np.zeros(0, dtype=int)
-            for side in (some.task, some.held)
+            np.r_[tuple(slices[one] for one in part)] if part else np.zeros(0, dtype=int)
+            for part in (some.task, some.held)
         )
         rows = np.concatenate((task, held)).astype(int)
-        place = rows[:, None], np.array(free_joints(robot, some.joints))
-        sigma = np.linalg.svd(usual[(slice(None), *place)], compute_uv=False)[:, -1]
+        entries = rows[:, None], np.array(free_joints(robot, some.joints))
+        sigma = np.linalg.svd(usual[(slice(None), *entries)], compute_uv=False)[:, -1]
         least = min(LEAST, PART * float(np.median(sigma)))
         metres = [1.0 / scale[k] for k in task if self._rates.units[k] == "m"]
-        return _Part(place, least, 0.5 * least * min(1.0, min(metres, default=length) / length))
+        return _Part(entries, least, 0.5 * least * min(1.0, min(metres, default=length) / length))
 
 
 def _weight(sigma: float, part: _Part) -> float:

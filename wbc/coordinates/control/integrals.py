@@ -34,12 +34,12 @@ class RateIntegrals:
     """
 
     def __init__(self, robot: Robot, rates: RateMatrices) -> None:
-        self._model, self._places = robot.model, rates.places
+        self._model, self._slices = robot.model, rates.row_slices
         self._plain = robot.nq == robot.nv
         self._mask = np.zeros(len(rates.units))
-        for one, rows in rates.places.items():
+        for one, rows in rates.row_slices.items():
             self._mask[rows] = expressions.rate_only(robot, one)
-        self.masked = {one for one, rows in rates.places.items() if self._mask[rows].any()}
+        self.masked = {one for one, rows in rates.row_slices.items() if self._mask[rows].any()}
         self.off = np.zeros(len(self._mask))
         self.rows: Rows = np.zeros(0, dtype=np.intp)
         #: Where the robot was, the matrix of all rows there, and what the rows were to go from there
@@ -55,7 +55,7 @@ class RateIntegrals:
     def restart(self, rows: Iterable[Coordinate]) -> None:
         """Some coordinates count from here on."""
         for one in rows:
-            self.off[self._places[one]] = 0.0
+            self.off[self._slices[one]] = 0.0
 
     def follow(self, rows: Rows) -> None:
         """Another pair is active; what it has not planned yet does not count until the tick after the next one."""

@@ -154,7 +154,7 @@ class PairController:
     def switch(self, name: str, seconds: float = 1.0) -> float:
         """Make another pair the active one; returns the time of the blend [s].
 
-        Coordinates that are commanded in both pairs, or kept in both, keep their rates; those of all others are zero.
+        Coordinates that are commanded in both pairs, or held in both, keep their rates; those of all others are zero.
 
         Raises:
             UnknownNameError: no such pair. RangeError: a negative time.
@@ -163,10 +163,10 @@ class PairController:
         wanted = validation.scalar("seconds", seconds, low=0.0, unit="s")
         if name == self.active:
             return 0.0
-        before, was, places = self._held(), self.pair, self._rates.places
+        before, was, slices = self._held(), self.pair, self._rates.row_slices
         self.active = name
         alike = {*(set(was.task) & set(self.pair.task)), *(set(was.constraint) & set(self.pair.constraint))}
-        for one, rows in places.items():
+        for one, rows in slices.items():
             if one not in alike:
                 self._command[rows] = 0.0
         self._fading[:] = 0.0
@@ -177,7 +177,7 @@ class PairController:
                 if not (one in before and one in self.pair.constraint):
                     # A task that goes on lags by what it was asked for, not by how that has changed since
                     asked = self._served if one in alike and one in was.task else self._command
-                    self._fading[places[one]] = now[places[one]] - asked[places[one]]
+                    self._fading[slices[one]] = now[slices[one]] - asked[slices[one]]
             wanted = max(wanted, self._shortest(self._q, v))
             self._latch([one for one in self.pair.constraint if one not in before], self._q)
         self._integrals.restart(self.pair.task)
@@ -200,7 +200,7 @@ class PairController:
             ShapeError, NotFiniteError, RotationError: no configuration.
         """
         whole = self._rates.whole(self.robot.configuration("q", q))
-        return {one: whole[rows] for one, rows in self._rates.places.items()}
+        return {one: whole[rows] for one, rows in self._rates.row_slices.items()}
 
     def step(self, q: Any, v: Any = None, dt: Any = None) -> Step:
         """One cycle: the velocity for the next dt seconds, see :meth:`wbc.Controller.step`.
@@ -225,7 +225,7 @@ class PairController:
             now.write(self.controller, self._served)
         if self._moving:
             self._latch(self._moving, q)
-            self._moving = tuple(one for one in self._moving if self._served[self._rates.places[one]].any())
+            self._moving = tuple(one for one in self._moving if self._served[self._rates.row_slices[one]].any())
         if now.integral_rows.size:
             self._integrals.plan(now.integral_rows, self._q, every, self._served, period)
             now.write_integrals(self.controller, self._integrals)
@@ -258,19 +258,19 @@ class PairController:
 
     def _mark_moving(self) -> None:
         """Constraint coordinates that have rates, or had them in the last tick."""
-        places = self._rates.places
+        slices = self._rates.row_slices
         busy = [
-            one for one in self.pair.constraint if self._command[places[one]].any() or self._served[places[one]].any()
+            one for one in self.pair.constraint if self._command[slices[one]].any() or self._served[slices[one]].any()
         ]
         self._moving = tuple(dict.fromkeys((*self._moving, *busy)))
 
     def _held(self) -> set[Coordinate]:
         """Constraint coordinates that are at rest."""
-        places = self._rates.places
+        slices = self._rates.row_slices
         moving = self._command != 0.0
         if self.blending:
             moving |= self._fading != 0.0
-        return {one for one in self.pair.constraint if not moving[places[one]].any()}
+        return {one for one in self.pair.constraint if not moving[slices[one]].any()}
 
     def _activate(self) -> None:
         """Switch the items of the active pair on and all others off."""

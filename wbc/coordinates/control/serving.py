@@ -1,4 +1,4 @@
-"""What the tick of one pair writes, and where: places in flat arrays and in the controller's buffer."""
+"""What the tick of one pair writes, and where: positions in flat arrays and in the controller's buffer."""
 
 from __future__ import annotations
 
@@ -60,10 +60,10 @@ def served(
 ) -> Served:
     """What the tick of a pair writes; ``masked``: coordinates that have integrals."""
     blocks = core_of(controller).layout.blocks
-    places = rates.places
+    slices = rates.row_slices
     follow = {one: declared.follow[one, metric_of(pair, one)] for one in pair.task}
     keep = {one: declared.keep[one] for one in pair.constraint}
-    tall = sum(places[one].stop - places[one].start for one in pair.rows) > rates.robot.nv
+    tall = sum(slices[one].stop - slices[one].start for one in pair.rows) > rates.robot.nv
     items = follow | keep
     offsets = [] if tall else [one for one in pair.task if one in masked]
     drifts = [one for one in pair.constraint if one in masked]
@@ -72,14 +72,14 @@ def served(
         frozenset(items.values()),
         _rows(rates, pair.task),
         _rows(rates, pair.constraint),
-        tuple((blocks[name].slots["speed"], places[one]) for one, name in items.items()),
+        tuple((blocks[name].slots["speed"], slices[one]) for one, name in items.items()),
         _rows(rates, counted),
-        tuple((blocks[follow[one]].slots["offset"], places[one]) for one in offsets),
-        tuple((blocks[keep[one]].slots[DRIFT], places[one]) for one in drifts),
+        tuple((blocks[follow[one]].slots["offset"], slices[one]) for one in offsets),
+        tuple((blocks[keep[one]].slots[DRIFT], slices[one]) for one in drifts),
     )
 
 
 def _rows(rates: RateMatrices, some: tuple[Coordinate, ...] | list[Coordinate]) -> Rows:
     """Numbers of the rows of some coordinates."""
-    found = [np.arange(rates.places[one].start, rates.places[one].stop) for one in some]
+    found = [np.arange(rates.row_slices[one].start, rates.row_slices[one].stop) for one in some]
     return np.concatenate([np.zeros(0, dtype=np.intp), *found])

@@ -29,7 +29,7 @@ from wbc.validation import Array
 FIRST, ROUNDS = 64, 40
 #: A joint goes this far at most [rad, m]: the path is sampled closely all along
 FARTHEST = 1e3
-#: Functions of rows that are kept
+#: Functions of rows that are cached
 KEPT = 64
 #: A pair is regular between two samples if its rows change by less than this part of its least singular value there
 SAFE = 0.5
@@ -168,7 +168,7 @@ class _Search:
         self._rows, self._columns = scales(robot, every)
         self._system = [(one, starts[one] + k, k) for one in reversed(bodies) for k in range(6)]
         self._pairs, self._given = list(pairs), len(pairs)
-        self._places = [[starts[one] + k for one in pair.rows for k in range(sizes[one])] for pair in pairs]
+        self._rows_of_pairs = [[starts[one] + k for one in pair.rows for k in range(sizes[one])] for pair in pairs]
         self._kept: dict[float, Array] = {}
 
     def legs(self) -> list[tuple[CoordinatePair, int, float, float, float]]:
@@ -200,9 +200,9 @@ class _Search:
         value at the samples [pairs, samples]).
         """
         whole = np.array([self._matrix(s) for s in grid])
-        count = len(self._places)
+        count = len(self._rows_of_pairs)
         sigma, change = np.zeros((count, len(grid))), np.zeros((count, len(grid) - 1))
-        for k, rows in enumerate(self._places):
+        for k, rows in enumerate(self._rows_of_pairs):
             J = whole[:, rows]
             sigma[k] = np.linalg.svd(J, compute_uv=False)[:, -1]
             change[k] = np.linalg.norm(np.diff(J, axis=0), axis=(1, 2))
@@ -250,7 +250,7 @@ class _Search:
         singles = [_single(one, k) for one, _, k in chosen]
         number = len(self._pairs) - self._given + 1
         self._pairs.append(CoordinatePair(singles[:split], singles[split:], f"system coordinates {number}"))
-        self._places.append([row for _, row, _ in chosen])
+        self._rows_of_pairs.append([row for _, row, _ in chosen])
 
 
 def _single(one: BodyRows, k: int) -> BodyRows:

@@ -96,7 +96,7 @@ def _part(path: Path, start: float, end: float, sizes: tuple[Array, Array, Array
 
 
 def _slower(law: Law, sizes: tuple[Array, Array, Array] | None = None) -> float:
-    """The factor of time at which the limits are just kept, at least 1."""
+    """The factor of time at which the limits are just satisfied, at least 1."""
     if sizes is not None:
         from wbc.trajectory.laws.limits import MotionLimits
 

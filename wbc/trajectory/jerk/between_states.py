@@ -93,10 +93,10 @@ def limits_of(dof: int, velocity: Any, acceleration: Any, jerk: Any, lower: Any,
     if (lower is None) != (upper is None):
         lower = -np.inf if lower is None else lower
         upper = np.inf if upper is None else upper
-    places = {} if lower is None else {"lower": _for_all("limits.lower", lower, dof)}
+    positions = {} if lower is None else {"lower": _for_all("limits.lower", lower, dof)}
     if upper is not None:
-        places["upper"] = _for_all("limits.upper", upper, dof)
-    return MotionLimits(**sizes, **places)
+        positions["upper"] = _for_all("limits.upper", upper, dof)
+    return MotionLimits(**sizes, **positions)
 
 
 def sizes_of(limits: MotionLimits) -> tuple[Array, Array, Array]:
@@ -113,9 +113,9 @@ def _for_all(name: str, value: Any, dof: int, finite: bool = False) -> Array:
 
 
 def _state(name: str, position: Any, velocity: Any, acceleration: Any, dof: int | None) -> Array:
-    place = np.atleast_1d(validation.ordinary_array(name, position))
-    shape = (len(place) if dof is None else dof,)
-    rows = [validation.ordinary_array(name, place, shape)]
+    given = np.atleast_1d(validation.ordinary_array(name, position))
+    shape = (len(given) if dof is None else dof,)
+    rows = [validation.ordinary_array(name, given, shape)]
     for part, value in (("velocity", velocity), ("acceleration", acceleration)):
         rows.append(np.zeros(shape) if value is None else validation.ordinary_array(f"{name}_{part}", value, shape))
     return np.stack(rows)

@@ -5,9 +5,9 @@ With x = (ds/dt)^2 and y = d2s/dt2 over the path coordinate s, dx/ds = 2 y, and
     dq/dt = q' sqrt(x),    d2q/dt2 = q'' x + q' y,    d3q/dt3 = sqrt(x) (q''' x + 3 q'' y + q' dy/ds)
 
 Velocities and accelerations bound x and y linearly. The jerk's limit J / sqrt(x) is convex in x, so its tangent at any
-speed lies below it: what keeps the tangent keeps the limit, and the tangent at the last solution leaves a margin for a
-faster one. Between grid points y is linear in u, where s = start + L g(u): beside rest s goes with u^3 and constant
-jerk makes y go with u. So dx/du = 2 y L g'(u) is integrated exactly.
+speed lies below it: what satisfies the tangent satisfies the limit, and the tangent at the last solution leaves a
+margin for a faster one. Between grid points y is linear in u, where s = start + L g(u): beside rest s goes with u^3
+and constant jerk makes y go with u. So dx/du = 2 y L g'(u) is integrated exactly.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ PLACES = np.array([0.0, 0.25, 0.5, 0.75, 1.0])
 
 @dataclass(frozen=True, eq=False)
 class Stretch:
-    """A smooth part of a path between two places at which it is at rest, on a grid.
+    """A smooth part of a path between two points at which it is at rest, on a grid.
 
     Attributes:
         u: grid in [0, 1]; s: its path coordinates, knots of the path among them. limits: velocity, acceleration, jerk.
@@ -67,7 +67,7 @@ class Stretch:
         s[[0, -1]] = start, end
         return cls(path, u, s, limits)
 
-    def places(self, place: float) -> Array:
+    def coordinates(self, place: float) -> Array:
         """Coordinates at a place in [0, 1] of every cell."""
         if place in (0.0, 1.0):
             return self.s[int(place) :][: len(self.s) - 1]
@@ -77,7 +77,7 @@ class Stretch:
     def derivatives(self, place: float) -> tuple[Array, Array, Array]:
         """q', q'', q''' there: cells x n."""
         piece = self.path.pieces_at(0.5 * (self.s[1:] + self.s[:-1]))
-        first, second, third = (self.path.evaluate(self.places(place), order, piece) for order in (1, 2, 3))
+        first, second, third = (self.path.evaluate(self.coordinates(place), order, piece) for order in (1, 2, 3))
         return first, second, third
 
     def gained(self, place: float) -> Array:
@@ -130,7 +130,7 @@ def fastest(stretch: Stretch) -> Timing:
         timing = _timing(stretch, x, y)
         ratios = _ratios(stretch, timing)
         loss = max(1.0, *(float(r.max()) ** (1.0 / order) for order, r in enumerate(ratios, 1)))
-        # Cells in which more is used between the places that the program looks at are given less
+        # Cells in which more is used between the points that the program looks at are given less
         shares = np.minimum(shares * np.clip(0.9999 / ratios, 0.8, 1.01), 1.0)
         gained = 1.0 - timing.duration * loss / least
         if gained > 0.0:
@@ -149,13 +149,13 @@ def _first(stretch: Stretch) -> tuple[Array, Array]:
     rows = []
     for point, jerk, span in zip(course.points(), course.jerks, course.spans, strict=False):
         rows += [moved(point, jerk, t) for t in np.linspace(0.0, span, 200)]
-    places, speeds, pushes = np.array(rows).T
+    at, speeds, pushes = np.array(rows).T
     # Beside rest an interpolated speed is far too low
     near = np.minimum(s, s[-1] - s)
-    x = np.interp(s, places, speeds) ** 2
+    x = np.interp(s, at, speeds) ** 2
     least = 0.5 * x.max() * (near / s[-1]) ** (4.0 / 3.0)
     low = x < least
-    return np.where(low, least, x), np.where(low, 0.0, np.interp(s, places, pushes))
+    return np.where(low, least, x), np.where(low, 0.0, np.interp(s, at, pushes))
 
 
 def _program(stretch: Stretch, x0: Array, y0: Array, shares: Array) -> tuple[Array, Array]:

@@ -149,7 +149,7 @@ def _in_time(task: StateTask, duration: float, longest: float) -> bool:
 
 
 def arrives(task: StateTask, i: int, course: Course) -> bool:
-    """Whether a joint's course ends in its target, to rounding, and keeps its limits of velocity and acceleration."""
+    """Whether a joint's course ends in its target, to rounding, and satisfies its limits of speed and acceleration."""
     length, tau = task.joint(i).units
     here, there = course.points()[-1], task.points(i)[1]
     v, a = float(task.velocity[i]), float(task.acceleration[i])

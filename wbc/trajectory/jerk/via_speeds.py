@@ -20,7 +20,7 @@ SETTLED = 1e-13
 
 @dataclass(frozen=True)
 class SpeedBounds:
-    """What the generator keeps: largest speed [m/s], acceleration [m/s^2], distance from a corner [m]."""
+    """Limits of the generator: largest speed [m/s], acceleration [m/s^2], distance from a corner [m]."""
 
     speed: float
     acceleration: float

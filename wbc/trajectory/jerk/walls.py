@@ -76,9 +76,9 @@ class Walls:
         self._pack = Struct(f"{len(self.state)}d").pack_into
         self._ticks_clear = Kernel(self._ticks(), self.state)
 
-    def contain(self, place: list[float]) -> bool:
+    def contain(self, position: list[float]) -> bool:
         """Whether a position is within; not if a number of it is none or infinite."""
-        for x, (low, high) in zip(place, self._bounds, strict=True):  # noqa: SIM110 (a generator takes twice as long)
+        for x, (low, high) in zip(position, self._bounds, strict=True):  # noqa: SIM110 (a generator takes twice as long)
             if not low <= x <= high:
                 return False
         return True
@@ -102,22 +102,22 @@ class Walls:
         with W = V + A^2/j at least w, its change is at most 3 (W + A^2/j) dt and that of the position W dt.
         """
         state = ca.SX.sym("state", 3 * len(self._rows))
-        place, rate, push = ca.vertsplit(state, len(self._rows))
+        position, rate, push = ca.vertsplit(state, len(self._rows))
         clearances = []
         for i, (near_low, near_high, low, high, most, slow, ramp, soft) in enumerate(self._rows):
             size = ca.fabs(push[i])
             speed = ca.fabs(rate[i]) + 0.5 * soft * size * size
             stop = speed * (speed * slow + ramp + size * soft) - TOLERANCE
-            far = ca.fmin(place[i] - near_low, near_high - place[i]) / self._changes[0][i]
-            left = ca.fmin(place[i] - low - stop, high - stop - place[i]) / self._changes[1][i]
+            far = ca.fmin(position[i] - near_low, near_high - position[i]) / self._changes[0][i]
+            left = ca.fmin(position[i] - low - stop, high - stop - position[i]) / self._changes[1][i]
             clearances.append(ca.if_else(size > most * (1.0 + SHARE), -1.0, ca.fmax(far, left)))
         return ca.Function("ticks", [state], [ca.fmin(ca.mmin(ca.vertcat(*clearances)), TICKS)])
 
-    def nearest(self, place: list[float]) -> list[float]:
+    def nearest(self, position: list[float]) -> list[float]:
         """The nearest position within."""
         return [
             low if x < low else high if x > high else x
-            for x, low, high in zip(place, self._low, self._high, strict=True)
+            for x, low, high in zip(position, self._low, self._high, strict=True)
         ]
 
     def guard(

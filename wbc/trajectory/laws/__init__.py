@@ -1,1 +1,1 @@
-"""Laws of motion: a path and its timing, what limits it keeps, as a file and as a plot."""
+"""Laws of motion: a path and its timing, what limits it satisfies, as a file and as a plot."""

@@ -58,7 +58,7 @@ def around(steepest: Array) -> Array:
 def highest(span: Array, evaluate: Callable[[Index, int], Array], count: int, rounds: int = ROUNDS) -> Highest:
     """The highest value of functions over pieces of time.
 
-    ``evaluate``: numbers of pieces, and a count -> samples at count + 1 places of each, pieces x places x numbers.
+    ``evaluate``: numbers of pieces, and a count -> samples at count + 1 points of each, pieces x points x numbers.
     Pieces in which more than :data:`CLOSE` above the highest sample may lie are sampled more densely.
     """
     pieces = np.arange(len(span))

@@ -1,4 +1,4 @@
-"""How much of its limits a law uses, at the worst place, bounded from above.
+"""How much of its limits a law uses, at the worst time, bounded from above.
 
 For piecewise polynomial paths and timings each derivative of each joint is a polynomial between breaks. Its Bernstein
 coefficients bound it, and are halved until the bound is within 1e-13 of a value that is taken: ``exact``. Else the law
@@ -16,6 +16,7 @@ import numpy as np
 
 from wbc import validation
 from wbc.errors import ShapeError
+from wbc.renamed import renamed
 from wbc.trajectory.laws.between import Highest, highest
 from wbc.trajectory.laws.limits import MotionLimits
 from wbc.trajectory.laws.timing import Timing
@@ -28,7 +29,7 @@ Kind = Literal["exact", "sampled", "unbounded"]
 #: Quantity -> order of its derivative
 ORDERS = {"position": 0, "velocity": 1, "acceleration": 2, "jerk": 3}
 
-#: What `exact` calls kept
+#: What `exact` calls satisfied
 TOLERANCE = 1e-6
 
 #: Intervals between samples of checks in each piece
@@ -53,7 +54,7 @@ class Check(Protocol):
     def columns(self) -> int: ...
 
     def ratios(self, position: Array, velocity: Array, acceleration: Array) -> Array:
-        """m x k numbers that are at most 1 where the limits are kept, at m states (m x n, or m x 4 x 4)."""
+        """m x k numbers that are at most 1 where the limits are satisfied, at m states (m x n, or m x 4 x 4)."""
         ...
 
 
@@ -91,9 +92,10 @@ class Worst:
     spacing: float = 0.0
 
 
+@renamed(kept="satisfied")
 @dataclass(frozen=True)
 class LawCertificate:
-    """Worst places by quantity: ``position``, ``velocity``, ``acceleration``, ``jerk``, and what else was asked for.
+    """Worst ratios by quantity: ``position``, ``velocity``, ``acceleration``, ``jerk``, and what else was requested.
 
     Quantities without a limit are not in it, but for jerk, which is in it as ``unbounded`` where accelerations jump.
 
@@ -110,8 +112,8 @@ class LawCertificate:
         return max((w.ratio for name, w in self.worst.items() if name in self.limited), default=0.0)
 
     @property
-    def kept(self) -> bool:
-        """Whether every limit is kept within 1e-6; where it was sampled, with what may lie between."""
+    def satisfied(self) -> bool:
+        """Whether every limit is satisfied within 1e-6; where it was sampled, with what may lie between."""
         return self.ratio <= 1.0 + TOLERANCE
 
     def __str__(self) -> str:
@@ -145,14 +147,14 @@ class LawPieces:
         return cls(start, span, pieces, path.pieces_at(timing.evaluate(middle, 0, pieces)))
 
     def at(self, path: Path, timing: Timing, order: int, u: Array) -> Array:
-        """A derivative of the law at places u in [0, 1] of every piece: pieces x places x n."""
-        count, places = len(self.start), len(u)
+        """A derivative of the law at u in [0, 1] of every piece: pieces x samples x n."""
+        count, samples = len(self.start), len(u)
         times = (self.start[:, None] + self.span[:, None] * u).ravel()
-        on_timing, on_path = np.repeat(self.timing, places), np.repeat(self.path, places)
+        on_timing, on_path = np.repeat(self.timing, samples), np.repeat(self.path, samples)
         s = [timing.evaluate(times, k, on_timing) for k in range(order + 1)]
         s[0] = np.clip(s[0], path.knots[on_path], path.knots[on_path + 1])
         out = chain(path, s, on_path, order)
-        return out.reshape(count, places, *out.shape[1:])
+        return out.reshape(count, samples, *out.shape[1:])
 
     def some(self, numbers: Index) -> LawPieces:
         """Those of some numbers."""
@@ -160,8 +162,8 @@ class LawPieces:
 
     def states(self, path: Path, timing: Timing, count: int = SAMPLES) -> list[Array]:
         """Position, velocity and acceleration at both ends and between, count + 1 times in every piece."""
-        places = np.linspace(0.0, 1.0, count + 1)
-        parts = [self.at(path, timing, order, places) for order in (0, 1, 2)]
+        u = np.linspace(0.0, 1.0, count + 1)
+        parts = [self.at(path, timing, order, u) for order in (0, 1, 2)]
         return [part.reshape(-1, *part.shape[2:]) for part in parts]
 
 
@@ -187,7 +189,7 @@ def certify(
     samples: int = 16,
     moving: tuple[bool, bool] = (False, False),
 ) -> LawCertificate:
-    """Worst places of a law; ``samples``: of each piece, at first, where it is no polynomial or one of a degree above
+    """Worst ratios of a law; ``samples``: of each piece, at first, where it is no polynomial or one of a degree above
     24; ``moving``: as of the law.
     """
     pieces = LawPieces.of(path, timing)
@@ -220,12 +222,12 @@ def certify(
 def _sampling(
     path: Path, timing: Timing, pieces: LawPieces, order: int, scaled: Callable[[Array], Array]
 ) -> Callable[[Index, int], Array]:
-    """Numbers of pieces, and a count -> what is to be at most 1, at count + 1 places of each."""
+    """Numbers of pieces, and a count -> what is to be at most 1, at count + 1 points of each."""
     return lambda some, count: scaled(pieces.some(some).at(path, timing, order, np.linspace(0.0, 1.0, count + 1)))
 
 
 def checked(path: Path, timing: Timing, pieces: LawPieces, check: Check) -> Worst:
-    """The worst place of a quantity that is known by its values, at samples of each piece, more of them at need."""
+    """The worst ratio of a quantity that is known by its values, at samples of each piece, more of them at need."""
 
     def evaluate(some: Index, count: int) -> Array:
         values = check.ratios(*pieces.some(some).states(path, timing, count))
@@ -256,7 +258,7 @@ def _exact(pieces: LawPieces, c: Array, joints: int) -> Worst:
 
 
 def _scaled(name: str, limits: MotionLimits, path: Path) -> Callable[[Array], Array] | None:
-    """Values of a quantity -> numbers that are at most 1 where its limits are kept, both signs side by side."""
+    """Values of a quantity -> numbers that are at most 1 where its limits are satisfied, both signs side by side."""
     if name != "position":
         limit = getattr(limits, name)
         return None if limit is None else lambda x: np.concatenate([x / limit, -x / limit], axis=-1)

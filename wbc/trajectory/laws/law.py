@@ -1,4 +1,4 @@
-"""A law: where a robot is at every time, with velocity and acceleration, and a certificate of the limits it keeps."""
+"""A law: position, velocity and acceleration at every time, and a certificate of the limits it satisfies."""
 
 from __future__ import annotations
 
@@ -120,7 +120,7 @@ class Law:
         pieces = self.path.pieces_at(s[0])
         last = times >= self.duration
         speed = s[1] if len(s) > 1 else self.timing.evaluate(times, 1)
-        # At rest, the acceleration tells where it goes, or where it came from
+        # At rest, the acceleration says where it goes, or where it came from
         speed = np.where(speed == 0.0, np.where(last, -1.0, 1.0) * self.timing.evaluate(times, 2), speed)
         back = (speed < 0.0) ^ (last & (speed != 0.0))
         return np.where(back, self.path.pieces_before(s[0], pieces), pieces)
@@ -178,7 +178,7 @@ class Law:
         return Law(path, self.timing.then(other.timing, path.shift), self.limits, self.checks, moving)
 
     def save(self, file: str | os.PathLike[str]) -> None:
-        """Into a file, from which ``wbc.trajectory.load`` makes the same law; ``checks`` are not kept.
+        """Into a file, from which ``wbc.trajectory.load`` makes the same law; ``checks`` are not stored.
 
         Raises:
             LawFileError: the file cannot be written, or the path is of a kind that files do not hold.

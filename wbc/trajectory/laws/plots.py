@@ -30,7 +30,7 @@ _PER = {"position": "", "velocity": "/s", "acceleration": "/s²", "jerk": "/s³"
 
 @dataclass(frozen=True, eq=False)
 class Panel:
-    """Curves of one quantity, times x curves, with their limits, and the worst place among them, if it is here."""
+    """Curves of one quantity, times x curves, with their limits, and the worst time among them, if it is here."""
 
     title: str
     unit: str

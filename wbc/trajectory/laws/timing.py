@@ -57,17 +57,17 @@ class Timing:
         Raises:
             ShapeError, NotFiniteError: not two vectors of one length. RangeError: s does not increase, or bad speeds.
         """
-        places = validation.ordinary_array("timing.s", s)
-        if places.ndim != 1 or len(places) < 2:
+        positions = validation.ordinary_array("timing.s", s)
+        if positions.ndim != 1 or len(positions) < 2:
             raise ShapeError("timing.s", s, "expected at least two numbers")
-        speeds = validation.ordinary_array("timing.speed", speed, places.shape)
-        if (np.diff(places) <= 0.0).any():
+        speeds = validation.ordinary_array("timing.speed", speed, positions.shape)
+        if (np.diff(positions) <= 0.0).any():
             raise RangeError("timing.s", s, "must increase strictly")
         mean = 0.5 * (speeds[:-1] + speeds[1:])
         if (speeds < 0.0).any() or (mean <= 0.0).any():
             raise RangeError("timing.speed", speed, "must not be negative, nor 0 at both ends of an interval")
-        times = np.concatenate([[0.0], np.cumsum(np.diff(places) / mean)])
-        return cls(times, [0.5 * np.diff(speeds) / np.diff(times), speeds[:-1], places[:-1]])
+        times = np.concatenate([[0.0], np.cumsum(np.diff(positions) / mean)])
+        return cls(times, [0.5 * np.diff(speeds) / np.diff(times), speeds[:-1], positions[:-1]])
 
     @property
     def duration(self) -> float:
@@ -171,15 +171,15 @@ class Timing:
             low[i], high[i] = -bernstein.largest(-hull[i : i + 1])[0], bernstein.largest(hull[i : i + 1])[0]
         return low, high
 
-    def crossings(self, places: Array) -> Array:
-        """Times inside pieces at which s passes one of the places, ascending."""
+    def crossings(self, positions: Array) -> Array:
+        """Times inside pieces at which s passes one of the positions, ascending."""
         spans = np.diff(self.times)
         hull = self.hull()
         # What only touches a break is not inside; roots of straight lines are exact
         edge = 1e-12 if self.degree > 1 else 1e-15
         tolerance = edge * (1.0 + np.abs(hull).max(axis=1))
         low, high = hull.min(axis=1) + tolerance, hull.max(axis=1) - tolerance
-        ordered = np.sort(places)
+        ordered = np.sort(positions)
         some = np.searchsorted(ordered, low) < np.searchsorted(ordered, high)
         powers = np.arange(self.degree, -1, -1)
         found = [np.zeros(0)]

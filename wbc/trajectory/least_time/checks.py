@@ -157,7 +157,7 @@ class PoseSpeed:
 class Inequality:
     """F w(q, v, a) <= g for a function w that is affine in a and quadratic in v: contact wrenches, cable forces.
 
-    Its ratio is 1 + (F w - g) / |g|, with 1 in the place of |g| where g = 0.
+    Its ratio is 1 + (F w - g) / |g|, with 1 instead of |g| where g = 0.
 
     Args:
         function: one state -> r numbers. matrix: F, k x r. bound: g, k. name: its entry in the certificate.

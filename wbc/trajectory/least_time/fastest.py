@@ -1,4 +1,4 @@
-"""The fastest timing along a path, on a grid, that keeps limits at its places."""
+"""The fastest timing along a path, on a grid, that satisfies limits at its points."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ class FastestTask:
         corners = _corners(self.path)
         pieces = len(self.path.knots) - 1
         total = count or refined * max(LEAST, PER_PIECE * pieces)
-        places, speeds = [], []
+        points, speeds = [], []
         for k, (first, last) in enumerate(pairwise(corners)):
             share = (self.path.knots[last] - self.path.knots[first]) / self.path.length
             least = min(LEAST_ON_PIECE * refined, max(2, total // pieces))
@@ -80,12 +80,12 @@ class FastestTask:
             start = self.start if k == 0 else 0.0
             end = self.end if last == pieces else 0.0
             speed = self._section(grid, shrunk or Shrunk(), start, end)
-            places.append(grid.s if k == 0 else grid.s[1:])
+            points.append(grid.s if k == 0 else grid.s[1:])
             speeds.append(speed if k == 0 else speed[1:])
-        return Timing.accelerations(np.concatenate(places), np.concatenate(speeds))
+        return Timing.accelerations(np.concatenate(points), np.concatenate(speeds))
 
     def _section(self, grid: Grid, shrunk: Shrunk, start: float, end: float) -> Array:
-        """Path speeds at the places of a grid over one smooth section."""
+        """Path speeds at the points of a grid over one smooth section."""
         rows = self._rows(grid, shrunk)
         _limited(grid, rows)
         # toppra brings matplotlib with it, which takes longer than all else that a command loads
@@ -127,7 +127,7 @@ class FastestTask:
         return PathRows(a.reshape(shape), b.reshape(shape), np.minimum(rest, 1.0).reshape(shape), both=False)
 
     def _squared(self, grid: Grid, shrunk: Shrunk) -> Array:
-        """Upper bounds of the squared path speed at the places of the grid."""
+        """Upper bounds of the squared path speed at the points of the grid."""
         out = np.full(len(grid.s), np.inf)
         first = grid.at_ends(self.path, 1)
         if self.limits.velocity is not None:

@@ -1,6 +1,6 @@
 """The fastest path speeds under rows that are linear in path acceleration and squared path speed: TOPP-RA.
 
-Backwards, the interval of squared speeds from which the end can be reached is found at every place of a grid; forwards,
+Backwards, the interval of squared speeds from which the end can be reached is found at every point of a grid; forwards,
 the largest path acceleration is taken that stays in these intervals (Pham and Pham, "A new approach to time-optimal
 path parameterization based on reachability analysis", IEEE T-RO 34, 2018). toppra solves the small linear programs, in
 units in which lengths, speeds and accelerations are near 1: its tolerances are absolute.
@@ -47,7 +47,7 @@ class _Coefficients(LinearConstraint):  # type: ignore[misc]  # toppra has no ty
 
 @dataclass(frozen=True, eq=False)
 class PathSpeeds:
-    """Path speeds at the places of a grid, or None with the speeds from which the end could be reached.
+    """Path speeds at the points of a grid, or None with the speeds from which the end could be reached.
 
     Attributes:
         speed: N + 1, None where there are none.
@@ -62,8 +62,8 @@ class SpeedProgram:
     """The linear programs of one grid.
 
     Args:
-        s: N + 1 places, increasing. rows: limits at both ends of the N intervals.
-        squared: upper bounds of the squared path speed at the N + 1 places, inf where there is none.
+        s: N + 1 points, increasing. rows: limits at both ends of the N intervals.
+        squared: upper bounds of the squared path speed at the N + 1 points, inf where there is none.
     """
 
     def __init__(self, s: Array, rows: Sequence[PathRows], squared: Array) -> None:

@@ -22,7 +22,7 @@ GRIDS = 4
 #: Rounds of shrinking limits on one grid
 ROUNDS = 6
 
-#: What is kept beyond the tolerance of a certificate
+#: Margin beyond the tolerance of a certificate
 MARGIN = 1e-9
 
 #: Largest factor of time by which forces are repaired
@@ -63,7 +63,7 @@ def _stretched(task: FastestTask, count: int | None) -> Law:
 
 
 def _factor(task: FastestTask, law: Law) -> float:
-    """Factor of time at which all limits are kept, inf if there is none below :data:`SLOWEST`."""
+    """Factor of time at which all limits are satisfied, inf if there is none below :data:`SLOWEST`."""
     worst = Law(law.path, law.timing, task.limits, task.speeds).certificate.worst
     linear = ["velocity", *(check.name for check in task.speeds)]
     needed = [worst[name].ratio for name in linear if name in worst]
@@ -80,13 +80,13 @@ def _factor(task: FastestTask, law: Law) -> float:
 
 
 class _Forces:
-    """Forces of a law by the factor k of its time, c + (f - c) / k^2 with c those at rest; sampled once a place."""
+    """Forces of a law by the factor k of its time, c + (f - c) / k^2 with c those at rest; sampled once a point."""
 
     def __init__(self, law: Law, pieces: LawPieces, force: Check) -> None:
         self.law, self.pieces, self.force = law, pieces, force
         self._known: dict[tuple[int, int], tuple[Array, Array]] = {}
 
-    def kept(self, factor: float) -> bool:
+    def satisfied(self, factor: float) -> bool:
         """Whether the bound of all ratios is at most 1."""
         return highest(self.pieces.span, lambda some, count: self._at(some, count, factor), SAMPLES).bound <= 1.0
 
@@ -106,13 +106,13 @@ def _slower(law: Law, pieces: LawPieces, force: Check, factor: float) -> float:
     """The smallest factor of time from ``factor`` on at which sampled forces keep their limits, by bisection."""
     forces = _Forces(law, pieces, force)
     low, high, step = factor, factor, 1e-3
-    while not forces.kept(high):
+    while not forces.satisfied(high):
         low, high, step = high, factor * (1.0 + step), 2.0 * step
         if high > SLOWEST * factor:
             return np.inf
     for _ in range(20 if high > low else 0):
         middle = 0.5 * (low + high)
-        low, high = (low, middle) if forces.kept(middle) else (middle, high)
+        low, high = (low, middle) if forces.satisfied(middle) else (middle, high)
     return high
 
 
@@ -129,7 +129,7 @@ def _shrunk(task: FastestTask, count: int | None) -> Law:
                 if shrunk == Shrunk():
                     raise
                 break
-            if law.certificate.kept:
+            if law.certificate.satisfied:
                 return law
             shrunk = _more(task, shrunk, law.certificate)
     raise failed or InfeasibleError("start_speed", (task.start, task.end), "no law between these path speeds was found")

@@ -73,7 +73,7 @@ def accelerations(path: Path, grid: Grid, limit: Array) -> PathRows:
 
 
 def squared_speed(slope: Array, limit: Array) -> Array:
-    """Upper bounds of x at the N + 1 places of a grid for |slope| sd <= limit: slopes N x 2 x m, limits m."""
+    """Upper bounds of x at the N + 1 points of a grid for |slope| sd <= limit: slopes N x 2 x m, limits m."""
     largest = (np.abs(slope) / limit).max(axis=-1, initial=0.0)
     at = np.zeros(len(largest) + 1)
     at[:-1] = largest[:, 0]

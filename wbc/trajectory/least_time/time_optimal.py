@@ -47,7 +47,7 @@ def time_optimal(
 
         min T  such that  |dq/dt| <= velocity, |d2q/dt2| <= acceleration, |tau| <= torque, |v_frame| <= cartesian_speed
 
-    with a constant path acceleration on each interval of a grid (TOPP-RA), made to keep its limits between the places
+    with a constant path acceleration on each interval of a grid (TOPP-RA), satisfying its limits between the points
     of the grid too. ``law.certificate`` is exact for velocity and acceleration along polynomial paths, at most
     1 + 1e-6, and sampled for the rest. The acceleration steps, so jerk is unbounded. Where the tangent of the path
     jumps, the law stops. A path that goes nowhere gives a law that stands for ``duration``, or for 1 ms.
@@ -86,7 +86,7 @@ def time_optimal(
     task = FastestTask(curve, kept, speeds, forces, start, end)
     longer = None if duration is None else validation.scalar("duration", duration, low=0.0, open_low=True, unit="s")
     if longer is not None and not task.rests:
-        raise RangeError("duration", duration, "a duration can only be asked for from rest to rest")
+        raise RangeError("duration", duration, "a duration can only be requested from rest to rest")
     count = None if intervals is None else validation.scalar("intervals", intervals, low=2.0, high=MOST_INTERVALS)
     if count is not None and count != int(count):
         raise RangeError("intervals", intervals, "expected a whole number")
@@ -95,7 +95,7 @@ def time_optimal(
     if longer is None:
         return law
     if longer < law.duration * (1.0 - 1e-12):
-        raise InfeasibleError("duration", duration, f"the shortest that keeps the limits is {law.duration:.9g} s")
+        raise InfeasibleError("duration", duration, f"the shortest that satisfies the limits is {law.duration:.9g} s")
     return law.scaled(longer / law.duration)
 
 
@@ -113,8 +113,8 @@ def _stands(path: Path) -> bool:
     """Whether a path goes nowhere."""
     if path.degree == 0:
         return True
-    places = path.knots[:-1, None] + np.diff(path.knots)[:, None] * np.linspace(0.0, 1.0, 9)
-    return not path.evaluate(places.ravel(), 1, np.repeat(np.arange(len(places)), 9)).any()
+    s = path.knots[:-1, None] + np.diff(path.knots)[:, None] * np.linspace(0.0, 1.0, 9)
+    return not path.evaluate(s.ravel(), 1, np.repeat(np.arange(len(s)), 9)).any()
 
 
 def _standing(task: FastestTask, duration: float | None) -> Law:
@@ -128,7 +128,7 @@ def _standing(task: FastestTask, duration: float | None) -> Law:
     if path.space == "joints":
         path, start = standing_path(path.evaluate(path.knots[:1])[0]), 0.0
     law = Law(path, Timing([0.0, duration or STANDING], [[start]]), task.limits, task.checks)
-    if not law.certificate.kept and task.forces:
+    if not law.certificate.satisfied and task.forces:
         worst = max((law.certificate.worst[f.name] for f in task.forces), key=lambda w: w.ratio)
         raise InfeasibleError("path", worst.ratio, f"standing still exceeds limits, at joint or row {worst.joint}")
     return law
@@ -197,7 +197,7 @@ def _within_positions(path: Path, limits: MotionLimits) -> None:
     """Refuses paths that leave the position limits.
 
     Raises:
-        BoundsError: with the joint and the place.
+        BoundsError: with the joint and the path coordinate.
     """
     if limits.lower is None or isinstance(path, JoinedPath):
         if isinstance(path, JoinedPath):

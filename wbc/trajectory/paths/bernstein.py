@@ -19,7 +19,7 @@ CLOSE = 1e-13
 
 @cache
 def nodes(degree: int) -> Array:
-    """degree + 1 places in [0, 1], both ends among them, at which values fix a polynomial well."""
+    """degree + 1 points in [0, 1], both ends among them, at which values fix a polynomial well."""
     return 0.5 - 0.5 * np.cos(np.pi * np.arange(degree + 1) / max(degree, 1))
 
 

@@ -31,7 +31,7 @@ class FunctionPath(PolynomialPath):
 
     Attributes:
         start, end: what the function was asked for at both ends of the path.
-        deviation: largest distance between path and function at places between the samples [rad or m].
+        deviation: largest distance between path and function between the samples [rad or m].
         intervals: between the samples.
     """
 
@@ -44,8 +44,8 @@ class FunctionPath(PolynomialPath):
 
     def argument(self, s: Any) -> Array:
         """What the function is asked for at coordinates s: start + (end - start) s / length."""
-        places = validation.ordinary_array("s", s)
-        return np.asarray(self.start + (self.end - self.start) * ((places - self.knots[0]) / self.length))
+        given = validation.ordinary_array("s", s)
+        return np.asarray(self.start + (self.end - self.start) * ((given - self.knots[0]) / self.length))
 
 
 def function_path(
@@ -53,10 +53,10 @@ def function_path(
 ) -> FunctionPath:
     """The spline of degree 5 (C4) through samples of q(x), x from start to end, halved until it is near enough:
 
-        |path - function| <= tolerance        at three places within each interval, none of them a sample
+        |path - function| <= tolerance        at three points within each interval, none of them a sample
 
     and until q' has settled: it changes by at most 1e-3 of its largest value from one spline to the next. s runs from
-    0 to the length of the curve, in proportion to x. Limits are kept and certified for the path, which is what moves;
+    0 to the length of the curve, in proportion to x. Limits hold and are certified for the path, which is what moves;
     how far it is from the function is its ``deviation``.
 
     Args:
@@ -71,7 +71,7 @@ def function_path(
         ContinuityError: the spline does not come near enough (a step, a corner, a root), with where it is farthest.
 
     A function that does not change gives a path that stands, over s in [0, 1]. Cannot do: find what lies between all
-    samples and all places of comparison. Where q'' jumps, the path has a continuous q'' that oscillates on both sides.
+    samples and all points of comparison. Where q'' jumps, the path has a continuous q'' that oscillates on both sides.
     """
     if not callable(function):
         raise ShapeError("path.function", function, "expected a function of one number")
@@ -138,7 +138,7 @@ def _halved(samples: _Samples, tolerance: float, most: int) -> FunctionPath:
     raise ContinuityError(
         "path.function",
         where,
-        f"not smooth enough near this place: with {count // 2} intervals, "
+        f"not smooth enough near here: with {count // 2} intervals, "
         + (f"off by {off:.3g}, allowed {tolerance:.3g}" if off > tolerance else "the derivative does not settle"),
     )
 

@@ -99,7 +99,7 @@ def wrapped(angle: Array) -> Array:
 
 
 def checked_signs(field_name: str, values: Sequence[int]) -> tuple[int, ...]:
-    """The branches asked for: 1, -1 or both.
+    """The requested branches: 1, -1 or both.
 
     Raises:
         ShapeError: something else.

@@ -218,7 +218,7 @@ class ArmKinematics:
         lean = angles[..., 1] + angles[..., 2] / 2 - data.shoulder_limit
         straight = data.elbow_limit - angles[..., 2]
         possible = (square.min(axis=1) > least) & ((es + reach - distance).min(axis=1) > margins.swing_reach)
-        # Limits of the published robot at the ends are kept as close as holding grips keep them
+        # Limits of the published robot at the ends are approached as closely as holding grips do
         possible &= (free.min(axis=(1, 2)) > margins.swing_angle) & (lean.min(axis=1) > margins.swing_angle)
         possible &= straight.min(axis=1) > margins.swing_elbow
         return angles, possible

@@ -1,4 +1,4 @@
-"""What the checker found: one line a check, with the worst value, its time and its place."""
+"""What the checker found: one line a check, with the worst value, its time and where."""
 
 from __future__ import annotations
 
@@ -119,7 +119,7 @@ class Report:
 
 
 class Tally:
-    """Collects the values of checks; keeps of each the worst and how many violate it."""
+    """Collects the values of checks; stores of each the worst and how many violate it."""
 
     def __init__(self) -> None:
         self._findings: dict[str, Finding] = {}

@@ -28,7 +28,7 @@ void swings_clear(const Arm *arm, const Grips *grips, long m, long n, const doub
    apart; `places` and `normals` of the holds; `arms`, `holds` and `free` (the hand may roll) of the grips.
 
    Curves have n points: how far `across`, how far `raised`, and the part of the wrists' change, `blend`. The numbers of
-   raise_curves: `span` at `spans` places, `look_across` and `look_raised` at `looks`, `steps` and `half` at `halves`.
+   raise_curves: `span` at `spans` points, `look_across` and `look_raised` at `looks`, `steps` and `half` at `halves`.
    `alternatives` says how much higher and what part of the arc each of `tried` curves is. Clear: `parts` of the links,
    `some` of them, at which they are at least `above` the surface, unless a hand is within `touching` of a hold, and
    `apart` of the links of two arms. The body is looked at `halfway` samples after the hand is lifted; a swing takes
@@ -46,7 +46,7 @@ typedef struct {
     double spacing, height, aside, upright, touching, extra, latch;
 } Scene;
 
-/* A swing that is asked about: row of the arm, grips, sample at which it is lifted, last sample of the body, sample at
+/* A swing to be examined: row of the arm, grips, sample at which it is lifted, last sample of the body, sample at
    which it may land. */
 typedef struct {
     long arm, source, target, lift, last, soonest;

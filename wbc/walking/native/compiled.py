@@ -27,7 +27,7 @@ _SOURCES = Path(__file__).parent
 _FILES = ("arm.h", "surface.h", "curve.h", "grips.h", "near.h", "speeds.h", "tracks.h", "choice.h", "planner.c")
 
 
-class Arm(ctypes.Structure):
+class ArmNumbers(ctypes.Structure):
     """Arm of native/arm.h."""
 
     _fields_ = [
@@ -44,11 +44,11 @@ class Table(ctypes.Structure):
 
 
 @functools.cache
-def arm(data: WalkerData) -> Arm:
+def arm(data: WalkerData) -> ArmNumbers:
     """An arm's numbers as the compiled code wants them."""
     lengths = data.neck_length, data.shoulder_offset, data.upper_arm_length, data.forearm_length, data.hand_length
     sixes = ((ctypes.c_double * 6)(*v) for v in (data.position_limits, data.joint_rates, data.joint_accelerations))
-    return Arm(*lengths, *sixes, data.elbow_limit, data.shoulder_limit)
+    return ArmNumbers(*lengths, *sixes, data.elbow_limit, data.shoulder_limit)
 
 
 #: Numbers in a row

@@ -6,11 +6,11 @@
 
 enum { BRANCHES = 2, LIMITS = 8, FREE = 5 };
 
-/* What is kept of reach [m] and angles [rad], largest steps of joints 1 to 5 [rad], least cosine between approach and
+/* Margins of reach [m] and angles [rad], largest steps of joints 1 to 5 [rad], least cosine between approach and
    body, samples of a grip at least, reach that hands lean for [m], the part of a tilt that they use, and the least
    [rad]; rounding of reach, and |sin theta5| of aligned axes. */
 typedef struct {
-    double reach_room, angle_room, most[FREE], facing, shortest, lean_for, tilt_part, least_tilt, rounding, aligned;
+    double reach_margin, angle_margin, most[FREE], facing, shortest, lean_for, tilt_part, least_tilt, rounding, aligned;
 } Keeping;
 
 /* A stretch of samples on one hold with one branch; `row`: of its first posture. */
@@ -138,7 +138,7 @@ static int wrist_on(const Arm *arm, const Keeping *keep, const double *spans, co
             w[k] = p[k] - arm->hand * axis[k];
         reach = wrist_margin(arm, w, spans[0], spans[1]);
     }
-    return reach > keep->reach_room;
+    return reach > keep->reach_margin;
 }
 
 /* Grips of an arm on m holds along n frames of its base (4 x 4): `stretches`, and their postures of six angles, joint 6
@@ -160,7 +160,7 @@ long grips_along(const Arm *arm, const Keeping *keep, long n, const double *fram
             for (int b = 0; b < BRANCHES; ++b) {
                 double *mine = work + JOINTS * n * b, least = 0.0;
                 const int limit = there ? nearest_limit(arm, q[b], &least) : 0;
-                const int fits = solved && least > keep->angle_room;
+                const int fits = solved && least > keep->angle_margin;
                 const int fast = there && since[b] >= 0 ? too_fast(keep->most, mine + JOINTS * (i - 1), q[b]) : -1;
                 if (since[b] >= 0 && (!fits || fast >= 0)) {
                     const long length = i - since[b], slow = fast >= 0 ? LIMITS + 1 + fast : limit;

@@ -11,7 +11,7 @@ enum { MOST = 128, FIVE = 5 };
    body's part of the rates is taken; margins of reach [m], angles, elbow [rad] and from the axis of joint 1 [m]. */
 typedef struct {
     double rate_part, acceleration_part, fastest, least, step;
-    double reach_room, angle_room, elbow_room, axis_room;
+    double reach_margin, angle_margin, elbow_margin, axis_margin;
 } Rules;
 
 /* np.unwrap, from a first angle in (-pi, pi]. */
@@ -55,7 +55,7 @@ static int joint_path(const Arm *arm, const Rules *rules, const double *base, co
         const double out = arm->offset + arm->hand * s4 * s5;
         const double reach = hypot(along, across), tilt = atan2(across, along), z = p[2] - arm->neck;
         const double square = p[0] * p[0] + p[1] * p[1] - out * out;
-        const double r = sqrt(larger(square, rules->axis_room * rules->axis_room)), distance = hypot(r, z);
+        const double r = sqrt(larger(square, rules->axis_margin * rules->axis_margin)), distance = hypot(r, z);
         const double es = arm->upper, cosine = (distance * distance - es * es - reach * reach) / (2.0 * es * reach);
         const double bend = acos(larger(smaller(cosine, 1.0), -1.0));
         q[0] = atan2(p[1], p[0]) - atan2(out, r);
@@ -63,13 +63,14 @@ static int joint_path(const Arm *arm, const Rules *rules, const double *base, co
         q[2] = -bend - tilt;
         for (int k = 0; k < guided; ++k)
             q[3 + k] = w[k];
-        possible &= square > rules->axis_room * rules->axis_room && arm->upper + reach - distance > rules->reach_room;
-        possible &= q[1] + q[2] / 2.0 - arm->shoulder > rules->angle_room && arm->elbow - q[2] > rules->elbow_room;
+        possible &= square > rules->axis_margin * rules->axis_margin;
+        possible &= arm->upper + reach - distance > rules->reach_margin;
+        possible &= q[1] + q[2] / 2.0 - arm->shoulder > rules->angle_margin && arm->elbow - q[2] > rules->elbow_margin;
     }
     unwrap(angles, n);
     for (long i = 0; i < n && possible; ++i)
         for (int k = 0; k < 3 + guided; ++k)
-            possible &= arm->limits[k] - fabs(angles[i][k]) > rules->angle_room;
+            possible &= arm->limits[k] - fabs(angles[i][k]) > rules->angle_margin;
     return possible;
 }
 

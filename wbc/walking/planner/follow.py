@@ -1,4 +1,4 @@
-"""A plan of a file made again: the same hands go to the same holds at the same places of the path."""
+"""A plan of a file made again: the same hands go to the same holds at the same points of the path."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ def _move(structure: Structure, search: BodySearch, step: Regrasp, k: int, arm: 
     if not len(mine):
         raise _refused(step, k, f"the arm cannot hold it at {step.land:g} s of the path")
     target = _lasting(grips, mine, round(step.until / spacing))
-    return Move(arm, key[arm], target, lift, land, step.duration, step.delay, step.way)
+    return Move(arm, key[arm], target, lift, land, step.duration, step.delay, step.curve)
 
 
 def _law(

@@ -11,6 +11,7 @@ from math import isfinite
 from typing import Any
 
 from wbc.errors import StructureFileError, WbcError
+from wbc.renamed import renamed
 from wbc.walking.body_path import BodyPath
 from wbc.walking.log.body_paths import path_of, way_of
 from wbc.walking.planner.grips.table import Grips
@@ -35,6 +36,7 @@ class HoldLost(WbcError):
     """Fewer hands hold than the robot needs."""
 
 
+@renamed(way="curve")
 @dataclass(frozen=True)
 class Regrasp:
     """One swing of a plan.
@@ -48,7 +50,7 @@ class Regrasp:
         margin: path time that the source could still have held at the lift [s].
         limit: what ends the grip on the target.
         until: path time until which the target can be held [s].
-        way: curve of the hand, see :data:`wbc.walking.planner.swings.curve.ALTERNATIVES`.
+        curve: number of the hand's curve, see :data:`wbc.walking.planner.swings.curve.ALTERNATIVES`.
         roll: angle about the target's z axis from its x axis to the hand's [rad]; None where the hand may roll.
     """
 
@@ -63,7 +65,7 @@ class Regrasp:
     margin: float
     limit: str
     until: float
-    way: int = 0
+    curve: int = 0
     roll: float | None = None
 
 
@@ -159,7 +161,7 @@ def _step(row: dict[str, Any]) -> Regrasp:
     Raises:
         TypeError, ValueError: a field that is missing, unknown, or has a value that it cannot have.
     """
-    step = Regrasp(**row)
+    step = Regrasp(**{"curve" if name == "way" else name: value for name, value in row.items()})
     for name, value in asdict(step).items():
         texts = name in ("arm", "source", "target", "limit")
         number = 0.0 if texts or (name == "roll" and value is None) else value

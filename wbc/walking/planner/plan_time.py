@@ -44,7 +44,7 @@ class PlannedJoints(NamedTuple):
         time: of the plan ``[n]``, delays included, from 0 [s].
         path_time: u of the body then ``[n]`` [s].
         joints: of all arms, one after the other ``[n, joints]`` [rad].
-        kept: whether the time up to the next row is kept: a hand opens, settles or closes ``[n - 1]``.
+        kept: whether the time up to the next row is the planned one: a hand opens, settles or closes ``[n - 1]``.
     """
 
     time: Array
@@ -103,7 +103,7 @@ def _ends(plan: Plan) -> list[tuple[float, float]]:
 
 
 def _times(latch: float, plan: Plan) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """Waypoints: time of the plan, path time, and which stretches between them are kept."""
+    """Waypoints: time of the plan, path time, and which stretches between them take the planned time."""
     known, at, spans = [0.0], [0.0], list[tuple[float, bool]]()
     for (lift, land), step in zip(_ends(plan), plan.regrasps, strict=True):
         known, at = [*known, lift, land], [*at, step.lift, step.land]
@@ -226,8 +226,8 @@ def _limits(limb: BodyLimb) -> tuple[tuple[tuple[float, ...], float], ...]:
 
 
 def _spline(table: PlannedJoints) -> PolynomialPath:
-    """The joint path over the plan's time, and a coordinate z with dz/ds = 1 in what is kept and 1 / FASTEST elsewhere,
-    linear between the two.
+    """The joint path over the plan's time, and a coordinate z with dz/ds = 1 where the planned time stays and
+    1 / FASTEST elsewhere, linear between the two.
     """
     s, spans = table.time, np.diff(table.time)
     slope = np.full(len(s), 1.0 / FASTEST)

@@ -57,7 +57,7 @@ def plan_walk(
         start: arm name -> hold id of the hands that hold at the beginning; default: the planner chooses.
         postures: arm name -> its joints now [rad]: a hand that holds keeps the branch of its wrist.
         avoid: arm name -> holds that it does not begin on.
-        width: stances kept for each number of re-grasps; None: all, which finds the fewest.
+        width: stances stored for each number of re-grasps; None: all, which finds the fewest.
         time_budget: [s]; after it what is found is returned or refused.
         partial: return a plan that does not lead to the end instead of refusing.
         detour: where the body cannot follow the path, look for a detour: lower, turned, beside it, see

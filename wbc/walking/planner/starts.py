@@ -113,7 +113,7 @@ def stance_slices(
         raise NoPlanError(
             "plan",
             structure.name,
-            "no stance is possible at the beginning: the arms are in each other's way",
+            "no stance is possible at the beginning: the arms would collide",
             separating=_at_first(structure, grips),
         )
     return [stance for _, _, stance in found[: most[1]]]

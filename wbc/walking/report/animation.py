@@ -47,9 +47,9 @@ def save_animation(
     turn = surroundings.upright(log).rotation
     rows = surroundings.near_rows(run.structure, log, SHOWN * surroundings.scale(run.walker))
     still = [
-        render.Mesh(surroundings.surface_triangles(run.structure, rows) @ turn.T, surroundings.SURFACE),
-        render.Mesh(surroundings.stud_triangles(run.structure, rows) @ turn.T, surroundings.HOLD),
-        render.Mesh(surroundings.obstacle_triangles(run.structure, rows) @ turn.T, surroundings.OBSTACLE),
+        render.ColouredMesh(surroundings.surface_triangles(run.structure, rows) @ turn.T, surroundings.SURFACE),
+        render.ColouredMesh(surroundings.stud_triangles(run.structure, rows) @ turn.T, surroundings.HOLD),
+        render.ColouredMesh(surroundings.obstacle_triangles(run.structure, rows) @ turn.T, surroundings.OBSTACLE),
     ]
     way = log.pose_body_in_structure[:, :3] @ turn.T
     camera = _camera(

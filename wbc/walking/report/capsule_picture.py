@@ -39,7 +39,7 @@ class Ground:
         camera: of the picture. meshes: what stands still.
     """
 
-    def __init__(self, camera: render.Camera, meshes: list[render.Mesh]) -> None:
+    def __init__(self, camera: render.Camera, meshes: list[render.ColouredMesh]) -> None:
         self._fine = render.Camera(camera.eye, camera.target, camera.view, RAYS * camera.width, RAYS * camera.height)
         layer = render.draw(meshes, self._fine)
         seen, colours = render.shade(layer, self._fine, None)

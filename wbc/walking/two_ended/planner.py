@@ -1,4 +1,4 @@
-"""Plans for the two-ended arm: from a stance to a hold, or to where its elbow is over a place."""
+"""Plans for the two-ended arm: from a stance to a hold, or to where its elbow is over a point."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from wbc.walking.two_ended.swing_path import Turn, TurnLaw, TurnPaths
 SPACING = 0.05
 #: The arm stands so many samples before and after each swing, while hands open and close
 STAND = 6
-#: Stances whose elbows are as near to a place as the nearest one, within this [m]
+#: Stances whose elbows are as near to a point as the nearest one, within this [m]
 SAME_PLACE = 0.05
 
 Goal = Callable[[Grip, Grip], bool]
@@ -33,7 +33,7 @@ Goal = Callable[[Grip, Grip], bool]
 
 @dataclass(frozen=True, eq=False)
 class TwoEndedPlan(Plan):
-    """A plan of the two-ended arm, and what it was asked for.
+    """A plan of the two-ended arm, and its request.
 
     Attributes:
         to, gait: of :func:`plan_two_ended`.
@@ -56,9 +56,9 @@ def plan_two_ended(
 
     Args:
         start: hold ids of ``arm1`` and ``arm2``.
-        to: id of a hold that a hand is to hold, or a place [m] that the elbow is to be as near to as it can be.
+        to: id of a hold that a hand is to hold, or a point [m] that the elbow is to be as near to as it can be.
         gait: ``inchworm``: hands keep their order along the route; ``turnaround``: each swing changes it; ``any``.
-        width: stances kept for each number of re-grasps; None: all.
+        width: stances stored for each number of re-grasps; None: all.
 
     Raises:
         UnknownNameError: another arm, hold or gait. ShapeError: another machine, or a start without both hands.

@@ -87,7 +87,7 @@ class Grip(NamedTuple):
 
 
 class PairPostures:
-    """Postures of pairs of grips, the first hand's and the second's; what was computed is kept.
+    """Postures of pairs of grips, the first hand's and the second's; results are cached.
 
     Of all postures in closed form, over joint 1, that keep their limits and the clearance, and whose elbow is bent to
     the same side (joint 4 > 0), the one with the least sum of weighted squared angles.

@@ -48,7 +48,7 @@ class Pairs:
         return Grip(int(self._grips.hold[grip]), int(self._grips.roll[grip]))
 
     def prepare(self, pairs: Iterable[tuple[int, int]]) -> None:
-        """Nothing: pairs are looked at when they are asked for."""
+        """Nothing: pairs are looked at on demand."""
 
     def first_conflict(self, one: int, other: int, sample: int) -> int:
         """The first sample from ``sample`` on at which two grips do not go together."""
@@ -118,7 +118,7 @@ class TurnSearch(StanceSearch[Turns]):
     A sample is a re-grasp, and a grip ends the later the further its hold is along the route, so hands only go on.
 
     Args:
-        towards: places of the holds along the route [m]. goal: whether grips of near and far hand are an end.
+        towards: positions of the holds along the route [m]. goal: whether grips of near and far hand are an end.
     """
 
     def __init__(

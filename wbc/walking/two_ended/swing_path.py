@@ -132,7 +132,7 @@ class TurnLaw(SwingLaw):
     """A table of the hand that swings and of all joints of its arm, from the lift to the landing.
 
     Args:
-        hands: places of the hand ``[n, 3]`` [m]. joints: of its arm, from the body outwards ``[n, joints]`` [rad].
+        hands: positions of the hand ``[n, 3]`` [m]. joints: of its arm, from the body outwards ``[n, joints]`` [rad].
         spacing: from row to row [s].
     """
 

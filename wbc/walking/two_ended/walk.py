@@ -105,7 +105,7 @@ class TurnLeader:
 
 
 class TurnReplanner:
-    """Plans from the stance that the arm comes to next, to a hold or a place.
+    """Plans from the stance that the arm comes to next, to a hold or a point.
 
     Args:
         to, gait: of :func:`wbc.walking.two_ended.planner.plan_two_ended`.
@@ -115,7 +115,7 @@ class TurnReplanner:
         self._machine, self._to, self.gait = machine, to, gait
 
     def go(self, goal: Any) -> None:
-        """To a hold, so that the elbow is near a place [m], or near the end of a body's path."""
+        """To a hold, so that the elbow is near a point [m], or near the end of a body's path."""
         structure = self._machine.structure
         if isinstance(goal, BodyPath):
             goal = goal.poses[-1][:3, 3]
@@ -187,7 +187,7 @@ class TwoEndedWalk(Walk):
         super().__init__(walker, structure, plan, leader=leader, replanner=replanner, **more)
 
     def go_to(self, to: str | Sequence[float], gait: str = "any") -> None:
-        """Go somewhere else, from the stance that the arm comes to next: to a hold, or with the elbow to a place [m].
+        """Go somewhere else, from the stance that the arm comes to next: to a hold, or with the elbow to a point [m].
 
         :meth:`go` does so with the gait that there is, and takes a body's path, too, whose end is then the place.
 

@@ -11,7 +11,7 @@
 /* wbc.analysis.search refuses what is larger */
 enum { MOST_ROWS = 24, MOST_COLS = 16, MOST_JOINTS = 16, MOST_FREQS = 1024 };
 
-/* Rounding of one evaluated term relative to its size: phase, sine and two products, with room to spare */
+/* Rounding of one evaluated term relative to its size: phase, sine and two products, with a margin */
 static const double ROUNDING = 1e-14;
 
 typedef struct {

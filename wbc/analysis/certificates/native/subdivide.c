@@ -10,7 +10,8 @@ typedef struct {
     long pending, kept;
 } Totals;
 
-/* Ways to prove full column rank of one matrix: each a run of forms that must all have it. `ends`: where runs end. */
+/* Proofs of full column rank of one matrix, any of which will do: each a run of forms that must all have it.
+ * `ends`: where runs end. */
 typedef struct {
     int proofs;
     const int *ends;
@@ -112,9 +113,9 @@ int subdivide(const Proofs *augmented, const Form *task, double eps, double smal
         }
         half[joint] /= 2.0;
         for (int side = -1; side <= 1; side += 2) {
-            double *place = stack + totals->pending++ * size;
-            memcpy(place, box, sizeof(double) * (size_t)size);
-            place[joint] += side * half[joint];
+            double *child = stack + totals->pending++ * size;
+            memcpy(child, box, sizeof(double) * (size_t)size);
+            child[joint] += side * half[joint];
         }
     }
     return 0;

@@ -4,7 +4,7 @@
 
 #include "bases.h"
 
-/* Relative room for the rounding of sums of non-negative numbers */
+/* Relative tolerance for the rounding of sums of non-negative numbers */
 static const double ROOM = 1e-9;
 /* Least variation of a row or column that counts, relative to the largest */
 static const double FLOOR = 0.01;

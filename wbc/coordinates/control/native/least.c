@@ -25,12 +25,12 @@ static double group(const double *rows, int g, double *left, double *right) {
  * slopes: GROUPS x NV along q; right: GROUPS x NV; both null, or both not */
 void conditioning(const double *q, const unsigned char *wanted, double *sigma, double *slopes, double *right) {
     double rows[ROWS * NV], left[ROWS], work[WORK_W];
-    long long int places[WORK_IW];
+    long long int integers[WORK_IW];
     const double *arguments[ARGUMENTS];
     double *results[ARGUMENTS];
     arguments[0] = q;
     results[0] = rows;
-    rates(arguments, results, places, work, 0);
+    rates(arguments, results, integers, work, 0);
     for (int g = 0; g < GROUPS; g++) {
         if (wanted && !wanted[g]) continue;
         if (!slopes) {
@@ -45,6 +45,6 @@ void conditioning(const double *q, const unsigned char *wanted, double *sigma, d
         arguments[1] = left;
         arguments[2] = scaled;
         results[0] = slopes + g * NV;
-        slope(arguments, results, places, work, 0);
+        slope(arguments, results, integers, work, 0);
     }
 }

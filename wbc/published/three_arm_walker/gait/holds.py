@@ -5,7 +5,7 @@ With b the base, o the centre of the body, p where the hand is and c a hold, all
     1  it is the hold that the arm has
     2  |c - b| > radius, or |c - b| < r, r = (SN + 2) / 9.25
     3  the angle between b - o and c - b has a cosine below -0.707: a wedge of 90 degrees that faces the centre
-    4  the way from p to c passes nearer to b than r: the distance of b from the line p c if the angles of the triangle
+    4  the line from p to c passes nearer to b than r: the distance of b from the line p c if the angles of the triangle
        at p and c are acute, else |c - b|
     5  the same with o and (R - SN - 2) / 9.25
 
@@ -52,9 +52,9 @@ def handholds(view: View, arm: int, hand: Array, terrain: Terrain, held: Place |
 
 
 def _clear(places: NDArray[np.int64], hand: Array, corner: Array, least: float) -> NDArray[np.bool_]:
-    """Whether the way from the hand to each place passes a corner at the least distance; cosines by the cosine rule."""
-    way, back, far = places - hand, hand - corner, places - corner
-    aa, bb, cc = np.einsum("mi,mi->m", way, way), float(back @ back), np.einsum("mi,mi->m", far, far)
+    """Whether the line from the hand to each hold passes a corner at the least distance; by the cosine rule."""
+    line, back, far = places - hand, hand - corner, places - corner
+    aa, bb, cc = np.einsum("mi,mi->m", line, line), float(back @ back), np.einsum("mi,mi->m", far, far)
     flat = aa * bb * cc < 1e-12
     with np.errstate(divide="ignore", invalid="ignore"):
         at_place = (aa + cc - bb) / (2.0 * np.sqrt(aa * cc))

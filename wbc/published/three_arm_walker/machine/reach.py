@@ -60,9 +60,9 @@ def project(body: Array, points: Array) -> Array:
     half = points[:, :2] @ direction[:2]
     root = half**2 - a * (np.einsum("mi,mi->m", points[:, :2], points[:, :2]) - WRISTS**2)
     reach = np.sqrt(np.maximum(root, 0.0))
-    ways = np.stack([-half - reach, -half + reach]) / a
-    way = np.where(np.abs(ways[0]) <= np.abs(ways[1]), ways[0], ways[1])
-    return coordinates(points + np.where(root < 0.0, 0.0, way)[:, None] * direction)
+    roots = np.stack([-half - reach, -half + reach]) / a
+    distance = np.where(np.abs(roots[0]) <= np.abs(roots[1]), roots[0], roots[1])
+    return coordinates(points + np.where(root < 0.0, 0.0, distance)[:, None] * direction)
 
 
 @dataclass(frozen=True)

@@ -39,7 +39,7 @@ Seen = dict[tuple[Grips, int], set[int]]
 
 
 @dataclass(frozen=True, eq=False)
-class Node:
+class CellNode:
     """Grips that hold, cells at which they do, where the last hand landed before, and what was before.
 
     Attributes:
@@ -51,7 +51,7 @@ class Node:
     cells: Ints
     landed: Ints
     left: int
-    before: Node | None
+    before: CellNode | None
     count: int
 
 
@@ -66,7 +66,7 @@ class Outcome:
         expanded: nodes that were looked at.
     """
 
-    nodes: tuple[Node, ...]
+    nodes: tuple[CellNode, ...]
     final: Ints
     complete: bool
     reached: tuple[int, ...]
@@ -74,7 +74,7 @@ class Outcome:
 
 
 class CellSearch:
-    """A search over the cells about one path; what was computed is kept."""
+    """A search over the cells about one path; results are cached."""
 
     def __init__(self, walker: Walker, structure: Structure, cells: Cells, grips: CellGrips) -> None:
         self.cells, self.grips, self._structure = cells, grips, structure
@@ -106,7 +106,7 @@ class CellSearch:
         if apart is not None:
             return apart
         seen: Seen = {}
-        queue: list[tuple[float, int, Node, int, bool]] = []
+        queue: list[tuple[float, int, CellNode, int, bool]] = []
         near: tuple[float, tuple[int, ...]] = np.inf, ()
         fresh, pushed, expanded = self._first(start or {}, seen), 0, 0
         goal = self.cells.goal
@@ -143,7 +143,7 @@ class CellSearch:
         grips = np.nonzero(self.grips.fits[:, ends].any(axis=1))[0]
         return Outcome((), np.zeros(0, dtype=np.int64), True, tuple(grips.tolist()), 0)
 
-    def _first(self, start: Mapping[int, int], seen: Seen) -> list[Node]:
+    def _first(self, start: Mapping[int, int], seen: Seen) -> list[CellNode]:
         """Nodes of the stances at the first cell."""
         cell, grips = self.cells.start, self.grips
         choices = []
@@ -163,14 +163,14 @@ class CellSearch:
                         out += self._node(held, np.array([cell]), left, None, seen)
         return out
 
-    def _children(self, node: Node, grip: int, landed: Ints, seen: Seen) -> list[Node]:
+    def _children(self, node: CellNode, grip: int, landed: Ints, seen: Seen) -> list[CellNode]:
         out = []
         for left in reversed(node.held):
             rest = tuple(g for g in node.held if g != left)
             out += self._node(tuple(sorted((*rest, grip))), landed, left, node, seen)
         return out
 
-    def _node(self, held: Grips, landed: Ints, left: int, before: Node | None, seen: Seen) -> list[Node]:
+    def _node(self, held: Grips, landed: Ints, left: int, before: CellNode | None, seen: Seen) -> list[CellNode]:
         """New nodes of some grips: one for each connected set that has some of the cells."""
         parts = self._part(held)
         out, count = [], 0 if before is None else before.count + 1
@@ -179,10 +179,10 @@ class CellSearch:
             if number and left not in known and len(known) < LEFTS:
                 known.add(left)
                 cells = np.nonzero(parts == number)[0]
-                out.append(Node(held, cells, landed[parts[landed] == number], left, before, count))
+                out.append(CellNode(held, cells, landed[parts[landed] == number], left, before, count))
         return out
 
-    def _next(self, node: Node) -> list[tuple[float, int]]:
+    def _next(self, node: CellNode) -> list[tuple[float, int]]:
         """Grips of the other arms that can land at a node's cells, and an estimate of how far the goal is then."""
         grips = self.grips
         used = {int(grips.arm[g]) for g in node.held}
@@ -199,7 +199,7 @@ class CellSearch:
             out += list(zip(estimate.tolist(), mine.tolist(), strict=True))
         return out
 
-    def _landings(self, node: Node, grip: int) -> Ints:
+    def _landings(self, node: CellNode, grip: int) -> Ints:
         """Cells of a node at which a hand can land; how it swings there is known of the hand that was lifted last."""
         cells: Ints = node.cells[self.grips.lands[grip, node.cells]]
         for g in node.held:
@@ -254,7 +254,7 @@ class CellSearch:
         return out
 
 
-def _back(node: Node) -> tuple[Node, ...]:
+def _back(node: CellNode) -> tuple[CellNode, ...]:
     out = [node]
     while out[-1].before is not None:
         out.append(out[-1].before)

@@ -21,7 +21,7 @@ TURN = radians(15.0)
 
 
 @dataclass(frozen=True)
-class Mesh:
+class CellSpacing:
     """How far cells are apart.
 
     Attributes:
@@ -37,7 +37,7 @@ class Mesh:
     lower: tuple[float, ...]
     turns: int
 
-    def of(self, limb: BodyLimb) -> Mesh:
+    def of(self, limb: BodyLimb) -> CellSpacing:
         """As large for an arm as this one is for a PUMA 600."""
         scale = round(limb.hand_span / HAND_SPAN, 9)
         lower = tuple(scale * height for height in self.lower)
@@ -47,8 +47,8 @@ class Mesh:
 #: Reach of the arm that the meshes below were chosen for, a PUMA 600 from neck to hand [m]
 HAND_SPAN = 1.1684
 #: Along the path alone, and beside it; 54 to 44 in for a path at 52 in
-ALONG = Mesh(0.1175, 0.0, 0, tuple(inch * 0.0254 for inch in (-2.0, 0.0, 2.0, 4.0, 6.0, 8.0)), 24)
-WIDE = Mesh(0.14, 0.2, 7, tuple(inch * 0.0254 for inch in (-2.0, 0.0, 4.0, 8.0)), 18)
+ALONG = CellSpacing(0.1175, 0.0, 0, tuple(inch * 0.0254 for inch in (-2.0, 0.0, 2.0, 4.0, 6.0, 8.0)), 24)
+WIDE = CellSpacing(0.14, 0.2, 7, tuple(inch * 0.0254 for inch in (-2.0, 0.0, 4.0, 8.0)), 18)
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +61,7 @@ class Cells:
         at: path time of each station [s].
     """
 
-    mesh: Mesh
+    mesh: CellSpacing
     shape: tuple[int, int, int, int]
     frames: Array
     at: Array
@@ -91,7 +91,7 @@ class Cells:
         return int(np.ravel_multi_index((station, self.mesh.beside, self.mesh.lower.index(0.0), 0), self.shape))
 
 
-def cells_about(path: BodyPath, structure: Structure, mesh: Mesh) -> Cells:
+def cells_about(path: BodyPath, structure: Structure, mesh: CellSpacing) -> Cells:
     """Cells about a path."""
     at = stations(path, mesh.step)
     sides = [k * mesh.side for k in range(-mesh.beside, mesh.beside + 1)]
@@ -117,7 +117,7 @@ def stations(path: BodyPath, step: float) -> Array:
     moved = np.linalg.norm(np.diff(poses[:, :3, 3], axis=0), axis=1)
     cosine = (np.einsum("nij,nij->n", poses[1:, :3, :3], poses[:-1, :3, :3]) - 1.0) / 2.0
     far = np.maximum(moved / step, np.arccos(np.clip(cosine, -1.0, 1.0)) / TURN)
-    # Samples that stand still take no place of their own
+    # Samples that stand still add (nearly) no length
     total = np.concatenate([[0.0], np.cumsum(far + 1e-9)])
     count = max(round(total[-1]), 1)
     return np.asarray(np.interp(np.linspace(0.0, total[-1], count + 1), total, np.arange(len(poses)) * path.spacing))

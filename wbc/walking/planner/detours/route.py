@@ -18,8 +18,8 @@ from wbc.walking.arms.puma import limb_of
 from wbc.walking.body_path import BodyPath
 from wbc.walking.holds.structure import Structure
 from wbc.walking.planner.detours.cell_grips import cell_grips
-from wbc.walking.planner.detours.cell_search import CellSearch, Node
-from wbc.walking.planner.detours.cells import ALONG, WIDE, Cells, Ints, Mesh, cells_about
+from wbc.walking.planner.detours.cell_search import CellNode, CellSearch
+from wbc.walking.planner.detours.cells import ALONG, WIDE, Cells, CellSpacing, Ints, cells_about
 
 #: How fast the body goes down [m/s] and turns [rad/s]
 DOWN_SPEED, TURN_SPEED = 0.05, 0.1
@@ -57,7 +57,7 @@ def find_route(
     structure: Structure,
     path: BodyPath,
     *,
-    mesh: Mesh = ALONG,
+    mesh: CellSpacing = ALONG,
     start: Mapping[int, int] | None = None,
     deadline: float | None = None,
 ) -> BodyRoute:
@@ -90,7 +90,7 @@ def find_routes(
     start: Mapping[int, int] | None = None,
     deadline: float | None = None,
 ) -> Iterator[BodyRoute]:
-    """Detours, those near the path first; the next one is looked for when asked for.
+    """Detours, those near the path first; the next one is looked for on demand.
 
     Args:
         start, deadline: of :func:`find_route`.
@@ -102,7 +102,7 @@ def find_routes(
         yield find_route(walker, structure, path, mesh=mesh.of(limb), start=start, deadline=deadline)
 
 
-def shortest(cells: Cells, nodes: tuple[Node, ...], final: Ints) -> list[int]:
+def shortest(cells: Cells, nodes: tuple[CellNode, ...], final: Ints) -> list[int]:
     """The quickest chain of cells through the sets of nodes, each left where the next hand lands."""
     sets = [set(node.cells.tolist()) for node in nodes]
     doors = [*(set(node.landed.tolist()) for node in nodes[1:]), set(final.tolist())]

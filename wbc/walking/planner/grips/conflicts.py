@@ -96,7 +96,7 @@ class LimbShapes:
 
 
 class ArmClearance:
-    """When two grips bring their arms too near to each other; answers are kept.
+    """When two grips bring their arms too near to each other; answers are cached.
 
     Args:
         walker: see :class:`LimbShapes`. grips: over one path.

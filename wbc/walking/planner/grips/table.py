@@ -100,7 +100,7 @@ class Grips:
         return known
 
     def ends_at(self, spacing: float) -> list[float]:
-        """Path times of the last samples of all grips [s], of a path with this spacing; the list is kept."""
+        """Path times of the last samples of all grips [s], of a path with this spacing; the list is cached."""
         if spacing not in self._ends:
             self._ends[spacing] = (self.last * spacing).tolist()
         return self._ends[spacing]

@@ -1,4 +1,4 @@
-"""What a search over stances is made of: stances with their moves, which grips go together, what is asked about swings,
+"""What a search over stances is made of: stances with their moves, which grips go together, what it needs of swings,
 and what was found.
 """
 
@@ -22,7 +22,7 @@ class Conflicts(Protocol):
     """Which grips do not go together, and when."""
 
     def prepare(self, pairs: Iterable[tuple[int, int]], /) -> None:
-        """Look at pairs of grips together, as they will be asked about."""
+        """Look at pairs of grips together, as the search will need them."""
 
     def first_conflict(self, one: int, other: int, sample: int, /) -> int:
         """The first sample from ``sample`` on at which two grips do not go together; one behind every path for none."""

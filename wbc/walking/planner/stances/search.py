@@ -44,7 +44,7 @@ MOVES, PARTS = 2, 2
 #: Stances, and pairs of grips, of one slice of the search
 NODES, PAIRS = 16, 96
 #: Arm, grips and sample of a swing that was looked at
-Asked = tuple[int, int, int, int]
+SwingKey = tuple[int, int, int, int]
 S = TypeVar("S", bound=SwingTable)
 
 
@@ -56,7 +56,7 @@ class StanceSearch(Generic[S]):
         hover: how long a hand may be in the air longer than it needs, until its next grip begins [s].
         patient: hands may wait in the air for any time, also for others to let them land.
         longest_delay: of one swing [s]; 0: the body never slows down.
-        width: stances kept of each number of re-grasps, None: all.
+        width: stances stored for each number of re-grasps, None: all.
         first: row of an arm and of a hold: the first move, whether it is needed or not; None: any.
         spare: samples before the end of a grip until which other hands land.
     """
@@ -79,8 +79,8 @@ class StanceSearch(Generic[S]):
         self._usual = round(USUAL / path.spacing)
         codes = grips.hold * (1 + grips.branch.max(initial=0)) + grips.branch
         self._outlook = Outlook(grips.last, codes, len(path) - 1, self._usual, SLACK / path.spacing, path.spacing)
-        # Levels of the last search, and swings (arm, source, target, lift) that each but the first asked for
-        self._levels, self._asked = list[dict[Key, Node]](), list[set[Asked]]()
+        # Levels of the last search, and swings (arm, source, target, lift) that each but the first needed
+        self._levels, self._asked = list[dict[Key, Node]](), list[set[SwingKey]]()
         self.patient, self._longest_wait = patient, np.inf if patient else hover
         self.longest_delay, self.width, self.first = longest_delay, width, first
         self.expanded = 0
@@ -120,15 +120,15 @@ class StanceSearch(Generic[S]):
         return self._result(levels, None, False)
 
     def correct(self, move: Move, duration: float, possible: bool) -> None:
-        """A move takes another time [s], or is not possible; what was searched without looking at it is kept."""
+        """A move takes another time [s], or is not possible; what was searched without it stays."""
         self.swings.correct(move, duration, possible)
         for depth, asked in enumerate(self._asked):
             if (move.arm, move.source, move.target, move.lift) in asked:
                 self._levels, self._asked = self._levels[: depth + 1], self._asked[:depth]
 
-    def _next(self, level: dict[Key, Node]) -> Slices[tuple[dict[Key, Node], set[Asked]]]:
+    def _next(self, level: dict[Key, Node]) -> Slices[tuple[dict[Key, Node], set[SwingKey]]]:
         """Stances with one more re-grasp, the promising ones first, until there are enough; and swings looked at."""
-        whole, parts, asked = list(level.items()), list[Fan](), set[Asked]()
+        whole, parts, asked = list(level.items()), list[Fan](), set[SwingKey]()
         for begin in range(0, len(whole), NODES):
             parts += self._moves(whole, range(begin, min(begin + NODES, len(whole))))
             yield None

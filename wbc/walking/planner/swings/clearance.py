@@ -44,7 +44,7 @@ class SwingClearance:
 
         Args:
             points: ``[m, n, points, 3]``. bodies: ``[m, n, 4, 4]``, where the bodies are.
-            holds: places of the holds that the hands leave and come to ``[m, 2, 3]`` [m].
+            holds: positions of the holds that the hands leave and come to ``[m, 2, 3]`` [m].
 
         Returns:
             ``[m]``.

@@ -1,4 +1,4 @@
-"""The first curve of a swing that is possible and clear, by compiled code: hundreds are asked for in a plan."""
+"""The first curve of a swing that is possible and clear, by compiled code: a plan needs hundreds."""
 
 from __future__ import annotations
 

@@ -151,7 +151,7 @@ def between(
     """Curves of hands of which one end or both are in the air.
 
     Args:
-        ends, axes: places and z axes of the hands at the beginning and the end, ``[m, 3]`` each. free: which are in
+        ends, axes: positions and z axes of the hands at the beginning and the end, ``[m, 3]`` each. free: which are in
             the air ``[m, 2]``.
     """
     height, flat = crossing_height(walker), Curves(*ends, *axes, np.zeros(free.shape), np.zeros(len(free)), pivots, 1.0)

@@ -39,7 +39,7 @@ class SwingLaw:
     Rows are 5 ms apart, so that they miss a curve by a hundredth of a millimetre.
 
     Args:
-        times: of the rows, evenly from 0 ``[n]`` [s]. places: of the hand ``[n, 3]`` [m].
+        times: of the rows, evenly from 0 ``[n]`` [s]. places: positions of the hand ``[n, 3]`` [m].
         parts: of the guided joints' change ``[n]``, 0 to 1.
 
     Attributes:

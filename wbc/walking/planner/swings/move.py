@@ -29,7 +29,7 @@ class Move(NamedTuple):
 
 
 class Swing(NamedTuple):
-    """A swing that is asked about.
+    """A swing to be examined.
 
     Attributes:
         arm: row. source, target: grips. lift: sample of the body's path.

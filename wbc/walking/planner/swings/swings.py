@@ -21,9 +21,8 @@ from wbc.walking.planner.swings.clearance import SwingClearance
 from wbc.walking.planner.swings.compiled_choice import CompiledChoice, Name
 from wbc.walking.planner.swings.curve import ALTERNATIVES, Curves, Pivots, curves
 from wbc.walking.planner.swings.move import Chosen, Move, Swing
-from wbc.walking.planner.swings.tracks import Asked, Tracks, points_along, tracks
-from wbc.walking.planner.swings.waiting import Asked as WaitingAsked
-from wbc.walking.planner.swings.waiting import Waiting, waiting
+from wbc.walking.planner.swings.tracks import TrackRequests, Tracks, points_along, tracks
+from wbc.walking.planner.swings.waiting import Waiting, WaitRequests, waiting
 
 #: Points of a curve: enough for the search, and for carrying it out
 COARSE, FINE = 25, 97
@@ -55,7 +54,7 @@ class _Track:
 
 
 class Swings:
-    """Swings of a body's arms between grips over one path; what was computed is kept.
+    """Swings of a body's arms between grips over one path; results are cached.
 
     It is a :class:`wbc.walking.planner.stances.search.SwingTable`.
     """
@@ -135,7 +134,7 @@ class Swings:
             rest = []
             for swing in left:
                 track = self._tracks[_name(swing), which]
-                # A time that was corrected for other ends tells nothing where there is no curve for these
+                # A time that was corrected for other ends says nothing where there is no curve for these
                 known = None if track is None else self._known.get((*_name(swing)[:4], which), track.duration)
                 if known is not None and all(self._apart[_name(swing), which, g] for g in swing.others):
                     self._chosen[swing] = Chosen(which, known)
@@ -208,7 +207,7 @@ class Swings:
         begin, least = lift + self.latch / self.path.spacing, (soonest - lift) * self.path.spacing - self.extra
         if which < len(ALTERNATIVES):
             curve = self.curve(arms, source, target, lift, which)
-            asked = Asked(arms, source, target, begin, last, least)
+            asked = TrackRequests(arms, source, target, begin, last, least)
             found = tracks(self.walker, self.shapes, self.path, self.grips, curve, asked, COARSE)
         else:
             whole = begin, begin + least / self.path.spacing
@@ -223,7 +222,7 @@ class Swings:
 
     def waiting(self, ends: tuple[Ints, Ints, Ints], times: tuple[Array, Array], which: int, n: int) -> Waiting:
         """Swings of arms from grips to grips, between samples, that wait in the air."""
-        asked = WaitingAsked(*ends, *times)
+        asked = WaitRequests(*ends, *times)
         return waiting(self.walker, self.structure, self.path, self.grips, asked, which - len(ALTERNATIVES), n)
 
     def _check(self, swings: Sequence[Swing], which: int) -> None:

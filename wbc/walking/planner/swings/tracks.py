@@ -42,7 +42,7 @@ class Tracks:
 
 
 @dataclass(frozen=True, eq=False)
-class Asked:
+class TrackRequests:
     """Swings of arms between grips, ``[m]`` each: the body is at sample ``begin`` at first and ``last`` at most, and
     they take ``least`` [s] if their law takes less.
     """
@@ -56,7 +56,7 @@ class Asked:
 
 
 def tracks(
-    walker: Walker, shapes: LimbShapes, path: BodyPath, grips: Grips, curve: Curves, asked: Asked, n: int
+    walker: Walker, shapes: LimbShapes, path: BodyPath, grips: Grips, curve: Curves, asked: TrackRequests, n: int
 ) -> Tracks:
     """Swings along curves, at n points of each."""
     limb = shapes.limb
@@ -86,7 +86,7 @@ def tracks(
 
 
 def _numpy(
-    walker: Walker, shapes: LimbShapes, path: BodyPath, grips: Grips, curve: Curves, asked: Asked, n: int
+    walker: Walker, shapes: LimbShapes, path: BodyPath, grips: Grips, curve: Curves, asked: TrackRequests, n: int
 ) -> Tracks:
     """What the compiled code does."""
     times = np.linspace(0.0, 1.0, n)

@@ -1,4 +1,4 @@
-"""Swings in which the hand waits: off its hold to a place that goes with the body, and from there onto the next hold.
+"""Swings in which the hand waits: off its hold to a point that moves with the body, and from there onto the next hold.
 
 A hand whose next hold comes into reach long after it had to leave the last one cannot swing all the time: the
 body would carry the arm past it. It is drawn in at once, rides with the body, and goes on as late as it can.
@@ -32,7 +32,7 @@ PASSES, GUESS = 4, 1.0
 
 
 @dataclass(frozen=True, eq=False)
-class Asked:
+class WaitRequests:
     """Swings of arms between grips, ``[m]`` each, that may move from sample ``begin`` of the body to sample ``end``."""
 
     arms: Ints
@@ -62,7 +62,7 @@ class Waiting:
 
     Attributes:
         away, onto: off the holds, and onto the next ones.
-        samples: of the bodies while the hands ride ``[m, n]``. places: where the hands are then ``[m, n, 3]`` [m].
+        samples: of the bodies while the hands ride ``[m, n]``. places: positions of the hands then ``[m, n, 3]`` [m].
         angles: of the joints in all three parts ``[m, 3 n, joints]`` [rad].
         possible: within reach and limits, and in time ``[m]``.
     """
@@ -82,7 +82,7 @@ class Waiting:
 
 
 def waiting(
-    walker: Walker, structure: Structure, path: BodyPath, grips: Grips, asked: Asked, place: int, n: int
+    walker: Walker, structure: Structure, path: BodyPath, grips: Grips, asked: WaitRequests, place: int, n: int
 ) -> Waiting:
     """Swings that wait at one of :attr:`wbc.robots.BodyLimb.waiting`, at n points of each of their three parts."""
     limb = limb_of(walker)
@@ -99,7 +99,14 @@ def waiting(
 
 
 def _half(
-    walker: Walker, structure: Structure, path: BodyPath, grips: Grips, asked: Asked, place: int, n: int, leaves: bool
+    walker: Walker,
+    structure: Structure,
+    path: BodyPath,
+    grips: Grips,
+    asked: WaitRequests,
+    place: int,
+    n: int,
+    leaves: bool,
 ) -> Half:
     """From the holds, or onto them."""
     arms, limb = asked.arms, limb_of(walker)
@@ -132,7 +139,7 @@ def _place(limb: BodyLimb, place: int) -> Array:
     return np.array([radius * cos(angle), radius * sin(angle), height])
 
 
-def _frames(walker: Walker, path: BodyPath, asked: Asked, samples: Array) -> Array:
+def _frames(walker: Walker, path: BodyPath, asked: WaitRequests, samples: Array) -> Array:
     """Of the arms' bases at samples of the path ``[m]`` or ``[m, n]``: ``[..., 4, 4]``."""
     bases = np.array([arm.base.homogeneous for arm in walker.arms])[asked.arms]
     out: Array = path.blended(samples) @ (bases if samples.ndim == 1 else bases[:, None])
