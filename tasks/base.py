@@ -104,7 +104,7 @@ class Row:
         return many * length**power
 
 
-class Order(IntEnum):
+class SacrificeOrder(IntEnum):
     """Order of sacrifice when rows cannot all hold: a higher number gives way first."""
 
     ACTUATOR = 0
@@ -260,7 +260,7 @@ class Constraint(Item):
     """
 
     abstract: ClassVar[bool] = True
-    order: ClassVar[Order] = Order.MARGIN
+    order: ClassVar[SacrificeOrder] = SacrificeOrder.MARGIN
 
     #: Rows are equalities (lower == upper)
     equality: ClassVar[bool] = False

@@ -13,7 +13,7 @@ from wbc import validation
 from wbc.symbolic import rotations as rot
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks._pointing import shortest_turn
-from wbc.tasks.base import Constraint, Input, Order, Row, Rows, Values
+from wbc.tasks.base import Constraint, Input, Row, Rows, SacrificeOrder, Values
 from wbc.tasks.frames import frame_pose, require_motion
 
 if TYPE_CHECKING:
@@ -26,7 +26,8 @@ UPRIGHT = 1e-12
 
 @dataclass(frozen=True)
 class Hold(Constraint):
-    """A frame does not move, and drift from its target decays like exp(-gain t): the equality J v = -gain e, with
+    """A constraint on a frame (a thing to grasp is a ``wbc.walking.Hold``): it does not move, and drift from its target
+    decays like exp(-gain t), by the equality J v = -gain e, with
 
         position     J = J_lin (3 x nv), e = p - p_target                             [m/s]
         orientation  J = J_ang (3 x nv), e = log3(R R_target'), |e| <= pi             [rad/s]
@@ -56,7 +57,7 @@ class Hold(Constraint):
     not contact forces.
     """
 
-    order: ClassVar[Order] = Order.HOLD
+    order: ClassVar[SacrificeOrder] = SacrificeOrder.HOLD
     equality: ClassVar[bool] = True
     initial_only: ClassVar[tuple[str, ...]] = ("gain",)
 

@@ -19,7 +19,7 @@ from wbc.tasks import _bodies as bodies
 from wbc.tasks import _gap as gap
 from wbc.tasks._ball import BallRow
 from wbc.tasks._selection import selection
-from wbc.tasks.base import Constraint, Input, Numbers, Order, Row, Sensor, Values
+from wbc.tasks.base import Constraint, Input, Numbers, Row, SacrificeOrder, Sensor, Values
 
 if TYPE_CHECKING:
     from wbc.robot import Robot
@@ -29,7 +29,8 @@ SHAPES = (Sphere, Capsule, Box, Cylinder, Convex, HalfSpace)
 
 @dataclass(frozen=True)
 class Obstacle(Constraint):
-    """Links keep clear of a sphere, capsule, box, cylinder, convex hull, mesh or half-space, at rest or moving:
+    """A constraint on links (a structure's box or capsule is a ``wbc.walking.Obstacle``): they keep clear of a sphere,
+    capsule, box, cylinder, convex hull, mesh or half-space, at rest or moving:
 
         h = (signed distance between a shape of a link and the obstacle) - margin >= 0     [m]
 
@@ -71,7 +72,7 @@ class Obstacle(Constraint):
         UnknownNameError, MissingShapeError, RangeError: in :meth:`validate`.
     """
 
-    order: ClassVar[Order] = Order.MARGIN
+    order: ClassVar[SacrificeOrder] = SacrificeOrder.MARGIN
 
     shape: Shape | Sequence[Convex]
     links: tuple[str, ...] | None = None

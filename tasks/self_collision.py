@@ -17,7 +17,7 @@ from wbc.robot.pairs.link_pairs import neighbours, shaped_links
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks import _bodies as bodies
 from wbc.tasks import _gap as gap
-from wbc.tasks.base import Constraint, Input, Numbers, Order, Row, Sensor, Values
+from wbc.tasks.base import Constraint, Input, Numbers, Row, SacrificeOrder, Sensor, Values
 
 if TYPE_CHECKING:
     from wbc.robot import Robot
@@ -71,7 +71,7 @@ class SelfCollision(Constraint):
         UnknownNameError, MissingShapeError, RangeError, ShapeError: in :meth:`validate`.
     """
 
-    order: ClassVar[Order] = Order.MARGIN
+    order: ClassVar[SacrificeOrder] = SacrificeOrder.MARGIN
 
     pairs: tuple[tuple[str, str], ...] | None = None
     margin: float = 0.0

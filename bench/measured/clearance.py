@@ -11,7 +11,7 @@ import pinocchio as pin
 
 import wbc
 from bench.sheet import Sheet
-from wbc.clearance import Body, Motion, Pair, Scene, Sweep, Sweeper, Tree, bodies_of, self_pairs
+from wbc.clearance import Motion, Pair, Sweep, Sweeper, SweptBody, SweptScene, Tree, bodies_of, self_pairs
 from wbc.shapes import Box, Capsule, Cylinder, HalfSpace
 from wbc.validation import Array
 
@@ -39,20 +39,20 @@ def parts() -> dict[str, Sheet | str]:
     return {"costs": Sheet("", columns, rows())}
 
 
-def scene_of(arms: int, far: float) -> Scene:
+def scene_of(arms: int, far: float) -> SweptScene:
     """A walker of so many arms over a plane, among obstacles that begin ``far`` from its middle [m]."""
     robot, rng = wbc.robots.walker(arms=arms).robot, np.random.default_rng(arms)
     tree = Tree.of_model(robot.model)
     links = bodies_of(robot)
-    things = [Body("plane", HalfSpace(), "world", pin.SE3(np.eye(3), np.array([0.0, 0.0, -far])))]
+    things = [SweptBody("plane", HalfSpace(), "world", pin.SE3(np.eye(3), np.array([0.0, 0.0, -far])))]
     for k in range(AROUND):
         shape = (Capsule(0.03, 1.0), Box((0.3, 0.2, 0.2)), Cylinder(0.05, 0.8))[k % 3]
         direction = rng.normal(size=3)
         position = direction / np.linalg.norm(direction) * (far + rng.uniform(0.5, 2.0))
         turn = pin.Quaternion(*(x := rng.normal(size=4)) / np.linalg.norm(x)).matrix()
-        things.append(Body(f"thing {k}", shape, "world", pin.SE3(turn, position)))
+        things.append(SweptBody(f"thing {k}", shape, "world", pin.SE3(turn, position)))
     pairs = [Pair(a.name, b.name, CLEARANCE) for a in links for b in things]
-    return Scene(tree, [*links, *things], [*pairs, *self_pairs(robot, CLEARANCE)])
+    return SweptScene(tree, [*links, *things], [*pairs, *self_pairs(robot, CLEARANCE)])
 
 
 def motion_of(arms: int, duration: float) -> tuple[Array, Array, Array]:
@@ -88,7 +88,7 @@ def rows() -> list[tuple[str, ...]]:
         if spare < inf:
             pairs = zip(scene.pairs, own.bound.tolist(), strict=True)
             near = [Pair(pair.first, pair.second, pair.required + least - spare) for pair, least in pairs]
-            scene = Scene(scene.tree, scene.bodies, near)
+            scene = SweptScene(scene.tree, scene.bodies, near)
         # Links of the arms are too near to each other during this motion: the other pairs are swept
         chosen, sweeper = own.pairs[own.bound > 1e-3], Sweeper(scene, native)
 

@@ -16,7 +16,7 @@ from wbc.coordinates.rows import KINDS, Coordinate
 from wbc.errors import RangeError
 from wbc.robot import Robot
 from wbc.symbolic.tracer import Tracer
-from wbc.tasks.base import Constraint, Input, Order, Row, Rows, Task, Values
+from wbc.tasks.base import Constraint, Input, Row, Rows, SacrificeOrder, Task, Values
 from wbc.validation import Array
 
 #: Fastest return of what is held [m/s, rad/s]
@@ -115,7 +115,7 @@ class KeepRows(Constraint):
 
     #: Made by pairs, so it is not in the table of items
     abstract: ClassVar[bool] = True
-    order: ClassVar[Order] = Order.HOLD
+    order: ClassVar[SacrificeOrder] = SacrificeOrder.HOLD
     equality: ClassVar[bool] = True
     initial_only: ClassVar[tuple[str, ...]] = ("gain",)
 
