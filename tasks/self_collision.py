@@ -54,8 +54,8 @@ class SelfCollision(Constraint):
     Inputs:
         margin: what is kept between the shapes, >= 0 [m].
 
-    The rows hold dh/dt >= -rate h, hence h(t + dt) >= (1 - rate dt) h up to the bend of the links' paths over one tick.
-    From an overlap (h < 0) they push apart at -rate h at least; where limits do not let them, the step says
+    The rows hold dh/dt >= -rate h, hence h(t + dt) >= (1 - rate dt) h up to the curvature of the links' paths over one
+    tick. From an overlap (h < 0) they push apart at -rate h at least; where limits do not let them, the step says
     ``relaxed``.
 
     It cannot see what the link shapes do not cover. Shapes that are larger than the links may overlap in every

@@ -26,7 +26,7 @@ DEAD = 1e-20
 
 
 class Reach:
-    """Curvature of the errors that no step removes, and gains that leave room to brake.
+    """Curvature of the errors that no step removes, and gains that leave margin to brake.
 
     Args:
         curve: weights of the task rows -> curvature (nv x nv, symmetric); None: no task has any.
