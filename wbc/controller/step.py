@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 
 class Context:
-    """What all steps of a controller share: names and places."""
+    """What all steps of a controller share: names and offsets."""
 
     def __init__(self, stack: Declaration, layout: Layout, assembly: Assembly | None) -> None:
         self.stack, self.layout, self.assembly = stack, layout, assembly

@@ -154,6 +154,6 @@ def _of_levels(past: Past, frozen: Frozen) -> tuple[Array, Callable[[int], Array
     def slope(row: int) -> Array:
         size = frozen.sizes[row]
         start = first.to_bound(row) / dofs * size
-        return np.asarray(frozen.optimum.to_side(numbers, row, start) * dofs / size)
+        return np.asarray(frozen.optimum.to_bound(numbers, row, start) * dofs / size)
 
     return frozen.answer.x * dofs, slope

@@ -223,7 +223,7 @@ class Reach:
         return limited
 
     def brake_for_margins(self, A: Array, low: Array, margin: Array, p: Array, dt: float, bound_enabled: Array) -> None:
-        """Raise the lower sides of margin rows to what the joints can brake for, see ``native/margins.h``."""
+        """Raise the lower bounds of margin rows to what the joints can brake for, see ``native/margins.h``."""
         limited = self._limited(bound_enabled)
         if not limited.any() or not len(self._margin_rows):
             return

@@ -92,7 +92,7 @@ class VmAssembly(Assembly):
     def curvature(self) -> Array | None:
         return self._curvature
 
-    def row_sides(self) -> tuple[Array, Array]:
+    def row_bounds(self) -> tuple[Array, Array]:
         return self._sides
 
     def _curvature_of(self, program: TickProgram, arguments: list[Array]) -> Callable[[Array], Array] | None:
