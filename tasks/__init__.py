@@ -1,9 +1,14 @@
 """Tasks and constraints: declarative objects, one idea a file (floor 3)."""
 
+from __future__ import annotations
+
+import warnings
+from typing import Any
+
 from wbc.tasks._stereographic import PlaneReference
 from wbc.tasks.axis_align import AxisAlign
 from wbc.tasks.axis_cone import AxisCone
-from wbc.tasks.base import Bounds, Constraint, Form, Input, Item, Order, Row, Rows, Task, Values, registry
+from wbc.tasks.base import Bounds, Constraint, Form, Input, Item, Row, Rows, SacrificeOrder, Task, Values, registry
 from wbc.tasks.center_of_mass import CenterOfMass
 from wbc.tasks.damping import Damping
 from wbc.tasks.distance import Distance
@@ -57,7 +62,6 @@ __all__ = [
     "Mechanism",
     "Momentum",
     "Obstacle",
-    "Order",
     "PitchPlane",
     "PitchPlaneLimit",
     "PlaneReference",
@@ -66,6 +70,7 @@ __all__ = [
     "Rolling",
     "Row",
     "Rows",
+    "SacrificeOrder",
     "SelfCollision",
     "Task",
     "Values",
@@ -74,3 +79,10 @@ __all__ = [
     "WorkspacePolyhedron",
     "registry",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    if name != "Order":
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    warnings.warn("Order is called SacrificeOrder now", DeprecationWarning, stacklevel=2)
+    return SacrificeOrder

@@ -11,7 +11,7 @@ are unit vectors everywhere. Where a distance has no direction it is declared: f
     centres of spheres coincide                         down (-z of the world)
     centre on the core of a capsule                     from the sphere to the capsule: the capsule's x axis
     cores of capsules cross                             perpendicular to both; the first one's x axis if parallel
-    centre inside a box or cylinder, several ways out   the sphere leaves along the first of x, y, z (box), along the
+    centre inside a box or cylinder, several exits      the sphere leaves along the first of x, y, z (box), along the
                                                         axis (cylinder), through the positive face from the middle
 
 To that end the first three move one shape by :data:`wbc.tasks._nearest.SHIFT` times its size.

@@ -19,7 +19,7 @@ def plain(value: Any, robot: Robot) -> Any:
     """A field's value as plain data; items within items by their own declarations.
 
     Raises:
-        ShapeError: nothing that can be told apart by its data.
+        ShapeError: nothing that its data distinguish from another.
     """
     if hasattr(value, "declaration"):
         return value.declaration(robot)

@@ -10,7 +10,7 @@ from wbc import validation
 from wbc.errors import RangeError
 from wbc.tasks._stereographic import Triple, triple
 
-#: An axis this close to opposite its direction [rad] turns the declared way round.
+#: An axis this close to opposite its direction [rad] turns in the declared direction.
 OPPOSITE = 1e-9
 
 

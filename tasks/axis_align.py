@@ -48,7 +48,7 @@ class AxisAlign(Task):
         >>> AxisAlign("panda_hand", axis=(0, 0, 1))          # then target = (0, 0, -1): the hand points down
 
     What it cannot do: it does not choose the turn about the axis, and it tells a direction from its opposite (for a
-    line without a sense choose the nearer of the two as target). Noise may choose the way round near theta = pi.
+    line without a sense choose the nearer of the two as target). Noise may choose the turn's sense near theta = pi.
 
     Attributes:
         frame: name of the frame that the axis is fixed in.

@@ -39,7 +39,7 @@ class AxisCone(Constraint):
     Example:
         >>> AxisCone("panda_hand", axis=(0, 0, -1), half_angle=0.2)       # the cup in the hand stays level
 
-    What it cannot do: at theta = pi every way back is as short: one is taken, and noise may choose another. It limits
+    What it cannot do: at theta = pi every turn back is as short: one is taken, and noise may choose another. It limits
     an angle and not the point that the axis goes through (see ``GazeCone``). Over one tick of length dt an axis that
     turns at w against the direction may leave the cone by (1 + 1 / alpha) (w dt)^2 / 2: a cone must be wide against
     w dt. A direction that moves faster than the joints can follow is lost: actuator limits come first.

@@ -59,7 +59,7 @@ class Input:
             (linear; angular, 6, in the axes the pose is given in) for a pose, an angular velocity (3) for a
             rotation, nv numbers for a configuration.
         low, high: valid range of each number.
-        infinite: the infinity that is a valid number, too: no limit on that side.
+        infinite: the infinity that is a valid number, too: no limit there.
         below: name of an input of the same size, with a default like this one, whose numbers this one's never exceed.
         direction: a vector that is kept at unit length; its rate is the derivative of the unit vector.
         sensed: a :class:`Sensor` writes it before every tick; users only read it.
@@ -104,7 +104,7 @@ class Row:
         return many * length**power
 
 
-class Order(IntEnum):
+class SacrificeOrder(IntEnum):
     """Order of sacrifice when rows cannot all hold: a higher number gives way first."""
 
     ACTUATOR = 0
@@ -201,7 +201,7 @@ class Item:
 
 @dataclass(frozen=True)
 class Task(Item):
-    """A wish: e(q, inputs) -> 0, weighted against the other wishes of its level.
+    """What is desired: e(q, inputs) -> 0, weighted against the other tasks of its level.
 
     Every task has the run-time inputs ``gain`` [1/s], ``weight``, ``enabled`` and ``mask`` (one number
     >= 0 a row, multiplies the row's weight).
@@ -260,7 +260,7 @@ class Constraint(Item):
     """
 
     abstract: ClassVar[bool] = True
-    order: ClassVar[Order] = Order.MARGIN
+    order: ClassVar[SacrificeOrder] = SacrificeOrder.MARGIN
 
     #: Rows are equalities (lower == upper)
     equality: ClassVar[bool] = False

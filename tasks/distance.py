@@ -41,7 +41,7 @@ class Distance(Task):
     Example:
         >>> Distance("gripper_left", "gripper_right")            # the hands keep their distance, however they turn
 
-    What it cannot do: keep two bodies apart: it is a wish for one distance of two points, not a margin (use Obstacle).
+    What it cannot do: keep two bodies apart: it has one desired distance of two points, no margin (use Obstacle).
     A target of 0 leaves the direction of approach to the other tasks and is served up to the tick's rounding of a
     cone's tip; to bring two points together command a position (EndEffector with ``relative_to``).
 

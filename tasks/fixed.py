@@ -11,7 +11,7 @@ import casadi as ca
 from wbc import validation
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks._selection import dof_rows, joint_dofs, selection
-from wbc.tasks.base import Bounds, Constraint, Order, Row, Values
+from wbc.tasks.base import Bounds, Constraint, Row, SacrificeOrder, Values
 from wbc.tasks.braking import clip
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ class Fixed(Constraint):
     order of sacrifice. A joint that never moves costs less as a locked joint of the robot.
     """
 
-    order: ClassVar[Order] = Order.HOLD
+    order: ClassVar[SacrificeOrder] = SacrificeOrder.HOLD
 
     joints: tuple[str, ...]
     acceleration: bool = True

@@ -12,7 +12,7 @@ from wbc import validation
 from wbc.errors import NotFiniteError, RangeError, ShapeError
 from wbc.symbolic.kinematics import WORLD
 from wbc.symbolic.tracer import Tracer
-from wbc.tasks.base import Constraint, Input, Order, Row, Rows, Values
+from wbc.tasks.base import Constraint, Input, Row, Rows, SacrificeOrder, Values
 from wbc.tasks.frames import require_motion
 
 if TYPE_CHECKING:
@@ -47,7 +47,7 @@ class FrameVelocityLimit(Constraint):
     ``JointLimits`` lets the joints brake, so a limit that drops suddenly may be broken for some ticks.
     """
 
-    order: ClassVar[Order] = Order.MARGIN
+    order: ClassVar[SacrificeOrder] = SacrificeOrder.MARGIN
 
     frame: str
     linear: float | Triple | None = None

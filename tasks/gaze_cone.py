@@ -44,7 +44,7 @@ class GazeCone(Constraint):
         >>> GazeCone("camera_link", half_angle=0.5, axis=(0, 0, 1), point_frame="panda_hand")   # the hand stays in view
 
     What it cannot do: it sees no occlusion and no nearest or farthest distance of sharp sight, and it looks along one
-    axis: a rectangular image is its inscribed cone. Straight behind the apex every way back is as short: one is taken,
+    axis: a rectangular image is its inscribed cone. Straight behind the apex every turn back is as short: one is taken,
     and noise may choose another. A point that moves faster than the joints can follow is lost: actuator limits come
     first.
 

@@ -13,7 +13,7 @@ from wbc import validation
 from wbc.symbolic import rotations as rot
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks._pointing import shortest_turn
-from wbc.tasks.base import Constraint, Input, Order, Row, Rows, Values
+from wbc.tasks.base import Constraint, Input, Row, Rows, SacrificeOrder, Values
 from wbc.tasks.frames import frame_pose, require_motion
 
 if TYPE_CHECKING:
@@ -26,7 +26,8 @@ UPRIGHT = 1e-12
 
 @dataclass(frozen=True)
 class Hold(Constraint):
-    """A frame does not move, and drift from its target decays like exp(-gain t): the equality J v = -gain e, with
+    """A frame does not move (a thing to grasp is a ``wbc.walking.Hold``), and drift from its target decays like
+    exp(-gain t): the equality J v = -gain e, with
 
         position     J = J_lin (3 x nv), e = p - p_target                             [m/s]
         orientation  J = J_ang (3 x nv), e = log3(R R_target'), |e| <= pi             [rad/s]
@@ -52,11 +53,11 @@ class Hold(Constraint):
 
     It cannot hold what the robot cannot do: six rows on an arm with fewer free joints, or in a singular pose, are
     dependent, and with drift left they may contradict. A frame that moves when it becomes held cannot stop faster than
-    ``JointLimits`` lets it; actuator and position limits come first. It holds velocities and a geometric place,
+    ``JointLimits`` lets it; actuator and position limits come first. It holds velocities and a geometric pose,
     not contact forces.
     """
 
-    order: ClassVar[Order] = Order.HOLD
+    order: ClassVar[SacrificeOrder] = SacrificeOrder.HOLD
     equality: ClassVar[bool] = True
     initial_only: ClassVar[tuple[str, ...]] = ("gain",)
 

@@ -44,7 +44,7 @@ class JointCoupling(Task):
 
     A row has the unit of its first joint; coefficients carry what the others lack (0.005 m/rad of a screw).
 
-    What it cannot do: it is a wish, with a weight. What the mechanism itself couples (``robot.couplings``) is held
+    What it cannot do: it is a task, with a weight. What the mechanism itself couples (``robot.couplings``) is held
     exactly by ``Mechanism``. Rows that contradict each other are served in the least-squares sense. At an error of half
     a turn, a row with an unbounded joint may turn either way.
 

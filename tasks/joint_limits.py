@@ -14,7 +14,7 @@ from wbc import validation
 from wbc.errors import RangeError
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks._selection import dof_rows, joint_dofs, selection
-from wbc.tasks.base import Bounds, Constraint, Input, Order, Row, Values
+from wbc.tasks.base import Bounds, Constraint, Input, Row, SacrificeOrder, Values
 from wbc.tasks.braking import braking_bound, clip
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ class JointLimits(Constraint):
     have no position limit. Torque limits are no concern of it.
     """
 
-    order: ClassVar[Order] = Order.ACTUATOR
+    order: ClassVar[SacrificeOrder] = SacrificeOrder.ACTUATOR
 
     position: bool = True
     velocity: bool = True

@@ -1,4 +1,4 @@
-"""Limits on both sides of what a task is about."""
+"""Lower and upper limits of what a task is about."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from wbc.errors import DuplicateNameError, ShapeError
 from wbc.symbolic.kinematics import Kinematics
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks import inputs as run_time
+from wbc.tasks._limits import LimitValues, checked_limits, limit_inputs, limit_margins, limit_rows
 from wbc.tasks._selection import selection
-from wbc.tasks._sides import Side, checked_sides, side_inputs, side_margins, side_rows
 from wbc.tasks.base import Constraint, Input, Row, Task, Values
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ class Limit(Constraint):
 
         h = (f (e - lower) + (1 - f) c,  f (upper - e) + (1 - f) c),
 
-    c = (upper - lower) / 2, or 1 where there is no other side.
+    c = (upper - lower) / 2, or 1 where there is no other limit.
 
     Inputs:
         those of the task, and
@@ -52,7 +52,7 @@ class Limit(Constraint):
 
     Attributes:
         task: any task whose rows are the derivative of its error; also one of your own, or an ``Expression``.
-        lower, upper: first values of the inputs; one number serves all rows. None: no rows on this side.
+        lower, upper: first values of the inputs; one number serves all rows. None: no rows of this limit.
         only: labels of the task's rows that are limited, in this order; None: all.
 
     Raises:
@@ -64,14 +64,14 @@ class Limit(Constraint):
     initial_only: ClassVar[tuple[str, ...]] = ("lower", "upper")
 
     task: Task
-    lower: Side = None
-    upper: Side = None
+    lower: LimitValues = None
+    upper: LimitValues = None
     only: tuple[str, ...] | None = None
 
     def __post_init__(self) -> None:
         if not isinstance(self.task, Task):
             raise ShapeError("Limit.task", self.task, "expected a task")
-        lower, upper = checked_sides("Limit", self.lower, self.upper)
+        lower, upper = checked_limits("Limit", self.lower, self.upper)
         object.__setattr__(self, "lower", lower)
         object.__setattr__(self, "upper", upper)
         if self.only is not None:
@@ -91,19 +91,19 @@ class Limit(Constraint):
             value = getattr(self, name)
             if isinstance(value, tuple) and len(value) != count:
                 raise ShapeError(f"Limit.{name}", value, f"expected one number, or {count}: one a row")
-        own = [d.name for d in side_inputs(self.lower, self.upper, ("",) * count)]
+        own = [d.name for d in limit_inputs(self.lower, self.upper, ("",) * count)]
         for declared in self.task.inputs(robot):
             if declared.name in own:
                 raise DuplicateNameError("Limit.task", declared.name, "an input of the task has the name of a limit's")
 
     def inputs(self, robot: Robot) -> tuple[Input, ...]:
-        """Those of the task, then both sides and their rates."""
+        """Those of the task, then both limits and their rates."""
         units = [row.unit for row in self._selected(robot)]
-        return (*self.task.inputs(robot), *side_inputs(self.lower, self.upper, units))
+        return (*self.task.inputs(robot), *limit_inputs(self.lower, self.upper, units))
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
         """``label.lower`` and ``label.upper`` of the selected rows, in the units of the task."""
-        return side_rows(self.lower, self.upper, self._selected(robot))
+        return limit_rows(self.lower, self.upper, self._selected(robot))
 
     def initial(self, robot: Robot, q: NDArray[np.float64]) -> dict[str, Any]:
         """What the task says."""
@@ -113,10 +113,10 @@ class Limit(Constraint):
         """The formula of the class."""
         factor = self.task.row_factor(robot, kin, inputs)
         error = self._pick(robot, self.task.error(robot, kin, inputs))
-        return side_margins(error, inputs, None if factor is None else self._pick(robot, factor))
+        return limit_margins(error, inputs, None if factor is None else self._pick(robot, factor))
 
     def row_factor(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX | None:
-        """The task's factors of the selected rows, once a side."""
+        """The task's factors of the selected rows, once a limit."""
         factor = self.task.row_factor(robot, kin, inputs)
         if factor is None:
             return None
@@ -124,7 +124,7 @@ class Limit(Constraint):
         return ca.vertcat(*[self._pick(robot, factor)] * sides)
 
     def declaration(self, robot: Robot) -> dict[str, Any]:
-        """The task's own declaration, the selected rows, and which sides there are."""
+        """The task's own declaration, the selected rows, and which limits there are."""
         return super().declaration(robot) | {"sides": [self.lower is not None, self.upper is not None]}
 
     def _numbers(self, robot: Robot) -> list[int]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, ClassVar
 import casadi as ca
 
 from wbc.symbolic.tracer import Tracer
-from wbc.tasks.base import Constraint, Input, Order, Row, Rows, Values
+from wbc.tasks.base import Constraint, Input, Row, Rows, SacrificeOrder, Values
 
 if TYPE_CHECKING:
     from wbc.robot import Robot
@@ -30,7 +30,7 @@ class Mechanism(Constraint):
     It cannot couple joints without a plain coordinate (unbounded joints are coupled in velocity only).
     """
 
-    order: ClassVar[Order] = Order.POSITION
+    order: ClassVar[SacrificeOrder] = SacrificeOrder.POSITION
     equality: ClassVar[bool] = True
 
     def inputs(self, robot: Robot) -> tuple[Input, ...]:

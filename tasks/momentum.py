@@ -49,8 +49,8 @@ class Momentum(Task):
     Example:
         >>> Momentum("angular")                                # swing the arms so that the feet need no twist
 
-    What it cannot do: it is a wish, no law of physics: a robot that floats freely keeps its momentum whatever it is
-    told (make that a constraint of your own where it matters). It holds no position, so the centre of mass drifts
+    What it cannot do: it is a task, no law of physics: a robot that floats freely keeps its momentum whatever is
+    commanded (make that a constraint of your own where it matters). It holds no position, so the centre of mass drifts
     (CenterOfMass holds it). Rotors of motors (armature) and payloads that the description does not have are not seen.
 
     Attributes:

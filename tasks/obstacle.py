@@ -19,7 +19,7 @@ from wbc.tasks import _bodies as bodies
 from wbc.tasks import _gap as gap
 from wbc.tasks._ball import BallRow
 from wbc.tasks._selection import selection
-from wbc.tasks.base import Constraint, Input, Numbers, Order, Row, Sensor, Values
+from wbc.tasks.base import Constraint, Input, Numbers, Row, SacrificeOrder, Sensor, Values
 
 if TYPE_CHECKING:
     from wbc.robot import Robot
@@ -29,7 +29,8 @@ SHAPES = (Sphere, Capsule, Box, Cylinder, Convex, HalfSpace)
 
 @dataclass(frozen=True)
 class Obstacle(Constraint):
-    """Links keep clear of a sphere, capsule, box, cylinder, convex hull, mesh or half-space, at rest or moving:
+    """Links keep clear of a sphere, capsule, box, cylinder, convex hull, mesh or half-space, at rest or moving (a
+    structure's box or capsule is a ``wbc.walking.Obstacle``):
 
         h = (signed distance between a shape of a link and the obstacle) - margin >= 0     [m]
 
@@ -54,12 +55,12 @@ class Obstacle(Constraint):
         margin: what is kept between the shapes, >= 0 [m].
 
     The rows hold dh/dt >= -rate h, hence h(t + dt) >= (1 - rate dt) h up to the curvature of h over one tick. The
-    distance of convex shapes is convex in their relative place, which only helps; what remains is the bend of the
-    point's path, at most (1/2) rho w^2 dt^2 for a point within rho of joint axes that turn at w in all. From an overlap
-    (h < 0) the rows push apart at -rate h at least.
+    distance of convex shapes is convex in their relative position, which only helps; what remains is the curvature
+    of the point's path, at most (1/2) rho w^2 dt^2 for a point within rho of joint axes that turn at w in all. From an
+    overlap (h < 0) the rows push apart at -rate h at least.
 
     It cannot see what the link shapes do not cover, nor contacts between two ticks of a fast obstacle (speed times dt
-    must stay well below the sizes involved), nor plan a way round: a robot may stop in front of the obstacle. Where a
+    must stay well below the sizes involved), nor plan a detour: a robot may stop in front of the obstacle. Where a
     distance has no direction (one shape's centre in the middle of the other) one is declared, see
     :mod:`wbc.tasks._gap`. Where an obstacle comes faster than the joints may move, actuator limits come first.
 
@@ -71,7 +72,7 @@ class Obstacle(Constraint):
         UnknownNameError, MissingShapeError, RangeError: in :meth:`validate`.
     """
 
-    order: ClassVar[Order] = Order.MARGIN
+    order: ClassVar[SacrificeOrder] = SacrificeOrder.MARGIN
 
     shape: Shape | Sequence[Convex]
     links: tuple[str, ...] | None = None

@@ -42,7 +42,7 @@ class PitchPlane(PlaneItem, Task):
     is now: error = -target.
 
     **Axis form with** ``reference=``: the angle of that same plane, e = wrap(psi - target) with the plane direction
-    u x y in the place of e - s, u = r / |r|. Its exact rate is
+    u x y in place of e - s, u = r / |r|. Its exact rate is
 
         d psi / dt = alpha + p.(u x du/dt) / (1 + p.u),    p the pole,
 

@@ -25,13 +25,13 @@ class PitchPlaneLimit(PlaneItem, Constraint):
     (with ``PlaneReference()`` if no ``reference`` is given, because a limit needs an angle); m = (lower + upper) / 2
     is the middle, c = (upper - lower) / 2 the half range and f the fading factor of PitchPlane.
 
-    Where f = 1 that is psi - lower and upper - psi, the short way round. Towards a singular set f falls
+    Where f = 1 that is psi - lower and upper - psi, by the shorter turn. Towards a singular set f falls
     smoothly to 0 and both margins to the constant c, whose derivative is zero: the limit is switched off there by
     margins that stay differentiable, so v = 0 keeps meeting the rows of any state that meets h >= 0. An arm that
     turned its plane beyond a bound inside the faded zone cannot leave the zone until the plane is back.
 
-    It cannot: guard the plane inside the faded zones; count turns; tell the way back where psi is opposite to the
-    middle (there the two rows swap roles, and the plane may go on to the other side); promise a gap 2 pi -
+    It cannot: guard the plane inside the faded zones; count turns; know the shorter turn back where psi is opposite to
+    the middle (there the two rows swap roles, and the plane may go on beyond it); promise a gap 2 pi -
     (upper - lower) smaller than the plane's turn in one tick.
 
     Attributes:

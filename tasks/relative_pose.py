@@ -49,7 +49,7 @@ class RelativePose(Task):
     Example:
         >>> RelativePose("left_gripper", "right_gripper", at=(0.0, -0.2, 0.0))     # where the cup stands on the tray
 
-    What it cannot do: it is a wish, with a weight; it knows no forces, so it does not squeeze. It says nothing about
+    What it cannot do: it is a task, with a weight; it knows no forces, so it does not squeeze. It says nothing about
     where the object goes: see the page for two tasks that move it. At a relative rotation error of exactly pi the
     direction of turning is ambiguous, and midway axes jump there.
 

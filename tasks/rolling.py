@@ -15,7 +15,7 @@ from wbc import validation
 from wbc.errors import DuplicateNameError, RangeError, ShapeError
 from wbc.symbolic.kinematics import Kinematics, Pose
 from wbc.symbolic.tracer import Tracer
-from wbc.tasks.base import Constraint, Input, Order, Row, Rows, Values
+from wbc.tasks.base import Constraint, Input, Row, Rows, SacrificeOrder, Values
 
 if TYPE_CHECKING:
     from wbc.robot import Robot
@@ -101,7 +101,7 @@ class Rolling(Constraint):
             ground, or whose axis is along the normal, so that it steers; gain < 0.
     """
 
-    order: ClassVar[Order] = Order.HOLD
+    order: ClassVar[SacrificeOrder] = SacrificeOrder.HOLD
     equality: ClassVar[bool] = True
     initial_only: ClassVar[tuple[str, ...]] = ("gain",)
 

@@ -17,7 +17,7 @@ from wbc.robot.pairs.link_pairs import neighbours, shaped_links
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks import _bodies as bodies
 from wbc.tasks import _gap as gap
-from wbc.tasks.base import Constraint, Input, Numbers, Order, Row, Sensor, Values
+from wbc.tasks.base import Constraint, Input, Numbers, Row, SacrificeOrder, Sensor, Values
 
 if TYPE_CHECKING:
     from wbc.robot import Robot
@@ -54,8 +54,8 @@ class SelfCollision(Constraint):
     Inputs:
         margin: what is kept between the shapes, >= 0 [m].
 
-    The rows hold dh/dt >= -rate h, hence h(t + dt) >= (1 - rate dt) h up to the bend of the links' paths over one tick.
-    From an overlap (h < 0) they push apart at -rate h at least; where limits do not let them, the step says
+    The rows hold dh/dt >= -rate h, hence h(t + dt) >= (1 - rate dt) h up to the curvature of the links' paths over one
+    tick. From an overlap (h < 0) they push apart at -rate h at least; where limits do not let them, the step says
     ``relaxed``.
 
     It cannot see what the link shapes do not cover. Shapes that are larger than the links may overlap in every
@@ -71,7 +71,7 @@ class SelfCollision(Constraint):
         UnknownNameError, MissingShapeError, RangeError, ShapeError: in :meth:`validate`.
     """
 
-    order: ClassVar[Order] = Order.MARGIN
+    order: ClassVar[SacrificeOrder] = SacrificeOrder.MARGIN
 
     pairs: tuple[tuple[str, str], ...] | None = None
     margin: float = 0.0

@@ -10,7 +10,7 @@ import casadi as ca
 from wbc import validation
 from wbc.symbolic.kinematics import WORLD
 from wbc.symbolic.tracer import Tracer
-from wbc.tasks._sides import checked_sides, side_inputs, side_margins, side_rows
+from wbc.tasks._limits import checked_limits, limit_inputs, limit_margins, limit_rows
 from wbc.tasks.base import Constraint, Input, Row, Values
 from wbc.tasks.frames import point_in, point_rows, require_motion
 
@@ -26,7 +26,7 @@ class WorkspaceBox(Constraint):
 
         h = (x - lower, upper - x) >= 0,    x = R_b' (p + R offset - p_b)      [m]
 
-    Three rows a side: ``x.lower``, ``y.lower``, ``z.lower``, ``x.upper``, ``y.upper``, ``z.upper``.
+    Three rows a bound: ``x.lower``, ``y.lower``, ``z.lower``, ``x.upper``, ``y.upper``, ``z.upper``.
 
     Inputs:
         lower, upper: three numbers each in the axes of the reference [m]; -inf in ``lower`` and inf in ``upper`` are no
@@ -37,12 +37,12 @@ class WorkspaceBox(Constraint):
         >>> WorkspaceBox("panda_hand", lower=(0.2, -0.4, 0.05), upper=(0.7, 0.4, float("inf")))
 
     What it cannot do: it guards one point, not the body around it (``Obstacle`` with link shapes does). A tick is
-    linear: the point may pass a wall by the bend of its path over one tick. A wall that comes faster than the joints
+    linear: the point may pass a wall by its path's curvature over one tick. A wall that comes faster than the joints
     may move is passed: actuator limits come first.
 
     Attributes:
         frame: name of the frame that carries the point.
-        lower, upper: first values of the inputs; one number serves all three axes. None: no rows on this side.
+        lower, upper: first values of the inputs; one number serves all three axes. None: no rows of this bound.
         relative_to: reference frame b, ``"world"`` or a frame of the robot, which may move; the box is fixed to it.
         offset: the point in ``frame`` [m].
 
@@ -60,7 +60,7 @@ class WorkspaceBox(Constraint):
     offset: Triple = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
-        lower, upper = checked_sides("WorkspaceBox", self.lower, self.upper, 3)
+        lower, upper = checked_limits("WorkspaceBox", self.lower, self.upper, 3)
         object.__setattr__(self, "lower", lower)
         object.__setattr__(self, "upper", upper)
         offset = validation.real_array("WorkspaceBox.offset", self.offset, (3,))
@@ -73,17 +73,17 @@ class WorkspaceBox(Constraint):
         require_motion(robot, "WorkspaceBox.frame", self.frame, self.relative_to)
 
     def inputs(self, robot: Robot) -> tuple[Input, ...]:
-        """Both sides and their rates, as far as they are not None."""
-        return side_inputs(self.lower, self.upper, ("m",) * 3)
+        """Both bounds and their rates, as far as they are not None."""
+        return limit_inputs(self.lower, self.upper, ("m",) * 3)
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
-        """x, y, z of each side [m]."""
-        return side_rows(self.lower, self.upper, point_rows())
+        """x, y, z of each bound [m]."""
+        return limit_rows(self.lower, self.upper, point_rows())
 
     def margins(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
         """The formula of the class."""
-        return side_margins(point_in(kin, self.frame, self.offset, self.relative_to), inputs)
+        return limit_margins(point_in(kin, self.frame, self.offset, self.relative_to), inputs)
 
     def declaration(self, robot: Robot) -> dict[str, Any]:
-        """Which sides there are, not where they begin."""
+        """Which bounds there are, not their first values."""
         return super().declaration(robot) | {"sides": [self.lower is not None, self.upper is not None]}

@@ -44,7 +44,7 @@ class WorkspacePolyhedron(Constraint):
 
     What it cannot do: it guards one point, not the body around it (``Obstacle`` with link shapes does). It is
     convex: a region with a re-entrant corner needs a planner. Planes that leave no point between them are not refused:
-    the rows then give way, see ``Step.relaxed``. Over one tick the point may pass a plane by the bend of its path.
+    the rows then give way, see ``Step.relaxed``. Over one tick the point may pass a plane by the curvature of its path.
 
     Attributes:
         frame: name of the frame that carries the point.

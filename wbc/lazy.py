@@ -22,17 +22,17 @@ def attach(package: str, file: str, renamed: Mapping[str, str] | None = None) ->
     Args:
         package: its ``__name__``.
         file: its ``__file__``.
-        renamed: names of the version before this one -> what they are now; whoever uses one is told so.
+        renamed: names of the version before this one -> what they are now; whoever uses one is warned.
     """
     now = renamed or {}
-    places = _places(ast.parse(pathlib.Path(file).read_text(encoding="utf-8")))
+    found_at = _imports(ast.parse(pathlib.Path(file).read_text(encoding="utf-8")))
 
     def find(name: str) -> Any:
         if name in now:
             warnings.warn(f"{package}.{name} is {package}.{now[name]} now", DeprecationWarning, stacklevel=2)
             return find(now[name])
-        if name in places:
-            module, original = places[name]
+        if name in found_at:
+            module, original = found_at[name]
             whole = module == package
             value = importlib.import_module(f"{module}.{original}" if whole else module)
             value = value if whole else getattr(value, original)
@@ -45,7 +45,18 @@ def attach(package: str, file: str, renamed: Mapping[str, str] | None = None) ->
     return find
 
 
-def _places(tree: ast.Module) -> dict[str, tuple[str, str]]:
+def renamed(name: str) -> Any:
+    """A property under the old name of attribute ``name``, for one version; whoever reads it is warned."""
+
+    def get(owner: Any) -> Any:
+        text = f"this attribute of {type(owner).__name__} is called {name} now"
+        warnings.warn(text, DeprecationWarning, stacklevel=2)
+        return getattr(owner, name)
+
+    return property(get, doc=f"Old name of ``{name}``.")
+
+
+def _imports(tree: ast.Module) -> dict[str, tuple[str, str]]:
     """Public name -> (module, name there), from the imports under ``if TYPE_CHECKING``."""
     blocks = (n for n in tree.body if isinstance(n, ast.If) and getattr(n.test, "id", "") == "TYPE_CHECKING")
     imports = (n for block in blocks for n in block.body if isinstance(n, ast.ImportFrom))

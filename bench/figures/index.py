@@ -93,6 +93,7 @@ _ALL = (
     ),
     Figure("soak", (*TICK, "bench/soak"), 20.0),
     Figure("analysis", ("wbc/analysis",), 2.0),
+    Figure("clearance", ("wbc/clearance",), 1.0),
     Figure("demo", (*TICK, "wbc/track", "wbc/cli/demo.py"), 0.5),
     Figure("examples", (*TICK, "wbc/proximity", "examples"), 1.0),
     Figure("levels", TICK, 0.5),

@@ -46,7 +46,7 @@ MADE = (
     *("Controller", "Step", "Recording", "Online", "FunctionPath", "PosePath", "Followed", "Walker", "OperatorArm"),
     *("Arm", "Solution", "Explanation", "Replay", "PairSensor", "Robot", "Item", "Task", "Constraint", "Values"),
     *("Form", "Order", "Status", "WbcError", "Bounds", "Rows", "Row", "Certificate", "Worst", "State", "Recipe"),
-    *("RankCertificate", "LawCertificate"),
+    *("SacrificeOrder", "RankCertificate", "LawCertificate"),
     *("SelfPairs", "LinkPair", "ConvexParts", "Witness", "Coupling", "Path", "Advice", "CarriedMotion", "ClosedForm"),
     *("CompleteSet", "Leg", "MotionCue", "PairCount", "PairStack", "PairSurvey", "Parts", "TreeSet", "TreeSets"),
     *("Analysis", "BlockAnalysis", "Branch", "Cost", "Counts", "Determinant", "JointBlock", "Locus", "NumericWitness"),

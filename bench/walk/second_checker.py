@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from wbc.clearance import Body, EndlessCylinder, Exemption, Motion, Pair, Scene, Sweeper, Tree
+from wbc.clearance import EndlessCylinder, Exemption, Motion, Pair, Sweeper, SweptBody, SweptScene, Tree
 from wbc.robots import Walker
 from wbc.shapes import Capsule, HalfSpace, Sphere
 from wbc.validation import Array
@@ -66,7 +66,7 @@ def _touched(log: Columns, model: pin.Model, urdf: Path, structure: Structure) -
         if moved[a.name] != moved[b.name] and frozenset((a.link, b.link)) not in neighbours
     ]
     pairs += [Pair(a.name, b.name, least) for a in parts for b in things]
-    scene = Scene(tree, [*parts, *things], pairs)
+    scene = SweptScene(tree, [*parts, *things], pairs)
     sweeper = Sweeper(scene)
     exemptions = list(_exemptions(log, model, parts, structure))
     swept = sweeper.sweep(motion, exemptions=exemptions, aim="every", tolerance=1e-4)
@@ -79,10 +79,10 @@ def _touched(log: Columns, model: pin.Model, urdf: Path, structure: Structure) -
         yield f"clearance: not proven, {float(swept.bound.min()):.3g} m"
 
 
-def _parts(model: pin.Model, urdf: Path, hands: dict[str, int]) -> list[Body]:
+def _parts(model: pin.Model, urdf: Path, hands: dict[str, int]) -> list[SweptBody]:
     """Collision bodies of the links; a cylinder and the balls at its ends are a capsule."""
     shapes = pin.buildGeomFromUrdf(model, str(urdf), pin.GeometryType.COLLISION)
-    found: list[Body] = []
+    found: list[SweptBody] = []
     balls = []
     for one in shapes.geometryObjects:
         frame = model.frames[one.parentFrame]
@@ -92,7 +92,7 @@ def _parts(model: pin.Model, urdf: Path, hands: dict[str, int]) -> list[Body]:
             balls.append((name, at, float(one.geometry.radius)))
             continue
         body = Capsule(float(one.geometry.radius), 2.0 * float(one.geometry.halfLength))
-        found.append(Body(name, body, name, at))
+        found.append(SweptBody(name, body, name, at))
     for name, at, radius in balls:
         ends = [
             body.placement * np.array([0.0, 0.0, side * body.shape.length / 2])
@@ -101,10 +101,10 @@ def _parts(model: pin.Model, urdf: Path, hands: dict[str, int]) -> list[Body]:
             if body.link == name and isinstance(body.shape, Capsule) and body.placement is not None
         ]
         if not any(np.linalg.norm(at.translation - end) < 1e-9 for end in ends):
-            found.append(Body(name, Sphere(radius), name, at))
+            found.append(SweptBody(name, Sphere(radius), name, at))
     # What moves with a hand's frame is the hand
     carried = {int(model.frames[model.getFrameId(hand)].parentJoint): hand for hand in hands}
-    out, count = list[Body](), dict[str, int]()
+    out, count = list[SweptBody](), dict[str, int]()
     for body in found:
         count[body.name] = count.get(body.name, 0) + 1
         name = body.name if count[body.name] == 1 else f"{body.name}, body {count[body.name]}"
@@ -113,17 +113,17 @@ def _parts(model: pin.Model, urdf: Path, hands: dict[str, int]) -> list[Body]:
         grasp = None
         if hand is not None:
             grasp = (frame.placement.inverse() * model.frames[model.getFrameId(hand)].placement).translation
-        out.append(Body(name, body.shape, body.link, body.placement, grasp))
+        out.append(SweptBody(name, body.shape, body.link, body.placement, grasp))
     return out
 
 
-def _things(structure: Structure) -> list[Body]:
+def _things(structure: Structure) -> list[SweptBody]:
     """Surface and obstacles."""
-    out = [Body(one.id, one.shape, "world", one.placement) for one in structure.obstacles]
+    out = [SweptBody(one.id, one.shape, "world", one.placement) for one in structure.obstacles]
     surface = structure.surface
     if surface is not None:
         shape = HalfSpace() if isinstance(surface, PlaneSurface) else EndlessCylinder(surface.radius)
-        out.append(Body("surface", shape, "world", surface.pose))
+        out.append(SweptBody("surface", shape, "world", surface.pose))
     return out
 
 
@@ -140,7 +140,7 @@ def _neighbours(model: pin.Model, shaped: set[str]) -> set[frozenset[str]]:
     return out
 
 
-def _exemptions(log: Columns, model: pin.Model, parts: list[Body], structure: Structure) -> Iterator[Exemption]:
+def _exemptions(log: Columns, model: pin.Model, parts: list[SweptBody], structure: Structure) -> Iterator[Exemption]:
     """Hands at the holds that the log has them at, against what these are mounted on."""
     mounts: dict[int, list[str]] = {}
     for arm, hand in enumerate(log["hands"]):

@@ -11,7 +11,9 @@ import pinocchio as pin
 import pytest
 
 import wbc
-from bench.walk import swept, trial_parts
+from bench.measured import clearance
+from bench.sheet import Sheet
+from bench.walk import trial_parts
 from bench.walk.second_checker import second_check
 from bench.walk.structures import FAMILIES, UnsupportedStructureError, capsule_between, random_structure
 from bench.walk.trial_parts import apart, trial_goals, trial_sheet
@@ -132,16 +134,12 @@ def test_a_trial_that_fails_is_a_record(monkeypatch: pytest.MonkeyPatch, tmp_pat
     assert "not done" in apart("structures", "posts 0", tmp_path)["reason"]
 
 
-def test_costs_of_proofs_are_printed(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    monkeypatch.setattr(
-        swept,
-        "CASES",
-        (("short", 3, 0.1, 6.0, 1e-3, "any", True, 2), ("least", 3, 0.1, 2.0, float("inf"), "least", True, 1)),
-    )
-    swept.main()
-    shown = capsys.readouterr().out
-    assert "short" in shown
-    assert [row[3] for row in swept.rows()] == ["yes", "yes"]
+def test_costs_of_proofs_are_tabulated(monkeypatch: pytest.MonkeyPatch) -> None:
+    cases = (("short", 3, 0.1, 6.0, 1e-3, "any", True, 2), ("least", 3, 0.1, 2.0, float("inf"), "least", True, 1))
+    monkeypatch.setattr(clearance, "CASES", cases)
+    sheet = clearance.parts()["costs"]
+    assert isinstance(sheet, Sheet)
+    assert [(row[0], row[3]) for row in sheet.rows] == [("short", "yes"), ("least", "yes")]
 
 
 def test_tables_count_what_came_out() -> None:

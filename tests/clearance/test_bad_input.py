@@ -11,14 +11,14 @@ import pytest
 
 from tests.clearance.world import free_tree, random_arms, still
 from wbc.clearance import (
-    Body,
     CylinderInside,
     EndlessCylinder,
     Exemption,
     Motion,
     Pair,
-    Scene,
     Sweeper,
+    SweptBody,
+    SweptScene,
     Tree,
     TriangleMesh,
 )
@@ -37,16 +37,16 @@ from wbc.errors import (
 from wbc.shapes import Capsule, HalfSpace, Sphere
 
 TREE = free_tree()
-HAND = Body("hand", Sphere(0.1), "universe", grasp=np.zeros(3))
-TABLE = Body("table", HalfSpace())
+HAND = SweptBody("hand", Sphere(0.1), "universe", grasp=np.zeros(3))
+TABLE = SweptBody("table", HalfSpace())
 POSES = [[0, 0, 1, 0, 0, 0, 1], [0, 0, 1, 0, 0, 0, 1]]
 NONE = np.zeros((2, 0))
 
 
-def scene(**changes: Any) -> Scene:
+def scene(**changes: Any) -> SweptScene:
     """A hand and a table."""
     given = {"bodies": [HAND, TABLE], "pairs": [Pair("hand", "table", 0.01)], **changes}
-    return Scene(TREE, given["bodies"], given["pairs"])
+    return SweptScene(TREE, given["bodies"], given["pairs"])
 
 
 def jumping() -> Motion:
@@ -63,14 +63,14 @@ def exempt(**changes: Any) -> Any:
 
 BAD: list[tuple[Callable[[], Any], type[WbcError], str]] = [
     (lambda: scene(bodies=[HAND, HAND]), DuplicateNameError, "hand"),
-    (lambda: scene(bodies=["hand"]), ShapeError, "Body"),
-    (lambda: scene(bodies=[HAND, Body(3, HalfSpace())]), WbcError, "name"),  # type: ignore[arg-type]
-    (lambda: scene(bodies=[HAND, Body("table", HalfSpace(), "world", "here")]), WbcError, "table.placement"),  # type: ignore[arg-type]
-    (lambda: scene(bodies=[HAND, Body("table", HalfSpace(), [])]), WbcError, "table.link"),  # type: ignore[arg-type]
-    (lambda: scene(bodies=[Body("hand", Sphere(0.1), "universe", grasp=[1, 2]), TABLE]), ShapeError, "hand.grasp"),
+    (lambda: scene(bodies=["hand"]), ShapeError, "SweptBody"),
+    (lambda: scene(bodies=[HAND, SweptBody(3, HalfSpace())]), WbcError, "name"),  # type: ignore[arg-type]
+    (lambda: scene(bodies=[HAND, SweptBody("table", HalfSpace(), "world", "here")]), WbcError, "table.placement"),  # type: ignore[arg-type]
+    (lambda: scene(bodies=[HAND, SweptBody("table", HalfSpace(), [])]), WbcError, "table.link"),  # type: ignore[arg-type]
+    (lambda: scene(bodies=[SweptBody("hand", Sphere(0.1), "universe", grasp=[1, 2]), TABLE]), ShapeError, "hand.grasp"),
     (lambda: scene(pairs=[("hand", "table")]), ShapeError, "a Pair"),
     (lambda: scene(pairs=[Pair(["hand"], "table")]), WbcError, "pairs"),  # type: ignore[arg-type]
-    (lambda: Scene("tree", [], []), ShapeError, "a Tree"),  # type: ignore[arg-type]
+    (lambda: SweptScene("tree", [], []), ShapeError, "a Tree"),  # type: ignore[arg-type]
     (lambda: Sweeper(scene()).sweep(still(pin.SE3.Identity()), exemptions=["hand"]), ShapeError, "an Exemption"),  # type: ignore[list-item]
     (lambda: Sweeper(scene()).sweep(still(pin.SE3.Identity()), "all"), ShapeError, "pairs"),
     (lambda: Sweeper(scene()).sweep(still(pin.SE3.Identity()), [[0], [0, 1]]), ShapeError, "pairs"),
@@ -78,9 +78,9 @@ BAD: list[tuple[Callable[[], Any], type[WbcError], str]] = [
     (lambda: scene(pairs=[Pair("hand", "tabel")]), UnknownNameError, "table"),
     (lambda: scene(pairs=[Pair("hand", "table", float("nan"))]), NotFiniteError, "hand and table"),
     (lambda: scene(pairs=[Pair("table", "table")]), ShapeError, "solid"),
-    (lambda: scene(bodies=[HAND, Body("table", HalfSpace(), "universe")]), ShapeError, "fixed in the world"),
-    (lambda: scene(bodies=[HAND, Body("table", HalfSpace(), "wrold")]), UnknownNameError, "world"),
-    (lambda: scene(bodies=[HAND, Body("table", "box")]), ShapeError, "table.shape"),  # type: ignore[arg-type]
+    (lambda: scene(bodies=[HAND, SweptBody("table", HalfSpace(), "universe")]), ShapeError, "fixed in the world"),
+    (lambda: scene(bodies=[HAND, SweptBody("table", HalfSpace(), "wrold")]), UnknownNameError, "world"),
+    (lambda: scene(bodies=[HAND, SweptBody("table", "box")]), ShapeError, "table.shape"),  # type: ignore[arg-type]
     (lambda: CylinderInside(0.0), RangeError, "CylinderInside.radius"),
     (lambda: EndlessCylinder(float("inf")), WbcError, "EndlessCylinder.radius"),
     (lambda: TriangleMesh.read("no.stl"), RobotFileError, "no.stl"),
@@ -96,7 +96,7 @@ BAD: list[tuple[Callable[[], Any], type[WbcError], str]] = [
     (lambda: Motion.linear(TREE, [0.0, 1.0], NONE, POSES, slack=[1.0, 2.0]), ShapeError, "slack"),
     (lambda: Tree.of_model(pin.Model(), things=("cart", "cart")), DuplicateNameError, "cart"),
     (jumping, ContinuityError, r"Motion.controls\[1, 0\]"),
-    (lambda: Sweeper("scene"), ShapeError, "Scene"),  # type: ignore[arg-type]
+    (lambda: Sweeper("scene"), ShapeError, "SweptScene"),  # type: ignore[arg-type]
     (lambda: Sweeper(scene()).sweep("motion"), ShapeError, "Motion"),  # type: ignore[arg-type]
     (lambda: Sweeper(scene()).sweep(still(pin.SE3.Identity()), aim="al"), UnknownNameError, "any"),
     (lambda: Sweeper(scene()).sweep(still(pin.SE3.Identity()), tolerance=0.0), RangeError, "tolerance"),
@@ -119,7 +119,7 @@ def test_bad_input_is_refused_by_name(case: tuple[Callable[[], Any], type[WbcErr
 
 
 def test_an_exemption_of_no_pair_names_those_there_are() -> None:
-    bodies = [HAND, TABLE, Body("wall", HalfSpace())]
+    bodies = [HAND, TABLE, SweptBody("wall", HalfSpace())]
     sweeper = Sweeper(scene(bodies=bodies))
     with pytest.raises(UnknownNameError, match="hand and table"):
         sweeper.sweep(still(pin.SE3.Identity()), exemptions=[Exemption("hand", "wall", np.zeros(3), 0.1)])
@@ -143,6 +143,8 @@ def test_joints_that_are_no_turns_and_shifts_by_scalars_are_refused() -> None:
 def test_two_solids_may_both_move() -> None:
     model = random_arms(np.random.default_rng(1))
     tree = Tree.of_model(model)
-    found = Scene(tree, [Body("a", Capsule(0.1, 0.2), "a3_link"), Body("b", Sphere(0.1), "b1_link")], [Pair("a", "b")])
+    found = SweptScene(
+        tree, [SweptBody("a", Capsule(0.1, 0.2), "a3_link"), SweptBody("b", Sphere(0.1), "b1_link")], [Pair("a", "b")]
+    )
     swept = Sweeper(found).sweep(Motion.linear(tree, [0.0, 1.0], np.zeros((2, 8))))
     assert swept.measured[1] == 1

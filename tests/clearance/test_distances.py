@@ -12,7 +12,7 @@ import pytest
 
 from tests.clearance.world import free_tree, judged, numbers, random_pose, solids, still
 from tests.repeats import repeats
-from wbc.clearance import Body, CylinderInside, EndlessCylinder, Motion, Pair, Scene, Sweeper, TriangleMesh
+from wbc.clearance import CylinderInside, EndlessCylinder, Motion, Pair, Sweeper, SweptBody, SweptScene, TriangleMesh
 from wbc.errors import ShapeError
 from wbc.shapes import Box, Capsule, Convex, Cylinder, HalfSpace, Shape, Solid, Sphere
 from wbc.validation import Array
@@ -24,7 +24,9 @@ NATIVE = pytest.mark.parametrize("native", [True, False], ids=["C", "numpy"])
 
 def measured(a: Shape, at: pin.SE3, b: Shape, there: pin.SE3, native: bool) -> tuple[float, Array]:
     """Distance and nearest points of two bodies, the first on a base that stands still."""
-    scene = Scene(free_tree(), [Body("a", a, "universe"), Body("b", b, "world", there)], [Pair("a", "b")])
+    scene = SweptScene(
+        free_tree(), [SweptBody("a", a, "universe"), SweptBody("b", b, "world", there)], [Pair("a", "b")]
+    )
     found = Sweeper(scene, native).at(still(at), 0.5)[0]
     return found.distance, found.points
 
@@ -36,7 +38,9 @@ def test_all_solids_as_coal_finds_them(native: bool) -> None:
         for a, b in combinations_with_replacement(solids(rng), 2):
             there = random_pose(rng, 1.0)
             rows = np.array([numbers(random_pose(rng, 2.0)) for _ in range(5)])
-            scene = Scene(free_tree(), [Body("a", a, "universe"), Body("b", b, "world", there)], [Pair("a", "b")])
+            scene = SweptScene(
+                free_tree(), [SweptBody("a", a, "universe"), SweptBody("b", b, "world", there)], [Pair("a", "b")]
+            )
             motion, sweeper = Motion.linear(scene.tree, np.arange(5.0), np.zeros((5, 0)), rows), Sweeper(scene, native)
             for k, row in enumerate(rows):
                 found, at = sweeper.at(motion, k)[0], pin.XYZQUATToSE3(row)

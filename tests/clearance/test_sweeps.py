@@ -21,14 +21,14 @@ from tests.clearance.world import (
 )
 from tests.repeats import repeats
 from wbc.clearance import (
-    Body,
     CylinderInside,
     EndlessCylinder,
     Exemption,
     Motion,
     Pair,
-    Scene,
     Sweeper,
+    SweptBody,
+    SweptScene,
     Tree,
     bodies_of,
     self_pairs,
@@ -40,17 +40,17 @@ from wbc.validation import Array
 TOLERANCE = 1e-3
 
 
-def machine(rng: np.random.Generator, model: pin.Model) -> Scene:
+def machine(rng: np.random.Generator, model: pin.Model) -> SweptScene:
     """Shapes on all links, and things around; links of different arms, of one arm but not neighbours, and the
     things."""
     shapes = (Capsule(0.05, 0.3), Sphere(0.08), Box((0.1, 0.1, 0.2)), Cylinder(0.06, 0.2))
     links = [frame.name for frame in model.frames if frame.name.endswith("_link")]
-    bodies = [Body(link, shapes[k % 4], link, random_pose(rng, 0.05)) for k, link in enumerate(links)]
+    bodies = [SweptBody(link, shapes[k % 4], link, random_pose(rng, 0.05)) for k, link in enumerate(links)]
     around = (
         Capsule(0.05, 1.0), Box((0.3, 0.4, 0.2)), Cylinder(0.1, 0.5), Convex(0.2 * rng.normal(size=(10, 3))),
         HalfSpace(), CylinderInside(3.0), EndlessCylinder(0.1),
     )  # fmt: skip
-    bodies += [Body(f"thing {k}", shape, "world", random_pose(rng, 1.0)) for k, shape in enumerate(around)]
+    bodies += [SweptBody(f"thing {k}", shape, "world", random_pose(rng, 1.0)) for k, shape in enumerate(around)]
     pairs = [Pair(link, f"thing {k}", 0.02) for link in links for k in range(len(around))]
     pairs += [
         Pair(a, b, 0.01)
@@ -58,12 +58,12 @@ def machine(rng: np.random.Generator, model: pin.Model) -> Scene:
         for b in links[i + 1 :]
         if a[0] != b[0] or int(b[1]) - int(a[1]) > 1
     ]
-    return Scene(Tree.of_model(model, floating=True), bodies, pairs)
+    return SweptScene(Tree.of_model(model, floating=True), bodies, pairs)
 
 
 def sampled(
     model: pin.Model,
-    scene: Scene,
+    scene: SweptScene,
     motion: Motion,
     times: Array,
     solids: tuple[type, ...] = (Capsule, Box, Cylinder, Sphere),
@@ -142,8 +142,10 @@ def test_numpy_proves_the_same() -> None:
 def test_what_a_sample_at_every_knot_misses_is_found(native: bool) -> None:
     """A ball flies past a thin post between two knots; at both it is a metre away."""
     tree = free_tree()
-    scene = Scene(
-        tree, [Body("ball", Sphere(0.02), "universe"), Body("post", Capsule(0.005, 1.0))], [Pair("ball", "post", 0.01)]
+    scene = SweptScene(
+        tree,
+        [SweptBody("ball", Sphere(0.02), "universe"), SweptBody("post", Capsule(0.005, 1.0))],
+        [Pair("ball", "post", 0.01)],
     )
     for aside, clear in ((0.03, False), (0.0349, False), (0.0352, True)):
         poses = np.array([[-1.0, aside, 0, 0, 0, 0, 1.0], [1.0, aside, 0, 0, 0, 0, 1.0]])
@@ -202,9 +204,9 @@ def test_rods_that_come_by_a_thin_post_between_two_knots(rod: tuple[Solid, float
     ):
         for at in (-0.6, 0.55):
             place = tip * np.array([np.cos(at), np.sin(at), 0.0]) if turns else np.array([tip, at, 0.0])
-            body = Body("rod", shape, link, pin.SE3(ALONG, np.array([side, 0.0, 0.0])))
-            post = Body("post", Capsule(0.002, 0.5), "world", pin.SE3(np.eye(3), place))
-            swept = Sweeper(Scene(tree, [body, post], [Pair("rod", "post", 0.001)]), native).sweep(motion)
+            body = SweptBody("rod", shape, link, pin.SE3(ALONG, np.array([side, 0.0, 0.0])))
+            post = SweptBody("post", Capsule(0.002, 0.5), "world", pin.SE3(np.eye(3), place))
+            swept = Sweeper(SweptScene(tree, [body, post], [Pair("rod", "post", 0.001)]), native).sweep(motion)
             assert swept.violation is not None, (link, turns, at)
             assert abs(swept.violation.time - 0.5) > 0.1
 
@@ -212,12 +214,12 @@ def test_rods_that_come_by_a_thin_post_between_two_knots(rod: tuple[Solid, float
 @pytest.mark.parametrize("native", [True, False], ids=["C", "numpy"])
 def test_a_cubic_that_begins_fast_is_bound_by_its_fastest(native: bool) -> None:
     tree = jointed(pin.JointModelRZ())
-    body = Body("rod", Capsule(0.01, 1.0), "rod", pin.SE3(ALONG, np.zeros(3)))
-    post = Body(
+    body = SweptBody("rod", Capsule(0.01, 1.0), "rod", pin.SE3(ALONG, np.zeros(3)))
+    post = SweptBody(
         "post", Capsule(0.002, 0.5), "world", pin.SE3(np.eye(3), 0.45 * np.array([np.cos(0.2), np.sin(0.2), 0]))
     )
     motion = Motion.cubic(tree, [0.0, 1.0], [[0.0], [1.0]], [[2.7], [0.0]])
-    swept = Sweeper(Scene(tree, [body, post], [Pair("rod", "post")]), native).sweep(motion)
+    swept = Sweeper(SweptScene(tree, [body, post], [Pair("rod", "post")]), native).sweep(motion)
     assert swept.violation is not None
     assert swept.violation.time < 0.15
 
@@ -235,7 +237,7 @@ def test_clear_is_a_proof_on_motions_that_are_just_so() -> None:
                 Pair(pair.first, pair.second, pair.required + float(found) + off)
                 for pair, found in zip(scene.pairs, least.found, strict=True)
             ]
-            swept = Sweeper(Scene(scene.tree, scene.bodies, pairs)).sweep(motion, tolerance=1e-5)
+            swept = Sweeper(SweptScene(scene.tree, scene.bodies, pairs)).sweep(motion, tolerance=1e-5)
             assert swept.clear is clear
             assert (swept.violation is None) is clear
 
@@ -275,7 +277,9 @@ def test_what_carries_both_moves_them_not_apart() -> None:
     """Two arms on a base that flies and spins: their distance is constant, so that one look is enough."""
     model = random_arms(np.random.default_rng(4))
     tree = Tree.of_model(model, floating=True)
-    scene = Scene(tree, [Body("a", Sphere(0.01), "a3_link"), Body("b", Sphere(0.01), "b3_link")], [Pair("a", "b")])
+    scene = SweptScene(
+        tree, [SweptBody("a", Sphere(0.01), "a3_link"), SweptBody("b", Sphere(0.01), "b3_link")], [Pair("a", "b")]
+    )
     motion, _, _ = random_motion(np.random.default_rng(5), tree, 50)
     held = Motion.linear(tree, motion.times, np.zeros((50, 8)), _as_rows(motion.poses[0]))
     swept = Sweeper(scene, native=True).sweep(held, aim="every", tolerance=1e-6, far=inf)
@@ -291,8 +295,8 @@ def _as_rows(poses: Array) -> Array:
 def test_a_hand_may_go_to_its_hold_and_so_deep_while_it_holds(native: bool) -> None:
     """A hand comes down onto a table, to 3 mm in it, and goes along it."""
     tree = free_tree()
-    hand = Body("hand", Capsule(0.02, 0.1), "universe", grasp=(0.0, 0.0, -0.07))
-    scene = Scene(tree, [hand, Body("table", HalfSpace())], [Pair("hand", "table", 0.025)])
+    hand = SweptBody("hand", Capsule(0.02, 0.1), "universe", grasp=(0.0, 0.0, -0.07))
+    scene = SweptScene(tree, [hand, SweptBody("table", HalfSpace())], [Pair("hand", "table", 0.025)])
     sweeper = Sweeper(scene, native)
 
     def down(depth: float, along: float = 0.0) -> Motion:
@@ -321,8 +325,8 @@ def test_a_hand_may_go_to_its_hold_and_so_deep_while_it_holds(native: bool) -> N
 def test_a_grasp_point_that_leaves_its_hold_ends_the_exemption(native: bool) -> None:
     """A ball on the axis stands still in the mount, while its grasp point goes round by the hold."""
     tree = jointed(pin.JointModelRZ())
-    hand = Body("hand", Sphere(0.1), "rod", grasp=np.array([1.0, 0.0, 0.0]))
-    scene = Scene(tree, [hand, Body("table", HalfSpace())], [Pair("hand", "table", 0.01)])
+    hand = SweptBody("hand", Sphere(0.1), "rod", grasp=np.array([1.0, 0.0, 0.0]))
+    scene = SweptScene(tree, [hand, SweptBody("table", HalfSpace())], [Pair("hand", "table", 0.01)])
     held = Exemption("hand", "table", np.array([1.0, 0.0, 0.0]), 0.05, 0.2)
     for turn, clear in ((1.0, False), (0.06, False), (0.04, True)):
         motion = Motion.linear(tree, [0.0, 1.0], [[-turn], [turn]])
@@ -332,8 +336,8 @@ def test_a_grasp_point_that_leaves_its_hold_ends_the_exemption(native: bool) -> 
 @pytest.mark.parametrize("native", [True, False], ids=["C", "numpy"])
 def test_a_body_that_rests_longer_than_it_may_is_seen(native: bool) -> None:
     tree = free_tree()
-    hand = Body("hand", Sphere(0.02), "universe", grasp=np.zeros(3))
-    scene = Scene(tree, [hand, Body("table", HalfSpace())], [Pair("hand", "table", 0.01)])
+    hand = SweptBody("hand", Sphere(0.02), "universe", grasp=np.zeros(3))
+    scene = SweptScene(tree, [hand, SweptBody("table", HalfSpace())], [Pair("hand", "table", 0.01)])
     motion = Motion.linear(tree, np.arange(9.0), np.zeros((9, 0)), np.tile([0, 0, 0.02, 0, 0, 0, 1.0], (9, 1)))
     for since, until, clear in ((0.0, 8.0, True), (2.0, 6.0, False), (0.0, 7.0, False), (1.0, 8.0, False)):
         held = Exemption("hand", "table", np.zeros(3), 0.1, 0.001, since, until)
@@ -343,8 +347,8 @@ def test_a_body_that_rests_longer_than_it_may_is_seen(native: bool) -> None:
 def test_times_of_an_exemption_are_those_of_the_hold() -> None:
     """A hand that rests deep from 2 to 6 s of 8 is looked at in pieces that end there."""
     tree, times = free_tree(), np.arange(9.0)
-    hand = Body("hand", Sphere(0.02), "universe", grasp=np.zeros(3))
-    scene = Scene(tree, [hand, Body("table", HalfSpace())], [Pair("hand", "table", 0.01)])
+    hand = SweptBody("hand", Sphere(0.02), "universe", grasp=np.zeros(3))
+    scene = SweptScene(tree, [hand, SweptBody("table", HalfSpace())], [Pair("hand", "table", 0.01)])
     z = np.array([1.0, 1.0, 0.04, 0.02, 0.02, 0.02, 0.04, 1.0, 1.0])
     poses = np.column_stack([0 * z, 0 * z, z, 0 * z, 0 * z, 0 * z, 0 * z + 1])
     motion = Motion.linear(tree, times, np.zeros((9, 0)), poses)
@@ -356,7 +360,9 @@ def test_times_of_an_exemption_are_those_of_the_hold() -> None:
 
 def test_a_body_that_stands_in_something_is_seen() -> None:
     tree = free_tree()
-    scene = Scene(tree, [Body("a", Sphere(0.1), "universe"), Body("b", Box((2.0, 2.0, 2.0)))], [Pair("a", "b")])
+    scene = SweptScene(
+        tree, [SweptBody("a", Sphere(0.1), "universe"), SweptBody("b", Box((2.0, 2.0, 2.0)))], [Pair("a", "b")]
+    )
     swept = Sweeper(scene).sweep(still(pin.SE3.Identity()))
     assert swept.violation is not None
     assert swept.violation.distance == pytest.approx(-1.1)
@@ -373,7 +379,7 @@ def test_pairs_can_be_chosen_and_far_ones_cost_one_bound() -> None:
     assert some.pairs.tolist() == [5, 2, 9]
     assert some.found == pytest.approx(every.found[[5, 2, 9]], abs=1e-4)
     assert sweeper.sweep(motion, []).clear
-    lenient = Scene(scene.tree, scene.bodies, [Pair(p.first, p.second, -100.0) for p in scene.pairs])
+    lenient = SweptScene(scene.tree, scene.bodies, [Pair(p.first, p.second, -100.0) for p in scene.pairs])
     assert Sweeper(lenient, native=True).sweep(motion).measured == (0, 1)
 
 
@@ -385,7 +391,7 @@ def test_links_of_a_robot_are_bodies_and_its_pairs_are_pairs() -> None:
     q = np.tile(robot.neutral[7:], (2, 1))
     poses = np.tile([0.3, 0.2, 0.1, 0.0, 0.0, 0.0, 1.0], (2, 1))
     tree = Tree.of_model(robot.model)
-    found = Sweeper(Scene(tree, bodies, pairs)).at(Motion.linear(tree, [0.0, 1.0], q, poses), 0.5)
+    found = Sweeper(SweptScene(tree, bodies, pairs)).at(Motion.linear(tree, [0.0, 1.0], q, poses), 0.5)
     data = robot.model.createData()
     pin.framesForwardKinematics(robot.model, data, np.concatenate([poses[0], q[0]]))
     shapes = {body.name: body for body in bodies}
@@ -416,7 +422,9 @@ def test_two_things_that_fly_past_each_other(native: bool) -> None:
     model.addJoint(0, pin.JointModelRZ(), pin.SE3.Identity(), "joint")
     tree = Tree.of_model(model, things=("cart", "drone"))
     assert tree.free == ("cart", "drone")
-    scene = Scene(tree, [Body("a", Sphere(0.1), "cart"), Body("b", Sphere(0.1), "drone")], [Pair("a", "b")])
+    scene = SweptScene(
+        tree, [SweptBody("a", Sphere(0.1), "cart"), SweptBody("b", Sphere(0.1), "drone")], [Pair("a", "b")]
+    )
     for off, clear in ((0.19, False), (0.21, True)):
         still_turn = [0.0, 0.0, 0.0, 1.0]
         cart = [[-1.0, 0.0, 0.0, *still_turn], [1.0, 0.0, 0.0, *still_turn]]

@@ -9,7 +9,7 @@ import pinocchio as pin
 import pytest
 
 from tests.clearance.world import free_tree, still
-from wbc.clearance import Body, Pair, Scene, Sweeper, native, sweep
+from wbc.clearance import Pair, Sweeper, SweptBody, SweptScene, native, sweep
 from wbc.clearance.native import library
 from wbc.errors import CompileError
 from wbc.native import toolchain
@@ -32,8 +32,8 @@ def test_numpy_stands_in(
         assert library.__wrapped__() is None
     assert said in caplog.text
     monkeypatch.setattr(sweep, "library", library.__wrapped__)
-    bodies = [Body("ball", Sphere(0.05), "universe"), Body("box", Box((0.2, 0.2, 0.2)))]
-    sweeper = Sweeper(Scene(free_tree(), bodies, [Pair("ball", "box", 0.1)]))
+    bodies = [SweptBody("ball", Sphere(0.05), "universe"), SweptBody("box", Box((0.2, 0.2, 0.2)))]
+    sweeper = Sweeper(SweptScene(free_tree(), bodies, [Pair("ball", "box", 0.1)]))
     assert not sweeper.native
     swept = sweeper.sweep(still(pin.SE3(np.eye(3), np.array([0.3, 0.0, 0.0]))), aim="least")
     assert swept.clear

@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+import wbc
 from tests.constraints.robots import NAMES, robot
 from tests.evaluation import probe, random_configuration
 from wbc.errors import DuplicateNameError, ShapeError, UnknownNameError
-from wbc.tasks.base import Order
+from wbc.tasks.base import SacrificeOrder
 from wbc.tasks.fixed import Fixed
 from wbc.tasks.joint_limits import JointLimits
 
@@ -63,7 +64,7 @@ def test_within_joint_limits_from_every_viable_state(name: str) -> None:
 def test_rows_and_order() -> None:
     bot = robot("talos")
     assert tuple(r.label for r in Fixed(bot.joint_names[0]).rows(bot)) == bot.dof_names
-    assert Fixed.order == Order.HOLD
+    assert Fixed.order == SacrificeOrder.HOLD
 
 
 def test_bad_declarations() -> None:
@@ -77,3 +78,8 @@ def test_bad_declarations() -> None:
         Fixed("panda_joint1", acceleration=2)
     with pytest.raises(UnknownNameError, match="did you mean 'panda_joint1'"):
         Fixed("panda_joint_1").validate(bot)
+
+
+def test_the_old_name_of_the_order_of_sacrifice_warns() -> None:
+    with pytest.warns(DeprecationWarning, match="SacrificeOrder now"):
+        assert wbc.tasks.Order is SacrificeOrder

@@ -209,7 +209,7 @@ def test_bad_frames(name: str) -> None:
 CASES: dict[str, tuple[Callable[[], Item], type[WbcError], str]] = {
     "box crossed": (lambda: WorkspaceBox(HAND, (0, 0, 1), (1, 1, 0.5)), BoundsError, "WorkspaceBox.lower: above upper"),
     "box crossed numbers": (lambda: WorkspaceBox(HAND, 1.0, -1.0), BoundsError, "WorkspaceBox.lower"),
-    "box without sides": (lambda: WorkspaceBox(HAND), ShapeError, "one side at least"),
+    "box without sides": (lambda: WorkspaceBox(HAND), ShapeError, "a lower or an upper limit"),
     "box short": (lambda: WorkspaceBox(HAND, (0, 0)), ShapeError, "one number or 3"),
     "box text": (lambda: WorkspaceBox(HAND, "low"), ShapeError, "WorkspaceBox.lower"),
     "box NaN": (lambda: WorkspaceBox(HAND, upper=(0, np.nan, 1)), NotFiniteError, "WorkspaceBox.upper"),

@@ -10,7 +10,7 @@ from tests.constraints.items import tip
 from tests.constraints.robots import NAMES, robot
 from tests.evaluation import probe, random_configuration
 from wbc.errors import RangeError, UnknownNameError
-from wbc.tasks.base import Order
+from wbc.tasks.base import SacrificeOrder
 from wbc.tasks.hold import Hold
 
 ROWS = {"pose": slice(0, 6), "position": slice(0, 3), "orientation": slice(3, 6)}
@@ -96,7 +96,7 @@ def test_rows_and_order() -> None:
     assert [r.unit for r in Hold("panda_hand", "position").rows(bot)] == ["m/s"] * 3
     assert [r.unit for r in Hold("panda_hand", "orientation").rows(bot)] == ["rad/s"] * 3
     assert [r.label for r in Hold("panda_hand", "roll").rows(bot)] == ["x", "y", "z", "roll"]
-    assert Hold.order == Order.HOLD
+    assert Hold.order == SacrificeOrder.HOLD
 
 
 def test_bad_declarations() -> None:

@@ -10,7 +10,7 @@ import pytest
 from tests.constraints.robots import NAMES, robot
 from tests.evaluation import probe, random_configuration
 from wbc.errors import DuplicateNameError, NotFiniteError, RangeError, ShapeError, UnknownNameError
-from wbc.tasks.base import Order
+from wbc.tasks.base import SacrificeOrder
 from wbc.tasks.joint_limits import JointLimits
 
 
@@ -98,7 +98,7 @@ def test_a_row_for_every_degree_of_freedom(name: str) -> None:
     rows = JointLimits().rows(bot)
     assert tuple(r.label for r in rows) == bot.dof_names
     assert {r.unit for r in rows} <= {"rad/s", "m/s"}
-    assert JointLimits().order == Order.ACTUATOR
+    assert JointLimits().order == SacrificeOrder.ACTUATOR
 
 
 def test_bad_declarations_name_the_field() -> None:

@@ -181,7 +181,7 @@ CASES: dict[str, tuple[Callable[[], Item], type[WbcError], str]] = {
     "rate of a plane": (lambda: Limit(rate_of_plane(), upper=1.0), ShapeError, "its rows are velocities"),
     "bad task": (lambda: Limit(Elbow("panda_hnd"), upper=1.0), UnknownNameError, "Elbow.frame"),
     "still task": (lambda: Limit(Elbow("panda_link0"), upper=1.0), RangeError, "no joint moves"),
-    "no side": (lambda: Limit(PLACE), ShapeError, "one side at least"),
+    "no limit": (lambda: Limit(PLACE), ShapeError, "a lower or an upper limit"),
     "crossed": (lambda: Limit(PLACE, (0, 0, 1), 0.5), BoundsError, "above upper = 0.5 in entry 2"),
     "counts differ": (lambda: Limit(PLACE, (0, 0, 1), (1, 2)), ShapeError, "lower has 3 numbers"),
     "count": (lambda: Limit(PLACE, (0, 1)), ShapeError, "one number, or 3"),

@@ -26,7 +26,7 @@ from tests.wheels import (
 )
 from wbc.errors import DuplicateNameError, NotFiniteError, RangeError, ShapeError, UnknownNameError, WbcError
 from wbc.robot import Limits, Robot
-from wbc.tasks import EndEffector, JointLimits, Order, Posture, Rolling, Wheel
+from wbc.tasks import EndEffector, JointLimits, Posture, Rolling, SacrificeOrder, Wheel
 
 LEVEL = {"ground": pin.SE3.Identity()}
 
@@ -83,7 +83,7 @@ def test_rows_labels_and_order() -> None:
     assert len(Rolling(legs.wheels[0], contact=False).rows(legs.robot)) == 2
     assert [declared.name for declared in Rolling(tiago.wheels).inputs(tiago.robot)] == ["ground"]
     assert {row.unit for row in one.rows(legs.robot)} == {"m/s"}
-    assert Rolling.order == Order.HOLD
+    assert Rolling.order == SacrificeOrder.HOLD
     assert Rolling.equality
 
 

@@ -13,7 +13,7 @@ import pytest
 from tests.controller.stacks import DT, controller, inside, near_limits, quarrel, robot
 from wbc.controller import Controller, Stack, Status, Step, core_of
 from wbc.shapes import HalfSpace
-from wbc.tasks import Constraint, EndEffector, Fixed, Hold, JointLimits, Obstacle, Order, Posture, Row, Rows
+from wbc.tasks import Constraint, EndEffector, Fixed, Hold, JointLimits, Obstacle, Posture, Row, Rows, SacrificeOrder
 
 BACKENDS = ("native", "vm")
 TIP = "panda_hand_tcp"
@@ -111,7 +111,7 @@ def test_a_hold_gives_way_to_joint_limits(both: Controller) -> None:
     assert {s.item for s in step.relaxed} == {"hold"}
     assert {s.unit for s in step.relaxed} <= {"m/s", "rad/s"}
     assert step.v[3] < -1e-3
-    assert any(b.item == "limits" and b.row == "panda_joint4" and b.side == "upper" for b in step.binding)
+    assert any(b.item == "limits" and b.row == "panda_joint4" and b.bound == "upper" for b in step.binding)
     # the same rows at a place where nothing is outside: solved again at once
     q[3] = bot.limits.position_upper[3] - 0.3
     both.reset(q)
@@ -155,17 +155,17 @@ class Ask(Constraint):
 
 @dataclass(frozen=True)
 class AskActuator(Ask):
-    order: ClassVar[Order] = Order.ACTUATOR
+    order: ClassVar[SacrificeOrder] = SacrificeOrder.ACTUATOR
 
 
 @dataclass(frozen=True)
 class AskPosition(Ask):
-    order: ClassVar[Order] = Order.POSITION
+    order: ClassVar[SacrificeOrder] = SacrificeOrder.POSITION
 
 
 @dataclass(frozen=True)
 class AskSoft(Ask):
-    order: ClassVar[Order] = Order.SOFT
+    order: ClassVar[SacrificeOrder] = SacrificeOrder.SOFT
 
 
 @pytest.mark.parametrize("backend", BACKENDS)

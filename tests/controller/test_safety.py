@@ -24,11 +24,11 @@ from wbc.tasks import (
     Input,
     JointLimits,
     Obstacle,
-    Order,
     PitchPlane,
     Posture,
     Row,
     Rows,
+    SacrificeOrder,
 )
 
 BACKENDS = ("native", "vm")
@@ -139,7 +139,7 @@ class Broken(Constraint):
 class BrokenBounds(Constraint):
     """Simple bounds [lower, upper] on one joint, NaN where lower > 100."""
 
-    order: ClassVar[Order] = Order.SOFT
+    order: ClassVar[SacrificeOrder] = SacrificeOrder.SOFT
 
     def inputs(self, robot: Any) -> tuple[Input, ...]:
         return (Input("lower", default=-1.0), Input("upper", default=1.0))

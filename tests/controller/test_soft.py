@@ -50,7 +50,7 @@ def test_soft_rows_give_way_alone(tick: Controller) -> None:
     assert step.status is Status.RELAXED
     assert step.v[0] == pytest.approx(0.01, abs=1e-8)
     assert [(s.item, pytest.approx(s.amount, abs=1e-7)) for s in step.relaxed] == [("other", 0.02)]
-    assert {s.name for c in step.explain().conflicts for s in c.sides} == {"firm/ask", "other/ask"}
+    assert {s.name for c in step.explain().conflicts for s in c.bounds} == {"firm/ask", "other/ask"}
     tick["firm"].enabled = False
     step = tick.step(q)
     tick["firm"].enabled = True

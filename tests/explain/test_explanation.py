@@ -14,7 +14,9 @@ import pytest
 
 from tests.controller.stacks import DT, FRAMES, robot
 from wbc.controller import Controller, Stack, Status, core_of
+from wbc.controller.outcome import Binding
 from wbc.errors import SolverError
+from wbc.explain.explanation import Bound, Give
 from wbc.shapes import Sphere
 from wbc.tasks import Constraint, EndEffector, Hold, Input, JointLimits, Obstacle, Posture, Row, Rows
 
@@ -81,15 +83,15 @@ def test_a_conflict_names_row_and_joint_and_the_least_that_ends_it(tick: Control
     assert step.status is Status.RELAXED
     explanation = step.explain()
     (conflict,) = explanation.conflicts
-    assert [(s.name, s.side, s.kind) for s in conflict.sides] == [
+    assert [(s.name, s.which, s.kind) for s in conflict.bounds] == [
         ("limits/panda_joint1", "upper", "acceleration"),
         ("ask/ask", "lower", ""),
     ]
-    assert [side.value for side in conflict.sides] == pytest.approx([able, 2 * able])
+    assert [side.value for side in conflict.bounds] == pytest.approx([able, 2 * able])
     assert conflict.enough
-    assert conflict.cheapest.side.name == "ask/ask"
+    assert conflict.cheapest.bound.name == "ask/ask"
     assert conflict.cheapest.amount == pytest.approx(able, rel=1e-6)
-    assert [(g.side.name, g.side.unit) for g in explanation.least] == [("ask/ask", "rad/s")]
+    assert [(g.bound.name, g.bound.unit) for g in explanation.least] == [("ask/ask", "rad/s")]
     assert explanation.least[0].amount == pytest.approx(able, rel=1e-6)
     assert explanation.gave_way[0].amount == pytest.approx(step.relaxed[0].amount)
     text = str(explanation)
@@ -103,7 +105,7 @@ def test_a_margin_says_what_it_has_to_spare(tick: Controller) -> None:
     tick["ball"].pose = moved([0.2, 0.0, 0.0])
     tick["ball"].velocity = [-4.0, 0, 0, 0, 0, 0]
     step = tick.step(q, np.zeros(7))
-    sides = [side for conflict in step.explain().conflicts for side in conflict.sides if side.item == "ball"]
+    sides = [side for conflict in step.explain().conflicts for side in conflict.bounds if side.item == "ball"]
     assert sides
     for side in sides:
         block = core_of(tick).layout.blocks["ball"]
@@ -121,7 +123,7 @@ def test_losses_and_prices_are_what_other_limits_give(tick: Controller) -> None:
     assert step.status is Status.SOLVED
     assert explanation.conflicts == ()
     loss = next(loss for loss in explanation.losses if (loss.task, loss.unit) == ("hand", "m/s"))
-    assert loss.asked == pytest.approx(2.0 * 0.05, rel=1e-6)
+    assert loss.requested == pytest.approx(2.0 * 0.05, rel=1e-6)
     assert loss.to[0].item == "limits"
     kinds = {side.kind for side in explanation.binding if side.item == "limits"}
     assert kinds == {"velocity"}
@@ -133,14 +135,14 @@ def test_losses_and_prices_are_what_other_limits_give(tick: Controller) -> None:
 
     measured = (lost(0.01 - 1e-6) - lost(0.01 + 1e-6)) / 2e-6
     speeds = dict(zip(bot.dof_names, bot.limits.velocity, strict=True))
-    told = sum(p.amount * speeds[p.side.row] for p in explanation.prices if (p.task, p.unit) == ("hand", "m/s"))
+    told = sum(p.amount * speeds[p.bound.row] for p in explanation.prices if (p.task, p.unit) == ("hand", "m/s"))
     assert told == pytest.approx(measured, rel=1e-3)
     # regained: what the loss is without the limits
     tick["limits"].enabled = False
     free = tick.step(bot.neutral, np.zeros(7)).explain()
     tick["limits"].enabled = True
     rest = [x.lost for x in free.losses if (x.task, x.unit) == ("hand", "m/s")]
-    assert loss.to[0].amount == pytest.approx(loss.lost - (rest[0] if rest else 0.0), abs=2e-4 * loss.asked)
+    assert loss.to[0].amount == pytest.approx(loss.lost - (rest[0] if rest else 0.0), abs=2e-4 * loss.requested)
 
 
 def test_losses_are_those_of_the_command(tick: Controller) -> None:
@@ -194,3 +196,11 @@ def test_a_step_from_a_pickle_tells_everything_else(tick: Controller) -> None:
         assert repr(other) == repr(step)
         with pytest.raises(SolverError, match="pickle"):
             other.explain()
+
+
+def test_old_names_warn() -> None:
+    bound = Bound("limits", "joint", "upper", 1.0, "rad/s")
+    give, binding = Give(bound, 0.5), Binding("limits", "joint", "upper", 2.0)
+    for owner, old, value in ((bound, "side", "upper"), (give, "side", bound), (binding, "side", "upper")):
+        with pytest.warns(DeprecationWarning, match="is called (which|bound) now"):
+            assert getattr(owner, old) == value

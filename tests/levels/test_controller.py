@@ -53,7 +53,7 @@ def goals(controller: Controller) -> list[Goal]:
 def wanted(controller: Controller, v: np.ndarray) -> np.ndarray:
     """The optimum by the reference, from any velocity that the hard rows allow."""
     tick: Any = core_of(controller).tick
-    qp, (low, high) = controller.qp(), tick.assembly.row_sides()
+    qp, (low, high) = controller.qp(), tick.assembly.row_bounds()
     n, unit = qp.n, np.array(row_units(controller.stack, core_of(controller).layout))
     lower, upper = np.concatenate((qp.lower[:n], low / unit)), np.concatenate((qp.upper[:n], high / unit))
     return hierarchy(v, lower, upper, qp.A / unit[:, None], goals(controller))

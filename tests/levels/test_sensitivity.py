@@ -126,7 +126,7 @@ def test_prices_reach_across_levels(plain: Controller) -> None:
         step = plain.step(q, v)
         if step.status != Status.SOLVED:
             continue
-        prices = [p for p in step.explain().prices if p.side.item == "limits"]
+        prices = [p for p in step.explain().prices if p.bound.item == "limits"]
         assert {p.task for p in prices} <= {"tip", "knee", "posture"}
         told = {(p.task, p.unit): 0.0 for p in prices}
         for price in prices:
@@ -151,13 +151,13 @@ def test_equality_rows_tell_what_they_cost_the_first_level(held: Controller) -> 
     assert {key for key in found if key[0] == "hold"} == {("hold", "x"), ("hold", "y")}
     for key in (("hold", "x"), ("hold", "y")):
         assert found[key] == pytest.approx(wanted[key], rel=1e-6)
-    assert {(b.side, b.level) for b in step.binding if b.item == "hold"} == {("equal", 0)}
+    assert {(b.bound, b.level) for b in step.binding if b.item == "hold"} == {("equal", 0)}
     assert "hold/y equal costs knee" in str(step.explain())
 
 
 def test_equality_rows_have_their_price_at_every_level(held: Controller) -> None:
     step = held.step(Q)
-    prices = {(p.side.row, p.task): p for p in step.explain().prices if p.side.item == "hold"}
+    prices = {(p.bound.row, p.task): p for p in step.explain().prices if p.bound.item == "hold"}
     start = held["hold"].target
     for row, k in (("x", 0), ("y", 1)):
         losses = []

@@ -117,7 +117,7 @@ def test_a6_a_limit_that_is_reached_takes_from_the_task_and_not_from_the_constra
     np.testing.assert_allclose(control.rates(PLANAR_STATE)[TIP2] @ step.v, (0.031882, -0.046602), atol=1e-6)
     assert abs(control.rates(PLANAR_STATE)[MIDDLE_X] @ step.v) < 1e-12
     (binding,) = [b for b in step.binding if b.item == "joint_limits"]
-    assert (binding.side, binding.row) == ("lower", "joint2")
+    assert (binding.bound, binding.row) == ("lower", "joint2")
     # -mu / 2 of (B.21) to (B.23), whose mu is 0.0500165; metres count by the characteristic length
     assert binding.multiplier == pytest.approx(-0.0500165 / 2 / robot.characteristic_length**2, rel=1e-5)
 

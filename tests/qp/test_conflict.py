@@ -56,7 +56,7 @@ def test_conflicts_are_irreducible_and_slacks_are_least(seed: int) -> None:
     shifted = QP(qp.H, qp.g, qp.lower - found.slack, qp.upper + found.slack, qp.A)
     assert gap(shifted, sides, general) < 1e-7
     for conflict in found.conflicts:
-        members = list(conflict.sides)
+        members = list(conflict.bounds)
         assert gap(qp, members, members) > 1e-9
         for k, side in enumerate(members):
             others = [s for s in members if s != side]
@@ -70,7 +70,7 @@ def test_two_rows_that_name_each_other() -> None:
     """x + y >= 3 on the unit box: all three sides are needed, and only the row is worth giving."""
     qp = QP(np.eye(2), np.zeros(2), np.array([-1, -1, 3.0]), np.array([1, 1, np.inf]), np.array([[1.0, 1.0]]))
     found = diagnose(qp)
-    assert [c.sides for c in found.conflicts] == [(RowBound(0, True), RowBound(1, True), RowBound(2, False))]
+    assert [c.bounds for c in found.conflicts] == [(RowBound(0, True), RowBound(1, True), RowBound(2, False))]
     assert found.conflicts[0].alone == pytest.approx([1.0, 1.0, 1.0], abs=1e-8)
     assert found.slack == pytest.approx([0, 0, 1.0], abs=1e-8)
 

@@ -10,7 +10,7 @@ import pinocchio as pin
 import pytest
 
 import wbc.robots
-from wbc.symbolic.curvature import Force, curvature
+from wbc.symbolic.curvature import AppliedForce, curvature
 from wbc.symbolic.kinematics import Kinematics
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks import AxisAlign
@@ -47,7 +47,7 @@ def test_against_differences(name: str, kind: str) -> None:
     ]
     wanted = 0.5 * (np.array(columns) + np.array(columns).T)
     kinematics = Kinematics(model)
-    K = curvature(kinematics, [Force(kind, FRAMES[name], ca.SX(ca.DM(vector)))])  # type: ignore[arg-type]
+    K = curvature(kinematics, [AppliedForce(kind, FRAMES[name], ca.SX(ca.DM(vector)))])  # type: ignore[arg-type]
     found = np.array(ca.Function("K", [kinematics.q], [K])(q))
     assert np.abs(found - wanted).max() < 1e-7 * max(1.0, float(np.abs(wanted).max()))
 

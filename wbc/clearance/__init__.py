@@ -2,12 +2,12 @@
 
 from wbc.clearance.motion import Motion
 from wbc.clearance.scene import (
-    Body,
     CylinderInside,
     EndlessCylinder,
     Exemption,
     Pair,
-    Scene,
+    SweptBody,
+    SweptScene,
     TriangleMesh,
     bodies_of,
     self_pairs,
@@ -16,6 +16,18 @@ from wbc.clearance.sweep import Nearest, Sweep, Sweeper
 from wbc.clearance.tree import Tree
 
 __all__ = [
-    "Body", "CylinderInside", "EndlessCylinder", "Exemption", "Motion", "Nearest", "Pair", "Scene", "Sweep", "Sweeper",
-    "Tree", "TriangleMesh", "bodies_of", "self_pairs",
+    "CylinderInside",
+    "EndlessCylinder",
+    "Exemption",
+    "Motion",
+    "Nearest",
+    "Pair",
+    "Sweep",
+    "Sweeper",
+    "SweptBody",
+    "SweptScene",
+    "Tree",
+    "TriangleMesh",
+    "bodies_of",
+    "self_pairs",
 ]  # fmt: skip

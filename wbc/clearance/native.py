@@ -13,7 +13,7 @@ import numpy as np
 
 import wbc.proximity
 from wbc.clearance.motion import Motion
-from wbc.clearance.scene import Scene, TriangleMesh, sizes_of
+from wbc.clearance.scene import SweptScene, TriangleMesh, sizes_of
 from wbc.errors import CompileError
 from wbc.native import toolchain
 from wbc.native.kernel import kernel
@@ -92,7 +92,7 @@ class NativeSweep:
             when [knots].
     """
 
-    def __init__(self, functions: ctypes.PyDLL, scene: Scene) -> None:
+    def __init__(self, functions: ctypes.PyDLL, scene: SweptScene) -> None:
         self.scene, self._functions = scene, functions
         bodies, pairs, frames = len(scene.bodies), len(scene.pairs), len(scene.tree.frames)
         depth = max([1, *(len(chain) for chain in scene.chain)])
@@ -183,7 +183,7 @@ class NativeSweep:
             setattr(self._sweep, name, self._arrays[name].ctypes.data)
 
 
-def _shapes(scene: Scene) -> dict[str, Any]:
+def _shapes(scene: SweptScene) -> dict[str, Any]:
     """Shapes, hulls' points and trees of boxes, as native/sweep.h has them."""
     hull, points, tree, box, triangle = [], list[Array](), list[list[int]](), list[Array](), list[Array]()
     for body, center in zip(scene.bodies, scene.center, strict=True):

@@ -15,7 +15,7 @@ import pinocchio as pin
 import coal
 
 from wbc.clearance.motion import Motion
-from wbc.clearance.scene import INSIDE, OUTSIDE, PLANE, SUM, TRIANGLES, Scene, sizes_of
+from wbc.clearance.scene import INSIDE, OUTSIDE, PLANE, SUM, TRIANGLES, SweptScene, sizes_of
 from wbc.clearance.tree import Moves
 from wbc.proximity.judge import declared
 from wbc.proximity.scene import Index
@@ -34,7 +34,7 @@ SLOP = 1e-6
 class PlainSweep:
     """A scene; see :class:`wbc.clearance.native.NativeSweep`. Pieces of the motion are halved level by level."""
 
-    def __init__(self, scene: Scene) -> None:
+    def __init__(self, scene: SweptScene) -> None:
         self.scene = scene
         self.low, self.high, self.when = (np.zeros(len(scene.pairs)) for _ in range(3))
         self.measured = (0, 0)
@@ -176,7 +176,7 @@ class _Pieces:
         ends: of the capsules about the bodies, [bodies, n, 2, 3].
     """
 
-    def __init__(self, scene: Scene, motion: Motion, pieces: Array) -> None:
+    def __init__(self, scene: SweptScene, motion: Motion, pieces: Array) -> None:
         self.pieces, self._scene, tree = pieces, scene, scene.tree
         first, last, low, high = pieces[:, 0].astype(int), pieces[:, 1].astype(int), pieces[:, 2], pieces[:, 3]
         self.whole = last - first > 1

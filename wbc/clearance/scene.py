@@ -97,8 +97,8 @@ Shape = Solid | Unbounded | TriangleMesh
 
 
 @dataclass(frozen=True, eq=False)
-class Body:
-    """A shape on a link.
+class SweptBody:
+    """A shape on a link of a tree, to be swept.
 
     Attributes:
         name: unique in a scene.
@@ -147,12 +147,12 @@ class Exemption:
 SUM, HULL, PLANE, INSIDE, OUTSIDE, TRIANGLES = range(6)
 
 
-def bodies_of(robot: Robot) -> list[Body]:
+def bodies_of(robot: Robot) -> list[SweptBody]:
     """The collision shapes of a robot's links, by the link's name; from a link's second on with ", body 2" and so
     on.
     """
     return [
-        Body(link if k == 0 else f"{link}, body {k + 1}", placed.shape, link, placed.placement)
+        SweptBody(link if k == 0 else f"{link}, body {k + 1}", placed.shape, link, placed.placement)
         for link, group in robot.shapes.items()
         for k, placed in enumerate(group)
     ]
@@ -172,7 +172,7 @@ def self_pairs(robot: Robot, required: float = 0.0) -> list[Pair]:
     return [Pair(a, b, required) for one, other in robot.self_pairs for a in on.get(one, ()) for b in on.get(other, ())]
 
 
-class Scene:
+class SweptScene:
     """Bodies of a tree and their pairs, as arrays; kept, and swept again and again.
 
     Attributes:
@@ -180,8 +180,7 @@ class Scene:
         kind: of the bodies' shapes. frame: numbers of their frames, -1: the world. place: poses on them, moved to the
             shapes' centres. center: of those in the shapes' frames.
         line: [bodies, 8]: ends of a capsule about the body in its frame, its radius, and the radius about the ends of
-            what
-            turns with the body: 0 where its core is all, more where there is a grasp point.
+            what turns with the body: 0 where its core is all, more where there is a grasp point.
         chain: frames with joints from the body's on, up to the world.
         first, second: numbers of the pairs' bodies. stops: how many frames of the chains move the two apart, [pairs,
             2].
@@ -192,13 +191,15 @@ class Scene:
         number.
     """
 
-    def __init__(self, tree: Tree, bodies: Sequence[Body], pairs: Sequence[Pair]) -> None:
+    def __init__(self, tree: Tree, bodies: Sequence[SweptBody], pairs: Sequence[Pair]) -> None:
         self.tree = validation.instance("tree", tree, Tree, "a Tree")
-        self.bodies: tuple[Body, ...] = validation.items("bodies", bodies, "Bodies")
+        self.bodies: tuple[SweptBody, ...] = validation.items("bodies", bodies, "Bodies")
         self.pairs: tuple[Pair, ...] = validation.items("pairs", pairs, "Pairs")
         self.number: dict[str, int] = {}
         for k, body in enumerate(self.bodies):
-            validation.name(f"bodies[{k}].name", validation.instance(f"bodies[{k}]", body, Body, "a Body").name)
+            validation.name(
+                f"bodies[{k}].name", validation.instance(f"bodies[{k}]", body, SweptBody, "a SweptBody").name
+            )
             if body.name in self.number:
                 raise DuplicateNameError("bodies", body.name, "two of this name")
             self.number[body.name] = k
@@ -262,14 +263,14 @@ class Scene:
     def _known(self, field: str, name: str) -> int:
         return self.number[validation.one_of(field, name, tuple(self.number))]
 
-    def _on_frame(self, body: Body) -> tuple[pin.SE3, pin.SE3]:
+    def _on_frame(self, body: SweptBody) -> tuple[pin.SE3, pin.SE3]:
         """(pose of the shape, pose of the link) on the frame."""
         _, link = self.tree.link(f"{body.name}.link", body.link)
         if body.placement is None:
             return link, link
         return link * validation.pose(f"{body.name}.placement", body.placement), link
 
-    def _place(self, body: Body) -> tuple[int, pin.SE3, Array]:
+    def _place(self, body: SweptBody) -> tuple[int, pin.SE3, Array]:
         if not isinstance(body.shape, Shape):
             raise ShapeError(
                 f"{body.name}.shape", body.shape, "expected a solid, a surface of triangles or one without end"
@@ -312,7 +313,7 @@ def sizes_of(shape: Shape) -> list[float]:
     return [0.0, 0.0, 0.0, 0.0 if isinstance(shape, HalfSpace) else shape.radius, 0.0, 0.0]
 
 
-def _line(body: Body, shape: pin.SE3, link: pin.SE3) -> Array:
+def _line(body: SweptBody, shape: pin.SE3, link: pin.SE3) -> Array:
     if isinstance(body.shape, Unbounded):
         return np.zeros(8)
     if isinstance(body.shape, TriangleMesh):

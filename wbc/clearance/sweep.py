@@ -14,7 +14,7 @@ from wbc import validation
 from wbc.clearance.motion import Motion
 from wbc.clearance.native import NativeSweep, library
 from wbc.clearance.plain import PlainSweep
-from wbc.clearance.scene import Exemption, Scene
+from wbc.clearance.scene import Exemption, SweptScene
 from wbc.errors import RangeError, ShapeError
 from wbc.validation import Array
 
@@ -82,8 +82,8 @@ class Sweeper:
     """Sweeps of a scene.
 
         tree = Tree.of_model(model)
-        scene = Scene(tree, [Body("hand", Capsule(0.05, 0.2), "hand"), Body("post", Cylinder(0.03, 1.0))],
-                      [Pair("hand", "post", 0.025)])
+        hand, post = SweptBody("hand", Capsule(0.05, 0.2), "hand"), SweptBody("post", Cylinder(0.03, 1.0))
+        scene = SweptScene(tree, [hand, post], [Pair("hand", "post", 0.025)])
         swept = Sweeper(scene).sweep(Motion.linear(tree, times, q))
         if not swept.clear:
             print(swept.nearest)
@@ -98,8 +98,8 @@ class Sweeper:
             distances of cylinders, boxes and hulls within 2e-5 m.
     """
 
-    def __init__(self, scene: Scene, native: bool | None = None) -> None:
-        self.scene = validation.instance("scene", scene, Scene, "a Scene")
+    def __init__(self, scene: SweptScene, native: bool | None = None) -> None:
+        self.scene = validation.instance("scene", scene, SweptScene, "a SweptScene")
         functions = None if native is False else library()
         self._sweep: Any = PlainSweep(scene) if functions is None else NativeSweep(functions, scene)
 
@@ -129,7 +129,7 @@ class Sweeper:
 
         Raises:
             ShapeError: a motion of another tree. RangeError: a pair that is not there, a tolerance that is not
-            positive. What :meth:`Scene.exempt` raises. UnknownNameError: no such aim.
+            positive. What :meth:`SweptScene.exempt` raises. UnknownNameError: no such aim.
         """
         number = AIMS.index(validation.one_of("aim", aim, AIMS))
         tolerance = validation.scalar("tolerance", tolerance, low=0.0, open_low=True, unit="m")

@@ -9,6 +9,7 @@ from enum import StrEnum
 import numpy as np
 
 from wbc.controller.tick.buffers import CHAIN, INFINITE
+from wbc.lazy import renamed
 from wbc.stack.layout import Block, Layout
 from wbc.stack.memory import LEVEL_NUMBERS
 from wbc.tasks._direction import Direction
@@ -41,19 +42,21 @@ ANSWERED = ("", "", "", "", *CHAIN, "braking", "policy")
 
 @dataclass(frozen=True)
 class Binding:
-    """A row that pushes: ``item`` and ``row`` names, ``side`` (lower, upper, equal), its multiplier.
+    """A row that pushes: ``item`` and ``row`` names, ``bound`` (lower, upper, equal), its multiplier.
 
     ``level``: the first level whose optimum it pushes against, None for the least velocity after all levels.
     """
 
     item: str
     row: str
-    side: str
+    bound: str
     multiplier: float
     level: int | None = 0
 
+    side = renamed("bound")
+
     def __str__(self) -> str:
-        return f"{self.item}/{self.row} {self.side}"
+        return f"{self.item}/{self.row} {self.bound}"
 
 
 @dataclass(frozen=True)

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 
 class Context:
-    """What all steps of a controller share: names and places."""
+    """What all steps of a controller share: names and offsets."""
 
     def __init__(self, stack: Declaration, layout: Layout, assembly: Assembly | None) -> None:
         self.stack, self.layout, self.assembly = stack, layout, assembly
@@ -149,18 +149,18 @@ class Step:
         out = []
         for i in np.flatnonzero(multipliers):
             value = float(multipliers[i])
-            side = "upper" if value > 0 else "lower"
+            bound = "upper" if value > 0 else "lower"
             if i < nv:
                 if (high if value > 0 else low)[i] < 0.0:
-                    side = "lower" if value > 0 else "upper"  # held by a relaxation, see the order of sacrifice
-                owner = int((high if side == "upper" else low)[i])
+                    bound = "lower" if value > 0 else "upper"  # held by a relaxation, see the order of sacrifice
+                owner = int((high if bound == "upper" else low)[i])
                 name = context.bounds[owner].entry.name if owner >= 0 else "bounds"
-                out.append(Binding(name, context.stack.robot.dof_names[i], side, value, levels[i]))
+                out.append(Binding(name, context.stack.robot.dof_names[i], bound, value, levels[i]))
             else:
                 block, row = context.general[i - nv]
-                side = "lower" if block.form == "margins" else side
-                side = "equal" if getattr(block.entry.item, "equality", False) else side
-                out.append(Binding(block.entry.name, block.rows[row].label, side, value, levels[i]))
+                bound = "lower" if block.form == "margins" else bound
+                bound = "equal" if getattr(block.entry.item, "equality", False) else bound
+                out.append(Binding(block.entry.name, block.rows[row].label, bound, value, levels[i]))
         return tuple(out)
 
     def _pushes(self, count: int) -> list[int | None]:

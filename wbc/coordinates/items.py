@@ -17,7 +17,7 @@ from wbc.errors import RangeError
 from wbc.renamed import renamed
 from wbc.robot import Robot
 from wbc.symbolic.tracer import Tracer
-from wbc.tasks.base import Constraint, Input, Order, Row, Rows, Task, Values
+from wbc.tasks.base import Constraint, Input, Row, Rows, SacrificeOrder, Task, Values
 from wbc.validation import Array
 
 #: Largest rate at which the drift of what is held is taken back [m/s, rad/s]
@@ -118,7 +118,7 @@ class KeepRows(Constraint):
 
     #: Made by pairs, so it is not in the table of items
     abstract: ClassVar[bool] = True
-    order: ClassVar[Order] = Order.HOLD
+    order: ClassVar[SacrificeOrder] = SacrificeOrder.HOLD
     equality: ClassVar[bool] = True
     initial_only: ClassVar[tuple[str, ...]] = ("gain",)
 

@@ -1,11 +1,11 @@
-"""From a step's copy of its tick to an :class:`Explanation`. Nothing here runs unless it is asked for."""
+"""From a step's copy of its tick to an :class:`Explanation`. Nothing here runs unless requested."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from wbc.controller.outcome import certificates, scales
-from wbc.explain.explanation import Contradiction, Explanation, Give, Residue, Side
+from wbc.explain.explanation import Bound, Contradiction, Explanation, Give, Residue
 from wbc.explain.losses import groups, losses, prices
 from wbc.explain.naming import Naming
 from wbc.explain.past import Past
@@ -71,30 +71,30 @@ class Explainer:
         return diagnose(QP(np.eye(n), np.zeros(n), qp.lower / units, qp.upper / units, A))
 
     def _contradiction(self, conflict: Conflict) -> Contradiction:
-        sides = tuple(self.naming.side(*side) for side in conflict.sides)
-        units = np.array([self.naming.units[side.row] for side in conflict.sides])
+        bounds = tuple(self.naming.bound(*member) for member in conflict.bounds)
+        units = np.array([self.naming.units[member.row] for member in conflict.bounds])
         enough = bool(np.isfinite(conflict.alone).any())
         needed = conflict.alone if enough else conflict.within
-        alone = tuple(Give(s, float(a * u)) for s, a, u in zip(sides, needed, units, strict=True))
-        may = [k for k in range(len(sides)) if np.isfinite(needed[k]) and not sides[k].actuator]
-        cheapest = alone[min(may or range(len(sides)), key=lambda k: needed[k])]
-        return Contradiction(sides, tuple(g for g in alone if np.isfinite(g.amount)), enough, cheapest)
+        alone = tuple(Give(s, float(a * u)) for s, a, u in zip(bounds, needed, units, strict=True))
+        may = [k for k in range(len(bounds)) if np.isfinite(needed[k]) and not bounds[k].actuator]
+        cheapest = alone[min(may or range(len(bounds)), key=lambda k: needed[k])]
+        return Contradiction(bounds, tuple(g for g in alone if np.isfinite(g.amount)), enough, cheapest)
 
-    def _violated(self, row: int, v: Array) -> Side:
-        """The side of a row that v misses, or is nearer to missing."""
+    def _violated(self, row: int, v: Array) -> Bound:
+        """The bound of a row that v misses, or is nearer to missing."""
         qp = self.past.qp
         at = float(qp.rows_at(v)[row])
-        return self.naming.side(row, at - qp.upper[row] > qp.lower[row] - at)
+        return self.naming.bound(row, at - qp.upper[row] > qp.lower[row] - at)
 
-    def _binding(self, row: int, multiplier: float, v: Array) -> Side:
-        """The side that pushes; a bound that a relaxation holds may push the other way than its side."""
+    def _binding(self, row: int, multiplier: float, v: Array) -> Bound:
+        """The active bound; one that a relaxation holds may have a multiplier of the other sign."""
         qp, at = self.past.qp, v[row] if row < self.past.layout.variables else 0.0
         upper = multiplier > 0.0
         if row < self.past.layout.variables:
             upper = bool(abs(at - qp.upper[row]) < abs(at - qp.lower[row]))
         elif not np.isfinite((qp.upper if upper else qp.lower)[row]):
             upper = not upper
-        return self.naming.side(row, upper)
+        return self.naming.bound(row, upper)
 
     def _culprits(self, rows: list[int], multipliers: Array) -> list[Block]:
         """Constraints that bind and tasks that are on."""
@@ -121,8 +121,8 @@ class Explainer:
         for values, named in ((beyond, True), (gradient, False), (off, True)):
             row = int((values / naming.units[: values.size]).argmax())
             own = not named and row < robot.nv
-            where = robot.dof_names[row] if own else self.naming.side(row, False).name if named else "slack"
-            unit = f"{robot.dof_units[row]}/s" if own else self.naming.side(row, False).unit if named else "rad/s"
+            where = robot.dof_names[row] if own else self.naming.bound(row, False).name if named else "slack"
+            unit = f"{robot.dof_units[row]}/s" if own else self.naming.bound(row, False).unit if named else "rad/s"
             out.append(Residue(float(values[row]), unit, where if values[row] > 0.0 else ""))
         if past.layout.cascade:
             worst = max(certificates(past.layout, past.part), key=lambda level: level.stationarity)

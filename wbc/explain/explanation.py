@@ -6,6 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from wbc.lazy import renamed
+
+RELATIONS = {"lower": "at least", "upper": "at most", "equal": "exactly"}
+
 
 def amount(value: float, unit: str) -> str:
     """A number with its unit, lengths below a metre in millimetres or micrometres: ``31 mm/s``."""
@@ -15,25 +19,25 @@ def amount(value: float, unit: str) -> str:
     return f"{value if abs(value) > 1e-13 else 0.0:.3g} {prefix}{unit}".rstrip()
 
 
-def listed(sides: tuple[Side, ...]) -> str:
-    """Sides as text, joint limits of one kind together."""
+def listed(bounds: tuple[Bound, ...]) -> str:
+    """Bounds as text, joint limits of one kind together."""
     groups: dict[tuple[str, str], list[str]] = {}
-    for side in sides:
-        if side.kind:
-            bound = {"lower": "at least", "upper": "at most", "equal": "exactly"}[side.side]
-            groups.setdefault((side.item, side.kind), []).append(f"{side.row} {bound} {amount(side.value, side.unit)}")
-    plain = [str(side) for side in sides if not side.kind]
+    for bound in bounds:
+        if bound.kind:
+            text = f"{bound.row} {RELATIONS[bound.which]} {amount(bound.value, bound.unit)}"
+            groups.setdefault((bound.item, bound.kind), []).append(text)
+    plain = [str(bound) for bound in bounds if not bound.kind]
     return ", ".join([*plain, *(f"{item} ({kind}: {', '.join(rows)})" for (item, kind), rows in groups.items())])
 
 
 @dataclass(frozen=True)
-class Side:
-    """One side of a row or bound.
+class Bound:
+    """A lower or upper bound of a row or of a degree of freedom, or the value of an equality.
 
     Attributes:
-        item, row: names; the row of a bound is its degree of freedom.
-        side: ``lower``, ``upper`` or ``equal``.
-        value: the side, per second [unit]. unit: of the row's rate, such as m/s.
+        item, row: names; the row of a joint's bound is its degree of freedom.
+        which: ``lower``, ``upper`` or ``equal``.
+        value: per second [unit]. unit: of the row's rate, such as m/s.
         kind: what a joint limit is at this value: ``velocity``, ``acceleration`` or ``position``; else empty.
         margin: h of a margin row before the tick, in its unit; None for others.
         actuator: it belongs to the class that never gives way.
@@ -41,12 +45,14 @@ class Side:
 
     item: str
     row: str
-    side: str
+    which: str
     value: float
     unit: str
     kind: str = ""
     margin: float | None = None
     actuator: bool = False
+
+    side = renamed("which")
 
     @property
     def name(self) -> str:
@@ -54,8 +60,8 @@ class Side:
         return f"{self.item}/{self.row}"
 
     def __str__(self) -> str:
-        relation = {"lower": "at least", "upper": "at most", "equal": "exactly"}[self.side]
-        text = f"{self.name} ({self.kind + ' limit: ' if self.kind else ''}{relation} {amount(self.value, self.unit)}"
+        relation, kind = RELATIONS[self.which], self.kind + " limit: " if self.kind else ""
+        text = f"{self.name} ({kind}{relation} {amount(self.value, self.unit)}"
         if self.margin is not None:
             text += f", {amount(self.margin, self.unit.removesuffix('/s'))} to spare"
         return text + ")"
@@ -63,40 +69,44 @@ class Side:
 
 @dataclass(frozen=True)
 class Give:
-    """By how much a side gives or would have to give [unit]; inf: no amount is enough."""
+    """By how much a bound is relaxed, or would have to be [unit]; inf: no amount is enough."""
 
-    side: Side
+    bound: Bound
     amount: float
 
+    side = renamed("bound")
+
     def __str__(self) -> str:
-        return f"{self.side.name} by {amount(self.amount, self.side.unit)}"
+        return f"{self.bound.name} by {amount(self.amount, self.bound.unit)}"
 
 
 @dataclass(frozen=True)
 class Contradiction:
-    """Sides that cannot all hold; without any one of them the others can.
+    """Bounds that cannot all hold; without any one of them the others can.
 
     Attributes:
-        sides: the members.
+        bounds: the members.
         alone: what each would have to give if it alone gives and everything else in the stack holds; or, where no
             single one of them ends all conflicts, only the other members.
         enough: the first of these.
-        cheapest: the least of them among sides that may give way at all, a length of ``stack.length`` counted as one
+        cheapest: the least of them among bounds that may give way at all, a length of ``stack.length`` counted as one
             radian; among all where none may.
     """
 
-    sides: tuple[Side, ...]
+    bounds: tuple[Bound, ...]
     alone: tuple[Give, ...]
     enough: bool
     cheapest: Give
 
+    sides = renamed("bounds")
+
     def __str__(self) -> str:
-        members = listed(self.sides)
-        if len(self.sides) == 1:
+        members = listed(self.bounds)
+        if len(self.bounds) == 1:
             text = f"This cannot hold within the bounds: {members}."
         else:
-            text = f"These {len(self.sides)} cannot hold together, any {len(self.sides) - 1} of them can: {members}."
-        others = [str(g) for g in self.alone if g is not self.cheapest and not g.side.actuator]
+            text = f"These {len(self.bounds)} cannot hold together, any {len(self.bounds) - 1} of them can: {members}."
+        others = [str(g) for g in self.alone if g is not self.cheapest and not g.bound.actuator]
         text += f" Cheapest to relax{'' if self.enough else ' (there are other conflicts too)'}: {self.cheapest}"
         return f"{text}, instead {' or '.join(others)}." if others else f"{text}."
 
@@ -111,11 +121,11 @@ class Share:
 
 @dataclass(frozen=True)
 class Loss:
-    """How much slower than asked a task is served, or a soft constraint violated, its rows of one unit together.
+    """How much slower than requested a task is served, or a soft constraint violated, its rows of one unit together.
 
     Attributes:
         task, unit: whose rows, and the unit of their rates.
-        asked: Euclidean norm of the rates asked for, gain e + de/dt. lost: norm of what is missing. Of a soft
+        requested: Euclidean norm of the desired rates, gain e + de/dt. lost: norm of what is missing. Of a soft
             constraint: 0, and norm of its violations.
         alone: norm of what would be missing with every other item off: out of reach, singular, slowed by its gain.
         to: items that it would regain something without, the greatest first. They need not add up to ``lost``.
@@ -123,14 +133,16 @@ class Loss:
 
     task: str
     unit: str
-    asked: float
+    requested: float
     lost: float
     alone: float
     to: tuple[Share, ...]
 
+    asked = renamed("requested")
+
     def __str__(self) -> str:
-        text = f"{self.task} misses {amount(self.lost, self.unit)} of {amount(self.asked, self.unit)}"
-        if self.asked == 0.0:
+        text = f"{self.task} misses {amount(self.lost, self.unit)} of {amount(self.requested, self.unit)}"
+        if self.requested == 0.0:
             text = f"{self.task} gives up {amount(self.lost, self.unit)}"
         if self.to:
             parts = [f"{amount(share.amount, self.unit)} without {share.item}" for share in self.to]
@@ -142,21 +154,22 @@ class Loss:
 
 @dataclass(frozen=True)
 class Price:
-    """What one unit of a binding side costs a task: the loss falls by ``amount`` per unit that the side gives.
+    """What one unit of a active bound costs a task: the loss falls by ``amount`` per unit by which it is relaxed.
 
-    ``amount`` is -d lost / d side [unit of the task's rate per unit of the side's rate]; negative where the task is
+    ``amount`` is -d lost / d bound [unit of the task's rate per unit of the bound's rate]; negative where the task is
     better off with the limit.
     """
 
-    side: Side
+    bound: Bound
     task: str
     amount: float
     unit: str
 
+    side = renamed("bound")
+
     def __str__(self) -> str:
-        return (
-            f"{self.side.name} {self.side.side} costs {self.task} {amount(self.amount, self.unit)} per {self.side.unit}"
-        )
+        bound, cost = self.bound, amount(self.amount, self.unit)
+        return f"{bound.name} {bound.which} costs {self.task} {cost} per {bound.unit}"
 
 
 @dataclass(frozen=True)
@@ -178,13 +191,13 @@ class Explanation:
     Attributes:
         status: of the step. answered_by: what gave the answer, see :attr:`wbc.Step.answered_by`.
         broken: items that are on and whose numbers are NaN, infinite or without an interval.
-        conflicts: minimal sets of sides that contradict each other; empty where all rows can hold.
+        conflicts: minimal sets of bounds that contradict each other; empty where all rows can hold.
         least: the least sum of squared slack that lets everything hold, by row (metres as ``stack.length`` radians).
         gave_way: what did give way in this tick, in the order of sacrifice.
         binding: what pushes against the command.
-        losses: what each task misses, and to whom. prices: what one unit of each binding side costs each task.
+        losses: what each task misses, and to whom. prices: what one unit of each active bound costs each task.
         primal: largest violation of a row that did not give way. dual: largest velocity by which one degree of freedom
-            alone would better the objective. complementarity: largest distance of a pushing row from its side.
+            alone would better the objective. complementarity: largest distance of an active row from its bound.
         scales: lambda of each scaled task that is slowed down; the rows that keep its direction are not in ``binding``.
     """
 
@@ -194,7 +207,7 @@ class Explanation:
     conflicts: tuple[Contradiction, ...]
     least: tuple[Give, ...]
     gave_way: tuple[Give, ...]
-    binding: tuple[Side, ...]
+    binding: tuple[Bound, ...]
     losses: tuple[Loss, ...]
     prices: tuple[Price, ...]
     primal: Residue
@@ -218,7 +231,7 @@ class Explanation:
         lines += [f"{price}." for price in self.prices]
         if np.isfinite(self.dual.amount):
             lines.append(
-                f"Residuals: rows {self.primal}, optimality {self.dual}, pushing rows off their side "
+                f"Residuals: rows {self.primal}, optimality {self.dual}, active rows off their bound "
                 f"{self.complementarity}."
             )
         return "\n".join(lines)

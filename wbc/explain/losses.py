@@ -1,4 +1,4 @@
-"""What the tasks of a past tick lost, to whom, and what one unit of each binding side costs them."""
+"""What the tasks of a past tick lost, to whom, and what one unit of each active bound costs them."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from wbc.explain.explanation import Loss, Price, Share, Side
+from wbc.explain.explanation import Bound, Loss, Price, Share
 from wbc.explain.past import Frozen, Past
 from wbc.qp.problem import QPSolution
 from wbc.qp.relax import Relaxed
@@ -15,7 +15,7 @@ from wbc.stack.layout import Block
 from wbc.tasks._direction import Direction
 from wbc.validation import Array
 
-#: Losses and regained parts below this share of what was asked, and below this rate, are not named [rad/s, m/s]
+#: Losses and regained parts below this share of what was requested, and below this rate, are not named [rad/s, m/s]
 _SHARE, _LEAST = 1e-3, 1e-6
 
 
@@ -37,7 +37,7 @@ class Group:
 
 
 class SoftGroup(Group):
-    """Rows of one soft constraint that share a unit: what they miss is how far A v is outside their sides."""
+    """Rows of one soft constraint that share a unit: what they miss is how far A v is outside their bounds."""
 
     def __init__(self, block: Block, unit: str, A: Array, lower: Array, upper: Array) -> None:
         super().__init__(block, unit, A, np.zeros(len(A)))
@@ -100,16 +100,16 @@ def losses(past: Past, found: list[Group], v: Array, culprits: list[Block]) -> t
             alone[block.entry.name] = past.solve()[0]
     out = []
     for group in short:
-        name, lost, asked = group.block.entry.name, group.lost(v), float(np.linalg.norm(group.desired))
+        name, lost, requested = group.block.entry.name, group.lost(v), float(np.linalg.norm(group.desired))
         regained = [Share(item, lost - group.lost(other)) for item, other in without.items() if item != name]
-        named = [share for share in regained if share.amount > max(_LEAST, _SHARE * asked)]
+        named = [share for share in regained if share.amount > max(_LEAST, _SHARE * requested)]
         named.sort(key=lambda share: -share.amount)
-        out.append(Loss(name, group.unit, asked, lost, group.lost(alone[name]), tuple(named)))
+        out.append(Loss(name, group.unit, requested, lost, group.lost(alone[name]), tuple(named)))
     return tuple(out)
 
 
-def prices(past: Past, found: list[Group], answer: Relaxed, sides: dict[int, Side]) -> tuple[Price, ...]:
-    """Of every binding side and every task that misses something, from the active set of an optimum: of one QP, or of
+def prices(past: Past, found: list[Group], answer: Relaxed, bounds: dict[int, Bound]) -> tuple[Price, ...]:
+    """Of every active bound and every task that misses something, from the active set of an optimum: of one QP, or of
     all levels; none where a level has none.
     """
     frozen = past.frozen()
@@ -117,26 +117,26 @@ def prices(past: Past, found: list[Group], answer: Relaxed, sides: dict[int, Sid
         return ()
     v, slope = _of_one(past, answer) if frozen is None else _of_levels(past, frozen)
     out = []
-    for row, side in sides.items():
+    for row, bound in bounds.items():
         moved = slope(row)
         if not moved.any():
             continue
-        moved = moved * (-1.0 if side.side == "lower" else 1.0)
+        moved = moved * (-1.0 if bound.which == "lower" else 1.0)
         for group in found:
             if group.lost(v) <= max(_LEAST, _SHARE * float(np.linalg.norm(group.desired))):
                 continue
-            if group.block.entry.name == side.item:
+            if group.block.entry.name == bound.item:
                 continue
             fall = -float(group.slope(v) @ moved)
-            if side.side == "equal":
+            if bound.which == "equal":
                 fall = abs(fall)
             if abs(fall) > _SHARE:
-                out.append(Price(side, group.block.entry.name, fall, group.unit))
+                out.append(Price(bound, group.block.entry.name, fall, group.unit))
     return tuple(out)
 
 
 def _of_one(past: Past, answer: Relaxed) -> tuple[Array, Callable[[int], Array]]:
-    """(command, row -> dv / db of the side that holds it, zero where it holds nothing)."""
+    """(command, row -> dv / db of the bound that holds it, zero where it holds nothing)."""
     wide, n = past.qp.with_slacks(), past.qp.n
     one = Sensitivity(wide, QPSolution(answer.x, answer.multipliers, "solved"))
 
@@ -154,6 +154,6 @@ def _of_levels(past: Past, frozen: Frozen) -> tuple[Array, Callable[[int], Array
     def slope(row: int) -> Array:
         size = frozen.sizes[row]
         start = first.to_bound(row) / dofs * size
-        return np.asarray(frozen.optimum.to_side(numbers, row, start) * dofs / size)
+        return np.asarray(frozen.optimum.to_bound(numbers, row, start) * dofs / size)
 
     return frozen.answer.x * dofs, slope

@@ -1,4 +1,4 @@
-"""Names, units and kinds of the sides of a past tick's rows and bounds."""
+"""Names, units and kinds of the bounds of a past tick's rows and joints."""
 
 from __future__ import annotations
 
@@ -6,18 +6,18 @@ from functools import cached_property
 
 import numpy as np
 
-from wbc.explain.explanation import Side
+from wbc.explain.explanation import Bound
 from wbc.explain.past import Past
 from wbc.stack.codegen import row_orders, row_units
 from wbc.stack.layout import Block
 from wbc.tasks._direction import Direction
-from wbc.tasks.base import Constraint, Order
+from wbc.tasks.base import Constraint, SacrificeOrder
 from wbc.tasks.joint_limits import JointLimits
 from wbc.validation import Array
 
 
 class Naming:
-    """Sides by their place in [1; A]: simple bounds first, then general rows."""
+    """Bounds by their row of [1; A]: simple bounds first, then general rows."""
 
     def __init__(self, past: Past) -> None:
         self._past, self._nv = past, past.layout.variables
@@ -36,7 +36,7 @@ class Naming:
         return self._past.layout.of_form("bounds")
 
     def owner(self, row: int, upper: bool) -> Block | None:
-        """The item that sets a side."""
+        """The item that sets a bound."""
         if row >= self._nv:
             return self.general[row - self._nv][0]
         number = int((self._past.owner_high if upper else self._past.owner_low)[row])
@@ -46,26 +46,26 @@ class Naming:
         """Whether a general row is one of those that keep the direction of a scaled task."""
         return row >= self._nv and isinstance(self.general[row - self._nv][0].entry.item, Direction)
 
-    def side(self, row: int, upper: bool) -> Side:
-        """A side by name, with its value in the QP."""
+    def bound(self, row: int, upper: bool) -> Bound:
+        """A bound by name, with its value in the QP."""
         past, block, qp = self._past, self.owner(row, upper), self._past.qp
         value = float((qp.upper if upper else qp.lower)[row])
-        side = "equal" if qp.lower[row] == qp.upper[row] else ("upper" if upper else "lower")
-        order = Order.ACTUATOR
+        which = "equal" if qp.lower[row] == qp.upper[row] else ("upper" if upper else "lower")
+        order = SacrificeOrder.ACTUATOR
         if block is not None and isinstance(block.entry.item, Constraint):
             order = block.entry.item.order
         item = block.entry.name if block is not None else "bounds"
-        actuator = order == Order.ACTUATOR
+        actuator = order == SacrificeOrder.ACTUATOR
         if row < self._nv:
             robot = past.stack.robot
             unit = f"{robot.dof_units[row]}/s"
             kind = self._kind(block, row, value)
-            return Side(item, robot.dof_names[row], side, value, unit, kind, None, actuator and kind != "position")
+            return Bound(item, robot.dof_names[row], which, value, unit, kind, None, actuator and kind != "position")
         own, k = self.general[row - self._nv]
         label = own.rows[k]
         margin = float(past.part("margin")[own.margin_start + k]) if own.form == "margins" else None
         unit = label.unit if label.unit.endswith("/s") else f"{label.unit or '1'}/s"
-        return Side(item, label.label, side, value, unit, "", margin, actuator)
+        return Bound(item, label.label, which, value, unit, "", margin, actuator)
 
     def _kind(self, block: Block | None, row: int, value: float) -> str:
         """Which of the limits of a :class:`JointLimits` gives a bound its value."""
@@ -76,9 +76,9 @@ class Naming:
         speed = float(limits.velocity[row]) * float(tick.p[block.slots["velocity_scale"].span][0])
         change = float(limits.acceleration[row]) * float(tick.dt[0])
         start = float(tick.v_last[row])
-        room = 1e-12 * max(1.0, abs(value))
-        if block.entry.item.velocity and abs(abs(value) - speed) <= room:
+        tolerance = 1e-12 * max(1.0, abs(value))
+        if block.entry.item.velocity and abs(abs(value) - speed) <= tolerance:
             return "velocity"
-        if block.entry.item.acceleration and min(abs(value - start - change), abs(value - start + change)) <= room:
+        if block.entry.item.acceleration and min(abs(value - start - change), abs(value - start + change)) <= tolerance:
             return "acceleration"
         return "position" if block.entry.item.position else ""

@@ -56,8 +56,8 @@ def _of_one(past: Past, answer: Relaxed, moves: Moves, count: int) -> Array:
         H, g, A = (_slope(ends, part) for part in ("H", "g", "A"))
         force[:, k] = H @ answer.x + g + A.T @ answer.multipliers[n:]
         with np.errstate(invalid="ignore"):
-            sides = np.where(upper > 0.0, _slope(ends, "upper"), _slope(ends, "lower"))
-        offset[:, k] = np.nan_to_num(sides) - np.concatenate((np.zeros(n), A @ answer.x))
+            ends_moved = np.where(upper > 0.0, _slope(ends, "upper"), _slope(ends, "lower"))
+        offset[:, k] = np.nan_to_num(ends_moved) - np.concatenate((np.zeros(n), A @ answer.x))
     return sensitivity.change(force, offset)[:variables]
 
 
@@ -130,7 +130,7 @@ def _input(past: Past, slot: Slot) -> tuple[Moves, int]:
         rotation = numbers[:9].reshape(3, 3, order="F")
         numbers[:9] = (pin.exp3(by * np.eye(3)[k]) @ rotation).ravel(order="F")
 
-    def place(k: int, by: float) -> None:
+    def move_pose(k: int, by: float) -> None:
         if k < 3:
             numbers[9 + k] += by
         else:
@@ -142,4 +142,4 @@ def _input(past: Past, slot: Slot) -> tuple[Moves, int]:
 
     if kind == "configuration":
         return along, past.layout.nv
-    return {"pose": (place, 6), "rotation": (turn, 3)}.get(kind, (move, slot.size))
+    return {"pose": (move_pose, 6), "rotation": (turn, 3)}.get(kind, (move, slot.size))

@@ -99,7 +99,9 @@ def _instead(base: pathlib.Path, problem: str) -> pathlib.Path:
     """A private folder that lives as long as this process; said once in the log."""
     folder = tempfile.mkdtemp(prefix="wbc-cache-")
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
-    log.warning("cache directory %s cannot be used (%s); compiled stacks are kept for this process only", base, problem)
+    log.warning(
+        "cache directory %s cannot be used (%s); compiled stacks are stored for this process only", base, problem
+    )
     return pathlib.Path(folder)
 
 

@@ -35,7 +35,7 @@ TYPES = {
     "Iterable[str]": "names",
     "Iterable[Input]": "`Input` or several",
     "Sequence[Convex]": "`Convex` parts",
-    "Side": "number or numbers or None",
+    "LimitValues": "number or numbers or None",
     "Triple": "3 numbers",
     "float": "number",
     "bool": "True or False",

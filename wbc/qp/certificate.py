@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wbc.qp.factor import ROUNDOFF, WIDE_ROUNDOFF, ActiveRows, Factor, Wide, sides
+from wbc.qp.factor import ROUNDOFF, WIDE_ROUNDOFF, ActiveRows, Factor, Wide, active_bounds
 from wbc.qp.problem import QP, QPSolution
 from wbc.validation import Array
 
@@ -81,29 +81,29 @@ def error_bound(qp: QP, solution: QPSolution, count: int | None = None) -> float
     if loss > 0.1:
         return np.inf
     x, lam = solution.x, solution.multipliers
-    side = sides(qp, factor, solution)
-    clean = np.where(_right(side, lam), lam, 0.0)
+    held = active_bounds(qp, factor, solution)
+    clean = np.where(_right(held, lam), lam, 0.0)
     size = np.concatenate((np.ones(qp.n), np.abs(qp.A).sum(axis=1))) * np.abs(x).max(initial=0.0)
 
     exact = x.astype(np.longdouble)
-    bound = np.where(side == -1, qp.lower, np.where(side == 0, 0.0, qp.upper))
-    rows = ActiveRows(factor, side, clean)
+    bound = np.where(held == -1, qp.lower, np.where(held == 0, 0.0, qp.upper))
+    rows = ActiveRows(factor, held, clean)
     for _ in range(_CORRECTIONS):
         residual = (bound - factor.rows_at(exact))[rows.index].astype(np.float64)
         dy, _ = rows.solve(np.zeros(qp.n), residual)
         exact = exact + factor.inverse @ dy
     at = factor.rows_at(exact)
-    room = 4.0 * ROUNDOFF * (np.where(side == 0, 0.0, np.abs(bound)) + size)
+    tolerance = 4.0 * ROUNDOFF * (np.where(held == 0, 0.0, np.abs(bound)) + size)
     low, high = at - qp.lower, qp.upper - at
-    off = np.abs(np.where(side == 0, 0.0, bound - at))
-    if bool((np.minimum(low, high) < -room).any()) or bool((off > room)[clean != 0.0].any()):
+    off = np.abs(np.where(held == 0, 0.0, bound - at))
+    if bool((np.minimum(low, high) < -tolerance).any()) or bool((off > tolerance)[clean != 0.0].any()):
         return np.inf
 
-    side[off > room] = 0  # active rows that depend on others and are missed take no force
-    force, rounding = _forces(qp, factor, rows, side, exact, clean)
+    held[off > tolerance] = 0  # active rows that depend on others and are missed take no force
+    force, rounding = _forces(qp, factor, rows, held, exact, clean)
     left = off[rows.index].astype(np.float64) + WIDE_ROUNDOFF * (qp.n + 2) * size[rows.index]
     rest = float(np.linalg.norm(left)) * rows.inverse_norm()
-    inverse, tilt = _within_equalities(factor, rows, side)
+    inverse, tilt = _within_equalities(factor, rows, held)
     whole = np.abs(factor.inverse.T) @ (np.abs(force) + rounding)
     step = float(np.linalg.norm(inverse.T @ force)) + float(np.linalg.norm(np.abs(inverse).T @ rounding))
     step += tilt * float(np.linalg.norm(whole)) + rest
@@ -112,14 +112,14 @@ def error_bound(qp: QP, solution: QPSolution, count: int | None = None) -> float
     return float(total[:count].max(initial=0.0))
 
 
-def _right(side: NDArray[np.int8], lam: Any) -> NDArray[np.bool_]:
+def _right(held: NDArray[np.int8], lam: Any) -> NDArray[np.bool_]:
     """Which rows have a multiplier that they may have."""
-    out: NDArray[np.bool_] = (side == 2) | (lam * side > 0.0)
+    out: NDArray[np.bool_] = (held == 2) | (lam * held > 0.0)
     return out
 
 
 def _forces(
-    qp: QP, factor: Factor, rows: ActiveRows, side: NDArray[np.int8], x: Wide, multipliers: Array
+    qp: QP, factor: Factor, rows: ActiveRows, held: NDArray[np.int8], x: Wide, multipliers: Array
 ) -> tuple[Array, Array]:
     """Stationarity at x with the multipliers that fit it best, and a bound on the rounding in it [n], [n]."""
     lam, still = multipliers.astype(np.longdouble), np.zeros(rows.index.size)
@@ -127,19 +127,19 @@ def _forces(
         force = factor.stationarity(qp, x, lam).astype(np.float64)
         fitted = lam.copy()
         fitted[rows.index] -= rows.solve(factor.inverse.T @ force, still)[1]
-        lam = np.where(_right(side, fitted), fitted, 0.0)
+        lam = np.where(_right(held, fitted), fitted, 0.0)
     force = factor.stationarity(qp, x, lam).astype(np.float64)
     sizes = _magnitudes(qp, x.astype(np.float64), lam.astype(np.float64))
     rounding = WIDE_ROUNDOFF * (qp.n + qp.m + 3) * sizes
     # the multiplier of an active bound takes all of its residual, whatever that is, if it keeps its sign
-    own, at = lam[: qp.n] - force, side[: qp.n]
+    own, at = lam[: qp.n] - force, held[: qp.n]
     taken = _right(at, np.where(np.abs(own) > rounding, own, 0.0))
     return np.where(taken, 0.0, force), np.where(taken, 0.0, rounding)
 
 
-def _within_equalities(factor: Factor, rows: ActiveRows, side: NDArray[np.int8]) -> tuple[Array, float]:
+def _within_equalities(factor: Factor, rows: ActiveRows, held: NDArray[np.int8]) -> tuple[Array, float]:
     """R^-1 (I - Q Q'), Q a basis of the equality rows seen through R, and by how much its plane may be tilted."""
-    count = int((side[rows.index] == 2).sum())
+    count = int((held[rows.index] == 2).sum())
     inverse, Q, T = factor.inverse, rows.Q[:, :count], rows.T[:count, :count]
     if count == 0:
         return inverse, 0.0

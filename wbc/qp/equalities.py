@@ -28,8 +28,8 @@ THRESHOLD = 1e-7
 #: Rows whose remainder is within this share of the longest are equally good pivots: the lowest index is taken.
 _TIE = 1e-6
 
-#: Room for the right side of a dropped row [unit of the row per second]
-_ROOM = 1e-9
+#: Tolerance of the right side of a dropped row [unit of the row per second]
+_TOLERANCE = 1e-9
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -128,8 +128,8 @@ def _finish(
         target[k] = (right[kept[k]] - triangle[k, :k] @ target[:k]) / triangle[k, k]
     point = target @ basis
     inconsistency = np.abs(free[left] @ point - right[left])
-    room = _ROOM + hidden[left] * float(np.linalg.norm(point + constant))
-    return Equalities(rows[kept], rows[left], inconsistency, inconsistency <= room, basis, target, triangle)
+    tolerance = _TOLERANCE + hidden[left] * float(np.linalg.norm(point + constant))
+    return Equalities(rows[kept], rows[left], inconsistency, inconsistency <= tolerance, basis, target, triangle)
 
 
 def orthonormal(qp: QP, equalities: Equalities) -> QP:

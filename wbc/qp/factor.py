@@ -64,7 +64,7 @@ class Factor:
         return np.concatenate((wide, self.wide_A @ wide))
 
 
-def sides(qp: QP, factor: Factor, solution: QPSolution) -> NDArray[np.int8]:
+def active_bounds(qp: QP, factor: Factor, solution: QPSolution) -> NDArray[np.int8]:
     """The guessed active set: +1 at the upper bound, -1 at the lower, +2 equality, 0 inactive [n + m].
 
     Seen through the factor, dropping the multiplier of row i moves y by |lam_i| |M_i|, and moving the
@@ -91,9 +91,9 @@ class ActiveRows:
         Q: orthonormal columns [n, k]; T: upper triangular [k, k].
     """
 
-    def __init__(self, factor: Factor, side: NDArray[np.int8], multipliers: Array) -> None:
-        active = np.flatnonzero(side)
-        order = np.lexsort((active, -np.abs(multipliers[active]) * factor.norms[active], side[active] != 2))
+    def __init__(self, factor: Factor, held: NDArray[np.int8], multipliers: Array) -> None:
+        active = np.flatnonzero(held)
+        order = np.lexsort((active, -np.abs(multipliers[active]) * factor.norms[active], held[active] != 2))
         index = active[order]
         empty = factor.norms[index] == 0.0
         self.dependent = index[empty]

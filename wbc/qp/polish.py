@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from wbc.qp.factor import ActiveRows, Factor, sides
+from wbc.qp.factor import ActiveRows, Factor, active_bounds
 from wbc.qp.problem import QP, QPSolution
 from wbc.validation import Array
 
@@ -55,39 +55,39 @@ def polish(qp: QP, solution: QPSolution, rounds: int = ROUNDS) -> Polished:
     factor = Factor(qp)
     if not factor.definite:
         return Polished(QPSolution(solution.x, solution.multipliers, "failed", 0), False, 0)
-    side = sides(qp, factor, solution)
+    held = active_bounds(qp, factor, solution)
     norms = np.where(factor.norms > 0.0, factor.norms, 1.0)
     best, best_error = QPSolution(solution.x, solution.multipliers, "failed", 0), np.inf
     lam = solution.multipliers
     for count in range(1, rounds + 1):
-        x, lam, rows = solve_on(qp, factor, side, lam)
-        wrong = _wrong_signs(qp, side, lam) * norms
+        x, lam, rows = solve_on(qp, factor, held, lam)
+        wrong = _wrong_signs(qp, held, lam) * norms
         beyond = _violations(qp, x) / norms
         error = float(max(wrong.max(initial=0.0), beyond.max(initial=0.0)))
         if error < best_error:
             best, best_error = QPSolution(x, lam, "failed", count), error
         if error == 0.0:
             return Polished(QPSolution(x, lam, "solved", count), True, count)
-        side[rows.dependent[side[rows.dependent] != 2]] = 0
+        held[rows.dependent[held[rows.dependent] != 2]] = 0
         if wrong.max(initial=0.0) > 0.0:
-            side[int(wrong.argmax())] = 0
+            held[int(wrong.argmax())] = 0
         else:
             entering = int(beyond.argmax())
-            if side[entering] != 0:
+            if held[entering] != 0:
                 break  # an active row that cannot be met depends on the others: the set is contradictory
-            side[entering] = 1 if qp.rows_at(x)[entering] > qp.upper[entering] else -1
+            held[entering] = 1 if qp.rows_at(x)[entering] > qp.upper[entering] else -1
     return Polished(best, False, count)
 
 
 def solve_on(
-    qp: QP, factor: Factor, side: NDArray[np.int8], multipliers: Array, refinements: int = REFINEMENTS
+    qp: QP, factor: Factor, held: NDArray[np.int8], multipliers: Array, refinements: int = REFINEMENTS
 ) -> tuple[Array, Array, ActiveRows]:
-    """The optimum with the rows of ``side`` held at their bounds: x, multipliers, and the rows used.
+    """The optimum with the rows of ``held`` at their bounds: x, multipliers, and the rows used.
 
     ``multipliers`` only decides the order in which dependent rows are left out.
     """
-    rows = ActiveRows(factor, side, multipliers)
-    bound = np.where(side == -1, qp.lower, qp.upper)[rows.index]
+    rows = ActiveRows(factor, held, multipliers)
+    bound = np.where(held == -1, qp.lower, qp.upper)[rows.index]
     x = np.zeros(qp.n, dtype=np.longdouble)
     lam = np.zeros(qp.n + qp.m, dtype=np.longdouble)
     for _ in range(1 + refinements):
@@ -99,9 +99,9 @@ def solve_on(
     return x.astype(np.float64), lam.astype(np.float64), rows
 
 
-def _wrong_signs(qp: QP, side: NDArray[np.int8], lam: Array) -> Array:
+def _wrong_signs(qp: QP, held: NDArray[np.int8], lam: Array) -> Array:
     """How far multipliers point the wrong way, 0 where they are right or within rounding [n + m]."""
-    wrong = np.where(side == 1, -lam, np.where(side == -1, lam, 0.0))
+    wrong = np.where(held == 1, -lam, np.where(held == -1, lam, 0.0))
     scale = np.abs(lam).max(initial=0.0) + np.abs(qp.g).max(initial=0.0)
     return np.where(wrong > TOLERANCE * scale, wrong, 0.0)
 

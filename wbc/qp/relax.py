@@ -31,8 +31,8 @@ PROXIMAL = 1e-6
 STEPS = 30
 SETTLED = 1e-12
 
-#: Violations up to this (per unit of the row) count as none; rows of finished classes get this much room
-ROOM = 1e-9
+#: Violations up to this (per unit of the row) count as none; rows of finished classes get this much tolerance
+TOLERANCE = 1e-9
 
 #: Rows and bounds whose multiplier exceeds this share of the largest one stay active in the later classes
 _PUSHING = 1e-6
@@ -49,7 +49,7 @@ class Relaxed:
             declared, x minimises the objective over the rest; ``failed``: a solver gave no verdict, x is
             the point of least violation found last.
         slack: violation of each row at x, in the row's units, >= 0 [m].
-        relaxed: rows whose slack exceeds the numerical room [m].
+        relaxed: rows whose slack exceeds the numerical tolerance [m].
         lower, upper: the bounds that x minimises the objective over, the given ones but for what gave way and
             what was held for it [n + m].
         iterations: of all solver calls together.
@@ -148,21 +148,21 @@ class Relaxation:
     def _rest(self, work: QP, v: Array) -> tuple[QPSolution, int]:
         """The optimum over what the classes left, and the iterations; all that is held meets at v.
 
-        Where nearly every joint is held, rounding may leave nothing else: then rows held as equalities get room, and
-        at last their joints stay where they are.
+        Where nearly every joint is held, rounding may leave nothing else: then equalities get a
+        tolerance, and at last their joints stay where they are.
         """
         last = self._final.solve(work, warm=False)
         iterations, rows = last.iterations, np.flatnonzero(work.lower[self.n :] == work.upper[self.n :])
-        for room in (ROOM, np.inf):
+        for tolerance in (TOLERANCE, np.inf):
             if last.solved or not rows.size:
                 break
-            if room == np.inf:
+            if tolerance == np.inf:
                 joints = np.flatnonzero((work.A[rows] != 0.0).any(axis=0))
                 work.lower[joints] = work.upper[joints] = v[joints]
-            roomy = work.copy()
-            roomy.lower[self.n + rows] -= room
-            roomy.upper[self.n + rows] += room
-            last = self._final.solve(roomy, warm=False)
+            loosened = work.copy()
+            loosened.lower[self.n + rows] -= tolerance
+            loosened.upper[self.n + rows] += tolerance
+            last = self._final.solve(loosened, warm=False)
             iterations += last.iterations
         return last, iterations
 
@@ -199,12 +199,12 @@ class Relaxation:
         s = np.zeros(m)
         s[rows] = stage.x[n + rows]
         x = np.clip(stage.x[:n], work.lower[:n], work.upper[:n])
-        given = rows[np.abs(s[rows]) > ROOM]
+        given = rows[np.abs(s[rows]) > TOLERANCE]
         equal = np.flatnonzero(work.lower[n:] == work.upper[n:])
         pushing = np.abs(stage.multipliers) > _PUSHING * np.abs(s).max(initial=0.0)
         others = np.setdiff1d(rows, np.union1d(given, equal))
-        work.lower[n + others] -= ROOM
-        work.upper[n + others] += ROOM
+        work.lower[n + others] -= TOLERANCE
+        work.upper[n + others] += TOLERANCE
         if given.size:
             fixed = np.flatnonzero(pushing[:n])
             at = np.where(stage.multipliers[fixed] > 0.0, work.upper[fixed], work.lower[fixed])
@@ -218,7 +218,7 @@ class Relaxation:
         """Move the sides that x misses by rounding to x: of dependent equalities, one set of digits holds them all."""
         n, value = self.n, work.A @ x
         low, high = work.lower[n:], work.upper[n:]
-        close = (value >= low - 10.0 * ROOM) & (value <= high + 10.0 * ROOM)
+        close = (value >= low - 10.0 * TOLERANCE) & (value <= high + 10.0 * TOLERANCE)
         equal = close & (low == high)
         low[close] = np.where(equal, value, np.minimum(low, value))[close]
         high[close] = np.where(equal, value, np.maximum(high, value))[close]
@@ -228,7 +228,7 @@ class Relaxation:
     ) -> Relaxed:
         x = np.clip(last.x, qp.lower[: self.n], qp.upper[: self.n])
         slack = qp.violation(x)[self.n :]
-        return Relaxed(x, last.multipliers, flag, slack, slack > 10.0 * ROOM * unit, *ends, iterations)
+        return Relaxed(x, last.multipliers, flag, slack, slack > 10.0 * TOLERANCE * unit, *ends, iterations)
 
 
 def relax(qp: QP, order: NDArray[np.int_], unit: Array | None = None) -> Relaxed:

@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from wbc.errors import SolverError
-from wbc.qp.factor import ActiveRows, Factor, sides
+from wbc.qp.factor import ActiveRows, Factor, active_bounds
 from wbc.qp.problem import QP, QPSolution
 from wbc.validation import Array
 
@@ -33,7 +33,7 @@ class Sensitivity:
         if not self._factor.definite:
             raise SolverError("qp", "H", "is not positive definite, so the minimiser has no derivative")
         self._size = qp.n + qp.m
-        self._rows = ActiveRows(self._factor, sides(qp, self._factor, solution), solution.multipliers)
+        self._rows = ActiveRows(self._factor, active_bounds(qp, self._factor, solution), solution.multipliers)
         self.active = self._rows.index
 
     def change(self, force: Array, offset: Array) -> Array:

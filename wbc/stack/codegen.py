@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from importlib import resources
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -165,8 +166,8 @@ def unit_groups(stack: Declaration) -> list[tuple[int, int]]:
     model = stack.robot.model
     groups: list[tuple[int, int]] = []
 
-    def visit(joint: object, start: int) -> None:
-        kind = joint.shortname().removeprefix("JointModel")  # type: ignore[attr-defined]
+    def visit(joint: Any, start: int) -> None:
+        kind = joint.shortname().removeprefix("JointModel")
         if kind.startswith(("RUB", "RevoluteUnbounded")):
             groups.append((start, 2))
         elif kind == "FreeFlyer":
@@ -176,7 +177,7 @@ def unit_groups(stack: Declaration) -> list[tuple[int, int]]:
         elif kind == "Spherical":
             groups.append((start, 4))
         elif kind == "Composite":
-            for part in joint.extract().joints:  # type: ignore[attr-defined]
+            for part in joint.extract().joints:
                 visit(part, start)
                 start += int(part.nq)
 

@@ -13,7 +13,7 @@ from wbc.errors import DuplicateNameError, LevelError, PicklingError, RangeError
 from wbc.robot import Robot
 from wbc.tasks import inputs
 from wbc.tasks._direction import DIRECTION_PRICE, Direction
-from wbc.tasks.base import Constraint, Item, Order, Task
+from wbc.tasks.base import Constraint, Item, SacrificeOrder, Task
 from wbc.tasks.mechanism import Mechanism
 
 #: Default cost of velocity against a task row of weight 1, per (rad/s)^2: keeps the optimum unique.
@@ -39,10 +39,10 @@ class Entry:
     price: float | None = None
 
     @property
-    def order(self) -> Order:
+    def order(self) -> SacrificeOrder:
         """Class of a constraint in the order of sacrifice; that of a soft one is the last."""
         assert isinstance(self.item, Constraint)
-        return self.item.order if self.hard and self.price is None else Order.SOFT
+        return self.item.order if self.hard and self.price is None else SacrificeOrder.SOFT
 
     @property
     def is_task(self) -> bool:
@@ -270,7 +270,7 @@ def _require_soft(item: Item, field: str, value: object) -> None:
         raise RangeError(field, value, "a task is never hard: it has a weight")
     if item.form == "bounds":
         raise RangeError(field, value, f"{type(item).__name__} bounds joints, and bounds never give way")
-    if item.order <= Order.POSITION:
+    if item.order <= SacrificeOrder.POSITION:
         raise RangeError(field, value, f"{type(item).__name__} is what the robot can do, which never gives way")
 
 
@@ -278,7 +278,7 @@ def _check_softened(level: int, item: Constraint) -> None:
     """Only rows that may give way can be minimised at a level."""
     if item.form == "bounds":
         reason = f"{type(item).__name__} bounds velocities and is always hard; a level is for margins and rows"
-    elif item.order <= Order.POSITION:
+    elif item.order <= SacrificeOrder.POSITION:
         reason = f"{type(item).__name__} is what the robot can do, which never gives way"
     else:
         return

@@ -16,7 +16,7 @@ from wbc.tasks.base import Constraint, Form, Input, Row, Task
 
 @dataclass(frozen=True, eq=False)
 class Slot:
-    """An input and its place in the parameter buffer."""
+    """An input and its slots in the parameter buffer."""
 
     input: Input
     start: int
@@ -24,7 +24,7 @@ class Slot:
 
     @cached_property
     def span(self) -> slice:
-        """Place in the parameter buffer."""
+        """Slots in the parameter buffer."""
         return slice(self.start, self.start + self.size)
 
 
@@ -63,12 +63,12 @@ class Layout:
         levels: numbers of the levels at which something is minimised, in order. cascade: they are strict levels, solved
             one after the other; False: all is one problem.
         leading: task rows of the first level, which come first.
-        row_levels: place in ``levels`` of each general row that is minimised there, -1 for the others.
-        price_at: place in the parameters of the price of each general row that is soft, -1 for the others.
+        row_levels: index in ``levels`` of each general row that is minimised there, -1 for the others.
+        price_at: offset in the parameters of the price of each general row that is soft, -1 for the others.
         nv: degrees of freedom. variables: of the QP; what comes after the velocities are shares of scaled tasks.
         share_rows: task row -> the share of a scaled task; such a row counts for nothing, and its error is the speed
             that is asked for.
-        nothing: a place in the parameters that holds 0, where there are shares.
+        nothing: an offset in the parameters that holds 0, where there are shares.
     """
 
     def __init__(self, stack: Declaration) -> None:
@@ -153,7 +153,7 @@ class Layout:
         return [b for b in self.blocks.values() if b.form in forms]
 
     def level_rows(self, place: int) -> slice:
-        """Task rows of a level, by its place in ``levels``."""
+        """Task rows of a level, by its index in ``levels``."""
         return slice(self._ends[place - 1] if place else 0, self._ends[place])
 
     def row_scales(self, stack: Declaration) -> np.ndarray:

@@ -84,7 +84,7 @@ LEVEL_REPORT = (
     Field("missed", ("MT",), "rate of every task row less the rate that it asks for", True),
     Field("share", ("MT",), "part of every task row that the levels before left free, 0 to 1", True),
     Field("dropped", ("MC",), "of equality rows that depend on others, how far they are off; else -1", True),
-    Field("pushes", ("NV + MC",), "level, by its place, that a row pushes against first, -1: none", True),
+    Field("pushes", ("NV + MC",), "index of the level that a row pushes against first, -1: none", True),
     Field("levels", ("LEVELS + 1", "LEVEL_NUMBERS"), f"{', '.join(LEVEL_NUMBERS)}; last the least velocity"),
 )
 INPUTS = (
@@ -110,7 +110,7 @@ QP_FIELDS = (
     Field("desired", ("MT",), "rate that each task row asks for", True),
     Field("free_low", ("MC",), "bounds of the general rows before relaxation", True),
     Field("free_high", ("MC",), "", True),
-    Field("given", ("4", "4"), "a pose on its way into p: a homogeneous matrix, row by row"),
+    Field("given", ("4", "4"), "a pose to be written into p: a homogeneous matrix, row by row"),
     Field("give", ("MC",), "by how much a soft row gives way per multiplier; 0 for hard rows", True),
 )
 

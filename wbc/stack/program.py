@@ -41,7 +41,7 @@ from wbc.stack.distances import Balls, Sensed
 from wbc.stack.layout import Block, Layout, Slot
 from wbc.stack.shares import kept_direction, speeds, unlimited, widened
 from wbc.symbolic import rotations as rot
-from wbc.symbolic.curvature import Force, curvature
+from wbc.symbolic.curvature import AppliedForce, curvature
 from wbc.symbolic.kinematics import Kinematics, Pose
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks._direction import Direction
@@ -90,7 +90,7 @@ class _Builder:
         self.p = ca.SX.sym("p", layout.parameters)
         self.dt = ca.SX.sym("dt")
         self.force = ca.SX.sym("force", layout.task_rows)
-        self.forces: list[Force] = []
+        self.forces: list[AppliedForce] = []
         self.tasks: dict[str, tuple[ca.SX, ca.SX, ca.SX, ca.SX]] = {}
 
     @cached_property

@@ -23,7 +23,7 @@ from wbc.symbolic.kinematics import Kinematics
 
 
 @dataclass(frozen=True, eq=False)
-class Force:
+class AppliedForce:
     """A force at the origin of ``frame``, a torque on it, or a force on every body in proportion to its mass.
 
     ``vector``: world axes, 3 entries; for ``mass`` the force on the whole robot. What is no force but knows its
@@ -44,7 +44,7 @@ class _Load:
     torque: ca.SX
 
 
-def curvature(kinematics: Kinematics, forces: Iterable[Force]) -> ca.SX:
+def curvature(kinematics: Kinematics, forces: Iterable[AppliedForce]) -> ca.SX:
     """K of the module, nv x nv, symmetric, for all forces together."""
     known = list(forces)
     loads = _loads(kinematics, [force for force in known if force.kind != "own"])
@@ -66,7 +66,7 @@ def curvature(kinematics: Kinematics, forces: Iterable[Force]) -> ca.SX:
     return ca.sparsify(K)
 
 
-def _loads(kinematics: Kinematics, forces: Iterable[Force]) -> dict[int, _Load]:
+def _loads(kinematics: Kinematics, forces: Iterable[AppliedForce]) -> dict[int, _Load]:
     """Per joint that carries a force, all that it carries."""
     loads: dict[int, _Load] = {}
 

@@ -21,7 +21,7 @@ import casadi as ca
 
 from wbc.errors import UnknownNameError
 from wbc.symbolic import rotations as rot
-from wbc.symbolic.curvature import Force
+from wbc.symbolic.curvature import AppliedForce
 from wbc.symbolic.gaps import Gap, gap_jacobian
 from wbc.symbolic.kinematics import WORLD, Kinematics, Pose
 from wbc.symbolic.manipulability import manipulability, manipulability_curvature
@@ -86,7 +86,7 @@ class Tracer:
                     lambda: kinematics.center_of_mass,
                     ca.SX.eye(3),
                     lambda: kinematics.center_of_mass_jacobian,
-                    forces=lambda force: (Force("mass", WORLD, force),),
+                    forces=lambda force: (AppliedForce("mass", WORLD, force),),
                 )
             )
         return self._com
@@ -120,7 +120,7 @@ class Tracer:
                 motion,
                 partial(self._spin, frame, base),
                 inner=True,
-                forces=lambda torque: (Force("torque", frame, torque), Force("torque", base, -torque)),
+                forces=lambda torque: (AppliedForce("torque", frame, torque), AppliedForce("torque", base, -torque)),
             )
         )
         if not ca.symvar(target):
@@ -148,9 +148,13 @@ class Tracer:
         still = self.held(axes)
         outer = still if base == WORLD else self.rotation(base) @ still
 
-        def forces(torque: ca.SX) -> tuple[Force, ...]:
+        def forces(torque: ca.SX) -> tuple[AppliedForce, ...]:
             curved = axis_curvature(spin(), self.expand(outer[:, 2]), torque, self.expand(outer[:, :2] @ turn))
-            return (Force("torque", frame, torque), Force("torque", base, -torque), Force("own", frame, curved))
+            return (
+                AppliedForce("torque", frame, torque),
+                AppliedForce("torque", base, -torque),
+                AppliedForce("own", frame, curved),
+            )
 
         zero = ca.SX.zeros(2)
         across = Placeholder(
@@ -206,8 +210,12 @@ class Tracer:
             kinematics.frame(name)
         both = cache(lambda: manipulability(kinematics, frame, base, rows, length))
 
-        def forces(force: ca.SX) -> tuple[Force, ...]:
-            return (Force("own", frame, force * both()[0] * manipulability_curvature(kinematics, frame, base, length)),)
+        def forces(force: ca.SX) -> tuple[AppliedForce, ...]:
+            return (
+                AppliedForce(
+                    "own", frame, force * both()[0] * manipulability_curvature(kinematics, frame, base, length)
+                ),
+            )
 
         text = f"manipulability {frame} {base} {rows} {length!r}"
         slope = Placeholder(text, symbol, lambda: both()[0], ca.SX(1), lambda: both()[1], forces=forces)
@@ -238,12 +246,12 @@ class Tracer:
                 total = total + ca.sparsify(change @ known.motion) @ known.jacobian()
         return self.expand(ca.sparsify(total))
 
-    def forces(self, expression: ca.SX) -> list[Force]:
+    def forces(self, expression: ca.SX) -> list[AppliedForce]:
         """Forces and torques on the robot whose virtual work is the derivative of a scalar expression.
 
         What depends on joint coordinates directly has no curvature and gives none.
         """
-        out: list[Force] = []
+        out: list[AppliedForce] = []
         works: list[tuple[Placeholder, ca.SX]] = []
         for known in self._symbols:
             partial = ca.jacobian(expression, known.symbol)
@@ -252,7 +260,7 @@ class Tracer:
                 out += known.forces(self.expand(work))
                 works.append((known, work))
         curved = turning(works, self._symbols, self.expand, self.kinematics.nv)
-        return [*out, Force("own", WORLD, curved)] if curved.nnz() else out
+        return [*out, AppliedForce("own", WORLD, curved)] if curved.nnz() else out
 
     def expand(self, expression: ca.SX) -> ca.SX:
         """The expression with every placeholder replaced by the kinematics that it stands for."""
@@ -300,7 +308,7 @@ class Placeholder:
     jacobian: Callable[[], ca.SX]
     inner: bool = False
     turns: bool = False
-    forces: Callable[[ca.SX], tuple[Force, ...]] = lambda force: ()
+    forces: Callable[[ca.SX], tuple[AppliedForce, ...]] = lambda force: ()
 
 
 def of_frame(kinematics: Kinematics, frame: str, pose: Pose) -> list[Placeholder]:
@@ -313,7 +321,7 @@ def of_frame(kinematics: Kinematics, frame: str, pose: Pose) -> list[Placeholder
         lambda: kinematics.pose(frame).position,
         ca.SX.eye(3),
         lambda: kinematics.jacobian(frame)[:3, :],
-        forces=lambda force: (Force("force", frame, force),),
+        forces=lambda force: (AppliedForce("force", frame, force),),
     )
     rotation = Placeholder(
         f"rotation {frame}",
@@ -322,7 +330,7 @@ def of_frame(kinematics: Kinematics, frame: str, pose: Pose) -> list[Placeholder
         rotation_rate(pose.rotation),
         lambda: kinematics.jacobian(frame)[3:, :],
         turns=True,
-        forces=lambda torque: (Force("torque", frame, torque),),
+        forces=lambda torque: (AppliedForce("torque", frame, torque),),
     )
     return [position, rotation]
 

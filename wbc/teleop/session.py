@@ -203,7 +203,7 @@ class Teleoperation:
         if self.control.active in self._tall:
             cue = motion_cue(self.robot, self.control.pair, q, self.control.asked)
             out.append(f"more rows than joints: {cue}")
-        joints = dict.fromkeys(b.row for b in step.binding if b.row in self.robot.dof_names and b.side != "equal")
+        joints = dict.fromkeys(b.row for b in step.binding if b.row in self.robot.dof_names and b.bound != "equal")
         if joints:
             out.append(f"at limits of {', '.join(joints)}")
         if step.relaxed:

@@ -41,7 +41,7 @@ class TargetAnswer:
     @property
     def binding(self) -> str:
         """Rows and bounds that push; not those of holds, which always do."""
-        return ", ".join(str(b) for b in self.solution.binding if b.side != "equal")
+        return ", ".join(str(b) for b in self.solution.binding if b.bound != "equal")
 
     @property
     def reason(self) -> str:

@@ -112,8 +112,8 @@ class Assembly(Buffers, ABC):
         """
 
     @abstractmethod
-    def row_sides(self) -> tuple[Array, Array]:
-        """Sides of the general rows in the last QP, those that are minimised at a level included."""
+    def row_bounds(self) -> tuple[Array, Array]:
+        """Bounds of the general rows in the last QP, those that are minimised at a level included."""
 
     @abstractmethod
     def look_ahead(self) -> None:

@@ -24,7 +24,7 @@ class ElasticTick(SolvedTick):
     """minimise 1/2 v'Hv + g'v + price/2 |s|^2 over v within its bounds, lower <= A_i v + unit_i s_i <= upper.
 
     Rows of the class of the actuators have no slack. The order of sacrifice plays no part. The certificate is that of
-    the problem whose sides have been moved by the slack.
+    the problem whose bounds have been moved by the slack.
     """
 
     def __init__(self, assembly: Assembly, stack: Declaration, layout: Layout) -> None:

@@ -71,7 +71,7 @@ class Levels:
         nv, soft = self._layout.variables, self._row_levels >= 0
         low, high = (
             np.concatenate((ends[:nv], np.where(soft, own, ends[nv:]))) / self.sizes
-            for ends, own in zip((lower, upper), self._assembly.row_sides(), strict=True)
+            for ends, own in zip((lower, upper), self._assembly.row_bounds(), strict=True)
         )
         levels, scales = self._levels(qp)
         A = qp.A * self._dofs / self._units[:, None]
@@ -79,7 +79,7 @@ class Levels:
 
     def with_soft(self, qp: QP, v: Array, slack: Array) -> Array:
         """Slack of general rows with that of the rows that are minimised at a level."""
-        low, high = self._assembly.row_sides()
+        low, high = self._assembly.row_bounds()
         at = qp.A @ v
         return np.where(self._row_levels >= 0, np.maximum(0.0, np.maximum(low - at, at - high)), slack)
 

@@ -121,7 +121,7 @@ class NativeTick(Assembly):
         if not self._layout.cascade:
             raise SolverError(asked, "one level", "only stacks with strict levels keep this; see qp()")
 
-    def row_sides(self) -> tuple[Array, Array]:
+    def row_bounds(self) -> tuple[Array, Array]:
         low, high = (side.copy() for side in self._sides)
         low[low <= -INFINITE], high[high >= INFINITE] = -np.inf, np.inf
         return low, high

@@ -26,7 +26,7 @@ DEAD = 1e-20
 
 
 class Reach:
-    """Curvature of the errors that no step removes, and gains that leave room to brake.
+    """Curvature of the errors that no step removes, and gains that leave margin to brake.
 
     Args:
         curve: weights of the task rows -> curvature (nv x nv, symmetric); None: no task has any.
@@ -223,7 +223,7 @@ class Reach:
         return limited
 
     def brake_for_margins(self, A: Array, low: Array, margin: Array, p: Array, dt: float, bound_enabled: Array) -> None:
-        """Raise the lower sides of margin rows to what the joints can brake for, see ``native/margins.h``."""
+        """Raise the lower bounds of margin rows to what the joints can brake for, see ``native/margins.h``."""
         limited = self._limited(bound_enabled)
         if not limited.any() or not len(self._margin_rows):
             return

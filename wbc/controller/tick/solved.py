@@ -90,7 +90,7 @@ class SolvedTick(Buffers):
         slack = qp.violation(v)[self._nv :] if flag == RELAXED else np.zeros(self._units.size)
         if self.levels is not None:
             slack = self.levels.with_soft(qp, v, slack)
-        slack = self._soft.reported(qp, v, self.assembly.row_sides(), slack) if answer is not None else slack
+        slack = self._soft.reported(qp, v, self.assembly.row_bounds(), slack) if answer is not None else slack
         slack = np.where(slack > 2.0 * TOLERANCE * self._units, slack, 0.0)
         if flag == RELAXED and not slack[self._hard].any():
             flag = SOLVED  # the rows contradict each other by rounding only
@@ -148,7 +148,7 @@ class SolvedTick(Buffers):
         return np.minimum(np.maximum(0.0, qp.lower[: self._nv]), qp.upper[: self._nv])
 
     def _met(self, qp: QP, answer: Relaxed, v: Array) -> tuple[Array, Array]:
-        """Sides of the answer's problem without equality rows that v meets to rounding and that do not push.
+        """Bounds of the answer's problem without equality rows that v meets to rounding and that do not push.
 
         Rows that depend on each other have no common point to the last digit, so no bound could be stated with all of
         them. A minimiser over fewer rows that meets the others is the minimiser over all.
@@ -166,7 +166,7 @@ class SolvedTick(Buffers):
         return self.levels.below(qp, v, first, self.report)
 
     def _name_frozen_bounds(self, qp: QP, answer: Relaxed) -> None:
-        """Of a bound that a relaxation holds, the other side is not what binds, whatever sign its multiplier has."""
+        """Of a bound that a relaxation holds, the other bound is not what binds, whatever sign its multiplier has."""
         n = self._nv
         frozen = (answer.lower[:n] == answer.upper[:n]) & (qp.lower[:n] != qp.upper[:n])
         at_lower = answer.lower[:n] == qp.lower[:n]
@@ -186,7 +186,7 @@ class SolvedTick(Buffers):
         return BRAKED, self.rest(qp), None
 
     def _uncrossed(self, qp: QP) -> tuple[QP, NDArray[np.bool_]]:
-        """Rows whose sides have crossed are met half-way; and which of them give way by more than rounding."""
+        """Rows whose bounds have crossed are met half-way; and which of them give way by more than rounding."""
         n = qp.n
         gap = qp.lower[n:] - qp.upper[n:]
         if not (gap > 0.0).any():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -21,9 +22,9 @@ from wbc.validation import Array
 class _Call:
     """A CasADi function bound once to flat arrays (kept alive here, as the buffer interface requires)."""
 
-    def __init__(self, function: object, arguments: list[Array], results: list[Array]) -> None:
+    def __init__(self, function: Any, arguments: list[Array], results: list[Array]) -> None:
         self._keep = (function, arguments, results)
-        self._buffer, self.run = function.buffer()  # type: ignore[attr-defined]
+        self._buffer, self.run = function.buffer()
         for i, array in enumerate(arguments):
             self._buffer.set_arg(i, memoryview(array.data))
         for i, array in enumerate(results):
@@ -91,7 +92,7 @@ class VmAssembly(Assembly):
     def curvature(self) -> Array | None:
         return self._curvature
 
-    def row_sides(self) -> tuple[Array, Array]:
+    def row_bounds(self) -> tuple[Array, Array]:
         return self._sides
 
     def _curvature_of(self, program: TickProgram, arguments: list[Array]) -> Callable[[Array], Array] | None:

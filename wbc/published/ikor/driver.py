@@ -18,7 +18,17 @@ from wbc.published.ikor.files import Trajectory
 from wbc.published.ikor.machines import STEERING, WHEEL_BASE, Machine
 from wbc.published.ikor.stack_steps import StackSteps
 from wbc.resolvers import PseudoInverse, RateProblem
-from wbc.resolvers.fsp import Criterion, Optimum, Row, SolutionSpace, best, blocked, joint_row, orthogonal, point_row
+from wbc.resolvers.fsp import (
+    Criterion,
+    EqualityRow,
+    Optimum,
+    SolutionSpace,
+    best,
+    blocked,
+    joint_row,
+    orthogonal,
+    point_row,
+)
 from wbc.validation import Array
 
 #: Rows of a task, in their order
@@ -298,7 +308,7 @@ class Driver:
             found = Optimum(v, np.zeros(0))
         else:
             space = self._space(J, x, held)
-            slide = [Row(f"wheels {k}", row, 0.0) for k, row in enumerate(self.machine.slide(q))]
+            slide = [EqualityRow(f"wheels {k}", row, 0.0) for k, row in enumerate(self.machine.slide(q))]
             now = [] if settings.two_step else self._broken(q, np.zeros(len(q)), ahead=False)
             found = self._best(space, q, slide, now)
             if settings.two_step:
@@ -344,7 +354,7 @@ class Driver:
     def _criterion(self) -> Criterion:
         return Criterion(None if (self._b == 1.0).all() else self._b**2)
 
-    def _best(self, space: SolutionSpace, q: Array, slide: list[Row], now: list[Row]) -> Optimum:
+    def _best(self, space: SolutionSpace, q: Array, slide: list[EqualityRow], now: list[EqualityRow]) -> Optimum:
         """In one shot; ahead, constraints that a step would break act on it, the first broken first."""
         settings = self.settings
         if self.machine.base == "car":
@@ -356,7 +366,7 @@ class Driver:
             bend = float(np.clip(wanted[-1] / speed, -most, most)) if abs(speed) > 1e-12 else 0.0
             row = np.zeros(len(q))
             row[-3:] = [-bend * ahead[0], -bend * ahead[1], 1.0]
-            slide = [*slide, Row("steering", row, 0.0)]
+            slide = [*slide, EqualityRow("steering", row, 0.0)]
         rows = [*slide, *now]
         found = best(space, self._criterion(), rows, in_order=True)
         for _ in range(space.span if settings.ahead else 0):
@@ -368,7 +378,7 @@ class Driver:
             found = best(space, self._criterion(), rows, in_order=True)
         return found
 
-    def _broken(self, q: Array, v: Array, ahead: bool) -> list[Row]:
+    def _broken(self, q: Array, v: Array, ahead: bool) -> list[EqualityRow]:
         """Constraints that q + v breaks, the worst first: back by all of it in one step."""
         settings, machine, out = self.settings, self.machine, []
         if ahead is not settings.ahead and not settings.two_step:

@@ -14,7 +14,7 @@ from wbc.controller import Stack
 from wbc.errors import InfeasibleError, RangeError
 from wbc.published.ikor.machines import Machine
 from wbc.shapes import Capsule, PlacedShape, Sphere
-from wbc.tasks.base import Constraint, Order, Row, Rows
+from wbc.tasks.base import Constraint, Row, Rows, SacrificeOrder
 from wbc.validation import Array
 
 if TYPE_CHECKING:
@@ -29,7 +29,7 @@ class _FixedAxle(Constraint):
     """-sin(turn) dx/dt + cos(turn) dy/dt = 0 of a platform with joints x, y and turn."""
 
     abstract: ClassVar[bool] = True
-    order: ClassVar[Order] = Order.HOLD
+    order: ClassVar[SacrificeOrder] = SacrificeOrder.HOLD
 
     def rows(self, robot: Any) -> tuple[Row, ...]:
         """One."""

@@ -28,7 +28,7 @@ PROXIMAL, STEPS, SETTLED = 1e-6, 12, 1e-11
 #: Corrections of the active set where the solver finds none
 POLISH_ROUNDS = 200
 #: Violations up to this are rounding
-ROOM = 1e-9
+TOLERANCE = 1e-9
 #: Rows shorter than this in the space that is left cannot be moved
 DEAD = 1e-9
 #: Multipliers above this share of what drives a level are not rounding; nor are those below NOISE
@@ -255,7 +255,7 @@ class LevelStep:
     def _holds(self, x: Array) -> bool:
         low, high = self._sides()
         at = self.rows.C @ x
-        return bool(((at >= low - ROOM) & (at <= high + ROOM)).all())
+        return bool(((at >= low - TOLERANCE) & (at <= high + TOLERANCE)).all())
 
     def _searched(self, place: int) -> tuple[Array, Array, Array, bool]:
         """(x, y_c, multipliers, solved) where rows bind."""

@@ -70,7 +70,7 @@ class FrozenLevels:
             space = complement(rows.C[push], step.F)
         return np.asarray(x)
 
-    def to_side(self, problem: Hierarchy, row: int, start: Array) -> Array:
+    def to_bound(self, problem: Hierarchy, row: int, start: Array) -> Array:
         """dx / db of the side that holds a row, zero for rows that hold nothing [n].
 
         ``start`` is how the problem's own x moves. The optimum is affine in its sides, so a difference is exact.

@@ -23,7 +23,7 @@ LEAST_ANGLE = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Hold:
-    """A place that a hand can grasp.
+    """A thing to grasp, at a pose of a structure; the constraint that a frame does not move is :class:`wbc.tasks.Hold`.
 
     A closed hand has its frame's origin at the hold's and its z axis along the hold's, up to ``max_tilt``; about that
     axis it may roll as ``roll`` says.

@@ -21,7 +21,7 @@ GOLDEN, CUTS = (5**0.5 - 1) / 2, 45
 
 @dataclass(frozen=True, eq=False)
 class Obstacle:
-    """A box or capsule that no link may touch.
+    """A box or capsule of a structure that no link may touch; the constraint is :class:`wbc.tasks.Obstacle`.
 
     Attributes:
         id: name, unique among the structure's obstacles.

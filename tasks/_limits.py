@@ -1,4 +1,4 @@
-"""What limits on both sides of a quantity share: numbers of each side, inputs that may move, and margins."""
+"""What lower and upper limits of a quantity share: their values, inputs that may move, and margins."""
 
 from __future__ import annotations
 
@@ -13,27 +13,27 @@ from wbc import validation
 from wbc.errors import BoundsError, NotFiniteError, ShapeError
 from wbc.tasks.base import Input, Row, Values
 
-#: Numbers of one side: one for all rows or one a row; None: no rows on this side.
-Side = float | tuple[float, ...] | None
+#: Values of a limit: one for all rows or one a row; None: no rows of it.
+LimitValues = float | tuple[float, ...] | None
 
-#: The infinity that means no limit, by side
+#: The infinity that means no limit, by which limit it is
 NO_LIMIT = {"lower": -math.inf, "upper": math.inf}
 
 #: Bounds beyond this are taken as infinite where a margin is faded
 BEYOND = 1e20
 
 
-def checked_sides(owner: str, lower: Any, upper: Any, count: int | None = None) -> tuple[Side, Side]:
-    """Both sides as floats or tuples; ``count``: how many numbers a side has, where that is known.
+def checked_limits(owner: str, lower: Any, upper: Any, count: int | None = None) -> tuple[LimitValues, LimitValues]:
+    """Both limits as floats or tuples; ``count``: how many numbers one has, where that is known.
 
     Raises:
-        ShapeError: no numbers, or no side at all. NotFiniteError: NaN, or the wrong infinity.
+        ShapeError: no numbers, or neither limit. NotFiniteError: NaN, or the wrong infinity.
         BoundsError: lower > upper.
     """
-    sides = [_checked(f"{owner}.{name}", name, value, count) for name, value in (("lower", lower), ("upper", upper))]
-    low, high = sides
+    limits = [_checked(f"{owner}.{name}", name, value, count) for name, value in (("lower", lower), ("upper", upper))]
+    low, high = limits
     if low is None and high is None:
-        raise ShapeError(f"{owner}.lower", None, "expected a limit on one side at least, lower or upper")
+        raise ShapeError(f"{owner}.lower", None, "expected a lower or an upper limit, or both")
     if low is not None and high is not None:
         if isinstance(low, tuple) and isinstance(high, tuple) and len(low) != len(high):
             raise ShapeError(f"{owner}.upper", upper, f"lower has {len(low)} numbers")
@@ -43,7 +43,7 @@ def checked_sides(owner: str, lower: Any, upper: Any, count: int | None = None) 
     return low, high
 
 
-def _checked(field: str, name: str, value: Any, count: int | None) -> Side:
+def _checked(field: str, name: str, value: Any, count: int | None) -> LimitValues:
     if value is None:
         return None
     numbers = validation.real_array(field, value, finite=False)
@@ -54,8 +54,8 @@ def _checked(field: str, name: str, value: Any, count: int | None) -> Side:
     return tuple(numbers.tolist()) if numbers.ndim else float(numbers)
 
 
-def side_inputs(lower: Side, upper: Side, units: Iterable[str]) -> tuple[Input, ...]:
-    """``lower``, ``lower_rate``, ``upper``, ``upper_rate``, as far as there are sides; a number a row."""
+def limit_inputs(lower: LimitValues, upper: LimitValues, units: Iterable[str]) -> tuple[Input, ...]:
+    """``lower``, ``lower_rate``, ``upper``, ``upper_rate``, of the limits there are; a number a row."""
     each = tuple(units)
     unit, count = ", ".join(dict.fromkeys(each)), len(each)
     per_second = ", ".join(f"{u or '1'}/s" for u in dict.fromkeys(each))
@@ -70,18 +70,18 @@ def side_inputs(lower: Side, upper: Side, units: Iterable[str]) -> tuple[Input, 
     return tuple(out)
 
 
-def side_rows(lower: Side, upper: Side, rows: Iterable[Row]) -> tuple[Row, ...]:
-    """``label.lower`` of every row, then ``label.upper``, as far as there are sides."""
+def limit_rows(lower: LimitValues, upper: LimitValues, rows: Iterable[Row]) -> tuple[Row, ...]:
+    """``label.lower`` of every row, then ``label.upper``, of the limits there are."""
     each = tuple(rows)
     given = [name for name, value in (("lower", lower), ("upper", upper)) if value is not None]
     return tuple(Row(f"{row.label}.{name}", row.unit) for name in given for row in each)
 
 
-def side_margins(value: ca.SX, inputs: Values, factor: ca.SX | None = None) -> ca.SX:
-    """(value - lower, upper - value), as far as there are sides.
+def limit_margins(value: ca.SX, inputs: Values, factor: ca.SX | None = None) -> ca.SX:
+    """(value - lower, upper - value), of the limits there are.
 
     With a factor f a margin h becomes f h + (1 - f) c: where f falls to 0 it is the constant c > 0, whose derivative is
-    zero, so the limit is off. c is half of upper - lower, or 1 where there is no other side.
+    zero, so the limit is off. c is half of upper - lower, or 1 where there is no other limit.
     """
     count = value.numel()
     lower, upper = (inputs.get(name) for name in ("lower", "upper"))
@@ -91,13 +91,13 @@ def side_margins(value: ca.SX, inputs: Values, factor: ca.SX | None = None) -> c
     low = -ca.SX.inf(count) if lower is None else lower
     high = ca.SX.inf(count) if upper is None else upper
     margins: list[ca.SX] = []
-    for side, sign in ((lower, 1.0), (upper, -1.0)):
-        if side is None:
+    for limit, sign in ((lower, 1.0), (upper, -1.0)):
+        if limit is None:
             continue
         for k in range(count):
-            limited, closed = ca.fabs(side[k]) < BEYOND, high[k] - low[k] < BEYOND
+            limited, closed = ca.fabs(limit[k]) < BEYOND, high[k] - low[k] < BEYOND
             # An infinite number never meets a factor of 0
-            end = ca.if_else(limited, side[k], 0.0)
+            end = ca.if_else(limited, limit[k], 0.0)
             middle = ca.if_else(closed, (high[k] - low[k]) / 2, 1.0)
             faded = factor[k] * sign * (value[k] - end) + (1 - factor[k]) * middle
             margins.append(ca.if_else(limited, faded, ca.inf))

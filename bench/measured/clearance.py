@@ -1,4 +1,4 @@
-"""``python -m bench.walk.swept``: what proven clearances cost, for a swing of a planner and for a whole log."""
+"""What proven clearances cost, for a swing of a planner and for a whole log."""
 
 from __future__ import annotations
 
@@ -8,11 +8,10 @@ from math import inf
 
 import numpy as np
 import pinocchio as pin
-from rich.console import Console
 
 import wbc
 from bench.sheet import Sheet
-from wbc.clearance import Body, Motion, Pair, Scene, Sweep, Sweeper, Tree, bodies_of, self_pairs
+from wbc.clearance import Motion, Pair, Sweep, Sweeper, SweptBody, SweptScene, Tree, bodies_of, self_pairs
 from wbc.shapes import Box, Capsule, Cylinder, HalfSpace
 from wbc.validation import Array
 
@@ -34,20 +33,26 @@ CASES = (
 )
 
 
-def scene_of(arms: int, far: float) -> Scene:
+def parts() -> dict[str, Sheet | str]:
+    """One table, a row a case."""
+    columns = ("", "arms", "pairs", "clear", "least margin, mm", "pieces", "exact distances", "processor time, ms")
+    return {"costs": Sheet("", columns, rows())}
+
+
+def scene_of(arms: int, far: float) -> SweptScene:
     """A walker of so many arms over a plane, among obstacles that begin ``far`` from its middle [m]."""
     robot, rng = wbc.robots.walker(arms=arms).robot, np.random.default_rng(arms)
     tree = Tree.of_model(robot.model)
     links = bodies_of(robot)
-    things = [Body("plane", HalfSpace(), "world", pin.SE3(np.eye(3), np.array([0.0, 0.0, -far])))]
+    things = [SweptBody("plane", HalfSpace(), "world", pin.SE3(np.eye(3), np.array([0.0, 0.0, -far])))]
     for k in range(AROUND):
         shape = (Capsule(0.03, 1.0), Box((0.3, 0.2, 0.2)), Cylinder(0.05, 0.8))[k % 3]
-        way = rng.normal(size=3)
-        place = way / np.linalg.norm(way) * (far + rng.uniform(0.5, 2.0))
+        direction = rng.normal(size=3)
+        position = direction / np.linalg.norm(direction) * (far + rng.uniform(0.5, 2.0))
         turn = pin.Quaternion(*(x := rng.normal(size=4)) / np.linalg.norm(x)).matrix()
-        things.append(Body(f"thing {k}", shape, "world", pin.SE3(turn, place)))
+        things.append(SweptBody(f"thing {k}", shape, "world", pin.SE3(turn, position)))
     pairs = [Pair(a.name, b.name, CLEARANCE) for a in links for b in things]
-    return Scene(tree, [*links, *things], [*pairs, *self_pairs(robot, CLEARANCE)])
+    return SweptScene(tree, [*links, *things], [*pairs, *self_pairs(robot, CLEARANCE)])
 
 
 def motion_of(arms: int, duration: float) -> tuple[Array, Array, Array]:
@@ -83,8 +88,8 @@ def rows() -> list[tuple[str, ...]]:
         if spare < inf:
             pairs = zip(scene.pairs, own.bound.tolist(), strict=True)
             near = [Pair(pair.first, pair.second, pair.required + least - spare) for pair, least in pairs]
-            scene = Scene(scene.tree, scene.bodies, near)
-        # Links of the arms are too near to each other in places of this motion: those that are not are looked at
+            scene = SweptScene(scene.tree, scene.bodies, near)
+        # Links of the arms are too near to each other during this motion: the other pairs are swept
         chosen, sweeper = own.pairs[own.bound > 1e-3], Sweeper(scene, native)
 
         def call(
@@ -98,16 +103,3 @@ def rows() -> list[tuple[str, ...]]:
         clear = "yes" if found.clear else "no"
         out.append((name, str(arms), str(len(chosen)), clear, least, str(pieces), str(exact), f"{1e3 * cost:.3f}"))
     return out
-
-
-def main() -> None:
-    """Measure and print."""
-    columns = ("", "arms", "pairs", "clear", "least margin, mm", "pieces", "exact distances", "processor time, ms")
-    console = Console()
-    if not console.is_terminal:
-        console = Console(width=140)
-    console.print(Sheet("Proven clearances, motion and sweep", columns, rows()).rich())
-
-
-if __name__ == "__main__":
-    main()
