@@ -127,7 +127,8 @@ class Connection:
             return "there is no valid reading of where the robot is"
         shapes = np.shape(state.q), np.shape(state.v)
         if shapes != (self._q_shape, self._v_shape) or not isinstance(state.q, np.ndarray):
-            return f"expected arrays q {list(self._q_shape)} and v {list(self._v_shape)}, not {shapes[0]} and {shapes[1]}"
+            wanted = f"q {list(self._q_shape)} and v {list(self._v_shape)}"
+            return f"expected arrays {wanted}, not {shapes[0]} and {shapes[1]}"
         if state.time < self._time:
             return f"its clock went back from {self._time:g} s"
         return "expected finite numbers"
