@@ -70,6 +70,11 @@ class Walker:
         return self.data if isinstance(self.data, WalkerData) else WalkerData.read()
 
     @property
+    def two_ended(self) -> bool:
+        """It is the two-ended arm, and no body with arms."""
+        return isinstance(self.data, TwoEndedData)
+
+    @property
     def arm_data(self) -> WalkerData:
         """Numbers of a body with PUMA arms.
 

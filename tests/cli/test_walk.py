@@ -16,16 +16,17 @@ from PIL import Image
 
 from tests.cli.test_commands import run
 from wbc import style
+from wbc.cli.walking import options
 from wbc.robots import WalkerData
 from wbc.robots.walker_data import WALKER_DIGEST
-from wbc.walking.holds.built_in import plane
+from wbc.walking.holds.built_in import BUILT_IN, plane
 from wbc.walking.log.log import WalkLog
 from wbc.walking.loop.walk import Walk
 from wbc.walking.planner.detours import ALONG
 from wbc.walking.planner.detours import route as detours
 from wbc.walking.report.folder import RunFolderError
 from wbc.walking.run.places import over_holds
-from wbc.walking.run.request import Site
+from wbc.walking.run.request import SPEED, TURN_RATE, Site
 
 SHORT = ["--from", "13,9", "--to", "13,14"]
 
@@ -41,6 +42,11 @@ SMALL = {
     "wbc.track.render.SHADOW_MAP": 300,
     "wbc.style.SETTINGS": {**style.SETTINGS, "savefig.dpi": 50},
 }
+
+
+def test_help_says_what_the_walk_has() -> None:
+    assert set(options.BUILT_IN) == set(BUILT_IN)
+    assert (options.SPEED, options.TURN_RATE) == (SPEED, TURN_RATE)
 
 
 @functools.cache

@@ -19,6 +19,8 @@ BUDGETS = {
     "--version": (*HEAVY[2:], "matplotlib", *NUMBERS, *UPPER, "wbc.robot", "wbc.tasks"),
     "robots": (*HEAVY[3:], "matplotlib", *UPPER, "wbc.coordinates", "flint"),
     "modes": (*HEAVY[3:], "matplotlib", *UPPER, "flint"),
+    "walk --help": (*HEAVY[3:], "matplotlib", *NUMBERS, *UPPER, "wbc.robot", "wbc.tasks"),
+    "plans --help": (*HEAVY[3:], "matplotlib", *NUMBERS, *UPPER, "wbc.robot", "wbc.tasks"),
 }
 
 

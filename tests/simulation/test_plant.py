@@ -95,7 +95,7 @@ class Broken(KinematicPlant):
         self.last = command.values
 
 
-@pytest.mark.parametrize("what", ["invalid", "nan", "short", "time", "none"])
+@pytest.mark.parametrize("what", ["invalid", "nan", "short", "list", "time", "back", "none"])
 def test_a_reading_that_is_none_commands_rest(what: str) -> None:
     robot = wbc.robots.load("panda")
     q, v = robot.neutral, np.zeros(robot.nv)
@@ -103,7 +103,9 @@ def test_a_reading_that_is_none_commands_rest(what: str) -> None:
         "invalid": PlantState(q, v, 0.0, valid=False),
         "nan": PlantState(q, np.full(robot.nv, np.nan), 0.0),
         "short": PlantState(q[:-1], v, 0.0),
+        "list": PlantState(q.tolist(), v, 0.0),  # type: ignore[arg-type]
         "time": PlantState(q, v, np.inf),
+        "back": PlantState(q, v, -0.01),
         "none": None,
     }[what]
     plant = Broken(robot, PlantState(q, v, 0.0))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Iterator
-from math import isfinite
+from math import inf, isfinite
 from typing import Any
 
 import numpy as np
@@ -39,8 +39,14 @@ class Connection:
 
     def __init__(self, plant: Plant | None, robot: Robot, dt: float) -> None:
         self.plant: Plant = KinematicPlant(robot) if plant is None else plant
-        self._nq, self._nv, self._dt = robot.nq, robot.nv, dt
         _check(self.plant, robot, dt)
+        self._q_shape, self._v_shape, self._dt, self._time = (robot.nq,), (robot.nv,), dt, -inf
+        # One command for all ticks, written anew in each
+        self._command = Command(CommandKind.VELOCITY, np.zeros(robot.nv))
+        self._values = self._command.values
+        # q and v as they are read, in one piece
+        self._read = np.zeros(robot.nq + robot.nv)
+        self._read_q, self._read_v = self._read[: robot.nq], self._read[robot.nq :]
 
     def __enter__(self) -> Connection:
         return self
@@ -57,6 +63,7 @@ class Connection:
             PlantError: the plant is not there, has no valid reading, or raised what is no error of this package.
         """
         with self._named():
+            self._time = -inf
             self.plant.reset(q, time)
             return self._checked(self.plant.read())
 
@@ -66,10 +73,12 @@ class Connection:
         Raises:
             PlantError: no valid reading, and the plant is commanded to rest; or it raised.
         """
+        self._values[:] = v
+        plant = self.plant
         try:
-            self.plant.apply(Command(CommandKind.VELOCITY, v))
-            self.plant.advance(self._dt)
-            return self._checked(self.plant.read())
+            plant.apply(self._command)
+            plant.advance(self._dt)
+            return self._checked(plant.read())
         except WbcError:
             raise
         except Exception as error:
@@ -81,8 +90,9 @@ class Connection:
         Raises:
             PlantError: the plant raised.
         """
+        self._values[:] = 0.0
         with self._named():
-            self.plant.apply(Command(CommandKind.VELOCITY, np.zeros(self._nv)))
+            self.plant.apply(self._command)
 
     @contextlib.contextmanager
     def _named(self) -> Iterator[None]:
@@ -97,26 +107,31 @@ class Connection:
         return PlantError("plant", type(self.plant).__name__, f"it raised {type(error).__name__}: {error}")
 
     def _checked(self, state: Any) -> PlantState:
-        reason = self._fault(state)
-        if reason:
-            self.rest()
-            raise PlantError("plant.state", state, reason)
-        # Arrays of the loop's own: a plant may write into its
-        return PlantState(np.array(state.q, dtype=np.float64), np.array(state.v, dtype=np.float64), float(state.time))
+        """Arrays of the loop's own: a plant may write into its."""
+        if isinstance(state, PlantState) and state.valid:
+            q, v, time = state.q, state.v, state.time
+            if type(q) is type(v) is np.ndarray and q.shape == self._q_shape and v.shape == self._v_shape:
+                self._read_q[:], self._read_v[:] = q, v
+                # A sum of squares is a number where all are
+                if time >= self._time and isfinite(self._read.dot(self._read)) and isfinite(time):
+                    self._time = time
+                    return PlantState(self._read_q.copy(), self._read_v.copy(), float(time))
+        self.rest()
+        raise PlantError("plant.state", state, self._fault(state))
 
     def _fault(self, state: Any) -> str:
-        """What is wrong with a reading; "": nothing."""
+        """What is wrong with a reading."""
         if not isinstance(state, PlantState):
             return "expected a PlantState"
         if not state.valid:
             return "there is no valid reading of where the robot is"
-        q, v = state.q, state.v
-        if q.shape != (self._nq,) or v.shape != (self._nv,):
-            return f"expected q [{self._nq}] and v [{self._nv}], not {q.shape} and {v.shape}"
-        # A sum of squares is a number where all are
-        if not isfinite(q.dot(q) + v.dot(v) + state.time):
-            return "expected finite numbers"
-        return ""
+        shapes = np.shape(state.q), np.shape(state.v)
+        if shapes != (self._q_shape, self._v_shape) or not isinstance(state.q, np.ndarray):
+            wanted = f"q {list(self._q_shape)} and v {list(self._v_shape)}"
+            return f"expected arrays {wanted}, not {shapes[0]} and {shapes[1]}"
+        if state.time < self._time:
+            return f"its clock went back from {self._time:g} s"
+        return "expected finite numbers"
 
 
 def _check(plant: Any, robot: Robot, dt: float) -> None:

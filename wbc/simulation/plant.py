@@ -31,7 +31,7 @@ class Command:
     values: Array
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(slots=True, eq=False)
 class PlantState:
     """What is known of a robot at one time.
 
@@ -51,8 +51,8 @@ class Plant(Protocol):
     """A robot as a control loop sees it: a simulator, or a driver of a real one.
 
     A loop calls :meth:`reset` once and then, tick by tick, :meth:`apply`, :meth:`advance` and :meth:`read`, from one
-    thread. A plant knows its robot and nothing of tasks, plans or holds. Arrays that it is given it copies if it keeps
-    them; arrays that it returns it may go on using.
+    thread. A plant knows its robot and nothing of tasks, plans or holds. Arrays that it is given, those of commands
+    too, it copies if it keeps them; arrays that it returns it may go on using.
     """
 
     @property

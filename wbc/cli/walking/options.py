@@ -7,7 +7,9 @@ from typing import Annotated
 
 import typer
 
-from wbc.walking.holds.built_in import BUILT_IN
+#: Names and defaults as :mod:`wbc.walking` has them, which help does without
+BUILT_IN = ("cylinder", "plane", "truss", "module")
+SPEED, TURN_RATE = 0.1016, 0.05
 
 _SCENE, _HOW, _OUTPUT = "What it does", "How it is done", "What it writes"
 

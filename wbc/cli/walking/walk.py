@@ -2,35 +2,12 @@
 
 from __future__ import annotations
 
-import datetime
-import json
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
-from rich.markup import escape
-from rich.table import Table
 
-from wbc import robots
-from wbc.cli.console import err, out, progress_bar
-from wbc.cli.session import INTERRUPTED, Stopper
 from wbc.cli.walking import options
-from wbc.cli.walking.modes import Perform, performance
-from wbc.cli.walking.published_walk import perform_published, published_figures, save_published
-from wbc.errors import RangeError, ShapeError
-from wbc.robots import TwoEndedData, Walker, WalkerData
-from wbc.track.summary import Figure
-from wbc.walking.planner.plan import differences, read_plan
-from wbc.walking.report.figures import figures_of, save_figures
-from wbc.walking.report.folder import make_folder, save_pictures, save_run
-from wbc.walking.run import WalkRun
-from wbc.walking.run.compiling import keep
-from wbc.walking.run.request import SPEED, TURN_RATE, PublishedRequest, Request, read_request
-
-#: Exit codes: the walk is not possible or did not arrive, and what a check of it violates
-REFUSED, VIOLATED = 3, 4
-#: Outcomes of a walk that did what it was to do
-WELL = ("arrived", "time", "key")
 
 
 def walk(
@@ -38,8 +15,8 @@ def walk(
     robot: options.RobotName = "three-armed",
     gait: options.Gait = "any",
     mode: options.Mode = "velocity",
-    speed: options.Speed = SPEED,
-    turn_rate: options.TurnRate = TURN_RATE,
+    speed: options.Speed = options.SPEED,
+    turn_rate: options.TurnRate = options.TURN_RATE,
     start: options.From = "",
     to: options.To = None,
     remove_rows: options.RemoveRows = "",
@@ -69,6 +46,12 @@ def walk(
     Ends with 3 if the walk is not possible or does not arrive. Ctrl-C ends it early; what was done until then is
     written all the same.
     """
+    from wbc import robots
+    from wbc.cli.walking.modes import performance
+    from wbc.cli.walking.run import changed_data, new_folder, walk_free, walk_published
+    from wbc.errors import RangeError
+    from wbc.walking.run.request import PublishedRequest, read_request
+
     two_ended = robot == "two-ended"
     request = read_request(
         structure,
@@ -98,17 +81,11 @@ def walk(
     if isinstance(request, PublishedRequest):
         if resume or ask or least_time:
             raise RangeError("planner", planner, "resuming, asking and the least time are of the planner 'free'")
-        _published(request, _folder(request, output, force))
+        walk_published(request, new_folder(request, output, force))
         return
     perform = performance(request, machine, resume, ask, least_time, tuple(to or ()))
-    folder = _folder(request, output, force)
-    _free(perform, machine, folder, backend, check or strict, pictures, strict)
-
-
-def _folder(request: Request, output: Path | None, force: bool) -> Path:
-    stamp = datetime.datetime.now().strftime("%Y%m%d-%H%M%S")
-    name = Path(request.site.structure).stem
-    return make_folder(output or Path("runs") / f"walk-{name}-{stamp}", force)
+    folder = new_folder(request, output, force)
+    walk_free(perform, machine, folder, backend, check or strict, pictures, strict)
 
 
 def plans(
@@ -116,6 +93,9 @@ def plans(
     other: Annotated[Path, typer.Argument(help="Another one.")],
 ) -> None:
     """Show what two plans do differently, one line each; exit code 1 if there is anything."""
+    from wbc.cli.console import out
+    from wbc.walking.planner.plan import differences, read_plan
+
     first, second = (read_plan(path) for path in (one, other))
     lines = differences(first, second)
     for line in lines:
@@ -123,84 +103,3 @@ def plans(
     if lines:
         raise typer.Exit(1)
     out().print(f"the same {len(first.regrasps)} re-grasps")
-
-
-def changed_data(changes: list[str], two_ended: bool = False) -> WalkerData | TwoEndedData:
-    """The machine's data with fields changed, from NAME=VALUE.
-
-    Raises:
-        ShapeError: no such text. UnknownNameError: no such field. What the data raise.
-    """
-    values: dict[str, Any] = {}
-    for text in changes:
-        name, sign, value = text.partition("=")
-        try:
-            read = json.loads(value)
-        except ValueError as error:
-            raise ShapeError("set", text, "expected NAME=NUMBER or NAME=[NUMBER, ...]") from error
-        if not sign:
-            raise ShapeError("set", text, "expected NAME=NUMBER or NAME=[NUMBER, ...]")
-        values[name] = tuple(read) if isinstance(read, list) else read
-    return TwoEndedData.read(**values) if two_ended else WalkerData.read(**values)
-
-
-def _free(
-    perform: Perform, machine: Walker, folder: Path, backend: str, check: bool, pictures: bool, strict: bool
-) -> None:
-    stopper, console = Stopper(), err()
-    with progress_bar() as bar:
-        stage = bar.add_task("planning", total=None)
-
-        def report_progress(what: str, part: float | None) -> None:
-            bar.update(stage, description=what, total=None if part is None else 1.0, completed=part or 0.0)
-
-        with stopper.listening():
-            keep()  # a full collection would look at all modules of the program in the middle of a tick
-            run = perform(backend, report_progress, stopper)
-            report_progress("checking and writing", None)
-            files, report = save_run(run, folder, check)
-            missing = list[str]()
-            if pictures and not stopper():
-                shown, missing = save_pictures(run, folder, report_progress, stopper)
-                files += shown
-    _report(f"{machine.robot.name} on {run.structure.name}", figures_of(run, report), folder, files)
-    for text in missing:
-        console.print(f"[yellow]note[/yellow]: {escape(text)}", soft_wrap=True)
-    _end(run, stopper())
-    if report is not None and not report.ok:
-        kinds = ", ".join(finding.kind for finding in report.violations)
-        console.print(f"[bold red]the checker finds violations[/bold red]: {kinds}; see check.txt", soft_wrap=True)
-        if strict:
-            raise typer.Exit(VIOLATED)
-
-
-def _end(run: WalkRun, interrupted: bool) -> None:
-    """The exit code of a walk that did not arrive."""
-    if interrupted:
-        raise typer.Exit(INTERRUPTED)
-    if run.outcome not in WELL:
-        err().print(f"[bold red]{run.outcome}[/bold red]: {escape(run.reason)}", soft_wrap=True)
-        raise typer.Exit(REFUSED)
-
-
-def _published(request: PublishedRequest, folder: Path) -> None:
-    run = perform_published(request)
-    figures = published_figures(run)
-    _report(
-        "published walker on cylinder", figures, folder, [*save_published(run, folder), *save_figures(figures, folder)]
-    )
-    if not run.arrived:
-        err().print(f"[bold red]stopped[/bold red]: {escape(run.reason)}", soft_wrap=True)
-        raise typer.Exit(REFUSED)
-
-
-def _report(title: str, figures: list[Figure], folder: Path, files: list[Path]) -> None:
-    console = out()
-    table = Table(title=title, title_justify="left", title_style="bold", show_header=False, box=None, pad_edge=False)
-    table.add_column(style="cyan", no_wrap=True)
-    table.add_column()
-    for figure in figures:
-        if figure.label:
-            table.add_row(figure.label, escape(figure.text))
-    console.print(table)
-    console.print(f"[bold]{escape(str(folder))}[/bold]: {', '.join(file.name for file in files)}", soft_wrap=True)

@@ -10,7 +10,6 @@ import numpy as np
 import pinocchio as pin
 
 from wbc.errors import ShapeError
-from wbc.robots import WalkerData
 from wbc.validation import Array
 from wbc.walking.loop.hand_command import UPRIGHT, HandCommand, HandLanding
 from wbc.walking.loop.hand_pace import HAND_RAMP, HAND_STOP, LANDING, at_rest, hand_pace, turned
@@ -60,7 +59,7 @@ class ArmLeader:
     one_motion = False
 
     def __init__(self, machine: Machine, progress: PlanProgress, stack: WalkStack) -> None:
-        if not isinstance(machine.walker.data, WalkerData):
+        if machine.walker.two_ended:
             raise ShapeError("plan", progress.plan, "expected a plan of a machine with WalkerData")
         self._machine, self._progress, self._stack, self._dt = machine, progress, stack, machine.dt
         self._hand, self._landing = HandCommand(machine.dt), HandLanding(machine.dt)

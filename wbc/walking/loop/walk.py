@@ -166,7 +166,7 @@ class Walk:
         ended = self.path_time >= self.plan.path.duration - 1e-9 and self.swinging is None and not self._changing
         if not ended or self.progress.step is not None:
             return False
-        return dist(self.q[:3], self.plan.path.poses[-1][:3, 3]) < ARRIVED
+        return dist(self.q[:3].tolist(), self.plan.path.poses[-1][:3, 3].tolist()) < ARRIVED
 
     def run(self, on_tick: Callable[[Tick], Any] | None = None) -> str:
         """Ticks until the walk is done or given up.
@@ -213,7 +213,7 @@ class Walk:
         if hands.swinging is not None:
             self._land(hands.swinging)
         pose = self.body.pose
-        error = dist(machine.q[:3], pose[:3])
+        error = dist(machine.q[:3].tolist(), pose[:3].tolist())
         state = hands.states(), hands.holds(), pose, error, slip, step.status, cost, fixed
         return Tick(machine.time, self.path_time, machine.q, machine.v, machine.rates, *state)
 

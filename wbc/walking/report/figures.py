@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from wbc.robots import Walker, WalkerData
+from wbc.robots import Walker
 from wbc.track.summary import Figure, save_summary
 from wbc.validation import Array
 from wbc.walking.checker import Report
@@ -160,7 +160,7 @@ def _machine(run: WalkRun, log: WalkLog) -> list[Figure]:
     part = np.abs(log.v) / limits.velocity[6:]
     k = int(part.max(axis=0).argmax())
     out = [Figure("rate", "largest joint rate", float(part.max()), f"{part.max():.6f} of its limit, {log.joints[k]}")]
-    if isinstance(run.walker.data, WalkerData):
+    if not run.walker.two_ended:
         least = float(np.nanmin(np.abs(wrist_angles(run, log))))
         out.append(Figure("theta5", "smallest |theta5| held", least, f"{np.degrees(least):.2f} deg"))
     return out

@@ -6,7 +6,7 @@ import pathlib
 from collections.abc import Callable
 
 from wbc.errors import WbcError
-from wbc.robots import TwoEndedData, Walker, WalkerData
+from wbc.robots import Walker
 from wbc.walking.checker import Report, Rules, check_run
 from wbc.walking.holds.files import save_structure
 from wbc.walking.report.animation import save_animation
@@ -74,7 +74,7 @@ def save_run(run: WalkRun, folder: pathlib.Path, check: bool = True) -> tuple[li
 
 def rules_of(walker: Walker) -> Rules:
     """What the checker goes by: tips of the two-ended arm are thicker than hands."""
-    if isinstance(walker.data, TwoEndedData):
+    if walker.two_ended:
         return Rules(exempt_distance=touching_distance(walker))
     return Rules()
 
@@ -89,7 +89,7 @@ def save_pictures(
     """
     told, asked = progress or (lambda what, part: None), stop or (lambda: False)
     files, missing = list[pathlib.Path](), list[str]()
-    if isinstance(run.walker.data, WalkerData):
+    if not run.walker.two_ended:
         told("reach map", None)
         files.append(save_reach_map(run, folder))
     log, ticks = run.log, run.ticks

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
-from wbc.robots import Walker, WalkerData
+from wbc.robots import Walker
 from wbc.shapes import Capsule, Solid
 from wbc.validation import Array
 from wbc.walking.report.surroundings import BODY, Colour, arm_colour, mixed
@@ -37,12 +37,14 @@ class Part:
 
 def joining_pieces(walker: Walker, colours: Mapping[str, Colour]) -> list[Part]:
     """What joins necks and upper arms, or the joints of the two-ended arm; ``colours``: of the links with shapes."""
-    if isinstance(walker.data, WalkerData):
-        neck, across = walker.data.neck_length, walker.data.shoulder_offset
+    if not walker.two_ended:
+        data = walker.arm_data
+        neck, across = data.neck_length, data.shoulder_offset
         place = pin.SE3(pin.utils.rotate("x", -np.pi / 2), np.array([0.0, -across / 2, neck]))
-        piece = Capsule(walker.data.upper_arm_radius, across)
+        piece = Capsule(data.upper_arm_radius, across)
         return [Part(arm.links[0], piece, place, colours[arm.links[0]]) for arm in walker.arms]
-    radius = THIN * min(walker.data.boom_radius, walker.data.wrist_radius)
+    arm = walker.two_ended_data
+    radius = THIN * min(arm.boom_radius, arm.wrist_radius)
     out = []
     for link, start, end in _gaps(walker):
         away = end - start

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wbc import style
-from wbc.robots import TwoEndedData
 from wbc.walking.log.log import CLOSED, OPENING, WalkLog
 from wbc.walking.report.figures import body_speed, wrist_angles
 from wbc.walking.report.surroundings import arm_colour
@@ -37,7 +36,7 @@ def save_plots(run: WalkRun, log: WalkLog, ticks: TickColumns, folder: pathlib.P
         "speed": _speed,
         "tick_time": _tick_time,
     }
-    if isinstance(run.walker.data, TwoEndedData):
+    if run.walker.two_ended:
         del draws["margins"], draws["wrists"]
     files = []
     with style.pyplot() as plt:

@@ -6,7 +6,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wbc.robots import TwoEndedData, Walker
+from wbc.robots import Walker
 from wbc.shapes import PlacedShape
 from wbc.style import BLUE, ORANGE, PURPLE, TEAL
 from wbc.track import render
@@ -33,7 +33,7 @@ EDGE, UNDER, PATCH = 0.18, 0.004, 0.12
 
 def scale(walker: Walker) -> float:
     """How many times larger than those of bodies with arms the pictures of a machine are."""
-    return TWO_ENDED if isinstance(walker.data, TwoEndedData) else 1.0
+    return TWO_ENDED if walker.two_ended else 1.0
 
 
 def arm_colour(arm: int) -> str:

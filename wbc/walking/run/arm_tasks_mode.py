@@ -25,7 +25,7 @@ from wbc.walking.modes.hand_motion import ArmRefused
 from wbc.walking.planner.plan import HoldLost, Plan
 from wbc.walking.run.arm_task import ArmTask
 from wbc.walking.run.carrying_out import CarryingOut, Outcome, Progress, farthest, travelled
-from wbc.walking.run.mode import Ending, Mode, Result, arms_of
+from wbc.walking.run.mode import Ending, Mode, Result
 from wbc.walking.run.recording import TickColumns, WalkRecorder, as_walked
 from wbc.walking.run.request import ArmRequest
 
@@ -59,7 +59,7 @@ class ArmTasksMode(Mode[ArmRequest]):
 
     def __init__(self, request: ArmRequest, walker: Walker) -> None:
         super().__init__(walker)
-        data = arms_of(walker)
+        data = walker.arm_data
         self.request, self.structure = request, request.site.build()
         for task in request.tasks:
             if task.kind == "hold":

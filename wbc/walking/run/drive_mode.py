@@ -18,7 +18,7 @@ from wbc.walking.modes.commands import Commands, read_commands
 from wbc.walking.modes.drive import Drive, standing_plan
 from wbc.walking.planner.plan import Plan
 from wbc.walking.run.carrying_out import CarryingOut, Progress
-from wbc.walking.run.mode import Ending, Mode, Result, arms_of
+from wbc.walking.run.mode import Ending, Mode, Result
 from wbc.walking.run.recording import TickColumns, WalkRecorder, as_walked
 from wbc.walking.run.request import DriveRequest
 
@@ -40,7 +40,7 @@ class DriveMode(Mode[DriveRequest]):
 
     def __init__(self, request: DriveRequest, walker: Walker, commands: Commands | None = None) -> None:
         super().__init__(walker)
-        data = arms_of(walker)
+        data = walker.arm_data
         self.request, self.structure = request, request.site.build()
         self._pose = request.beginning(data)
         self.path = standing_path(self._pose)

@@ -7,8 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Generic, NamedTuple, TypeVar
 
-from wbc.errors import ShapeError
-from wbc.robots import Walker, WalkerData
+from wbc.robots import Walker
 from wbc.simulation import Plant
 from wbc.track.summary import Figure
 from wbc.walking.body_path import BodyPath
@@ -93,14 +92,3 @@ class Mode(ABC, Generic[Asked]):
     def result(self, walk: Walk, log: WalkLog, ticks: TickColumns) -> Result:
         """What is left of a walk that was carried out."""
         return Result(None, log, ticks, self.figures(log))
-
-
-def arms_of(walker: Walker) -> WalkerData:
-    """The data of a body with arms.
-
-    Raises:
-        ShapeError: another machine.
-    """
-    if not isinstance(walker.data, WalkerData):
-        raise ShapeError("walker", walker.robot.name, "expected a body with arms")
-    return walker.data

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 from wbc.errors import ShapeError, WbcError
-from wbc.robots import TwoEndedData, Walker
+from wbc.robots import Walker
 from wbc.simulation import Plant
 from wbc.track.summary import Figure
 from wbc.walking.body_path import standing_path
@@ -21,7 +21,7 @@ from wbc.walking.planner.follow import follow_plan
 from wbc.walking.planner.plan import Plan, Regrasp, read_plan
 from wbc.walking.planner.planner import plan_walk
 from wbc.walking.run.carrying_out import CarryingOut, Progress
-from wbc.walking.run.mode import Asked, Ending, Mode, arms_of
+from wbc.walking.run.mode import Asked, Ending, Mode
 from wbc.walking.run.recording import WalkRecorder
 from wbc.walking.run.request import PathRequest, TwoEndedRequest
 from wbc.walking.two_ended import TwoEndedPlan, TwoEndedStack, TwoEndedWalk, plan_two_ended
@@ -76,7 +76,7 @@ class PathMode(PlannedMode[PathRequest]):
 
     def __init__(self, request: PathRequest, walker: Walker, ask: Ask | None = None) -> None:
         super().__init__(walker, ask)
-        data = arms_of(walker)
+        data = walker.arm_data
         self.request, self.structure = request, request.site.build()
         self._given = read_plan(request.plan) if request.plan else None
         for step in () if self._given is None else self._given.regrasps:
@@ -113,8 +113,7 @@ class TwoEndedMode(PlannedMode[TwoEndedRequest]):
 
     def __init__(self, request: TwoEndedRequest, walker: Walker) -> None:
         super().__init__(walker)
-        if not isinstance(walker.data, TwoEndedData):
-            raise ShapeError("walker", walker.robot.name, "expected the two-ended arm")
+        _ = walker.two_ended_data
         self.request, self.structure = request, request.site.build()
         first = [self.structure.index(name) for name in request.start]
         if isinstance(request.goal, str):

@@ -14,7 +14,7 @@ import pinocchio as pin
 
 from wbc import validation
 from wbc.errors import RangeError, ShapeError
-from wbc.robots import Walker, WalkerData
+from wbc.robots import Walker
 from wbc.simulation import Plant
 from wbc.track.summary import Figure
 from wbc.validation import Array
@@ -142,7 +142,7 @@ class ResumeMode(Mode[PathRequest]):
         self._old = WalkLog.load(self._folder)
         old, at = self._old, resume.at
         self.request = request = _goal(request_of(old.meta.get("request")), resume.points)
-        if not isinstance(walker.data, WalkerData) or walker.data.digest != old.meta["robot_digest"]:
+        if walker.two_ended or walker.data.digest != old.meta["robot_digest"]:
             raise RangeError("resume", old.meta["robot_digest"], "the run has another robot; use the same --set")
         row = len(old) - 1 if at is None else int(np.searchsorted(old.t, at + 1e-9, side="right")) - 1
         if row < 1 or (at is not None and at > old.t[-1] + 1e-9):
@@ -153,7 +153,7 @@ class ResumeMode(Mode[PathRequest]):
         self._there = self.structure.without(gone)
         self._state = resumed_state(old, row, walker, self._there)
         asked = resume.points or "way" not in old.meta
-        whole = request.path(walker.data) if asked else path_of(old.meta["way"])
+        whole = request.path(walker.arm_data) if asked else path_of(old.meta["way"])
         self.path = _rest(pin.XYZQUATToSE3(old.pose_body_in_structure[row]), whole, request)
 
     def plan(self) -> Plan:
