@@ -91,7 +91,7 @@ def numbers(item: Item, robot: Robot) -> Numbers:
 
 @lru_cache(maxsize=16)
 def _kinematics(robot: Robot) -> Kinematics:
-    """Expressions that the items of one robot share: half of what an item's take to build."""
+    """Expressions that the items of one robot share."""
     return Kinematics(robot.model)
 
 
