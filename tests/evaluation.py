@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import casadi as ca
@@ -65,7 +65,7 @@ class Numbers:
 def numbers(item: Item, robot: Robot) -> Numbers:
     """Validate an item and make its expressions a function, interpreted."""
     item.validate(robot)
-    kinematics, dt = Kinematics(robot.model), ca.SX.sym("dt")
+    kinematics, dt = _kinematics(robot), ca.SX.sym("dt")
     tracer = Tracer(kinematics)
     symbols = run_time.symbols(robot, item.inputs(robot))
     outputs: dict[str, ca.SX] = {}
@@ -85,8 +85,14 @@ def numbers(item: Item, robot: Robot) -> Numbers:
     for name, output in outputs.items():
         assert output.shape[0] == len(item.rows(robot)), name
     arguments = [kinematics.q, kinematics.v, symbols.vector, dt]
-    dense = ca.cse([ca.densify(o) for o in outputs.values()])
+    dense = [ca.densify(o) for o in outputs.values()]
     return Numbers(robot, item, ca.Function("item", arguments, dense, ["q", "v", "p", "dt"], list(outputs)))
+
+
+@lru_cache(maxsize=16)
+def _kinematics(robot: Robot) -> Kinematics:
+    """Expressions that the items of one robot share."""
+    return Kinematics(robot.model)
 
 
 @dataclass(frozen=True, eq=False)
