@@ -14,9 +14,9 @@ from wbc.errors import InfeasibleError, NotFiniteError, RangeError, ShapeError, 
 from wbc.resolvers import FullSpace, PseudoInverse, RateProblem
 from wbc.resolvers.fsp import (
     Criterion,
-    Row,
+    RateRow,
     SolutionSpace,
-    Status,
+    SpaceStatus,
     best,
     blocked,
     joint_row,
@@ -162,7 +162,7 @@ def test_the_closed_form_is_the_optimum(seed: int, weighting: str, aimed: bool) 
     S, b, G = np.vstack((J, A)), np.concatenate((x, d)), np.linalg.inv(H)
     wanted = r + G @ S.T @ np.linalg.solve(S @ G @ S.T, b - S @ r)
     bound = 1e-11 * max(1.0, np.abs(wanted).max()) * np.linalg.cond(S) ** 2
-    rows = [Row(f"row {k}", a, value) for k, (a, value) in enumerate(zip(A, d, strict=True))]
+    rows = [RateRow(f"row {k}", a, value) for k, (a, value) in enumerate(zip(A, d, strict=True))]
     for make in (orthogonal, blocked):
         found = best(make(J, x), criterion, rows)
         np.testing.assert_allclose(found.v, wanted, rtol=0, atol=bound)
@@ -240,11 +240,11 @@ def test_dependent_rows_leave_and_inconsistent_ones_are_refused_or_projected() -
     x = J @ rng.normal(size=7)
     for make in (orthogonal, blocked):
         space = make(J, x)
-        assert (space.status, space.rank, space.span) == (Status.REDUCED, 3, 5)
+        assert (space.status, space.rank, space.span) == (SpaceStatus.REDUCED, 3, 5)
         with pytest.raises(InfeasibleError, match="contradict each other: row"):
             make(J, x + [0, 0, 0, 0.1])
         near = make(J, x + [0, 0, 0, 0.1], project=True)
-        assert near.status is Status.INCONSISTENT
+        assert near.status is SpaceStatus.INCONSISTENT
         assert near.missed > 0.01
         np.testing.assert_allclose(J @ near.vectors[0], near.x, atol=1e-12)
         norms = np.linalg.norm(J, axis=1)
@@ -282,7 +282,7 @@ def test_a_row_of_rounding_is_no_row(make: Any) -> None:
     J[2] = 1e-17 * rng.normal(size=7)
     x = J @ rng.normal(size=7)
     space = make(J, x)
-    assert (space.rows, space.span, space.status) == ((0, 1, 3), 5, Status.REDUCED)
+    assert (space.rows, space.span, space.status) == ((0, 1, 3), 5, SpaceStatus.REDUCED)
     assert np.abs(space.vectors).max() < 1e3
     with pytest.raises(InfeasibleError, match="row 2"):
         make(J, x + [0, 0, 0.01, 0])
@@ -315,11 +315,11 @@ def test_constraints_that_contradict_are_named_and_given_up_in_order() -> None:
     rng = np.random.default_rng(9)
     J, x = rng.normal(size=(3, 7)), rng.normal(size=3)
     rows = [joint_row(f"limit {k}", k, 7, 0.1) for k in range(4)]
-    summed = Row("sum", rows[0].a + rows[2].a, 0.3)
+    summed = RateRow("sum", rows[0].a + rows[2].a, 0.3)
     space = orthogonal(J, x)
     with pytest.raises(InfeasibleError, match="limit 0 and limit 2 and sum contradict each other"):
         best(space, rows=[*rows[:3], summed])
-    found = best(space, rows=[*rows[:3], summed, Row("again", 2.0 * rows[1].a, 0.2)], in_order=True)
+    found = best(space, rows=[*rows[:3], summed, RateRow("again", 2.0 * rows[1].a, 0.2)], in_order=True)
     assert (found.kept, found.left_out, found.redundant) == (("limit 0", "limit 1", "limit 2"), ("sum",), ("again",))
     np.testing.assert_allclose(found.v[:3], 0.1, atol=1e-12)
     # One more than there are degrees of redundancy
@@ -328,8 +328,8 @@ def test_constraints_that_contradict_are_named_and_given_up_in_order() -> None:
     with pytest.raises(InfeasibleError, match="limit 4"):
         best(space, rows=five)
     with pytest.raises(InfeasibleError, match="row of the task contradicts the task"):
-        best(space, rows=[Row("row of the task", J[0], x[0] + 1.0)])
-    assert best(space, rows=[Row("row of the task", J[0], x[0])]).redundant == ("row of the task",)
+        best(space, rows=[RateRow("row of the task", J[0], x[0] + 1.0)])
+    assert best(space, rows=[RateRow("row of the task", J[0], x[0])]).redundant == ("row of the task",)
 
 
 def test_an_inequality_asks_for_less() -> None:
@@ -347,7 +347,7 @@ def test_an_inequality_asks_for_less() -> None:
 def test_whatever_the_constraints_the_answer_is_finite_or_refused(kind: str, seed: int, count: int) -> None:
     J, x = system(kind, seed)
     rng = np.random.default_rng(seed)
-    rows = [Row(f"row {k}", rng.integers(-1, 2, J.shape[1]), rng.normal()) for k in range(count)]
+    rows = [RateRow(f"row {k}", rng.integers(-1, 2, J.shape[1]), rng.normal()) for k in range(count)]
     space = blocked(J, x, project=True)
     found = best(space, rows=rows, in_order=True)
     assert np.isfinite(found.v).all()
@@ -371,7 +371,7 @@ def test_whatever_the_constraints_the_answer_is_finite_or_refused(kind: str, see
         (lambda: blocked(np.random.default_rng(0).normal(size=(5, 3)), np.ones(5)), InfeasibleError),
         (lambda: blocked(np.ones((1, 3)), [1.0], search="quick"), UnknownNameError),
         (lambda: best(orthogonal(np.ones((1, 3)), [1.0]), Criterion(np.ones(2))), ShapeError),
-        (lambda: best(orthogonal(np.ones((1, 3)), [1.0]), rows=[Row("r", np.ones(2), 1.0)]), ShapeError),
+        (lambda: best(orthogonal(np.ones((1, 3)), [1.0]), rows=[RateRow("r", np.ones(2), 1.0)]), ShapeError),
         (lambda: orthogonal(np.ones((1, 3)), [1.0]).at([1.0]), ShapeError),
         (lambda: parametric(orthogonal(np.ones((1, 3)), [0.0])), RangeError),
         (lambda: Criterion(-np.ones(3)), RangeError),
@@ -382,7 +382,7 @@ def test_whatever_the_constraints_the_answer_is_finite_or_refused(kind: str, see
         (lambda: point_row("p", np.zeros((3, 4)), [0, 0, 2], 0.1), RangeError),
         (lambda: point_row("p", np.zeros(4), [0, 0, 1], 0.1), ShapeError),
         (lambda: joint_row("j", 4, 4, 0.1), RangeError),
-        (lambda: Row("r", np.eye(2), 0.1), ShapeError),
+        (lambda: RateRow("r", np.eye(2), 0.1), ShapeError),
         (lambda: FullSpace(generator="svd"), UnknownNameError),
         (lambda: FullSpace(np.eye(3)), ShapeError),
     ],

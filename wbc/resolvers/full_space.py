@@ -8,7 +8,7 @@ import numpy as np
 
 from wbc import validation
 from wbc.resolvers.fsp.blocking import blocked
-from wbc.resolvers.fsp.closed_form import Row, best, one_shot
+from wbc.resolvers.fsp.closed_form import RateRow, best, one_shot
 from wbc.resolvers.fsp.criteria import Criterion
 from wbc.resolvers.fsp.space import orthogonal
 from wbc.resolvers.problem import RateProblem, checked
@@ -52,5 +52,5 @@ class FullSpace:
             found = one_shot(problem.task, problem.wanted, second, rates, self.criterion)
             if found is not None:
                 return found
-        rows = [Row(f"second row {k}", a, value) for k, (a, value) in enumerate(zip(second, rates, strict=True))]
+        rows = [RateRow(f"second row {k}", a, value) for k, (a, value) in enumerate(zip(second, rates, strict=True))]
         return np.asarray(best(make(problem.task, problem.wanted, free=True), self.criterion, rows).v)

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from wbc.resolvers.fsp.blocking import blocked, pattern_counts
-from wbc.resolvers.fsp.closed_form import Optimum, Row, best, joint_row, lost_rows, one_shot, parametric, point_row
+from wbc.resolvers.fsp.closed_form import Optimum, RateRow, best, joint_row, lost_rows, one_shot, parametric, point_row
 from wbc.resolvers.fsp.criteria import Criterion, least_acceleration, least_power, least_torque
-from wbc.resolvers.fsp.space import SolutionSpace, Status, orthogonal
+from wbc.resolvers.fsp.space import SolutionSpace, SpaceStatus, orthogonal
 
 __all__ = [
     "Criterion",
     "Optimum",
-    "Row",
+    "RateRow",
     "SolutionSpace",
-    "Status",
+    "SpaceStatus",
     "best",
     "blocked",
     "joint_row",

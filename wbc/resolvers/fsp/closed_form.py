@@ -19,7 +19,7 @@ PLAIN = Criterion()
 
 
 @dataclass(frozen=True, eq=False)
-class Row:
+class RateRow:
     """A constraint a' v = value, such as a joint that returns into its range or a point that leaves an obstacle.
 
     Attributes:
@@ -40,14 +40,14 @@ class Row:
         object.__setattr__(self, "value", validation.scalar(f"{self.name}.value", self.value))
 
 
-def joint_row(name: str, joint: int, joints: int, step: float) -> Row:
+def joint_row(name: str, joint: int, joints: int, step: float) -> RateRow:
     """v_l = step: eq. 13 of the report."""
     a = np.zeros(joints)
     a[validation.integer("joint", joint, high=joints - 1)] = 1.0
-    return Row(name, a, step)
+    return RateRow(name, a, step)
 
 
-def point_row(name: str, J: Any, normal: Any, step: float) -> Row:
+def point_row(name: str, J: Any, normal: Any, step: float) -> RateRow:
     """n' J v = step for a point of a link: eq. 12 of the report.
 
     Args:
@@ -62,15 +62,15 @@ def point_row(name: str, J: Any, normal: Any, step: float) -> Row:
     J = validation.ordinary_array("J", J)
     if J.ndim != 2 or len(J) != 3:
         raise ShapeError("J", J.shape, "expected three rows")
-    return Row(name, n @ J, step)
+    return RateRow(name, n @ J, step)
 
 
-def lost_rows(J: Any, x: Any, rows: Sequence[int]) -> tuple[Row, ...]:
+def lost_rows(J: Any, x: Any, rows: Sequence[int]) -> tuple[RateRow, ...]:
     """Rows of a task that a generator is to leave out, as constraints: where J is nearly singular the blocks are
     inverted without them, and they come back here (Rank_lost_betas of the report).
     """
     J, x = np.asarray(J, dtype=np.float64), np.asarray(x, dtype=np.float64)
-    return tuple(Row(f"task row {k}", J[k], float(x[k])) for k in rows)
+    return tuple(RateRow(f"task row {k}", J[k], float(x[k])) for k in rows)
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +91,7 @@ class Optimum:
 
 
 def best(
-    space: SolutionSpace, criterion: Criterion = PLAIN, rows: Sequence[Row] = (), *, in_order: bool = False
+    space: SolutionSpace, criterion: Criterion = PLAIN, rows: Sequence[RateRow] = (), *, in_order: bool = False
 ) -> Optimum:
     """The v of the space with the least (v - r)' H (v - r) and a_k' v = value_k, by the null-space form:
 
@@ -188,7 +188,7 @@ def _least(C: Array, off: Array, sizes: Array) -> Array | None:
 
 
 def _independent(
-    E: Array, g: Array, rows: Sequence[Row], in_order: bool
+    E: Array, g: Array, rows: Sequence[RateRow], in_order: bool
 ) -> tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]:
     """Names of rows that decide, that follow from earlier ones, and that contradict them.
 
@@ -226,7 +226,7 @@ def _independent(
 
 
 def parametric(
-    space: SolutionSpace, rows: Sequence[Row] = (), *, weight: Array | None = None, null: bool = False
+    space: SolutionSpace, rows: Sequence[RateRow] = (), *, weight: Array | None = None, null: bool = False
 ) -> Array:
     """t of the least v' H v by the report's closed form (eqs. 9 to 11):
 

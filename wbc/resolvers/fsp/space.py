@@ -25,7 +25,7 @@ IDLE = 1e-15
 CONSISTENT = 1e-9
 
 
-class Status(enum.StrEnum):
+class SpaceStatus(enum.StrEnum):
     """What a generator met."""
 
     FULL = "full rank"
@@ -44,7 +44,7 @@ class SolutionSpace:
         vectors: g_i, one a row [K, M].
         rows: indices of independent rows of J that state the whole task.
         idle: joints that no vector moves: columns of zeros, and those that were held.
-        status: see :class:`Status`. missed: max |J g - x| of what was asked for.
+        status: see :class:`SpaceStatus`. missed: max |J g - x| of what was asked for.
         blocks: for each vector of the published generator the joints that were blocked, beside the idle ones.
         completed: how many vectors, the last ones, are no blocked solutions: where the rates need not all columns,
             blocking finds fewer than M - N + 1 vectors, and the others are one of them and a self-motion.
@@ -57,7 +57,7 @@ class SolutionSpace:
     vectors: Array
     rows: tuple[int, ...]
     idle: tuple[int, ...] = ()
-    status: Status = Status.FULL
+    status: SpaceStatus = SpaceStatus.FULL
     missed: float = 0.0
     blocks: tuple[tuple[int, ...], ...] = ()
     completed: int = 0
@@ -148,27 +148,27 @@ def _orthogonal(J: Array, x: Array, held: tuple[int, ...], free: bool, project: 
     vectors[:, active] = Q[:, :rank] @ along
     vectors[1:, active] += Q[:, rank:].T
     status, missed, reached = consistency(J, x, vectors[0], rank, project)
-    if status is Status.INCONSISTENT:
+    if status is SpaceStatus.INCONSISTENT:
         again = _orthogonal(J, reached, held, free, False)
         return SolutionSpace(J, reached, again.vectors, again.rows, idle, status, missed)
     return SolutionSpace(J, x, vectors, tuple(sorted(chosen.tolist())), idle, status, missed)
 
 
-def consistency(J: Array, x: Array, v: Array, rank: int, project: bool) -> tuple[Status, float, Array]:
+def consistency(J: Array, x: Array, v: Array, rank: int, project: bool) -> tuple[SpaceStatus, float, Array]:
     """(status, what is missed, rates that can be had) of a task with a candidate solution.
 
     Raises:
         InfeasibleError: it is inconsistent and nothing shall be projected.
     """
     if rank == len(J):
-        return Status.FULL, 0.0, x
+        return SpaceStatus.FULL, 0.0, x
     off = np.abs(J @ v - x)
     # Each row against its own size, for rows in mm and in rad stand side by side; what moves most counts for all
     scales = row_scales(J)
     norms = 1.0 / np.where(scales > 0.0, scales, 1.0)
     sizes = norms * float(((np.abs(J) @ np.abs(v) + np.abs(x)) / norms).max())
     if (off <= CONSISTENT * sizes).all():
-        return Status.REDUCED, float(off.max(initial=0.0)), x
+        return SpaceStatus.REDUCED, float(off.max(initial=0.0)), x
     if not project:
         worst = int(np.argmax(off / sizes))
         reason = f"the rates contradict each other: row {worst} depends on others and would miss {off[worst]:.3g}"
@@ -176,7 +176,7 @@ def consistency(J: Array, x: Array, v: Array, rank: int, project: bool) -> tuple
     u, sigma, _ = np.linalg.svd(J / norms[:, None])
     basis = u[:, : int((sigma > RANK * sigma[0]).sum())]
     reached = norms * (basis @ (basis.T @ (x / norms)))
-    return Status.INCONSISTENT, float(np.abs(reached - x).max()), reached
+    return SpaceStatus.INCONSISTENT, float(np.abs(reached - x).max()), reached
 
 
 def checked_system(J: Any, x: Any) -> tuple[Array, Array]:
