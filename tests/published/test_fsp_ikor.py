@@ -38,7 +38,7 @@ from wbc.published.ikor import (
     without_platform,
 )
 from wbc.published.ikor import files as ikor_files
-from wbc.published.ikor.cases import BETWEEN, route, unmatched
+from wbc.published.ikor.cases import BETWEEN, unmatched
 from wbc.published.ikor.driver import euler_angles, intrusions, rotation_of
 from wbc.published.ikor.legacy import legacy_hermies
 from wbc.published.ikor.settings import AXES
@@ -157,7 +157,7 @@ def test_4_fsp_is_the_pseudo_inverse(config: str) -> None:
         ("2", "6x10", 232, 3e-5, {"misread": 1, "up and down": 2}),
         ("3", "3x7", 118, 1.2e-4, {}),
         ("3", "3x10", 61, 1e-4, {}),
-        ("3", "6x7", 241, 7e-5, {"misread": 1, "up and down": 36}),
+        ("3", "6x7", 241, 7e-5, {"misread": 1, "up and down": 29, "unexplained": 7}),
         ("3", "6x10", 235, 4e-5, {"misread": 3, "up and down": 7, "unexplained": 4}),
     ],
 )
@@ -262,7 +262,8 @@ def test_12_rank_loss_does_not_stop_the_driver() -> None:
 def through_a_singularity() -> tuple[Any, Trajectory]:
     """Trajectory 3 with its turn: near a singularity at step 89, a printed norm of 27 deg^2."""
     machine = hermies()
-    return machine, route(machine, "3")
+    step, turn = (0.00251716, 0.00050234, -0.00371982), (-0.01130479, 0.00264447, 0.01750863)
+    return machine, straight(machine, step, 241, turn=turn)
 
 
 @pytest.mark.parametrize("resolver", ["fsp", "pseudo_inverse", "stack"])
@@ -386,7 +387,7 @@ HERMIES_DAT = """5
 {rows}
 Y
 2 1 0.1
-0.3 0.6 0
+0.3 0.61 0
 Jacob_HERMIES.c
 """
 ROWS = [f"360 -360 N 1.0 {home}" for home in (0, 180, 0, 0, 0, 90, 0)]
