@@ -96,6 +96,8 @@ _ALL = (
     Figure("clearance", ("wbc/clearance",), 1.0),
     Figure("demo", (*TICK, "wbc/track", "wbc/cli/demo.py"), 0.5),
     Figure("examples", (*TICK, "wbc/proximity", "examples"), 1.0),
+    Figure("fsp", ("wbc/resolvers", "wbc/explore", "wbc/published/ikor"), 4.0),
+    Figure("fsp_norms", ("wbc/resolvers/fsp", "wbc/published/ikor"), 0.5),
     Figure("levels", TICK, 0.5),
     Figure("pairs", (*TICK, "wbc/coordinates"), 0.5),
     Figure("policy", (*TICK, "wbc/record", "wbc/explain"), 0.5),

@@ -13,13 +13,13 @@ from wbc.errors import WbcError
 #: The repository, if the package is installed from one
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 
-#: First argument -> the module that measures something else than the tick
+#: First argument -> the module, and its arguments, that measures something else than the tick
 OTHERS = {
     "time-laws": "bench.time_laws",
     "ik": "bench.ik",
     "walk": "bench.walk",
     "resolvers": "bench.resolvers",
-    "fsp": "bench.fsp",
+    "fsp": "bench.figures --only fsp fsp_norms",
 }
 
 
@@ -40,7 +40,7 @@ def bench(context: typer.Context) -> None:
 
     wbc bench resolvers drives the Space Station arm by classical rate resolution and by pairs
 
-    wbc bench fsp measures solution spaces, printed norms, and paths resolved as a whole: wbc bench fsp --quick
+    wbc bench fsp measures solution spaces, printed norms, and paths resolved as a whole
     """
     if not (ROOT / "bench" / "__main__.py").is_file():
         reason = "the benchmark is not installed with the package; run it from a clone of the repository"
@@ -49,4 +49,4 @@ def bench(context: typer.Context) -> None:
     module = OTHERS[given.pop(0)] if given and given[0] in OTHERS else "bench"
     # In place of this process: whoever interrupts or kills it means the benchmark, which ends with what it has
     os.chdir(ROOT)
-    os.execv(sys.executable, [sys.executable, "-m", module, *given])
+    os.execv(sys.executable, [sys.executable, "-m", *module.split(), *given])

@@ -86,7 +86,8 @@ def explore(
         console().print(f"farthest from limits: {margin:.3f} of half a range at " + ",".join(f"{x:.4f}" for x in best))
         figures["pieces"] = [{"count": len(p.q), "closed": p.closed, "ends": p.ends, "free": p.free} for p in pieces]
         figures["best"] = {"q": best.tolist(), "share": margin}
-        np.savez_compressed(out / "self_motion.npz", **{f"piece{k}": p.q for k, p in enumerate(pieces, 1)})  # type: ignore[arg-type]
+        curves: dict[str, Any] = {f"piece{k}": p.q for k, p in enumerate(pieces, 1)}
+        np.savez_compressed(out / "self_motion.npz", **curves)
         save_pieces(machine, pieces, out / "self_motion.png", best)
     if to is not None:
         end = _numbers("to", to)

@@ -109,10 +109,11 @@ def ikor(
         _published(case, config, not consistent, method, out, force)
         return
     from wbc.published.ikor import driver, files
+    from wbc.published.ikor.settings import AXES
 
     numbers = None if line is None else _numbers(line)
     oriented = angles is not None or (numbers is not None and len(numbers) == 6)
-    axes = tuple(rows.split(",")) if rows else driver.AXES if oriented else driver.AXES[:3]
+    axes = tuple(rows.split(",")) if rows else AXES if oriented else AXES[:3]
     settings = Settings(
         Method(method), axes, resolver=resolver, two_step=two_step, ahead=ahead, margin=margin, damping=damping,
         generator="orthogonal" if ahead else "blocked", loop_back=loop_back,
@@ -193,7 +194,7 @@ def _published(case: str | None, config: str | None, legacy: bool, method: int, 
     from wbc.published import ikor as published
     from wbc.published.ikor import cases
 
-    chosen = [(t, c) for t in ([case] if case else cases.KNOWN) for c in ([config] if config else cases.CONFIGS)]
+    chosen = [(t, c) for t in ([case] if case else cases.BETWEEN) for c in ([config] if config else cases.CONFIGS)]
     table = Table(header_style="bold", box=None, pad_edge=False)
     for name in ("run", "values", "rms", "largest", "first", "measured", "last", "measured"):
         table.add_column(name, justify="right", no_wrap=True)

@@ -15,7 +15,8 @@ import pinocchio as pin
 from wbc import validation
 from wbc.errors import RangeError, WbcError
 from wbc.published.ikor.files import Trajectory
-from wbc.published.ikor.machines import STEERING, WHEEL_BASE, Machine
+from wbc.published.ikor.machines import STEERING, WHEEL_BASE, ArmMachine
+from wbc.published.ikor.settings import AXES, Method, Settings
 from wbc.published.ikor.stack_steps import StackSteps
 from wbc.resolvers import PseudoInverse, RateProblem
 from wbc.resolvers.fsp import (
@@ -31,24 +32,12 @@ from wbc.resolvers.fsp import (
 )
 from wbc.validation import Array
 
-#: Rows of a task, in their order
-AXES = ("x", "y", "z", "yaw", "pitch", "roll")
 #: Of a line that is created: [m], [rad], as the published program shows them
 INCREMENTS = 0.01, math.radians(1.0)
 #: Smallest cosine of the pitch at which yaw and roll are told apart
 GIMBAL = 1e-6
 #: Steps that a loop back goes back by, and holds its joint beyond the step that was too long
 BACK = 8
-
-
-class Method(enum.IntEnum):
-    """The published codes."""
-
-    LIMITS = 0
-    PSEUDO_INVERSE = 1
-    OBSTACLES = 2
-    BOTH = 3
-    FSP = 4
 
 
 class Code(enum.IntEnum):
@@ -68,64 +57,6 @@ class Stop(enum.StrEnum):
     NO_COLUMN = "no joint moves the task"
     INCONSISTENT = "the task contradicts itself"
     NO_STEP = "no step within the limits"
-
-
-@dataclass(frozen=True)
-class Settings:
-    """How a trajectory is followed.
-
-    Attributes:
-        method: a code; obstacles and limits are constraints of FSP and of the stack as it says.
-        rows: of :data:`AXES`. euler: all three angles are Euler angles, as published, and not a rotation; one or two
-            always are.
-        resolver: ``fsp``, ``pseudo_inverse`` or ``stack``: levels of a QP with inequalities.
-        generator: ``blocked``, as published, or ``orthogonal``.
-        two_step: constraints in a second step, by self-motion, where the first broke them; else in one shot.
-        ahead: a constraint acts on the step that would break it, with ``margin``, also for tool and platform; else, as
-            published, on the step after.
-        margin: kept from spheres [m]. damping: d of J' (J J' + d^2)^-1. step_limit: longest step of a column
-            [rad or m]; the whole step is shortened, and the feedback makes up for it.
-        loop_back: where a step would be longer than the limit, some steps are taken back and tried again with the
-            joint held that moved most.
-        feedback: the target less where the tool is; else less where it should have been.
-    """
-
-    method: Method = Method.FSP
-    rows: tuple[str, ...] = AXES[:3]
-    euler: bool = False
-    resolver: str = "fsp"
-    generator: str = "blocked"
-    two_step: bool = False
-    ahead: bool = False
-    margin: float = 0.0
-    damping: float = 0.0
-    step_limit: float = math.inf
-    loop_back: bool = False
-    feedback: bool = True
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "method", _method(self.method))
-        object.__setattr__(
-            self, "rows", tuple(sorted({validation.one_of("rows", r, AXES) for r in self.rows}, key=AXES.index))
-        )
-        if not self.rows:
-            raise RangeError("rows", self.rows, "expected at least one row")
-        validation.one_of("resolver", self.resolver, ("fsp", "pseudo_inverse", "stack"))
-        validation.one_of("generator", self.generator, ("blocked", "orthogonal"))
-        for name in ("margin", "damping"):
-            validation.scalar(name, getattr(self, name), low=0.0)
-        if not self.step_limit > 0.0:
-            raise RangeError("step_limit", self.step_limit, "expected a length above 0")
-
-    @property
-    def limits(self) -> bool:
-        """Whether joint limits act."""
-        return self.method in (Method.LIMITS, Method.BOTH)
-
-    @property
-    def obstacles(self) -> bool:
-        """Whether spheres act."""
-        return self.method in (Method.OBSTACLES, Method.BOTH)
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,7 +84,7 @@ class Run:
     loops: int = 0
 
 
-def straight(machine: Machine, step: Any, count: int, start: Any = None, turn: Any = None) -> Trajectory:
+def straight(machine: ArmMachine, step: Any, count: int, start: Any = None, turn: Any = None) -> Trajectory:
     """A line in equal steps from where the tool is; ``turn``: of yaw, pitch, roll a step [rad]."""
     q = machine.home if start is None else machine.checked("start", start)
     place, rotation = machine.place(q)
@@ -162,7 +93,7 @@ def straight(machine: Machine, step: Any, count: int, start: Any = None, turn: A
     return Trajectory(q, place + ways * validation.ordinary_array("step", step, (3,)), euler)
 
 
-def line_to(machine: Machine, point: Any, euler: Any = None, start: Any = None) -> Trajectory:
+def line_to(machine: ArmMachine, point: Any, euler: Any = None, start: Any = None) -> Trajectory:
     """A line from where the tool is to a point [m], turning to yaw, pitch, roll [rad] on the way, in equal steps of at
     most :data:`INCREMENTS`.
 
@@ -197,7 +128,7 @@ def rotation_of(euler: Array) -> Array:
     return np.asarray(turn("z", yaw) @ turn("y", pitch) @ turn("x", roll))
 
 
-def intrusions(machine: Machine, q: Array, spheres: Array, margin: float = 0.0, whole: bool = True) -> list[Any]:
+def intrusions(machine: ArmMachine, q: Array, spheres: Array, margin: float = 0.0, whole: bool = True) -> list[Any]:
     """(gap, link, point, normal, sphere) of every link and sphere: the nearest point of the link, where it goes to get
     away, and by how much it is clear, less than 0 within the sphere. ``whole``: tool and platform, too; link -1 is the
     platform, a disc.
@@ -236,7 +167,7 @@ class Driver:
         WbcError: settings that the machine cannot have.
     """
 
-    def __init__(self, machine: Machine, settings: Settings | None = None, spheres: Any = ()) -> None:
+    def __init__(self, machine: ArmMachine, settings: Settings | None = None, spheres: Any = ()) -> None:
         self.machine, self.settings = machine, settings or Settings()
         spheres = validation.ordinary_array("spheres", np.asarray(spheres, dtype=float).reshape(-1, 4))
         self.spheres = spheres[spheres[:, 3] > 0.0]
@@ -404,7 +335,7 @@ class Driver:
         return [row for _, row in sorted(out, key=lambda one: -one[0])]
 
 
-def _plate_jacobian(machine: Machine, q: Array) -> Array:
+def _plate_jacobian(machine: ArmMachine, q: Array) -> Array:
     J = np.zeros((3, len(q)))
     J[0, -3] = J[1, -2] = 1.0
     return J
@@ -414,12 +345,3 @@ def _reason(error: WbcError) -> Stop:
     if "no joint moves" in str(error) or "all joints are blocked" in str(error):
         return Stop.NO_COLUMN
     return Stop.INCONSISTENT if error.field == "x" else Stop.NO_STEP
-
-
-def _method(value: Any) -> Method:
-    try:
-        return Method(value)
-    except ValueError:
-        raise RangeError(
-            "method", value, f"expected a code: {', '.join(f'{m.value} {m.name}' for m in Method)}"
-        ) from None

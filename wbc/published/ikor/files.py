@@ -14,7 +14,7 @@ import numpy as np
 
 from wbc import robots, validation
 from wbc.errors import WbcError
-from wbc.published.ikor.machines import Machine, airarm, hermies, machine_of, planar
+from wbc.published.ikor.machines import ArmMachine, airarm, hermies, machine_of, planar
 from wbc.validation import Array
 
 #: Points of a trajectory beyond these are dropped
@@ -90,7 +90,7 @@ class Trajectory:
     dropped: int = 0
 
 
-def read_trajectory(file: Any, machine: Machine, angles: Any = None) -> Trajectory:
+def read_trajectory(file: Any, machine: ArmMachine, angles: Any = None) -> Trajectory:
     """``TrajectoryPts``: initial joints, number of points, a point a line; ``EulerAngles``: yaw, pitch, roll a line.
 
     Raises:
@@ -110,7 +110,7 @@ def read_trajectory(file: Any, machine: Machine, angles: Any = None) -> Trajecto
     return Trajectory(start, points[:MAX_POINTS], euler, max(0, len(points) - MAX_POINTS))
 
 
-def write_trajectory(file: Any, machine: Machine, trajectory: Trajectory, angles: Any = None) -> None:
+def write_trajectory(file: Any, machine: ArmMachine, trajectory: Trajectory, angles: Any = None) -> None:
     """The same back, to 9 digits."""
     rows = [trajectory.start * _units(machine), [len(trajectory.points)], *trajectory.points]
     _write(file, rows)
@@ -141,7 +141,7 @@ def write_spheres(file: Any, spheres: Array) -> None:
     _write(file, spheres)
 
 
-def read_angles(file: Any, machine: Machine) -> Array:
+def read_angles(file: Any, machine: ArmMachine) -> Array:
     """``CheezyAngles``: the columns of every step [steps, M].
 
     Raises:
@@ -153,7 +153,7 @@ def read_angles(file: Any, machine: Machine) -> Array:
     return np.array(out).reshape(-1, machine.joints) / _units(machine)
 
 
-def write_angles(file: Any, machine: Machine, q: Array) -> None:
+def write_angles(file: Any, machine: ArmMachine, q: Array) -> None:
     """The same back."""
     _write(file, q * _units(machine))
 
@@ -172,7 +172,7 @@ def read_jacobian(file: Any) -> tuple[Array, Array]:
     return J, x
 
 
-def read_robot(file: Any, base: str = "none") -> Machine:
+def read_robot(file: Any, base: str = "none") -> ArmMachine:
     """``ROBOT.dat``: number of links, lengths; number of joints, a row each: most, least, prismatic, weight, home;
     platform, its plate, its offsets (Z, L, angle); and what knows the kinematics: HERMIES, AIRARM, PLANAR (with
     ``Jacob_`` and an ending, if you like) or a URDF file beside it. ``base``: of :data:`BASES`, where a platform is.
@@ -201,7 +201,7 @@ def read_robot(file: Any, base: str = "none") -> Machine:
     a = np.radians(turn)
     offset = (-along * np.cos(a), -along * np.sin(a), height)
     name = reference.removeprefix("Jacob_").split(".")[0].upper()
-    makers: dict[str, Callable[..., Machine]] = {"HERMIES": hermies, "AIRARM": airarm}
+    makers: dict[str, Callable[..., ArmMachine]] = {"HERMIES": hermies, "AIRARM": airarm}
     try:
         if name in makers:
             machine = makers[name](base if on else "none", links, offset)
@@ -220,7 +220,7 @@ def read_robot(file: Any, base: str = "none") -> Machine:
     return _with_rows(machine, np.array(rows), flags, lines, line)
 
 
-def _with_rows(machine: Machine, rows: Array, flags: list[bool], lines: _Lines, line: int) -> Machine:
+def _with_rows(machine: ArmMachine, rows: Array, flags: list[bool], lines: _Lines, line: int) -> ArmMachine:
     """The machine with a file's limits, weights and home; rows of a platform may be there and not be used."""
     count, units = machine.joints, _units(machine)
     if len(rows) < count and machine.base != "none":
@@ -242,7 +242,7 @@ def _flag(lines: _Lines, line: int, word: str) -> bool:
     return word.upper() == "Y"
 
 
-def _units(machine: Machine) -> Array:
+def _units(machine: ArmMachine) -> Array:
     """What columns are multiplied by in files."""
     return np.where(machine.prismatic, 1.0, np.degrees(1.0))
 

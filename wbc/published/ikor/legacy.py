@@ -13,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
-from wbc.published.ikor.machines import HERMIES_BASE, HERMIES_LINKS, Machine, hermies
+from wbc.published.ikor.machines import HERMIES_BASE, HERMIES_LINKS, ArmMachine, hermies
 from wbc.validation import Array
 
 #: From the frame of the listing to that of the printed norms
@@ -21,11 +21,11 @@ QUARTER = np.array([[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])
 
 
 @dataclass(frozen=True, eq=False)
-class LegacyHermies(Machine):
+class LegacyHermies(ArmMachine):
     """The forward kinematics of :func:`hermies` and the published Jacobian."""
 
     @cached_property
-    def _other(self) -> Machine:
+    def _other(self) -> ArmMachine:
         *others, tool = HERMIES_LINKS
         return hermies(self.base, (*others, 0.0), elbow=tool)
 

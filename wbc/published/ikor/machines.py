@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise
 from typing import Any
 
@@ -23,9 +24,10 @@ WHEEL_BASE, STEERING = 0.8, math.radians(40.0)
 #: HERMIES-III [m]: shoulder, upper arm, forearm, hand, tool. The first is 0.396 in what is legible, and 0.356 by the
 #: published norms
 HERMIES_LINKS = (0.356, 0.635, 0.508, 0.343, 0.029)
-#: Of both platforms: from its centre to the arm [m]; HERMIES's is L_off = 0.6 along an axis that its norms give.
+#: Of both platforms: from its centre to the arm [m]; HERMIES's is 0.6 in what is legible, and 0.6100 by the
+#: norms of all three trajectories.
 #: Radius of a disc that holds it; assumed, the plate's size is not legible
-HERMIES_BASE, AIRARM_BASE, PLATE = (-0.6, 0.0, 0.3), (0.0, 1.0, 0.0), 0.5
+HERMIES_BASE, AIRARM_BASE, PLATE = (-0.61, 0.0, 0.3), (0.0, 1.0, 0.0), 0.5
 #: AIRARM [m]: the last two by the position on a published screen; assumed
 AIRARM_LINKS = (0.6096, 1.3716, 0.0, 0.4572, 0.2048)
 #: The planar arm of the first tests [m]: not printed; assumed
@@ -33,7 +35,7 @@ PLANAR_LINKS = (0.25, 0.25, 0.25, 0.25)
 
 
 @dataclass(frozen=True, eq=False)
-class Machine:
+class ArmMachine:
     """An arm, its columns in the report's order: joints of the arm, then x, y and turn of its platform.
 
     Attributes:
@@ -60,9 +62,13 @@ class Machine:
     plate: float = PLATE
     assumed: tuple[str, ...] = ()
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "_data", self.robot.model.createData())
-        object.__setattr__(self, "_tip", self.robot.model.getFrameId(self.tip))
+    @cached_property
+    def _data(self) -> Any:
+        return self.robot.model.createData()
+
+    @cached_property
+    def _tip(self) -> int:
+        return int(self.robot.model.getFrameId(self.tip))
 
     @property
     def joints(self) -> int:
@@ -88,26 +94,26 @@ class Machine:
     def place(self, q: Array) -> tuple[Array, Array]:
         """Position [3] and rotation [3, 3] of the tool in the world."""
         self._run(q)
-        placed = pin.updateFramePlacement(self.robot.model, self._data, self._tip)  # type: ignore[attr-defined]
+        placed = pin.updateFramePlacement(self.robot.model, self._data, self._tip)
         return placed.translation.copy(), placed.rotation.copy()
 
     def jacobian(self, q: Array) -> Array:
         """Of the tool: velocity and angular velocity in world axes [6, M]."""
         self._run(q)
         frame = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
-        J = pin.getFrameJacobian(self.robot.model, self._data, self._tip, frame)  # type: ignore[attr-defined]
+        J = pin.getFrameJacobian(self.robot.model, self._data, self._tip, frame)
         return np.asarray(J @ self.spread)
 
     def points(self, q: Array) -> Array:
         """Ends of all links, the arm's base first [links + 1, 3]."""
         self._run(q)
-        return np.array([self._data.oMi[j].act(np.array(p)) for j, p in self.ends])  # type: ignore[attr-defined]
+        return np.array([self._data.oMi[j].act(np.array(p)) for j, p in self.ends])
 
     def point_jacobian(self, q: Array, link: int, point: Array) -> Array:
         """Of a point of the world fixed to a link: the arm truncated there, later joints move it not [3, M]."""
         self._run(q)
         joint, frame = self.ends[link + 1][0], pin.ReferenceFrame.WORLD
-        J = pin.getJointJacobian(self.robot.model, self._data, joint, frame)  # type: ignore[attr-defined]
+        J = pin.getJointJacobian(self.robot.model, self._data, joint, frame)
         return np.asarray((J[:3] + np.cross(J[3:].T, point).T) @ self.spread)
 
     def slide(self, q: Array) -> Array:
@@ -118,7 +124,7 @@ class Machine:
         return out
 
     def _run(self, q: Array) -> None:
-        pin.computeJointJacobians(self.robot.model, self._data, self.of_robot(q))  # type: ignore[attr-defined]
+        pin.computeJointJacobians(self.robot.model, self._data, self.of_robot(q))
 
 
 def hermies(
@@ -126,7 +132,7 @@ def hermies(
     links: Sequence[float] = HERMIES_LINKS,
     offset: Sequence[float] = HERMIES_BASE,
     elbow: float = 0.0,
-) -> Machine:
+) -> ArmMachine:
     """HERMIES-III's CESARm arm: 7 joints, 10 with its platform; consistent kinematics, tool along the hand.
 
     ``elbow``: an offset [m] after joint 3, which the published Jacobian has.
@@ -154,7 +160,9 @@ def hermies(
     return _machine("hermies", model, base, shift, np.eye(7), ends, home, np.full(7, 2.0 * math.pi), (note,))
 
 
-def airarm(base: str = "none", links: Sequence[float] = AIRARM_LINKS, offset: Sequence[float] = AIRARM_BASE) -> Machine:
+def airarm(
+    base: str = "none", links: Sequence[float] = AIRARM_LINKS, offset: Sequence[float] = AIRARM_BASE
+) -> ArmMachine:
     """AIRARM, the munitions handler: joint 3 slides, joint 4 is slaved and keeps the wrist level, so that its column is
     zero; position only.
 
@@ -184,7 +192,7 @@ def airarm(base: str = "none", links: Sequence[float] = AIRARM_LINKS, offset: Se
     return made
 
 
-def planar(links: Sequence[float] = PLANAR_LINKS) -> Machine:
+def planar(links: Sequence[float] = PLANAR_LINKS) -> ArmMachine:
     """The planar arm of the first FSP tests, one joint a link; tasks x, y and yaw.
 
     Raises:
@@ -200,7 +208,7 @@ def planar(links: Sequence[float] = PLANAR_LINKS) -> Machine:
     return _machine("planar", model, "none", shift, np.eye(len(lengths)), ends, home, most, ("all links",))
 
 
-def machine_of(robot: Robot, tip: str) -> Machine:
+def machine_of(robot: Robot, tip: str) -> ArmMachine:
     """Any robot of joints of one degree of freedom: its columns are those joints, its links go from one to the next.
 
     Raises:
@@ -217,7 +225,7 @@ def machine_of(robot: Robot, tip: str) -> Machine:
     low, high = (np.where(np.isfinite(x), x, np.sign(x) * 1e3) for x in bounds)
     still = tuple(unit == "m" for unit in robot.dof_units)
     one, none = np.ones(robot.nv), np.zeros(robot.nv)
-    return Machine(
+    return ArmMachine(
         robot.name,
         robot,
         tip,
@@ -232,7 +240,7 @@ def machine_of(robot: Robot, tip: str) -> Machine:
     )
 
 
-def without_platform(machine: Machine) -> Machine:
+def without_platform(machine: ArmMachine) -> ArmMachine:
     """The same machine with its platform at rest: columns 8 to 10 of HERMIES are gone, as its M = 7 says."""
     if machine.base == "none":
         return machine
@@ -276,7 +284,7 @@ def _tool(model: pin.Model, place: tuple[float, float, float], turn: float) -> N
 def _machine(
     name: str, model: pin.Model, base: str, shift: Array, spread: Array, ends: Any, home: Array, most: Array,
     assumed: tuple[str, ...], prismatic: tuple[int, ...] = (),
-) -> Machine:  # fmt: skip
+) -> ArmMachine:  # fmt: skip
     arm, first = len(home), model.nv - len(home)
     whole = np.zeros((model.nv, model.nv))
     whole[first:, :arm] = spread
@@ -292,6 +300,6 @@ def _machine(
     bounds = {"position_lower": np.minimum(*limits), "position_upper": np.maximum(*limits)}
     robot = robots.load(model, name=name, **bounds)
     start = np.concatenate((home, np.zeros(first)))
-    return Machine(
+    return ArmMachine(
         name, robot, "tip", whole, shift, ends, start, -upper, upper, np.ones(model.nv), sliding, base, assumed=assumed
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import casadi as ca
 import numpy as np
@@ -12,13 +12,11 @@ import pinocchio as pin
 from wbc import tasks
 from wbc.controller import Stack
 from wbc.errors import InfeasibleError, RangeError
-from wbc.published.ikor.machines import Machine
+from wbc.published.ikor.machines import ArmMachine
+from wbc.published.ikor.settings import Settings
 from wbc.shapes import Capsule, PlacedShape, Sphere
 from wbc.tasks.base import Constraint, Row, Rows, SacrificeOrder
 from wbc.validation import Array
-
-if TYPE_CHECKING:
-    from wbc.published.ikor.driver import Settings
 
 #: A step lasts so long [s]; links are capsules of this radius [m]
 DT, RADIUS = 0.1, 1e-6
@@ -50,7 +48,7 @@ class StackSteps:
         RangeError: one or two Euler angles alone, or a car, which no item of a stack states.
     """
 
-    def __init__(self, machine: Machine, settings: Settings, spheres: Array) -> None:
+    def __init__(self, machine: ArmMachine, settings: Settings, spheres: Array) -> None:
         angles = [r for r in settings.rows if r in ("yaw", "pitch", "roll")]
         if len(angles) not in (0, 3) or not {"x", "y", "z"} <= set(settings.rows):
             raise RangeError("rows", settings.rows, "a stack takes x, y and z, and all three angles or none")
@@ -104,7 +102,7 @@ class StackSteps:
         return np.linalg.pinv(self.machine.spread) @ found.v * DT
 
 
-def _slaved(machine: Machine) -> list[dict[str, float]]:
+def _slaved(machine: ArmMachine) -> list[dict[str, float]]:
     """Relations of the robot's joints that its columns imply: of AIRARM the wrist that stays level."""
     u, sigma, _ = np.linalg.svd(machine.spread)
     rank = int((sigma > 1e-9).sum())
@@ -112,7 +110,7 @@ def _slaved(machine: Machine) -> list[dict[str, float]]:
     return [{n: float(c) for n, c in zip(names, row, strict=True) if abs(c) > 1e-9} for row in u[:, rank:].T]
 
 
-def _shapes(machine: Machine) -> dict[str, list[PlacedShape]]:
+def _shapes(machine: ArmMachine) -> dict[str, list[PlacedShape]]:
     """A thin capsule for each link that has a length, and the platform's disc as a ball."""
     points, out = machine.points(machine.home), dict[str, list[PlacedShape]]()
     data = machine.robot.model.createData()

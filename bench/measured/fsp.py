@@ -1,4 +1,4 @@
-"""The measurements: each a dictionary of numbers."""
+"""What spaces of solutions and their steps cost, runs past obstacles and limits, and paths resolved as a whole."""
 
 from __future__ import annotations
 
@@ -10,15 +10,62 @@ from typing import Any
 import numpy as np
 
 import wbc
+from bench.sheet import Sheet
 from wbc.errors import InfeasibleError
 from wbc.explore import Explorer
-from wbc.published.ikor import Driver, Method, Settings, case, differences, hermies, printed, straight
-from wbc.published.ikor.cases import CONFIGS, KNOWN
+from wbc.published.ikor import Driver, Method, Settings, hermies
+from wbc.published.ikor.cases import route
 from wbc.resolvers import FullSpace, PseudoInverse, RateProblem
 from wbc.resolvers.fsp import best, blocked, joint_row, orthogonal, parametric, point_row
 
 #: Calls of a batch; of every timing the least median of so many batches, as other work on the machine only adds
 CALLS, BATCHES = 40, 5
+
+
+STEPS = {
+    "full_space": "`FullSpace().resolve`, two obstacles and three limits",
+    "orthogonal": "orthogonal space, then the closed form, the same constraints",
+    "orthogonal_free": "the same without constraints",
+    "blocked": "blocked columns, then the closed form, the same constraints",
+    "blocked_free": "the same without constraints",
+    "two_steps": "blocked columns in two steps, three limits",
+    "pseudo_inverse": "`PseudoInverse().resolve`, without constraints",
+}
+GENERATORS = ("joints", "vectors", "orthogonal [us], cond G", "exchange", "exhaustive")
+OBSTACLES = (
+    "method", "done", "least clearance [mm]", "beyond the limit [mrad]", "miss at the end [mm]", "longest step [rad]",
+    "a step [ms]",
+)  # fmt: skip
+
+
+def parts() -> dict[str, Sheet | str]:
+    """All of it."""
+    return shown(steps(), generators(), obstacles(), paths())
+
+
+def shown(
+    step: dict[str, float], spaces: list[dict[str, float]], past: list[dict[str, Any]], whole: dict[str, Any]
+) -> dict[str, Sheet | str]:
+    """Tables of the numbers."""
+    costs = [
+        (f"{row['joints']}", f"{row['vectors']}", *(f"{row[n]:.0f}, {row[f'{n}_condition']:.0e}" for n in made))
+        for made in [("orthogonal", "exchange", "exhaustive")]
+        for row in spaces
+        if row["joints"] in (4, 7, 10, 15, 20)
+    ]
+    obstacle = []
+    for one in past:
+        lengths = (f"{1e3 * one[key]:.{digits}f}" for key, digits in (("clearance", 1), ("beyond", 1), ("miss", 3)))
+        times = f"{one['step']:.3f}", f"{one['milliseconds']:.1f}"
+        obstacle.append((one["method"], "yes" if one["done"] else "no", *lengths, *times))
+    share = [(name, f"{done} of {whole['paths']}") for name, done in whole["done"].items()]
+    return {
+        "steps": Sheet("", ("step of 3 x 10", "us"), [(STEPS[k], f"{v:.0f}") for k, v in step.items()]),
+        "generators": Sheet("", GENERATORS, costs),
+        "obstacles": Sheet("", OBSTACLES, obstacle),
+        "paths": Sheet("", ("way of resolution", "paths done"), share),
+        "path": f"One path as a whole: {whole['seconds']:.2f} s.",
+    }
 
 
 def microseconds(call: Callable[[], Any], calls: int = CALLS) -> float:
@@ -97,39 +144,10 @@ def steps() -> dict[str, float]:
     }
 
 
-def norms() -> list[dict[str, Any]]:
-    """Printed and measured norms of every run, and how near they are."""
-    out = []
-    for trajectory in KNOWN:
-        for config in CONFIGS:
-            run, table = case(trajectory, config), printed()[trajectory, config]
-            off = differences(run, trajectory, config)
-            good = np.flatnonzero(np.isfinite(table.fsp))
-            some = [int(good[k]) for k in (0, len(good) // 2, -1)]
-            pairs = [
-                (int(table.steps[k]), float(table.fsp[k]), float(run.norms[int(table.steps[k]) - 1])) for k in some
-            ]
-            consistent = case(trajectory, config, legacy=False)
-            out.append(
-                {
-                    "run": f"{trajectory} {config}",
-                    "values": len(off),
-                    "rms": float(np.sqrt(np.mean(off**2))),
-                    "median": float(np.median(np.abs(off))),
-                    "largest": float(np.abs(off).max()),
-                    "pairs": pairs,
-                    "miss": float(run.errors[-1]),
-                    "consistent_miss": float(consistent.errors[-1]),
-                    "seconds_a_step": float(np.median(run.seconds)),
-                }
-            )
-    return out
-
-
 def obstacles() -> list[dict[str, Any]]:
     """Trajectory 1 past a sphere that its forearm goes into, and with a joint limit that it passes."""
     machine = hermies()
-    path = straight(machine, KNOWN["1"][1], KNOWN["1"][0])
+    path = route(machine, "1")
     free = Driver(machine).run(path).q
     points = machine.points(free[100])
     spheres = [(*(0.5 * (points[2] + points[3]) + [0, 0.05, 0]), 0.1)]

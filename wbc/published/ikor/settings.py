@@ -1,0 +1,91 @@
+"""How a trajectory is followed: the published codes of method, and what the published driver lacked."""
+
+from __future__ import annotations
+
+import enum
+import math
+from dataclasses import dataclass
+from typing import Any
+
+from wbc import validation
+from wbc.errors import RangeError
+
+#: Rows of a task, in their order
+AXES = ("x", "y", "z", "yaw", "pitch", "roll")
+
+
+class Method(enum.IntEnum):
+    """The published codes."""
+
+    LIMITS = 0
+    PSEUDO_INVERSE = 1
+    OBSTACLES = 2
+    BOTH = 3
+    FSP = 4
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How a trajectory is followed.
+
+    Attributes:
+        method: a code; obstacles and limits are constraints of FSP and of the stack as it says.
+        rows: of :data:`AXES`. euler: all three angles are Euler angles, as published, and not a rotation; one or two
+            always are.
+        resolver: ``fsp``, ``pseudo_inverse`` or ``stack``: levels of a QP with inequalities.
+        generator: ``blocked``, as published, or ``orthogonal``.
+        two_step: constraints in a second step, by self-motion, where the first broke them; else in one shot.
+        ahead: a constraint acts on the step that would break it, with ``margin``, also for tool and platform; else, as
+            published, on the step after.
+        margin: kept from spheres [m]. damping: d of J' (J J' + d^2)^-1. step_limit: longest step of a column
+            [rad or m]; the whole step is shortened, and the feedback makes up for it.
+        loop_back: where a step would be longer than the limit, some steps are taken back and tried again with the
+            joint held that moved most.
+        feedback: the target less where the tool is; else less where it should have been.
+    """
+
+    method: Method = Method.FSP
+    rows: tuple[str, ...] = AXES[:3]
+    euler: bool = False
+    resolver: str = "fsp"
+    generator: str = "blocked"
+    two_step: bool = False
+    ahead: bool = False
+    margin: float = 0.0
+    damping: float = 0.0
+    step_limit: float = math.inf
+    loop_back: bool = False
+    feedback: bool = True
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "method", _method(self.method))
+        object.__setattr__(
+            self, "rows", tuple(sorted({validation.one_of("rows", r, AXES) for r in self.rows}, key=AXES.index))
+        )
+        if not self.rows:
+            raise RangeError("rows", self.rows, "expected at least one row")
+        validation.one_of("resolver", self.resolver, ("fsp", "pseudo_inverse", "stack"))
+        validation.one_of("generator", self.generator, ("blocked", "orthogonal"))
+        for name in ("margin", "damping"):
+            validation.scalar(name, getattr(self, name), low=0.0)
+        if not self.step_limit > 0.0:
+            raise RangeError("step_limit", self.step_limit, "expected a length above 0")
+
+    @property
+    def limits(self) -> bool:
+        """Whether joint limits act."""
+        return self.method in (Method.LIMITS, Method.BOTH)
+
+    @property
+    def obstacles(self) -> bool:
+        """Whether spheres act."""
+        return self.method in (Method.OBSTACLES, Method.BOTH)
+
+
+def _method(value: Any) -> Method:
+    try:
+        return Method(value)
+    except ValueError:
+        raise RangeError(
+            "method", value, f"expected a code: {', '.join(f'{m.value} {m.name}' for m in Method)}"
+        ) from None
