@@ -6,17 +6,20 @@ import ast
 import sys
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from bench.walk.structures import surface_of
 from tests.project.layout import ROOT
 from tests.project.test_floors import imported
 from tests.walking.honest import DT, HOLD, LATCH, MACHINE, SWING, honest
+from wbc.clearance import TriangleMesh
 from wbc.errors import RobotFileError, ShapeError, StructureFileError, UnknownNameError, UnsupportedJointError
-from wbc.shapes import Box, Capsule
+from wbc.shapes import Box, Capsule, Cylinder, Sphere
 from wbc.walking import Obstacle, Structure, save_structure
 from wbc.walking.checker import Report, Rules, check_run, check_walk
 from wbc.walking.log.log import CLOSED, CLOSING, OPEN, WalkLog, WalkLogError
@@ -288,6 +291,14 @@ def test_links_two_inches_in_an_obstacle(urdf: Path, walk: Walk) -> None:
         assert kinds(found) == {STRUCTURE}
         assert found[STRUCTURE].where.endswith("and tank")
         assert found[STRUCTURE].worst < 0.0
+    # Bodies that the capsule is within
+    block = TriangleMesh(surface_of(np.array(list(product((-0.2, 0.2), (-0.2, 0.2), (-0.4, 0.4))))), solid=True)
+    for larger in (Sphere(0.4), Cylinder(0.2, 0.8), block):
+        around = Structure("obstacle", ground.holds, (Obstacle("tank", larger, place),), ground.surface)
+        about = check_walk(log, urdf, around, FEW)
+        assert kinds(about) == {STRUCTURE}
+        assert about[STRUCTURE].where.endswith("and tank")
+        assert about[STRUCTURE].worst < 0.0
 
 
 def test_links_in_each_other(urdf: Path, walk: Walk) -> None:
@@ -367,7 +378,7 @@ def test_what_cannot_be_checked_is_refused(walk: Walk, urdf: Path, tmp_path: Pat
 def test_the_checker_shares_no_code_with_planning_and_control() -> None:
     """Whatever the checker imports, itself or through other modules, is neither planner nor stack nor controller."""
     allowed = {
-        *("wbc.errors", "wbc.validation", "wbc.shapes", "wbc.robot"),
+        *("wbc.errors", "wbc.validation", "wbc.shapes", "wbc.robot", "wbc.clearance"),
         "wbc.walking.log.log",
         *(f"wbc.walking.holds.{name}" for name in ("hold", "obstacle", "structure", "files", "surface")),
         "wbc.walking.checker",
