@@ -1,6 +1,6 @@
 """Clearances as a proof: bodies over the whole motion between ticks, by :mod:`wbc.clearance`.
 
-A hand may be nearer than the clearance to the one thing that a hold is mounted on while it comes to that hold, holds it
+A hand may be nearer than the clearance to what a hold is mounted on while it comes to that hold, holds it
 or leaves it, and no deeper in it than a stated depth beyond its own roundness.
 """
 
@@ -120,19 +120,17 @@ def _exemptions(
             if rows[start] < 0:
                 continue
             point = log.hold_pose[int(rows[start]), :3]
-            mount = _mount(structure, point)
-            if mount is None:
-                continue
+            mounts = _mounts(structure, point)
             since, until = float(log.t[start]) - LEAVING, float(log.t[end]) + LEAVING
             for body in mine:
                 depth = rules.exempt_depth + float(getattr(body.shape, "radius", 0.0))
-                yield Exemption(body.name, mount, point, rules.exempt_distance, depth, since, until)
+                for mount in mounts:
+                    yield Exemption(body.name, mount, point, rules.exempt_distance, depth, since, until)
 
 
-def _mount(structure: Structure, point: Array) -> str | None:
-    """What a hold is mounted on: the nearest thing."""
+def _mounts(structure: Structure, point: Array) -> list[str]:
+    """What a hold is mounted on; where bars meet, each of them."""
     off = {f"obstacle {one.id}": abs(float(one.distance(point))) for one in structure.obstacles}
     if structure.surface is not None:
         off["surface"] = abs(float(structure.surface.height(point)))
-    nearest = min(off, key=lambda name: off[name], default=None)
-    return nearest if nearest is not None and off[nearest] <= MOUNTED else None
+    return [name for name, distance in off.items() if distance <= MOUNTED]
