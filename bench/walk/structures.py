@@ -9,10 +9,11 @@ from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
+from scipy.spatial import ConvexHull
 
 from wbc import validation
-from wbc.errors import WbcError
-from wbc.shapes import Box, Capsule, Convex
+from wbc.clearance import TriangleMesh
+from wbc.shapes import Box, Capsule
 from wbc.validation import Array
 from wbc.walking import Hold, Obstacle, PlaneSurface, Structure, save_structure
 from wbc.walking.holds.hold import FIXED, FREE, frame_of
@@ -46,15 +47,11 @@ class Trial:
         return save_structure(self.structure, folder / f"{self.family}-{self.seed}.csv")
 
 
-class UnsupportedStructureError(WbcError):
-    """A structure that the package has no objects for."""
-
-
 def random_structure(family: str, seed: int) -> Trial:
     """The structure of a seed.
 
     Raises:
-        UnknownNameError: no such family. UnsupportedStructureError: the package refuses its shapes.
+        UnknownNameError: no such family.
     """
     make = FAMILIES[validation.one_of("family", family, tuple(FAMILIES))]
     rng = np.random.default_rng([list(FAMILIES).index(family), seed])
@@ -204,16 +201,23 @@ def rock(rng: np.random.Generator, size: float) -> Array:
     return np.array([_unit(rng.normal(size=3)) * size * rng.uniform(0.6, 1.0) for _ in range(24)])
 
 
+def surface_of(points: Array) -> Array:
+    """The triangles of the hull of points, outwards and of single precision as in files, [n, 3, 3] m."""
+    points = points.astype(np.float32).astype(np.float64)
+    hull = ConvexHull(points)
+    corners: Array = points[hull.simplices]
+    turned = (np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) * hull.equations[:, :3]).sum(1) < 0
+    corners[turned] = corners[turned][:, ::-1]
+    return corners
+
+
 def _mesh(rng: np.random.Generator, name: str) -> tuple[Structure, str, str]:
     """Rocks as meshes, on the plane and above it."""
     rocks = []
     for k in range(int(rng.integers(2, 6))):
         place = rng.uniform([0.5, 0.5, 0.0], [3.5, 2.8, 1.0])
-        shape = Convex(rock(rng, float(rng.uniform(0.1, 0.3))))
-        try:
-            rocks.append(Obstacle(f"rock {k}", shape, pin.SE3(np.eye(3), place)))  # type: ignore[arg-type]
-        except WbcError as error:
-            raise UnsupportedStructureError("structure", "mesh", str(error)) from error
+        shape = TriangleMesh(surface_of(rock(rng, float(rng.uniform(0.1, 0.3)))), solid=True)
+        rocks.append(Obstacle(f"rock {k}", shape, pin.SE3(np.eye(3), place)))
     structure = _on_plane(name, rocks)
     return structure, *_ends(rng, structure)
 

@@ -20,7 +20,7 @@ from bench.walk.trials import PARTS, names
 #: What a trial may take [s]
 LONGEST = 900.0
 #: Ends of a walk that did what it was to do, and of one that was refused with a reason
-WELL, REFUSED = ("arrived", "time"), ("refused", "not supported", "hold lost", "HoldLost", "NoPlanError", "late")
+WELL, REFUSED = ("arrived", "time"), ("refused", "hold lost", "HoldLost", "NoPlanError", "late")
 
 
 def trial_jobs(it: Machine, part: str, count: int, folder: Path) -> list[Job]:

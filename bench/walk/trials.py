@@ -18,7 +18,7 @@ import numpy as np
 
 import wbc
 from bench.walk.second_checker import second_check
-from bench.walk.structures import FAMILIES, UnsupportedStructureError, random_structure
+from bench.walk.structures import FAMILIES, random_structure
 from wbc.errors import RangeError, WbcError
 from wbc.interrupts import obey_kill
 from wbc.robots import Walker
@@ -180,8 +180,6 @@ def tried(part: str, name: str, folder: Path) -> Record:
         arms = ARMS[int(name.split()[1]) % len(ARMS)] if part == "structures" else 3
         out["arms"] = arms
         out |= PARTS[part](name, wbc.robots.walker(arms=arms), folder)
-    except UnsupportedStructureError as error:
-        out |= {"outcome": "not supported", "reason": str(error)}
     except WbcError as error:
         out |= {"outcome": "error", "reason": f"{type(error).__name__}: {error}"}
     except Exception as error:  # noqa: BLE001 (an error of a trial is what the benchmark looks for)

@@ -15,7 +15,7 @@ from bench.measured import clearance
 from bench.sheet import Sheet
 from bench.walk import trial_parts
 from bench.walk.second_checker import second_check
-from bench.walk.structures import FAMILIES, UnsupportedStructureError, capsule_between, random_structure
+from bench.walk.structures import FAMILIES, capsule_between, random_structure
 from bench.walk.trial_parts import apart, trial_goals, trial_sheet
 from bench.walk.trials import names, tried
 from wbc.errors import UnknownNameError
@@ -29,7 +29,7 @@ from wbc.walking.planner.planner import plan_walk
 from wbc.walking.run.recording import WalkRecorder
 
 
-@pytest.mark.parametrize("family", [name for name in FAMILIES if name != "mesh"])
+@pytest.mark.parametrize("family", FAMILIES)
 def test_structures_are_those_of_their_seeds(family: str, tmp_path: Path) -> None:
     digests = set()
     for seed in range(4):
@@ -45,12 +45,11 @@ def test_structures_are_those_of_their_seeds(family: str, tmp_path: Path) -> Non
         assert read.ids == structure.ids
         assert read.positions == pytest.approx(structure.positions, abs=1e-12)
         assert [one.id for one in read.obstacles] == [one.id for one in structure.obstacles]
+        assert read.clearance(structure.positions) == pytest.approx(structure.clearance(structure.positions), abs=1e-9)
     assert len(digests) == 4
 
 
-def test_structures_of_meshes_wait_for_obstacles_that_are_such() -> None:
-    with pytest.raises(UnsupportedStructureError, match="mesh"):
-        random_structure("mesh", 0)
+def test_an_unknown_family_is_refused() -> None:
     with pytest.raises(UnknownNameError, match="posts"):
         random_structure("post", 0)
 
@@ -126,7 +125,6 @@ def test_hands_go_no_deeper_than_they_may(walked: tuple[WalkLog, Structure], mac
 
 
 def test_a_trial_that_fails_is_a_record(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    assert tried("structures", "mesh 0", tmp_path)["outcome"] == "not supported"
     assert tried("structures", "posts x", tmp_path)["outcome"] == "crash"
     died = apart("structures", "posts x y", tmp_path)
     assert died["outcome"] == "crash"

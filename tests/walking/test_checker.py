@@ -6,18 +6,22 @@ import ast
 import sys
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
+from bench.walk.structures import surface_of
 from tests.project.layout import ROOT
 from tests.project.test_floors import imported
 from tests.walking.honest import DT, HOLD, LATCH, MACHINE, SWING, honest
+from wbc.clearance import TriangleMesh
 from wbc.errors import RobotFileError, ShapeError, StructureFileError, UnknownNameError, UnsupportedJointError
-from wbc.shapes import Box, Capsule
-from wbc.walking import Obstacle, Structure, save_structure
+from wbc.shapes import Box, Capsule, Cylinder, Sphere
+from wbc.walking import Obstacle, PlaneSurface, Structure, save_structure
 from wbc.walking.checker import Report, Rules, check_run, check_walk
 from wbc.walking.log.log import CLOSED, CLOSING, OPEN, WalkLog, WalkLogError
 
@@ -26,6 +30,7 @@ Walk = tuple[WalkLog, Structure]
 FEW = Rules(sub_samples=1)
 OFF, TILTED, ROLLED = "held hand off its hold", "held hand's tilt beyond max_tilt", "held hand's roll"
 STRUCTURE = "clearance of the structure"
+SWEPT, SWEPT_STRUCTURE = "swept clearance of links", "swept clearance of the structure"
 #: The tick at which the hand closes, and one in the middle of the swing
 CLOSES, MIDDLE = round((HOLD + LATCH + SWING) / DT), round((HOLD + LATCH + SWING / 2) / DT)
 
@@ -89,6 +94,59 @@ def test_the_report_is_a_table_of_all_checks(urdf: Path, walk: Walk) -> None:
     assert line.split() == ["joint", "rate", "/", "limit", "2.2617", "1", "0.070", "arm1_joint4", "1"]
     lines = str(good).splitlines()
     assert all(any(finding.kind in line for line in lines) for finding in good.findings)
+
+
+def test_clearances_are_proven_between_ticks(urdf: Path, walk: Walk) -> None:
+    """A bead in the way of the swinging hand, between two ticks; a hand no deeper in the surface than it may be."""
+    log, ground = walk
+    honest_one = check_walk(log, urdf, ground, FEW)
+    for kind in (SWEPT, SWEPT_STRUCTURE):
+        assert honest_one[kind].ok, kind
+        assert honest_one[kind].worst < 1.0
+    model = pin.buildModelFromUrdf(str(urdf), pin.JointModelFreeFlyer())
+    data, hand, between = model.createData(), model.getFrameId(log.hands[0]), []
+    for k in (MIDDLE, MIDDLE + 1):
+        q = np.concatenate([log.pose_body_in_structure[k], log.q[k]])
+        pin.framesForwardKinematics(model, data, q)
+        between.append(data.oMf[hand].translation.copy())
+    ball = Obstacle("bead", Sphere(1e-4), pin.SE3(np.eye(3), (between[0] + between[1]) / 2))
+    found = check_walk(log, urdf, Structure("bead", ground.holds, (ball,), ground.surface), FEW)[SWEPT_STRUCTURE]
+    assert not found.ok
+    assert found.where == "arm1_link6 and obstacle bead"
+    assert found.worst < 0.0
+    for deep, touched in ((0.004, False), (0.006, True), (0.014, True)):
+        there = pin.SE3(np.eye(3), np.array([0.0, 0.0, deep]))
+        higher = Structure("higher", ground.holds, (), PlaneSurface(there))
+        worst = check_walk(log, urdf, higher, FEW)[SWEPT_STRUCTURE].worst
+        assert (worst < 0.0) == touched, deep
+    # Where time stands still there is no motion
+    times = np.array(log.t)
+    times[5] = times[4]
+    assert np.isnan(check_walk(replace(log, t=times), urdf, ground, FEW)[SWEPT].worst)
+
+
+def test_jumps_of_the_bodys_velocity_are_observed(urdf: Path, walk: Walk) -> None:
+    """A body that moves by 0.5 mm and 0.5 mrad more a tick from one on."""
+    log, ground = walk
+    assert all(finding.ok for finding in check_walk(log, urdf, ground, FEW).observed)
+    on = np.maximum(np.arange(len(log)) - 40.0, 0.0)
+    pose = np.array(log.pose_body_in_structure)
+    pose[:, 0] += 5e-4 * on
+    pose[:, 3:] = [
+        (pin.Quaternion(row) * pin.Quaternion(pin.exp3(np.array([0.0, 0.0, 5e-4 * k])))).coeffs()
+        for row, k in zip(pose[:, 3:], on, strict=True)
+    ]
+    moved = replace(log, pose_body_in_structure=pose)
+    report = check_walk(moved, urdf, ground, FEW)
+    for kind in ("jump of the body's velocity", "jump of the body's turn rate"):
+        found = report[kind]
+        assert found in report.observed
+        assert found not in report.findings
+        assert kind in str(report)
+        assert (found.time, found.where) == (pytest.approx(log.t[40]), "body")
+        # Ticks of 10 ms, beside what the honest body does by itself
+        assert found.worst == pytest.approx(0.05, abs=0.01)
+    assert kinds(report).isdisjoint(finding.kind for finding in report.observed)
 
 
 @pytest.mark.parametrize("joint", range(6))
@@ -288,6 +346,14 @@ def test_links_two_inches_in_an_obstacle(urdf: Path, walk: Walk) -> None:
         assert kinds(found) == {STRUCTURE}
         assert found[STRUCTURE].where.endswith("and tank")
         assert found[STRUCTURE].worst < 0.0
+    # Bodies that the capsule is within
+    block = TriangleMesh(surface_of(np.array(list(product((-0.2, 0.2), (-0.2, 0.2), (-0.4, 0.4))))), solid=True)
+    for larger in (Sphere(0.4), Cylinder(0.2, 0.8), block):
+        around = Structure("obstacle", ground.holds, (Obstacle("tank", larger, place),), ground.surface)
+        about = check_walk(log, urdf, around, FEW)
+        assert kinds(about) == {STRUCTURE}
+        assert about[STRUCTURE].where.endswith("and tank")
+        assert about[STRUCTURE].worst < 0.0
 
 
 def test_links_in_each_other(urdf: Path, walk: Walk) -> None:
@@ -367,7 +433,7 @@ def test_what_cannot_be_checked_is_refused(walk: Walk, urdf: Path, tmp_path: Pat
 def test_the_checker_shares_no_code_with_planning_and_control() -> None:
     """Whatever the checker imports, itself or through other modules, is neither planner nor stack nor controller."""
     allowed = {
-        *("wbc.errors", "wbc.validation", "wbc.shapes", "wbc.robot"),
+        *("wbc.errors", "wbc.validation", "wbc.shapes", "wbc.robot", "wbc.clearance"),
         "wbc.walking.log.log",
         *(f"wbc.walking.holds.{name}" for name in ("hold", "obstacle", "structure", "files", "surface")),
         "wbc.walking.checker",
@@ -395,5 +461,5 @@ def test_the_checker_shares_no_code_with_planning_and_control() -> None:
                     else []
                 )
             }
-            packages = {"numpy", "rich", "wbc"}
+            packages = {"numpy", "pinocchio", "rich", "wbc"}
             assert outside <= packages | set(sys.stdlib_module_names)

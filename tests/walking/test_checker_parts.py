@@ -11,7 +11,7 @@ import pytest
 
 from tests.walking.honest import MACHINE, honest
 from wbc.robots import walker
-from wbc.shapes import Box, Capsule
+from wbc.shapes import Box, Capsule, Cylinder, Sphere
 from wbc.walking import CylinderSurface, Obstacle, PlaneSurface
 from wbc.walking.checker import distances
 from wbc.walking.checker.body import Hands, estimate, single
@@ -95,7 +95,7 @@ def test_distances_are_those_of_many_points() -> None:
     assert (found <= grid + 1e-12).all()
     np.testing.assert_allclose(found, grid, atol=0.03)
     place = pin.SE3.Random()
-    for shape in (Box((0.5, 1.0, 0.3)), Capsule(0.2, 0.9)):
+    for shape in (Box((0.5, 1.0, 0.3)), Capsule(0.2, 0.9), Sphere(0.4), Cylinder(0.3, 0.8)):
         obstacle = Obstacle("o", shape, place)
         exact = distances.from_obstacle(obstacle, a, b)
         grid = obstacle.distance(brute(a, b)).min(axis=1)

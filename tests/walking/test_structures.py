@@ -10,8 +10,10 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from bench.walk.structures import surface_of
+from wbc.clearance import Body, Motion, Pair, Scene, Sweeper, Tree, TriangleMesh
 from wbc.errors import DuplicateNameError, NotFiniteError, RangeError, RotationError, ShapeError, UnknownNameError
-from wbc.shapes import Box, Capsule, Sphere
+from wbc.shapes import Box, Capsule, Cylinder, HalfSpace, Sphere
 from wbc.walking import (
     CylinderSurface,
     Hold,
@@ -195,9 +197,100 @@ def test_bad_holds_and_structures_are_refused() -> None:
     with pytest.raises(ShapeError, match="obstacles"):
         Structure("s", (Hold("a", pose),), (Box((1.0, 1.0, 1.0)),))  # type: ignore[arg-type]
     with pytest.raises(ShapeError, match="shape"):
-        Obstacle("ball", Sphere(1.0), pose)  # type: ignore[arg-type]
+        Obstacle("floor", HalfSpace(), pose)  # type: ignore[arg-type]
+    with pytest.raises(ShapeError, match="'sail': expected a closed mesh"):
+        Obstacle("sail", TriangleMesh(np.eye(3)[None]), pose)
     with pytest.raises(ShapeError, match="points"):
         ALL["plane"].clearance([1.0, 2.0])
+
+
+def cluttered() -> Structure:
+    """One obstacle of each kind."""
+    rng = np.random.default_rng(5)
+    shapes = (
+        Box((0.3, 0.2, 0.5)), Capsule(0.1, 0.4), Sphere(0.3), Cylinder(0.2, 0.5),
+        TriangleMesh(surface_of(rng.normal(size=(40, 3)) * 0.3), solid=True),
+    )  # fmt: skip
+    there = [pin.SE3(pin.exp3(rng.normal(size=3)), rng.normal(size=3)) for _ in shapes]
+    obstacles = [Obstacle(f"{k}", shape, place) for k, (shape, place) in enumerate(zip(shapes, there, strict=True))]
+    return Structure("clutter", (Hold("h", pin.SE3.Identity()),), tuple(obstacles))
+
+
+@pytest.mark.parametrize("kind", range(5))
+def test_distances_of_obstacles_are_those_of_the_swept_proof(kind: int) -> None:
+    """Segments are capsules without a radius, for which wbc.clearance has an exact distance of its own."""
+    rng = np.random.default_rng([6, kind])
+    obstacle = cluttered().obstacles[kind]
+    a = obstacle.placement.translation + rng.normal(size=(120, 3)) * rng.choice([0.15, 0.5], (120, 1))
+    b = a + rng.normal(size=(120, 3)) * 0.4
+    found, points, through = obstacle.segment_distance(a, b), obstacle.distance(a), 0
+    tree = Tree.of_model(pin.Model())
+    sizes = np.linalg.norm(b - a, axis=1)
+    for k in range(len(a)):
+        turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), (b[k] - a[k]) / sizes[k]).matrix()
+        core = Body("core", Capsule(0.0, sizes[k]), placement=pin.SE3(turn, (a[k] + b[k]) / 2))
+        point = Body("point", Sphere(0.0), placement=pin.SE3(np.eye(3), a[k]))
+        thing = Body("thing", obstacle.shape, placement=obstacle.placement)
+        scene = Scene(tree, [core, point, thing], [Pair("core", "thing"), Pair("point", "thing")])
+        exact, at_point = Sweeper(scene).at(Motion.linear(tree, [0.0, 1.0], np.zeros((2, 0))), 0.0)
+        # The depth of a body that is partly inside is another thing than that of its deepest point
+        if found[k] > 0.0 or exact.distance > 0.0:
+            assert found[k] == pytest.approx(exact.distance, abs=1e-8)
+        else:
+            through += 1
+        assert points[k] == pytest.approx(at_point.distance, abs=1e-8)
+    assert 5 < through < 115
+
+
+def test_obstacles_of_every_kind_survive_a_file(tmp_path: Path) -> None:
+    structure = cluttered()
+    back = read_structure(save_structure(structure, tmp_path / "all, of it.csv"))
+    assert (tmp_path / "all__of_it-5.stl").is_file()
+    assert [o.shape for o in back.obstacles[:4]] == [o.shape for o in structure.obstacles[:4]]
+    points = np.random.default_rng(7).normal(size=(200, 3))
+    np.testing.assert_allclose(back.clearance(points), structure.clearance(points), atol=1e-12)
+    # A mesh of a file has the precision of the file, so that it is written the same again
+    again = read_structure(save_structure(back, tmp_path / "other.csv"))
+    text = (tmp_path / "other.csv").read_text()
+    np.testing.assert_allclose(again.clearance(points), structure.clearance(points), atol=1e-12)
+    (tmp_path / "larger.csv").write_text(text.replace("other-5.stl,,", "other-5.stl,2,"))
+    larger = read_structure(tmp_path / "larger.csv")
+    shapes = [one.obstacles[4].shape for one in (larger, again)]
+    assert isinstance(shapes[0], TriangleMesh)
+    assert isinstance(shapes[1], TriangleMesh)
+    np.testing.assert_allclose(shapes[0].corners, 2.0 * shapes[1].corners, atol=1e-6)
+    assert pickle.loads(pickle.dumps(again)).digest == again.digest != larger.digest
+
+
+@pytest.mark.parametrize(
+    ("cells", "made", "field", "said"),
+    [
+        ("none.stl,,", b"", "line 6: d1", "no such file"),
+        ("rock.obj,,", b"", "line 6: d1", "expected an STL file"),
+        (",,", b"", "line 6: d1", "expected a text"),
+        ("bad.stl,,", b"solid nothing", "line 6: d1", ""),
+        ("bad.stl,,", b"", "line 6: d1", ""),
+        ("bad.stl,,", bytes(80) + b"\x09\0\0\0" + bytes(70), "line 6: d1", ""),
+        ("open.stl,,", b"", "line 6: d1", "open"),
+        ("open.stl,0,", b"", "line 6: d2", "scale above 0"),
+        ("open.stl,inches,", b"", "line 6: d2", "expected a number"),
+        ("open.stl,1,2", b"", "line 6: d3", "a file and a scale"),
+    ],
+)
+def test_meshes_that_cannot_be_read_are_named(cells: str, made: bytes, field: str, said: str, tmp_path: Path) -> None:
+    file = save_structure(cluttered(), tmp_path / "good.csv")
+    stl = (tmp_path / "good-5.stl").read_bytes()
+    (tmp_path / "bad.stl").write_bytes(made)
+    # The last triangle left out
+    count = int.from_bytes(stl[80:84], "little") - 1
+    (tmp_path / "open.stl").write_bytes(stl[:80] + count.to_bytes(4, "little") + stl[84:-50])
+    lines = file.read_text().splitlines()
+    text = "\n".join([*lines[:5], lines[-1].replace("good-5.stl,,", cells)])
+    (tmp_path / "one.csv").write_text(text)
+    with pytest.raises(StructureFileError) as caught:
+        read_structure(tmp_path / "one.csv")
+    assert caught.value.field == field
+    assert said in str(caught.value)
 
 
 @pytest.mark.parametrize("name", ALL)
@@ -276,7 +369,7 @@ def test_the_page_shows_a_file_that_is_read() -> None:
     page = (Path(__file__).parents[2] / "docs" / "walking.md").read_text()
     lines = page[page.index("    id, x, y") : page.index("(x, y, z) is the origin")].splitlines()
     structure = parse_structure("\n".join(line.strip() for line in lines))
-    assert (structure.ids, len(structure.obstacles)) == (("h1", "h2"), 2)
+    assert (structure.ids, len(structure.obstacles)) == (("h1", "h2"), 4)
     with pytest.raises(StructureFileError) as caught:
         parse_structure("\n\n".join([lines[0].strip(), lines[1].strip().replace("0.05", "-0.05")]))
     assert str(caught.value) in page

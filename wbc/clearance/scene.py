@@ -10,9 +10,11 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 
 from wbc import validation
 from wbc.clearance.tree import Moves, Tree
+from wbc.clearance.triangles import least_distances, point_distances, within
 from wbc.errors import DuplicateNameError, ShapeError, UnknownNameError
 from wbc.robot import Robot
 from wbc.robot.geometry.coal_shapes import sphere_round
@@ -89,6 +91,31 @@ class TriangleMesh:
         factor = validation.scalar("scale", scale, low=0.0, open_low=True)
         mesh = read_mesh(validation.file_path("path", path), np.full(3, factor))
         return cls(mesh.vertices[mesh.triangles], solid)
+
+    def distance(self, points: Array) -> Array:
+        """Distance [m] of points ``[..., 3]`` in the surface's frame; within a solid it is negative."""
+        at = np.asarray(points, dtype=np.float64).reshape(-1, 3)
+        out = point_distances(self.corners, at)
+        if self.solid:
+            out = np.where(self._within(at), -out, out)
+        return np.asarray(out.reshape(np.shape(points)[:-1]))
+
+    def segment_distance(self, a: Array, b: Array) -> Array:
+        """Distance [m] of the segments from ``a`` to ``b``, ``[..., 3]`` each in the surface's frame.
+
+        0 where one goes through the surface; of one wholly within a solid less the distance from the surface.
+        """
+        start, end = (np.asarray(x, dtype=np.float64).reshape(-1, 3) for x in (a, b))
+        out = least_distances(self.corners, start, end)
+        if self.solid:
+            out = np.where(self._within(start), -out, out)
+        return np.asarray(out.reshape(np.shape(a)[:-1]))
+
+    def _within(self, points: Array) -> NDArray[np.bool_]:
+        low, high = (bound(self.corners, axis=(0, 1)) for bound in (np.min, np.max))
+        out: NDArray[np.bool_] = np.all((points >= low) & (points <= high), axis=1)
+        out[out] = within(self.corners, points[out])
+        return out
 
 
 #: Those that have no end, and are fixed in the world

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from wbc.errors import ShapeError
 from wbc.validation import Array
-from wbc.walking.checker import clearances, clock_and_joints, grasps, table_of_holds
+from wbc.walking.checker import clearances, clock_and_joints, grasps, swept, table_of_holds
 from wbc.walking.checker.body import Bodies, Hands, estimate, single
 from wbc.walking.checker.holds import HoldTable, turns_between
 from wbc.walking.checker.report import Report, Tally
@@ -65,7 +65,7 @@ def check_walk(
     machine, tally = read_urdf(urdf), Tally()
     _check_names(log, machine)
     table = HoldTable.of(log)
-    for declare in (table_of_holds.declare, clock_and_joints.declare, clearances.declare):
+    for declare in (table_of_holds.declare, clock_and_joints.declare, clearances.declare, swept.declare):
         declare(tally, used)
     grasps.declare(tally, used, log)
     _declare(tally, used)
@@ -73,6 +73,8 @@ def check_walk(
     clock_and_joints.check_time(log, tally)
     clock_and_joints.check_rates(log, machine, tally)
     clock_and_joints.check_twist(log, used, tally)
+    clock_and_joints.check_jumps(log, tally)
+    swept.check_swept(log, machine, urdf, structure, used, tally)
     grasps.check_counts(log, used, tally)
     grasps.check_states(log, used, tally)
     grasps.check_shared(log, tally)
@@ -92,7 +94,9 @@ def check_walk(
         samples, loose = samples + len(block), loose + int(bodies.open.sum())
     grasps.check_closing(log, at_ticks.distance, at_ticks.angle, at_ticks.speed, at_ticks.rate, tally)
     grasps.check_drift(log, at_ticks.distance, at_ticks.angle, tally)
-    return Report(tally.findings(), len(log), samples, float(log.t[-1] - log.t[0]), loose)
+    return Report(
+        tally.findings(), len(log), samples, float(log.t[-1] - log.t[0]), loose, tally.findings(observed=True)
+    )
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,6 +14,7 @@ from wbc.walking.log.log import WalkLog
 
 #: A step of time below this [s] is none
 LEAST_STEP = 1e-12
+JUMP, SPIN_JUMP = "jump of the body's velocity", "jump of the body's turn rate"
 
 
 def declare(tally: Tally, rules: Rules) -> None:
@@ -26,6 +27,8 @@ def declare(tally: Tally, rules: Rules) -> None:
     tally.declare("joint step less rate x dt", rules.rounding, "rad")
     tally.declare("twist speed", rules.twist_speed, "m/s")
     tally.declare("twist turn rate", rules.twist_rate, "rad/s")
+    tally.declare(JUMP, rules.jump_speed, "m/s", observed=True)
+    tally.declare(SPIN_JUMP, rules.jump_rate, "rad/s", observed=True)
 
 
 def check_time(log: WalkLog, tally: Tally) -> None:
@@ -79,3 +82,21 @@ def check_twist(log: WalkLog, rules: Rules, tally: Tally) -> None:
     half = np.concatenate([axis * np.sin(angle / 2)[:, None], np.cos(angle / 2)[:, None]], axis=1)
     off = turns_between(rotations(half) @ rotation[:-window], rotation[window:])
     tally.add("twist turn rate", off / span, log.t, lambda _: "body")
+
+
+def check_jumps(log: WalkLog, tally: Tally) -> None:
+    """|v[k] - v[k - 1]| and |w[k] - w[k - 1]| of the body, out of its logged poses, from rest on."""
+    rotation, position = rotations(log.pose_body_in_structure[:, 3:]), log.pose_body_in_structure[:, :3]
+    gaps = np.maximum(np.diff(log.t), LEAST_STEP)[:, None]
+    turn = rotation[1:] @ np.swapaxes(rotation[:-1], 1, 2)
+    skew = np.stack(
+        [turn[:, 2, 1] - turn[:, 1, 2], turn[:, 0, 2] - turn[:, 2, 0], turn[:, 1, 0] - turn[:, 0, 1]], axis=1
+    )
+    angle = np.arctan2(np.linalg.norm(skew, axis=1), np.trace(turn, axis1=1, axis2=2) - 1.0)[:, None]
+    # Of a turn by no angle that can be told from 0, half of the skew part is the turn
+    length = np.linalg.norm(skew, axis=1, keepdims=True)
+    spin = skew * np.where(length > 1e-12, angle / np.maximum(length, 1e-12), 0.5)
+    for kind, moved in ((JUMP, np.diff(position, axis=0)), (SPIN_JUMP, spin)):
+        rate = moved / gaps
+        steps = np.linalg.norm(np.diff(rate, axis=0, prepend=0.0 * rate[:1]), axis=1)
+        tally.add(kind, steps, log.t, lambda _: "body")

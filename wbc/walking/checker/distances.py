@@ -1,4 +1,4 @@
-"""Distances of many segments from segments, boxes and surfaces; written for the checker alone."""
+"""Distances of many segments from segments, obstacles and surfaces; written for the checker alone."""
 
 from __future__ import annotations
 
@@ -6,8 +6,9 @@ from collections.abc import Callable
 
 import numpy as np
 
+from wbc.clearance import TriangleMesh
 from wbc.errors import UnknownNameError
-from wbc.shapes import Capsule
+from wbc.shapes import Capsule, Cylinder, Sphere
 from wbc.validation import Array
 from wbc.walking.holds.obstacle import Obstacle
 from wbc.walking.holds.surface import CylinderSurface, PlaneSurface, Surface
@@ -34,17 +35,23 @@ def between_segments(a: Array, b: Array, c: Array, d: Array) -> Array:
 
 
 def from_obstacle(obstacle: Obstacle, a: Array, b: Array) -> Array:
-    """Signed distance [s] of the segments a b from a box or a capsule, [s, 3] each."""
+    """Signed distance [s] of the segments a b from an obstacle, [s, 3] each."""
     place, shape = obstacle.placement, obstacle.shape
-    if isinstance(shape, Capsule):
-        half = shape.length / 2 * place.rotation[:, 2]
+    if isinstance(shape, TriangleMesh):
+        return shape.segment_distance(
+            (a - place.translation) @ place.rotation, (b - place.translation) @ place.rotation
+        )
+    if isinstance(shape, (Capsule, Sphere)):
+        half = (shape.length / 2 if isinstance(shape, Capsule) else 0.0) * place.rotation[:, 2]
         ends = (np.broadcast_to(place.translation + side * half, a.shape) for side in (-1.0, 1.0))
         return np.asarray(between_segments(a, b, *ends) - shape.radius)
     local = [(x - place.translation) @ place.rotation for x in (a, b)]
-    half = np.array(shape.size) / 2
+    size = np.array([shape.radius, shape.length / 2] if isinstance(shape, Cylinder) else np.array(shape.size) / 2)
 
     def distance(x: Array) -> Array:
-        beyond = np.abs(x) - half
+        if isinstance(shape, Cylinder):
+            x = np.stack([np.hypot(x[:, 0], x[:, 1]), x[:, 2]], axis=1)
+        beyond = np.abs(x) - size
         return np.asarray(np.linalg.norm(np.maximum(beyond, 0.0), axis=1) + np.minimum(beyond.max(axis=1), 0.0))
 
     return _least_on(distance, *local)

@@ -65,6 +65,7 @@ class Report:
         ticks, samples: how many were checked; duration [s].
         open_freedoms: samples at which the holding hands leave freedoms of the body open; there the body is compared in
             what they fix.
+        observed: checks that no walk is held to yet: what they find is shown and does not count.
     """
 
     findings: tuple[Finding, ...]
@@ -72,6 +73,7 @@ class Report:
     samples: int
     duration: float
     open_freedoms: int
+    observed: tuple[Finding, ...] = ()
 
     @property
     def ok(self) -> bool:
@@ -84,12 +86,12 @@ class Report:
         return tuple(finding for finding in self.findings if not finding.ok)
 
     def __getitem__(self, kind: str) -> Finding:
-        """The finding of a check.
+        """The finding of a check, observed ones among them.
 
         Raises:
             UnknownNameError: no such check.
         """
-        found = {finding.kind: finding for finding in self.findings}
+        found = {finding.kind: finding for finding in (*self.findings, *self.observed)}
         if kind not in found:
             raise UnknownNameError("check", kind, found)
         return found[kind]
@@ -115,6 +117,11 @@ class Report:
         out.add_column("violations", justify="right")
         for finding in self.findings:
             out.add_row(*_cells(finding), style="" if finding.ok else "red")
+        if self.observed:
+            out.add_section()
+            out.add_row(Text("observed, not counted:"))
+        for finding in self.observed:
+            out.add_row(*_cells(finding), style="" if finding.ok else "yellow")
         return out
 
 
@@ -123,9 +130,12 @@ class Tally:
 
     def __init__(self) -> None:
         self._findings: dict[str, Finding] = {}
+        self._observed: set[str] = set()
 
-    def declare(self, kind: str, limit: float, unit: str = "", least: bool = False) -> None:
-        """A check whose values must be at most ``limit``, or at least, with ``least``."""
+    def declare(self, kind: str, limit: float, unit: str = "", least: bool = False, observed: bool = False) -> None:
+        """A check: values of at most ``limit``, or at least, with ``least``; an observed one does not count."""
+        if observed:
+            self._observed.add(kind)
         self._findings[kind] = Finding(kind, 0, nan, limit, unit, nan, "", least)
 
     def worst(self, kind: str) -> float:
@@ -156,9 +166,9 @@ class Tally:
                 kind, old.count + count, old.worst, old.limit, old.unit, old.time, old.where, old.least
             )
 
-    def findings(self) -> tuple[Finding, ...]:
-        """All checks in the order in which they were declared."""
-        return tuple(self._findings.values())
+    def findings(self, observed: bool = False) -> tuple[Finding, ...]:
+        """The checks that count, or those that are observed, in the order in which they were declared."""
+        return tuple(one for kind, one in self._findings.items() if (kind in self._observed) == observed)
 
 
 def _cells(finding: Finding) -> list[Text]:

@@ -25,8 +25,10 @@ class Rules:
         rounding: by which a joint's steps may miss its logged rate times dt [rad].
         drift_distance, drift_angle: by which the offset of a closed hand may grow again.
         twist_speed, twist_rate: of the logged twist against the body's motion, means over ``twist_window``.
+        jump_speed, jump_rate: by which the body's velocity may change from tick to tick; observed.
         clearance, clearance_slack: least distance, and by how much it may be missed.
         exempt_distance: a hand this near to a hold may touch what the hold stands on.
+        exempt_depth: how deep it may be in that, beyond its roundness; observed.
         latch_time: of closing and of opening, less a tick.
 
     Raises:
@@ -49,9 +51,12 @@ class Rules:
     twist_speed: float = 0.01
     twist_rate: float = radians(1.0)
     twist_window: float = 0.1
+    jump_speed: float = 0.02
+    jump_rate: float = 0.02
     clearance: float = 1.0 * INCH
     clearance_slack: float = 1e-4
     exempt_distance: float = 3.0 * INCH
+    exempt_depth: float = 0.005
     latch_time: float = 0.1
 
     def __post_init__(self) -> None:

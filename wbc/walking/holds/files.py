@@ -15,8 +15,10 @@
 (x, y, z) is the origin [m], (ax, ay, az) the z axis and (rx, ry, rz) the direction whose part across it is the x axis,
 of any length. Holds come first, with z the approach direction, roll ``free``, ``fixed`` or a whole number from 2 to
 360, and max_tilt [rad]. The numbers d1, d2, d3 of a box are its sides along x, y, z; of a capsule radius and length
-between the centres of its ends, along z; of a ``cylinder`` surface its radius about z, and a ``plane`` has none. A
-text with a comma in it stands in double quotes. Empty lines and lines that begin with ``#`` do not count.
+between the centres of its ends, along z; of a sphere its radius; of a cylinder, which has flat ends, radius and length
+along z. Of a mesh d1 is an STL file, by its path from the structure's file, whose surface is closed, and d2 what its
+lengths are multiplied by (1 if empty). Of a ``cylinder`` surface d1 is the radius about z, and a ``plane`` has none.
+A text with a comma in it stands in double quotes. Empty lines and lines that begin with ``#`` do not count.
 """
 
 from __future__ import annotations
@@ -24,17 +26,21 @@ from __future__ import annotations
 import csv
 import os
 import pathlib
+import re
 from collections.abc import Mapping, Sequence
 from math import isfinite
 from typing import Any, TextIO
 
+import numpy as np
 import pinocchio as pin
 
 from wbc import validation
+from wbc.clearance import TriangleMesh
 from wbc.errors import StructureFileError, WbcError
-from wbc.shapes import Box, Capsule
+from wbc.shapes import Box, Capsule, Cylinder, Sphere
+from wbc.validation import Array
 from wbc.walking.holds.hold import Hold, checked_id, checked_roll, frame_of
-from wbc.walking.holds.obstacle import Obstacle
+from wbc.walking.holds.obstacle import Obstacle, ObstacleShape
 from wbc.walking.holds.structure import Structure
 from wbc.walking.holds.surface import CylinderSurface, PlaneSurface, Surface
 
@@ -45,8 +51,11 @@ COLUMNS: Mapping[str, tuple[str, ...]] = {
     "obstacles": ("id", "shape", *_POSE, "d1", "d2", "d3"),
     "surface": ("shape", *_POSE, "d1"),
 }
-#: Shape -> how many of d1, d2, d3 it has
-_SIZES = {"box": 3, "capsule": 2, "plane": 0, "cylinder": 1}
+#: Shape -> how many of d1, d2, d3 it has; a mesh has a file
+_OBSTACLES = {"box": 3, "capsule": 2, "sphere": 1, "cylinder": 2}
+_SURFACES = {"plane": 0, "cylinder": 1}
+#: What a mesh's file name does not take over from the structure's
+_UNPLAIN = re.compile(r"[^\w.-]")
 
 
 def read_structure(path: str | os.PathLike[str]) -> Structure:
@@ -60,16 +69,17 @@ def read_structure(path: str | os.PathLike[str]) -> Structure:
         text = file.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
         raise StructureFileError("structure", str(path), f"cannot be read: {error}") from error
-    return parse_structure(text, file.stem)
+    return parse_structure(text, file.stem, file.parent)
 
 
-def parse_structure(text: str, name: str = "structure") -> Structure:
-    """The structure in a text; see the module for its form.
+def parse_structure(text: str, name: str = "structure", folder: str | os.PathLike[str] = ".") -> Structure:
+    """The structure in a text; see the module for its form. The paths of meshes count from ``folder``.
 
     Raises:
         StructureFileError: a bad line: ``field`` names the line and the column.
     """
     validation.instance("text", text, str, "text")
+    beside = validation.file_path("folder", folder)
     section, header = "holds", False
     holds: dict[str, Hold] = {}
     obstacles: dict[str, Obstacle] = {}
@@ -89,7 +99,7 @@ def parse_structure(text: str, name: str = "structure") -> Structure:
         if section == "holds":
             _add(number, holds, _hold(row))
         elif section == "obstacles":
-            _add(number, obstacles, _obstacle(row))
+            _add(number, obstacles, _obstacle(row, beside))
         elif surface is not None:
             raise StructureFileError(f"line {number}", line.strip(), "a structure has one surface")
         else:
@@ -101,6 +111,8 @@ def parse_structure(text: str, name: str = "structure") -> Structure:
 
 def save_structure(structure: Structure, path: str | os.PathLike[str]) -> pathlib.Path:
     """Writes a structure such that reading gives every number back within 1e-15 of its size; returns the file.
+
+    A mesh becomes an STL file beside it, NAME-K.stl for the K-th obstacle, whose corners have single precision.
 
     Raises:
         StructureFileError: the file cannot be written.
@@ -116,8 +128,13 @@ def save_structure(structure: Structure, path: str | os.PathLike[str]) -> pathli
             if structure.obstacles:
                 stream.write("\n[obstacles]\n")
                 out.writerow(COLUMNS["obstacles"])
-            for obstacle in structure.obstacles:
-                kind, sizes = _shape_numbers(obstacle.shape)
+            for k, obstacle in enumerate(structure.obstacles, start=1):
+                if isinstance(obstacle.shape, TriangleMesh):
+                    mesh = file.with_name(f"{_UNPLAIN.sub('_', file.stem)}-{k}.stl")
+                    _write_stl(mesh, obstacle.shape.corners)
+                    kind, sizes = "mesh", [mesh.name, "", ""]
+                else:
+                    kind, sizes = _shape_numbers(obstacle.shape)
                 out.writerow([obstacle.id, kind, *_numbers(obstacle.placement), *sizes])
             if structure.surface is not None:
                 stream.write("\n[surface]\n")
@@ -187,9 +204,8 @@ class _Row:
                 )
         return self.made("rx, ry, rz", lambda: frame_of("frame", position, axis, reference))
 
-    def sizes(self, kind: str) -> list[float]:
+    def sizes(self, kind: str, count: int) -> list[float]:
         columns = [c for c in ("d1", "d2", "d3") if c in self.cells]
-        count = _SIZES[kind]
         for column in columns[count:]:
             if self.cells[column]:
                 raise StructureFileError(self.field(column), self.cells[column], f"a {kind} has {count} sizes")
@@ -215,16 +231,45 @@ def _hold(row: _Row) -> Hold:
     return found
 
 
-def _obstacle(row: _Row) -> Obstacle:
-    name, kind, pose = row.name(), row.choice("shape", ("box", "capsule")), row.pose()
-    sizes: Any = row.sizes(kind)
-    shape: Box | Capsule = row.made("d1, d2, d3", lambda: Capsule(*sizes) if kind == "capsule" else Box(tuple(sizes)))
+def _obstacle(row: _Row, folder: pathlib.Path) -> Obstacle:
+    name, kind, pose = row.name(), row.choice("shape", (*_OBSTACLES, "mesh")), row.pose()
+    if kind == "mesh":
+        return Obstacle(name, _mesh(row, folder), pose)
+    sizes: Any = row.sizes(kind, _OBSTACLES[kind])
+    makes = {"box": lambda: Box(tuple(sizes)), "capsule": lambda: Capsule(*sizes)}
+    makes |= {"sphere": lambda: Sphere(*sizes), "cylinder": lambda: Cylinder(*sizes)}
+    shape: ObstacleShape = row.made("d1, d2, d3", makes[kind])
     return Obstacle(name, shape, pose)
 
 
+def _mesh(row: _Row, folder: pathlib.Path) -> TriangleMesh:
+    path = row.text("d1")
+    if row.cells["d3"]:
+        raise StructureFileError(row.field("d3"), row.cells["d3"], "a mesh has a file and a scale")
+    scale = row.real("d2", low=0.0) if row.cells["d2"] else 1.0
+    if "\0" in path or pathlib.Path(path).suffix.lower() != ".stl":
+        raise StructureFileError(row.field("d1"), path, "expected an STL file")
+    if scale == 0.0:
+        raise StructureFileError(row.field("d2"), row.cells["d2"], "expected a scale above 0")
+    try:
+        return TriangleMesh.read(folder / path, scale)
+    except WbcError as error:
+        reason = str(error).removeprefix(f"{error.field}: ").split(" (got ")[0]
+        raise StructureFileError(row.field("d1"), path, reason) from error
+
+
+def _write_stl(path: pathlib.Path, corners: Array) -> None:
+    """A binary STL file: 80 bytes, the count, and a triangle's normal, corners and two more bytes."""
+    out = np.zeros(len(corners), dtype=[("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("more", "<u2")])
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    length = np.linalg.norm(normal, axis=1, keepdims=True)
+    out["normal"], out["corners"] = normal / np.where(length > 0.0, length, 1.0), corners
+    path.write_bytes(bytes(80) + np.uint32(len(corners)).astype("<u4").tobytes() + out.tobytes())
+
+
 def _surface(row: _Row) -> Surface:
-    kind, pose = row.choice("shape", ("plane", "cylinder")), row.pose()
-    sizes = row.sizes(kind)
+    kind, pose = row.choice("shape", tuple(_SURFACES)), row.pose()
+    sizes = row.sizes(kind, _SURFACES[kind])
     if kind == "plane":
         return PlaneSurface(pose)
     found: CylinderSurface = row.made("d1", lambda: CylinderSurface(pose, sizes[0]))
@@ -268,7 +313,9 @@ def _numbers(pose: pin.SE3) -> list[str]:
     return [repr(float(x)) for vector in vectors for x in vector]
 
 
-def _shape_numbers(shape: Box | Capsule) -> tuple[str, list[str]]:
-    if isinstance(shape, Capsule):
-        return "capsule", [repr(shape.radius), repr(shape.length), ""]
-    return "box", [repr(x) for x in shape.size]
+def _shape_numbers(shape: Box | Capsule | Sphere | Cylinder) -> tuple[str, list[str]]:
+    if isinstance(shape, Box):
+        return "box", [repr(x) for x in shape.size]
+    if isinstance(shape, Sphere):
+        return "sphere", [repr(shape.radius), "", ""]
+    return type(shape).__name__.lower(), [repr(shape.radius), repr(shape.length), ""]

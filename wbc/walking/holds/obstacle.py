@@ -9,48 +9,66 @@ import numpy as np
 import pinocchio as pin
 
 from wbc import validation
+from wbc.clearance import TriangleMesh
 from wbc.errors import ShapeError
 from wbc.robot.geometry.segments import segment_distances
-from wbc.shapes import Box, Capsule
+from wbc.shapes import Box, Capsule, Cylinder, Sphere
 from wbc.validation import Array
 from wbc.walking.holds.hold import checked_id
 
+#: What an obstacle can be; a mesh is a closed surface
+ObstacleShape = Box | Capsule | Sphere | Cylinder | TriangleMesh
 #: Golden ratio's inverse, and how often an interval is cut by it: to 5e-10 of its length
 GOLDEN, CUTS = (5**0.5 - 1) / 2, 45
 
 
 @dataclass(frozen=True, eq=False)
 class Obstacle:
-    """A box or capsule of a structure that no link may touch; the constraint is :class:`wbc.tasks.Obstacle`.
+    """A body of a structure that no link may touch; the constraint is :class:`wbc.tasks.Obstacle`.
 
     Attributes:
         id: name, unique among the structure's obstacles.
-        shape: :class:`~wbc.shapes.Box` or :class:`~wbc.shapes.Capsule`.
+        shape: :class:`~wbc.shapes.Box`, :class:`~wbc.shapes.Capsule`, :class:`~wbc.shapes.Sphere`,
+            :class:`~wbc.shapes.Cylinder` (solid, with flat ends) or a solid :class:`~wbc.clearance.TriangleMesh`.
         placement: pose of the shape in the structure's frame.
 
     Raises:
-        ShapeError: an empty id or another shape. NotFiniteError, RotationError: a bad placement.
+        ShapeError: an empty id, another shape, or a mesh that is a sheet. NotFiniteError, RotationError: a bad
+            placement.
     """
 
     id: str
-    shape: Box | Capsule
+    shape: ObstacleShape
     placement: pin.SE3
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "id", checked_id("Obstacle.id", self.id))
-        if not isinstance(self.shape, (Box, Capsule)):
-            raise ShapeError("Obstacle.shape", self.shape, "expected a Box or a Capsule")
+        if not isinstance(self.shape, ObstacleShape):
+            raise ShapeError(
+                "Obstacle.shape",
+                self.shape,
+                f"of {self.id!r}: expected a Box, Capsule, Sphere, Cylinder or TriangleMesh",
+            )
+        if isinstance(self.shape, TriangleMesh) and not self.shape.solid:
+            raise ShapeError("Obstacle.shape", "a sheet", f"of {self.id!r}: expected a closed mesh (solid=True)")
         object.__setattr__(self, "placement", validation.pose("Obstacle.placement", self.placement))
 
     def distance(self, points: Array) -> Array:
         """Signed distance [m] of points ``[..., 3]`` in the structure's frame from the body."""
         local = (np.asarray(points, dtype=np.float64) - self.placement.translation) @ self.placement.rotation
-        if isinstance(self.shape, Capsule):
-            half = self.shape.length / 2
+        shape = self.shape
+        if isinstance(shape, TriangleMesh):
+            return shape.distance(local)
+        if isinstance(shape, (Capsule, Sphere)):
+            half = shape.length / 2 if isinstance(shape, Capsule) else 0.0
             local = local - np.clip(local[..., 2:], -half, half) * np.array([0.0, 0.0, 1.0])
             length: Array = np.linalg.norm(local, axis=-1)
-            return length - self.shape.radius
-        beyond = np.abs(local) - np.array(self.shape.size) / 2
+            return length - shape.radius
+        if isinstance(shape, Cylinder):
+            across = np.linalg.norm(local[..., :2], axis=-1) - shape.radius
+            beyond = np.stack([across, np.abs(local[..., 2]) - shape.length / 2], axis=-1)
+        else:
+            beyond = np.abs(local) - np.array(shape.size) / 2
         outside = np.linalg.norm(np.maximum(beyond, 0.0), axis=-1)
         out: Array = outside + np.minimum(beyond.max(axis=-1), 0.0)
         return out
@@ -58,12 +76,17 @@ class Obstacle:
     def segment_distance(self, a: Array, b: Array) -> Array:
         """Least signed distance [m] on the segments from ``a`` to ``b``, ``[..., 3]`` each in the structure's frame.
 
-        Of a box it is found by golden section, as a signed distance from a convex body is convex along a line; the
-        error is under 1e-9 of the segment's length.
+        Of a box and a cylinder it is found by golden section, as a signed distance from a convex body is convex along
+        a line; the error is under 1e-9 of the segment's length. Of a mesh it is 0 where a segment goes through the
+        surface, and that of the point next to the surface where one is wholly inside.
         """
-        if isinstance(self.shape, Box):
+        if isinstance(self.shape, (Box, Cylinder)):
             return _least_along(self.distance, a, b)
-        half = self.shape.length / 2 * self.placement.rotation[:, 2]
+        if isinstance(self.shape, TriangleMesh):
+            at, turn = self.placement.translation, self.placement.rotation
+            return self.shape.segment_distance((np.asarray(a) - at) @ turn, (np.asarray(b) - at) @ turn)
+        length = self.shape.length if isinstance(self.shape, Capsule) else 0.0
+        half = length / 2 * self.placement.rotation[:, 2]
         ends = (self.placement.translation - half, self.placement.translation + half)
         columns = [np.broadcast_to(point, np.shape(a)).reshape(-1, 3).T for point in (a, b, *ends)]
         return np.asarray(segment_distances(*columns).reshape(np.shape(a)[:-1]) - self.shape.radius)

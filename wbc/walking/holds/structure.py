@@ -12,6 +12,7 @@ import numpy as np
 import pinocchio as pin
 
 from wbc import validation
+from wbc.clearance import TriangleMesh
 from wbc.errors import DuplicateNameError, ShapeError, UnknownNameError
 from wbc.validation import Array
 from wbc.walking.holds.hold import FREE, Hold
@@ -127,7 +128,10 @@ class Structure:
         for hold in self.holds:
             h.update(f"{hold.id} {hold.roll} {hold.max_tilt.hex()}".encode() + _bytes(hold.pose))
         for obstacle in self.obstacles:
-            h.update(f"{obstacle.id} {obstacle.shape}".encode() + _bytes(obstacle.placement))
+            shape = obstacle.shape
+            text = f"{obstacle.id} {'mesh' if isinstance(shape, TriangleMesh) else shape}".encode()
+            corners = shape.corners.tobytes() if isinstance(shape, TriangleMesh) else b""
+            h.update(text + corners + _bytes(obstacle.placement))
         if self.surface is not None:
             h.update(f"{type(self.surface).__name__} {getattr(self.surface, 'radius', 0.0)!r}".encode())
             h.update(_bytes(self.surface.pose))
@@ -174,8 +178,9 @@ class Structure:
     def segment_clearance(self, a: Any, b: Any) -> Array:
         """Least :meth:`clearance` [m] on the segments from ``a`` to ``b``, ``[..., 3]`` each.
 
-        A capsule's clearance is that of its core less its radius. Exact for surfaces and capsules, within 1e-9 m for
-        boxes; for a structure with neither surface nor obstacles it is that of the ends.
+        A capsule's clearance is that of its core less its radius. Exact for surfaces, capsules and spheres, within
+        1e-9 m for boxes and cylinders; of meshes see :meth:`Obstacle.segment_distance`. For a structure with neither
+        surface nor obstacles it is that of the ends.
 
         Raises:
             ShapeError, NotFiniteError: not finite numbers, three a point.

@@ -6,6 +6,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from wbc.clearance import TriangleMesh
 from wbc.robots import Walker
 from wbc.shapes import PlacedShape
 from wbc.style import BLUE, ORANGE, PURPLE, TEAL
@@ -98,7 +99,11 @@ def obstacle_triangles(structure: Structure, rows: NDArray[np.int64]) -> Array:
     places, parts = structure.positions[rows], []
     for obstacle in structure.obstacles:
         if structure.surface is None or (len(rows) and obstacle.distance(places).min() < EDGE + PATCH):
-            parts.append(render.triangles(PlacedShape(obstacle.shape, obstacle.placement)))
+            shape, place = obstacle.shape, obstacle.placement
+            if isinstance(shape, TriangleMesh):
+                parts.append(np.asarray(shape.corners @ place.rotation.T + place.translation))
+            else:
+                parts.append(render.triangles(PlacedShape(shape, place)))
     return np.concatenate(parts) if parts else np.zeros((0, 3, 3))
 
 
