@@ -13,7 +13,7 @@ from itertools import combinations
 import numpy as np
 import pinocchio as pin
 
-from wbc.clearance import Body, EndlessCylinder, Exemption, Motion, Pair, Scene, Sweeper, Tree
+from wbc.clearance import SweptBody, EndlessCylinder, Exemption, Motion, Pair, SweptScene, Sweeper, Tree
 from wbc.shapes import Capsule, HalfSpace
 from wbc.validation import Array
 from wbc.walking.checker.report import Tally
@@ -61,7 +61,7 @@ def check_swept(
     columns = [log.joints.index(name) for name in tree.coordinates]
     motion = Motion.linear(tree, log.t, log.q[:, columns], log.pose_body_in_structure)
     exemptions = [] if structure is None else list(_exemptions(log, urdf, bodies, structure, rules))
-    sweeper = Sweeper(Scene(tree, [*bodies, *things], pairs))
+    sweeper = Sweeper(SweptScene(tree, [*bodies, *things], pairs))
     swept = sweeper.sweep(motion, exemptions=exemptions, aim="every", tolerance=max(tolerance, 1e-6))
     least = np.maximum(swept.bound, -tolerance) + required
     for k in np.flatnonzero(swept.found < 0.0):
@@ -76,10 +76,10 @@ def check_swept(
         tally.add(kind, least[part] + 1e-12, swept.times[part], where)
 
 
-def _links(log: WalkLog, urdf: Urdf, tree: Tree) -> list[Body]:
+def _links(log: WalkLog, urdf: Urdf, tree: Tree) -> list[SweptBody]:
     """Capsules of the links; what moves with a hand's frame has its grasp point."""
     carried = {link: hand for hand in log.hands for link in urdf.carried_with(hand)}
-    out, count = list[Body](), dict[str, int]()
+    out, count = list[SweptBody](), dict[str, int]()
     for capsule in urdf.capsules:
         link = capsule.link
         count[link] = count.get(link, 0) + 1
@@ -87,7 +87,7 @@ def _links(log: WalkLog, urdf: Urdf, tree: Tree) -> list[Body]:
         grasp = None
         if link in carried:
             grasp = (tree.links[link][1].inverse() * tree.links[carried[link]][1]).translation
-        out.append(Body(name, *_capsule(capsule), grasp=grasp))
+        out.append(SweptBody(name, *_capsule(capsule), grasp=grasp))
     return out
 
 
@@ -100,17 +100,17 @@ def _capsule(capsule: CapsuleOfLink) -> tuple[Capsule, str, pin.SE3]:
     return Capsule(capsule.radius, length), capsule.link, pin.SE3(turn, (capsule.a + capsule.b) / 2.0)
 
 
-def _things(structure: Structure) -> list[Body]:
-    out = [Body(f"obstacle {one.id}", one.shape, placement=one.placement) for one in structure.obstacles]
+def _things(structure: Structure) -> list[SweptBody]:
+    out = [SweptBody(f"obstacle {one.id}", one.shape, placement=one.placement) for one in structure.obstacles]
     surface = structure.surface
     if surface is not None:
         shape = HalfSpace() if isinstance(surface, PlaneSurface) else EndlessCylinder(surface.radius)
-        out.append(Body("surface", shape, placement=surface.pose))
+        out.append(SweptBody("surface", shape, placement=surface.pose))
     return out
 
 
 def _exemptions(
-    log: WalkLog, urdf: Urdf, bodies: Sequence[Body], structure: Structure, rules: Rules
+    log: WalkLog, urdf: Urdf, bodies: Sequence[SweptBody], structure: Structure, rules: Rules
 ) -> Iterator[Exemption]:
     for arm, hand in enumerate(log.hands):
         mine = [body for body in bodies if body.link in urdf.carried_with(hand)]
