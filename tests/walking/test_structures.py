@@ -11,7 +11,7 @@ import pinocchio as pin
 import pytest
 
 from bench.walk.structures import surface_of
-from wbc.clearance import Body, Motion, Pair, Scene, Sweeper, Tree, TriangleMesh
+from wbc.clearance import Motion, Pair, Sweeper, SweptBody, SweptScene, Tree, TriangleMesh
 from wbc.errors import DuplicateNameError, NotFiniteError, RangeError, RotationError, ShapeError, UnknownNameError
 from wbc.shapes import Box, Capsule, Cylinder, HalfSpace, Sphere
 from wbc.walking import (
@@ -228,10 +228,10 @@ def test_distances_of_obstacles_are_those_of_the_swept_proof(kind: int) -> None:
     sizes = np.linalg.norm(b - a, axis=1)
     for k in range(len(a)):
         turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), (b[k] - a[k]) / sizes[k]).matrix()
-        core = Body("core", Capsule(0.0, sizes[k]), placement=pin.SE3(turn, (a[k] + b[k]) / 2))
-        point = Body("point", Sphere(0.0), placement=pin.SE3(np.eye(3), a[k]))
-        thing = Body("thing", obstacle.shape, placement=obstacle.placement)
-        scene = Scene(tree, [core, point, thing], [Pair("core", "thing"), Pair("point", "thing")])
+        core = SweptBody("core", Capsule(0.0, sizes[k]), placement=pin.SE3(turn, (a[k] + b[k]) / 2))
+        point = SweptBody("point", Sphere(0.0), placement=pin.SE3(np.eye(3), a[k]))
+        thing = SweptBody("thing", obstacle.shape, placement=obstacle.placement)
+        scene = SweptScene(tree, [core, point, thing], [Pair("core", "thing"), Pair("point", "thing")])
         exact, at_point = Sweeper(scene).at(Motion.linear(tree, [0.0, 1.0], np.zeros((2, 0))), 0.0)
         # The depth of a body that is partly inside is another thing than that of its deepest point
         if found[k] > 0.0 or exact.distance > 0.0:

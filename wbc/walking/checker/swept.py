@@ -13,7 +13,7 @@ from itertools import combinations
 import numpy as np
 import pinocchio as pin
 
-from wbc.clearance import SweptBody, EndlessCylinder, Exemption, Motion, Pair, SweptScene, Sweeper, Tree
+from wbc.clearance import EndlessCylinder, Exemption, Motion, Pair, Sweeper, SweptBody, SweptScene, Tree
 from wbc.shapes import Capsule, HalfSpace
 from wbc.validation import Array
 from wbc.walking.checker.report import Tally
