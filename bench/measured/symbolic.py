@@ -7,7 +7,7 @@ import casadi as ca
 import wbc.robots
 from bench.sheet import Sheet
 from tests.symbolic.test_tracer import CASES, EXPRESSIONS, functions
-from wbc.symbolic import Centroidal, Dynamics, Kinematics, Motion
+from wbc.symbolic import Centroidal, Dynamics, Kinematics, Velocities
 
 ROBOTS = {
     "Panda, 9 dof": (("panda", {"lock": ()}), "panda_hand_tcp"),
@@ -34,7 +34,7 @@ def parts() -> dict[str, Sheet | str]:
 def sizes(name: str, options: dict[str, object], frame: str) -> dict[str, int]:
     """Quantity -> instructions of its function."""
     kin = Kinematics(wbc.robots.load(name, **options).model)
-    motion = Motion(kin)
+    motion = Velocities(kin)
     dynamics = Dynamics(kin, motion)
     centroidal = Centroidal(dynamics)
     pose = kin.pose(frame)
