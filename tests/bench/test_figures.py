@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import importlib
+import pkgutil
 import re
 import subprocess
 from pathlib import Path
 
 import pytest
 
+from bench import measured
 from bench.figures import __main__ as command
 from bench.figures import floors, index, pages, store
 from bench.figures.index import FIGURES, Figure, render
@@ -43,6 +46,14 @@ def test_every_figure_is_on_a_page_and_measures_what_exists() -> None:
         if not figure.command:
             assert (ROOT / "bench" / "measured" / f"{name}.py").is_file()
     assert {name for name, _ in shown} == set(FIGURES)
+
+
+def test_every_producer_has_parts() -> None:
+    producers = [
+        importlib.import_module(f"bench.measured.{found.name}") for found in pkgutil.iter_modules(measured.__path__)
+    ]
+    assert len(producers) > 15
+    assert [module.__name__ for module in producers if not callable(getattr(module, "parts", None))] == []
 
 
 def test_the_picture_of_the_floors_is_that_of_the_table() -> None:
