@@ -72,6 +72,16 @@ def test_there_and_back_and_stop(
     assert report.ok, str(report)
 
 
+def test_a_second_walk_on_a_stack_is_as_the_first(machine: Walker, structure: Structure, begin: Plan) -> None:
+    stack, found = WalkStack(machine, structure, collisions=False), []
+    for _ in range(2):
+        walk = Walk(machine, structure, begin, stack=stack)
+        drive, recorder = Drive(walk), WalkRecorder(walk)
+        found.append([tick.q for tick in drive_on(drive, recorder, 1.5, 0.0, 4 * INCH, 0.0)])
+        assert walk.swinging is not None or walk.events
+    np.testing.assert_array_equal(found[0], found[1])
+
+
 def test_a_hand_that_could_not_hold_on_the_new_way_lands_first(
     machine: Walker, structure: Structure, stack: WalkStack
 ) -> None:

@@ -158,6 +158,13 @@ class WalkStack:
         for swing, axis in zip(self._swings, self._axes, strict=True):
             swing.gain, axis.gain = SWING_GAIN, AXIS_GAIN
 
+    def begin(self, q: Array) -> None:
+        """A walk begins at ``q`` ``[nq]``, at rest: nothing is left of the walk that was on this stack before."""
+        self.controller.reset(q)
+        self._posture[:], self._turning[:], self._mask[:] = self.walker.robot.neutral, 0.0, RESTING
+        self._near = (-1, False)
+        self._rest.target, self._rest.feedforward, self._rest.mask = q, self._turning, self._mask
+
     def hold(self, arm: int, hold: int, roll: int = ANY) -> None:
         """A closed hand, at one of the rolls of its hold: the hold is exact; a hand that may tilt prefers not to.
 

@@ -102,6 +102,7 @@ class Walk:
             machine.begin(self.leader.first(), machine.held)
         else:
             machine.begin(state.q, state.held, state.time)
+        self.stack.begin(machine.q)
         self.hands.begin([int(grips.roll[grip]) for grip in mine])
 
     @property
