@@ -12,7 +12,7 @@ import pytest
 
 import wbc
 from wbc.robot import DHRow
-from wbc.robots import Arm, Margins, Walker, WalkerData
+from wbc.robots import Margins, Walker, WalkerArm, WalkerData
 from wbc.robots.link_tree import Link, build_model
 from wbc.robots.walker_arms import BODY, chain
 from wbc.validation import Array
@@ -163,14 +163,14 @@ def numeric_walker() -> Walker:
     """A body with three such arms, 0.3 m from its middle."""
     rows = [DHRow(a, alpha, d, lower=-LIMIT, upper=LIMIT, velocity=RATE) for a, alpha, d in ROWS]
     seeds = np.array([[0.28, 3.0, 1.56, 0.15, 1.57, 0.0], [0.28, 3.05, 2.01, 2.8, -1.57, 0.0]])
-    limb, arms, links = NumericLimb.of(wbc.robots.from_dh(rows).model, seeds), list[Arm](), list[Link]()
+    limb, arms, links = NumericLimb.of(wbc.robots.from_dh(rows).model, seeds), list[WalkerArm](), list[Link]()
     for k in range(3):
         name, out = f"arm{k + 1}", pin.SE3(np.eye(3), np.array([0.3, 0.0, 0.0]))
         base = pin.SE3(pin.utils.rotate("z", 2 * pi * k / 3), np.zeros(3)) * out
         links += [Link(f"{name}_base", BODY, base), *chain(name, f"{name}_base", rows, f"{name}_hand")]
         joints = tuple(f"{name}_joint{j}" for j in range(1, 7))
         some = slice(7 + 6 * k, 13 + 6 * k), slice(6 + 6 * k, 12 + 6 * k)
-        arms.append(Arm(name, base, joints, *some, f"{name}_base", f"{name}_hand", ()))
+        arms.append(WalkerArm(name, base, joints, *some, f"{name}_base", f"{name}_hand", ()))
     neutral = {joint: value for arm in arms for joint, value in zip(arm.joints, seeds[0].tolist(), strict=True)}
     model = build_model("three_ur5", BODY, links)
     robot = wbc.robots.load(model, base="floating", neutral=neutral, acceleration=ACCELERATION)
