@@ -45,17 +45,6 @@ def attach(package: str, file: str, renamed: Mapping[str, str] | None = None) ->
     return find
 
 
-def renamed(name: str) -> Any:
-    """A property under the old name of attribute ``name``, for one version; whoever reads it is warned."""
-
-    def get(owner: Any) -> Any:
-        text = f"this attribute of {type(owner).__name__} is called {name} now"
-        warnings.warn(text, DeprecationWarning, stacklevel=2)
-        return getattr(owner, name)
-
-    return property(get, doc=f"Old name of ``{name}``.")
-
-
 def _imports(tree: ast.Module) -> dict[str, tuple[str, str]]:
     """Public name -> (module, name there), from the imports under ``if TYPE_CHECKING``."""
     blocks = (n for n in tree.body if isinstance(n, ast.If) and getattr(n.test, "id", "") == "TYPE_CHECKING")

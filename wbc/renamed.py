@@ -29,6 +29,21 @@ def renamed(**names: str) -> Callable[[F], F]:
     return decorate
 
 
+def old_attribute(name: str, old: str = "") -> Any:
+    """A property under the old name of attribute ``name``; whoever reads it is warned, with the old name if given.
+
+    For classes whose constructor takes no old names, as wrapping it would cost time wherever they are made.
+    """
+
+    def get(owner: Any) -> Any:
+        kind = type(owner).__name__
+        text = f"{kind}.{old} is {kind}.{name} now" if old else f"this attribute of {kind} is called {name} now"
+        warnings.warn(text, DeprecationWarning, stacklevel=2)
+        return getattr(owner, name)
+
+    return property(get, doc=f"Old name of ``{name}``.")
+
+
 def _function(function: Callable[..., Any], title: str, names: dict[str, str]) -> Callable[..., Any]:
     @functools.wraps(function)
     def call(*args: Any, **given: Any) -> Any:
@@ -45,9 +60,4 @@ def _function(function: Callable[..., Any], title: str, names: dict[str, str]) -
 def _class(kind: Any, names: dict[str, str]) -> None:
     kind.__init__ = _function(kind.__init__, kind.__name__, names)
     for old, new in names.items():
-
-        def read(instance: Any, old: str = old, new: str = new) -> Any:
-            warnings.warn(f"{kind.__name__}.{old} is {kind.__name__}.{new} now", DeprecationWarning, stacklevel=2)
-            return getattr(instance, new)
-
-        setattr(kind, old, property(read))
+        setattr(kind, old, old_attribute(new, old))

@@ -9,7 +9,7 @@ from enum import StrEnum
 import numpy as np
 
 from wbc.controller.tick.buffers import CHAIN, INFINITE
-from wbc.lazy import renamed
+from wbc.renamed import old_attribute
 from wbc.stack.layout import Block, Layout
 from wbc.stack.memory import LEVEL_NUMBERS
 from wbc.tasks._direction import Direction
@@ -53,7 +53,7 @@ class Binding:
     multiplier: float
     level: int | None = 0
 
-    side = renamed("bound")
+    side = old_attribute("bound")
 
     def __str__(self) -> str:
         return f"{self.item}/{self.row} {self.bound}"

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wbc.lazy import renamed
+from wbc.renamed import old_attribute
 
 RELATIONS = {"lower": "at least", "upper": "at most", "equal": "exactly"}
 
@@ -52,7 +52,7 @@ class Bound:
     margin: float | None = None
     actuator: bool = False
 
-    side = renamed("which")
+    side = old_attribute("which")
 
     @property
     def name(self) -> str:
@@ -74,7 +74,7 @@ class Give:
     bound: Bound
     amount: float
 
-    side = renamed("bound")
+    side = old_attribute("bound")
 
     def __str__(self) -> str:
         return f"{self.bound.name} by {amount(self.amount, self.bound.unit)}"
@@ -98,7 +98,7 @@ class Contradiction:
     enough: bool
     cheapest: Give
 
-    sides = renamed("bounds")
+    sides = old_attribute("bounds")
 
     def __str__(self) -> str:
         members = listed(self.bounds)
@@ -138,7 +138,7 @@ class Loss:
     alone: float
     to: tuple[Share, ...]
 
-    asked = renamed("requested")
+    asked = old_attribute("requested")
 
     def __str__(self) -> str:
         text = f"{self.task} misses {amount(self.lost, self.unit)} of {amount(self.requested, self.unit)}"
@@ -165,7 +165,7 @@ class Price:
     amount: float
     unit: str
 
-    side = renamed("bound")
+    side = old_attribute("bound")
 
     def __str__(self) -> str:
         bound, cost = self.bound, amount(self.amount, self.unit)
