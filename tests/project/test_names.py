@@ -28,7 +28,9 @@ def test_dir_shows_every_name_once() -> None:
     assert all(getattr(wbc, name) is not None for name in dir(wbc))
 
 
-@pytest.mark.parametrize("name", ["wbc", "wbc.analysis", "wbc.coordinates", "wbc.robots", "wbc.trajectory"])
+@pytest.mark.parametrize(
+    "name", ["wbc", "wbc.analysis", "wbc.coordinates", "wbc.robots", "wbc.track", "wbc.trajectory"]
+)
 def test_late_names_are_there_and_hide_no_module(name: str) -> None:
     package = importlib.import_module(name)
     assert sorted(dir(package)) == sorted(package.__all__)
@@ -59,6 +61,9 @@ def test_an_unknown_name_is_an_attribute_error() -> None:
         ("analysis", "Witness", "RankWitness"),
         ("analysis", "Branch", "LocusBranch"),
         ("robots", "Arm", "WalkerArm"),
+        ("track", "Moving", "MovingObstacle"),
+        ("track", "Path", "TimedPath"),
+        ("track", "Plan", "PathRun"),
     ],
 )
 def test_old_names_are_found_and_said_to_be_old(package: str, old: str, new: str) -> None:

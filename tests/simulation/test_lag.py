@@ -49,7 +49,7 @@ def test_a_tracked_path_lags_and_ends_where_it_ends() -> None:
     pin.framesForwardKinematics(robot.model, data, robot.neutral)
     start = data.oMf[robot.model.getFrameId("panda_hand_tcp")].copy()
     there = pin.SE3(start.rotation, start.translation + np.array([0.0, 0.1, -0.1]))
-    plan = track.Plan(
+    plan = track.PathRun(
         robot, "panda_hand_tcp", track.SplinePath([0.0, 1.5], [start, there]), "line", robot.neutral, dt=0.01
     )
     exact, lagging = track.track(plan), track.track(plan, plant=LaggingPlant(robot, *SERVO))
@@ -141,7 +141,7 @@ def test_a_plant_of_another_robot_is_refused_everywhere(
 ) -> None:
     other = KinematicPlant(wbc.robots.load("ur5"))
     robot = wbc.robots.load("panda")
-    plan = track.Plan(robot, "panda_hand_tcp", track.SplinePath([0.0, 1.0], [np.eye(4)] * 2), "none", robot.neutral)
+    plan = track.PathRun(robot, "panda_hand_tcp", track.SplinePath([0.0, 1.0], [np.eye(4)] * 2), "none", robot.neutral)
     with pytest.raises(ShapeError, match=r"plant\.nq"):
         track.track(plan, plant=other)
     with pytest.raises(ShapeError, match=r"plant\.nq"):

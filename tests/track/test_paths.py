@@ -9,7 +9,7 @@ import pinocchio as pin
 import pytest
 
 from wbc.errors import NotFiniteError, RangeError, ShapeError, UnknownNameError
-from wbc.track.path import Approach, Path, SplinePath, smooth_step
+from wbc.track.path import Approach, SplinePath, TimedPath, smooth_step
 from wbc.track.presets import PRESETS, preset
 
 START = pin.SE3(pin.utils.rotate("x", math.pi), np.array([0.4, 0.1, 0.5]))
@@ -31,7 +31,7 @@ def spline(seed: int) -> SplinePath:
     return SplinePath(np.cumsum(rng.uniform(0.5, 1.5, 5)), poses(5, seed))
 
 
-PATHS: dict[str, Path] = {
+PATHS: dict[str, TimedPath] = {
     "spline0": spline(0),
     "spline1": spline(1),
     "approach": Approach(START, spline(2), 1.5),

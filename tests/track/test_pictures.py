@@ -95,7 +95,9 @@ def test_picture_and_plots_of_a_robot_without_meshes(tmp_path: Path) -> None:
     pin.framesForwardKinematics(robot.model, data, start)
     here = data.oMf[robot.model.getFrameId("tip")].copy()
     there = pin.SE3(here.rotation, here.translation + np.array([0.0, -0.2, 0.0]))
-    plan = track.Plan(robot, "tip", track.SplinePath([0.0, 1.0], [here, there]), "down", start, dt=0.02, backend="vm")
+    plan = track.PathRun(
+        robot, "tip", track.SplinePath([0.0, 1.0], [here, there]), "down", start, dt=0.02, backend="vm"
+    )
     log = track.track(plan)
     file = save_picture(log, robot, tmp_path / "overview.png", size=(120, 80))
     assert file is not None

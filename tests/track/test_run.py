@@ -17,7 +17,7 @@ from wbc.errors import MissingShapeError, UnknownNameError, WbcError
 from wbc.shapes import PlacedShape
 from wbc.track.clearance import clearances, self_clearances
 from wbc.track.log import LogFileError
-from wbc.track.setup import ElbowSwing, Moving
+from wbc.track.setup import ElbowSwing, MovingObstacle
 from wbc.track.summary import save_summary, summarise
 
 
@@ -74,7 +74,9 @@ def test_coal_agrees_with_the_margins() -> None:
 
 def test_clearance_of_a_moving_obstacle() -> None:
     robot = wbc.robots.load("panda")
-    ball = Moving(wbc.shapes.Sphere(0.1), pin.SE3(np.eye(3), np.array([3.0, 0.0, 0.5])), np.array([-0.5, 0.0, 0.0]))
+    ball = MovingObstacle(
+        wbc.shapes.Sphere(0.1), pin.SE3(np.eye(3), np.array([3.0, 0.0, 0.5])), np.array([-0.5, 0.0, 0.0])
+    )
     q = np.vstack([robot.neutral, robot.neutral])
     gaps = clearances(robot, q, {"ball": ball}, np.array([0.0, 1.0]))
     for values in gaps.values():
@@ -172,6 +174,6 @@ def test_stopping_leaves_the_ticks_that_were_done() -> None:
 def test_a_robot_without_an_elbow_plane_is_told() -> None:
     robot = wbc.robots.load("double_pendulum")
     path = track.preset("circle", pin.SE3.Identity(), 1.0).path
-    plan = track.Plan(robot, robot.frame_names[-1], path, "circle", robot.neutral, plane=ElbowSwing())
+    plan = track.PathRun(robot, robot.frame_names[-1], path, "circle", robot.neutral, plane=ElbowSwing())
     with pytest.raises(WbcError, match="knows no shoulder, elbow and wrist"):
         plan.stack()

@@ -13,7 +13,7 @@ from wbc import robots, shapes
 from wbc.cli import options
 from wbc.cli.session import Output, perform
 from wbc.track.presets import preset
-from wbc.track.setup import ElbowSwing, Moving, Plan
+from wbc.track.setup import ElbowSwing, MovingObstacle, PathRun
 
 #: The hand points down at (0.48, 0.42, 0.30) m, the elbow is up
 START = (1.0579, 0.3132, -0.38, -1.7484, 0.1283, 2.0373, 1.4223)
@@ -21,7 +21,7 @@ START = (1.0579, 0.3132, -0.38, -1.7484, 0.1283, 2.0373, 1.4223)
 LAMP = (0.25, -0.32, 0.62)
 
 
-def plan(duration: float = 12.0, rate: float = 200.0, solver: str = "daqp", backend: str = "auto") -> Plan:
+def plan(duration: float = 12.0, rate: float = 200.0, solver: str = "daqp", backend: str = "auto") -> PathRun:
     """A Panda's hand goes round a ball of 0.12 m and back, while its elbow plane is commanded to swing by
     0.5 rad; a second ball of 0.10 m hangs where the elbow would have to go.
     """
@@ -32,7 +32,7 @@ def plan(duration: float = 12.0, rate: float = 200.0, solver: str = "daqp", back
     pin.framesForwardKinematics(robot.model, data, start)
     found = preset("around-obstacle", data.oMf[robot.model.getFrameId(tip)], duration, 0.12)
     ball, center = found.obstacles[0]
-    return Plan(
+    return PathRun(
         robot,
         tip,
         found.path,
@@ -40,8 +40,8 @@ def plan(duration: float = 12.0, rate: float = 200.0, solver: str = "daqp", back
         start,
         dt=1.0 / rate,
         obstacles={
-            "ball": Moving(ball, pin.SE3(np.eye(3), center)),
-            "lamp": Moving(shapes.Sphere(0.10), pin.SE3(np.eye(3), np.array(LAMP))),
+            "ball": MovingObstacle(ball, pin.SE3(np.eye(3), center)),
+            "lamp": MovingObstacle(shapes.Sphere(0.10), pin.SE3(np.eye(3), np.array(LAMP))),
         },
         plane=ElbowSwing(0.5),
         solver=solver,

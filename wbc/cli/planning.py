@@ -12,11 +12,10 @@ import pinocchio as pin
 from wbc import robots, shapes, validation
 from wbc.errors import ShapeError, UnknownNameError, WbcError
 from wbc.robot import Robot
-from wbc.track.path import Approach
-from wbc.track.path import Path as TimedPath
+from wbc.track.path import Approach, TimedPath
 from wbc.track.path_file import SUFFIXES, read_path
 from wbc.track.presets import PRESETS, preset
-from wbc.track.setup import ElbowSwing, Moving, Plan
+from wbc.track.setup import ElbowSwing, MovingObstacle, PathRun
 from wbc.validation import Array
 
 PLANES = ("auto", "off", "hold", "swing")
@@ -27,13 +26,13 @@ def planned(
     frame: str | None,
     start: str | None,
     hold: list[str] | None,
-    obstacles: dict[str, Moving],
+    obstacles: dict[str, MovingObstacle],
     *,
     follow: tuple[str, float | None, float | None] = ("circle", None, None),
     plane: tuple[str, float] = ("off", 0.0),
     rate: float = 200.0,
     **settings: Any,
-) -> Plan:
+) -> PathRun:
     """The plan that options mean. A plan has a path, on which its stack does not depend.
 
     Args:
@@ -49,7 +48,7 @@ def planned(
     tip = tip_frame(machine, frame)
     first = machine.neutral if start is None else configuration(machine, start)
     path, own, label = scene(machine, tip, first, *follow)
-    return Plan(
+    return PathRun(
         machine,
         tip,
         path,
@@ -84,7 +83,7 @@ def configuration(robot: Robot, text: str) -> Array:
 
 def scene(
     robot: Robot, tip: str, q: Array, path: str, duration: float | None, size: float | None
-) -> tuple[TimedPath, dict[str, Moving], str]:
+) -> tuple[TimedPath, dict[str, MovingObstacle], str]:
     """(path, obstacles that belong to it, label). A file's path begins with an approach to its first waypoint.
 
     Raises:
@@ -96,7 +95,7 @@ def scene(
     if path in PRESETS:
         found = preset(path, here, 6.0 if duration is None else duration, size)
         parts = enumerate(found.obstacles)
-        return found.path, {f"ball{k or ''}": Moving(s, pin.SE3(np.eye(3), p)) for k, (s, p) in parts}, path
+        return found.path, {f"ball{k or ''}": MovingObstacle(s, pin.SE3(np.eye(3), p)) for k, (s, p) in parts}, path
     if not path.lower().endswith(SUFFIXES) and "/" not in path:
         raise UnknownNameError("path", path, PRESETS)
     if size is not None:
@@ -114,22 +113,22 @@ def scene(
     return Approach(here, timed, time), {}, label
 
 
-def given_obstacles(sphere: list[str] | None, floor: float | None) -> dict[str, Moving]:
+def given_obstacles(sphere: list[str] | None, floor: float | None) -> dict[str, MovingObstacle]:
     """Obstacles by name, as their options say."""
     out = {f"sphere{k}": parse_sphere(text) for k, text in enumerate(sphere or (), 1)}
     if floor is not None:
         height = validation.scalar("floor", floor, unit="m")
-        out["floor"] = Moving(shapes.HalfSpace(), pin.SE3(np.eye(3), np.array([0.0, 0.0, height])))
+        out["floor"] = MovingObstacle(shapes.HalfSpace(), pin.SE3(np.eye(3), np.array([0.0, 0.0, height])))
     return out
 
 
-def parse_sphere(text: str) -> Moving:
+def parse_sphere(text: str) -> MovingObstacle:
     """An obstacle from X,Y,Z,RADIUS[,VX,VY,VZ]."""
     numbers = comma_numbers("sphere", text)
     if len(numbers) not in (4, 7):
         raise ShapeError("sphere", text, "expected X,Y,Z,RADIUS or X,Y,Z,RADIUS,VX,VY,VZ")
     velocity = numbers[4:] if len(numbers) == 7 else np.zeros(3)
-    return Moving(shapes.Sphere(float(numbers[3])), pin.SE3(np.eye(3), numbers[:3]), velocity)
+    return MovingObstacle(shapes.Sphere(float(numbers[3])), pin.SE3(np.eye(3), numbers[:3]), velocity)
 
 
 def plane_command(robot: Robot, plane: str, swing: float) -> ElbowSwing | None:

@@ -22,7 +22,7 @@ from wbc.record.recording import RecordingError
 from wbc.track.log import FORMATS, Log, save
 from wbc.track.plots import save_picture, save_plots
 from wbc.track.run import track
-from wbc.track.setup import Plan
+from wbc.track.setup import PathRun
 from wbc.track.summary import Figure, save_summary, summarise
 
 INTERRUPTED = 130
@@ -66,7 +66,7 @@ class Stopper:
             yield
 
 
-def perform(plan: Plan, output: Output) -> None:
+def perform(plan: PathRun, output: Output) -> None:
     """Do a plan, write its folder and print its summary; exit code 130 if Ctrl-C ended it early.
 
     Raises:
@@ -92,7 +92,7 @@ def perform(plan: Plan, output: Output) -> None:
         raise typer.Exit(INTERRUPTED)
 
 
-def _tracked(plan: Plan, bar: Progress, stage: Any, stopper: Stopper, recording: Path | None) -> Log:
+def _tracked(plan: PathRun, bar: Progress, stage: Any, stopper: Stopper, recording: Path | None) -> Log:
     with contextlib.ExitStack() as stack:
 
         def compiled(controller: Controller) -> None:
@@ -112,7 +112,7 @@ def _tracked(plan: Plan, bar: Progress, stage: Any, stopper: Stopper, recording:
         return track(plan, progress, stopper, compiled)
 
 
-def _drawn(plan: Plan, log: Log, folder: Path, bar: Progress, stage: Any) -> list[Path]:
+def _drawn(plan: PathRun, log: Log, folder: Path, bar: Progress, stage: Any) -> list[Path]:
     bar.update(stage, description="plots", total=None)
     files = save_plots(log, folder, lambda name: bar.update(stage, description=f"plots: {name}"))
     bar.update(stage, description="picture")
@@ -120,7 +120,7 @@ def _drawn(plan: Plan, log: Log, folder: Path, bar: Progress, stage: Any) -> lis
     return files if picture is None else [*files, picture]
 
 
-def prepare(plan: Plan, output: Output) -> Path:
+def prepare(plan: PathRun, output: Output) -> Path:
     """The run folder, made.
 
     Raises:
@@ -150,7 +150,7 @@ def start_warnings(log: Log) -> list[str]:
     ]
 
 
-def report(plan: Plan, log: Log, figures: list[Figure], folder: Path, files: list[Path]) -> None:
+def report(plan: PathRun, log: Log, figures: list[Figure], folder: Path, files: list[Path]) -> None:
     """Print the summary."""
     console = out()
     title = f"{plan.robot.name} follows {plan.label} with {plan.frame}"

@@ -131,17 +131,22 @@ class QP:
 
 
 def definite(matrix: Array) -> Array:
-    """A symmetric matrix, with rounding of its diagonal added to it until it is positive definite."""
-    more = 16.0 * len(matrix) * 2.0**-53
+    """A symmetric matrix, with rounding of its diagonal added to it until it is positive definite by more than rounding.
+
+    A pivot of the Cholesky factor that is rounding may be an exact zero to another factorisation of the same matrix.
+    """
+    rounding = len(matrix) * 2.0**-53
+    more = 16.0 * rounding
     out = matrix
     for _ in range(8):
         try:
-            np.linalg.cholesky(out)
+            pivots = np.diag(np.linalg.cholesky(out)) ** 2
         except np.linalg.LinAlgError:
-            out = out + np.diag(more * np.diag(matrix) + more * 1e-3 * np.abs(matrix).max(initial=0.0))
-            more *= 10.0
-        else:
+            pivots = np.zeros(len(matrix))
+        if (pivots > rounding * np.diag(matrix)).all():
             break
+        out = out + np.diag(more * np.diag(matrix) + more * 1e-3 * np.abs(matrix).max(initial=0.0))
+        more *= 10.0
     return out
 
 

@@ -28,10 +28,10 @@ def left_free(stack: Declaration) -> float:
 
 def gain_table(layout: Layout) -> list[int]:
     """Where the gain of each task row is in the parameters."""
-    places = [layout.nothing] * layout.task_rows
+    slots = [layout.nothing] * layout.task_rows
     for block in layout.of_form("task"):
-        places[block.span] = [block.slots["gain"].start] * len(block.rows)
-    return places
+        slots[block.span] = [block.slots["gain"].start] * len(block.rows)
+    return slots
 
 
 def kept_rows(layout: Layout) -> list[int]:
@@ -76,14 +76,14 @@ def force_scales(stack: Declaration, layout: Layout, program: TickProgram) -> li
 
 def brakes(stack: Declaration, layout: Layout) -> tuple[list[int], np.ndarray]:
     """(entry of ``bound_enabled``, -1 for none; limit) of what limits each degree of freedom's acceleration most."""
-    places, limits = [-1] * layout.variables, np.full(layout.variables, np.inf)
+    slots, limits = [-1] * layout.variables, np.full(layout.variables, np.inf)
     for k, block in enumerate(layout.of_form("bounds")):
         item = block.entry.item
         assert isinstance(item, Constraint)
         for i, limit in enumerate(item.acceleration_limits(stack.robot)):
             if limit < limits[i]:
-                places[i], limits[i] = k * layout.variables + i, limit
-    return places, limits
+                slots[i], limits[i] = k * layout.variables + i, limit
+    return slots, limits
 
 
 def margin_table(layout: Layout) -> list[int]:
@@ -102,14 +102,14 @@ def rate_table(layout: Layout) -> list[int]:
 
 def stops(stack: Declaration, layout: Layout) -> tuple[list[int], np.ndarray, np.ndarray]:
     """(entry of ``bound_enabled``, -1 for none; lower; upper) of the position limits of each degree of freedom."""
-    places = [-1] * layout.variables
+    slots = [-1] * layout.variables
     lower, upper = np.full(layout.variables, -np.inf), np.full(layout.variables, np.inf)
     for k, block in enumerate(layout.of_form("bounds")):
         item = block.entry.item
         assert isinstance(item, Constraint)
         below, above = item.position_limits(stack.robot)
         for i in np.flatnonzero(np.isfinite(below) | np.isfinite(above)):
-            places[i] = k * layout.variables + int(i)
+            slots[i] = k * layout.variables + int(i)
         lower[: layout.nv] = np.maximum(lower[: layout.nv], below)
         upper[: layout.nv] = np.minimum(upper[: layout.nv], above)
-    return places, lower, upper
+    return slots, lower, upper

@@ -1,23 +1,32 @@
 """One robot follows one timed path: paths, the loop over ticks, the log and its plots (what ``wbc track`` runs)."""
 
-from wbc.track.clearance import clearances, self_clearances
-from wbc.track.log import Log, load, save
-from wbc.track.path import Path, Sample, SplinePath
-from wbc.track.path_file import read_path
-from wbc.track.presets import PRESETS, preset
-from wbc.track.run import track
-from wbc.track.scene import Scene
-from wbc.track.setup import Moving, Plan
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from wbc import lazy
+
+if TYPE_CHECKING:
+    from wbc.track.clearance import clearances, self_clearances
+    from wbc.track.log import Log, load, save
+    from wbc.track.path import Sample, SplinePath, TimedPath
+    from wbc.track.path_file import read_path
+    from wbc.track.presets import PRESETS, preset
+    from wbc.track.run import track
+    from wbc.track.scene import Scene
+    from wbc.track.setup import MovingObstacle, PathRun
+else:
+    __getattr__ = lazy.attach(__name__, __file__, {"Moving": "MovingObstacle", "Path": "TimedPath", "Plan": "PathRun"})
 
 __all__ = [
     "PRESETS",
     "Log",
-    "Moving",
-    "Path",
-    "Plan",
+    "MovingObstacle",
+    "PathRun",
     "Sample",
     "Scene",
     "SplinePath",
+    "TimedPath",
     "clearances",
     "load",
     "preset",
@@ -26,3 +35,7 @@ __all__ = [
     "self_clearances",
     "track",
 ]
+
+
+def __dir__() -> list[str]:
+    return __all__

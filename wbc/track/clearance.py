@@ -19,7 +19,7 @@ from wbc.robot.geometry.coal_shapes import geometry_of
 from wbc.robot.robot import checked_robot
 from wbc.robot.sources.files import captured_stderr
 from wbc.shapes import Shape
-from wbc.track.setup import Moving
+from wbc.track.setup import MovingObstacle
 from wbc.validation import Array
 
 log = logging.getLogger("wbc")
@@ -28,7 +28,7 @@ log = logging.getLogger("wbc")
 Body = tuple[int, pin.SE3, Any]
 
 
-def clearances(robot: Robot, q: Array, obstacles: Mapping[str, Moving], t: Array) -> dict[str, Array]:
+def clearances(robot: Robot, q: Array, obstacles: Mapping[str, MovingObstacle], t: Array) -> dict[str, Array]:
     """Smallest distance of each moving link's shapes to any obstacle, tick by tick [m].
 
     Args:
@@ -39,7 +39,7 @@ def clearances(robot: Robot, q: Array, obstacles: Mapping[str, Moving], t: Array
     if t.shape != (len(q),):
         raise ShapeError("t", t, f"expected {len(q)} times, one for each configuration")
     for name, one in validation.mapping("obstacles", obstacles, "names to Movings").items():
-        validation.instance(f"obstacles[{name}]", one, Moving, "a Moving")
+        validation.instance(f"obstacles[{name}]", one, MovingObstacle, "a MovingObstacle")
     bodies = {link: _bodies(robot, link) for link in robot.shapes if _moves(robot, link)}
     return _distances(robot, bodies, q, obstacles, t)
 
@@ -84,7 +84,7 @@ def _states(robot: Robot, q: Any) -> Array:
 
 
 def least_mesh_clearance(
-    robot: Robot, q: Array, obstacles: Mapping[str, Moving], t: Array, lower: Mapping[str, Array]
+    robot: Robot, q: Array, obstacles: Mapping[str, MovingObstacle], t: Array, lower: Mapping[str, Array]
 ) -> tuple[float, str, float] | None:
     """(distance [m], link, time [s]) where the URDF's collision bodies come nearest to an obstacle.
 
@@ -130,7 +130,7 @@ def bodies_of(robot: Robot, kind: pin.GeometryType) -> list[tuple[str, pin.SE3, 
 
 
 def _distances(
-    robot: Robot, bodies: Mapping[str, list[Body]], q: Array, obstacles: Mapping[str, Moving], t: Array
+    robot: Robot, bodies: Mapping[str, list[Body]], q: Array, obstacles: Mapping[str, MovingObstacle], t: Array
 ) -> dict[str, Array]:
     out = {link: np.full(len(q), np.inf) for link, group in bodies.items() if group and obstacles}
     data = robot.model.createData()
@@ -159,7 +159,7 @@ def _placed(data: pin.Data, body: Body) -> tuple[Any, Any]:
     return geometry, coal.Transform3s(pose.rotation, pose.translation)
 
 
-def _obstacle(obstacle: Moving, t: float) -> tuple[Any, Any]:
+def _obstacle(obstacle: MovingObstacle, t: float) -> tuple[Any, Any]:
     pose, geometry = _geometry(obstacle.shape, obstacle.at(t))
     return geometry, coal.Transform3s(pose.rotation, pose.translation)
 

@@ -41,7 +41,7 @@ class Sample:
     twist: Array
 
 
-class Path(Protocol):
+class TimedPath(Protocol):
     """What can be followed."""
 
     @property
@@ -132,7 +132,7 @@ class SplinePath:
 class Approach:
     """First a path from a pose to the start of another path, then that path. Both are at rest where they meet."""
 
-    def __init__(self, start: pin.SE3, path: Path, duration: float) -> None:
+    def __init__(self, start: pin.SE3, path: TimedPath, duration: float) -> None:
         self._first = SplinePath([0.0, duration], [start, path.sample(0.0).pose])
         self._path = path
 

@@ -10,7 +10,7 @@ import numpy as np
 import pinocchio as pin
 
 from wbc import shapes, validation
-from wbc.track.path import Path, Sample, SplinePath, smooth_step
+from wbc.track.path import Sample, SplinePath, TimedPath, smooth_step
 from wbc.validation import Array
 
 
@@ -48,7 +48,7 @@ class ClosedCurve:
 class Preset:
     """A path, and the obstacles that it was made for: (sphere, position) pairs."""
 
-    path: Path
+    path: TimedPath
     obstacles: tuple[tuple[shapes.Sphere, Array], ...] = ()
 
 

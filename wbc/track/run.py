@@ -25,7 +25,7 @@ from wbc.shapes import Sphere
 from wbc.simulation import Connection, Plant
 from wbc.track.clearance import clearances, least_mesh_clearance
 from wbc.track.log import Log
-from wbc.track.setup import Plan
+from wbc.track.setup import PathRun
 from wbc.validation import Array
 
 VERSIONS = ("wbc", "casadi", "pin", "daqp", "osqp", "numpy")
@@ -34,7 +34,7 @@ POSE = ("x", "y", "z", "qx", "qy", "qz", "qw")
 
 
 def track(
-    plan: Plan,
+    plan: PathRun,
     progress: Callable[[int], None] | None = None,
     stop: Callable[[], bool] | None = None,
     compiled: Callable[[Controller], None] | None = None,
@@ -54,7 +54,7 @@ def track(
         WbcError: the stack does not fit the robot, or it does not compile. What
             :class:`wbc.simulation.Connection` raises of the plant.
     """
-    validation.instance("plan", plan, Plan, "a Plan")
+    validation.instance("plan", plan, PathRun, "a PathRun")
     for name, one in (("progress", progress), ("stop", stop), ("compiled", compiled)):
         validation.function(name, one)
     connection = Connection(plant, plan.robot, plan.dt)
@@ -81,7 +81,7 @@ def track(
 
 
 def _loop(
-    plan: Plan,
+    plan: PathRun,
     controller: Controller,
     connection: Connection,
     recorder: RunRecorder,
@@ -119,7 +119,7 @@ def _loop(
             validation.called("progress", progress, k + 1)
 
 
-def _meta(plan: Plan, controller: Controller, recorder: RunRecorder, compile_time: float) -> dict[str, Any]:
+def _meta(plan: PathRun, controller: Controller, recorder: RunRecorder, compile_time: float) -> dict[str, Any]:
     robot, limits = plan.robot, plan.robot.limits
     arrays = {
         "position_lower": limits.position_lower,
@@ -167,7 +167,7 @@ def _meta(plan: Plan, controller: Controller, recorder: RunRecorder, compile_tim
 class RunRecorder:
     """Columns of a run that grow by one tick with each :meth:`add`."""
 
-    def __init__(self, plan: Plan, controller: Controller) -> None:
+    def __init__(self, plan: PathRun, controller: Controller) -> None:
         n, robot = plan.ticks, plan.robot
         self._plan = plan
         self._data = robot.model.createData()

@@ -15,7 +15,7 @@ from wbc.controller import Stack
 from wbc.errors import ShapeError, WbcError
 from wbc.robot import Robot
 from wbc.robot.robot import checked_robot
-from wbc.track.path import Path, smooth_step
+from wbc.track.path import TimedPath, smooth_step
 from wbc.validation import Array
 
 #: Angle 0 of the elbow plane is "elbow up" for an arm that reaches forward: the plane is vertical, the elbow above.
@@ -27,7 +27,7 @@ WEIGHTS = {"hand": 1.0, "plane": 1e-4, "posture": 1e-6}
 
 
 @dataclass(frozen=True, eq=False)
-class Moving:
+class MovingObstacle:
     """An obstacle: a shape, at a place at t = 0, with a constant linear velocity [m/s]."""
 
     shape: shapes.Shape
@@ -36,9 +36,9 @@ class Moving:
 
     def __post_init__(self) -> None:
         if not isinstance(self.shape, shapes.Shape):
-            raise ShapeError("Moving.shape", self.shape, "expected a shape of wbc.shapes")
-        object.__setattr__(self, "pose", validation.pose("Moving.pose", self.pose))
-        velocity = validation.ordinary_array("Moving.velocity", self.velocity, (3,))
+            raise ShapeError("MovingObstacle.shape", self.shape, "expected a shape of wbc.shapes")
+        object.__setattr__(self, "pose", validation.pose("MovingObstacle.pose", self.pose))
+        velocity = validation.ordinary_array("MovingObstacle.velocity", self.velocity, (3,))
         object.__setattr__(self, "velocity", velocity)
 
     def at(self, t: float) -> pin.SE3:
@@ -71,7 +71,7 @@ class ElbowSwing:
 
 
 @dataclass(frozen=True, eq=False)
-class Plan:
+class PathRun:
     """A run before it is done.
 
     Attributes:
@@ -92,11 +92,11 @@ class Plan:
 
     robot: Robot
     frame: str
-    path: Path
+    path: TimedPath
     label: str
     start: Array
     dt: float = 0.005
-    obstacles: dict[str, Moving] = field(default_factory=dict)
+    obstacles: dict[str, MovingObstacle] = field(default_factory=dict)
     margin: float = 0.02
     approach: float = 10.0
     plane: ElbowSwing | None = None
@@ -110,7 +110,7 @@ class Plan:
         if not callable(getattr(self.path, "sample", None)) or not hasattr(self.path, "duration"):
             raise ShapeError("path", self.path, "expected a path: duration, and sample(t)")
         for name, one in validation.mapping("obstacles", self.obstacles, "names to Movings").items():
-            validation.instance(f"obstacles[{name}]", one, Moving, "a Moving")
+            validation.instance(f"obstacles[{name}]", one, MovingObstacle, "a MovingObstacle")
         if self.plane is not None:
             validation.instance("plane", self.plane, ElbowSwing, "a ElbowSwing")
         for frame in validation.items("holds", self.holds, "frames"):

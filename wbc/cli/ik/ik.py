@@ -15,7 +15,7 @@ from wbc.cli.ik.targets import Target, given_targets
 from wbc.cli.planning import given_obstacles, planned
 from wbc.errors import InfeasibleError, RangeError
 from wbc.ik import InverseKinematics, Solution
-from wbc.track.setup import Moving
+from wbc.track.setup import MovingObstacle
 from wbc.validation import Array
 
 #: Exit code where not every target was reached
@@ -108,7 +108,7 @@ def _answers(
     return [TargetAnswer(number, k, solution, target.oriented) for k, solution in enumerate(found, 1)]
 
 
-def _standing(obstacles: dict[str, Moving]) -> dict[str, Moving]:
+def _standing(obstacles: dict[str, MovingObstacle]) -> dict[str, MovingObstacle]:
     """Obstacles that do not move.
 
     Raises:

@@ -37,14 +37,14 @@ class ElasticTick(SolvedTick):
         nothing = BRAKED, self.rest(qp), None
         if not self.assembly.usable:
             return nothing
-        sides, crossed = self._uncrossed(qp)
+        bounded, crossed = self._uncrossed(qp)
         if crossed[self._orders == 0].any():
             return nothing
         dofs = np.ones(n) if self._dof_scales is None else self._dof_scales
         unit, soft = self._units, self._orders > 0
-        H = sides.H * np.outer(dofs, dofs)
+        H = bounded.H * np.outer(dofs, dofs)
         if self.levels is not None:
-            # the first level leaves directions to others, which begin anew within the sides that are found here
+            # the first level leaves directions to others, which begin anew within the bounds that are found here
             H[np.diag_indices(n)] += _STEADY * float(np.diag(H).max(initial=1.0))
         # a slack counted in units of 1 / sqrt(_PRICE) costs what v does: the solver sees no other scale
         price = float(np.diag(H).max())
@@ -55,16 +55,16 @@ class ElasticTick(SolvedTick):
         ends = np.concatenate((dofs, unit))
         problem = QP(
             wide,
-            np.concatenate((sides.g * dofs, np.zeros(m))),
-            np.concatenate((sides.lower[:n] / dofs, -free, sides.lower[n:] / unit)),
-            np.concatenate((sides.upper[:n] / dofs, free, sides.upper[n:] / unit)),
-            np.hstack((sides.A * dofs / unit[:, None], np.eye(m) / np.sqrt(_PRICE))),
+            np.concatenate((bounded.g * dofs, np.zeros(m))),
+            np.concatenate((bounded.lower[:n] / dofs, -free, bounded.lower[n:] / unit)),
+            np.concatenate((bounded.upper[:n] / dofs, free, bounded.upper[n:] / unit)),
+            np.hstack((bounded.A * dofs / unit[:, None], np.eye(m) / np.sqrt(_PRICE))),
         )
         found = self._wide.solve(problem, warm=False)
         if not found.solved:
             return nothing
-        x = np.clip(found.x[:n] * dofs, sides.lower[:n], sides.upper[:n])
-        at, lower, upper = sides.A @ x, sides.lower.copy(), sides.upper.copy()
+        x = np.clip(found.x[:n] * dofs, bounded.lower[:n], bounded.upper[:n])
+        at, lower, upper = bounded.A @ x, bounded.lower.copy(), bounded.upper.copy()
         lower[n:], upper[n:] = np.minimum(lower[n:], at), np.maximum(upper[n:], at)
         multipliers = np.concatenate((found.multipliers[:n], found.multipliers[n + m :])) / ends
         zero = np.zeros(m)

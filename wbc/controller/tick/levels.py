@@ -34,7 +34,7 @@ class Levels:
         self._damping = stack.damping
         self.cascade = Cascade(layout.variables, layout.general_rows, left_free(stack), stack.damping)
         self.sizes = np.concatenate((self._dofs, self._units))
-        self._places = Memory(layout)
+        self._memory = Memory(layout)
 
     def reset(self) -> None:
         """Forget the active sets of the last tick."""
@@ -44,7 +44,7 @@ class Levels:
         """The command and the answer of all levels, which is written to the report; v where the tick brakes.
 
         Args:
-            qp: the first level's. v: its answer. first: the same with its sides and multipliers, None for none.
+            qp: the first level's. v: its answer. first: the same with its bounds and multipliers, None for none.
         """
         if first is None:
             self._write(None, v, report)
@@ -67,7 +67,7 @@ class Levels:
         answer.multipliers[held], answer.pushes[held] = first.multipliers[held], 0
 
     def problem(self, qp: QP, v: Array, lower: Array, upper: Array) -> tuple[Hierarchy, list[float]]:
-        """(all levels, from a command v of the first and sides of its rows; the weight of the heaviest row of each)."""
+        """(all levels, from a command v of the first and bounds of its rows; the heaviest weight of each level)."""
         nv, soft = self._layout.variables, self._row_levels >= 0
         low, high = (
             np.concatenate((ends[:nv], np.where(soft, own, ends[nv:]))) / self.sizes
@@ -121,18 +121,18 @@ class Levels:
         return out, scales
 
     def _write(self, answer: LevelsAnswer | None, v: Array, report: Array) -> None:
-        places, tasks = self._places, self._assembly.task_rows()
+        memory, tasks = self._memory, self._assembly.task_rows()
         share = np.zeros(self._layout.task_rows)
-        report[places["missed"]] = tasks.J @ v - tasks.desired
-        report[places["share"]] = share
-        report[places["dropped"]] = report[places["pushes"]] = -1.0
-        report[places["levels"]] = 0.0
+        report[memory["missed"]] = tasks.J @ v - tasks.desired
+        report[memory["share"]] = share
+        report[memory["dropped"]] = report[memory["pushes"]] = -1.0
+        report[memory["levels"]] = 0.0
         if answer is None:
             return
         for place, level in enumerate(answer.levels[:-1]):
             share[self._layout.level_rows(place)] = level.share
-        report[places["share"]] = share
-        report[places["dropped"]] = np.where(answer.dropped >= 0.0, answer.dropped * self._units, -1.0)
-        report[places["pushes"]] = answer.pushes
+        report[memory["share"]] = share
+        report[memory["dropped"]] = np.where(answer.dropped >= 0.0, answer.dropped * self._units, -1.0)
+        report[memory["pushes"]] = answer.pushes
         numbers = [[min(float(getattr(level, name)), INFINITE) for name in LEVEL_NUMBERS] for level in answer.levels]
-        report[places["levels"]] = np.ravel(numbers)
+        report[memory["levels"]] = np.ravel(numbers)

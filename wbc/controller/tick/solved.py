@@ -49,7 +49,7 @@ class SolvedTick(Buffers):
         self.assembly = assembly
         self.share(assembly)
         self._nv, self._velocities = layout.variables, layout.nv
-        self._places = Memory(layout)
+        self._memory = Memory(layout)
         self._solver = make_solver(solver, layout.with_slacks, layout.general_rows)
         self._relaxation = Relaxation(layout.with_slacks, layout.general_rows, self._solver)
         self._orders = np.array(row_orders(layout), dtype=np.int_)
@@ -94,32 +94,33 @@ class SolvedTick(Buffers):
         slack = np.where(slack > 2.0 * TOLERANCE * self._units, slack, 0.0)
         if flag == RELAXED and not slack[self._hard].any():
             flag = SOLVED  # the rows contradict each other by rounding only
-        places, report = self._places, self.report
+        memory, report = self._memory, self.report
         certificate, multipliers = _NONE, np.zeros(qp.lower.size)
         if answer is not None:
             self._name_frozen_bounds(qp, answer)
             if levels is None:
                 multipliers = qp.rows_of(answer.multipliers)
-                sides = QP(wide.H, wide.g, *self._met(wide, answer, x), wide.A)
-                certificate = certify(sides, QPSolution(x, answer.multipliers, "solved"), self._velocities)
+                bounded = QP(wide.H, wide.g, *self._met(wide, answer, x), wide.A)
+                certificate = certify(bounded, QPSolution(x, answer.multipliers, "solved"), self._velocities)
                 if not self._sound(certificate):
-                    found = polish(sides, QPSolution(x, answer.multipliers, "solved"), POLISH_ROUNDS)
-                    better = certify(sides, found.solution, self._velocities)
+                    found = polish(bounded, QPSolution(x, answer.multipliers, "solved"), POLISH_ROUNDS)
+                    better = certify(bounded, found.solution, self._velocities)
                     if found.exact and self._sound(better):
-                        certificate, x = better, np.clip(found.solution.x, sides.lower[: wide.n], sides.upper[: wide.n])
+                        certificate = better
+                        x = np.clip(found.solution.x, bounded.lower[: wide.n], bounded.upper[: wide.n])
                         v, multipliers = x[: self._nv], qp.rows_of(found.solution.multipliers)
             else:
                 multipliers = levels.multipliers
-                sides = QP(qp.H, qp.g, *self._met(qp, answer, v), qp.A)
-                certificate = Levels.certified(levels, float(sides.violation(v).max(initial=0.0)))
+                bounded = QP(qp.H, qp.g, *self._met(qp, answer, v), qp.A)
+                certificate = Levels.certified(levels, float(bounded.violation(v).max(initial=0.0)))
         for name in ("stationarity", "violation", "complementarity", "error_bound"):
-            report[places[name]] = min(getattr(certificate, name), INFINITE)
-        report[places["v"]] = v
-        report[places["flag"]] = flag
+            report[memory[name]] = min(getattr(certificate, name), INFINITE)
+        report[memory["v"]] = v
+        report[memory["flag"]] = flag
         iterations = 0 if levels is None else levels.iterations
-        report[places["iterations"]] = iterations + (answer.iterations if answer is not None else 0)
-        report[places["multipliers"]] = multipliers
-        report[places["slack"]] = slack
+        report[memory["iterations"]] = iterations + (answer.iterations if answer is not None else 0)
+        report[memory["multipliers"]] = multipliers
+        report[memory["slack"]] = slack
         self.assembly.look_ahead()
         self.v_last[:] = v
         if answer is None:
@@ -134,12 +135,12 @@ class SolvedTick(Buffers):
 
     def brake(self, qp: QP) -> None:
         """Every joint comes to rest as fast as its bounds allow; the report says so."""
-        places, report, v = self._places, self.report, self.rest(qp)
+        memory, report, v = self._memory, self.report, self.rest(qp)
         for name in ("stationarity", "violation", "complementarity", "error_bound"):
-            report[places[name]] = INFINITE
-        report[places["v"]], report[places["flag"]] = v, BRAKED
-        report[places["iterations"]] = 0.0
-        report[places["multipliers"]], report[places["slack"]] = 0.0, 0.0
+            report[memory[name]] = INFINITE
+        report[memory["v"]], report[memory["flag"]] = v, BRAKED
+        report[memory["iterations"]] = 0.0
+        report[memory["multipliers"]], report[memory["slack"]] = 0.0, 0.0
         self.assembly.look_ahead()
         self.v_last[:] = v
 
@@ -170,16 +171,16 @@ class SolvedTick(Buffers):
         n = self._nv
         frozen = (answer.lower[:n] == answer.upper[:n]) & (qp.lower[:n] != qp.upper[:n])
         at_lower = answer.lower[:n] == qp.lower[:n]
-        self.report[self._places["owner_high"]][frozen & at_lower] = -1.0
-        self.report[self._places["owner_low"]][frozen & ~at_lower] = -1.0
+        self.report[self._memory["owner_high"]][frozen & at_lower] = -1.0
+        self.report[self._memory["owner_low"]][frozen & ~at_lower] = -1.0
 
     def answer(self, qp: QP) -> tuple[int, Array, Relaxed | None]:
         """Flag, point and, unless the tick brakes, what the solver answered to a QP whose soft rows have slacks."""
         if self.assembly.usable:
-            sides, crossed = self._uncrossed(qp)
+            bounded, crossed = self._uncrossed(qp)
             if crossed[self._orders == 0].any():
                 return BRAKED, self.rest(qp), None
-            answer = self._relaxation.solve(sides, self._orders, self._units, self._dof_scales)
+            answer = self._relaxation.solve(bounded, self._orders, self._units, self._dof_scales)
             if answer.flag != "failed":
                 answer = self._soft.polished(qp, answer)
                 return RELAXED if crossed.any() or answer.flag == "relaxed" else SOLVED, answer.x, answer
@@ -204,13 +205,13 @@ class SoftRows:
         self._rows = np.flatnonzero(np.array(layout.price_at, dtype=np.intp) >= 0)
         self._least = np.array(reported_slacks(stack, layout))[self._rows]
 
-    def reported(self, qp: QP, v: Array, sides: tuple[Array, Array], slack: Array) -> Array:
+    def reported(self, qp: QP, v: Array, bounds: tuple[Array, Array], slack: Array) -> Array:
         """``slack`` of the general rows with the violations of those that are soft."""
         rows = self._rows
         if not rows.size:
             return slack
         at = qp.A[rows] @ v
-        missed = np.maximum(sides[0][rows] - at, at - sides[1][rows])
+        missed = np.maximum(bounds[0][rows] - at, at - bounds[1][rows])
         out = slack.copy()
         out[rows] = np.where(missed > self._least, missed, 0.0)
         return out
@@ -219,8 +220,8 @@ class SoftRows:
         """The answer at rounding level, where there are soft rows: nearly dependent ones leave solvers less."""
         if not self._rows.size:
             return answer
-        sides = QP(qp.H, qp.g, answer.lower, answer.upper, qp.A)
-        found = polish(sides, QPSolution(answer.x, answer.multipliers, "solved"))
+        bounded = QP(qp.H, qp.g, answer.lower, answer.upper, qp.A)
+        found = polish(bounded, QPSolution(answer.x, answer.multipliers, "solved"))
         if not found.exact:
             return answer
         n = qp.n

@@ -43,10 +43,10 @@ class VmAssembly(Assembly):
         nv, rows, tasks = layout.variables, layout.general_rows, layout.task_rows
         self._layout = layout
         self._given = (program, stack, layout)
-        self.places = places = Memory(layout)
-        self.state = np.zeros(places.state)
-        self.report = self.state[: places.report]
-        view = functools.partial(places.view, self.state)
+        self.memory = memory = Memory(layout)
+        self.state = np.zeros(memory.state)
+        self.report = self.state[: memory.report]
+        view = functools.partial(memory.view, self.state)
         self.q, self.p, self.dt, self.cap, self.plain = (view(name) for name in ("q", "p", "dt", "cap", "plain"))
         self.v_last, self.v_in, self.use_v = view("v_last"), view("v_in"), view("use_v")
         self.weight, self.enabled, self.bound_enabled = view("weight"), view("enabled"), view("bound_enabled")
@@ -83,8 +83,8 @@ class VmAssembly(Assembly):
 
     def _wide(self, name: str) -> Array:
         """A field of the state with its spare number, which no empty array lacks."""
-        place = self.places[name]
-        return self.state[place.start : max(place.stop, place.start + 1)]
+        field = self.memory[name]
+        return self.state[field.start : max(field.stop, field.start + 1)]
 
     def task_rows(self) -> TaskRows:
         return self._last
@@ -145,7 +145,7 @@ class VmAssembly(Assembly):
         factor, desired = out["factor"][: layout.task_rows].copy(), out["desired"][: layout.task_rows].copy()
         J = self._J.copy()
         self._usable = self._drop_idle_rows(J, desired, factor)
-        self.report[self.places["factor"]] = factor
+        self.report[self.memory["factor"]] = factor
         self._last = TaskRows(J, desired, factor)
         first = slice(layout.leading)
         J, weight, desired = J[first], (self.weight * factor)[first], desired[first]
@@ -160,8 +160,8 @@ class VmAssembly(Assembly):
         on = (self.enabled != 0.0) & (price > 0.0)
         A = np.where(on[:, None], self._A, 0.0)
         if self._reach is not None:
-            sides, margin = out["low"][: layout.general_rows], out["margin"][: layout.margin_rows]
-            self._reach.brake_for_margins(self._A, sides, margin, self.p, float(self.dt[0]), self.bound_enabled)
+            bounds, margin = out["low"][: layout.general_rows], out["margin"][: layout.margin_rows]
+            self._reach.brake_for_margins(self._A, bounds, margin, self.p, float(self.dt[0]), self.bound_enabled)
         low_rows = np.where(on, out["low"][: layout.general_rows], -np.inf)
         high_rows = np.where(on, out["high"][: layout.general_rows], np.inf)
         self._usable &= bool(np.isfinite(A).all() and (low_rows < INFINITE).all() and (high_rows > -INFINITE).all())
@@ -180,14 +180,14 @@ class VmAssembly(Assembly):
 
     def _report_rows(self) -> None:
         """Errors and margins into the report; no output is NaN."""
-        layout, places = self._layout, self.places
+        layout, memory = self._layout, self.memory
         for name, size, instead in (
             ("error", layout.task_rows, np.inf),
             ("margin", layout.margin_rows, -np.inf),
             ("margin_factor", layout.margin_rows, 0.0),
         ):
             values = self._out[name][:size]
-            self.report[places[name]] = np.where(np.isnan(values), instead, values)
+            self.report[memory[name]] = np.where(np.isnan(values), instead, values)
 
     def _drop_idle_rows(self, J: Array, desired: Array, factor: Array) -> bool:
         """Task rows without weight leave the problem, whatever their numbers are. False: others are not finite."""
@@ -199,7 +199,7 @@ class VmAssembly(Assembly):
         """Bound blocks in the order of sacrifice, a later one clipped into what the earlier ones left."""
         nv = self._layout.variables
         low, high = np.full(nv, -np.inf), np.full(nv, np.inf)
-        owner_low, owner_high = (self.report[self.places[n]] for n in ("owner_low", "owner_high"))
+        owner_low, owner_high = (self.report[self.memory[n]] for n in ("owner_low", "owner_high"))
         owner_low[:] = owner_high[:] = -1.0
         for b in self._sequence:
             part = slice(b * nv, (b + 1) * nv)
@@ -227,10 +227,10 @@ class VmAssembly(Assembly):
     def look_ahead(self) -> None:
         """Margins at q (+) v dt, into the report."""
         if self._ahead is not None:
-            self._command[:] = self.report[self.places["v"]][: self._layout.nv]
+            self._command[:] = self.report[self.memory["v"]][: self._layout.nv]
             self._ahead.run()
             later = self._later[: self._layout.margin_rows]
-            self.report[self.places["ahead"]] = np.where(np.isnan(later), -np.inf, later)
+            self.report[self.memory["ahead"]] = np.where(np.isnan(later), -np.inf, later)
 
 
 def _unit_equalities(low: Array, high: Array, low_rows: Array, high_rows: Array, A: Array, dofs: Array) -> Array:

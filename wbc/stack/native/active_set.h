@@ -87,7 +87,7 @@ static int is_equality(const wbc_tick *t, int i) {
     return t->low[i] == t->high[i] && !(i >= NV && SOFTENED(t, i - NV));
 }
 
-/* Whether a row that stays is met at its lower side */
+/* Whether a row that stays is met at its lower bound */
 static int below(const wbc_tick *t, int i) {
 #if SOFT_ROWS > 0
     return t->held[i - NV] & LOWER;
@@ -132,8 +132,8 @@ static int active_set(wbc_tick *t, int warm, int checked, double angle, const do
         const double sum = row_at(t, k, t->x);
         double square = 0.0;
         for (int e = a_start[k]; e < a_end[k]; e++) square += t->at[e] * t->at[e];
-        const double room = (seen ? SEEN : TOLERANCE) * row_scale[k] + angle * sqrt(square * dot(t->x, t->x, 0));
-        if (sum < t->low[i] - room || sum > t->high[i] + room) return EXIT_INFEASIBLE;
+        const double tolerance = (seen ? SEEN : TOLERANCE) * row_scale[k] + angle * sqrt(square * dot(t->x, t->x, 0));
+        if (sum < t->low[i] - tolerance || sum > t->high[i] + tolerance) return EXIT_INFEASIBLE;
     }
     return flag;
 }

@@ -5,7 +5,7 @@
  * screws (linear at the origin of the world, angular) of the joints that move the link.
  *
  * A row whose margin is so wide that no velocity within the bounds could use it up is left out of the tick: it has no
- * entries and no sides. */
+ * entries and no bounds. */
 #ifndef WBC_BALLS_H
 #define WBC_BALLS_H
 

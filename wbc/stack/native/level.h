@@ -17,26 +17,26 @@ static void unit_row(const wbc_tick *t, int k, double *out) {
 static double row_price(const wbc_tick *t, int k) { return price_at[k] >= 0 ? t->p[price_at[k]] : 1.0; }
 
 /* The weight of the heaviest row of a level, soft rows included: the others count beside it */
-static double heaviest(const wbc_tick *t, int place) {
+static double heaviest(const wbc_tick *t, int level) {
     double most = 0.0;
     for (int k = 0; k < MC; k++)
-        if (row_level[k] == place && !t->far[k]) most = larger(most, row_price(t, k));
-    for (int k = level_start[place]; k < level_start[place + 1]; k++)
+        if (row_level[k] == level && !t->far[k]) most = larger(most, row_price(t, k));
+    for (int k = level_start[level]; k < level_start[level + 1]; k++)
         if (t->report.factor[k] > 0.0) most = larger(most, t->weight[k] * task_scale[k] * task_scale[k]);
     return most > 0.0 ? most : 1.0;
 }
 
-/* Rows, weights and what is wanted of level `place`, the least velocity where that is LEVELS */
-static void load_level(wbc_tick *t, int place) {
+/* Rows, weights and what is wanted of `level`, the least velocity where that is LEVELS */
+static void load_level(wbc_tick *t, int level) {
     wbc_levels *s = &t->levels;
     s->count = 0;
-    for (int i = 0; i < M_ALL; i++) s->soft[i] = i >= NV && row_level[i - NV] == place && !t->far[i - NV] && row_price(t, i - NV) > 0.0;
+    for (int i = 0; i < M_ALL; i++) s->soft[i] = i >= NV && row_level[i - NV] == level && !t->far[i - NV] && row_price(t, i - NV) > 0.0;
     for (int i = 0; i < NV; i++) s->wanted[i] = 0.0;
     s->scale = 1.0;
-    if (place == LEVELS) return;
-    s->scale = heaviest(t, place);
+    if (level == LEVELS) return;
+    s->scale = heaviest(t, level);
     for (int i = NV; i < M_ALL; i++) s->give[i] = s->soft[i] ? s->scale / row_price(t, i - NV) : 0.0;
-    for (int k = level_start[place]; k < level_start[place + 1]; k++, s->count++) {
+    for (int k = level_start[level]; k < level_start[level + 1]; k++, s->count++) {
         double *row = s->row + s->count * NV;
         unit_row(t, k, row);
         const double rate = sqrt(larger(t->report.factor[k], 0.0)) / task_scale[k] * t->desired[k];
@@ -44,18 +44,18 @@ static void load_level(wbc_tick *t, int place) {
         add_to(s->wanted, row, s->weight[s->count] * rate, NV);
     }
     /* The first level's, as its gains were changed where joints could not brake */
-    for (int i = 0; place == 0 && LEADING > 0 && i < NV; i++) s->wanted[i] = -t->g[i] * dof_scale[i] / s->scale;
+    for (int i = 0; level == 0 && LEADING > 0 && i < NV; i++) s->wanted[i] = -t->g[i] * dof_scale[i] / s->scale;
 }
 
 /* Directions that the level takes come first in `basis`, with their singular values and dampings */
-static void take_directions(wbc_tick *t, int place) {
+static void take_directions(wbc_tick *t, int level) {
     wbc_levels *s = &t->levels;
     double local[LEVEL_MOST * NV], *q = s->direction;
     for (int r = 0; r < s->count; r++) {
         double *row = s->row + r * NV;
         for (int j = 0; j < s->width; j++) local[r * NV + j] = inner(row, s->space + j * NV, NV);
         const double left = inner(local + r * NV, local + r * NV, s->width), all = inner(row, row, NV);
-        t->report.share[level_start[place] + r] = all > 0.0 ? sqrt(left / all) : 1.0;
+        t->report.share[level_start[level] + r] = all > 0.0 ? sqrt(left / all) : 1.0;
     }
     const int rank = reduce(local, s->count, s->width, NOTHING, s->order, q);
     for (int j = 0; j < rank; j++)
@@ -89,7 +89,7 @@ static void take_all(wbc_levels *s) {
     for (int j = 0; j < s->width; j++) s->damped[j] = 0.0;
 }
 
-/* H, and the right side without and with damping, in the directions that are taken */
+/* H, and the right-hand side without and with damping, in the directions that are taken */
 static void level_quadratic(wbc_levels *s, int rest) {
     double descent[NV];
     for (int i = 0; i < NV; i++) descent[i] = rest ? -s->x[i] : s->wanted[i];

@@ -72,7 +72,7 @@ static void take_curvature(wbc_tick *t) {
     s->rank += taken;
 }
 
-/* What curvature adds to H and to the right side */
+/* What curvature adds to H and to the right-hand side */
 static void add_level_curvature(wbc_levels *s) {
     for (int i = 0; i < s->rank; i++) {
         double image[NV];

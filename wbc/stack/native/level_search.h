@@ -21,7 +21,7 @@ INLINE double row_of(const wbc_levels *s, int i, const double *x) {
     return i < NV ? x[i] : inner(s->general + (i - NV) * NV, x, NV);
 }
 
-/* Sides of a row for this level; those that cross are met half-way */
+/* Bounds of a row for this level; those that cross are met half-way */
 INLINE void level_sides(const wbc_levels *s, int i, double *low, double *high) {
     *low = s->soft[i] ? s->given_low[i] : s->low[i];
     *high = s->soft[i] ? s->given_high[i] : s->high[i];
@@ -127,7 +127,7 @@ static void level_multipliers(wbc_levels *s) {
         if (fabs(s->lambda[i]) * s->length[i] <= larger(PUSHING * drive, NOISE)) s->lambda[i] = 0.0;
 }
 
-/* Active rows meet their sides to rounding: the search leaves them off by what the cost of free directions hides */
+/* Active rows meet their bounds to rounding: the search leaves them off by what the cost of free directions hides */
 static void level_meet(wbc_tick *t, double *z) {
     wbc_levels *s = &t->levels;
     DAQPWorkspace *work = &s->daqp;
@@ -154,16 +154,16 @@ static void level_meet(wbc_tick *t, double *z) {
 }
 
 /* The optimum of a level whose rows bind, into `z` (its directions) and lambda; 0 where it was not found */
-static int level_search(wbc_tick *t, int place, double *z) {
+static int level_search(wbc_tick *t, int level, double *z) {
     wbc_levels *s = &t->levels;
     double next[NV];
-    int found = 0, *keep = s->keep + place * M_ALL;
+    int found = 0, *keep = s->keep + level * M_ALL;
     s->problem.n = s->daqp.n = s->width;
     level_rows(s);
     for (int j = 0; j < NV; j++) z[j] = 0.0;
     for (int step = 0; step < LEVEL_STEPS; step++) {
         level_shift(s, z);
-        const int warm = s->warm[place];
+        const int warm = s->warm[level];
         int flag = level_active_set(t, warm ? keep : NULL);
         if (flag < 0 && warm && !t->spent) flag = level_active_set(t, NULL);
         if (flag < 0) break;
@@ -175,7 +175,7 @@ static int level_search(wbc_tick *t, int place, double *z) {
         }
         memcpy(keep, s->sense, M_ALL * sizeof(int));
         level_multipliers(s);
-        s->warm[place] = found = 1;
+        s->warm[level] = found = 1;
         if (s->width == s->rank || (step > 0 && moved <= LEVEL_SETTLED)) break;
     }
     if (found && !t->spent) {

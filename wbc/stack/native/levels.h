@@ -51,7 +51,7 @@ static void take_equalities(wbc_tick *t) {
     for (int r = 0; r < before - s->width; r++) t->report.dropped[which[s->order[r]]] = -1.0;
 }
 
-/* Where the cascade begins, and the sides of all rows per unit, loosened as far as that point misses them */
+/* Where the cascade begins, and the bounds of all rows per unit, loosened as far as that point misses them */
 static void begin_levels(wbc_tick *t) {
     wbc_levels *s = &t->levels;
     for (int i = 0; i < NV; i++) {
@@ -94,7 +94,7 @@ static void held_by_equalities(wbc_tick *t) {
     }
 }
 
-/* Sides of rows that hold give way to x by rounding; rows that the level minimised hold from here on */
+/* Bounds of rows that hold are moved to x by rounding; rows that the level minimised hold from here on */
 static void pass_on(wbc_levels *s) {
     for (int i = 0; i < M_ALL; i++) {
         if (!counts(s, i)) continue;
@@ -106,7 +106,7 @@ static void pass_on(wbc_levels *s) {
 }
 
 /* The directions from `first` on are what is left, without those that the rows that push see */
-static void leave(wbc_tick *t, int place, int first) {
+static void leave(wbc_tick *t, int level, int first) {
     wbc_levels *s = &t->levels;
     double rows[LEVEL_MOST * NV];
     int count = 0;
@@ -116,7 +116,7 @@ static void leave(wbc_tick *t, int place, int first) {
         if (s->lambda[i] == 0.0) continue;
         local_row(s, i, rows + count++ * NV);
         if (t->report.pushes[i] >= 0.0) continue;
-        t->report.pushes[i] = place;
+        t->report.pushes[i] = level;
         t->report.lambda[i] = s->lambda[i] * s->scale / (i < NV ? dof_scale[i] : row_scale[i - NV]);
     }
     if (count > 0) without(s, rows, count);
@@ -160,16 +160,16 @@ static void judge(wbc_tick *t, const double *z, double *numbers, double *gain) {
     *gain = sqrt(inverse * image);
 }
 
-/* Level `place`, from the point and the space of the one before; 0 where the cap ended its search */
-static int one_level(wbc_tick *t, int place, double *error) {
+/* Level `level`, from the point and the space of the one before; 0 where the cap ended its search */
+static int one_level(wbc_tick *t, int level, double *error) {
     wbc_levels *s = &t->levels;
-    double z[NV] = {0}, x[NV], gain = 0.0, *numbers = t->report.levels + place * LEVEL_NUMBERS;
-    const int rest = place == LEVELS;
-    load_level(t, place);
+    double z[NV] = {0}, x[NV], gain = 0.0, *numbers = t->report.levels + level * LEVEL_NUMBERS;
+    const int rest = level == LEVELS;
+    load_level(t, level);
     if (rest) take_all(s);
-    else take_directions(t, place);
+    else take_directions(t, level);
     s->curved = 0;
-    if (place == 0 && t->curved) take_curvature(t);
+    if (level == 0 && t->curved) take_curvature(t);
     numbers[0] = s->rank;
     numbers[2] = s->least;
     level_quadratic(s, rest);
@@ -188,7 +188,7 @@ static int one_level(wbc_tick *t, int place, double *error) {
         solve_level(s->inverse, s->rank, s->right, z);
         into_point(s, z, s->rank, x);
         if (!level_holds(s, x)) {
-            solved = level_search(t, place, z);
+            solved = level_search(t, level, z);
             memcpy(x, s->x, sizeof x);
             if (solved) into_point(s, z, s->width, x);
         }
@@ -201,9 +201,9 @@ static int one_level(wbc_tick *t, int place, double *error) {
     numbers[8] = solved;
     *error = numbers[7] = smaller(numbers[7] + *error * (1.0 + gain), WBC_INF);
     pass_on(s);
-    leave(t, place, s->rank);
+    leave(t, level, s->rank);
     numbers[1] = s->width;
-    memcpy(s->reached + place * NV, s->x, sizeof s->x);
+    memcpy(s->reached + level * NV, s->x, sizeof s->x);
     return !t->spent;
 }
 
@@ -214,13 +214,13 @@ static void sum_up(wbc_tick *t) {
     for (int i = 0; i < NV; i++) out->v[i] = clamp(s->x[i] * dof_scale[i], t->low[i], t->high[i]);
     out->stationarity = out->complementarity = out->violation = 0.0;
     out->error_bound = out->levels[LEVELS * LEVEL_NUMBERS + 7];
-    for (int place = 0; place <= LEVELS; place++) {
-        double *numbers = out->levels + place * LEVEL_NUMBERS, row[NV];
+    for (int level = 0; level <= LEVELS; level++) {
+        double *numbers = out->levels + level * LEVEL_NUMBERS, row[NV];
         out->stationarity = larger(numbers[5], out->stationarity);
         out->complementarity = larger(numbers[6], out->complementarity);
-        for (int k = level_start[place]; place < LEVELS && k < level_start[place + 1]; k++) {
+        for (int k = level_start[level]; level < LEVELS && k < level_start[level + 1]; k++) {
             unit_row(t, k, row);
-            const double moved = inner(row, s->x, NV) - inner(row, s->reached + place * NV, NV);
+            const double moved = inner(row, s->x, NV) - inner(row, s->reached + level * NV, NV);
             numbers[4] = larger(numbers[4], fabs(moved));
         }
     }
@@ -251,7 +251,7 @@ static int all_levels(wbc_tick *t, int flag) {
     if (going) {
         begin_levels(t);
         if (flag == WBC_SOLVED) held_by_equalities(t);
-        for (int place = 0; going && place <= LEVELS; place++) going = one_level(t, place, &error);
+        for (int level = 0; going && level <= LEVELS; level++) going = one_level(t, level, &error);
         sum_up(t);
         if (!going) {
             flag = out->flag = WBC_CAPPED;

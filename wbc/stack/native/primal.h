@@ -5,7 +5,7 @@
  *     K p + G + A_E' mu = 0,   A_E p = d,      K = H + sum of a a' / give over violated soft rows,
  *
  * on the variables that no bound fixes, and ends where a row or a bound is met, which then holds too, or where a soft row
- * begins or ends to be violated. At the optimum of a set the row that pushes the wrong way most is released. The cost
+ * begins or ends to be violated. At the optimum of a set the row that pushes away from its bound most is released. The cost
  * falls from step to step, so that no set comes back unless steps have no length. docs/solvers.md */
 #ifndef WBC_PRIMAL_H
 #define WBC_PRIMAL_H
@@ -23,7 +23,7 @@
 typedef struct {
     const double *H, *g;
     wide x[NV], p[NV], G[NV], L[NV * NV], y[NV], Q[NV * NV], R[NV * NV], mu[NV], size[NV];
-    int side[M_ALL];            /* 0, or where the row is held: ACTIVE at its upper side, ACTIVE | LOWER at its lower one */
+    int active[M_ALL];          /* 0, or which bound the row is held at: ACTIVE the upper, ACTIVE | LOWER the lower */
     int free[NV], count;        /* variables that no bound fixes */
     int row[NV], rows;          /* general rows that are held, of those that are independent */
 } wbc_primal;
@@ -34,7 +34,7 @@ static wide wide_row(const wbc_tick *t, int k, const wide *x) {
     return sum;
 }
 
-static double side_of(const wbc_tick *t, const wbc_primal *s, int i) { return s->side[i] & LOWER ? t->low[i] : t->high[i]; }
+static double active_bound(const wbc_tick *t, const wbc_primal *s, int i) { return s->active[i] & LOWER ? t->low[i] : t->high[i]; }
 
 INLINE int is_soft(const wbc_tick *t, int i) {
     (void)t;
@@ -43,28 +43,28 @@ INLINE int is_soft(const wbc_tick *t, int i) {
 
 /* Where the search begins: the command, if it keeps all hard rows; 0 if it does not */
 static int begin_primal(wbc_tick *t, wbc_primal *s) {
-    memset(s->side, 0, sizeof s->side);
+    memset(s->active, 0, sizeof s->active);
     for (int i = 0; i < NV; i++) {
         s->x[i] = clamp(t->report.v[i], t->low[i], t->high[i]);
-        if (t->low[i] == t->high[i]) s->side[i] = ACTIVE;
+        if (t->low[i] == t->high[i]) s->active[i] = ACTIVE;
     }
     for (int k = 0; k < MC; k++) {
         const int i = NV + k;
         const wide at = wide_row(t, k, s->x);
         if (t->low[i] <= -WBC_INF && t->high[i] >= WBC_INF) continue;
         if (is_soft(t, i)) {
-            if (t->low[i] == t->high[i]) s->side[i] = ACTIVE;
-            else s->side[i] = at > t->high[i] ? ACTIVE : at < t->low[i] ? ACTIVE | LOWER : 0;
+            if (t->low[i] == t->high[i]) s->active[i] = ACTIVE;
+            else s->active[i] = at > t->high[i] ? ACTIVE : at < t->low[i] ? ACTIVE | LOWER : 0;
             continue;
         }
         if (at < t->low[i] - 4.0 * TOLERANCE * row_scale[k] || at > t->high[i] + 4.0 * TOLERANCE * row_scale[k]) return 0;
-        if (t->low[i] == t->high[i]) s->side[i] = ACTIVE;
+        if (t->low[i] == t->high[i]) s->active[i] = ACTIVE;
     }
     for (int a = 0; a < t->daqp.n_active; a++) {
         const int i = t->daqp.WS[a], lower = t->sense[i] & LOWER;
-        if ((i >= NV && MC == 0) || s->side[i] || is_soft(t, i)) continue;
+        if ((i >= NV && MC == 0) || s->active[i] || is_soft(t, i)) continue;
         const wide at = i < NV ? s->x[i] : wide_row(t, i - NV, s->x), end = lower ? t->low[i] : t->high[i];
-        if (i < NV ? at == end : fabsl(at - end) <= TOLERANCE * row_scale[i - NV]) s->side[i] = ACTIVE | lower;
+        if (i < NV ? at == end : fabsl(at - end) <= TOLERANCE * row_scale[i - NV]) s->active[i] = ACTIVE | lower;
     }
     return 1;
 }
@@ -85,8 +85,8 @@ static void wide_gradient(const wbc_tick *t, wbc_primal *s) {
             s->size[j] += fabsl(h * s->x[i]);
         }
     for (int k = 0; k < MC; k++) {
-        if (!is_soft(t, NV + k) || !s->side[NV + k]) continue;
-        const wide force = (wide_row(t, k, s->x) - side_of(t, s, NV + k)) / t->give[k];
+        if (!is_soft(t, NV + k) || !s->active[NV + k]) continue;
+        const wide force = (wide_row(t, k, s->x) - active_bound(t, s, NV + k)) / t->give[k];
         for (int e = a_start[k]; e < a_end[k]; e++) {
             s->G[a_col[e]] += force * t->at[e];
             s->size[a_col[e]] += fabsl(force * t->at[e]);
@@ -100,14 +100,14 @@ static int factor_free(const wbc_tick *t, wbc_primal *s) {
     s->count = 0;
     for (int i = 0; i < NV; i++) {
         place[i] = -1;
-        if (s->side[i]) continue;
+        if (s->active[i]) continue;
         place[i] = s->count;
         s->free[s->count++] = i;
     }
     for (int a = 0; a < s->count; a++)
         for (int b = 0; b <= a; b++) s->L[a * NV + b] = s->H[s->free[b] * WIDE + s->free[a]];
     for (int k = 0; k < MC; k++) {
-        if (!is_soft(t, NV + k) || !s->side[NV + k]) continue;
+        if (!is_soft(t, NV + k) || !s->active[NV + k]) continue;
         for (int e = a_start[k]; e < a_end[k]; e++)
             for (int c = a_start[k]; c <= e; c++) {
                 const int a = place[a_col[e]], b = place[a_col[c]];
@@ -143,7 +143,7 @@ static wide wide_inner(const wide *x, const wide *y, int count) {
 static void hold_rows(const wbc_tick *t, wbc_primal *s) {
     s->rows = 0;
     for (int k = 0; k < MC && s->rows < s->count; k++) {
-        if (!s->side[NV + k] || is_soft(t, NV + k)) continue;
+        if (!s->active[NV + k] || is_soft(t, NV + k)) continue;
         wide *q = s->Q + s->rows * NV, *r = s->R + s->rows * NV, whole[NV] = {0};
         for (int e = a_start[k]; e < a_end[k]; e++) whole[a_col[e]] = t->at[e];
         for (int a = 0; a < s->count; a++) q[a] = whole[s->free[a]];
@@ -174,7 +174,7 @@ static int primal_step(const wbc_tick *t, wbc_primal *s) {
     hold_rows(t, s);
     memcpy(first, s->y, sizeof first);
     for (int b = 0; b < s->rows; b++) {
-        wide gap = side_of(t, s, NV + s->row[b]) - wide_row(t, s->row[b], s->x);
+        wide gap = active_bound(t, s, NV + s->row[b]) - wide_row(t, s->row[b], s->x);
         for (int c = 0; c < b; c++) gap -= s->R[b * NV + c] * s->mu[c];
         s->mu[b] = gap / s->R[b * NV + b];
     }
@@ -204,20 +204,20 @@ static int walk(const wbc_tick *t, wbc_primal *s) {
     for (int i = 0; i < M_ALL; i++) {
         const wide change = i < NV ? s->p[i] : wide_row(t, i - NV, s->p);
         const int soft = is_soft(t, i);
-        if (change == 0.0L || (s->side[i] && !soft) || (soft && t->low[i] == t->high[i])) continue;
+        if (change == 0.0L || (s->active[i] && !soft) || (soft && t->low[i] == t->high[i])) continue;
         const wide at = i < NV ? s->x[i] : wide_row(t, i - NV, s->x);
-        wide way;
+        wide remaining;
         int down = change < 0.0L;
-        if (soft && s->side[i]) {
+        if (soft && s->active[i]) {
             /* It ends to be violated on its way back */
-            if (down == ((s->side[i] & LOWER) != 0)) continue;
-            way = side_of(t, s, i) - at;
+            if (down == ((s->active[i] & LOWER) != 0)) continue;
+            remaining = active_bound(t, s, i) - at;
         } else {
             const double end = down ? t->low[i] : t->high[i];
             if (fabs(end) >= WBC_INF) continue;
-            way = end - at;
+            remaining = end - at;
         }
-        const wide part = way / change > 0.0L ? way / change : 0.0L;
+        const wide part = remaining / change > 0.0L ? remaining / change : 0.0L;
         if (part < share) {
             share = part;
             ends = i;
@@ -226,13 +226,13 @@ static int walk(const wbc_tick *t, wbc_primal *s) {
     }
     for (int i = 0; i < NV; i++) s->x[i] += share * s->p[i];
     if (ends < 0) return -1;
-    if (s->side[ends]) s->side[ends] = 0;
-    else s->side[ends] = ACTIVE | (lower ? LOWER : 0);
-    if (ends < NV) s->x[ends] = side_of(t, s, ends);
+    if (s->active[ends]) s->active[ends] = 0;
+    else s->active[ends] = ACTIVE | (lower ? LOWER : 0);
+    if (ends < NV) s->x[ends] = active_bound(t, s, ends);
     return ends;
 }
 
-/* Release what pushes the wrong way most; multipliers to the report. 0 where nothing does. */
+/* Release what pushes away from its bound most; multipliers to the report. 0 where nothing does. */
 static int release(wbc_tick *t, wbc_primal *s) {
     double *lambda = t->report.lambda, worst = 0.0, largest = 0.0;
     wide force[NV];
@@ -249,23 +249,23 @@ static int release(wbc_tick *t, wbc_primal *s) {
         }
     }
     for (int i = 0; i < NV; i++) {
-        if (s->side[i]) lambda[i] = (double)-force[i];
+        if (s->active[i]) lambda[i] = (double)-force[i];
         largest = larger(largest, (double)s->size[i] * dof_scale[i]);
-        s->G[i] = s->side[i] ? 0.0L : force[i];
+        s->G[i] = s->active[i] ? 0.0L : force[i];
     }
     for (int i = 0; i < M_ALL; i++) {
-        if (!s->side[i] || t->low[i] == t->high[i]) continue;
-        const double push = lambda[i] * (s->side[i] & LOWER ? 1.0 : -1.0) * (i < NV ? dof_scale[i] : row_scale[i - NV]);
+        if (!s->active[i] || t->low[i] == t->high[i]) continue;
+        const double push = lambda[i] * (s->active[i] & LOWER ? 1.0 : -1.0) * (i < NV ? dof_scale[i] : row_scale[i - NV]);
         if (push > worst) {
             worst = push;
             which = i;
         }
     }
     for (int k = 0; k < MC; k++)
-        if (is_soft(t, NV + k) && s->side[NV + k])
-            lambda[NV + k] = (double)((wide_row(t, k, s->x) - side_of(t, s, NV + k)) / t->give[k]);
+        if (is_soft(t, NV + k) && s->active[NV + k])
+            lambda[NV + k] = (double)((wide_row(t, k, s->x) - active_bound(t, s, NV + k)) / t->give[k]);
     if (which < 0 || worst <= 64.0 * NV * (double)WIDE_EPS * largest) return 0;
-    s->side[which] = 0;
+    s->active[which] = 0;
     return 1;
 }
 
@@ -288,7 +288,7 @@ static double primal_bound(wbc_primal *s) {
     return (double)sqrtl(square * seen);
 }
 
-/* Replace the command by the optimum over the sides as they stand, with its certificate; 0, and the report is as it was
+/* Replace the command by the optimum over the bounds as they stand, with its certificate; 0, and the report is as it was
  * but for its multipliers, where there is none */
 static int primal(wbc_tick *t) {
     wbc_primal s;
@@ -335,9 +335,9 @@ static int primal(wbc_tick *t) {
         out->violation = larger(out->violation, larger(t->low[NV + k] - value, value - t->high[NV + k]));
     }
     out->error_bound = bound + rounding;
-    for (int i = 0; i < M_ALL; i++) t->keep[i] = is_soft(t, i) ? 0 : s.side[i];
+    for (int i = 0; i < M_ALL; i++) t->keep[i] = is_soft(t, i) ? 0 : s.active[i];
 #if SOFT_ROWS > 0
-    for (int k = 0; k < MC; k++) t->held[k] = is_soft(t, NV + k) ? s.side[NV + k] : 0;
+    for (int k = 0; k < MC; k++) t->held[k] = is_soft(t, NV + k) ? s.active[NV + k] : 0;
     memset(t->melted, 0, sizeof t->melted);
 #endif
     t->warm = 1;

@@ -67,8 +67,8 @@ static int find_free(const wbc_tick *t, const double *slope, double *free) {
     for (int i = 0; i < NV; i++) {
         free[i] = 1.0;
         if (stop_at[i] < 0 || t->bound_enabled[stop_at[i]] == 0.0) continue;
-        const double q = t->q[stop_q[i]], room = slope[i] < 0.0 ? stop_high[i] - q : q - stop_low[i];
-        const double near = clamp(2.0 - room / (AT_LIMIT * dof_scale[i]), 0.0, 1.0);
+        const double q = t->q[stop_q[i]], slack = slope[i] < 0.0 ? stop_high[i] - q : q - stop_low[i];
+        const double near = clamp(2.0 - slack / (AT_LIMIT * dof_scale[i]), 0.0, 1.0);
         const double pushed = clamp(fabs(slope[i]) * dof_scale[i] / (PUSHED * steepest + DBL_MIN), 0.0, 1.0);
         free[i] = 1.0 - near * pushed;
         blocked |= free[i] < 1.0;
@@ -274,7 +274,7 @@ static void product(const wbc_tick *t, const double *x, double *out) {
 
 #endif
 
-/* The gain up to which all joints can brake on the way, at most `largest` */
+/* The gain up to which all joints can brake before the target, at most `largest` */
 static double stoppable(wbc_tick *t, const double *free, const double *error, double largest) {
     double square[MT + 1], b[WIDE], rate[WIDE], worst = 0.0;
     int limited = 0;

@@ -4,21 +4,21 @@
 
 #include "soft.h"
 
-/* Whether a row of a class misses its sides at x by more than rounding */
+/* Whether a row of a class violates its bounds at x by more than rounding */
 static int gives_way(const wbc_tick *t, int k) {
-    const double value = row_at(t, k, t->x), room = TOLERANCE * row_scale[k];
-    return value < t->low[NV + k] - room || value > t->high[NV + k] + room;
+    const double value = row_at(t, k, t->x), tolerance = TOLERANCE * row_scale[k];
+    return value < t->low[NV + k] - tolerance || value > t->high[NV + k] + tolerance;
 }
 
 /* A class has found its least violation at x. Where a row gave way, it and what pushed against it become equalities
  * that meet at x: all least violations lie there, and what is left to move has no boundary within rounding. Rows of
- * the class that hold get room. */
+ * the class that hold may move by rounding. */
 static void freeze(wbc_tick *t, int order, const char *pushing) {
     int given = 0;
     for (int k = 0; k < MC; k++) given |= row_order[k] == order && gives_way(t, k);
     for (int i = 0; given && i < NV; i++) {
         if (!pushing[i] || t->low[i] == t->high[i]) continue;
-        /* The other side is not what binds here, whatever sign the last multiplier takes */
+        /* The other bound is not what binds here, whatever sign the last multiplier takes */
         if (pushing[i] == LOWER) {
             t->high[i] = t->low[i];
             t->report.owner_high[i] = -1.0;
@@ -124,13 +124,13 @@ static int relax_class(wbc_tick *t, int order) {
 }
 
 /* The optimum over what the classes left. The set may be so thin that rounding makes it empty: then its bounds get
- * room, then the joints of frozen rows are fixed, and at last the point that the classes met at is the answer. */
+ * rounding, then the joints of frozen rows are fixed, and at last the point that the classes met at is the answer. */
 static int optimum_of_the_rest(wbc_tick *t) {
     double met[WIDE], low[NV], high[NV];
     memcpy(met, t->x, sizeof met);
     memcpy(low, t->low, sizeof low);
     memcpy(high, t->high, sizeof high);
-    /* The sides have moved, and with them what the equality rows contribute */
+    /* The bounds have moved, and with them what the equality rows contribute */
     t->prepared = 0;
     int flag = optimum(t, LOOSE);
     if (flag >= 0 || t->spent) return flag;

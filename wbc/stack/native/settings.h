@@ -22,7 +22,7 @@ int curvature(const double **arg, double **res, long long *iw, double *w, int me
 /* Two rows whose normals differ by an angle below sqrt(DEPENDENT) count as one */
 #define DEPENDENT 1e-10
 /* How far rows that were left out as dependent may be off, per |row| |v|: at first, and in a relaxation, where the
- * sides are those of a solution already and only the angle counts */
+ * bounds are those of a solution already and only the angle counts */
 #define TIGHT 1e-7
 #define LOOSE 2e-5
 /* A general row whose image under R^-1 is shorter than this cannot be moved by v */

@@ -21,7 +21,7 @@ static void steady(double *H) {
 
 #if SOFT_ROWS > 0
 
-/* 0: a soft row holds at x; else the side that it violates */
+/* 0: a soft row holds at x; else the bound that it violates */
 static int violated(const wbc_tick *t, int k, const double *x) {
     const double at = row_at(t, k, x), least = 1e-12 * row_scale[k];
     if (at > t->high[NV + k] + least) return ACTIVE;
@@ -37,10 +37,10 @@ static void held_from_last(wbc_tick *t) {
     for (int k = 0; k < MC; k++) {
         if (t->later[k]) t->held[k] = t->later[k];
         t->later[k] = 0;
-        const double side = t->held[k] & LOWER ? t->low[NV + k] : t->high[NV + k];
+        const double bound = t->held[k] & LOWER ? t->low[NV + k] : t->high[NV + k];
         if (!may_give(t, k) || (t->idle[k] && !t->melted[k])) t->held[k] = 0;
         else if (t->low[NV + k] == t->high[NV + k]) t->held[k] = ACTIVE;
-        else if (fabs(side) >= WBC_INF) t->held[k] = 0;
+        else if (fabs(bound) >= WBC_INF) t->held[k] = 0;
     }
 }
 

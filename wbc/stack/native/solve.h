@@ -7,7 +7,7 @@
 
 /* Come to rest as fast as the bounds let each joint */
 static void brake(wbc_tick *t) {
-    /* A relaxation may have moved the sides */
+    /* A relaxation may have moved the bounds */
     form_bounds(t);
     for (int i = 0; i < NV; i++) {
         const double low = t->low[i], high = t->high[i];
@@ -17,7 +17,7 @@ static void brake(wbc_tick *t) {
     t->warm = 0;
 }
 
-/* Rows whose sides have crossed are met half-way; 1 if any gives way by more than rounding. Actuators never do. */
+/* Rows whose bounds have crossed are met half-way; 1 if any gives way by more than rounding. Actuators never do. */
 static int uncross(wbc_tick *t) {
     int crossed = 0;
     for (int k = 0; k < MC; k++) {
@@ -33,19 +33,19 @@ static int uncross(wbc_tick *t) {
 }
 
 /* The cap ended the search. From braking towards the velocity that was found so far, `found`, as far as no row leaves
- * its sides by it, and rows that braking misses are not missed by more; braking itself where `share` is 0. */
+ * its bounds by it, and rows that braking misses are not missed by more; braking itself where `share` is 0. */
 static void partly(wbc_tick *t, const double *found, double share) {
-    double way[NV];
+    double step[NV];
     brake(t);
-    for (int i = 0; i < NV; i++) way[i] = (isfinite(found[i]) ? clamp(found[i], t->low[i], t->high[i]) : 0.0) - t->x[i];
+    for (int i = 0; i < NV; i++) step[i] = (isfinite(found[i]) ? clamp(found[i], t->low[i], t->high[i]) : 0.0) - t->x[i];
     for (int k = 0; k < MC; k++) {
         if (MINIMISED(k) || price_at[k] >= 0) continue;
-        const double at = row_at(t, k, t->x), change = row_at(t, k, way), rounding = TOLERANCE * row_scale[k];
+        const double at = row_at(t, k, t->x), change = row_at(t, k, step), rounding = TOLERANCE * row_scale[k];
         const double down = t->free_low[k] - rounding - at, up = t->free_high[k] + rounding - at;
         if (change < 0.0 && change < down) share = smaller(share, smaller(down, 0.0) / change);
         if (change > 0.0 && change > up) share = smaller(share, larger(up, 0.0) / change);
     }
-    for (int i = 0; i < NV; i++) t->x[i] += share * way[i];
+    for (int i = 0; i < NV; i++) t->x[i] += share * step[i];
 }
 
 /* What a tick commands whose search the cap has ended; `first`: that of the whole problem, from which the next tick
@@ -70,7 +70,7 @@ static void command(wbc_tick *t) {
     }
 }
 
-/* The sides as they were before anything gave way, those that cross met half-way */
+/* The bounds as they were before anything gave way, those that cross met half-way */
 static void own_sides(wbc_tick *t) {
     form_bounds(t);
     for (int k = 0; k < MC; k++) {
@@ -121,7 +121,7 @@ EXPORT int wbc_tick_solve(wbc_tick *t) {
         t->report.slack[k] = slack > 2.0 * TOLERANCE * row_scale[k] ? slack : 0.0;
         gave_way |= t->report.slack[k] > 0.0;
     }
-    /* Rows that contradict each other by rounding only: what is certified are their own sides */
+    /* Rows that contradict each other by rounding only: what is certified are their own bounds */
     if (flag == WBC_RELAXED && !gave_way) {
         flag = WBC_SOLVED;
         own_sides(t);

@@ -94,7 +94,7 @@ typedef struct {
 
 typedef struct {
     WBC_BUFFERS                  /* what the caller knows: see memory.h, which is generated */
-    int prepared;                /* R is the factor of H, and y its right side */
+    int prepared;                /* R is the factor of H, and y its right-hand side */
     int curved;                  /* H contains curvature */
     int firm;                    /* rows that keep directions are firm in R */
     double stiffness;            /* what fixed variables add to the Hessian, in units of dof_scale */

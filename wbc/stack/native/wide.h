@@ -37,7 +37,7 @@ static void solve_factors(const double *L, const double *D, int count, double *r
 
 static void solve_gram(const wbc_tick *t, int count, double *r) { solve_factors(t->L, t->D, count, r); }
 
-/* By how much the command misses the side of active row `a`, moved by what a soft row gives way, as the solver scales it */
+/* By how much the command misses the bound of active row `a`, moved by what a soft row gives way, as the solver scales it */
 static double side_gap(const wbc_tick *t, int a) {
     const int i = t->daqp.WS[a];
     wide gap = t->sense[i] & LOWER ? -(wide)t->low[i] : -(wide)t->high[i];
