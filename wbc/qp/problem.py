@@ -131,7 +131,7 @@ class QP:
 
 
 def definite(matrix: Array) -> Array:
-    """A symmetric matrix, with rounding of its diagonal added to it until it is positive definite by more than rounding.
+    """A symmetric matrix, with rounding of its diagonal added until it is positive definite by more than rounding.
 
     A pivot of the Cholesky factor that is rounding may be an exact zero to another factorisation of the same matrix.
     """

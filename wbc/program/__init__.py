@@ -1,0 +1,54 @@
+"""Programs of steps with guards over a controller's tasks. See docs/programs.md."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from wbc import lazy
+
+if TYPE_CHECKING:
+    from wbc.program.hand import Gripper
+    from wbc.program.reference import HandReference
+    from wbc.program.runner import Event, Report, Runner
+    from wbc.program.steps import (
+        Activate,
+        Alternatives,
+        Approach,
+        Grasp,
+        Guard,
+        Hold,
+        Move,
+        Operate,
+        Pose,
+        Program,
+        ProgramError,
+        Release,
+        Retreat,
+    )
+else:
+    __getattr__ = lazy.attach(__name__, __file__)
+
+__all__ = [
+    "Activate",
+    "Alternatives",
+    "Approach",
+    "Event",
+    "Grasp",
+    "Gripper",
+    "Guard",
+    "HandReference",
+    "Hold",
+    "Move",
+    "Operate",
+    "Pose",
+    "Program",
+    "ProgramError",
+    "Release",
+    "Report",
+    "Retreat",
+    "Runner",
+]
+
+
+def __dir__() -> list[str]:
+    return __all__
