@@ -40,16 +40,15 @@ controller["ball"].velocity = [*flight, 0.0, 0.0, 0.0]
 
 q, first, last = robot.neutral, np.array([0.5, -0.45, 0.4]), np.array([0.5, 0.45, 0.4])
 times = stack.dt * np.arange(400)
-data, postures, hand = robot.model.createData(), [], []
+postures, hand = [], []
 for t in times:
-    pin.framesForwardKinematics(robot.model, data, q)
-    hand.append(data.oMf[robot.model.getFrameId(robot.frames["tip"])].translation.copy())
+    hand.append(robot.pose(q, robot.frames["tip"]).translation)
     postures.append(q)
     share = min(max((t - 1.0) / 4.0, 0.0), 1.0)
     controller["hand"].target = (1.0 - share) * first + share * last
     controller["ball"].pose = clutter["ball"][0].at(t)
     step = controller.step(q)
-    q = pin.integrate(robot.model, q, step.v * stack.dt)
+    q = robot.integrate(q, step.v, stack.dt)
 
 # Coal measures every part of the clutter against all links, whatever the controller looked at
 for name, parts in clutter.items():

@@ -17,9 +17,7 @@ stack.add(wbc.tasks.Obstacle(Sphere(0.08), links=("panda_hand",)), name="ball")
 controller = stack.compile()
 
 q, still = robot.neutral, np.zeros(robot.nv)
-data = robot.model.createData()
-pin.framesForwardKinematics(robot.model, data, q)
-place = data.oMf[robot.model.getFrameId(tip)].translation
+place = robot.pose(q, tip).translation
 
 
 def at(offset: list[float]) -> pin.SE3:

@@ -1,7 +1,5 @@
 """A task of one's own: any CasADi expression of the robot's kinematics; its Jacobian is derived."""
 
-import pinocchio as pin
-
 import wbc
 from wbc.tasks import Expression, Input
 
@@ -20,11 +18,11 @@ controller = stack.compile()
 q = robot.neutral
 for _ in range(600):
     step = controller.step(q)
-    q = pin.integrate(robot.model, q, step.v * stack.dt)
+    q = robot.integrate(q, step.v, stack.dt)
 print(step)
 
 controller["look"].point = [0.3, -0.5, 0.4]
 for _ in range(600):
     step = controller.step(q)
-    q = pin.integrate(robot.model, q, step.v * stack.dt)
+    q = robot.integrate(q, step.v, stack.dt)
 print(step)

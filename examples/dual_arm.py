@@ -13,9 +13,7 @@ frames = [robot.frames[f"{side}_hand"] for side in ("left", "right")]
 
 def places(q: np.ndarray, *names: str) -> list[pin.SE3]:
     """Poses of frames in the world, by Pinocchio: what the controller says of itself is not asked."""
-    data = robot.model.createData()
-    pin.framesForwardKinematics(robot.model, data, q)
-    return [data.oMf[robot.model.getFrameId(name)].copy() for name in names]
+    return [robot.pose(q, name) for name in names]
 
 
 # The tray is a frame on *each* hand, so that both arms share its way instead of one leading and one following
@@ -59,7 +57,7 @@ for k in range(ticks):
     trail.append((left.translation + right.translation) / 2)
     postures.append((q, left))
     step = controller.step(q)
-    q = pin.integrate(robot.model, q, step.v * stack.dt)
+    q = robot.integrate(q, step.v, stack.dt)
 print(f"{step.status}: tray at most {1e3 * late:.2f} mm off its way;")
 print(f"where the two hands have it: at most {1e3 * slipped:.3f} mm apart")
 

@@ -1,7 +1,6 @@
 """TALOS reaches forward with one hand: feet held, centre of mass above them, the rest stays near its posture."""
 
 import numpy as np
-import pinocchio as pin
 
 import wbc
 
@@ -21,10 +20,8 @@ foot = controller["left foot"].target.translation
 controller["hand"].target = controller["hand"].target + np.array([0.25, 0.1, 0.15])
 for _ in range(800):
     step = controller.step(q)
-    q = pin.integrate(robot.model, q, step.v * stack.dt)
+    q = robot.integrate(q, step.v, stack.dt)
 
-data = robot.model.createData()
-pin.framesForwardKinematics(robot.model, data, q)
-drift = np.linalg.norm(data.oMf[robot.model.getFrameId(robot.frames["left_foot"])].translation - foot)
+drift = np.linalg.norm(robot.pose(q, robot.frames["left_foot"]).translation - foot)
 print(f"{step.status}: hand {1e3 * step.residuals['hand'].norm('m'):.2f} mm from its target,")
 print(f"centre of mass {1e3 * step.residuals['balance'].norm('m'):.2f} mm off, left foot moved {1e6 * drift:.2f} um")

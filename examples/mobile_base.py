@@ -1,7 +1,6 @@
 """TIAGo on its two driven wheels: the hand follows an eight far wider than the arm, so the wheels take it there."""
 
 import numpy as np
-import pinocchio as pin
 
 import wbc
 from wbc.track import Scene
@@ -32,18 +31,15 @@ def goal(k: int) -> np.ndarray:
     return start + np.array([0.6 * np.sin(2 * phase), 1.5 * np.sin(phase), 0.15 * np.sin(3 * phase)])
 
 
-data = robot.model.createData()
-tip, base = (robot.model.getFrameId(robot.frames[role]) for role in ("tip", "base"))
+tip, base = robot.frames["tip"], robot.frames["base"]
 turning = [robot.dofs(wheel.joint).start for wheel in wheels]
 rolled, late, slip = np.zeros(2), 0.0, 0.0
 postures, hand, floor, seen = [], [], [], []
 for k in range(ticks):
-    # Where hand and base are is asked of Pinocchio, not of the controller
-    pin.framesForwardKinematics(robot.model, data, q)
     postures.append(q)
-    hand.append(data.oMf[tip].translation.copy())
-    floor.append(np.array([*data.oMf[base].translation[:2], 0.02]))
-    seen.append(data.oMf[base].actInv(data.oMf[tip]).translation)
+    hand.append(robot.pose(q, tip).translation)
+    floor.append(np.array([*robot.pose(q, base).translation[:2], 0.02]))
+    seen.append(robot.pose(q, tip, base).translation)
     late = max(late, float(np.linalg.norm(hand[-1] - goal(k))))
     controller["hand"].target = goal(k)
     controller["hand"].feedforward = (goal(k + 1) - goal(k)) / stack.dt
@@ -51,7 +47,7 @@ for k in range(ticks):
     rolled += radius * np.abs(step.v[turning]) * stack.dt
     # What both wheels roll on average is what the base drives, forwards
     slip = max(slip, abs(float(radius * step.v[turning].mean() - step.v[0])))
-    q = pin.integrate(robot.model, q, step.v * stack.dt)
+    q = robot.integrate(q, step.v, stack.dt)
 
 x, y, z = np.ptp(seen, axis=0)
 print(f"{step.status}: hand at most {1e3 * late:.2f} mm off an eight of 3 m by 1.2 m;")

@@ -24,7 +24,7 @@ for tick in range(1000):
     step = controller.step(q)
     nearest = min(nearest, step.margins["ball"].min())
     furthest = max(furthest, step.residuals["hand"].norm("m"))
-    q = pin.integrate(robot.model, q, step.v * stack.dt)
+    q = robot.integrate(q, step.v, stack.dt)
 
 print(f"least distance beyond the margin {1e3 * nearest:.2f} mm, hand pushed {1e3 * furthest:.0f} mm away")
 print(f"at the end: {step.status}, hand error {1e3 * step.residuals['hand'].norm('m'):.2f} mm")

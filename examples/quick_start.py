@@ -22,7 +22,7 @@ for tick in range(400):
     offset = speed[:3] * tick * stack.dt
     controller["hand"].target = pin.SE3(start.rotation, start.translation + offset)
     step = controller.step(q)
-    q = pin.integrate(robot.model, q, step.v * stack.dt)
+    q = robot.integrate(q, step.v, stack.dt)
 
 error = step.residuals["hand"].norm("m")
 print(f"after {400 * stack.dt:g} s: {step.status}, hand error {1e3 * error:.3f} mm")

@@ -41,7 +41,7 @@ def crossed(apart: bool) -> np.ndarray:
             share = min(max((k - 100) / 150, 0.0), 1.0)
             controller[side].target = (1.0 - share) * np.array(first) + share * np.array(last)
         step = controller.step(q)
-        q = pin.integrate(robot.model, q, step.v * stack.dt)
+        q = robot.integrate(q, step.v, stack.dt)
         postures.append(q)
     # Measured by Coal, whether the controller looked at these pairs or not
     least = min(gap.min() for gap in self_clearances(robot, np.array(postures), pairs).values())
@@ -53,10 +53,9 @@ def crossed(apart: bool) -> np.ndarray:
 
 def trail(postures: np.ndarray, frame: str) -> np.ndarray:
     """Way of a frame from where the targets start to cross [m]."""
-    data, points = robot.model.createData(), []
+    points = []
     for q in postures[100:]:
-        pin.framesForwardKinematics(robot.model, data, q)
-        points.append(data.oMf[robot.model.getFrameId(frame)].translation.copy())
+        points.append(robot.pose(q, frame).translation)
     return np.array(points)
 
 

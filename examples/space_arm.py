@@ -6,7 +6,6 @@ the way, with joint rates that stay within the acceleration limits.
 """
 
 import numpy as np
-import pinocchio as pin
 
 from wbc.coordinates import Adviser, AutomaticPairs, CoordinatePair, DriveLog, PairController, parts, plot_drives
 
@@ -20,10 +19,7 @@ DT, TICKS, RAMP = 0.02, 1300, 100
 
 def twist(tick: int) -> np.ndarray:
     """What the operator commands: the tip's motion along a line in the space of joints."""
-    data = ROBOT.model.createData()
-    index, q = ROBOT.model.getFrameId("tip"), START + SLOW * tick * DT
-    J = pin.computeFrameJacobian(ROBOT.model, data, q, index, pin.LOCAL_WORLD_ALIGNED)
-    return min(1.0, tick / RAMP) * J @ SLOW
+    return min(1.0, tick / RAMP) * ROBOT.jacobian(START + SLOW * tick * DT, "tip") @ SLOW
 
 
 def drive(*names: str) -> DriveLog:

@@ -15,9 +15,7 @@ pathlib.Path("runs").mkdir(exist_ok=True)
 
 def hand(q: np.ndarray) -> pin.SE3:
     """Pose of the hand, by Pinocchio."""
-    data = robot.model.createData()
-    pin.framesForwardKinematics(robot.model, data, q)
-    return data.oMf[robot.model.getFrameId("panda_hand_tcp")].copy()
+    return robot.pose(q, "panda_hand_tcp")
 
 
 # 1. Five waypoints in the least time, within velocities, accelerations and torques of the arm

@@ -63,6 +63,7 @@ class Input:
         below: name of an input of the same size, with a default like this one, whose numbers this one's never exceed.
         direction: a vector that is kept at unit length; its rate is the derivative of the unit vector.
         sensed: a :class:`Sensor` writes it before every tick; users only read it.
+        joints: of a configuration or a velocity, the joints of which it is read: their numbers alone are a value, too.
     """
 
     name: str
@@ -77,6 +78,7 @@ class Input:
     below: str | None = None
     direction: bool = False
     sensed: bool = False
+    joints: tuple[str, ...] | None = None
 
 
 @dataclass(frozen=True)

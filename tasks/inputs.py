@@ -54,6 +54,8 @@ def flat(robot: Robot, field: str, declared: Input, value: Any) -> Array:
         return validation.pose_numbers(field, value)
     if declared.kind == "rotation":
         return np.ravel(validation.rotation(field, value), order="F")
+    if declared.joints is not None:
+        value = _spread(robot, field, declared, value)
     if declared.kind == "configuration":
         return robot.configuration(field, value)
     count = declared.size if declared.kind == "vector" else size(robot, declared)
@@ -77,6 +79,20 @@ def flat(robot: Robot, field: str, declared: Input, value: Any) -> Array:
         for number in numbers:
             validation.scalar(field, number, low=declared.low, high=declared.high, unit=declared.unit)
     return numbers
+
+
+def _spread(robot: Robot, field: str, declared: Input, value: Any) -> Any:
+    """All numbers of a configuration or a velocity, where those of the chosen joints are given; else what is given."""
+    numbers = validation.real_array(field, value)
+    model, turns = robot.model, declared.kind == "configuration"
+    starts, counts = (model.idx_qs, model.nqs) if turns else (model.idx_vs, model.nvs)
+    chosen = [int(model.getJointId(name)) for name in declared.joints or ()]
+    at = [k for j in chosen for k in range(int(starts[j]), int(starts[j]) + int(counts[j]))]
+    if numbers.shape != (len(at),) or len(at) == size(robot, declared):
+        return value
+    out = robot.neutral.copy() if turns else np.zeros(robot.nv)
+    out[at] = numbers
+    return out
 
 
 @dataclass(frozen=True, eq=False)

@@ -32,9 +32,10 @@ class Posture(Task):
     floating base the logarithm of the relative pose (linear; angular, in base axes).
 
     Inputs:
-        target: a configuration, nq numbers (also where only some joints are chosen; the others are not read).
+        target: a configuration, nq numbers, or those of the chosen joints alone, in their order.
             Default: see ``start``.
-        feedforward: velocity of the target in its tangent space, nv numbers [rad/s, m/s]. Default 0.
+        feedforward: velocity of the target in its tangent space, nv numbers, or those of the chosen joints
+            [rad/s, m/s]. Default 0.
 
     Example:
         >>> Posture(joints=("panda_joint1", "panda_joint3"), weights=(1.0, 0.2))
@@ -80,8 +81,8 @@ class Posture(Task):
         """``target`` and ``feedforward``, see the class."""
         default = robot.neutral.copy() if self.start == "neutral" else None
         return (
-            Input("target", "configuration", unit="rad, m", default=default, rate="feedforward"),
-            Input("feedforward", "tangent", unit="rad/s, m/s", default=np.zeros(robot.nv)),
+            Input("target", "configuration", unit="rad, m", default=default, rate="feedforward", joints=self.joints),
+            Input("feedforward", "tangent", unit="rad/s, m/s", default=np.zeros(robot.nv), joints=self.joints),
         )
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:

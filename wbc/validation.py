@@ -242,9 +242,14 @@ def rotation(field: str, value: Any) -> Array:
 
 
 def pose(field: str, value: Any) -> pin.SE3:
-    """A pose, from ``pin.SE3``, a 4x4 homogeneous matrix or seven numbers (position, quaternion x, y, z, w)."""
+    """A pose, from ``pin.SE3``, a 4x4 homogeneous matrix, seven numbers (position, quaternion x, y, z, w), or a pair.
+
+    A pair is a position with a quaternion or with a 3x3 rotation matrix.
+    """
     if isinstance(value, pin.SE3):
         return pin.SE3(rotation(field, value.rotation), real_array(field, value.translation, (3,)))
+    if isinstance(value, (tuple, list)) and len(value) == 2:
+        return pin.SE3(rotation(field, value[1]), real_array(field, value[0], (3,)))
     raw = real_array(field, value)
     if raw.shape == (7,):
         return pin.SE3(rotation(field, raw[3:]), raw[:3])

@@ -321,11 +321,37 @@ class Handle:
         return f"<{type(self._block.entry.item).__name__} {self._block.entry.name!r}: {', '.join(self.names)}>"
 
 
+class ReadPose(pin.SE3):  # type: ignore[misc]
+    """A pose that was read from a controller; ``.copy()`` gives one that can be changed and set.
+
+    What is written into its parts would not reach the controller, so that they are read-only.
+    """
+
+    @property
+    def translation(self) -> Array:
+        """Read-only [3]."""
+        return _read_only(super().translation)
+
+    @property
+    def rotation(self) -> Array:
+        """Read-only [3, 3]."""
+        return _read_only(super().rotation)
+
+    def copy(self) -> pin.SE3:
+        """A pose of its own."""
+        return pin.SE3(self)
+
+
+def _read_only(array: Array) -> Array:
+    array.flags.writeable = False
+    return array
+
+
 def _as_written(slot: Slot, numbers: Array) -> Any:
     """An input's numbers as the user writes them."""
     kind = slot.input.kind
     if kind == "pose":
-        return pin.SE3(numbers[:9].reshape(3, 3, order="F").copy(), numbers[9:].copy())
+        return ReadPose(numbers[:9].reshape(3, 3, order="F"), numbers[9:])
     if kind == "rotation":
         return numbers.reshape(3, 3, order="F").copy()
     if kind == "vector" and slot.input.size == 0:

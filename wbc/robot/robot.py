@@ -31,7 +31,7 @@ class Coupling:
     offset: float = 0.0
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Robot:
     """A robot model and what the description says about it.
 
@@ -75,6 +75,9 @@ class Robot:
                 raise RangeError("robot.locked_dofs", dof, f"expected an index into v, 0 to {self.nv - 1}")
         neutral = self.neutral if np.size(self.neutral) else pin.neutral(self.model)
         object.__setattr__(self, "neutral", self.configuration("robot.neutral", neutral))
+
+    def __repr__(self) -> str:
+        return f"<Robot {self.name!r}: {len(self.joint_names)} joints, nq {self.nq}, nv {self.nv}, {self.base} base>"
 
     def __getstate__(self) -> dict[str, Any]:
         return pickling.declared(self)
@@ -188,6 +191,65 @@ class Robot:
         out = validation.real_array(field_name, q, (self.nq,))
         if not pin.isNormalized(self.model, out, validation.ROTATION_TOLERANCE):
             raise RotationError(field_name, q, "a quaternion or (cos, sin) pair is not of unit length")
+        return out
+
+    def pose(self, q: Any, frame: str, relative_to: str = WORLD) -> pin.SE3:
+        """Pose of a frame in another one, or in the world, at a configuration.
+
+        Raises:
+            UnknownNameError: no such frame. ShapeError, NotFiniteError, RotationError: no configuration.
+        """
+        q, names = self.configuration("q", q), (WORLD, *self.frame_names)
+        data = self.model.createData()
+        pin.forwardKinematics(self.model, data, q)
+        of, base = (
+            pin.SE3.Identity()
+            if name == WORLD
+            else pin.updateFramePlacement(self.model, data, frame_index(self.model, name)).copy()
+            for name in (validation.one_of("frame", frame, names), validation.one_of("relative_to", relative_to, names))
+        )
+        return base.actInv(of)
+
+    def jacobian(self, q: Any, frame: str) -> Array:
+        """J with (linear; angular) = J v: the twist of a frame at its origin, along the world's axes [6, nv].
+
+        Raises:
+            UnknownNameError: no such frame. ShapeError, NotFiniteError, RotationError: no configuration.
+        """
+        q, index = self.configuration("q", q), frame_index(self.model, self.check_frame("frame", frame))
+        axes, data = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED, self.model.createData()
+        return np.asarray(pin.computeFrameJacobian(self.model, data, q, index, axes))
+
+    def integrate(self, q: Any, v: Any, dt: float = 1.0) -> Array:
+        """q (+) v dt: the configuration after moving with a velocity for a time [s].
+
+        Raises:
+            ShapeError, NotFiniteError, RotationError: no configuration, velocity or time.
+        """
+        step = validation.real_array("v", v, (self.nv,)) * validation.real_array("dt", dt, ())
+        return np.asarray(pin.normalize(self.model, pin.integrate(self.model, self.configuration("q", q), step)))
+
+    def difference(self, a: Any, b: Any) -> Array:
+        """b (-) a: the velocity that leads from one configuration to another within a second [nv].
+
+        Raises:
+            ShapeError, NotFiniteError, RotationError: no configuration.
+        """
+        return np.asarray(pin.difference(self.model, self.configuration("a", a), self.configuration("b", b)))
+
+    def random(self, seed: int = 0) -> Array:
+        """A configuration within the position limits; what has none is within half a turn, or a metre, of neutral.
+
+        Raises:
+            RangeError: a seed below 0.
+        """
+        rng = np.random.default_rng(int(validation.scalar("seed", seed, low=0.0)))
+        reach = np.where(np.array([unit == "rad" for unit in self.dof_units]), np.pi, 1.0)
+        out = self.integrate(self.neutral, rng.uniform(-reach, reach))
+        for k in np.flatnonzero(self.position_index >= 0).tolist():
+            low, high = float(self.limits.position_lower[k]), float(self.limits.position_upper[k])
+            if np.isfinite([low, high]).all():
+                out[int(self.position_index[k])] = rng.uniform(low, high)
         return out
 
     def with_frame(self, name: str, parent: str, placement: Any = None) -> Robot:

@@ -74,6 +74,10 @@ class Declaration:
         if robot.couplings or robot.locked_dofs:
             self.add(Mechanism())
 
+    def __repr__(self) -> str:
+        items = ", ".join(f"{name} ({type(entry.item).__name__})" for name, entry in self._entries.items())
+        return f"<Stack of {self._robot.name!r}, dt {self._dt:g} s: {items or 'empty'}>"
+
     @property
     def robot(self) -> Robot:
         """The robot."""

@@ -1,0 +1,113 @@
+"""What a robot says of a configuration, against Pinocchio's own calls, and values as users write them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import wbc
+from wbc.errors import NotFiniteError, RangeError, RotationError, ShapeError, UnknownNameError
+
+ROBOTS = ("panda", "tiago", "talos")
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_poses_jacobians_and_steps_are_those_of_pinocchio(name: str) -> None:
+    robot = wbc.robots.load(name)
+    rng, frames, data = np.random.default_rng(0), robot.frame_names, robot.model.createData()
+    for seed in range(4):
+        q, v = robot.random(seed), rng.normal(size=robot.nv)
+        frame, base = (str(rng.choice(frames)) for _ in range(2))
+        pin.framesForwardKinematics(robot.model, data, q)
+        of, at = (data.oMf[robot.model.getFrameId(one)] for one in (frame, base))
+        np.testing.assert_allclose(robot.pose(q, frame).homogeneous, of.homogeneous, atol=1e-14)
+        np.testing.assert_allclose(robot.pose(q, frame, base).homogeneous, at.actInv(of).homogeneous, atol=1e-13)
+        ahead = robot.integrate(q, v, 1e-6)
+        moved = robot.pose(ahead, frame)
+        twist = [moved.translation - of.translation, pin.log3(moved.rotation @ of.rotation.T)]
+        np.testing.assert_allclose(robot.jacobian(q, frame) @ v, np.concatenate(twist) / 1e-6, atol=2e-4)
+        np.testing.assert_allclose(robot.difference(q, ahead) / 1e-6, v, atol=1e-8)
+        np.testing.assert_array_equal(ahead, robot.configuration("q", ahead))
+    np.testing.assert_array_equal(robot.pose(q, "world").homogeneous, np.eye(4))
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_random_configurations_are_within_the_limits_and_repeat(name: str) -> None:
+    robot = wbc.robots.load(name)
+    at = robot.position_index
+    some = np.array([robot.random(seed) for seed in range(50)])
+    for k in np.flatnonzero(at >= 0):
+        low, high = robot.limits.position_lower[k], robot.limits.position_upper[k]
+        if np.isfinite([low, high]).all():
+            assert ((some[:, at[k]] >= low) & (some[:, at[k]] <= high)).all()
+            assert np.ptp(some[:, at[k]]) > 0.5 * (high - low) or low == high
+    np.testing.assert_array_equal(robot.random(7), some[7])
+    for q in some:
+        robot.configuration("q", q)
+
+
+def test_bad_values_are_refused() -> None:
+    robot = wbc.robots.load("talos")
+    with pytest.raises(UnknownNameError, match="frame"):
+        robot.pose(robot.neutral, "hand")
+    with pytest.raises(UnknownNameError, match="relative_to"):
+        robot.pose(robot.neutral, "world", "hand")
+    with pytest.raises(UnknownNameError):
+        robot.jacobian(robot.neutral, "hand")
+    with pytest.raises(ShapeError):
+        robot.integrate(robot.neutral, [1.0])
+    with pytest.raises(NotFiniteError):
+        robot.integrate(robot.neutral, np.zeros(robot.nv), np.nan)
+    with pytest.raises(RotationError):
+        robot.difference(robot.neutral, np.zeros(robot.nq))
+    with pytest.raises(RangeError):
+        robot.random(-1)
+
+
+def test_objects_say_in_a_line_what_they_are() -> None:
+    robot = wbc.robots.load("panda")
+    stack = wbc.Stack(robot, dt=0.01).add(wbc.tasks.Damping(), name="rest")
+    assert repr(robot) == "<Robot 'panda': 7 joints, nq 7, nv 7, fixed base>"
+    assert repr(stack) == "<Stack of 'panda', dt 0.01 s: rest (Damping)>"
+
+
+def test_values_as_users_write_them() -> None:
+    robot = wbc.robots.load("panda")
+    stack = wbc.Stack(robot, dt=0.01)
+    stack.add(wbc.tasks.EndEffector("panda_hand_tcp"), name="hand")
+    stack.add(wbc.tasks.Posture(joints=("panda_joint6", "panda_joint2")), name="posture")
+    controller = stack.compile(backend="vm")
+    controller.reset(robot.neutral)
+    hand, posture = controller["hand"], controller["posture"]
+
+    turn = pin.Quaternion(pin.exp3(np.array([0.1, 0.2, 0.3])))
+    hand.target = ((0.4, 0.1, 0.5), turn.coeffs())
+    np.testing.assert_allclose(
+        hand.target.homogeneous, pin.SE3(turn, np.array([0.4, 0.1, 0.5])).homogeneous, atol=1e-15
+    )
+    hand.target = (np.array([0.4, 0.1, 0.5]), turn.matrix())
+    np.testing.assert_allclose(hand.target.rotation, turn.matrix(), atol=1e-15)
+    with pytest.raises(ValueError, match="read-only"):
+        hand.target.translation[:] += 0.1
+    with pytest.raises(ValueError, match="read-only"):
+        hand.target.rotation[0, 0] = 2.0
+    own = hand.target.copy()
+    own.translation[2] += 0.1
+    hand.target = own
+    np.testing.assert_allclose(hand.target.translation, [0.4, 0.1, 0.6])
+    for bad, error in (((1.0, 2.0), ShapeError), (([0.0] * 3, [0.0, 0.0, 0.0, 2.0]), RotationError)):
+        with pytest.raises(error):
+            hand.target = bad
+
+    posture.target = [2.0, -0.5]
+    assert posture.target[[5, 1]].tolist() == [2.0, -0.5]
+    posture.feedforward = [0.3, 0.0]
+    assert posture.feedforward.tolist() == [0.0, 0.0, 0.0, 0.0, 0.0, 0.3, 0.0]
+    whole = robot.random(1)
+    posture.target = whole
+    np.testing.assert_array_equal(posture.target, whole)
+    for bad in ([1.0], [1.0, 2.0, 3.0], [1.0, np.nan]):
+        with pytest.raises((ShapeError, NotFiniteError)):
+            posture.target = bad
+    np.testing.assert_array_equal(posture.target, whole)
