@@ -7,7 +7,7 @@ import pinocchio as pin
 
 import wbc
 from wbc.shapes import Box, Capsule, Convex, Cylinder, Sphere
-from wbc.track import Moving, Scene, clearances
+from wbc.track import MovingObstacle, Scene, clearances
 
 
 def at(x: float, y: float, z: float, roll: float = 0.0) -> pin.SE3:
@@ -20,11 +20,11 @@ walls = Convex(np.array(list(itertools.product((-0.1, 0.1), (-0.1, 0.1), (0.0, 0
 roof = Convex(np.array([[x, y, 0.32 if y == 0 else 0.2] for x in (-0.12, 0.12) for y in (-0.12, 0.0, 0.12)]))
 flight = np.array([0.0, -0.25, 0.0])
 clutter = {
-    "house": [Moving(part, at(0.55, 0.0, 0.0)) for part in (walls, roof)],
-    "box": [Moving(Box((0.25, 0.3, 0.3)), at(0.55, 0.45, 0.15))],
-    "post": [Moving(Cylinder(0.04, 0.5), at(0.3, 0.25, 0.25))],
-    "bar": [Moving(Capsule(0.03, 0.6), at(0.55, 0.0, 0.72, np.pi / 2))],
-    "ball": [Moving(Sphere(0.08), at(0.3, 1.0, 0.62), flight)],
+    "house": [MovingObstacle(part, at(0.55, 0.0, 0.0)) for part in (walls, roof)],
+    "box": [MovingObstacle(Box((0.25, 0.3, 0.3)), at(0.55, 0.45, 0.15))],
+    "post": [MovingObstacle(Cylinder(0.04, 0.5), at(0.3, 0.25, 0.25))],
+    "bar": [MovingObstacle(Capsule(0.03, 0.6), at(0.55, 0.0, 0.72, np.pi / 2))],
+    "ball": [MovingObstacle(Sphere(0.08), at(0.3, 1.0, 0.62), flight)],
 }
 
 robot = wbc.robots.load("panda")

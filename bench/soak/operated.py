@@ -80,13 +80,15 @@ def _log() -> track.Log:
     return track.track(_plan())
 
 
-def _plan() -> track.Plan:
+def _plan() -> track.PathRun:
     path = track.SplinePath([0.0, 0.03], POSES)
-    return track.Plan(robot(), TIP, path, "line", Q, DT, {"ball": _moving()}, backend="vm")
+    return track.PathRun(robot(), TIP, path, "line", Q, DT, {"ball": _moving()}, backend="vm")
 
 
-def _moving() -> track.Moving:
-    return track.Moving(shapes.Sphere(0.1), pin.SE3(np.eye(3), np.array([2.0, 0.0, 0.0])), np.array([0.0, 0.1, 0.0]))
+def _moving() -> track.MovingObstacle:
+    return track.MovingObstacle(
+        shapes.Sphere(0.1), pin.SE3(np.eye(3), np.array([2.0, 0.0, 0.0])), np.array([0.0, 0.1, 0.0])
+    )
 
 
 def _problem() -> resolvers.RateProblem:
@@ -251,7 +253,7 @@ GOOD: dict[str, Callable[[Any], Any]] = {
     "RankReduction.rates": lambda g: None, "RateProblem.task": lambda g: np.eye(2, 3),
     "RateProblem.wanted": lambda g: np.ones(2), "SplinePath.times": lambda g: [0.0, 0.03],
     "SplinePath.poses": lambda g: POSES, "SplinePath.t": lambda g: 0.01, "SplinePath.duration": lambda g: 0.05,
-    "Moving.pose": lambda g: _moving().pose, "Moving.velocity": lambda g: np.zeros(3), "Moving.t": lambda g: 0.1,
+    "MovingObstacle.pose": lambda g: _moving().pose, "MovingObstacle.velocity": lambda g: np.zeros(3), "MovingObstacle.t": lambda g: 0.1,
     "Plan.path": lambda g: track.SplinePath([0.0, 0.03], POSES), "Plan.start": lambda g: Q,
     "track.clearances.q": lambda g: np.array([Q, -Q]), "track.clearances.t": lambda g: np.array([0.0, 0.1]),
     "track.self_clearances.q": lambda g: np.array([Q, -Q]), "Log.units": lambda g: {"t": "s"},

@@ -148,7 +148,7 @@ CALLS: dict[str, tuple[Callable[[], Any], type[WbcError], str]] = {
     "path to read": (lambda: track.read_path(3), ShapeError, "path"),
     "time of a path": (lambda: way().sample("now"), ShapeError, "t"),
     "stretched for ever": (lambda: way().stretched(1e55), RangeError, "times"),
-    "moving": (lambda: track.Moving(3, ONE), ShapeError, "Moving.shape"),
+    "moving": (lambda: track.MovingObstacle(3, ONE), ShapeError, "MovingObstacle.shape"),
     "clearances": (lambda: track.clearances(robot(), Q, {}, [0.0]), ShapeError, "q"),
     "plan of nothing": (lambda: track.track(3), ShapeError, "plan"),
     "picture of a long path": (lambda: scene().add_path([[0, 0, 0], [1e9, 0, 0]]), RangeError, "Scene.points"),
