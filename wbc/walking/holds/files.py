@@ -15,10 +15,10 @@
 (x, y, z) is the origin [m], (ax, ay, az) the z axis and (rx, ry, rz) the direction whose part across it is the x axis,
 of any length. Holds come first, with z the approach direction, roll ``free``, ``fixed`` or a whole number from 2 to
 360, max_tilt [rad], and what the hold is mounted on: the id of an obstacle, ``surface``, or nothing where nobody says;
-the column ``on`` may be left out. The numbers d1, d2, d3 of a box are its sides along x, y, z; of a capsule radius and length
-between the centres of its ends, along z; of a sphere its radius; of a cylinder, which has flat ends, radius and length
-along z. Of a mesh d1 is an STL file, by its path from the structure's file, whose surface is closed, and d2 what its
-lengths are multiplied by (1 if empty). Of a ``cylinder`` surface d1 is the radius about z, and a ``plane`` has none.
+the column ``on`` may be left out. The numbers d1, d2, d3 of a box are its sides along x, y, z; of a capsule radius and
+length between the centres of its ends, along z; of a sphere its radius; of a cylinder, which has flat ends, radius and
+length along z. Of a mesh d1 is an STL file, by its path from the structure's file, whose surface is closed, and d2 what
+its lengths are multiplied by (1 if empty). Of a ``cylinder`` surface d1 is the radius about z, and a ``plane`` has none.
 A text with a comma in it stands in double quotes. Empty lines and lines that begin with ``#`` do not count.
 """
 

@@ -2,5 +2,6 @@
 
 from wbc.walking.log.log import WalkLog, WalkLogError
 from wbc.walking.log.recorder import LogRecorder
+from wbc.walking.log.ticks import TickColumns
 
-__all__ = ["LogRecorder", "WalkLog", "WalkLogError"]
+__all__ = ["LogRecorder", "TickColumns", "WalkLog", "WalkLogError"]

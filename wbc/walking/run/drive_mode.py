@@ -13,13 +13,14 @@ from wbc.track.summary import Figure
 from wbc.validation import Array
 from wbc.walking.body_path import standing_path
 from wbc.walking.log.log import WalkLog
+from wbc.walking.log.ticks import TickColumns
 from wbc.walking.loop.walk import Walk
 from wbc.walking.modes.commands import Commands, read_commands
 from wbc.walking.modes.drive import Drive, standing_plan
 from wbc.walking.planner.plan import Plan
 from wbc.walking.run.carrying_out import CarryingOut, Progress
 from wbc.walking.run.mode import Ending, Mode, Result
-from wbc.walking.run.recording import TickColumns, WalkRecorder, as_walked
+from wbc.walking.run.recording import WalkRecorder, as_walked
 from wbc.walking.run.request import DriveRequest
 
 #: Time that the body has to come to rest after the last command [s]
