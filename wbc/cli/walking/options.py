@@ -110,7 +110,7 @@ Ask = Annotated[
 Resume = Annotated[
     str,
     typer.Option(
-        help="Go on with a run, ended or killed: its folder, or FOLDER@SECONDS. It keeps its structure, robot and rates.",
+        help="Go on with a run, ended or killed: its folder, or FOLDER@SECONDS. It keeps structure, robot and rates.",
         rich_help_panel=_SCENE,
     ),
 ]

@@ -18,8 +18,8 @@ of any length. Holds come first, with z the approach direction, roll ``free``, `
 the column ``on`` may be left out. The numbers d1, d2, d3 of a box are its sides along x, y, z; of a capsule radius and
 length between the centres of its ends, along z; of a sphere its radius; of a cylinder, which has flat ends, radius and
 length along z. Of a mesh d1 is an STL file, by its path from the structure's file, whose surface is closed, and d2 what
-its lengths are multiplied by (1 if empty). Of a ``cylinder`` surface d1 is the radius about z, and a ``plane`` has none.
-A text with a comma in it stands in double quotes. Empty lines and lines that begin with ``#`` do not count.
+its lengths are multiplied by (1 if empty). Of a ``cylinder`` surface d1 is the radius about z, and a ``plane`` has
+none. A text with a comma in it stands in double quotes. Empty lines and lines that begin with ``#`` do not count.
 """
 
 from __future__ import annotations

@@ -49,8 +49,8 @@ def machine_made(plain: Any) -> Walker:
     try:
         values = {name: tuple(value) if isinstance(value, list) else value for name, value in plain["data"].items()}
         if plain["two_ended"]:
-            return walker(data=TwoEndedData(**values), two_ended=True)
-        return walker(plain["arms"], data=WalkerData(**values))
+            return walker(data=TwoEndedData.read(**values), two_ended=True)
+        return walker(plain["arms"], data=WalkerData.read(**values))
     except (KeyError, TypeError, AttributeError, WbcError) as error:
         raise WalkLogError("machine", type(plain).__name__, f"the run does not say what walked: {error}") from error
 

@@ -228,14 +228,10 @@ class LogRecorder:
                 tick that cannot be.
         """
         rows, presence = self._rows[: self._count], self.presence()
-        return WalkLog(
-            *self._names,
-            **{name: rows[name].copy() for name in ROW},
-            **self._holds(),
-            presence_hold=presence["presence_hold"],
-            presence_span=presence["presence_span"],
-            meta=self._meta,
-        )
+        names = dict(zip(("joints", "arms", "hands"), self._names, strict=True))
+        fields: dict[str, Any] = {**names, **{name: rows[name].copy() for name in ROW}, **self._holds()}
+        fields |= {name: presence[name] for name in ("presence_hold", "presence_span")}
+        return WalkLog(**fields, meta=self._meta)
 
     def _open_span(self, hold: str, wanted: bool) -> int:
         """The span without end of a hold, if it is ``wanted``; -1 where there is none and none is."""

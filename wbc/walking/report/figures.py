@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import pathlib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -73,10 +73,12 @@ def save_figures(figures: Sequence[Figure], folder: pathlib.Path) -> list[pathli
     wide = max(len(figure.label) for figure in figures)
     lines = [f"{figure.label:<{wide}}  {figure.text}" for figure in figures if figure.label]
     values = json.dumps({figure.key: figure.value for figure in figures}, indent=1)
-    return [
-        write_whole(folder / name, lambda file, text=text: file.write_text(f"{text}\n"))
-        for name, text in (("summary.json", values), ("summary.txt", "\n".join(lines)))
-    ]
+    texts = {"summary.json": values, "summary.txt": "\n".join(lines)}
+    return [write_whole(folder / name, _writes(f"{text}\n")) for name, text in texts.items()]
+
+
+def _writes(text: str) -> Callable[[pathlib.Path], int]:
+    return lambda file: file.write_text(text)
 
 
 def least_time_figure(walker: Walker, plan: Plan) -> Figure:

@@ -114,7 +114,7 @@ class Mode(ABC, Generic[Asked]):
 
 
 def off_goal(walk: Walk, goal: Array) -> str:
-    """How far a body is from the pose where it was to end ``[4, 4]``, and which hands do not hold; "" if all is well."""
+    """How far a body is from the pose where it was to end ``[4, 4]``, or which hands do not hold; "" if all is well."""
     body = pin.XYZQUATToSE3(walk.q[:7])
     away = float(np.linalg.norm(body.translation - goal[:3, 3]))
     turned = float(np.linalg.norm(pin.log3(body.rotation.T @ goal[:3, :3])))

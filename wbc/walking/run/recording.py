@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import groupby
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -30,7 +30,8 @@ _Kept = tuple[float, Array, Array, Array]
 _Hands = tuple[list[int], list[int], bool]
 
 
-class Before(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Before:
     """What was walked before a walk goes on: a log and its ticks, of which ``count`` rows count, and all its holds."""
 
     log: WalkLog
