@@ -16,7 +16,10 @@ _SCENE, _HOW, _OUTPUT = "What it does", "How it is done", "What it writes"
 RobotName = Annotated[
     str, typer.Option("--robot", help="three-armed, or two-ended: end over end, --gait.", rich_help_panel=_SCENE)
 ]
-Arms = Annotated[int, typer.Option(help="Number of arms of the body, 2 to 6.", rich_help_panel=_SCENE)]
+Arms = Annotated[
+    int,
+    typer.Option(help="Arms of the body, 2 to 6; with more than three it is larger.", rich_help_panel=_SCENE),
+]
 Gait = Annotated[str, typer.Option(help="Of the two-ended arm: inchworm, turnaround or any.", rich_help_panel=_SCENE)]
 StructureName = Annotated[
     str,

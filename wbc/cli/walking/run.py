@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
+from math import pi, sin
 from pathlib import Path
 from typing import Any
 
@@ -43,7 +45,7 @@ def changed_machine(changes: list[str], two_ended: bool = False, arms: int | Non
     """The machine with fields of its data changed, from NAME=VALUE.
 
     Args:
-        arms: of the body; None: three.
+        arms: of the body; None: three. More than three stand as far from each other as three do, on a larger body.
 
     Raises:
         ShapeError: no such text. UnknownNameError: no such field. RangeError: arms that it cannot have. What the data
@@ -64,7 +66,11 @@ def changed_machine(changes: list[str], two_ended: bool = False, arms: int | Non
             raise RangeError("arms", arms, "the two-ended arm has two ends")
         return walker(data=TwoEndedData.read(**values), two_ended=True)
     count = validation.integer("arms", 3 if arms is None else arms, *ARMS)
-    return walker(count, data=WalkerData.read(**values))
+    data = WalkerData.read(**values)
+    if count > 3 and "shoulder_radius" not in values:
+        # As far from each other as three of them are
+        data = replace(data, shoulder_radius=data.shoulder_radius * sin(pi / 3) / sin(pi / count))
+    return walker(count, data=data)
 
 
 def walk_free(perform: Perform, machine: Walker, folder: Path, backend: str, check: bool, pictures: bool) -> None:
@@ -114,7 +120,7 @@ def check_folder(folder: Path) -> None:
     Raises:
         WalkLogError, StructureFileError, RobotFileError: no run, or one that was ended before it walked.
     """
-    if not folder.is_dir():
+    if not validation.exists("run", folder) or not folder.is_dir():
         raise WalkLogError("run", str(folder), "there is no such folder")
     log = WalkLog.load(folder)
     machine = log.meta.get("machine")

@@ -41,13 +41,15 @@ def figures_of(run: WalkRun, report: Report | None = None) -> list[Figure]:
     """
     data, structure = run.walker.data, run.structure
     run = run.judged(report)
+    arms = "" if run.walker.two_ended else f" with {len(run.walker.arms)} arms"
     told = f"{run.outcome}: {run.reason}" if run.reason else run.outcome
     if report is None and run.log is not None:
         told += " (not checked)"
     out = [
         Figure("outcome", "outcome", run.outcome, told),
         Figure("reason", "", run.reason, ""),
-        Figure("robot", "robot", data.digest, f"{run.walker.robot.name}, {data.summary()}"),
+        Figure("robot", "robot", data.digest, f"{run.walker.robot.name}{arms}, {data.summary()}"),
+        Figure("arms", "", len(run.walker.arms), ""),
         Figure(
             "structure",
             "structure",
@@ -56,6 +58,8 @@ def figures_of(run: WalkRun, report: Report | None = None) -> list[Figure]:
         ),
     ]
     out += _plan(run)
+    if run.log is None:
+        out += run.more
     if run.log is not None and run.ticks is not None:
         out += _speed(run, run.log)
         out += _errors(run.log, run.ticks)

@@ -27,6 +27,7 @@ from wbc.walking.planner.plan import HoldLost, Plan
 from wbc.walking.run.arm_task import ArmTask
 from wbc.walking.run.carrying_out import CarryingOut, Outcome, Progress, farthest, travelled
 from wbc.walking.run.mode import Ending, Mode, Result, loose_hands
+from wbc.walking.run.plausible import check_holds
 from wbc.walking.run.recording import WalkRecorder, as_walked
 from wbc.walking.run.request import ArmRequest
 
@@ -62,6 +63,7 @@ class ArmTasksMode(Mode[ArmRequest]):
         super().__init__(walker)
         data = walker.arm_data
         self.request, self.structure = request, request.site.build()
+        check_holds(self.structure, walker)
         for task in request.tasks:
             if task.kind == "hold":
                 self.structure.index(task.hold)

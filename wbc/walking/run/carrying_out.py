@@ -7,6 +7,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from wbc.errors import WbcError
 from wbc.simulation import PlantError
 from wbc.track.summary import Figure
 from wbc.walking.loop.state import Tick
@@ -86,6 +87,9 @@ class CarryingOut:
             self.outcome, self.reason = "refused", str(error)
         except PlantError as error:
             self.outcome, self.reason = "plant failed", str(error)
+        except WbcError as error:
+            # Such as a pose that the holding hands do not fix: what was walked until then is kept
+            self.outcome, self.reason = "refused", str(error)
         if len(self.recorder) % STRIDE == 0:
             self._report("walking", None if part is None else min(part, 1.0))
         return self.outcome is None

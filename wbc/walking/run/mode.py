@@ -84,6 +84,10 @@ class Mode(ABC, Generic[Asked]):
     def figures(self, log: WalkLog | None) -> tuple[Figure, ...]:
         """For the summary, of a walk that was carried out; None: without a tick."""
 
+    def remarks(self) -> tuple[Figure, ...]:
+        """What the summary says of the request, whatever comes of it."""
+        return ()
+
     def compiled(self, backend: str) -> WalkStack:
         """The stack that the walk needs."""
         return compiled_stack(self.walker, self.structure, backend)

@@ -13,6 +13,7 @@ from wbc.simulation import Plant
 from wbc.track.summary import Figure
 from wbc.validation import Array
 from wbc.walking.body_path import standing_path
+from wbc.walking.holds.surface import CylinderSurface
 from wbc.walking.log.body_paths import way_of
 from wbc.walking.log.log import WalkLog
 from wbc.walking.loop.stack import WalkStack
@@ -25,12 +26,15 @@ from wbc.walking.planner.plan import NoPlanError, Plan, Regrasp, read_plan
 from wbc.walking.planner.planner import plan_walk
 from wbc.walking.run.carrying_out import CarryingOut, Progress
 from wbc.walking.run.mode import Asked, Ending, Mode, off_goal
+from wbc.walking.run.plausible import check_holds
 from wbc.walking.run.recording import WalkRecorder
 from wbc.walking.run.request import PathRequest, TwoEndedRequest
 from wbc.walking.two_ended import TwoEndedPlan, TwoEndedStack, TwoEndedWalk, plan_two_ended
 
 #: (the next re-grasp, why the last answer was refused or "") -> "" for yes, another hold, or None: nobody answers
 Ask = Callable[[Regrasp, str], str | None]
+#: A path that goes round a cylinder by less goes along it, and there is nothing to say [deg]
+ROUND = 30.0
 
 
 class PlannedMode(Mode[Asked]):
@@ -86,6 +90,7 @@ class PathMode(PlannedMode[PathRequest]):
         super().__init__(walker, ask)
         data = walker.arm_data
         self.request, self.structure = request, request.site.build()
+        check_holds(self.structure, walker)
         self._given = read_plan(request.plan) if request.plan else None
         for step in () if self._given is None else self._given.regrasps:
             self.structure.index(step.target)
@@ -101,6 +106,21 @@ class PathMode(PlannedMode[PathRequest]):
             return follow_plan(self.walker, self.structure, self._given)
         objective = self.request.objective
         return plan_walk(self.walker, self.structure, self.path, objective=objective, partial=True, detour=True)
+
+    def remarks(self) -> tuple[Figure, ...]:
+        """How far a path from hold to hold goes round a cylinder, which it does by the shorter way."""
+        surface, request = self.structure.surface, self.request
+        names = [place for place in (request.start, *request.points) if isinstance(place, str)]
+        if self._given is not None or not names or not isinstance(surface, CylinderSurface):
+            return ()
+        whole = request.site.whole()
+        places = (whole[name].position - surface.pose.translation for name in names)
+        angles = np.array([np.arctan2(y, x) for x, y, _ in (surface.pose.rotation.T @ place for place in places)])
+        turns = np.degrees((np.diff(angles) + np.pi) % (2 * np.pi) - np.pi)
+        if (np.abs(turns) < ROUND).all():
+            return ()
+        text = ", ".join(f"{abs(turn):.0f} deg, the other way would be {360 - abs(turn):.0f} deg" for turn in turns)
+        return (Figure("round", "round the cylinder", np.radians(turns).tolist(), f"the short way: {text}"),)
 
     def walk(self, plan: Plan, stack: WalkStack, plant: Plant | None) -> Walk:
         """On the plan's holds, or with nothing held."""
@@ -127,6 +147,7 @@ class TwoEndedMode(PlannedMode[TwoEndedRequest]):
         super().__init__(walker)
         _ = walker.two_ended_data
         self.request, self.structure = request, request.site.build()
+        check_holds(self.structure, walker)
         first = [self.structure.index(name) for name in request.start]
         if isinstance(request.goal, str):
             self.structure.index(request.goal)

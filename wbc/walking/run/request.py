@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import pathlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from typing import Any, ClassVar
@@ -84,7 +83,8 @@ class Site:
             return make(max_tilt=0.0) if self.rigid else make()
         if self.rigid:
             raise RangeError("rigid", self.rigid, "a file says itself what its holds allow")
-        if "/" in self.structure or self.structure.lower().endswith(".csv") or pathlib.Path(self.structure).is_file():
+        named = "/" in self.structure or self.structure.lower().endswith(".csv")
+        if named or validation.is_file("structure", self.structure):
             return read_structure(self.structure)
         validation.one_of("structure", self.structure, (*BUILT_IN, GRAPPLES, "FILE.csv"))
         raise RangeError("structure", self.structure, "no such file")

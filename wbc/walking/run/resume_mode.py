@@ -95,8 +95,8 @@ def read_resume(text: str, points: tuple[str, ...] = ()) -> ResumeRequest:
         at = float(seconds) if sign else None
     except ValueError:
         at = None
-    folder = pathlib.Path(text if at is None else name)
-    if not folder.is_dir():
+    folder = validation.file_path("resume", text if at is None else name)
+    if not validation.exists("resume", folder) or not folder.is_dir():
         raise RangeError("resume", text, "expected the folder of a run, or FOLDER@SECONDS")
     return ResumeRequest(folder, at, points)
 

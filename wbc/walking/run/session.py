@@ -28,6 +28,7 @@ from wbc.walking.run.carrying_out import WELL, Outcome, Progress
 from wbc.walking.run.drive_mode import DriveMode
 from wbc.walking.run.mode import Mode
 from wbc.walking.run.path_mode import Ask, PathMode, TwoEndedMode
+from wbc.walking.run.plausible import far_apart
 from wbc.walking.run.recording import WalkRecorder
 from wbc.walking.run.request import ArmRequest, DriveRequest, PathRequest, Request, TwoEndedRequest, record_of
 from wbc.walking.run.resume_mode import ResumeMode, ResumeRequest, going_on
@@ -169,8 +170,10 @@ def perform(
     try:
         plan = mode.plan()
     except NoPlanError as error:
-        return replace(run, reason=str(error), plan_time=clock() - begin)
-    run = replace(run, path=plan.path, plan=plan, reason=plan.reason, plan_time=clock() - begin)
+        reason = f"{error}{_hint(mode)}"
+        return replace(run, reason=reason, plan_time=clock() - begin, more=mode.remarks())
+    reason = plan.reason if plan.complete else f"{plan.reason}{_hint(mode)}"
+    run = replace(run, path=plan.path, plan=plan, reason=reason, plan_time=clock() - begin, more=mode.remarks())
     if folder is not None:
         write_whole(folder / PLAN, plan.save)
     if not plan.complete:
@@ -190,9 +193,15 @@ def perform(
     missed = mode.missed(walk) if ending.outcome == "arrived" else ""
     run = replace(run, outcome="missed" if missed else ending.outcome, reason=missed or ending.reason)
     if not len(recorder):
-        return replace(run, more=mode.figures(None))
+        return replace(run, more=(*run.more, *mode.figures(None)))
     result = mode.result(walk, *recorder.log())
-    run = replace(run, log=result.log, ticks=result.ticks, more=result.figures)
+    run = replace(run, log=result.log, ticks=result.ticks, more=(*run.more, *result.figures))
     if result.plan is not None:
         run = replace(run, path=result.plan.path, plan=result.plan)
     return replace(run, walk_time=clock() - begin)
+
+
+def _hint(mode: Mode[Any]) -> str:
+    """What else may be the reason where there is no plan."""
+    remark = far_apart(mode.structure, mode.walker)
+    return f"; {remark}" if remark else ""
