@@ -26,7 +26,7 @@ from wbc.walking.loop.walk import Tick, Walk
 from wbc.walking.planner.plan import HoldLost, NoPlanError, Plan
 from wbc.walking.planner.planner import plan_walk
 from wbc.walking.report.figures import RAMP, body_speed
-from wbc.walking.run.compiling import compiled_stack, keep
+from wbc.walking.run.mode import compiled_stack, keep
 from wbc.walking.run.recording import WalkRecorder
 
 Record = dict[str, Any]

@@ -27,7 +27,7 @@ from wbc.walking.log.log import FILE, WalkLog, WalkLogError
 from wbc.walking.report.figures import figures_of, save_figures
 from wbc.walking.report.folder import WRITTEN, rules_of, save_pictures, save_run
 from wbc.walking.run import WalkRun
-from wbc.walking.run.compiling import keep
+from wbc.walking.run.mode import keep
 from wbc.walking.run.request import PublishedRequest
 
 #: Exit codes: the walk is not possible or did not arrive, and what a check of it violates

@@ -271,6 +271,8 @@ def _mesh(row: _Row, folder: pathlib.Path) -> TriangleMesh:
     scale = row.real("d2", low=0.0) if row.cells["d2"] else 1.0
     if "\0" in path or pathlib.Path(path).suffix.lower() != ".stl":
         raise StructureFileError(row.field("d1"), path, "expected an STL file")
+    if not validation.is_file("d1", folder / path):
+        raise StructureFileError(row.field("d1"), path, "there is no such file")
     if scale == 0.0:
         raise StructureFileError(row.field("d2"), row.cells["d2"], "expected a scale above 0")
     try:

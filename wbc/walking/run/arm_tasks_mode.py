@@ -24,12 +24,11 @@ from wbc.walking.modes.arm_mode import ArmMode, ArmStopped
 from wbc.walking.modes.drive import standing_plan
 from wbc.walking.modes.hand_motion import ArmRefused
 from wbc.walking.planner.plan import HoldLost, Plan
-from wbc.walking.run.arm_task import ArmTask
 from wbc.walking.run.carrying_out import CarryingOut, Outcome, Progress, farthest, travelled
 from wbc.walking.run.mode import Ending, Mode, Result, loose_hands
 from wbc.walking.run.plausible import check_holds
 from wbc.walking.run.recording import WalkRecorder, as_walked
-from wbc.walking.run.request import ArmRequest
+from wbc.walking.run.request import ArmRequest, ArmTask
 
 Reason = Literal["reached", "time", "key", "refused"]
 #: How the run ended, by how its last task did

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -17,12 +18,16 @@ from wbc.validation import Array
 from wbc.walking.body_path import BodyPath
 from wbc.walking.holds.structure import Structure
 from wbc.walking.log.log import WalkLog
+from wbc.walking.log.recorder import versions
 from wbc.walking.log.ticks import TickColumns
+from wbc.walking.loop.body_command import pose_function
+from wbc.walking.loop.closed_chain import chain_function
+from wbc.walking.loop.hand_command import aim_function
 from wbc.walking.loop.stack import WalkStack
 from wbc.walking.loop.walk import ARRIVED, Walk
+from wbc.walking.native import compiled
 from wbc.walking.planner.plan import Plan
 from wbc.walking.run.carrying_out import Outcome, Progress
-from wbc.walking.run.compiling import compiled_stack
 from wbc.walking.run.recording import Before, WalkRecorder
 from wbc.walking.run.request import Request, record_of
 
@@ -131,3 +136,30 @@ def loose_hands(walk: Walk) -> str:
     """Which hands do not hold; "" if all do."""
     loose = [arm.name for k, arm in enumerate(walk.walker.arms) if k not in walk.held]
     return f"{', '.join(loose)} {'do' if len(loose) > 1 else 'does'} not hold" if loose else ""
+
+
+def compiled_stack(
+    walker: Walker, structure: Structure, backend: str = "auto", *, collisions: bool = False
+) -> WalkStack:
+    """A stack; the expressions of the loop and the planner's code are loaded then, too.
+
+    Args:
+        collisions, backend: as of :class:`WalkStack`.
+    """
+    stack = WalkStack(walker, structure, collisions=collisions, backend=backend)
+    chain_function(walker)
+    pose_function()
+    aim_function()
+    compiled.library()
+    versions()
+    return stack
+
+
+def keep() -> None:
+    """Say that all that is there now is there to stay: the garbage collector leaves it alone.
+
+    For a program of its own (a command, a benchmark), once what it needs is loaded. A full collection looks at every
+    object, which with the modules of a walk takes some 80 ms in the middle of a plan or a tick, and finds nothing.
+    """
+    gc.collect()
+    gc.freeze()

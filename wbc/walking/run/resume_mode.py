@@ -32,8 +32,7 @@ from wbc.walking.modes.first_grasps import plan_from_state
 from wbc.walking.planner.plan import Plan
 from wbc.walking.planner.planner import Objective
 from wbc.walking.run.carrying_out import CarryingOut, Progress
-from wbc.walking.run.compiling import compiled_stack
-from wbc.walking.run.mode import Ending, Mode, Result, off_goal
+from wbc.walking.run.mode import Ending, Mode, Result, compiled_stack, off_goal
 from wbc.walking.run.places import GridPlace, Place
 from wbc.walking.run.recording import Before, WalkRecorder, as_walked, configuration
 from wbc.walking.run.request import PathRequest, Request, TwoEndedRequest, request_of
