@@ -48,7 +48,7 @@ COMMANDS = {
     "check": Listed(
         "walking.walk",
         "check",
-        "Check the walk in a run's folder, ended or killed; exit code 4 if it violates a rule.",
+        "Check the walk in a run's folder; exit code 4 if it violates anything.",
     ),
     "plans": Listed(
         "walking.walk", "plans", "Show what two plans do differently, one line each; exit code 1 if there is anything."
