@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 
 import wbc
 from wbc import style, track
-from wbc.cli import bench, console
+from wbc.cli import bench, console, session
 from wbc.cli.app import COMMANDS, app, command
 from wbc.errors import UnknownNameError, WbcError
 from wbc.track.plots import save_picture
