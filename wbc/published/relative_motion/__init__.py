@@ -19,10 +19,10 @@ from wbc.published.relative_motion.arms import (
     wrist_drives,
 )
 from wbc.published.relative_motion.motion import Held, LevelHand, deviation, hold_on_table, straight_line
-from wbc.published.relative_motion.recursion import MasterSlave
-from wbc.published.relative_motion.tables import (
+from wbc.published.relative_motion.printed import (
     Measured,
     commanded,
+    line_errors,
     predicted,
     registration,
     residuals,
@@ -30,6 +30,7 @@ from wbc.published.relative_motion.tables import (
     start,
     tables,
 )
+from wbc.published.relative_motion.recursion import MasterSlave
 
 __all__ = [
     "INCH",
@@ -44,6 +45,7 @@ __all__ = [
     "hanging",
     "hold_on_table",
     "levelled",
+    "line_errors",
     "manipulator",
     "measured",
     "measuring_arm",

@@ -11,7 +11,7 @@ import numpy as np
 
 from wbc import validation
 from wbc.published.relative_motion.arms import INCH, hand
-from wbc.published.relative_motion.motion import LevelHand, straight_line
+from wbc.published.relative_motion.motion import LevelHand, deviation, straight_line
 from wbc.validation import Array
 
 FILE = pathlib.Path(__file__).parent / "data" / "tables.csv"
@@ -79,6 +79,15 @@ def predicted(table: str, method: str) -> Array:
 def residuals(table: str, method: str) -> Array:
     """Measured minus predicted [rows - 1, 3] in inches."""
     return np.asarray(tables()[table].modified[:, :3] - predicted(table, method))
+
+
+def line_errors(table: str, solves: int = 32) -> Array:
+    """The exact method along a table's commands: error of the end, farthest from the line [rows - 1, 2] in inches."""
+    q, out = start(table), []
+    for step in commanded(table):
+        end, way = deviation(straight_line(LevelHand(), q, step, solves=solves, feedback=True, divisions=2), step)
+        out.append((np.abs(end).max(), way))
+    return np.array(out) / INCH
 
 
 def slopes(table: str) -> tuple[Array, Array]:
