@@ -29,13 +29,14 @@ def relative_motion(table: TableName = None, solves: Solves = 32, out: Out = Non
 
     from wbc.cli.console import out as console
     from wbc.cli.console import run_folder
+    from wbc.published.relative_motion import INCH
     from wbc.published.relative_motion import printed as known
     from wbc.validation import one_of
 
     chosen = ARM if table is None else (one_of("table", table, ARM),)
     rows: list[dict[str, Any]] = []
     for name in chosen:
-        command = known.commanded(name) / known.INCH
+        command = known.commanded(name) / INCH
         errors = {"measured": known.tables()[name].modified[:, :3] - command}
         errors |= {method: known.predicted(name, method) - command for method in known.METHODS}
         lines = known.line_errors(name, solves)
@@ -68,6 +69,7 @@ def _plot(file: Path, measured: dict[str, Array]) -> None:
     import numpy as np
 
     from wbc import style
+    from wbc.published.relative_motion import INCH
     from wbc.published.relative_motion import printed as known
 
     with style.pyplot() as plt:
@@ -75,7 +77,7 @@ def _plot(file: Path, measured: dict[str, Array]) -> None:
         size = (3.6 * wide + 1.2, 2.9 * high)
         figure, panels = plt.subplots(high, wide, figsize=size, layout="constrained", squeeze=False)
         for panel, (name, points) in zip(panels.flat, measured.items(), strict=True):
-            sizes, wanted = known.tables()[name].commands[1:], known.commanded(name) / known.INCH
+            sizes, wanted = known.tables()[name].commands[1:], known.commanded(name) / INCH
             for axis, colour in enumerate((style.BLUE, style.ORANGE, style.TEAL)):
                 label = "xyz"[axis]
                 panel.plot(sizes, (points - wanted)[:, axis], "o", ms=4, color=colour, label=f"{label} measured")

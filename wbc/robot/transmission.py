@@ -35,6 +35,7 @@ class Transmission:
     joints: tuple[str, ...]
     drives: Mapping[str, Mapping[str, float]]
     offset: Sequence[float] | None = None
+    zero: Array = field(init=False, repr=False)
     matrix: Array = field(init=False, repr=False)
     inverse: Array = field(init=False, repr=False)
 
@@ -52,17 +53,17 @@ class Transmission:
         if not condition < WORST_CONDITION:
             raise RangeError("drives", list(rows), f"the joints do not follow from the drives, condition {condition:g}")
         offset = validation.ordinary_array("offset", np.zeros(n) if self.offset is None else self.offset, (n,))
-        for key, value in (("joints", joints), ("drives", rows), ("offset", offset), ("matrix", matrix)):
+        for key, value in (("joints", joints), ("drives", rows), ("zero", offset), ("matrix", matrix)):
             object.__setattr__(self, key, value)
         object.__setattr__(self, "inverse", np.linalg.inv(matrix))
 
     def to_drives(self, q: Any) -> Array:
         """Positions of the drives [n]."""
-        return np.asarray(self.matrix @ self._checked("q", q) + self.offset)
+        return np.asarray(self.matrix @ self._checked("q", q) + self.zero)
 
     def to_joints(self, d: Any) -> Array:
         """Positions of the joints [n]."""
-        return np.asarray(self.inverse @ (self._checked("d", d) - np.asarray(self.offset)))
+        return np.asarray(self.inverse @ (self._checked("d", d) - self.zero))
 
     def drive_rates(self, v: Any) -> Array:
         """Rates of the drives for rates of the joints [n]."""

@@ -41,8 +41,8 @@ class MasterSlave:
     def modes(self, which: str) -> Array:
         """Roots z of the ``sum`` or of the ``difference`` of both arms."""
         if validation.one_of("which", which, ("sum", "difference")) == "sum":
-            return np.roots([1.0, -1.0 - self.B, 0.0, self.B])
-        return np.roots([1.0, 2.0 * self.A - self.B - 1.0, 0.0, self.B])
+            return np.asarray(np.roots([1.0, -1.0 - self.B, 0.0, self.B]))
+        return np.asarray(np.roots([1.0, 2.0 * self.A - self.B - 1.0, 0.0, self.B]))
 
     def run(self, master: Array, slave: Array, table: Array) -> tuple[Array, Array]:
         """Commands of both arms cycle by cycle, each arm being where it was sent.

@@ -38,7 +38,7 @@ class FollowingArm:
         self, robot: Robot, frame: str | None = None, *, dt: float, q: Any = None, scale: float = 1.0,
         plant: Plant | None = None, backend: str = "auto",
     ) -> None:  # fmt: skip
-        self.robot, self._dt = robot, validation.scalar("dt", dt, low=0.0, open_low=True, unit="s")
+        self.robot, self.dt = robot, validation.scalar("dt", dt, low=0.0, open_low=True, unit="s")
         self.scale = validation.scalar("scale", scale, low=0.0, open_low=True)
         q0 = robot.configuration("q", robot.neutral if q is None else q)
         if robot.nq != robot.nv:
@@ -47,14 +47,14 @@ class FollowingArm:
         self.n, self.q = robot.nv if frame is None else 3, q0
         self._data = robot.model.createData()
         self._pose = robot.nv >= 6 and frame is not None
-        stack = Stack(robot, dt=self._dt).add(tasks.JointLimits())
+        stack = Stack(robot, dt=self.dt).add(tasks.JointLimits())
         if frame is None:
             stack.add(tasks.Posture(gain=GAIN), name="goal")
         else:
             stack.add(tasks.EndEffector(frame, "pose" if self._pose else "position", gain=GAIN), name="goal")
             stack.add(tasks.Posture(), name="posture", weight=POSTURE)
         self._controller = stack.compile(backend=backend)
-        self._connection = Connection(plant, robot, self._dt)
+        self._connection = Connection(plant, robot, self.dt)
         self.q = self._connection.reset(q0).q
         self._home, self._rotation = self._place()
         self._controller["posture" if frame else "goal"].target = self.q
@@ -67,7 +67,7 @@ class FollowingArm:
         """
         # From where it is at the rate that leads there: a servo that lags is behind, and is not driven into oscillation
         place, _ = self._place()
-        rate = (self._home + self.scale * x - place) / self._dt
+        rate = (self._home + self.scale * x - place) / self.dt
         target = pin.SE3(self._rotation, place) if self._pose else place
         self._controller["goal"].set(target=target, feedforward=np.append(rate, np.zeros(3)) if self._pose else rate)
         self.q = self._connection.drive(self._controller.step(self.q).v).q

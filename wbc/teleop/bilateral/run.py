@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
@@ -126,6 +126,7 @@ class Arm(Protocol):
     """What follows a device, see :class:`wbc.teleop.bilateral.arms.FollowingArm`."""
 
     n: int
+    dt: float
 
     def move(self, x: Array) -> Array:
         """Go to displacements x [n] in one period; where it is then [n]."""
@@ -139,6 +140,7 @@ class BilateralRecord:
         taken, given: by the teleoperator from both devices, and to them. stored: kinetic energy of the devices, and
             elastic energy of hand and wall. injected: by the operator, who moves the end of the hand's spring.
         scale: of master and slave, 1 where passivity control does nothing [ticks, runs, 2].
+        interrupted: ended by Ctrl-C; it has the ticks until then.
     """
 
     time: Array
@@ -153,6 +155,7 @@ class BilateralRecord:
     stored: Array
     injected: Array
     scale: Array
+    interrupted: bool = False
 
     def excess(self) -> Array:
         """Largest stored - injected over the run [runs] [J]: above 0 energy has come from nowhere."""
@@ -162,16 +165,17 @@ class BilateralRecord:
 def run_bilateral(
     systems: Bilateral | Sequence[Bilateral], operators: Operator | Sequence[Operator], walls: Wall | Sequence[Wall],
     *, arms: tuple[Arm | None, Arm | None] = (None, None), seed: int = 0,
+    progress: Callable[[int], None] | None = None,
 ) -> BilateralRecord:  # fmt: skip
     """Teleoperation from rest at 0 until the operators' paths end; many independent runs of the same period at once.
 
     Args:
         arms: robots that the master and the slave of a single run move; None: points that go where they are sent.
-        seed: of the links' jitter and losses.
+        seed: of the links' jitter and losses. progress: called after every tick with how many are done.
 
     Raises:
-        ShapeError: not as many operators and walls as systems, or paths of different shapes. RangeError: systems of
-            different periods, or a hand or wall that is stiffer or more damped than a device stands.
+        ShapeError: not as many operators and walls as systems, paths of different shapes, systems of different periods,
+            or arms that do not fit. RangeError: a hand or wall that is stiffer or more damped than a device stands.
     """
     many = [systems] if isinstance(systems, Bilateral) else list(validation.items("systems", systems))
     hands = [operators] if isinstance(operators, Operator) else list(validation.items("operators", operators))
@@ -183,6 +187,10 @@ def run_bilateral(
     shape = paths[0].shape
     if len(shape) != 2 or any(path.shape != shape for path in paths) or any(one.dt != dt for one in many):
         raise ShapeError("operators.path", shape, "expected paths [ticks, n] of one shape and systems of one period")
+    for arm in arms:
+        if arm is not None and (len(many) != 1 or arm.n != shape[1] or arm.dt != dt):
+            raise ShapeError("arms", arm, f"expected one run, and arms of {shape[1]} coordinates and {dt:g} s")
+    validation.function("progress", progress)
     for system, hand, wall in zip(many, hands, sides, strict=True):
         _touched("operator", hand, system.master)
         _touched("wall", wall, system.slave)
@@ -203,7 +211,8 @@ def run_bilateral(
     def received(side: int, rows: Array) -> Packet:
         return Packet(*(column[rows, every] for column in sent[side]))
 
-    for k in range(ticks):
+    def tick(k: int) -> None:
+        nonlocal injected
         inside = slave.x - wall_at
         push = np.maximum(wall_k * inside + wall_b * slave.v, 0.0)
         forces = hand_k * (path[k] - master.x) - hand_b * master.v, np.where(inside > 0.0, -push, 0.0)
@@ -223,8 +232,20 @@ def run_bilateral(
         if k + 1 < ticks:
             before, after = path[k] - master.x, path[k + 1] - master.x
             injected = injected + 0.5 * hand_k[:, 0] * np.sum(after**2 - before**2, axis=1)
-    (xm, vm, fm), (xs, vs, fs) = ([column[1:] for column in side[:3]] for side in sent)
-    return BilateralRecord(np.arange(ticks) * dt, xm, xs, vm, vs, fm, fs, *energies, scale)
+
+    done, interrupted = 0, False
+    try:
+        for done in range(1, ticks + 1):
+            tick(done - 1)
+            if progress is not None:
+                validation.called("progress", progress, done)
+    except KeyboardInterrupt:
+        done, interrupted = done - 1, True
+    (xm, vm, fm), (xs, vs, fs) = ([column[1 : done + 1] for column in side[:3]] for side in sent)
+    taken, given, stored, put_in = energies[:, :done]
+    return BilateralRecord(
+        np.arange(done) * dt, xm, xs, vm, vs, fm, fs, taken, given, stored, put_in, scale[:done], interrupted
+    )
 
 
 def _touched(name: str, by: Operator | Wall, device: Device) -> None:

@@ -154,6 +154,9 @@ class Bilateral:
 
     def __post_init__(self) -> None:
         dt = validation.scalar("dt", self.dt, low=0.0, open_low=True, unit="s")
+        kinds = (("scheme", Scheme), ("master", Device), ("slave", Device), ("forward", Link), ("backward", Link))
+        for name, kind in kinds:
+            validation.instance(name, getattr(self, name), kind, f"a {kind.__name__}")
         self.master.check("master", dt)
         self.slave.check("slave", dt)
         if validation.flag("passivity", self.passivity) or validation.flag("unchecked", self.unchecked):
