@@ -26,7 +26,7 @@ from wbc.teleop.bilateral import (
 )
 
 PICTURE = ROOT / "docs" / "images" / "bilateral.png"
-DEVICE, LIGHT = Device(2.0, 15.0), Device(2.0, 6.0)
+DEVICE, LIGHT = Device(2.0, 15.0), Device(2.0, 10.0)
 SCHEMES = {
     "position-position": position_position(), "position-force": position_force(), "four-channel": four_channel(),
 }  # fmt: skip
@@ -112,33 +112,37 @@ def _families() -> str:
         with np.errstate(all="ignore"):
             wild += int((~(run_bilateral(free, hands, walls, seed=batch).excess() < size)).sum())
     return (
-        f"Of {FAMILY * BATCHES} random systems (gains over four decades, devices at their bounds, up to 600 ms each way, "
-        f"jitter up to 300 ms, up to 90 % lost) {wild} had more than twice the energy that their operator put in without "
-        f"passivity control. With it none had more than was put in (largest excess {max(most, 0.0):.1g} of it), and at "
-        f"no tick did both sides together give out more than they had taken in (largest excess {max(worst, 0.0):.1g})."
+        f"Of {FAMILY * BATCHES} random systems (gains over four decades, devices at their bounds, up to 600 ms each "
+        f"way, jitter up to 300 ms, up to 90 % lost) {wild} had, without passivity control, more than twice the energy "
+        f"that their operator put in. With it none had more than was put in (largest excess {max(most, 0.0):.1g} of "
+        "it), and at no tick did both sides together give out more than they had taken in (largest excess "
+        f"{max(worst, 0.0):.1g})."
     )
 
 
 def _picture() -> None:
-    """Forces that are late, on a wall, with and without passivity control."""
+    """Forces that are late, on a wall, without passivity control and with it, and four channels."""
     free = Bilateral(SCHEMES["position-force"], LIGHT, LIGHT, Link(0.3), Link(0.3), DT, passivity=False, unchecked=True)
-    systems = [free, dataclasses.replace(free, passivity=True)]
-    run = run_bilateral(systems, [Operator(reach(seconds=SECONDS), 100.0)] * 2, [WALL] * 2)
+    systems = [free, dataclasses.replace(free, passivity=True), _system(SCHEMES["four-channel"], 0.6, 0.0, 0.0)]
+    run = run_bilateral(systems, [Operator(reach(seconds=SECONDS), k) for k in (100.0, 100.0, 400.0)], [WALL] * 3)
+    titles = ("position-force, no control", "position-force, passive", "four-channel, passive")
     with style.pyplot() as plt:
-        figure, panels = plt.subplots(3, 2, figsize=(9.6, 7.2), layout="constrained", sharex=True, sharey="row")
-        for k, title in enumerate(("without passivity control", "with passivity control")):
+        figure, panels = plt.subplots(3, 3, figsize=(12.0, 7.2), layout="constrained", sharex=True)
+        for k, title in enumerate(titles):
             _column(panels[:, k], run, k)
             panels[0, k].set_title(title)
             panels[2, k].set_xlabel("time [s]")
         for panel, label in zip(panels[:, 0], ("position [m]", "force [N]", "energy [J]"), strict=True):
             panel.set_ylabel(label)
-            panel.legend(loc="upper right")
+            panel.legend(loc="best")
         figure.savefig(PICTURE)
         plt.close(figure)
 
 
 def _column(panels: np.ndarray, run: BilateralRecord, k: int) -> None:
     time = run.time
+    panels[0].set_ylim(-0.2, 0.35)
+    panels[1].set_ylim(-45, 65)
     panels[0].axhline(WALL.at, color=style.GREY, lw=0.8, ls=":")
     panels[0].plot(time, run.master[:, k, 0], color=style.BLUE, label="master")
     panels[0].plot(time, run.slave[:, k, 0], color=style.ORANGE, label="slave")
