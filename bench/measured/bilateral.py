@@ -6,6 +6,7 @@ import dataclasses
 
 import numpy as np
 
+import wbc
 from bench.pool import ROOT
 from bench.sheet import Sheet
 from tests.teleop.bilateral_runs import DT, drawn, reach
@@ -24,6 +25,7 @@ from wbc.teleop.bilateral import (
     position_position,
     run_bilateral,
 )
+from wbc.teleop.bilateral.arms import FollowingArm
 
 PICTURE = ROOT / "docs" / "images" / "bilateral.png"
 DEVICE, LIGHT = Device(2.0, 15.0), Device(2.0, 10.0)
@@ -33,6 +35,17 @@ SCHEMES = {
 #: Delay there and back [s], jitter [s] and loss of each direction
 LINKS = ((0.0, 0.0, 0.0), (0.1, 0.0, 0.0), (0.2, 0.0, 0.0), (0.4, 0.0, 0.0), (0.6, 0.0, 0.0), (0.6, 0.1, 0.3))
 WALL = Wall(0.15)
+#: Robots: master, slave, how much more the slave moves, whether joint by joint
+PAIRS = (
+    ("panda", "ssrms", 3.0, False), ("xarm7", "ur10", 1.0, False), ("ur5", "talos_left_arm", 0.5, False),
+    ("ur3", "panda", 1.0, False), ("ur3", "ur10", 1.0, True), ("z1", "ur5", 1.0, True),
+)  # fmt: skip
+TIPS = {
+    "panda": "panda_hand_tcp", "ssrms": "tip", "xarm7": "link_eef", "ur10": "tool0", "ur5": "tool0", "ur3": "tool0",
+    "talos_left_arm": "gripper_left_base_link",
+}  # fmt: skip
+#: Joints of the Space Station arm at the start [degrees]
+BENT = (0.0, 30.0, -60.0, 90.0, -60.0, 20.0, 0.0)
 SECONDS = 8.0
 #: Random systems of a batch, batches, and their length in ticks
 FAMILY, BATCHES, TICKS = 250, 16, 1200
@@ -41,7 +54,7 @@ FAMILY, BATCHES, TICKS = 250, 16, 1200
 def parts() -> dict[str, Sheet | str]:
     """What is felt, what is accepted without passivity control, and the random families."""
     _picture()
-    return {"felt": _felt(), "accepted": _accepted(), "families": _families()}
+    return {"felt": _felt(), "accepted": _accepted(), "robots": _robots(), "families": _families()}
 
 
 def _felt() -> Sheet:
@@ -76,6 +89,36 @@ def _felt() -> Sheet:
 def _system(scheme: Scheme, delay: float, jitter: float, loss: float) -> Bilateral:
     link = Link(0.5 * delay, jitter, loss)
     return Bilateral(scheme, DEVICE, DEVICE, link, link, DT)
+
+
+def _robots() -> Sheet:
+    """Pairs of robots with four channels, 600 ms, jitter and losses: to a wall and back."""
+    system, path = _system(SCHEMES["four-channel"], 0.6, 0.05, 0.1), reach(0.1, SECONDS, 3, 1)
+    rows = []
+    for lead, follow, scale, by_joints in PAIRS:
+        n, wall = (6 if by_joints else 3), Wall(0.05)
+        arms = tuple(
+            FollowingArm(
+                wbc.robots.load(name), None if by_joints else TIPS[name], dt=DT, scale=part,
+                q=np.radians(BENT) if name == "ssrms" else None,
+            )
+            for name, part in ((lead, 1.0), (follow, scale))
+        )  # fmt: skip
+        run = run_bilateral(system, Operator(reach(0.1, SECONDS, n, 1) if by_joints else path), wall, arms=arms)
+        at = round(3.9 / DT)
+        space = "joints" if by_joints else "hand"
+        off = [arm.move(x[-1, 0]) - x[-1, 0] for arm, x in zip(arms, (run.master, run.slave), strict=True)]
+        rows.append((
+            f"{lead}, {follow}", space, f"{scale:g}", f"{1e3 * run.slave[at, 0, 1]:.0f}",
+            f"{run.operator_force[at, 0, 1]:.1f}", f"{-run.wall_force[at, 0, 1]:.1f}",
+            f"{1e3 * abs(run.slave[-1, 0, 1]):.1f}", f"{1e3 * np.abs(off).max():.2g}",
+            f"{(run.taken - run.given).min():.2g}",
+        ))  # fmt: skip
+    columns = (
+        "master, slave", "by", "scale", "slave at the wall", "felt, N", "on the wall, N", "at the end",
+        "arms off devices", "least energy kept, J",
+    )  # fmt: skip
+    return Sheet("", columns, rows)
 
 
 def _accepted() -> Sheet:
