@@ -11,6 +11,7 @@ from wbc import tasks, validation
 from wbc.controller import Stack
 from wbc.errors import ShapeError
 from wbc.robot import Robot
+from wbc.robot.robot import checked_robot
 from wbc.simulation import Connection, Plant
 from wbc.validation import Array
 
@@ -38,7 +39,7 @@ class FollowingArm:
         self, robot: Robot, frame: str | None = None, *, dt: float, q: Any = None, scale: float = 1.0,
         plant: Plant | None = None, backend: str = "auto",
     ) -> None:  # fmt: skip
-        self.robot, self.dt = robot, validation.scalar("dt", dt, low=0.0, open_low=True, unit="s")
+        self.robot, self.dt = checked_robot(robot), validation.scalar("dt", dt, low=0.0, open_low=True, unit="s")
         self.scale = validation.scalar("scale", scale, low=0.0, open_low=True)
         q0 = robot.configuration("q", robot.neutral if q is None else q)
         if robot.nq != robot.nv:
