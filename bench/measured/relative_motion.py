@@ -24,7 +24,7 @@ def _lines() -> Sheet:
         off = [tables()[name].modified[:, :3] - wanted, *(predicted(name, m) - wanted for m in ("order 0", "order 1"))]
         line = line_errors(name)
         last = [np.abs(one).max() for one in off]
-        rows.append((name, *(f"{x:.3f}" for x in last), f"{line[:, 0].max():.5f}", f"{line[:, 1].max():.5f}"))
+        rows.append((name, *(f"{x:.3f}" for x in last), f"{line[:, 0].max():.1g}", f"{line[:, 1].max():.1g}"))
     columns = ("table", "measured", "order 0", "order 1", "exact, end", "exact, way")
     return Sheet("", columns, rows)
 

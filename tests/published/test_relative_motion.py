@@ -301,6 +301,21 @@ def test_8_exact_lines_stay_within_a_thousandth(table: str) -> None:
             assert 0.19 < np.abs(deviation(once, line)[0]).max() / INCH < 0.75
 
 
+def test_8_exact_lines_from_anywhere() -> None:
+    """Random starts and directions: ends are exact, and the way between points closes in by their number squared."""
+    rng, level, found = np.random.default_rng(12), LevelHand(), []
+    for _ in range(8):
+        q = levelled(np.append(rng.uniform(-0.6, 0.6, 4), (0.0, 0.0)))
+        line = rng.normal(size=3)
+        line *= 4.0 * INCH / np.linalg.norm(line)
+        runs = [straight_line(level, q, line, hand(q)[1], solves=n, feedback=True, divisions=2) for n in (8, 16)]
+        found.append([deviation(run, line) for run in runs])
+        assert max(np.abs(end).max() for end, _ in found[-1]) / INCH < 1e-6
+    ways = np.array([[way for _, way in pair] for pair in found])
+    np.testing.assert_allclose(ways[:, 0] / ways[:, 1], 4.0, rtol=0.15)
+    assert np.median(ways[:, 1]) / INCH < 1e-3
+
+
 def test_8_the_stack_stays_within_a_thousandth() -> None:
     """A tick of the framework with the hand's pose as its task, from both starts along each axis."""
     stack = wbc.Stack(manipulator(), dt=0.01)

@@ -94,23 +94,23 @@ def straight_line(
     """Configurations of the program MAIN from q to q and an increment [m], with an absolute yaw [rad].
 
     Args:
-        solves: of the Jacobian on the way; the document has one. feedback: each goes to its point of the line from
-            where the hand is, not on by a part of the increment. divisions: of joint space between solves; they set the
-            speed. latched: where the Jacobian is expanded; default: q ("initial set").
+        solves: of the Jacobian on the way; the document has one. feedback: each is repeated until the hand is at its
+            point of the line. divisions: of joint space between solves; they set the speed.
+        latched: where the Jacobian is expanded; default: q ("initial set"), and each point with feedback.
 
     Returns:
         Configurations [1 + solves * divisions, 6], q first.
 
     Raises:
-        RangeError: no inverse on the way, or a hand that no wrist levels.
+        RangeError: no inverse on the way, or a hand that no wrist levels. InfeasibleError: with feedback, out of reach.
     """
     q, increment = validation.ordinary_array("q", q, (6,)), validation.ordinary_array("increment", increment, (3,))
     validation.integer("solves", solves, 1), validation.integer("divisions", divisions, 1)
     level.latch(q if latched is None else latched, yaw)
     start, out = hand(q)[0], [q]
     for k in range(1, solves + 1):
-        part = start + increment * k / solves - hand(q)[0] if feedback else increment / solves
-        goal = level.step(q, part)
+        there = np.append(start + increment * k / solves, yaw)
+        goal = level.reach(q, there) if feedback else level.step(q, increment / solves)
         out += [q + (goal - q) * j / divisions for j in range(1, divisions + 1)]
         q = goal
     return np.array(out)
