@@ -70,6 +70,11 @@ COMMANDS = {
         "Run the published driver of redundant arms: its own trajectories, "
         "printed norms beside, or one from its files.",
     ),
+    "relative-motion": Listed(
+        "relative_motion",
+        "relative_motion",
+        "Reproduce the published tables of compensation of relative motion, with exact straight lines beside them.",
+    ),
     "explore": Listed(
         "explore",
         "explore",
