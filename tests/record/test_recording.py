@@ -60,13 +60,13 @@ def sensed() -> Stack:
 @pytest.mark.parametrize(
     ("builder", "backend", "solver", "ticks"),
     [
-        ("arm", "native", "daqp", 120),
-        ("arm", "native", "osqp", 40),
-        ("arm", "native", "qpoases", 40),
-        ("arm", "vm", "daqp", 60),
-        ("sensed", "vm", "daqp", 40),
-        ("conflicts", "vm", "daqp", 40),
-        ("humanoid", "vm", "daqp", 40),
+        ("arm", "native", "daqp", 60),
+        ("arm", "native", "osqp", 24),
+        ("arm", "native", "qpoases", 24),
+        ("arm", "vm", "daqp", 30),
+        ("sensed", "vm", "daqp", 24),
+        ("conflicts", "vm", "daqp", 24),
+        ("humanoid", "vm", "daqp", 18),
     ],
 )
 def test_every_tick_again(
