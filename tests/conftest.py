@@ -36,6 +36,7 @@ PATIENCE = 60.0
 
 # Imported here, when the flags above are set
 from tests import objects  # noqa: E402
+from tests.repeats import repeats  # noqa: E402
 
 objects.keep(BUILD / "test-cache" / "objects")
 
@@ -67,7 +68,7 @@ settings.register_profile(
     "wbc",
     derandomize=True,
     deadline=None,
-    max_examples=40,
+    max_examples=repeats(25),
     database=None,
     print_blob=False,
     suppress_health_check=[HealthCheck.too_slow],

@@ -1,4 +1,4 @@
-"""Plots of the tests are small, and nobody looks whether their labels lie on each other: what is in them is the same."""
+"""Plots of the tests are small, and their labels may lie on each other: what is in them is the same."""
 
 from __future__ import annotations
 

@@ -45,9 +45,7 @@ def anywhere(name: str, direction: int, kind: str) -> tuple[float, float]:
 CASES = [(name, d) for name, directions in DIRECTIONS.items() for d in range(len(directions))]
 
 
-@pytest.mark.parametrize(
-    ("case", "gain", "kind"), covering(CASES, [1.0, 10.0, 50.0, None], ["pose", "position"])
-)
+@pytest.mark.parametrize(("case", "gain", "kind"), covering(CASES, [1.0, 10.0, 50.0, None], ["pose", "position"]))
 def test_comes_to_rest_at_the_best(case: tuple[str, int], gain: float | None, kind: str) -> None:
     """Ticks 900 to 1000: no sign flip, |v| < 1e-3 rad/s, within 1 mm of the best distance. ``None``: 1 / dt.
 

@@ -16,7 +16,6 @@ from tests.repeats import covering
 from tests.wheels import VEHICLES
 from wbc.tasks import Rolling
 
-
 #: What is checked of two hands
 HANDS = list(itertools.product(hands.SUBJECTS, [tasks.decay, tasks.tracking]))
 
