@@ -344,7 +344,7 @@ def heir(ticks: int) -> bool:
 
 
 def test_a_fork_leaves_the_file_to_its_parent(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    one = small.stack().compile(backend="vm")
+    one = small.stack().compile(backend="native")
     monkeypatch.setattr(sys.modules[__name__], "_shared", one)
     with one.record(tmp_path / "run.npz") as recorder:
         one.step(small.Q)
