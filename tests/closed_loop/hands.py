@@ -12,7 +12,7 @@ import pinocchio as pin
 
 import wbc.robots
 from tests.closed_loop.eyes import Array, Eyes
-from tests.closed_loop.loop import Loop, backend_of
+from tests.closed_loop.loop import Loop
 from tests.closed_loop.machines import STARTS
 from tests.closed_loop.subjects import Subject
 from tests.closed_loop.tasks import DT
@@ -45,9 +45,9 @@ FRAMES = {
 class HandsLoop(Loop):
     """A loop whose checks speak of two hands."""
 
-    def __init__(self, robot: Robot, items: Mapping[str, Item], dt: float, name: str, backend: str) -> None:
+    def __init__(self, robot: Robot, items: Mapping[str, Item], dt: float, name: str) -> None:
         self._hands = FRAMES[name]
-        super().__init__(robot, items, dt, name, backend)
+        super().__init__(robot, items, dt, name)
 
     @property
     def frames(self) -> Any:
@@ -109,4 +109,4 @@ def build(name: str, mutations: dict[str, Any] | None = None) -> Loop:
     other = mutations or {}
     f: Any = FRAMES[name]
     items = {key: s.declare(other.get(key, s.cls), f, robot(name)) for key, s in SUBJECTS.items()}
-    return HandsLoop(robot(name), items, DT, name, backend_of(mutations))
+    return HandsLoop(robot(name), items, DT, name)

@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 
 from tests.closed_loop.eyes import Array, length
-from tests.closed_loop.loop import Loop
+from tests.closed_loop.loop import Loop, backend_of
 from tests.closed_loop.machines import STARTS
 from tests.tasks.items_coordination import contact, slip
 from tests.wheels import Vehicle, vehicle
@@ -28,7 +28,7 @@ def build(name: str, cls: type[Rolling] = Rolling) -> Loop:
         "rest": Posture(joints=known.robot.joint_names),
         "caps": JointLimits(acceleration=False),
     }
-    return Loop(known.robot, items, DT, name, "vm")  # a few hundred ticks
+    return Loop(known.robot, items, DT, name, backend_of(cls is not Rolling))
 
 
 def start(known: Vehicle, rng: np.random.Generator, reach: float) -> Array:
