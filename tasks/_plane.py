@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, ClassVar
 
 import casadi as ca
@@ -35,6 +36,13 @@ class Plane:
     direction: ca.SX
     line_square: ca.SX
     elbow_square: ca.SX
+
+
+@lru_cache(maxsize=32)
+def _angle(item: PlaneItem, robot: Robot) -> ca.Function:
+    """q -> the angle of a plane; kept, since every reset of a controller asks for it."""
+    kin = Tracer(Kinematics(robot.model))
+    return ca.Function("angle", [kin.q], [kin.expand(item._turned(kin, ca.SX(0)))])
 
 
 @dataclass(frozen=True)
@@ -89,12 +97,10 @@ class PlaneItem(Item):
     def angle(self, robot: Robot, q: Any) -> float:
         """The plane's angle [rad] in (-pi, pi] at a configuration, 0 where it is singular.
 
-        Builds the expression anew: for set-up and inspection, not for a control loop.
+        Builds the expression when it is first asked on a robot: for set-up and inspection, not for a control loop.
         """
         q = robot.configuration("q", q)
-        kin = Tracer(Kinematics(robot.model))
-        expression = kin.expand(self._turned(kin, ca.SX(0)))
-        return float(ca.Function("angle", [kin.q], [expression])(q))
+        return float(_angle(self, robot)(q))
 
     def _against(self) -> PlaneReference:
         return self.reference if self.reference is not None else PlaneReference()

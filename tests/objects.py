@@ -1,7 +1,8 @@
 """Object files of compiled stacks, kept by what they are made from.
 
 A stack is compiled again as soon as a line of the package changes that may have to do with it (wbc.stack.key); nearly
-always the C code stays the same, and so does its object file.
+always the C code stays the same, and so does its object file. What is not in the folder is compiled; rows that are not
+to be optimised are assembled (:mod:`tests.assembly`).
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import tempfile
 
 import casadi as ca
 
+from tests.assembly import assembled
 from wbc.native import toolchain
 
 _run, _compiler = toolchain._run, toolchain.compiler()
@@ -32,13 +34,25 @@ def keep(folder: pathlib.Path) -> None:
         if kept.exists():
             shutil.copyfile(kept, made)
             return
-        _run(command, place)
+        _made(command, place)
         # Renamed into its place, since other processes look for it
         with tempfile.NamedTemporaryFile(dir=folder, delete=False) as file:
             file.write(made.read_bytes())
         os.replace(file.name, kept)
 
     toolchain._run = run
+
+
+def _made(command: list[str], place: pathlib.Path) -> None:
+    """By the compiler, or, where generated rows are not to be optimised, by the assembler."""
+    rows = place / "rows.c"
+    if rows.name in command and "-O0" in command:
+        text = assembled(rows.read_text())
+        if text is not None:
+            (place / "rows.s").write_text(text)
+            _run([command[0], "-c", "rows.s", "-o", command[command.index("-o") + 1]], place)
+            return
+    _run(command, place)
 
 
 def _name(command: list[str], place: pathlib.Path) -> str:

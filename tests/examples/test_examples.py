@@ -25,7 +25,16 @@ NUMBER = r"([-+0-9.e]+)"
 
 
 #: Examples with so many ticks that compiling them takes less time than the virtual machine
-LONG = ("space_arm", "time_laws", "mobile_base")
+LONG = (
+    "space_arm",
+    "time_laws",
+    "mobile_base",
+    "clutter",
+    "self_collision",
+    "levels",
+    "moving_obstacle",
+    "custom_expression",
+)
 
 
 def output(name: str) -> str:
@@ -135,6 +144,7 @@ def test_self_collision_keeps_the_arms_apart() -> None:
     check_picture(text)
 
 
+@pytest.mark.usefixtures("as_users_get_them")
 def test_time_laws_keep_their_limits() -> None:
     text = output("time_laws")
     fast, smooth = (line for line in text.splitlines() if re.match(r"(least time|jerk-limited) ", line))

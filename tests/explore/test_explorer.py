@@ -9,6 +9,7 @@ import pinocchio as pin
 import pytest
 
 import wbc
+from tests.repeats import repeats
 from wbc.errors import InfeasibleError, RangeError, ShapeError, UnknownNameError
 from wbc.explore import Explorer
 from wbc.explore.pictures import save_pieces
@@ -138,7 +139,7 @@ def path_near_limits(seed: int) -> tuple[Any, list[np.ndarray], np.ndarray]:
 
 def test_a_whole_path_is_resolved_where_single_steps_end_at_a_limit() -> None:
     done = {"whole": 0, "anywhere": 0, "steps": 0}
-    for seed in range(8):
+    for seed in range(repeats(4)):
         robot, targets, first = path_near_limits(seed)
         explorer = Explorer(plane_stack(robot), first, values={"tip": {"target": targets[0]}})
         stopped = explorer.step_by_step({"tip": targets}, first, step=0.5)[1]

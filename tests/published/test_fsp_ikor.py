@@ -9,6 +9,7 @@ import itertools
 import math
 from collections import Counter
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +28,6 @@ from wbc.published.ikor import (
     Stop,
     Trajectory,
     airarm,
-    case,
     differences,
     hermies,
     line_to,
@@ -37,6 +37,7 @@ from wbc.published.ikor import (
     straight,
     without_platform,
 )
+from wbc.published.ikor import case as run_case
 from wbc.published.ikor import files as ikor_files
 from wbc.published.ikor.cases import BETWEEN, unmatched
 from wbc.published.ikor.driver import euler_angles, intrusions, rotation_of
@@ -48,6 +49,10 @@ BENT = np.radians([10, 150, 20, 30, -15, 60, 25])
 #: A line near that of trajectory 1 [m a step]
 LINE = np.array((0.00109315, -0.00329651, -0.00428364))
 FOREARM = [(-0.40, -0.356, 0.58, 0.08)]
+
+
+#: Each run once, for all tests that read it
+case = cache(run_case)
 
 
 def run(machine: Any, settings: Settings, trajectory: Trajectory, spheres: Any = ()) -> Run:

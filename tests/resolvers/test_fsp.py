@@ -65,7 +65,7 @@ def off(space: SolutionSpace, v: np.ndarray) -> float:
     return float((np.abs(space.J @ v - space.x)).max() / size)
 
 
-@settings(max_examples=60)
+@settings(max_examples=30)
 @given(st.sampled_from(KINDS), st.integers(0, 10**6))
 def test_both_generators_span_the_same_space(kind: str, seed: int) -> None:
     J, x = system(kind, seed)
@@ -89,7 +89,7 @@ def test_exchange_finds_what_every_pattern_finds(kind: str, seed: int) -> None:
     assert (quick.span, quick.completed) == (all_patterns.span, all_patterns.completed)
 
 
-@settings(max_examples=60)
+@settings(max_examples=30)
 @given(st.integers(0, 10**6), st.sampled_from([orthogonal, blocked]))
 def test_weights_with_sum_one_are_solutions_and_with_sum_zero_self_motions(seed: int, make: Any) -> None:
     rng = np.random.default_rng(seed)
@@ -151,7 +151,7 @@ def random_problem(seed: int) -> tuple[Any, ...]:
     return J, x, A, d, root @ root.T + np.eye(m), rng.normal(size=m)
 
 
-@settings(max_examples=80)
+@settings(max_examples=40)
 @given(st.integers(0, 10**6), st.sampled_from(["plain", "diagonal", "matrix"]), st.booleans())
 def test_the_closed_form_is_the_optimum(seed: int, weighting: str, aimed: bool) -> None:
     J, x, A, d, H, r = random_problem(seed)
@@ -342,7 +342,7 @@ def test_an_inequality_asks_for_less() -> None:
     assert free @ free < held @ held - 0.1
 
 
-@settings(max_examples=60)
+@settings(max_examples=30)
 @given(st.sampled_from(KINDS), st.integers(0, 10**6), st.integers(0, 8))
 def test_whatever_the_constraints_the_answer_is_finite_or_refused(kind: str, seed: int, count: int) -> None:
     J, x = system(kind, seed)
