@@ -162,7 +162,7 @@ def test_a_whole_path_is_resolved_where_single_steps_end_at_a_limit() -> None:
 def test_a_resolution_becomes_a_law() -> None:
     robot, targets, first = path_near_limits(0)
     explorer = Explorer(plane_stack(robot), first, values={"tip": {"target": targets[0]}})
-    law = explorer.along({"tip": targets}, first, step=0.6, anywhere=True).law(1.0, 5.0)
+    law = explorer.along({"tip": targets}, first, step=0.6, anywhere=True).laws(1.0, 5.0)[0]
     assert law.duration > 0.0
     assert law.certificate
 
