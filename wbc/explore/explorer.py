@@ -51,7 +51,8 @@ class Piece:
         q: in order [count, nq]. closed: whether it comes back to its first.
         ends: what stops it at its first and last configuration: a limit or margin, ``singular`` or ``long``; empty
             where it is closed.
-        broken: of every configuration the limit or margin that does not hold, empty where all do.
+        broken: of every configuration the limit or margin that does not hold, empty where all do. Beyond limits, full
+            turns of joints are not counted.
         free: how many directions of self-motion there are: with more than one the curve is one of many.
     """
 
@@ -184,9 +185,9 @@ class Explorer:
             ends.append(end)
             if end == "closed":
                 q_all = np.array([start, *found])
-                return Piece(q_all, True, ("", ""), tuple(rows.broken(x) for x in q_all), len(ways))
+                return Piece(q_all, True, ("", ""), self._all_broken(q_all), len(ways))
         q_all = np.array([*halves[1][::-1], start, *halves[0]])
-        return Piece(q_all, False, (ends[1], ends[0]), tuple(rows.broken(x) for x in q_all), len(ways))
+        return Piece(q_all, False, (ends[1], ends[0]), self._all_broken(q_all), len(ways))
 
     def pieces(
         self, q: Any, *, seeds: int = 40, seed: int = 0, step: float = STEP, through: bool = False
@@ -227,7 +228,8 @@ class Explorer:
             InfeasibleError: no configuration keeps them.
         """
         value = self.rows.room if criterion is None else criterion
-        kept = [q for piece in pieces for q, broken in zip(piece.q, piece.broken, strict=True) if not broken]
+        held = [q for piece in pieces for q, broken in zip(piece.q, piece.broken, strict=True) if not broken]
+        kept = [self.rows.turned(q) if self.rows.broken(q) else q for q in held]
         if not kept:
             raise InfeasibleError("pieces", len(pieces), "no configuration of them keeps limits and margins")
         values = [float(validation.called("criterion", value, q)) for q in kept]
@@ -357,6 +359,10 @@ class Explorer:
             ways = rows.self_motions(q)
             take(rows.moved(q, rng.normal(size=len(ways)) @ ways * BESIDE * (1 + k % 3)))
         return np.array(out).reshape(-1, self.robot.nq)
+
+    def _all_broken(self, q: Array) -> tuple[str, ...]:
+        """What does not hold at configurations, in whichever turn of the joints most does."""
+        return tuple(self.rows.broken(x) and self.rows.broken(self.rows.turned(x)) for x in q)
 
     def _half(self, start: Array, heading: Array, step: float, free: int, through: bool) -> tuple[list[Array], str]:
         rows, q, out, length = self.rows, start, list[Array](), step

@@ -12,6 +12,7 @@ import pinocchio as pin
 from wbc import validation
 from wbc.errors import RangeError, UnknownNameError
 from wbc.stack.declaration import Declaration, Entry
+from wbc.stack.evaluation import SingleState
 from wbc.symbolic import Kinematics, Tracer
 from wbc.tasks import Fixed, Hold, Mechanism
 from wbc.tasks import inputs as run_time
@@ -43,7 +44,7 @@ class StackRows:
         names = [entry.name for entry in stack.tasks]
         if goals is None:
             first = min((entry.level for entry in stack.tasks), default=0)
-            chosen = [e for e in stack.tasks if e.level == first and type(e.item).error is not Task.error]
+            chosen = [e for e in stack.tasks if e.level == first and _states_an_error(e.item)]
         else:
             chosen = [stack[validation.one_of("goals", name, names)] for name in goals]
         if not chosen:
@@ -166,20 +167,23 @@ class _Item:
         declared += run_time.sensed(robot, count) if count else ()
         tracer, symbols = Tracer(Kinematics(robot.model)), run_time.symbols(robot, declared)
         if isinstance(item, Task):
-            e = ca.densify(item.error(robot, tracer, symbols.values))
-            outputs = [tracer.expand(e), tracer.expand(ca.densify(tracer.jacobian(e)))]
+            e = item.error(robot, tracer, symbols.values)
+            outputs = [tracer.expand(e), tracer.jacobian(e)]
         elif isinstance(item, Hold):
             held = item.velocity_rows(robot, tracer, symbols.values, ca.SX(1.0))
-            outputs = [-tracer.expand(held.upper), tracer.expand(ca.densify(held.matrix))]
+            outputs = [-tracer.expand(held.upper), tracer.expand(held.matrix)]
         else:
-            outputs = [tracer.expand(ca.densify(item.margins(robot, tracer, symbols.values)))]
+            outputs = [tracer.expand(item.margins(robot, tracer, symbols.values))]
+        flat = ca.densify(ca.veccat(*map(ca.densify, outputs)))
+        self._rows = SingleState(ca.Function("rows", [tracer.q, symbols.vector], [flat], {"cse": True}))
         self.labels = [row.label for row in item.rows(robot)]
         gain = getattr(item, "gain", None)
         self.gain = getattr(item, "default_gain", 0.0) if gain is None else float(gain)
-        self._q, self._p = np.zeros(robot.nq), np.zeros(symbols.vector.numel())
         ends = np.cumsum([one.numel() for one in symbols.flat.values()])
         self._declared = {d.name: d for d in declared}
-        self._numbers = dict(zip(symbols.flat, np.split(self._p, ends[:-1]), strict=True)) if declared else {}
+        self._numbers = (
+            dict(zip(symbols.flat, np.split(self._rows.inputs[1], ends[:-1]), strict=True)) if declared else {}
+        )
         starts = {d.name: d.default for d in declared} | item.initial(robot, q) | dict(values)
         if isinstance(item, Hold):
             starts["gain"] = 1.0
@@ -188,14 +192,6 @@ class _Item:
                 raise RangeError(f"{entry.name}.{name}", None, "this value is needed")
             self.put(name, value)
         self._sensor = item.sensor(robot, self._numbers) if count else None
-        function = ca.Function("rows", [tracer.q, symbols.vector], outputs, {"cse": True})
-        # Matrices by columns; without copies a call takes a tenth of the time
-        self._out = [np.zeros(out.shape[::-1]) for out in outputs]
-        self._buffer, self._run = function.buffer()
-        for k, given in enumerate((self._q, self._p)):
-            self._buffer.set_arg(k, memoryview(given))
-        for k, out in enumerate(self._out):
-            self._buffer.set_res(k, memoryview(out))
 
     def put(self, name: str, value: Any) -> None:
         """Sets an input.
@@ -206,13 +202,13 @@ class _Item:
         validation.one_of(self.name, name, self._declared)
         self._numbers[name][:] = run_time.flat(self.robot, f"{self.name}.{name}", self._declared[name], value)
 
-    def __call__(self, q: Array) -> list[Array]:
-        self._q[:] = q
+    def __call__(self, q: Array) -> tuple[Array, Array]:
+        self._rows.inputs[0][:] = q
         if self._sensor is not None:
             self._sensor.sense(q)
-        self._run()
-        first, *more = self._out
-        return [first[0].copy(), *(J.T.copy() for J in more)]
+        self._rows.run()
+        count, out = len(self.labels), self._rows.output
+        return out[:count].copy(), out[count:].reshape(-1, count).T.copy()
 
 
 def _held_rows(robot: Any) -> Array:
@@ -223,3 +219,7 @@ def _held_rows(robot: Any) -> Array:
     for k, dof in enumerate(robot.locked_dofs, len(robot.couplings)):
         rows[k, dof] = 1.0
     return rows
+
+
+def _states_an_error(item: Any) -> bool:
+    return isinstance(item, Task) and type(item).error is not Task.error
