@@ -109,16 +109,14 @@ def explore(
         places = [pose.translation + s * (end - pose.translation) for s in np.linspace(0.0, 1.0, points)]
         targets = places if kind == "position" else [pin.SE3(pose.rotation, place) for place in places]
         path = explorer.along({"hand": targets}, q, anywhere=anywhere, change=change)
-        laws = path.laws(np.minimum(machine.limits.velocity, 10.0), np.minimum(machine.limits.acceleration, 10.0))
-        for k, law in enumerate(laws):
-            law.save(out / f"law{k or ''}.npz")
-        duration = sum(law.duration for law in laws)
+        law = path.law(np.minimum(machine.limits.velocity, 10.0), np.minimum(machine.limits.acceleration, 10.0))
+        law.save(out / "law.npz")
         _, stopped = explorer.step_by_step({"hand": targets}, q)
         console().print(
-            f"along: {path.nodes} configurations compared, {len(path.changes)} changes of branch, {duration:.3f} s; "
+            f"along: {path.nodes} configurations compared, {len(path.changes)} changes, {law.duration:.3f} s; "
             f"step by step {stopped or 'done'}"
         )
-        figures["along"] = {"cost": path.cost, "nodes": path.nodes, "changes": path.changes, "duration": duration,
+        figures["along"] = {"cost": path.cost, "nodes": path.nodes, "changes": path.changes, "duration": law.duration,
                             "step_by_step": stopped}  # fmt: skip
     (out / "summary.json").write_text(json.dumps(figures, indent=1) + "\n")
     console().print(str(out))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import reduce
 from itertools import groupby, pairwise, product
 from typing import Any
 
@@ -15,6 +16,7 @@ from wbc.errors import InfeasibleError, RangeError, ShapeError
 from wbc.explore.rows import StackRows
 from wbc.resolvers.fsp import Criterion, SolutionSpace, best, orthogonal
 from wbc.stack.declaration import Declaration
+from wbc.trajectory import Law, time_optimal
 from wbc.validation import Array
 
 #: Steps of a trace [rad or m], how many at most each way, and how often one is halved before the curve ends
@@ -85,19 +87,18 @@ class Resolution:
     cost: float
     nodes: int
 
-    def laws(self, velocity: Any, acceleration: Any) -> tuple[Any, ...]:
-        """The fastest laws of motion from rest to rest, see :func:`wbc.trajectory.time_optimal`: one for each stretch
-        of the path, and between them one for each change of branch, straight in the joints.
+    def law(self, velocity: Any, acceleration: Any) -> Law:
+        """The fastest law of motion, see :func:`wbc.trajectory.time_optimal`; where the branch changes it is at rest
+        before and after, and goes straight in the joints.
 
         Raises:
             WbcError: limits that are none.
         """
-        from wbc.trajectory import time_optimal
-
         cuts, parts = [0, *self.changes, len(self.q)], list[Array]()
         for first, last in pairwise(cuts):
             parts += [self.q[first - 1 : first + 1]] * (first > 0) + [self.q[first:last]] * (last > first + 1)
-        return tuple(time_optimal(part, velocity, acceleration) for part in parts)
+        laws = [time_optimal(part, velocity, acceleration) for part in parts]
+        return reduce(lambda before, after: before.then(after), laws)
 
 
 class Explorer:
