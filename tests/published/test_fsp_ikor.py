@@ -38,9 +38,10 @@ from wbc.published.ikor import (
     without_platform,
 )
 from wbc.published.ikor import files as ikor_files
+from wbc.published.ikor.avoidance import gaps
 from wbc.published.ikor.cases import BETWEEN, unmatched
-from wbc.published.ikor.driver import euler_angles, intrusions, rotation_of
 from wbc.published.ikor.legacy import legacy_hermies
+from wbc.published.ikor.lines import euler_angles, rotation_of
 from wbc.published.ikor.settings import AXES
 from wbc.resolvers.fsp import best, blocked, joint_row, orthogonal, pattern_counts
 
@@ -206,8 +207,8 @@ def home_step(settings: Settings, spheres: Any = FOREARM) -> np.ndarray:
 
 def test_8_obstacle_in_one_shot_and_10_as_an_inequality() -> None:
     machine = hermies()
-    deepest = min(intrusions(machine, machine.home, np.array(FOREARM)), key=lambda one: one[0])
-    gap, link, point, normal, _ = deepest
+    deepest = min(gaps(machine, machine.home, np.array(FOREARM)), key=lambda one: one.size)
+    gap, link, point, normal = deepest.size, deepest.link, deepest.point, deepest.normal
     assert (gap, link) == (pytest.approx(-0.025, abs=1e-12), 2)
     np.testing.assert_allclose(point, [-0.40, -0.356, 0.635], atol=1e-12)
     np.testing.assert_allclose(normal, [0, 0, 1], atol=1e-12)
@@ -625,7 +626,8 @@ def test_a_sphere_centred_on_a_link_has_a_way_out() -> None:
     machine = hermies()
     points = machine.points(machine.home)
     centre = 0.5 * (points[2] + points[3])
-    gap, _, _, normal, _ = min(intrusions(machine, machine.home, np.array([[*centre, 0.05]])), key=lambda one: one[0])
+    deepest = min(gaps(machine, machine.home, np.array([[*centre, 0.05]])), key=lambda one: one.size)
+    gap, normal = deepest.size, deepest.normal
     assert gap == -0.05
     assert np.linalg.norm(normal) == pytest.approx(1.0)
     assert normal @ (points[3] - points[2]) == pytest.approx(0.0, abs=1e-12)

@@ -7,13 +7,14 @@ from __future__ import annotations
 
 import pathlib
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from wbc import robots, validation
 from wbc.errors import WbcError
+from wbc.published.ikor.lines import Trajectory
 from wbc.published.ikor.machines import ArmMachine, airarm, hermies, machine_of, planar
 from wbc.validation import Array
 
@@ -73,21 +74,6 @@ class _Lines:
 
     def error(self, line: int, value: str, reason: str) -> IkorFileError:
         return IkorFileError(f"{self.path.name}:{line}", value, reason)
-
-
-@dataclass(frozen=True, eq=False)
-class Trajectory:
-    """Where the tool goes.
-
-    Attributes:
-        start: columns of the machine at the start [M]. points: [n, 3] in m. euler: yaw, pitch, roll [n, 3] in rad.
-        dropped: points beyond :data:`MAX_POINTS`.
-    """
-
-    start: Array
-    points: Array
-    euler: Array | None = None
-    dropped: int = 0
 
 
 def read_trajectory(file: Any, machine: ArmMachine, angles: Any = None) -> Trajectory:
