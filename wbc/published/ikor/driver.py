@@ -232,7 +232,9 @@ class Driver:
             after = q + found.v
             late = broken(machine, settings, after, still, self.spheres) if settings.two_step else []
             if late:
-                space = self._space(self.task(after, point, euler, None)[0], 0.0 * x, held)
+                # The vectors of the same rates, of which the second step takes the self-motions
+                space = self._space(self.task(after, point, euler, None)[0], x, held, project=True)
+                space = replace(space, x=0.0 * x, vectors=np.vstack((still, space.directions)))
                 rest = [EqualityRow(row.name, row.a, 0.0) for row in rows]
                 second = best(space, Criterion(self.criterion.weight), [*rest, *late], in_order=True)
                 found = replace(second, v=found.v + second.v)
@@ -272,10 +274,10 @@ class Driver:
         log.path.append(after)
         return after
 
-    def _space(self, J: Array, x: Array, held: Sequence[int]) -> SolutionSpace:
+    def _space(self, J: Array, x: Array, held: Sequence[int], project: bool = False) -> SolutionSpace:
         if self.settings.generator == "blocked":
-            return blocked(J, x, held=held, project=bool(held))
-        return orthogonal(J, x, held=held, free=True, project=bool(held))
+            return blocked(J, x, held=held, project=project or bool(held))
+        return orthogonal(J, x, held=held, free=True, project=project or bool(held))
 
     def _best(self, space: SolutionSpace, q: Array, rows: list[EqualityRow]) -> Optimum:
         """In one shot; ahead, constraints that a step would break act on it, the first broken first."""
