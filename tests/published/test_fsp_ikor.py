@@ -574,6 +574,9 @@ def test_19_bad_lines_of_a_robot_file(change: Any, line: int, value: str, tmp_pa
         ("0 180 0 0 0 90 0\n1.5\n0 0 0\n", 2, "1.5"),
         ("0 180 0 0 0 90 0\n1\n0 0 0\n1 1 1\n", 4, "1 1 1"),
         ("", 1, ""),
+        ("0 180 0 0 0 90 0\n--1\n0 0 0\n", 2, "--1"),
+        ("0 180 0 0 0 90 0\n1\n0 0 1_0\n", 3, "1_0"),
+        ("0 180 0 0 0 90 0\n1\n0 0 1e400\n", 3, "1e400"),
     ],
 )
 def test_19_bad_lines_of_a_trajectory(text: str, line: int, value: str, tmp_path: Path) -> None:
@@ -582,6 +585,15 @@ def test_19_bad_lines_of_a_trajectory(text: str, line: int, value: str, tmp_path
     with pytest.raises(IkorFileError) as caught:
         ikor_files.read_trajectory(file, hermies())
     assert (caught.value.field, caught.value.value) == (f"TrajectoryPts:{line}", value)
+
+
+@pytest.mark.parametrize(("head", "line"), [("2.7 3", 1), ("0 3", 1), ("2", 1), ("-1 3", 1), ("3 3", 4), ("1 3", 3)])
+def test_19_bad_jacobians(head: str, line: int, tmp_path: Path) -> None:
+    file = tmp_path / "FSP_data"
+    file.write_text(f"{head}\n1 0 0\n0 1 1\n0.5\n0.25\n")
+    with pytest.raises(IkorFileError) as caught:
+        ikor_files.read_jacobian(file)
+    assert caught.value.field == f"FSP_data:{line}"
 
 
 def test_19_codes(tmp_path: Path) -> None:

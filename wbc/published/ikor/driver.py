@@ -85,10 +85,12 @@ class _Log:
 
     def run(self, stop: Stop, message: str = "", loops: int = 0) -> Run:
         """All of it."""
-        columns: Any = list(zip(*self.steps, strict=True)) or [()] * 6
+        columns: list[tuple[Any, ...]] = list(zip(*self.steps, strict=True)) or [()] * 6
+        norms, errors, clearance, seconds = (np.array(column, dtype=float) for column in columns[:4])
+        acted, given_up = columns[4:]
         code = Code.OK if stop in (Stop.DONE, Stop.NOTHING) else Code.PARTIAL
-        numbers = (np.array(column, dtype=float) for column in columns[:4])
-        return Run(np.array(self.path), *numbers, *columns[4:], code, stop, message, loops)
+        q = np.array(self.path)
+        return Run(q, norms, errors, clearance, seconds, acted, given_up, code, stop, message, loops)
 
 
 class Driver:
