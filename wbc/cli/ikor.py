@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+import functools
 import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -14,62 +15,39 @@ if TYPE_CHECKING:
 
 #: Exit code of a run that ended early; files that are none end with 2
 PARTIAL = 1
-_WHAT, _HOW, _OUTPUT = "What it follows", "How it follows", "What it writes"
+_what, _how, _output = (
+    functools.partial(typer.Option, rich_help_panel=title)
+    for title in ("What it follows", "How it follows", "What it writes")
+)
 
-Trajectory = Annotated[
-    str | None, typer.Option("--case", help="A published trajectory: 1, 2 or 3. Default: all.", rich_help_panel=_WHAT)
-]
-Config = Annotated[str | None, typer.Option(help="3x7, 3x10, 6x7 or 6x10. Default: all.", rich_help_panel=_WHAT)]
-Consistent = Annotated[
-    bool, typer.Option("--consistent", help="Without the defects of the printed norms.", rich_help_panel=_WHAT)
-]
-Machine = Annotated[str, typer.Option(help="hermies, airarm, planar or a file ROBOT.dat.", rich_help_panel=_WHAT)]
-Points = Annotated[Path | None, typer.Option(help="File TrajectoryPts, instead of a case.", rich_help_panel=_WHAT)]
-Line = Annotated[
-    str | None,
-    typer.Option(help="X,Y,Z[,YAW,PITCH,ROLL] in m and degrees: a line from home, instead.", rich_help_panel=_WHAT),
-]
-Jacobian = Annotated[
-    Path | None, typer.Option(help="File FSP_data: only the vectors of its solution space.", rich_help_panel=_WHAT)
-]
-Rates = Annotated[
-    Path | None, typer.Option(help="CSV file of an operator's rates: time, pair, r1 ... r6.", rich_help_panel=_WHAT)
-]
-Keys = Annotated[bool, typer.Option("--keys", help="Rates from the keyboard, at 50 Hz.", rich_help_panel=_WHAT)]
-Angles = Annotated[Path | None, typer.Option(help="File EulerAngles; controls them, too.", rich_help_panel=_WHAT)]
-Spheres = Annotated[Path | None, typer.Option(help="File sphere_data.", rich_help_panel=_WHAT)]
-Base = Annotated[str, typer.Option(help="Platform: none, holonomic, differential or car.", rich_help_panel=_WHAT)]
+Trajectory = Annotated[str | None, _what("--case", help="A published trajectory: 1, 2 or 3. Default: all.")]
+Config = Annotated[str | None, _what(help="3x7, 3x10, 6x7 or 6x10. Default: all.")]
+Consistent = Annotated[bool, _what("--consistent", help="Without the defects of the printed norms.")]
+Machine = Annotated[str, _what(help="hermies, airarm, planar or a file ROBOT.dat.")]
+Points = Annotated[Path | None, _what(help="File TrajectoryPts, instead of a case.")]
+Line = Annotated[str | None, _what(help="X,Y,Z[,YAW,PITCH,ROLL] in m and degrees: a line from home, instead.")]
+Jacobian = Annotated[Path | None, _what(help="File FSP_data: only the vectors of its solution space.")]
+Rates = Annotated[Path | None, _what(help="CSV file of an operator's rates: time, pair, r1 ... r6.")]
+Keys = Annotated[bool, _what("--keys", help="Rates from the keyboard, at 50 Hz.")]
+Angles = Annotated[Path | None, _what(help="File EulerAngles; controls them, too.")]
+Spheres = Annotated[Path | None, _what(help="File sphere_data.")]
+Base = Annotated[str, _what(help="Platform: none, holonomic, differential or car.")]
 MethodCode = Annotated[
-    int,
-    typer.Option(
-        help="0 FSP and limits, 1 pseudo-inverse, 2 FSP and obstacles, 3 both, 4 FSP.",
-        min=0,
-        max=4,
-        rich_help_panel=_HOW,
-    ),
+    int, _how(help="0 FSP and limits, 1 pseudo-inverse, 2 FSP and obstacles, 3 both, 4 FSP.", min=0, max=4)
 ]
-Resolver = Annotated[str, typer.Option(help="fsp, pseudo_inverse or stack.", rich_help_panel=_HOW)]
-Rows = Annotated[
-    str | None,
-    typer.Option(help="Of x,y,z,yaw,pitch,roll. Default: x,y,z, and all with --angles.", rich_help_panel=_HOW),
-]
-TwoStep = Annotated[bool, typer.Option("--two-step", help="Constraints in a second step.", rich_help_panel=_HOW)]
-Ahead = Annotated[
-    bool,
-    typer.Option(
-        "--ahead", help="Constraints act before they are broken, tool and platform too.", rich_help_panel=_HOW
-    ),
-]
-Margin = Annotated[float, typer.Option(help="Kept from spheres, in m.", rich_help_panel=_HOW)]
-Damping = Annotated[float, typer.Option(help="Of the inverse, near singularities.", rich_help_panel=_HOW)]
+Resolver = Annotated[str, _how(help="fsp, pseudo_inverse or stack.")]
+Rows = Annotated[str | None, _how(help="Of x,y,z,yaw,pitch,roll. Default: x,y,z, and all with --angles.")]
+TwoStep = Annotated[bool, _how("--two-step", help="Constraints in a second step.")]
+Ahead = Annotated[bool, _how("--ahead", help="Constraints act before they are broken, tool and platform too.")]
+Margin = Annotated[float, _how(help="Kept from spheres, in m.")]
+Damping = Annotated[float, _how(help="Of the inverse, near singularities.")]
 StepLimit = Annotated[
-    float | None,
-    typer.Option(help="Longest step of a joint, in degrees; pi/180 m for each where it slides.", rich_help_panel=_HOW),
+    float | None, _how(help="Longest step of a joint, in degrees; pi/180 m for each where it slides.")
 ]
-LoopBack = Annotated[bool, typer.Option("--loop-back", help="Back by some steps, a joint held.", rich_help_panel=_HOW)]
-Out = Annotated[Path | None, typer.Option(help="Run folder. Default: runs/ikor-TIME.", rich_help_panel=_OUTPUT)]
-Film = Annotated[str | None, typer.Option(help="gif, or html: plays, steps and scrubs.", rich_help_panel=_OUTPUT)]
-Force = Annotated[bool, typer.Option("--force", help="Write into a folder that has a run.", rich_help_panel=_OUTPUT)]
+LoopBack = Annotated[bool, _how("--loop-back", help="Back by some steps, a joint held.")]
+Out = Annotated[Path | None, _output(help="Run folder. Default: runs/ikor-TIME.")]
+Film = Annotated[str | None, _output(help="gif, or html: plays, steps and scrubs.")]
+Force = Annotated[bool, _output("--force", help="Write into a folder that has a run.")]
 
 
 def ikor(
