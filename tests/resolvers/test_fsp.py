@@ -180,6 +180,34 @@ def test_the_closed_form_is_the_optimum(seed: int, weighting: str, aimed: bool) 
         np.testing.assert_allclose(FullSpace(criterion, generator).resolve(problem), wanted, rtol=0, atol=bound)
 
 
+@settings(max_examples=40)
+@given(st.integers(0, 10**6), st.sampled_from([orthogonal, blocked]))
+def test_planted_loss_of_rank(seed: int, make: Any) -> None:
+    """Any rank, in any units, some joints held, any rates: a space of the nearest, or that no joint moves."""
+    rng = np.random.default_rng(seed)
+    m = int(rng.integers(1, 13))
+    n = int(rng.integers(1, m + 3))
+    rank = int(rng.integers(1, min(n, m) + 1))
+    scale = 10.0 ** rng.uniform(-6, 6)
+    J = scale * rng.normal(size=(n, rank)) @ rng.normal(size=(rank, m)) * (rng.random(m) < 0.9)
+    x = J @ rng.normal(size=m) + scale * rng.normal(size=n) * (rng.random() < 0.3)
+    held = np.flatnonzero(rng.random(m) < 0.1).tolist()
+    try:
+        space = make(J, x, held=held, project=True)
+    except RangeError:
+        assert len(held) == m or not np.delete(J, held, axis=1).any()
+        return
+    active = [k for k in range(m) if k not in space.idle]
+    assert space.rank == np.linalg.matrix_rank(J[:, active])
+    assert space.span == len(active) - space.rank + 1
+    assert not space.vectors[:, held].any()
+    norms = np.linalg.norm(J[:, active], axis=1)
+    norms[norms == 0.0] = 1.0
+    wanted = np.zeros(m)
+    wanted[active] = np.linalg.pinv(J[:, active] / norms[:, None], rcond=1e-10) @ (x / norms)
+    np.testing.assert_allclose(best(space).v, wanted, rtol=0, atol=1e-7 * max(1.0, np.abs(space.vectors).max()))
+
+
 @pytest.mark.parametrize("seed", range(12))
 def test_equal_to_the_stack_on_equalities(seed: int) -> None:
     """1e-8: the task and the constraints as one level, the criterion as the level below."""
@@ -250,6 +278,11 @@ def test_dependent_rows_leave_and_inconsistent_ones_are_refused_or_projected() -
         norms = np.linalg.norm(J, axis=1)
         left = (near.x - x - [0, 0, 0, 0.1]) / norms
         np.testing.assert_allclose((J / norms[:, None]).T @ left, 0.0, atol=1e-12)
+        # With joints at rest the nearest rates are those that the others have
+        still = make(J, x, held=range(1, 7), project=True)
+        size, sign = np.abs(J[:, 0]), np.sign(J[:, 0])
+        np.testing.assert_allclose(still.x / size, sign * (sign @ (x / size)) / len(x), atol=1e-12)
+        np.testing.assert_allclose(J @ still.vectors[0], still.x, atol=1e-12)
 
 
 def test_zero_rows_zero_columns_and_zero_rates() -> None:
