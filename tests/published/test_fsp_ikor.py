@@ -31,6 +31,7 @@ from wbc.published.ikor import (
     Stop,
     Trajectory,
     airarm,
+    case,
     differences,
     film,
     hermies,
@@ -41,7 +42,6 @@ from wbc.published.ikor import (
     straight,
     without_platform,
 )
-from wbc.published.ikor import case as run_case
 from wbc.published.ikor import files as ikor_files
 from wbc.published.ikor.avoidance import gaps
 from wbc.published.ikor.cases import BETWEEN, unmatched
@@ -60,7 +60,7 @@ FOREARM = [(-0.40, -0.356, 0.58, 0.08)]
 
 
 #: Each run once, for all tests that read it
-case = cache(run_case)
+case = cache(case)
 
 
 def run(machine: Any, settings: Settings, trajectory: Trajectory, spheres: Any = ()) -> Run:
