@@ -99,9 +99,9 @@ class FrameVelocityLimit(Constraint):
 
     def velocity_rows(self, robot: Robot, kin: Tracer, inputs: Values, dt: ca.SX) -> Rows:
         """See the class."""
-        jacobian = kin.kinematics.jacobian(self.frame)
+        jacobian = kin.frame_jacobian(self.frame)
         if self.relative_to != WORLD:
-            base = kin.kinematics.jacobian(self.relative_to)
+            base = kin.frame_jacobian(self.relative_to)
             arm = kin.position(self.frame) - kin.position(self.relative_to)
             carried = ca.vertcat(base[:3, :] - ca.skew(arm) @ base[3:, :], base[3:, :])
             jacobian = jacobian - carried
