@@ -267,14 +267,7 @@ class Declaration:
             "damping": self._damping.hex(),
             "calm": self._calm,
             "items": [
-                [
-                    e.name,
-                    e.level,
-                    e.item.declaration(self._robot),
-                    *_softness(e),
-                    *([["in", e.frame]] if e.frame else []),
-                ]
-                for e in self.entries
+                [e.name, e.level, e.item.declaration(self._robot), *_softness(e), *_frame(e)] for e in self.entries
             ],
         }
 
@@ -301,6 +294,11 @@ def soft_rows(entry: Entry, robot: Robot) -> int:
 def _softness(entry: Entry) -> list[str]:
     """What the compiled code knows of how soft an item is."""
     return ["priced"] if entry.price is not None else [] if entry.hard else ["soft"]
+
+
+def _frame(entry: Entry) -> list[dict[str, str]]:
+    """What the compiled code knows of the frame that an item is stated in."""
+    return [{"in": entry.frame}] if entry.frame else []
 
 
 def _require_soft(item: Item, field: str, value: object) -> None:
