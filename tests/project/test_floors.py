@@ -22,6 +22,7 @@ FLOORS = {
     "wbc.shapes": 0,
     "wbc.style": 0,
     "wbc.terminal": 0,
+    "wbc.estimation": 1,
     "wbc.native": 1,
     "wbc.symbolic": 1,
     "wbc.robot": 2,
