@@ -43,6 +43,7 @@ FLOORS = {
     "wbc.trajectory": 8,
     "wbc.coordinates": 8,
     "wbc.explore": 9,
+    "wbc.moving_target": 9,
     "wbc.teleop": 9,
     "wbc.track": 9,
     "wbc.published": 9,
