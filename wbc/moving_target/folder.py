@@ -48,7 +48,7 @@ def save(
                         kind,
                         number,
                         trial.success,
-                        trial.reason if not trial.success else "",
+                        trial.reason,
                         *map("{:.6g}".format, numbers),
                     )
                 )

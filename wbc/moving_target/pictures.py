@@ -26,7 +26,7 @@ LABELS = {
     Knowledge.ESTIMATED: "measured, filtered, predicted",
 }
 #: Width and height of one half of the film [pixels], rays along each side of one, pictures a second, and at most
-SIZE, RAYS, FRAMES_PER_SECOND, MOST = (360, 360), 2, 8, 70
+SIZE, RAYS, FRAMES_PER_SECOND, MOST = (360, 360), 2, 5, 40
 #: Colours of the robot, the object, the tool and the hole
 LINK, OBJECT, TOOL, MOUTH = (0.88, 0.89, 0.91), (0.80, 0.66, 0.45), (0.12, 0.37, 0.66), (0.16, 0.14, 0.13)
 

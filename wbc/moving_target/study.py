@@ -85,7 +85,7 @@ def peg(robot: Robot, tip: str, motion: str, clearance: float, measurement: Meas
     goal = pin.SE3(np.diag([1.0, -1.0, -1.0]), np.array([0.10, 0.05, -0.04]))
     scenario = Scenario(
         robot, tip, tool, robot.neutral, goal, near=0.025, aligned=(0.75 * clearance, np.radians(1.0)),
-        allowed=(clearance, np.radians(3.0)), lead=0.04, measurement=measurement,
+        allowed=(clearance, np.radians(3.0)), lead=0.04, timeout=9.0, measurement=measurement,
     )  # fmt: skip
     return _placed(scenario, motion, np.array([0.0, 0.0, 0.12]), (0.03, 0.1), 0.15, 0.005, **more)
 
@@ -124,8 +124,8 @@ def _placed(
 
 
 def _limber(robot: Robot, tip: str) -> Array:
-    """Of 300 configurations within half the joints' ranges, or 1.5 rad, the one from which the slowest motion of the tip
-    is the fastest: the largest least singular value of J, metres by the robot's length.
+    """Of 300 configurations within half the joints' ranges, or 1.5 rad, that with the largest least singular value of
+    J, metres by the robot's length: from which the slowest motion of the tip is the fastest.
     """
     rng, data = np.random.default_rng(0), robot.model.createData()
     reach = np.minimum((robot.limits.position_upper - robot.limits.position_lower) / 4, 1.5)

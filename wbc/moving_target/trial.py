@@ -182,11 +182,11 @@ class Bench:
                 if path.over:
                     break
                 state = connection.drive(step.v)
-        columns = [np.array(column) for column in zip(*rows, strict=True)]
+        t, q, command, error, wrong, shares, goals = (np.array(column) for column in zip(*rows, strict=True))
+        reason = "" if path.success else path.reason or "it was not aligned in time"
         return Trial(
-            columns[0][:, 0], *columns[1:5], columns[5][:, 0], columns[6],
-            path.success, path.reason or "it was not aligned in time", path.time, path.aligned_at,
-        )  # fmt: skip
+            t[:, 0], q, command, error, wrong, shares[:, 0], goals, path.success, reason, path.time, path.aligned_at
+        )
 
     def _tell(self, estimate: FrameMotion, wanted: pin.SE3, speed: Array) -> None:
         """The goal, which the object carries, is the moving frame; the tool's path is given in it."""
@@ -216,7 +216,8 @@ class _Known:
         self._next, self._quiet = -1.0, -np.inf
         self._waiting: list[tuple[float, pin.SE3]] = []
         self._stream = PoseStream(PoseFilter(noise, s.process), s.policy)
-        self._last = motion.at(0.0).pose
+        self._first = motion.at(0.0)
+        self._last = self._first.pose
 
     def at(self, t: float) -> tuple[FrameMotion, bool]:
         """The estimate, and whether the object is lost."""
@@ -225,7 +226,7 @@ class _Known:
         if self._kind is Knowledge.ESTIMATED:
             found = self._stream.at(t)
             return FrameMotion(found.pose, found.twist, found.acceleration), found.state is StreamState.LOST
-        true = self._motion.at(0.0 if self._kind is Knowledge.NONE else t)
+        true = self._first if self._kind is Knowledge.NONE else self._motion.at(t)
         if self._kind is Knowledge.TWIST:
             return true, False
         return FrameMotion(self._last if self._kind is Knowledge.LATE else true.pose, np.zeros(6), np.zeros(6)), False

@@ -215,7 +215,7 @@ class Declaration:
         if isinstance(field, str) and field in known:
             if frame not in (None, field):
                 raise RangeError("relative_to", frame, f"the item itself is stated relative to {field!r}")
-            item, frame = dataclasses.replace(item, relative_to=WORLD), field
+            item, frame = dataclasses.replace(item, **{"relative_to": WORLD}), field
         if frame is None:
             return item, ""
         validation.one_of("relative_to", frame, known)
