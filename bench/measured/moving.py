@@ -24,7 +24,7 @@ def parts() -> dict[str, Sheet | str]:
     return {
         "sea": sheet(sea, {k: RUNS if k in (Knowledge.NONE, Knowledge.ESTIMATED) else EXACT for k in every}),
         "swing": sheet(swing, dict.fromkeys(every, 5)),
-        "grasp": sheet(body, {k: GRASPS for k in (Knowledge.NONE, Knowledge.TWIST, Knowledge.ESTIMATED)}),
+        "grasp": sheet(body, dict.fromkeys((Knowledge.NONE, Knowledge.TWIST, Knowledge.ESTIMATED), GRASPS)),
     }
 
 

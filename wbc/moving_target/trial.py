@@ -295,12 +295,16 @@ class _Path:
             done = t - self.aligned_at
             if s.lead > 0.0 and depth > 0.0 and not _fits(error, depth, s.allowed[0]):
                 self._end(t, "it touched the wall of the hole")
-            elif done >= s.insert and not (
-                np.linalg.norm(error[:3]) < s.allowed[0] and np.linalg.norm(error[3:]) < s.allowed[1]
-            ):
+            elif done >= s.insert and not self._there(error):
                 self._end(t, "it was not at the goal")
             elif done >= s.insert + s.stay:
                 self.success, self.time, self.over = True, t, True
+
+    def _there(self, error: Array) -> bool:
+        """Within ``allowed`` of the goal; in a hole, whose walls are judged already, deep enough to a tenth."""
+        s = self._s
+        near = abs(error[2]) < 0.1 * s.lead if s.lead > 0.0 else np.linalg.norm(error[:3]) < s.allowed[0]
+        return bool(near and np.linalg.norm(error[3:]) < s.allowed[1])
 
     def _end(self, t: float, reason: str) -> None:
         self.reason, self.over = reason, True

@@ -215,7 +215,8 @@ class Declaration:
         if isinstance(field, str) and field in known:
             if frame not in (None, field):
                 raise RangeError("relative_to", frame, f"the item itself is stated relative to {field!r}")
-            item, frame = dataclasses.replace(item, **{"relative_to": WORLD}), field
+            own: dict[str, Any] = {"relative_to": WORLD}
+            item, frame = dataclasses.replace(item, **own), field
         if frame is None:
             return item, ""
         validation.one_of("relative_to", frame, known)
