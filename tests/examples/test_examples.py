@@ -89,6 +89,11 @@ def test_moving_obstacle_pushes_the_arm_away() -> None:
     assert number("at the end: solved, hand error # mm", text) < 0.1
 
 
+def test_moving_table_is_followed() -> None:
+    still, followed = (float(x) for x in re.findall(rf"table's frame {NUMBER} mm", output("moving_table")))
+    assert followed < 1.0 < 50.0 < still
+
+
 def test_humanoid_reaches_on_held_feet() -> None:
     text = output("humanoid")
     assert number("solved: hand # mm", text) < 1.0
