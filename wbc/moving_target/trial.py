@@ -182,10 +182,10 @@ class Bench:
                 if path.over:
                     break
                 state = connection.drive(step.v)
-        t, q, command, error, wrong, shares, goals = (np.array(column) for column in zip(*rows, strict=True))
+        times, q, command, error, wrong, shares, goals = (np.array(column) for column in zip(*rows, strict=True))
         reason = "" if path.success else path.reason or "it was not aligned in time"
         return Trial(
-            t[:, 0], q, command, error, wrong, shares[:, 0], goals, path.success, reason, path.time, path.aligned_at
+            times[:, 0], q, command, error, wrong, shares[:, 0], goals, path.success, reason, path.time, path.aligned_at
         )
 
     def _tell(self, estimate: FrameMotion, wanted: pin.SE3, speed: Array) -> None:
