@@ -122,10 +122,10 @@ def test_a_lost_frame_comes_to_rest_without_a_jump_and_its_twist_is_that_of_its_
 def test_late_and_lost_measurements() -> None:
     stream = tracking(DropoutPolicy(0.1, 0.1))
     before = stream.at(1.0).pose
-    stream.push(0.5, pin.SE3.Random())
+    stream.push(0.5, motion(np.random.default_rng(5)).pose)
     assert stream.late == 1
     assert np.array_equal(stream.at(1.0).pose.homogeneous, before.homogeneous)
-    there = pin.SE3.Random()
+    there = motion(np.random.default_rng(4)).pose
     stream.push(3.0, there)
     assert np.allclose(stream.at(2.95).pose.homogeneous, there.homogeneous)
     assert stream.at(2.95).state is StreamState.TRACKED
