@@ -26,6 +26,7 @@ from wbc.tasks.look_at import LookAt
 from wbc.tasks.manipulability import Manipulability
 from wbc.tasks.mechanism import Mechanism
 from wbc.tasks.momentum import Momentum
+from wbc.tasks.moving_frame import MovingFrame
 from wbc.tasks.obstacle import Obstacle
 from wbc.tasks.pitch_plane import PitchPlane
 from wbc.tasks.pitch_plane_limit import PitchPlaneLimit
@@ -61,6 +62,7 @@ __all__ = [
     "Manipulability",
     "Mechanism",
     "Momentum",
+    "MovingFrame",
     "Obstacle",
     "PitchPlane",
     "PitchPlaneLimit",

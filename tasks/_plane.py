@@ -139,8 +139,7 @@ class PlaneItem(Item):
         return Plane(along, direction, line_square, elbow_square)
 
     def _axis_in_world(self, kin: Tracer) -> ca.SX:
-        kinematics = kin.kinematics
-        return ca.densify(kinematics.joint_twist(int(kinematics.model.getJointId(self.axis)))[1])
+        return kin.joint_axis(int(kin.kinematics.model.getJointId(self.axis)))
 
     def _turning(self, kinematics: Kinematics) -> tuple[list[int], list[int]]:
         """Joints whose turning counts for the body that carries the axis, relative to the base: plus and minus."""
@@ -156,9 +155,14 @@ class PlaneItem(Item):
         axis = self._axis_in_world(kin)
         along = stereo.unit(line - axis * ca.dot(axis, line))
         plus, minus = self._turning(kinematics)
+        if kin.carrier is not None:
+            along = kin.carrier.pose.rotation @ along
         blocks = [(j, along.T @ kinematics.joint_twist(j)[1]) for j in plus]
         blocks += [(j, -along.T @ kinematics.joint_twist(j)[1]) for j in minus]
-        return kin.expand(kinematics.columns(1, blocks))
+        row = kinematics.columns(1, blocks)
+        if kin.carrier is not None and self.base == WORLD:
+            row = ca.horzcat(row, -along.T @ kin.carrier.twist[3:])
+        return kin.expand(row)
 
 
 def _revolute(robot: Robot) -> list[str]:

@@ -153,6 +153,10 @@ class Item:
     #: value); in return the compiled code is the same for all of their values.
     initial_only: ClassVar[tuple[str, ...]] = ()
 
+    #: Something of it is given in the world: a target, an obstacle, a plane. It may then be given in a
+    #: :class:`wbc.tasks.MovingFrame` instead.
+    stands_in_world: ClassVar[bool] = True
+
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)
         if "abstract" not in cls.__dict__:
@@ -225,7 +229,7 @@ class Task(Item):
 
     def jacobian(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX | None:
         """None: the Jacobian is derived from :meth:`error`. A task on the velocity itself (damping)
-        returns the matrix of its rows here.
+        returns the matrix of its rows here, with one column more where :meth:`Tracer.point_jacobian` has it.
         """
         return None
 
@@ -238,7 +242,10 @@ class Task(Item):
 
 @dataclass(frozen=True)
 class Rows:
-    """Constraint rows lower <= A v <= upper; equal bounds make an equality. ``A`` is rows x nv."""
+    """Constraint rows lower <= A v <= upper; equal bounds make an equality.
+
+    ``A`` is rows x nv. A column more, see :meth:`Tracer.point_jacobian`, is a velocity that both sides are less by.
+    """
 
     matrix: ca.SX
     lower: ca.SX

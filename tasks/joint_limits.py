@@ -58,6 +58,8 @@ class JointLimits(Constraint):
     have no position limit. Torque limits are no concern of it.
     """
 
+    stands_in_world: ClassVar[bool] = False
+
     order: ClassVar[SacrificeOrder] = SacrificeOrder.ACTUATOR
 
     position: bool = True

@@ -98,6 +98,11 @@ def test_moving_obstacle_pushes_the_arm_away() -> None:
     assert number("at the end: solved, hand error # mm", text) < 0.1
 
 
+def test_moving_table_is_followed() -> None:
+    still, followed = (float(x) for x in re.findall(rf"table's frame {NUMBER} mm", output("moving_table")))
+    assert followed < 1.0 < 50.0 < still
+
+
 def test_humanoid_reaches_on_held_feet() -> None:
     text = output("humanoid")
     assert number("solved: hand # mm", text) < 1.0
@@ -213,6 +218,7 @@ def test_examples_are_short_and_use_public_names(path: Path) -> None:
     modules = {a.name for n in ast.walk(tree) if isinstance(n, ast.Import) for a in n.names}
     modules |= {n.module or "" for n in ast.walk(tree) if isinstance(n, ast.ImportFrom)}
     ours = {"wbc", "wbc.tasks", "wbc.track", "wbc.shapes", "wbc.trajectory", "wbc.walking.run", "wbc.coordinates"}
+    ours |= {"wbc.estimation"}
     assert modules <= {"itertools", "pathlib", "numpy", "pinocchio", "casadi"} | ours
     assert not [n.attr for n in ast.walk(tree) if isinstance(n, ast.Attribute) and n.attr.startswith("_")]
 

@@ -39,6 +39,11 @@ COMMANDS = {
         "demo",
         "Do the main job: a Panda follows a timed path round an obstacle with its elbow plane commanded.",
     ),
+    "moving-target": Listed(
+        "moving_target",
+        "moving_target",
+        "Put a peg into a hole, or grasp a fixture, of an object that moves, with and without compensation.",
+    ),
     "walk": Listed(
         "walking.walk",
         "walk",

@@ -36,6 +36,7 @@ from wbc.tasks import (
     Manipulability,
     Mechanism,
     Momentum,
+    MovingFrame,
     Obstacle,
     PitchPlane,
     PitchPlaneLimit,
@@ -179,6 +180,14 @@ class PolyhedronHandle(MarginHandle):
     velocity: Any
 
 
+class MovingFrameHandle(ConstraintHandle):
+    """Of :class:`MovingFrame`."""
+
+    pose: Any
+    twist: Any
+    acceleration: Any
+
+
 if TYPE_CHECKING:
 
     class NamedHandle(
@@ -194,6 +203,7 @@ if TYPE_CHECKING:
         ObstacleHandle,
         BoxHandle,
         PolyhedronHandle,
+        MovingFrameHandle,
     ):
         """Of an item that is known by its name only: all values that items of this package have."""
 
@@ -222,6 +232,7 @@ KINDS: dict[type[Item], type[Handle]] = {
     Obstacle: ObstacleHandle,
     WorkspaceBox: BoxHandle,
     WorkspacePolyhedron: PolyhedronHandle,
+    MovingFrame: MovingFrameHandle,
 }
 
 
@@ -237,7 +248,7 @@ class Handles:
         self._handles = handles
         self._names: dict[int, list[str]] = {}
         for entry in stack.entries:
-            self._names.setdefault(id(entry.item), []).append(entry.name)
+            self._names.setdefault(id(entry.added or entry.item), []).append(entry.name)
 
     @overload
     def __getitem__(self, item: str) -> NamedHandle: ...
@@ -275,6 +286,8 @@ class Handles:
     def __getitem__(self, item: WorkspaceBox) -> BoxHandle: ...
     @overload
     def __getitem__(self, item: WorkspacePolyhedron) -> PolyhedronHandle: ...
+    @overload
+    def __getitem__(self, item: MovingFrame) -> MovingFrameHandle: ...
     @overload
     def __getitem__(self, item: Item) -> Any: ...
     def __getitem__(self, item: str | Item) -> Any:

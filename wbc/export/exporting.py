@@ -115,7 +115,7 @@ def _vary(controller: Controller, q: Array, rng: np.random.Generator) -> None:
     core = core_of(controller)
     for name, block in core.layout.blocks.items():
         item = block.entry.item
-        initial = item.initial(controller.stack.robot, q)
+        initial = item.initial(core.seen(name), q)
         for slot in block.slots.values():
             if slot.input.default is None and slot.input.name in initial:
                 numbers = controller[name].checked(slot.input.name, initial[slot.input.name])

@@ -11,10 +11,12 @@ from typing import Any, Self
 from wbc import pickling, validation
 from wbc.errors import DuplicateNameError, LevelError, PicklingError, RangeError, ShapeError, UnknownNameError
 from wbc.robot import Robot
+from wbc.symbolic.kinematics import WORLD
 from wbc.tasks import inputs
 from wbc.tasks._direction import DIRECTION_PRICE, Direction
 from wbc.tasks.base import Constraint, Item, SacrificeOrder, Task
 from wbc.tasks.mechanism import Mechanism
+from wbc.tasks.moving_frame import MovingFrame
 
 #: Default cost of velocity against a task row of weight 1, per (rad/s)^2: keeps the optimum unique.
 #: It biases a posture task of weight w by the fraction damping / w.
@@ -29,7 +31,11 @@ DT_FACTORS = (0.25, 2.0)
 
 @dataclass(frozen=True, eq=False)
 class Entry:
-    """One item of a stack, with the name, level and weight it was added with; ``price``: of a soft constraint."""
+    """One item of a stack, with the name, level and weight it was added with; ``price``: of a soft constraint.
+
+    ``frame``: name of the moving frame that it is stated in, whose world that is; "" for the world. ``added``: the item
+    as the user has it, where ``item`` is another.
+    """
 
     item: Item
     name: str
@@ -37,6 +43,8 @@ class Entry:
     weight: float
     hard: bool = True
     price: float | None = None
+    frame: str = ""
+    added: Item | None = None
 
     @property
     def order(self) -> SacrificeOrder:
@@ -140,6 +148,7 @@ class Declaration:
         hard: bool = True,
         soft: float | None = None,
         scaled: bool = False,
+        relative_to: str | None = None,
     ) -> Self:
         """Add an item; returns the stack, so that calls chain.
 
@@ -156,6 +165,8 @@ class Declaration:
                 task row of that weight that misses its rate by x. The first value of the input ``price``.
             scaled: of a task; it is slowed down and never turned aside: J v = lambda w with one lambda in [0, 1] for
                 the rates w that it asks for. Adds the item ``"<name> direction"``. docs/soft.md.
+            relative_to: name of a :class:`wbc.tasks.MovingFrame` of the stack that takes the place of the world for
+                this item; a field ``relative_to`` of the item says the same. docs/moving_frames.md.
 
         Raises:
             DuplicateNameError, LevelError, RangeError, ShapeError, UnknownNameError: bad input; the stack is unchanged.
@@ -169,6 +180,7 @@ class Declaration:
             raise LevelError("level", level, "expected an integer of 0 or more", ("0", "1", "2"))
         if level > 0 and isinstance(item, Constraint):
             _check_softened(level, item)
+        given, (item, frame) = item, self._framed(item, chosen, relative_to)
         number = validation.scalar("weight", weight, low=0.0)
         if isinstance(item, Constraint) and number != 1.0:
             raise RangeError("weight", weight, "a constraint is hard, soft at a price, or minimised at its level")
@@ -182,7 +194,7 @@ class Declaration:
             _require_soft(item, "soft", soft)
             if not hard:
                 raise RangeError("soft", soft, "hard=False is soft without a price; leave one of them out")
-        added = [Entry(item, chosen, level, number, bool(hard), price)]
+        added = [Entry(item, chosen, level, number, bool(hard), price, frame, None if item is given else given)]
         if validation.flag("scaled", scaled):
             if not isinstance(item, Task) or type(item).jacobian is not Task.jacobian:
                 raise RangeError("scaled", scaled, f"{type(item).__name__} asks for no velocity with a direction")
@@ -192,6 +204,29 @@ class Declaration:
         _check_values(item, self._robot)
         self._entries |= {entry.name: entry for entry in added}
         return self
+
+    def _framed(self, item: Item, name: str, frame: str | None) -> tuple[Item, str]:
+        """The item as it is in its own world, and the name of the moving frame that is this world.
+
+        Raises:
+            UnknownNameError: no such moving frame. RangeError: an item to which frames mean nothing.
+            DuplicateNameError: a moving frame that has the name of one of the robot's.
+        """
+        if isinstance(item, MovingFrame) and name in self._robot.frame_names:
+            raise DuplicateNameError("name", name, f"a frame of {self._robot.name!r} has this name")
+        known = [entry.name for entry in self.entries if isinstance(entry.item, MovingFrame)]
+        field = getattr(item, "relative_to", WORLD)
+        if isinstance(field, str) and field in known:
+            if frame not in (None, field):
+                raise RangeError("relative_to", frame, f"the item itself is stated relative to {field!r}")
+            own: dict[str, Any] = {"relative_to": WORLD}
+            item, frame = dataclasses.replace(item, **own), field
+        if frame is None:
+            return item, ""
+        validation.one_of("relative_to", frame, known)
+        if not item.stands_in_world:
+            raise RangeError("relative_to", frame, f"{type(item).__name__} depends on no frame outside the robot")
+        return item, frame
 
     def _free_name(self, name: object) -> str:
         if not isinstance(name, str) or not name:
@@ -236,7 +271,9 @@ class Declaration:
             "length": self._length.hex(),
             "damping": self._damping.hex(),
             "calm": self._calm,
-            "items": [[e.name, e.level, e.item.declaration(self._robot), *_softness(e)] for e in self.entries],
+            "items": [
+                [e.name, e.level, e.item.declaration(self._robot), *_softness(e), *_frame(e)] for e in self.entries
+            ],
         }
 
 
@@ -262,6 +299,11 @@ def soft_rows(entry: Entry, robot: Robot) -> int:
 def _softness(entry: Entry) -> list[str]:
     """What the compiled code knows of how soft an item is."""
     return ["priced"] if entry.price is not None else [] if entry.hard else ["soft"]
+
+
+def _frame(entry: Entry) -> list[dict[str, str]]:
+    """What the compiled code knows of the frame that an item is stated in."""
+    return [{"in": entry.frame}] if entry.frame else []
 
 
 def _require_soft(item: Item, field: str, value: object) -> None:

@@ -43,7 +43,7 @@ from wbc.stack.shares import kept_direction, speeds, unlimited, widened
 from wbc.symbolic import rotations as rot
 from wbc.symbolic.curvature import AppliedForce, curvature
 from wbc.symbolic.kinematics import Kinematics, Pose
-from wbc.symbolic.tracer import Tracer
+from wbc.symbolic.tracer import Carrier, Tracer
 from wbc.tasks._direction import Direction
 from wbc.tasks.base import Bounds, Constraint, Rows, Task
 from wbc.tasks.inputs import as_value
@@ -102,11 +102,35 @@ class _Builder:
         """What the item's expressions receive for its inputs."""
         return {name: as_value(slot.input, self.p[slot.span]) for name, slot in block.slots.items()}
 
-    def rate(self, block: Block, slot: Slot) -> ca.SX | None:
-        """Time derivative of an input's numbers, or None for one that stands still."""
-        if slot.input.rate is None:
+    def carrier(self, block: Block) -> Carrier | None:
+        """The moving frame that the item is stated in."""
+        if not block.entry.frame:
             return None
-        speed = self.p[block.slots[slot.input.rate].span]
+        frame = self.layout.blocks[block.entry.frame]
+        pose = as_value(frame.slots["pose"].input, self.p[frame.slots["pose"].span])
+        assert isinstance(pose, Pose)
+        return Carrier(pose, self.speed(frame, frame.slots["pose"]))
+
+    def tracer(self, block: Block) -> Tracer:
+        """What the item sees of the robot."""
+        return Tracer(self.kinematics, self.carrier(block))
+
+    def moving(self, block: Block) -> list[tuple[Block, Slot]]:
+        """Inputs that have a rate, with their blocks: the item's, and those of the frame that it is stated in."""
+        blocks = [block, *([self.layout.blocks[block.entry.frame]] if block.entry.frame else [])]
+        return [(b, slot) for b in blocks for slot in b.slots.values() if slot.input.rate is not None]
+
+    def speed(self, block: Block, slot: Slot) -> ca.SX:
+        """Rate of an input, as the user gives it: its mean over the tick, where it has a rate of its own."""
+        rate = block.slots[slot.input.rate or ""]
+        own = self.p[rate.span]
+        if rate.input.rate is None:
+            return own
+        return own + 0.5 * self.dt * self.p[block.slots[rate.input.rate].span]
+
+    def rate(self, block: Block, slot: Slot) -> ca.SX:
+        """Time derivative of the numbers of an input that has a rate."""
+        speed = self.speed(block, slot)
         part = self.p[slot.span]
         if slot.input.kind == "pose":
             return ca.vertcat(rot.rotation_rate(ca.reshape(part[:9], 3, 3)) @ speed[3:], speed[:3])
@@ -119,19 +143,15 @@ class _Builder:
     def drift(self, block: Block, expression: ca.SX) -> ca.SX:
         """Partial time derivative of an item's expression through its moving inputs."""
         total = ca.SX(expression.numel(), 1)
-        for slot in block.slots.values():
-            speed = self.rate(block, slot)
-            if speed is not None:
-                total = total + ca.jacobian(expression, self.p[slot.span]) @ speed
+        for owner, slot in self.moving(block):
+            total = total + ca.jacobian(expression, self.p[slot.span]) @ self.rate(owner, slot)
         return ca.sparsify(total)
 
     def advanced(self, block: Block) -> ca.SX:
         """The parameter vector with this block's moving inputs dt later."""
         out = ca.SX(self.p)
-        for slot in block.slots.values():
-            if slot.input.rate is None:
-                continue
-            speed = self.p[block.slots[slot.input.rate].span]
+        for owner, slot in self.moving(block):
+            speed = self.speed(owner, slot)
             part = self.p[slot.span]
             if slot.input.kind in ("pose", "rotation"):
                 angular = speed[3:] if slot.input.kind == "pose" else speed
@@ -160,14 +180,15 @@ class _Builder:
         """error, desired, factor, J of a task."""
         item = block.entry.item
         assert isinstance(item, Task)
-        robot, tracer, inputs = self.stack.robot, Tracer(self.kinematics), self.values(block)
+        robot, tracer, inputs = self.stack.robot, self.tracer(block), self.values(block)
         error = self.column(block, "error", item.error(robot, tracer, inputs))
         own = item.jacobian(robot, tracer, inputs)
         jacobian = tracer.jacobian(error) if own is None else tracer.expand(ca.SX(own))
+        jacobian, rest = jacobian[:, : robot.nv], jacobian[:, robot.nv :]
         if self.stack.calm and block.span.stop <= self.layout.leading:
             self.forces += tracer.forces(ca.dot(self.force[block.span], error))
         gain = self.p[block.slots["gain"].span]
-        desired = tracer.expand(-gain * error - self.drift(block, error))
+        desired = tracer.expand(-gain * error - self.drift(block, error)) - ca.sum2(rest)
         fade = item.row_factor(robot, tracer, inputs)
         factor = ca.SX.ones(len(block.rows)) if fade is None else self.column(block, "row_factor", fade)
         out = self.tasks[block.entry.name] = tracer.expand(error), desired, tracer.expand(factor), jacobian
@@ -187,13 +208,15 @@ class _Builder:
         """Rows on v of a constraint, its margins and their factors."""
         item = block.entry.item
         assert isinstance(item, Constraint)
-        robot, tracer, inputs = self.stack.robot, Tracer(self.kinematics), self.values(block)
+        robot, tracer, inputs = self.stack.robot, self.tracer(block), self.values(block)
         count = len(block.rows)
         if block.form == "rows":
             rows = item.velocity_rows(robot, tracer, inputs, self.dt)
             assert rows is not None
             low, high = self.column(block, "lower", rows.lower), self.column(block, "upper", rows.upper)
-            return Rows(tracer.expand(ca.SX(rows.matrix)), tracer.expand(low), tracer.expand(high)), None, None
+            matrix = tracer.expand(ca.SX(rows.matrix))
+            matrix, rest = matrix[:, : robot.nv], ca.sum2(matrix[:, robot.nv :])
+            return Rows(matrix, tracer.expand(low) - rest, tracer.expand(high) - rest), None, None
         if block.entry.name in self.balls:
             return (
                 Rows(ca.SX(count, self.layout.nv), ca.SX(count, 1), ca.SX.inf(count)),
@@ -227,7 +250,7 @@ class _Builder:
         assert isinstance(item, Constraint)
         if block.entry.name in self.balls:
             return ca.SX(len(block.rows), 1)
-        tracer = Tracer(self.kinematics)
+        tracer = self.tracer(block)
         margins = item.margins(self.stack.robot, tracer, self.values(block))
         assert margins is not None
         here = ca.Function("h", [self.kinematics.q, self.p], [ca.densify(tracer.expand(margins))])
