@@ -140,7 +140,7 @@ def _tried(swings: Swings, move: Move, others: Sequence[int]) -> tuple[SwingLaw 
     needed = _least_duration(swings, joints, places[0])
     if needed > duration:
         return None, needed
-    if not swings.clear_along(move, others, curve, joints.angles, samples):
+    if not swings.clear_along(move, others, joints.angles, samples):
         return None, 0.0
     rows = rows_over(duration)
     along = profile_at(rows / duration).position

@@ -12,7 +12,7 @@ from wbc.validation import Array
 from wbc.walking.arms.puma import limb_of
 from wbc.walking.holds.structure import Structure
 from wbc.walking.native import compiled
-from wbc.walking.native.compiled import plain_surface
+from wbc.walking.planner.around import Around, World, around
 from wbc.walking.planner.grips.table import Ints
 
 #: Parts of the curve, at its beginning and its end, in which the hand does not go across
@@ -131,13 +131,13 @@ def curves(
     more, part = alternatives(walker.margins)[alternative].tolist()
     a, b = structure.positions[begin], structure.positions[end]
     height, across = crossing_height(walker), walker.margins.across
-    none, surface = np.zeros((len(a), 2)), plain_surface(structure)
+    none, there = np.zeros((len(a), 2)), around(walker, structure)
     flat = Curves(a, b, structure.axes[begin], structure.axes[end], none, none[:, 0], pivots, part)
-    if surface is not None:
-        rise, lift = _raised(surface, flat, height, across)
+    if there.world is not None:
+        rise, lift = _raised(there.world, flat, height, across)
         return replace(flat, rise=rise, lift=lift + more)
     flat = replace(flat, rise=np.repeat(_rise(flat, height, across)[:, None], 2, axis=1))
-    return replace(flat, lift=_lift(structure, flat, height) + more)
+    return replace(flat, lift=_lift(there, flat, height) + more)
 
 
 def between(
@@ -156,21 +156,22 @@ def between(
     """
     height, flat = crossing_height(walker), Curves(*ends, *axes, np.zeros(free.shape), np.zeros(len(free)), pivots, 1.0)
     # From the air it need not rise more than it lacks, but must come down along the hold's normal
-    lack = np.stack([np.maximum(height - structure.clearance(end), 0.0) for end in ends], axis=1)
+    there = around(walker, structure)
+    lack = np.stack([np.maximum(height - there.height(end), 0.0) for end in ends], axis=1)
     rise = _rise(flat, height, walker.margins.across)[:, None]
     flat = replace(flat, rise=np.where(free, rise * lack / height, rise))
-    return replace(flat, lift=_lift(structure, flat, height))
+    return replace(flat, lift=_lift(there, flat, height))
 
 
-def _raised(surface: compiled.Numbers, flat: Curves, height: float, aside: float) -> tuple[Array, Array]:
-    """Rise and lift of curves over a surface, by compiled code."""
+def _raised(world: World, flat: Curves, height: float, aside: float) -> tuple[Array, Array]:
+    """Rise and lift of curves over what stands around, by compiled code."""
     library, count = compiled.library(), len(flat.begin)
     assert library is not None
     rise, lift = np.empty((count, 2)), np.empty(count)
     ends = flat.begin, flat.end, flat.leave, flat.arrive, flat.pivots.frames, flat.pivots.turn
     given = [compiled.packed(a) for a in ends]
     library.raise_curves(
-        surface,
+        world.pointer,
         ctypes.c_long(count),
         *map(compiled.at, given),
         *(ctypes.c_double(number) for number in (flat.part, height, aside, UPRIGHT)),
@@ -195,9 +196,9 @@ def _rise(flat: Curves, height: float, aside: float) -> Array:
     return out
 
 
-def _lift(structure: Structure, flat: Curves, height: float) -> Array:
+def _lift(there: Around, flat: Curves, height: float) -> Array:
     """What curves lack between their ends, the chord of a round surface and obstacles included."""
-    lack = (height - structure.clearance(flat.at(_LOOK))) / (4.0 * _ACROSS * (1.0 - _ACROSS))
+    lack = (height - there.height(flat.at(_LOOK))) / (4.0 * _ACROSS * (1.0 - _ACROSS))
     out: Array = np.maximum(lack.max(axis=1), 0.0)
     return out
 

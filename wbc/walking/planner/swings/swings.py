@@ -14,10 +14,10 @@ from wbc.robots import Walker
 from wbc.validation import Array
 from wbc.walking.body_path import BodyPath
 from wbc.walking.holds.structure import Structure
+from wbc.walking.planner.around import around
 from wbc.walking.planner.grips.conflicts import ArmClearance
 from wbc.walking.planner.grips.table import Grips, Ints
 from wbc.walking.planner.slices import Slices, drained
-from wbc.walking.planner.swings.clearance import SwingClearance
 from wbc.walking.planner.swings.compiled_choice import CompiledChoice, Name
 from wbc.walking.planner.swings.curve import ALTERNATIVES, Curves, Pivots, curves
 from wbc.walking.planner.swings.move import Chosen, Move, Swing
@@ -72,12 +72,12 @@ class Swings:
         # Hands that swing keep less of the others than hands that hold
         self._less = self.margins.held_clearance - self.margins.swing_clearance
         self._rates = np.array(self.limb.joint_rates)[:-1]
-        self._clear = SwingClearance(walker, structure)
+        self.around = around(walker, structure)
         self._quick: CompiledChoice | None = None
-        if CompiledChoice.possible(self.shapes, structure):
+        if self.around.world is not None:
             apart, times = self.shapes.least - self._less, (self.extra, self.latch)
             self._quick = CompiledChoice(
-                walker, structure, path, grips, self.shapes, self._clear, apart, COARSE, HALFWAY, *times
+                walker, structure, path, grips, self.shapes, self.around.world, apart, COARSE, HALFWAY, *times
             )
         self._tracks: dict[tuple[Name, int], _Track | None] = {}
         self._apart: dict[tuple[Name, int, int], bool] = {}
@@ -169,7 +169,7 @@ class Swings:
         name = _name(swing)
         return self._tracks[name, which] is not None and all(self._apart[name, which, g] for g in swing.others)
 
-    def clear_along(self, move: Move, others: Sequence[int], curve: Curves, angles: Array, samples: Array) -> bool:
+    def clear_along(self, move: Move, others: Sequence[int], angles: Array, samples: Array) -> bool:
         """Whether the arm of a move is clear as :meth:`clear` says, at joints ``[1, n, joints]`` [rad], the last of
         which may be left out, and samples of the path ``[1, n]``.
 
@@ -177,8 +177,8 @@ class Swings:
             others: grips of the other arms.
         """
         points = points_along(self.shapes, np.array([move.arm]), angles)
-        ends = np.stack([curve.begin, curve.end], axis=1)
-        if not self._clear.structure(points, self.path.blended(samples), ends)[0]:
+        ends = self.grips.hold[[[move.source, move.target]]]
+        if not self.around.swings(np.array([move.arm]), points, self.path.blended(samples), ends)[0]:
             return False
         points, samples = (np.repeat(array, len(others), axis=0) for array in (points, samples))
         return bool(self.arms.stay_clear(points, samples, np.array(others, dtype=np.int64), self._less).all())
@@ -212,9 +212,9 @@ class Swings:
         else:
             whole = begin, begin + least / self.path.spacing
             found = Tracks.of(self.waiting((arms, source, target), whole, which, COARSE), arms, self.shapes)
-        ends = self.structure.positions[self.grips.hold[np.stack([source, target], axis=1)]]
+        ends = self.grips.hold[np.stack([source, target], axis=1)]
         bodies = self.path.blended(found.samples)
-        possible = found.possible & self._clear.structure(found.points, bodies, ends)
+        possible = found.possible & self.around.swings(arms, found.points, bodies, ends)
         for k, name in enumerate(names):
             duration = FINER * float(found.duration[k]) + self.extra
             track = _Track(duration, found.points[k], found.samples[k])
