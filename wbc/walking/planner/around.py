@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import ctypes
 import functools
+from math import cos, radians
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +34,8 @@ MOUNTED, DEEP = 0.005, 0.0045
 FINELY = 2.5e-3
 #: The joint that the body is on, of a model with a free base
 BODY_JOINT = 1
+#: Holds whose axes are between these angles off a surface's normal stand aslant [rad]
+STRAIGHT, ASLANT = radians(0.5), radians(45.0)
 #: Nothing is met
 NOTHING = -1
 #: Triangles of a leaf of a tree of boxes
@@ -76,6 +79,21 @@ class Around:
         surface = structure.surface
         columns.append(np.zeros(len(at), bool) if surface is None else np.abs(surface.height(at)) <= MOUNTED)
         return np.ascontiguousarray(np.stack(columns, axis=1))
+
+    @functools.cached_property
+    def approaches(self) -> Array:
+        """Directions in which hands come to holds ``[holds, 3]``: those of the holds, but straight onto a surface on
+        which they stand aslant. There a hand that comes along the hold's own axis is too near to the surface as it gets
+        to where it may be near.
+        """
+        structure, surface = self.structure, self.structure.surface
+        out: Array = structure.axes.copy()
+        if surface is not None:
+            straight = -surface.normal(structure.positions)
+            cosine = (straight * out).sum(axis=1)
+            slants = self.mounted[:, -1] & (cosine < cos(STRAIGHT)) & (cosine > cos(ASLANT))
+            out[slants] = straight[slants]
+        return out
 
     def bodies(self, poses: Array) -> Ints:
         """What the body meets at poses ``[n, 4, 4]``: an index of :attr:`names`, :data:`NOTHING` for nothing."""
@@ -285,7 +303,7 @@ class World:
     """Numbers of what stands around, as compiled code wants them; they live as long as this.
 
     Attributes:
-        pointer: to them.
+        pointer: to them. approaches: of :class:`Around`.
     """
 
     def __init__(self, it: Around) -> None:
@@ -322,6 +340,7 @@ class World:
         mounted = self._mounted(len(structure), len(structure.obstacles) + 1)
         self._world.mounted = mounted.ctypes.data
         it.__dict__["mounted"] = mounted
+        self.approaches = it.approaches
 
     def _mounted(self, holds: int, things: int) -> Flags:
         """As :attr:`Around.mounted`, without a look at every triangle."""

@@ -77,7 +77,7 @@ class CompiledChoice:
         of_grips = grips.arm, np.maximum(grips.hold, 0), (grips.roll == ANY).astype(np.int64)
         curves = y, 1.0 - (1.0 - 2.0 * x) ** STEEP, blend(x), *RAISING
         distances = tried, apart
-        reals = [compiled.packed(a) for a in (shapes.bases, path.poses, structure.positions, structure.axes)]
+        reals = [compiled.packed(a) for a in (shapes.bases, path.poses, structure.positions, world.approaches)]
         whole = [np.ascontiguousarray(a, dtype=np.int64) for a in of_grips]
         more = [compiled.packed(a) for a in (*curves, *distances)]
         arrays = dict(zip((*_POINTERS, *_CURVES, *_CLEAR), (*reals, *whole, *more), strict=True))

@@ -132,7 +132,8 @@ def curves(
     a, b = structure.positions[begin], structure.positions[end]
     height, across = crossing_height(walker), walker.margins.across
     none, there = np.zeros((len(a), 2)), around(walker, structure)
-    flat = Curves(a, b, structure.axes[begin], structure.axes[end], none, none[:, 0], pivots, part)
+    axes = there.approaches
+    flat = Curves(a, b, axes[begin], axes[end], none, none[:, 0], pivots, part)
     if there.world is not None:
         rise, lift = _raised(there.world, flat, height, across)
         return replace(flat, rise=rise, lift=lift + more)

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,6 +54,13 @@ class _Track:
     samples: Array
 
 
+class HandLaw(Protocol):
+    """Where a swinging hand is when."""
+
+    def along(self, times: Array, /) -> tuple[Array, Array]:
+        """Positions [m] and parts of the guided joints' change at times since the hand is open [s]."""
+
+
 class Swings:
     """Swings of a body's arms between grips over one path; results are cached.
 
@@ -83,6 +91,11 @@ class Swings:
         self._apart: dict[tuple[Name, int, int], bool] = {}
         self._chosen: dict[Swing, Chosen | None] = {}
         self._known: dict[tuple[int, int, int, int, int], float | None] = {}
+
+    @property
+    def curves(self) -> int:
+        """That are tried for a swing, those with a wait included."""
+        return len(ALTERNATIVES) + len(self.limb.waiting)
 
     def estimate(self, sources: Ints, targets: Ints, lift: Ints, land: Ints) -> Array:
         """About how long swings from grips take, lifted and landed at about these samples; latches included [s].
@@ -182,6 +195,18 @@ class Swings:
             return False
         points, samples = (np.repeat(array, len(others), axis=0) for array in (points, samples))
         return bool(self.arms.stay_clear(points, samples, np.array(others, dtype=np.int64), self._less).all())
+
+    def posture_along(self, move: Move, law: HandLaw, samples: Array, since: Array) -> Array:
+        """Joints of the arm of a move ``[k, joints]`` [rad], with the body at samples of the path, at times since the
+        hand is open ``[k]`` [s].
+        """
+        limb, grips = self.limb, self.grips
+        places, part = law.along(since)
+        frames = self.path.blended(samples) @ self.shapes.bases[move.arm]
+        first, last = (grips.between(np.array(grip), samples)[:, limb.guided :] for grip in (move.source, move.target))
+        guide = first + part[:, None] * (last - first)
+        angles, _ = limb.follow(frames[None], places[None], guide[None], self.margins)
+        return angles[0]
 
     def correct(self, move: Move, duration: float, possible: bool) -> None:
         """A swing along the curve of a move takes another time [s], or is not possible after all."""
