@@ -37,7 +37,7 @@ BODY_JOINT = 1
 #: Holds whose axes are between these angles off a surface's normal stand aslant [rad]
 STRAIGHT, ASLANT = radians(0.5), radians(45.0)
 #: Nothing is met
-NOTHING = -1
+NONE_MET = -1
 #: Triangles of a leaf of a tree of boxes
 LEAF = 4
 
@@ -96,8 +96,8 @@ class Around:
         return out
 
     def bodies(self, poses: Array) -> Ints:
-        """What the body meets at poses ``[n, 4, 4]``: an index of :attr:`names`, :data:`NOTHING` for nothing."""
-        out = np.full(len(poses), NOTHING, dtype=np.int64)
+        """What the body meets at poses ``[n, 4, 4]``: an index of :attr:`names`, :data:`NONE_MET` for nothing."""
+        out = np.full(len(poses), NONE_MET, dtype=np.int64)
         if self._world is not None:
             library, given = compiled.library(), compiled.packed(poses)
             assert library is not None
@@ -204,7 +204,7 @@ class Around:
 
     def _meets(self, arms: Ints, local: Array, placed: Array, holds: Ints, more: Array) -> Flags:
         """Whether arms are nearer to anything than they may be, and ``more`` [m]."""
-        return np.asarray((self._arm_meets(placed, holds, more) != NOTHING) | self._meets_itself(arms, local, more))
+        return np.asarray((self._arm_meets(placed, holds, more) != NONE_MET) | self._meets_itself(arms, local, more))
 
     def _gap(self, thing: int, a: Array, b: Array) -> Array:
         """Distances of segments from an obstacle, or the surface."""
@@ -215,7 +215,7 @@ class Around:
 
     def _arm_meets(self, placed: Array, holds: Ints, more: Array) -> Ints:
         """The first thing that arms are nearer to than they may be; points in the structure ``[n, points, 3]``."""
-        out, limb, hand = np.full(len(placed), NOTHING, dtype=np.int64), self.limb, len(self.limb.links) - 1
+        out, limb, hand = np.full(len(placed), NONE_MET, dtype=np.int64), self.limb, len(self.limb.links) - 1
         if self.plain or not len(placed):
             return out
         there = holds >= 0

@@ -14,7 +14,7 @@ from wbc.walking.arms.puma import LIMIT_NAMES, limb_of
 from wbc.walking.body_path import BodyPath
 from wbc.walking.holds.structure import Structure
 from wbc.walking.native import compiled
-from wbc.walking.planner.around import NOTHING, Around, around
+from wbc.walking.planner.around import NONE_MET, Around, around
 from wbc.walking.planner.grips.held import Held, held, near_holds
 from wbc.walking.planner.grips.rolls import ANY, turns
 from wbc.walking.planner.grips.stretches import stretches
@@ -185,10 +185,10 @@ def _of_arm(
     neighbours = (holds[1:] == holds[:-1]) & (samples[1:] == samples[:-1] + 1)
     for branch in range(there.q.shape[1]):
         q, fits = there.q[:, branch], good[:, branch].copy()
-        meets = np.where(fits, blocked[samples], NOTHING)
-        some = np.nonzero(fits & (meets == NOTHING))[0]
+        meets = np.where(fits, blocked[samples], NONE_MET)
+        some = np.nonzero(fits & (meets == NONE_MET))[0]
         meets[some] = around_it.postures(arm, frames[samples[some]], q[some], holds[some])
-        fits &= meets == NOTHING
+        fits &= meets == NONE_MET
         slow = [np.abs(q[1:, k] - q[:-1, k]) <= most[k] for k in range(free)]
         joined = np.logical_and.reduce([neighbours, fits[1:], fits[:-1], *slow])
         begins = np.nonzero(np.concatenate([[True], ~joined]))[0]
@@ -218,7 +218,7 @@ def _reason(
         return names + len(q[0]) + 1
     if end + 1 == len(q) or not neighbours[end]:
         return names
-    if meets[end + 1] != NOTHING:
+    if meets[end + 1] != NONE_MET:
         return names + len(q[0]) + 2 + int(meets[end + 1])
     used = np.abs(q[end + 1, : len(most)] - q[end, : len(most)]) / most
     if (used > 1.0).any():

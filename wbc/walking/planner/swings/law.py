@@ -92,7 +92,7 @@ class SwingLaw:
         return Aim(row[:3], row[3:6], float(row[6]), part)
 
     def along(self, times: Array) -> tuple[Array, Array]:
-        """Positions ``[k, 3]`` [m] and parts of the guided joints' change ``[k]`` at times ``[k]``, clipped to the swing."""
+        """Positions ``[k, 3]`` [m] and parts of the guided joints' change ``[k]`` at times ``[k]``, clipped."""
         place = np.clip(times / self.duration, 0.0, 1.0) * (len(self._rows) - 1)
         low = np.minimum(place.astype(np.int64), len(self._rows) - 2)
         rows = self._rows[low] + (place - low)[:, None] * (self._rows[low + 1] - self._rows[low])
