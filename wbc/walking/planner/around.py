@@ -64,11 +64,15 @@ class Around:
         self.near_hold = tolerances.exempt_distance
         self.own = self._own(walker) if limb.closed_form is not None else np.zeros((self.arms, 0, 7))
         self.plain = structure.surface is None and not structure.obstacles
-        self._world = None if self.plain or compiled.library_for(limb) is None else World(self)
+        self._world: World | None = None
 
     @property
     def world(self) -> World | None:
         """For compiled code; None where there is none, or nothing stands around but holds."""
+        if self.plain or compiled.library_for(self.limb) is None:
+            return None
+        if self._world is None:
+            self._world = World(self)
         return self._world
 
     @functools.cached_property
@@ -98,10 +102,11 @@ class Around:
     def bodies(self, poses: Array) -> Ints:
         """What the body meets at poses ``[n, 4, 4]``: an index of :attr:`names`, :data:`NONE_MET` for nothing."""
         out = np.full(len(poses), NONE_MET, dtype=np.int64)
-        if self._world is not None:
+        world = self.world
+        if world is not None:
             library, given = compiled.library(), compiled.packed(poses)
             assert library is not None
-            library.bodies_meet(self._world.pointer, ctypes.c_long(len(poses)), compiled.at(given), compiled.at(out))
+            library.bodies_meet(world.pointer, ctypes.c_long(len(poses)), compiled.at(given), compiled.at(out))
             return out
         if self.plain:
             return out
@@ -120,12 +125,13 @@ class Around:
                 hands are at ``[n]``.
         """
         count, both = len(q), np.stack([holds, np.full(len(holds), -1)], axis=1).astype(np.int64)
-        if self._world is not None:
+        world = self.world
+        if world is not None:
             library, out = compiled.library(), np.empty(count, dtype=np.int64)
             assert library is not None
             given = [compiled.packed(frames), compiled.packed(q), np.ascontiguousarray(both), out]
             library.postures_meet(
-                self._world.pointer,
+                world.pointer,
                 compiled.arm_of(self.limb),
                 ctypes.c_long(arm),
                 ctypes.c_long(count),
@@ -145,13 +151,14 @@ class Around:
             arms: rows ``[m]``. points: in the body's frame ``[m, n, points, 3]`` [m]. bodies: where the body
                 is ``[m, n, 4, 4]``. holds: rows of the holds that hands leave and come to, -1 for none ``[m, 2]``.
         """
-        if self._world is not None:
+        world = self.world
+        if world is not None:
             library, out = compiled.library(), np.empty(len(arms), dtype=np.bool_)
             assert library is not None
             rows, ends = (np.ascontiguousarray(a, dtype=np.int64) for a in (arms, holds))
             given = [rows, *(compiled.packed(a) for a in (points, self.bases[arms], bodies)), ends, out]
             sizes = (ctypes.c_long(size) for size in points.shape[:2])
-            library.swings_meet(self._world.pointer, *sizes, *map(compiled.at, given))
+            library.swings_meet(world.pointer, *sizes, *map(compiled.at, given))
             return out
         base = self.bases[arms]
         local = np.einsum("mji,mnpj->mnpi", base[:, :3, :3], points - base[:, None, None, :3, 3])
@@ -189,12 +196,13 @@ class Around:
 
     def height(self, points: Array) -> Array:
         """Distance of points of the structure's frame ``[..., 3]`` from surface and obstacles [m]."""
-        if self._world is None:
+        world = self.world
+        if world is None:
             return self.structure.clearance(points)
         library, given = compiled.library(), compiled.packed(points)
         assert library is not None
         out = np.empty(given.shape[:-1])
-        library.heights(self._world.pointer, ctypes.c_long(out.size), compiled.at(given), compiled.at(out))
+        library.heights(world.pointer, ctypes.c_long(out.size), compiled.at(given), compiled.at(out))
         return out
 
     @functools.cached_property

@@ -1,8 +1,8 @@
 """The proof that a plan touches nothing: all bodies over the motion that the loop will make of it, at all times.
 
-A swinging hand follows its law from when it is open. The body goes along its path at full pace; where it has to wait for
-the hand, its pace is less over the whole of the swing, evenly. Hands that hold do so where the body is. A hand may be
-near to what its hold is mounted on while it is at the hold, see :class:`wbc.clearance.Exemption`.
+A swinging hand follows its law from when it is open. The body goes along its path at full pace; where it has to wait
+for the hand, its pace is less over the whole of the swing, evenly. Hands that hold do so where the body is. A hand may
+be near to what its hold is mounted on while it is at the hold, see :class:`wbc.clearance.Exemption`.
 """
 
 from __future__ import annotations
