@@ -104,7 +104,7 @@ def test_swings_are_the_same(machine: Walker, structure: Structure, path: BodyPa
         for what in there[: 1 if which else 3]:
             some = slice(0, 25 if what.obstacles else COUNT)
             given = asked.arms[some], one.points[some], bodies[some], ends[some]
-            fast, slow = both(lambda c=around(machine, what), g=given: c.swings(*g))
+            fast, slow = both(lambda w=what, g=given: around(machine, w).swings(*g))
             assert fast.tolist() == slow.tolist()
             found |= {("structure", x) for x in fast.tolist()}
         fast, slow = both(lambda t=one: arms.stay_clear(t.points, t.samples, others, 0.004))

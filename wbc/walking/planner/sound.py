@@ -55,5 +55,5 @@ def sound_slices(
                 break
             laws.append(law)
         else:
-            return (yield from eased_slices(search, found, laws, sample))
-    return (yield from eased_slices(search, search.shortened(found, len(laws)), laws, sample))
+            return (yield from eased_slices(search, found, laws, sample, proof))
+    return (yield from eased_slices(search, search.shortened(found, len(laws)), laws, sample, proof))
