@@ -21,6 +21,8 @@ UPRIGHT = 0.1
 STEEP = 2
 #: Points at which the height above the structure is measured
 LOOKS = 9
+#: Way over which the direction away from all that stands around is measured [m]
+NEAR = 1e-3
 #: Curves that are tried, the first that is clear is taken: how much higher in the middle, in ``Margins.higher``, and
 #: what part of the arc. ``python -m bench.walk.fits`` prints how often each is the first
 ALTERNATIVES = ((0.0, 1.0), (0.0, 0.6), (0.0, 0.2), (1.0, 1.0), (1.0, 0.4), (0.0, 1.4))
@@ -159,9 +161,22 @@ def between(
     # From the air it need not rise more than it lacks, but must come down along the hold's normal
     there = around(walker, structure)
     lack = np.stack([np.maximum(height - there.height(end), 0.0) for end in ends], axis=1)
+    # However a hand in the air is turned, it goes straight away from what it is near to
+    low = free & (lack > 0.0)
+    for side, name in ((0, "leave"), (1, "arrive")):
+        if low[:, side].any():
+            axis = np.where(low[:, side, None], -_upwards(there, ends[side]), getattr(flat, name))
+            flat = replace(flat, **{name: axis})
     rise = _rise(flat, height, walker.margins.across)[:, None]
     flat = replace(flat, rise=np.where(free, rise * lack / height, rise))
     return replace(flat, lift=_lift(there, flat, height))
+
+
+def _upwards(there: Around, points: Array) -> Array:
+    """The direction in which the distance from all that stands around grows ``[m, 3]``."""
+    steps = 0.5 * NEAR * np.eye(3)
+    out: Array = np.stack([there.height(points + way) - there.height(points - way) for way in steps], axis=1)
+    return out / np.maximum(np.linalg.norm(out, axis=1), 1e-9)[:, None]
 
 
 def _raised(world: World, flat: Curves, height: float, aside: float) -> tuple[Array, Array]:
