@@ -146,7 +146,8 @@ class Proof:
         samples = np.arange(first, last + 1)
         postures = [grips.posture(np.array(grip), samples) for grip in key]
         holds = [grips.hold[[grip]] for grip in key]
-        self._known[name] = self._scene.touched(samples * path.spacing, path.poses[samples], postures, holds)
+        times: Array = samples * path.spacing
+        self._known[name] = self._scene.touched(times, path.poses[samples], postures, holds)
         return self._known[name]
 
 

@@ -218,9 +218,9 @@ def way_to(walker: Walker, structure: Structure, plan: Plan, arm: int, hands: Ha
         return law
     limb, base = limb_of(walker), plan.path.poses[0] @ walker.arms[arm].base.homogeneous
     times = np.arange(0.0, law.duration + EVERY, EVERY)
-    places, part = law.along(times)
+    way, part = law.along(times)
     guide = first + part[:, None] * (last - first)
-    angles, _ = limb.follow(np.repeat(base[None, None], len(times), axis=1), places[None], guide[None], near.margins)
+    angles, _ = limb.follow(np.repeat(base[None, None], len(times), axis=1), way[None], guide[None], near.margins)
     postures, holds = list[Array](), list[Ints]()
     for k, other in enumerate(walker.arms):
         # Hands that are free as well are brought there one after the other, from where they are

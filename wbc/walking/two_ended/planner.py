@@ -118,7 +118,7 @@ def _goal(postures: PairPostures, to: str | Sequence[float]) -> tuple[Goal, Arra
     if not far:
         raise NoPlanError("to", list(to), "the arm has no posture on any two holds")
     nearest = min(far.values())
-    if nearest > postures.kinematics.data.boom_length:
+    if nearest > 2.0 * postures.kinematics.data.boom_length:
         raise NoPlanError("to", list(to), f"no two holds bring the arm's elbow nearer to it than {nearest:.1f} m")
     least = nearest + SAME_PLACE
     return (lambda near, other: far.get((near, other), np.inf) <= least), place
