@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import ctypes
 import functools
+from collections.abc import Sequence
 from math import cos, radians
 
 import numpy as np
@@ -167,7 +168,7 @@ class Around:
         who, ends = np.repeat(np.arange(count), n), np.asarray(holds, dtype=np.int64)
         flat = [a.reshape(-1, *a.shape[2:]) for a in (local, placed)]
         clear = np.ones(count, dtype=np.bool_)
-        clear[who[self._meets(arms[who], *flat, ends[who], np.zeros(len(who)))]] = False
+        clear[who[self._meets(arms[who], flat, ends[who], np.zeros(len(who)))]] = False
         self._between(arms, local, placed, ends, clear)
         return clear
 
@@ -183,9 +184,9 @@ class Around:
                 return
             middle = [a.mean(axis=1) for a in spans]
             half = 0.5 * np.linalg.norm(spans[1][:, 1] - spans[1][:, 0], axis=2)[:, self._moving].max(axis=1)
-            open_ = self._meets(arms[who], *middle, holds[who], half)
+            open_ = self._meets(arms[who], middle, holds[who], half)
             who, spans, middle, half = who[open_], [a[open_] for a in spans], [a[open_] for a in middle], half[open_]
-            clear[who[self._meets(arms[who], *middle, holds[who], np.zeros(len(who)))]] = False
+            clear[who[self._meets(arms[who], middle, holds[who], np.zeros(len(who)))]] = False
             on = half >= FINELY
             who, spans, middle = who[on], [a[on] for a in spans], [a[on] for a in middle]
             spans = [
@@ -210,8 +211,9 @@ class Around:
         """Points of an arm that joints move."""
         return sorted({end for link in self.limb.links[self.limb.still :] for end in link})
 
-    def _meets(self, arms: Ints, local: Array, placed: Array, holds: Ints, more: Array) -> Flags:
-        """Whether arms are nearer to anything than they may be, and ``more`` [m]."""
+    def _meets(self, arms: Ints, points: Sequence[Array], holds: Ints, more: Array) -> Flags:
+        """Whether arms are nearer to anything than they may be, and ``more`` [m]; points in the bases, and placed."""
+        local, placed = points
         return np.asarray((self._arm_meets(placed, holds, more) != NONE_MET) | self._meets_itself(arms, local, more))
 
     def _gap(self, thing: int, a: Array, b: Array) -> Array:
@@ -382,18 +384,18 @@ class _Trees:
 
 def _thing(one: Obstacle, trees: _Trees) -> _Thing:
     shape, placement, root = one.shape, one.placement, -1
-    middle = placement.translation
+    middle, size = placement.translation, np.zeros(3)
     if isinstance(shape, TriangleMesh):
-        kind, size, root = 3, (0.0, 0.0, 0.0), trees.grow(shape.corners)
+        kind, root = 3, trees.grow(shape.corners)
         points = shape.corners.reshape(-1, 3)
         center = (points.min(axis=0) + points.max(axis=0)) / 2.0
         reach, middle = float(np.linalg.norm(points - center, axis=1).max()), placement.act(center)
     elif isinstance(shape, Box):
-        kind, size = 1, tuple(length / 2.0 for length in shape.size)
+        kind, size = 1, np.array(shape.size) / 2.0
         reach = float(np.linalg.norm(size))
     else:
         half = 0.0 if isinstance(shape, Sphere) else shape.length / 2.0
-        kind, size = (2 if isinstance(shape, Cylinder) else 0), (shape.radius, half, 0.0)
+        kind, size = (2 if isinstance(shape, Cylinder) else 0), np.array([shape.radius, half, 0.0])
         reach = float(np.hypot(shape.radius, half)) if kind else shape.radius + half
     turn = (ctypes.c_double * 9)(*placement.rotation.ravel())
     numbers = [(ctypes.c_double * 3)(*row) for row in (placement.translation, size, middle)]
@@ -410,7 +412,7 @@ def _body_of(walker: Walker, bases: Array) -> Array:
                 rows.append(np.array([*(frame.placement * a), *(frame.placement * b), radius]))
     points = np.asarray(limb.points(np.zeros((1, len(limb.position_limits)))))[0]
     for base in bases:
-        for link, radius in zip(limb.links[: limb.still], limb.radii, strict=False):
-            ends = points[list(link)] @ base[:3, :3].T + base[:3, 3]
+        for pair, radius in zip(limb.links[: limb.still], limb.radii, strict=False):
+            ends = points[list(pair)] @ base[:3, :3].T + base[:3, 3]
             rows.append(np.array([*ends[0], *ends[1], radius]))
     return np.array(rows).reshape(-1, 7)
