@@ -146,7 +146,7 @@ class Proof:
         samples = np.arange(first, last + 1)
         postures = [grips.posture(np.array(grip), samples) for grip in key]
         holds = [grips.hold[[grip]] for grip in key]
-        times: Array = samples * path.spacing
+        times = np.asarray(samples * path.spacing, dtype=np.float64)
         self._known[name] = self._scene.touched(times, path.poses[samples], postures, holds)
         return self._known[name]
 

@@ -177,9 +177,10 @@ class ArmClearance:
         if library is None:
             there = shapes.points_of(grips.arm[others], grips.between(others[:, None], samples))
             one, other = (side.reshape(-1, *side.shape[2:]) for side in (points, there))
-            clear = ~shapes.near(one, other, less).reshape(samples.shape).any(axis=1)
+            near = shapes.near(one, other, less).reshape(samples.shape)
+            clear: Flags = np.asarray(np.logical_not(near.any(axis=1)))
             self._between(points, there, less, clear)
-            return np.asarray(clear)
+            return clear
         given = [compiled.packed(array) for array in (points, samples, shapes.bases[grips.arm[others]])]
         where = [compiled.at(array) for array in (*given, others, shapes.least - less, out)]
         sizes = (ctypes.c_long(size) for size in samples.shape)
@@ -195,9 +196,9 @@ class ArmClearance:
         while len(who):
             middle = [a.mean(axis=1) for a in spans]
             both = sum(0.5 * np.linalg.norm(a[:, 1] - a[:, 0], axis=2).max(axis=1) for a in spans)
-            left = clear[who] & self.shapes.near(*middle, less - both)
+            left = clear[who] & self.shapes.near(middle[0], middle[1], less - both)
             who, spans, middle, both = who[left], [a[left] for a in spans], [a[left] for a in middle], both[left]
-            clear[who[self.shapes.near(*middle, np.full(len(who), less))]] = False
+            clear[who[self.shapes.near(middle[0], middle[1], np.full(len(who), less))]] = False
             on = (both >= FINELY) & clear[who]
             who, spans, middle = np.tile(who[on], 2), [a[on] for a in spans], [a[on] for a in middle]
             spans = [

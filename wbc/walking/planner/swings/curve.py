@@ -162,11 +162,11 @@ def between(
     there = around(walker, structure)
     lack = np.stack([np.maximum(height - there.height(end), 0.0) for end in ends], axis=1)
     # However a hand in the air is turned, it goes straight away from what it is near to
-    low = free & (lack > 0.0)
-    for side, name in ((0, "leave"), (1, "arrive")):
-        if low[:, side].any():
-            axis = np.where(low[:, side, None], -_upwards(there, ends[side]), getattr(flat, name))
-            flat = replace(flat, **{name: axis})
+    leave, arrive = (
+        np.where(((free[:, side] > 0) & (lack[:, side] > 0.0))[:, None], -_upwards(there, ends[side]), axes[side])
+        for side in (0, 1)
+    )
+    flat = replace(flat, leave=leave, arrive=arrive)
     rise = _rise(flat, height, walker.margins.across)[:, None]
     flat = replace(flat, rise=np.where(free, rise * lack / height, rise))
     return replace(flat, lift=_lift(there, flat, height))
@@ -175,8 +175,9 @@ def between(
 def _upwards(there: Around, points: Array) -> Array:
     """The direction in which the distance from all that stands around grows ``[m, 3]``."""
     steps = 0.5 * NEAR * np.eye(3)
-    out: Array = np.stack([there.height(points + way) - there.height(points - way) for way in steps], axis=1)
-    return out / np.maximum(np.linalg.norm(out, axis=1), 1e-9)[:, None]
+    slopes: Array = np.stack([there.height(points + way) - there.height(points - way) for way in steps], axis=1)
+    out: Array = slopes / np.maximum(np.linalg.norm(slopes, axis=1), 1e-9)[:, None]
+    return out
 
 
 def _raised(world: World, flat: Curves, height: float, aside: float) -> tuple[Array, Array]:

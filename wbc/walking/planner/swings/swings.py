@@ -206,7 +206,8 @@ class Swings:
         first, last = (grips.between(np.array(grip), samples)[:, limb.guided :] for grip in (move.source, move.target))
         guide = first + part[:, None] * (last - first)
         angles, _ = limb.follow(frames[None], places[None], guide[None], self.margins)
-        return angles[0]
+        out: Array = angles[0]
+        return out
 
     def correct(self, move: Move, duration: float, possible: bool) -> None:
         """A swing along the curve of a move takes another time [s], or is not possible after all."""
