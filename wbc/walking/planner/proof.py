@@ -70,12 +70,20 @@ class ClearScene:
                 return SweptBody(body.name, body.shape, body.link, body.placement, grasp)
         return body
 
-    def touched(self, times: Array, poses: Array, postures: Sequence[Array], holds: Sequence[Ints]) -> Nearest | None:
+    def touched(
+        self,
+        times: Array,
+        poses: Array,
+        postures: Sequence[Array],
+        holds: Sequence[Ints],
+        left: tuple[int, Array] | None = None,
+    ) -> Nearest | None:
         """An instant at which two bodies are too near to each other; None where there is provably none.
 
         Args:
             times: of instants ``[k]`` [s]. poses: of the body ``[k, 4, 4]``. postures: of every arm ``[k, joints]``
-                [rad]. holds: rows of the holds that each hand is at, leaves or comes to.
+                [rad]. holds: rows of the holds that each hand is at, leaves or comes to. left: row of an arm, and where
+                its hand begins in the air: it may have just left a hold there that is gone ``[3]`` [m].
         """
         if self._sweeper is None:
             return None
@@ -86,7 +94,20 @@ class ClearScene:
         free = np.concatenate([(u @ v).reshape(-1, 9), poses[:, :3, 3]], axis=1)[None]
         controls = np.stack([scalars[:-1], scalars[1:]], axis=2)
         motion = Motion(times, controls, free, np.zeros(scalars.shape[1]), np.zeros((1, 2)))
-        return self._sweeper.sweep(motion, exemptions=list(self._exemptions(holds)), tolerance=TOLERANCE).violation
+        exempt = list(self._exemptions(holds))
+        if left is not None:
+            exempt += self._leaving(*left)
+        return self._sweeper.sweep(motion, exemptions=exempt, tolerance=TOLERANCE).violation
+
+    def _leaving(self, arm: int, point: Array) -> Iterator[Exemption]:
+        """Of what a hand is near to where it begins."""
+        surface, near = self.structure.surface, self.walker.tolerances.clearance + self._around.radii[-1]
+        gaps = [float(one.distance(point)) for one in self.structure.obstacles]
+        gaps += [] if surface is None else [float(surface.height(point))]
+        for k in np.nonzero(np.array(gaps) < near)[0].tolist():
+            for body in self._of_hand[arm]:
+                depth = DEPTH + float(getattr(body.shape, "radius", 0.0))
+                yield Exemption(body.name, self._things[k], point, self._around.near_hold, depth)
 
     def _exemptions(self, holds: Sequence[Ints]) -> Iterator[Exemption]:
         mounted, radius = self._around.mounted, self._around.near_hold

@@ -227,11 +227,12 @@ def way_to(walker: Walker, structure: Structure, plan: Plan, arm: int, hands: Ha
         rows = angles[0] if k == arm else np.repeat(q[other.q][None], len(times), axis=0)
         postures.append(rows)
         holds.append(np.array([structure.index(plan.start[k])]))
-    # A hand that has just left a hold may be near to what that is mounted on
-    left = np.linalg.norm(structure.positions - hands.origins[arm], axis=1)
-    holds[arm] = np.append(holds[arm], left.argmin())
+    # A hand that has just left a hold may be near to what that is mounted on, also where the hold is gone since
+    near_by = np.linalg.norm(structure.positions - hands.origins[arm], axis=1).argmin()
+    holds[arm] = np.append(holds[arm], near_by)
     poses = np.repeat(plan.path.poses[:1], len(times), axis=0)
-    law.possible = clear_scene(walker, structure).touched(times, poses, postures, holds) is None
+    left = arm, np.array(hands.origins[arm])
+    law.possible = clear_scene(walker, structure).touched(times, poses, postures, holds, left) is None
     return law
 
 
