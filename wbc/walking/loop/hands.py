@@ -12,7 +12,7 @@ import pinocchio as pin
 from wbc.errors import ShapeError
 from wbc.validation import Array
 from wbc.walking.loop.hand_command import UPRIGHT, HandCommand, HandLanding
-from wbc.walking.loop.hand_pace import HAND_RAMP, HAND_STOP, LANDING, at_rest, hand_pace, turned
+from wbc.walking.loop.hand_pace import HAND_RAMP, LANDING, at_rest, hand_pace, turned
 from wbc.walking.loop.machine import Machine
 from wbc.walking.loop.progress import PlanProgress
 from wbc.walking.loop.stack import WalkStack
@@ -63,7 +63,7 @@ class ArmLeader:
             raise ShapeError("plan", progress.plan, "expected a plan of a machine with WalkerData")
         self._machine, self._progress, self._stack, self._dt = machine, progress, stack, machine.dt
         self._hand, self._landing = HandCommand(machine.dt), HandLanding(machine.dt)
-        self.stops = Stops(machine.dt)
+        self.stops = Stops.of(machine.walker, machine.dt)
 
     def first(self) -> Array:
         """The body where the path begins, the arms on their grips."""
@@ -88,13 +88,15 @@ class ArmLeader:
             swinging.open_on(self._dt)
         elif swinging.state == "open":
             wanted = hand_pace(swinging, swinging.place, at_branch, early, pace)
-            wanted, change = (0.0, self._dt / HAND_STOP) if aborted else (wanted, self._dt / HAND_RAMP)
+            stops = aborted or swinging.dropped
+            wanted, change = (0.0, self._dt / self.stops.hand) if stops else (wanted, self._dt / HAND_RAMP)
             swinging.pace += min(max(wanted - swinging.pace, -change), change)
             swinging.clock = min(swinging.clock + swinging.pace * self._dt, swinging.law.duration)
         grip = progress.grip[arm]
         followed = self._hand.go(swinging, swinging.place, progress.grips, grip, progress.sample)
         hold = machine.structure.positions[swinging.hold], machine.structure.axes[swinging.hold]
         near = swinging.aim.blend > LANDING and at_branch and dist(swinging.aim.position, hold[0]) < UPRIGHT
+        near = near and not swinging.dropped
         self._stack.swing(arm, followed, self._landing.go(swinging, hold, near))
 
 
@@ -144,34 +146,46 @@ class Hands:
         self.stack.hold(arm, hold, roll)
         return True
 
+    def settle_in_air(self, arm: int) -> None:
+        """A hand in the air that followed joints waits where it is."""
+        origin, axis, _ = self.machine.hand(arm)
+        self.stack.settle(arm, origin, axis, None)
+
     def stay(self, arm: int) -> None:
         """A hand in the air waits where it is."""
         origin, axis, _ = self.machine.hand(arm)
         self.stack.rest(arm, origin, axis)
 
     def drop(self) -> None:
-        """The swinging hand stays in the air, and goes nowhere any more."""
-        if self.swinging is not None:
-            self.stay(self.swinging.arm)
-            self.swinging = None
+        """The swinging hand does not go to its hold any more: it slows down along its law, and stays in the air."""
+        if self.swinging is None:
+            return
+        if self.swinging.state == "open" and self.swinging.pace > 0.0:
+            self.swinging.dropped = True
+            return
+        self.stay(self.swinging.arm)
+        self.swinging = None
 
     def just_landed(self, arm: int) -> bool:
         """It has landed in this tick: a hand that goes on at once is closed for a tick."""
         return self._landed == (arm, self.machine.time)
 
-    def send(self, arm: int, grip: tuple[int, int, int], law: SwingLaw, **more: Any) -> Swinging:
-        """An open hand begins to go along a law.
+    def going(self, arm: int, grip: tuple[int, int, int], law: SwingLaw, **more: Any) -> Swinging:
+        """A hand that is to go along a law.
 
         Args:
             grip: its number, the row of its hold, and the number of its roll. more: of :class:`Swinging`.
         """
         number, hold, roll = grip
         x = None if roll == ANY else frame_on(self.machine.structure, hold, roll)[:3, 0]
-        self.swinging = Swinging(arm, hold, number, law, x=x, **more)
-        return self.swinging
+        return Swinging(arm, hold, number, law, x=x, **more)
 
     def settle(self, swinging: Swinging) -> bool:
         """Close a hand that has come to rest on its hold; whether the latch is through with this tick."""
+        if swinging.dropped:
+            if swinging.pace == 0.0:
+                self.drop()
+            return False
         if swinging.state == "open" and swinging.clock >= swinging.law.duration - 1e-9:
             before = swinging.place, swinging.axis, swinging.x_axis
             if self.rests(swinging.arm, swinging.hold, before, swinging.x):
@@ -208,7 +222,7 @@ class Hands:
         held = self.machine.held
         out = [held.get(arm, -1) for arm in self._arms]
         if self.swinging is not None:
-            out[self.swinging.arm] = self.swinging.hold
+            out[self.swinging.arm] = -1 if self.swinging.dropped else self.swinging.hold
         if self.manual is not None:
             out[self.manual.arm] = self.manual.hold
         return tuple(out)

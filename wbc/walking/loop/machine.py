@@ -41,13 +41,15 @@ class Machine:
         self.time, self.fixed = 0.0, False
         self.held: dict[int, int] = {}
 
-    def begin(self, q: Array, held: Mapping[int, int], time: float = 0.0) -> None:
-        """At rest in a configuration, with some hands closed on holds.
+    def begin(self, q: Array, held: Mapping[int, int], time: float = 0.0, v: Array | None = None) -> None:
+        """In a configuration, with some hands closed on holds, and the rates of the last command; None: at rest.
 
         Raises:
             PlantError: the plant is not there, or has no valid reading. RangeError: as of :class:`ClosedChain`.
         """
         self.held, self.q = dict(held), q.copy()
+        if v is not None:
+            self.v = v.copy()
         self.fixed = len(self.held) < self.walker.min_holds
         self._place(q[7:])
         state = self._connection.reset(self.q, time)

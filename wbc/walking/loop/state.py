@@ -49,6 +49,7 @@ class Swinging:
             leaves. wrist: joints 4 to 6 as they are to be now [rad].
         counted: it is a move of the plan, not one of an earlier plan, or one that brings a free hand to it.
         waits: the body stands until the hand has landed.
+        dropped: it does not go to its hold any more, but comes to rest on its law.
     """
 
     arm: int
@@ -58,6 +59,7 @@ class Swinging:
     latch: float
     counted: bool = True
     waits: bool = False
+    dropped: bool = False
     clock: float = 0.0
     pace: float = 1.0
     state: Hand = "opening"
@@ -87,12 +89,14 @@ class State:
     Attributes:
         q: configuration. held: row of the arm -> row of the hold. time: [s].
         opening: row of an arm that opens, and of the hold that it leaves; None: none does.
+        v: velocity ``[nv]`` that everything has; a walk comes to rest from it first. None: at rest.
     """
 
     q: Array
     held: Mapping[int, int]
     time: float = 0.0
     opening: tuple[int, int] | None = None
+    v: Array | None = None
 
 
 @dataclass(eq=False, slots=True)

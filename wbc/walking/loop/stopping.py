@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from wbc.robots import Walker
 from wbc.validation import Array
 from wbc.walking.loop.hand_pace import BEHIND, HAND_STOP
 from wbc.walking.planner.plan import Plan
@@ -14,6 +15,13 @@ from wbc.walking.planner.plan import Plan
 BRAKE = 0.25
 #: What a body may be off its path at the end of a stop [m]
 OFF = 0.002
+
+
+def slowness(walker: Walker) -> float:
+    """How many times longer than the shortest its joints need to their full rates: what all times above grow with."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        times = walker.robot.limits.velocity[6:] / walker.robot.limits.acceleration[6:]
+    return max(1.0, float(np.max(np.nan_to_num(times, nan=0.0, posinf=0.0))) / BRAKE)
 
 
 @dataclass(frozen=True)
@@ -27,6 +35,12 @@ class Stops:
     dt: float
     brake: float = BRAKE
     hand: float = HAND_STOP
+
+    @classmethod
+    def of(cls, walker: Walker, dt: float) -> Stops:
+        """Of a body with arms: longer where joints speed up more slowly than in :data:`BRAKE`."""
+        slower = slowness(walker)
+        return cls(dt, BRAKE * slower, HAND_STOP * slower)
 
     def of_body(self, places: Array, spacing: float, at: Array, pace: float, behind: float) -> Array:
         """How far a body's origin travels [m]: along its path while the pace p falls to 0, which is p^2 T / 2 of path

@@ -1,0 +1,114 @@
+"""Nothing is begun that is not proven clear: a swing before its hand is lifted, the body's way some tenths ahead."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from wbc.clearance import Nearest
+from wbc.walking.loop.foresight import STEP, Foresight, Timing
+from wbc.walking.loop.hand_pace import HAND_RAMP
+from wbc.walking.loop.machine import Machine
+from wbc.walking.loop.progress import PlanProgress
+from wbc.walking.loop.state import Swinging
+from wbc.walking.loop.stopping import Stops
+from wbc.walking.planner.swings.swings import SETTLE
+
+#: Path time that the body's way is proven ahead, and what is left of it when it is looked at again [s]
+AHEAD, LEFT = 1.0, 0.4
+
+
+class Course(NamedTuple):
+    """How body and swinging hand are about to go on.
+
+    Attributes:
+        pace: of the body now. end: path time that it does not pass [s]. due: path time at which the hand is to be on
+            its hold [s]. stands: the body comes to rest.
+    """
+
+    pace: float
+    end: float
+    due: float
+    stands: bool
+
+
+class Caution:
+    """What of a walk is proven.
+
+    Attributes:
+        until: path time up to which the body may go with the hands that hold now [s].
+    """
+
+    def __init__(self, sight: Foresight, machine: Machine, progress: PlanProgress, stops: Stops) -> None:
+        self.sight, self._machine, self._progress, self._stops = sight, machine, progress, stops
+        self.until = 0.0
+        self._known: tuple[object, ...] = ()
+
+    def forget(self) -> None:
+        """Nothing is proven any more."""
+        self._known, self.until = (), self._progress.path_time
+
+    def new(self, swinging: Swinging | None, stands: bool) -> bool:
+        """Whether what body and hand do has changed since it was proven."""
+        return self._known != (self._progress.plan.path, swinging, stands)
+
+    def ahead(self) -> Nearest | None:
+        """Prove the body's way on, all hands as they hold, if little of it is left; what is too near on it."""
+        progress = self._progress
+        path, u = progress.plan.path, progress.path_time
+        if self.new(None, False):
+            self._known, self.until = (path, None, False), u
+        if self.until - u > LEFT or self.until >= path.duration:
+            return None
+        end = min(u + AHEAD, path.duration)
+        times = np.linspace(0.0, max(end - u, STEP), max(int((end - u) / STEP), 1) + 1)
+        when = Timing(times, np.minimum(u + times, end), times)
+        found = self._near(None, when)
+        self.until = end if found is None else self.until
+        return found
+
+    def swing(self, swinging: Swinging, course: Course) -> Nearest | None:
+        """What is too near while a hand goes on to its hold and the body as its pace has it; None: proven clear."""
+        found = self._near(swinging, self.timing(swinging, course))
+        if found is None:
+            self._known = self._progress.plan.path, swinging, course.stands
+            self.until = self._progress.path_time
+        return found
+
+    def timing(self, swinging: Swinging, course: Course) -> Timing:
+        """Body and hand with the paces of the loop, until the hand holds."""
+        law, latch = swinging.law, swinging.latch if swinging.state == "opening" else 0.0
+        u, clock, pace, hand, t = self._progress.path_time, swinging.clock, course.pace, swinging.pace, 0.0
+        closing = self._machine.walker.tolerances.latch_time + SETTLE
+        rows = [(0.0, u, clock)]
+        while clock < law.duration - 1e-9 or latch > 1e-9 or (course.stands and pace > 0.0):
+            left = law.duration - clock
+            needed, until = latch + left + closing, max(course.end - u, 0.0)
+            wanted = 0.0 if course.stands else min(1.0, until / needed)
+            pace = max(pace + min(max(wanted - pace, -STEP / self._stops.brake), STEP / (2.0 * self._stops.brake)), 0.0)
+            wait = course.due - u - wanted * left
+            aim = 1.0 / (1.0 + 4.0 * wait) if wait > 0.0 else 1.0
+            u, t = min(u + pace * STEP, course.end), t + STEP
+            if latch > 1e-9:
+                latch -= STEP
+            else:
+                hand += min(max(aim - hand, -STEP / HAND_RAMP), STEP / HAND_RAMP)
+                clock = min(clock + hand * STEP, law.duration)
+            rows.append((t, u, clock))
+            if len(rows) > 4 * (law.duration + 2.0) / STEP:
+                break
+        rows.append((t + closing, u if course.stands else max(u, min(u + pace * closing, course.end)), clock))
+        return Timing(*np.array(rows).T)
+
+    def _near(self, swinging: Swinging | None, when: Timing) -> Nearest | None:
+        machine, progress = self._machine, self._progress
+        rows = self.sight.rows(progress.plan.path, progress, machine.q, swinging, when)
+        at = list(machine.held.items())
+        if swinging is not None:
+            at.append((swinging.arm, swinging.hold))
+            if swinging.first_wrist is None:
+                at.append((swinging.arm, int(progress.grips.hold[progress.grip[swinging.arm]])))
+            else:
+                at += self.sight.around(swinging.arm, machine.hand(swinging.arm)[0])
+        return self.sight.nearest(when.times, rows, at)

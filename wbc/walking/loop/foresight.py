@@ -1,0 +1,174 @@
+"""What the loop is about to do is proven clear before it does it: the motion as its timing has it, delays included."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+import pinocchio as pin
+
+from wbc.clearance import (
+    EndlessCylinder,
+    Exemption,
+    Motion,
+    Nearest,
+    Pair,
+    Sweeper,
+    SweptBody,
+    SweptScene,
+    Tree,
+    bodies_of,
+    self_pairs,
+)
+from wbc.robots import Walker
+from wbc.shapes import HalfSpace
+from wbc.validation import Array
+from wbc.walking.arms.puma import limb_of
+from wbc.walking.body_path import BodyPath
+from wbc.walking.holds.structure import Structure
+from wbc.walking.holds.surface import PlaneSurface
+from wbc.walking.loop.progress import PlanProgress
+from wbc.walking.loop.state import Swinging
+from wbc.walking.planner.plan import Plan
+from wbc.walking.planner.swings.law import SwingLaw
+
+#: Time from knot to knot of a motion [s]: between them joints go straight
+STEP = 0.025
+#: A hold is mounted on what is this near to it, and its hand may be this deep in it, beyond its own roundness [m]
+MOUNTED, DEPTH = 0.005, 0.005
+#: What clearances may lack: as much as the checker leaves; and what the proof may miss [m]
+SLACK, TOLERANCE = 1e-4, 5e-5
+
+
+@dataclass(frozen=True, eq=False)
+class Timing:
+    """k instants of a motion: times [s], path times of the body [s], and the clock of the swinging hand [s]."""
+
+    times: Array
+    path_times: Array
+    clock: Array
+
+
+class Foresight:
+    """Sweeps of a walker among what stands around it.
+
+    Args:
+        structure: its surface and obstacles; where holds are, for hands that may touch what these are mounted on.
+    """
+
+    def __init__(self, walker: Walker, structure: Structure) -> None:
+        self.walker, self.structure = walker, structure
+        tree, clearance = Tree.of_model(walker.robot.model), walker.tolerances.clearance - SLACK
+        self._hands = [self._grasping(tree, arm) for arm in range(len(walker.arms))]
+        hands = {body.name: body for body in self._hands}
+        bodies = [hands.get(body.name, body) for body in bodies_of(walker.robot)]
+        things = list(_things(structure))
+        pairs = self_pairs(walker.robot, clearance)
+        pairs += [Pair(body.name, thing.name, clearance) for body, thing in product(bodies, things)]
+        self._sweeper = Sweeper(SweptScene(tree, [*bodies, *things], pairs))
+        self._tree, self._mounts = tree, dict[str, tuple[str, ...]]()
+        column = {name: arm.q.start + k for arm in walker.arms for k, name in enumerate(arm.joints)}
+        self._columns = [column[name] for name in tree.coordinates]
+
+    def nearest(self, times: Array, q: Array, at: Sequence[tuple[int, int]]) -> Nearest | None:
+        """The first instant found at which two bodies are too near in a motion ``[k, nq]``; None: proven clear.
+
+        Args:
+            times: of the rows [s]. at: (row of an arm, row of a hold): its hand may touch what that is mounted on.
+        """
+        motion = Motion.linear(self._tree, times, q[:, self._columns], q[:, :7])
+        exempt = [one for arm, hold in at if hold >= 0 for one in self._exemptions(arm, hold)]
+        return self._sweeper.sweep(motion, exemptions=exempt, tolerance=TOLERANCE).violation
+
+    def rows(self, path: BodyPath, progress: PlanProgress, q: Array, swinging: Swinging | None, when: Timing) -> Array:
+        """Configurations ``[k, nq]`` that a plan has at instants; joints of holding arms, which lean as they do, change
+        from where they are now as those of their grips.
+
+        Args:
+            q: now, at the first instant.
+        """
+        out = np.repeat(q[None], len(when.times), axis=0)
+        poses = [path.at(u)[0] for u in when.path_times.tolist()]
+        out[:, :7] = [pin.SE3ToXYZQUAT(pose) for pose in poses]
+        samples, grips = when.path_times / path.spacing, progress.grips
+        for k, arm in enumerate(self.walker.arms):
+            grip = np.array(progress.grip[k])
+            if swinging is None or swinging.arm != k:
+                change = grips.between(grip, samples)
+                free = grips.roll[grip] < 0
+                change = change - change[0]
+                if free:
+                    change[:, -1] = 0.0
+                out[:, arm.q] += change
+                continue
+            law, limb = swinging.law, limb_of(self.walker)
+            parts, places = np.interp(when.clock, law.times, law.parts), np.empty((len(samples), 3))
+            for axis in range(3):
+                places[:, axis] = np.interp(when.clock, law.times, law.places[:, axis])
+            last = grips.between(np.array(swinging.grip), samples)[:, limb.guided :]
+            first = np.array(swinging.first_wrist) if swinging.first_wrist is not None else None
+            first = grips.between(grip, samples)[:, limb.guided :] if first is None else first
+            guide = first + parts[:, None] * (last - first)
+            frames = np.array([(pose * arm.base).homogeneous for pose in poses])
+            angles, _ = limb.follow(frames[None], places[None], guide[None], self.walker.margins)
+            out[:, arm.q] = angles[0]
+        return out
+
+    def may_bring(self, plan: Plan, arm: int, law: SwingLaw, held: Mapping[int, int], q: Array) -> bool:
+        """Whether a free hand may go along a law to where a plan begins, while the body stands and other hands hold."""
+        count, grips, limb = max(int(law.duration / STEP), 1) + 1, plan.grips, limb_of(self.walker)
+        assert grips is not None
+        times = np.linspace(0.0, law.duration, count)
+        out = np.repeat(q[None], count, axis=0)
+        pose = pin.SE3(plan.path.poses[0])
+        out[:, :7] = pin.SE3ToXYZQUAT(pose)
+        for k, other in enumerate(self.walker.arms):
+            if k < arm and k not in held:
+                # It has been brought before
+                out[:, other.q] = grips.posture_at(plan.chain[k][0], 0)
+        mine = self.walker.arms[arm]
+        first, last = q[mine.q][limb.guided :], grips.posture_at(plan.chain[arm][0], 0)[limb.guided :]
+        guide = first + np.interp(times, law.times, law.parts)[:, None] * (last - first)
+        places = np.stack([np.interp(times, law.times, column) for column in law.places.T], axis=1)
+        frames = np.repeat((pose * mine.base).homogeneous[None], count, axis=0)
+        angles, _ = limb.follow(frames[None], places[None], guide[None], self.walker.margins)
+        out[:, mine.q] = angles[0]
+        at = [*held.items(), (arm, self.structure.index(plan.start[arm])), *self.around(arm, places[0])]
+        return self.nearest(times, out, at) is None
+
+    def around(self, arm: int, place: Array) -> list[tuple[int, int]]:
+        """(arm, row of the hold) of the holds that a hand at a place [m] may have left just now."""
+        off = np.linalg.norm(self.structure.positions - place, axis=1)
+        return [(arm, int(hold)) for hold in np.flatnonzero(off < self.walker.tolerances.exempt_distance)]
+
+    def _grasping(self, tree: Tree, arm: int) -> SweptBody:
+        """The hand of an arm, with its grasp point."""
+        mine = self.walker.arms[arm]
+        body = next(body for body in bodies_of(self.walker.robot) if body.link == mine.links[-1])
+        grasp = (tree.links[body.link][1].inverse() * tree.links[mine.hand][1]).translation
+        return SweptBody(body.name, body.shape, body.link, body.placement, grasp)
+
+    def _exemptions(self, arm: int, hold: int) -> list[Exemption]:
+        name, point, hand = self.structure.ids[hold], self.structure.positions[hold], self._hands[arm]
+        if name not in self._mounts:
+            self._mounts[name] = tuple(_mounted(self.structure, point))
+        depth, radius = DEPTH + float(getattr(hand.shape, "radius", 0.0)), self.walker.tolerances.exempt_distance
+        return [Exemption(hand.name, mount, point, radius, depth) for mount in self._mounts[name]]
+
+
+def _things(structure: Structure) -> list[SweptBody]:
+    out = [SweptBody(f"obstacle {one.id}", one.shape, placement=one.placement) for one in structure.obstacles]
+    surface = structure.surface
+    if surface is not None:
+        shape = HalfSpace() if isinstance(surface, PlaneSurface) else EndlessCylinder(surface.radius)
+        out.append(SweptBody("the surface", shape, placement=surface.pose))
+    return out
+
+
+def _mounted(structure: Structure, point: Array) -> list[str]:
+    off = {f"obstacle {one.id}": abs(float(one.distance(point))) for one in structure.obstacles}
+    if structure.surface is not None:
+        off["the surface"] = abs(float(structure.surface.height(point)))
+    return [name for name, distance in off.items() if distance <= MOUNTED]
