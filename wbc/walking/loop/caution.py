@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -24,13 +25,14 @@ class Course(NamedTuple):
 
     Attributes:
         pace: of the body now. end: path time that it does not pass [s]. due: path time at which the hand is to be on
-            its hold [s]. stands: the body comes to rest.
+            its hold [s]. stands: the body comes to rest. most: pace that the path allows at a path time [s].
     """
 
     pace: float
     end: float
     due: float
     stands: bool
+    most: Callable[[float], float]
 
 
 class Caution:
@@ -85,7 +87,7 @@ class Caution:
         while clock < law.duration - 1e-9 or latch > 1e-9 or (course.stands and pace > 0.0):
             left = law.duration - clock
             needed, until = latch + left + closing, max(course.end - u, 0.0)
-            wanted = 0.0 if course.stands else min(1.0, until / needed)
+            wanted = 0.0 if course.stands else min(1.0, until / needed, course.most(u))
             pace = max(pace + min(max(wanted - pace, -STEP / self._stops.brake), STEP / (2.0 * self._stops.brake)), 0.0)
             wait = course.due - u - wanted * left
             aim = 1.0 / (1.0 + 4.0 * wait) if wait > 0.0 else 1.0

@@ -462,7 +462,8 @@ class Walk:
         soonest = min([end, *self._lasting(swinging.arm)])
         if swinging.counted and not self._changing:
             soonest = min(soonest, self._late())
-        return Course(self.pace, max(soonest, self.path_time), self._due(swinging), stands)
+        corners = self.body.corners(self.plan.path)
+        return Course(self.pace, max(soonest, self.path_time), self._due(swinging), stands, corners.pace)
 
     def _late(self) -> float:
         """Path time that the body does not pass before the swinging hand holds [s]: where the body has to wait for it,
@@ -527,7 +528,8 @@ class Walk:
                 # A hand that is late makes the body late too: the next ones then swing where they were planned to
                 until = min(until, max(self._late() - u, 0.0))
             landing = until, needed
-        self.body.choose(margin, max(end - u, 0.0), landing, self._stands())
+        most = self.body.corners(path).pace(u)
+        self.body.choose(margin, max(end - u, 0.0), landing, self._stands(), most)
         aim, progress.path_time = self.body.go(path, u)
         self.stack.body(aim)
 
