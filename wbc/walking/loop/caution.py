@@ -106,11 +106,9 @@ class Caution:
     def _near(self, swinging: Swinging | None, when: Timing) -> Nearest | None:
         machine, progress = self._machine, self._progress
         rows = self.sight.rows(progress.plan.path, progress, machine.q, swinging, when)
-        at = list(machine.held.items())
+        at = self.sight.holds(machine.held)
+        for arm in set(range(len(machine.walker.arms))) - set(machine.held):
+            at += self.sight.around(arm, machine.hand(arm)[0])
         if swinging is not None:
-            at.append((swinging.arm, swinging.hold))
-            if swinging.first_wrist is None:
-                at.append((swinging.arm, int(progress.grips.hold[progress.grip[swinging.arm]])))
-            else:
-                at += self.sight.around(swinging.arm, machine.hand(swinging.arm)[0])
+            at += self.sight.holds({swinging.arm: swinging.hold})
         return self.sight.nearest(when.times, rows, at)

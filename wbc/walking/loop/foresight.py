@@ -56,6 +56,9 @@ class Foresight:
 
     Args:
         structure: its surface and obstacles; where holds are, for hands that may touch what these are mounted on.
+
+    Attributes:
+        left: row of an arm -> places of holds that it has left [m], see :class:`wbc.walking.loop.machine.Machine`.
     """
 
     def __init__(self, walker: Walker, structure: Structure) -> None:
@@ -68,18 +71,19 @@ class Foresight:
         pairs = self_pairs(walker.robot, clearance)
         pairs += [Pair(body.name, thing.name, clearance) for body, thing in product(bodies, things)]
         self._sweeper = Sweeper(SweptScene(tree, [*bodies, *things], pairs))
-        self._tree, self._mounts = tree, dict[str, tuple[str, ...]]()
+        self._tree, self._mounts = tree, dict[bytes, tuple[str, ...]]()
+        self.left: Mapping[int, Sequence[Array]] = {}
         column = {name: arm.q.start + k for arm in walker.arms for k, name in enumerate(arm.joints)}
         self._columns = [column[name] for name in tree.coordinates]
 
-    def nearest(self, times: Array, q: Array, at: Sequence[tuple[int, int]]) -> Nearest | None:
+    def nearest(self, times: Array, q: Array, at: Sequence[tuple[int, Array]]) -> Nearest | None:
         """The first instant found at which two bodies are too near in a motion ``[k, nq]``; None: proven clear.
 
         Args:
-            times: of the rows [s]. at: (row of an arm, row of a hold): its hand may touch what that is mounted on.
+            times: of the rows [s]. at: (row of an arm, place of a hold [m]): its hand may touch what that is mounted on.
         """
         motion = Motion.linear(self._tree, times, q[:, self._columns], q[:, :7])
-        exempt = [one for arm, hold in at if hold >= 0 for one in self._exemptions(arm, hold)]
+        exempt = [one for arm, place in at for one in self._exemptions(arm, place)]
         return self._sweeper.sweep(motion, exemptions=exempt, tolerance=TOLERANCE).violation
 
     def rows(self, path: BodyPath, progress: PlanProgress, q: Array, swinging: Swinging | None, when: Timing) -> Array:
@@ -135,13 +139,20 @@ class Foresight:
         frames = np.repeat((pose * mine.base).homogeneous[None], count, axis=0)
         angles, _ = limb.follow(frames[None], places[None], guide[None], self.walker.margins)
         out[:, mine.q] = angles[0]
-        at = [*held.items(), (arm, self.structure.index(plan.start[arm])), *self.around(arm, places[0])]
+        at = [*self.holds(held), *self.holds({arm: self.structure.index(plan.start[arm])}), *self.around(arm, places[0])]
         return self.nearest(times, out, at) is None
 
-    def around(self, arm: int, place: Array) -> list[tuple[int, int]]:
-        """(arm, row of the hold) of the holds that a hand at a place [m] may have left just now."""
+    def holds(self, held: Mapping[int, int]) -> list[tuple[int, Array]]:
+        """(arm, place) of hands on holds."""
+        return [(arm, self.structure.positions[hold]) for arm, hold in held.items() if hold >= 0]
+
+    def around(self, arm: int, place: Array) -> list[tuple[int, Array]]:
+        """(arm, place) of the holds that an open hand at a place [m] has left; if none is known, those it is near to."""
+        if arm in self.left:
+            return [(arm, left) for left in self.left[arm]]
         off = np.linalg.norm(self.structure.positions - place, axis=1)
-        return [(arm, int(hold)) for hold in np.flatnonzero(off < self.walker.tolerances.exempt_distance)]
+        near = np.flatnonzero(off < self.walker.tolerances.exempt_distance)
+        return [(arm, self.structure.positions[hold]) for hold in near]
 
     def _grasping(self, tree: Tree, arm: int) -> SweptBody:
         """The hand of an arm, with its grasp point."""
@@ -150,8 +161,8 @@ class Foresight:
         grasp = (tree.links[body.link][1].inverse() * tree.links[mine.hand][1]).translation
         return SweptBody(body.name, body.shape, body.link, body.placement, grasp)
 
-    def _exemptions(self, arm: int, hold: int) -> list[Exemption]:
-        name, point, hand = self.structure.ids[hold], self.structure.positions[hold], self._hands[arm]
+    def _exemptions(self, arm: int, point: Array) -> list[Exemption]:
+        name, hand = point.tobytes(), self._hands[arm]
         if name not in self._mounts:
             self._mounts[name] = tuple(_mounted(self.structure, point))
         depth, radius = DEPTH + float(getattr(hand.shape, "radius", 0.0)), self.walker.tolerances.exempt_distance

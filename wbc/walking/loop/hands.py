@@ -161,10 +161,19 @@ class Hands:
         if self.swinging is None:
             return
         if self.swinging.state == "open" and self.swinging.pace > 0.0:
+            if not self.swinging.dropped:
+                self._leave(self.swinging)
             self.swinging.dropped = True
             return
+        if not self.swinging.dropped:
+            self._leave(self.swinging)
         self.stay(self.swinging.arm)
         self.swinging = None
+
+    def _leave(self, swinging: Swinging) -> None:
+        """The hand may still be near to what its hold is mounted on."""
+        places = self.machine.left.setdefault(swinging.arm, [])
+        places.append(self.machine.structure.positions[swinging.hold])
 
     def just_landed(self, arm: int) -> bool:
         """It has landed in this tick: a hand that goes on at once is closed for a tick."""

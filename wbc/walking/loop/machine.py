@@ -25,6 +25,7 @@ class Machine:
         q: configuration, the body's pose in the structure. v: last command. rates: of the joints, means over the last
             period, and the body's velocity as the plant has it.
         time: [s]. held: row of the arm -> row of the hold.
+        left: row of the arm -> places of the holds that an open hand has left, or was to go to, last [m].
         fixed: fewer hands hold than the body needs, and have since the beginning: it is declared fixed.
         structure, chain: the holds that are there, and the hands on them.
 
@@ -40,6 +41,7 @@ class Machine:
         self.v = self.rates = np.zeros(walker.robot.nv)
         self.time, self.fixed = 0.0, False
         self.held: dict[int, int] = {}
+        self.left: dict[int, list[Array]] = {}
 
     def begin(self, q: Array, held: Mapping[int, int], time: float = 0.0, v: Array | None = None) -> None:
         """In a configuration, with some hands closed on holds, and the rates of the last command; None: at rest.
@@ -85,7 +87,7 @@ class Machine:
 
     def open(self, arm: int) -> None:
         """A hand holds nothing."""
-        del self.held[arm]
+        self.left[arm] = [self.structure.positions[self.held.pop(arm)]]
 
     def hand(self, arm: int) -> tuple[Array, Array, Array]:
         """Origin [m], z axis and x axis of a hand in the structure."""

@@ -116,7 +116,7 @@ class Walk:
         self._refusals, self._refused = 0, ""
         if foresees and not self.leader.one_motion:
             sight = Foresight(walker, structure)
-            self.replanner.sight = sight
+            self.replanner.sight, sight.left = sight, machine.left
             self._caution = Caution(sight, machine, self.progress, self.leader.stops)
         self._coasting = None if state is None else Coasting.of(walker, state, self.leader.stops.brake, self.dt)
 
