@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wbc.clearance import Nearest
+from wbc.validation import Array
 from wbc.walking.loop.foresight import STEP, Foresight, Timing
 from wbc.walking.loop.hand_pace import HAND_RAMP
 from wbc.walking.loop.machine import Machine
@@ -55,15 +56,19 @@ class Caution:
         """Whether what body and hand do has changed since it was proven."""
         return self._known != (self._progress.plan.path, swinging, stands)
 
-    def ahead(self) -> Nearest | None:
-        """Prove the body's way on, all hands as they hold, if little of it is left; what is too near on it."""
+    def ahead(self, end: float) -> Nearest | None:
+        """Prove the body's way on, all hands as they hold, if little of it is left; what is too near on it.
+
+        Args:
+            end: path time to which they can hold [s].
+        """
         progress = self._progress
         path, u = progress.plan.path, progress.path_time
         if self.new(None, False):
             self._known, self.until = (path, None, False), u
-        if self.until - u > LEFT or self.until >= path.duration:
+        if self.until - u > LEFT or self.until >= end - 1e-9:
             return None
-        end = min(u + AHEAD, path.duration)
+        end = min(u + AHEAD, end)
         times = np.linspace(0.0, max(end - u, STEP), max(int((end - u) / STEP), 1) + 1)
         when = Timing(times, np.minimum(u + times, end), times)
         found = self._near(None, when)
@@ -105,10 +110,13 @@ class Caution:
 
     def _near(self, swinging: Swinging | None, when: Timing) -> Nearest | None:
         machine, progress = self._machine, self._progress
-        rows = self.sight.rows(progress.plan.path, progress, machine.q, swinging, when)
-        at = self.sight.holds(machine.held)
+        rows = self.sight.rows(machine, progress, swinging, when)
+        held = dict(machine.held)
+        at = list[tuple[int, Array]]()
         for arm in set(range(len(machine.walker.arms))) - set(machine.held):
             at += self.sight.around(arm, machine.hand(arm)[0])
         if swinging is not None:
-            at += self.sight.holds({swinging.arm: swinging.hold})
-        return self.sight.nearest(when.times, rows, at)
+            # It is on the hold that it is about to leave
+            leaving = {swinging.arm: held.pop(swinging.arm, -1)}
+            at += [*self.sight.holds({swinging.arm: swinging.hold}), *self.sight.holds(leaving)]
+        return self.sight.nearest(when.times, rows, at, held)

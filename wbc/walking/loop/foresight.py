@@ -26,9 +26,9 @@ from wbc.robots import Walker
 from wbc.shapes import HalfSpace
 from wbc.validation import Array
 from wbc.walking.arms.puma import limb_of
-from wbc.walking.body_path import BodyPath
 from wbc.walking.holds.structure import Structure
 from wbc.walking.holds.surface import PlaneSurface
+from wbc.walking.loop.machine import Machine
 from wbc.walking.loop.progress import PlanProgress
 from wbc.walking.loop.state import Swinging
 from wbc.walking.planner.plan import Plan
@@ -38,6 +38,8 @@ from wbc.walking.planner.swings.law import SwingLaw
 STEP = 0.025
 #: A hold is mounted on what is this near to it, and its hand may be this deep in it, beyond its own roundness [m]
 MOUNTED, DEPTH = 0.005, 0.005
+#: The same of a hand that holds, whose posture is foreseen less well than its place [m]
+HELD_DEPTH = 0.03
 #: What clearances may lack: as much as the checker leaves; and what the proof may miss [m]
 SLACK, TOLERANCE = 1e-4, 5e-5
 
@@ -76,38 +78,37 @@ class Foresight:
         column = {name: arm.q.start + k for arm in walker.arms for k, name in enumerate(arm.joints)}
         self._columns = [column[name] for name in tree.coordinates]
 
-    def nearest(self, times: Array, q: Array, at: Sequence[tuple[int, Array]]) -> Nearest | None:
+    def nearest(
+        self, times: Array, q: Array, at: Sequence[tuple[int, Array]], held: Mapping[int, int] | None = None
+    ) -> Nearest | None:
         """The first instant found at which two bodies are too near in a motion ``[k, nq]``; None: proven clear.
 
         Args:
             times: of the rows [s]. at: (row of an arm, place of a hold [m]): its hand may touch what that is mounted on.
+            held: row of an arm -> row of the hold, of hands that hold all the time.
         """
         motion = Motion.linear(self._tree, times, q[:, self._columns], q[:, :7])
-        exempt = [one for arm, place in at for one in self._exemptions(arm, place)]
+        exempt = [one for arm, place in at for one in self._exemptions(arm, place, DEPTH)]
+        exempt += [one for arm, place in self.holds(held or {}) for one in self._exemptions(arm, place, HELD_DEPTH)]
         return self._sweeper.sweep(motion, exemptions=exempt, tolerance=TOLERANCE).violation
 
-    def rows(self, path: BodyPath, progress: PlanProgress, q: Array, swinging: Swinging | None, when: Timing) -> Array:
-        """Configurations ``[k, nq]`` that a plan has at instants; joints of holding arms, which lean as they do, change
-        from where they are now as those of their grips.
-
-        Args:
-            q: now, at the first instant.
+    def rows(self, machine: Machine, progress: PlanProgress, swinging: Swinging | None, when: Timing) -> Array:
+        """Configurations ``[k, nq]`` that a plan has at instants; hands that hold keep their axes. Joint 6, which turns a
+        hand about its own axis, moves nothing and stays.
         """
+        q, held, path = machine.q, machine.held, progress.plan.path
         out = np.repeat(q[None], len(when.times), axis=0)
         poses = [path.at(u)[0] for u in when.path_times.tolist()]
         out[:, :7] = [pin.SE3ToXYZQUAT(pose) for pose in poses]
-        samples, grips = when.path_times / path.spacing, progress.grips
+        samples, grips, limb = when.path_times / path.spacing, progress.grips, limb_of(self.walker)
         for k, arm in enumerate(self.walker.arms):
-            grip = np.array(progress.grip[k])
+            grip, frames = np.array(progress.grip[k]), np.array([(pose * arm.base).homogeneous for pose in poses])
             if swinging is None or swinging.arm != k:
-                change = grips.between(grip, samples)
-                free = grips.roll[grip] < 0
-                change = change - change[0]
-                if free:
-                    change[:, -1] = 0.0
-                out[:, arm.q] += change
+                if k in held:
+                    place = self.structure.positions[held[k]]
+                    out[:, arm.q] = self._holding(frames, q[arm.q], place, machine.chain.axes[k])
                 continue
-            law, limb = swinging.law, limb_of(self.walker)
+            law = swinging.law
             parts, places = np.interp(when.clock, law.times, law.parts), np.empty((len(samples), 3))
             for axis in range(3):
                 places[:, axis] = np.interp(when.clock, law.times, law.places[:, axis])
@@ -115,9 +116,24 @@ class Foresight:
             first = np.array(swinging.first_wrist) if swinging.first_wrist is not None else None
             first = grips.between(grip, samples)[:, limb.guided :] if first is None else first
             guide = first + parts[:, None] * (last - first)
-            frames = np.array([(pose * arm.base).homogeneous for pose in poses])
             angles, _ = limb.follow(frames[None], places[None], guide[None], self.walker.margins)
             out[:, arm.q] = angles[0]
+        return out
+
+    def _holding(self, frames: Array, now: Array, place: Array, axis: Array) -> Array:
+        """Joints of an arm whose hand stays at a place along its axis, from frames of its base ``[k, 4, 4]`` on; where
+        it is out of reach it goes with the body.
+
+        Args:
+            now: its joints, at the first frame.
+        """
+        limb, turns = limb_of(self.walker), frames[:, :3, :3]
+        points, axes = np.einsum("kji,kj->ki", turns, place - frames[:, :3, 3]), np.einsum("kji,j->ki", turns, axis)
+        found, solved = limb.held(points, axes)
+        branch = int(np.abs(found[0, :, :-1] - now[:-1]).max(axis=1).argmin())
+        out = np.unwrap(found[:, branch], axis=0)
+        out[:, -1] = now[-1]
+        out[~solved[:, branch]] = now
         return out
 
     def may_bring(self, plan: Plan, arm: int, law: SwingLaw, held: Mapping[int, int], q: Array) -> bool:
@@ -128,10 +144,10 @@ class Foresight:
         out = np.repeat(q[None], count, axis=0)
         pose = pin.SE3(plan.path.poses[0])
         out[:, :7] = pin.SE3ToXYZQUAT(pose)
-        for k, other in enumerate(self.walker.arms):
-            if k < arm and k not in held:
-                # It has been brought before
-                out[:, other.q] = grips.posture_at(plan.chain[k][0], 0)
+        there = {k: self.structure.index(plan.start[k]) for k in range(arm + 1) if k not in held}
+        for k in set(there) - {arm}:
+            # It has been brought before
+            out[:, self.walker.arms[k].q] = grips.posture_at(plan.chain[k][0], 0)
         mine = self.walker.arms[arm]
         first, last = q[mine.q][limb.guided :], grips.posture_at(plan.chain[arm][0], 0)[limb.guided :]
         guide = first + np.interp(times, law.times, law.parts)[:, None] * (last - first)
@@ -139,8 +155,8 @@ class Foresight:
         frames = np.repeat((pose * mine.base).homogeneous[None], count, axis=0)
         angles, _ = limb.follow(frames[None], places[None], guide[None], self.walker.margins)
         out[:, mine.q] = angles[0]
-        at = [*self.holds(held), *self.holds({arm: self.structure.index(plan.start[arm])}), *self.around(arm, places[0])]
-        return self.nearest(times, out, at) is None
+        at = [*self.holds(there), *self.around(arm, places[0])]
+        return self.nearest(times, out, at, held) is None
 
     def holds(self, held: Mapping[int, int]) -> list[tuple[int, Array]]:
         """(arm, place) of hands on holds."""
@@ -161,11 +177,11 @@ class Foresight:
         grasp = (tree.links[body.link][1].inverse() * tree.links[mine.hand][1]).translation
         return SweptBody(body.name, body.shape, body.link, body.placement, grasp)
 
-    def _exemptions(self, arm: int, point: Array) -> list[Exemption]:
+    def _exemptions(self, arm: int, point: Array, deep: float) -> list[Exemption]:
         name, hand = point.tobytes(), self._hands[arm]
         if name not in self._mounts:
             self._mounts[name] = tuple(_mounted(self.structure, point))
-        depth, radius = DEPTH + float(getattr(hand.shape, "radius", 0.0)), self.walker.tolerances.exempt_distance
+        depth, radius = deep + float(getattr(hand.shape, "radius", 0.0)), self.walker.tolerances.exempt_distance
         return [Exemption(hand.name, mount, point, radius, depth) for mount in self._mounts[name]]
 
 

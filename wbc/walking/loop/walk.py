@@ -421,7 +421,7 @@ class Walk:
             return
         stands = self._stands()
         if swinging is None:
-            found = None if stands or len(self.held) < len(self.walker.arms) else caution.ahead()
+            found = None if stands or len(self.held) < len(self.walker.arms) else caution.ahead(min([self._end(), *self._lasting(-1)]))
             if found is not None:
                 self._refuse("the body's way", found)
         elif caution.new(swinging, stands):
