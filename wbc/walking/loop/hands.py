@@ -21,6 +21,8 @@ from wbc.walking.loop.stopping import Stops
 from wbc.walking.planner.grips.rolls import ANY, frame_on
 from wbc.walking.planner.swings.law import SwingLaw
 
+#: Rate at which a hand that has arrived takes back what it is off its hold [1/s]
+SETTLING = 8.0
 #: A hold that could not be grasped so many times is taken as vanished
 TRIES = 3
 
@@ -94,6 +96,10 @@ class ArmLeader:
             swinging.clock = min(swinging.clock + swinging.pace * self._dt, swinging.law.duration)
         grip = progress.grip[arm]
         followed = self._hand.go(swinging, swinging.place, progress.grips, grip, progress.sample)
+        if swinging.state == "open" and swinging.clock >= swinging.law.duration - 1e-9 and not swinging.dropped:
+            # What postures pull at a hand that has arrived is taken back, else it stays beside its hold
+            swinging.shift += SETTLING * self._dt * (swinging.aim.position - swinging.place)
+        followed[:3] += swinging.shift
         hold = machine.structure.positions[swinging.hold], machine.structure.axes[swinging.hold]
         near = swinging.aim.blend > LANDING and at_branch and dist(swinging.aim.position, hold[0]) < UPRIGHT
         near = near and not swinging.dropped

@@ -47,6 +47,7 @@ class Swinging:
         x: the x axis that the hand has on its hold; None if it may roll there.
         first_wrist: joints 4 to 6 of a hand that was in the air when it was sent [rad]; None: those of the grip that it
             leaves. wrist: joints 4 to 6 as they are to be now [rad].
+        shift: added to what the hand follows on its hold [m].
         counted: it is a move of the plan, not one of an earlier plan, or one that brings a free hand to it.
         waits: the body stands until the hand has landed.
         dropped: it does not go to its hold any more, but comes to rest on its law.
@@ -68,6 +69,7 @@ class Swinging:
     axis: Array = field(default_factory=lambda: np.zeros(3))
     x_axis: Array = field(default_factory=lambda: np.zeros(3))
     x: Array | None = None
+    shift: Array = field(default_factory=lambda: np.zeros(3))
     first_wrist: Wrist | None = None
     wrist: Wrist = (0.0, 0.0, 0.0)
     aim: Aim = field(init=False)
