@@ -73,10 +73,13 @@ def save_run(run: WalkRun, folder: pathlib.Path, check: bool = True) -> tuple[li
 
 
 def rules_of(walker: Walker) -> Rules:
-    """What the checker goes by: tips of the two-ended arm are thicker than hands."""
+    """What the checker goes by: the accelerations of the joints; tips of the two-ended arm are thicker than hands."""
+    names = [joint for arm in walker.arms for joint in arm.joints]
+    limits = walker.robot.limits.acceleration
+    found = dict(zip(names, [float(limits[k]) for arm in walker.arms for k in range(arm.v.start, arm.v.stop)], strict=True))
     if walker.two_ended:
-        return Rules(exempt_distance=touching_distance(walker))
-    return Rules()
+        return Rules(exempt_distance=touching_distance(walker), accelerations=found)
+    return Rules(accelerations=found)
 
 
 def save_pictures(
