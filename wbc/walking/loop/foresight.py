@@ -87,10 +87,14 @@ class Foresight:
             times: of the rows [s]. at: (row of an arm, place of a hold [m]): its hand may touch what that is mounted on.
             held: row of an arm -> row of the hold, of hands that hold all the time.
         """
-        motion = Motion.linear(self._tree, times, q[:, self._columns], q[:, :7])
+        motion = self.motion(times, q)
         exempt = [one for arm, place in at for one in self._exemptions(arm, place, DEPTH)]
         exempt += [one for arm, place in self.holds(held or {}) for one in self._exemptions(arm, place, HELD_DEPTH)]
         return self._sweeper.sweep(motion, exemptions=exempt, tolerance=TOLERANCE).violation
+
+    def motion(self, times: Array, q: Array) -> Motion:
+        """Of configurations ``[k, nq]`` at times [s]; joints go straight between them."""
+        return Motion.linear(self._tree, times, q[:, self._columns], q[:, :7])
 
     def rows(self, machine: Machine, progress: PlanProgress, swinging: Swinging | None, when: Timing) -> Array:
         """Configurations ``[k, nq]`` that a plan has at instants; hands that hold keep their axes. Joint 6, which turns a

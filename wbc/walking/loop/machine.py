@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from wbc.robots import Walker
 from wbc.simulation import Connection, Plant
 from wbc.validation import Array
+from wbc.walking.arms.fits import check_fits
 from wbc.walking.holds.structure import Structure
 from wbc.walking.loop.closed_chain import ClosedChain
 
@@ -30,10 +31,12 @@ class Machine:
         structure, chain: the holds that are there, and the hands on them.
 
     Raises:
-        what :class:`wbc.simulation.Connection` raises of a plant that does not fit.
+        RangeError: the walker's data are not those of its robot. What :class:`wbc.simulation.Connection` raises of a
+            plant that does not fit.
     """
 
     def __init__(self, walker: Walker, structure: Structure, dt: float, plant: Plant | None = None) -> None:
+        check_fits(walker)
         self.walker, self.structure, self.dt = walker, structure, dt
         self.chain = ClosedChain(walker, structure)
         self._connection = Connection(plant, walker.robot, dt)

@@ -63,7 +63,7 @@ def plan_two_ended(
     Raises:
         UnknownNameError: another arm, hold or gait. ShapeError: another machine, or a start without both hands.
         RangeError: a hold on which a hand may roll or lean: it does not say where the arm is.
-        NoPlanError: there is none.
+        NoPlanError: there is none, or the elbow comes nowhere near to a place.
     """
     validation.one_of("gait", gait, tuple(GAITS))
     rows = _start(structure, start)
@@ -117,7 +117,9 @@ def _goal(postures: PairPostures, to: str | Sequence[float]) -> tuple[Goal, Arra
             far[pair] = float(np.linalg.norm(elbow - place))
     if not far:
         raise NoPlanError("to", list(to), "the arm has no posture on any two holds")
-    least = min(far.values()) + SAME_PLACE
+    least, most = min(far.values()) + SAME_PLACE, postures.kinematics.data.boom_length
+    if least > most:
+        raise NoPlanError("to", list(to), f"the elbow comes no nearer than {least:.2f} m to it, a boom has {most:.2f} m")
     return (lambda near, other: far.get((near, other), np.inf) <= least), place
 
 
