@@ -75,6 +75,11 @@ class Caution:
         self.until = end if found is None else self.until
         return found
 
+    def here(self) -> Nearest | None:
+        """What is too near where everything is now."""
+        times = np.array([0.0, STEP])
+        return self._near(None, Timing(times, np.full(2, self._progress.path_time), times))
+
     def swing(self, swinging: Swinging, course: Course) -> Nearest | None:
         """What is too near while a hand goes on to its hold and the body as its pace has it; None: proven clear."""
         found = self._near(swinging, self.timing(swinging, course))

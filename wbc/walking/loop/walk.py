@@ -453,9 +453,10 @@ class Walk:
         """The body stops, and the rest is planned from there; given up where that has led nowhere before."""
         self._refusals += 1
         self._refused = f"{what}: {found}"
-        if found.time <= 0.0 and self.pace == 0.0:
+        here = None if self._caution is None or self.pace else self._caution.here()
+        if here is not None:
             # No plan leads out of where it stands
-            raise NoPlanError("walk", self.structure.name, f"where it stands two bodies are too near: {found}")
+            raise NoPlanError("walk", self.structure.name, f"where it stands two bodies are too near: {here}")
         self.replanner.from_stance(False)
         self._stop()
 
