@@ -90,7 +90,7 @@ def test_a_start_within_something_is_refused_at_once(
 ) -> None:
     upside_down = PlaneSurface(pin.SE3(pin.utils.rotate("x", np.pi), plan.path.poses[0][:3, 3]))
     walk = Walk(machine, replace(structure, surface=upside_down), plan, stack=stack)
-    with pytest.raises(NoPlanError, match="where it stands two bodies are too near: .* and the surface"):
+    with pytest.raises(NoPlanError, match=r"where it stands two bodies are too near: .* and the surface"):
         walk.tick()
 
 

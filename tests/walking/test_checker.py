@@ -137,7 +137,10 @@ def test_jumps_of_the_bodys_velocity_are_found(urdf: Path, walk: Walk) -> None:
         for row, k in zip(pose[:, 3:], on, strict=True)
     ]
     moved = replace(log, pose_body_in_structure=pose)
-    report, jumps = check_walk(moved, urdf, ground, FEW), ("jump of the body's velocity", "jump of the body's turn rate")
+    report, jumps = (
+        check_walk(moved, urdf, ground, FEW),
+        ("jump of the body's velocity", "jump of the body's turn rate"),
+    )
     assert kinds(report) > set(jumps)
     unheeded = check_walk(moved, urdf, ground, replace(FEW, observe=jumps))
     assert kinds(unheeded) == kinds(report) - set(jumps)

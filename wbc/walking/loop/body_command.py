@@ -115,7 +115,9 @@ class Corners:
         turns, places = path.poses[:, :3, :3], path.poses[:, :3, 3]
         step = turns[1:] @ turns[:-1].transpose(0, 2, 1)
         # Of small turns the skew part is the rotation vector
-        skew = 0.5 * np.stack([step[:, 2, 1] - step[:, 1, 2], step[:, 0, 2] - step[:, 2, 0], step[:, 1, 0] - step[:, 0, 1]])
+        skew = 0.5 * np.stack(
+            [step[:, 2, 1] - step[:, 1, 2], step[:, 0, 2] - step[:, 2, 0], step[:, 1, 0] - step[:, 0, 1]]
+        )
         rates = np.stack([np.diff(places, axis=0), skew.T], axis=1) / path.spacing
         jumps = np.linalg.norm(np.diff(rates, axis=0), axis=2).max(axis=1)
         most = np.ones(len(path.poses))
@@ -130,8 +132,7 @@ class Corners:
 
 
 class BodyMotion:
-    """The pace of the body, 1 the path's own, and its command. From rest to full pace takes twice as long as back, which
-    is as of :class:`Stops`.
+    """The pace of the body, 1 the path's own, and its command; how fast it changes says :class:`Stops`.
 
     Attributes:
         pace: now. wanted: that it should have. pose: where the body is to be as the tick ends: position [m] and
@@ -166,11 +167,13 @@ class BodyMotion:
             most: that the path allows.
         """
         brake = self._stops.brake
-        wanted = min(1.0, most, sqrt(2.0 * margin / brake * PART), sqrt(2.0 * left / (2.0 * brake) * PART))
+        wanted = min(1.0, most, sqrt(2.0 * margin / brake * PART), sqrt(2.0 * left / self._stops.ramp * PART))
         if landing is not None and landing[0] < landing[1]:
             wanted = min(wanted, landing[0] / landing[1])
         self.wanted = 0.0 if stands else wanted
-        self.pace = max(self.pace + min(max(self.wanted - self.pace, -self._dt / brake), self._dt / (2.0 * brake)), 0.0)
+        self.pace = max(
+            self.pace + min(max(self.wanted - self.pace, -self._dt / brake), self._dt / self._stops.ramp), 0.0
+        )
 
     def go(self, path: BodyPath, begin: float) -> tuple[Array, float]:
         """A tick along a path from a path time on [s]: what the stack follows, as of :meth:`BodyCommand.go`, and the

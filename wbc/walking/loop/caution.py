@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from math import inf
 from typing import NamedTuple
 
 import numpy as np
@@ -56,23 +57,27 @@ class Caution:
         """Whether what body and hand do has changed since it was proven."""
         return self._known != (self._progress.plan.path, swinging, stands)
 
-    def ahead(self, end: float) -> Nearest | None:
+    def ahead(self, end: float, lift: float | None = None) -> Nearest | None:
         """Prove the body's way on, all hands as they hold, if little of it is left; what is too near on it.
 
         Args:
-            end: path time to which they can hold [s].
+            end: path time to which they can hold [s]. lift: where the next hand is lifted, whose swing is proven then;
+                None: none is.
         """
         progress = self._progress
         path, u = progress.plan.path, progress.path_time
-        if self.new(None, False):
+        if self.new(None, False) or (lift is None and self.until == inf):
             self._known, self.until = (path, None, False), u
         if self.until - u > LEFT or self.until >= end - 1e-9:
             return None
         end = min(u + AHEAD, end)
+        lifts = lift is not None and lift <= end
+        end = end if lift is None else max(min(end, lift), u)
         times = np.linspace(0.0, max(end - u, STEP), max(int((end - u) / STEP), 1) + 1)
         when = Timing(times, np.minimum(u + times, end), times)
         found = self._near(None, when)
-        self.until = end if found is None else self.until
+        if found is None:
+            self.until = inf if lifts else end
         return found
 
     def here(self) -> Nearest | None:
@@ -98,7 +103,7 @@ class Caution:
             left = law.duration - clock
             needed, until = latch + left + closing, max(course.end - u, 0.0)
             wanted = 0.0 if course.stands else min(1.0, until / needed, course.most(u))
-            pace = max(pace + min(max(wanted - pace, -STEP / self._stops.brake), STEP / (2.0 * self._stops.brake)), 0.0)
+            pace = max(pace + min(max(wanted - pace, -STEP / self._stops.brake), STEP / self._stops.ramp), 0.0)
             wait = course.due - u - wanted * left
             aim = 1.0 / (1.0 + 4.0 * wait) if wait > 0.0 else 1.0
             u, t = min(u + pace * STEP, course.end), t + STEP

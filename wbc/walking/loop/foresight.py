@@ -84,7 +84,7 @@ class Foresight:
         """The first instant found at which two bodies are too near in a motion ``[k, nq]``; None: proven clear.
 
         Args:
-            times: of the rows [s]. at: (row of an arm, place of a hold [m]): its hand may touch what that is mounted on.
+            times: of the rows [s]. at: (row of an arm, place of a hold [m]): its hand may touch what it is on.
             held: row of an arm -> row of the hold, of hands that hold all the time.
         """
         motion = self.motion(times, q)
@@ -97,8 +97,8 @@ class Foresight:
         return Motion.linear(self._tree, times, q[:, self._columns], q[:, :7])
 
     def rows(self, machine: Machine, progress: PlanProgress, swinging: Swinging | None, when: Timing) -> Array:
-        """Configurations ``[k, nq]`` that a plan has at instants; hands that hold keep their axes. Joint 6, which turns a
-        hand about its own axis, moves nothing and stays.
+        """Configurations ``[k, nq]`` that a plan has at instants; hands that hold keep their axes. Joint 6, which turns
+        a hand about its own axis, moves nothing and stays.
         """
         q, held, path = machine.q, machine.held, progress.plan.path
         out = np.repeat(q[None], len(when.times), axis=0)
@@ -167,7 +167,7 @@ class Foresight:
         return [(arm, self.structure.positions[hold]) for arm, hold in held.items() if hold >= 0]
 
     def around(self, arm: int, place: Array) -> list[tuple[int, Array]]:
-        """(arm, place) of the holds that an open hand at a place [m] has left; if none is known, those it is near to."""
+        """(arm, place) of the holds that an open hand at a place [m] has left; none known: of those near to it."""
         if arm in self.left:
             return [(arm, left) for left in self.left[arm]]
         off = np.linalg.norm(self.structure.positions - place, axis=1)

@@ -32,10 +32,12 @@ class HandLeader(Protocol):
 
     Attributes:
         stops: how fast body and hand come to rest. one_motion: the hand moves because the body does, with its pace.
+        late: path time by which a hand that does not delay the body may land later than planned [s].
     """
 
     stops: Stops
     one_motion: bool
+    late: float
 
     def first(self) -> Array:
         """The configuration with which a plan begins: the body where its path begins, the arms on their grips."""
@@ -58,7 +60,7 @@ class ArmLeader:
         ShapeError: another machine.
     """
 
-    one_motion = False
+    one_motion, late = False, 0.05
 
     def __init__(self, machine: Machine, progress: PlanProgress, stack: WalkStack) -> None:
         if machine.walker.two_ended:
@@ -89,7 +91,8 @@ class ArmLeader:
         if swinging.state == "opening":
             swinging.open_on(self._dt)
         elif swinging.state == "open":
-            wanted = hand_pace(swinging, swinging.place, at_branch, early, pace)
+            far = dist(swinging.place, machine.structure.positions[swinging.hold])
+            wanted = hand_pace(swinging, swinging.place, at_branch, early, pace, far)
             stops = aborted or swinging.dropped
             wanted, change = (0.0, self._dt / self.stops.hand) if stops else (wanted, self._dt / HAND_RAMP)
             swinging.pace += min(max(wanted - swinging.pace, -change), change)

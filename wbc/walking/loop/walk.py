@@ -36,8 +36,6 @@ ARRIVED = 0.002
 PATIENCE, SLACK = 4.0, 20.0
 #: Slices of planning between two ticks
 SLICES = 3
-#: A hand that does not delay the body may land so much path time later than planned [s]
-LATE = 0.05
 #: So often in a row what was planned may turn out to be too near to something, before the walk is given up
 REFUSALS = 3
 
@@ -421,7 +419,11 @@ class Walk:
             return
         stands = self._stands()
         if swinging is None:
-            found = None if stands or len(self.held) < len(self.walker.arms) else caution.ahead(min([self._end(), *self._lasting(-1)]))
+            if stands or len(self.held) < len(self.walker.arms):
+                return
+            lift = self._may_lift()
+            leaving = -1 if lift is None else self.progress.arm_of(lift)
+            found = caution.ahead(min([self._end(), *self._lasting(leaving)]), None if lift is None else lift.lift)
             if found is not None:
                 self._refuse("the body's way", found)
         elif caution.new(swinging, stands):
@@ -474,7 +476,7 @@ class Walk:
         that at which it lands.
         """
         step = self.plan.regrasps[self.progress.next]
-        return step.land + (0.0 if step.delay else LATE)
+        return step.land + (0.0 if step.delay else self.leader.late)
 
     def _end(self) -> float:
         """Path time that the body does not pass [s]."""
@@ -532,7 +534,7 @@ class Walk:
                 # A hand that is late makes the body late too: the next ones then swing where they were planned to
                 until = min(until, max(self._late() - u, 0.0))
             landing = until, needed
-        most = self.body.corners(path).pace(u)
+        most = 1.0 if self.leader.one_motion else self.body.corners(path).pace(u)
         self.body.choose(margin, max(end - u, 0.0), landing, self._stands(), most)
         aim, progress.path_time = self.body.go(path, u)
         self.stack.body(aim)

@@ -11,11 +11,11 @@ import pinocchio as pin
 from wbc import validation
 from wbc.errors import WbcError
 from wbc.validation import Array
+from wbc.walking.loop.foresight import Foresight
 from wbc.walking.loop.state import Hand, Manual, Tick
 from wbc.walking.loop.stopping import OFF
 from wbc.walking.loop.walk import Walk
 from wbc.walking.modes.hand_motion import ArmRefused, Standing
-from wbc.walking.loop.foresight import Foresight
 from wbc.walking.planner.grips.conflicts import LimbShapes
 from wbc.walking.planner.grips.rolls import ANY, frame_on
 

@@ -58,9 +58,7 @@ class Standing:
         self._check_clear(out, {})
         return out
 
-    def onto(
-        self, off: Sequence[pin.SE3], on: Sequence[pin.SE3], hold: int, speed: float, turn_rate: float
-    ) -> Array:
+    def onto(self, off: Sequence[pin.SE3], on: Sequence[pin.SE3], hold: int, speed: float, turn_rate: float) -> Array:
         """As :meth:`along` through ``off``, by joints to the first pose of ``on``, and straight through the others.
 
         The posture there is the one that is reached soonest of those that lead on.
@@ -166,7 +164,7 @@ class Standing:
         at = [*sight.holds(to), *sight.holds(leaving)]
         if min(leaving.values()) < 0:
             at += sight.around(self.arm, (self._base * pin.SE3(self._kinematics.forward(rows[0]))).translation)
-        found = sight.nearest(self.dt * np.arange(len(rows)), q, at, held)
+        found = sight.nearest(np.arange(len(rows), dtype=np.float64) * self.dt, q, at, held)
         if found is not None:
             raise ArmRefused("poses", len(rows), f"the arm would come too near: {found}")
 

@@ -5,9 +5,12 @@ from __future__ import annotations
 import pathlib
 from collections.abc import Callable
 
+import numpy as np
+
 from wbc.errors import WbcError
 from wbc.robots import Walker
 from wbc.walking.checker import Report, Rules, check_run
+from wbc.walking.checker.clock_and_joints import JUMP, SPIN_JUMP
 from wbc.walking.holds.files import save_structure
 from wbc.walking.report.animation import save_animation
 from wbc.walking.report.figures import figures_of, save_figures
@@ -75,10 +78,11 @@ def save_run(run: WalkRun, folder: pathlib.Path, check: bool = True) -> tuple[li
 def rules_of(walker: Walker) -> Rules:
     """What the checker goes by: the accelerations of the joints; tips of the two-ended arm are thicker than hands."""
     names = [joint for arm in walker.arms for joint in arm.joints]
-    limits = walker.robot.limits.acceleration
-    found = dict(zip(names, [float(limits[k]) for arm in walker.arms for k in range(arm.v.start, arm.v.stop)], strict=True))
+    limits = np.concatenate([walker.robot.limits.acceleration[arm.v] for arm in walker.arms])
+    found = dict(zip(names, limits.tolist(), strict=True))
     if walker.two_ended:
-        return Rules(exempt_distance=touching_distance(walker), accelerations=found)
+        # Its body is its elbow, which goes as fast as the joints take it
+        return Rules(exempt_distance=touching_distance(walker), accelerations=found, observe=(JUMP, SPIN_JUMP))
     return Rules(accelerations=found)
 
 

@@ -117,9 +117,10 @@ def _goal(postures: PairPostures, to: str | Sequence[float]) -> tuple[Goal, Arra
             far[pair] = float(np.linalg.norm(elbow - place))
     if not far:
         raise NoPlanError("to", list(to), "the arm has no posture on any two holds")
-    least, most = min(far.values()) + SAME_PLACE, postures.kinematics.data.boom_length
+    least, most = min(far.values()) + SAME_PLACE, 2.0 * postures.kinematics.data.boom_length
     if least > most:
-        raise NoPlanError("to", list(to), f"the elbow comes no nearer than {least:.2f} m to it, a boom has {most:.2f} m")
+        reason = f"the elbow comes no nearer than {least:.2f} m to it, its booms have {most:.2f} m"
+        raise NoPlanError("to", list(to), reason)
     return (lambda near, other: far.get((near, other), np.inf) <= least), place
 
 

@@ -64,7 +64,7 @@ class TurnLeader:
         ShapeError: another machine.
     """
 
-    one_motion = True
+    one_motion, late = True, 0.2
 
     def __init__(self, machine: Machine, progress: PlanProgress, stack: TwoEndedStack) -> None:
         data, margins = machine.walker.two_ended_data, machine.walker.margins
