@@ -61,7 +61,7 @@ def test_four_inches_a_second(
     assert len(plan.regrasps) >= 2
     # One of them at least had time to spare
     assert any(law.jerk_limited for law in plan.laws)
-    assert plan.path.duration / (walk.time - 0.5) >= 0.98  # ramps at both ends take half a second
+    assert plan.path.duration / (walk.time - 0.5) >= 0.97  # ramps at both ends take half a second; a hand may wait
     assert max(tick.body_error for tick in ticks) < 0.002
     assert max(tick.slip for tick in ticks) < 0.001
     assert all(tick.status == "solved" for tick in ticks)

@@ -17,7 +17,7 @@ BEHIND = 0.02
 #: A swing waits for a hand that is behind its aim or beside it: full pace up to the first [m], least pace beyond the
 #: second. As it comes to the distance at which it may be near to what its hold is mounted on, within :data:`OVER` of
 #: it [m], it is over the hold
-BESIDE, WAITS, LEAST_PACE = 0.0015, 0.009, 0.05
+BESIDE, WAITS, LEAST_PACE = 0.0008, 0.005, 0.05
 OVER = (0.06, 0.16)
 #: A hand is near its hold from this part of the wrist's motion on; its joints are then this near to theirs [rad]
 LANDING, TURNED = 0.97, 0.5
