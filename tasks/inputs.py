@@ -26,6 +26,31 @@ RESERVED = ("gain", "weight", "enabled", "mask", "rate")
 ORDINARY = 1e-9
 
 
+def accelerations(robot: Robot, declared: Sequence[Input]) -> list[Input]:
+    """Inputs for the second time derivative of every input that names a rate, each the ``rate`` of that rate: zero
+    until it is set. ``feedforward`` and ``velocity`` have ``acceleration``, ``x_velocity`` and ``x_rate`` have
+    ``x_acceleration``, any other name ``name_acceleration``.
+    """
+    rates = {i.rate for i in declared if i.rate is not None}
+    out = []
+    for i in declared:
+        if i.name not in rates or i.rate is not None or i.sensed:
+            continue
+        unit = ", ".join(f"{u}^2" if u.endswith("/s") else f"{u or '1'}/s" for u in i.unit.split(", "))
+        zero = np.zeros(size(robot, i)) if i.size or i.kind != "vector" else 0.0
+        out.append(Input(acceleration_name(i.name), i.kind, unit, i.size, zero))
+    return out
+
+
+def acceleration_name(rate: str) -> str:
+    """Name of the input with the time derivative of an input that is a rate, see :func:`accelerations`."""
+    for end in ("feedforward", "_velocity", "velocity", "_rate"):
+        if rate.endswith(end):
+            stem = rate.removesuffix(end)
+            return f"{stem}_acceleration" if stem else "acceleration"
+    return f"{rate}_acceleration"
+
+
 def size(robot: Robot, declared: Input) -> int:
     """How many numbers the input takes in a buffer."""
     fixed = {"pose": 12, "rotation": 9, "configuration": robot.nq, "tangent": robot.nv}
