@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from wbc import validation
 from wbc.errors import RangeError
 from wbc.symbolic.tracer import Tracer
-from wbc.tasks.base import Command, Constraint, Input, Row, Rows, SacrificeOrder, Task, Torques, Values
+from wbc.tasks.base import Constraint, Input, Row, Rows, SacrificeOrder, Task, Torques, Values
 from wbc.tasks.frames import frame_pose, require_motion
 from wbc.tasks.hold import Hold
 
@@ -72,12 +72,6 @@ class Contact(Constraint):
         field = f"{type(self).__name__}.frame"
         robot.check_frame(field, self.frame)
         require_motion(robot, field, self.frame)
-
-    def refusal(self, robot: Robot, command: Command) -> str:
-        """A robot without mass has no dynamics."""
-        if command == "torque" and pin.computeTotalMass(robot.model) <= 0.0:
-            return f"needs forces, and the moving links of {robot.name!r} have no mass"
-        return ""
 
     def inputs(self, robot: Robot) -> tuple[Input, ...]:
         """``target`` and ``gain`` of the motion, then :meth:`limits`."""

@@ -99,7 +99,7 @@ def flat(robot: Robot, field: str, declared: Input, value: Any) -> Array:
     if declared.direction:
         return validation.unit_vector(field, numbers)
     if bounded:
-        for number in numbers:
+        for number in numbers[np.isfinite(numbers)]:
             validation.scalar(field, number, low=declared.low, high=declared.high, unit=declared.unit)
     return numbers
 

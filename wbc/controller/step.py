@@ -87,10 +87,15 @@ class Step:
         that it leads to until the next tick.
         """
         if self._context.command == "velocity":
-            return np.frombuffer(self._data, _FLOAT, self._context.nv)
-        later = self._part("v_in")[: self._context.nv] + self._number("dt") * self.a
+            return self.command
+        later = self._part("v_in")[: self._context.nv] + self._number("dt") * self.command
         later.flags.writeable = False
         return later
+
+    @property
+    def command(self) -> Array:
+        """What the tick decided about the joints, nv, read-only: their velocities, or accelerations."""
+        return np.frombuffer(self._data, _FLOAT, self._context.nv)
 
     @property
     def a(self) -> Array:
@@ -100,7 +105,7 @@ class Step:
             CommandError: the stack commands velocities.
         """
         self._require("a", "acceleration", "torque")
-        return np.frombuffer(self._data, _FLOAT, self._context.nv)
+        return self.command
 
     @property
     def torque(self) -> Array:

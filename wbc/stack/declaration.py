@@ -9,6 +9,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Self, get_args
 
+import pinocchio as pin
+
 from wbc import pickling, validation
 from wbc.errors import CommandError, DuplicateNameError, LevelError, PicklingError, RangeError, ShapeError, UnknownNameError
 from wbc.robot import Robot
@@ -131,7 +133,8 @@ class Declaration:
 
         Raises:
             UnknownNameError: another command.
-            CommandError: an item has no meaning for it, and why; or the stack commands something else already.
+            CommandError: an item has no meaning for it, and why; the stack commands something else already; the robot has
+                no mass.
         """
         validation.one_of("command", command, COMMANDS)
         if command == self._command:
@@ -139,6 +142,8 @@ class Declaration:
         if self._command != "velocity":
             reason = f"this stack is compiled for {self._command}; compile the one that it was made from"
             raise CommandError("command", command, reason)
+        if command == "torque" and pin.computeTotalMass(self._robot.model) <= 0.0:
+            raise CommandError("command", command, f"the moving links of {self._robot.name!r} have no mass")
         out = copy.copy(self)
         out._command = next(known for known in COMMANDS if known == command)
         for entry in self.entries:

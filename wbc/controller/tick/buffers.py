@@ -64,11 +64,14 @@ class Buffers:
     bound_enabled: Array
     report: Array
     state: Array
+    #: of accelerations, the wrenches that a tick without an answer keeps [variables]; empty for velocities
+    kept: Array = np.zeros(0)
 
     def share(self, other: Buffers) -> None:
         """Use the arrays of ``other``."""
         for name in Buffers.__annotations__:
             setattr(self, name, getattr(other, name))
+        self.kept = other.kept
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,12 +85,9 @@ class TaskRows:
 
 class Assembly(Buffers, ABC):
     """Buffers and the QP at their values; ``plain``: not 0 for the linear model as it is, without curvature.
-
-    ``kept``: of accelerations, the wrenches that a tick without an answer keeps.
     """
 
     plain: Array
-    kept: Array
     _command: Command
     _dofs: int
 
