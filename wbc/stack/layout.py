@@ -137,7 +137,7 @@ class Layout:
             default = item.default_gain if item.gain is None else item.gain
             declared += _gains(default) if self.command != "velocity" else [_gain(default)]
         if self.command != "velocity":
-            declared += inputs.accelerations(robot, declared)
+            declared = inputs.with_accelerations(robot, declared)
         if entry.price is not None:
             high = np.inf if isinstance(item, Direction) else HIGHEST_PRICE
             declared.append(Input("price", default=entry.price, low=0.0, high=high))

@@ -151,8 +151,12 @@ class SecondOrder:
     def _moving(self, block: Block) -> Sequence[tuple[ca.SX, ca.SX]]:
         """(symbols, rates) of an item's inputs that move, their rates included."""
         out = []
-        for slot in block.slots.values():
+        directions = {s.input.rate: s for s in block.slots.values() if s.input.direction and s.input.rate is not None}
+        for name, slot in block.slots.items():
             rate = self._b.rate(block, slot)
+            if name in directions and rate is not None:
+                # a direction stays at unit length
+                rate -= ca.sumsqr(self._b.p[slot.span]) * self._b.p[directions[name].span]
             if rate is not None:
                 out.append((self._b.p[slot.span], ca.densify(rate)))
         return out

@@ -273,14 +273,12 @@ class Tracer:
         used: dict[int, ca.SX] = {}
 
         def twist_of(known: Placeholder) -> ca.SX:
+            if known.twist is None:
+                # it may contain other placeholders, which go round with the rest
+                return known.jacobian() @ kinematics.v
             symbol = used.get(id(known))
             if symbol is None:
-                jacobian = known.jacobian()
-                if known.twist is not None:
-                    value, bias = known.twist(motion)
-                else:
-                    value = ca.densify(jacobian @ kinematics.v)
-                    bias = kinematics.directional(value, kinematics.v)
+                value, bias = known.twist(motion)
                 symbol = used[id(known)] = ca.SX.sym(f"w_{known.name}", value.shape[0])
                 twists.append((symbol, value, ca.densify(bias)))
             return symbol
