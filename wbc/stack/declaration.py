@@ -137,19 +137,20 @@ class Declaration:
                 no mass.
         """
         validation.one_of("command", command, COMMANDS)
-        if command == self._command:
+        if command == self._command and command != "velocity":
             return self
         if self._command != "velocity":
             reason = f"this stack is compiled for {self._command}; compile the one that it was made from"
             raise CommandError("command", command, reason)
         if command == "torque" and pin.computeTotalMass(self._robot.model) <= 0.0:
             raise CommandError("command", command, f"the moving links of {self._robot.name!r} have no mass")
-        out = copy.copy(self)
+        out = self if command == "velocity" else copy.copy(self)
         out._command = next(known for known in COMMANDS if known == command)
         for entry in self.entries:
             if reason := entry.item.refusal(self._robot, out._command):
                 raise CommandError(f"{entry.name}", command, reason)
-        out._command_entries()
+        if command != "velocity":
+            out._command_entries()
         return out
 
     def _command_entries(self) -> None:
