@@ -25,7 +25,7 @@ LABELS = ("fx", "fy", "fz", "mx", "my", "mz")
 UNITS = ("N", "N", "N", "N m", "N m", "N m")
 #: Acceleration by which a robot's mass is a force, whatever gravity it is in [m/s^2]
 NOMINAL = 9.81
-#: First weight of a force against task rows of weight 1: a robot's own weight costs as much as an error of 1 cm/s^2
+#: First weight of a force against task rows of weight 1: a robot's own weight costs as much as 0.01 rad/s^2 missed
 FORCE_WEIGHT = 1e-4
 
 
@@ -50,9 +50,9 @@ class Cone:
 class Contact(Constraint):
     """A frame that does not move, by a wrench that the surroundings exert on it.
 
-    The motion is that of ``Hold``. A stack that commands torques has the wrench as variables of its QP, in the axes of
-    the frame and about its origin, and the items ``"<name> wrench"``, the rows of :meth:`cone`, and ``"<name> force"``, a
-    task for the wrench.
+    The motion is that of ``Hold``. A stack that commands torques has the wrench as variables of its QP, in the axes
+    of the frame and about its origin, and the items ``"<name> wrench"``, the rows of :meth:`cone`, and
+    ``"<name> force"``, a task for the wrench.
     """
 
     abstract: ClassVar[bool] = True

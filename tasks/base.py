@@ -357,7 +357,9 @@ class Constraint(Item):
         """Simple bounds on v, or None; ``kin.v`` is the velocity that accelerations are counted from."""
         return None
 
-    def acceleration_bounds(self, robot: Robot, kin: Tracer, inputs: Values, dt: ca.SX, longest: float) -> Bounds | None:
+    def acceleration_bounds(
+        self, robot: Robot, kin: Tracer, inputs: Values, dt: ca.SX, longest: float
+    ) -> Bounds | None:
         """The same as bounds on the acceleration a that is held for dt from the velocity ``kin.v`` on, or None:
         by default :meth:`bounds` hold for the velocity at the end of it, v + a dt.
 

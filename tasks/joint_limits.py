@@ -145,7 +145,6 @@ class JointLimits(Constraint):
             )
         return Bounds(lower, upper)
 
-
     def acceleration_bounds(self, robot: Robot, kin: Tracer, inputs: Values, dt: ca.SX, longest: float) -> Bounds:
         """See :func:`wbc.tasks.stopping.allowed_accelerations`."""
         limits, count = robot.limits, robot.nv

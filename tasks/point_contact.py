@@ -36,7 +36,8 @@ class PointContact(Contact):
     Example:
         >>> PointContact("LF_FOOT", friction=0.7)
 
-    What it cannot do: it does not roll, and no torque acts at the point. Whether the surface is there is not its concern.
+    What it cannot do: it does not roll, and no torque acts at the point. Whether the surface is there is not its
+    concern.
 
     Attributes:
         frame: name of the frame; z is the normal, from the surface to the robot.

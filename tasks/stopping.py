@@ -1,6 +1,6 @@
-"""Which accelerations a joint may have so that position, velocity and acceleration limits hold for ever, in discrete time.
+"""Which accelerations a joint may have so that its limits hold for ever, in discrete time.
 
-An acceleration a is held for one tick of length t <= T, so q(t) = q + v t + a t^2 / 2 and v(t) = v + a t, exactly. With
+An acceleration a is held for one tick of length t <= T: q(t) = q + v t + a t^2 / 2 and v(t) = v + a t, exactly. With
 limits l <= q <= u, |v| <= V, |a| <= A let
 
     B = min(A, V / T, 2 (u - l) / (3 T^2))                      the deceleration that braking counts on
@@ -18,8 +18,8 @@ Why the interval is never empty from a viable state, for every t in (0, T]. Let 
 image. If v >= B t, or d < v t / 2, take a = -B. Braking at B follows the parabola v^2 + 2 B q = const, so the
 state stays on its side of that of the upper limit, and turns round before it. The velocity at the end is at least
 -B T >= -V. For the lower limit: where it is >= 0 nothing is asked. Else v < B t and d < v t / 2 < B t^2 / 2, so q - l >
-u - l - B t^2 / 2 >= B t^2 by the choice of B, and (v - B t)^2 <= 2 B (q(t) - l) is the same as v^2 - 4 B v t + 2 B^2 t^2 <=
-2 B (q - l), whose left side is at most 2 B^2 t^2 for 0 <= v <= B t. If v < B t and d >= v t / 2 take a = -v / t, which
+u - l - B t^2 / 2 >= B t^2 by the choice of B, and (v - B t)^2 <= 2 B (q(t) - l) is the same as
+v^2 - 4 B v t + 2 B^2 t^2 <= 2 B (q - l), whose left side is at most 2 B^2 t^2 for 0 <= v <= B t. If v < B t and d >= v t / 2 take a = -v / t, which
 ends at rest within the limits. So one acceleration is within all bounds, |a| <= B <= A. In contrast to Del Prete, Joint
 position and velocity bounds in discrete-time acceleration/torque control of robot manipulators, IEEE RA-L 3(1), 2018,
 t may be another one in every tick, because B and what is viable do not depend on it.
@@ -65,7 +65,8 @@ def allowed_accelerations(
         most = velocity_scale * velocity
         low, high = (-most - v) / dt, (most - v) / dt
     if math.isfinite(acceleration):
-        low, high = clip(low, -acceleration, acceleration), clip(high, -acceleration, acceleration)
+        most_a = ca.SX(acceleration)
+        low, high = clip(low, -most_a, most_a), clip(high, -most_a, most_a)
     bounded = math.isfinite(velocity) or math.isfinite(acceleration)
     deceleration = stopping_deceleration(acceleration, velocity, position[1] - position[0], longest)
     lower, upper = low, high

@@ -15,9 +15,9 @@ from wbc.tasks.base import Input, Row, Values
 
 @dataclass(frozen=True)
 class SurfaceContact(Contact):
-    """A frame does not move, J v = -gain e as for ``Hold`` with ``kind="pose"``, by the wrench w = (f; m) of a rectangle
-    of half lengths X and Y about the frame's origin, in the axes of the frame, whose z axis is the normal of the
-    surface, out of it and towards the robot:
+    """A frame does not move, J v = -gain e as for ``Hold`` with ``kind="pose"``, by the wrench w = (f; m) of a
+    rectangle of half lengths X and Y about the frame's origin, in the axes of the frame, whose z axis is the normal of
+    the surface, out of it and towards the robot:
 
         least <= f_z <= most,   |f_x| <= mu f_z,   |f_y| <= mu f_z                               [N]
         |m_x| <= Y f_z,   |m_y| <= X f_z                the centre of pressure is within it      [N m]

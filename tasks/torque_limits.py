@@ -83,6 +83,4 @@ class TorqueLimits(Constraint):
         followers = {c.follower for c in robot.couplings}
         chosen = joint_dofs(robot, "TorqueLimits.joints", self.joints)
         base = 6 if robot.base == "floating" else 0
-        return tuple(
-            i for i in chosen if i >= base and np.isfinite(robot.limits.effort[i]) and i not in followers
-        )
+        return tuple(i for i in chosen if i >= base and np.isfinite(robot.limits.effort[i]) and i not in followers)

@@ -1,4 +1,4 @@
-"""Stacks that command torques: a fixed arm, a humanoid on two feet with a hand at a wall, the walker without gravity."""
+"""Stacks that command torques: a fixed arm, a humanoid with a hand at a wall, the walker without gravity."""
 
 from __future__ import annotations
 

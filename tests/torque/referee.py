@@ -31,9 +31,7 @@ class Referee:
         self.M = np.triu(self.M) + np.triu(self.M, 1).T
         self.h = pin.nonLinearEffects(self.model, self.model.createData(), q, v)
         self.contacts = {
-            e.name: e.item
-            for e in self.stack.entries
-            if isinstance(e.item, (PointContact, SurfaceContact, RigidGrasp))
+            e.name: e.item for e in self.stack.entries if isinstance(e.item, (PointContact, SurfaceContact, RigidGrasp))
         }
         self.places, n = {}, self.model.nv
         for name, item in self.contacts.items():
@@ -153,7 +151,10 @@ class Referee:
         column = 1.0 / np.sqrt(np.diag(H))
         row = 1.0 / np.linalg.norm(C * column, axis=1)
         scaled = (C * column) * row[:, None]
-        x = quadprog.solve_qp(H * np.outer(column, column), -g * column, scaled.T, np.r_[e, b] * row, len(E))[0] * column
+        x = (
+            quadprog.solve_qp(H * np.outer(column, column), -g * column, scaled.T, np.r_[e, b] * row, len(E))[0]
+            * column
+        )
         tau = self.M @ x[:nv] + self.h
         for name, item in self.contacts.items():
             local = self.frame(item.frame)[3]

@@ -52,7 +52,7 @@ def test_same_path_as_velocities(command: str) -> None:
 
 
 def test_stiffness_and_damping_are_those_of_the_error() -> None:
-    """From rest, e(t) = e0 (1 + w t) exp(-w t) with w = sqrt(stiffness) where damping = 2 w, within the tick's length."""
+    """From rest, e(t) = e0 (1 + w t) exp(-w t) with w = sqrt(stiffness) where damping = 2 w."""
     tick, bot = controller("acceleration"), robot("panda")
     tick["hand"].set(stiffness=36.0, damping=12.0)
     try:

@@ -45,7 +45,7 @@ class Stack(Declaration):
         """A controller with its own memory; compiled code comes from the cache where it can.
 
         Args:
-            command: ``velocity`` (the default), ``acceleration``, or ``torque``: what ticks command, see docs/torque.md.
+            command: what ticks command: ``velocity`` (default), ``acceleration`` or ``torque``. docs/torque.md.
             solver: ``daqp`` (native where gcc is), ``osqp``, ``qpoases``, or an experimental one.
             backend: ``native``, ``vm``, or ``auto``: native where gcc is, else the CasADi virtual machine.
 

@@ -22,9 +22,9 @@ from wbc.controller.outcome import (
     scales,
 )
 from wbc.controller.tick.buffers import INFINITE, Assembly
+from wbc.errors import CommandError
 from wbc.qp.certificate import Certificate
 from wbc.stack.declaration import Declaration
-from wbc.errors import CommandError
 from wbc.stack.layout import CLOSED, Block, Layout, rate_unit
 from wbc.stack.memory import Memory
 from wbc.validation import Array

@@ -129,6 +129,8 @@ class Explainer:
         if past.layout.cascade:
             worst = max(certificates(past.layout, past.part), key=lambda level: level.stationarity)
             out[1] = Residue(
-                worst.stationarity, rate_unit("rad", past.layout.command), "least velocity" if worst.level is None else f"level {worst.level}"
+                worst.stationarity,
+                rate_unit("rad", past.layout.command),
+                "least velocity" if worst.level is None else f"level {worst.level}",
             )
         return out[0], out[1], out[2]

@@ -19,6 +19,7 @@ from wbc import validation
 from wbc.controller.controller import Controller, core_of
 from wbc.record.recording import FORMAT, RecordingError, Writer
 from wbc.stack.declaration import Declaration
+from wbc.stack.layout import Layout
 
 log = logging.getLogger("wbc")
 

@@ -12,11 +12,19 @@ from typing import Any, Self, get_args
 import pinocchio as pin
 
 from wbc import pickling, validation
-from wbc.errors import CommandError, DuplicateNameError, LevelError, PicklingError, RangeError, ShapeError, UnknownNameError
+from wbc.errors import (
+    CommandError,
+    DuplicateNameError,
+    LevelError,
+    PicklingError,
+    RangeError,
+    ShapeError,
+    UnknownNameError,
+)
 from wbc.robot import Robot
 from wbc.tasks import inputs
-from wbc.tasks._direction import DIRECTION_PRICE, Direction
 from wbc.tasks._contact import FORCE_WEIGHT, Contact, ContactForce, ContactWrench, Unactuated
+from wbc.tasks._direction import DIRECTION_PRICE, Direction
 from wbc.tasks.base import Command, Constraint, Item, SacrificeOrder, Task
 from wbc.tasks.damping import Damping
 from wbc.tasks.mechanism import Mechanism
@@ -57,7 +65,7 @@ class Entry:
 
 COMMANDS: tuple[Command, ...] = get_args(Command)
 
-#: Of a stack of accelerations: joints that no task moves come to rest like exp(-4 REST t), if dt is not above 1 / (8 REST)
+#: Of a stack of accelerations: joints that no task moves come to rest like exp(-4 REST t) [1/s]
 REST = 5.0
 
 
@@ -133,8 +141,8 @@ class Declaration:
 
         Raises:
             UnknownNameError: another command.
-            CommandError: an item has no meaning for it, and why; the stack commands something else already; the robot has
-                no mass.
+            CommandError: an item has no meaning for it, and why; the stack commands something else already; the robot
+                has no mass.
         """
         validation.one_of("command", command, COMMANDS)
         if command == self._command and command != "velocity":

@@ -103,7 +103,9 @@ INPUTS = (
     Field("plain", (), "not 0: the linear model as it is, whatever CALM says"),
 )
 #: Of accelerations
-REST_INPUTS = (Field("kept", ("NV",), "wrenches of the last tick with an answer, which one without keeps; 0 for joints"),)
+REST_INPUTS = (
+    Field("kept", ("NV",), "wrenches of the last tick with an answer, which one without keeps; 0 for joints"),
+)
 QP_FIELDS = (
     Field("H", ("NV", "WIDE"), "upper triangle, row by row"),
     Field("g", ("WIDE",), ""),

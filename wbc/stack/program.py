@@ -71,7 +71,8 @@ ROWS_OUTPUTS = (
 @dataclass(frozen=True, eq=False)
 class TickProgram:
     """The compiled-to-be functions of a stack; ``ahead`` is None where there are no margins, ``curvature`` where no
-    task has any or the stack does not want it; ``torque`` where none is commanded; ``balls`` and ``sensed`` are rows that are left to loops.
+    task has any or the stack does not want it; ``torque`` where none is commanded; ``balls`` and ``sensed`` are rows
+    that are left to loops.
     """
 
     rows: ca.Function
@@ -311,7 +312,7 @@ def build(stack: Declaration, layout: Layout, loops: bool = False) -> TickProgra
         second = checked_function("curvature", [*inputs, b.force], [upper], ["curvature"])
     torque = None
     if b.second is not None and stack.command == "torque":
-        most = b.second.most([block for block in layout.of_form("margins", "rows")])
+        most = b.second.most(layout.of_form("margins", "rows"))
         found = [ca.densify(b.second.torque), ca.densify(most)]
         torque = checked_function("torque", [*inputs, b.second.x], found, ["torque", "most"])
     return TickProgram(rows, ahead, second, torque, balls, sensed)

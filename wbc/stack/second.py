@@ -1,6 +1,6 @@
-"""Rows of a stack that commands accelerations or torques: the variables are x = (a; w), w the wrenches of the contacts.
+"""Rows of a stack that commands accelerations or torques, on x = (a; w) with the wrenches w of its contacts.
 
-    tasks       J a + (dJ/dt) v + ... = -damping de/dt - stiffness e         all derivatives of the item's own e(q, inputs)
+    tasks       J a + (dJ/dt) v + ... = -damping de/dt - stiffness e         derivatives of the item's e(q, inputs)
     margins     d2h/dt2 >= -rate (2 dh/dt + rate h) / (1 + rate dt / 2)
     rows        with r = A v - lower:  dr/dt >= -rate r, and the same for upper; equalities with both
     contacts    their motion as rows above; cone w within its limits; w = target as a task
@@ -125,7 +125,10 @@ class SecondOrder:
         assert declared is not None
         matrix, (low, high) = (
             tracer.expand(ca.SX(declared.matrix)),
-            (tracer.expand(b.column(block, name, ends)) for name, ends in (("lower", declared.lower), ("upper", declared.upper))),
+            (
+                tracer.expand(b.column(block, name, ends))
+                for name, ends in (("lower", declared.lower), ("upper", declared.upper))
+            ),
         )
         rate = b.p[block.slots["rate"].span]
         if isinstance(item, Contact):

@@ -161,7 +161,13 @@ class Tracer:
 
         zero = ca.SX.zeros(2)
         across = Placeholder(
-            f"across {frame} {base}", symbol, lambda: zero, outer[:, :2].T, spin, inner=True, forces=forces,
+            f"across {frame} {base}",
+            symbol,
+            lambda: zero,
+            outer[:, :2].T,
+            spin,
+            inner=True,
+            forces=forces,
             twist=lambda motion: motion.spin(frame, base),
         )
         self._symbols.append(across)
@@ -263,7 +269,7 @@ class Tracer:
         these go round once more, with dw_k/dt = (dJ_k/dt) v from the recursion that the dynamics use.
 
         Args:
-            own: rows of de/dt along v where the expression does not have them, see :meth:`wbc.tasks.base.Task.jacobian`.
+            own: rows of de/dt along v where the expression does not have them, see ``Task.jacobian``.
             moving: (symbols, rates) of what moves besides: inputs, and rates of inputs with their accelerations.
         """
         kinematics = self.kinematics
@@ -365,9 +371,9 @@ class Placeholder:
     The rate is kept as two factors because ``(partial @ motion) @ jacobian`` is much smaller than
     ``partial @ (motion @ jacobian)``. Kinematics are built when they are needed, so that an item can be traced
     (to count its rows, to make its cache key) without them. ``inner``: value and motion are in other placeholders.
-    ``turns``: it is the rotation of a frame, by which other forces turn. ``twist``: ``jacobian @ v``, and its rate where
-    v does not change, from a recursion over the bodies; None: from the Jacobian. ``forces``: what a force along the rate, given
-    as a 3-vector in the axes of ``jacobian``, does to the robot.
+    ``turns``: it is the rotation of a frame, by which other forces turn. ``twist``: ``jacobian @ v``, and its rate
+    where v does not change, from a recursion over the bodies; None: from the Jacobian. ``forces``: what a force along
+    the rate, given as a 3-vector in the axes of ``jacobian``, does to the robot.
     """
 
     name: str

@@ -84,8 +84,7 @@ class TaskRows:
 
 
 class Assembly(Buffers, ABC):
-    """Buffers and the QP at their values; ``plain``: not 0 for the linear model as it is, without curvature.
-    """
+    """Buffers and the QP at their values; ``plain``: not 0 for the linear model as it is, without curvature."""
 
     plain: Array
     _command: Command
