@@ -30,7 +30,7 @@ FORCE_WEIGHT = 1e-4
 
 
 def force_sizes(robot: Robot, count: int) -> NDArray[np.float64]:
-    """How many N, or N m, count as much as 1 rad/s^2 of a joint: the robot's weight on earth, and that by its length."""
+    """How many N, or N m, count as much as 1 rad/s^2: the robot's weight on earth, and that by its length."""
     mass = float(pin.computeTotalMass(robot.model))
     force = max(mass, 1e-3) * NOMINAL
     sizes: NDArray[np.float64] = np.repeat([force, force * robot.characteristic_length], 3)[:count]
