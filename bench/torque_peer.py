@@ -1,6 +1,6 @@
 """placo's dynamics solver on one problem; runs where placo is installed and prints a median tick in microseconds.
 
-    python -m bench.torque_peer problem.json
+python -m bench.torque_peer problem.json
 """
 
 from __future__ import annotations

@@ -37,7 +37,9 @@ def parts() -> dict[str, Sheet | str]:
     rows.append(("Panda, hand and posture: velocities", us(before), ""))
     arm.add(TorqueLimits())
     peer = placo("panda_description/urdf/panda.urdf", states, False, ["panda_hand"], False, [])
-    rows.append(("the same: torques with their limits", us(median(arm.compile(command="torque"), states, target)), peer))
+    rows.append(
+        ("the same: torques with their limits", us(median(arm.compile(command="torque"), states, target)), peer)
+    )
     grips = two_grips()
     states = near(grips.robot, 0.001)
     rows.append(("three-armed walker, two grips", us(median(grips.compile(command="torque"), states, None)), ""))

@@ -14,7 +14,7 @@ from wbc.symbolic.kinematics import frame_index
 from wbc.tasks import CenterOfMass, EndEffector, PointContact, Posture, RigidGrasp, SurfaceContact
 
 G = 9.81
-FORCE_WEIGHT, REST = 1e-4, 5.0
+FORCE_WEIGHT, REST, REST_WEIGHT = 1e-4, 5.0, 1e-8
 
 
 class Referee:
@@ -96,7 +96,7 @@ class Referee:
         # damping of all variables, and joints that come to rest
         H = np.diag(stack.damping / size**2)
         rest = np.zeros(n)
-        rest[:nv] = stack.damping / metre**2
+        rest[:nv] = REST_WEIGHT / metre**2
         H += np.diag(rest)
         g = rest * np.concatenate([4 * REST * self.v, np.zeros(n - nv)])
         for place in self.places.values():

@@ -33,6 +33,9 @@ from wbc.tasks.mechanism import Mechanism
 #: It biases a posture task of weight w by the fraction damping / w.
 DAMPING = 1e-8
 
+#: Least of it
+LEAST_DAMPING = 1e-12
+
 #: Highest price of a soft constraint; beyond it a row is as good as hard
 HIGHEST_PRICE = 1e9
 
@@ -88,7 +91,7 @@ class Declaration:
             raise ShapeError("robot", robot, "expected a wbc Robot, see wbc.robots.load")
         self._robot = robot
         self._dt = validation.scalar("dt", dt, low=0.0, open_low=True, unit="s")
-        self._damping = validation.scalar("damping", damping, low=1e-12, high=1.0)
+        self._damping = validation.scalar("damping", damping, low=LEAST_DAMPING, high=1.0)
         chosen = robot.characteristic_length if length is None else length
         self._length = validation.scalar("length", chosen, low=0.0, open_low=True, unit="m")
         self._calm = validation.flag("calm", calm)
@@ -168,6 +171,9 @@ class Declaration:
         # After strict levels it is one of its own: it must not disturb them
         cascade = len(self.levels) > 1 or any(e.level > 0 for e in self.entries)
         weight = 1.0 if cascade else self._damping
+        if not cascade:
+            # The rest task keeps the optimum unique: what else does would slow it down
+            self._damping = max(LEAST_DAMPING, self._damping * 1e-3)
         added = [Entry(Damping(gain=REST), rest, last + 1 if cascade else last, weight)]
         if self._command == "torque":
             if self._robot.base == "floating":
