@@ -40,6 +40,8 @@ class JointLimits(Constraint):
     where that is given). From outside the joint brakes at A, then returns at ``return_rate`` times the violation
     at least, and the violation does not grow again.
 
+    A stack that commands accelerations has the same limits as bounds on these: :mod:`wbc.tasks.stopping`.
+
     Attributes:
         position, velocity, acceleration: which limits to keep. Without ``acceleration`` the joint may stop at once,
             b(d) = d / dt.

@@ -15,14 +15,19 @@ w >= 0 is the fastest velocity at the end of the tick that can still be stopped;
 the limit within the tick. The lower limit is the mirror image.
 
 Why the interval is never empty from a viable state, for every t in (0, T]. Let v >= 0, the other case is the mirror
-image. If v >= B t, or d < v t / 2, take a = -B. Braking at B follows the parabola v^2 + 2 B q = const, so the
-state stays on its side of that of the upper limit, and turns round before it. The velocity at the end is at least
--B T >= -V. For the lower limit: where it is >= 0 nothing is asked. Else v < B t and d < v t / 2 < B t^2 / 2, so q - l >
-u - l - B t^2 / 2 >= B t^2 by the choice of B, and (v - B t)^2 <= 2 B (q(t) - l) is the same as
-v^2 - 4 B v t + 2 B^2 t^2 <= 2 B (q - l), whose left side is at most 2 B^2 t^2 for 0 <= v <= B t. If v < B t and
-d >= v t / 2 take a = -v / t, which ends at rest within the limits. So one acceleration is within all bounds, |a| <= B <= A. In contrast to Del Prete, Joint
-position and velocity bounds in discrete-time acceleration/torque control of robot manipulators, IEEE RA-L 3(1), 2018,
-t may be another one in every tick, because B and what is viable do not depend on it.
+image.
+
+If v >= B t, or d < v t / 2, take a = -B. Braking at B follows the parabola v^2 + 2 B q = const, so the state stays on
+its side of that of the upper limit, and turns round before it. The velocity at the end is at least -B T >= -V. For the
+lower limit nothing is asked where it is >= 0. Else v < B t and d < v t / 2 < B t^2 / 2, so that by the choice of B
+q - l > u - l - B t^2 / 2 >= B t^2, and (v - B t)^2 <= 2 B (q(t) - l) is the same as
+v^2 - 4 B v t + 2 B^2 t^2 <= 2 B (q - l), whose left side is at most 2 B^2 t^2 for 0 <= v <= B t.
+
+If v < B t and d >= v t / 2, take a = -v / t, which ends at rest within the limits.
+
+So one acceleration is within all bounds, |a| <= B <= A. In contrast to Del Prete (Joint position and velocity bounds in
+discrete-time acceleration/torque control of robot manipulators, IEEE RA-L 3(1), 2018) t may be another one in every
+tick, because B and what is viable do not depend on it.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What a tick of torques costs: a fixed arm beside its velocities, two grips, and a humanoid on its feet beside placo."""
+"""What a tick of torques costs: a fixed arm, two grips, and a humanoid on its feet, beside placo."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ import numpy as np
 import pinocchio as pin
 
 import wbc
-from bench.prepare import DESCRIPTIONS
 from bench.descriptions import write_urdf
+from bench.prepare import DESCRIPTIONS
 from bench.sheet import Sheet, us
 from wbc.controller import Controller, Stack
 from wbc.robot import Robot
