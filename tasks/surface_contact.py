@@ -95,7 +95,7 @@ class SurfaceContact(Contact):
                 for b in (1, -1):
                     # sign m_z <= mu (X + Y) f_z - a (Y f_x + sign mu m_x) - b (X f_y + sign mu m_y)
                     rows.append(ca.horzcat(-a * Y, -b * X, mu * (X + Y), -a * sign * mu, -b * sign * mu, -sign))
-        matrix = ca.sparsify(ca.vertcat(*rows))
+        matrix = ca.sparsify(ca.SX(ca.vertcat(*rows)))
         count = matrix.shape[0] - 1
         lower = ca.vertcat(inputs["least"], ca.SX.zeros(count))
         return Cone(matrix, lower, ca.vertcat(inputs["most"], ca.SX.inf(count)))

@@ -165,7 +165,7 @@ def test_from_every_viable_state_there_is_an_acceleration(
 
 def test_bounds_of_a_tick_are_those_of_a_search() -> None:
     """Against bisection of what an acceleration leads to, near limits."""
-    tick, rng = controller("panda"), np.random.default_rng(3)
+    tick, rng = controller("panda").clone(), np.random.default_rng(3)
     bot = tick.stack.robot
     lower, upper = bot.limits.position_lower, bot.limits.position_upper
     for _ in range(20):

@@ -33,7 +33,7 @@ def near(tick: Controller, rng: np.random.Generator) -> tuple[np.ndarray, np.nda
 
 @pytest.mark.parametrize("name", NAMES)
 def test_answers_are_those_of_another_program(name: str) -> None:
-    tick, rng = controller(name), np.random.default_rng(5)
+    tick, rng = controller(name).clone(), np.random.default_rng(5)
     bound = 0
     for _ in range(STATES):
         q, v = near(tick, rng)
@@ -53,7 +53,7 @@ def test_answers_are_those_of_another_program(name: str) -> None:
 @pytest.mark.parametrize("name", NAMES)
 def test_torques_move_the_robot_as_the_tick_says(name: str) -> None:
     """Forward dynamics by Pinocchio under the torques and the wrenches: the accelerations of the tick."""
-    tick, rng = controller(name), np.random.default_rng(6)
+    tick, rng = controller(name).clone(), np.random.default_rng(6)
     bot = tick.stack.robot
     q, v = near(tick, rng)
     step = tick.step(q, v)

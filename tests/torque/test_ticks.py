@@ -14,10 +14,7 @@ import wbc
 from tests.torque.problems import DT, controller, robot, stack
 from wbc.controller import Controller, Stack
 from wbc.errors import CommandError
-from wbc.native import toolchain
 from wbc.tasks import EndEffector, JointLimits, Posture, RigidGrasp, TorqueLimits, WorkspaceBox
-
-compiled = pytest.mark.skipif(not toolchain.available(), reason="there is no C compiler")
 
 
 def run(tick: Controller, ticks: int, seed: int = 4) -> np.ndarray:
@@ -36,7 +33,6 @@ def run(tick: Controller, ticks: int, seed: int = 4) -> np.ndarray:
     return np.array(out)
 
 
-@compiled
 @pytest.mark.parametrize("name", ["walker"])
 def test_compiled_ticks_are_those_of_the_virtual_machine(name: str) -> None:
     native, vm = run(controller(name, "native").clone(), 30), run(controller(name).clone(), 30)
@@ -57,7 +53,6 @@ def test_recordings_are_replayed_bit_by_bit(tmp_path: Path) -> None:
     assert found.differing == 0, str(found)
 
 
-@compiled
 def test_an_export_gives_the_same_commands(tmp_path: Path) -> None:
     tick = controller("panda", "native").clone()
     tick.reset(tick.stack.robot.neutral)

@@ -209,7 +209,7 @@ if TYPE_CHECKING:
         DistanceHandle,
         RelativePoseHandle,
         MomentumHandle,
-        HoldHandle,
+        ContactHandle,
         RollingHandle,
         JointLimitsHandle,
         FrameVelocityHandle,
@@ -218,7 +218,6 @@ if TYPE_CHECKING:
         ObstacleHandle,
         BoxHandle,
         PolyhedronHandle,
-        ContactHandle,
         TorqueLimitsHandle,
     ):
         """Of an item that is known by its name only: all values that items of this package have."""

@@ -203,7 +203,7 @@ class Step:
         low, high = self._part("owner_low"), self._part("owner_high")
         levels = self._pushes(multipliers.size)
         out = []
-        for i in np.flatnonzero(multipliers):
+        for i in np.flatnonzero(multipliers).tolist():
             value = float(multipliers[i])
             bound = "upper" if value > 0 else "lower"
             if i < nv:

@@ -97,9 +97,9 @@ class SecondOrder:
         robot, tracer, inputs = self._robot, Tracer(self._kinematics), self._b.values(block)
         if isinstance(item, ContactWrench):
             cone = item.contact.cone(self._b.values(self._layout.blocks[item.of]))
-            rows = ca.SX(len(block.rows), self._layout.variables)
-            rows[:, self._layout.forces[item.of]] = cone.matrix
-            return Rows(rows, cone.lower, cone.upper), None, None
+            wide = ca.SX(len(block.rows), self._layout.variables)
+            wide[:, self._layout.forces[item.of]] = cone.matrix
+            return Rows(wide, cone.lower, cone.upper), None, None
         torques = item.torque_rows(robot, inputs)
         if torques is not None:
             dofs = list(torques.dofs)
