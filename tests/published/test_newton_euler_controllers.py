@@ -54,7 +54,11 @@ from wbc.published.newton_euler.three_link import (
 from wbc.validation import Array
 
 ARM, TASK, DRIVE, DT = arm(), task(), Drive([MOTOR] * 3), 0.01
+#: As good as 20 to 2e-7 of the errors, but for a chattering joint
+SUBSTEPS = 4
 Q, R = 1e5 * np.eye(6), 0.01 * np.eye(3)
+#: Weights on errors with 10^4 times more on positions
+STIFF = np.diag([1e9] * 3 + [1e5] * 3)
 
 
 @cache
@@ -101,7 +105,8 @@ def controller(name: str) -> Nominal | Linearised | Adaptive | DecoupledArm | De
 
 @cache
 def run(name: str, plant: str = "torque") -> Run:
-    return simulate(referee(), controller(name), TASK, plant=plant, drive=DRIVE)
+    substeps = 20 if name == "decoupled two" else SUBSTEPS
+    return simulate(referee(), controller(name), TASK, plant=plant, drive=DRIVE, substeps=substeps)
 
 
 def tip_error(found: Run) -> float:
@@ -286,13 +291,16 @@ def test_n7_the_optimum_as_a_qp() -> None:
 
 
 def test_n7_limits_of_the_motors() -> None:
-    """The perturbation as a QP keeps 44 N and N m, of which the nominal torque leaves little; the free one does not."""
-    limits = np.array([2.0, 17.5, 43.5])
+    """As a QP the perturbation keeps limits a seventh above the largest nominal torques; the free one does not."""
+    limits = np.array([2.5, 20.0, 50.0])
     offset = np.array([0.01, 0.02, -0.01])
-    weights = np.diag([1e5] * 3 + [10.0] * 3)
     found = {
         held: simulate(
-            referee(), Linearised(ARM, TASK, DT, OneStep(3, weights), limits if held else None), TASK, offset=offset
+            referee(),
+            Linearised(ARM, TASK, DT, OneStep(3, STIFF), limits if held else None),
+            TASK,
+            offset=offset,
+            substeps=SUBSTEPS,
         )
         for held in (False, True)
     }
@@ -345,7 +353,8 @@ def test_goal_the_best_of_the_thesis_at_its_own_rate() -> None:
 
 
 def decoupled_errors(preview: float, forward: bool = False) -> Array:
-    law = DecoupledArm(rigid(referee()), TASK, preview, forward=forward)
+    """With a preview that ends where the line ends; of one that goes on the last figure is the 0.00497 of 100 Hz."""
+    law = DecoupledArm(rigid(referee()), lambda time: TASK(min(time, 1.0)), preview, forward=forward)
     return simulate(referee(), law, TASK, dt=1e-3, steps=1000, substeps=1).largest
 
 
@@ -372,7 +381,7 @@ def test_n9_joint_1_drifts_without_torque() -> None:
 def test_n9_any_relative_degree() -> None:
     """Outputs of degrees 0, 1, 2 and 3 of one nonlinear system obey the linear equations of their poles."""
     x, t = ca.SX.sym("x", 6), ca.SX.sym("t")
-    A = ca.vertcat(-x[0] ** 3 + x[1], x[2] + ca.sin(x[0]), x[0] * x[1], x[4] + ca.sin(t), x[5] - x[3], x[3] * x[0])
+    A = ca.vertcat(-(x[0] ** 3) + x[1], x[2] + ca.sin(x[0]), x[0] * x[1], x[4] + ca.sin(t), x[5] - x[3], x[3] * x[0])
     B, C, D = ca.SX.zeros(6, 4), ca.vertcat(x[0] * x[1], x[0] + t, x[1], x[3]), ca.SX.zeros(4, 4)
     B[0, 1], B[2, 2], B[5, 3], D[0, 0] = 2 + ca.cos(x[1]), 1.5, 1 + x[0] ** 2, 3.0
     poles = ((), (-2.0,), (-1 + 2j, -1 - 2j), (-1.0, -2.0, -3.0))
@@ -380,15 +389,13 @@ def test_n9_any_relative_degree() -> None:
     assert law.degrees == [0, 1, 2, 3]
     function = ca.Function("f", [x, t], [A, B, C, D])
     state, v, h = np.array([0.3, -0.2, 0.5, 0.1, 0.4, -0.3]), np.array([0.7, -0.5, 0.3, 0.6]), 1e-3
-    want = [scipy.signal.StateSpace(*scipy.signal.tf2ss([np.poly(p)[-1]], np.poly(p))) if p else None for p in poles]
-    assert want[0] is None
 
     def rate(z: Array, time: float) -> Array:
         a, b, _, _ = (np.array(part) for part in function(z, time))
         return np.asarray(a.ravel() + b @ law.input(z, v, time))
 
     outputs = []
-    for k in range(1001):
+    for k in range(201):
         _, _, c, d = (np.array(part) for part in function(state, k * h))
         outputs.append(c.ravel() + d @ law.input(state, v, k * h))
         k1 = rate(state, k * h)
@@ -401,7 +408,7 @@ def test_n9_any_relative_degree() -> None:
     for i in (1, 2, 3):
         # Derivatives of y by central differences: order and linear equation with these coefficients
         a = np.poly(poles[i])[::-1].real
-        jet, terms = y[:, i], np.zeros(1001)
+        jet, terms = y[:, i], np.zeros(201)
         for k in range(len(a)):
             terms = terms + a[k] * jet
             jet = np.gradient(jet, h)
@@ -463,8 +470,7 @@ def test_n11_adaptive_loop() -> None:
 def test_n11_an_estimate_of_zeros_learns_nothing() -> None:
     law = Adaptive(ARM, TASK, DT, theta=np.zeros((6, 9)))
     found = simulate(referee(), law, TASK, steps=30)
-    assert np.abs(found.torques - [Nominal(ARM, TASK).command(t, q, q) for t, q in zip(found.times, found.q[:-1],
-                                                                                      strict=False)]).max() == 0.0  # fmt: skip
+    np.testing.assert_array_equal(found.torques, [law.nominal.command(t, BASE, BASE) for t in found.times[:-1]])
     assert not law.estimator.theta[:, 6:].any()
 
 
@@ -490,7 +496,7 @@ def test_n12_totals_as_printed() -> None:
     assert printed_total("adaptive", 3) == (1203, 897)
     assert [printed_total("linearised", n) for n in (6, 7)] == [(75951, 61413), (119280, 97734)]
     assert [printed_total("adaptive", n) for n in (6, 7)] == [(5262, 4308), (7595, 6335)]
-    assert 11400 / 1203 == pytest.approx(9.48, abs=0.01)
+    assert round(11400 / 1203, 2) == 9.48
 
 
 def test_n13_linear_model() -> None:
@@ -531,15 +537,15 @@ def test_n13_linear_model_of_any_arm(n: int) -> None:
 
 
 def test_n14_offset_at_the_start() -> None:
-    """The published weights keep over nine tenths of an offset for 1 s; 10^4 times more weight on positions cures it."""
+    """The published weights keep over nine tenths of an offset for 1 s; more weight on positions cures it."""
     offset = np.array([0.01, 0.02, -0.01])
-    published = simulate(referee(), Linearised(ARM, TASK, DT), TASK, offset=offset)
+    published = simulate(referee(), Linearised(ARM, TASK, DT), TASK, offset=offset, substeps=SUBSTEPS)
     assert (np.abs(published.errors[-1]) > 0.9 * np.abs(offset)).all()
-    stiff = Linearised(ARM, TASK, DT, OneStep(3, np.diag([1e5] * 3 + [10.0] * 3)))
-    cured = simulate(referee(), stiff, TASK, offset=offset)
+    stiff = Linearised(ARM, TASK, DT, OneStep(3, STIFF))
+    cured = simulate(referee(), stiff, TASK, offset=offset, substeps=SUBSTEPS)
     assert (np.abs(cured.errors[-1]) < 0.01 * np.abs(offset)).all()
     # Without an offset it tracks ten times closer as well
-    assert tip_error(simulate(referee(), stiff, TASK)) < 0.1 * tip_error(run("linearised"))
+    assert tip_error(simulate(referee(), stiff, TASK, substeps=SUBSTEPS)) < 0.1 * tip_error(run("linearised"))
 
 
 def test_n15_load_on_a_link() -> None:
@@ -600,21 +606,15 @@ def test_more_bad_input() -> None:
         equations(ARM, np.zeros(2), np.zeros(3))
     with pytest.raises(UnknownNameError):
         simulate(referee(), Nominal(ARM, TASK), TASK, plant="torq")
-    point = Link(1e-59, np.full(3, 1e-59), *LINK[2:])
-    along = Arm((point, Link(*LINK)), np.eye(3)[2], np.ones(3))
+    x, _, z = np.eye(3)
+    needle = Link(1.0, np.full(3, 1e-30), z, z, z, z, reference=x)
     with pytest.raises(RangeError, match="singular"):
-        # Two parallel axes in one place
-        equations(Arm((Link(*LINK[:4], np.array([1.0, 0, 0]), np.array([1.0, 0, 0])), LINK_2), np.eye(3)[2],
-                      np.ones(3)), np.zeros(2), np.zeros(2)).acceleration(np.zeros(2))  # fmt: skip
-    assert along.n == 2
-    x, t = ca.SX.sym("x", 2), ca.SX.sym("t")
+        equations(Arm((Link(*LINK), needle), z, x), np.zeros(2), np.zeros(2)).acceleration(np.zeros(2))
+    s, t = ca.SX.sym("x", 2), ca.SX.sym("t")
     with pytest.raises(RangeError, match="no input reaches"):
-        Decoupling(x, t, ca.vertcat(x[0], x[1]), ca.DM([0, 1]), x[0], ca.SX.zeros(1, 1), ((),))
-    law = Decoupling(x, t, ca.vertcat(x[1], 0), ca.vertcat(0, x[0]), x[0], ca.SX.zeros(1, 1), ((-1, -1),))
+        Decoupling(s, t, ca.vertcat(s[0], s[1]), ca.DM([0, 1]), s[0], ca.SX.zeros(1, 1), ((),))
+    law = Decoupling(s, t, ca.vertcat(s[1], 0), ca.vertcat(0, s[0]), s[0], ca.SX.zeros(1, 1), ((-1, -1),))
     with pytest.raises(RangeError, match="decouple"):
         law.input(np.zeros(2), np.zeros(1))
     with pytest.raises(RangeError, match="ran away"):
         simulate(referee(), DecoupledArm(rigid(referee()), TASK, DT, (-2000.0, -2000.0)), TASK, steps=100)
-
-
-LINK_2 = Link(*LINK[:4], np.array([1.0, 0, 0]), np.ones(3))

@@ -1,4 +1,4 @@
-"""The published simulator of arms by Newton and Euler, and its three controllers of a three-link arm on a straight line.
+"""The published simulator of arms by Newton and Euler, and its three controllers of a three-link arm.
 
 Source: a thesis on a simulator in PL/1 with a modified Stanford arm; title page and figures of the copy are lost. What
 its print has wrong is put right here and shown in tests/published/test_newton_euler_controllers.py.

@@ -1,4 +1,4 @@
-"""Arithmetic of one step by the thesis: multiplications and divisions, additions and subtractions, for n links (ch. 7)."""
+"""Operations in one step by the thesis, chapter 7: multiplications with divisions, additions with subtractions."""
 
 from __future__ import annotations
 

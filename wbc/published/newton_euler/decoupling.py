@@ -17,7 +17,7 @@ import numpy as np
 
 from wbc import validation
 from wbc.errors import RangeError, ShapeError
-from wbc.published.newton_euler.recursion import Equations, regular
+from wbc.published.newton_euler.recursion import Equations
 from wbc.published.newton_euler.three_link import Motion, closed_form
 from wbc.validation import Array
 
@@ -124,7 +124,7 @@ def characteristic(field: str, poles: Sequence[complex], degree: int) -> Array:
     roots = np.atleast_1d(np.asarray(poles, dtype=complex))
     if len(roots) != degree or not np.isfinite(roots).all() or (roots.real >= 0.0).any():
         raise RangeError(field, poles, f"expected {degree} poles with negative real parts")
-    out = np.poly(roots)[::-1]
+    out = np.atleast_1d(np.poly(roots))[::-1]
     if np.abs(np.imag(out)).max() > 1e-9 * np.abs(out).max():
         raise RangeError(field, poles, "expected complex poles in pairs")
     return np.array(out.real, dtype=float)

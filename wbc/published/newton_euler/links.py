@@ -97,7 +97,7 @@ class Arm:
         return link.next_axis, link.next_lever, link.next_reference
 
     def joint_class(self, i: int) -> int:
-        """Type of joint i as the text numbers it: 1 no lever along the axis, 2 that of the link before, 3 its own, 4 both."""
+        """Type of joint i in the text: 1 no lever along the axis, 2 that of the link before, 3 its own, 4 both."""
         axis, lever, _ = self.before(i)
         own = self.links[i]
         return 1 + _collinear(lever, axis) + 2 * _collinear(own.lever, own.axis)

@@ -1,4 +1,4 @@
-"""Equations of motion by Newton and Euler, with coefficients of the joint accelerations kept apart, and their derivatives.
+"""Equations of motion by Newton and Euler, by coefficients of the joint accelerations, and their derivatives.
 
     tau = H(q) q'' + h(q, q')
     d tau = H dq'' + H1 dq' + H2 dq,   H1 = dh/dq',   H2 = dH/dq q'' + dh/dq

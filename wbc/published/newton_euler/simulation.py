@@ -1,8 +1,8 @@
 """An arm under a controller: the plant of the listing, and two that close the loop.
 
-    listing  motors with the torque that was asked for, H and h at the desired state: no closed loop
-    torque   a rigid arm (Pinocchio), torques held over a step
-    motor    a rigid arm (Pinocchio) on its motors, voltages held over a step
+listing  motors with the torque that was asked for, H and h at the desired state: no closed loop
+torque   a rigid arm (Pinocchio), torques held over a step
+motor    a rigid arm (Pinocchio) on its motors, voltages held over a step
 """
 
 from __future__ import annotations
