@@ -13,7 +13,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from tests.published.test_newton_euler_controllers import (
+from tests.published.newton_euler_arm import (
     ARM,
     DRIVE,
     DT,
@@ -30,7 +30,7 @@ from wbc.errors import RangeError
 from wbc.published.newton_euler import Arm, Decoupling, Estimator, External, discretised, equations, gain
 from wbc.published.newton_euler.counts import operations, printed_total
 from wbc.published.newton_euler.recursion import Inertial, inertial
-from wbc.published.newton_euler.three_link import BASE, GRAVITY, closed_form, tip
+from wbc.published.newton_euler.three_link import GRAVITY, closed_form, tip
 from wbc.validation import Array
 
 
