@@ -70,6 +70,11 @@ COMMANDS = {
         "Run the published driver of redundant arms: its own trajectories, "
         "printed norms beside, or one from its files.",
     ),
+    "compare-controllers": Listed(
+        "compare_controllers",
+        "compare_controllers",
+        "Run three published controllers of a three-link arm and two of today on the same line of 0.58 m in 1 s.",
+    ),
     "explore": Listed(
         "explore",
         "explore",

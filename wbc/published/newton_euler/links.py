@@ -117,7 +117,8 @@ class Arm:
 
     def place(self, q: Array) -> tuple[list[Array], list[Array], list[Array], list[Array]]:
         """A_i [3, 3], e_i, r_ii and r_i-1,i [3] in the base, n of each, at joint positions q [n] (A.68)."""
-        rotations, axes, levers, before = [], [], [], []
+        rotations: list[Array] = []
+        axes, levers, before = [], [], []
         turned = np.eye(3)
         for i, link in enumerate(self.links):
             axis, lever, _ = self.before(i)

@@ -106,17 +106,17 @@ def simulate(
             voltage = drive.voltage(exact(*at), q, v, torque)
         logged.append((q, v, qd - q, np.array(pin.rnea(model, data, qd, vd, ad)), torque, voltage))
         if plant == "torque":
-            q, v = _advanced(lambda q, v, u=torque: np.array(pin.aba(model, data, q, v, u)), q, v, dt, substeps)
+            q, v = _advanced(_moved(model, data, torque), q, v, dt, substeps)
         elif drive is not None and plant == "motor":
             q, v = _advanced(_driven(drive, exact, voltage), q, v, dt, substeps)
         elif drive is not None:
             q, v = _as_listed(drive, q, v, voltage, torque, dt)
         if not np.abs(np.concatenate([q, v])).max() < validation.LARGEST:
             raise RangeError("dt", dt, f"the arm ran away after {k * dt:.3g} s: the step is too coarse for these gains")
-    columns = [np.array(column) for column in zip(*logged, strict=True)]
+    columns = [np.array(column, dtype=np.float64) for column in zip(*logged, strict=True)]
     positions, velocities = np.vstack([columns[0], q]), np.vstack([columns[1], v])
     errors = np.vstack([columns[2], motion(steps * dt)[0] - q])
-    return Run(dt * np.arange(steps + 1), positions, velocities, errors, *columns[3:])
+    return Run(np.linspace(0.0, steps * dt, steps + 1), positions, velocities, errors, *columns[3:])
 
 
 def _advanced(acceleration: Acceleration, q: Array, v: Array, dt: float, substeps: int) -> tuple[Array, Array]:
@@ -130,6 +130,13 @@ def _advanced(acceleration: Acceleration, q: Array, v: Array, dt: float, substep
         q = q + h * v + h * h / 6 * (a1 + a2 + a3)
         v = v + h / 6 * (a1 + 2 * a2 + 2 * a3 + a4)
     return q, v
+
+
+def _moved(model: pin.Model, data: pin.Data, torque: Array) -> Acceleration:
+    def acceleration(q: Array, v: Array) -> Array:
+        return np.array(pin.aba(model, data, q, v, torque))
+
+    return acceleration
 
 
 def _driven(drive: Drive, exact: Callable[[Array, Array], Equations], voltage: Array) -> Acceleration:
