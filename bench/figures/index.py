@@ -95,6 +95,7 @@ _ALL = (
     Figure("analysis", ("wbc/analysis",), 2.0),
     Figure("clearance", ("wbc/clearance",), 1.0),
     Figure("demo", (*TICK, "wbc/track", "wbc/cli/demo.py"), 0.5),
+    Figure("dynamics", ("wbc/published/newton_euler",), 0.5),
     Figure("examples", (*TICK, "wbc/proximity", "examples"), 1.0),
     Figure("fsp", ("wbc/resolvers", "wbc/explore", "wbc/published/ikor"), 4.0),
     Figure("fsp_norms", ("wbc/resolvers/fsp", "wbc/published/ikor"), 0.5),

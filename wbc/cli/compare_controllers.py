@@ -50,19 +50,24 @@ def compare_controllers(
             if not found:
                 raise
     table = Table(header_style="bold", box=None, pad_edge=False)
-    for head in ("controller", "tip off, mm", "at the end, mm", "torques, N m, N m, N", "us a command", "payload, kg"):
-        table.add_column(head, justify="left" if head == "controller" else "right")
+    table.add_column("controller")
+    for head in ("tip, mm", "at end", "tau 1", "tau 2", "tau 3", "us", "payload"):
+        table.add_column(head, justify="right")
     rows = []
     for one in found:
-        largest = [] if one.run is None else np.abs(one.run.torques).max(axis=0).tolist()
-        off, end = (None, None) if one.run is None else (1e3 * float(one.tip.max()), 1e3 * float(one.tip[-1]))
-        table.add_row(
-            one.name, "ran away" if off is None else f"{off:.3g}", "" if end is None else f"{end:.3g}",
-            ", ".join(f"{torque:.3g}" for torque in largest), f"{one.microseconds:.0f}",
-            "" if one.mass is None else f"{one.mass:.3f}",
-        )  # fmt: skip
-        rows.append({"name": one.name, "tip_mm": off, "end_mm": end, "torques": largest,
-                     "microseconds": one.microseconds, "payload_kg": one.mass})  # fmt: skip
+        row = {"name": one.name, "microseconds": one.microseconds, "payload_kg": one.mass}
+        if one.run is None:
+            cells = ["ran away", "", "", "", ""]
+        else:
+            torques = np.abs(one.run.torques).max(axis=0).tolist()
+            lengths = [1e3 * float(one.tip.max()), 1e3 * float(one.tip[-1])]
+            row |= {"tip_mm": lengths[0], "end_mm": lengths[1], "torques": torques}
+            cells = [f"{number:.3g}" for number in (*lengths, *torques)]
+        rows.append(row)
+        mass = "" if one.mass is None else f"{one.mass:.3f} kg"
+        table.add_row(one.name, *cells, f"{one.microseconds:.0f}", mass)
+    console().print(f"{payload:g} kg at the tip, unknown to all; {hertz:g} Hz")
+    console().print("tip: largest distance from its place; tau: largest torques [N m, N m, N]; us: a command in Python")
     console().print(table)
     title = f"{payload:g} kg at the tip, unknown; {hertz:g} Hz"
     save_plot(found, title, folder / "controllers.png")
