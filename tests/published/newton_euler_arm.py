@@ -9,10 +9,12 @@ import pinocchio as pin
 
 from wbc.published.newton_euler import (
     Adaptive,
+    Arm,
     DecoupledArm,
     DecoupledTwo,
     Drive,
     Linearised,
+    Link,
     Nominal,
     Run,
     discretised,
@@ -45,6 +47,20 @@ def referee() -> pin.Model:
     model.appendBodyToJoint(j, pin.Inertia(4.25, np.array([0, 0, -0.6447]), np.diag([2.51, 2.51, 0.006])), one)
     model.gravity.linear = np.array([0, 0, -9.80621])
     return model
+
+
+def random_arm(rng: np.random.Generator, n: int) -> Arm:
+    """Any axes, any levers, turning and sliding joints."""
+    links = []
+    for _ in range(n):
+        sides = rng.uniform(0.1, 1.0, 3) ** 2
+        links.append(
+            Link(
+                rng.uniform(0.5, 5.0), sides.sum() - sides, rng.normal(size=3), rng.normal(size=3),
+                0.5 * rng.normal(size=3), 0.5 * rng.normal(size=3), bool(rng.random() < 0.3),
+            )
+        )  # fmt: skip
+    return Arm(tuple(links), rng.normal(size=3), rng.normal(size=3))
 
 
 def controller(name: str) -> Nominal | Linearised | Adaptive | DecoupledArm | DecoupledTwo:

@@ -25,6 +25,7 @@ from tests.published.newton_euler_arm import (
     Q,
     R,
     at,
+    random_arm,
     referee,
     run,
     step_model,
@@ -64,20 +65,6 @@ from wbc.published.newton_euler.three_link import (
     tip,
 )
 from wbc.validation import Array
-
-
-def random_arm(rng: np.random.Generator, n: int) -> Arm:
-    """Any axes, any levers, turning and sliding joints."""
-    links = []
-    for _ in range(n):
-        sides = rng.uniform(0.1, 1.0, 3) ** 2
-        links.append(
-            Link(
-                rng.uniform(0.5, 5.0), sides.sum() - sides, rng.normal(size=3), rng.normal(size=3),
-                0.5 * rng.normal(size=3), 0.5 * rng.normal(size=3), bool(rng.random() < 0.3),
-            )
-        )  # fmt: skip
-    return Arm(tuple(links), rng.normal(size=3), rng.normal(size=3))
 
 
 def test_n1_assembly() -> None:
