@@ -9,13 +9,21 @@ import typer
 
 Payload = Annotated[float, typer.Option(help="Mass at the tip that no controller knows of, in kg.")]
 Rate = Annotated[float, typer.Option(help="Commands a second, in Hz.")]
+Heavier = Annotated[float, typer.Option(help="How many times heavier links are than controllers think.")]
+Noise = Annotated[float, typer.Option(help="Standard deviation of measured joints, in rad and m.")]
 Only = Annotated[list[str] | None, typer.Option("--only", help="One controller by name; may be repeated.")]
 Out = Annotated[Path | None, typer.Option(help="Folder for plot and figures. Default: runs/controllers-TIME.")]
 Force = Annotated[bool, typer.Option(help="Write into a folder that has such a comparison.")]
 
 
 def compare_controllers(
-    payload: Payload = 2.125, rate: Rate = 100.0, only: Only = None, out: Out = None, force: Force = False
+    payload: Payload = 2.125,
+    rate: Rate = 100.0,
+    heavier: Heavier = 1.0,
+    noise: Noise = 0.0,
+    only: Only = None,
+    out: Out = None,
+    force: Force = False,
 ) -> None:
     """Run three published controllers of a three-link arm and two of today on the same line of 0.58 m in 1 s.
 
@@ -36,13 +44,14 @@ def compare_controllers(
 
     names = [validation.one_of("only", name, LAWS) for name in only] if only else list(LAWS)
     hertz = validation.scalar("rate", rate, low=10.0, high=1e4, unit="Hz")
-    loaded(payload)
+    loaded(payload, heavier)
+    validation.scalar("noise", noise, low=0.0)
     folder = run_folder(out, "controllers", ("controllers.png", "controllers.json"), force)
     found = []
     with progress_bar() as bar:
         task = bar.add_task("controllers", total=len(names))
         try:
-            for one in compare(payload, 1.0 / hertz, names):
+            for one in compare(payload, 1.0 / hertz, names, heavier=heavier, noise=noise):
                 found.append(one)
                 bar.advance(task)
         except KeyboardInterrupt:
@@ -66,12 +75,15 @@ def compare_controllers(
         rows.append(row)
         mass = "" if one.mass is None else f"{one.mass:.3f} kg"
         table.add_row(one.name, *cells, f"{one.microseconds:.0f}", mass)
-    console().print(f"{payload:g} kg at the tip, unknown to all; {hertz:g} Hz")
+    title = f"{payload:g} kg at the tip, unknown; {hertz:g} Hz"
+    title += f"; links {heavier:g} times heavier" if heavier != 1.0 else ""
+    title += f"; noise {noise:g}" if noise else ""
+    console().print(title)
     console().print("tip: largest distance from its place; tau: largest torques [N m, N m, N]; us: a command in Python")
     console().print(table)
-    title = f"{payload:g} kg at the tip, unknown; {hertz:g} Hz"
     save_plot(found, title, folder / "controllers.png")
     (folder / "controllers.json").write_text(
-        json.dumps({"payload": payload, "rate": hertz, "rows": rows}, indent=1) + "\n"
+        json.dumps({"payload": payload, "rate": hertz, "heavier": heavier, "noise": noise, "rows": rows}, indent=1)
+        + "\n"
     )
     console().print(str(folder))

@@ -83,23 +83,31 @@ class _Timed:
         return out
 
 
-def loaded(payload: float) -> pin.Model:
-    """The arm with a point mass at its tip [kg]."""
+def loaded(payload: float, heavier: float = 1.0) -> pin.Model:
+    """The arm with a point mass at its tip [kg], and with links so many times heavier than they are thought to be."""
     validation.scalar("payload", payload, low=0.0, high=100.0, unit="kg")
+    validation.scalar("heavier", heavier, low=0.1, high=10.0)
     model = _ARM.model.copy()
+    for i in range(1, model.njoints):
+        body = model.inertias[i]
+        model.inertias[i] = pin.Inertia(heavier * body.mass, body.lever, heavier * body.inertia)
     if payload > 0.0:
         # The tip is the origin of joint 3 at q3 = 0
         model.inertias[3] = model.inertias[3] + pin.Inertia(payload, np.zeros(3), np.zeros((3, 3)))
     return model
 
 
-def compare(payload: float, dt: float, names: Sequence[str] = tuple(LAWS)) -> Iterator[Compared]:
+def compare(
+    payload: float, dt: float, names: Sequence[str] = tuple(LAWS), *, heavier: float = 1.0, noise: float = 0.0
+) -> Iterator[Compared]:
     """The controllers one by one, with a payload [kg] and a step [s].
+
+    ``heavier`` as for :func:`loaded`; ``noise`` of measured positions [rad, m] as for :func:`simulate`.
 
     Raises:
         UnknownNameError: no such controller. RangeError: a payload out of range, or a step that does not divide 1 s.
     """
-    model = loaded(payload)
+    model = loaded(payload, heavier)
     chosen = [validation.one_of("controller", name, LAWS) for name in names]
     validation.scalar("dt", dt, low=1e-4, high=0.1, unit="s")
     steps = round(1.0 / dt)
@@ -108,7 +116,7 @@ def compare(payload: float, dt: float, names: Sequence[str] = tuple(LAWS)) -> It
     for name in chosen:
         timed = _Timed(LAWS[name](dt))
         try:
-            run = simulate(model, timed, _TASK, dt=dt, steps=steps, substeps=max(1, round(dt / 5e-4)))
+            run = simulate(model, timed, _TASK, dt=dt, steps=steps, substeps=max(1, round(dt / 5e-4)), noise=noise)
             off = np.array([np.linalg.norm(tip(q) - tip(_TASK(t)[0])) for q, t in zip(run.q, run.times, strict=True)])
         except RangeError as error:
             if error.field != "dt":

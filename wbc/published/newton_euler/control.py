@@ -25,6 +25,8 @@ from wbc.validation import Array
 
 #: Weights of the thesis, times unit matrices: on torques, and on errors of positions and of rates
 TORQUE_WEIGHT, ERROR_WEIGHT = 0.01, 1e5
+#: Without excitation P would grow by 1/rho a step until it is no number
+LARGEST_P = 1e30
 
 
 class Controller(Protocol):
@@ -32,6 +34,15 @@ class Controller(Protocol):
 
     def command(self, time: float, q: Array, v: Array) -> Array:
         """Torques [n] at a time [s] and the measured positions and velocities, [n] each."""
+
+
+def measured(q: Array, v: Array, n: int) -> tuple[Array, Array]:
+    """Positions and velocities as they were measured, [n] each.
+
+    Raises:
+        ShapeError, NotFiniteError, RangeError: they are no such numbers.
+    """
+    return validation.ordinary_array("q", q, (n,)), validation.ordinary_array("v", v, (n,))
 
 
 def gain(Phi: Array, Gamma: Array, Q: Array, R: Array) -> Array:
@@ -97,6 +108,7 @@ class Linearised:
 
     def command(self, time: float, q: Array, v: Array) -> Array:
         """Torques [n]."""
+        q, v = measured(q, v, self.arm.n)
         qd, vd, ad = self.motion(time)
         model = linear_model(self.arm, qd, vd, ad)
         A, B = model.system
@@ -126,19 +138,22 @@ class Estimator:
         self.forgets = validation.flag("forgets", forgets)
 
     def update(self, phi: Array, following: Array) -> None:
-        """What followed a state and a torque, phi (7.58, 7.59)."""
+        """What followed a state and a torque, phi (7.58, 7.59); P grows no more where it is above :data:`LARGEST_P`."""
+        phi = validation.ordinary_array("phi", phi, (self.theta.shape[1],))
+        following = validation.ordinary_array("following", following, (self.theta.shape[0],))
         weighed = self.P @ phi
         step = weighed / (phi @ weighed + self.rho)
         self.theta = self.theta + np.outer(following - self.theta @ phi, step)
         P = self.P - np.outer(step, weighed)
-        self.P = (P + P.T) / (2.0 * self.rho if self.forgets else 2.0)
+        forgets = self.forgets and np.abs(P).max() < LARGEST_P
+        self.P = (P + P.T) / (2.0 * self.rho if forgets else 2.0)
 
 
 class Adaptive:
     """Controller 3: the perturbation by an estimated model.
 
     An estimate of zeros gives no perturbation, and then nothing is ever learned: ``theta`` is by default the computed
-    model of the first step. Without excitation P grows by 1/rho a step; ``forgets`` as for :class:`Estimator`.
+    model of the first step. Without excitation P grows by 1/rho a step, up to :data:`LARGEST_P`.
     """
 
     def __init__(
@@ -162,6 +177,7 @@ class Adaptive:
 
     def command(self, time: float, q: Array, v: Array) -> Array:
         """Torques [n]."""
+        q, v = measured(q, v, self.arm.n)
         qd, vd, _ = self.motion(time)
         x, n = np.concatenate([q - qd, v - vd]), self.arm.n
         if self._last is not None:

@@ -17,6 +17,7 @@ import numpy as np
 
 from wbc import validation
 from wbc.errors import RangeError, ShapeError
+from wbc.published.newton_euler.control import measured
 from wbc.published.newton_euler.recursion import Equations
 from wbc.published.newton_euler.three_link import Motion, closed_form
 from wbc.validation import Array
@@ -67,7 +68,9 @@ class Decoupling:
         Raises:
             RangeError: D* is singular there.
         """
-        u, decoupled = self._law(x, time, v)
+        x = validation.ordinary_array("x", x, (self._law.numel_in(0),))
+        v = validation.ordinary_array("v", v, (len(self.degrees),))
+        u, decoupled = self._law(x, validation.scalar("time", time), v)
         matrix = np.array(decoupled)
         if not np.linalg.cond(matrix) < 1e12:
             raise RangeError("x", x, "the inputs do not decouple the outputs here")
@@ -95,6 +98,7 @@ class DecoupledArm:
 
     def command(self, time: float, q: Array, v: Array) -> Array:
         """Torques [n]."""
+        q, v = measured(q, v, len(q))
         qd, vd, ad = self.motion(time + self.preview)
         wanted = self.a[0] * (qd - q) - self.a[1] * v
         return self.equations(q, v).torque(wanted + self.a[1] * vd + ad if self.forward else wanted)
@@ -110,6 +114,7 @@ class DecoupledTwo:
 
     def command(self, time: float, q: Array, v: Array) -> Array:
         """Torques [3] (6.50 to 6.52)."""
+        q, v = measured(q, v, 3)
         qd = self.motion(time + self.preview)[0]
         c, d = closed_form(q, v)
         return np.concatenate([[0.0], -(c + self.a[1] * v[1:] + self.a[0] * (q[1:] - qd[1:])) / d])

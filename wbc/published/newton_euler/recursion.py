@@ -4,8 +4,8 @@
     d tau = H dq'' + H1 dq' + H2 dq,   H1 = dh/dq',   H2 = dH/dq q'' + dh/dq
 
 Every vector below is a jet, [rows, ..., 3]: row 0 is its value and row 1 + l its derivative by coordinate l of
-(q, q'). Derivatives come from the rules da/dq_l = e_l x a (B.119, B.121) and the product rule, as the thesis writes
-them out by hand in sixteen arrays. Source: appendix B, equations B.75 to B.118.
+(q, q'). Derivatives come from the rules da/dq_l = e_l x a (B.119, B.121) and the product rule, which the thesis
+writes out by hand, array by array. Source: appendix B, equations B.75 to B.118.
 """
 
 from __future__ import annotations

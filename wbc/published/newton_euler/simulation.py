@@ -78,12 +78,15 @@ def simulate(
     drive: Drive | None = None,
     substeps: int = SUBSTEPS,
     offset: Array | None = None,
+    noise: float = 0.0,
+    seed: int = 0,
 ) -> Run:
     """Let a controller follow a motion from its start, where the arm already moves as desired.
 
     Args:
         model: of the plant. plant: of :data:`PLANTS`; all but ``torque`` need a ``drive``. offset: of the first
-            positions [n].
+            positions [n]. noise: standard deviation of measured positions [rad, m]; where there is any, velocities are
+            their differences over a step.
 
     Raises:
         UnknownNameError: no such plant. RangeError: a plant without drive; the arm ran away.
@@ -96,14 +99,22 @@ def simulate(
     exact, data = rigid(model), model.createData()
     q, v, _ = motion(0.0)
     q = q if offset is None else q + validation.ordinary_array("offset", offset, q.shape)
+    validation.scalar("noise", noise, low=0.0)
+    random = np.random.default_rng(validation.integer("seed", seed))
+    seen, rate = q, v
     logged: list[tuple[Array, ...]] = []
     for k in range(validation.integer("steps", steps, low=1)):
         qd, vd, ad = motion(k * dt)
-        torque = controller.command(k * dt, q, v)
+        if noise:
+            last, seen = seen, q + noise * random.normal(size=q.shape)
+            rate = (seen - last) / dt if k else v
+        else:
+            seen, rate = q, v
+        torque = controller.command(k * dt, seen, rate)
         voltage = np.zeros_like(torque)
         if drive is not None:
-            at = (qd, vd) if plant == "listing" else (q, v)
-            voltage = drive.voltage(exact(*at), q, v, torque)
+            at = (qd, vd) if plant == "listing" else (seen, rate)
+            voltage = drive.voltage(exact(*at), seen, rate, torque)
         logged.append((q, v, qd - q, np.array(pin.rnea(model, data, qd, vd, ad)), torque, voltage))
         if plant == "torque":
             q, v = _advanced(_moved(model, data, torque), q, v, dt, substeps)

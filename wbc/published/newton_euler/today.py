@@ -16,6 +16,7 @@ import pinocchio as pin
 
 from wbc import validation
 from wbc.errors import RangeError
+from wbc.published.newton_euler.control import measured
 from wbc.published.newton_euler.simulation import rigid
 from wbc.published.newton_euler.three_link import Motion
 from wbc.validation import Array
@@ -30,6 +31,7 @@ class ComputedTorque:
 
     def command(self, time: float, q: Array, v: Array) -> Array:
         """Torques [n]."""
+        q, v = measured(q, v, len(q))
         qd, vd, ad = self.motion(time)
         return self.equations(q, v).torque(ad + 2.0 * self.omega * (vd - v) + self.omega**2 * (qd - q))
 
@@ -71,6 +73,7 @@ class SlotineLi:
 
     def command(self, time: float, q: Array, v: Array) -> Array:
         """Torques [n]; the estimate moves on by one step."""
+        q, v = measured(q, v, self.model.nv)
         qd, vd, ad = self.motion(time)
         wanted = vd + self.stiffness * (qd - q)
         s = wanted - v
