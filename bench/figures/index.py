@@ -96,6 +96,7 @@ _ALL = (
     Figure("bilateral", ("wbc/teleop/bilateral",), 1.5),
     Figure("clearance", ("wbc/clearance",), 1.0),
     Figure("demo", (*TICK, "wbc/track", "wbc/cli/demo.py"), 0.5),
+    Figure("dynamics", ("wbc/published/newton_euler",), 0.5),
     Figure("examples", (*TICK, "wbc/proximity", "examples"), 1.0),
     Figure("fsp", ("wbc/resolvers", "wbc/explore", "wbc/published/ikor"), 4.0),
     Figure("fsp_norms", ("wbc/resolvers/fsp", "wbc/published/ikor"), 0.5),

@@ -80,6 +80,11 @@ COMMANDS = {
         "relative_motion",
         "Largest errors in inches of each table's straight lines: as measured, by the published solve, and exactly.",
     ),
+    "compare-controllers": Listed(
+        "compare_controllers",
+        "compare_controllers",
+        "Run three published controllers of a three-link arm and two of today on the same line of 0.58 m in 1 s.",
+    ),
     "explore": Listed(
         "explore",
         "explore",
