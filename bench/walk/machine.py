@@ -20,13 +20,14 @@ from wbc.walking import Structure, cylinder
 from wbc.walking.body_path import BodyPath
 from wbc.walking.checker import check_walk
 from wbc.walking.log.log import WalkLog
+from wbc.walking.log.ticks import TickColumns
 from wbc.walking.loop.stack import WalkStack
 from wbc.walking.loop.walk import Tick, Walk
 from wbc.walking.planner.plan import HoldLost, NoPlanError, Plan
 from wbc.walking.planner.planner import plan_walk
 from wbc.walking.report.figures import RAMP, body_speed
-from wbc.walking.run.compiling import compiled_stack, keep
-from wbc.walking.run.recording import TickColumns, WalkRecorder
+from wbc.walking.run.mode import compiled_stack, keep
+from wbc.walking.run.recording import WalkRecorder
 
 Record = dict[str, Any]
 

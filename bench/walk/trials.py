@@ -29,7 +29,7 @@ from wbc.walking.loop.walk import Tick, Walk
 from wbc.walking.planner.plan import HoldLost, NoPlanError
 from wbc.walking.planner.planner import Objective, plan_walk
 from wbc.walking.report.folder import rules_of, save_run
-from wbc.walking.run.compiling import compiled_stack
+from wbc.walking.run.mode import compiled_stack
 from wbc.walking.run.recording import WalkRecorder
 from wbc.walking.run.request import DriveRequest, PathRequest, Site
 from wbc.walking.run.resume_mode import ResumeRequest

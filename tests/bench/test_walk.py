@@ -29,7 +29,7 @@ from wbc.walking.loop.closed_chain import chain_function
 from wbc.walking.loop.hand_command import aim_function
 from wbc.walking.loop.stack import WalkStack
 from wbc.walking.planner.swings.swings import ESTIMATE
-from wbc.walking.run.compiling import compiled_stack
+from wbc.walking.run.mode import compiled_stack
 
 #: A course of a few seconds
 SHORT = ((13, 12), (13, 13))

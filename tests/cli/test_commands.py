@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 
 import wbc
 from wbc import style, track
-from wbc.cli import bench, session
+from wbc.cli import bench, console, session
 from wbc.cli.app import COMMANDS, app, command
 from wbc.errors import UnknownNameError, WbcError
 from wbc.track.plots import save_picture
@@ -288,6 +288,6 @@ def test_bench_without_the_repository(tmp_path: Path, monkeypatch: pytest.Monkey
 
 
 def test_errors_are_of_one_family() -> None:
-    assert issubclass(session.OutputError, WbcError)
+    assert issubclass(console.OutputError, WbcError)
     assert issubclass(bench.BenchError, WbcError)
     assert issubclass(UnknownNameError, WbcError)

@@ -17,12 +17,14 @@ from tests.cli.test_commands import run
 from wbc import robots
 from wbc.cli.app import app
 from wbc.cli.walking.keyboard import END, KeyCommands
+from wbc.cli.walking.modes import Lines
 from wbc.terminal import terminal_keys
 from wbc.walking.checker import check_run
 from wbc.walking.log.log import WalkLog
+from wbc.walking.planner.plan import Regrasp
 from wbc.walking.run import DriveRequest, perform_walk
 
-BARE = ["--no-pictures", "--strict"]
+BARE = ["--no-pictures"]
 
 
 def summary(folder: Path) -> dict[str, object]:
@@ -130,7 +132,7 @@ def test_a_task_that_is_refused_says_why_and_the_hand_comes_down(tmp_path: Path)
 
 def test_a_walk_that_asks(tmp_path: Path) -> None:
     arguments = ["--from", "13,9", "--to", "13,13", "--free-start", "--ask", *BARE, "--out", str(tmp_path)]
-    done = CliRunner().invoke(app, ["walk", *arguments], input="1,1\n\n")
+    done = CliRunner().invoke(app, ["walk", *arguments], input="1,1\n" + "\n" * 9)
     assert done.exit_code == 0, done.stderr
     err = " ".join(done.stderr.split())
     steps = json.loads((tmp_path / "plan.json").read_text())["regrasps"]
@@ -140,6 +142,74 @@ def test_a_walk_that_asks(tmp_path: Path) -> None:
     log = WalkLog.load(tmp_path)
     assert log.body_fixed[0]
     assert not log.body_fixed[-1]
+
+
+def test_where_nobody_answers_the_walk_stops(tmp_path: Path) -> None:
+    arguments = ["--from", "13,9", "--to", "13,13", "--ask", *BARE, "--out", str(tmp_path)]
+    done = CliRunner().invoke(app, ["walk", *arguments], input="")
+    assert done.exit_code == 3
+    assert "nobody said yes to arm" in " ".join(done.stderr.split())
+    told, log = summary(tmp_path), WalkLog.load(tmp_path)
+    assert told["outcome"] == "declined"
+    assert told["checks"]["ok"]  # type: ignore[index]
+    assert (log.hand_state == 2).all()  # nothing was lifted
+    assert np.abs(log.v[-2]).max() < 1e-3
+
+
+def test_answers_come_from_a_pipe_and_a_stop_is_heard() -> None:
+    read, write = os.pipe()
+    with os.fdopen(read, "rb") as source, pytest.MonkeyPatch.context() as patch:
+        patch.setattr("sys.stdin", source)
+        lines, asked = Lines(), iter([False, True])
+        os.write(write, b"\n13,9\nhalf")
+        step = Regrasp("arm1", "1,1", "2,2", 0, 0.0, 0.5, 0.5, 0.0, 1.0, "reach", 2.0)
+        assert [lines.answer(step, ""), lines.answer(step, "no")] == ["", "13,9"]
+        lines.stop = lambda: next(asked)
+        assert lines.answer(step, "") is None
+        lines.stop = lambda: False
+        os.close(write)
+        assert lines.answer(step, "") is None
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (["--structure", "truss"], "structure: a run that is gone on with keeps its own"),
+        (["--speed", "0.1"], "speed: a run that is gone on with keeps its own"),
+        (["--arms", "4"], "the run has 3 arms"),
+        (["--set", "hand_radius=0.06"], "another robot"),
+        (["--least-time"], "least-time"),
+    ],
+)
+def test_what_a_resumed_run_does_not_take(driven: Path, arguments: list[str], told: str, tmp_path: Path) -> None:
+    resume = ["walk", "--resume", f"{driven}@1.2", "--to", "13,11", *BARE]
+    code, _, err = run(*resume, *arguments, "--out", tmp_path / "run")
+    assert code == 2
+    assert told in err
+    assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize("at", ["nan", "inf", "-1", "1e9", "0"])
+def test_an_instant_that_the_log_does_not_have(driven: Path, at: str, tmp_path: Path) -> None:
+    code, _, err = run("walk", "--resume", f"{driven}@{at}", "--to", "13,11", "--out", tmp_path / "run")
+    assert code == 2
+    assert f"expected a time from 0.01 to {WalkLog.load(driven).t[-1]:g} s" in err
+
+
+def test_a_run_does_not_go_on_in_its_own_folder(driven: Path) -> None:
+    code, _, err = run("walk", "--resume", driven, "--to", "13,11", "--out", driven, "--force")
+    assert code == 2
+    assert "needs its own" in err
+    assert WalkLog.load(driven)
+
+
+def test_a_folder_is_checked(driven: Path, tmp_path: Path) -> None:
+    code, out, _ = run("check", driven)
+    assert code == 0
+    assert "the walk holds" in out
+    code, _, err = run("check", tmp_path)
+    assert (code, "no run.npz" in err) == (2, True)
+    assert run("check", tmp_path / "none")[0] == 2
 
 
 @pytest.mark.parametrize(

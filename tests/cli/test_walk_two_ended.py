@@ -82,7 +82,8 @@ def test_an_abort_in_a_swing_goes_no_farther_than_was_said(quick: Walker, stack:
         (["--robot", "two-ended", "--from", "1"], "'ID1 ID2'"),
         (["--robot", "two-ended", "--to", "9"], "'9'"),
         (["--robot", "two-ended", "--free-start"], "goes to a hold or a place"),
-        (["--robot", "two-ended", "--resume", "there"], "not resumed"),
+        (["--robot", "two-ended", "--resume", "."], "leave it out"),
+        (["--robot", "two-ended", "--arms", "3"], "two ends"),
         (["--robot", "two-ended", "--ask"], "ask"),
     ],
 )

@@ -266,6 +266,7 @@ def test_obstacles_of_every_kind_survive_a_file(tmp_path: Path) -> None:
     ("cells", "made", "field", "said"),
     [
         ("none.stl,,", b"", "line 6: d1", "no such file"),
+        ("x" * 300 + ".stl,,", b"", "line 6: d1", "no such file"),
         ("rock.obj,,", b"", "line 6: d1", "expected an STL file"),
         (",,", b"", "line 6: d1", "expected a text"),
         ("bad.stl,,", b"solid nothing", "line 6: d1", ""),
@@ -438,3 +439,37 @@ def test_grid_poses_follow_the_heading() -> None:
     # y is the direction of +T: that of the tangent where T grows
     ahead = grid_pose(10.001, 3, 2.0).translation - straight.translation
     np.testing.assert_allclose(ahead / np.linalg.norm(ahead), straight.rotation[:, 1], atol=radians(0.01))
+
+
+def mounted(on: str, header: str = ", on") -> str:
+    return f"""id, x, y, z, ax, ay, az, rx, ry, rz, roll, max_tilt{header}
+a, 0,0,0, 0,0,-1, 1,0,0, free, 0.05, {on}
+b, 1,0,0, 0,0,-1, 1,0,0, free, 0.05,
+
+[obstacles]
+id, shape, x, y, z, ax, ay, az, rx, ry, rz, d1, d2, d3
+"bar, 1", sphere, 0,0,1, 0,0,1, 1,0,0, 0.1,,
+
+[surface]
+shape, x, y, z, ax, ay, az, rx, ry, rz, d1
+plane, 0,0,0, 0,0,1, 1,0,0,
+"""
+
+
+def test_a_hold_says_what_it_is_mounted_on(tmp_path: Path) -> None:
+    for on, row in (('"bar, 1"', 0), ("surface", -1), ("", -2)):
+        made = parse_structure(mounted(on))
+        assert made.mounts == (row, -2)
+        again = read_structure(save_structure(made, tmp_path / "again.csv"))
+        assert (again.mounts, again.digest) == (made.mounts, made.digest)
+        assert made.moved(pin.SE3.Random()).mounts == made.without(["b"]).mounts + (-2,) == (row, -2)
+    assert [path.name for path in tmp_path.iterdir()] == ["again.csv"]
+    with pytest.raises(StructureFileError, match=r"line 2: on: neither an obstacle nor the surface.*valid: .*bar, 1"):
+        parse_structure(mounted("bar 1"))
+    with pytest.raises(StructureFileError, match="expected 12 values"):
+        parse_structure(mounted("surface", header=""))
+    with pytest.raises(UnknownNameError, match="hold a: on"):
+        Structure("none", (Hold("a", pin.SE3.Identity(), on="there"),))
+    with pytest.raises(ShapeError, match=r"Hold\.on"):
+        Hold("a", pin.SE3.Identity(), on=" there")
+    assert parse_structure(mounted("")).digest != parse_structure(mounted("surface")).digest

@@ -45,6 +45,11 @@ COMMANDS = {
         "Walk on a structure of holds with three arms, or end over end, and leave log, "
         "plan, check, pictures and a page.",
     ),
+    "check": Listed(
+        "walking.walk",
+        "check",
+        "Check the walk in a run's folder; exit code 4 if it violates anything.",
+    ),
     "plans": Listed(
         "walking.walk", "plans", "Show what two plans do differently, one line each; exit code 1 if there is anything."
     ),
@@ -64,6 +69,11 @@ COMMANDS = {
         "ikor",
         "Run the published driver of redundant arms: its own trajectories, "
         "printed norms beside, or one from its files.",
+    ),
+    "relative-motion": Listed(
+        "relative_motion",
+        "relative_motion",
+        "Reproduce the published tables of compensation of relative motion, with exact straight lines beside them.",
     ),
     "explore": Listed(
         "explore",

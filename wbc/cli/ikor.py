@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import datetime
 import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -100,6 +99,7 @@ def ikor(
 
     import numpy as np
 
+    from wbc.cli.console import run_folder
     from wbc.published.ikor import Method, Settings
 
     if jacobian is not None:
@@ -125,7 +125,7 @@ def ikor(
     else:
         path = files.read_trajectory(trajectory, machine, angles)
     balls = files.read_spheres(spheres) if spheres else np.zeros((0, 4))
-    folder = _folder(out, force)
+    folder = run_folder("ikor", out, force)
     run = driver.Driver(machine, settings, balls).run(path)
     files.write_angles(folder / "CheezyAngles", machine, run.q)
     files.write_trajectory(folder / "TrajectoryPts", machine, path, folder / "EulerAngles")
@@ -191,6 +191,7 @@ def _published(case: str | None, config: str | None, legacy: bool, method: int, 
     from rich.table import Table
 
     from wbc.cli.console import out as console
+    from wbc.cli.console import run_folder
     from wbc.published import ikor as published
     from wbc.published.ikor import cases
 
@@ -211,7 +212,7 @@ def _published(case: str | None, config: str | None, legacy: bool, method: int, 
         key = f"{t}-{c}"
         figures[key] = {"values": len(off), "rms": rms, "largest": worst, "last_error": float(run.errors[-1])}
         runs[key] = (run, table_of)
-    folder = _folder(out, force)
+    folder = run_folder("ikor", out, force)
     console().print(table)
     console().print("differences: ln(measured / printed)", style="dim")
     if len(chosen) == 1:
@@ -227,19 +228,6 @@ def _steps(run: Run, printed: Any) -> None:
         step = int(printed.steps[k])
         numbers = (printed.fsp[k], printed.pseudo_inverse[k], run.norms[step - 1])
         typer.echo(f"{step:6d} " + " ".join(f"{x:14.6f}" for x in numbers))
-
-
-def _folder(out: Path | None, force: bool) -> Path:
-    from wbc.cli.console import OutputError
-
-    folder = out or Path("runs") / f"ikor-{datetime.datetime.now():%Y%m%d-%H%M%S}"
-    if (folder / "summary.json").exists() and not force:
-        raise OutputError("out", str(folder), "there is a run in this folder; choose another, or use --force")
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise OutputError("out", str(folder), f"cannot be written: {error.strerror}") from error
-    return folder
 
 
 def _written(folder: Path, figures: dict[str, Any], runs: dict[str, Any]) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import datetime
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,7 +14,8 @@ from rich.progress import Progress
 from rich.table import Table
 
 from wbc import validation
-from wbc.cli.console import OutputError, err, out, progress_bar
+from wbc.cli.console import err, out, progress_bar
+from wbc.cli.folders import run_folder
 from wbc.controller import Controller
 from wbc.interrupts import interrupts
 from wbc.record.recording import RecordingError
@@ -73,7 +73,9 @@ def perform(plan: PathRun, output: Output) -> None:
         WbcError: bad input; nothing is written then but an empty folder.
     """
     validation.one_of("log", output.log, FORMATS)
-    folder = prepare(plan, output)
+    written = (*(f"log.{kind}" for kind in FORMATS), RECORDING, "summary.json")
+    name = f"{plan.robot.name}-{plan.label}"
+    folder = run_folder(output.folder, name, written, output.force, field="output")
     stopper, console = Stopper(), err()
     with progress_bar() as bar:
         stage = bar.add_task("compiling", total=None)
@@ -118,26 +120,6 @@ def _drawn(plan: PathRun, log: Log, folder: Path, bar: Progress, stage: Any) -> 
     bar.update(stage, description="picture")
     picture = save_picture(log, plan.robot, folder / "overview.png")
     return files if picture is None else [*files, picture]
-
-
-def prepare(plan: PathRun, output: Output) -> Path:
-    """The run folder, made.
-
-    Raises:
-        OutputError: it has a run and ``force`` is off, or it cannot be made.
-    """
-    stamp = datetime.datetime.now().strftime("%Y%m%d-%H%M%S")
-    folder = output.folder or Path("runs") / f"{plan.robot.name}-{plan.label}-{stamp}"
-    logs = [folder / f"log.{kind}" for kind in FORMATS]
-    if any(log.exists() for log in logs) and not output.force:
-        raise OutputError("output", str(folder), "there is a run in this folder; choose another, or use --force")
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        for log in (*logs, folder / RECORDING):
-            log.unlink(missing_ok=True)
-    except OSError as error:
-        raise OutputError("output", str(folder), f"cannot be written: {error.strerror}") from error
-    return folder
 
 
 def start_warnings(log: Log) -> list[str]:

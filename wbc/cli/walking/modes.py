@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import os
+import select
 import sys
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 from wbc.cli.console import err
 from wbc.cli.walking.keyboard import HELP, KeyCommands
@@ -14,54 +17,52 @@ from wbc.terminal import terminal, terminal_keys
 from wbc.walking.planner.plan import Regrasp
 from wbc.walking.report.figures import least_time_figure
 from wbc.walking.run.carrying_out import Progress
-from wbc.walking.run.request import DriveRequest, PathRequest, Request, TwoEndedRequest
-from wbc.walking.run.resume_mode import read_resume
+from wbc.walking.run.request import DriveRequest, PathRequest, Request
+from wbc.walking.run.resume_mode import ResumeRequest
 from wbc.walking.run.session import WalkRun, mode_of, perform, perform_walk
 
-#: (back end, progress, whether to stop) -> what was done
-Perform = Callable[[str, Progress, Callable[[], bool]], WalkRun]
+#: Time between two looks at whether a walk is to stop that waits for an answer [s]
+WAIT = 0.1
+#: (back end, progress, whether to stop, the run's folder) -> what was done
+Perform = Callable[[str, Progress, Callable[[], bool], Path], WalkRun]
 
 
 def performance(
-    request: Request,
-    machine: Walker,
-    resume: str = "",
-    ask: bool = False,
-    least_time: bool = False,
-    points: tuple[str, ...] = (),
+    request: Request | ResumeRequest, machine: Walker, ask: bool = False, least_time: bool = False
 ) -> Perform:
     """The run of a request, not begun yet.
 
     Args:
-        resume: a run's folder, perhaps with @SECONDS; "": none. points: where a resumed run goes, as they were typed.
         ask: whether re-grasps are proposed. least_time: whether the least time of the plan is among the figures.
 
     Raises:
         what the modes raise for bad input.
     """
     if least_time:
-        planned = isinstance(request, PathRequest) and not request.free_start and not resume
-        if not planned:
-            raise RangeError("least-time", True, "it is of a plan of three arms that hold, by the planner 'free'")
-        return _with_least_time(performance(request, machine, resume, ask))
-    if isinstance(request, PathRequest) and request.plan and resume:
-        raise RangeError("plan", request.plan, "a resumed run is planned anew")
-    if ask and (resume or not isinstance(request, PathRequest)):
+        if not isinstance(request, PathRequest) or request.free_start:
+            raise RangeError("least-time", True, "it is of a plan of arms that hold, by the planner 'free'")
+        return _with_least_time(performance(request, machine, ask))
+    if ask and not isinstance(request, PathRequest):
         raise RangeError("ask", ask, "only walks along a path ask")
-    if isinstance(request, TwoEndedRequest) and resume:
-        raise RangeError("resume", resume, "runs of the two-ended arm are not resumed")
-    if isinstance(request, DriveRequest) and request.commands == "keyboard" and not resume:
+    if isinstance(request, DriveRequest) and request.commands == "keyboard":
         terminal("commands")
-        return lambda backend, report, stop: _driven_by_keys(request, machine, backend, stop)
-    mode = mode_of(read_resume(resume, points) if resume else request, machine, _answer if ask else None)
-    return lambda backend, report, stop: perform(mode, backend=backend, progress=report, stop=stop)
+        return lambda backend, report, stop, folder: _driven_by_keys(request, machine, backend, stop, folder)
+    lines = Lines() if ask else None
+    mode = mode_of(request, machine, None if lines is None else lines.answer)
+
+    def run(backend: str, report: Progress, stop: Callable[[], bool], folder: Path) -> WalkRun:
+        if lines is not None:
+            lines.stop = stop
+        return perform(mode, backend=backend, progress=report, stop=stop, folder=folder)
+
+    return run
 
 
 def _with_least_time(run: Perform) -> Perform:
     """The same run, with the least time of its plan among its figures; without it where there is no whole plan."""
 
-    def both(backend: str, report: Progress, stop: Callable[[], bool]) -> WalkRun:
-        done = run(backend, report, stop)
+    def both(backend: str, report: Progress, stop: Callable[[], bool], folder: Path) -> WalkRun:
+        done = run(backend, report, stop, folder)
         if done.plan is None or not done.plan.complete:
             return done
         report("least time", None)
@@ -70,15 +71,48 @@ def _with_least_time(run: Perform) -> Perform:
     return both
 
 
-def _driven_by_keys(request: DriveRequest, machine: Walker, backend: str, stop: Callable[[], bool]) -> WalkRun:
+def _driven_by_keys(
+    request: DriveRequest, machine: Walker, backend: str, stop: Callable[[], bool], folder: Path
+) -> WalkRun:
     with terminal_keys() as read:
         err().print(HELP)
-        return perform_walk(request, machine, commands=KeyCommands(read), backend=backend, stop=stop)
+        commands = KeyCommands(read)
+        return perform_walk(request, machine, commands=commands, backend=backend, stop=stop, folder=folder)
 
 
-def _answer(step: Regrasp, refused: str) -> str:
-    """A line from the standard input; empty, also at its end, is a yes."""
-    if refused:
-        err().print(refused, markup=False)
-    err().print(f"{step.arm}: {step.source} -> {step.target}? [Enter: yes, or another hold]", markup=False)
-    return sys.stdin.readline().strip()
+class Lines:
+    """Answers to proposals: lines of the standard input, until it ends or somebody stops the walk.
+
+    Attributes:
+        stop: asked while nobody has answered yet; true: there is no answer.
+    """
+
+    def __init__(self) -> None:
+        self.stop: Callable[[], bool] = lambda: False
+        self._read = b""
+
+    def answer(self, step: Regrasp, refused: str) -> str | None:
+        """A line, "" for yes, or another hold; None at the end of the input or of the walk: nobody says yes."""
+        if refused:
+            err().print(refused, markup=False)
+        question = f"{step.arm}: {step.source} -> {step.target}? [Enter: yes, another hold, or Ctrl-D: stop]"
+        err().print(question, markup=False)
+        return self._line()
+
+    def _line(self) -> str | None:
+        try:
+            number = sys.stdin.fileno()
+        except (OSError, ValueError):  # no file, as in a test
+            line = sys.stdin.readline()
+            return line.strip() if line else None
+        # A line that waits in a buffer of sys.stdin would not be seen by select, and readline would not hear a stop
+        while b"\n" not in self._read:
+            if self.stop():
+                return None
+            if select.select([number], [], [], WAIT)[0]:
+                some = os.read(number, 4096)
+                if not some:
+                    return None
+                self._read += some
+        line, _, self._read = self._read.partition(b"\n")
+        return line.decode(errors="replace").strip()

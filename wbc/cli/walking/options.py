@@ -16,6 +16,10 @@ _SCENE, _HOW, _OUTPUT = "What it does", "How it is done", "What it writes"
 RobotName = Annotated[
     str, typer.Option("--robot", help="three-armed, or two-ended: end over end, --gait.", rich_help_panel=_SCENE)
 ]
+Arms = Annotated[
+    int,
+    typer.Option(help="Arms of the body, 2 to 6; with more than three it is larger.", rich_help_panel=_SCENE),
+]
 Gait = Annotated[str, typer.Option(help="Of the two-ended arm: inchworm, turnaround or any.", rich_help_panel=_SCENE)]
 StructureName = Annotated[
     str,
@@ -75,7 +79,7 @@ RunFolder = Annotated[
 ]
 Force = Annotated[bool, typer.Option(help="Write into a folder that has a run.", rich_help_panel=_OUTPUT)]
 Check = Annotated[bool, typer.Option(help="Run the external checker.", rich_help_panel=_OUTPUT)]
-Strict = Annotated[bool, typer.Option(help="End with 4 if the checker finds a violation.", rich_help_panel=_OUTPUT)]
+Strict = Annotated[bool, typer.Option("--strict", help="Old: a violation ends with 4 anyway.", hidden=True)]
 Pictures = Annotated[
     bool, typer.Option(help="Draw plots, stills, animation and the replay page.", rich_help_panel=_OUTPUT)
 ]
@@ -102,8 +106,14 @@ Ask = Annotated[
     bool,
     typer.Option(
         "--ask",
-        help="Propose every re-grasp: a line of input is empty for yes, or another hold.",
+        help="Propose every re-grasp: a line of input is empty for yes, or another hold; at its end the walk stops.",
         rich_help_panel=_HOW,
     ),
 ]
-Resume = Annotated[str, typer.Option(help="Go on with a run: its folder, or FOLDER@SECONDS.", rich_help_panel=_SCENE)]
+Resume = Annotated[
+    str,
+    typer.Option(
+        help="Go on with a run, ended or killed: its folder, or FOLDER@SECONDS. It keeps structure, robot and rates.",
+        rich_help_panel=_SCENE,
+    ),
+]

@@ -1,4 +1,4 @@
-"""``wbc walk``: a walk on holds, planned, carried out, checked and shown; ``wbc plans`` compares two plans."""
+"""``wbc walk``: a walk on holds, planned, carried out, checked and shown; ``wbc check`` and ``wbc plans`` read runs."""
 
 from __future__ import annotations
 
@@ -9,10 +9,17 @@ import typer
 
 from wbc.cli.walking import options
 
+#: Parameters that a run which is gone on with takes; all others are its own already
+RESUMED = ("resume", "to", "change", "arms", "ask", "least_time")
+#: Parameters about how a walk is done and what it writes
+ANYWAY = ("backend", "output", "force", "check", "strict", "pictures")
+
 
 def walk(
+    context: typer.Context,
     structure: options.StructureName = "",
     robot: options.RobotName = "three-armed",
+    arms: options.Arms = 3,
     gait: options.Gait = "any",
     mode: options.Mode = "velocity",
     speed: options.Speed = options.SPEED,
@@ -43,16 +50,24 @@ def walk(
 ) -> None:
     """Walk on a structure of holds with three arms, or end over end, and leave log, plan, check, pictures and a page.
 
-    Ends with 3 if the walk is not possible or does not arrive. Ctrl-C ends it early; what was done until then is
-    written all the same.
+    Ends with 3 if the walk is not possible or does not arrive, with 4 if the checker finds a violation. Ctrl-C ends it
+    early; what was done until then is written all the same, and so is what a kill leaves.
     """
-    from wbc import robots
+    from wbc.cli.console import err
     from wbc.cli.walking.modes import performance
-    from wbc.cli.walking.run import changed_data, new_folder, walk_free, walk_published
+    from wbc.cli.walking.run import changed_machine, new_folder, walk_free, walk_published
     from wbc.errors import RangeError
     from wbc.walking.run.request import PublishedRequest, read_request
 
-    two_ended = robot == "two-ended"
+    if strict:
+        err().print("[yellow]note[/yellow]: --strict is no longer needed: a violation ends with 4 anyway")
+    if resume:
+        for name in _given(context) - {*RESUMED, *ANYWAY}:
+            option = next(param for param in context.command.params if param.name == name).opts[0]
+            reason = "a run that is gone on with keeps its own; leave it out"
+            raise RangeError(option.lstrip("-"), context.params[name], reason)
+        _resumed(context, resume, tuple(to or ()), ask, least_time, check or strict)
+        return
     request = read_request(
         structure,
         mode,
@@ -74,18 +89,61 @@ def walk(
         gait,
         plan,
     )
-    if change and planner == "published":
+    if planner == "published" and (change or arms != 3):
         raise RangeError("set", change, "the published planner has numbers of its own, three_arm_walker.Calibration")
-    machine = robots.walker(data=changed_data(change or [], two_ended), two_ended=two_ended)
+    machine = changed_machine(change or [], robot == "two-ended", arms if "arms" in _given(context) else None)
     # Bad input shows before a folder is made
     if isinstance(request, PublishedRequest):
-        if resume or ask or least_time:
-            raise RangeError("planner", planner, "resuming, asking and the least time are of the planner 'free'")
-        walk_published(request, new_folder(request, output, force))
+        if ask or least_time:
+            raise RangeError("planner", planner, "asking and the least time are of the planner 'free'")
+        walk_published(request, new_folder(request.site.structure, output, force))
         return
-    perform = performance(request, machine, resume, ask, least_time, tuple(to or ()))
-    folder = new_folder(request, output, force)
-    walk_free(perform, machine, folder, backend, check or strict, pictures, strict)
+    perform = performance(request, machine, ask, least_time)
+    folder = new_folder(request.site.structure, output, force)
+    walk_free(perform, machine, folder, backend, check or strict, pictures)
+
+
+def _given(context: typer.Context) -> set[str]:
+    """Names of the parameters that the user gave."""
+    return {
+        name
+        for name in context.params
+        if (source := context.get_parameter_source(name)) is not None and source.name == "COMMANDLINE"
+    }
+
+
+def _resumed(
+    context: typer.Context, resume: str, points: tuple[str, ...], ask: bool, least_time: bool, check: bool
+) -> None:
+    """Go on with a run, or begin one again that was ended before it walked."""
+    from wbc.cli.walking.modes import performance
+    from wbc.cli.walking.run import changed_machine, new_folder, walk_free
+    from wbc.errors import RangeError
+    from wbc.walking.run.resume_mode import going_on, machine_walked, read_resume
+
+    given, of = context.params, read_resume(resume, points)
+    output = given["output"]
+    if output is not None and output.resolve() == Path(of.folder).resolve():
+        raise RangeError("out", str(output), "this is the folder of the run that is gone on with; it needs its own")
+    request = going_on(of)
+    machine = machine_walked(request, Path(of.folder))
+    named = _given(context)
+    if "arms" in named and given["arms"] != len(machine.arms):
+        raise RangeError("arms", given["arms"], f"the run has {len(machine.arms)} arms")
+    if "change" in named:
+        machine = changed_machine(given["change"], machine.two_ended, len(machine.arms))
+    perform = performance(request, machine, ask, least_time)
+    folder = new_folder("resumed", output, given["force"])
+    walk_free(perform, machine, folder, given["backend"], check, given["pictures"])
+
+
+def check(
+    run: Annotated[Path, typer.Argument(help="Folder of a run, ended or killed.")],
+) -> None:
+    """Check the walk in a run's folder; exit code 4 if it violates anything."""
+    from wbc.cli.walking.run import check_folder
+
+    check_folder(run)
 
 
 def plans(

@@ -1,7 +1,7 @@
 """Structures as files: comma-separated rows in three sections.
 
-    id, x, y, z, ax, ay, az, rx, ry, rz, roll, max_tilt
-    h1, 0, 0, 0, 0, 0, -1, 1, 0, 0, free, 0.05
+    id, x, y, z, ax, ay, az, rx, ry, rz, roll, max_tilt, on
+    h1, 0, 0, 0, 0, 0, -1, 1, 0, 0, free, 0.05, surface
 
     [obstacles]
     id, shape, x, y, z, ax, ay, az, rx, ry, rz, d1, d2, d3
@@ -14,11 +14,12 @@
 
 (x, y, z) is the origin [m], (ax, ay, az) the z axis and (rx, ry, rz) the direction whose part across it is the x axis,
 of any length. Holds come first, with z the approach direction, roll ``free``, ``fixed`` or a whole number from 2 to
-360, and max_tilt [rad]. The numbers d1, d2, d3 of a box are its sides along x, y, z; of a capsule radius and length
-between the centres of its ends, along z; of a sphere its radius; of a cylinder, which has flat ends, radius and length
-along z. Of a mesh d1 is an STL file, by its path from the structure's file, whose surface is closed, and d2 what its
-lengths are multiplied by (1 if empty). Of a ``cylinder`` surface d1 is the radius about z, and a ``plane`` has none.
-A text with a comma in it stands in double quotes. Empty lines and lines that begin with ``#`` do not count.
+360, max_tilt [rad], and what the hold is mounted on: the id of an obstacle, ``surface``, or nothing where nobody says;
+the column ``on`` may be left out. The numbers d1, d2, d3 of a box are its sides along x, y, z; of a capsule radius and
+length between the centres of its ends, along z; of a sphere its radius; of a cylinder, which has flat ends, radius and
+length along z. Of a mesh d1 is an STL file, by its path from the structure's file, whose surface is closed, and d2 what
+its lengths are multiplied by (1 if empty). Of a ``cylinder`` surface d1 is the radius about z, and a ``plane`` has
+none. A text with a comma in it stands in double quotes. Empty lines and lines that begin with ``#`` do not count.
 """
 
 from __future__ import annotations
@@ -39,7 +40,7 @@ from wbc.clearance import TriangleMesh
 from wbc.errors import StructureFileError, WbcError
 from wbc.shapes import Box, Capsule, Cylinder, Sphere
 from wbc.validation import Array
-from wbc.walking.holds.hold import Hold, checked_id, checked_roll, frame_of
+from wbc.walking.holds.hold import SURFACE, Hold, checked_id, checked_roll, frame_of
 from wbc.walking.holds.obstacle import Obstacle, ObstacleShape
 from wbc.walking.holds.structure import Structure
 from wbc.walking.holds.surface import CylinderSurface, PlaneSurface, Surface
@@ -47,10 +48,12 @@ from wbc.walking.holds.surface import CylinderSurface, PlaneSurface, Surface
 _POSE = ("x", "y", "z", "ax", "ay", "az", "rx", "ry", "rz")
 #: Section -> its columns; the first has no line of its own
 COLUMNS: Mapping[str, tuple[str, ...]] = {
-    "holds": ("id", *_POSE, "roll", "max_tilt"),
+    "holds": ("id", *_POSE, "roll", "max_tilt", "on"),
     "obstacles": ("id", "shape", *_POSE, "d1", "d2", "d3"),
     "surface": ("shape", *_POSE, "d1"),
 }
+#: Section -> how many of its last columns may be left out
+OPTIONAL: Mapping[str, int] = {"holds": 1, "obstacles": 0, "surface": 0}
 #: Shape -> how many of d1, d2, d3 it has; a mesh has a file
 _OBSTACLES = {"box": 3, "capsule": 2, "sphere": 1, "cylinder": 2}
 _SURFACES = {"plane": 0, "cylinder": 1}
@@ -80,24 +83,26 @@ def parse_structure(text: str, name: str = "structure", folder: str | os.PathLik
     """
     validation.instance("text", text, str, "text")
     beside = validation.file_path("folder", folder)
-    section, header = "holds", False
+    section = "holds"
+    header: Sequence[str] = ()
     holds: dict[str, Hold] = {}
     obstacles: dict[str, Obstacle] = {}
+    lines = dict[str, _Row]()
     surface: Surface | None = None
     for number, line in enumerate(text.splitlines(), start=1):
         if not line.strip() or line.lstrip().startswith("#"):
             continue
         if line.lstrip().startswith("["):
-            section, header = _section(number, line), False
+            section, header = _section(number, line), ()
             continue
         cells = _cells(number, line)
         if not header:
-            _check_header(number, cells, COLUMNS[section])
-            header = True
+            header = _header(number, cells, section)
             continue
-        row = _row(number, cells, COLUMNS[section])
+        row = _row(number, cells, header)
         if section == "holds":
             _add(number, holds, _hold(row))
+            lines[row.cells["id"]] = row
         elif section == "obstacles":
             _add(number, obstacles, _obstacle(row, beside))
         elif surface is not None:
@@ -106,6 +111,11 @@ def parse_structure(text: str, name: str = "structure", folder: str | os.PathLik
             surface = _surface(row)
     if not holds:
         raise StructureFileError("holds", name, "the file has no hold")
+    there = [*([] if surface is None else [SURFACE]), *obstacles]
+    for hold in holds.values():
+        if hold.on and hold.on not in there:
+            reason = "neither an obstacle nor the surface of this file"
+            raise StructureFileError(lines[hold.id].field("on"), hold.on, reason, there)
     return Structure(name, tuple(holds.values()), tuple(obstacles.values()), surface)
 
 
@@ -119,12 +129,16 @@ def save_structure(structure: Structure, path: str | os.PathLike[str]) -> pathli
     """
     validation.instance("structure", structure, Structure, "a Structure")
     file = validation.file_path("path", path)
+    mounted = any(hold.on for hold in structure.holds)
+    # Written beside its place and renamed into it, so that no reader ever meets half a file
+    fresh = file.with_name(f".{file.name}")
     try:
-        with file.open("w", encoding="utf-8", newline="") as stream:
+        with fresh.open("w", encoding="utf-8", newline="") as stream:
             out = _Writer(stream)
-            out.writerow(COLUMNS["holds"])
+            out.writerow(COLUMNS["holds"] if mounted else COLUMNS["holds"][:-1])
             for hold in structure.holds:
-                out.writerow([hold.id, *_numbers(hold.pose), hold.roll, repr(hold.max_tilt)])
+                on = [_quoted(hold.on)] if mounted else []
+                out.writerow([hold.id, *_numbers(hold.pose), hold.roll, repr(hold.max_tilt), *on])
             if structure.obstacles:
                 stream.write("\n[obstacles]\n")
                 out.writerow(COLUMNS["obstacles"])
@@ -142,22 +156,28 @@ def save_structure(structure: Structure, path: str | os.PathLike[str]) -> pathli
                 round_ = isinstance(structure.surface, CylinderSurface)
                 size = repr(structure.surface.radius) if isinstance(structure.surface, CylinderSurface) else ""
                 out.writerow(["cylinder" if round_ else "plane", *_numbers(structure.surface.pose), size])
+        fresh.replace(file)
     except OSError as error:
         raise StructureFileError("path", str(path), f"cannot be written: {error.strerror}") from error
     return file
 
 
 class _Writer:
-    """Rows of cells; the first is quoted where it would be read as something else."""
+    """Rows of cells; names are quoted where they would be read as something else."""
 
     def __init__(self, stream: TextIO) -> None:
         self.stream = stream
 
     def writerow(self, cells: Sequence[Any]) -> None:
         first, *rest = (str(cell) for cell in cells)
-        if first[0] in "#[" or any(sign in first for sign in ',"'):
-            first = '"' + first.replace('"', '""') + '"'
-        self.stream.write(",".join([first, *rest]) + "\n")
+        self.stream.write(",".join([_quoted(first), *rest]) + "\n")
+
+
+def _quoted(text: str) -> str:
+    """A cell of a name."""
+    if text[:1] in ("#", "[") or any(sign in text for sign in ',"'):
+        return '"' + text.replace('"', '""') + '"'
+    return text
 
 
 class _Row:
@@ -227,7 +247,9 @@ def _hold(row: _Row) -> Hold:
     text = row.text("roll")
     whole = text.isdecimal() and len(text) < 9
     roll = row.made("roll", lambda: checked_roll("roll", int(text) if whole else text))
-    found: Hold = row.made("max_tilt", lambda: Hold(name, pose, roll, tilt))
+    on = row.cells.get("on", "")
+    row.made("on", lambda: on and checked_id("on", on))
+    found: Hold = row.made("max_tilt", lambda: Hold(name, pose, roll, tilt, on))
     return found
 
 
@@ -249,6 +271,8 @@ def _mesh(row: _Row, folder: pathlib.Path) -> TriangleMesh:
     scale = row.real("d2", low=0.0) if row.cells["d2"] else 1.0
     if "\0" in path or pathlib.Path(path).suffix.lower() != ".stl":
         raise StructureFileError(row.field("d1"), path, "expected an STL file")
+    if not validation.is_file("d1", folder / path):
+        raise StructureFileError(row.field("d1"), path, "there is no such file")
     if scale == 0.0:
         raise StructureFileError(row.field("d2"), row.cells["d2"], "expected a scale above 0")
     try:
@@ -290,9 +314,12 @@ def _cells(number: int, line: str) -> list[str]:
         raise StructureFileError(f"line {number}", line.strip(), f"cannot be read: {error}") from error
 
 
-def _check_header(number: int, cells: Sequence[str], columns: Sequence[str]) -> None:
-    if tuple(cells) != tuple(columns):
+def _header(number: int, cells: Sequence[str], section: str) -> Sequence[str]:
+    """The columns of a section, with those that it may leave out or without."""
+    columns = COLUMNS[section]
+    if tuple(cells) not in (columns, columns[: len(columns) - OPTIONAL[section]]):
         raise StructureFileError(f"line {number}", ", ".join(cells), f"expected the columns {', '.join(columns)}")
+    return cells
 
 
 def _row(number: int, cells: Sequence[str], columns: Sequence[str]) -> _Row:

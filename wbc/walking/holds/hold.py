@@ -15,6 +15,8 @@ from wbc.validation import Array
 
 FREE = "free"
 FIXED = "fixed"
+#: What a hold is mounted on, besides obstacles: the structure's surface
+SURFACE = "surface"
 #: Most positions of an n-fold roll
 MOST_ROLLS = 360
 #: An axis and a roll reference closer to each other than this [rad] leave the roll undetermined
@@ -35,15 +37,19 @@ class Hold:
         roll: ``"free"``, ``"fixed"`` (the hand's x axis along the hold's) or n, 2 to 360 (fixed, or turned by a
             multiple of 2 pi / n).
         max_tilt: largest angle between the two z axes while closed [rad]; 0 fixes them.
+        on: what it is mounted on, which a hand at it may touch: the id of an obstacle, ``"surface"``, or "" where
+            nobody says.
 
     Raises:
-        ShapeError, NotFiniteError, RotationError: a bad pose or an empty id. RangeError: a roll or tilt that is none.
+        ShapeError, NotFiniteError, RotationError: a bad pose, or a text that is no id. RangeError: a roll or tilt that
+            is none.
     """
 
     id: str
     pose: pin.SE3
     roll: str | int = FREE
     max_tilt: float = 0.0
+    on: str = ""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "id", checked_id("Hold.id", self.id))
@@ -51,6 +57,7 @@ class Hold:
         object.__setattr__(self, "roll", checked_roll("Hold.roll", self.roll))
         tilt = validation.scalar("Hold.max_tilt", self.max_tilt, low=0.0, high=pi / 2, unit="rad")
         object.__setattr__(self, "max_tilt", tilt)
+        object.__setattr__(self, "on", self.on if self.on == "" else checked_id("Hold.on", self.on))
 
     @property
     def position(self) -> Array:
@@ -72,7 +79,7 @@ class Hold:
 
     def moved(self, pose: pin.SE3) -> Hold:
         """The same hold on a structure that was moved by ``pose``."""
-        return Hold(self.id, pose * self.pose, self.roll, self.max_tilt)
+        return Hold(self.id, pose * self.pose, self.roll, self.max_tilt, self.on)
 
 
 def checked_id(field: str, value: Any) -> str:

@@ -15,9 +15,12 @@ from wbc import validation
 from wbc.clearance import TriangleMesh
 from wbc.errors import DuplicateNameError, ShapeError, UnknownNameError
 from wbc.validation import Array
-from wbc.walking.holds.hold import FREE, Hold
+from wbc.walking.holds.hold import FREE, SURFACE, Hold
 from wbc.walking.holds.obstacle import Obstacle
 from wbc.walking.holds.surface import CylinderSurface, PlaneSurface, Surface
+
+#: Of :attr:`Structure.mounts`, where it is no row of an obstacle
+ON_SURFACE, NOT_SAID = -1, -2
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +34,8 @@ class Structure:
         surface: what the holds stand on, if it has a formula.
 
     Raises:
-        ShapeError: no holds, or things of another type. DuplicateNameError: two of one id.
+        ShapeError: no holds, or things of another type. DuplicateNameError: two of one id. UnknownNameError: a hold on
+            something that is not there.
     """
 
     name: str
@@ -54,6 +58,10 @@ class Structure:
             raise ShapeError("Structure.holds", (), "expected at least one hold")
         if self.surface is not None and not isinstance(self.surface, (PlaneSurface, CylinderSurface)):
             raise ShapeError("Structure.surface", self.surface, "expected a PlaneSurface, a CylinderSurface or None")
+        there = {"", *(obstacle.id for obstacle in self.obstacles), *([] if self.surface is None else [SURFACE])}
+        for hold in self.holds:
+            if hold.on not in there:
+                raise UnknownNameError(f"hold {hold.id}: on", hold.on, sorted(there - {""}))
 
     def __getitem__(self, hold: str) -> Hold:
         """The hold of an id.
@@ -122,11 +130,18 @@ class Structure:
         return tuple(hold.roll == FREE for hold in self.holds)
 
     @cached_property
+    def mounts(self) -> tuple[int, ...]:
+        """What each hold is mounted on: the row of an obstacle, :data:`ON_SURFACE`, or :data:`NOT_SAID`."""
+        rows = {"": NOT_SAID, SURFACE: ON_SURFACE} | {obstacle.id: k for k, obstacle in enumerate(self.obstacles)}
+        return tuple(rows[hold.on] for hold in self.holds)
+
+    @cached_property
     def digest(self) -> str:
         """First 12 digits of the SHA-256 of holds, obstacles and surface."""
         h = hashlib.sha256()
         for hold in self.holds:
-            h.update(f"{hold.id} {hold.roll} {hold.max_tilt.hex()}".encode() + _bytes(hold.pose))
+            on = f" {hold.on}" if hold.on else ""
+            h.update(f"{hold.id} {hold.roll} {hold.max_tilt.hex()}{on}".encode() + _bytes(hold.pose))
         for obstacle in self.obstacles:
             shape = obstacle.shape
             text = f"{obstacle.id} {'mesh' if isinstance(shape, TriangleMesh) else shape}".encode()

@@ -14,15 +14,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wbc import validation
-from wbc.errors import NotFiniteError, RangeError, RotationError, ShapeError, WbcError
+from wbc.errors import NotFiniteError, RangeError, RotationError, ShapeError
 from wbc.validation import Array
+from wbc.walking.log.part import FILE as FILE
+from wbc.walking.log.part import PART, read_part
+from wbc.walking.log.part import WalkLogError as WalkLogError
+from wbc.walking.log.ticks import TICK
 
 Integers = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 
 FORMAT = 1
-#: Name of the file in a run's folder
-FILE = "run.npz"
 #: What a hand does; the log has the index. A hand holds only while it is closed
 HAND_STATES = ("open", "closing", "closed", "opening")
 OPEN, CLOSING, CLOSED, OPENING = range(4)
@@ -41,8 +43,20 @@ META: Mapping[str, type | tuple[type, ...]] = {
 _FORMAT = "format"
 
 
-class WalkLogError(WbcError):
-    """A log of a walk that is missing, cannot be read or written, or is of another format."""
+#: Fields with a row a tick, in the order in which ``run.part`` has them
+ROW = (
+    *("t", "pose_body_in_structure", "q", "v", "twist_body", "hand_state", "hand_hold", "body_fixed"),
+    *("command", "command_kind"),
+)
+#: When a hold was there, in ``run.part``
+PRESENCE = np.dtype([("presence_hold", "i8"), ("presence_span", "f8", 2)])
+
+
+def row_dtype(joints: int, arms: int) -> np.dtype[Any]:
+    """A row of a log with so many joints and arms: its fields :data:`ROW`."""
+    sizes: list[Any] = [("f8",), ("f8", (7,)), ("f8", (joints,)), ("f8", (joints,)), ("f8", (6,))]
+    sizes += [("i8", (arms,)), ("i8", (arms,)), ("?",), ("f8", (7,)), ("i8",)]
+    return np.dtype([(name, *size) for name, size in zip(ROW, sizes, strict=True)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,14 +173,17 @@ class WalkLog:
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> WalkLog:
-        """The log in a file, or in a run's folder.
+        """The log in a file, or in a run's folder: of a run that was killed as far as it was written, ``run.part``.
 
         Raises:
             WalkLogError: no such file, no log of a walk, another format, or a field that is missing.
             ShapeError, NotFiniteError, RangeError, RotationError: a field that cannot be; the message names it.
         """
         file = pathlib.Path(path)
-        file = file / FILE if file.is_dir() else file
+        if file.is_dir():
+            if not (file / FILE).is_file() and (file / PART).is_file():
+                return cls(**_from_part(file / PART))
+            file = file / FILE
         if not file.is_file():
             raise WalkLogError(
                 "run", str(path), f"there is no {FILE}" if file.name == FILE else "there is no such file"
@@ -194,6 +211,42 @@ class WalkLog:
     def _set(self, name: str, array: NDArray[Any]) -> None:
         array.flags.writeable = False
         object.__setattr__(self, name, array)
+
+
+def _from_part(file: pathlib.Path) -> dict[str, Any]:
+    """The fields of a log out of what was written while walking.
+
+    Raises:
+        WalkLogError: nothing was, or something else.
+    """
+    arrays = read_part(file)
+    if not arrays:
+        raise WalkLogError("run", str(file.parent), "the run was ended before it walked")
+    try:
+        text = json.loads(str(arrays[0]))
+        if text["format"] != FORMAT:
+            raise WalkLogError("run.format", text["format"], f"this version reads format {FORMAT}")
+        dtype, presence = row_dtype(len(text["joints"]), len(text["arms"])), np.zeros(0, PRESENCE)
+        rows, ticks = [np.zeros(0, dtype)], 0
+        for array in arrays[2:]:
+            if array.dtype == dtype:
+                rows.append(array)
+            elif array.dtype == TICK:
+                ticks += len(array)
+            else:
+                presence = array
+        whole = np.concatenate(rows)[:ticks]
+        if len(whole) < 2:
+            raise WalkLogError("run", str(file.parent), "the run was ended before its first ticks were written")
+        out: dict[str, Any] = {name: np.ascontiguousarray(whole[name]) for name in ROW}
+        out |= {name: np.array(arrays[1][name]) for name in ("hold_id", "hold_pose", "hold_roll", "hold_max_tilt")}
+        out |= {name: np.array(presence[name]) for name in ("presence_hold", "presence_span")}
+        names = {name: tuple(text[name]) for name in ("joints", "arms", "hands")}
+        return {**names, **out, "meta": text["meta"]}
+    except WalkLogError:
+        raise
+    except (IndexError, KeyError, TypeError, ValueError) as error:
+        raise WalkLogError("run", str(file), f"no log of a walk: {error}") from error
 
 
 def _names(name: str, value: Any) -> tuple[str, ...]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-import itertools
+import json
 from collections.abc import Mapping, Sequence
 from importlib.metadata import PackageNotFoundError, version
 from math import inf
@@ -18,7 +18,8 @@ from wbc.errors import RangeError, ShapeError, UnknownNameError
 from wbc.validation import Array
 from wbc.walking.holds.hold import FIXED, FREE
 from wbc.walking.holds.structure import Structure
-from wbc.walking.log.log import WalkLog
+from wbc.walking.log.log import FORMAT, PRESENCE, ROW, WalkLog, row_dtype
+from wbc.walking.log.part import Records
 
 #: Packages whose versions a log states, beside this one's
 PACKAGES = ("numpy", "pin", "casadi", "daqp")
@@ -26,6 +27,8 @@ PACKAGES = ("numpy", "pin", "casadi", "daqp")
 ROLLS: Mapping[Any, int] = {FREE: 0, FIXED: 1}
 #: Numbers of a command -> its index in ``COMMANDS``
 _KINDS = {0: 0, 6: 1, 7: 2}
+#: Fields of a hold besides its id
+_HOLD: list[Any] = [("hold_pose", "f8", 7), ("hold_roll", "i8"), ("hold_max_tilt", "f8")]
 
 
 class LogRecorder:
@@ -74,14 +77,8 @@ class LogRecorder:
             "seed": seed,
             "versions": dict(versions()),
         }
-        # One row a tick: t, pose, q, v, twist, command; and state, hold of every arm, kind of the command, fixed
-        ends = np.cumsum([0, 1, 7, m, m, 6, 7])
-        _, self._pose, self._q, self._v, self._twist, self._command = (
-            slice(int(i), int(j)) for i, j in itertools.pairwise(ends)
-        )
-        self._reals, self._least = np.zeros((capacity, int(ends[-1]))), int(ends[-2])
-        self._whole = np.zeros((capacity, 2 * a + 2), dtype=np.int64)
-        self._arms, self._count, self._lengths = a, 0, (7, m, m, 6, a, a)
+        self._dtype = row_dtype(m, a)
+        self._rows, self._count, self._lengths = np.zeros(capacity, self._dtype), 0, (7, m, m, 6, a, a)
         self._spans: list[list[float]] = [[k, -inf, inf] for k in range(len(structure))]
 
     def __len__(self) -> int:
@@ -120,10 +117,10 @@ class LogRecorder:
                 (*lengths, len(given)),
                 f"expected {self._lengths} numbers of pose, q, v, twist, states, holds, and 0, 6 or 7 of the command",
             )
-        # Rows are made of zeros, so what a command does not have is 0
-        row = self._reals[k, : self._least + len(given)]
-        np.concatenate(((t,), numbers, q, v, twist, given), out=row)
-        self._whole[k] = (*states, *holds, _KINDS[len(given)], bool(body_fixed))
+        whole = np.zeros(7)
+        whole[: len(given)] = given
+        hands = np.asarray(states), np.asarray(holds)
+        self._rows[k] = (t, numbers, q, v, twist, *hands, bool(body_fixed), whole, _KINDS[len(given)])
         self._count = k + 1
 
     def extend(
@@ -149,16 +146,61 @@ class LogRecorder:
         if found != wanted or width not in (6, 7):
             raise ShapeError("ticks", found, f"expected {wanted}, a command of 6 or 7 numbers")
         self._grow(n)
-        rows = slice(self._count, self._count + n)
-        np.concatenate((t[:, None], pose, q, v, twist, command), axis=1, out=self._reals[rows, : self._least + width])
-        self._whole[rows] = np.column_stack((states, holds, np.full(n, _KINDS[width]), body_fixed))
+        rows = self._rows[self._count : self._count + n]
+        for name, values in zip(ROW, (t, pose, q, v, twist, states, holds, body_fixed), strict=False):
+            rows[name] = values
+        rows["command"][:, :width], rows["command"][:, width:] = command, 0.0
+        rows["command_kind"] = _KINDS[width]
         self._count += n
+
+    def begin_with(self, log: WalkLog, count: int) -> None:
+        """Take over the first ``count`` rows of a log of the same machine and holds. What vanished by then stays gone.
+
+        Raises:
+            ShapeError: another machine or other holds. RangeError: something is recorded already.
+        """
+        if self._count:
+            raise RangeError("rows", self._count, "a log is gone on with from its beginning")
+        if (log.joints, log.arms, log.hold_id) != (*self._names[:2], self._structure.ids):
+            raise ShapeError("log", log.arms, "expected a log of the same machine on the same holds")
+        self._grow(count)
+        for name in ROW:
+            self._rows[name][:count] = getattr(log, name)[:count]
+        self._count, now = count, float(log.t[count])
+        spans = zip(log.presence_hold.tolist(), log.presence_span.tolist(), strict=True)
+        self._spans = [[row, start, end if end <= now else inf] for row, (start, end) in spans if start <= now]
+
+    def records(self, start: int = 0) -> Records:
+        """The rows from one on, as they are kept; not a copy."""
+        return self._rows[start : self._count]
+
+    def head(self) -> list[Records]:
+        """What ``run.part`` begins with: names and meta as JSON, and the table of holds."""
+        joints, arms, hands = self._names
+        text = {"format": FORMAT, "joints": joints, "arms": arms, "hands": hands, "meta": self._meta}
+        holds = np.zeros(len(self._structure), [("hold_id", f"U{max(map(len, self._structure.ids))}"), *_HOLD])
+        for name, values in self._holds().items():
+            holds[name] = values
+        return [np.array(json.dumps(text)), holds, self.presence()]
+
+    def presence(self) -> Records:
+        """When each hold was there, as ``run.part`` has it."""
+        return np.array([(int(row), (start, end)) for row, start, end in self._spans], PRESENCE)
 
     def _grow(self, count: int) -> None:
         """Arrays that are full double."""
-        while self._count + count > len(self._reals):
-            self._reals = np.concatenate([self._reals, np.zeros_like(self._reals)])
-            self._whole = np.concatenate([self._whole, np.zeros_like(self._whole)])
+        while self._count + count > len(self._rows):
+            self._rows = np.concatenate([self._rows, np.zeros_like(self._rows)])
+
+    def _holds(self) -> dict[str, Any]:
+        """The table of holds, as the log has it."""
+        holds = self._structure.holds
+        return {
+            "hold_id": self._structure.ids,
+            "hold_pose": np.array([pin.SE3ToXYZQUAT(hold.pose) for hold in holds]),
+            "hold_roll": np.array([ROLLS.get(hold.roll, hold.roll) for hold in holds]),
+            "hold_max_tilt": self._structure.tilts,
+        }
 
     def vanish(self, t: float, hold: str) -> None:
         """A hold is gone from time ``t`` [s] on.
@@ -185,28 +227,11 @@ class LogRecorder:
             ShapeError: fewer than two ticks, or names that do not fit. NotFiniteError, RangeError, RotationError: a
                 tick that cannot be.
         """
-        n, a = self._count, self._arms
-        reals, whole, holds = self._reals[:n], self._whole[:n], self._structure.holds
-        return WalkLog(
-            *self._names,
-            t=reals[:, 0],
-            pose_body_in_structure=reals[:, self._pose],
-            q=reals[:, self._q],
-            v=reals[:, self._v],
-            twist_body=reals[:, self._twist],
-            hand_state=whole[:, :a],
-            hand_hold=whole[:, a : 2 * a],
-            body_fixed=whole[:, 2 * a + 1].astype(bool),
-            command=reals[:, self._command],
-            command_kind=whole[:, 2 * a],
-            hold_id=self._structure.ids,
-            hold_pose=np.array([pin.SE3ToXYZQUAT(hold.pose) for hold in holds]),
-            hold_roll=np.array([ROLLS.get(hold.roll, hold.roll) for hold in holds]),
-            hold_max_tilt=self._structure.tilts,
-            presence_hold=np.array([span[0] for span in self._spans], dtype=np.int64),
-            presence_span=np.array([span[1:] for span in self._spans]),
-            meta=self._meta,
-        )
+        rows, presence = self._rows[: self._count], self.presence()
+        names = dict(zip(("joints", "arms", "hands"), self._names, strict=True))
+        fields: dict[str, Any] = {**names, **{name: rows[name].copy() for name in ROW}, **self._holds()}
+        fields |= {name: presence[name] for name in ("presence_hold", "presence_span")}
+        return WalkLog(**fields, meta=self._meta)
 
     def _open_span(self, hold: str, wanted: bool) -> int:
         """The span without end of a hold, if it is ``wanted``; -1 where there is none and none is."""

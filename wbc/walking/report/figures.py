@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
+import json
 import pathlib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from wbc.robots import Walker
-from wbc.track.summary import Figure, save_summary
+from wbc.track.summary import Figure
 from wbc.validation import Array
 from wbc.walking.checker import Report
+from wbc.walking.log.folder import write_whole
 from wbc.walking.log.log import CLOSED, OPENING, WalkLog
+from wbc.walking.log.ticks import TickColumns
 from wbc.walking.planner.eased import JERK
 from wbc.walking.planner.plan import Plan
 from wbc.walking.planner.swings.law import SwingLaw
-from wbc.walking.run.recording import TickColumns
 from wbc.walking.run.session import WalkRun
 
 #: Time over which speeds are means [s]
@@ -38,11 +40,16 @@ def figures_of(run: WalkRun, report: Report | None = None) -> list[Figure]:
         report: of the external checker.
     """
     data, structure = run.walker.data, run.structure
+    run = run.judged(report)
+    arms = "" if run.walker.two_ended else f" with {len(run.walker.arms)} arms"
     told = f"{run.outcome}: {run.reason}" if run.reason else run.outcome
+    if report is None and run.log is not None:
+        told += " (not checked)"
     out = [
         Figure("outcome", "outcome", run.outcome, told),
         Figure("reason", "", run.reason, ""),
-        Figure("robot", "robot", data.digest, f"{run.walker.robot.name}, {data.summary()}"),
+        Figure("robot", "robot", data.digest, f"{run.walker.robot.name}{arms}, {data.summary()}"),
+        Figure("arms", "", len(run.walker.arms), ""),
         Figure(
             "structure",
             "structure",
@@ -51,6 +58,8 @@ def figures_of(run: WalkRun, report: Report | None = None) -> list[Figure]:
         ),
     ]
     out += _plan(run)
+    if run.log is None:
+        out += run.more
     if run.log is not None and run.ticks is not None:
         out += _speed(run, run.log)
         out += _errors(run.log, run.ticks)
@@ -60,12 +69,20 @@ def figures_of(run: WalkRun, report: Report | None = None) -> list[Figure]:
 
 
 def save_figures(figures: Sequence[Figure], folder: pathlib.Path) -> list[pathlib.Path]:
-    """Writes ``summary.json``, in SI, and ``summary.txt``, as printed; returns the files."""
+    """Writes ``summary.json``, in SI, and ``summary.txt``, as printed; returns the files.
+
+    Raises:
+        WalkLogError: a file cannot be written.
+    """
     wide = max(len(figure.label) for figure in figures)
     lines = [f"{figure.label:<{wide}}  {figure.text}" for figure in figures if figure.label]
-    text = folder / "summary.txt"
-    text.write_text("\n".join(lines) + "\n")
-    return [save_summary(list(figures), folder), text]
+    values = json.dumps({figure.key: figure.value for figure in figures}, indent=1)
+    texts = {"summary.json": values, "summary.txt": "\n".join(lines)}
+    return [write_whole(folder / name, _writes(f"{text}\n")) for name, text in texts.items()]
+
+
+def _writes(text: str) -> Callable[[pathlib.Path], int]:
+    return lambda file: file.write_text(text)
 
 
 def least_time_figure(walker: Walker, plan: Plan) -> Figure:
@@ -161,8 +178,10 @@ def _machine(run: WalkRun, log: WalkLog) -> list[Figure]:
     k = int(part.max(axis=0).argmax())
     out = [Figure("rate", "largest joint rate", float(part.max()), f"{part.max():.6f} of its limit, {log.joints[k]}")]
     if not run.walker.two_ended:
-        least = float(np.nanmin(np.abs(wrist_angles(run, log))))
-        out.append(Figure("theta5", "smallest |theta5| held", least, f"{np.degrees(least):.2f} deg"))
+        angles = np.abs(wrist_angles(run, log))
+        least = float(np.where(np.isnan(angles), np.inf, angles).min())
+        if np.isfinite(least):  # else no hand held
+            out.append(Figure("theta5", "smallest |theta5| held", least, f"{np.degrees(least):.2f} deg"))
     return out
 
 

@@ -5,10 +5,13 @@ from __future__ import annotations
 import pathlib
 from collections.abc import Callable
 
-from wbc.errors import WbcError
 from wbc.robots import Walker
 from wbc.walking.checker import Report, Rules, check_run
 from wbc.walking.holds.files import save_structure
+from wbc.walking.log.folder import BEGUN, PLAN, STRUCTURE, URDF, write_whole
+from wbc.walking.log.log import FILE
+from wbc.walking.log.part import PART
+from wbc.walking.log.ticks import TICKS
 from wbc.walking.report.animation import save_animation
 from wbc.walking.report.figures import figures_of, save_figures
 from wbc.walking.report.plots import save_plots
@@ -19,56 +22,38 @@ from wbc.walking.run.carrying_out import Progress
 from wbc.walking.run.session import WalkRun
 from wbc.walking.two_ended import touching_distance
 
-PLAN, STRUCTURE, URDF = "plan.json", "structure.csv", "robot.urdf"
+CHECK = "check.txt"
 #: All files of a run, which the next one in the same folder does not leave behind
 WRITTEN = (
-    *("run.npz", "ticks.npz", "published.npz", PLAN, STRUCTURE, URDF, "check.txt", "summary.json", "summary.txt"),
+    *(BEGUN, FILE, PART, TICKS, "published.npz", PLAN, STRUCTURE, f"{pathlib.Path(STRUCTURE).stem}-*.stl", URDF),
+    *(CHECK, "summary.json", "summary.txt"),
     *(f"{name}.png" for name in ("holds", "margins", "joints", "rates", "drift", "wrists", "speed", "tick_time")),
     *("reach_map.png", "walk.png", "still_*.png", "walk.gif", "replay.html"),
 )
 
 
-class RunFolderError(WbcError):
-    """A run folder that cannot be written, or that has a run already."""
-
-
-def make_folder(folder: pathlib.Path, force: bool = False) -> pathlib.Path:
-    """The folder, made, without the files of an earlier run.
-
-    Raises:
-        RunFolderError: it has a run and ``force`` is off, or it cannot be written.
-    """
-    if (folder / "summary.json").exists() and not force:
-        raise RunFolderError("out", str(folder), "there is a run in this folder; choose another, or use --force")
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        for file in [file for name in WRITTEN for file in folder.glob(name)]:
-            file.unlink()
-        # A folder that can be seen but not written says so before anything is computed
-        probe = folder / ".probe"
-        probe.touch()
-        probe.unlink()
-    except OSError as error:
-        raise RunFolderError("out", str(folder), f"cannot be written: {error.strerror}") from error
-    return folder
-
-
 def save_run(run: WalkRun, folder: pathlib.Path, check: bool = True) -> tuple[list[pathlib.Path], Report | None]:
     """Everything that is needed to read, check and repeat the run; (files, what the checker found).
 
+    The files come in an order in which the folder can be read after each of them.
+
     Args:
         check: run the external checker.
+
+    Raises:
+        WbcError: a file cannot be written.
     """
-    files = [save_structure(run.structure, folder / STRUCTURE), run.walker.urdf(folder / URDF)]
+    files = [save_structure(run.structure, folder / STRUCTURE), write_whole(folder / URDF, run.walker.urdf)]
     if run.plan is not None:
-        files.append(run.plan.save(folder / PLAN))
+        files.append(write_whole(folder / PLAN, run.plan.save))
     report = None
     if run.log is not None and run.ticks is not None:
-        files += [run.log.save(folder), run.ticks.save(folder)]
+        files += [run.ticks.save(folder), run.log.save(folder)]
+        (folder / PART).unlink(missing_ok=True)
         report = check_run(folder, rules_of(run.walker)) if check else None
         if report is not None:
-            files.append(folder / "check.txt")
-            files[-1].write_text(f"{report}\n")
+            text = f"{report}\n"
+            files.append(write_whole(folder / CHECK, lambda file: file.write_text(text)))
     return [*files, *save_figures(figures_of(run, report), folder)], report
 
 

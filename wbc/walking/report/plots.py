@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from wbc import style
 from wbc.walking.log.log import CLOSED, OPENING, WalkLog
+from wbc.walking.log.ticks import TickColumns
 from wbc.walking.report.figures import body_speed, wrist_angles
 from wbc.walking.report.surroundings import arm_colour
-from wbc.walking.run.recording import TickColumns
 from wbc.walking.run.request import DriveRequest
 from wbc.walking.run.session import WalkRun
 

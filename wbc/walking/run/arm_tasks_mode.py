@@ -18,16 +18,17 @@ from wbc.simulation import PlantError
 from wbc.track.summary import Figure
 from wbc.walking.body_path import standing_path
 from wbc.walking.log.log import WalkLog
+from wbc.walking.log.ticks import TickColumns
 from wbc.walking.loop.walk import Walk
 from wbc.walking.modes.arm_mode import ArmMode, ArmStopped
 from wbc.walking.modes.drive import standing_plan
 from wbc.walking.modes.hand_motion import ArmRefused
 from wbc.walking.planner.plan import HoldLost, Plan
-from wbc.walking.run.arm_task import ArmTask
 from wbc.walking.run.carrying_out import CarryingOut, Outcome, Progress, farthest, travelled
-from wbc.walking.run.mode import Ending, Mode, Result
-from wbc.walking.run.recording import TickColumns, WalkRecorder, as_walked
-from wbc.walking.run.request import ArmRequest
+from wbc.walking.run.mode import Ending, Mode, Result, loose_hands
+from wbc.walking.run.plausible import check_holds
+from wbc.walking.run.recording import WalkRecorder, as_walked
+from wbc.walking.run.request import ArmRequest, ArmTask
 
 Reason = Literal["reached", "time", "key", "refused"]
 #: How the run ended, by how its last task did
@@ -61,6 +62,7 @@ class ArmTasksMode(Mode[ArmRequest]):
         super().__init__(walker)
         data = walker.arm_data
         self.request, self.structure = request, request.site.build()
+        check_holds(self.structure, walker)
         for task in request.tasks:
             if task.kind == "hold":
                 self.structure.index(task.hold)
@@ -104,6 +106,10 @@ class ArmTasksMode(Mode[ArmRequest]):
             out.append(Figure("body_moved", "body moved", moved, f"at most {1e3 * moved:.3f} mm"))
         out.append(farthest(*self._mode.farthest))
         return (*out, *([] if self._mode.stopped is None else [travelled(*self._mode.stopped)]))
+
+    def missed(self, walk: Walk) -> str:
+        """The hand is to hold at the end, as the others do."""
+        return loose_hands(walk)
 
     def result(self, walk: Walk, log: WalkLog, ticks: TickColumns) -> Result:
         """The plan is what was done."""

@@ -7,6 +7,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from wbc.errors import WbcError
 from wbc.simulation import PlantError
 from wbc.track.summary import Figure
 from wbc.walking.loop.state import Tick
@@ -14,8 +15,23 @@ from wbc.walking.loop.walk import Walk
 from wbc.walking.planner.plan import HoldLost, NoPlanError
 from wbc.walking.run.recording import WalkRecorder
 
-#: How a mode ended: where it was to go, too late, its time over, by key, aborted, or why it could not go on
-Outcome = Literal["arrived", "late", "time", "key", "interrupted", "hold lost", "plant failed", "refused"]
+#: How a mode ended: where it was to go, elsewhere, too late, its time over, by key, aborted, without the yes that it
+#: asked for, or why it could not go on; and, whatever else it did, with something that the checker finds violated
+Outcome = Literal[
+    "arrived",
+    "missed",
+    "late",
+    "time",
+    "key",
+    "interrupted",
+    "declined",
+    "hold lost",
+    "plant failed",
+    "refused",
+    "violated",
+]
+#: Outcomes of a walk that did what it was to do
+WELL: tuple[Outcome, ...] = ("arrived", "time", "key")
 #: (what is done, how much of it from 0 to 1 or None)
 Progress = Callable[[str, float | None], None]
 #: Ticks between two reports of progress
@@ -61,7 +77,7 @@ class CarryingOut:
         if self.walk.plan is not self._seen:
             self._look()
         if self._stop():
-            self._abort()
+            self.abort("interrupted", f"stopped at {self.walk.time:.2f} s")
             return False
         try:
             self.recorder.tick(self._tick(), command)
@@ -71,6 +87,9 @@ class CarryingOut:
             self.outcome, self.reason = "refused", str(error)
         except PlantError as error:
             self.outcome, self.reason = "plant failed", str(error)
+        except WbcError as error:
+            # Such as a pose that the holding hands do not fix: what was walked until then is kept
+            self.outcome, self.reason = "refused", str(error)
         if len(self.recorder) % STRIDE == 0:
             self._report("walking", None if part is None else min(part, 1.0))
         return self.outcome is None
@@ -84,10 +103,10 @@ class CarryingOut:
         self._seen = self.walk.plan
         self._most = np.maximum(self._most, self.walk.leader.stops.longest(self._seen))
 
-    def _abort(self) -> None:
+    def abort(self, outcome: Outcome, reason: str) -> None:
         """Bring everything to rest, and keep how far it went beside what was said before."""
         walk = self.walk
-        self.outcome, self.reason = "interrupted", f"stopped at {walk.time:.2f} s"
+        self.outcome, self.reason = outcome, reason
         bounds, swinging = walk.stopping(), walk.swinging
         begin, hands, left = walk.q[:3].copy(), walk.machine.chain.origins.copy(), REST
         far = np.zeros(2)

@@ -13,13 +13,15 @@ from wbc.track.summary import Figure
 from wbc.validation import Array
 from wbc.walking.body_path import standing_path
 from wbc.walking.log.log import WalkLog
+from wbc.walking.log.ticks import TickColumns
 from wbc.walking.loop.walk import Walk
 from wbc.walking.modes.commands import Commands, read_commands
 from wbc.walking.modes.drive import Drive, standing_plan
 from wbc.walking.planner.plan import Plan
 from wbc.walking.run.carrying_out import CarryingOut, Progress
 from wbc.walking.run.mode import Ending, Mode, Result
-from wbc.walking.run.recording import TickColumns, WalkRecorder, as_walked
+from wbc.walking.run.plausible import check_holds
+from wbc.walking.run.recording import WalkRecorder, as_walked
 from wbc.walking.run.request import DriveRequest
 
 #: Time that the body has to come to rest after the last command [s]
@@ -42,6 +44,7 @@ class DriveMode(Mode[DriveRequest]):
         super().__init__(walker)
         data = walker.arm_data
         self.request, self.structure = request, request.site.build()
+        check_holds(self.structure, walker)
         self._pose = request.beginning(data)
         self.path = standing_path(self._pose)
         self._commands = read_commands(request.commands) if commands is None else commands

@@ -2,26 +2,38 @@
 
 from __future__ import annotations
 
+import gc
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Generic, NamedTuple, TypeVar
 
+import numpy as np
+import pinocchio as pin
+
 from wbc.robots import Walker
 from wbc.simulation import Plant
 from wbc.track.summary import Figure
+from wbc.validation import Array
 from wbc.walking.body_path import BodyPath
 from wbc.walking.holds.structure import Structure
 from wbc.walking.log.log import WalkLog
+from wbc.walking.log.recorder import versions
+from wbc.walking.log.ticks import TickColumns
+from wbc.walking.loop.body_command import pose_function
+from wbc.walking.loop.closed_chain import chain_function
+from wbc.walking.loop.hand_command import aim_function
 from wbc.walking.loop.stack import WalkStack
-from wbc.walking.loop.walk import Walk
+from wbc.walking.loop.walk import ARRIVED, Walk
+from wbc.walking.native import compiled
 from wbc.walking.planner.plan import Plan
 from wbc.walking.run.carrying_out import Outcome, Progress
-from wbc.walking.run.compiling import compiled_stack
-from wbc.walking.run.recording import TickColumns, WalkRecorder
-from wbc.walking.run.request import Request
+from wbc.walking.run.recording import Before, WalkRecorder
+from wbc.walking.run.request import Request, record_of
 
 Asked = TypeVar("Asked", bound=Request)
+#: A body that is turned by less has arrived, as one that is off by less than :data:`ARRIVED` [rad]
+TURNED = 0.01
 
 
 class Ending(NamedTuple):
@@ -77,6 +89,10 @@ class Mode(ABC, Generic[Asked]):
     def figures(self, log: WalkLog | None) -> tuple[Figure, ...]:
         """For the summary, of a walk that was carried out; None: without a tick."""
 
+    def remarks(self) -> tuple[Figure, ...]:
+        """What the summary says of the request, whatever comes of it."""
+        return ()
+
     def compiled(self, backend: str) -> WalkStack:
         """The stack that the walk needs."""
         return compiled_stack(self.walker, self.structure, backend)
@@ -85,10 +101,65 @@ class Mode(ABC, Generic[Asked]):
         """The walk, not begun."""
         return Walk(self.walker, self.structure, plan, stack=stack, plant=plant)
 
+    def asked(self) -> dict[str, Any]:
+        """What was asked for, as plain data."""
+        return record_of(self.request)
+
+    def before(self) -> Before | None:
+        """What the log begins with; None: it is empty."""
+        return None
+
     def meta(self, plan: Plan) -> dict[str, Any]:
         """More plain data for the log."""
         return {"start": list(plan.start)}
 
+    def missed(self, walk: Walk) -> str:
+        """Why a walk that is over is not where it was to be, "" where it is."""
+        return ""
+
     def result(self, walk: Walk, log: WalkLog, ticks: TickColumns) -> Result:
         """What is left of a walk that was carried out."""
         return Result(None, log, ticks, self.figures(log))
+
+
+def off_goal(walk: Walk, goal: Array) -> str:
+    """How far a body is from the pose where it was to end ``[4, 4]``, or which hands do not hold; "" if all is well."""
+    body = pin.XYZQUATToSE3(walk.q[:7])
+    away = float(np.linalg.norm(body.translation - goal[:3, 3]))
+    turned = float(np.linalg.norm(pin.log3(body.rotation.T @ goal[:3, :3])))
+    if away > ARRIVED or turned > TURNED:
+        return f"the body is {1e3 * away:.1f} mm and {np.degrees(turned):.2f} deg from where it was to go"
+    return loose_hands(walk)
+
+
+def loose_hands(walk: Walk) -> str:
+    """Which hands do not hold; "" if all do."""
+    loose = [arm.name for k, arm in enumerate(walk.walker.arms) if k not in walk.held]
+    return f"{', '.join(loose)} {'do' if len(loose) > 1 else 'does'} not hold" if loose else ""
+
+
+def compiled_stack(
+    walker: Walker, structure: Structure, backend: str = "auto", *, collisions: bool = False
+) -> WalkStack:
+    """A stack; the expressions of the loop and the planner's code are loaded then, too.
+
+    Args:
+        collisions, backend: as of :class:`WalkStack`.
+    """
+    stack = WalkStack(walker, structure, collisions=collisions, backend=backend)
+    chain_function(walker)
+    pose_function()
+    aim_function()
+    compiled.library()
+    versions()
+    return stack
+
+
+def keep() -> None:
+    """Say that all that is there now is there to stay: the garbage collector leaves it alone.
+
+    For a program of its own (a command, a benchmark), once what it needs is loaded. A full collection looks at every
+    object, which with the modules of a walk takes some 80 ms in the middle of a plan or a tick, and finds nothing.
+    """
+    gc.collect()
+    gc.freeze()

@@ -5,11 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
+
 from wbc.errors import ShapeError, WbcError
 from wbc.robots import Walker
 from wbc.simulation import Plant
 from wbc.track.summary import Figure
+from wbc.validation import Array
 from wbc.walking.body_path import standing_path
+from wbc.walking.holds.surface import CylinderSurface
 from wbc.walking.log.body_paths import way_of
 from wbc.walking.log.log import WalkLog
 from wbc.walking.loop.stack import WalkStack
@@ -18,16 +22,19 @@ from wbc.walking.loop.walk import PATIENCE, SLACK, Walk
 from wbc.walking.modes.first_grasps import free_state, plan_from_state
 from wbc.walking.modes.veto import Veto
 from wbc.walking.planner.follow import follow_plan
-from wbc.walking.planner.plan import Plan, Regrasp, read_plan
+from wbc.walking.planner.plan import NoPlanError, Plan, Regrasp, read_plan
 from wbc.walking.planner.planner import plan_walk
 from wbc.walking.run.carrying_out import CarryingOut, Progress
-from wbc.walking.run.mode import Asked, Ending, Mode
+from wbc.walking.run.mode import Asked, Ending, Mode, off_goal
+from wbc.walking.run.plausible import check_holds
 from wbc.walking.run.recording import WalkRecorder
 from wbc.walking.run.request import PathRequest, TwoEndedRequest
 from wbc.walking.two_ended import TwoEndedPlan, TwoEndedStack, TwoEndedWalk, plan_two_ended
 
-#: (the next re-grasp, why the last answer was refused or "") -> "" for yes, or another hold
-Ask = Callable[[Regrasp, str], str]
+#: (the next re-grasp, why the last answer was refused or "") -> "" for yes, another hold, or None: nobody answers
+Ask = Callable[[Regrasp, str], str | None]
+#: A path that goes round a cylinder by less goes along it, and there is nothing to say [deg]
+ROUND = 30.0
 
 
 class PlannedMode(Mode[Asked]):
@@ -50,8 +57,13 @@ class PlannedMode(Mode[Asked]):
         veto, late = None if self._ask is None else Veto(walk), PATIENCE * duration + SLACK
         ending = Ending("arrived", "")
         while not walk.done:
-            if veto is not None and self._ask is not None:
-                _approved(veto, self._ask)
+            if veto is not None and self._ask is not None and veto.proposal is not None:
+                recorder.write()  # an answer may take long
+                declined = _declined(veto, self._ask)
+                if declined:
+                    doing.abort("interrupted" if stop is not None and stop() else "declined", declined)
+                    ending = Ending(doing.outcome or "declined", doing.reason)
+                    break
             if walk.time > late:
                 reason = f"not there after {walk.time:.0f} s, the path takes {duration:.0f} s"
                 ending = Ending("late", reason)
@@ -78,6 +90,7 @@ class PathMode(PlannedMode[PathRequest]):
         super().__init__(walker, ask)
         data = walker.arm_data
         self.request, self.structure = request, request.site.build()
+        check_holds(self.structure, walker)
         self._given = read_plan(request.plan) if request.plan else None
         for step in () if self._given is None else self._given.regrasps:
             self.structure.index(step.target)
@@ -94,9 +107,28 @@ class PathMode(PlannedMode[PathRequest]):
         objective = self.request.objective
         return plan_walk(self.walker, self.structure, self.path, objective=objective, partial=True, detour=True)
 
+    def remarks(self) -> tuple[Figure, ...]:
+        """How far a path from hold to hold goes round a cylinder, which it does by the shorter way."""
+        surface, request = self.structure.surface, self.request
+        names = [place for place in (request.start, *request.points) if isinstance(place, str)]
+        if self._given is not None or not names or not isinstance(surface, CylinderSurface):
+            return ()
+        whole = request.site.whole()
+        places = (whole[name].position - surface.pose.translation for name in names)
+        angles = np.array([np.arctan2(y, x) for x, y, _ in (surface.pose.rotation.T @ place for place in places)])
+        turns = np.degrees((np.diff(angles) + np.pi) % (2 * np.pi) - np.pi)
+        if (np.abs(turns) < ROUND).all():
+            return ()
+        text = ", ".join(f"{abs(turn):.0f} deg, the other way would be {360 - abs(turn):.0f} deg" for turn in turns)
+        return (Figure("round", "round the cylinder", np.radians(turns).tolist(), f"the short way: {text}"),)
+
     def walk(self, plan: Plan, stack: WalkStack, plant: Plant | None) -> Walk:
         """On the plan's holds, or with nothing held."""
         return Walk(self.walker, self.structure, plan, stack=stack, state=self._state, plant=plant)
+
+    def missed(self, walk: Walk) -> str:
+        """Where the path that was asked for ends, whatever path was found."""
+        return off_goal(walk, self.path.poses[-1])
 
     def meta(self, plan: Plan) -> dict[str, Any]:
         """A detour that was found, or the path of a file, goes with the log, so that the walk can be resumed on it."""
@@ -115,6 +147,7 @@ class TwoEndedMode(PlannedMode[TwoEndedRequest]):
         super().__init__(walker)
         _ = walker.two_ended_data
         self.request, self.structure = request, request.site.build()
+        check_holds(self.structure, walker)
         first = [self.structure.index(name) for name in request.start]
         if isinstance(request.goal, str):
             self.structure.index(request.goal)
@@ -124,7 +157,24 @@ class TwoEndedMode(PlannedMode[TwoEndedRequest]):
         """End over end to the goal."""
         request = self.request
         start = dict(zip(("arm1", "arm2"), request.start, strict=True))
-        return plan_two_ended(self.walker, self.structure, start, request.goal, gait=request.gait)
+        plan = plan_two_ended(self.walker, self.structure, start, request.goal, gait=request.gait)
+        far = "" if isinstance(request.goal, str) else self._too_far(plan.path.poses[-1][:3, 3])
+        if far:
+            raise NoPlanError("to", request.goal, far)
+        return plan
+
+    def _too_far(self, elbow: Array) -> str:
+        """Why an elbow [m] is not at the place that was asked for: stances are few, so that it counts within a boom."""
+        away = float(np.linalg.norm(np.asarray(self.request.goal, dtype=float) - elbow))
+        boom = self.walker.two_ended_data.boom_length
+        return "" if away <= boom else f"the elbow comes no nearer to it than {away:.3g} m, a boom is {boom:.3g} m long"
+
+    def missed(self, walk: Walk) -> str:
+        """A hand on the hold, or the elbow near the place."""
+        goal, there = self.request.goal, [walk.structure.ids[hold] for hold in walk.held.values()]
+        if isinstance(goal, str):
+            return "" if goal in there else f"no hand holds {goal!r}"
+        return self._too_far(walk.q[:3])
 
     def compiled(self, backend: str) -> TwoEndedStack:
         """With swings by all joints of half the arm."""
@@ -137,15 +187,18 @@ class TwoEndedMode(PlannedMode[TwoEndedRequest]):
         return TwoEndedWalk(self.walker, self.structure, plan, stack=stack, plant=plant)
 
 
-def _approved(veto: Veto, ask: Ask) -> None:
-    """Answers to the proposal, until one is possible."""
+def _declined(veto: Veto, ask: Ask) -> str:
+    """Answers to the proposal, until one is possible; why the walk is to stop, "" where it goes on."""
     refused = ""
     while (step := veto.proposal) is not None:
         answer = ask(step, refused)
+        if answer is None:
+            return f"nobody said yes to {step.arm} from {step.source} to {step.target}"
         if not answer:
             veto.accept()
-            return
+            return ""
         try:
             veto.choose(answer)
         except WbcError as error:
             refused = str(error)
+    return ""

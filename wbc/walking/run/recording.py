@@ -3,26 +3,27 @@
 from __future__ import annotations
 
 import os
-import pathlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from itertools import groupby
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
 from wbc.robots import Walker
 from wbc.validation import Array
 from wbc.walking.body_path import SPACING, BodyPath
-from wbc.walking.log.log import CLOSED, HAND_STATES, OPEN, OPENING, WalkLog, WalkLogError
+from wbc.walking.holds.structure import Structure
+from wbc.walking.log.log import CLOSED, HAND_STATES, OPEN, OPENING, WalkLog
+from wbc.walking.log.part import PartWriter
 from wbc.walking.log.recorder import LogRecorder
+from wbc.walking.log.ticks import TICK, TickColumns
 from wbc.walking.loop.walk import Event, Tick, Walk
 from wbc.walking.planner.plan import Plan, Regrasp
 
-#: Name of the file in a run's folder
-TICKS = "ticks.npz"
+#: Ticks that are put together, and written, at once
+CHUNK = 50
 #: A row of the log: t, q, v, command
 _Kept = tuple[float, Array, Array, Array]
 #: States and holds of the hands, and whether the body is fixed
@@ -30,43 +31,13 @@ _Hands = tuple[list[int], list[int], bool]
 
 
 @dataclass(frozen=True, eq=False)
-class TickColumns:
-    """n ticks; entry k belongs to the step from row k of the log to row k + 1.
+class Before:
+    """What was walked before a walk goes on: a log and its ticks, of which ``count`` rows count, and all its holds."""
 
-    Attributes:
-        path_time: u [s]. body_error: distance of the body from its command [m]. slip: of the worst held hand [m].
-        cost: of the controller's tick [s]. solved: whether the controller's answer is one of all rows.
-    """
-
-    path_time: Array
-    body_error: Array
-    slip: Array
-    cost: Array
-    solved: NDArray[np.bool_]
-
-    def save(self, path: str | os.PathLike[str]) -> pathlib.Path:
-        """Writes the columns into a folder; returns the file."""
-        file = pathlib.Path(path) / TICKS
-        np.savez_compressed(file, allow_pickle=False, **{f.name: getattr(self, f.name) for f in fields(self)})
-        return file
-
-    @classmethod
-    def load(cls, path: str | os.PathLike[str]) -> TickColumns:
-        """What :meth:`save` wrote.
-
-        Raises:
-            WalkLogError: no such file, or not such a one.
-        """
-        try:
-            with np.load(path, allow_pickle=False) as data:
-                return cls(*(data[f.name] for f in fields(cls)))
-        except (OSError, ValueError, KeyError) as error:
-            raise WalkLogError("ticks", str(path), f"no ticks of a walk: {error}") from error
-
-    def then(self, count: int, after: TickColumns) -> TickColumns:
-        """The first ticks of these, and others after them."""
-        pairs = ((getattr(self, f.name)[:count], getattr(after, f.name)) for f in fields(self))
-        return TickColumns(*(np.concatenate(pair) for pair in pairs))
+    log: WalkLog
+    ticks: TickColumns
+    count: int
+    structure: Structure
 
 
 class WalkRecorder:
@@ -77,15 +48,28 @@ class WalkRecorder:
 
     Args:
         meta: plain data for the log.
+        folder: gets ``run.part``, which has all ticks but the last :data:`CHUNK` at any time; None: nothing is written.
+        before: the log begins with it.
+
+    Raises:
+        WalkLogError: the folder cannot be written. ShapeError: another machine walked before.
     """
 
-    def __init__(self, walk: Walk, seed: int = 0, meta: Mapping[str, Any] | None = None) -> None:
+    def __init__(
+        self,
+        walk: Walk,
+        seed: int = 0,
+        meta: Mapping[str, Any] | None = None,
+        *,
+        folder: str | os.PathLike[str] | None = None,
+        before: Before | None = None,
+    ) -> None:
         walker = walk.walker
         names = [arm.name for arm in walker.arms]
         self._walk, self._arms = walk, {name: k for k, name in enumerate(names)}
-        self._structure = walk.structure
+        self._structure = walk.structure if before is None else before.structure
         self._recorder = LogRecorder(
-            walk.structure,
+            self._structure,
             [joint for arm in walker.arms for joint in arm.joints],
             names,
             [arm.hand for arm in walker.arms],
@@ -97,21 +81,33 @@ class WalkRecorder:
         )
         self._time, self._q = walk.time, walk.q.copy()
         self._states = [CLOSED if arm in walk.held else OPEN for arm in range(len(names))]
-        self._holds = [walk.held.get(k, -1) for k in range(len(names))]
+        self._holds = [self._row(walk.held.get(k, -1)) for k in range(len(names))]
         if walk.opens is not None:
             arm, hold = walk.opens
-            self._states[arm], self._holds[arm] = OPENING, hold
+            self._states[arm], self._holds[arm] = OPENING, self._row(hold)
         self._seen = len(walk.events)
         self._command = np.array(pin.SE3ToXYZQUAT(walk.plan.path.at(walk.path_time)[0]))
-        # Ticks as they come; they are put together by :meth:`log`, which takes a tenth of the time
+        # Ticks as they come; they are put together by the chunk, which takes a tenth of the time
         self._kept: list[_Kept] = []
-        # Hands that change, with the row from which on
+        # Hands that change, with the row of the chunk from which on
         self._hands: list[tuple[int, _Hands]] = [(0, (self._states, self._holds, walk.machine.fixed))]
         self._rows: list[tuple[float, float, float, float, bool]] = []
         self._last: tuple[Any, Any, Any] = ((), (), None)
+        self._count, self._ticks, self._vanished = 0, [np.zeros(0, TICK)], False
+        if before is not None:
+            self._recorder.begin_with(before.log, before.count)
+            self._ticks.append(before.ticks.records()[: before.count])
+        self._part = None if folder is None else PartWriter(folder)
+        if self._part is not None:
+            self._part.add([*self._recorder.head(), self._recorder.records(), self._ticks[-1]])
 
     def __len__(self) -> int:
-        return len(self._rows)
+        return self._count
+
+    @property
+    def error(self) -> str:
+        """Why the log is not written while walking any more, "" where it is."""
+        return "" if self._part is None else self._part.error
 
     def tick(self, tick: Tick, command: Array | None = None) -> None:
         """Keeps the tick that was just made.
@@ -126,12 +122,15 @@ class WalkRecorder:
             self._seen = len(walk.events)
         self._command = tick.target if command is None else command
         self._keep(tick.rates, tick.fixed)
+        self._count += 1
         self._rows.append((walk.progress.travelled, tick.body_error, tick.slip, tick.cost, tick.status == "solved"))
         self._time, self._q = tick.time, tick.q
         found = tick.hands, tick.holds, walk.structure
         if found != self._last:
             self._take(tick)
             self._last = found
+        if len(self._rows) == CHUNK:
+            self.write()
 
     def log(self) -> tuple[WalkLog, TickColumns]:
         """What was recorded so far; afterwards nothing more can be.
@@ -139,12 +138,20 @@ class WalkRecorder:
         Raises:
             ShapeError: no tick was recorded.
         """
-        rest = np.zeros(self._walk.walker.robot.nv)
-        self._keep(rest, self._walk.machine.fixed)
+        self._keep(np.zeros(self._walk.walker.robot.nv), self._walk.machine.fixed)
+        self.write()
+        if self._part is not None:
+            self._part.close()
+        return self._recorder.log(), TickColumns.of(np.concatenate(self._ticks))
+
+    def write(self) -> None:
+        """What was kept since the last time becomes rows of the log, and is written to the folder, if there is one."""
+        if not self._kept:
+            return
         rows, hands = zip(*self._hands, strict=True)
         lasting = np.diff([*rows, len(self._kept)])
         states, holds, fixed = (np.repeat(np.array(column), lasting, axis=0) for column in zip(*hands, strict=True))
-        begin = 0
+        begin, before = 0, len(self._recorder)
         # Commands may be twists first and poses after an abort
         for _, same in groupby(self._kept, key=lambda kept: len(kept[3])):
             times, *numbers = zip(*same, strict=True)
@@ -152,8 +159,15 @@ class WalkRecorder:
             part = slice(begin, begin := begin + len(times))
             now = states[part], holds[part], command, fixed[part]
             self._recorder.extend(np.array(times), q[:, :7], q[:, 7:], v[:, 6:], v[:, :6], *now)
-        columns = [np.array(column) for column in zip(*self._rows, strict=True)] or [np.zeros(0)] * 5
-        return self._recorder.log(), TickColumns(*columns)
+        self._ticks.append(np.array(self._rows, TICK))
+        if self._part is not None:
+            vanished = [self._recorder.presence()] if self._vanished else []
+            self._part.add([*vanished, self._recorder.records(before), self._ticks[-1]])
+        self._kept, self._rows, self._hands, self._vanished = [], [], [(0, self._hands[-1][1])], False
+
+    def _row(self, hold: int) -> int:
+        """The log's row of a hold of the walk's structure, which loses holds that vanish; -1 for none."""
+        return -1 if hold < 0 else self._structure.index(self._walk.structure.ids[hold])
 
     def _happened(self, event: Event) -> None:
         """A hand that is lifted opens from its hold; one whose hold vanishes is open at once."""
@@ -163,6 +177,7 @@ class WalkRecorder:
             self._states[arm], self._holds[arm] = OPENING, self._structure.index(event.hold)
         elif event.what == "vanished":
             self._recorder.vanish(event.time, event.hold)
+            self._vanished = True
             row = self._structure.index(event.hold)
             for arm in [arm for arm, hold in enumerate(self._holds) if hold == row]:
                 self._states[arm], self._holds[arm] = OPEN, -1
@@ -177,9 +192,7 @@ class WalkRecorder:
     def _take(self, tick: Tick) -> None:
         """What hands do and where, after a tick."""
         self._states = [HAND_STATES.index(state) for state in tick.hands]
-        # Holds that vanish renumber the walk's structure; the log keeps the rows of the first one
-        ids = self._walk.structure.ids
-        now = [self._structure.index(ids[hold]) if hold >= 0 else -1 for hold in tick.holds]
+        now = [self._row(hold) for hold in tick.holds]
         leaving = [state == OPENING for state in self._states]
         self._holds = [old if leaves else new for old, new, leaves in zip(self._holds, now, leaving, strict=True)]
 

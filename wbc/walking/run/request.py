@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import pathlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal
 
+import numpy as np
 import pinocchio as pin
 
 from wbc import validation
@@ -15,10 +15,11 @@ from wbc.robots import WalkerData
 from wbc.walking.body_path import BodyPath, grid_path, straight_path
 from wbc.walking.holds.built_in import BUILT_IN, remove_columns, remove_fraction, remove_rows
 from wbc.walking.holds.files import read_structure
+from wbc.walking.holds.hold import frame_of
 from wbc.walking.holds.structure import Structure
 from wbc.walking.log.log import WalkLogError
+from wbc.walking.modes.commands import read_numbers
 from wbc.walking.planner.planner import Objective
-from wbc.walking.run.arm_task import ArmTask, arm_task
 from wbc.walking.run.places import GridPlace, Place, grid_place, over_holds
 from wbc.walking.two_ended import grapple_row
 from wbc.walking.two_ended.search import GAITS
@@ -84,7 +85,8 @@ class Site:
             return make(max_tilt=0.0) if self.rigid else make()
         if self.rigid:
             raise RangeError("rigid", self.rigid, "a file says itself what its holds allow")
-        if "/" in self.structure or self.structure.lower().endswith(".csv") or pathlib.Path(self.structure).is_file():
+        named = "/" in self.structure or self.structure.lower().endswith(".csv")
+        if named or validation.is_file("structure", self.structure):
             return read_structure(self.structure)
         validation.one_of("structure", self.structure, (*BUILT_IN, GRAPPLES, "FILE.csv"))
         raise RangeError("structure", self.structure, "no such file")
@@ -203,12 +205,64 @@ class DriveRequest(Route):
     goes: ClassVar[bool] = False
 
 
+TaskKind = Literal["hold", "poses", "rate"]
+#: Columns of a file of poses: origin [m], z axis, and a direction whose part across it is the x axis
+POSES = ("x", "y", "z", "ax", "ay", "az", "rx", "ry", "rz")
+
+
+@dataclass(frozen=True)
+class ArmTask:
+    """What a hand is to do.
+
+    Attributes:
+        kind: to a hold, through poses, or by a twist for a time. text: as it was asked for.
+        hold: its id. poses: positions [m] and quaternions x, y, z, w. twist: [m/s, rad/s]. seconds: [s].
+    """
+
+    kind: TaskKind
+    text: str
+    hold: str = ""
+    poses: tuple[tuple[float, ...], ...] = ()
+    twist: tuple[float, ...] = ()
+    seconds: float = 0.0
+
+
+def arm_task(text: str) -> ArmTask:
+    """A task from what a user types; whether there is such a hold is not asked here:
+
+        hold ID                                  go to a hold and close
+        poses FILE                               through poses, a table with columns x, y, z, ax, ay, az, rx, ry, rz
+        rate vx,vy,vz,wx,wy,wz for SECONDS       a twist in the structure's axes [m/s, rad/s]
+
+    Raises:
+        ShapeError: it is none. NumberTableError, RangeError: a file of poses.
+    """
+    kind, _, rest = text.strip().partition(" ")
+    rest = rest.strip()
+    if kind == "hold" and rest:
+        return ArmTask("hold", text, hold=rest)
+    if kind == "poses" and rest:
+        rows = read_numbers(rest, POSES)
+        poses = (frame_of(f"row {k + 1}", row[:3], row[3:6], row[6:]) for k, row in enumerate(rows))
+        return ArmTask("poses", text, poses=tuple(tuple(pin.SE3ToXYZQUAT(pose).tolist()) for pose in poses))
+    if kind == "rate":
+        numbers, _, seconds = rest.partition(" for ")
+        try:
+            twist, duration = tuple(float(part) for part in numbers.split(",")), float(seconds)
+        except ValueError as error:
+            raise ShapeError("do", text, "expected 'rate vx,vy,vz,wx,wy,wz for SECONDS'") from error
+        if len(twist) != 6 or not np.isfinite([*twist, duration]).all() or duration <= 0.0:
+            raise ShapeError("do", text, "expected six rates and a time above 0")
+        return ArmTask("rate", text, twist=twist, seconds=duration)
+    raise ShapeError("do", text, "expected 'hold ID', 'poses FILE' or 'rate vx,vy,vz,wx,wy,wz for SECONDS'")
+
+
 @dataclass(frozen=True)
 class ArmRequest(Route):
     """The body stands as that of :class:`DriveRequest`, and one hand does some tasks.
 
     Attributes:
-        arm: its name; "": the first. tasks: or their texts, see :mod:`wbc.walking.run.arm_task`.
+        arm: its name; "": the first. tasks: or their texts, see :func:`arm_task`.
 
     Raises:
         ShapeError, NumberTableError, RangeError: no tasks, or one that is none.

@@ -5,16 +5,16 @@ from __future__ import annotations
 import os
 import pathlib
 from collections.abc import Callable
-from dataclasses import dataclass, fields
-from math import inf
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
 from wbc import validation
-from wbc.errors import RangeError, ShapeError
+from wbc.errors import RangeError, ShapeError, WbcError
 from wbc.robots import Walker
+from wbc.robots import walker as made_walker
 from wbc.simulation import Plant
 from wbc.track.summary import Figure
 from wbc.validation import Array
@@ -22,7 +22,9 @@ from wbc.walking.body_path import BodyPath, straight_path
 from wbc.walking.holds.files import read_structure
 from wbc.walking.holds.structure import Structure
 from wbc.walking.log.body_paths import path_of
-from wbc.walking.log.log import CLOSED, OPENING, WalkLog
+from wbc.walking.log.folder import BEGUN, STRUCTURE, machine_made, read_begun, walked
+from wbc.walking.log.log import CLOSED, OPENING, WalkLog, WalkLogError
+from wbc.walking.log.ticks import TickColumns
 from wbc.walking.loop.stack import WalkStack
 from wbc.walking.loop.state import Manual, State
 from wbc.walking.loop.walk import PATIENCE, SLACK, Walk
@@ -30,13 +32,13 @@ from wbc.walking.modes.first_grasps import plan_from_state
 from wbc.walking.planner.plan import Plan
 from wbc.walking.planner.planner import Objective
 from wbc.walking.run.carrying_out import CarryingOut, Progress
-from wbc.walking.run.compiling import compiled_stack
-from wbc.walking.run.mode import Ending, Mode, Result
-from wbc.walking.run.places import Place
-from wbc.walking.run.recording import TICKS, TickColumns, WalkRecorder, as_walked, configuration
+from wbc.walking.run.mode import Ending, Mode, Result, compiled_stack, off_goal
+from wbc.walking.run.places import GridPlace, Place
+from wbc.walking.run.recording import Before, WalkRecorder, as_walked, configuration
 from wbc.walking.run.request import PathRequest, Request, TwoEndedRequest, request_of
 
-STRUCTURE = "structure.csv"
+#: Name of the mode in ``begun.json``
+RESUME = "resume"
 
 
 def resumed_state(log: WalkLog, row: int, walker: Walker, structure: Structure) -> State:
@@ -60,36 +62,6 @@ def resumed_state(log: WalkLog, row: int, walker: Walker, structure: Structure) 
     return State(configuration(walker, log, row), held, float(log.t[row]), opening)
 
 
-def joined(before: WalkLog, row: int, after: WalkLog) -> WalkLog:
-    """A log up to a row, and from there on another one of the same holds or fewer.
-
-    Raises:
-        ShapeError: other arms or joints.
-    """
-    if before.joints != after.joints or before.arms != after.arms:
-        raise ShapeError("joined", after.arms, "expected a log of the same machine")
-    rows = np.array([before.hold_id.index(name) for name in after.hold_id])
-    hold = np.where(after.hand_hold >= 0, rows[after.hand_hold], -1)
-    parts: dict[str, Any] = {}
-    for name in (*("t", "pose_body_in_structure", "q", "v", "twist_body", "hand_state", "body_fixed"),):
-        parts[name] = np.concatenate([getattr(before, name)[:row], getattr(after, name)])
-    for name in ("command", "command_kind"):
-        parts[name] = np.concatenate([getattr(before, name)[:row], getattr(after, name)])
-    parts["hand_hold"] = np.concatenate([before.hand_hold[:row], hold])
-    # What vanished before the row stays gone; what would have vanished later has not
-    begin = float(after.t[0])
-    spans = before.presence_span.copy()
-    spans[spans[:, 1] > begin, 1] = inf
-    for gone, span in zip(after.presence_hold, after.presence_span, strict=True):
-        mine = (before.presence_hold == rows[gone]) & (spans[:, 1] == inf)
-        spans[mine, 1] = span[1]
-    there = spans[:, 0] <= begin
-    parts |= {"presence_hold": before.presence_hold[there], "presence_span": spans[there]}
-    kept = {f.name: getattr(before, f.name) for f in fields(before)}
-    meta = {**before.meta, "resumed": [*before.meta.get("resumed", []), begin]}
-    return WalkLog(**{**kept, **parts, "meta": meta})
-
-
 @dataclass(frozen=True)
 class ResumeRequest:
     """A run goes on, at rest in the state that its log has at a time, to its end.
@@ -107,8 +79,8 @@ class ResumeRequest:
     def __post_init__(self) -> None:
         object.__setattr__(self, "folder", validation.file_path("resume", self.folder))
         object.__setattr__(self, "points", tuple(validation.items("to", self.points, "places")))
-        if self.at is not None:
-            validation.scalar("resume.at", self.at, unit="s")
+        if self.at is not None and (isinstance(self.at, bool) or not isinstance(self.at, (int, float))):
+            raise ShapeError("resume.at", self.at, "expected a time in s")
 
 
 def read_resume(text: str, points: tuple[str, ...] = ()) -> ResumeRequest:
@@ -122,10 +94,56 @@ def read_resume(text: str, points: tuple[str, ...] = ()) -> ResumeRequest:
         at = float(seconds) if sign else None
     except ValueError:
         at = None
-    folder = pathlib.Path(text if at is None else name)
-    if not folder.is_dir():
+    folder = validation.file_path("resume", text if at is None else name)
+    if not validation.exists("resume", folder) or not folder.is_dir():
         raise RangeError("resume", text, "expected the folder of a run, or FOLDER@SECONDS")
     return ResumeRequest(folder, at, points)
+
+
+def going_on(resume: ResumeRequest, seen: frozenset[pathlib.Path] = frozenset()) -> Request | ResumeRequest:
+    """The request itself; of a run that was ended before it walked what it was asked to do, which is then begun.
+
+    Raises:
+        WalkLogError: there is no run. RangeError: a time of a run that did not walk.
+    """
+    folder = pathlib.Path(resume.folder)
+    if walked(folder):
+        return resume
+    if resume.at is not None:
+        raise RangeError("resume.at", resume.at, "the run was ended before it walked, and can only be begun again")
+    begun = dict(read_begun(folder)["request"])
+    if begun.get("kind") != RESUME:
+        request = request_of(begun)
+        return _goal(request, resume.points) if resume.points else request
+    try:
+        at, points = begun["at"], tuple(_place(place) for place in begun["points"])
+        before = ResumeRequest(begun["folder"], at, resume.points or points)
+    except (KeyError, TypeError, WbcError) as error:
+        raise WalkLogError("resume", str(folder), f"{BEGUN} does not say what was gone on with: {error}") from error
+    if folder.resolve() in seen:
+        raise WalkLogError("resume", str(folder), "this run goes on with itself")
+    return going_on(before, seen | {folder.resolve()})
+
+
+def machine_walked(request: Request | ResumeRequest, folder: pathlib.Path) -> Walker:
+    """The machine of a run that is gone on with, or begun again.
+
+    Args:
+        request: of :func:`going_on`. folder: of the run that was asked for.
+
+    Raises:
+        WalkLogError: the run does not say.
+    """
+    if not isinstance(request, ResumeRequest):
+        return machine_made(read_begun(folder)["machine"])
+    log = WalkLog.load(request.folder)
+    # Logs of the version before do not say; theirs is checked by its digest
+    return machine_made(log.meta["machine"]) if "machine" in log.meta else made_walker(len(log.arms))
+
+
+def _place(place: Any) -> Place:
+    """Of plain data."""
+    return place if isinstance(place, str) else GridPlace(*place)
 
 
 class ResumeMode(Mode[PathRequest]):
@@ -138,15 +156,17 @@ class ResumeMode(Mode[PathRequest]):
 
     def __init__(self, resume: ResumeRequest, walker: Walker) -> None:
         super().__init__(walker)
-        self._folder = pathlib.Path(resume.folder)
-        self._old = WalkLog.load(self._folder)
+        self._resume, self._folder = resume, pathlib.Path(resume.folder)
+        self._old, self._ticks = WalkLog.load(self._folder), TickColumns.load(self._folder)
         old, at = self._old, resume.at
         self.request = request = _goal(request_of(old.meta.get("request")), resume.points)
         if walker.two_ended or walker.data.digest != old.meta["robot_digest"]:
             raise RangeError("resume", old.meta["robot_digest"], "the run has another robot; use the same --set")
-        row = len(old) - 1 if at is None else int(np.searchsorted(old.t, at + 1e-9, side="right")) - 1
-        if row < 1 or (at is not None and at > old.t[-1] + 1e-9):
+        if len(old.arms) != len(walker.arms):
+            raise RangeError("resume", len(old.arms), f"the run has another number of arms than {len(walker.arms)}")
+        if at is not None and not old.t[1] - 1e-9 <= at <= old.t[-1] + 1e-9:  # nor is nan
             raise RangeError("resume.at", at, f"expected a time from {old.t[1]:g} to {old.t[-1]:g} s")
+        row = len(old) - 1 if at is None else int(np.searchsorted(old.t, at + 1e-9, side="right")) - 1
         self._row, self.structure = row, read_structure(self._folder / STRUCTURE)
         here = old.present(np.arange(len(old.hold_id)), float(old.t[row]))
         gone = [name for name, there in zip(old.hold_id, here, strict=True) if not there]
@@ -168,9 +188,20 @@ class ResumeMode(Mode[PathRequest]):
         """From the state of the log."""
         return Walk(self.walker, self._there, plan, stack=stack, state=self._state, plant=plant)
 
+    def asked(self) -> dict[str, Any]:
+        """The run that goes on, by its whole path, and from when."""
+        resume = self._resume
+        folder = str(pathlib.Path(resume.folder).resolve())
+        return {"kind": RESUME, "folder": folder, "at": resume.at, "points": list(resume.points)}
+
+    def before(self) -> Before:
+        """What was walked until it goes on."""
+        return Before(self._old, self._ticks, self._row, self.structure)
+
     def meta(self, plan: Plan) -> dict[str, Any]:
-        """Nothing: the old log has it."""
-        return {}
+        """What the old log has, and when it was gone on with; its way leads to the old goal."""
+        old = {name: value for name, value in self._old.meta.items() if not (name == "way" and self._resume.points)}
+        return {**old, "resumed": [*old.get("resumed", []), self._state.time]}
 
     def carry_out(
         self, walk: Walk, recorder: WalkRecorder, report: Progress, stop: Callable[[], bool] | None
@@ -184,6 +215,10 @@ class ResumeMode(Mode[PathRequest]):
             pass
         return Ending(doing.outcome or ("arrived" if walk.done else "late"), doing.reason)
 
+    def missed(self, walk: Walk) -> str:
+        """Where its path ends."""
+        return off_goal(walk, self.path.poses[-1])
+
     def figures(self, log: WalkLog | None) -> tuple[Figure, ...]:
         """From where it went on, and how far things go after an abort."""
         value = {"from": str(self._folder), "at": self._state.time}
@@ -191,11 +226,9 @@ class ResumeMode(Mode[PathRequest]):
         return (resumed, *self._doing.summary())
 
     def result(self, walk: Walk, log: WalkLog, ticks: TickColumns) -> Result:
-        """The log of the run up to then and of the new walk."""
-        whole = joined(self._old, self._row, log)
-        ticks = TickColumns.load(self._folder / TICKS).then(self._row, ticks)
-        plan, ticks = as_walked(whole, ticks, walk.progress.steps)
-        return Result(plan, whole, ticks, self.figures(whole))
+        """The log of the run up to then and of the new walk; the plan is what was done."""
+        plan, ticks = as_walked(log, ticks, walk.progress.steps)
+        return Result(plan, log, ticks, self.figures(log))
 
 
 def _latch(walk: Walk, doing: CarryingOut, state: State) -> None:

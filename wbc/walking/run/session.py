@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import pathlib
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -13,19 +14,24 @@ from wbc.robots import Walker
 from wbc.simulation import Plant, PlantError
 from wbc.track.summary import Figure
 from wbc.walking.body_path import BodyPath
+from wbc.walking.checker import Report
+from wbc.walking.checker.report import SHOWN, Finding
 from wbc.walking.holds.structure import Structure
+from wbc.walking.log.folder import PLAN, begin_folder, machine_of, write_whole
 from wbc.walking.log.log import WalkLog
+from wbc.walking.log.ticks import TickColumns
 from wbc.walking.loop.stack import WalkStack
 from wbc.walking.modes.commands import Commands
 from wbc.walking.planner.plan import NoPlanError, Plan
 from wbc.walking.run.arm_tasks_mode import ArmTasksMode
-from wbc.walking.run.carrying_out import Outcome, Progress
+from wbc.walking.run.carrying_out import WELL, Outcome, Progress
 from wbc.walking.run.drive_mode import DriveMode
 from wbc.walking.run.mode import Mode
 from wbc.walking.run.path_mode import Ask, PathMode, TwoEndedMode
-from wbc.walking.run.recording import TickColumns, WalkRecorder
+from wbc.walking.run.plausible import far_apart
+from wbc.walking.run.recording import WalkRecorder
 from wbc.walking.run.request import ArmRequest, DriveRequest, PathRequest, Request, TwoEndedRequest, record_of
-from wbc.walking.run.resume_mode import ResumeMode, ResumeRequest
+from wbc.walking.run.resume_mode import ResumeMode, ResumeRequest, going_on
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,6 +61,32 @@ class WalkRun:
     walk_time: float = 0.0
     more: tuple[Figure, ...] = ()
 
+    @property
+    def well(self) -> bool:
+        """It did what it was to do, as far as is known: :meth:`judged` knows more."""
+        return self.outcome in WELL
+
+    def judged(self, report: Report | None) -> WalkRun:
+        """The run as the checker sees it: where anything is violated the outcome is ``violated``, whatever else it did.
+
+        Args:
+            report: None: it was not checked, and stays as it is.
+        """
+        if report is None or report.ok:
+            return self
+        did = f"it {self.outcome}" if self.well else f"{self.outcome}: {self.reason}"
+        reason = f"{'; '.join(map(_found, report.violations))}; apart from that {did}"
+        return replace(self, outcome="violated", reason=reason)
+
+
+def _found(finding: Finding) -> str:
+    """A violation in words."""
+    unit, factor = SHOWN[finding.unit]
+    side = "at least" if finding.least else "at most"
+    numbers = f"{factor * finding.worst:.4g} {unit}".strip()
+    text = f"{finding.kind} {numbers}, {side} {factor * finding.limit:.4g} are allowed, at {finding.time:.2f} s"
+    return f"{text}, {finding.where}" if finding.where else text
+
 
 def perform_walk(
     request: Request | ResumeRequest,
@@ -67,6 +99,7 @@ def perform_walk(
     ask: Ask | None = None,
     commands: Commands | None = None,
     plant: Plant | None = None,
+    folder: pathlib.Path | None = None,
 ) -> WalkRun:
     """Plans and walks with our planner, as the request says.
 
@@ -74,15 +107,19 @@ def perform_walk(
         stack: a compiled one for the same walker and structure; None: compiles one.
         backend: as of ``Stack.compile``.
         stop: asked before every tick; the body then comes to rest, and the log ends there.
-        ask: (the next re-grasp, why the last answer was refused or "") -> "" for yes, or another hold; of paths.
+        ask: (the next re-grasp, why the last answer was refused or "") -> "" for yes, another hold, or None: the walk
+            comes to rest and ends, ``declined``; of paths.
         commands: what drives the body, asked every tick; default: the file of the :class:`DriveRequest`.
         plant: what moves; default: a :class:`wbc.simulation.KinematicPlant`.
+        folder: gets what was asked for, holds, machine, plan and log while they come, so that nothing is lost when the
+            program is killed; None: nothing is written.
 
     Raises:
+        WalkLogError: the folder cannot be written.
         What the mode of the request and :class:`wbc.walking.loop.walk.Walk` raise for bad input.
     """
     mode = mode_of(request, walker, ask, commands)
-    return perform(mode, stack=stack, backend=backend, progress=progress, stop=stop, plant=plant)
+    return perform(mode, stack=stack, backend=backend, progress=progress, stop=stop, plant=plant, folder=folder)
 
 
 def mode_of(
@@ -94,6 +131,8 @@ def mode_of(
         RangeError: questions or commands for a mode that has none. ShapeError: no request that is carried out here.
             What the mode raises.
     """
+    if isinstance(request, ResumeRequest):
+        request = going_on(request)
     if ask is not None and not isinstance(request, PathRequest):
         raise RangeError("ask", type(request).__name__, "only walks along a path ask")
     if commands is not None and not isinstance(request, DriveRequest):
@@ -119,8 +158,11 @@ def perform(
     progress: Progress | None = None,
     stop: Callable[[], bool] | None = None,
     plant: Plant | None = None,
+    folder: pathlib.Path | None = None,
 ) -> WalkRun:
     """Plans, compiles, walks and records. Arguments as of :func:`perform_walk`."""
+    if folder is not None:
+        begin_folder(folder, mode.asked(), mode.walker, mode.structure)
     report, clock = progress or (lambda what, part: None), time.perf_counter
     run = WalkRun(mode.request, mode.walker, mode.structure, mode.path, None, "refused", "")
     report("planning", None)
@@ -128,8 +170,12 @@ def perform(
     try:
         plan = mode.plan()
     except NoPlanError as error:
-        return replace(run, reason=str(error), plan_time=clock() - begin)
-    run = replace(run, path=plan.path, plan=plan, reason=plan.reason, plan_time=clock() - begin)
+        reason = f"{error}{_hint(mode)}"
+        return replace(run, reason=reason, plan_time=clock() - begin, more=mode.remarks())
+    reason = plan.reason if plan.complete else f"{plan.reason}{_hint(mode)}"
+    run = replace(run, path=plan.path, plan=plan, reason=reason, plan_time=clock() - begin, more=mode.remarks())
+    if folder is not None:
+        write_whole(folder / PLAN, plan.save)
     if not plan.complete:
         return run
     report("compiling", None)
@@ -137,18 +183,25 @@ def perform(
     stack = stack or mode.compiled(backend)
     run, begin = replace(run, compile_time=clock() - begin), clock()
     walk = mode.walk(plan, stack, plant)
-    meta = {"request": record_of(mode.request), **mode.meta(plan)}
-    recorder = WalkRecorder(walk, mode.request.site.seed, meta)
+    meta = {"machine": machine_of(mode.walker), **mode.meta(plan), "request": record_of(mode.request)}
+    recorder = WalkRecorder(walk, mode.request.site.seed, meta, folder=folder, before=mode.before())
     try:
         ending = mode.carry_out(walk, recorder, report, stop)
     finally:
         with contextlib.suppress(PlantError):
             walk.machine.rest()
-    run = replace(run, outcome=ending.outcome, reason=ending.reason)
+    missed = mode.missed(walk) if ending.outcome == "arrived" else ""
+    run = replace(run, outcome="missed" if missed else ending.outcome, reason=missed or ending.reason)
     if not len(recorder):
-        return replace(run, more=mode.figures(None))
+        return replace(run, more=(*run.more, *mode.figures(None)))
     result = mode.result(walk, *recorder.log())
-    run = replace(run, log=result.log, ticks=result.ticks, more=result.figures)
+    run = replace(run, log=result.log, ticks=result.ticks, more=(*run.more, *result.figures))
     if result.plan is not None:
         run = replace(run, path=result.plan.path, plan=result.plan)
     return replace(run, walk_time=clock() - begin)
+
+
+def _hint(mode: Mode[Any]) -> str:
+    """What else may be the reason where there is no plan."""
+    remark = far_apart(mode.structure, mode.walker)
+    return f"; {remark}" if remark else ""

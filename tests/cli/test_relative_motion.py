@@ -1,0 +1,34 @@
+"""``wbc relative-motion``: what it prints, writes and refuses."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+from typer.testing import CliRunner
+
+from wbc.cli.app import app
+
+RUN = CliRunner(env={"COLUMNS": "200"})
+
+
+def test_a_table_row_by_row(tmp_path: Path) -> None:
+    words = ["relative-motion", "--table", "4.6", "--solves", "8", "--out", str(tmp_path)]
+    done = RUN.invoke(app, words)
+    assert done.exit_code == 0, done.output
+    last = done.output.splitlines()[5].split()
+    assert last[:5] == ["4.6", "4.000", "0.480", "0.497", "0.197"]
+    assert "x, y, z [in]" in done.output
+    largest = json.loads((tmp_path / "summary.json").read_text())["inches"]["4.6"]
+    assert largest["order 0"] > 0.49
+    assert largest["line end"] < 0.005
+    with (tmp_path / "tables.csv").open() as stream:
+        assert [row["command"] for row in csv.DictReader(stream)] == ["0.5", "1.0", "2.0", "3.0", "4.0"]
+    assert (tmp_path / "tables.png").stat().st_size > 5000
+    again = RUN.invoke(app, words)
+    assert again.exit_code == 2
+    assert "--force" in again.output
+    bad = RUN.invoke(app, ["relative-motion", "--table", "4.2"])
+    assert bad.exit_code == 2
+    assert "valid: 4.3" in bad.output

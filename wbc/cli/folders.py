@@ -1,0 +1,46 @@
+"""The folder of a run: named, made, and kept from being written over."""
+
+from __future__ import annotations
+
+import datetime
+from collections.abc import Sequence
+from pathlib import Path
+
+from wbc.cli.console import OutputError
+
+
+def run_folder(
+    wanted: Path | None, name: str, written: Sequence[str], force: bool = False, *, field: str = "out"
+) -> Path:
+    """The folder that was asked for, or a new one ``runs/NAME-TIME``; made, and without the files of an earlier run.
+
+    Args:
+        wanted: None: a new one. written: names, or patterns, of all files that such a run writes.
+        force: write into a folder that has such a file. field: the option, for errors.
+
+    Raises:
+        OutputError: it has a file of a run and ``force`` is off, or it cannot be written.
+    """
+    folder = wanted or _new(name)
+    try:
+        there = [file for pattern in written for file in folder.glob(pattern)]
+        if there and not force:
+            reason = f"there is a run in this folder ({there[0].name}); choose another, or use --force"
+            raise OutputError(field, str(folder), reason)
+        folder.mkdir(parents=True, exist_ok=True)
+        for file in there:
+            file.unlink()
+        # A folder that can be seen but not written says so before anything is computed
+        probe = folder / ".probe"
+        probe.touch()
+        probe.unlink()
+    except (OSError, ValueError) as error:
+        raise OutputError(field, str(folder), f"cannot be written: {getattr(error, 'strerror', error)}") from error
+    return folder
+
+
+def _new(name: str) -> Path:
+    """A name that no folder has yet."""
+    stem = Path("runs") / f"{name}-{datetime.datetime.now():%Y%m%d-%H%M%S}"
+    choices = (stem.with_name(f"{stem.name}{more}") for more in ("", *(f"-{k}" for k in range(2, 1000))))
+    return next(choice for choice in choices if not choice.exists())

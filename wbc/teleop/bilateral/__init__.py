@@ -1,0 +1,32 @@
+"""Bilateral teleoperation over links with delay. See docs/teleoperation.md."""
+
+from __future__ import annotations
+
+from wbc.teleop.bilateral.run import BilateralRecord, Operator, Packet, Port, Wall, run_bilateral
+from wbc.teleop.bilateral.scheme import (
+    Bilateral,
+    Channels,
+    Device,
+    Link,
+    Scheme,
+    four_channel,
+    position_force,
+    position_position,
+)
+
+__all__ = [
+    "Bilateral",
+    "BilateralRecord",
+    "Channels",
+    "Device",
+    "Link",
+    "Operator",
+    "Packet",
+    "Port",
+    "Scheme",
+    "Wall",
+    "four_channel",
+    "position_force",
+    "position_position",
+    "run_bilateral",
+]
