@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections import deque
+import logging
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any
@@ -12,21 +12,24 @@ import pinocchio as pin
 
 from wbc import validation
 from wbc.controller import Controller, Step
-from wbc.errors import BoundsError
-from wbc.servo.model import Response
+from wbc.errors import BoundsError, RangeError, UnsupportedJointError
+from wbc.servo.laws import Feedback, quickness
+from wbc.servo.response import Identification, Response
 from wbc.simulation import Command, CommandKind
 from wbc.validation import Array
 
-#: Time constant in which an error is made up for: at least so many periods,
-QUICKEST = 10.0
-#: so many times the delay, which positions see through the servo's own loop and the others through what is still to come,
-PER_DELAY = {CommandKind.POSITION: 2.5, CommandKind.VELOCITY: 1.5, CommandKind.TORQUE: 1.0}
-#: of a servo of velocities so many times its lag more,
-PER_LAG = 2.0
-#: and where nobody told how the servo responds, at least this [s]
-CAREFUL = {CommandKind.POSITION: 0.3, CommandKind.VELOCITY: 0.05, CommandKind.TORQUE: 0.0}
-#: The integral of a torque servo is this many times slower than its proportional part
-SLOWER = 3.0
+log = logging.getLogger("wbc")
+
+#: No delay is longer than this [s]
+LONGEST_DELAY = 0.05
+#: A response that nobody told is looked for after so much motion, see :attr:`Identification.motion` [rad^2/s],
+ENOUGH = 0.02
+#: as it was over the last [s],
+MEMORY = 5.0
+#: again after so many periods,
+EVERY = 20
+#: and taken on with this time constant [s]
+TAKEN_ON = 0.1
 #: Acceleration of braking where a joint has no limit [rad/s^2, m/s^2]
 PLAIN = 10.0
 
@@ -58,32 +61,33 @@ class ServoStep:
 class Servo:
     """Lets a robot follow a controller through servos of positions, velocities or torques.
 
-        servo = Servo(controller, "position", response=identify(commands, positions, dt))
+        servo = Servo(controller, "position")
         servo.reset(q)
         while True:
             driver.send(servo.step(driver.positions()).command.values)
 
-    The controller's ticks are taken at a reference r that nothing disturbs, dr/dt = v: limits and accelerations count from it.
-    The robot follows it by what is known of its servos and by feedback of e = r(t - D) (-) q, with D the delay and
-    w = 1 / max(10 dt, 4 D):
+    The controller's ticks are taken at a reference r that nothing disturbs, dr/dt = v, a = dv/dt: limits count from it. With e =
+    r(t) (-) q, where r(t) is what was to be reached now when the command of D ago was sent, and the correction d of
+    :class:`wbc.servo.laws.Feedback`, the robot gets
 
-        position   u = r (+) (T v + T w e + w int e dt)               T: the servo's lag
-        velocity   u = v + w e + w^2/4 int e dt
-        torque     u = M(r) (a + 2 w de/dt + w^2 e + w^3/3 int e dt) + h(r, v)
+        position   u = r (+) (T v + d)          velocity   u = v + T a + d
+        torque     u = (M(r) + armature) (a + d) + h(r, v) + damping v
 
-    The integrals make up for gravity, payload and friction that nobody told. They stand while the robot is farther behind than
-    ``divergence[0]``; then the reference slows down as well, and at ``divergence[1]`` it brakes and stays stopped until
-    :meth:`reset`.
+    at r(t + D). z = int e dt makes up for gravity, payload and friction that nobody told.
+
+    Where the robot is farther behind than ``divergence[0]`` the reference slows down, z stands and no correction is larger
+    than for that distance; at ``divergence[1]`` the reference brakes, and stays where it is until :meth:`reset`.
 
     Args:
         controller: compiled; it belongs to the servo from now on, apart from its run-time values.
-        kind: what the servos take. response: lag and delay, see :func:`identify`; default: none of either.
+        kind: what the servos take: "position", "velocity" or "torque".
+        response: T and D, see :func:`wbc.servo.identify`. Default: positions and velocities: found while the robot moves; torques: 0.
         divergence: distance behind the reference at which it begins to wait, and at which it stops [rad or m].
-        armature: of motors, added to the diagonal of M for torque servos, nv numbers or one [kg m^2].
-        damping: of joints, for torque servos [N m s].
+        armature: of motors, where the model has none, nv numbers or one [kg m^2]. damping: of joints [N m s]. Both for torques only.
 
     Raises:
-        UnknownNameError: another kind. ShapeError, NotFiniteError, RangeError, BoundsError: arguments that make no sense.
+        UnknownNameError: another kind. UnsupportedJointError: a base that moves, which no servo holds.
+        ShapeError, NotFiniteError, RangeError, BoundsError: arguments that make no sense.
     """
 
     def __init__(
@@ -97,23 +101,29 @@ class Servo:
         damping: Any = 0.0,
     ) -> None:
         self.kind = CommandKind(validation.one_of("kind", str(kind), [str(one) for one in CommandKind]))
+        validation.instance("controller", controller, Controller, "a compiled stack")
         self.controller, self._robot, self._dt = controller, controller.stack.robot, controller.stack.dt
         self._model, nv = self._robot.model, self._robot.nv
-        self._data = self._model.createData()
+        if self._robot.base != "fixed":
+            raise UnsupportedJointError("controller", self._robot.base, "no servo holds a base that moves: expected a fixed one")
         near, far = validation.ordinary_array("divergence", divergence, (2,)).tolist()
         if not 0.0 < near < far:
             raise BoundsError("divergence", divergence, "expected 0 < where it waits < where it stops")
         self._near, self._far = near, far
-        self._lag = np.zeros(nv) if response is None else validation.real_array("response.lag", response.lag, (nv,))
-        delay = 0.0 if response is None else validation.scalar("response.delay", response.delay, low=0.0, unit="s")
-        self._delay, self._late = delay, round(delay / self._dt)
-        slow = PER_LAG * self._lag if self.kind is CommandKind.VELOCITY else np.zeros(nv)
-        least = CAREFUL[self.kind] if response is None else PER_DELAY[self.kind] * delay + slow
-        self._w = 1.0 / np.maximum(QUICKEST * self._dt, least)
-        self._armature = np.broadcast_to(validation.real_array("armature", armature), (nv,)) + np.zeros(nv)
-        self._damping = np.broadcast_to(validation.real_array("damping", damping), (nv,)) + np.zeros(nv)
+        self._armature, self._damping = (
+            _each(name, value, nv) for name, value in (("armature", armature), ("damping", damping))
+        )
+        self._data = self._model.createData()
         known = self._robot.limits.acceleration
-        self._most = np.where(np.isfinite(known), known, PLAIN)
+        self._brake = np.where(np.isfinite(known), known, PLAIN)
+        self._told = validation.instance("response", response or Response(), Response, "a wbc.servo.Response")
+        self._learns = response is None and self.kind is not CommandKind.TORQUE
+        _each("response.lag", self._told.lag, nv)
+        validation.scalar("response.delay", self._told.delay, high=LONGEST_DELAY, unit="s")
+        if not np.isfinite(known).all():
+            joint = self._robot.dof_names[int(np.argmin(np.isfinite(known)))]
+            log.warning("%s has no acceleration limit: its reference may jump, which no servo follows", joint)
+        self._most = round(LONGEST_DELAY / self._dt) + 1
         self.reset(self._robot.neutral)
 
     @property
@@ -121,75 +131,114 @@ class Servo:
         """The configuration that the robot is to be at [nq]."""
         return self._q.copy()
 
+    @property
+    def response(self) -> Response:
+        """The lag and the delay that are counted on: as told, or as found so far."""
+        return Response(self._lag.copy(), self._late * self._dt)
+
     def reset(self, q: Any) -> None:
-        """Begin anew, at rest at a measured configuration.
+        """Begin anew, at rest at a measured configuration. What was found of the response is kept.
 
         Raises:
             ShapeError, NotFiniteError, RotationError: no configuration; nothing is changed.
         """
-        q = self._robot.configuration("q", q)
+        q, nv = self._robot.configuration("q", q), self._robot.nv
         self.controller.reset(q)
-        self._q, self._v, self._sum = q, np.zeros(self._robot.nv), np.zeros(self._robot.nv)
-        self._before = deque([(q, self._v)] * (self._late + 1), maxlen=self._late + 1)
-        self._pending = deque[Array](maxlen=self._late)
-        self._measured, self._stopped, self._a = q, False, np.zeros(self._robot.nv)
+        if not hasattr(self, "_lag"):
+            self._respond(_each("response.lag", self._told.lag, nv), self._told.delay)
+            self._wanted = self._lag
+        self._identification = Identification(nv, self._dt, LONGEST_DELAY, MEMORY) if self._learns else None
+        self._q, self._v, self._a, self._sum = q, *np.zeros((3, nv))
+        self._measured, self._command, self._moved, self._asked = q, q, *np.zeros((2, nv))
+        self._stopped, self._ticks = False, 0
+        #: The last references and corrections, the oldest first
+        self._references = [(q, self._v)] * self._most
+        self._sent = np.zeros((self._most, nv))
 
     def step(self, q: Any, v: Any = None) -> ServoStep:
         """One period: a tick at the reference, and the command that lets the robot follow it.
 
         Args:
-            q: measured configuration. v: measured velocity; default: from two measurements.
+            q: measured configuration. v: measured velocity; default: from two measurements of q.
 
         Raises:
             ShapeError, NotFiniteError, RotationError: no configuration or velocity; nothing is changed.
         """
         q = self._robot.configuration("q", q)
-        speed = (
-            pin.difference(self._model, self._measured, q) / self._dt
-            if v is None
-            else validation.real_array("v", v, (self._robot.nv,))
-        )
-        self._measured = q
-        where, rate = self._before[0]
+        given = None if v is None else validation.ordinary_array("v", v, (self._robot.nv,))
+        moved = pin.difference(self._model, self._measured, q)
+        speed = moved / self._dt if given is None else given
+        self._measured, self._moved = q, self._moved + moved
+        where, rate = self._ahead(*self._references[-1 - self._late])
         error = np.asarray(pin.difference(self._model, q, where))
         behind = float(np.abs(error).max(initial=0.0))
         self._stopped |= behind >= self._far
         pace = 0.0 if self._stopped else min(1.0, (self._far - behind) / (self._far - self._near))
-        step = self.controller.step(self._q, self._v)
-        before, self._v = self._v, self._limited(step.v * pace) if pace < 1.0 else step.v.copy()
-        change = (self._v - before) / self._dt
-        self._q = np.asarray(pin.integrate(self._model, self._q, self._v * self._dt))
-        self._a += (change - self._a) * self._dt / (self._delay + self._dt)
-        ahead = np.asarray(pin.integrate(self._model, self._q, self._v * self._delay)), self._v + self._a * self._delay
-        self._before.append(ahead)
+        step = self._tick(pace)
         if behind < self._near:
             self._sum += error * self._dt
+        total, most = self._sum, self._near
+        d = self._feedback.correction(np.clip(error, -most, most), rate - speed, total, self._sent[self._most - self._late :])
+        self._sent[:-1] = self._sent[1:]
+        self._sent[-1] = d
+        values = self._values(d)
+        if self._identification is not None:
+            self._learn(self._identification, values, speed)
         following = Following.STOPPED if self._stopped else Following.CLOSE if pace == 1.0 else Following.SLOWED
-        return ServoStep(Command(self.kind, self._values(ahead, error, rate - speed, change)), step, following, error)
+        return ServoStep(Command(self.kind, values), step, following, error)
 
-    def _limited(self, wanted: Array) -> Array:
-        """A velocity that the joints can take from the last one within their accelerations."""
-        change = self._most * self._dt
-        return np.asarray(np.clip(wanted, self._v - change, self._v + change))
+    def _tick(self, pace: float) -> Step:
+        """The reference one period on, at a part of the tick's velocity."""
+        step, before = self.controller.step(self._q, self._v), self._v
+        change = self._brake * self._dt
+        self._v = step.v.copy() if pace == 1.0 else np.clip(pace * step.v, before - change, before + change)
+        self._change = (self._v - before) / self._dt
+        # Smoothed over the time that it is extrapolated by
+        self._a = self._a + (self._change - self._a) / (self._late + 1.0)
+        self._q = np.asarray(pin.integrate(self._model, self._q, self._v * self._dt))
+        self._references.append((self._q, self._v + self._late * self._dt * self._a))
+        del self._references[0]
+        return step
 
-    def _values(self, ahead: tuple[Array, Array], error: Array, rate_error: Array, change: Array) -> Array:
+    def _ahead(self, q: Array, v: Array) -> tuple[Array, Array]:
+        """Where a reference is D later, and how fast."""
+        return np.asarray(pin.integrate(self._model, q, self._late * self._dt * v)), v
+
+    def _values(self, d: Array) -> Array:
         """What the servos get."""
-        (q, v), w = ahead, self._w
+        q, v = self._ahead(*self._references[-1])
         if self.kind is CommandKind.POSITION:
-            lead = self._lag * v + self._lag * w * error + w * self._sum
-            return np.asarray(pin.integrate(self._model, q, lead))
-        # The error when this takes hold: what was commanded against it and has not taken hold yet is still to come
-        pending = np.array(self._pending).reshape(-1, error.size)
+            return np.asarray(pin.integrate(self._model, q, self._lag * v + d))
         if self.kind is CommandKind.VELOCITY:
-            error = error - pending.sum(axis=0) * self._dt
-            against = w * error + 0.25 * w * w * self._sum
-            self._pending.append(against)
-            return v + self._lag * self._a + against
-        left = self._dt * (np.arange(len(pending), 0.0, -1.0) - 0.5)[:, None]
-        error = error + rate_error * self._delay - (pending * left).sum(axis=0) * self._dt
-        rate_error = rate_error - pending.sum(axis=0) * self._dt
-        against = 2.0 * w * rate_error + w * w * error + w**3 / SLOWER * self._sum
-        self._pending.append(against)
-        a = change + against
-        torque = pin.rnea(self._model, self._data, q, v, a)
-        return np.asarray(torque + self._armature * a + self._damping * v)
+            return v + self._lag * self._a + d
+        a = self._change + d
+        return np.asarray(pin.rnea(self._model, self._data, q, v, a) + self._armature * a + self._damping * v)
+
+    def _respond(self, lag: Array, delay: float) -> None:
+        """Count on a lag and a delay."""
+        self._lag, self._late = lag, round(delay / self._dt)
+        w = quickness(self.kind, self._dt, delay, not self._learns)
+        self._feedback = Feedback(self.kind, self._dt, lag, self._late, w)
+
+    def _learn(self, found: Identification, values: Array, speed: Array) -> None:
+        """Find lag and delay while the robot moves, and take them on slowly."""
+        if self.kind is CommandKind.POSITION:
+            self._asked = self._asked + pin.difference(self._model, self._command, values)
+            self._command = values
+            found.add(self._asked, self._moved)
+        else:
+            found.add(values, speed)
+        self._ticks += 1
+        if self._ticks % EVERY == 0 and found.motion > ENOUGH:
+            best, part = found.response(), min(1.0, EVERY * self._dt / TAKEN_ON)
+            self._respond(self._lag + part * (best.lag - self._lag), best.delay)
+
+
+def _each(field: str, value: Any, nv: int) -> Array:
+    """One number at least 0 for each degree of freedom, from one or from nv."""
+    number = validation.ordinary_array(field, value)
+    if number.shape not in ((), (nv,)):
+        validation.real_array(field, value, (nv,))
+    if (number < 0.0).any():
+        raise RangeError(field, value, "expected at least 0")
+    return np.broadcast_to(number, (nv,)).copy()
