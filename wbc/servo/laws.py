@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from wbc.servo.response import Response
 from wbc.simulation import CommandKind
 from wbc.validation import Array
 
@@ -12,20 +13,21 @@ PER_DELAY = {CommandKind.POSITION: 2.5, CommandKind.VELOCITY: 1.5, CommandKind.T
 #: at least so many periods,
 PER_PERIOD = 10.0
 #: and where nobody told the response, at least so much [s]
-UNTOLD = {CommandKind.POSITION: 0.05, CommandKind.VELOCITY: 0.03, CommandKind.TORQUE: 0.01}
-#: The integral, as a part of w^2/4 of a velocity servo and of w^3 of a torque servo
-INTEGRAL = 1.0 / 3.0
+UNTOLD = {CommandKind.POSITION: 0.05, CommandKind.VELOCITY: 0.02, CommandKind.TORQUE: 0.01}
+#: A velocity servo's error takes so many times its lag longer
+PER_LAG = 2.0
 
 
 class Feedback:
     """Corrections d that make an error e = r (-) q vanish in about 1/w, by what q does with them:
 
         position   T dq/dt + q = r + T dr/dt + d     d = T w e + w z
-        velocity   T dv/dt + v = dr/dt + T a + d     d = (k - 1) de/dt + k w/2 e + k w^2/12 z,   k = max(1, 2 T w)
+        velocity   T dv/dt + v = dr/dt + T a + d     d = w' e + w'^2/4 z,   1/w' = 1/w + 2 T
         torque     dv/dt = a + d                     d = 2 w de/dt + w^2 e + w^3/3 z
 
     with z = int e dt. Of velocities and torques e and de/dt are those at t + D, when d takes hold: corrections that were sent
     within the last D are accounted for. Of positions the loop is w/s exp(-D s) without that, because the zero of d cancels the lag.
+    A velocity servo gets no de/dt: joints that move more lightly together than one by one would answer it by more than itself.
 
     Args:
         kind: of servo. dt: period [s]. lag: T, nv numbers. late: D in periods. w: [1/s].
@@ -33,12 +35,12 @@ class Feedback:
 
     def __init__(self, kind: CommandKind, dt: float, lag: Array, late: int, w: float) -> None:
         self.late = late
-        wide, k = np.ones_like(lag), np.maximum(1.0, 2.0 * w * lag)
+        wide, slow = np.ones_like(lag), 1.0 / (1.0 / w + PER_LAG * lag)
         #: Of de/dt, e and z
         self._gains = {
             CommandKind.POSITION: (0.0 * lag, w * lag, w * wide),
-            CommandKind.VELOCITY: (k - 1.0, 0.5 * w * k, 0.25 * INTEGRAL * w * w * k),
-            CommandKind.TORQUE: (2.0 * w * wide, w * w * wide, INTEGRAL * w**3 * wide),
+            CommandKind.VELOCITY: (0.0 * lag, slow, 0.25 * slow * slow),
+            CommandKind.TORQUE: (2.0 * w * wide, w * w * wide, w**3 / 3.0 * wide),
         }[kind]
         left = np.arange(late, 0.0, -1.0)[:, None]  # periods from the sending of each correction to t + D, the oldest first
         if kind is CommandKind.TORQUE:
@@ -60,6 +62,10 @@ class Feedback:
         return np.asarray(on_rate * rate + on_error * error + on_total * total)
 
 
-def quickness(kind: CommandKind, dt: float, delay: float, told: bool) -> float:
-    """w [1/s]: 1 over the largest of the times that the delay, the period and ignorance ask for."""
-    return 1.0 / max(PER_PERIOD * dt, PER_DELAY[kind] * delay, 0.0 if told else UNTOLD[kind])
+def quickness(kind: CommandKind, dt: float, response: Response, told: bool) -> float:
+    """w [1/s]: 1 over the largest of the times that the period, the delay and ignorance ask for.
+
+    Delays and doubts longer than the real ones cost accuracy; w times what the delay is longer than known must stay below 1.
+    """
+    late = PER_DELAY[kind] * response.delay + response.doubt
+    return 1.0 / max(PER_PERIOD * dt, late, 0.0 if told else UNTOLD[kind])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -13,44 +13,70 @@ from wbc.validation import Array
 
 #: Both sides of the equation are smoothed over this time, which makes the derivative one of measured values [s]
 SMOOTHING = 0.02
-#: A joint's share of int (dx/dt)^2 dt below which its lag is said to be less than what is found [rad^2/s, m^2/s]
-LITTLE = 1e-4
+#: What is found for each joint
+PER_JOINT = ("lag", "compliance", "sag", "friction")
+#: These, and an offset
+TERMS = 5
+#: Integrals of the squares of the terms up to which their numbers are said to be less than what fits, [rad^2/s], [(N m)^2 s], [s]
+LITTLE = (1e-4, 1e-2, 1e-2, 1e-2, 1e-9)
+#: A delay is doubted as long as its squared residual is at most so many times the least one
+AS_GOOD = 1.5
 #: A joint that moves less than this between its extremes says nothing of its lag [rad or m, rad/s or m/s]
 LEAST_MOTION = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
 class Response:
-    """A servo as a lag and a delay, joint by joint:
+    """What a servo does with what it is sent, joint by joint, each one number or nv of them:
 
-        T dx/dt + x = u(t - D) + offset,   x = q of a position servo, v of a velocity servo
+        T dx/dt + x = u(t - D) - C (M(q) a + c(q, v)) - S g(q) - F sign(v) + offset
+
+    with x = q of a position servo and v of a velocity servo; M, c and g are inertia, Coriolis forces and gravity.
 
     Attributes:
-        lag: T [s], one number or nv of them. delay: D, of command and measurement together [s].
+        lag: T [s]. delay: D, of command and measurement together [s].
+        doubt: by how much the delay may be longer, at the cost of the lag; feedback is as slow as that asks for [s].
+        compliance, sag: C and S, of forces of motion and of gravity [rad/(N m), or rad/(N m s) of velocities].
+        friction: F [rad or rad/s].
 
     Raises:
-        ShapeError, NotFiniteError, RangeError: no times.
+        ShapeError, NotFiniteError, RangeError: no such numbers, or negative ones.
     """
 
     lag: Array | float = 0.0
     delay: float = 0.0
+    doubt: float = 0.0
+    compliance: Array | float = 0.0
+    sag: Array | float = 0.0
+    friction: Array | float = 0.0
 
     def __post_init__(self) -> None:
-        lag = validation.ordinary_array("response.lag", self.lag)
-        if lag.ndim > 1 or (lag < 0.0).any():
-            raise RangeError("response.lag", self.lag, "expected one time, or one a joint, of at least 0 s")
-        validation.scalar("response.delay", self.delay, low=0.0, unit="s")
+        for name in PER_JOINT:
+            found = validation.ordinary_array(f"response.{name}", getattr(self, name))
+            if found.ndim > 1 or (found < 0.0).any():
+                raise RangeError(f"response.{name}", getattr(self, name), "expected one number, or one a joint, of at least 0")
+        for name in ("delay", "doubt"):
+            validation.scalar(f"response.{name}", getattr(self, name), low=0.0, unit="s")
 
-    def __repr__(self) -> str:
-        return f"Response(lag={np.round(self.lag, 4).tolist()}, delay={self.delay:g})"
+    def towards(self, other: Response, part: float) -> Response:
+        """With the delay of another one, and a part of the way to its numbers of joints."""
+        here, there = self.rows(), other.rows()
+        return Response(there[0], other.delay, other.doubt, *there[1:]) if part >= 1.0 else replace(
+            other, **{name: a + part * (b - a) for name, a, b in zip(PER_JOINT, here, there, strict=True)}
+        )
+
+    def rows(self, joints: int | None = None) -> list[Array]:
+        """T, C, S and F, each for so many joints."""
+        found = [np.asarray(getattr(self, name), dtype=float) for name in PER_JOINT]
+        return found if joints is None else [np.broadcast_to(one, (joints,)) for one in found]
 
 
 class Identification:
     """Least squares over what has been sent and measured so far, for every delay up to a longest one:
 
-        min over D, T >= 0, offset of  int f |x + T dx/dt - u(t - D) - offset|^2 dt
+        min over D, offset and T, C, S, F >= 0 of  int f |u(t - D) - x - T dx/dt - C .. - S .. - F .. - offset|^2 dt
 
-    f forgets the past with a time constant. u and x are smoothed alike, which leaves T and D as they are.
+    f forgets the past with a time constant. All is smoothed alike, which leaves the numbers as they are.
 
     Args:
         joints: how many. dt: between samples [s]. longest_delay, memory: of D and of f [s].
@@ -62,50 +88,56 @@ class Identification:
         self._rows = round(longest_delay / dt) + 1
         # Written twice, so that the last rows always lie in one piece, the oldest first
         self._sent = np.zeros((2 * self._rows, joints))
-        self._error = np.zeros((self._rows, joints))
-        self._sums = np.zeros((3, self._rows, joints))
-        self._count, self._next = 0.0, -1
-        self._u, self._x, self._rate = np.zeros((3, joints))
-        self._rates, self._squares = np.zeros((2, joints))
+        #: Smoothed: u, x; dx/dt, the loads, and 1
+        self._u, self._x, self._terms = np.zeros(joints), np.zeros(joints), np.zeros((TERMS, joints))
+        self._terms[-1] = 1.0
+        self._squares = np.zeros((TERMS, TERMS, joints))
+        self._products = np.zeros((TERMS, self._rows, joints))
+        self._errors = np.zeros((self._rows, joints))
+        self._next = -1
 
-    def add(self, u: Array, x: Array) -> None:
-        """What is sent now, and what is measured now."""
+    def add(self, u: Array, x: Array, loads: Array | float = 0.0) -> None:
+        """What is sent now, what is measured now, and the terms of C, S and F now ``[3, joints]``."""
         if self._next < 0:
-            self._u[:], self._x[:], self._sent[:] = u, x, u
+            self._u[:], self._x[:], self._sent[:], self._terms[1:-1] = u, x, u, loads
         self._next = (self._next + 1) % self._rows
         self._u += self._part * (u - self._u)
-        np.subtract(x, self._x, out=self._rate)
-        self._rate *= self._part / self._dt
-        self._x += self._dt * self._rate
+        terms = self._terms
+        terms[0] = (self._part / self._dt) * (x - self._x)
+        self._x += self._dt * terms[0]
+        terms[1:-1] += self._part * (loads - terms[1:-1])
         self._sent[self._next] = self._sent[self._next + self._rows] = self._u
-        error, rate, keep = self._error, self._rate, self._keep
-        np.subtract(self._sent[self._next + 1 : self._next + 1 + self._rows], self._x, out=error)
-        self._count = keep * self._count + 1.0
-        self._rates *= keep
-        self._rates += rate
-        self._squares *= keep
-        self._squares += rate * rate
-        self._sums *= keep
-        self._sums[0] += error
-        self._sums[1] += error * rate
-        error *= error
-        self._sums[2] += error
+        error = self._sent[self._next + 1 : self._next + 1 + self._rows] - self._x
+        for sums, new in (
+            (self._squares, terms[:, None] * terms), (self._products, terms[:, None] * error), (self._errors, error * error)
+        ):  # fmt: skip
+            sums *= self._keep
+            sums += new
 
     @property
     def motion(self) -> float:
         """How much there was to learn from: the sum of int (dx/dt)^2 dt about its mean [rad^2/s]."""
-        return float(self._dt * (self._squares - self._rates**2 / max(self._count, 1.0)).sum())
+        return float(self._dt * self._variance().sum())
+
+    def _variance(self) -> Array:
+        squares = self._squares
+        return np.maximum(squares[0, 0] - squares[0, -1] ** 2 / np.maximum(squares[-1, -1], 1.0), 0.0)
 
     def response(self) -> Response:
         """What fits best."""
-        count, mean = max(self._count, 1.0), self._rates / max(self._count, 1.0)
-        error, product, square = self._sums
-        variance = np.maximum(self._squares - mean * self._rates, 0.0)
-        product, square = product - error * mean, square - error * error / count
-        lag = np.maximum(product / (variance + LITTLE / self._dt), 0.0)
-        left = (square - 2.0 * lag * product + lag * lag * variance) / (variance + LITTLE / self._dt)
-        row = int(left.sum(axis=1).argmin())
-        return Response(lag[row], (self._rows - 1 - row) * self._dt)
+        squares, products = np.moveaxis(self._squares, -1, 0), np.moveaxis(self._products, -1, 0)
+        found = np.linalg.solve(squares + np.diag(np.array(LITTLE) / self._dt), products)
+        found[:, :-1] = np.maximum(found[:, :-1], 0.0)
+        # The offset that goes with what was cut off
+        rest = products[:, -1] - np.einsum("jt,jtd->jd", squares[:, -1, :-1], found[:, :-1])
+        found[:, -1] = rest / np.maximum(squares[:, -1, -1], 1.0)[:, None]
+        explained = np.einsum("jtd,jtd->jd", found, 2.0 * products - squares @ found)
+        left = ((self._errors.T - explained) / (self._variance() + LITTLE[0] / self._dt)[:, None]).sum(axis=0)
+        row = int(left.argmin())
+        # Row 0 is the longest delay
+        doubtful = row - int(np.argmax(left <= AS_GOOD * left[row]))
+        lag, compliance, sag, friction = found[:, :-1, row].T
+        return Response(lag, (self._rows - 1 - row) * self._dt, doubtful * self._dt, compliance, sag, friction)
 
 
 def identify(commands: Any, measured: Any, dt: float, longest_delay: float = 0.05) -> Response:

@@ -14,7 +14,7 @@ from wbc import validation
 from wbc.controller import Controller, Step
 from wbc.errors import BoundsError, RangeError, UnsupportedJointError
 from wbc.servo.laws import Feedback, quickness
-from wbc.servo.response import Identification, Response
+from wbc.servo.response import PER_JOINT, Identification, Response
 from wbc.simulation import Command, CommandKind
 from wbc.validation import Array
 
@@ -30,6 +30,8 @@ MEMORY = 5.0
 EVERY = 20
 #: and taken on with this time constant [s]
 TAKEN_ON = 0.1
+#: Friction is all there at several times this speed [rad/s, m/s]
+CREEP = 0.01
 #: Acceleration of braking where a joint has no limit [rad/s^2, m/s^2]
 PLAIN = 10.0
 
@@ -70,13 +72,16 @@ class Servo:
     r(t) (-) q, where r(t) is what was to be reached now when the command of D ago was sent, and the correction d of
     :class:`wbc.servo.laws.Feedback`, the robot gets
 
-        position   u = r (+) (T v + d)          velocity   u = v + T a + d
+        position   u = r (+) (T v + f + d)          velocity   u = v + T a + f + d
         torque     u = (M(r) + armature) (a + d) + h(r, v) + damping v
 
-    at r(t + D). z = int e dt makes up for gravity, payload and friction that nobody told.
+    at r(t + D), with f = C (M a + c) + S g + F sign(v), see :class:`Response`. z = int e dt makes up for what nobody told.
 
     Where the robot is farther behind than ``divergence[0]`` the reference slows down, z stands and no correction is larger
     than for that distance; at ``divergence[1]`` the reference brakes, and stays where it is until :meth:`reset`.
+
+    Attributes:
+        response: that is counted on, as told or as found so far: to be told next time.
 
     Args:
         controller: compiled; it belongs to the servo from now on, apart from its run-time values.
@@ -116,25 +121,23 @@ class Servo:
         self._data = self._model.createData()
         known = self._robot.limits.acceleration
         self._brake = np.where(np.isfinite(known), known, PLAIN)
-        self._told = validation.instance("response", response or Response(), Response, "a wbc.servo.Response")
+        told = validation.instance("response", response or Response(), Response, "a wbc.servo.Response")
         self._learns = response is None and self.kind is not CommandKind.TORQUE
-        _each("response.lag", self._told.lag, nv)
-        validation.scalar("response.delay", self._told.delay, high=LONGEST_DELAY, unit="s")
+        for name in PER_JOINT:
+            _each(f"response.{name}", getattr(told, name), nv)
+        validation.scalar("response.delay", told.delay, high=LONGEST_DELAY, unit="s")
         if not np.isfinite(known).all():
             joint = self._robot.dof_names[int(np.argmin(np.isfinite(known)))]
             log.warning("%s has no acceleration limit: its reference may jump, which no servo follows", joint)
         self._most = round(LONGEST_DELAY / self._dt) + 1
+        self._inertia = np.diag(pin.crba(self._model, self._data, self._robot.neutral)).copy()
+        self._respond(told)
         self.reset(self._robot.neutral)
 
     @property
     def reference(self) -> Array:
         """The configuration that the robot is to be at [nq]."""
         return self._q.copy()
-
-    @property
-    def response(self) -> Response:
-        """The lag and the delay that are counted on: as told, or as found so far."""
-        return Response(self._lag.copy(), self._late * self._dt)
 
     def reset(self, q: Any) -> None:
         """Begin anew, at rest at a measured configuration. What was found of the response is kept.
@@ -144,15 +147,12 @@ class Servo:
         """
         q, nv = self._robot.configuration("q", q), self._robot.nv
         self.controller.reset(q)
-        if not hasattr(self, "_lag"):
-            self._respond(_each("response.lag", self._told.lag, nv), self._told.delay)
-            self._wanted = self._lag
         self._identification = Identification(nv, self._dt, LONGEST_DELAY, MEMORY) if self._learns else None
         self._q, self._v, self._a, self._sum = q, *np.zeros((3, nv))
         self._measured, self._command, self._moved, self._asked = q, q, *np.zeros((2, nv))
         self._stopped, self._ticks = False, 0
         #: The last references and corrections, the oldest first
-        self._references = [(q, self._v)] * self._most
+        self._references = [(q, self._v, self._a)] * self._most
         self._sent = np.zeros((self._most, nv))
 
     def step(self, q: Any, v: Any = None) -> ServoStep:
@@ -169,7 +169,7 @@ class Servo:
         moved = pin.difference(self._model, self._measured, q)
         speed = moved / self._dt if given is None else given
         self._measured, self._moved = q, self._moved + moved
-        where, rate = self._ahead(*self._references[-1 - self._late])
+        where, rate, _ = state = self._ahead(*self._references[-1 - self._late])
         error = np.asarray(pin.difference(self._model, q, where))
         behind = float(np.abs(error).max(initial=0.0))
         self._stopped |= behind >= self._far
@@ -183,7 +183,7 @@ class Servo:
         self._sent[-1] = d
         values = self._values(d)
         if self._identification is not None:
-            self._learn(self._identification, values, speed)
+            self._learn(self._identification, values, speed, self._loads(*state))
         following = Following.STOPPED if self._stopped else Following.CLOSE if pace == 1.0 else Following.SLOWED
         return ServoStep(Command(self.kind, values), step, following, error)
 
@@ -196,42 +196,50 @@ class Servo:
         # Smoothed over the time that it is extrapolated by
         self._a = self._a + (self._change - self._a) / (self._late + 1.0)
         self._q = np.asarray(pin.integrate(self._model, self._q, self._v * self._dt))
-        self._references.append((self._q, self._v + self._late * self._dt * self._a))
+        self._references.append((self._q, self._v + self._late * self._dt * self._a, self._a))
         del self._references[0]
         return step
 
-    def _ahead(self, q: Array, v: Array) -> tuple[Array, Array]:
-        """Where a reference is D later, and how fast."""
-        return np.asarray(pin.integrate(self._model, q, self._late * self._dt * v)), v
+    def _ahead(self, q: Array, v: Array, a: Array) -> tuple[Array, Array, Array]:
+        """Where a reference is D later, how fast, and its acceleration."""
+        return np.asarray(pin.integrate(self._model, q, self._late * self._dt * v)), v, a
+
+    def _loads(self, q: Array, v: Array, a: Array) -> Array:
+        """What compliance, sag and friction answer to ``[3, nv]``."""
+        gravity = pin.computeGeneralizedGravity(self._model, self._data, q).copy()
+        return np.array([pin.rnea(self._model, self._data, q, v, a) - gravity, gravity, v / (np.abs(v) + CREEP)])
 
     def _values(self, d: Array) -> Array:
         """What the servos get."""
-        q, v = self._ahead(*self._references[-1])
-        if self.kind is CommandKind.POSITION:
-            return np.asarray(pin.integrate(self._model, q, self._lag * v + d))
-        if self.kind is CommandKind.VELOCITY:
-            return v + self._lag * self._a + d
-        a = self._change + d
-        return np.asarray(pin.rnea(self._model, self._data, q, v, a) + self._armature * a + self._damping * v)
+        q, v, a = state = self._ahead(*self._references[-1])
+        if self.kind is CommandKind.TORQUE:
+            a = self._change + d
+            return np.asarray(pin.rnea(self._model, self._data, q, v, a) + self._armature * a + self._damping * v)
+        if self._yields.any():
+            d = d + (self._yields * self._loads(*state)).sum(axis=0)
+        return v + self._lag * a + d if self.kind is CommandKind.VELOCITY else pin.integrate(self._model, q, self._lag * v + d)
 
-    def _respond(self, lag: Array, delay: float) -> None:
-        """Count on a lag and a delay."""
-        self._lag, self._late = lag, round(delay / self._dt)
-        w = quickness(self.kind, self._dt, delay, not self._learns)
+    def _respond(self, response: Response) -> None:
+        """Count on a response."""
+        self.response, self._late = response, round(response.delay / self._dt)
+        self._lag, *yields = response.rows(self._robot.nv)
+        self._yields = np.array(yields)
+        w = quickness(self.kind, self._dt, response, not self._learns)
+        # The inertia that a compliant servo of velocities has to accelerate is a lag as well
+        lag = self._lag + self._yields[0] * self._inertia if self.kind is CommandKind.VELOCITY else self._lag
         self._feedback = Feedback(self.kind, self._dt, lag, self._late, w)
 
-    def _learn(self, found: Identification, values: Array, speed: Array) -> None:
+    def _learn(self, found: Identification, values: Array, speed: Array, loads: Array) -> None:
         """Find lag and delay while the robot moves, and take them on slowly."""
         if self.kind is CommandKind.POSITION:
             self._asked = self._asked + pin.difference(self._model, self._command, values)
             self._command = values
-            found.add(self._asked, self._moved)
+            found.add(self._asked, self._moved, loads)
         else:
-            found.add(values, speed)
+            found.add(values, speed, loads)
         self._ticks += 1
         if self._ticks % EVERY == 0 and found.motion > ENOUGH:
-            best, part = found.response(), min(1.0, EVERY * self._dt / TAKEN_ON)
-            self._respond(self._lag + part * (best.lag - self._lag), best.delay)
+            self._respond(self.response.towards(found.response(), EVERY * self._dt / TAKEN_ON))
 
 
 def _each(field: str, value: Any, nv: int) -> Array:
