@@ -18,7 +18,7 @@ PER_JOINT = ("lag", "compliance", "sag", "friction")
 #: These, and an offset
 TERMS = 5
 #: Integrals of the squares of the terms up to which their numbers are said to be less than what fits, [rad^2/s], [(N m)^2 s], [s]
-LITTLE = (1e-4, 1e-2, 1e-2, 1e-2, 1e-9)
+LITTLE = (1e-4, 1.0, 1.0, 0.1, 1e-9)
 #: A delay is doubted as long as its squared residual is at most so many times the least one
 AS_GOOD = 1.5
 #: A joint that moves less than this between its extremes says nothing of its lag [rad or m, rad/s or m/s]

@@ -23,7 +23,7 @@ log = logging.getLogger("wbc")
 #: No delay is longer than this [s]
 LONGEST_DELAY = 0.05
 #: A response that nobody told is looked for after so much motion, see :attr:`Identification.motion` [rad^2/s],
-ENOUGH = 0.02
+ENOUGH = 0.05
 #: as it was over the last [s],
 MEMORY = 5.0
 #: again after so many periods,
@@ -169,7 +169,7 @@ class Servo:
         moved = pin.difference(self._model, self._measured, q)
         speed = moved / self._dt if given is None else given
         self._measured, self._moved = q, self._moved + moved
-        where, rate, _ = state = self._ahead(*self._references[-1 - self._late])
+        where, rate, _ = self._ahead(*self._references[-1 - self._late])
         error = np.asarray(pin.difference(self._model, q, where))
         behind = float(np.abs(error).max(initial=0.0))
         self._stopped |= behind >= self._far
@@ -183,7 +183,7 @@ class Servo:
         self._sent[-1] = d
         values = self._values(d)
         if self._identification is not None:
-            self._learn(self._identification, values, speed, self._loads(*state))
+            self._learn(self._identification, values, speed, self._loads(self._q, self._v, self._change))
         following = Following.STOPPED if self._stopped else Following.CLOSE if pace == 1.0 else Following.SLOWED
         return ServoStep(Command(self.kind, values), step, following, error)
 
