@@ -25,16 +25,17 @@ class Feedback:
         velocity   T dv/dt + v = dr/dt + T a + d     d = w' e + w'^2/4 z,   1/w' = 1/w + 2 T
         torque     dv/dt = a + d                     d = 2 w de/dt + w^2 e + w^3/3 z
 
-    with z = int e dt. Of velocities and torques e and de/dt are those at t + D, when d takes hold: corrections that were sent
-    within the last D are accounted for. Of positions the loop is w/s exp(-D s) without that, because the zero of d cancels the lag.
-    A velocity servo gets no de/dt: joints that move more lightly together than one by one would answer it by more than itself.
+    with z = int e dt. Of velocities and torques e and de/dt are those at t + D, when d takes hold: corrections that were
+    sent within the last D are accounted for. Of positions the loop is w/s exp(-D s) without that, because the zero of d
+    cancels the lag. A velocity servo gets no de/dt: joints that move more lightly together than one by one would answer
+    it by more than itself.
 
     Args:
         kind: of servo. dt: period [s]. lag: T, nv numbers. late: D in periods. w: [1/s].
     """
 
     def __init__(self, kind: CommandKind, dt: float, lag: Array, late: int, w: float) -> None:
-        self.late = late
+        self._w = w
         wide, slow = np.ones_like(lag), 1.0 / (1.0 / w + PER_LAG * lag)
         #: Of de/dt, e and z
         self._gains = {
@@ -42,7 +43,9 @@ class Feedback:
             CommandKind.VELOCITY: (0.0 * lag, slow, 0.25 * slow * slow),
             CommandKind.TORQUE: (2.0 * w * wide, w * w * wide, w**3 / 3.0 * wide),
         }[kind]
-        left = np.arange(late, 0.0, -1.0)[:, None]  # periods from the sending of each correction to t + D, the oldest first
+        left = np.arange(late, 0.0, -1.0)[
+            :, None
+        ]  # periods from the sending of each correction to t + D, the oldest first
         if kind is CommandKind.TORQUE:
             self._stay, self._reach = wide, late * dt * wide
             self._slows, self._moves = dt * (wide + 0.0 * left), dt * dt * (left - 0.5) * wide
@@ -53,8 +56,9 @@ class Feedback:
             self._moves = dt - lag * self._slows
         self._predicts = late > 0 and kind is not CommandKind.POSITION
 
-    def correction(self, error: Array, rate: Array, total: Array, sent: Array) -> Array:
-        """d, from e, de/dt, z and the corrections of the last D, the oldest first."""
+    def correction(self, error: Array, rate: Array, total: Array, sent: Array, most: float) -> Array:
+        """d, from e, de/dt, z and the corrections of the last D, the oldest first; of e at most so much, of de/dt w times."""
+        error, rate = np.clip(error, -most, most), np.clip(rate, -most * self._w, most * self._w)
         if self._predicts:
             error = error + self._reach * rate - (self._moves * sent).sum(axis=0)
             rate = self._stay * rate - (self._slows * sent).sum(axis=0)
@@ -65,7 +69,7 @@ class Feedback:
 def quickness(kind: CommandKind, dt: float, response: Response, told: bool) -> float:
     """w [1/s]: 1 over the largest of the times that the period, the delay and ignorance ask for.
 
-    Delays and doubts longer than the real ones cost accuracy; w times what the delay is longer than known must stay below 1.
+    A delay that is told too long costs accuracy; what is missing of it, times w, must stay below 1.
     """
     late = PER_DELAY[kind] * response.delay + response.doubt
     return 1.0 / max(PER_PERIOD * dt, late, 0.0 if told else UNTOLD[kind])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -17,7 +17,7 @@ SMOOTHING = 0.02
 PER_JOINT = ("lag", "compliance", "sag", "friction")
 #: These, and an offset
 TERMS = 5
-#: Integrals of the squares of the terms up to which their numbers are said to be less than what fits, [rad^2/s], [(N m)^2 s], [s]
+#: Integrals of squares of terms, about which their numbers are said to be half of what fits [rad^2/s, (N m)^2 s, s]
 LITTLE = (1e-4, 1.0, 1.0, 0.1, 1e-9)
 #: A delay is doubted as long as its squared residual is at most so many times the least one
 AS_GOOD = 1.5
@@ -54,16 +54,16 @@ class Response:
         for name in PER_JOINT:
             found = validation.ordinary_array(f"response.{name}", getattr(self, name))
             if found.ndim > 1 or (found < 0.0).any():
-                raise RangeError(f"response.{name}", getattr(self, name), "expected one number, or one a joint, of at least 0")
+                raise RangeError(
+                    f"response.{name}", getattr(self, name), "expected one number, or one a joint, of at least 0"
+                )
         for name in ("delay", "doubt"):
             validation.scalar(f"response.{name}", getattr(self, name), low=0.0, unit="s")
 
     def towards(self, other: Response, part: float) -> Response:
         """With the delay of another one, and a part of the way to its numbers of joints."""
-        here, there = self.rows(), other.rows()
-        return Response(there[0], other.delay, other.doubt, *there[1:]) if part >= 1.0 else replace(
-            other, **{name: a + part * (b - a) for name, a, b in zip(PER_JOINT, here, there, strict=True)}
-        )
+        lag, *others = (a + min(1.0, part) * (b - a) for a, b in zip(self.rows(), other.rows(), strict=True))
+        return Response(lag, other.delay, other.doubt, *others)
 
     def rows(self, joints: int | None = None) -> list[Array]:
         """T, C, S and F, each for so many joints."""
@@ -108,11 +108,11 @@ class Identification:
         terms[1:-1] += self._part * (loads - terms[1:-1])
         self._sent[self._next] = self._sent[self._next + self._rows] = self._u
         error = self._sent[self._next + 1 : self._next + 1 + self._rows] - self._x
-        for sums, new in (
-            (self._squares, terms[:, None] * terms), (self._products, terms[:, None] * error), (self._errors, error * error)
-        ):  # fmt: skip
+        for sums in (self._squares, self._products, self._errors):
             sums *= self._keep
-            sums += new
+        self._squares += terms[:, None] * terms
+        self._products += terms[:, None] * error
+        self._errors += error * error
 
     @property
     def motion(self) -> float:
@@ -121,7 +121,7 @@ class Identification:
 
     def _variance(self) -> Array:
         squares = self._squares
-        return np.maximum(squares[0, 0] - squares[0, -1] ** 2 / np.maximum(squares[-1, -1], 1.0), 0.0)
+        return np.asarray(np.maximum(squares[0, 0] - squares[0, -1] ** 2 / np.maximum(squares[-1, -1], 1.0), 0.0))
 
     def response(self) -> Response:
         """What fits best."""
@@ -144,8 +144,8 @@ def identify(commands: Any, measured: Any, dt: float, longest_delay: float = 0.0
     """Lag and delay of servos from what they were commanded and what they did: see :class:`Identification`.
 
     Args:
-        commands: u ``[n, joints]``. measured: as each command was sent, positions of a position servo or velocities of a
-            velocity servo ``[n, joints]``. dt: between two rows [s]. longest_delay: no delay is longer [s].
+        commands: u ``[n, joints]``. measured: as each command was sent ``[n, joints]``, positions of a position servo
+            or velocities of a velocity servo. dt: between two rows [s]. longest_delay: no delay is longer [s].
 
     Raises:
         ShapeError, NotFiniteError: other arrays. RangeError: a joint that hardly moves, or too few samples.

@@ -1,4 +1,4 @@
-"""A reference between the tick and the servos of a robot: kept, integrated, and followed with feedback from measurement."""
+"""A reference between the tick and a robot's servos: kept, integrated, and followed with feedback from measurement."""
 
 from __future__ import annotations
 
@@ -68,17 +68,18 @@ class Servo:
         while True:
             driver.send(servo.step(driver.positions()).command.values)
 
-    The controller's ticks are taken at a reference r that nothing disturbs, dr/dt = v, a = dv/dt: limits count from it. With e =
-    r(t) (-) q, where r(t) is what was to be reached now when the command of D ago was sent, and the correction d of
-    :class:`wbc.servo.laws.Feedback`, the robot gets
+    The controller's ticks are taken at a reference r that nothing disturbs, dr/dt = v, a = dv/dt: limits count from it.
+    With e = r(t) (-) q, where r(t) is what was to be reached now when the command of D ago was sent, and the correction d
+    of :class:`wbc.servo.laws.Feedback`, the robot gets
 
         position   u = r (+) (T v + f + d)          velocity   u = v + T a + f + d
         torque     u = (M(r) + armature) (a + d) + h(r, v) + damping v
 
-    at r(t + D), with f = C (M a + c) + S g + F sign(v), see :class:`Response`. z = int e dt makes up for what nobody told.
+    at r(t + D), with f = C (M a + c) + S g + F sign(v), see :class:`Response`. z = int e dt makes up for what nobody
+    told.
 
-    Where the robot is farther behind than ``divergence[0]`` the reference slows down, z stands and no correction is larger
-    than for that distance; at ``divergence[1]`` the reference brakes, and stays where it is until :meth:`reset`.
+    Where the robot is farther behind than ``divergence[0]`` the reference slows down, z stands and no correction is
+    larger than for that distance; at ``divergence[1]`` the reference brakes, and stays where it is until :meth:`reset`.
 
     Attributes:
         response: that is counted on, as told or as found so far: to be told next time.
@@ -86,9 +87,11 @@ class Servo:
     Args:
         controller: compiled; it belongs to the servo from now on, apart from its run-time values.
         kind: what the servos take: "position", "velocity" or "torque".
-        response: T and D, see :func:`wbc.servo.identify`. Default: positions and velocities: found while the robot moves; torques: 0.
+        response: see :func:`wbc.servo.identify`. Default: of positions and velocities it is found while the robot moves;
+            of torques, which show none, only a delay counts, 0 unless it is told.
         divergence: distance behind the reference at which it begins to wait, and at which it stops [rad or m].
-        armature: of motors, where the model has none, nv numbers or one [kg m^2]. damping: of joints [N m s]. Both for torques only.
+        armature: of motors, where the model has none, nv numbers or one [kg m^2]. damping: of joints [N m s]. Both for
+            torques only.
 
     Raises:
         UnknownNameError: another kind. UnsupportedJointError: a base that moves, which no servo holds.
@@ -110,7 +113,9 @@ class Servo:
         self.controller, self._robot, self._dt = controller, controller.stack.robot, controller.stack.dt
         self._model, nv = self._robot.model, self._robot.nv
         if self._robot.base != "fixed":
-            raise UnsupportedJointError("controller", self._robot.base, "no servo holds a base that moves: expected a fixed one")
+            raise UnsupportedJointError(
+                "controller", self._robot.base, "no servo holds a base that moves: expected a fixed one"
+            )
         near, far = validation.ordinary_array("divergence", divergence, (2,)).tolist()
         if not 0.0 < near < far:
             raise BoundsError("divergence", divergence, "expected 0 < where it waits < where it stops")
@@ -145,7 +150,7 @@ class Servo:
         Raises:
             ShapeError, NotFiniteError, RotationError: no configuration; nothing is changed.
         """
-        q, nv = self._robot.configuration("q", q), self._robot.nv
+        q, nv = self._robot.configuration("q", validation.ordinary_array("q", q)), self._robot.nv
         self.controller.reset(q)
         self._identification = Identification(nv, self._dt, LONGEST_DELAY, MEMORY) if self._learns else None
         self._q, self._v, self._a, self._sum = q, *np.zeros((3, nv))
@@ -164,7 +169,7 @@ class Servo:
         Raises:
             ShapeError, NotFiniteError, RotationError: no configuration or velocity; nothing is changed.
         """
-        q = self._robot.configuration("q", q)
+        q = self._robot.configuration("q", validation.ordinary_array("q", q))
         given = None if v is None else validation.ordinary_array("v", v, (self._robot.nv,))
         moved = pin.difference(self._model, self._measured, q)
         speed = moved / self._dt if given is None else given
@@ -177,12 +182,11 @@ class Servo:
         step = self._tick(pace)
         if behind < self._near:
             self._sum += error * self._dt
-        total, most = self._sum, self._near
-        d = self._feedback.correction(np.clip(error, -most, most), rate - speed, total, self._sent[self._most - self._late :])
+        d = self._feedback.correction(error, rate - speed, self._sum, self._sent[self._most - self._late :], self._near)
         self._sent[:-1] = self._sent[1:]
         self._sent[-1] = d
         values = self._values(d)
-        if self._identification is not None:
+        if self._identification is not None and not self._stopped:
             self._learn(self._identification, values, speed, self._loads(self._q, self._v, self._change))
         following = Following.STOPPED if self._stopped else Following.CLOSE if pace == 1.0 else Following.SLOWED
         return ServoStep(Command(self.kind, values), step, following, error)
@@ -217,7 +221,9 @@ class Servo:
             return np.asarray(pin.rnea(self._model, self._data, q, v, a) + self._armature * a + self._damping * v)
         if self._yields.any():
             d = d + (self._yields * self._loads(*state)).sum(axis=0)
-        return v + self._lag * a + d if self.kind is CommandKind.VELOCITY else pin.integrate(self._model, q, self._lag * v + d)
+        if self.kind is CommandKind.VELOCITY:
+            return v + self._lag * a + d
+        return np.asarray(pin.integrate(self._model, q, self._lag * v + d))
 
     def _respond(self, response: Response) -> None:
         """Count on a response."""
