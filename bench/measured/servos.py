@@ -22,12 +22,12 @@ HOME = np.array([0.0, 0.3, 0.0, -1.6, 0.0, 1.8, 0.0])
 DT, TICKS, SETTLED = 0.001, 4000, 500
 #: Servos drawn at random
 COUNT = 12
-KINDS = tuple(CommandKind)
+KINDS = (CommandKind.POSITION, CommandKind.VELOCITY, CommandKind.TORQUE)
 
 
 @dataclass(frozen=True)
 class Hardware:
-    """Servos of an arm: stiffness [N m/rad] and lag [s] of those of positions, drive [N m s/rad] of those of velocities,
+    """Servos of an arm: stiffness [N m/rad] and lag [s] for positions, drive [N m s/rad] for velocities,
     damping [N m s/rad], friction [N m], payload [kg], delay [ms].
     """
 
@@ -58,8 +58,8 @@ def drawn(seed: int) -> Hardware:
     rng = np.random.default_rng(seed)
     low, high = (10**2.9, 0.03, 50.0, 0.0, 0.0, 0.0), (10**3.9, 0.15, 400.0, 3.0, 2.0, 2.0)
     numbers = rng.uniform((np.log10(low[0]), *low[1:]), (np.log10(high[0]), *high[1:]))
-    stiffness, lag, drive, damping, friction, payload = 10 ** numbers[0], *numbers[1:].tolist()
-    return Hardware(float(stiffness), lag, drive, damping, friction, payload, int(rng.integers(0, 21)))
+    stiffness, lag, drive, damping, friction, payload = numbers.tolist()
+    return Hardware(10.0**stiffness, lag, drive, damping, friction, payload, int(rng.integers(0, 21)))
 
 
 def controller() -> Controller:

@@ -25,9 +25,9 @@ class Feedback:
         velocity   T dv/dt + v = dr/dt + T a + d     d = w' e + w'^2/4 z,   1/w' = 1/w + 2 T
         torque     dv/dt = a + d                     d = 2 w de/dt + w^2 e + w^3/3 z
 
-    with z = int e dt. Of velocities and torques e and de/dt are those at t + D, when d takes hold: corrections that were
-    sent within the last D are accounted for. Of positions the loop is w/s exp(-D s) without that, because the zero of d
-    cancels the lag. A velocity servo gets no de/dt: joints that move more lightly together than one by one would answer
+    with z = int e dt. Of velocities and torques e and de/dt are those at t + D, when d takes hold: corrections that
+    were sent within the last D are accounted for. Of positions the loop is w/s exp(-D s) without that, because the zero
+    of d cancels the lag. A velocity servo gets no de/dt: joints that move more lightly together than one by one would answer
     it by more than itself.
 
     Args:
@@ -57,7 +57,7 @@ class Feedback:
         self._predicts = late > 0 and kind is not CommandKind.POSITION
 
     def correction(self, error: Array, rate: Array, total: Array, sent: Array, most: float) -> Array:
-        """d, from e, de/dt, z and the corrections of the last D, the oldest first; of e at most so much, of de/dt w times."""
+        """d, from e up to ``most``, de/dt up to w most, z, and what was sent within the last D, the oldest first."""
         error, rate = np.clip(error, -most, most), np.clip(rate, -most * self._w, most * self._w)
         if self._predicts:
             error = error + self._reach * rate - (self._moves * sent).sum(axis=0)

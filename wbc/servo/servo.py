@@ -69,8 +69,8 @@ class Servo:
             driver.send(servo.step(driver.positions()).command.values)
 
     The controller's ticks are taken at a reference r that nothing disturbs, dr/dt = v, a = dv/dt: limits count from it.
-    With e = r(t) (-) q, where r(t) is what was to be reached now when the command of D ago was sent, and the correction d
-    of :class:`wbc.servo.laws.Feedback`, the robot gets
+    With e = r(t) (-) q, where r(t) is what was to be reached now when the command of D ago was sent, and the correction
+    d of :class:`wbc.servo.laws.Feedback`, the robot gets
 
         position   u = r (+) (T v + f + d)          velocity   u = v + T a + f + d
         torque     u = (M(r) + armature) (a + d) + h(r, v) + damping v
@@ -87,8 +87,8 @@ class Servo:
     Args:
         controller: compiled; it belongs to the servo from now on, apart from its run-time values.
         kind: what the servos take: "position", "velocity" or "torque".
-        response: see :func:`wbc.servo.identify`. Default: of positions and velocities it is found while the robot moves;
-            of torques, which show none, only a delay counts, 0 unless it is told.
+        response: see :func:`wbc.servo.identify`. Default: of positions and velocities it is found while the robot
+            moves; of torques, which show none, only a delay counts, 0 unless it is told.
         divergence: distance behind the reference at which it begins to wait, and at which it stops [rad or m].
         armature: of motors, where the model has none, nv numbers or one [kg m^2]. damping: of joints [N m s]. Both for
             torques only.
@@ -195,7 +195,7 @@ class Servo:
         """The reference one period on, at a part of the tick's velocity."""
         step, before = self.controller.step(self._q, self._v), self._v
         change = self._brake * self._dt
-        self._v = step.v.copy() if pace == 1.0 else np.clip(pace * step.v, before - change, before + change)
+        self._v = step.v.copy() if pace == 1.0 else np.asarray(np.clip(pace * step.v, before - change, before + change))
         self._change = (self._v - before) / self._dt
         # Smoothed over the time that it is extrapolated by
         self._a = self._a + (self._change - self._a) / (self._late + 1.0)
@@ -222,7 +222,7 @@ class Servo:
         if self._yields.any():
             d = d + (self._yields * self._loads(*state)).sum(axis=0)
         if self.kind is CommandKind.VELOCITY:
-            return v + self._lag * a + d
+            return np.asarray(v + self._lag * a + d)
         return np.asarray(pin.integrate(self._model, q, self._lag * v + d))
 
     def _respond(self, response: Response) -> None:

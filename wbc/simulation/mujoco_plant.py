@@ -31,10 +31,10 @@ class MujocoPlant:
         plant.apply(servo.step(plant.read().q).command)
         plant.advance(servo.controller.stack.dt)
 
-    q and v are as of ``pin.Model``: quaternions x, y, z, w (MuJoCo: w, x, y, z), and the linear velocity of a free joint
-    along the body's axes (MuJoCo: the world's). A position actuator takes positions, a velocity actuator velocities, and
-    a motor torques; a command goes to the actuators of its kind, and the others keep what they have: positions of the
-    reset, else 0.
+    q and v are as of ``pin.Model``: quaternions x, y, z, w (MuJoCo: w, x, y, z), and the linear velocity of a free
+    joint along the body's axes (MuJoCo: the world's). A position actuator takes positions, a velocity actuator
+    velocities, and a motor torques; a command goes to the actuators of its kind, and the others keep what they have:
+    positions of the reset, else 0.
 
     Args:
         model: a compiled model, ``mujoco.MjModel``. robot: has the same joints; other joints of the
