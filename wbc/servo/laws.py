@@ -27,8 +27,8 @@ class Feedback:
 
     with z = int e dt. Of velocities and torques e and de/dt are those at t + D, when d takes hold: corrections that
     were sent within the last D are accounted for. Of positions the loop is w/s exp(-D s) without that, because the zero
-    of d cancels the lag. A velocity servo gets no de/dt: joints that move more lightly together than one by one would answer
-    it by more than itself.
+    of d cancels the lag. A velocity servo gets no de/dt: joints that move more lightly together than
+    one by one would answer it by more than itself.
 
     Args:
         kind: of servo. dt: period [s]. lag: T, nv numbers. late: D in periods. w: [1/s].

@@ -32,6 +32,8 @@ EVERY = 20
 TAKEN_ON = 0.1
 #: Friction is all there at several times this speed [rad/s, m/s]
 CREEP = 0.01
+#: Part of its speed that a reference keeps until it is stopped: it does not wait for ever for a robot that is stuck
+SLOWEST = 0.2
 #: Acceleration of braking where a joint has no limit [rad/s^2, m/s^2]
 PLAIN = 10.0
 
@@ -153,7 +155,7 @@ class Servo:
         q, nv = self._robot.configuration("q", validation.ordinary_array("q", q)), self._robot.nv
         self.controller.reset(q)
         self._identification = Identification(nv, self._dt, LONGEST_DELAY, MEMORY) if self._learns else None
-        self._q, self._v, self._a, self._sum = q, *np.zeros((3, nv))
+        self._q, self._v, self._a, self._wanted, self._sum = q, *np.zeros((4, nv))
         self._measured, self._command, self._moved, self._asked = q, q, *np.zeros((2, nv))
         self._stopped, self._ticks = False, 0
         #: The last references and corrections, the oldest first
@@ -178,7 +180,8 @@ class Servo:
         error = np.asarray(pin.difference(self._model, q, where))
         behind = float(np.abs(error).max(initial=0.0))
         self._stopped |= behind >= self._far
-        pace = 0.0 if self._stopped else min(1.0, (self._far - behind) / (self._far - self._near))
+        farther = max(0.0, (behind - self._near) / (self._far - self._near))
+        pace = 0.0 if self._stopped else 1.0 - (1.0 - SLOWEST) * farther
         step = self._tick(pace)
         if behind < self._near:
             self._sum += error * self._dt
@@ -193,7 +196,9 @@ class Servo:
 
     def _tick(self, pace: float) -> Step:
         """The reference one period on, at a part of the tick's velocity."""
-        step, before = self.controller.step(self._q, self._v), self._v
+        # From what was wanted last, not from the part that was taken: that would be cut again in every tick
+        step, before = self.controller.step(self._q, self._wanted), self._v
+        self._wanted = step.v
         change = self._brake * self._dt
         self._v = step.v.copy() if pace == 1.0 else np.asarray(np.clip(pace * step.v, before - change, before + change))
         self._change = (self._v - before) / self._dt
