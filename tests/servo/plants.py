@@ -43,7 +43,7 @@ def controller(robot: Robot) -> Controller:
 class Drives:
     """Servos of a kind: first-order for positions and velocities, Pinocchio's forward dynamics for torques.
 
-    T dx/dt + x = u(t - delay) - S g(q) - F sign(v); M a + h = u(t - delay) - friction sign(v), with a payload at the tip.
+    T dx/dt + x = u(t - delay) - S g(q) - F sign(v); M a + h = u(t - delay) - F sign(v), with a payload at the tip.
     """
 
     robot: Robot

@@ -13,7 +13,8 @@ from wbc.simulation import Command, CommandKind, MujocoPlant
 
 mujoco = pytest.importorskip("mujoco")
 
-ARM = """<mujoco><compiler angle="radian"/><option gravity="0 0 0" timestep="0.001"/><default><joint damping="1"/></default>
+ARM = """<mujoco><compiler angle="radian"/><option gravity="0 0 0" timestep="0.001"/>
+<default><joint damping="1"/></default>
 <worldbody><body name="a"><joint name="one" axis="0 0 1"/><inertial pos=".1 0 0" mass="1" diaginertia=".1 .1 .1"/>
 <body name="b" pos=".3 0 0"><joint name="two" axis="0 1 0"/><inertial pos=".1 0 0" mass="1" diaginertia=".1 .1 .1"/>
 </body></body></worldbody><actuator>{}</actuator></mujoco>"""
