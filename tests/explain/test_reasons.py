@@ -162,12 +162,12 @@ def test_a_ball_between_hand_and_target_is_named() -> None:
     robot = limited_robot("panda")
     q = robot.neutral
     tick, here = fresh(q), robot.pose(q, "panda_hand_tcp").translation
-    tick["ball"].pose = np.array([*(here + [0.35, 0.0, 0.0]), 0.0, 0.0, 0.0, 1.0])
+    tick["ball"].pose = np.array([*(here + [0.3, 0.0, 0.0]), 0.0, 0.0, 0.0, 1.0])
     before = float(tick["ball"].margin)
     spare = float(min(tick.step(q).margins["ball"]))
     tick["ball"].margin = before + spare
     tick.reset(q)
-    tick["hand"].target = here + [0.7, 0.0, 0.0]
+    tick["hand"].target = here + [0.5, 0.0, 0.0]
     found = reason(tick.step(q, np.zeros(7)))
     tick["ball"].margin = before
     assert found.kind in ("minimum", "held")

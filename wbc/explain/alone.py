@@ -1,4 +1,4 @@
-"""One task of a past tick without the others: its error anywhere, and how near any configuration comes to its target."""
+"""One task of a past tick without the others: its error anywhere, and the nearest that any configuration comes."""
 
 from __future__ import annotations
 
@@ -7,12 +7,15 @@ from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 
-from wbc.explain.past import Past, kept_rows, keeps_rows, rows_of
+from wbc.explain.past import Past, keeps_rows, kept_rows, rows_of
 from wbc.stack.layout import Block
 from wbc.stack.tables import stops
 from wbc.tasks.mechanism import Mechanism
 from wbc.validation import Array
+
+Mask = NDArray[np.bool_]
 
 #: Errors below this are zero [rad, characteristic lengths]
 MET = 1e-5
@@ -39,7 +42,7 @@ class Rates:
     A: Array
     b: Array
 
-    def kernel(self, joints: Array) -> Array:
+    def kernel(self, joints: Mask) -> Array:
         """Orthonormal steps of some joints that keep the equality rows [joints, directions]."""
         count = int(joints.sum())
         if not len(self.A):
@@ -119,7 +122,7 @@ class Alone:
         """q (+) step."""
         return np.asarray(pin.integrate(self._past.stack.robot.model, q, step * self._dofs))
 
-    def blocked(self, q: Array, downhill: Array, limited: bool = True) -> Array:
+    def blocked(self, q: Array, downhill: Array, limited: bool = True) -> Mask:
         """Joints that their position limits do not let go downhill."""
         if not limited:
             return np.zeros(len(downhill), dtype=bool)

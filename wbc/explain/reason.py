@@ -8,9 +8,6 @@ import numpy as np
 
 from wbc.validation import Array
 
-#: Kinds of reasons, as :class:`Reason` says them
-KINDS = ("done", "slow", "limited", "held", "singular", "minimum", "reach")
-
 
 def amount(value: float, unit: str) -> str:
     """A number with its unit, lengths below a metre in millimetres or micrometres: ``31 mm/s``."""
@@ -31,17 +28,17 @@ class Reason:
     """Why a task does or does not converge.
 
     Attributes:
-        task: its name. kind: ``done``: nothing to do; ``slow``: as its gain, or braking in time, wants it; ``limited``:
-            speed or acceleration limits slow it down; ``held``: other items slow it down or turn it aside; ``singular``:
-            no joint serves a direction of it, though its target can be reached; ``minimum``: the gradient of its error
-            vanishes within what the others leave, though its target can be reached; ``reach``: it cannot.
+        task: its name. kind: ``done``: nothing to do; ``slow``: as its gain, or braking in time, wants it;
+            ``limited``: speed or acceleration limits slow it down; ``held``: other items slow it down or turn it aside;
+            ``singular``: no joint serves a direction of it, though its target can be reached; ``minimum``: the gradient
+            of its error vanishes within what the others leave, though its target can be reached; ``reach``: it cannot.
         error: norm of its error by unit. rate: how fast that falls now by unit, negative where it grows.
         gain: of the task [1/s].
         beyond: error by unit at the nearest configuration that a search found. nearest: that configuration [nq], None
             where none was searched. place: position of the task's frame there [m], None for tasks without one.
             starts: of the search.
-        singular: smallest singular value of the task's rows, in radians and characteristic lengths. direction: label and
-            share of each row in the direction that no joint serves. lost: error along it. restores: the joint that
+        singular: smallest singular value of the task's rows, in radians and characteristic lengths. direction: label
+            and share of each row in the direction that no joint serves. lost: error along it. restores: the joint that
             moves most along the steepest way out, empty where the error has no slope downhill from here.
         by: items and bounds that hold it, the strongest first. without: what puts it out of
             reach, position limits or holds; without them it is within.
@@ -64,7 +61,16 @@ class Reason:
     without: tuple[str, ...] = ()
 
     def __str__(self) -> str:
-        return getattr(self, f"_{self.kind}")() + "."
+        say = {
+            "done": self._done,
+            "slow": self._slow,
+            "limited": self._limited,
+            "held": self._held,
+            "singular": self._singular,
+            "minimum": self._minimum,
+            "reach": self._reach,
+        }
+        return say[self.kind]() + "."
 
     def _done(self) -> str:
         return f"{self.task} has nothing to do: its error is {amounts(self.error)}"
@@ -106,13 +112,16 @@ class Reason:
     def _singular(self) -> str:
         along = ", ".join(f"{share:+.2g} {label}" for label, share in self.direction)
         text = (
-            f"{self.task} is singular: no joint moves it along ({along}), in which {amounts(self.lost)} of its error of "
-            f"{amounts(self.error)} lie; smallest singular value {self.singular:.2g}"
+            f"{self.task} is singular: no joint moves it along ({along}), in which {amounts(self.lost)} of its error "
+            f"of {amounts(self.error)} lie; smallest singular value {self.singular:.2g}"
         )
         return f"{text}. The target can be reached, and moving {self.restores} begins it" if self.restores else text
 
     def _reach(self) -> str:
-        text = f"{self.task} is out of reach by {amounts(self.beyond)}, at the nearest configuration that {self.starts} searches found"
+        text = (
+            f"{self.task} is out of reach by {amounts(self.beyond)}, at the nearest configuration that "
+            f"{self.starts} searches found"
+        )
         if self.place is not None:
             text += f", with its frame at ({', '.join(f'{x:.3g}' for x in self.place)}) m"
         if self.without:

@@ -1,10 +1,12 @@
-"""Which :class:`Reason` each task of a past tick has: from its own rows, and what the rest of the stack takes from it."""
+"""Which :class:`Reason` each task of a past tick has: from its own rows, and from what the rest of the stack does."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
-from wbc.explain.alone import MET, SINGULAR, Alone, Nearest, Rates
+from wbc.explain.alone import MET, SINGULAR, Alone, Nearest
 from wbc.explain.explanation import Bound, Loss
 from wbc.explain.past import Past, rows_of
 from wbc.explain.reason import Reason
@@ -79,7 +81,7 @@ class _Finder:
         free = float(self._towards(self.here.J @ (v[: len(scales)] / scales)))
         now = float(self._towards(self.rates))
         names = self._holders(binding, losses)
-        if now >= _SERVED * free and free > 0.0 or not names:
+        if (now >= _SERVED * free and free > 0.0) or not names:
             return self._say("slow" if now > 0.0 else "minimum")
         only = [bound for bound in binding if str(bound) in names]
         if len(only) == len(names) and all(bound.kind in ("velocity", "acceleration") for bound in only):
@@ -114,14 +116,15 @@ class _Finder:
         unit = lost / np.linalg.norm(lost)
         labels = [row.label for row, counts in zip(self.block.rows, self.alone.counts, strict=True) if counts]
         direction = tuple((a, float(x)) for a, x in zip(labels, unit, strict=True) if abs(x) > 0.01)
-        known = {"singular": least, "direction": direction, "lost": self._norms(lost)}
+        restores = ""
         gradient = float(np.linalg.norm(self.here.J.T @ self.here.e))
         curvature, step = self.alone.escape(self.q)
         if curvature < -_FLAT:
-            known["restores"] = self.past.stack.robot.dof_names[int(np.abs(step).argmax())]
+            restores = self.past.stack.robot.dof_names[int(np.abs(step).argmax())]
         elif gradient < SINGULAR * float(np.linalg.norm(self.here.e)):
-            return self._say("minimum", **known)
-        return self._say("singular", **known)
+            return self._say("minimum")
+        out = self._say("singular")
+        return replace(out, singular=least, direction=direction, lost=self._norms(lost), restores=restores)
 
     def _out_of_reach(self, found: Nearest) -> Reason:
         robot, item = self.past.stack.robot, self.block.entry.item
@@ -137,7 +140,8 @@ class _Finder:
         frame = getattr(item, "frame", None)
         place = robot.pose(near, frame).translation if isinstance(frame, str) and frame in robot.frame_names else None
         beyond = self._norms(found.e)
-        return self._say("reach", beyond=beyond, nearest=near, place=place, starts=found.starts, without=without)
+        out = self._say("reach")
+        return replace(out, beyond=beyond, nearest=near, place=place, starts=found.starts, without=without)
 
     def _holds(self, block: Block) -> bool:
         """An item that ties the robot to where it is."""
@@ -165,6 +169,5 @@ class _Finder:
             out.append((float(-e[mine] @ rates[mine]) / size if size > MET else 0.0, unit))
         return tuple(out)
 
-    def _say(self, kind: str, **known: object) -> Reason:
-        about = self.block.entry.name, kind, self._norms(self.here.e), self._falls(), self.gain
-        return Reason(*about, **known)  # type: ignore[arg-type]
+    def _say(self, kind: str, by: tuple[str, ...] = ()) -> Reason:
+        return Reason(self.block.entry.name, kind, self._norms(self.here.e), self._falls(), self.gain, by=by)
