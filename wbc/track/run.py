@@ -77,9 +77,9 @@ def track(
     if plant is not None:
         meta["integration"] = f"plant {type(plant).__name__}"
     if recorder.worst is not None:
-        t, step = recorder.worst
+        when, step = recorder.worst
         said = [str(reason) for reason in step.explain().reasons if reason.task == "hand"]
-        meta["hindrance"] = {"t": t, "text": " ".join(said)}
+        meta["hindrance"] = {"t": when, "text": " ".join(said)}
     nearest = least_mesh_clearance(robot, recorder.q, obstacles, t, gaps)
     if nearest is not None:
         meta["mesh_clearance"] = dict(zip(("least", "link", "t"), nearest, strict=True))
