@@ -9,7 +9,7 @@ import pytest
 
 import wbc.robots
 from tests.constraints.robots import robot as limited_robot
-from wbc.controller import Controller, Stack, Step
+from wbc.controller import Controller, Policy, Stack, Step
 from wbc.explain.reason import Reason
 from wbc.robot import Robot
 from wbc.shapes import Sphere
@@ -201,3 +201,28 @@ def test_speed_limits_are_named() -> None:
     found = reason(tick.step(q, np.zeros(7)))
     assert found.kind == "limited"
     assert "slowed by limits/panda_joint1 (velocity limit" in str(found)
+
+
+@pytest.mark.parametrize("name", ARMS)
+def test_an_escape_leaves_a_singular_start_and_arrives(name: str) -> None:
+    """Without it a stretched arm stays; with it the target on its own line is reached, the same way each time."""
+    robot, tip, tick = arm(name)
+    along = np.array([0.3, -0.4, 0.5]) / np.sqrt(0.5)
+    start = farthest(robot, tip, along, 2)
+    goal = robot.pose(start, tip).translation - 0.1 * along
+    ends = []
+    for policy in (Policy(), Policy(escape=True), Policy(escape=True)):
+        tick.policy, q = policy, start
+        tick.reset(q)
+        tick["hand"].target, tick["hand"].gain = goal, 10.0
+        answered = set()
+        for _ in range(20 if not policy.escape else 250):
+            step = tick.step(q, dt=2 * DT)
+            answered.add(step.answered_by)
+            q = robot.integrate(q, step.v * 2 * DT)
+        off = float(np.linalg.norm(robot.pose(q, tip).translation - goal))
+        ends.append(q)
+        assert answered == ({"", "escape"} if policy.escape else {""})
+        assert off < 5e-3 if policy.escape else off > 0.09
+    tick.policy, tick["hand"].gain = Policy(), 2.0
+    np.testing.assert_array_equal(ends[1], ends[2])

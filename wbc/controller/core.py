@@ -11,9 +11,10 @@ import numpy as np
 import pinocchio as pin
 
 from wbc import validation
+from wbc.controller.escape import Escape
 from wbc.controller.handle import Directions, Handle
 from wbc.controller.handles import kind_of
-from wbc.controller.policy import Fallback
+from wbc.controller.policy import Fallback, Policy
 from wbc.controller.ramps import Ramps
 from wbc.controller.step import Context, Step
 from wbc.controller.tick.buffers import BAD_V, Assembly
@@ -89,6 +90,7 @@ class Core:
         self.call: Callable[[], int] = self.tick.step
         if isinstance(self.tick, NativeTick):
             self.call = functools.partial(self.tick.step_function, self.tick.pointer)
+        self._plain_call = self.call
         self.context = Context(stack, layout, self.assembly)
         # of all ways to copy some hundred numbers into something immutable, the fastest
         self.snapshot: Callable[[], bytes] = self.tick.state.data.cast("B").tobytes
@@ -119,11 +121,16 @@ class Core:
         for name in ("q", "v_last", "p", "cap", "dt", "weight", "enabled", "bound_enabled"):
             getattr(self.tick, name)[:] = getattr(other.tick, name)
         self.tick.check()
-        self.fallback.policy = other.fallback.policy
+        self.follow(other.fallback.policy)
         self.ramps.assume(other.ramps, self.handles)
         if other.fallback.prepared:
             self.fallback.prepare()
         self._first, self.waiting, self.waits = dict(other._first), dict(other.waiting), other.waits
+
+    def follow(self, policy: Policy) -> None:
+        """Another policy from now on."""
+        self.fallback.policy = policy
+        self.call = Escape(self, self._plain_call) if policy.escape else self._plain_call
 
     def again(self) -> Step:
         """A tick on the buffers as they are."""

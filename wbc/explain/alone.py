@@ -51,6 +51,16 @@ class Rates:
         rank = int((sizes > 1e-9 * max(1.0, sizes.max(initial=0.0))).sum())
         return np.asarray(turned[rank:].T)
 
+    def lost(self, free: Mask, least: float) -> tuple[Array, float]:
+        """(part of e along which these joints move the task by singular values below ``least``, the smallest one)."""
+        J = self.J[:, free] @ self.kernel(free)
+        if not J.size:
+            return self.e, 0.0
+        turned, sizes, _ = np.linalg.svd(J)
+        reached = turned[:, : int((sizes > least).sum())]
+        smallest = 0.0 if len(sizes) < len(self.e) else float(sizes.min())
+        return np.asarray(self.e - reached @ (reached.T @ self.e)), smallest
+
 
 @dataclass(frozen=True, eq=False)
 class Nearest:
@@ -117,6 +127,10 @@ class Alone:
         A, b = A[kept] / sizes[kept, None], low[equal][kept] / sizes[kept] * float(tick.dt[0])
         chosen = self.counts
         return Rates((J[:, :nv] * self._dofs / self._scales[:, None])[chosen], (e / self._scales)[chosen], A, b)
+
+    def free(self, q: Array, here: Rates) -> Mask:
+        """Joints that their position limits let go downhill."""
+        return ~self.blocked(q, -here.J.T @ here.e)
 
     def moved(self, q: Array, step: Array) -> Array:
         """q (+) step."""
@@ -217,7 +231,7 @@ class Alone:
             ends = [here.e @ self.at(self.moved(q, sign * by * np.eye(nv)[k])).J for sign in (1.0, -1.0)]
             slopes[k] = (ends[0] - ends[1]) / (2.0 * by)
         curvature = here.J.T @ here.J + 0.5 * (slopes + slopes.T)
-        free = ~self.blocked(q, -here.J.T @ here.e)
+        free = self.free(q, here)
         kernel = here.kernel(free)
         if not kernel.size:
             return 0.0, np.zeros(nv)

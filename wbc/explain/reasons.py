@@ -10,6 +10,7 @@ from wbc.explain.alone import MET, SINGULAR, Alone, Nearest
 from wbc.explain.explanation import Bound, Loss
 from wbc.explain.past import Past, rows_of
 from wbc.explain.reason import Reason
+from wbc.explain.way_out import FLAT, LOST
 from wbc.stack.layout import Block
 from wbc.tasks.mechanism import Mechanism
 from wbc.validation import Array
@@ -18,10 +19,6 @@ from wbc.validation import Array
 _SERVED = 0.9
 #: A task that moves at less than this share of its rates is at rest
 _RESTS = 0.02
-#: A direction is lost where this share of the rates lies in it
-_LOST = 0.3
-#: Curvature of |e|^2 / 2 that is none [squared characteristic lengths per squared radian]
-_FLAT = 1e-6
 #: Slower than this a task asks for nothing [1/s times radians or characteristic lengths]
 _ASKS = 1e-6
 
@@ -72,8 +69,8 @@ class _Finder:
 
     def _moving(self, share: float, binding: tuple[Bound, ...], losses: list[Loss]) -> Reason:
         """A task that can be met and is not served."""
-        lost, least = self._lost_direction()
-        if np.linalg.norm(lost) > _LOST * np.linalg.norm(self.here.e) and share < _SERVED:
+        lost, least = self.here.lost(self.alone.free(self.q, self.here), SINGULAR)
+        if np.linalg.norm(lost) > LOST * np.linalg.norm(self.here.e) and share < _SERVED:
             return self._singular(lost, least)
         with self.past.without(self.past.others(self.block)):
             v = self.past.solve()[0]
@@ -101,17 +98,6 @@ class _Finder:
             names += bounds or [item]
         return tuple(names)
 
-    def _lost_direction(self) -> tuple[Array, float]:
-        """(part of the error along which no joint moves the task, smallest singular value)."""
-        free = ~self.alone.blocked(self.q, -self.here.J.T @ self.here.e)
-        J = self.here.J[:, free] @ self.here.kernel(free)
-        if not J.size:
-            return self.here.e, 0.0
-        turned, sizes, _ = np.linalg.svd(J)
-        reached = turned[:, : int((sizes > SINGULAR).sum())]
-        least = 0.0 if len(sizes) < len(self.here.e) else float(sizes.min())
-        return np.asarray(self.here.e - reached @ (reached.T @ self.here.e)), least
-
     def _singular(self, lost: Array, least: float) -> Reason:
         unit = lost / np.linalg.norm(lost)
         labels = [row.label for row, counts in zip(self.block.rows, self.alone.counts, strict=True) if counts]
@@ -119,7 +105,7 @@ class _Finder:
         restores = ""
         gradient = float(np.linalg.norm(self.here.J.T @ self.here.e))
         curvature, step = self.alone.escape(self.q)
-        if curvature < -_FLAT:
+        if curvature < -FLAT:
             restores = self.past.stack.robot.dof_names[int(np.abs(step).argmax())]
         elif gradient < SINGULAR * float(np.linalg.norm(self.here.e)):
             return self._say("minimum")
