@@ -130,7 +130,9 @@ class Core:
     def follow(self, policy: Policy) -> None:
         """Another policy from now on."""
         self.fallback.policy = policy
-        self.call = Escape(self, self._plain_call) if policy.escape else self._plain_call
+        self.call = self._plain_call
+        if policy.escape:
+            self.call = Escape(self._plain_call, self.tick, self.fallback, self.context, self.snapshot)
 
     def again(self) -> Step:
         """A tick on the buffers as they are."""
@@ -155,6 +157,8 @@ class Core:
         self.waiting = {} if configuration is not None else dict(self._first)
         self.tick.v_last[: self.layout.nv] = velocity
         self.tick.reset()
+        if isinstance(self.call, Escape):
+            self.call.reset()
         for sensor, _ in self.sensors:
             sensor.reset()
         self.resets += 1
