@@ -6,9 +6,9 @@ import numpy as np
 
 import wbc
 from bench.sheet import Sheet
+from wbc.moving_target.knowledge import Knowledge, Measurement
 from wbc.moving_target.pictures import LABELS
 from wbc.moving_target.study import Outcome, Study, grasp, outcome, peg, trials
-from wbc.moving_target.trial import Knowledge, Measurement
 
 COLUMNS = ("the object is known by", "done", "rms, mm", "largest, mm", "time, s", "joint rate / limit")
 #: Trials with each knowledge; the exact ones differ little
