@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
-from itertools import product
+from itertools import chain, product
 
 import numpy as np
 import pinocchio as pin
@@ -124,7 +124,7 @@ def grasp(robot: Robot, tip: str, motion: str, measurement: Measurement, **more:
         abort=(LOST,),
     )
     scenario = Scenario(
-        robot, tip, pin.SE3.Identity(), nimble(robot, tip), pin.SE3.Identity(), program, lead=0.0, clearance=0.02,
+        robot, tip, pin.SE3.Identity(), nimble(robot, tip, 0.05 * length), pin.SE3.Identity(), program, lead=0.0, clearance=0.02,
         size=near, timeout=40.0, rate=25.0, gain=2.0, measurement=measurement, process=(1e-3, 1e-3),
         policy=DropoutPolicy(1.0, 2.0),
     )  # fmt: skip
@@ -150,13 +150,14 @@ def _placed(
     return Study(scenario, motion, home, spread, lever, drift, **more)
 
 
-def nimble(robot: Robot, tip: str, rate: float = RATE, seconds: float = 14.0) -> Array:
-    """Of 1000 configurations within half the joints' ranges, or 1.5 rad, one from which the tip can turn at ``rate``
-    about any of 26 axes for some seconds with the smallest part of its joints' rate limits, least-norm velocities
+def nimble(robot: Robot, tip: str, ahead: float, rate: float = RATE, seconds: float = 18.0) -> Array:
+    """Of 2000 configurations within half the joints' ranges, or 1.5 rad, that from which the tip can turn at ``rate``
+    about every one of 26 axes u with the smallest part of its joints' rate limits, while it goes ahead along its z axis
+    in the first five seconds: with least-norm velocities
 
-        dq/dt = J^+ (0; rate u),          max over u, joints and times of |dq/dt| / limit.
+        dq/dt = J^+ (v; rate u),          the largest |dq/dt| / limit of all axes, joints and times.
 
-    The 40 best at the first moment are followed all the way.
+    Only the 150 that are best at the first moment are followed over the time.
     """
     rng, model, data = np.random.default_rng(0), robot.model, robot.model.createData()
     reach = np.minimum((robot.limits.position_upper - robot.limits.position_lower) / 4, 1.5)
@@ -164,23 +165,31 @@ def nimble(robot: Robot, tip: str, rate: float = RATE, seconds: float = 14.0) ->
     axes = np.array([u for u in product((-1.0, 0.0, 1.0), repeat=3) if any(u)])
     axes *= rate / np.linalg.norm(axes, axis=1)[:, None]
 
-    def turning(q: Array) -> Array:
-        jacobian = pin.computeFrameJacobian(model, data, q, frame, pin.LOCAL_WORLD_ALIGNED)
-        return np.asarray(np.linalg.pinv(jacobian)[:, 3:])
+    def inverse(q: Array) -> Array:
+        return np.linalg.pinv(pin.computeFrameJacobian(model, data, q, frame, pin.LOCAL_WORLD_ALIGNED))
 
-    def part(q: Array) -> float:
-        return float((np.abs(turning(q) @ axes.T) / fastest[:, None]).max())
+    def at_first(q: Array) -> float:
+        return float((np.abs(inverse(q)[:, 3:] @ axes.T) / fastest[:, None]).max())
 
-    def along(q: Array, spin: Array) -> float:
+    def followed(q: Array, spin: Array) -> Iterator[float]:
+        inverse(q)
+        way = pin.updateFramePlacement(model, data, frame).rotation[:, 2] * ahead / 5.0
+        for second in range(round(seconds)):
+            v = inverse(q) @ np.concatenate([way * (second < 5), spin])
+            yield float((np.abs(v) / fastest).max())
+            q = pin.integrate(model, q, v)
+
+    drawn = [pin.integrate(model, robot.neutral, reach * rng.uniform(-1.0, 1.0, robot.nv)) for _ in range(2000)]
+    best, least = drawn[0], np.inf
+    for q in sorted(drawn, key=at_first)[:150]:
         worst = 0.0
-        for _ in range(round(seconds)):
-            v = turning(q) @ spin
-            worst, q = max(worst, float((np.abs(v) / fastest).max())), pin.integrate(model, q, v)
-        return worst
-
-    drawn = [pin.integrate(model, robot.neutral, reach * rng.uniform(-1.0, 1.0, robot.nv)) for _ in range(1000)]
-    best = sorted(drawn, key=part)[:40]
-    return np.array(min(best, key=lambda q: max(along(q, spin) for spin in axes)))
+        for part in chain.from_iterable(followed(q, spin) for spin in axes):
+            worst = max(worst, part)
+            if worst >= least:
+                break
+        else:
+            best, least = q, worst
+    return np.array(best)
 
 
 def trials(
