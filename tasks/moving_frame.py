@@ -11,7 +11,7 @@ import pinocchio as pin
 
 from wbc import validation
 from wbc.symbolic.tracer import Tracer
-from wbc.tasks.base import Command, Constraint, Input, Row, Rows, Values
+from wbc.tasks.base import Constraint, Input, Row, Rows, Values
 
 if TYPE_CHECKING:
     from wbc.robot import Robot

@@ -124,8 +124,8 @@ def grasp(robot: Robot, tip: str, motion: str, measurement: Measurement, **more:
         abort=(LOST,),
     )
     scenario = Scenario(
-        robot, tip, pin.SE3.Identity(), nimble(robot, tip, 0.05 * length), pin.SE3.Identity(), program, lead=0.0, clearance=0.02,
-        size=near, timeout=40.0, rate=25.0, gain=2.0, measurement=measurement, process=(1e-3, 1e-3),
+        robot, tip, pin.SE3.Identity(), nimble(robot, tip, 0.05 * length), pin.SE3.Identity(), program, lead=0.0,
+        clearance=0.02, size=near, timeout=40.0, rate=25.0, gain=2.0, measurement=measurement, process=(1e-3, 1e-3),
         policy=DropoutPolicy(1.0, 2.0),
     )  # fmt: skip
     return _placed(scenario, motion, np.array([0.0, 0.0, 0.05 * length]), (0.01 * length, 0.1), 1.0, 0.005, **more)

@@ -75,7 +75,7 @@ class ProgramHand:
         return distance * (self._item.kind != "orientation"), angle * (self._item.kind != "position")
 
     def write(self) -> None:
-        """Where the hand is to be now, into the controller, and its mean twist over the tick, on whose end it counts."""
+        """Where the hand is to be now, into the controller, and its mean twist over the tick that begins."""
         pose, before = self.reference.pose, self.reference.twist
         self.reference.tick()
         self.target, twist = pose, 0.5 * (before + self.reference.twist)
