@@ -72,9 +72,7 @@ def test_a_trial_is_its_program_and_the_same_again() -> None:
     names = [step.name or step.step for step in bench().scenario.program.steps]
     assert names == ["move", "align", "go in", "stay", "retreat"]
     short = Bench(replace(bench().scenario, timeout=0.5), backend="vm")
-    once, again = (
-        short.run(study("swing").moves(0), Knowledge.ESTIMATED, np.random.default_rng(0)) for _ in range(2)
-    )
+    once, again = (short.run(study("swing").moves(0), Knowledge.ESTIMATED, np.random.default_rng(0)) for _ in range(2))
     assert np.array_equal(once.q, again.q)
     assert (once.success, once.reason) == (False, "move: not done in time")
 
