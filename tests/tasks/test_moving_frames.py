@@ -15,6 +15,7 @@ import pytest
 
 import wbc
 from tests.evaluation import sample, slope
+from tests.repeats import MORE
 from tests.tasks.items import FACTORIES
 from tests.tasks.robots import NAMES, random_configuration, robot
 from wbc.errors import DuplicateNameError, RangeError, SolverError, UnknownNameError
@@ -46,22 +47,26 @@ PANDA = wbc.robots.load("panda")
 class Program:
     """The tick's expressions of one item, in a moving frame or in the world, interpreted."""
 
-    def __init__(self, machine: Robot, item: Item, moving: bool) -> None:
+    def __init__(self, machine: Robot, item: Item, moving: bool, command: str = "velocity") -> None:
         stack = Declaration(machine, DT, calm=False)
         if moving:
             stack.add(MovingFrame(), name="table")
         stack.add(item, name="item", relative_to="table" if moving else None)
+        stack = stack.commanding(command)
         self.layout, self.machine = Layout(stack), machine
         self.rows = program.build(stack, self.layout).rows
         self.block = self.layout.blocks["item"]
 
-    def __call__(self, q: np.ndarray, values: dict[str, Any], **frame: Any) -> dict[str, np.ndarray]:
+    def __call__(
+        self, q: np.ndarray, values: dict[str, Any], v: np.ndarray | None = None, **frame: Any
+    ) -> dict[str, np.ndarray]:
         p = np.zeros(self.layout.parameters)
         for name, given in (("item", values), ("table", frame)):
             for slot in self.layout.blocks[name].slots.values() if name in self.layout.blocks else ():
                 value = given.get(slot.input.name, slot.input.default)
                 p[slot.span] = run_time.flat(self.machine, slot.input.name, slot.input, value)
-        found = dict(zip(self.rows.name_out(), self.rows(q, np.zeros(self.machine.nv), p, DT), strict=True))
+        v = np.zeros(self.machine.nv) if v is None else v
+        found = dict(zip(self.rows.name_out(), self.rows(q, v, p, DT), strict=True))
         span, task = self.block.span, self.block.form == "task"
         names = ("jt", "desired") if task else ("at", "low")
         out = {"jacobian": found[names[0]][:, span].T, "asked": found[names[1]][span]}
@@ -91,16 +96,28 @@ def somewhere(seed: int) -> pin.SE3:
     return pin.SE3(pin.exp3(rng.uniform(-1.8, 1.8, 3)), rng.uniform(-1.0, 1.0, 3))
 
 
+FLOATING = ("Hold", "FrameVelocityLimit", "Rolling", "PointContact", "RigidGrasp", "SurfaceContact")
+
+
+def walk(class_name: str) -> Iterator[tuple[Robot, Item, dict[str, Any]]]:
+    """Items of a class: some on one robot, or all on every robot, see ``make test REPEATS=3``; in plain rows what the
+    frame does is read off a floating base.
+    """
+    names = ("talos",) if class_name in FLOATING else NAMES[:3]
+    few = MORE < 2.0
+    for name in [names[zlib.crc32(class_name.encode()) % len(names)]] if few else names:
+        items = list(declared(class_name, robot(name)))
+        yield from ((robot(name), *one) for one in items[:: (1 + len(items) // 3) if few else 1])
+
+
 @pytest.mark.parametrize("class_name", STANDING)
-def test_an_item_sees_the_robot_from_the_frame_and_feeds_its_twist_forward(class_name: str) -> None:
+def test_an_item_sees_the_robot_from_the_frame_and_feeds_its_motion_forward(class_name: str) -> None:
     """Value and Jacobian are those of Pinocchio's model placed in the frame; the rate that is asked for is less by what
     the frame's motion alone does to the value: a finite difference, or for plain rows the motion of a floating base.
+    Accelerations that are asked for are held to these rates.
     """
-    rng, seed = np.random.default_rng(1), zlib.crc32(class_name.encode())
-    floating = class_name in ("Hold", "FrameVelocityLimit", "Rolling")
-    machine = robot("talos" if floating else NAMES[seed % 3])
-    items = list(declared(class_name, machine))
-    for item, values in items[:: 1 + len(items) // 6]:
+    rng, floating = np.random.default_rng(1), class_name in FLOATING
+    for machine, item, values in walk(class_name):
         q, pose, twist = random_configuration(machine, rng), somewhere(1), rng.uniform(-1.0, 1.0, 6)
         moving = Program(machine, item, moving=True)
         still = moving(q, values, pose=pose, twist=np.zeros(6))
@@ -113,6 +130,48 @@ def test_an_item_sees_the_robot_from_the_frame_and_feeds_its_twist_forward(class
             close(drift, (still["jacobian"] @ rigid(machine, q, pose, twist)), 1e-8)
         elif not isinstance(item, Task) or type(item).jacobian is Task.jacobian:
             close(drift, slope(lambda t: _later(moving, q, values, pose, twist, t)), 1e-7)  # noqa: B023
+        accelerations_are_derivatives(moving, item, values, rng)
+
+
+def accelerations_are_derivatives(first: Program, item: Item, values: dict[str, Any], rng: np.random.Generator) -> None:
+    """At a steady v, d/dt (J v - asked rate) of the tick of velocities, the frame's twist and pose moving, is what the
+    tick of accelerations takes off.
+    """
+    machine, h = first.machine, 1e-5
+    # A direction that moves at a steady rate does not keep its length
+    if item.refusal(machine, "acceleration") or any(slot.input.direction for slot in first.block.slots.values()):
+        return
+    pose, (twist, push) = somewhere(2), rng.uniform(-0.5, 0.5, (2, 6))
+    q, v = random_configuration(machine, rng), rng.uniform(-0.5, 0.5, machine.nv)
+    given = values | dict.fromkeys(("gain", "rate", "stiffness", "damping"), 0.0)
+
+    def rate(t: float) -> np.ndarray:
+        there = pin.SE3(pin.exp3(t * twist[3:]) @ pose.rotation, pose.translation + t * twist[:3])
+        later, moved = pin.integrate(machine.model, q, v * t), given | after(first, values, t)
+        found = first(later, moved, pose=there, twist=twist + t * push)
+        return np.asarray(found["jacobian"] @ v - found["asked"][:, 0])
+
+    second = Program(machine, item, True, "acceleration")
+    asked = second(q, given, v, pose=pose, twist=twist, acceleration=push)["asked"][:, 0]
+    finite = np.isfinite(asked)
+    close(-asked[finite], ((rate(h) - rate(-h)) / (2.0 * h))[finite], 1e-5)
+
+
+def after(program: Program, values: dict[str, Any], t: float) -> dict[str, Any]:
+    """Inputs of the item that have a rate, t later."""
+    out: dict[str, Any] = {}
+    for name, slot in program.block.slots.items():
+        if slot.input.rate is None or name not in values:
+            continue
+        rate = np.asarray(values.get(slot.input.rate, program.block.slots[slot.input.rate].input.default))
+        if slot.input.kind == "pose":
+            pose = pin.SE3(values[name])
+            out[name] = pin.SE3(pin.exp3(t * rate[3:]) @ pose.rotation, pose.translation + t * rate[:3])
+        elif slot.input.kind == "rotation":
+            out[name] = pin.exp3(t * rate) @ values[name]
+        else:
+            out[name] = np.asarray(values[name]) + t * rate
+    return out
 
 
 def test_the_curvature_is_that_of_the_robot_placed_in_the_frame() -> None:
@@ -172,6 +231,26 @@ def test_robot_and_frame_that_stand_together_need_no_command_and_defaults_are_th
     pin.framesForwardKinematics(PANDA.model, data, q)
     hand = data.oMf[PANDA.model.getFrameId("panda_hand_tcp")]
     assert np.allclose(controller["hand"].target.homogeneous, pose.actInv(hand).homogeneous, atol=1e-12)
+
+
+@pytest.mark.parametrize("command", ["acceleration", "torque"])
+def test_a_hand_that_goes_with_the_frame_has_the_acceleration_of_its_point(command: str) -> None:
+    """a_T + alpha x r + w x (w x r), by Pinocchio's classical acceleration at the command."""
+    rng, tip = np.random.default_rng(0), PANDA.model.getFrameId("panda_hand_tcp")
+    stack = wbc.Stack(PANDA, DT).add(MovingFrame(), name="table")
+    stack.add(EndEffector("panda_hand_tcp", relative_to="table"), name="hand")
+    controller, q = stack.compile(command=command, backend="vm"), PANDA.neutral + 0.1 * rng.normal(size=7)
+    pose, (twist, push), data = somewhere(0), rng.uniform(-0.3, 0.3, (2, 6)), PANDA.model.createData()
+    jacobian = pin.computeFrameJacobian(PANDA.model, data, q, tip, pin.LOCAL_WORLD_ALIGNED)
+    arm = pin.updateFramePlacement(PANDA.model, data, tip).translation - pose.translation
+    (linear, spin), (thrust, turning) = twist.reshape(2, 3), push.reshape(2, 3)
+    v = np.linalg.lstsq(jacobian, np.append(linear + np.cross(spin, arm), spin), rcond=None)[0]
+    controller["table"].set(pose=pose, twist=twist, acceleration=push)
+    pin.forwardKinematics(PANDA.model, data, q, v, controller.step(q, v).a)
+    found = pin.getFrameClassicalAcceleration(PANDA.model, data, tip, pin.LOCAL_WORLD_ALIGNED).vector
+    wanted = np.append(thrust + np.cross(turning, arm) + np.cross(spin, np.cross(spin, arm)), turning)
+    assert np.allclose(found, wanted, atol=2e-6)
+    assert np.linalg.norm(wanted) > 0.3
 
 
 def test_the_mean_twist_of_the_tick_counts() -> None:

@@ -47,6 +47,12 @@ class Builder(Protocol):
     def values(self, block: Block) -> dict[str, ca.SX | Pose]:
         """Inputs of an item as its expressions receive them."""
 
+    def tracer(self, block: Block) -> Tracer:
+        """What an item sees of the robot."""
+
+    def moving(self, block: Block) -> list[tuple[Block, Slot]]:
+        """Inputs that have a rate, with their blocks."""
+
     def rate(self, block: Block, slot: Slot) -> ca.SX:
         """Time derivative of the numbers of an input that has a rate."""
 
@@ -78,11 +84,11 @@ class SecondOrder:
             rows = ca.SX(count, self._layout.variables)
             rows[:, self._layout.forces[item.of]] = ca.SX.eye(count)
             return -target, target, ca.SX.ones(count), rows
-        tracer, inputs = Tracer(self._kinematics), b.values(block)
+        tracer, inputs = b.tracer(block), b.values(block)
         error = b.column(block, "error", item.error(robot, tracer, inputs))
         own = item.jacobian(robot, tracer, inputs)
         rate, bias = tracer.second(error, self._motion, own, self._moving(block))
-        jacobian = tracer.jacobian(error) if own is None else tracer.expand(ca.SX(own))
+        jacobian = tracer.jacobian(error) if own is None else tracer.expand(ca.SX(own))[:, : robot.nv]
         stiffness, damping = (b.p[block.slots[name].span] for name in ("stiffness", "damping"))
         value = tracer.expand(error)
         desired = -stiffness * value - damping * rate - bias
@@ -94,7 +100,7 @@ class SecondOrder:
         """Rows over all variables of a constraint, its margins and their factors."""
         item = block.entry.item
         assert isinstance(item, Constraint)
-        robot, tracer, inputs = self._robot, Tracer(self._kinematics), self._b.values(block)
+        robot, tracer, inputs = self._robot, self._b.tracer(block), self._b.values(block)
         if isinstance(item, ContactWrench):
             cone = item.contact.cone(self._b.values(self._layout.blocks[item.of]))
             wide = ca.SX(len(block.rows), self._layout.variables)
@@ -131,10 +137,11 @@ class SecondOrder:
             ),
         )
         rate = b.p[block.slots["rate"].span]
-        if isinstance(item, Contact):
+        matrix, rest = matrix[:, : self._robot.nv], ca.sum2(matrix[:, self._robot.nv :])
+        if isinstance(item, Contact) and not block.entry.frame:
             speed, drift = (part[: len(block.rows)] for part in self._motion.frame(item.frame))
         else:
-            speed = ca.densify(matrix @ self._kinematics.v)
+            speed = ca.densify(matrix @ self._kinematics.v + rest)
             drift = self._along(speed, block)
         ends = []
         for end in (low, high):
@@ -152,16 +159,14 @@ class SecondOrder:
         return ca.densify(total)
 
     def _moving(self, block: Block) -> Sequence[tuple[ca.SX, ca.SX]]:
-        """(symbols, rates) of an item's inputs that move, their rates included."""
+        """(symbols, rates) of inputs that move, their rates included: the item's, and those of the frame it is in."""
         out = []
         directions = {s.input.rate: s for s in block.slots.values() if s.input.direction and s.input.rate is not None}
-        for name, slot in block.slots.items():
-            if slot.input.rate is None:
-                continue
-            rate = self._b.rate(block, slot)
-            if name in directions:
+        for owner, slot in self._b.moving(block):
+            rate = self._b.rate(owner, slot)
+            if owner is block and slot.input.name in directions:
                 # a direction stays at unit length
-                rate -= ca.sumsqr(self._b.p[slot.span]) * self._b.p[directions[name].span]
+                rate -= ca.sumsqr(self._b.p[slot.span]) * self._b.p[directions[slot.input.name].span]
             out.append((self._b.p[slot.span], ca.densify(rate)))
         return out
 

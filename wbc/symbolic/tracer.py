@@ -381,7 +381,7 @@ class Tracer:
                     if change.nnz():
                         rate += ca.sparsify(change @ known.motion) @ twist_of(known)
         else:
-            rate += own @ kinematics.v
+            rate += own[:, : kinematics.nv] @ kinematics.v + ca.sum2(own[:, kinematics.nv :])
         for symbols, rates in moving:
             rate += ca.jtimes(expression, symbols, rates)
         rate = self._without_inner(ca.densify(rate))
