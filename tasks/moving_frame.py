@@ -11,7 +11,7 @@ import pinocchio as pin
 
 from wbc import validation
 from wbc.symbolic.tracer import Tracer
-from wbc.tasks.base import Command, Constraint, Input, Row, Rows, Values
+from wbc.tasks.base import Constraint, Input, Row, Rows, Values
 
 if TYPE_CHECKING:
     from wbc.robot import Robot
@@ -32,7 +32,8 @@ class MovingFrame(Constraint):
         R_T' (J v - (v_T + w_T x (p - p_T); w_T)),
 
     so T's twist is fed forward exactly, and a robot and an object that move together need no command.
-    Within a tick the twist changes: its mean over the tick counts, twist + acceleration dt / 2.
+    Within a tick the twist changes: for velocities its mean over the tick counts, twist + acceleration dt / 2. Of
+    accelerations and torques both are fed forward as they are, with the terms of Coriolis and of the centrifuge.
 
     Attributes:
         pose: first value of the input; None: it must be set before the first step.
@@ -57,10 +58,6 @@ class MovingFrame(Constraint):
     def __post_init__(self) -> None:
         if self.pose is not None:
             object.__setattr__(self, "pose", validation.pose("MovingFrame.pose", self.pose))
-
-    def refusal(self, robot: Robot, command: Command) -> str:
-        """Second derivatives of what is seen from a frame are not there yet."""
-        return "" if command == "velocity" else "frames outside the robot are for stacks that command velocities"
 
     def inputs(self, robot: Robot) -> tuple[Input, ...]:
         """``pose``, ``twist`` and ``acceleration``, see the class."""

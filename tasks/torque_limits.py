@@ -41,6 +41,7 @@ class TorqueLimits(Constraint):
     """
 
     order: ClassVar[SacrificeOrder] = SacrificeOrder.ACTUATOR
+    stands_in_world: ClassVar[bool] = False
 
     joints: tuple[str, ...] | None = None
 

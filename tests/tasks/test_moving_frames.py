@@ -28,15 +28,18 @@ from wbc.tasks import (
     CenterOfMass,
     EndEffector,
     FrameVelocityLimit,
+    Hold,
     Item,
     MovingFrame,
     Obstacle,
     PitchPlane,
     Posture,
+    Rolling,
     Task,
     registry,
 )
 from wbc.tasks import inputs as run_time
+from wbc.tasks._contact import Contact
 
 STANDING = sorted(name for name, cls in registry().items() if cls.__module__.startswith("wbc.") and cls.stands_in_world)
 DT = 0.01
@@ -46,22 +49,25 @@ PANDA = wbc.robots.load("panda")
 class Program:
     """The tick's expressions of one item, in a moving frame or in the world, interpreted."""
 
-    def __init__(self, machine: Robot, item: Item, moving: bool) -> None:
+    def __init__(self, machine: Robot, item: Item, moving: bool, command: str = "velocity") -> None:
         stack = Declaration(machine, DT, calm=False)
         if moving:
             stack.add(MovingFrame(), name="table")
         stack.add(item, name="item", relative_to="table" if moving else None)
+        stack = stack.commanding(command)
         self.layout, self.machine = Layout(stack), machine
         self.rows = program.build(stack, self.layout).rows
         self.block = self.layout.blocks["item"]
 
-    def __call__(self, q: np.ndarray, values: dict[str, Any], **frame: Any) -> dict[str, np.ndarray]:
+    def __call__(
+        self, q: np.ndarray, values: dict[str, Any], v: np.ndarray | None = None, **frame: Any
+    ) -> dict[str, np.ndarray]:
         p = np.zeros(self.layout.parameters)
         for name, given in (("item", values), ("table", frame)):
             for slot in self.layout.blocks[name].slots.values() if name in self.layout.blocks else ():
                 value = given.get(slot.input.name, slot.input.default)
                 p[slot.span] = run_time.flat(self.machine, slot.input.name, slot.input, value)
-        found = dict(zip(self.rows.name_out(), self.rows(q, np.zeros(self.machine.nv), p, DT), strict=True))
+        found = dict(zip(self.rows.name_out(), self.rows(q, np.zeros(self.machine.nv) if v is None else v, p, DT), strict=True))
         span, task = self.block.span, self.block.form == "task"
         names = ("jt", "desired") if task else ("at", "low")
         out = {"jacobian": found[names[0]][:, span].T, "asked": found[names[1]][span]}
@@ -97,7 +103,8 @@ def test_an_item_sees_the_robot_from_the_frame_and_feeds_its_twist_forward(class
     the frame's motion alone does to the value: a finite difference, or for plain rows the motion of a floating base.
     """
     rng, seed = np.random.default_rng(1), zlib.crc32(class_name.encode())
-    floating = class_name in ("Hold", "FrameVelocityLimit", "Rolling")
+    cls = registry()[class_name]
+    floating = issubclass(cls, (Hold, FrameVelocityLimit, Rolling, Contact))
     machine = robot("talos" if floating else NAMES[seed % 3])
     items = list(declared(class_name, machine))
     for item, values in items[:: 1 + len(items) // 6]:
@@ -113,6 +120,33 @@ def test_an_item_sees_the_robot_from_the_frame_and_feeds_its_twist_forward(class
             close(drift, (still["jacobian"] @ rigid(machine, q, pose, twist)), 1e-8)
         elif not isinstance(item, Task) or type(item).jacobian is Task.jacobian:
             close(drift, slope(lambda t: _later(moving, q, values, pose, twist, t)), 1e-7)  # noqa: B023
+
+
+@pytest.mark.parametrize("class_name", STANDING)
+def test_twist_and_acceleration_are_fed_forward_to_accelerations(class_name: str) -> None:
+    """What rows on accelerations ask for is the rate, by differences along the motion of robot and frame, of what rows
+    on velocities ask for; those are held to Pinocchio above. Inputs stand still, stiffness, damping and rate are 0.
+    """
+    rng, seed = np.random.default_rng(3), zlib.crc32(class_name.encode())
+    machine = robot("talos" if class_name == "Rolling" else NAMES[seed % 3])
+    items = [pair for pair in declared(class_name, machine) if not pair[0].refusal(machine, "acceleration")]
+    for item, given in items[:: 1 + len(items) // 2]:
+        # rates of inputs are inputs: what moves here is the frame
+        rates = {d.rate: 0.0 * np.asarray(given[d.rate]) for d in item.inputs(machine) if d.rate is not None}
+        values = given | rates | {"rate": 0.0, "stiffness": 0.0, "damping": 0.0}
+        q, pose, v = random_configuration(machine, rng), somewhere(1), rng.uniform(-1.0, 1.0, machine.nv)
+        twist, change = rng.uniform(-1.0, 1.0, (2, 6))
+        first, second = (Program(machine, item, True, command) for command in ("velocity", "acceleration"))
+
+        def rate(t: float) -> np.ndarray:
+            turn = t * (twist + 0.5 * t * change)  # noqa: B023
+            there = pin.SE3(pin.exp3(turn[3:]) @ pose.rotation, pose.translation + turn[:3])  # noqa: B023
+            here = pin.integrate(machine.model, q, t * v)  # noqa: B023
+            found = first(here, values, v, pose=there, twist=twist + t * change)  # noqa: B023
+            return found["jacobian"] @ v - found["asked"][:, 0]
+
+        found = second(q, values, v, pose=pose, twist=twist, acceleration=change)
+        close(-found["asked"][:, 0], slope(rate, 3e-4), 2e-6)
 
 
 def test_the_curvature_is_that_of_the_robot_placed_in_the_frame() -> None:

@@ -13,6 +13,7 @@ from wbc.tasks import inputs
 from wbc.tasks._contact import Contact, ContactWrench, force_sizes
 from wbc.tasks._direction import Direction
 from wbc.tasks.base import Constraint, Form, Input, Row, Task
+from wbc.tasks.moving_frame import MovingFrame
 
 
 @dataclass(frozen=True, eq=False)
@@ -214,8 +215,8 @@ def _gains(gain: float) -> list[Input]:
 
 
 def _on_forces(item: Constraint) -> bool:
-    """Whether rows are on forces, which have no rate."""
-    return isinstance(item, ContactWrench) or type(item).torque_rows is not Constraint.torque_rows
+    """Whether rows are on forces, which have no rate, or there are none."""
+    return isinstance(item, (ContactWrench, MovingFrame)) or type(item).torque_rows is not Constraint.torque_rows
 
 
 def rate_unit(unit: str, command: str) -> str:

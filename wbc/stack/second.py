@@ -22,7 +22,7 @@ from wbc.stack.declaration import Declaration
 from wbc.stack.layout import CLOSED, Block, Layout, Slot
 from wbc.symbolic.kinematics import Kinematics, Pose
 from wbc.symbolic.motion import Motion
-from wbc.symbolic.tracer import Tracer
+from wbc.symbolic.tracer import Tracer, along
 from wbc.tasks._contact import Contact, ContactForce, ContactWrench
 from wbc.tasks.base import Constraint, Rows, Task
 
@@ -43,6 +43,12 @@ class Builder(Protocol):
     def p(self) -> ca.SX: ...
     @property
     def dt(self) -> ca.SX: ...
+
+    def tracer(self, block: Block) -> Tracer:
+        """What an item sees of the robot."""
+
+    def moving(self, block: Block) -> list[tuple[Block, Slot]]:
+        """Inputs that have a rate, with their blocks: the item's, and those of the frame that it is stated in."""
 
     def values(self, block: Block) -> dict[str, ca.SX | Pose]:
         """Inputs of an item as its expressions receive them."""
@@ -78,11 +84,11 @@ class SecondOrder:
             rows = ca.SX(count, self._layout.variables)
             rows[:, self._layout.forces[item.of]] = ca.SX.eye(count)
             return -target, target, ca.SX.ones(count), rows
-        tracer, inputs = Tracer(self._kinematics), b.values(block)
+        tracer, inputs = b.tracer(block), b.values(block)
         error = b.column(block, "error", item.error(robot, tracer, inputs))
         own = item.jacobian(robot, tracer, inputs)
         rate, bias = tracer.second(error, self._motion, own, self._moving(block))
-        jacobian = tracer.jacobian(error) if own is None else tracer.expand(ca.SX(own))
+        jacobian = tracer.jacobian(error) if own is None else tracer.expand(ca.SX(own))[:, : robot.nv]
         stiffness, damping = (b.p[block.slots[name].span] for name in ("stiffness", "damping"))
         value = tracer.expand(error)
         desired = -stiffness * value - damping * rate - bias
@@ -94,7 +100,7 @@ class SecondOrder:
         """Rows over all variables of a constraint, its margins and their factors."""
         item = block.entry.item
         assert isinstance(item, Constraint)
-        robot, tracer, inputs = self._robot, Tracer(self._kinematics), self._b.values(block)
+        robot, tracer, inputs = self._robot, self._b.tracer(block), self._b.values(block)
         if isinstance(item, ContactWrench):
             cone = item.contact.cone(self._b.values(self._layout.blocks[item.of]))
             wide = ca.SX(len(block.rows), self._layout.variables)
@@ -105,6 +111,8 @@ class SecondOrder:
             dofs = list(torques.dofs)
             still = self._still[dofs]
             return Rows(self._dynamics[dofs, :], torques.lower - still, torques.upper - still), None, None
+        if not block.rows:
+            return Rows(ca.SX(0, self._layout.variables), ca.SX(0, 1), ca.SX(0, 1)), None, None
         if block.form == "rows":
             return self._rates(block, item, tracer), None, None
         margins = item.margins(robot, tracer, inputs)
@@ -131,17 +139,17 @@ class SecondOrder:
             ),
         )
         rate = b.p[block.slots["rate"].span]
-        if isinstance(item, Contact):
+        if isinstance(item, Contact) and not block.entry.frame:
             speed, drift = (part[: len(block.rows)] for part in self._motion.frame(item.frame))
         else:
-            speed = ca.densify(matrix @ self._kinematics.v)
+            speed = ca.densify(along(matrix, self._kinematics.v))
             drift = self._along(speed, block)
         ends = []
         for end in (low, high):
             ends.append(self._along(end, block) - drift - rate * (speed - end))
         if item.equality:
             ends[1] = ends[0]
-        return Rows(self._wide(matrix), ends[0], ends[1])
+        return Rows(self._wide(matrix[:, : self._layout.nv]), ends[0], ends[1])
 
     def _along(self, expression: ca.SX, block: Block) -> ca.SX:
         """Time derivative of an expression in q, v and inputs where v does not change."""
@@ -154,14 +162,12 @@ class SecondOrder:
     def _moving(self, block: Block) -> Sequence[tuple[ca.SX, ca.SX]]:
         """(symbols, rates) of an item's inputs that move, their rates included."""
         out = []
-        directions = {s.input.rate: s for s in block.slots.values() if s.input.direction and s.input.rate is not None}
-        for name, slot in block.slots.items():
-            if slot.input.rate is None:
-                continue
-            rate = self._b.rate(block, slot)
-            if name in directions:
-                # a direction stays at unit length
-                rate -= ca.sumsqr(self._b.p[slot.span]) * self._b.p[directions[name].span]
+        for owner, slot in self._b.moving(block):
+            rate, name = self._b.rate(owner, slot), slot.input.name
+            for other in owner.slots.values():
+                if other.input.direction and other.input.rate == name:
+                    # a direction stays at unit length
+                    rate -= ca.sumsqr(self._b.p[slot.span]) * self._b.p[other.span]
             out.append((self._b.p[slot.span], ca.densify(rate)))
         return out
 
