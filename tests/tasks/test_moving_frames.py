@@ -67,7 +67,9 @@ class Program:
             for slot in self.layout.blocks[name].slots.values() if name in self.layout.blocks else ():
                 value = given.get(slot.input.name, slot.input.default)
                 p[slot.span] = run_time.flat(self.machine, slot.input.name, slot.input, value)
-        found = dict(zip(self.rows.name_out(), self.rows(q, np.zeros(self.machine.nv) if v is None else v, p, DT), strict=True))
+        found = dict(
+            zip(self.rows.name_out(), self.rows(q, np.zeros(self.machine.nv) if v is None else v, p, DT), strict=True)
+        )
         span, task = self.block.span, self.block.form == "task"
         names = ("jt", "desired") if task else ("at", "low")
         out = {"jacobian": found[names[0]][:, span].T, "asked": found[names[1]][span]}
@@ -143,7 +145,7 @@ def test_twist_and_acceleration_are_fed_forward_to_accelerations(class_name: str
             there = pin.SE3(pin.exp3(turn[3:]) @ pose.rotation, pose.translation + turn[:3])  # noqa: B023
             here = pin.integrate(machine.model, q, t * v)  # noqa: B023
             found = first(here, values, v, pose=there, twist=twist + t * change)  # noqa: B023
-            return found["jacobian"] @ v - found["asked"][:, 0]
+            return found["jacobian"] @ v - found["asked"][:, 0]  # noqa: B023
 
         found = second(q, values, v, pose=pose, twist=twist, acceleration=change)
         close(-found["asked"][:, 0], slope(rate, 3e-4), 2e-6)

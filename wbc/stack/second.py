@@ -140,7 +140,8 @@ class SecondOrder:
         )
         rate = b.p[block.slots["rate"].span]
         if isinstance(item, Contact) and not block.entry.frame:
-            speed, drift = (part[: len(block.rows)] for part in self._motion.frame(item.frame))
+            turn, inputs = self._kinematics.pose(item.frame).rotation, b.values(block)
+            speed, drift = (item.still(inputs, turn, part) for part in self._motion.frame(item.frame))
         else:
             speed = ca.densify(along(matrix, self._kinematics.v))
             drift = self._along(speed, block)
@@ -187,7 +188,19 @@ class SecondOrder:
     @property
     def _still(self) -> ca.SX:
         """Torques of the motors without acceleration and wrenches."""
-        return ca.densify(self._driven @ self._motion.dynamics.nonlinear_effects)
+        return ca.densify(self._driven @ (self._motion.dynamics.nonlinear_effects - self._loads))
+
+    @property
+    def _loads(self) -> ca.SX:
+        """Generalised forces of all loads, as far as they are enabled."""
+        total = ca.SX(self._layout.nv, 1)
+        for block in self._layout.blocks.values():
+            item = block.entry.item
+            if isinstance(item, Constraint) and item.is_load:
+                load = item.load(self._robot, self._kinematics, self._b.values(block))
+                assert load is not None
+                total += self._b.p[block.slots[CLOSED].span] * load
+        return total
 
     @property
     def _dynamics(self) -> ca.SX:
@@ -198,15 +211,26 @@ class SecondOrder:
         return self._forces
 
     def _contacts(self) -> list[ca.SX]:
-        """Jacobian of every contact in its own axes, components x nv, as far as it is closed."""
+        """What the transposed of takes each contact's wrench to generalised forces, components x nv, as far as it is
+        closed.
+        """
         out = []
-        for name, span in self._layout.forces.items():
+        for name in self._layout.forces:
             block = self._layout.blocks[name]
             item = block.entry.item
             assert isinstance(item, Contact)
             closed = self._b.p[block.slots[CLOSED].span]
-            out.append(closed * self._kinematics.jacobian(item.frame, "local")[: span.stop - span.start, :])
+            units = item.unit_wrenches(self._b.values(block), *self._seen(block, item.frame))
+            out.append(closed * (ca.sparsify(units) @ self._kinematics.jacobian(item.frame, "local")))
         return out
+
+    def _seen(self, block: Block, frame: str) -> tuple[ca.SX, ca.SX]:
+        """Rotation and twist of a frame as the item sees them, from the world or from the frame it is stated in."""
+        tracer = self._b.tracer(block)
+        rotation = tracer.expand(ca.SX(tracer.rotation(frame)))
+        if tracer.carrier is None:
+            return rotation, self._motion.frame(frame)[0]
+        return rotation, tracer.expand(along(tracer.frame_jacobian(frame), self._kinematics.v))
 
     def most(self, blocks: Sequence[Block]) -> ca.SX:
         """The largest torque that each general row allows, infinite for rows on other things."""
@@ -225,7 +249,7 @@ class SecondOrder:
         tau = ca.substitute(dynamics.inverse_dynamics, dynamics.a, self.x[:nv])
         for jacobian, span in zip(self._contacts(), self._layout.forces.values(), strict=True):
             tau -= jacobian.T @ self.x[span]
-        tau = self._driven @ tau
+        tau = self._driven @ (tau - self._loads)
         if self._robot.base == "floating":
             tau[:6] = 0.0
         return tau
