@@ -15,13 +15,16 @@ from wbc.tasks.distance import Distance
 from wbc.tasks.elbow import Elbow
 from wbc.tasks.end_effector import EndEffector
 from wbc.tasks.expression import Expression
+from wbc.tasks.external_wrench import ExternalWrench
 from wbc.tasks.fixed import Fixed
 from wbc.tasks.frame_velocity_limit import FrameVelocityLimit
 from wbc.tasks.gaze_cone import GazeCone
 from wbc.tasks.hold import Hold
 from wbc.tasks.joint_coupling import JointCoupling
+from wbc.tasks.joint_friction import JointFriction
 from wbc.tasks.joint_limits import JointLimits
 from wbc.tasks.limit import Limit
+from wbc.tasks.line_contact import LineContact
 from wbc.tasks.look_at import LookAt
 from wbc.tasks.manipulability import Manipulability
 from wbc.tasks.mechanism import Mechanism
@@ -36,6 +39,7 @@ from wbc.tasks.relative_pose import RelativePose
 from wbc.tasks.rigid_grasp import RigidGrasp
 from wbc.tasks.rolling import Rolling, Wheel
 from wbc.tasks.self_collision import SelfCollision
+from wbc.tasks.sliding_contact import SlidingContact
 from wbc.tasks.surface_contact import SurfaceContact
 from wbc.tasks.torque_limits import TorqueLimits
 from wbc.tasks.workspace_box import WorkspaceBox
@@ -52,6 +56,7 @@ __all__ = [
     "Elbow",
     "EndEffector",
     "Expression",
+    "ExternalWrench",
     "Fixed",
     "Form",
     "FrameVelocityLimit",
@@ -60,8 +65,10 @@ __all__ = [
     "Input",
     "Item",
     "JointCoupling",
+    "JointFriction",
     "JointLimits",
     "Limit",
+    "LineContact",
     "LookAt",
     "Manipulability",
     "Mechanism",
@@ -80,6 +87,7 @@ __all__ = [
     "Rows",
     "SacrificeOrder",
     "SelfCollision",
+    "SlidingContact",
     "SurfaceContact",
     "Task",
     "TorqueLimits",

@@ -29,11 +29,11 @@ NOMINAL = 9.81
 FORCE_WEIGHT = 1e-4
 
 
-def force_sizes(robot: Robot, count: int) -> NDArray[np.float64]:
-    """How many N, or N m, count as much as 1 rad/s^2: the robot's weight on earth, and that by its length."""
+def force_sizes(robot: Robot) -> NDArray[np.float64]:
+    """How many N, 3, and N m, 3, count as much as 1 rad/s^2: the robot's weight on earth, and that by its length."""
     mass = float(pin.computeTotalMass(robot.model))
     force = max(mass, 1e-3) * NOMINAL
-    sizes: NDArray[np.float64] = np.repeat([force, force * robot.characteristic_length], 3)[:count]
+    sizes: NDArray[np.float64] = np.repeat([force, force * robot.characteristic_length], 3)
     return sizes
 
 
@@ -58,13 +58,18 @@ class Contact(Constraint):
     abstract: ClassVar[bool] = True
     order: ClassVar[SacrificeOrder] = SacrificeOrder.HOLD
     equality: ClassVar[bool] = True
-    #: Components of the wrench: 6, or 3 for a force alone
-    components: ClassVar[int] = 6
+    #: Components of the wrench that the contact can bear, in the axes of its frame: 0, 1, 2 force, 3, 4, 5 moment
+    axes: ClassVar[tuple[int, ...]] = (0, 1, 2, 3, 4, 5)
 
     frame: str
 
+    @property
+    def components(self) -> int:
+        """How many numbers the wrench has."""
+        return len(self.axes)
+
     def validate(self, robot: Robot) -> None:
-        """Check the frame, and that the robot has mass.
+        """Check the frame.
 
         Raises:
             UnknownNameError: no such frame. RangeError: a frame that no joint moves.
@@ -96,6 +101,17 @@ class Contact(Constraint):
     def velocity_rows(self, robot: Robot, kin: Tracer, inputs: Values, dt: ca.SX) -> Rows:
         """Those of ``Hold``: J v = -gain e."""
         return self._hold.velocity_rows(robot, kin, inputs, dt)
+
+    def still(self, inputs: Values, rotation: ca.SX, twist: ca.SX) -> ca.SX:
+        """What of a twist (linear; angular) in the axes of :meth:`velocity_rows` its rows are, linear in the twist.
+
+        Of J v it is the rows times v, and of (dJ/dt) v their rate where v does not change.
+        """
+        return twist[: self.components]
+
+    def unit_wrenches(self, inputs: Values, rotation: ca.SX, twist: ca.SX) -> ca.SX:
+        """components x 6: the wrench in the axes of the frame, about its origin, that each component is the size of."""
+        return ca.SX.eye(6)[list(self.axes), :]
 
     def limits(self) -> tuple[Input, ...]:
         """Run-time inputs of :meth:`cone`."""
@@ -144,14 +160,13 @@ class ContactForce(Task):
 
     def inputs(self, robot: Robot) -> tuple[Input, ...]:
         """``target``, in the axes of the frame [N; N m]."""
-        count = self.contact.components
-        return (Input("target", unit="N, N m" if count == 6 else "N", size=count, default=np.zeros(count)),)
+        count, moments = self.contact.components, max(self.contact.axes) >= 3
+        return (Input("target", unit="N, N m" if moments else "N", size=count, default=np.zeros(count)),)
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
         """The components of the wrench."""
-        count = self.contact.components
-        sizes = force_sizes(robot, count)
-        return tuple(Row(LABELS[k], UNITS[k], float(sizes[k])) for k in range(count))
+        sizes = force_sizes(robot)
+        return tuple(Row(LABELS[k], UNITS[k], float(sizes[k])) for k in self.contact.axes)
 
 
 @dataclass(frozen=True)
@@ -164,7 +179,7 @@ class Unactuated(Constraint):
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
         """x, y, z [N] and rx, ry, rz [N m] along the base's own axes."""
-        sizes = force_sizes(robot, 6)
+        sizes = force_sizes(robot)
         return tuple(Row(robot.dof_names[k], UNITS[k], float(sizes[k])) for k in range(6))
 
     def velocity_rows(self, robot: Robot, kin: Tracer, inputs: Values, dt: ca.SX) -> Rows | None:
@@ -179,7 +194,7 @@ class Unactuated(Constraint):
 
 def force_row(robot: Robot, label: str, kind: str = "N") -> Row:
     """A row of a force or a moment with the robot's own size."""
-    return Row(label, kind, float(force_sizes(robot, 6)[0 if kind == "N" else 3]))
+    return Row(label, kind, float(force_sizes(robot)[0 if kind == "N" else 3]))
 
 
 def checked_positive(field: str, value: Any, unit: str = "", zero: bool = False) -> float:

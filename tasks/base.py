@@ -30,6 +30,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wbc import pickling
+from wbc.symbolic.kinematics import Kinematics
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks._plain import plain
 from wbc.tasks.units import UNITS, checked_unit
@@ -381,6 +382,15 @@ class Constraint(Item):
     def torque_rows(self, robot: Robot, inputs: Values) -> Torques | None:
         """Rows on generalised forces of a stack that commands torques, or None."""
         return None
+
+    def load(self, robot: Robot, kin: Kinematics, inputs: Values) -> ca.SX | None:
+        """Generalised forces on the robot, nv [N m; N], that are neither motors nor gravity nor contacts, or None."""
+        return None
+
+    @property
+    def is_load(self) -> bool:
+        """Whether it gives a :meth:`load`."""
+        return type(self).load is not Constraint.load
 
     def acceleration_limits(self, robot: Robot) -> NDArray[np.float64]:
         """Largest change of each velocity per second that :meth:`bounds` leave, nv numbers; inf where there is none."""

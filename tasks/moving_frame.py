@@ -32,8 +32,8 @@ class MovingFrame(Constraint):
         R_T' (J v - (v_T + w_T x (p - p_T); w_T)),
 
     so T's twist is fed forward exactly, and a robot and an object that move together need no command.
-    Within a tick the twist changes: its mean over the tick counts, twist + acceleration dt / 2. In stacks that command
-    accelerations or torques the acceleration enters as it is, in the second derivative of what the item says.
+    Within a tick the twist changes: for velocities its mean over the tick counts, twist + acceleration dt / 2. Of
+    accelerations and torques both are fed forward as they are, with the terms of Coriolis and of the centrifuge.
 
     Attributes:
         pose: first value of the input; None: it must be set before the first step.

@@ -50,7 +50,7 @@ class PointContact(Contact):
         UnknownNameError, ShapeError, NotFiniteError, RangeError: on construction or in :meth:`validate`.
     """
 
-    components: ClassVar[int] = 3
+    axes: ClassVar[tuple[int, ...]] = (0, 1, 2)
 
     friction: float = 0.5
     least: float = 0.0

@@ -14,6 +14,7 @@ from tests.closed_loop.machines import CONSTRAINT_ROBOTS, TASK_ROBOTS
 from tests.closed_loop.mechanism import ROBOTS as COUPLED
 from tests.closed_loop.mechanism import build, mechanism
 from tests.closed_loop.pointing import CLASSES as POINTING
+from tests.constraints.items_forces import FACTORIES as FORCES
 from tests.repeats import covering
 from wbc.tasks import Mechanism, SelfCollision, registry
 
@@ -22,7 +23,9 @@ def test_every_shipped_class_has_a_case() -> None:
     shipped = {cls for cls in registry().values() if cls.__module__.startswith("wbc.tasks")}
     shared = {case.cls for case in (cases.TASKS | cases.CONSTRAINTS).values()}
     guards = {guard.cls for guard in GUARDS.values()}
-    assert shipped == shared | {Mechanism, SelfCollision} | POINTING | COORDINATION | guards
+    # contacts and what else is about forces: tests/torque
+    forces = {registry()[name] for name in FORCES}
+    assert shipped == shared | forces | {Mechanism, SelfCollision} | POINTING | COORDINATION | guards
 
 
 @pytest.mark.parametrize(("case", "name"), covering(cases.TASKS, TASK_ROBOTS))

@@ -226,3 +226,11 @@ def test_examples_are_short_and_use_public_names(path: Path) -> None:
 def test_every_example_is_run() -> None:
     called = set(re.findall(r'output\("(\w+)"\)', Path(__file__).read_text()))
     assert called == {path.stem for path in EXAMPLES}
+
+
+def test_torque_wipes_with_ten_newtons() -> None:
+    text = output("torque")
+    assert number("force # N", text) == pytest.approx(10.0, abs=0.3)
+    assert number("from # to", text) > 9.5
+    assert number("error along the table # mm", text) < 1.0
+    assert number("largest torque # %", text) < 100.0

@@ -29,15 +29,18 @@ from wbc.tasks import (
     CenterOfMass,
     EndEffector,
     FrameVelocityLimit,
+    Hold,
     Item,
     MovingFrame,
     Obstacle,
     PitchPlane,
     Posture,
+    Rolling,
     Task,
     registry,
 )
 from wbc.tasks import inputs as run_time
+from wbc.tasks._contact import Contact
 
 STANDING = sorted(name for name, cls in registry().items() if cls.__module__.startswith("wbc.") and cls.stands_in_world)
 DT = 0.01
@@ -96,7 +99,7 @@ def somewhere(seed: int) -> pin.SE3:
     return pin.SE3(pin.exp3(rng.uniform(-1.8, 1.8, 3)), rng.uniform(-1.0, 1.0, 3))
 
 
-FLOATING = ("Hold", "FrameVelocityLimit", "Rolling", "PointContact", "RigidGrasp", "SurfaceContact")
+FLOATING = [name for name, cls in registry().items() if issubclass(cls, (Hold, FrameVelocityLimit, Rolling, Contact))]
 
 
 def walk(class_name: str) -> Iterator[tuple[Robot, Item, dict[str, Any]]]:

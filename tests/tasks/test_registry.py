@@ -13,6 +13,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from tests.constraints.items_forces import TILTED
 from tests.evaluation import Numbers, later, numbers, sample, slope
 from tests.tasks.items import FACTORIES
 from tests.tasks.items_coordination import RATES as COORDINATION
@@ -24,10 +25,12 @@ from wbc.tasks import (
     FrameVelocityLimit,
     Hold,
     Item,
+    LineContact,
     Mechanism,
     PitchPlane,
     PointContact,
     RigidGrasp,
+    SlidingContact,
     SurfaceContact,
     Task,
     registry,
@@ -91,6 +94,15 @@ def hold(item: Hold, robot: Robot, q: np.ndarray, v: np.ndarray) -> np.ndarray:
     return {"pose": twist, "position": twist[:3], "orientation": twist[3:]}[item.kind]
 
 
+def line(item: LineContact, robot: Robot, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+    twist = velocity(robot, item.frame, q, v)
+    return np.concatenate([twist[:3], (placement(robot, item.frame, q).rotation.T @ twist[3:])[1:]])
+
+
+def sliding(item: SlidingContact, robot: Robot, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+    return np.array([TILTED.rotation[:, 2] @ velocity(robot, item.frame, q, v)[:3]])
+
+
 def contact(item: RigidGrasp, robot: Robot, q: np.ndarray, v: np.ndarray) -> np.ndarray:
     return velocity(robot, item.frame, q, v)[: item.components]
 
@@ -126,6 +138,8 @@ RATES = {
     Hold: hold,
     RigidGrasp: contact,
     PointContact: contact,
+    LineContact: line,
+    SlidingContact: sliding,
     SurfaceContact: contact,
     Mechanism: mechanism,
     PitchPlane: plane_rate,
@@ -153,8 +167,8 @@ def test_rows_are_what_the_class_says(class_name: str, robot_name: str) -> None:
     rng = np.random.default_rng(zlib.crc32(f"{class_name} {robot_name}".encode()))
     for item, given in FACTORIES[class_name](machine):
         if item.refusal(machine, "velocity"):
-            # limits of torques have no rows on velocities: tests/torque
-            assert class_name == "TorqueLimits"
+            # torques and forces have no rows on velocities: tests/torque
+            assert class_name in ("TorqueLimits", "ExternalWrench", "JointFriction")
             continue
         found = numbers(item, machine)
         for _ in range(STATES):

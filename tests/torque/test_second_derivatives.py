@@ -136,7 +136,7 @@ def test_rows_of_every_class(robot_name: str) -> None:
         check(found, block, drawn[name], q, v, got)
     assert len(alone) > (40 if robot_name == "panda" else 20)
     # nothing that is left out is left out silently
-    assert set(refused) <= {"SelfCollision", "Obstacle", "TorqueLimits"}
+    assert set(refused) <= {"SelfCollision", "Obstacle", "TorqueLimits", "ExternalWrench", "JointFriction"}
 
 
 def test_what_has_no_second_derivative_says_so() -> None:

@@ -26,12 +26,15 @@ from wbc.tasks import (
     Distance,
     Elbow,
     EndEffector,
+    ExternalWrench,
     Fixed,
     FrameVelocityLimit,
     GazeCone,
     Hold,
     JointCoupling,
+    JointFriction,
     JointLimits,
+    LineContact,
     LookAt,
     Manipulability,
     Mechanism,
@@ -46,6 +49,7 @@ from wbc.tasks import (
     RigidGrasp,
     Rolling,
     SelfCollision,
+    SlidingContact,
     SurfaceContact,
     TorqueLimits,
     WorkspaceBox,
@@ -113,6 +117,21 @@ class ContactHandle(HoldHandle):
     friction: float
     least: float
     most: float
+    slow: float
+
+
+class ExternalWrenchHandle(ConstraintHandle):
+    """Of :class:`ExternalWrench`."""
+
+    wrench: Any
+
+
+class JointFrictionHandle(ConstraintHandle):
+    """Of :class:`JointFriction`."""
+
+    viscous: Any
+    coulomb: Any
+    slow: float
 
 
 class TorqueLimitsHandle(ConstraintHandle):
@@ -228,6 +247,8 @@ if TYPE_CHECKING:
         BoxHandle,
         PolyhedronHandle,
         MovingFrameHandle,
+        ExternalWrenchHandle,
+        JointFrictionHandle,
         TorqueLimitsHandle,
     ):
         """Of an item that is known by its name only: all values that items of this package have."""
@@ -249,6 +270,10 @@ KINDS: dict[type[Item], type[Handle]] = {
     RigidGrasp: ContactHandle,
     PointContact: ContactHandle,
     SurfaceContact: ContactHandle,
+    LineContact: ContactHandle,
+    SlidingContact: ContactHandle,
+    ExternalWrench: ExternalWrenchHandle,
+    JointFriction: JointFrictionHandle,
     TorqueLimits: TorqueLimitsHandle,
     Rolling: RollingHandle,
     Fixed: ConstraintHandle,
@@ -294,7 +319,13 @@ class Handles:
     @overload
     def __getitem__(self, item: Hold | Mechanism) -> HoldHandle: ...
     @overload
-    def __getitem__(self, item: RigidGrasp | PointContact | SurfaceContact) -> ContactHandle: ...
+    def __getitem__(
+        self, item: RigidGrasp | PointContact | SurfaceContact | LineContact | SlidingContact
+    ) -> ContactHandle: ...
+    @overload
+    def __getitem__(self, item: ExternalWrench) -> ExternalWrenchHandle: ...
+    @overload
+    def __getitem__(self, item: JointFriction) -> JointFrictionHandle: ...
     @overload
     def __getitem__(self, item: TorqueLimits) -> TorqueLimitsHandle: ...
     @overload

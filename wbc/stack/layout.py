@@ -129,9 +129,9 @@ class Layout:
             count = item.sensed_rows(robot)
             if count:
                 declared += inputs.sensed(robot, count)
-            if form == "margins" or (form == "rows" and self.command != "velocity" and not _on_forces(item)):
+            if form == "margins" or (form == "rows" and self.command != "velocity" and not _on_forces(item, rows)):
                 declared.append(Input("rate", unit="1/s", default=item.default_rate, low=0.0))
-            if isinstance(item, Contact) and self.command == "torque":
+            if self.command == "torque" and (isinstance(item, Contact) or item.is_load):
                 declared.append(Input(CLOSED, default=1.0, low=0.0, high=1.0, sensed=True))
         elif isinstance(item, Task) and not any(i.name == "gain" for i in declared):
             default = item.default_gain if item.gain is None else item.gain
@@ -190,12 +190,14 @@ class Layout:
         """
         own = [stack.length if u == "m" else 1.0 for u in stack.robot.dof_units]
         out = np.array(own + [1.0] * (self.variables - self.nv))
-        for span in self.forces.values():
-            out[span] = force_sizes(stack.robot, span.stop - span.start)
+        for name, span in self.forces.items():
+            item = self.blocks[name].entry.item
+            assert isinstance(item, Contact)
+            out[span] = force_sizes(stack.robot)[list(item.axes)]
         return out
 
 
-#: Input of a contact, 1 where it is enabled and 0 where it is not, so that it bears nothing
+#: Input of a contact or a load, 1 where it is enabled and 0 where it is not, so that it bears nothing
 CLOSED = "closed"
 
 
@@ -213,9 +215,9 @@ def _gains(gain: float) -> list[Input]:
     ]
 
 
-def _on_forces(item: Constraint) -> bool:
-    """Whether rows are on forces, which have no rate."""
-    return isinstance(item, ContactWrench) or type(item).torque_rows is not Constraint.torque_rows
+def _on_forces(item: Constraint, rows: tuple[Row, ...]) -> bool:
+    """Whether rows are on forces, which have no rate, or there are none."""
+    return not rows or isinstance(item, ContactWrench) or type(item).torque_rows is not Constraint.torque_rows
 
 
 def rate_unit(unit: str, command: str) -> str:

@@ -119,7 +119,7 @@ class _Builder:
         frame = self.layout.blocks[block.entry.frame]
         pose = as_value(frame.slots["pose"].input, self.p[frame.slots["pose"].span])
         assert isinstance(pose, Pose)
-        return Carrier(pose, self.speed(frame, frame.slots["pose"]))
+        return Carrier(pose, self.speed(frame, frame.slots["pose"], mean=self.second is None))
 
     def tracer(self, block: Block) -> Tracer:
         """What the item sees of the robot."""
@@ -130,17 +130,17 @@ class _Builder:
         blocks = [block, *([self.layout.blocks[block.entry.frame]] if block.entry.frame else [])]
         return [(b, slot) for b in blocks for slot in b.slots.values() if slot.input.rate is not None]
 
-    def speed(self, block: Block, slot: Slot) -> ca.SX:
-        """Rate of an input, as the user gives it: its mean over the tick, where it has a rate of its own."""
+    def speed(self, block: Block, slot: Slot, mean: bool) -> ca.SX:
+        """Rate of an input, as the user gives it, now or its mean over the tick, where it has a rate of its own."""
         rate = block.slots[slot.input.rate or ""]
         own = self.p[rate.span]
-        if rate.input.rate is None or self.second is not None:
+        if rate.input.rate is None or not mean:
             return own
         return own + 0.5 * self.dt * self.p[block.slots[rate.input.rate].span]
 
     def rate(self, block: Block, slot: Slot) -> ca.SX:
         """Time derivative of the numbers of an input that has a rate."""
-        speed = self.speed(block, slot)
+        speed = self.speed(block, slot, mean=self.second is None)
         part = self.p[slot.span]
         if slot.input.kind == "pose":
             return ca.vertcat(rot.rotation_rate(ca.reshape(part[:9], 3, 3)) @ speed[3:], speed[:3])
@@ -161,7 +161,7 @@ class _Builder:
         """The parameter vector with this block's moving inputs dt later."""
         out = ca.SX(self.p)
         for owner, slot in self.moving(block):
-            speed = self.speed(owner, slot)
+            speed = self.speed(owner, slot, mean=True)
             part = self.p[slot.span]
             if slot.input.kind in ("pose", "rotation"):
                 angular = speed[3:] if slot.input.kind == "pose" else speed

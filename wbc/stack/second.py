@@ -22,7 +22,7 @@ from wbc.stack.declaration import Declaration
 from wbc.stack.layout import CLOSED, Block, Layout, Slot
 from wbc.symbolic.kinematics import Kinematics, Pose
 from wbc.symbolic.motion import Motion
-from wbc.symbolic.tracer import Tracer
+from wbc.symbolic.tracer import Tracer, along
 from wbc.tasks._contact import Contact, ContactForce, ContactWrench
 from wbc.tasks.base import Constraint, Rows, Task
 
@@ -44,14 +44,14 @@ class Builder(Protocol):
     @property
     def dt(self) -> ca.SX: ...
 
-    def values(self, block: Block) -> dict[str, ca.SX | Pose]:
-        """Inputs of an item as its expressions receive them."""
-
     def tracer(self, block: Block) -> Tracer:
         """What an item sees of the robot."""
 
     def moving(self, block: Block) -> list[tuple[Block, Slot]]:
-        """Inputs that have a rate, with their blocks."""
+        """Inputs that have a rate, with their blocks: the item's, and those of the frame that it is stated in."""
+
+    def values(self, block: Block) -> dict[str, ca.SX | Pose]:
+        """Inputs of an item as its expressions receive them."""
 
     def rate(self, block: Block, slot: Slot) -> ca.SX:
         """Time derivative of the numbers of an input that has a rate."""
@@ -111,6 +111,8 @@ class SecondOrder:
             dofs = list(torques.dofs)
             still = self._still[dofs]
             return Rows(self._dynamics[dofs, :], torques.lower - still, torques.upper - still), None, None
+        if not block.rows:
+            return Rows(ca.SX(0, self._layout.variables), ca.SX(0, 1), ca.SX(0, 1)), None, None
         if block.form == "rows":
             return self._rates(block, item, tracer), None, None
         margins = item.margins(robot, tracer, inputs)
@@ -137,18 +139,18 @@ class SecondOrder:
             ),
         )
         rate = b.p[block.slots["rate"].span]
-        matrix, rest = matrix[:, : self._robot.nv], ca.sum2(matrix[:, self._robot.nv :])
         if isinstance(item, Contact) and not block.entry.frame:
-            speed, drift = (part[: len(block.rows)] for part in self._motion.frame(item.frame))
+            turn, inputs = self._kinematics.pose(item.frame).rotation, b.values(block)
+            speed, drift = (item.still(inputs, turn, part) for part in self._motion.frame(item.frame))
         else:
-            speed = ca.densify(matrix @ self._kinematics.v + rest)
+            speed = ca.densify(along(matrix, self._kinematics.v))
             drift = self._along(speed, block)
         ends = []
         for end in (low, high):
             ends.append(self._along(end, block) - drift - rate * (speed - end))
         if item.equality:
             ends[1] = ends[0]
-        return Rows(self._wide(matrix), ends[0], ends[1])
+        return Rows(self._wide(matrix[:, : self._layout.nv]), ends[0], ends[1])
 
     def _along(self, expression: ca.SX, block: Block) -> ca.SX:
         """Time derivative of an expression in q, v and inputs where v does not change."""
@@ -159,14 +161,14 @@ class SecondOrder:
         return ca.densify(total)
 
     def _moving(self, block: Block) -> Sequence[tuple[ca.SX, ca.SX]]:
-        """(symbols, rates) of inputs that move, their rates included: the item's, and those of the frame it is in."""
+        """(symbols, rates) of an item's inputs that move, their rates included."""
         out = []
-        directions = {s.input.rate: s for s in block.slots.values() if s.input.direction and s.input.rate is not None}
         for owner, slot in self._b.moving(block):
-            rate = self._b.rate(owner, slot)
-            if owner is block and slot.input.name in directions:
-                # a direction stays at unit length
-                rate -= ca.sumsqr(self._b.p[slot.span]) * self._b.p[directions[slot.input.name].span]
+            rate, name = self._b.rate(owner, slot), slot.input.name
+            for other in owner.slots.values():
+                if other.input.direction and other.input.rate == name:
+                    # a direction stays at unit length
+                    rate -= ca.sumsqr(self._b.p[slot.span]) * self._b.p[other.span]
             out.append((self._b.p[slot.span], ca.densify(rate)))
         return out
 
@@ -186,7 +188,19 @@ class SecondOrder:
     @property
     def _still(self) -> ca.SX:
         """Torques of the motors without acceleration and wrenches."""
-        return ca.densify(self._driven @ self._motion.dynamics.nonlinear_effects)
+        return ca.densify(self._driven @ (self._motion.dynamics.nonlinear_effects - self._loads))
+
+    @property
+    def _loads(self) -> ca.SX:
+        """Generalised forces of all loads, as far as they are enabled."""
+        total = ca.SX(self._layout.nv, 1)
+        for block in self._layout.blocks.values():
+            item = block.entry.item
+            if isinstance(item, Constraint) and item.is_load:
+                load = item.load(self._robot, self._kinematics, self._b.values(block))
+                assert load is not None
+                total += self._b.p[block.slots[CLOSED].span] * load
+        return total
 
     @property
     def _dynamics(self) -> ca.SX:
@@ -197,15 +211,26 @@ class SecondOrder:
         return self._forces
 
     def _contacts(self) -> list[ca.SX]:
-        """Jacobian of every contact in its own axes, components x nv, as far as it is closed."""
+        """What the transposed of takes each contact's wrench to generalised forces, components x nv, as far as it is
+        closed.
+        """
         out = []
-        for name, span in self._layout.forces.items():
+        for name in self._layout.forces:
             block = self._layout.blocks[name]
             item = block.entry.item
             assert isinstance(item, Contact)
             closed = self._b.p[block.slots[CLOSED].span]
-            out.append(closed * self._kinematics.jacobian(item.frame, "local")[: span.stop - span.start, :])
+            units = item.unit_wrenches(self._b.values(block), *self._seen(block, item.frame))
+            out.append(closed * (ca.sparsify(units) @ self._kinematics.jacobian(item.frame, "local")))
         return out
+
+    def _seen(self, block: Block, frame: str) -> tuple[ca.SX, ca.SX]:
+        """Rotation and twist of a frame as the item sees them, from the world or from the frame it is stated in."""
+        tracer = self._b.tracer(block)
+        rotation = tracer.expand(ca.SX(tracer.rotation(frame)))
+        if tracer.carrier is None:
+            return rotation, self._motion.frame(frame)[0]
+        return rotation, tracer.expand(along(tracer.frame_jacobian(frame), self._kinematics.v))
 
     def most(self, blocks: Sequence[Block]) -> ca.SX:
         """The largest torque that each general row allows, infinite for rows on other things."""
@@ -224,7 +249,7 @@ class SecondOrder:
         tau = ca.substitute(dynamics.inverse_dynamics, dynamics.a, self.x[:nv])
         for jacobian, span in zip(self._contacts(), self._layout.forces.values(), strict=True):
             tau -= jacobian.T @ self.x[span]
-        tau = self._driven @ tau
+        tau = self._driven @ (tau - self._loads)
         if self._robot.base == "floating":
             tau[:6] = 0.0
         return tau

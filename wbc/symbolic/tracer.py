@@ -381,7 +381,7 @@ class Tracer:
                     if change.nnz():
                         rate += ca.sparsify(change @ known.motion) @ twist_of(known)
         else:
-            rate += own[:, : kinematics.nv] @ kinematics.v + ca.sum2(own[:, kinematics.nv :])
+            rate += along(own, kinematics.v)
         for symbols, rates in moving:
             rate += ca.jtimes(expression, symbols, rates)
         rate = self._without_inner(ca.densify(rate))
@@ -469,6 +469,11 @@ class Placeholder:
     turns: bool = False
     forces: Callable[[ca.SX], tuple[AppliedForce, ...]] = lambda force: ()
     twist: Callable[[Motion], tuple[ca.SX, ca.SX]] | None = None
+
+
+def along(matrix: ca.SX, v: ca.SX) -> ca.SX:
+    """Rows by v, with the column of what remains at v = 0, see :meth:`Tracer.point_jacobian`."""
+    return matrix[:, : v.numel()] @ v + ca.sum2(matrix[:, v.numel() :])
 
 
 def of_frame(kinematics: Kinematics, frame: str, pose: Pose) -> list[Placeholder]:
