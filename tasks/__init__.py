@@ -30,10 +30,14 @@ from wbc.tasks.moving_frame import MovingFrame
 from wbc.tasks.obstacle import Obstacle
 from wbc.tasks.pitch_plane import PitchPlane
 from wbc.tasks.pitch_plane_limit import PitchPlaneLimit
+from wbc.tasks.point_contact import PointContact
 from wbc.tasks.posture import Posture
 from wbc.tasks.relative_pose import RelativePose
+from wbc.tasks.rigid_grasp import RigidGrasp
 from wbc.tasks.rolling import Rolling, Wheel
 from wbc.tasks.self_collision import SelfCollision
+from wbc.tasks.surface_contact import SurfaceContact
+from wbc.tasks.torque_limits import TorqueLimits
 from wbc.tasks.workspace_box import WorkspaceBox
 from wbc.tasks.workspace_polyhedron import WorkspacePolyhedron
 
@@ -67,14 +71,18 @@ __all__ = [
     "PitchPlane",
     "PitchPlaneLimit",
     "PlaneReference",
+    "PointContact",
     "Posture",
     "RelativePose",
+    "RigidGrasp",
     "Rolling",
     "Row",
     "Rows",
     "SacrificeOrder",
     "SelfCollision",
+    "SurfaceContact",
     "Task",
+    "TorqueLimits",
     "Values",
     "Wheel",
     "WorkspaceBox",

@@ -11,7 +11,7 @@ import pinocchio as pin
 
 from wbc import validation
 from wbc.symbolic.tracer import Tracer
-from wbc.tasks.base import Constraint, Input, Row, Rows, Values
+from wbc.tasks.base import Command, Constraint, Input, Row, Rows, Values
 
 if TYPE_CHECKING:
     from wbc.robot import Robot
@@ -57,6 +57,10 @@ class MovingFrame(Constraint):
     def __post_init__(self) -> None:
         if self.pose is not None:
             object.__setattr__(self, "pose", validation.pose("MovingFrame.pose", self.pose))
+
+    def refusal(self, robot: Robot, command: Command) -> str:
+        """Second derivatives of what is seen from a frame are not there yet."""
+        return "" if command == "velocity" else "frames outside the robot are for stacks that command velocities"
 
     def inputs(self, robot: Robot) -> tuple[Input, ...]:
         """``pose``, ``twist`` and ``acceleration``, see the class."""

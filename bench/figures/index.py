@@ -112,6 +112,7 @@ _ALL = (
     Figure("symbolic", ("wbc/symbolic",), 0.2),
     Figure("plants", (*WALK, "wbc/simulation", "tests/simulation/lagging.py"), 1.0),
     Figure("moving", (*TICK, "wbc/moving_target", "wbc/estimation", "wbc/simulation"), 6.0),
+    Figure("torques", (*TICK, "bench/torque_peer.py"), 1.5),
     Figure("two_ended", WALK, 0.5),
     Figure("walks", (*WALK, "bench/walk/reference"), 1.5),
 )  # fmt: skip

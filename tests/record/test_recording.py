@@ -359,4 +359,5 @@ def test_parts_are_all_that_a_tick_reads() -> None:
     """A buffer that is added to the tick must be added to the recording."""
     from wbc.controller.tick.buffers import Buffers
 
-    assert set(INPUTS) == set(Buffers.__annotations__) - {"report", "state"}
+    # the wrenches that are kept are those of stacks that command accelerations
+    assert {*INPUTS, "kept"} == set(Buffers.__annotations__) - {"report", "state"}

@@ -118,6 +118,8 @@ class Core:
             handle.assume(other.handles[name])
         for name in ("q", "v_last", "p", "cap", "dt", "weight", "enabled", "bound_enabled"):
             getattr(self.tick, name)[:] = getattr(other.tick, name)
+        if self.layout.command != "velocity":
+            self.assembly.kept[:] = other.assembly.kept
         self.tick.check()
         self.fallback.policy = other.fallback.policy
         self.ramps.assume(other.ramps, self.handles)
@@ -147,6 +149,8 @@ class Core:
             self.initialise(self._first, configuration)
         self.waiting = {} if configuration is not None else dict(self._first)
         self.tick.v_last[: self.layout.nv] = velocity
+        if self.layout.command != "velocity":
+            self.assembly.kept[:] = 0.0
         self.tick.reset()
         for sensor, _ in self.sensors:
             sensor.reset()

@@ -40,10 +40,14 @@ from wbc.tasks import (
     Obstacle,
     PitchPlane,
     PitchPlaneLimit,
+    PointContact,
     Posture,
     RelativePose,
+    RigidGrasp,
     Rolling,
     SelfCollision,
+    SurfaceContact,
+    TorqueLimits,
     WorkspaceBox,
     WorkspacePolyhedron,
 )
@@ -51,17 +55,20 @@ from wbc.tasks.base import Item
 
 
 class TaskHandle(Handle):
-    """Of every task."""
+    """Of every task; ``stiffness`` and ``damping`` in place of ``gain`` where accelerations are commanded."""
 
     weight: float
     gain: float
+    stiffness: float
+    damping: float
 
 
 class FollowerHandle(TaskHandle):
-    """Of tasks that follow a target."""
+    """Of tasks that follow a target; ``acceleration`` where accelerations are commanded."""
 
     target: Any
     feedforward: Any
+    acceleration: Any
 
 
 class DistanceHandle(FollowerHandle):
@@ -91,10 +98,27 @@ class ConstraintHandle(Handle):
 
 
 class HoldHandle(ConstraintHandle):
-    """Of equalities that are corrected with a gain."""
+    """Of equalities that are corrected with a gain; ``rate`` where accelerations are commanded."""
 
     gain: float
+    rate: float
     target: Any
+
+
+class ContactHandle(HoldHandle):
+    """Of contacts: what they bear."""
+
+    force: Any
+    torque: Any
+    friction: float
+    least: float
+    most: float
+
+
+class TorqueLimitsHandle(ConstraintHandle):
+    """Of :class:`TorqueLimits`."""
+
+    scale: float
 
 
 class RollingHandle(ConstraintHandle):
@@ -194,7 +218,7 @@ if TYPE_CHECKING:
         DistanceHandle,
         RelativePoseHandle,
         MomentumHandle,
-        HoldHandle,
+        ContactHandle,
         RollingHandle,
         JointLimitsHandle,
         FrameVelocityHandle,
@@ -204,6 +228,7 @@ if TYPE_CHECKING:
         BoxHandle,
         PolyhedronHandle,
         MovingFrameHandle,
+        TorqueLimitsHandle,
     ):
         """Of an item that is known by its name only: all values that items of this package have."""
 
@@ -221,6 +246,10 @@ KINDS: dict[type[Item], type[Handle]] = {
     Damping: TaskHandle,
     Hold: HoldHandle,
     Mechanism: HoldHandle,
+    RigidGrasp: ContactHandle,
+    PointContact: ContactHandle,
+    SurfaceContact: ContactHandle,
+    TorqueLimits: TorqueLimitsHandle,
     Rolling: RollingHandle,
     Fixed: ConstraintHandle,
     JointLimits: JointLimitsHandle,
@@ -264,6 +293,10 @@ class Handles:
     def __getitem__(self, item: _Follower) -> FollowerHandle: ...
     @overload
     def __getitem__(self, item: Hold | Mechanism) -> HoldHandle: ...
+    @overload
+    def __getitem__(self, item: RigidGrasp | PointContact | SurfaceContact) -> ContactHandle: ...
+    @overload
+    def __getitem__(self, item: TorqueLimits) -> TorqueLimitsHandle: ...
     @overload
     def __getitem__(self, item: Rolling) -> RollingHandle: ...
     @overload

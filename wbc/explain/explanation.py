@@ -63,7 +63,7 @@ class Bound:
         relation, kind = RELATIONS[self.which], self.kind + " limit: " if self.kind else ""
         text = f"{self.name} ({kind}{relation} {amount(self.value, self.unit)}"
         if self.margin is not None:
-            text += f", {amount(self.margin, self.unit.removesuffix('/s'))} to spare"
+            text += f", {amount(self.margin, self.unit.removesuffix('^2').removesuffix('/s'))} to spare"
         return text + ")"
 
 

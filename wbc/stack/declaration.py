@@ -2,25 +2,41 @@
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, Self
+from typing import Any, Self, get_args
+
+import pinocchio as pin
 
 from wbc import pickling, validation
-from wbc.errors import DuplicateNameError, LevelError, PicklingError, RangeError, ShapeError, UnknownNameError
+from wbc.errors import (
+    CommandError,
+    DuplicateNameError,
+    LevelError,
+    PicklingError,
+    RangeError,
+    ShapeError,
+    UnknownNameError,
+)
 from wbc.robot import Robot
 from wbc.symbolic.kinematics import WORLD
 from wbc.tasks import inputs
+from wbc.tasks._contact import FORCE_WEIGHT, Contact, ContactForce, ContactWrench, Unactuated
 from wbc.tasks._direction import DIRECTION_PRICE, Direction
-from wbc.tasks.base import Constraint, Item, SacrificeOrder, Task
+from wbc.tasks.base import Command, Constraint, Item, SacrificeOrder, Task
+from wbc.tasks.damping import Damping
 from wbc.tasks.mechanism import Mechanism
 from wbc.tasks.moving_frame import MovingFrame
 
 #: Default cost of velocity against a task row of weight 1, per (rad/s)^2: keeps the optimum unique.
 #: It biases a posture task of weight w by the fraction damping / w.
 DAMPING = 1e-8
+
+#: Least of it
+LEAST_DAMPING = 1e-12
 
 #: Highest price of a soft constraint; beyond it a row is as good as hard
 HIGHEST_PRICE = 1e9
@@ -58,8 +74,17 @@ class Entry:
         return isinstance(self.item, Task)
 
 
+COMMANDS: tuple[Command, ...] = get_args(Command)
+
+#: Of a stack of accelerations: joints that no task moves come to rest like exp(-4 REST t) [1/s]
+REST = 5.0
+
+
 class Declaration:
     """Items on a robot. See :class:`wbc.Stack`, which adds ``compile``."""
+
+    #: What it is compiled to command, see :meth:`commanding`
+    _command: Command = "velocity"
 
     def __init__(
         self,
@@ -74,7 +99,7 @@ class Declaration:
             raise ShapeError("robot", robot, "expected a wbc Robot, see wbc.robots.load")
         self._robot = robot
         self._dt = validation.scalar("dt", dt, low=0.0, open_low=True, unit="s")
-        self._damping = validation.scalar("damping", damping, low=1e-12, high=1.0)
+        self._damping = validation.scalar("damping", damping, low=LEAST_DAMPING, high=1.0)
         chosen = robot.characteristic_length if length is None else length
         self._length = validation.scalar("length", chosen, low=0.0, open_low=True, unit="m")
         self._calm = validation.flag("calm", calm)
@@ -114,7 +139,64 @@ class Declaration:
     @property
     def calm(self) -> bool:
         """Targets out of reach make no chatter, see docs/reach.md; False: the plain linear model."""
-        return self._calm
+        return self._calm and self._command == "velocity"
+
+    @property
+    def command(self) -> Command:
+        """What the stack commands: ``"velocity"``, ``"acceleration"`` or ``"torque"``."""
+        return self._command
+
+    def commanding(self, command: str) -> Self:
+        """This stack with what it needs to command accelerations or torques; itself where it commands that already.
+
+            rest                a task at the least weight that brings joints to rest that no other task moves
+            base                no motor drives a floating base (torques)
+            "<contact> wrench"  what the wrench of a contact may be (torques)
+            "<contact> force"   what it should be (torques)
+
+        Raises:
+            UnknownNameError: another command.
+            CommandError: an item has no meaning for it, and why; the stack commands something else already; the robot
+                has no mass.
+        """
+        validation.one_of("command", command, COMMANDS)
+        if command == self._command and command != "velocity":
+            return self
+        if self._command != "velocity":
+            reason = f"this stack is compiled for {self._command}; compile the one that it was made from"
+            raise CommandError("command", command, reason)
+        if command == "torque" and pin.computeTotalMass(self._robot.model) <= 0.0:
+            raise CommandError("command", command, f"the moving links of {self._robot.name!r} have no mass")
+        out = self if command == "velocity" else copy.copy(self)
+        out._command = next(known for known in COMMANDS if known == command)
+        for entry in self.entries:
+            if reason := entry.item.refusal(self._robot, out._command):
+                raise CommandError(f"{entry.name}", command, reason)
+        if command != "velocity":
+            out._command_entries()
+        return out
+
+    def _command_entries(self) -> None:
+        """Add what the command needs."""
+        last = max(self.levels)
+        rest = self._free_name("rest")
+        # After strict levels it is one of its own: it must not disturb them
+        cascade = len(self.levels) > 1 or any(e.level > 0 for e in self.entries)
+        weight = 1.0 if cascade else self._damping
+        if not cascade:
+            # The rest task keeps the optimum unique: what else does would slow it down
+            self._damping = max(LEAST_DAMPING, self._damping * 1e-3)
+        added = [Entry(Damping(gain=REST), rest, last + 1 if cascade else last, weight)]
+        if self._command == "torque":
+            if self._robot.base == "floating":
+                added.append(Entry(Unactuated(), self._free_name("base"), 0, 1.0))
+            for entry in self.entries:
+                if isinstance(entry.item, Contact):
+                    name = entry.name
+                    added.append(Entry(ContactWrench(name, entry.item), self._free_name(f"{name} wrench"), 0, 1.0))
+                    force = ContactForce(name, entry.item)
+                    added.append(Entry(force, self._free_name(f"{name} force"), last, FORCE_WEIGHT))
+        self._entries |= {entry.name: entry for entry in added}
 
     @property
     def entries(self) -> tuple[Entry, ...]:
@@ -270,7 +352,8 @@ class Declaration:
             "robot": self._robot.fingerprint,
             "length": self._length.hex(),
             "damping": self._damping.hex(),
-            "calm": self._calm,
+            "calm": self.calm,
+            "command": self._command,
             "items": [
                 [e.name, e.level, e.item.declaration(self._robot), *_softness(e), *_frame(e)] for e in self.entries
             ],

@@ -20,6 +20,10 @@ inputs advanced by their rates. ``curvature(q, v, p, dt, force)`` is the upper t
 curvature of the errors of the first level's tasks for a weight ``force`` on each row, as far as it comes from the
 robot's links; see :mod:`wbc.symbolic.curvature`.
 
+Of a stack that commands accelerations or torques the variables are a, and the wrenches of contacts, in place of v: see
+:mod:`wbc.stack.second`. Then ``torque(q, v, p, dt, x)`` are the torques of the joints, and ``ahead`` takes the mean
+velocity until the next tick.
+
 For a compiled tick the rows of :meth:`Constraint.ball_rows` are left to the loop in ``native/balls.h``: here they have
 no entries, and ``low`` and ``margin`` are 0. Sensed rows have no entries either (``native/sensed.h``). Both need:
 
@@ -39,6 +43,7 @@ from wbc.errors import ShapeError
 from wbc.stack.declaration import Declaration
 from wbc.stack.distances import Balls, Sensed
 from wbc.stack.layout import Block, Layout, Slot
+from wbc.stack.second import SecondOrder
 from wbc.stack.shares import kept_direction, speeds, unlimited, widened
 from wbc.symbolic import rotations as rot
 from wbc.symbolic.curvature import AppliedForce, curvature
@@ -66,24 +71,28 @@ ROWS_OUTPUTS = (
 @dataclass(frozen=True, eq=False)
 class TickProgram:
     """The compiled-to-be functions of a stack; ``ahead`` is None where there are no margins, ``curvature`` where no
-    task has any or the stack does not want it; ``balls`` and ``sensed`` are rows that are left to loops.
+    task has any or the stack does not want it; ``torque`` where none is commanded; ``balls`` and ``sensed`` are rows
+    that are left to loops.
     """
 
     rows: ca.Function
     ahead: ca.Function | None
     curvature: ca.Function | None
+    torque: ca.Function | None = None
     balls: Balls = field(default_factory=Balls)
     sensed: Sensed = field(default_factory=Sensed)
 
     @property
     def functions(self) -> dict[str, ca.Function]:
         """Those that exist, by name."""
-        every = {"rows": self.rows, "ahead": self.ahead, "curvature": self.curvature}
+        every = {"rows": self.rows, "ahead": self.ahead, "curvature": self.curvature, "torque": self.torque}
         return {name: function for name, function in every.items() if function is not None}
 
 
 class _Builder:
     def __init__(self, stack: Declaration, layout: Layout, loops: bool) -> None:
+        # Loops know first derivatives
+        loops = loops and stack.command == "velocity"
         self.stack, self.layout, self.loops = stack, layout, loops
         self.balls = Balls.of(stack, layout) if loops else Balls()
         self.kinematics = Kinematics(stack.robot.model)
@@ -92,6 +101,7 @@ class _Builder:
         self.force = ca.SX.sym("force", layout.task_rows)
         self.forces: list[AppliedForce] = []
         self.tasks: dict[str, tuple[ca.SX, ca.SX, ca.SX, ca.SX]] = {}
+        self.second = SecondOrder(self) if stack.command != "velocity" else None
 
     @cached_property
     def later(self) -> ca.SX:
@@ -124,7 +134,7 @@ class _Builder:
         """Rate of an input, as the user gives it: its mean over the tick, where it has a rate of its own."""
         rate = block.slots[slot.input.rate or ""]
         own = self.p[rate.span]
-        if rate.input.rate is None:
+        if rate.input.rate is None or self.second is not None:
             return own
         return own + 0.5 * self.dt * self.p[block.slots[rate.input.rate].span]
 
@@ -166,6 +176,10 @@ class _Builder:
             out[slot.span] = moved
         return out
 
+    def columns(self, transposed: ca.SX) -> ca.SX:
+        """Rows of a task over all variables, as columns."""
+        return transposed if self.second is not None else widened(self.layout, transposed)
+
     def column(self, block: Block, what: str, expression: ca.SX) -> ca.SX:
         """The expression as a dense column of the declared number of rows."""
         expression = ca.SX(expression)
@@ -180,6 +194,8 @@ class _Builder:
         """error, desired, factor, J of a task."""
         item = block.entry.item
         assert isinstance(item, Task)
+        if self.second is not None:
+            return self.second.task(block)
         robot, tracer, inputs = self.stack.robot, self.tracer(block), self.values(block)
         error = self.column(block, "error", item.error(robot, tracer, inputs))
         own = item.jacobian(robot, tracer, inputs)
@@ -199,6 +215,8 @@ class _Builder:
         item = block.entry.item
         if isinstance(item, Direction):
             rows, margin, factor = kept_direction(self.stack, self.layout, block, *self.tasks[item.of][1:]), None, None
+        elif self.second is not None:
+            rows, margin, factor = self.second.constraint(block)
         else:
             rows, margin, factor = self.constraint(block)
             rows = Rows(widened(self.layout, rows.matrix.T).T, rows.lower, rows.upper)
@@ -269,10 +287,10 @@ def build(stack: Declaration, layout: Layout, loops: bool = False) -> TickProgra
         ShapeError: an item's expression has another number of rows than it declares, or free symbols.
     """
     b = _Builder(stack, layout, loops)
-    balls, sensed = b.balls, Sensed.of(stack, layout) if loops else Sensed()
+    balls, sensed = b.balls, Sensed.of(stack, layout) if b.loops else Sensed()
     nv = layout.variables
     tasks = [(block.start, *b.task(block)) for block in layout.of_form("task")]
-    tasks = [(start, e, w, f, widened(layout, shared_pattern(J.T))) for start, e, w, f, J in tasks]
+    tasks = [(start, e, w, f, b.columns(shared_pattern(J.T))) for start, e, w, f, J in tasks]
     tasks = sorted([*tasks, *speeds(stack, layout, b.tasks)], key=lambda part: part[0])
     general = [b.general(block) for block in layout.of_form("margins", "rows")]
     bounds = []
@@ -280,7 +298,10 @@ def build(stack: Declaration, layout: Layout, loops: bool = False) -> TickProgra
         item = block.entry.item
         assert isinstance(item, Constraint)
         tracer = Tracer(b.kinematics)
-        got = item.bounds(stack.robot, tracer, b.values(block), b.dt)
+        if b.second is None:
+            got = item.bounds(stack.robot, tracer, b.values(block), b.dt)
+        else:
+            got = item.acceleration_bounds(stack.robot, tracer, b.values(block), b.dt, stack.dt_range[1])
         assert got is not None
         wide = unlimited(layout, Bounds(b.column(block, "lower", got.lower), b.column(block, "upper", got.upper)))
         bounds.append((wide.lower, wide.upper))
@@ -312,7 +333,12 @@ def build(stack: Declaration, layout: Layout, loops: bool = False) -> TickProgra
         upper = widened(layout, widened(layout, ca.triu(curvature(b.kinematics, b.forces))).T).T
     if upper.nnz():
         second = checked_function("curvature", [*inputs, b.force], [upper], ["curvature"])
-    return TickProgram(rows, ahead, second, balls, sensed)
+    torque = None
+    if b.second is not None and stack.command == "torque":
+        most = b.second.most(layout.of_form("margins", "rows"))
+        found = [ca.densify(b.second.torque), ca.densify(most)]
+        torque = checked_function("torque", [*inputs, b.second.x], found, ["torque", "most"])
+    return TickProgram(rows, ahead, second, torque, balls, sensed)
 
 
 def shared_pattern(transposed: ca.SX) -> ca.SX:
@@ -330,7 +356,7 @@ def sparsity_rows(transposed: ca.Sparsity) -> tuple[np.ndarray, np.ndarray]:
 
 
 def checked_function(name: str, inputs: list[ca.SX], outputs: list[ca.SX], labels: list[str]) -> ca.Function:
-    """A function of (q, v, p, dt, force), as many of them as there are inputs.
+    """A function of (q, v, p, dt, more), as many of them as there are inputs.
 
     Raises:
         ShapeError: symbols that are no inputs.
@@ -340,4 +366,4 @@ def checked_function(name: str, inputs: list[ca.SX], outputs: list[ca.SX], label
     stray = [s.name() for s in free if s.__hash__() not in known]
     if stray:
         raise ShapeError(f"stack.{name}", stray, "an item's expression contains symbols that are not its inputs")
-    return ca.Function(name, inputs, ca.cse(outputs), ["q", "v", "p", "dt", "force"][: len(inputs)], labels)
+    return ca.Function(name, inputs, ca.cse(outputs), ["q", "v", "p", "dt", "more"][: len(inputs)], labels)

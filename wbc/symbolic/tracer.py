@@ -25,6 +25,7 @@ from wbc.symbolic.curvature import AppliedForce
 from wbc.symbolic.gaps import Gap, gap_jacobian
 from wbc.symbolic.kinematics import WORLD, Kinematics, Pose
 from wbc.symbolic.manipulability import manipulability, manipulability_curvature
+from wbc.symbolic.motion import Motion
 from wbc.symbolic.rotations import rotation_rate
 
 
@@ -113,6 +114,7 @@ class Tracer:
                     ca.SX.eye(3),
                     lambda: kinematics.center_of_mass_jacobian,
                     forces=lambda force: (AppliedForce("mass", WORLD, force),),
+                    twist=lambda motion: motion.center_of_mass,
                 )
             )
         return self._com if self.carrier is None else self.carrier.pose.inverse_point(self._com)
@@ -185,6 +187,7 @@ class Tracer:
                 partial(self._spin, frame, base),
                 inner=True,
                 forces=lambda torque: (AppliedForce("torque", frame, torque), AppliedForce("torque", base, -torque)),
+                twist=lambda motion: motion.spin(frame, base),
             )
         )
         carried = phi if self.carrier is None or base != WORLD else phi - inverse @ self._swung()
@@ -224,7 +227,14 @@ class Tracer:
 
         zero = ca.SX.zeros(2)
         across = Placeholder(
-            f"across {frame} {base}", symbol, lambda: zero, outer[:, :2].T, spin, inner=True, forces=forces
+            f"across {frame} {base}",
+            symbol,
+            lambda: zero,
+            outer[:, :2].T,
+            spin,
+            inner=True,
+            forces=forces,
+            twist=lambda motion: motion.spin(frame, base),
         )
         self._symbols.append(across)
         return symbol if self.carrier is None or base != WORLD else symbol - still[:, :2].T @ self._swung()
@@ -330,6 +340,70 @@ class Tracer:
                 total = total + ca.sparsify(change @ known.motion) @ known.jacobian()
         return self.expand(ca.sparsify(total))
 
+    def second(
+        self,
+        expression: ca.SX,
+        motion: Motion,
+        own: ca.SX | None = None,
+        moving: Sequence[tuple[ca.SX, ca.SX]] = (),
+    ) -> tuple[ca.SX, ca.SX]:
+        """de/dt, and d2e/dt2 where v does not change, of an expression in this tracer's symbols at the velocity v.
+
+        The first derivative is one of a few placeholders, their twists w_k = J_k v, and q; in it the rates of all of
+        these go round once more, with dw_k/dt = (dJ_k/dt) v from the recursion that the dynamics use.
+
+        Args:
+            own: rows of de/dt along v where the expression does not have them, see ``Task.jacobian``.
+            moving: (symbols, rates) of what moves besides: inputs, and rates of inputs with their accelerations.
+        """
+        kinematics = self.kinematics
+        speed = kinematics.tangent_map @ kinematics.v
+        twists: list[tuple[ca.SX, ca.SX, ca.SX]] = []
+        rate = ca.SX(expression.shape[0], 1)
+        used: dict[int, ca.SX] = {}
+
+        def twist_of(known: Placeholder) -> ca.SX:
+            if known.twist is None:
+                # it may contain other placeholders, which go round with the rest
+                return known.jacobian() @ kinematics.v
+            symbol = used.get(id(known))
+            if symbol is None:
+                value, bias = known.twist(motion)
+                symbol = used[id(known)] = ca.SX.sym(f"w_{known.name}", value.shape[0])
+                twists.append((symbol, value, ca.densify(bias)))
+            return symbol
+
+        if own is None:
+            rate += ca.jtimes(expression, self.q, speed)
+            for known in self._symbols:
+                if known.motion.nnz():
+                    change = ca.jacobian(expression, known.symbol)
+                    if change.nnz():
+                        rate += ca.sparsify(change @ known.motion) @ twist_of(known)
+        else:
+            rate += own @ kinematics.v
+        for symbols, rates in moving:
+            rate += ca.jtimes(expression, symbols, rates)
+        rate = self._without_inner(ca.densify(rate))
+        variables, changes = [self.q], [speed]
+        for known in self._symbols:
+            if not known.inner and known.motion.nnz() and ca.jacobian_sparsity(rate, known.symbol).nnz():
+                variables.append(known.symbol)
+                changes.append(known.motion @ twist_of(known))
+        for symbol, _, bias in list(twists):
+            variables.append(symbol)
+            changes.append(bias)
+        for symbols, rates in moving:
+            variables.append(symbols)
+            changes.append(rates)
+        bias = ca.jtimes(rate, ca.vertcat(*variables), ca.densify(ca.vertcat(*changes)))
+        both = ca.vertcat(rate, bias)
+        if twists:
+            both = ca.substitute(both, ca.vertcat(*[t[0] for t in twists]), ca.vertcat(*[t[1] for t in twists]))
+        both = ca.densify(self.expand(both))
+        count = expression.shape[0]
+        return both[:count], both[count:]
+
     def forces(self, expression: ca.SX) -> list[AppliedForce]:
         """Forces and torques on the robot whose virtual work is the derivative of a scalar expression.
 
@@ -381,8 +455,9 @@ class Placeholder:
     The rate is kept as two factors because ``(partial @ motion) @ jacobian`` is much smaller than
     ``partial @ (motion @ jacobian)``. Kinematics are built when they are needed, so that an item can be traced
     (to count its rows, to make its cache key) without them. ``inner``: value and motion are in other placeholders.
-    ``turns``: it is the rotation of a frame, by which other forces turn. ``forces``: what a force along the rate, given
-    as a 3-vector in the axes of ``jacobian``, does to the robot.
+    ``turns``: it is the rotation of a frame, by which other forces turn. ``twist``: ``jacobian @ v``, and its rate
+    where v does not change, from a recursion over the bodies; None: from the Jacobian. ``forces``: what a force along
+    the rate, given as a 3-vector in the axes of ``jacobian``, does to the robot.
     """
 
     name: str
@@ -393,6 +468,7 @@ class Placeholder:
     inner: bool = False
     turns: bool = False
     forces: Callable[[ca.SX], tuple[AppliedForce, ...]] = lambda force: ()
+    twist: Callable[[Motion], tuple[ca.SX, ca.SX]] | None = None
 
 
 def of_frame(kinematics: Kinematics, frame: str, pose: Pose) -> list[Placeholder]:
@@ -406,6 +482,7 @@ def of_frame(kinematics: Kinematics, frame: str, pose: Pose) -> list[Placeholder
         ca.SX.eye(3),
         lambda: kinematics.jacobian(frame)[:3, :],
         forces=lambda force: (AppliedForce("force", frame, force),),
+        twist=lambda motion: motion.part(frame, slice(0, 3)),
     )
     rotation = Placeholder(
         f"rotation {frame}",
@@ -415,6 +492,7 @@ def of_frame(kinematics: Kinematics, frame: str, pose: Pose) -> list[Placeholder
         lambda: kinematics.jacobian(frame)[3:, :],
         turns=True,
         forces=lambda torque: (AppliedForce("torque", frame, torque),),
+        twist=lambda motion: motion.part(frame, slice(3, 6)),
     )
     return [position, rotation]
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterator, Mapping
+from collections.abc import Callable, Generator, Iterator, Mapping
 from dataclasses import replace
 from itertools import product
 from typing import Protocol
@@ -28,6 +28,8 @@ from wbc.walking.planner.swings.swings import FINE
 
 #: Yields None or, first, a plan to begin with; returns the whole one
 PlanSlices = Generator[Plan | None, None, Plan]
+#: (plan, row of a free arm, law of its hand, row of an arm -> row of its hold, configuration) -> it touches nothing
+MayBring = Callable[[Plan, int, SwingLaw, Mapping[int, int], Array], bool]
 #: A new plan begins with a body that stands for so many samples
 STANDING = 10
 #: How far the body goes back to where a hand may be lifted [m]
@@ -125,6 +127,7 @@ def plan_from_here(
     q: Array,
     hands: HandsThere,
     behind: Array,
+    may: MayBring | None = None,
 ) -> PlanSlices:
     """A plan along a path that begins where the body stands. If there is none, the body first goes back where it came
     from, by :data:`BACK`, or towards one of its holds, by :data:`TOWARDS`, and returns: a hand at the edge of its reach
@@ -133,6 +136,7 @@ def plan_from_here(
     Args:
         held: row of the arm -> row of the hold, of hands that hold. q: configuration. hands: where they are.
         behind: poses that the body had, the last ones first ``[n, 4, 4]``.
+        may: whether a free hand may go to where a plan begins; None: wherever it can.
 
     Raises:
         NoPlanError: there is none.
@@ -143,7 +147,7 @@ def plan_from_here(
         other = BodyPath(np.concatenate([here, there, there[::-1], path.poses]), path.spacing)
         sample = STANDING + len(there) if len(there) else 0
         try:
-            plan = yield from _from_here(walker, structure, other, held, q, hands, sample)
+            plan = yield from _from_here(walker, structure, other, held, q, hands, sample, may)
             return plan
         except NoPlanError as error:
             refused = refused or error
@@ -174,6 +178,7 @@ def _from_here(
     q: Array,
     hands: HandsThere,
     sample: int,
+    may: MayBring | None,
 ) -> PlanSlices:
     """Along one path, with free hands where they can be brought to."""
     arms, avoid = walker.arms, dict[str, set[str]]()
@@ -185,7 +190,11 @@ def _from_here(
         beginning: Beginning = start, postures, avoid
         asked = plan_slices(walker, structure, path, beginning, objective="destination", grips=grips, sample=sample)
         plan = _complete(structure, (yield from asked))
-        far = [arm for arm in free if not way_to(walker, structure, plan, arm, hands, q).possible]
+        far = list[int]()
+        for arm in free:
+            law = way_to(walker, structure, plan, arm, hands, q)
+            if not law.possible or (may is not None and not may(plan, arm, law, held, q)):
+                far.append(arm)
         if not far:
             return plan
         for arm in far:

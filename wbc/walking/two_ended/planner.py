@@ -63,7 +63,7 @@ def plan_two_ended(
     Raises:
         UnknownNameError: another arm, hold or gait. ShapeError: another machine, or a start without both hands.
         RangeError: a hold on which a hand may roll or lean: it does not say where the arm is.
-        NoPlanError: there is none.
+        NoPlanError: there is none, or the elbow comes nowhere near to a place.
     """
     validation.one_of("gait", gait, tuple(GAITS))
     rows = _start(structure, start)
