@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import pinocchio as pin
 import yaml
-from pydantic import BaseModel, ConfigDict, Field, PositiveFloat, ValidationError, model_validator
-from pydantic._internal._model_construction import ModelMetaclass
+from pydantic import ConfigDict, Field, PositiveFloat, ValidationError, model_validator
+from pydantic.dataclasses import dataclass, rebuild_dataclass
 
 from wbc.errors import RobotFileError, WbcError, nearest
 
@@ -19,25 +20,25 @@ class ProgramError(WbcError):
     """A program that does not follow the schema: ``field`` says where, ``value`` what stands there."""
 
 
-class _Explaining(ModelMetaclass):
+#: They do not change, and have no other fields than those declared
+_STRICT = ConfigDict(extra="forbid", allow_inf_nan=False)
+
+
+class _Explaining(type):
     """Makes one typed error of what the outermost part of a program finds wrong in itself and in its parts."""
 
-    __pydantic_fields__: dict[str, Any]
-
     def __call__(cls, *positional: Any, **values: Any) -> Any:
-        own = [name for name in cls.__pydantic_fields__ if name not in ("step", "name", "timeout", "unless")]
         try:
-            return super().__call__(**dict(zip(own, positional, strict=False)), **values)
+            return super().__call__(*positional, **values)
         except ValidationError as error:
-            raise _explained(cls.__name__, error) from None
+            raise _explained(cls, error) from None
 
 
-class Declared(BaseModel, metaclass=_Explaining):
-    """What all parts of a program have in common: they do not change, and have no other fields than those declared."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+class Declared(metaclass=_Explaining):
+    """What all parts of a program have in common."""
 
 
+@dataclass(frozen=True, config=_STRICT)
 class Guard(Declared):
     """A signal on one side of a threshold for some time.
 
@@ -50,7 +51,7 @@ class Guard(Declared):
     signal: str
     above: float | None = None
     below: float | None = None
-    lasting: float = Field(0.0, ge=0.0)
+    lasting: float = Field(default=0.0, ge=0.0)
 
     @model_validator(mode="after")
     def _one_side(self) -> Guard:
@@ -66,6 +67,7 @@ class Guard(Declared):
         return f"{self.signal} {'above' if self.above is not None else 'below'} {self.above or self.below or 0.0:g}"
 
 
+@dataclass(frozen=True, config=_STRICT)
 class Pose(Declared):
     """Where a hand is to be, in the reference frame of its task.
 
@@ -92,6 +94,7 @@ class Pose(Declared):
         return out
 
 
+@dataclass(frozen=True, config=_STRICT)
 class Step(Declared):
     """What all steps have in common.
 
@@ -100,11 +103,12 @@ class Step(Declared):
         unless: the step fails when one of these guards holds.
     """
 
-    name: str = ""
-    timeout: PositiveFloat | None = None
-    unless: tuple[Guard, ...] = ()
+    name: str = Field(default="", kw_only=True)
+    timeout: PositiveFloat | None = Field(default=None, kw_only=True)
+    unless: tuple[Guard, ...] = Field(default=(), kw_only=True)
 
 
+@dataclass(frozen=True, config=_STRICT)
 class Move(Step):
     """A hand goes straight to a pose, and is there when its measured error is within the tolerance.
 
@@ -113,13 +117,14 @@ class Move(Step):
         within: largest distance [m] and angle [rad] at the end.
     """
 
-    step: Literal["move"] = "move"
+    step: Literal["move"] = Field(default="move", kw_only=True)
     hand: str
     to: Pose
     speed: tuple[PositiveFloat, PositiveFloat] = (0.1, 0.5)
     within: tuple[PositiveFloat, PositiveFloat] = (1e-3, 1e-2)
 
 
+@dataclass(frozen=True, config=_STRICT)
 class Retreat(Step):
     """A hand moves by a distance along its own axes.
 
@@ -128,27 +133,28 @@ class Retreat(Step):
         speed, within: as of :class:`Move`.
     """
 
-    step: Literal["retreat"] = "retreat"
+    step: Literal["retreat"] = Field(default="retreat", kw_only=True)
     hand: str
     by: Three
     speed: tuple[PositiveFloat, PositiveFloat] = (0.1, 0.5)
     within: tuple[PositiveFloat, PositiveFloat] = (1e-3, 1e-2)
 
 
+@dataclass(frozen=True, config=_STRICT)
 class Approach(Step):
     """A hand moves in one direction until a guard holds, and fails if none does over the whole distance.
 
     Attributes:
-        hand: name of an ``EndEffector``. along: direction in the axes of its reference frame. speed: [m/s].
+        hand: name of an ``EndEffector``. along: direction in the axes of its reference frame.
         until: any of these ends the step: contact is a force above a threshold, nearness a distance below one.
-        at_most: distance after which the step has failed [m].
+        speed: [m/s]. at_most: distance after which the step has failed [m].
     """
 
-    step: Literal["approach"] = "approach"
+    step: Literal["approach"] = Field(default="approach", kw_only=True)
     hand: str
     along: Three
-    speed: PositiveFloat = 0.01
     until: tuple[Guard, ...] = Field(min_length=1)
+    speed: PositiveFloat = 0.01
     at_most: PositiveFloat = 0.1
 
     @model_validator(mode="after")
@@ -158,6 +164,7 @@ class Approach(Step):
         return self
 
 
+@dataclass(frozen=True, config=_STRICT)
 class Operate(Step):
     """An operator moves a hand by twists in its reference frame, see :meth:`Runner.operate`.
 
@@ -169,13 +176,14 @@ class Operate(Step):
         until: what ends the step. stale: a twist counts for so long [s].
     """
 
-    step: Literal["operate"] = "operate"
+    step: Literal["operate"] = Field(default="operate", kw_only=True)
     hand: str
     until: tuple[Guard, ...] = Field(min_length=1)
     speed: tuple[PositiveFloat, PositiveFloat] = (0.1, 0.5)
     stale: PositiveFloat = 0.5
 
 
+@dataclass(frozen=True, config=_STRICT)
 class Hold(Step):
     """Every hand keeps its pose in its reference frame, until a guard holds.
 
@@ -183,24 +191,27 @@ class Hold(Step):
         until: what ends the step; for a time: ``[{signal: elapsed, above: 2}]``.
     """
 
-    step: Literal["hold"] = "hold"
+    step: Literal["hold"] = Field(default="hold", kw_only=True)
     until: tuple[Guard, ...] = Field(min_length=1)
 
 
+@dataclass(frozen=True, config=_STRICT)
 class Grasp(Step):
     """A gripper closes; done when it says that it holds."""
 
-    step: Literal["grasp"] = "grasp"
+    step: Literal["grasp"] = Field(default="grasp", kw_only=True)
     gripper: str
 
 
+@dataclass(frozen=True, config=_STRICT)
 class Release(Step):
     """A gripper opens; done when it says that it is open."""
 
-    step: Literal["release"] = "release"
+    step: Literal["release"] = Field(default="release", kw_only=True)
     gripper: str
 
 
+@dataclass(frozen=True, config=_STRICT)
 class Activate(Step):
     """Weights of tasks change smoothly; 0 switches a task off. Done when they are there.
 
@@ -208,15 +219,16 @@ class Activate(Step):
         weights: name of a task -> weight. seconds: how long it takes.
     """
 
-    step: Literal["activate"] = "activate"
+    step: Literal["activate"] = Field(default="activate", kw_only=True)
     weights: dict[str, Annotated[float, Field(ge=0.0)]] = Field(min_length=1)
-    seconds: float = Field(0.5, ge=0.0)
+    seconds: float = Field(default=0.5, ge=0.0)
 
 
+@dataclass(frozen=True, config=_STRICT)
 class Alternatives(Step):
     """The first list of steps that succeeds; fails when all have."""
 
-    step: Literal["alternatives"] = "alternatives"
+    step: Literal["alternatives"] = Field(default="alternatives", kw_only=True)
     tries: tuple[tuple[AnyStep, ...], ...] = Field(min_length=1)
 
 
@@ -225,6 +237,7 @@ AnyStep = Annotated[
 ]
 
 
+@dataclass(frozen=True, config=_STRICT)
 class Program(Declared):
     """Steps in order, what ends all of them, and what is done then.
 
@@ -265,12 +278,13 @@ class Program(Declared):
         return cls(**{str(key): value for key, value in content.items()})
 
 
-Alternatives.model_rebuild()
+for _recursive in (Alternatives, Program):
+    rebuild_dataclass(_recursive)  # type: ignore[arg-type]
 
-_KINDS: tuple[type[Step], ...] = (Move, Retreat, Approach, Operate, Hold, Grasp, Release, Activate, Alternatives)
-_STEPS: dict[str, type[Declared]] = {str(one.model_fields["step"].default): one for one in _KINDS}
+_KINDS: tuple[type[Any], ...] = (Move, Retreat, Approach, Operate, Hold, Grasp, Release, Activate, Alternatives)
+_STEPS: dict[str, type[Any]] = {one.__name__.lower(): one for one in _KINDS}
 #: What an unknown field may belong to, by the name that stands before it in an error's place
-_PARTS: dict[str, type[Declared]] = {
+_PARTS: dict[str, type[Any]] = {
     **_STEPS,
     **{one.__name__: one for one in _KINDS},
     **dict.fromkeys(("Guard", "until", "unless", "abort"), Guard),
@@ -279,17 +293,19 @@ _PARTS: dict[str, type[Declared]] = {
 }
 
 
-def _explained(kind: str, error: ValidationError) -> ProgramError:
+def _explained(kind: type, error: ValidationError) -> ProgramError:
     """The first thing that is wrong, by its place."""
     # A misspelt field comes before the one that is missing for it
-    first = min(error.errors(), key=lambda one: one["type"] != "extra_forbidden")
-    place = ".".join([kind, *(str(part) for part in first["loc"])])
+    first = min(error.errors(), key=lambda one: one["type"] not in ("extra_forbidden", "unexpected_keyword_argument"))
+    # Arguments are numbered: by their names in the order of the declaration
+    names = [one.name for one in fields(kind) if not one.kw_only]
+    loc = [names[part] if k == 0 and isinstance(part, int) else part for k, part in enumerate(first["loc"])]
+    place = ".".join([kind.__name__, *(str(part) for part in loc)])
     if first["type"] == "union_tag_invalid":
-        return ProgramError(
-            f"{place}.step", first["input"]["step"], "unknown step", nearest(first["ctx"]["tag"], _STEPS)
-        )
-    if first["type"] == "extra_forbidden":
-        *_, owner, name = (kind, *(part for part in first["loc"] if isinstance(part, str)))
-        fields = tuple(_PARTS[owner].model_fields) if owner in _PARTS else ()
-        return ProgramError(place, first["input"], "unknown field", nearest(name, fields))
+        step = first["ctx"]["tag"]
+        return ProgramError(f"{place}.step", step, "unknown step", nearest(step, _STEPS))
+    if first["type"] in ("extra_forbidden", "unexpected_keyword_argument"):
+        *_, owner, name = (kind.__name__, *(part for part in loc if isinstance(part, str)))
+        known = tuple(one.name for one in fields(_PARTS[owner])) if owner in _PARTS else ()
+        return ProgramError(place, first["input"], "unknown field", nearest(name, known))
     return ProgramError(place, first["input"], first["msg"].removeprefix("Value error, ").lower())

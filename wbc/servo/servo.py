@@ -144,7 +144,8 @@ class Servo:
     @property
     def reference(self) -> Array:
         """The configuration that the robot is to be at [nq]."""
-        return self._q.copy()
+        out: Array = self._q.copy()
+        return out
 
     def reset(self, q: Any) -> None:
         """Begin anew, at rest at a measured configuration. What was found of the response is kept.
