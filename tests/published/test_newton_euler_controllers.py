@@ -395,6 +395,16 @@ def test_n10_estimation_with_and_without_forgetting() -> None:
     assert printed[119] == pytest.approx(0.109, rel=0.05)
 
 
+def test_n10_rest_excites_nothing_and_breaks_nothing() -> None:
+    """P grows by 1/rho a step at rest, and stays a number for hours."""
+    found = Estimator(np.eye(2, 3))
+    for _ in range(5000):
+        found.update(np.zeros(3), np.zeros(2))
+    found.update(np.ones(3), np.ones(2))
+    assert np.isfinite(found.P).all()
+    np.testing.assert_allclose(found.theta @ np.ones(3), np.ones(2))
+
+
 def test_n11_adaptive_loop() -> None:
     """Errors as the linearised one's or less, for perturbations at the start that are over three times as large."""
     for plant in ("torque", "motor"):

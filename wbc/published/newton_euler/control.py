@@ -88,6 +88,7 @@ class Nominal:
 
     def command(self, time: float, q: Array, v: Array) -> Array:
         """Torques [n]."""
+        measured(q, v, self.arm.n)
         qd, vd, ad = self.motion(time)
         return equations(self.arm, qd, vd).torque(ad)
 
