@@ -31,7 +31,7 @@ from tests.published.newton_euler_arm import (
     step_model,
     tip_error,
 )
-from wbc.errors import RangeError, ShapeError, UnknownNameError, WbcError
+from wbc.errors import BoundsError, RangeError, ShapeError, UnknownNameError
 from wbc.published.newton_euler import (
     Adaptive,
     Arm,
@@ -228,12 +228,12 @@ def test_n7_the_optimum_as_a_qp() -> None:
         held = optimum(Phi, Gamma, x, (np.full(3, -0.1), np.full(3, 0.1)))
         assert np.abs(held).max() <= 0.1 + 1e-12
         assert (np.abs(held).max() > 0.1 - 1e-9) == (np.abs(free).max() > 0.1)
-    with pytest.raises(WbcError):
+    with pytest.raises(BoundsError):
         optimum(Phi, Gamma, x, (np.ones(3), np.zeros(3)))
 
 
 def test_n7_limits_of_the_motors() -> None:
-    """As a QP the perturbation keeps limits a seventh above the largest nominal torques; the free one does not."""
+    """As a QP the perturbation keeps limits of the torques, 15 to 40 % above the nominal ones; the free one does not."""
     limits = np.array([2.5, 20.0, 50.0])
     offset = np.array([0.01, 0.02, -0.01])
     found = {
@@ -243,6 +243,7 @@ def test_n7_limits_of_the_motors() -> None:
             TASK,
             offset=offset,
             substeps=SUBSTEPS,
+            steps=100 if held else 5,
         )
         for held in (False, True)
     }
