@@ -233,7 +233,7 @@ def test_n7_the_optimum_as_a_qp() -> None:
 
 
 def test_n7_limits_of_the_motors() -> None:
-    """As a QP the perturbation keeps limits of the torques, 15 to 40 % above the nominal ones; the free one does not."""
+    """As a QP the perturbation keeps limits of torques, 15 to 40 % above nominal ones; the free one does not."""
     limits = np.array([2.5, 20.0, 50.0])
     offset = np.array([0.01, 0.02, -0.01])
     found = {
