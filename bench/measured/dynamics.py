@@ -32,8 +32,8 @@ PAYLOAD = 2.125
 
 
 def parts() -> dict[str, Sheet | str]:
-    """Tracking on the three plants; with a payload; cost of a step."""
-    return {"tracking": _tracking(), "payload": _payload(), "cost": _cost()}
+    """Tracking on the three plants; with a payload; with noise and heavier links; cost of a step."""
+    return {"tracking": _tracking(), "payload": _payload(), "faults": _faults(), "cost": _cost()}
 
 
 def _tracking() -> Sheet:
@@ -75,6 +75,17 @@ def _payload() -> Sheet:
     heads = ("controller", "100 Hz [mm]", "at the end [mm]", "1 kHz [mm]", "at the end [mm]", "a command [us]",
              "payload learned [kg]")  # fmt: skip
     return Sheet("", heads, rows)
+
+
+def _faults() -> Sheet:
+    """Largest distance of the tip [mm]; no payload."""
+    columns = []
+    for heavier, noise in ((1.0, 1e-5), (1.2, 0.0)):
+        for dt in (0.01, 0.001):
+            found = compare(0.0, dt, heavier=heavier, noise=noise)
+            columns.append([f"{1e3 * one.tip.max():.3g}" if one.run else "ran away" for one in found])
+    heads = ("controller", "noise, 100 Hz [mm]", "noise, 1 kHz [mm]", "heavier, 100 Hz [mm]", "heavier, 1 kHz [mm]")
+    return Sheet("", heads, list(zip(LAWS, *columns, strict=True)))
 
 
 def _cost() -> Sheet:

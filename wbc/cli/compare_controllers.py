@@ -59,7 +59,7 @@ def compare_controllers(
             if not found:
                 raise
     table = Table(header_style="bold", box=None, pad_edge=False)
-    table.add_column("controller")
+    table.add_column("controller", no_wrap=True)
     for head in ("tip, mm", "at end", "tau 1", "tau 2", "tau 3", "us", "payload"):
         table.add_column(head, justify="right")
     rows = []
@@ -73,7 +73,7 @@ def compare_controllers(
             row |= {"tip_mm": lengths[0], "end_mm": lengths[1], "torques": torques}
             cells = [f"{number:.3g}" for number in (*lengths, *torques)]
         rows.append(row)
-        mass = "" if one.mass is None else f"{one.mass:.3f} kg"
+        mass = "" if one.mass is None else f"{one.mass:.4g} kg"
         table.add_row(one.name, *cells, f"{one.microseconds:.0f}", mass)
     title = f"{payload:g} kg at the tip, unknown; {hertz:g} Hz"
     title += f"; links {heavier:g} times heavier" if heavier != 1.0 else ""

@@ -15,7 +15,7 @@ from typing import Protocol
 import numpy as np
 
 from wbc import validation
-from wbc.errors import InfeasibleError, RangeError
+from wbc.errors import RangeError, SolverError
 from wbc.published.newton_euler.actuators import discretised
 from wbc.published.newton_euler.links import Arm
 from wbc.published.newton_euler.recursion import equations, linear_model
@@ -69,14 +69,14 @@ class OneStep:
         """u* [n] at an error x [2n]; ``bounds``: lower and upper ones of u, [n] each.
 
         Raises:
-            InfeasibleError: a lower bound lies above its upper bound.
+            BoundsError: a lower bound lies above its upper bound. SolverError: the solver failed.
         """
         if bounds is None:
             return -gain(Phi, Gamma, self.Q, self.R) @ x
         H = self.R + Gamma.T @ self.Q @ Gamma
         solution = self._solver.solve(QP.checked((H + H.T) / 2.0, Gamma.T @ self.Q @ Phi @ x, *bounds, self._rows))
         if solution.flag != "solved":
-            raise InfeasibleError("bounds", bounds, "no torque within them was found")
+            raise SolverError("bounds", bounds, f"no torque within them was found: {solution.flag}")
         return np.asarray(solution.x)
 
 
@@ -88,6 +88,7 @@ class Nominal:
 
     def command(self, time: float, q: Array, v: Array) -> Array:
         """Torques [n]."""
+        measured(q, v, self.arm.n)
         qd, vd, ad = self.motion(time)
         return equations(self.arm, qd, vd).torque(ad)
 

@@ -173,14 +173,14 @@ def _place(arm: Arm, q: Array, derivatives: bool) -> tuple[list[Array], ...]:
     """Columns of A_i [rows, 3, 3], and e_i, r_ii, r_i-1,i [rows, 3], n of each."""
     rotations, axes, levers, before = arm.place(q)
     rows = 1 + 2 * arm.n if derivatives else 1
+    turning = np.array([0.0 * e if link.prismatic else e for link, e in zip(arm.links, axes, strict=True)])
 
     def jet(value: Array, links: int) -> Array:
         """Of vectors [..., 3] that go with the first ``links`` joints (B.119, B.121)."""
         out = np.zeros((rows, *value.shape))
         out[0] = value
-        for l in range(links if derivatives else 0):
-            if not arm.links[l].prismatic:
-                out[1 + l] = np.cross(axes[l], value)
+        if derivatives:
+            out[1 : 1 + links] = _crossed(turning[:links].reshape(links, *[1] * (value.ndim - 1), 3), value)
         return out
 
     own = [jet(lever, i + 1) for i, lever in enumerate(levers)]
@@ -221,8 +221,12 @@ def _product(rule: Callable[[Array, Array], Array], a: Array, b: Array) -> Array
 _LEFT, _RIGHT = [1, 2, 0], [2, 0, 1]
 
 
+def _crossed(x: Array, y: Array) -> Array:
+    return np.asarray(x[..., _LEFT] * y[..., _RIGHT] - x[..., _RIGHT] * y[..., _LEFT])
+
+
 def _cross(a: Array, b: Array) -> Array:
-    return _product(lambda x, y: x[..., _LEFT] * y[..., _RIGHT] - x[..., _RIGHT] * y[..., _LEFT], a, b)
+    return _product(_crossed, a, b)
 
 
 def _dot(a: Array, b: Array) -> Array:
