@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import mujoco
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -10,8 +11,6 @@ import wbc
 from tests.refusals import assert_refused
 from wbc.errors import RangeError, UnknownNameError
 from wbc.simulation import Command, CommandKind, MujocoPlant
-
-mujoco = pytest.importorskip("mujoco")
 
 ARM = """<mujoco><compiler angle="radian"/><option gravity="0 0 0" timestep="0.001"/>
 <default><joint damping="1"/></default>
