@@ -15,24 +15,33 @@ from wbc.tasks.distance import Distance
 from wbc.tasks.elbow import Elbow
 from wbc.tasks.end_effector import EndEffector
 from wbc.tasks.expression import Expression
+from wbc.tasks.external_wrench import ExternalWrench
 from wbc.tasks.fixed import Fixed
 from wbc.tasks.frame_velocity_limit import FrameVelocityLimit
 from wbc.tasks.gaze_cone import GazeCone
 from wbc.tasks.hold import Hold
 from wbc.tasks.joint_coupling import JointCoupling
+from wbc.tasks.joint_friction import JointFriction
 from wbc.tasks.joint_limits import JointLimits
 from wbc.tasks.limit import Limit
+from wbc.tasks.line_contact import LineContact
 from wbc.tasks.look_at import LookAt
 from wbc.tasks.manipulability import Manipulability
 from wbc.tasks.mechanism import Mechanism
 from wbc.tasks.momentum import Momentum
+from wbc.tasks.moving_frame import MovingFrame
 from wbc.tasks.obstacle import Obstacle
 from wbc.tasks.pitch_plane import PitchPlane
 from wbc.tasks.pitch_plane_limit import PitchPlaneLimit
+from wbc.tasks.point_contact import PointContact
 from wbc.tasks.posture import Posture
 from wbc.tasks.relative_pose import RelativePose
+from wbc.tasks.rigid_grasp import RigidGrasp
 from wbc.tasks.rolling import Rolling, Wheel
 from wbc.tasks.self_collision import SelfCollision
+from wbc.tasks.sliding_contact import SlidingContact
+from wbc.tasks.surface_contact import SurfaceContact
+from wbc.tasks.torque_limits import TorqueLimits
 from wbc.tasks.workspace_box import WorkspaceBox
 from wbc.tasks.workspace_polyhedron import WorkspacePolyhedron
 
@@ -47,6 +56,7 @@ __all__ = [
     "Elbow",
     "EndEffector",
     "Expression",
+    "ExternalWrench",
     "Fixed",
     "Form",
     "FrameVelocityLimit",
@@ -55,24 +65,32 @@ __all__ = [
     "Input",
     "Item",
     "JointCoupling",
+    "JointFriction",
     "JointLimits",
     "Limit",
+    "LineContact",
     "LookAt",
     "Manipulability",
     "Mechanism",
     "Momentum",
+    "MovingFrame",
     "Obstacle",
     "PitchPlane",
     "PitchPlaneLimit",
     "PlaneReference",
+    "PointContact",
     "Posture",
     "RelativePose",
+    "RigidGrasp",
     "Rolling",
     "Row",
     "Rows",
     "SacrificeOrder",
     "SelfCollision",
+    "SlidingContact",
+    "SurfaceContact",
     "Task",
+    "TorqueLimits",
     "Values",
     "Wheel",
     "WorkspaceBox",

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, ClassVar
 import casadi as ca
 
 from wbc.symbolic.tracer import Tracer
-from wbc.tasks.base import Constraint, Row, Rows, Task, Values
+from wbc.tasks.base import Command, Constraint, Row, Rows, Task, Values
 
 if TYPE_CHECKING:
     from wbc.robot import Robot
@@ -45,6 +45,10 @@ class Direction(Constraint):
         own = self.task.rows(robot)
         rates = [Row(r.label, r.unit if r.unit.endswith("/s") else f"{r.unit or '1'}/s") for r in own]
         return (*rates, Row("scale", ""))
+
+    def refusal(self, robot: Robot, command: Command) -> str:
+        """Slowing a task down along its path is a matter of velocities."""
+        return "" if command == "velocity" else "keeps the direction of a velocity; leave scaled=True out"
 
     def velocity_rows(self, robot: Robot, kin: Tracer, inputs: Values, dt: ca.SX) -> Rows | None:
         """None: the rows are made from those that the task has in the same stack."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, ClassVar
 
 import casadi as ca
@@ -35,6 +36,13 @@ class Plane:
     direction: ca.SX
     line_square: ca.SX
     elbow_square: ca.SX
+
+
+@lru_cache(maxsize=32)
+def _angle(item: PlaneItem, robot: Robot) -> ca.Function:
+    """q -> the angle of a plane; kept, since every reset of a controller asks for it."""
+    kin = Tracer(Kinematics(robot.model))
+    return ca.Function("angle", [kin.q], [kin.expand(item._turned(kin, ca.SX(0)))])
 
 
 @dataclass(frozen=True)
@@ -89,12 +97,10 @@ class PlaneItem(Item):
     def angle(self, robot: Robot, q: Any) -> float:
         """The plane's angle [rad] in (-pi, pi] at a configuration, 0 where it is singular.
 
-        Builds the expression anew: for set-up and inspection, not for a control loop.
+        Builds the expression when it is first asked on a robot: for set-up and inspection, not for a control loop.
         """
         q = robot.configuration("q", q)
-        kin = Tracer(Kinematics(robot.model))
-        expression = kin.expand(self._turned(kin, ca.SX(0)))
-        return float(ca.Function("angle", [kin.q], [expression])(q))
+        return float(_angle(self, robot)(q))
 
     def _against(self) -> PlaneReference:
         return self.reference if self.reference is not None else PlaneReference()
@@ -133,8 +139,7 @@ class PlaneItem(Item):
         return Plane(along, direction, line_square, elbow_square)
 
     def _axis_in_world(self, kin: Tracer) -> ca.SX:
-        kinematics = kin.kinematics
-        return ca.densify(kinematics.joint_twist(int(kinematics.model.getJointId(self.axis)))[1])
+        return kin.joint_axis(int(kin.kinematics.model.getJointId(self.axis)))
 
     def _turning(self, kinematics: Kinematics) -> tuple[list[int], list[int]]:
         """Joints whose turning counts for the body that carries the axis, relative to the base: plus and minus."""
@@ -150,9 +155,14 @@ class PlaneItem(Item):
         axis = self._axis_in_world(kin)
         along = stereo.unit(line - axis * ca.dot(axis, line))
         plus, minus = self._turning(kinematics)
+        if kin.carrier is not None:
+            along = kin.carrier.pose.rotation @ along
         blocks = [(j, along.T @ kinematics.joint_twist(j)[1]) for j in plus]
         blocks += [(j, -along.T @ kinematics.joint_twist(j)[1]) for j in minus]
-        return kin.expand(kinematics.columns(1, blocks))
+        row = kinematics.columns(1, blocks)
+        if kin.carrier is not None and self.base == WORLD:
+            row = ca.horzcat(row, -along.T @ kin.carrier.twist[3:])
+        return kin.expand(row)
 
 
 def _revolute(robot: Robot) -> list[str]:

@@ -53,7 +53,7 @@ class AxisAlign(Task):
     Attributes:
         frame: name of the frame that the axis is fixed in.
         axis: the direction a in that frame, of any length.
-        relative_to: frame b that the target is given in; ``"world"`` or a frame of the robot, which may move.
+        relative_to: frame b that the target is given in; ``"world"``, a frame of the robot or a moving frame.
         around: b1, a direction in the frame; its part along the axis is dropped. None: the coordinate axis of the frame
             that follows the one nearest to ``axis`` (x, y for a z axis).
 

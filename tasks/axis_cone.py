@@ -49,7 +49,7 @@ class AxisCone(Constraint):
         half_angle: first value of the input [rad].
         axis: a in that frame, of any length.
         direction: first value of the input; ``(0, 0, 1)`` is up.
-        relative_to: frame b that the direction is given in, ``"world"`` or a frame of the robot, which may move.
+        relative_to: frame b that the direction is given in, ``"world"``, a frame of the robot or a moving frame.
 
     Raises:
         UnknownNameError, ShapeError, NotFiniteError: a bad field.

@@ -9,6 +9,9 @@ lower <= A v <= upper, or simple bounds on v. A margin becomes
 
     (dh/dq) v + dh/dt >= -rate h,      rate dt in (0, 1].
 
+A stack that commands accelerations or torques (docs/torque.md) has the second derivatives of the same
+expressions in its rows.
+
 Items are frozen declarations. Run-time values (targets, gains, masks) are :class:`Input`
 declarations; their values live in the controller. Jacobians, time derivatives, C code, tests and
 tables are derived from the expressions.
@@ -27,6 +30,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wbc import pickling
+from wbc.symbolic.kinematics import Kinematics
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks._plain import plain
 from wbc.tasks.units import UNITS, checked_unit
@@ -36,6 +40,9 @@ if TYPE_CHECKING:
     from wbc.tasks._ball import BallRow
 
 Kind = Literal["vector", "pose", "rotation", "configuration", "tangent"]
+
+#: What a stack commands: the velocity of the joints, their acceleration, or the torque of the motors.
+Command = Literal["velocity", "acceleration", "torque"]
 
 #: What an item contributes: task rows, margin rows, plain rows on v, or simple bounds on v.
 Form = Literal["task", "margins", "rows", "bounds"]
@@ -87,6 +94,7 @@ class Row:
 
     Attributes:
         unit: one of :data:`wbc.tasks.units.UNITS`, or a rate of it: ``"m/s"``.
+        size: how many of the unit count as much as a radian, for units that no length says it of: forces; else 0.
 
     Raises:
         UnknownNameError: another unit.
@@ -94,6 +102,7 @@ class Row:
 
     label: str
     unit: str
+    size: float = 0.0
 
     def __post_init__(self) -> None:
         checked_unit(f"row {self.label!r}.unit", self.unit)
@@ -102,6 +111,8 @@ class Row:
         """What counts as much as a radian, in the row's own unit, where ``length`` [m] is the characteristic length:
         the length for rows in metres, 1000 times it for millimetres, 180 / pi for degrees, 1 for radians.
         """
+        if self.size > 0.0:
+            return self.size
         many, power = UNITS[self.unit.removesuffix("/s")]
         return many * length**power
 
@@ -153,6 +164,10 @@ class Item:
     #: value); in return the compiled code is the same for all of their values.
     initial_only: ClassVar[tuple[str, ...]] = ()
 
+    #: Something of it is given in the world: a target, an obstacle, a plane. It may then be given in a
+    #: :class:`wbc.tasks.MovingFrame` instead.
+    stands_in_world: ClassVar[bool] = True
+
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)
         if "abstract" not in cls.__dict__:
@@ -192,6 +207,10 @@ class Item:
         """Values at configuration ``q`` of the inputs whose default is None."""
         return {}
 
+    def refusal(self, robot: Robot, command: Command) -> str:
+        """Why the item has no meaning for what a stack commands; empty where it has one."""
+        return ""
+
     def declaration(self, robot: Robot) -> dict[str, Any]:
         """Everything that decides the compiled code besides the robot, as plain data; part of the cache key."""
         return {"class": f"{type(self).__module__}.{type(self).__qualname__}"} | {
@@ -225,7 +244,7 @@ class Task(Item):
 
     def jacobian(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX | None:
         """None: the Jacobian is derived from :meth:`error`. A task on the velocity itself (damping)
-        returns the matrix of its rows here.
+        returns the matrix of its rows here, with one column more where :meth:`Tracer.point_jacobian` has it.
         """
         return None
 
@@ -238,7 +257,10 @@ class Task(Item):
 
 @dataclass(frozen=True)
 class Rows:
-    """Constraint rows lower <= A v <= upper; equal bounds make an equality. ``A`` is rows x nv."""
+    """Constraint rows lower <= A v <= upper; equal bounds make an equality.
+
+    ``A`` is rows x nv. A column more, see :meth:`Tracer.point_jacobian`, is a velocity that both sides are less by.
+    """
 
     matrix: ca.SX
     lower: ca.SX
@@ -249,6 +271,15 @@ class Rows:
 class Bounds:
     """Simple bounds lower <= v <= upper, nv entries each; +-inf where there is none."""
 
+    lower: ca.SX
+    upper: ca.SX
+
+
+@dataclass(frozen=True)
+class Torques:
+    """Limits lower <= tau <= upper of the generalised forces of some degrees of freedom [N m, N]."""
+
+    dofs: tuple[int, ...]
     lower: ca.SX
     upper: ca.SX
 
@@ -269,6 +300,12 @@ class Constraint(Item):
 
     #: Default rate [1/s] of margins: h decays no faster than exp(-rate t)
     default_rate: ClassVar[float] = 20.0
+
+    def refusal(self, robot: Robot, command: Command) -> str:
+        """Distances that are measured are known with their first derivative only."""
+        if command != "velocity" and self.sensed_rows(robot):
+            return "measures distances of meshes, of which only the first derivative is known; give shapes of its own"
+        return ""
 
     @property
     def form(self) -> Form:
@@ -329,6 +366,31 @@ class Constraint(Item):
     def bounds(self, robot: Robot, kin: Tracer, inputs: Values, dt: ca.SX) -> Bounds | None:
         """Simple bounds on v, or None; ``kin.v`` is the velocity that accelerations are counted from."""
         return None
+
+    def acceleration_bounds(
+        self, robot: Robot, kin: Tracer, inputs: Values, dt: ca.SX, longest: float
+    ) -> Bounds | None:
+        """The same as bounds on the acceleration a that is held for dt from the velocity ``kin.v`` on, or None:
+        by default :meth:`bounds` hold for the velocity at the end of it, v + a dt.
+
+        Args:
+            longest: no tick is longer [s].
+        """
+        own = self.bounds(robot, kin, inputs, dt)
+        return None if own is None else Bounds((own.lower - kin.v) / dt, (own.upper - kin.v) / dt)
+
+    def torque_rows(self, robot: Robot, inputs: Values) -> Torques | None:
+        """Rows on generalised forces of a stack that commands torques, or None."""
+        return None
+
+    def load(self, robot: Robot, kin: Kinematics, inputs: Values) -> ca.SX | None:
+        """Generalised forces on the robot, nv [N m; N], that are neither motors nor gravity nor contacts, or None."""
+        return None
+
+    @property
+    def is_load(self) -> bool:
+        """Whether it gives a :meth:`load`."""
+        return type(self).load is not Constraint.load
 
     def acceleration_limits(self, robot: Robot) -> NDArray[np.float64]:
         """Largest change of each velocity per second that :meth:`bounds` leave, nv numbers; inf where there is none."""

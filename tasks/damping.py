@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import casadi as ca
 import numpy as np
@@ -40,6 +40,8 @@ class Damping(Task):
     Raises:
         ShapeError, NotFiniteError, RangeError: on construction or in :meth:`validate`.
     """
+
+    stands_in_world: ClassVar[bool] = False
 
     weights: tuple[float, ...] | None = None
 

@@ -58,7 +58,7 @@ class EndEffector(Task):
     Attributes:
         frame: name of the frame that moves.
         kind: which rows: ``pose`` (6), ``position`` (3) or ``orientation`` (3).
-        relative_to: frame b that the target is given in; ``"world"`` or a frame of the robot, which may move.
+        relative_to: frame b that the target is given in; ``"world"``, a frame of the robot or a moving frame.
         axes: frame a along whose axes rows and weights are counted: ``"reference"`` (those of b), ``"frame"`` (its
             own), ``"world"`` or a frame's name.
         weights: one number >= 0 a row, None: 1 each.

@@ -35,6 +35,8 @@ class Fixed(Constraint):
     order of sacrifice. A joint that never moves costs less as a locked joint of the robot.
     """
 
+    stands_in_world: ClassVar[bool] = False
+
     order: ClassVar[SacrificeOrder] = SacrificeOrder.HOLD
 
     joints: tuple[str, ...]

@@ -36,7 +36,7 @@ class FrameVelocityLimit(Constraint):
         linear, angular: initial values of the inputs: one number for all three axes, three numbers, or None for no
             limit. inf in place of a number: this axis has no limit and no row.
         axes: name of the frame whose axes the rows are in; ``"world"`` by default.
-        relative_to: name of the frame that the velocity is relative to; ``"world"`` by default.
+        relative_to: frame that the velocity is relative to, the robot's or a moving one; ``"world"`` by default.
 
     Inputs:
         linear: >= 0, one number a limited axis [m/s].
@@ -99,9 +99,9 @@ class FrameVelocityLimit(Constraint):
 
     def velocity_rows(self, robot: Robot, kin: Tracer, inputs: Values, dt: ca.SX) -> Rows:
         """See the class."""
-        jacobian = kin.kinematics.jacobian(self.frame)
+        jacobian = kin.frame_jacobian(self.frame)
         if self.relative_to != WORLD:
-            base = kin.kinematics.jacobian(self.relative_to)
+            base = kin.frame_jacobian(self.relative_to)
             arm = kin.position(self.frame) - kin.position(self.relative_to)
             carried = ca.vertcat(base[:3, :] - ca.skew(arm) @ base[3:, :], base[3:, :])
             jacobian = jacobian - carried

@@ -98,7 +98,7 @@ class Hold(Constraint):
     def velocity_rows(self, robot: Robot, kin: Tracer, inputs: Values, dt: ca.SX) -> Rows:
         """See the class."""
         pose, target = kin.pose(self.frame), inputs["target"]
-        jacobian = kin.kinematics.jacobian(self.frame)
+        jacobian = kin.frame_jacobian(self.frame)
         drift, matrix = [], []
         if self.kind != "orientation":
             drift.append(pose.position - target.position)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, get_args
 
 import casadi as ca
@@ -24,6 +24,35 @@ if TYPE_CHECKING:
 RESERVED = ("gain", "weight", "enabled", "mask", "rate")
 #: Directions longer than this, and shorter than its inverse, are scaled as they are
 ORDINARY = 1e-9
+
+
+def with_accelerations(robot: Robot, declared: Sequence[Input]) -> list[Input]:
+    """The inputs, and one for the second time derivative of every input that names a rate, as the ``rate`` of that
+    rate: zero until it is set. ``feedforward`` and ``velocity`` have ``acceleration``, ``x_velocity`` and ``x_rate``
+    have ``x_acceleration``, any other name ``name_acceleration``. That of a direction is what turns it: what keeps
+    it at unit length comes by itself.
+    """
+    rates = {i.rate for i in declared if i.rate is not None}
+    rates -= {i.rate for i in declared if i.name in rates}  # second derivatives that are declared
+    out, more = [], []
+    for i in declared:
+        if i.name not in rates or i.rate is not None or i.sensed:
+            out.append(i)
+            continue
+        unit = ", ".join(f"{u}^2" if u.endswith("/s") else f"{u or '1'}/s" for u in i.unit.split(", "))
+        zero = np.zeros(size(robot, i)) if i.size or i.kind != "vector" else 0.0
+        out.append(replace(i, rate=acceleration_name(i.name)))
+        more.append(Input(acceleration_name(i.name), i.kind, unit, i.size, zero))
+    return [*out, *more]
+
+
+def acceleration_name(rate: str) -> str:
+    """Name of the input with the time derivative of an input that is a rate, see :func:`with_accelerations`."""
+    for end in ("feedforward", "_velocity", "velocity", "_rate"):
+        if rate.endswith(end):
+            stem = rate.removesuffix(end)
+            return f"{stem}_acceleration" if stem else "acceleration"
+    return f"{rate}_acceleration"
 
 
 def size(robot: Robot, declared: Input) -> int:
@@ -76,7 +105,7 @@ def flat(robot: Robot, field: str, declared: Input, value: Any) -> Array:
     if declared.direction:
         return validation.unit_vector(field, numbers)
     if bounded:
-        for number in numbers:
+        for number in numbers[np.isfinite(numbers)]:
             validation.scalar(field, number, low=declared.low, high=declared.high, unit=declared.unit)
     return numbers
 

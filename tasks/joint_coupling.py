@@ -59,6 +59,8 @@ class JointCoupling(Task):
         RangeError: a row without a coefficient other than 0, an uneven coefficient of an unbounded joint.
     """
 
+    stands_in_world: ClassVar[bool] = False
+
     initial_only: ClassVar[tuple[str, ...]] = ("gain", "target")
 
     coefficients: tuple[Relation, ...]

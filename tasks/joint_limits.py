@@ -16,6 +16,7 @@ from wbc.symbolic.tracer import Tracer
 from wbc.tasks._selection import dof_rows, joint_dofs, selection
 from wbc.tasks.base import Bounds, Constraint, Input, Row, SacrificeOrder, Values
 from wbc.tasks.braking import braking_bound, clip
+from wbc.tasks.stopping import allowed_accelerations
 
 if TYPE_CHECKING:
     from wbc.robot import Robot
@@ -39,6 +40,8 @@ class JointLimits(Constraint):
     where that is given). From outside the joint brakes at A, then returns at ``return_rate`` times the violation
     at least, and the violation does not grow again.
 
+    A stack that commands accelerations has the same limits as bounds on these: :mod:`wbc.tasks.stopping`.
+
     Attributes:
         position, velocity, acceleration: which limits to keep. Without ``acceleration`` the joint may stop at once,
             b(d) = d / dt.
@@ -57,6 +60,8 @@ class JointLimits(Constraint):
     Degrees of freedom whose rate is not that of one coordinate (floating bases, ball joints, unbounded joints)
     have no position limit. Torque limits are no concern of it.
     """
+
+    stands_in_world: ClassVar[bool] = False
 
     order: ClassVar[SacrificeOrder] = SacrificeOrder.ACTUATOR
 
@@ -141,6 +146,29 @@ class JointLimits(Constraint):
                 velocity_scale=inputs["velocity_scale"],
                 return_rate=inputs["return_rate"],
                 shortest_dt=self.shortest_dt,
+            )
+        return Bounds(lower, upper)
+
+    def acceleration_bounds(self, robot: Robot, kin: Tracer, inputs: Values, dt: ca.SX, longest: float) -> Bounds:
+        """See :func:`wbc.tasks.stopping.allowed_accelerations`."""
+        limits, count = robot.limits, robot.nv
+        lower, upper = -ca.SX.inf(count), ca.SX.inf(count)
+        for i in joint_dofs(robot, "JointLimits.joints", self.joints):
+            k = int(robot.position_index[i])
+            here = self.position and k >= 0
+            lower[i], upper[i] = allowed_accelerations(
+                kin.q[k] if here else ca.SX(0),
+                kin.v[i],
+                dt,
+                position=(
+                    float(limits.position_lower[i]) + self.margin if here else -np.inf,
+                    float(limits.position_upper[i]) - self.margin if here else np.inf,
+                ),
+                velocity=float(limits.velocity[i]) if self.velocity else np.inf,
+                acceleration=float(limits.acceleration[i]) if self.acceleration else np.inf,
+                velocity_scale=inputs["velocity_scale"],
+                return_rate=inputs["return_rate"],
+                longest=longest,
             )
         return Bounds(lower, upper)
 

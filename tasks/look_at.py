@@ -56,7 +56,7 @@ class LookAt(Task):
         frame: name of the frame that carries the camera.
         axis: the direction a in that frame, of any length.
         offset: the point c in that frame [m].
-        relative_to: frame b that the target is given in; ``"world"`` or a frame of the robot, which may move.
+        relative_to: frame b that the target is given in; ``"world"``, a frame of the robot or a moving frame.
         around: b1, a direction in the frame; its part along the axis is dropped. None: the coordinate axis of the frame
             that follows the one nearest to ``axis`` (x, y for a z axis).
         width: distance below which the rows fade, as a part of the robot's characteristic length.

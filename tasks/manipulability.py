@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import casadi as ca
 import numpy as np
@@ -74,6 +74,8 @@ class Manipulability(Task):
         UnknownNameError, DuplicateNameError, ShapeError, NotFiniteError: on construction or in :meth:`validate`.
         RangeError: w is zero wherever the arm is, or length <= 0.
     """
+
+    stands_in_world: ClassVar[bool] = False
 
     frame: str
     kind: Literal["pose", "position", "orientation"] = "pose"

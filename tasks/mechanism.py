@@ -30,6 +30,8 @@ class Mechanism(Constraint):
     It cannot couple joints without a plain coordinate (unbounded joints are coupled in velocity only).
     """
 
+    stands_in_world: ClassVar[bool] = False
+
     order: ClassVar[SacrificeOrder] = SacrificeOrder.POSITION
     equality: ClassVar[bool] = True
 

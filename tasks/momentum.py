@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, ClassVar, Literal
 
 import casadi as ca
 import numpy as np
@@ -61,6 +61,8 @@ class Momentum(Task):
         UnknownNameError, ShapeError, NotFiniteError, RangeError: on construction or in :meth:`validate`; a
             robot without mass is a RangeError.
     """
+
+    stands_in_world: ClassVar[bool] = False
 
     kind: Literal["both", "linear", "angular"] = "both"
     weights: tuple[float, ...] | None = None

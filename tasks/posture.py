@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import casadi as ca
 import numpy as np
@@ -53,6 +53,8 @@ class Posture(Task):
         UnknownNameError, DuplicateNameError, ShapeError, NotFiniteError, RangeError: on construction or in
             :meth:`validate`.
     """
+
+    stands_in_world: ClassVar[bool] = False
 
     joints: tuple[str, ...] | None = None
     weights: tuple[float, ...] | None = None

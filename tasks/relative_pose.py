@@ -65,6 +65,8 @@ class RelativePose(Task):
         RangeError: no joint moves the two frames against each other, or a negative weight.
     """
 
+    stands_in_world: ClassVar[bool] = False
+
     initial_only: ClassVar[tuple[str, ...]] = ("gain", "at")
 
     frame_a: str

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from wbc import validation
 from wbc.errors import DuplicateNameError, RangeError, ShapeError
-from wbc.symbolic.kinematics import Kinematics, Pose
+from wbc.symbolic.kinematics import Pose
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks.base import Constraint, Input, Row, Rows, SacrificeOrder, Values
 
@@ -169,7 +169,7 @@ class Rolling(Constraint):
         normal = ground.rotation[:, 2]
         matrix, right = [], []
         for wheel in self.wheels:
-            point, jacobian, forwards = _contact(kin.kinematics, wheel, normal)
+            point, jacobian, forwards = _contact(kin, wheel, normal)
             sideways = ca.cross(normal, forwards)
             if wheel.roller is None:
                 held = [forwards, sideways]
@@ -187,14 +187,14 @@ class Rolling(Constraint):
         return robot.base == "floating" if self.contact is None else self.contact
 
 
-def _contact(kinematics: Kinematics, wheel: Wheel, normal: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
+def _contact(kin: Tracer, wheel: Wheel, normal: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
     """(point of contact, its Jacobian 3 x nv as a point of the wheel, rolling direction)."""
-    joint = int(kinematics.model.getJointId(wheel.joint))
-    axis = kinematics.joint_twist(joint)[1]
+    joint = int(kin.kinematics.model.getJointId(wheel.joint))
+    axis = kin.joint_axis(joint)
     upright = normal - axis * ca.dot(axis, normal)
     upright = upright / ca.sqrt(ca.dot(upright, upright) + FLAT**2)
-    point = kinematics.joint_pose(joint).position - wheel.radius * upright
-    return point, kinematics.point_jacobian(joint, point)[:3, :], ca.cross(axis, upright)
+    point = kin.joint_position(joint) - wheel.radius * upright
+    return point, kin.point_jacobian(joint, point)[:3, :], ca.cross(axis, upright)
 
 
 def _axis(robot: Robot, joint: int, q: NDArray[np.float64]) -> NDArray[np.float64]:

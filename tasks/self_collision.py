@@ -71,6 +71,8 @@ class SelfCollision(Constraint):
         UnknownNameError, MissingShapeError, RangeError, ShapeError: in :meth:`validate`.
     """
 
+    stands_in_world: ClassVar[bool] = False
+
     order: ClassVar[SacrificeOrder] = SacrificeOrder.MARGIN
 
     pairs: tuple[tuple[str, str], ...] | None = None

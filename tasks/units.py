@@ -8,7 +8,8 @@ from typing import Any
 from wbc.errors import UnknownNameError
 
 #: Unit of a row -> (how many of it are one in SI units, power of the characteristic length that it is measured by);
-#: rows of momenta are not measured by a length, since no mass is the characteristic one
+#: rows of momenta are not measured by a length, since no mass is the characteristic one; rows of forces say their own
+#: size, see :attr:`wbc.tasks.base.Row.size`
 UNITS: dict[str, tuple[float, int]] = {
     "m": (1.0, 1),
     "cm": (1e2, 1),
@@ -23,6 +24,8 @@ UNITS: dict[str, tuple[float, int]] = {
     "%": (1e2, 0),
     "kg m": (1.0, 0),
     "kg m^2": (1.0, 0),
+    "N": (1.0, 0),
+    "N m": (1.0, 0),
 }
 
 

@@ -43,7 +43,7 @@ class WorkspaceBox(Constraint):
     Attributes:
         frame: name of the frame that carries the point.
         lower, upper: first values of the inputs; one number serves all three axes. None: no rows of this bound.
-        relative_to: reference frame b, ``"world"`` or a frame of the robot, which may move; the box is fixed to it.
+        relative_to: reference frame b, ``"world"``, a frame of the robot or a moving frame; the box is fixed to it.
         offset: the point in ``frame`` [m].
 
     Raises:

@@ -50,7 +50,7 @@ class WorkspacePolyhedron(Constraint):
         frame: name of the frame that carries the point.
         normals: k x 3 directions to the allowed side, in the axes of W, of any length; kept at unit length.
         offsets: first values of the input: k numbers, or one for all.
-        relative_to: reference frame b, ``"world"`` or a frame of the robot, which may move.
+        relative_to: reference frame b, ``"world"``, a frame of the robot or a moving frame.
         offset: the point in ``frame`` [m].
         pose: first value of the input; None: the identity.
 

@@ -5,12 +5,13 @@ from __future__ import annotations
 import gc
 import os
 import sys
+import time
 from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, settings
 
-pytest_plugins = ["tests.processes", "tests.slow"]
+pytest_plugins = ["tests.processes", "tests.slow", "tests.pictures"]
 
 os.environ.setdefault("MPLBACKEND", "Agg")
 # One thread a process: pytest-xdist already fills the cores, and sums keep their order.
@@ -30,10 +31,25 @@ if sys.dont_write_bytecode:
     os.environ["PYTHONPYCACHEPREFIX"] = sys.pycache_prefix
     os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
+#: Seconds that a worker waits for another's bytecode
+PATIENCE = 60.0
+
 # Imported here, when the flags above are set
 from tests import objects  # noqa: E402
+from tests.repeats import repeats  # noqa: E402
 
 objects.keep(BUILD / "test-cache" / "objects")
+
+# Workers that collect at once compile the same modules at once: where there is no bytecode yet, one goes ahead
+FIRST = BUILD / "test-cache" / f"collected-{sys.implementation.cache_tag}"
+
+
+def pytest_sessionstart(session: pytest.Session) -> None:
+    if os.environ.get("PYTEST_XDIST_WORKER", "gw0") != "gw0":
+        until = time.monotonic() + PATIENCE
+        while not FIRST.exists() and time.monotonic() < until:
+            time.sleep(0.1)
+
 
 # Thousands of tests are collected, and live to the end: searching them for garbage again and again takes a sixth of the
 # time of the collection, and a part of every later search
@@ -41,7 +57,10 @@ gc.disable()
 
 
 def pytest_collection_finish(session: pytest.Session) -> None:
+    FIRST.touch()
     gc.freeze()
+    # Expressions and arrays come and go by the thousand and are seldom in circles
+    gc.set_threshold(20_000, 20, 20)
     gc.enable()
 
 
@@ -49,7 +68,7 @@ settings.register_profile(
     "wbc",
     derandomize=True,
     deadline=None,
-    max_examples=40,
+    max_examples=repeats(25),
     database=None,
     print_blob=False,
     suppress_health_check=[HealthCheck.too_slow],

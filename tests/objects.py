@@ -1,7 +1,10 @@
 """Object files of compiled stacks, kept by what they are made from.
 
 A stack is compiled again as soon as a line of the package changes that may have to do with it (wbc.stack.key); nearly
-always the C code stays the same, and so does its object file.
+always the C code stays the same, and so does its object file. What is not in the folder is compiled; rows that are not
+to be optimised are assembled (:mod:`tests.assembly`).
+
+Code that the compiler refuses fails the test: the package itself would go on, slowly, on the virtual machine.
 """
 
 from __future__ import annotations
@@ -14,6 +17,8 @@ import tempfile
 
 import casadi as ca
 
+from tests.assembly import assembled
+from wbc.errors import CompileError
 from wbc.native import toolchain
 
 _run, _compiler = toolchain._run, toolchain.compiler()
@@ -24,7 +29,16 @@ def keep(folder: pathlib.Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
 
     def run(command: list[str], place: pathlib.Path) -> None:
-        if command[0] != _compiler or "-c" not in command:
+        if command[0] != _compiler:
+            _run(command, place)
+            return
+        try:
+            compile_or_take(command, place)
+        except CompileError as error:
+            raise AssertionError(f"the package's C code does not compile: {error}") from error
+
+    def compile_or_take(command: list[str], place: pathlib.Path) -> None:
+        if "-c" not in command:
             _run(command, place)
             return
         made = place / command[command.index("-o") + 1]
@@ -32,13 +46,25 @@ def keep(folder: pathlib.Path) -> None:
         if kept.exists():
             shutil.copyfile(kept, made)
             return
-        _run(command, place)
+        _made(command, place)
         # Renamed into its place, since other processes look for it
         with tempfile.NamedTemporaryFile(dir=folder, delete=False) as file:
             file.write(made.read_bytes())
         os.replace(file.name, kept)
 
     toolchain._run = run
+
+
+def _made(command: list[str], place: pathlib.Path) -> None:
+    """By the compiler, or, where generated rows are not to be optimised, by the assembler."""
+    rows = place / "rows.c"
+    if rows.name in command and "-O0" in command:
+        text = assembled(rows.read_text())
+        if text is not None:
+            (place / "rows.s").write_text(text)
+            _run([command[0], "-c", "rows.s", "-o", command[command.index("-o") + 1]], place)
+            return
+    _run(command, place)
 
 
 def _name(command: list[str], place: pathlib.Path) -> str:

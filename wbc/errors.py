@@ -90,6 +90,10 @@ class LevelError(WbcError):
     """A level that an item cannot have, or levels where there can be none; a level is never turned into a weight."""
 
 
+class CommandError(WbcError):
+    """An item, a solver or a value that has no meaning for what a stack is compiled to command."""
+
+
 class SolverError(WbcError):
     """A solver that is missing or that failed outside of a tick."""
 

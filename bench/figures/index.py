@@ -96,6 +96,7 @@ _ALL = (
     Figure("bilateral", ("wbc/teleop/bilateral",), 1.5),
     Figure("clearance", ("wbc/clearance",), 1.0),
     Figure("demo", (*TICK, "wbc/track", "wbc/cli/demo.py"), 0.5),
+    Figure("dynamics", ("wbc/published/newton_euler",), 0.5),
     Figure("examples", (*TICK, "wbc/proximity", "examples"), 1.0),
     Figure("fsp", ("wbc/resolvers", "wbc/explore", "wbc/published/ikor"), 4.0),
     Figure("fsp_norms", ("wbc/resolvers/fsp", "wbc/published/ikor"), 0.5),
@@ -112,6 +113,8 @@ _ALL = (
     Figure("solvers", (*TICK, "bench/conditioning.py"), 2.0),
     Figure("symbolic", ("wbc/symbolic",), 0.2),
     Figure("plants", (*WALK, "wbc/simulation", "tests/simulation/lagging.py"), 1.0),
+    Figure("moving", (*TICK, "wbc/moving_target", "wbc/estimation", "wbc/simulation"), 6.0),
+    Figure("torques", (*TICK, "bench/torque_peer.py"), 1.5),
     Figure("two_ended", WALK, 0.5),
     Figure("walks", (*WALK, "bench/walk/reference"), 1.5),
 )  # fmt: skip

@@ -13,7 +13,7 @@ import wbc
 from bench.sheet import Sheet
 from wbc.errors import InfeasibleError
 from wbc.explore import Explorer
-from wbc.published.ikor import Driver, Method, Settings, hermies
+from wbc.published.ikor import Driver, Method, Settings, airarm, hermies, straight
 from wbc.published.ikor.cases import route
 from wbc.resolvers import FullSpace, PseudoInverse, RateProblem
 from wbc.resolvers.fsp import best, blocked, joint_row, orthogonal, parametric, point_row
@@ -24,6 +24,7 @@ CALLS, BATCHES = 40, 5
 
 STEPS = {
     "full_space": "`FullSpace().resolve`, two obstacles and three limits",
+    "full_space_free": "the same without constraints",
     "orthogonal": "orthogonal space, then the closed form, the same constraints",
     "orthogonal_free": "the same without constraints",
     "blocked": "blocked columns, then the closed form, the same constraints",
@@ -32,6 +33,18 @@ STEPS = {
     "pseudo_inverse": "`PseudoInverse().resolve`, without constraints",
 }
 GENERATORS = ("joints", "vectors", "orthogonal [us], cond G", "exchange", "exhaustive")
+#: FSP over the pseudo-inverse for runs without constraints, user time: the quotients of the report's three trajectories
+PRINTED = {"3x10": "1.7 to 1.8", "3x7": "1.4 to 1.7", "6x7": "1.7 to 1.9", "6x10": "2.3 to 3.6"}
+SIZES = ("task", "printed", "FSP by blocks / pseudo-inverse", "FSP by a factorisation", "`FullSpace`")
+#: Constraints act in so many steps -> seconds of the pseudo-inverse, of one shot, of two steps, as printed for AIRARM
+AIRARM = {"none": (10.0, 19.7, 19.9), "80 %": (10.0, 19.7, 30.9), "all": (10.0, 19.7, 36.0)}
+CONSTRAINED = (
+    "steps with constraints",
+    "one shot / free, printed",
+    "measured",
+    "two steps / one shot, printed",
+    "measured",
+)
 OBSTACLES = (
     "method", "done", "least clearance [mm]", "beyond the limit [mrad]", "miss at the end [mm]", "longest step [rad]",
     "a step [ms]",
@@ -40,30 +53,36 @@ OBSTACLES = (
 
 def parts() -> dict[str, Sheet | str]:
     """All of it."""
-    return shown(steps(), generators(), obstacles(), paths())
+    return shown(steps(), generators(), sizes(), constrained(), obstacles(), paths())
 
 
 def shown(
-    step: dict[str, float], spaces: list[dict[str, float]], past: list[dict[str, Any]], whole: dict[str, Any]
+    step: dict[str, float],
+    spaces: list[dict[str, float]],
+    size: list[tuple[str, ...]],
+    share: list[tuple[str, ...]],
+    past: list[dict[str, Any]],
+    whole: dict[str, Any],
 ) -> dict[str, Sheet | str]:
     """Tables of the numbers."""
     costs = [
         (f"{row['joints']}", f"{row['vectors']}", *(f"{row[n]:.0f}, {row[f'{n}_condition']:.0e}" for n in made))
         for made in [("orthogonal", "exchange", "exhaustive")]
         for row in spaces
-        if row["joints"] in (4, 7, 10, 15, 20)
     ]
     obstacle = []
     for one in past:
         lengths = (f"{1e3 * one[key]:.{digits}f}" for key, digits in (("clearance", 1), ("beyond", 1), ("miss", 3)))
         times = f"{one['step']:.3f}", f"{one['milliseconds']:.1f}"
         obstacle.append((one["method"], "yes" if one["done"] else "no", *lengths, *times))
-    share = [(name, f"{done} of {whole['paths']}") for name, done in whole["done"].items()]
+    done = [(name, f"{done} of {whole['paths']}") for name, done in whole["done"].items()]
     return {
         "steps": Sheet("", ("step of 3 x 10", "us"), [(STEPS[k], f"{v:.0f}") for k, v in step.items()]),
         "generators": Sheet("", GENERATORS, costs),
+        "sizes": Sheet("", SIZES, size),
+        "constrained": Sheet("", CONSTRAINED, share),
         "obstacles": Sheet("", OBSTACLES, obstacle),
-        "paths": Sheet("", ("way of resolution", "paths done"), share),
+        "paths": Sheet("", ("way of resolution", "paths done"), done),
         "path": f"One path as a whole: {whole['seconds']:.2f} s.",
     }
 
@@ -82,10 +101,10 @@ def microseconds(call: Callable[[], Any], calls: int = CALLS) -> float:
     return min(medians)
 
 
-def generators(most: int = 20) -> list[dict[str, float]]:
+def generators(numbers: tuple[int, ...] = (4, 7, 10, 15, 20)) -> list[dict[str, float]]:
     """Time and conditioning of the spaces of random tasks of 3 rows, over the number of joints."""
     rng, out = np.random.default_rng(0), []
-    for joints in range(4, most + 1):
+    for joints in numbers:
         J, x = rng.normal(size=(3, joints)), rng.normal(size=3)
         row: dict[str, float] = {"joints": joints, "vectors": joints - 2}
         for name, make, calls in (
@@ -135,6 +154,7 @@ def steps() -> dict[str, float]:
     assert max(np.abs(v - fused()).max() for v in same) < 1e-9
     return {
         "full_space": microseconds(fused),
+        "full_space_free": microseconds(lambda: resolver.resolve(RateProblem(J, x))),
         "orthogonal": microseconds(lambda: spaces(orthogonal, True)),
         "orthogonal_free": microseconds(lambda: spaces(orthogonal, False)),
         "blocked": microseconds(lambda: spaces(blocked, True)),
@@ -142,6 +162,47 @@ def steps() -> dict[str, float]:
         "two_steps": microseconds(two_steps),
         "pseudo_inverse": microseconds(lambda: plain.resolve(RateProblem(J, x))),
     }
+
+
+def sizes() -> list[tuple[str, ...]]:
+    """Steps of HERMIES-III along trajectory 1 without constraints, from the Jacobian on, by size of the task."""
+    out = []
+    for size, printed in PRINTED.items():
+        rows, joints = map(int, size.split("x"))
+        machine = hermies("none" if joints == 7 else "holonomic")
+        q = np.concatenate((np.radians([10, 150, 20, 30, -15, 60, 25]), [0.1, 0.2, 0.3]))[:joints]
+        J, x = machine.jacobian(q)[:rows], np.array([0.001, -0.003, -0.004, 0.01, 0.02, -0.01])[:rows]
+        plain = microseconds(lambda J=J, x=x: PseudoInverse().resolve(RateProblem(J, x)))
+        ways: list[Callable[..., Any]] = [lambda J, x, make=make: best(make(J, x)) for make in (blocked, orthogonal)]
+        ways.append(lambda J, x: FullSpace().resolve(RateProblem(J, x)))
+        spent = [microseconds(lambda way=way, J=J, x=x: way(J, x)) for way in ways]
+        out.append((size, printed, *(f"{one / plain:.1f}" for one in spent)))
+    return out
+
+
+def constrained() -> list[tuple[str, ...]]:
+    """Runs of AIRARM by blocked columns with a limit of a joint that acts in none, most or all of the steps."""
+    machine, steps = airarm(), 200
+    path = straight(machine, (0.0008, 0.0, -0.001), steps)
+    free = Driver(machine).run(path).q[:, 2]
+    out = []
+    for share, (_, one, two) in AIRARM.items():
+        upper = machine.upper.copy()
+        # The slide goes out all the way: the limit is where it is after so many steps
+        upper[2] = {"none": free.max() + 1.0, "80 %": free[int(0.2 * steps)], "all": free[0] - 1e-4}[share]
+        tight = replace(machine, upper=upper)
+        runs = {}
+        for name, settings in (
+            ("free", Settings()),
+            ("one", Settings(Method.LIMITS)),
+            ("two", Settings(Method.LIMITS, two_step=True)),
+        ):
+            spent = [Driver(tight, settings).run(path) for _ in range(3)]
+            runs[name] = min(float(run.seconds.sum()) for run in spent)
+            acted = sum(map(bool, spent[0].acted))
+        numbers = one / AIRARM["none"][1], runs["one"] / runs["free"], two / one, runs["two"] / runs["one"]
+        out.append((f"{share} ({acted} of {steps})", *(f"{number:.2f}" for number in numbers)))
+    return out
 
 
 def obstacles() -> list[dict[str, Any]]:
@@ -188,7 +249,12 @@ def paths(count: int = 100) -> dict[str, Any]:
     )
     stack = wbc.Stack(robot, dt=0.01).add(tip, name="tip")
     explorer = Explorer(stack, np.full(3, 0.3))
-    done = {"step by step": 0, "whole, same start": 0, "whole, any start": 0}
+    ways: dict[str, dict[str, Any]] = {
+        "whole, same start and branch": {},
+        "whole, any start": {"anywhere": True},
+        "whole, any start, the branch may change": {"anywhere": True, "change": 1.0},
+    }
+    done = {"step by step": 0} | dict.fromkeys(ways, 0)
     seconds = []
     for seed in range(count):
         rng = np.random.default_rng(seed)
@@ -196,10 +262,10 @@ def paths(count: int = 100) -> dict[str, Any]:
         ends = [np.array([np.cos(np.cumsum(q)).sum(), np.sin(np.cumsum(q)).sum()]) for q in (first, last)]
         targets = [ends[0] + k * (ends[1] - ends[0]) for k in np.linspace(0, 1, 12)]
         done["step by step"] += not explorer.step_by_step({"tip": targets}, first, step=0.6)[1]
-        for name, anywhere in (("whole, same start", False), ("whole, any start", True)):
+        for name, way in ways.items():
             began = time.perf_counter()
             try:
-                explorer.along({"tip": targets}, first, step=0.6, nodes=30, anywhere=anywhere)
+                explorer.along({"tip": targets}, first, step=0.6, nodes=24, **way)
                 done[name] += 1
             except InfeasibleError:
                 pass

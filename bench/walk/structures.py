@@ -66,10 +66,13 @@ def _lattice(rows: int, columns: int) -> dict[str, Array]:
 
 def _on_plane(name: str, obstacles: list[Obstacle], rows: int = 15, columns: int = 18) -> Structure:
     """A plane with a lattice, less the holds that obstacles stand on or are close to."""
+    lattice = _lattice(rows, columns)
+    points = np.array([*lattice.values()])
+    free = np.all([obstacle.distance(points) >= FREE_OF for obstacle in obstacles], axis=0)
     holds = [
         Hold(key, frame_of("hold", at, (0, 0, -1), (1, 0, 0)), FREE, TILT)
-        for key, at in _lattice(rows, columns).items()
-        if all(obstacle.distance(at) >= FREE_OF for obstacle in obstacles)
+        for (key, at), clear in zip(lattice.items(), free, strict=True)
+        if clear
     ]
     return Structure(name, tuple(holds), tuple(obstacles), PlaneSurface(pin.SE3.Identity()))
 

@@ -138,8 +138,9 @@ class Judge:
         v, omega = np.zeros((2, many, 3, size))
         for k in range(joint):
             R, o = chain[k + 1]
+            (x, y, z), (a, b, c) = R[:, :, 2].T, (p - o).T
             omega[:, :, k] = R[:, :, 2]
-            v[:, :, k] = np.cross(R[:, :, 2], p - o)
+            v[:, 0, k], v[:, 1, k], v[:, 2, k] = y * c - z * b, z * a - x * c, x * b - y * a
         return v, omega
 
     def _rows(self, rows: Rows, q: Array, chain: list[tuple[Array, Array]]) -> Array:
@@ -174,7 +175,7 @@ class Judge:
         v = np.linalg.svd(self.value(rows, q))[2][:, -1]
         for _ in range(STEPS):
             J = self.value(rows, q)
-            by_q = np.stack([self._slope(rows, q, v, k) for k in range(size)], axis=2)
+            by_q = self._slope(rows, q, v)
             residual = np.concatenate(((J @ v[:, :, None])[:, :, 0], (v * v).sum(1, keepdims=True) - 1.0), axis=1)
             below = np.concatenate((np.zeros_like(q), 2.0 * v), axis=1)[:, None]
             M = np.concatenate((np.concatenate((by_q, J), axis=2), below), axis=1)
@@ -186,9 +187,10 @@ class Judge:
         scale = np.linalg.svd(self.value(rows, q), compute_uv=False)[:, 0]
         return np.asarray(q[self.least(rows, q) < REACHED * scale])
 
-    def _slope(self, rows: tuple[Rows, ...], q: Array, v: Array, k: int) -> Array:
-        """d (J v) / d q_k, by central differences."""
-        h = np.zeros(q.shape[1])
-        h[k] = 1e-5
-        both = (self.value(rows, q + h) - self.value(rows, q - h)) @ v[:, :, None]
-        return np.asarray(both[:, :, 0] / 2e-5)
+    def _slope(self, rows: tuple[Rows, ...], q: Array, v: Array) -> Array:
+        """d (J v) / dq [many, rows, joints], by central differences."""
+        many, size = q.shape
+        h = 1e-5 * np.eye(size)[:, None]
+        around = self.value(rows, np.concatenate((q + h, q - h)).reshape(-1, size)).reshape(2, size, many, -1, size)
+        both = ((around[0] - around[1]) @ v[:, :, None])[..., 0] / 2e-5
+        return np.asarray(both.transpose(1, 2, 0))

@@ -10,9 +10,12 @@ from tests.calm.scenes import POSTURE, TIPS, Array, tip_pose
 from wbc.robot import Robot
 
 
-def cost(robot: Robot, name: str, target: pin.SE3, q: Array, kind: str) -> tuple[float, Array]:
+def cost(
+    robot: Robot, name: str, target: pin.SE3, q: Array, kind: str, data: pin.Data | None = None
+) -> tuple[float, Array]:
     """Half the weighted squares of the hand's error and the posture's, with the gradient."""
-    model, data = robot.model, robot.model.createData()
+    model = robot.model
+    data = model.createData() if data is None else data
     frame = model.getFrameId(TIPS[name])
     pin.computeJointJacobians(model, data, q)
     pin.updateFramePlacements(model, data)
@@ -34,9 +37,10 @@ def best(robot: Robot, name: str, target: pin.SE3, kind: str, starts: list[Array
     """(cost, distance of the hand to the target [m]) of the best optimum within the position limits."""
     low, high = robot.limits.position_lower, robot.limits.position_upper
     found = []
+    data = robot.model.createData()
     for start in starts:
         answer = minimize(
-            lambda q: cost(robot, name, target, q, kind),
+            lambda q: cost(robot, name, target, q, kind, data),
             np.clip(start, low, high),
             jac=True,
             method="L-BFGS-B",

@@ -10,6 +10,7 @@ import pinocchio as pin
 import pytest
 
 from tests.calm.scenes import Array, built, machine, run, tip_pose
+from tests.repeats import covering
 
 DT = 0.005
 GAINS = (2.0, 10.0, 50.0, 200.0)
@@ -30,8 +31,7 @@ def towards(place: Callable[[float], tuple[float, float, float]]) -> Callable[[f
     return target
 
 
-@pytest.mark.parametrize("gain", GAINS)
-@pytest.mark.parametrize("scene", PULLS)
+@pytest.mark.parametrize(("scene", "gain"), covering(PULLS, GAINS))
 def test_comes_to_rest(scene: str, gain: float) -> None:
     done = run(built("panda", DT, scene=scene), gain, towards(lambda t: PULLS[scene]), 1200)
     assert done.unsolved == 0
@@ -42,8 +42,7 @@ def test_comes_to_rest(scene: str, gain: float) -> None:
     assert (np.abs(done.acceleration) <= machine("panda").limits.acceleration * (1 + 1e-9)).all()
 
 
-@pytest.mark.parametrize("gain", GAINS)
-@pytest.mark.parametrize("scene", ["wall", "corner"])
+@pytest.mark.parametrize(("scene", "gain"), covering(["wall", "corner"], GAINS))
 def test_slides(scene: str, gain: float) -> None:
     """A target that swings behind the wall, or in and out of the corner: the hand slides without shaking."""
     swing = {
@@ -58,8 +57,7 @@ def test_slides(scene: str, gain: float) -> None:
     assert done.flips(1200, above=1e-3) <= 7 * 12
 
 
-@pytest.mark.parametrize("gain", GAINS)
-@pytest.mark.parametrize("scene", ["wall", "corner"])
+@pytest.mark.parametrize(("scene", "gain"), covering(["wall", "corner"], GAINS))
 def test_a_servo_that_lags_does_not_bounce(scene: str, gain: float) -> None:
     """20 ms of lag: less than a millimetre into the wall, then rest."""
     done = run(built("panda", DT, scene=scene), gain, towards(lambda t: PULLS[scene]), 1200, lag=0.02)

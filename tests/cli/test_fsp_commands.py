@@ -11,6 +11,7 @@ import pytest
 from typer.testing import CliRunner
 
 from wbc.cli.app import app
+from wbc.published.ikor import film
 
 RUN = CliRunner(env={"COLUMNS": "200"})
 LINE = "\n".join(f"{-0.88 + 0.002 * k} -0.356 {0.635 - 0.002 * k}" for k in range(1, 11))
@@ -59,6 +60,33 @@ def test_a_line_and_a_jacobian(tmp_path: Path) -> None:
     assert "0.50000000   0.12500000   0.12500000" in done.output
     data.write_text("2 3\n1 0 0\n0 1\n0.5\n0.25\n")
     assert "FSP_data:3" in RUN.invoke(app, ["ikor", "--jacobian", str(data)]).output
+
+
+def test_an_operators_rates_and_a_film(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(film, "MOST", 2)
+    rates, out = tmp_path / "rates.csv", tmp_path / "run"
+    rates.write_text("time,pair,r1,r2,r3,r4,r5,r6\n0,tool,0.05\n0.1,base,0,0,0,0.1\n0.2,\n")
+    done = RUN.invoke(app, ["ikor", "--rates", str(rates), "--base", "holonomic", "--film", "gif", "--out", str(out)])
+    assert done.exit_code == 0, done.output
+    assert len((out / "CheezyAngles").read_text().splitlines()) == 11
+    assert (out / "film.gif").stat().st_size > 5000
+    rates.write_text("time,pair,r1,r2,r3,r4,r5,r6\n0,arm,0.05\n1,\n")
+    done = RUN.invoke(app, ["ikor", "--rates", str(rates), "--out", str(tmp_path / "other")])
+    assert done.exit_code == 2
+    assert "arm" in done.output
+    assert "tool" in done.output
+
+
+def test_a_published_run_with_what_was_not_published(tmp_path: Path) -> None:
+    spheres = tmp_path / "sphere_data"
+    spheres.write_text("-0.5 -0.356 0.55 0.08\n")
+    arguments = ["ikor", "--case", "1", "--config", "3x7", "--consistent", "--step-limit", "0.2"]
+    done = RUN.invoke(app, [*arguments, "--spheres", str(spheres), "--method", "2", "--out", str(tmp_path / "run")])
+    assert done.exit_code == 0, done.output
+    with (tmp_path / "run" / "norms.csv").open() as stream:
+        rows = list(csv.DictReader(stream))
+    assert all(float(row["norm"]) <= 7 * 0.2**2 * (1 + 1e-6) for row in rows)
+    assert all(np.isfinite(float(row["clearance"])) for row in rows)
 
 
 def test_a_bad_line_is_named(tmp_path: Path) -> None:
@@ -129,6 +157,12 @@ def test_explore_panda(tmp_path: Path) -> None:
         (["explore", "panda", "--rates", "1,x"], "numbers"),
         (["ikor", "--case", "4"], "valid: 1, 2, 3"),
         (["ikor", "--line", "1,2"], "X,Y,Z"),
+        (["ikor", "--case", "1", "--line", "1,2,3"], "not several"),
+        (["ikor", "--config", "3x7", "--line", "1,2,3"], "not several"),
+        (["ikor", "--case", "1", "--base", "car"], "belong to a trajectory"),
+        (["ikor", "--line", "-0.8,-0.3,0.6", "--film", "mov"], "gif"),
+        (["ikor", "--case", "1", "--resolver", "stack"], "consistent"),
+        (["explore", "panda", "--to", "1,2"], "X,Y,Z"),
         (["ikor", "--trajectory", "no_such_file"], "no_such_file"),
         (["ikor", "--robot", "hermes", "--trajectory", "x"], "hermes"),
     ],

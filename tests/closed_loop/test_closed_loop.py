@@ -1,4 +1,4 @@
-"""Every task and constraint in its loop, on three robots, from random starts."""
+"""Every task and constraint in its loop, on robots in turn, from random starts."""
 
 from __future__ import annotations
 
@@ -14,6 +14,8 @@ from tests.closed_loop.machines import CONSTRAINT_ROBOTS, TASK_ROBOTS
 from tests.closed_loop.mechanism import ROBOTS as COUPLED
 from tests.closed_loop.mechanism import build, mechanism
 from tests.closed_loop.pointing import CLASSES as POINTING
+from tests.constraints.items_forces import FACTORIES as FORCES
+from tests.repeats import covering
 from wbc.tasks import Mechanism, SelfCollision, registry
 
 
@@ -21,17 +23,17 @@ def test_every_shipped_class_has_a_case() -> None:
     shipped = {cls for cls in registry().values() if cls.__module__.startswith("wbc.tasks")}
     shared = {case.cls for case in (cases.TASKS | cases.CONSTRAINTS).values()}
     guards = {guard.cls for guard in GUARDS.values()}
-    assert shipped == shared | {Mechanism, SelfCollision} | POINTING | COORDINATION | guards
+    # contacts and what else is about forces: tests/torque
+    forces = {registry()[name] for name in FORCES}
+    assert shipped == shared | forces | {Mechanism, SelfCollision} | POINTING | COORDINATION | guards
 
 
-@pytest.mark.parametrize("name", TASK_ROBOTS)
-@pytest.mark.parametrize("case", cases.TASKS)
+@pytest.mark.parametrize(("case", "name"), covering(cases.TASKS, TASK_ROBOTS))
 def test_task(case: str, name: str) -> None:
     cases.TASKS[case].check(cases.task_loop(name))
 
 
-@pytest.mark.parametrize("name", CONSTRAINT_ROBOTS)
-@pytest.mark.parametrize("case", cases.CONSTRAINTS)
+@pytest.mark.parametrize(("case", "name"), covering(cases.CONSTRAINTS, CONSTRAINT_ROBOTS))
 def test_constraint(case: str, name: str) -> None:
     cases.CONSTRAINTS[case].check(cases.constraint_loop(name))
 

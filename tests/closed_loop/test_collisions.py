@@ -1,4 +1,4 @@
-"""Collision constraints in their loops, on three robots, and mutations that the loops notice."""
+"""Collision constraints in their loops, on robots in turn, and mutations that the loops notice."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from tests.closed_loop.collision_mutations import MUTATIONS
 from tests.closed_loop.collisions import SELF, THINGS
 from tests.closed_loop.loop import Loop
 from tests.closed_loop.machines import CONSTRAINT_ROBOTS, FEWER, STARTS
+from tests.repeats import covering
 
 
 @cache
@@ -28,8 +29,7 @@ def check(loop: Loop, item: str, starts: int) -> None:
     run(loop, item, starts)
 
 
-@pytest.mark.parametrize("name", CONSTRAINT_ROBOTS)
-@pytest.mark.parametrize("item", [*THINGS, *SELF])
+@pytest.mark.parametrize(("item", "name"), covering([*THINGS, *SELF], CONSTRAINT_ROBOTS))
 def test_shapes_keep_clear(item: str, name: str) -> None:
     check(loop(name), item, STARTS if item == "rod" and name != "talos" else FEWER)
 

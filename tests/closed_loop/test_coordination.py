@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from functools import cache
 from typing import Any
 
@@ -11,8 +12,12 @@ from tests.closed_loop import coordination_mutations as wrong
 from tests.closed_loop import couplings, dexterity, hands, rolling, tasks
 from tests.closed_loop.loop import Loop
 from tests.closed_loop.machines import TASK_ROBOTS
+from tests.repeats import covering
 from tests.wheels import VEHICLES
 from wbc.tasks import Rolling
+
+#: What is checked of two hands
+HANDS = list(itertools.product(hands.SUBJECTS, [tasks.decay, tasks.tracking]))
 
 
 @cache
@@ -30,21 +35,20 @@ def dexterous(name: str) -> Loop:
     return dexterity.build(name)
 
 
-@pytest.mark.parametrize("robot", hands.ROBOTS)
-@pytest.mark.parametrize("check", [tasks.decay, tasks.tracking])
-@pytest.mark.parametrize("name", hands.SUBJECTS)
+@pytest.mark.parametrize(
+    ("name", "check", "robot"),
+    [(*case, robot) for case, robot in covering(HANDS, hands.ROBOTS)],
+)
 def test_two_hands(name: str, check: Any, robot: str) -> None:
     check(hands_loop(robot), name, subjects=hands.SUBJECTS)
 
 
-@pytest.mark.parametrize("robot", TASK_ROBOTS)
-@pytest.mark.parametrize("check", [tasks.decay, tasks.tracking])
+@pytest.mark.parametrize(("check", "robot"), covering([tasks.decay, tasks.tracking], TASK_ROBOTS))
 def test_coupled_joints(check: Any, robot: str) -> None:
     check(coupled(robot), "gear", subjects=couplings.SUBJECTS)
 
 
-@pytest.mark.parametrize("robot", TASK_ROBOTS)
-@pytest.mark.parametrize("name", dexterity.SUBJECTS)
+@pytest.mark.parametrize(("name", "robot"), covering(dexterity.SUBJECTS, TASK_ROBOTS))
 def test_manipulability_goes_to_its_target(name: str, robot: str) -> None:
     tasks.decay(dexterous(robot), name, subjects=dexterity.SUBJECTS)
 

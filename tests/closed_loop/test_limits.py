@@ -1,4 +1,4 @@
-"""Limits on frames and tasks in their loops, on three robots, and mutations that the loops notice."""
+"""Limits on frames and tasks in their loops, on robots in turn, and mutations that the loops notice."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from tests.closed_loop import limits
 from tests.closed_loop.limit_mutations import MUTATIONS
 from tests.closed_loop.loop import Loop
 from tests.closed_loop.machines import CONSTRAINT_ROBOTS, FEWER, machine
+from tests.repeats import covering
 
 
 @cache
@@ -23,8 +24,7 @@ def mutated() -> Loop:
     return Loop(machine("panda"), items, limits.DT, "panda", "vm")
 
 
-@pytest.mark.parametrize("name", CONSTRAINT_ROBOTS)
-@pytest.mark.parametrize("guard", limits.GUARDS)
+@pytest.mark.parametrize(("guard", "name"), covering(limits.GUARDS, CONSTRAINT_ROBOTS))
 def test_limit_holds_and_is_reached(guard: str, name: str) -> None:
     limits.check(loop(name), guard)
 

@@ -1,4 +1,4 @@
-"""Axes, cameras, distances and momentum in their loops on three robots, and that wrong formulas are noticed."""
+"""Axes, cameras, distances and momentum in their loops on robots in turn, and that wrong formulas are noticed."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from tests.closed_loop.loop import Loop
 from tests.closed_loop.machines import TASK_ROBOTS
 from tests.closed_loop.pointing import CHECKS, CLASSES, build, pointing_loop
 from tests.closed_loop.pointing_mutations import MUTATIONS
+from tests.repeats import covering
 
 
-@pytest.mark.parametrize("name", TASK_ROBOTS)
-@pytest.mark.parametrize("check", CHECKS)
+@pytest.mark.parametrize(("check", "name"), covering(CHECKS, TASK_ROBOTS))
 def test_loop(check: str, name: str) -> None:
     CHECKS[check].run(pointing_loop(name))
 

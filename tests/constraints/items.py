@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 from tests.constraints.items_collisions import FACTORIES as COLLISIONS
+from tests.constraints.items_forces import FACTORIES as FORCES
 from tests.constraints.robots import with_test_shapes
 from wbc.robot import Robot
 from wbc.tasks.base import Item
@@ -79,4 +80,5 @@ FACTORIES: dict[str, Callable[[Robot], list[Declared]]] = {
     "Fixed": _fixed,
     "Mechanism": _mechanism,
     **COLLISIONS,
+    **FORCES,
 }

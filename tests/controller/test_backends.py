@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from tests.controller.stacks import DT, aim, controller, inside, near_limits, quarrel, randomise
+from tests.repeats import repeats
 from tests.stack.small import stack as small
 from wbc.controller import Controller, Status, Step, core_of
 from wbc.errors import SolverError
@@ -55,9 +56,9 @@ def compare(one: Step, two: Step, tolerance: float) -> None:
 
 
 CASES = {
-    "panda": (("arm", "panda"), aim, 60),
-    "conflicts": (("conflicts",), quarrel, 120),
-    "kinova": (("everything", "kinova"), randomise, 24),
+    "panda": (("arm", "panda"), aim, repeats(30)),
+    "conflicts": (("conflicts",), quarrel, repeats(60)),
+    "kinova": (("everything", "kinova"), randomise, repeats(12)),
     "talos": (("humanoid",), aim, 8),
 }
 

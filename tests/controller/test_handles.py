@@ -70,7 +70,9 @@ def test_every_value_of_an_item_is_declared(name: str) -> None:
         assert slots <= declared(kind_of(entry.item)), item
     # Nothing that no item of a class has, but what items of it may have elsewhere
     rest = declared(KINDS[registry()[name]]) - seen - {"enabled", "mask", "weight", "price"}
-    assert rest <= {"distance", "drift", "line", "side", "target"}
+    # of stacks that command accelerations
+    rest -= {"stiffness", "damping", "rate", "acceleration"}
+    assert rest <= {"distance", "drift", "line", "side", "target", "force", "torque", "friction", "least", "most"}
 
 
 def test_the_checker_and_the_program_have_the_same_classes() -> None:

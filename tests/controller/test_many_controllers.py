@@ -252,14 +252,14 @@ def heir(seed: int) -> list[bytes]:
     return _inherited(seed)
 
 
-@pytest.mark.parametrize("backend", BACKENDS)
-def test_spawned_processes(backend: str) -> None:
-    first = controller("arm", "panda", backend=backend)
-    wanted = [work(first.clone(), seed, 40) for seed in range(3)]
-    data = pickle.dumps(first.stack)
+def test_spawned_processes() -> None:
+    wanted, jobs = [], []
+    for backend in BACKENDS:
+        first = controller("arm", "panda", backend=backend)
+        wanted += [work(first.clone(), seed, 40) for seed in range(3)]
+        jobs += [(pickle.dumps(first.stack), backend, seed) for seed in range(3)]
     with multiprocessing.get_context("spawn").Pool(2) as pool:
-        found = pool.starmap(child, [(data, backend, seed) for seed in range(3)])
-    assert found == wanted
+        assert pool.starmap(child, jobs) == wanted
 
 
 @pytest.mark.parametrize("backend", BACKENDS)

@@ -42,7 +42,7 @@ def numbers(step: Step) -> np.ndarray:
 seeds = st.integers(0, 2**32 - 1)
 
 
-@settings(max_examples=100)
+@settings(max_examples=50)
 @given(seed=seeds, reach=st.floats(-2, 6), speed=st.floats(0, 3), factor=st.floats(0.25, 2.0))
 def test_any_state_and_any_target(seed: int, reach: float, speed: float, factor: float) -> None:
     tick, rng = controller("conflicts", backend="native"), np.random.default_rng(seed)

@@ -18,6 +18,7 @@ import pytest
 import wbc
 from tests.closed_loop.machines import anywhere, near
 from tests.evaluation import numbers, sample
+from tests.repeats import covering
 from tests.tasks.items import FACTORIES
 from tests.tasks.robots import FRAMES, robot
 from wbc.controller import Controller, Step, core_of
@@ -106,8 +107,7 @@ def scene(where: str, name: str) -> tuple[Motion, np.random.Generator]:
     return motion(where), np.random.default_rng(zlib.crc32(f"{name} {where}".encode()))
 
 
-@pytest.mark.parametrize("where", ROBOTS)
-@pytest.mark.parametrize("name", CLASSES)
+@pytest.mark.parametrize(("name", "where"), covering(CLASSES, ROBOTS))
 def test_switched_while_moving(name: str, where: str) -> None:
     """Random values, which may ask for the impossible, come and go as a whole and row by row."""
     moving, rng = scene(where, name)
@@ -138,8 +138,7 @@ MARGINS = [
 ]
 
 
-@pytest.mark.parametrize("where", ROBOTS)
-@pytest.mark.parametrize("name", MARGINS)
+@pytest.mark.parametrize(("name", "where"), covering(MARGINS, ROBOTS))
 def test_violated_margin_recovers(name: str, where: str) -> None:
     """A margin that is violated, and is not a little way off, is switched on in the middle of a motion."""
     moving, rng = scene(where, name)

@@ -25,7 +25,16 @@ NUMBER = r"([-+0-9.e]+)"
 
 
 #: Examples with so many ticks that compiling them takes less time than the virtual machine
-LONG = ("space_arm", "time_laws", "mobile_base")
+LONG = (
+    "space_arm",
+    "time_laws",
+    "mobile_base",
+    "clutter",
+    "self_collision",
+    "levels",
+    "moving_obstacle",
+    "custom_expression",
+)
 
 
 def output(name: str) -> str:
@@ -89,6 +98,11 @@ def test_moving_obstacle_pushes_the_arm_away() -> None:
     assert number("at the end: solved, hand error # mm", text) < 0.1
 
 
+def test_moving_table_is_followed() -> None:
+    still, followed = (float(x) for x in re.findall(rf"table's frame {NUMBER} mm", output("moving_table")))
+    assert followed < 1.0 < 50.0 < still
+
+
 def test_humanoid_reaches_on_held_feet() -> None:
     text = output("humanoid")
     assert number("solved: hand # mm", text) < 1.0
@@ -135,6 +149,7 @@ def test_self_collision_keeps_the_arms_apart() -> None:
     check_picture(text)
 
 
+@pytest.mark.usefixtures("as_users_get_them")
 def test_time_laws_keep_their_limits() -> None:
     text = output("time_laws")
     fast, smooth = (line for line in text.splitlines() if re.match(r"(least time|jerk-limited) ", line))
@@ -203,6 +218,7 @@ def test_examples_are_short_and_use_public_names(path: Path) -> None:
     modules = {a.name for n in ast.walk(tree) if isinstance(n, ast.Import) for a in n.names}
     modules |= {n.module or "" for n in ast.walk(tree) if isinstance(n, ast.ImportFrom)}
     ours = {"wbc", "wbc.tasks", "wbc.track", "wbc.shapes", "wbc.trajectory", "wbc.walking.run", "wbc.coordinates"}
+    ours |= {"wbc.estimation"}
     assert modules <= {"itertools", "pathlib", "numpy", "pinocchio", "casadi"} | ours
     assert not [n.attr for n in ast.walk(tree) if isinstance(n, ast.Attribute) and n.attr.startswith("_")]
 
@@ -210,3 +226,11 @@ def test_examples_are_short_and_use_public_names(path: Path) -> None:
 def test_every_example_is_run() -> None:
     called = set(re.findall(r'output\("(\w+)"\)', Path(__file__).read_text()))
     assert called == {path.stem for path in EXAMPLES}
+
+
+def test_torque_wipes_with_ten_newtons() -> None:
+    text = output("torque")
+    assert number("force # N", text) == pytest.approx(10.0, abs=0.3)
+    assert number("from # to", text) > 9.5
+    assert number("error along the table # mm", text) < 1.0
+    assert number("largest torque # %", text) < 100.0

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import coal
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -13,6 +14,7 @@ from wbc.errors import InfeasibleError, RangeError, ShapeError, UnknownNameError
 from wbc.explore import Explorer
 from wbc.explore.pictures import save_pieces
 from wbc.resolvers.fsp import Criterion
+from wbc.tasks.frames import frame_pose
 
 PANDA = wbc.robots.load("panda", shapes="auto")
 Q = np.array([0.3, 0.2, 0.1, -1.8, 0.2, 1.9, 0.4])
@@ -136,35 +138,108 @@ def path_near_limits(seed: int) -> tuple[Any, list[np.ndarray], np.ndarray]:
     return robot, [tip(first) + k * (tip(last) - tip(first)) for k in np.linspace(0, 1, 15)], first
 
 
+def meets(explorer: Explorer, found: Any, targets: list[np.ndarray], step: float) -> None:
+    """Every configuration meets its target within the limits, and no step is too long but where the branch changes."""
+    number = np.rint(found.s * (len(targets) - 1)).astype(int)
+    assert set(number) == set(range(len(targets)))
+    assert (np.flatnonzero(np.diff(number) == 0) + 1).tolist() == list(found.changes)
+    for q, k in zip(found.q, number, strict=True):
+        explorer.rows.aim("tip", targets[k])
+        assert np.abs(explorer.rows.errors(q)[0]).max() < 1e-9
+        assert explorer.rows.broken(q) == ""
+    steps = np.abs(np.diff(found.q, axis=0)).max(axis=1)
+    assert (np.delete(steps, np.array(found.changes, dtype=int) - 1) <= step).all()
+
+
 def test_a_whole_path_is_resolved_where_single_steps_end_at_a_limit() -> None:
-    done = {"whole": 0, "anywhere": 0, "steps": 0}
-    for seed in range(8):
+    """More freedom, more paths: single steps, the same branch, any start, changes of branch on the way."""
+    done = {"steps": 0, "whole": 0, "anywhere": 0, "changes": 0}
+    ways: dict[str, Any] = {"whole": {}, "anywhere": {"anywhere": True}, "changes": {"anywhere": True, "change": 1.0}}
+    changed = 0
+    for seed in (0, 3, 4, 5, 9):
         robot, targets, first = path_near_limits(seed)
+        targets = targets[::2]
         explorer = Explorer(plane_stack(robot), first, values={"tip": {"target": targets[0]}})
-        stopped = explorer.step_by_step({"tip": targets}, first, step=0.5)[1]
-        done["steps"] += not stopped
-        for name, anywhere in (("whole", False), ("anywhere", True)):
+        done["steps"] += not explorer.step_by_step({"tip": targets}, first, step=0.7)[1]
+        for name, way in ways.items():
             try:
-                found = explorer.along({"tip": targets}, first, step=0.5, nodes=40, anywhere=anywhere)
+                found = explorer.along({"tip": targets}, first, step=0.7, nodes=20, **way)
             except InfeasibleError:
-                assert stopped or name == "anywhere"
                 continue
             done[name] += 1
-            assert np.abs(np.diff(found.q, axis=0)).max() <= 0.5
-            for q, target in zip(found.q, targets, strict=True):
-                explorer.rows.aim("tip", target)
-                assert np.abs(explorer.rows.errors(q)[0]).max() < 1e-9
-                assert explorer.rows.broken(q) == ""
-    assert done["whole"] > done["steps"]
-    assert done["anywhere"] >= done["whole"]
+            changed += len(found.changes)
+            meets(explorer, found, targets, 0.7)
+    assert done["steps"] < done["whole"] < done["anywhere"] < done["changes"] == 5
+    assert changed > 0
 
 
-def test_a_resolution_becomes_a_law() -> None:
-    robot, targets, first = path_near_limits(0)
+def test_a_resolution_becomes_a_law_of_motion() -> None:
+    """At rest where the branch changes, and straight in the joints there."""
+    robot, targets, first = path_near_limits(5)
+    targets = targets[::2]
     explorer = Explorer(plane_stack(robot), first, values={"tip": {"target": targets[0]}})
-    law = explorer.along({"tip": targets}, first, step=0.6, anywhere=True).law(1.0, 5.0)
-    assert law.duration > 0.0
+    found = explorer.along({"tip": targets}, first, step=0.7, nodes=20, change=1.0)
+    law = found.law(1.0, 5.0)
     assert law.certificate
+    states = law.at(np.linspace(0.0, law.duration, 4000))
+    assert len(found.changes) > 0
+    for k in found.changes:
+        here, there = (np.abs(states.position - found.q[j]).max(axis=1) for j in (k - 1, k))
+        between = states.position[here.argmin() : there.argmin() + 1]
+        assert np.abs(states.velocity[[here.argmin(), there.argmin()]]).max() < 0.01
+        way = found.q[k] - found.q[k - 1]
+        across = (between - found.q[k - 1]) - np.outer((between - found.q[k - 1]) @ way / (way @ way), way)
+        assert np.abs(across).max() < 1e-3
+
+
+def box_arm() -> Any:
+    """Three links as boxes, whose distances from another box no expression states."""
+    turned = pin.SE3(np.eye(3), np.array([-0.5, 0.0, 0.0]))
+    shape = wbc.shapes.Box((0.9, 0.1, 0.1))
+    return planar(2.0).with_shapes({f"link{k}": [wbc.shapes.PlacedShape(shape, turned)] for k in (1, 2, 3)})
+
+
+def box_gap(robot: Any, q: np.ndarray, place: pin.SE3, size: tuple[float, float, float]) -> float:
+    """Least distance of the links from a box, by Coal."""
+    gaps = []
+    for k in (1, 2, 3):
+        link = frame_pose(robot, f"link{k}", q) * pin.SE3(np.eye(3), np.array([-0.5, 0.0, 0.0]))
+        request, result = coal.DistanceRequest(), coal.DistanceResult()
+        boxes = coal.Box(0.9, 0.1, 0.1), coal.Box(*size)
+        placed = [coal.Transform3s(p.rotation, p.translation) for p in (link, place)]
+        gaps.append(coal.distance(boxes[0], placed[0], boxes[1], placed[1], request, result))
+    return min(gaps)
+
+
+def test_measured_distances_are_margins_too() -> None:
+    robot = box_arm()
+    place = pin.SE3(np.eye(3), np.array([1.2, 1.2, 0.0]))
+    wall = wbc.shapes.Box((0.2, 0.2, 0.2))
+    stack = plane_stack(robot).add(wbc.tasks.Obstacle(wall, margin=0.05, pose=place), name="wall")
+    explorer = Explorer(stack, [0.3, 0.4, 0.1], values={"tip": {"target": [1.5, 0.5]}})
+    pieces = explorer.pieces([0.3, 0.4, 0.1], seeds=6, through=True, step=0.1)
+    assert any("wall/closest" in what for piece in pieces for _, _, what in piece.windows)
+    for q, broken in [(q, b) for p in pieces for q, b in zip(p.q, p.broken, strict=True)][::7]:
+        gap = box_gap(robot, q, place, (0.2, 0.2, 0.2))
+        if not broken:
+            assert gap > 0.05 - 1e-6
+        elif "wall" in broken:
+            assert gap < 0.05 + 1e-6
+
+
+def test_held_frames_are_goals() -> None:
+    """The second link held in its place by a Hold: what the tip may still do is what it may with a goal there."""
+    robot, q = planar(3.0, 5), np.array([0.3, 0.4, -0.5, 0.6, 0.2])
+    held = Explorer(plane_stack(robot).add(wbc.tasks.Hold("link2", kind="position"), name="grip"), q)
+    other = plane_stack(robot).add(wbc.tasks.EndEffector("link2", kind="position"), name="grip")
+    named = Explorer(other, q)
+    one, two = (e.tick(q, rates) for e, rates in ((held, [0.1, 0.2]), (named, [0.1, 0.2, 0, 0, 0])))
+    np.testing.assert_allclose(one.optima["least norm"], two.optima["least norm"], atol=1e-12)
+    far = q + 0.1
+    np.testing.assert_allclose(held.rows.errors(far)[0], named.rows.errors(far)[0], atol=1e-12)
+    curve = held.trace(q, through=True)
+    tip = [frame_pose(robot, "link2", x).translation for x in curve.q]
+    np.testing.assert_allclose(tip, np.tile(frame_pose(robot, "link2", q).translation, (len(tip), 1)), atol=1e-9)
 
 
 def test_what_the_mechanism_holds_stays() -> None:
@@ -203,7 +278,8 @@ def test_the_picture_is_drawn(tmp_path: Any) -> None:
         (lambda: Explorer(PANDA, Q), ShapeError),
         (lambda: Explorer(wbc.Stack(PANDA, dt=0.01), Q), RangeError),
         (lambda: Explorer(pose_stack(), Q[:3]), ShapeError),
-        (lambda: Explorer(pose_stack().add(wbc.tasks.Hold("panda_link5")), Q), RangeError),
+        (lambda: Explorer(pose_stack(), Q).along({"hand": [np.zeros(3)]}, Q, change=-1.0), RangeError),
+        (lambda: Explorer(pose_stack(), Q).along({"arm": [np.zeros(3)]}, Q), UnknownNameError),
         (lambda: Explorer(pose_stack(), Q, goals=("hnd",)), UnknownNameError),
         (lambda: Explorer(pose_stack(), Q, values={"hnd": {}}), UnknownNameError),
         (lambda: Explorer(pose_stack(), Q, values={"hand": {"targt": 1}}), UnknownNameError),

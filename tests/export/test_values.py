@@ -122,7 +122,7 @@ def boxed(backend: str) -> Controller:
 
 @pytest.mark.parametrize("backend", ["native", "vm"])
 def test_sensed_pairs_are_inputs(backend: str, tmp_path: Path) -> None:
-    folder = boxed(backend).export(tmp_path / "box", states=300)
+    folder = boxed(backend).export(tmp_path / "box", states=120)
     text = (folder / "wbc_tick.h").read_text()
     assert text.count("SENSED: the caller measures it") == 4
     build(folder)

@@ -15,10 +15,11 @@ from bench.soak.arm import robot
 from bench.soak.goods import Goods
 from bench.soak.hostile import spoiled
 from bench.soak.surface import MODULES, Callee, Hang, attempt, calls, impatient, surface
+from tests.repeats import repeats
 
 
 def test_every_call_answers_or_refuses() -> None:
-    ((_, counts),) = calls(0, 0, 2)
+    ((_, counts),) = calls(0, 0, repeats(1))
     assert {key: n for key, n in counts.items() if key.startswith("wrong")} == {}
     ends = Counter({end: sum(n for key, n in counts.items() if key.startswith(end)) for end in ("answered", "refused")})
     assert min(ends.values()) > 100, ends

@@ -5,17 +5,21 @@ Numbers marked "printed" stand in the report; the others were worked out from it
 
 from __future__ import annotations
 
+import functools
 import itertools
 import math
 from collections import Counter
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from PIL import Image
 
 import wbc
+import wbc.published.ikor.driver
 from wbc.errors import InfeasibleError, RangeError, UnknownNameError, WbcError
 from wbc.published.ikor import (
     Code,
@@ -29,6 +33,7 @@ from wbc.published.ikor import (
     airarm,
     case,
     differences,
+    film,
     hermies,
     line_to,
     machine_of,
@@ -38,16 +43,24 @@ from wbc.published.ikor import (
     without_platform,
 )
 from wbc.published.ikor import files as ikor_files
+from wbc.published.ikor.avoidance import gaps
 from wbc.published.ikor.cases import BETWEEN, unmatched
-from wbc.published.ikor.driver import euler_angles, intrusions, rotation_of
 from wbc.published.ikor.legacy import legacy_hermies
+from wbc.published.ikor.lines import euler_angles, rotation_of
 from wbc.published.ikor.settings import AXES
-from wbc.resolvers.fsp import best, blocked, joint_row, orthogonal, pattern_counts
+from wbc.resolvers.fsp import Criterion, best, blocked, joint_row, orthogonal, parametric, pattern_counts
+from wbc.teleop import Order
 
+#: Published runs that several tests look at
+once = functools.cache(case)
 BENT = np.radians([10, 150, 20, 30, -15, 60, 25])
 #: A line near that of trajectory 1 [m a step]
 LINE = np.array((0.00109315, -0.00329651, -0.00428364))
 FOREARM = [(-0.40, -0.356, 0.58, 0.08)]
+
+
+#: Each run once, for all tests that read it
+case = cache(case)
 
 
 def run(machine: Any, settings: Settings, trajectory: Trajectory, spheres: Any = ()) -> Run:
@@ -79,10 +92,43 @@ def test_2_jacobian() -> None:
     np.testing.assert_allclose(hermies().jacobian(BENT), J, atol=1e-6)
 
 
+def formula(q: np.ndarray) -> np.ndarray:
+    """Positions of the tool of HERMIES by the closed form, for many configurations [count, 7]; theirs by the tool's
+    place along the hand.
+    """
+    shoulder, upper, forearm, hand = 0.356, 0.635, 0.508, 0.343 + 0.029
+    s1, s2, s3, _, _, s6 = np.sin(q[:, :6]).T
+    c1, c2, c3, c4, _, c6 = np.cos(q[:, :6]).T
+    s45, c45 = np.sin(q[:, 3] + q[:, 4]), np.cos(q[:, 3] + q[:, 4])
+    zz, ww = hand * c45 * s6 + forearm * c4, hand * s45 * s6 + forearm * np.sin(q[:, 3]) - upper
+    a, b = c3 * zz + hand * s3 * c6, -s3 * zz + hand * c3 * c6 + shoulder
+    reach = c2 * a - s2 * ww
+    return np.stack((s1 * b + c1 * reach, -c1 * b + s1 * reach, s2 * a + c2 * ww), axis=1)
+
+
+@pytest.mark.parametrize("base", ["none", "holonomic"])
+def test_2_a_thousand_configurations_by_the_closed_form(base: str) -> None:
+    machine, rng, step = hermies(base), np.random.default_rng(1), 1e-6
+    q = rng.uniform(-np.pi, np.pi, (1000, machine.joints))
+
+    def tool(q: np.ndarray) -> np.ndarray:
+        p = formula(q)
+        if base == "none":
+            return p
+        p = p + [-0.61, 0.0, 0.3]
+        x, y, s, c = *q[:, 7:9].T, np.sin(q[:, 9]), np.cos(q[:, 9])
+        return np.stack((x + c * p[:, 0] - s * p[:, 1], y + s * p[:, 0] + c * p[:, 1], p[:, 2]), axis=1)
+
+    J = np.array([machine.jacobian(one)[:3] for one in q])
+    np.testing.assert_allclose([machine.place(one)[0] for one in q], tool(q), atol=1e-12)
+    for k, e in enumerate(step * np.eye(machine.joints)):
+        np.testing.assert_allclose(J[:, :, k], (tool(q + e) - tool(q - e)) / (2 * step), atol=1e-8)
+
+
 @pytest.mark.parametrize("machine", [hermies(), hermies("holonomic"), airarm("holonomic"), planar()])
 def test_2_jacobians_are_derivatives(machine: Any) -> None:
     rng, step = np.random.default_rng(2), 1e-6
-    for _ in range(60):
+    for _ in range(15):
         q = rng.uniform(-1, 1, machine.joints)
         J, (_, R) = machine.jacobian(q), machine.place(q)
         for k, e in enumerate(np.eye(machine.joints)):
@@ -108,7 +154,7 @@ def test_2_jacobians_are_derivatives(machine: Any) -> None:
 )
 def test_3_printed_norms(trajectory: str, config: str, count: int) -> None:
     """With the two defects 445 printed values at their noise floor; without them tracking is 5 to 15 times tighter."""
-    as_printed, consistent = (case(trajectory, config, legacy=legacy) for legacy in (True, False))
+    as_printed, consistent = (once(trajectory, config, legacy=legacy) for legacy in (True, False))
     off = differences(as_printed, trajectory, config)
     assert len(off) == count
     assert rms(off) < 3e-4
@@ -128,16 +174,25 @@ def test_3_printed_norms(trajectory: str, config: str, count: int) -> None:
     ],
 )
 def test_3_first_and_last_printed_norm(trajectory: str, config: str, first: float, last: float) -> None:
-    found = case(trajectory, config).norms
+    found = once(trajectory, config).norms
     assert found[0] == pytest.approx(first, rel=1e-3)
     assert found[-1] == pytest.approx(last, rel=1e-3)
     assert printed()[trajectory, config].fsp[0] == first
 
 
+@pytest.mark.parametrize(("rows", "joints"), [(2, 4), (3, 4), (3, 7), (6, 7), (3, 10), (6, 10)])
+def test_4_random_jacobians(rows: int, joints: int) -> None:
+    rng = np.random.default_rng(rows * joints)
+    for _ in range(5):
+        J, x = rng.normal(size=(rows, joints)), rng.normal(size=rows)
+        for make in (blocked, orthogonal):
+            np.testing.assert_allclose(best(make(J, x)).v, np.linalg.pinv(J) @ x, atol=1e-9)
+
+
 @pytest.mark.parametrize("config", ["3x7", "3x10"])
 def test_4_fsp_is_the_pseudo_inverse(config: str) -> None:
     """Printed: to 1e-5 of the norms; here the steps to 1e-9."""
-    one, other = (case("1", config, method=method) for method in (Method.FSP, Method.PSEUDO_INVERSE))
+    one, other = (once("1", config, method=method) for method in (Method.FSP, Method.PSEUDO_INVERSE))
     np.testing.assert_allclose(one.q, other.q, atol=1e-9)
     table = printed()["1", config]
     both = np.isfinite(table.fsp) & np.isfinite(table.pseudo_inverse)
@@ -152,18 +207,18 @@ def test_4_fsp_is_the_pseudo_inverse(config: str) -> None:
         ("1", "6x7", 191, 4e-5, {"misread": 1}),
         ("1", "6x10", 74, 3e-5, {}),
         ("2", "3x7", 159, 1e-4, {}),
-        ("2", "3x10", 230, 1.1e-4, {"up and down": 2}),
+        ("2", "3x10", 230, 1.1e-4, {"given back": 2}),
         ("2", "6x7", 166, 4e-5, {"misread": 1}),
-        ("2", "6x10", 232, 3e-5, {"misread": 1, "up and down": 2}),
+        ("2", "6x10", 232, 3e-5, {"misread": 1, "given back": 2}),
         ("3", "3x7", 118, 1.2e-4, {}),
         ("3", "3x10", 61, 1e-4, {}),
-        ("3", "6x7", 241, 7e-5, {"misread": 1, "up and down": 29, "unexplained": 7}),
-        ("3", "6x10", 235, 4e-5, {"misread": 3, "up and down": 7, "unexplained": 4}),
+        ("3", "6x7", 241, 7e-5, {"misread": 1, "given back": 36}),
+        ("3", "6x10", 235, 4e-5, {"misread": 3, "given back": 7, "numbered 4 on": 4}),
     ],
 )
 def test_3_all_printed_norms(trajectory: str, config: str, count: int, median: float, differ: dict[str, int]) -> None:
     """All 1973, from joints in whole degrees at both ends; every one within 1e-3 or of the reason that stands here."""
-    run = case(trajectory, config)
+    run = once(trajectory, config)
     off = differences(run, trajectory, config)
     assert (len(off), np.median(np.abs(off)) < median) == (count, True)
     assert Counter(row[-1] for row in unmatched(run, trajectory, config)) == differ
@@ -184,8 +239,24 @@ def test_3_other_whole_degrees_do_not_give_the_norms() -> None:
 def test_5_four_vectors_where_six_joints_act() -> None:
     machine = hermies()
     for make in (blocked, orthogonal):
-        space = make(machine.jacobian(BENT)[:3], [0.01, 0.0, 0.0])
+        J = machine.jacobian(BENT)[:3]
+        space = make(J, [0.01, 0.0, 0.0])
         assert (space.span, space.idle) == (4, (6,))
+        np.testing.assert_allclose(J @ space.vectors.T, np.tile([[0.01], [0.0], [0.0]], 4), atol=1e-12)
+        t = np.array([0.7, -1.3, 2.0, -0.4])
+        np.testing.assert_allclose(J @ space.at(t), [0.01, 0.0, 0.0], atol=1e-12)
+        np.testing.assert_allclose(J @ space.at(t - 0.25), 0.0, atol=1e-12)
+        other = best(space, rows=[joint_row("joint 2", 1, 7, 0.3)]).v
+        assert space.coordinates(other)[1] < 1e-12
+
+
+def test_6_least_norm_in_one_shot() -> None:
+    """The extraction lists no numbers 6 and 9: here least norm, and the second step."""
+    J = hermies().jacobian(BENT)[:3]
+    for make in (blocked, orthogonal):
+        space = make(J, [0.01, 0.0, 0.0])
+        for v in (best(space).v, space.at(parametric(space))):
+            np.testing.assert_allclose(v, np.linalg.pinv(J) @ [0.01, 0.0, 0.0], atol=1e-12)
 
 
 def test_7_joint_limit_in_one_shot() -> None:
@@ -206,8 +277,8 @@ def home_step(settings: Settings, spheres: Any = FOREARM) -> np.ndarray:
 
 def test_8_obstacle_in_one_shot_and_10_as_an_inequality() -> None:
     machine = hermies()
-    deepest = min(intrusions(machine, machine.home, np.array(FOREARM)), key=lambda one: one[0])
-    gap, link, point, normal, _ = deepest
+    deepest = min(gaps(machine, machine.home, np.array(FOREARM)), key=lambda one: one.size)
+    gap, link, point, normal = deepest.size, deepest.link, deepest.point, deepest.normal
     assert (gap, link) == (pytest.approx(-0.025, abs=1e-12), 2)
     np.testing.assert_allclose(point, [-0.40, -0.356, 0.635], atol=1e-12)
     np.testing.assert_allclose(normal, [0, 0, 1], atol=1e-12)
@@ -222,6 +293,22 @@ def test_8_obstacle_in_one_shot_and_10_as_an_inequality() -> None:
     np.testing.assert_allclose(home_step(Settings(Method.OBSTACLES, resolver="stack")), wanted, atol=1e-5)
     far = [(-0.40, -0.356, 0.40, 0.08)]
     np.testing.assert_allclose(home_step(Settings(Method.OBSTACLES, resolver="stack"), far), free, atol=1e-8)
+
+
+def test_9_the_second_step_is_self_motion() -> None:
+    """Two steps: the least norm, then self-motion by the null-space form, which the tool does not feel."""
+    machine = hermies()
+    J = machine.jacobian(BENT)[:3]
+    for make in (blocked, orthogonal):
+        first = best(make(J, [0.01, 0.0, 0.0])).v
+        space, back = make(J, [0.01, 0.0, 0.0]), joint_row("joint 4", 3, 7, -0.002 - first[3])
+        second = space.at(parametric(space, [back], null=True))
+        np.testing.assert_allclose(second, best(make(J, np.zeros(3)), rows=[back]).v, atol=1e-12)
+        np.testing.assert_allclose(J @ second, 0.0, atol=1e-12)
+        assert (first + second)[3] == pytest.approx(-0.002, abs=1e-12)
+    # In one shot the same, here: least norm and its correction are across each other
+    one = best(orthogonal(J, [0.01, 0.0, 0.0]), rows=[joint_row("joint 4", 3, 7, -0.002)]).v
+    np.testing.assert_allclose(first + second, one, atol=1e-12)
 
 
 def test_11_many_constraints() -> None:
@@ -245,6 +332,24 @@ def test_11_many_constraints() -> None:
     assert run(machine, Settings(Method.BOTH), straight(machine, LINE, 3), six).stop is Stop.DONE
 
 
+@pytest.mark.parametrize("make", [blocked, orthogonal])
+def test_12_rank_loss(make: Any) -> None:
+    J = hermies().jacobian(BENT)
+    twice, x = np.vstack((J[:3], J[:1])), np.array([0.01, -0.02, 0.005, 0.01])
+    space = make(twice, x)
+    assert (space.rank, str(space.status)) == (3, "dependent rows")
+    np.testing.assert_allclose(best(space).v, np.linalg.pinv(J[:3]) @ x[:3], atol=1e-12)
+    with pytest.raises(InfeasibleError, match="contradict each other"):
+        make(twice, x + [0, 0, 0, 0.01])
+    near = make(twice, x + [0, 0, 0, 0.01], project=True)
+    assert (str(near.status), near.missed) == ("inconsistent", pytest.approx(0.005))
+    np.testing.assert_allclose(best(near).v, np.linalg.pinv(J[:3]) @ (x[:3] + [0.005, 0, 0]), atol=1e-12)
+    empty = make(np.vstack((J[:3], np.zeros(7))), [*x[:3], 0.0])
+    np.testing.assert_allclose(best(empty).v, best(space).v, atol=1e-12)
+    assert not np.any(best(make(J[:3], np.zeros(3))).v)
+    assert not np.any(make(J[:3], x[:3]).vectors[:, 6])
+
+
 def test_12_rank_loss_does_not_stop_the_driver() -> None:
     """The arm stretched out: no step outwards, and a reason that says so."""
     machine = planar()
@@ -259,27 +364,25 @@ def test_12_rank_loss_does_not_stop_the_driver() -> None:
     np.testing.assert_array_equal(run(machine, Settings(rows=("x", "y")), still).norms, 0.0)
 
 
-def through_a_singularity() -> tuple[Any, Trajectory]:
-    """Trajectory 3 with its turn: near a singularity at step 89, a printed norm of 27 deg^2."""
-    machine = hermies()
-    step, turn = (0.00251716, 0.00050234, -0.00371982), (-0.01130479, 0.00264447, 0.01750863)
-    return machine, straight(machine, step, 241, turn=turn)
+def test_13_printed_singularity_with_and_without_a_limit_of_steps() -> None:
+    """Printed: 1471.66 deg^2 at step 189 of 234, 38.4 degrees in one step, from which FSP and the pseudo-inverse
+    differ by 1e-4 at most.
+    """
+    wild, plain = (once("2", "6x7", method=method) for method in (Method.FSP, Method.PSEUDO_INVERSE))
+    assert (wild.norms.argmax() + 1, wild.norms.max()) == (189, pytest.approx(1471.66, rel=1e-3))
+    assert math.sqrt(wild.norms.max()) == pytest.approx(38.4, abs=0.1)
+    np.testing.assert_allclose(wild.norms, plain.norms, rtol=1e-4)
 
 
-@pytest.mark.parametrize("resolver", ["fsp", "pseudo_inverse", "stack"])
-def test_13_a_step_limit_holds_near_a_singularity(resolver: str) -> None:
-    """Printed: norms to 1471.66 deg^2, 38.4 degrees in one step, on a path that is not known. This one has more."""
-    machine, path = through_a_singularity()
-    limit = math.radians(2.0)
-    wild = run(machine, Settings(rows=AXES), path)
-    assert np.abs(np.diff(wild.q, axis=0)).max() > math.radians(38.4)
-    damping = 0.0 if resolver == "stack" else 0.1
-    found = run(machine, Settings(rows=AXES, resolver=resolver, step_limit=limit, damping=damping), path)
+@pytest.mark.parametrize("way", [{}, {"damping": 0.05}, {"resolver": "pseudo_inverse"}, {"resolver": "stack"}])
+def test_13_a_step_limit_holds_near_a_singularity(way: dict[str, Any]) -> None:
+    limit = math.radians(5.0)
+    found = case("2", "6x7", legacy=False, step_limit=limit, **way)
     assert found.stop is Stop.DONE
     assert np.abs(np.diff(found.q, axis=0)).max() < limit * (1 + 1e-6)
     # The tracking recovers
-    assert found.errors.max() > 0.01
-    assert found.errors[-1] < 2e-3
+    assert found.errors.max() > 0.1
+    assert found.errors[-1] < 3e-4
 
 
 def test_14_airarm() -> None:
@@ -359,6 +462,32 @@ def test_17_feedback() -> None:
     assert closed.errors[-1] < 1e-4
     assert closed.errors[-1] == pytest.approx(1.4e-5, rel=0.2)
     assert open_.errors[-1] > 20 * closed.errors[-1]
+
+
+def test_18_how_often_a_space_is_made(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Printed times: one shot costs the same with constraints and without; two steps 1.83 of it, with constraints at
+    80 % of the steps 1.57. Here what they count: a space a step, and two where the second step has something to do.
+    """
+    made = 0
+
+    def counted(*given: Any, **named: Any) -> Any:
+        nonlocal made
+        made += 1
+        return blocked(*given, **named)
+
+    monkeypatch.setattr(wbc.published.ikor.driver, "blocked", counted)
+    machine, path = hermies(), straight(hermies(), LINE, 40)
+    free = run(machine, Settings(), path).q
+    assert made == 40
+    upper = machine.upper.copy()
+    # Broken at every step after the tenth
+    upper[3] = free[10, 3]
+    for two_step in (False, True):
+        made = 0
+        found = run(replace(machine, upper=upper), Settings(Method.LIMITS, two_step=two_step), path)
+        acted = sum(map(bool, found.acted))
+        assert acted > (20 if two_step else 10)
+        assert made == 40 + two_step * acted
 
 
 def test_19_files_there_and_back(tmp_path: Path) -> None:
@@ -450,6 +579,9 @@ def test_19_bad_lines_of_a_robot_file(change: Any, line: int, value: str, tmp_pa
         ("0 180 0 0 0 90 0\n1.5\n0 0 0\n", 2, "1.5"),
         ("0 180 0 0 0 90 0\n1\n0 0 0\n1 1 1\n", 4, "1 1 1"),
         ("", 1, ""),
+        ("0 180 0 0 0 90 0\n--1\n0 0 0\n", 2, "--1"),
+        ("0 180 0 0 0 90 0\n1\n0 0 1_0\n", 3, "1_0"),
+        ("0 180 0 0 0 90 0\n1\n0 0 1e400\n", 3, "1e400"),
     ],
 )
 def test_19_bad_lines_of_a_trajectory(text: str, line: int, value: str, tmp_path: Path) -> None:
@@ -458,6 +590,15 @@ def test_19_bad_lines_of_a_trajectory(text: str, line: int, value: str, tmp_path
     with pytest.raises(IkorFileError) as caught:
         ikor_files.read_trajectory(file, hermies())
     assert (caught.value.field, caught.value.value) == (f"TrajectoryPts:{line}", value)
+
+
+@pytest.mark.parametrize(("head", "line"), [("2.7 3", 1), ("0 3", 1), ("2", 1), ("-1 3", 1), ("3 3", 4), ("1 3", 3)])
+def test_19_bad_jacobians(head: str, line: int, tmp_path: Path) -> None:
+    file = tmp_path / "FSP_data"
+    file.write_text(f"{head}\n1 0 0\n0 1 1\n0.5\n0.25\n")
+    with pytest.raises(IkorFileError) as caught:
+        ikor_files.read_jacobian(file)
+    assert caught.value.field == f"FSP_data:{line}"
 
 
 def test_19_codes(tmp_path: Path) -> None:
@@ -491,6 +632,89 @@ def test_21_a_line_in_published_increments() -> None:
     np.testing.assert_allclose(turned.points[-1], place + [0.1, 0.0, -0.05], atol=1e-12)
     np.testing.assert_allclose(turned.euler[-1] - turned.euler[-2], np.radians([0.0, 1.0, 0.25]), atol=1e-9)
     assert run(machine, Settings(rows=AXES), turned).errors[-1] < 1e-3
+
+
+class Hand:
+    """An operator: rates for some ticks, then others."""
+
+    def __init__(self, *orders: tuple[int, Any]) -> None:
+        self.orders = [order for count, order in orders for _ in range(count)]
+
+    def order(self, time: float, names: Any, active: str, units: Any) -> Any:
+        if not self.orders:
+            raise StopIteration
+        assert active in names
+        assert len(units) == 6
+        return self.orders.pop(0)
+
+
+@pytest.mark.parametrize("resolver", ["fsp", "pseudo_inverse"])
+def test_21_tool_and_base_by_an_operators_rates(resolver: str) -> None:
+    """Button on: x, y, z and yaw, pitch, roll of the tool; off: x, y, z of the tool and x, y, turn of the platform."""
+    machine = hermies("holonomic")
+    q0 = np.concatenate((BENT, np.zeros(3)))
+    tool, base = (0.05, 0.0, -0.05, 0.1, 0.0, 0.2), (0.0, 0.02, 0.0, 0.1, -0.05, 0.1)
+    hand = Hand((25, Order(tool)), (25, Order(base, pair="base")), (25, Order(stop=True)))
+    found = Driver(machine, Settings(resolver=resolver)).operate(hand, q0)
+    assert (found.stop, len(found.norms)) == (Stop.DONE, 75)
+    places = [machine.place(q) for q in found.q]
+    moved = [places[50][0] - places[0][0], places[25][0] - places[0][0]]
+    np.testing.assert_allclose(moved, [[0.025, 0.01, -0.025], [0.025, 0.0, -0.025]], atol=5e-4)
+    turn = euler_angles(places[25][1]) - euler_angles(places[0][1])
+    np.testing.assert_allclose(turn, [0.05, 0.0, 0.1], atol=1e-3)
+    np.testing.assert_allclose(found.q[50, 7:] - found.q[25, 7:], [0.05, -0.025, 0.05], atol=1e-9)
+    np.testing.assert_allclose(found.q[75] - found.q[52], 0.0, atol=1e-6)
+
+
+def test_21_operators_are_checked() -> None:
+    fixed = Driver(hermies())
+    with pytest.raises(UnknownNameError, match="base"):
+        fixed.operate(Hand((1, Order((), pair="base"))))
+    with pytest.raises(RangeError, match="operator"):
+        Driver(airarm(), Settings(resolver="stack")).operate(Hand())
+    assert len(fixed.operate(Hand((1000, Order())), seconds=0.1).norms) == 5
+
+    class Interrupted(Hand):
+        def order(self, *given: Any) -> Any:
+            if time_of(given) > 0.05:
+                raise KeyboardInterrupt
+            return Order((0.01,))
+
+    def time_of(given: Any) -> float:
+        return float(given[0])
+
+    found = fixed.operate(Interrupted())
+    assert (found.stop, found.code, len(found.norms)) == (Stop.INTERRUPTED, Code.PARTIAL, 3)
+
+
+@pytest.mark.parametrize("kind", ["gif", "html"])
+def test_21_films(kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A film to look at, and a page that plays, steps and scrubs."""
+    monkeypatch.setattr(film, "MOST", 3)
+    machine = hermies("holonomic")
+    found = run(machine, Settings(), straight(machine, LINE, 6))
+    made = film.save_film(machine, found, np.array(FOREARM), tmp_path / f"film.{kind}")
+    if kind == "gif":
+        with Image.open(made) as pictures:
+            assert pictures.n_frames == 3
+    else:
+        page = made.read_text()
+        assert all(word in page for word in ('type="range"', "next_frame", "play"))
+    with pytest.raises(UnknownNameError):
+        film.save_film(machine, found, np.array(FOREARM), tmp_path / "film.mov")
+
+
+def test_criteria_of_ones_own() -> None:
+    """Joint 2 dear: it moves less, and the tool as before."""
+    machine, weight = hermies(), np.ones(7)
+    weight[1] = 100.0
+    plain, dear = (
+        run(machine, s, straight(machine, LINE, 30)) for s in (Settings(), Settings(criterion=Criterion(weight)))
+    )
+    assert abs(dear.q[-1, 1] - machine.home[1]) < 0.2 * abs(plain.q[-1, 1] - machine.home[1])
+    assert dear.errors[-1] < 1e-4
+    with pytest.raises(RangeError, match="criterion"):
+        Settings(resolver="stack", criterion=Criterion(weight))
 
 
 def test_weights_set_the_platform_against_the_arm() -> None:
@@ -532,6 +756,10 @@ def test_random_settings_end_with_a_reason() -> None:
             step_limit=(math.inf, 0.05)[rng.integers(2)],
             loop_back=bool(rng.random() < 0.3),
         )
+        if settings.plain and machine.base == "car":
+            with pytest.raises(RangeError, match="steering"):
+                Driver(machine, settings)
+            continue
         points = machine.points(machine.home)
         count = int(rng.integers(0, 8))
         middle = points[rng.integers(len(points), size=count)] + rng.normal(size=(count, 3)) * 0.2
@@ -606,26 +834,35 @@ def test_limit_runs_keep_within_where_the_published_method_went_out() -> None:
     assert over["stack"] < 1e-9
 
 
-def test_loop_back_goes_on_with_a_joint_held() -> None:
-    machine, path = through_a_singularity()
-    limit = math.radians(2.0)
-    found = run(machine, Settings(rows=AXES, step_limit=limit, loop_back=True), path)
-    assert found.loops >= 1
-    assert np.isfinite(found.q).all()
-    assert np.abs(np.diff(found.q, axis=0)).max() <= limit * (1 + 1e-9)
+def test_loop_back_never_misses_more_and_sometimes_less() -> None:
+    """A planar arm of three joints that comes out of its stretched posture: with one joint at rest some paths pass."""
+    machine, gained = planar((0.4, 0.3, 0.3)), 0
+    for seed in range(5):
+        rng = np.random.default_rng(seed)
+        start = np.array([rng.uniform(-1, 1), *rng.uniform(-0.02, 0.02, 2)])
+        turn = rng.uniform(-0.02, 0.02)
+        path = straight(machine, (-0.004 * math.cos(turn), -0.004 * math.sin(turn), 0.0), 60, start)
+        for limit in (0.02, 0.05):
+            settings = Settings(rows=("x", "y"), step_limit=limit)
+            plain, back = (run(machine, replace(settings, loop_back=b), path) for b in (False, True))
+            assert np.abs(np.diff(back.q, axis=0)).max(initial=0.0) <= limit * (1 + 1e-9)
+            assert len(back.norms) == len(plain.norms)
+            gained += back.loops > 0
+    assert gained > 0
 
 
 def test_damping_makes_short_steps() -> None:
-    machine, path = through_a_singularity()
-    plain, damped = (run(machine, Settings(rows=AXES, damping=d), path) for d in (0.0, 0.1))
-    assert damped.norms.max() < 0.5 * plain.norms.max()
+    plain, damped = (once("2", "6x7", damping=d) for d in (0.0, 0.1))
+    assert damped.norms.max() < 0.4 * plain.norms.max()
+    assert damped.errors[-1] < 2e-3
 
 
 def test_a_sphere_centred_on_a_link_has_a_way_out() -> None:
     machine = hermies()
     points = machine.points(machine.home)
     centre = 0.5 * (points[2] + points[3])
-    gap, _, _, normal, _ = min(intrusions(machine, machine.home, np.array([[*centre, 0.05]])), key=lambda one: one[0])
+    deepest = min(gaps(machine, machine.home, np.array([[*centre, 0.05]])), key=lambda one: one.size)
+    gap, normal = deepest.size, deepest.normal
     assert gap == -0.05
     assert np.linalg.norm(normal) == pytest.approx(1.0)
     assert normal @ (points[3] - points[2]) == pytest.approx(0.0, abs=1e-12)
@@ -650,6 +887,8 @@ def test_euler_angles_are_those_of_their_rotation(angles: Any) -> None:
         (lambda: hermies("boat"), UnknownNameError),
         (lambda: hermies(links=(1.0, 2.0)), WbcError),
         (lambda: Driver(hermies("car"), Settings(resolver="stack")), RangeError),
+        (lambda: Driver(hermies("car"), Settings(resolver="pseudo_inverse")), RangeError),
+        (lambda: case("1", "3x7", resolver="stack"), RangeError),
         (lambda: Driver(hermies(), Settings(resolver="stack", rows=("x", "y", "z", "yaw"))), RangeError),
         (lambda: case("4", "3x7"), UnknownNameError),
         (lambda: case("1", "3x8"), UnknownNameError),

@@ -49,7 +49,7 @@ def least(qp: QP, order: np.ndarray, level: int, slack: np.ndarray) -> float:
     return float(np.linalg.norm(found.fun[held.size :]))
 
 
-@settings(max_examples=50)
+@settings(max_examples=25)
 @given(st.integers(0, 10**6))
 def test_a_class_is_violated_no_more_than_it_must(seed):
     qp, order = problem(seed, conflict=True)

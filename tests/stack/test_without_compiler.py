@@ -7,47 +7,45 @@ import os
 import pathlib
 import subprocess
 import sys
+from collections.abc import Callable, Iterator
+from typing import Any
 
 import numpy as np
 import pytest
 
 from tests.stack import small
+from tests.stack.fallback import found
+from wbc.native import toolchain
 
 ROOT = pathlib.Path(__file__).parents[2]
-
-#: Compiles three stacks, two of them alike but for a weight; prints what came out, with every log record
-SCRIPT = """
-import json, logging, sys
-records = []
-class Keep(logging.Handler):
-    def emit(self, record):
-        records.append([record.name, record.levelname, record.getMessage()])
-logging.getLogger().addHandler(Keep())
-import wbc
-imported = list(records)
-from tests.stack import small
-made = [small.stack().compile(), small.stack(gain=3.0).compile(), small.stack(small.arm(length=0.6)).compile()]
-small.command(made[1])
-try:
-    small.stack().compile(backend="native")
-    refused = None
-except wbc.errors.CompileError as error:
-    refused = [error.field, str(error)]
-print(json.dumps({
-    "imported": imported,
-    "records": records,
-    "backends": [c.backend for c in made],
-    "commands": [small.command(made[0]), small.command(made[2])],
-    "refused": refused,
-}))
-"""
+Here = Callable[..., dict[str, Any]]
 
 
-def run(cache: pathlib.Path, **environment: str) -> dict[str, object]:
-    """What the script prints in a process of its own."""
+@pytest.fixture
+def here(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., dict[str, Any]]]:
+    """What :mod:`tests.stack.fallback` finds in this process, which forgets what it knows of its compiler."""
+    known = (toolchain.compiler, toolchain.missing, toolchain.fall_back)
+
+    def run(cache: pathlib.Path, **environment: str) -> dict[str, Any]:
+        monkeypatch.delenv("WBC_CC", raising=False)
+        for name, value in {"WBC_CACHE": str(cache), **environment}.items():
+            monkeypatch.setenv(name, value)
+        for each in known:
+            each.cache_clear()
+        monkeypatch.setattr(toolchain, "identity", toolchain.identity.__wrapped__)
+        return found()
+
+    yield run
+    monkeypatch.undo()
+    for each in known:
+        each.cache_clear()
+
+
+def in_a_process(cache: pathlib.Path, **environment: str) -> dict[str, Any]:
+    """The same in a process of its own, in which importing says nothing."""
     unchosen = {k: v for k, v in os.environ.items() if k != "WBC_CC"}
     done = subprocess.run(
-        [sys.executable, "-c", SCRIPT],
+        [sys.executable, "-m", "tests.stack.fallback"],
         cwd=ROOT,
         env={**unchosen, "WBC_CACHE": str(cache), **environment},
         capture_output=True,
@@ -55,7 +53,7 @@ def run(cache: pathlib.Path, **environment: str) -> dict[str, object]:
         check=False,
     )
     assert done.returncode == 0, done.stderr
-    return json.loads(done.stdout)
+    return dict(json.loads(done.stdout))
 
 
 @pytest.fixture(scope="module")
@@ -66,33 +64,33 @@ def native() -> list[list[float]]:
     return [small.command(c) for c in made]
 
 
-def check(found: dict[str, object], native: list[list[float]], *texts: str) -> None:
+def check(told: dict[str, object], native: list[list[float]], *texts: str) -> None:
     """All on the virtual machine, the same answers, and one warning that says these texts."""
-    assert found["imported"] == [], "import alone says nothing"
-    assert found["backends"] == ["vm"] * 3
-    assert np.abs(np.subtract(found["commands"], native)).max() < 1e-9
-    assert [record[:2] for record in found["records"]] == [["wbc", "WARNING"]]
+    assert told["imported"] == [], "import alone says nothing"
+    assert told["backends"] == ["vm"] * 3
+    assert np.abs(np.subtract(told["commands"], native)).max() < 1e-9
+    assert [record[:2] for record in told["records"]] == [["wbc", "WARNING"]]
     for text in (*texts, "virtual machine"):
-        assert text in found["records"][0][2]
+        assert text in told["records"][0][2]
 
 
 def test_no_compiler(tmp_path: pathlib.Path, native: list[list[float]]) -> None:
-    found = run(tmp_path, WBC_CC="")
-    check(found, native, "no C compiler")
-    field, text = found["refused"]
+    told = in_a_process(tmp_path, WBC_CC="")
+    check(told, native, "no C compiler")
+    field, text = told["refused"]
     assert field == "backend"
     assert "no C compiler" in text
     assert "daqp" not in text, "that is there"
 
 
-def test_compiler_that_does_not_exist(tmp_path: pathlib.Path, native: list[list[float]]) -> None:
-    found = run(tmp_path, WBC_CC="gcc-of-nowhere")
-    check(found, native, "no C compiler", "gcc-of-nowhere")
-    assert "gcc-of-nowhere" in found["refused"][1]
+def test_compiler_that_does_not_exist(tmp_path: pathlib.Path, native: list[list[float]], here: Here) -> None:
+    told = here(tmp_path, WBC_CC="gcc-of-nowhere")
+    check(told, native, "no C compiler", "gcc-of-nowhere")
+    assert "gcc-of-nowhere" in told["refused"][1]
 
 
-def test_no_compiler_on_the_path(tmp_path: pathlib.Path, native: list[list[float]]) -> None:
-    check(run(tmp_path, PATH=str(tmp_path)), native, "neither gcc nor cc")
+def test_no_compiler_on_the_path(tmp_path: pathlib.Path, native: list[list[float]], here: Here) -> None:
+    check(here(tmp_path, PATH=str(tmp_path)), native, "neither gcc nor cc")
 
 
 @pytest.mark.parametrize(
@@ -109,15 +107,15 @@ def test_no_compiler_on_the_path(tmp_path: pathlib.Path, native: list[list[float
     ],
 )
 def test_compiler_that_fails(
-    script: str, texts: tuple[str, ...], tmp_path: pathlib.Path, native: list[list[float]]
+    script: str, texts: tuple[str, ...], tmp_path: pathlib.Path, native: list[list[float]], here: Here
 ) -> None:
     compiler = tmp_path / "broken-cc"
     compiler.write_text(script)
     compiler.chmod(0o755)
-    found = run(tmp_path / "cache", WBC_CC=str(compiler))
-    check(found, native, *texts, str(compiler))
-    assert "cc: fatal 5" not in found["records"][0][2], "the first lines only"
-    field, text = found["refused"]
+    told = here(tmp_path / "cache", WBC_CC=str(compiler))
+    check(told, native, *texts, str(compiler))
+    assert "cc: fatal 5" not in told["records"][0][2], "the first lines only"
+    field, text = told["refused"]
     assert field == "compiler"
     for said in texts:
         assert said in text
@@ -125,23 +123,11 @@ def test_compiler_that_fails(
     assert len(left) == 2, "two entries for the virtual machine, nothing of the failed builds"
 
 
-def test_casadi_without_the_solver_library(tmp_path: pathlib.Path) -> None:
+def test_casadi_without_the_solver_library(tmp_path: pathlib.Path, here: Here, monkeypatch: pytest.MonkeyPatch) -> None:
     """A compiler alone is not enough."""
-    script = (
-        "import pathlib, wbc\nfrom wbc.native import toolchain\n"
-        "toolchain.library = lambda: pathlib.Path('/nowhere.a')\n"
-        "from tests.stack import small\nc = small.stack().compile()\nassert c.backend == 'vm'\n"
-        "try:\n    small.stack().compile(backend='native')\n"
-        "except wbc.errors.CompileError as error:\n    print(error)\n"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", script],
-        cwd=ROOT,
-        env={**os.environ, "WBC_CACHE": str(tmp_path)},
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    assert "no static daqp library" in done.stdout
-    assert "no C compiler" not in done.stdout
-    assert done.stderr.count("virtual machine") == 1
+    monkeypatch.setattr(toolchain, "library", lambda: pathlib.Path("/nowhere.a"))
+    told = here(tmp_path)
+    assert told["backends"] == ["vm"] * 3
+    assert "no static daqp library" in told["refused"][1]
+    assert "no C compiler" not in told["refused"][1]
+    assert len([text for _, _, text in told["records"] if "virtual machine" in text]) == 1

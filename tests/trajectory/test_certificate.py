@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,7 @@ from wbc.trajectory.laws.certificate import ORDERS, LawPieces
 seeds = st.integers(0, 2**32 - 1)
 
 
-def ratios(law: Law, count: int = 20001) -> dict[str, float]:
+def ratios(law: Law, count: int = 8001) -> dict[str, float]:
     """The largest ratios among so many samples, both sides of every break among them."""
     pieces = LawPieces.of(law.path, law.timing)
     places = np.linspace(0.0, 1.0, count // len(pieces.start) + 1)
@@ -90,6 +91,7 @@ def test_smooth_laws_and_the_place_that_is_named(seed: int) -> None:
     assert law.certificate.satisfied == (law.certificate.ratio <= 1.0 + 1e-6)
 
 
+@cache
 def pose_laws() -> list[Law]:
     random = np.random.default_rng(3)
     poses = [pin.SE3(pin.exp3(0.6 * random.normal(size=3)), random.normal(size=3)) for _ in range(5)]

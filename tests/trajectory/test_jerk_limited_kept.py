@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from tests.repeats import repeats
 from wbc.errors import WbcError
 from wbc.trajectory import jerk_limited
 
@@ -50,7 +51,7 @@ def test_random_laws_are_kept_or_refused():
     """Moving ends, limits of sizes over three decades that differ by joint and lie close, all synchronisations."""
     rng = np.random.default_rng(5)
     laws = 0
-    while laws < 250:
+    while laws < repeats(100):
         n = int(rng.integers(1, 6))
         v, a, j = (10.0 ** rng.uniform(-1.5, 1.5, n) for _ in range(3))
         start, target = rng.normal(size=(2, n)) * 10.0 ** rng.uniform(-2, 2)

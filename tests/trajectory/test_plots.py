@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
+from PIL import Image
 
 from tests.published.via_walker import swing
 from tests.trajectory.random_laws import smooth
@@ -130,16 +131,22 @@ def test_orientations_do_not_jump_over_half_a_turn(figures: list[Figure]) -> Non
     assert np.abs(np.diff(quaternions, axis=1)).max() < 0.01
 
 
+@pytest.mark.usefixtures("as_users_get_them")
+def test_a_picture_as_users_get_it(tmp_path: FilePath) -> None:
+    trajectory.plot(poses(), tmp_path / "law.png")
+    with Image.open(tmp_path / "law.png") as picture:
+        assert picture.width > 1000
+        assert np.array(picture.convert("L"), dtype=float).std() > 10.0
+
+
 @pytest.mark.parametrize(
     "law",
     [
-        gentle(),
         smooth(0),
-        poses(),
         Law(trajectory.standing_path([1.0]), Timing.identity(1e-6)),
         Law(trajectory.standing_path(np.zeros(12)), Timing.identity(1.0)),
     ],
-    ids=["gentle", "smooth", "poses", "standing", "no limits"],
+    ids=["smooth", "standing", "no limits"],
 )
 def test_files_are_written(law: Law, tmp_path: FilePath) -> None:
     trajectory.plot(law, tmp_path / "law.png")

@@ -89,7 +89,7 @@ def test_an_honest_walk_passes(urdf: Path, roll: str | int, tilt: float) -> None
 def test_the_report_is_a_table_of_all_checks(urdf: Path, walk: Walk) -> None:
     good, bad = (check_walk(log, urdf, walk[1], FEW) for log in (walk[0], changed(walk[0], "v", (7, 3), 9.0)))
     assert str(good).splitlines()[0].startswith("the walk holds: 191 ticks, 381 samples, 1.90 s")
-    assert str(bad).splitlines()[0].startswith("2 of 28 checks are violated")
+    assert str(bad).splitlines()[0].startswith("2 of 33 checks are violated")
     line = next(line for line in str(bad).splitlines() if "joint rate / limit" in line)
     assert line.split() == ["joint", "rate", "/", "limit", "2.2617", "1", "0.070", "arm1_joint4", "1"]
     lines = str(good).splitlines()
@@ -125,10 +125,10 @@ def test_clearances_are_proven_between_ticks(urdf: Path, walk: Walk) -> None:
     assert np.isnan(check_walk(replace(log, t=times), urdf, ground, FEW)[SWEPT].worst)
 
 
-def test_jumps_of_the_bodys_velocity_are_observed(urdf: Path, walk: Walk) -> None:
+def test_jumps_of_the_bodys_velocity_are_found(urdf: Path, walk: Walk) -> None:
     """A body that moves by 0.5 mm and 0.5 mrad more a tick from one on."""
     log, ground = walk
-    assert all(finding.ok for finding in check_walk(log, urdf, ground, FEW).observed)
+    assert check_walk(log, urdf, ground, FEW).ok
     on = np.maximum(np.arange(len(log)) - 40.0, 0.0)
     pose = np.array(log.pose_body_in_structure)
     pose[:, 0] += 5e-4 * on
@@ -137,16 +137,36 @@ def test_jumps_of_the_bodys_velocity_are_observed(urdf: Path, walk: Walk) -> Non
         for row, k in zip(pose[:, 3:], on, strict=True)
     ]
     moved = replace(log, pose_body_in_structure=pose)
-    report = check_walk(moved, urdf, ground, FEW)
-    for kind in ("jump of the body's velocity", "jump of the body's turn rate"):
+    report, jumps = (
+        check_walk(moved, urdf, ground, FEW),
+        ("jump of the body's velocity", "jump of the body's turn rate"),
+    )
+    assert kinds(report) > set(jumps)
+    unheeded = check_walk(moved, urdf, ground, replace(FEW, observe=jumps))
+    assert kinds(unheeded) == kinds(report) - set(jumps)
+    assert {finding.kind for finding in unheeded.observed} == set(jumps)
+    with pytest.raises(UnknownNameError, match="observe"):
+        check_walk(log, urdf, ground, replace(FEW, observe=("jump",)))
+    for kind in jumps:
         found = report[kind]
-        assert found in report.observed
-        assert found not in report.findings
-        assert kind in str(report)
+        assert kind in str(unheeded)
         assert (found.time, found.where) == (pytest.approx(log.t[40]), "body")
         # Ticks of 10 ms, beside what the honest body does by itself
         assert found.worst == pytest.approx(0.05, abs=0.01)
-    assert kinds(report).isdisjoint(finding.kind for finding in report.observed)
+
+
+def test_joints_that_speed_up_faster_than_they_can(urdf: Path, walk: Walk) -> None:
+    log, ground = walk
+    steps = np.abs(np.diff(log.v, axis=0, prepend=np.zeros((1, log.v.shape[1])))) / log.dt
+    most = dict(zip(log.joints, steps.max(axis=0).tolist(), strict=True))
+    kind = "joint acceleration / limit"
+    assert np.isnan(check_walk(log, urdf, ground, FEW)[kind].worst)
+    limits = {name: max(most[name], 1e-3) for name in most}
+    assert check_walk(log, urdf, ground, replace(FEW, accelerations=limits)).ok
+    joint = max(most, key=lambda name: most[name])
+    found = check_walk(log, urdf, ground, replace(FEW, accelerations={**limits, joint: 0.5 * most[joint]}))[kind]
+    assert (found.worst, found.where) == (pytest.approx(2.0), joint)
+    assert not found.ok
 
 
 @pytest.mark.parametrize("joint", range(6))
@@ -321,7 +341,7 @@ def test_first_grasps_with_the_body_declared_fixed(urdf: Path, walk: Walk) -> No
 def test_a_hand_two_inches_in_the_surface(urdf: Path) -> None:
     log, ground = honest(lift=0.0)
     report = check_walk(log, urdf, ground, FEW)
-    assert kinds(report) == {STRUCTURE}
+    assert kinds(report) == {STRUCTURE, SWEPT_STRUCTURE}
     # The hand's capsule leans, and its lower end is a ball of 2 in about the surface
     assert report[STRUCTURE].worst == pytest.approx(-2 * 0.0254, abs=1e-4)
     assert report[STRUCTURE].where == "arm1_link6 and surface"
@@ -343,7 +363,7 @@ def test_links_two_inches_in_an_obstacle(urdf: Path, walk: Walk) -> None:
         place.translation[0] += (there.worst + 2 * 0.0254) * (-1.0 if there.worst > 0.0 else 0.0)
         pushed = Structure("obstacle", ground.holds, (Obstacle("tank", shape, place),), ground.surface)
         found = check_walk(log, urdf, pushed, FEW)
-        assert kinds(found) == {STRUCTURE}
+        assert kinds(found) == {STRUCTURE, SWEPT_STRUCTURE}
         assert found[STRUCTURE].where.endswith("and tank")
         assert found[STRUCTURE].worst < 0.0
     # Bodies that the capsule is within
@@ -351,7 +371,7 @@ def test_links_two_inches_in_an_obstacle(urdf: Path, walk: Walk) -> None:
     for larger in (Sphere(0.4), Cylinder(0.2, 0.8), block):
         around = Structure("obstacle", ground.holds, (Obstacle("tank", larger, place),), ground.surface)
         about = check_walk(log, urdf, around, FEW)
-        assert kinds(about) == {STRUCTURE}
+        assert kinds(about) == {STRUCTURE, SWEPT_STRUCTURE}
         assert about[STRUCTURE].where.endswith("and tank")
         assert about[STRUCTURE].worst < 0.0
 

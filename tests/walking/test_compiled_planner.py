@@ -7,17 +7,21 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
+from wbc.clearance import TriangleMesh
 from wbc.robots import Walker
-from wbc.walking import Structure, cylinder, plane
+from wbc.shapes import Box, Capsule, Cylinder, Sphere
+from wbc.walking import Obstacle, Structure, cylinder, plane
 from wbc.walking.body_path import BodyPath, grid_path
+from wbc.walking.holds.built_in import grid_pose
 from wbc.walking.native import compiled
+from wbc.walking.planner.around import around
 from wbc.walking.planner.grips.conflicts import ArmClearance
 from wbc.walking.planner.grips.table import Grips, find_grips
 from wbc.walking.planner.plan import Plan
 from wbc.walking.planner.planner import plan_walk
-from wbc.walking.planner.swings.clearance import SwingClearance
 from wbc.walking.planner.swings.curve import ALTERNATIVES
 from wbc.walking.planner.swings.least_time import speeds
 from wbc.walking.planner.swings.move import Chosen, Move, Swing
@@ -26,6 +30,21 @@ from wbc.walking.planner.swings.tracks import TrackRequests, Tracks, tracks
 
 Both = Callable[[Callable[[], Any]], tuple[Any, Any]]
 COUNT, N = 120, 25
+
+
+def shapes() -> tuple[Obstacle, ...]:
+    """One of each shape, among the holds of the path."""
+    corners = np.array([[1.0, 0, -0.7], [-1, 0, -0.7], [0, 1, 0.7], [0, -1, 0.7]]) * 0.15
+    mesh = TriangleMesh(corners[[[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]], solid=True)
+    kinds = Box((0.1, 0.2, 0.3)), Cylinder(0.06, 0.3), Capsule(0.05, 0.4), Sphere(0.1), mesh
+    where = [(11, 8), (12, 11), (14, 9), (15, 11.5), (12.5, 7)]
+    return tuple(
+        Obstacle(f"thing {k}", kind, grid_pose(*at, 2.7) * pin.SE3(pin.utils.rotate("x", 0.4), np.zeros(3)))
+        for k, (kind, at) in enumerate(zip(kinds, where, strict=True))
+    )
+
+
+SHAPES = shapes()
 
 
 @pytest.fixture(scope="module")
@@ -80,11 +99,12 @@ def test_swings_are_the_same(machine: Walker, structure: Structure, path: BodyPa
         fits = one.possible
         for name in ("duration", "samples", "points"):
             np.testing.assert_allclose(getattr(one, name)[fits], getattr(other, name)[fits], rtol=1e-9, atol=1e-9)
-        for what in (structure, plane()):
-            clear = SwingClearance(machine, what)
-            ends = np.stack([curve.begin, curve.end], axis=1)
-            bodies = path.blended(one.samples)
-            fast, slow = both(lambda c=clear, b=bodies, e=ends, p=one.points: c.structure(p, b, e))
+        ends, bodies = grips.hold[np.stack([asked.source, asked.target], axis=1)], path.blended(one.samples)
+        there = [structure, replace(plane(), holds=structure.holds), replace(structure, obstacles=SHAPES)]
+        for what in there[: 1 if which else 3]:
+            some = slice(0, 25 if what.obstacles else COUNT)
+            given = asked.arms[some], one.points[some], bodies[some], ends[some]
+            fast, slow = both(lambda w=what, g=given: around(machine, w).swings(*g))
             assert fast.tolist() == slow.tolist()
             found |= {("structure", x) for x in fast.tolist()}
         fast, slow = both(lambda t=one: arms.stay_clear(t.points, t.samples, others, 0.004))

@@ -8,6 +8,7 @@ import numpy as np
 import pinocchio as pin
 
 import wbc
+from tests.repeats import repeats
 from wbc.robots import Margins, Walker, WalkerData
 from wbc.validation import Array
 from wbc.walking import Structure
@@ -22,7 +23,7 @@ SPEED, TURN_RATE = 4 * INCH, 0.05
 #: A quarter of a grid unit, on the circle of the wrists the same angle: samples of either path
 STEP = {"diagonal": 0.25 * 9.25 * INCH / SPEED / 0.05, "turn": 0.25 * 9.25 / 30.0 / TURN_RATE / 0.05}
 #: Samples from solution to solution, and grips of a path that are looked at
-STRIDE, COUNT = 3, 15
+STRIDE, COUNT = 3, repeats(8)
 
 
 def tight() -> Walker:

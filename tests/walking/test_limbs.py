@@ -131,9 +131,12 @@ class NumericLimb:
     ) -> tuple[Array, np.ndarray]:
         """By damped least squares from postures ``[m, 6]``; without ``x`` joint 6 stays."""
         q, there = q.copy(), np.zeros(len(q), dtype=bool)
+        near = np.linalg.norm(points - self.pivot, axis=1) <= self.hand_span
         count = 6 if x is not None else 5
         for _ in range(steps):
-            left = np.nonzero(~there)[0]
+            left = np.nonzero(~there & near)[0]
+            if not len(left):
+                break
             frames = self.frames(q[left])
             hand, z, at = frames[:, 6], frames[:, :6, :3, 2], frames[:, :6, :3, 3]
             jacobian, error = np.cross(z, hand[:, None, :3, 3] - at), points[left] - hand[:, :3, 3]

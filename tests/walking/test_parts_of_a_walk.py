@@ -15,7 +15,7 @@ from wbc.robots import Walker
 from wbc.simulation import PlantError, PlantState
 from wbc.walking import Structure
 from wbc.walking.body_path import BodyPath, grid_path
-from wbc.walking.loop.body_command import RAMP, BodyMotion
+from wbc.walking.loop.body_command import BodyMotion
 from wbc.walking.loop.hands import TRIES, Hands
 from wbc.walking.loop.machine import Machine
 from wbc.walking.loop.progress import PlanProgress
@@ -95,7 +95,8 @@ def test_a_plan_is_carried_out_step_by_step(progress: PlanProgress, plan: Plan) 
     step = progress.step
     assert step is plan.regrasps[0]
     arm = progress.arm_of(step)
-    old, grip = progress.grip[arm], progress.lift(arm)
+    old, grip = progress.grip[arm], progress.next_grip(arm)
+    progress.lift(arm)
     assert grip == plan.chain[arm][1] != old
     assert progress.grip[arm] == old
     progress.land(Swinging(arm, 0, grip, plan.laws[0], 0.0))
@@ -124,7 +125,7 @@ def test_a_body_comes_to_rest_within_what_is_left(plan: Plan, left: float) -> No
         body.choose(10.0, 10.0, None, False)
         _, u = body.go(plan.path, u)
     assert body.pace == 1.0
-    end, paces = u + max(left, RAMP / 2 + 0.05), [1.0]
+    end, paces = u + max(left, Stops(DT).brake + 0.05), [1.0]
     for _ in range(400):
         body.choose(max(end - u, 0.0), max(end - u, 0.0), None, False)
         _, u = body.go(plan.path, u)
@@ -164,7 +165,7 @@ def test_hands_open_close_and_miss(standing: Machine) -> None:
     hands.open(1)
     assert [said[:2] for said in stack.said[-2:]] == [("release", 1), ("rest", 1)]
     law = SimpleNamespace(at=lambda _t: None, duration=1.0)
-    swinging = hands.send(1, (7, hold, -1), law, latch=0.02)  # type: ignore[arg-type]
+    swinging = hands.swinging = hands.going(1, (7, hold, -1), law, latch=0.02)  # type: ignore[arg-type]
     assert (hands.states()[1], hands.holds()[1]) == ("opening", hold)
     for _ in range(2):
         swinging.open_on(0.01)
@@ -177,6 +178,11 @@ def test_hands_open_close_and_miss(standing: Machine) -> None:
     standing.move(np.zeros(len(standing.v)))
     assert not hands.just_landed(1)
     hands.drop()
+    assert hands.swinging is swinging
+    assert swinging.dropped
+    assert hands.holds()[1] == -1
+    swinging.pace = 0.0
+    assert not hands.settle(swinging)
     assert hands.swinging is None
     hands.manual = Manual(2, "open", -1)
     assert (hands.states()[2], hands.holds()[2]) == ("open", -1)

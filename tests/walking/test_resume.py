@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tests.repeats import repeats
 from wbc.errors import RangeError
 from wbc.robots import Walker
 from wbc.walking import Structure
@@ -96,7 +97,7 @@ def walks(
     return out
 
 
-@settings(max_examples=8, deadline=None, derandomize=True)
+@settings(max_examples=repeats(4), deadline=None, derandomize=True)
 @given(free=st.booleans(), part=st.floats(0.0, 1.0))
 def test_a_walk_goes_on_from_any_instant(
     walks: list[tuple[WalkLog, pathlib.Path]], machine: Walker, stack: WalkStack, free: bool, part: float

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pathlib
+from dataclasses import replace
 from math import radians
 
 import numpy as np
@@ -14,9 +15,10 @@ from wbc.errors import RangeError, ShapeError, UnknownNameError
 from wbc.robots import TwoEndedData, Walker
 from wbc.shapes import Box
 from wbc.walking import Hold, Obstacle, Structure, cylinder
-from wbc.walking.checker import Rules, check_walk
+from wbc.walking.checker import check_walk
 from wbc.walking.loop.walk import Walk
 from wbc.walking.planner.plan import HoldLost, NoPlanError
+from wbc.walking.report.folder import rules_of
 from wbc.walking.run.recording import WalkRecorder
 from wbc.walking.two_ended import (
     TwoEndedPlan,
@@ -24,7 +26,6 @@ from wbc.walking.two_ended import (
     TwoEndedWalk,
     grapple_row,
     plan_two_ended,
-    touching_distance,
 )
 
 START = {"arm1": "1", "arm2": "2"}
@@ -81,7 +82,7 @@ def test_both_gaits_walk(
     assert np.subtract(lands, lifts) == pytest.approx(planned, abs=0.2)
     # The checker knows nothing of the planner; one hand alone says where the arm is
     # The log has the twist of a tick where it ends; at these rates it changes more within a tick
-    rules = Rules(exempt_distance=touching_distance(quick), twist_speed=0.1)
+    rules = replace(rules_of(quick), twist_speed=0.1)
     report = check_walk(log, quick.urdf(tmp_path / "robot.urdf"), row, rules)
     assert report.ok, str(report)
     assert report["hands that hold"].worst == 1
@@ -158,6 +159,8 @@ def test_bad_questions_are_refused(quick: Walker, row: Structure) -> None:
         plan_two_ended(quick, row, {"arm1": "1", "arm2": "1"}, "6")
     with pytest.raises(NoPlanError, match="no posture between"):
         plan_two_ended(quick, row, {"arm1": "1", "arm2": "6"}, "6")
+    with pytest.raises(NoPlanError, match="the elbow comes no nearer"):
+        plan_two_ended(quick, row, START, [1000.0, 0.0, 0.0])
     with pytest.raises(RangeError, match="one hand must fix the arm"):
         plan_two_ended(quick, cylinder(), {"arm1": "1,1", "arm2": "9,9"}, "5,5")
     with pytest.raises(ShapeError, match="two-ended arm"):

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import datetime
-from pathlib import Path
-
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.text import Text
@@ -24,22 +21,6 @@ def out() -> Console:
 def err() -> Console:
     """For progress and errors."""
     return Console(stderr=True, highlight=False)
-
-
-def run_folder(kind: str, folder: Path | None, force: bool) -> Path:
-    """The folder of a run that leaves ``summary.json``, made; default: runs/KIND-TIME.
-
-    Raises:
-        OutputError: there is a run in it and ``force`` is off, or it cannot be made.
-    """
-    folder = folder or Path("runs") / f"{kind}-{datetime.datetime.now():%Y%m%d-%H%M%S}"
-    if (folder / "summary.json").exists() and not force:
-        raise OutputError("out", str(folder), "there is a run in this folder; choose another, or use --force")
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise OutputError("out", str(folder), f"cannot be written: {error.strerror}") from error
-    return folder
 
 
 def complain(error: WbcError) -> None:

@@ -18,6 +18,8 @@ Through = Annotated[bool, typer.Option("--through", help="Trace beyond limits, w
 To = Annotated[str | None, typer.Option(help="X,Y,Z: where the frame goes straight to, resolved as a whole.")]
 Points = Annotated[int, typer.Option(help="Targets on the way there.", min=2)]
 Anywhere = Annotated[bool, typer.Option("--anywhere", help="On the way there, start on any branch.")]
+Change = Annotated[float | None, typer.Option(help="What a change of branch on the way costs [rad^2]. Default: none.")]
+Apart = Annotated[bool, typer.Option("--self-collision", help="Links stay apart from each other, too.")]
 Out = Annotated[Path, typer.Option(help="Folder for picture, curves and figures.")]
 
 
@@ -27,12 +29,15 @@ def explore(
     at: At = "",
     kind: Kind = "pose",
     sphere: options.Spheres = None,
+    floor: options.Floor = None,
+    self_collision: Apart = False,
     rates: Rates = None,
     seeds: Seeds = 20,
     through: Through = False,
     to: To = None,
     points: Points = 25,
     anywhere: Anywhere = False,
+    change: Change = None,
     margin: options.Margin = 0.02,
     out: Out = Path("runs/explore"),
 ) -> None:
@@ -41,16 +46,18 @@ def explore(
     Example: [bold]wbc explore panda --kind pose --sphere 0.3,0.3,0.5,0.1[/bold]
     """
     import numpy as np
+    import pinocchio as pin
     from rich.table import Table
 
     from wbc import robots, tasks, validation
     from wbc.cli.analysis.advise import configuration_of
     from wbc.cli.console import out as console
-    from wbc.cli.planning import given_obstacles, tip_frame
+    from wbc.cli.planning import comma_numbers, given_obstacles, tip_frame
     from wbc.controller import Stack
     from wbc.errors import ShapeError
     from wbc.explore import Explorer
     from wbc.explore.pictures import save_pieces
+    from wbc.tasks.frames import frame_pose
 
     machine = robots.load(robot)
     name = machine.check_frame("frame", frame) if frame else tip_frame(machine, None)
@@ -58,10 +65,15 @@ def explore(
     stack = Stack(machine, dt=0.01)
     chosen: Any = validation.one_of("kind", kind, ("pose", "position", "orientation"))
     stack.add(tasks.EndEffector(name, kind=chosen), name="hand")
-    for label, one in given_obstacles(sphere, None).items():
+    for label, one in given_obstacles(sphere, floor).items():
         stack.add(tasks.Obstacle(one.shape, margin=margin, pose=one.pose), name=label)
+    if self_collision:
+        stack.add(tasks.SelfCollision(margin=margin), name="links")
     explorer = Explorer(stack, q)
-    wanted = None if rates is None else _numbers("rates", rates)
+    wanted = None if rates is None else comma_numbers("rates", rates)
+    end = None if to is None else comma_numbers("to", to)
+    if end is not None and len(end) != 3:
+        raise ShapeError("to", to, "expected X,Y,Z")
     found = explorer.tick(q, wanted if wanted is not None else np.zeros(6 if kind == "pose" else 3))
     console().print(f"{machine.name}, {kind} of {name}: rank {found.space.rank}, {found.space.span - 1} self-motions")
     table = Table(header_style="bold", box=None, pad_edge=False)
@@ -76,53 +88,35 @@ def explore(
                                "self_motions": found.space.span - 1}  # fmt: skip
     if found.space.span > 1:
         pieces = explorer.pieces(q, seeds=seeds, through=through)
-        best, margin = explorer.best(pieces)
+        best, room = explorer.best(pieces)
         for number, piece in enumerate(pieces, 1):
             kept = sum(not text for text in piece.broken)
             how = "closed" if piece.closed else f"from {piece.ends[0]} to {piece.ends[1]}"
             console().print(
                 f"piece {number}: {len(piece.q)} configurations, {kept} within all limits, {how}", highlight=False
             )
-        console().print(f"farthest from limits: {margin:.3f} of half a range at " + ",".join(f"{x:.4f}" for x in best))
-        figures["pieces"] = [{"count": len(p.q), "closed": p.closed, "ends": p.ends, "free": p.free} for p in pieces]
-        figures["best"] = {"q": best.tolist(), "share": margin}
+            for a, b, what in piece.windows:
+                console().print(f"  {a} to {b}: {what}", highlight=False)
+        console().print(f"farthest from limits: {room:.3f} of half a range at " + ",".join(f"{x:.4f}" for x in best))
+        figures["pieces"] = [{"count": len(p.q), "closed": p.closed, "ends": p.ends, "free": p.free,
+                              "windows": p.windows} for p in pieces]  # fmt: skip
+        figures["best"] = {"q": best.tolist(), "share": room}
         curves: dict[str, Any] = {f"piece{k}": p.q for k, p in enumerate(pieces, 1)}
         np.savez_compressed(out / "self_motion.npz", **curves)
         save_pieces(machine, pieces, out / "self_motion.png", best)
-    if to is not None:
-        end = _numbers("to", to)
-        if len(end) != 3:
-            raise ShapeError("to", to, "expected X,Y,Z")
-        targets = _line(machine, q, name, kind, end, points)
-        path = explorer.along({"hand": targets}, q, anywhere=anywhere)
+    if end is not None:
+        pose = frame_pose(machine, name, q)
+        places = [pose.translation + s * (end - pose.translation) for s in np.linspace(0.0, 1.0, points)]
+        targets = places if kind == "position" else [pin.SE3(pose.rotation, place) for place in places]
+        path = explorer.along({"hand": targets}, q, anywhere=anywhere, change=change)
         law = path.law(np.minimum(machine.limits.velocity, 10.0), np.minimum(machine.limits.acceleration, 10.0))
         law.save(out / "law.npz")
         _, stopped = explorer.step_by_step({"hand": targets}, q)
         console().print(
-            f"along: {path.nodes} configurations compared, {law.duration:.3f} s; step by step {stopped or 'done'}"
+            f"along: {path.nodes} configurations compared, {len(path.changes)} changes, {law.duration:.3f} s; "
+            f"step by step {stopped or 'done'}"
         )
-        figures["along"] = {"cost": path.cost, "nodes": path.nodes, "duration": law.duration, "step_by_step": stopped}
+        figures["along"] = {"cost": path.cost, "nodes": path.nodes, "changes": path.changes, "duration": law.duration,
+                            "step_by_step": stopped}  # fmt: skip
     (out / "summary.json").write_text(json.dumps(figures, indent=1) + "\n")
     console().print(str(out))
-
-
-def _numbers(field: str, text: str) -> Any:
-    import numpy as np
-
-    from wbc.errors import ShapeError
-
-    try:
-        return np.array([float(part) for part in text.split(",")])
-    except ValueError:
-        raise ShapeError(field, text, "expected numbers with commas") from None
-
-
-def _line(machine: Any, q: Any, frame: str, kind: str, end: Any, points: int) -> list[Any]:
-    import numpy as np
-    import pinocchio as pin
-
-    data = machine.model.createData()
-    pin.framesForwardKinematics(machine.model, data, q)
-    pose = data.oMf[machine.model.getFrameId(frame)]
-    places = [pose.translation + s * (end - pose.translation) for s in np.linspace(0.0, 1.0, points)]
-    return places if kind == "position" else [pin.SE3(pose.rotation, p) for p in places]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -13,57 +14,41 @@ if TYPE_CHECKING:
 
 #: Exit code of a run that ended early; files that are none end with 2
 PARTIAL = 1
-_WHAT, _HOW, _OUTPUT = "What it follows", "How it follows", "What it writes"
+#: Files of a run
+WRITTEN = ("summary.json", "norms.*", "film.*", "CheezyAngles", "TrajectoryPts", "EulerAngles", "sphere_data")
+_what, _how, _output = (
+    functools.partial(typer.Option, rich_help_panel=title)
+    for title in ("What it follows", "How it follows", "What it writes")
+)
 
-Trajectory = Annotated[
-    str | None, typer.Option("--case", help="A published trajectory, 1 or 3. Default: both.", rich_help_panel=_WHAT)
-]
-Config = Annotated[str | None, typer.Option(help="3x7, 3x10, 6x7 or 6x10. Default: all.", rich_help_panel=_WHAT)]
-Consistent = Annotated[
-    bool, typer.Option("--consistent", help="Without the defects of the printed norms.", rich_help_panel=_WHAT)
-]
-Machine = Annotated[str, typer.Option(help="hermies, airarm, planar or a file ROBOT.dat.", rich_help_panel=_WHAT)]
-Points = Annotated[Path | None, typer.Option(help="File TrajectoryPts, instead of a case.", rich_help_panel=_WHAT)]
-Line = Annotated[
-    str | None,
-    typer.Option(help="X,Y,Z[,YAW,PITCH,ROLL] in m and degrees: a line from home, instead.", rich_help_panel=_WHAT),
-]
-Jacobian = Annotated[
-    Path | None, typer.Option(help="File FSP_data: only the vectors of its solution space.", rich_help_panel=_WHAT)
-]
-Angles = Annotated[Path | None, typer.Option(help="File EulerAngles; controls them, too.", rich_help_panel=_WHAT)]
-Spheres = Annotated[Path | None, typer.Option(help="File sphere_data.", rich_help_panel=_WHAT)]
-Base = Annotated[str, typer.Option(help="Platform: none, holonomic, differential or car.", rich_help_panel=_WHAT)]
+Trajectory = Annotated[str | None, _what("--case", help="A published trajectory: 1, 2 or 3. Default: all.")]
+Config = Annotated[str | None, _what(help="3x7, 3x10, 6x7 or 6x10. Default: all.")]
+Consistent = Annotated[bool, _what("--consistent", help="Without the defects of the printed norms.")]
+Machine = Annotated[str, _what(help="hermies, airarm, planar or a file ROBOT.dat.")]
+Points = Annotated[Path | None, _what(help="File TrajectoryPts, instead of a case.")]
+Line = Annotated[str | None, _what(help="X,Y,Z[,YAW,PITCH,ROLL] in m and degrees: a line from home, instead.")]
+Jacobian = Annotated[Path | None, _what(help="File FSP_data: only the vectors of its solution space.")]
+Rates = Annotated[Path | None, _what(help="CSV file of an operator's rates: time, pair, r1 ... r6.")]
+Keys = Annotated[bool, _what("--keys", help="Rates from the keyboard, at 50 Hz.")]
+Angles = Annotated[Path | None, _what(help="File EulerAngles; controls them, too.")]
+Spheres = Annotated[Path | None, _what(help="File sphere_data.")]
+Base = Annotated[str, _what(help="Platform: none, holonomic, differential or car.")]
 MethodCode = Annotated[
-    int,
-    typer.Option(
-        help="0 FSP and limits, 1 pseudo-inverse, 2 FSP and obstacles, 3 both, 4 FSP.",
-        min=0,
-        max=4,
-        rich_help_panel=_HOW,
-    ),
+    int, _how(help="0 FSP and limits, 1 pseudo-inverse, 2 FSP and obstacles, 3 both, 4 FSP.", min=0, max=4)
 ]
-Resolver = Annotated[str, typer.Option(help="fsp, pseudo_inverse or stack.", rich_help_panel=_HOW)]
-Rows = Annotated[
-    str | None,
-    typer.Option(help="Of x,y,z,yaw,pitch,roll. Default: x,y,z, and all with --angles.", rich_help_panel=_HOW),
-]
-TwoStep = Annotated[bool, typer.Option("--two-step", help="Constraints in a second step.", rich_help_panel=_HOW)]
-Ahead = Annotated[
-    bool,
-    typer.Option(
-        "--ahead", help="Constraints act before they are broken, tool and platform too.", rich_help_panel=_HOW
-    ),
-]
-Margin = Annotated[float, typer.Option(help="Kept from spheres, in m.", rich_help_panel=_HOW)]
-Damping = Annotated[float, typer.Option(help="Of the inverse, near singularities.", rich_help_panel=_HOW)]
+Resolver = Annotated[str, _how(help="fsp, pseudo_inverse or stack.")]
+Rows = Annotated[str | None, _how(help="Of x,y,z,yaw,pitch,roll. Default: x,y,z, and all with --angles.")]
+TwoStep = Annotated[bool, _how("--two-step", help="Constraints in a second step.")]
+Ahead = Annotated[bool, _how("--ahead", help="Constraints act before they are broken, tool and platform too.")]
+Margin = Annotated[float, _how(help="Kept from spheres, in m.")]
+Damping = Annotated[float, _how(help="Of the inverse, near singularities.")]
 StepLimit = Annotated[
-    float | None,
-    typer.Option(help="Longest step of a joint, in degrees; pi/180 m for each where it slides.", rich_help_panel=_HOW),
+    float | None, _how(help="Longest step of a joint, in degrees; pi/180 m for each where it slides.")
 ]
-LoopBack = Annotated[bool, typer.Option("--loop-back", help="Back by some steps, a joint held.", rich_help_panel=_HOW)]
-Out = Annotated[Path | None, typer.Option(help="Run folder. Default: runs/ikor-TIME.", rich_help_panel=_OUTPUT)]
-Force = Annotated[bool, typer.Option("--force", help="Write into a folder that has a run.", rich_help_panel=_OUTPUT)]
+LoopBack = Annotated[bool, _how("--loop-back", help="Back by some steps, a joint held.")]
+Out = Annotated[Path | None, _output(help="Run folder. Default: runs/ikor-TIME.")]
+Film = Annotated[str | None, _output(help="gif, or html: plays, steps and scrubs.")]
+Force = Annotated[bool, _output("--force", help="Write into a folder that has a run.")]
 
 
 def ikor(
@@ -73,6 +58,8 @@ def ikor(
     robot: Machine = "hermies",
     trajectory: Points = None,
     line: Line = None,
+    rates: Rates = None,
+    keys: Keys = False,
     jacobian: Jacobian = None,
     angles: Angles = None,
     spheres: Spheres = None,
@@ -86,6 +73,7 @@ def ikor(
     damping: Damping = 0.0,
     step_limit: StepLimit = None,
     loop_back: LoopBack = False,
+    film: Film = None,
     out: Out = None,
     force: Force = False,
 ) -> None:
@@ -99,36 +87,52 @@ def ikor(
 
     import numpy as np
 
-    from wbc.cli.console import run_folder
-    from wbc.published.ikor import Method, Settings
+    from wbc import validation
+    from wbc.cli.planning import comma_numbers
+    from wbc.errors import RangeError, ShapeError
+    from wbc.published.ikor import Driver, Method, Settings, files, line_to
+    from wbc.published.ikor.settings import AXES
 
     if jacobian is not None:
         _vectors(jacobian)
         return
-    if trajectory is None and line is None:
-        _published(case, config, not consistent, method, out, force)
-        return
-    from wbc.published.ikor import driver, files
-    from wbc.published.ikor.settings import AXES
-
-    numbers = None if line is None else _numbers(line)
-    oriented = angles is not None or (numbers is not None and len(numbers) == 6)
-    axes = tuple(rows.split(",")) if rows else AXES if oriented else AXES[:3]
-    settings = Settings(
-        Method(method), axes, resolver=resolver, two_step=two_step, ahead=ahead, margin=margin, damping=damping,
-        generator="orthogonal" if ahead else "blocked", loop_back=loop_back,
-        step_limit=inf if step_limit is None else radians(step_limit),
-    )  # fmt: skip
-    machine = _machine(robot, base)
-    if numbers is not None:
-        path = driver.line_to(machine, numbers[:3], np.radians(numbers[3:]) if oriented else None)
-    else:
-        path = files.read_trajectory(trajectory, machine, angles)
+    ways = {"trajectory": trajectory, "line": line, "rates": rates, "keys": keys, "case": case, "config": config}
+    given = [name for name, value in ways.items() if value]
+    if len(set(given) - {"config"}) > 1 or (given[:1] != ["case"] and given[1:] == ["config"]):
+        raise RangeError(given[0], given, "expected one of these, not several")
+    if film is not None:
+        validation.one_of("film", film, ("gif", "html"))
+    end = np.zeros(0) if line is None else comma_numbers("line", line)
+    if len(end) not in (0, 3, 6):
+        raise ShapeError("line", line, "expected X,Y,Z or X,Y,Z,YAW,PITCH,ROLL")
     balls = files.read_spheres(spheres) if spheres else np.zeros((0, 4))
-    folder = run_folder("ikor", out, force)
-    run = driver.Driver(machine, settings, balls).run(path)
+    how: dict[str, Any] = {
+        "method": Method(method), "resolver": resolver, "two_step": two_step, "ahead": ahead, "margin": margin,
+        "damping": damping, "generator": "orthogonal" if ahead else "blocked", "loop_back": loop_back,
+        "step_limit": inf if step_limit is None else radians(step_limit),
+    }  # fmt: skip
+    if not set(given) - {"case", "config"}:
+        if robot != "hermies" or base != "none" or rows or angles or film:
+            raise RangeError("case", case, "robot, base, rows, angles and film belong to a trajectory, line or rates")
+        _published(case, config, not consistent, balls, how, _folder(out, force))
+        return
+    oriented = angles is not None or len(end) == 6
+    axes = tuple(rows.split(",")) if rows else AXES if oriented else AXES[:3]
+    machine = _machine(robot, base)
+    driver, path = Driver(machine, Settings(rows=axes, **how), balls), None
+    if trajectory is not None:
+        path = files.read_trajectory(trajectory, machine, angles)
+    elif line is not None:
+        path = line_to(machine, end[:3], np.radians(end[3:]) if len(end) == 6 else None)
+    source = _source(rates) if path is None else None
+    folder = _folder(out, force)
+    if path is not None:
+        run = driver.run(path)
+        files.write_trajectory(folder / "TrajectoryPts", machine, path, folder / "EulerAngles")
+    else:
+        with source or _keyboard() as operator:
+            run = driver.operate(operator, realtime=keys)
     files.write_angles(folder / "CheezyAngles", machine, run.q)
-    files.write_trajectory(folder / "TrajectoryPts", machine, path, folder / "EulerAngles")
     if spheres:
         files.write_spheres(folder / "sphere_data", balls)
     figures = {
@@ -140,11 +144,34 @@ def ikor(
         "assumed": list(machine.assumed),
     }  # fmt: skip
     _written(folder, figures, {"run": (run, None)})
+    if film is not None and len(run.norms):
+        from wbc.published.ikor.film import save_film
+
+        save_film(machine, run, balls, folder / f"film.{film}")
     for key, value in figures.items():
         typer.echo(f"{key.replace('_', ' '):>23}  {value}")
     typer.echo(str(folder))
     if run.code:
         raise typer.Exit(PARTIAL)
+
+
+def _source(rates: Path | None) -> Any:
+    """Orders from a file, or none."""
+    import contextlib
+
+    from wbc.teleop import RateFile
+
+    return None if rates is None else contextlib.nullcontext(RateFile(rates))
+
+
+def _keyboard() -> Any:
+    """Orders from the terminal, with a hint of what its keys do."""
+    from wbc.cli.console import err
+    from wbc.teleop import Keyboard
+    from wbc.teleop.keyboard import HELP
+
+    err().print(HELP, soft_wrap=True)
+    return Keyboard(0.1, 0.3).terminal()
 
 
 def _machine(robot: str, base: str) -> Any:
@@ -155,18 +182,6 @@ def _machine(robot: str, base: str) -> Any:
     if robot in makers:
         return makers[robot](base)
     return published.planar() if robot == "planar" else files.read_robot(robot, base)
-
-
-def _numbers(text: str) -> list[float]:
-    from wbc.errors import ShapeError
-
-    try:
-        numbers = [float(part) for part in text.split(",")]
-    except ValueError:
-        numbers = []
-    if len(numbers) not in (3, 6):
-        raise ShapeError("line", text, "expected X,Y,Z or X,Y,Z,YAW,PITCH,ROLL")
-    return numbers
 
 
 def _vectors(file: Path) -> None:
@@ -185,13 +200,15 @@ def _vectors(file: Path) -> None:
     typer.echo("least norm\n  " + " ".join(f"{value:12.8f}" for value in best(space).v))
 
 
-def _published(case: str | None, config: str | None, legacy: bool, method: int, out: Path | None, force: bool) -> None:
+def _published(
+    case: str | None, config: str | None, legacy: bool, balls: Any, how: dict[str, Any], folder: Path
+) -> None:
     """All that are asked for: a line each, or every tenth step of one."""
     import numpy as np
     from rich.table import Table
 
     from wbc.cli.console import out as console
-    from wbc.cli.console import run_folder
+    from wbc.cli.console import progress_bar
     from wbc.published import ikor as published
     from wbc.published.ikor import cases
 
@@ -201,24 +218,32 @@ def _published(case: str | None, config: str | None, legacy: bool, method: int, 
         table.add_column(name, justify="right", no_wrap=True)
     figures: dict[str, Any] = {"legacy": legacy}
     runs: dict[str, Any] = {}
-    for t, c in chosen:
-        run = published.case(t, c, legacy=legacy, method=published.Method(method))
-        off, table_of = published.differences(run, t, c), published.printed()[t, c]
-        good = np.flatnonzero(np.isfinite(table_of.fsp))
-        ends = [(float(table_of.fsp[k]), float(run.norms[int(table_of.steps[k]) - 1])) for k in (good[0], good[-1])]
-        rms, worst = float(np.sqrt(np.mean(off**2))), float(np.abs(off).max())
-        cells = [f"{x:.6f}" for pair in ends for x in pair]
-        table.add_row(f"{t} {c}", str(len(off)), f"{rms:.1e}", f"{worst:.1e}", *cells)
-        key = f"{t}-{c}"
-        figures[key] = {"values": len(off), "rms": rms, "largest": worst, "last_error": float(run.errors[-1])}
-        runs[key] = (run, table_of)
-    folder = run_folder("ikor", out, force)
+    with progress_bar() as bar:
+        stage = bar.add_task("runs", total=len(chosen))
+        for t, c in chosen:
+            run, key = published.case(t, c, legacy=legacy, spheres=balls, **how), f"{t}-{c}"
+            bar.advance(stage)
+            runs[key] = run, published.printed()[t, c]
+            figures[key] = {"stop": str(run.stop), "message": run.message, "steps": len(run.norms)}
+            if run.code:
+                table.add_row(f"{t} {c}", f"{len(run.norms)} steps: {run.stop}")
+                continue
+            off, (steps, fsp) = published.differences(run, t, c), (runs[key][1].steps, runs[key][1].fsp)
+            ends = np.flatnonzero(np.isfinite(fsp))[[0, -1]]
+            cells = [f"{x:.6f}" for k in ends for x in (fsp[k], run.norms[int(steps[k]) - 1])]
+            rms, worst = float(np.sqrt(np.mean(off**2))), float(np.abs(off).max())
+            table.add_row(f"{t} {c}", str(len(off)), f"{rms:.1e}", f"{worst:.1e}", *cells)
+            figures[key] |= {"values": len(off), "rms": rms, "largest": worst, "last_error": float(run.errors[-1])}
+            if run.stop is published.Stop.INTERRUPTED:
+                break
     console().print(table)
     console().print("differences: ln(measured / printed)", style="dim")
-    if len(chosen) == 1:
+    if len(runs) == 1:
         _steps(*runs[key])
     _written(folder, figures, runs)
     typer.echo(str(folder))
+    if any(run.code for run, _ in runs.values()):
+        raise typer.Exit(PARTIAL)
 
 
 def _steps(run: Run, printed: Any) -> None:
@@ -226,8 +251,16 @@ def _steps(run: Run, printed: Any) -> None:
     typer.echo(f"{'step':>6} {'printed FSP':>14} {'printed J+':>14} {'measured':>14}")
     for k in range(0, len(printed.steps), 10):
         step = int(printed.steps[k])
+        if step > len(run.norms):
+            break
         numbers = (printed.fsp[k], printed.pseudo_inverse[k], run.norms[step - 1])
         typer.echo(f"{step:6d} " + " ".join(f"{x:14.6f}" for x in numbers))
+
+
+def _folder(out: Path | None, force: bool) -> Path:
+    from wbc.cli.folders import run_folder
+
+    return run_folder(out, "ikor", WRITTEN, force)
 
 
 def _written(folder: Path, figures: dict[str, Any], runs: dict[str, Any]) -> None:

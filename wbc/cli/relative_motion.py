@@ -28,7 +28,7 @@ def relative_motion(table: TableName = None, solves: Solves = 32, out: Out = Non
     from rich.table import Table
 
     from wbc.cli.console import out as console
-    from wbc.cli.console import run_folder
+    from wbc.cli.folders import run_folder
     from wbc.published.relative_motion import INCH
     from wbc.published.relative_motion import printed as known
     from wbc.validation import one_of
@@ -43,7 +43,7 @@ def relative_motion(table: TableName = None, solves: Solves = 32, out: Out = Non
         for k, size in enumerate(known.tables()[name].commands[1:]):
             worst = {key: float(np.abs(off[k]).max()) for key, off in errors.items()}
             rows.append({"table": name, "command": float(size), **worst, "line end": lines[k, 0], "line": lines[k, 1]})
-    folder = run_folder("relative-motion", out, force)
+    folder = run_folder(out, "relative-motion", ("summary.json", "tables.csv", "tables.png"), force)
     columns = list(rows[0])
     with (folder / "tables.csv").open("w", newline="") as stream:
         writer = csv.DictWriter(stream, columns, lineterminator="\n")

@@ -8,11 +8,13 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 
 from wbc import validation
+from wbc.controller.escape import Escape
 from wbc.controller.handle import Directions, Handle
 from wbc.controller.handles import kind_of
-from wbc.controller.policy import Fallback
+from wbc.controller.policy import Fallback, Policy
 from wbc.controller.ramps import Ramps
 from wbc.controller.step import Context, Step
 from wbc.controller.tick.buffers import BAD_V, Assembly
@@ -20,6 +22,7 @@ from wbc.controller.tick.native import NativeTick
 from wbc.controller.tick.solved import SolvedTick
 from wbc.controller.tick.vm import VmAssembly
 from wbc.errors import SolverError
+from wbc.robot import Robot
 from wbc.stack.artifact import Artifact
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Slot
@@ -38,6 +41,28 @@ def assembly_of(stack: Declaration, artifact: Artifact) -> Assembly:
     if artifact.program is not None:
         return VmAssembly(artifact.program, stack, artifact.layout)
     raise SolverError("artifact", artifact, "has neither a library nor a program")
+
+
+class Carried:
+    """Pose and velocity in the world, flat as inputs are, of what stands in a moving frame; all are views.
+
+    Args:
+        frame, twist: of the frame in the world. local, drift: of what stands in it, in its axes.
+    """
+
+    def __init__(self, frame: Array, twist: Array, local: Array, drift: Array) -> None:
+        self._turn, self._origin, self._twist = frame[:9].reshape(3, 3, order="F"), frame[9:], twist
+        self._local, self._drift = local, drift
+        self.pose, self.velocity = np.zeros(12), np.zeros(6)
+
+    def place(self) -> None:
+        """Compute both anew: R R_o, p + R p_o; v + w x R p_o + R v_o, w + R w_o."""
+        turn, local, arm = self._turn, self._local, self._turn @ self._local[9:]
+        self.pose[:9] = (turn @ local[:9].reshape(3, 3, order="F")).ravel(order="F")
+        self.pose[9:] = self._origin + arm
+        linear, angular = self._twist[:3], self._twist[3:]
+        self.velocity[:3] = linear + np.cross(angular, arm) + turn @ self._drift[:3]
+        self.velocity[3:] = angular + turn @ self._drift[3:]
 
 
 class Core:
@@ -65,6 +90,7 @@ class Core:
         self.call: Callable[[], int] = self.tick.step
         if isinstance(self.tick, NativeTick):
             self.call = functools.partial(self.tick.step_function, self.tick.pointer)
+        self._plain_call = self.call
         self.context = Context(stack, layout, self.assembly)
         # of all ways to copy some hundred numbers into something immutable, the fastest
         self.snapshot: Callable[[], bytes] = self.tick.state.data.cast("B").tobytes
@@ -75,6 +101,8 @@ class Core:
         self.waiting: dict[Slot, str] = {}
         self.handles = {name: kind_of(block.entry.item)(self, block) for name, block in layout.blocks.items()}
         self.directions = Directions(layout, self.tick, self.handles)
+        #: what sensors measure that stands in a moving frame, by the name of the item
+        self._carried: dict[str, Carried] = {}
         #: sensors with the handles of their items
         self.sensors = [(self._sensor(name), self.handles[name]) for name in layout.blocks if self._is_sensed(name)]
         self.tick.dt[0] = stack.dt
@@ -92,12 +120,21 @@ class Core:
             handle.assume(other.handles[name])
         for name in ("q", "v_last", "p", "cap", "dt", "weight", "enabled", "bound_enabled"):
             getattr(self.tick, name)[:] = getattr(other.tick, name)
+        if self.layout.command != "velocity":
+            self.assembly.kept[:] = other.assembly.kept
         self.tick.check()
-        self.fallback.policy = other.fallback.policy
+        self.follow(other.fallback.policy)
         self.ramps.assume(other.ramps, self.handles)
         if other.fallback.prepared:
             self.fallback.prepare()
         self._first, self.waiting, self.waits = dict(other._first), dict(other.waiting), other.waits
+
+    def follow(self, policy: Policy) -> None:
+        """Another policy from now on."""
+        self.fallback.policy = policy
+        self.call = self._plain_call
+        if policy.escape:
+            self.call = Escape(self._plain_call, self.tick, self.fallback, self.context, self.snapshot)
 
     def again(self) -> Step:
         """A tick on the buffers as they are."""
@@ -121,7 +158,11 @@ class Core:
             self.initialise(self._first, configuration)
         self.waiting = {} if configuration is not None else dict(self._first)
         self.tick.v_last[: self.layout.nv] = velocity
+        if self.layout.command != "velocity":
+            self.assembly.kept[:] = 0.0
         self.tick.reset()
+        if isinstance(self.call, Escape):
+            self.call.reset()
         for sensor, _ in self.sensors:
             sensor.reset()
         self.resets += 1
@@ -191,7 +232,7 @@ class Core:
             SolverError: an item has no value for one; nothing is written.
         """
         values: list[tuple[Slot, Array]] = []
-        initial = {name: self.stack[name].item.initial(self.stack.robot, q) for name in set(slots.values())}
+        initial = {name: self.stack[name].item.initial(self.seen(name), q) for name in set(slots.values())}
         for slot, name in slots.items():
             wanted = slot.input.name
             if wanted not in initial[name]:
@@ -199,6 +240,25 @@ class Core:
             values.append((slot, self.handles[name].checked(wanted, initial[name][wanted])))
         for slot, numbers in values:
             self.tick.p[slot.span] = numbers
+
+    def frame_pose(self, name: str) -> pin.SE3:
+        """Present pose of the moving frame that an item is stated in; the identity for one in the world.
+
+        Raises:
+            SolverError: nobody has said where the frame is.
+        """
+        frame = self.stack[name].frame
+        if not frame:
+            return pin.SE3.Identity()
+        slot = self.layout.blocks[frame].slots["pose"]
+        if slot in self.waiting:
+            raise SolverError(f"{frame}.pose", None, "has no default value; set it before step")
+        return pin.SE3(self.tick.p[slot.span][:9].reshape(3, 3, order="F"), self.tick.p[slot.span][9:])
+
+    def seen(self, name: str) -> Robot:
+        """The robot as an item sees it."""
+        robot = self.stack.robot
+        return robot.seen_from(self.frame_pose(name)) if self.stack[name].frame else robot
 
     # What is measured
 
@@ -209,7 +269,13 @@ class Core:
     def _sensor(self, name: str) -> Sensor:
         item, slots = self.stack[name].item, self.layout.blocks[name].slots
         assert isinstance(item, Constraint)
-        return item.sensor(self.stack.robot, {key: self.tick.p[slot.span] for key, slot in slots.items()})
+        numbers = {key: self.tick.p[slot.span] for key, slot in slots.items()}
+        if frame := self.stack[name].frame:
+            own = {key: self.tick.p[slot.span] for key, slot in self.layout.blocks[frame].slots.items()}
+            carried = Carried(own["pose"], own["twist"], numbers["pose"], numbers["velocity"])
+            self._carried[name] = carried
+            numbers |= {"pose": carried.pose, "velocity": carried.velocity}
+        return item.sensor(self.stack.robot, numbers)
 
     def sense(self, q: Array) -> None:
         """Measure what enabled items sense; not at numbers that the tick will refuse."""
@@ -217,4 +283,6 @@ class Core:
             return
         for sensor, handle in self.sensors:
             if handle.enabled:
+                if carried := self._carried.get(handle.item_name):
+                    carried.place()
                 sensor.sense(q)

@@ -15,7 +15,7 @@ from wbc.controller.tick.buffers import Buffers
 from wbc.errors import NotFiniteError, RangeError, UnknownNameError
 from wbc.robot import Robot
 from wbc.stack.declaration import Declaration
-from wbc.stack.layout import Block, Layout, Slot
+from wbc.stack.layout import CLOSED, Block, Layout, Slot
 from wbc.tasks import inputs
 from wbc.tasks._direction import DIRECTION_PRICE, Direction
 from wbc.validation import LARGEST, Array
@@ -103,7 +103,8 @@ class Handle:
         put("_block", block)
         put("_robot", owner.stack.robot)
         # the one input with a limit that the item does not know: rate dt <= 1
-        put("_rate", block.slots.get("rate") if block.form == "margins" else None)
+        bounded = block.form == "margins" or owner.layout.command != "velocity"
+        put("_rate", block.slots.get("rate") if bounded else None)
         put("_ramped", None if isinstance(block.entry.item, Direction) else block.slots.get("price"))
         put("_fields", {name: f"{block.entry.name}.{name}" for name in block.slots})
         # inputs that may not exceed another, by the name of either
@@ -290,6 +291,8 @@ class Handle:
             tick.bound_enabled[start : start + len(on)] = on
         else:
             tick.enabled[block.span] = on
+            if CLOSED in block.slots:
+                tick.p[block.slots[CLOSED].span] = float(self._enabled)
         self._owner.directions.follow(block.entry.name)
 
     def _checked_mask(self, field: str, value: Any) -> Array:

@@ -26,23 +26,32 @@ from wbc.tasks import (
     Distance,
     Elbow,
     EndEffector,
+    ExternalWrench,
     Fixed,
     FrameVelocityLimit,
     GazeCone,
     Hold,
     JointCoupling,
+    JointFriction,
     JointLimits,
+    LineContact,
     LookAt,
     Manipulability,
     Mechanism,
     Momentum,
+    MovingFrame,
     Obstacle,
     PitchPlane,
     PitchPlaneLimit,
+    PointContact,
     Posture,
     RelativePose,
+    RigidGrasp,
     Rolling,
     SelfCollision,
+    SlidingContact,
+    SurfaceContact,
+    TorqueLimits,
     WorkspaceBox,
     WorkspacePolyhedron,
 )
@@ -50,17 +59,20 @@ from wbc.tasks.base import Item
 
 
 class TaskHandle(Handle):
-    """Of every task."""
+    """Of every task; ``stiffness`` and ``damping`` in place of ``gain`` where accelerations are commanded."""
 
     weight: float
     gain: float
+    stiffness: float
+    damping: float
 
 
 class FollowerHandle(TaskHandle):
-    """Of tasks that follow a target."""
+    """Of tasks that follow a target; ``acceleration`` where accelerations are commanded."""
 
     target: Any
     feedforward: Any
+    acceleration: Any
 
 
 class DistanceHandle(FollowerHandle):
@@ -90,10 +102,42 @@ class ConstraintHandle(Handle):
 
 
 class HoldHandle(ConstraintHandle):
-    """Of equalities that are corrected with a gain."""
+    """Of equalities that are corrected with a gain; ``rate`` where accelerations are commanded."""
 
     gain: float
+    rate: float
     target: Any
+
+
+class ContactHandle(HoldHandle):
+    """Of contacts: what they bear."""
+
+    force: Any
+    torque: Any
+    friction: float
+    least: float
+    most: float
+    slow: float
+
+
+class ExternalWrenchHandle(ConstraintHandle):
+    """Of :class:`ExternalWrench`."""
+
+    wrench: Any
+
+
+class JointFrictionHandle(ConstraintHandle):
+    """Of :class:`JointFriction`."""
+
+    viscous: Any
+    coulomb: Any
+    slow: float
+
+
+class TorqueLimitsHandle(ConstraintHandle):
+    """Of :class:`TorqueLimits`."""
+
+    scale: float
 
 
 class RollingHandle(ConstraintHandle):
@@ -179,13 +223,21 @@ class PolyhedronHandle(MarginHandle):
     velocity: Any
 
 
+class MovingFrameHandle(ConstraintHandle):
+    """Of :class:`MovingFrame`."""
+
+    pose: Any
+    twist: Any
+    acceleration: Any
+
+
 if TYPE_CHECKING:
 
     class NamedHandle(
         DistanceHandle,
         RelativePoseHandle,
         MomentumHandle,
-        HoldHandle,
+        ContactHandle,
         RollingHandle,
         JointLimitsHandle,
         FrameVelocityHandle,
@@ -194,6 +246,10 @@ if TYPE_CHECKING:
         ObstacleHandle,
         BoxHandle,
         PolyhedronHandle,
+        MovingFrameHandle,
+        ExternalWrenchHandle,
+        JointFrictionHandle,
+        TorqueLimitsHandle,
     ):
         """Of an item that is known by its name only: all values that items of this package have."""
 
@@ -211,6 +267,14 @@ KINDS: dict[type[Item], type[Handle]] = {
     Damping: TaskHandle,
     Hold: HoldHandle,
     Mechanism: HoldHandle,
+    RigidGrasp: ContactHandle,
+    PointContact: ContactHandle,
+    SurfaceContact: ContactHandle,
+    LineContact: ContactHandle,
+    SlidingContact: ContactHandle,
+    ExternalWrench: ExternalWrenchHandle,
+    JointFriction: JointFrictionHandle,
+    TorqueLimits: TorqueLimitsHandle,
     Rolling: RollingHandle,
     Fixed: ConstraintHandle,
     JointLimits: JointLimitsHandle,
@@ -222,6 +286,7 @@ KINDS: dict[type[Item], type[Handle]] = {
     Obstacle: ObstacleHandle,
     WorkspaceBox: BoxHandle,
     WorkspacePolyhedron: PolyhedronHandle,
+    MovingFrame: MovingFrameHandle,
 }
 
 
@@ -237,7 +302,7 @@ class Handles:
         self._handles = handles
         self._names: dict[int, list[str]] = {}
         for entry in stack.entries:
-            self._names.setdefault(id(entry.item), []).append(entry.name)
+            self._names.setdefault(id(entry.added or entry.item), []).append(entry.name)
 
     @overload
     def __getitem__(self, item: str) -> NamedHandle: ...
@@ -253,6 +318,16 @@ class Handles:
     def __getitem__(self, item: _Follower) -> FollowerHandle: ...
     @overload
     def __getitem__(self, item: Hold | Mechanism) -> HoldHandle: ...
+    @overload
+    def __getitem__(
+        self, item: RigidGrasp | PointContact | SurfaceContact | LineContact | SlidingContact
+    ) -> ContactHandle: ...
+    @overload
+    def __getitem__(self, item: ExternalWrench) -> ExternalWrenchHandle: ...
+    @overload
+    def __getitem__(self, item: JointFriction) -> JointFrictionHandle: ...
+    @overload
+    def __getitem__(self, item: TorqueLimits) -> TorqueLimitsHandle: ...
     @overload
     def __getitem__(self, item: Rolling) -> RollingHandle: ...
     @overload
@@ -275,6 +350,8 @@ class Handles:
     def __getitem__(self, item: WorkspaceBox) -> BoxHandle: ...
     @overload
     def __getitem__(self, item: WorkspacePolyhedron) -> PolyhedronHandle: ...
+    @overload
+    def __getitem__(self, item: MovingFrame) -> MovingFrameHandle: ...
     @overload
     def __getitem__(self, item: Item) -> Any: ...
     def __getitem__(self, item: str | Item) -> Any:

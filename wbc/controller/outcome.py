@@ -10,7 +10,7 @@ import numpy as np
 
 from wbc.controller.tick.buffers import CHAIN, INFINITE
 from wbc.renamed import old_attribute
-from wbc.stack.layout import Block, Layout
+from wbc.stack.layout import Block, Layout, rate_unit
 from wbc.stack.memory import LEVEL_NUMBERS
 from wbc.tasks._direction import Direction
 from wbc.validation import Array
@@ -35,9 +35,9 @@ class Status(StrEnum):
 
 #: By the tick's flag
 STATUSES: tuple[Status, ...] = (Status.SOLVED, Status.RELAXED, Status.BRAKED, Status.CAPPED)
-STATUSES += (*[Status.RECOVERED] * len(CHAIN), Status.BRAKED, Status.BRAKED)
+STATUSES += (*[Status.RECOVERED] * len(CHAIN), Status.BRAKED, Status.BRAKED, Status.SOLVED)
 #: What gave the command, by the tick's flag
-ANSWERED = ("", "", "", "", *CHAIN, "braking", "policy")
+ANSWERED = ("", "", "", "", *CHAIN, "braking", "policy", "escape")
 
 
 @dataclass(frozen=True)
@@ -169,19 +169,19 @@ def _dropped(layout: Layout, part: Callable[[str], Array], place: int) -> tuple[
     if place == 0:
         off = part("dropped")
         for block in layout.of_form("margins", "rows"):
-            out += [_row(block, k, off[block.start + k]) for k in np.flatnonzero(off[block.span] >= 0.0).tolist()]
+            gone = np.flatnonzero(off[block.span] >= 0.0).tolist()
+            out += [_row(block, k, off[block.start + k], layout.command) for k in gone]
     share, missed = part("share"), part("missed")
     for block in layout.of_form("task"):
         if block.entry.level == layout.levels[place]:
             gone = np.flatnonzero(share[block.span] <= GONE).tolist()
-            out += [_row(block, k, abs(missed[block.start + k])) for k in gone]
+            out += [_row(block, k, abs(missed[block.start + k]), layout.command) for k in gone]
     return tuple(out)
 
 
-def _row(block: Block, row: int, off: float) -> Dropped:
-    unit = block.rows[row].unit
-    per_second = unit if unit.endswith("/s") else f"{unit or '1'}/s"
-    return Dropped(block.entry.name, block.rows[row].label, float(off), per_second)
+def _row(block: Block, row: int, off: float, command: str) -> Dropped:
+    unit = rate_unit(block.rows[row].unit, command)
+    return Dropped(block.entry.name, block.rows[row].label, float(off), unit)
 
 
 #: A task that asks for less than this is followed, whatever it does [rad/s, lengths per second]

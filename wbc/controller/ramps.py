@@ -41,7 +41,7 @@ class Ramp:
         if s >= 1.0 or self.first == self.last:
             return self.last
         floor = _FLOOR * max(self.first, self.last)
-        low, high = (math.log(max(weight, floor)) for weight in (self.first, self.last))
+        low, high = (math.log(weight if weight > 0.0 else floor) for weight in (self.first, self.last))
         return math.exp(low + (high - low) * s * s * (3.0 - 2.0 * s))
 
 

@@ -41,20 +41,23 @@ class Stack(Declaration):
         ShapeError, RangeError, NotFiniteError: bad arguments.
     """
 
-    def compile(self, solver: str = "daqp", backend: str = "auto") -> Controller:
+    def compile(self, solver: str = "daqp", backend: str = "auto", command: str | None = None) -> Controller:
         """A controller with its own memory; compiled code comes from the cache where it can.
 
         Args:
+            command: what ticks command: ``velocity`` (default), ``acceleration`` or ``torque``. docs/torque.md.
             solver: ``daqp`` (native where gcc is), ``osqp``, ``qpoases``, or an experimental one.
             backend: ``native``, ``vm``, or ``auto``: native where gcc is, else the CasADi virtual machine.
 
         Raises:
-            UnknownNameError: unknown solver or backend. CompileError: native without gcc, or gcc failed.
+            UnknownNameError: unknown solver, backend or command. CompileError: native without gcc, or gcc failed.
+            CommandError: an item of the stack has no meaning for this command, and why.
         """
         from wbc import __version__
 
         validation.one_of("solver", solver, available_solvers(experimental=True))
-        controller = Controller(self, compile_stack(self, backend, __version__), solver)
+        declared = self.commanding(self.command if command is None else command)
+        controller = Controller(declared, compile_stack(declared, backend, __version__), solver)
         core_of(controller).fallback.prepare()
         return controller
 

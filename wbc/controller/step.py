@@ -22,9 +22,10 @@ from wbc.controller.outcome import (
     scales,
 )
 from wbc.controller.tick.buffers import INFINITE, Assembly
+from wbc.errors import CommandError
 from wbc.qp.certificate import Certificate
 from wbc.stack.declaration import Declaration
-from wbc.stack.layout import Block, Layout
+from wbc.stack.layout import CLOSED, Block, Layout, rate_unit
 from wbc.stack.memory import Memory
 from wbc.validation import Array
 
@@ -37,13 +38,17 @@ class Context:
 
     def __init__(self, stack: Declaration, layout: Layout, assembly: Assembly | None) -> None:
         self.stack, self.layout, self.assembly = stack, layout, assembly
-        self.nv = layout.nv
+        self.nv, self.command = layout.nv, layout.command
         self.memory = Memory(layout)
         self.flag_offset = 8 * self.memory.flag
 
     def __getstate__(self) -> dict[str, Any]:
         # the memory of a process; a step from a pickle tells everything but its explanation
         return vars(self) | {"assembly": None}
+
+    def variable(self, number: int) -> str:
+        """Name of a variable of the QP."""
+        return self.stack.robot.dof_names[number] if number < self.nv else f"variable {number}"
 
     @cached_property
     def general(self) -> list[tuple[Block, int]]:
@@ -78,8 +83,59 @@ class Step:
 
     @property
     def v(self) -> Array:
-        """The command: velocities [rad/s, m/s], nv, read-only."""
+        """Velocities [rad/s, m/s], nv, read-only: the command, or where the command is an acceleration the velocity
+        that it leads to until the next tick.
+        """
+        if self._context.command == "velocity":
+            return self.command
+        later = self._part("v_in")[: self._context.nv] + self._number("dt") * self.command
+        later.flags.writeable = False
+        return later
+
+    @property
+    def command(self) -> Array:
+        """What the tick decided about the joints, nv, read-only: their velocities, or accelerations."""
         return np.frombuffer(self._data, _FLOAT, self._context.nv)
+
+    @property
+    def a(self) -> Array:
+        """Accelerations of the joints [rad/s^2, m/s^2], nv, read-only, to be held until the next tick.
+
+        Raises:
+            CommandError: the stack commands velocities.
+        """
+        self._require("a", "acceleration", "torque")
+        return self.command
+
+    @property
+    def torque(self) -> Array:
+        """Torques of the joints [N m, N], nv, read-only; 0 for a floating base and for the followers of couplings.
+
+        Raises:
+            CommandError: the stack does not command torques.
+        """
+        self._require("torque", "torque")
+        return self._part("torque")
+
+    @property
+    def forces(self) -> Mapping[str, Array]:
+        """Wrench of every contact on the robot by the contact's name, in the axes of its frame and about its origin
+        [N, N m]; 0 for a contact that is not enabled.
+
+        Raises:
+            CommandError: the stack does not command torques.
+        """
+        self._require("forces", "torque")
+        layout, variables, p = self._context.layout, self._part("v"), self._part("p")
+        return {
+            name: variables[span] * p[layout.blocks[name].slots[CLOSED].span] for name, span in layout.forces.items()
+        }
+
+    def _require(self, field: str, *commands: str) -> None:
+        command = self._context.command
+        if command not in commands:
+            reason = f"this stack commands {command}; compile it with command={commands[-1]!r}"
+            raise CommandError(field, command, reason)
 
     @property
     def status(self) -> Status:
@@ -147,7 +203,7 @@ class Step:
         low, high = self._part("owner_low"), self._part("owner_high")
         levels = self._pushes(multipliers.size)
         out = []
-        for i in np.flatnonzero(multipliers):
+        for i in np.flatnonzero(multipliers).tolist():
             value = float(multipliers[i])
             bound = "upper" if value > 0 else "lower"
             if i < nv:
@@ -155,7 +211,7 @@ class Step:
                     bound = "lower" if value > 0 else "upper"  # held by a relaxation, see the order of sacrifice
                 owner = int((high if bound == "upper" else low)[i])
                 name = context.bounds[owner].entry.name if owner >= 0 else "bounds"
-                out.append(Binding(name, context.stack.robot.dof_names[i], bound, value, levels[i]))
+                out.append(Binding(name, context.variable(i), bound, value, levels[i]))
             else:
                 block, row = context.general[i - nv]
                 bound = "lower" if block.form == "margins" else bound
@@ -178,9 +234,8 @@ class Step:
         out = []
         for i in np.flatnonzero(slack):
             block, row = self._context.general[i]
-            unit = block.rows[row].unit
-            per_second = unit if unit.endswith("/s") else f"{unit or '1'}/s"
-            out.append(Slack(block.entry.name, block.rows[row].label, float(slack[i]), per_second))
+            unit = rate_unit(block.rows[row].unit, self._context.command)
+            out.append(Slack(block.entry.name, block.rows[row].label, float(slack[i]), unit))
         return tuple(out)
 
     @property
@@ -194,7 +249,8 @@ class Step:
     @property
     def answered_by(self) -> str:
         """What gave the command in place of the first answer: a link of :attr:`wbc.Policy.chain`; ``braking``, where
-        none had a certified answer; ``policy``, where that brakes in conflicts. Empty for a first answer.
+        none had a certified answer; ``policy``, where that brakes in conflicts; ``escape``, where it leaves a singular
+        configuration. Empty for a first answer.
         """
         return ANSWERED[int(self._number("flag"))]
 

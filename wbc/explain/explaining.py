@@ -9,9 +9,10 @@ from wbc.explain.explanation import Bound, Contradiction, Explanation, Give, Res
 from wbc.explain.losses import groups, losses, prices
 from wbc.explain.naming import Naming
 from wbc.explain.past import Past
+from wbc.explain.reasons import reasons
 from wbc.qp.conflict import Conflict, Infeasibility, diagnose
 from wbc.qp.problem import QP
-from wbc.stack.layout import Block
+from wbc.stack.layout import Block, rate_unit
 from wbc.validation import Array
 
 _NONE = Residue(np.inf, "", "")
@@ -62,6 +63,7 @@ class Explainer:
                 for task, share in scales(past.layout, v, past.part("error")).items()
                 if share < 1.0 - 1e-6
             ),
+            reasons(past, v, tuple(binding.values()), missed),
         )
 
     def _infeasibility(self) -> Infeasibility:
@@ -122,11 +124,15 @@ class Explainer:
             row = int((values / naming.units[: values.size]).argmax())
             own = not named and row < robot.nv
             where = robot.dof_names[row] if own else self.naming.bound(row, False).name if named else "slack"
-            unit = f"{robot.dof_units[row]}/s" if own else self.naming.bound(row, False).unit if named else "rad/s"
+            command = past.layout.command
+            unit = rate_unit(robot.dof_units[row] if own else "rad", command)
+            unit = self.naming.bound(row, False).unit if named else unit
             out.append(Residue(float(values[row]), unit, where if values[row] > 0.0 else ""))
         if past.layout.cascade:
             worst = max(certificates(past.layout, past.part), key=lambda level: level.stationarity)
             out[1] = Residue(
-                worst.stationarity, "rad/s", "least velocity" if worst.level is None else f"level {worst.level}"
+                worst.stationarity,
+                rate_unit("rad", past.layout.command),
+                "least velocity" if worst.level is None else f"level {worst.level}",
             )
         return out[0], out[1], out[2]

@@ -11,7 +11,7 @@ from wbc.explain.past import Frozen, Past
 from wbc.qp.problem import QPSolution
 from wbc.qp.relax import Relaxed
 from wbc.qp.sensitivity import Sensitivity
-from wbc.stack.layout import Block
+from wbc.stack.layout import Block, rate_unit
 from wbc.tasks._direction import Direction
 from wbc.validation import Array
 
@@ -23,8 +23,7 @@ class Group:
     """Rows of one task that share a unit: J v - w is what they miss."""
 
     def __init__(self, block: Block, unit: str, J: Array, desired: Array) -> None:
-        self.block, self.J, self.desired = block, J, desired
-        self.unit = unit if unit.endswith("/s") else f"{unit or '1'}/s"
+        self.block, self.J, self.desired, self.unit = block, J, desired, unit
 
     def lost(self, v: Array) -> float:
         """Norm of what is missing at v."""
@@ -66,7 +65,7 @@ def groups(past: Past) -> list[Group]:
         for unit in dict.fromkeys(row.unit for row in block.rows):
             mine = np.array([row.unit == unit for row in block.rows]) & counts
             if mine.any():
-                out.append(Group(block, unit, J[mine], desired[mine]))
+                out.append(Group(block, rate_unit(unit, past.layout.command), J[mine], desired[mine]))
     return [*out, *_soft_groups(past)]
 
 
@@ -81,7 +80,7 @@ def _soft_groups(past: Past) -> list[Group]:
         lower, upper = past.qp.lower[nv:][block.span], past.qp.upper[nv:][block.span]
         for unit in dict.fromkeys(row.unit for row in block.rows):
             mine = np.array([row.unit == unit for row in block.rows])
-            out.append(SoftGroup(block, unit, A[mine], lower[mine], upper[mine]))
+            out.append(SoftGroup(block, rate_unit(unit, past.layout.command), A[mine], lower[mine], upper[mine]))
     return out
 
 

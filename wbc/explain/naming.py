@@ -9,7 +9,7 @@ import numpy as np
 from wbc.explain.explanation import Bound
 from wbc.explain.past import Past
 from wbc.stack.codegen import row_orders, row_units
-from wbc.stack.layout import Block
+from wbc.stack.layout import Block, rate_unit
 from wbc.tasks._direction import Direction
 from wbc.tasks.base import Constraint, SacrificeOrder
 from wbc.tasks.joint_limits import JointLimits
@@ -58,13 +58,13 @@ class Naming:
         actuator = order == SacrificeOrder.ACTUATOR
         if row < self._nv:
             robot = past.stack.robot
-            unit = f"{robot.dof_units[row]}/s"
-            kind = self._kind(block, row, value)
+            unit = rate_unit(robot.dof_units[row], past.layout.command)
+            kind = self._kind(block, row, value) if past.layout.command == "velocity" else ""
             return Bound(item, robot.dof_names[row], which, value, unit, kind, None, actuator and kind != "position")
         own, k = self.general[row - self._nv]
         label = own.rows[k]
         margin = float(past.part("margin")[own.margin_start + k]) if own.form == "margins" else None
-        unit = label.unit if label.unit.endswith("/s") else f"{label.unit or '1'}/s"
+        unit = rate_unit(label.unit, past.layout.command)
         return Bound(item, label.label, which, value, unit, "", margin, actuator)
 
     def _kind(self, block: Block | None, row: int, value: float) -> str:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import reduce
+from itertools import groupby, pairwise, product
 from typing import Any
 
 import numpy as np
@@ -14,10 +16,15 @@ from wbc.errors import InfeasibleError, RangeError, ShapeError
 from wbc.explore.rows import StackRows
 from wbc.resolvers.fsp import Criterion, SolutionSpace, best, orthogonal
 from wbc.stack.declaration import Declaration
+from wbc.trajectory import Law, time_optimal
 from wbc.validation import Array
 
 #: Steps of a trace [rad or m], how many at most each way, and how often one is halved before the curve ends
 STEP, MOST, HALVINGS = 0.05, 2000, 8
+#: A change of branch is looked at in steps of a joint of so much [rad or m]
+CLEAR = 0.1
+#: Configurations of a population differ by this at least; others are looked for so far beside them [rad or m]
+APART, BESIDE = 0.02, 0.15
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +53,8 @@ class Piece:
         q: in order [count, nq]. closed: whether it comes back to its first.
         ends: what stops it at its first and last configuration: a limit or margin, ``singular`` or ``long``; empty
             where it is closed.
-        broken: of every configuration the limit or margin that does not hold, empty where all do: the windows.
+        broken: of every configuration the limit or margin that does not hold, empty where all do. Beyond limits, full
+            turns of joints are not counted.
         free: how many directions of self-motion there are: with more than one the curve is one of many.
     """
 
@@ -56,25 +64,41 @@ class Piece:
     broken: tuple[str, ...]
     free: int
 
+    @property
+    def windows(self) -> tuple[tuple[int, int, str], ...]:
+        """(first, last, limit or margin) of the stretches of q where one does not hold."""
+        runs = [list(run) for _, run in groupby(range(len(self.q)), key=self.broken.__getitem__)]
+        return tuple((run[0], run[-1], self.broken[run[0]]) for run in runs if self.broken[run[0]])
+
 
 @dataclass(frozen=True, eq=False)
 class Resolution:
-    """Configurations along a path. ``cost``: sum of squared steps; ``nodes``: configurations that were compared."""
+    """Configurations along a path.
+
+    Attributes:
+        s, q: path coordinates [count] and configurations there [count, nq]. changes: indices at which the branch
+            changes: there the configuration before has the same s. cost: sum of squared steps, with what changes cost.
+        nodes: configurations that were compared.
+    """
 
     s: Array
     q: Array
+    changes: tuple[int, ...]
     cost: float
     nodes: int
 
-    def law(self, velocity: Any, acceleration: Any) -> Any:
-        """The fastest law of motion through them, see :func:`wbc.trajectory.time_optimal`.
+    def law(self, velocity: Any, acceleration: Any) -> Law:
+        """The fastest law of motion, see :func:`wbc.trajectory.time_optimal`; where the branch changes it is at rest
+        before and after, and goes straight in the joints.
 
         Raises:
             WbcError: limits that are none.
         """
-        from wbc.trajectory import time_optimal
-
-        return time_optimal(self.q, velocity, acceleration)
+        cuts, parts = [0, *self.changes, len(self.q)], list[Array]()
+        for first, last in pairwise(cuts):
+            parts += [self.q[first - 1 : first + 1]] * (first > 0) + [self.q[first:last]] * (last > first + 1)
+        laws = [time_optimal(part, velocity, acceleration) for part in parts]
+        return reduce(lambda before, after: before.then(after), laws)
 
 
 class Explorer:
@@ -117,7 +141,7 @@ class Explorer:
         """
         q = self.robot.configuration("q", q)
         J = self.rows.errors(q)[1]
-        x = self.rows.task_rates(self.rows.rates(q) if rates is None else rates)
+        x = self.rows.rates(q, rates)
         space = orthogonal(J, x, free=True)
         if criteria is None:
             criteria = {"least norm": Criterion()}
@@ -162,9 +186,9 @@ class Explorer:
             ends.append(end)
             if end == "closed":
                 q_all = np.array([start, *found])
-                return Piece(q_all, True, ("", ""), tuple(rows.broken(x) for x in q_all), len(ways))
+                return Piece(q_all, True, ("", ""), self._all_broken(q_all), len(ways))
         q_all = np.array([*halves[1][::-1], start, *halves[0]])
-        return Piece(q_all, False, (ends[1], ends[0]), tuple(rows.broken(x) for x in q_all), len(ways))
+        return Piece(q_all, False, (ends[1], ends[0]), self._all_broken(q_all), len(ways))
 
     def pieces(
         self, q: Any, *, seeds: int = 40, seed: int = 0, step: float = STEP, through: bool = False
@@ -185,6 +209,8 @@ class Explorer:
         out: list[Piece] = []
         for first in starts:
             found = rows.correct(first)
+            if found is not None and rows.broken(found):
+                found = rows.turned(found)
             if found is None or (not through and rows.broken(found)):
                 continue
             if any(self._apart(piece.q, found) < 1.5 * step for piece in out):
@@ -203,7 +229,8 @@ class Explorer:
             InfeasibleError: no configuration keeps them.
         """
         value = self.rows.room if criterion is None else criterion
-        kept = [q for piece in pieces for q, broken in zip(piece.q, piece.broken, strict=True) if not broken]
+        held = [q for piece in pieces for q, broken in zip(piece.q, piece.broken, strict=True) if not broken]
+        kept = [self.rows.turned(q) if self.rows.broken(q) else q for q in held]
         if not kept:
             raise InfeasibleError("pieces", len(pieces), "no configuration of them keeps limits and margins")
         values = [float(validation.called("criterion", value, q)) for q in kept]
@@ -217,6 +244,7 @@ class Explorer:
         *,
         s: Any = None,
         anywhere: bool = False,
+        change: float | None = None,
         nodes: int = 60,
         step: float = 0.3,
         seed: int = 0,
@@ -230,6 +258,9 @@ class Explorer:
         Args:
             targets: goal -> a target for each path coordinate. q0: where it starts, corrected to the first target.
             anywhere: it may start in any configuration, on another branch too; else in q0's.
+            change: what it costs to change the branch on the way [rad^2, m^2]: at a target the arm leaves the path and
+                comes back to it in another configuration, straight in the joints within limits and margins. None: it
+                may not.
             nodes: of the population. step: longest of a joint between targets [rad or m].
             criterion: cost of a configuration, added to the squared steps.
 
@@ -242,38 +273,49 @@ class Explorer:
             raise ShapeError("targets", sorted(counts), "expected as many targets for each goal")
         count = counts.pop()
         places = np.linspace(0.0, 1.0, count) if s is None else validation.ordinary_array("s", s, (count,))
-        rng, rows = np.random.default_rng(validation.integer("seed", seed)), self.rows
-        start = self.robot.configuration("q0", q0)
-        population: Array = np.zeros((0, self.robot.nq))
-        costs, layers, parents, total = np.zeros(0), [], [], 0
+        price = np.inf if change is None else validation.scalar("change", change, low=0.0)
+        nodes, step = validation.integer("nodes", nodes, 1), validation.scalar("step", step, low=0.0, open_low=True)
+        rng, start = np.random.default_rng(validation.integer("seed", seed)), self.robot.configuration("q0", q0)
+        before, costs, total = start[None], np.zeros(1), 0
+        #: of each target the population, whom each comes from, those that go on, and which of it they change from
+        layers = list[tuple[Array, Any, Any, Any]]()
         for k in range(count):
             for name in names:
-                rows.aim(name, targets[name][k])
-            seeds = [start] if k == 0 else list(population)
-            others = self._population(seeds, rng, nodes if k or anywhere else 1, anywhere and k == 0)
+                self.rows.aim(name, targets[name][k])
+            scatter = change is not None if k else anywhere
+            others = self._population(list(before), rng, nodes if k or anywhere else 1, scatter)
             if not len(others):
                 raise InfeasibleError("targets", k, "no configuration meets this target within limits and margins")
-            own = np.array([0.0 if criterion is None else criterion(q) for q in others])
-            if k == 0:
-                costs, parent = own, np.full(len(others), -1)
-            else:
-                ways = self._ways(population, others)
+            own = np.array([0.0 if criterion is None else validation.called("criterion", criterion, q) for q in others])
+            parent = np.zeros(len(others), dtype=int)
+            if k:
+                ways = self._ways(before, others)
                 steps = np.where(np.abs(ways).max(axis=2) <= step, (ways**2).sum(axis=2), np.inf) + costs
-                parent = np.argmin(steps, axis=1)
-                costs = steps[np.arange(len(others)), parent] + own
-                kept = np.isfinite(costs)
-                if not kept.any():
-                    raise InfeasibleError("targets", k, f"no step of {step:g} or less leads to this target")
-                others, costs, parent = others[kept], costs[kept], parent[kept]
-            population, total = others, total + len(others)
-            layers.append(others)
-            parents.append(parent)
-        at = int(np.argmin(costs))
-        cost, chain = float(costs[at]), []
-        for layer, parent in zip(reversed(layers), reversed(parents), strict=True):
-            chain.append(layer[at])
-            at = int(parent[at])
-        return Resolution(places, np.array(chain[::-1]), cost, total)
+                parent, costs = np.argmin(steps, axis=1), steps.min(axis=1)
+            costs = costs + own if k else own
+            source, best = np.arange(len(others)), int(np.argmin(costs))
+            for j in np.flatnonzero(costs > costs[best] + price + own):
+                if self._clear(others[best], others[j]):
+                    costs[j], source[j] = costs[best] + price + own[j], best
+            kept = np.flatnonzero(np.isfinite(costs))
+            if not len(kept):
+                raise InfeasibleError("targets", k, f"no step of {step:g} or less leads to this target")
+            layers.append((others, parent, kept, source))
+            before, costs, total = others[kept], costs[kept], total + len(others)
+        at, chain = int(np.argmin(costs)), list[tuple[int, Array]]()
+        for k, (others, parent, kept, source) in reversed(list(enumerate(layers))):
+            here = kept[at]
+            chain += [(k, others[j]) for j in dict.fromkeys((here, source[here]))]
+            at = parent[source[here]]
+        numbers = np.array([k for k, _ in chain[::-1]])
+        changes = tuple((1 + np.flatnonzero(np.diff(numbers) == 0)).tolist())
+        return Resolution(places[numbers], np.array([q for _, q in chain[::-1]]), changes, float(costs.min()), total)
+
+    def _clear(self, a: Array, b: Array) -> bool:
+        """Whether the straight way of the joints keeps limits and margins."""
+        way = self.rows.between(a, b)
+        shares = np.linspace(0.0, 1.0, 2 + int(np.abs(way).max() / CLEAR))
+        return not any(self.rows.broken(self.rows.moved(a, share * way)) for share in shares)
 
     def step_by_step(self, targets: Mapping[str, Sequence[Any]], q0: Any, *, step: float = 0.3) -> tuple[Array, str]:
         """(configurations, what stopped them): the least step to each target in turn, as a pseudo-inverse goes."""
@@ -292,31 +334,36 @@ class Explorer:
         return np.array(out), ""
 
     def _population(self, seeds: list[Array], rng: np.random.Generator, nodes: int, scatter: bool) -> Array:
-        """Configurations at the present targets, apart from each other."""
+        """Configurations at the present targets, apart from each other: from those before, random ones if scattered,
+        and, while there are too few, beside those that were found, by self-motion.
+        """
         rows, out = self.rows, list[Array]()
-        tries = list(seeds)
-        if scatter:
-            tries += [rows.random(rng) for _ in range(2 * nodes)]
-        spread = 0.15
 
         def take(first: Array) -> None:
             found = rows.correct(first)
-            if found is not None and not rows.broken(found) and (not out or self._apart(np.array(out), found) > 0.02):
+            if scatter and found is not None and rows.broken(found):
+                found = rows.turned(found)
+            if found is not None and not rows.broken(found) and (not out or self._apart(np.array(out), found) > APART):
                 out.append(found)
 
-        for first in tries:
-            take(first)
-            if len(out) >= nodes:
-                break
-        # Beside those that are there, by self-motion; short of nodes from any of them
+        # Of a scattered population a half at least is new
+        for first in [
+            *seeds[: nodes // 2 if scatter else nodes],
+            *(rows.random(rng) for _ in range(2 * nodes * scatter)),
+        ]:
+            if len(out) < nodes:
+                take(first)
         for k in range(3 * (nodes - len(out)) if nodes > 1 else 0):
             if not out or len(out) >= nodes:
                 break
             q = out[int(rng.integers(len(out)))]
             ways = rows.self_motions(q)
-            if len(ways):
-                take(rows.moved(q, rng.normal(size=len(ways)) @ ways * spread * (1 + k % 3)))
+            take(rows.moved(q, rng.normal(size=len(ways)) @ ways * BESIDE * (1 + k % 3)))
         return np.array(out).reshape(-1, self.robot.nq)
+
+    def _all_broken(self, q: Array) -> tuple[str, ...]:
+        """What does not hold at configurations, in whichever turn of the joints most does."""
+        return tuple(self.rows.broken(x) and self.rows.broken(self.rows.turned(x)) for x in q)
 
     def _half(self, start: Array, heading: Array, step: float, free: int, through: bool) -> tuple[list[Array], str]:
         rows, q, out, length = self.rows, start, list[Array](), step
@@ -385,22 +432,18 @@ class Explorer:
         place = q[self.robot.position_index[at]]
         low[at] = np.maximum(low[at], np.minimum(0.0, (limits.position_lower[at] - place) / dt))
         high[at] = np.minimum(high[at], np.maximum(0.0, (limits.position_upper[at] - place) / dt))
-        g = space.vectors[0]
+        g, nv = space.vectors[0], len(low)
+        out = np.full((2, nv), np.nan)
         if not len(D):
-            fits = bool((g >= low - 1e-9).all() and (g <= high + 1e-9).all())
-            return (g, g) if fits else (np.full(len(g), np.nan),) * 2
-        rows = [
-            (s * D.T[k], s * (b[k] - g[k]))
-            for s, b in ((1.0, high), (-1.0, low))
-            for k in np.flatnonzero(np.isfinite(b))
-        ]
-        A, b = (np.array([r[0] for r in rows]), np.array([r[1] for r in rows])) if rows else (None, None)
-        out = np.full((2, len(g)), np.nan)
-        for k in range(len(g)):
-            for side, sign in ((0, 1.0), (1, -1.0)):
-                found = linprog(sign * D.T[k], A, b, bounds=(None, None), method="highs")
-                if found.status == 0:
-                    out[side, k] = g[k] + sign * found.fun
-                elif found.status == 3:
-                    out[side, k] = -sign * np.inf
+            out[:] = g if (g >= low - 1e-9).all() and (g <= high + 1e-9).all() else np.nan
+            return out[0], out[1]
+        A, b = np.vstack((D.T, -D.T)), np.concatenate((high - g, g - low))
+        A, b = A[np.isfinite(b)], b[np.isfinite(b)]
+        for k, side in product(range(nv), range(2)):
+            sign = 1.0 - 2.0 * side
+            found = linprog(sign * D.T[k], A if len(A) else None, b if len(A) else None, bounds=(None, None))
+            if found.status == 0:
+                out[side, k] = g[k] + sign * found.fun
+            elif found.status == 3:
+                out[side, k] = -sign * np.inf
         return out[0], out[1]

@@ -90,7 +90,7 @@ def vectors(controller: Controller, count: int, seed: int = 0) -> Array:
         step = controller.step(q, v)
         first = not step.answered_by  # exported code has no chain
         if first and ((controller.backend == "native" and controller.solver == "daqp") or _certain(step)):
-            rows.append(np.concatenate([q, v, core.tick.p, [STATUSES.index(step.status)], step.v]))
+            rows.append(np.concatenate([q, v, core.tick.p, [STATUSES.index(step.status)], step.command]))
         q, v = pin.integrate(model, q, step.v * controller.stack.dt), step.v.copy()
     width = core.layout.nq + 2 * core.layout.nv + core.layout.parameters + 1
     return np.array(rows).reshape(len(rows), width)
@@ -115,7 +115,7 @@ def _vary(controller: Controller, q: Array, rng: np.random.Generator) -> None:
     core = core_of(controller)
     for name, block in core.layout.blocks.items():
         item = block.entry.item
-        initial = item.initial(controller.stack.robot, q)
+        initial = item.initial(core.seen(name), q)
         for slot in block.slots.values():
             if slot.input.default is None and slot.input.name in initial:
                 numbers = controller[name].checked(slot.input.name, initial[slot.input.name])

@@ -58,7 +58,7 @@ def _sizes(snapshot: Snapshot) -> str:
 
 
 #: Sizes in the public header
-_MACROS = {"NV": "WBC_VARIABLES", "MT": "WBC_TASK_ROWS", "MC": "WBC_ROWS", "MH": "WBC_MARGINS"}
+_MACROS = {"NV": "WBC_VARIABLES", "MT": "WBC_TASK_ROWS", "MC": "WBC_ROWS", "MH": "WBC_MARGINS", "DOFS": "WBC_NV"}
 
 
 def _result(snapshot: Snapshot) -> str:

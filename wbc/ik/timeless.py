@@ -50,7 +50,8 @@ def timeless(stack: Declaration) -> Stack:
         if isinstance(item, JointLimits):
             item = dataclasses.replace(item, velocity=True, acceleration=False, shortest_dt=None)
         if entry.name not in out:
-            out.add(item, name=entry.name, level=entry.level, weight=entry.weight)
+            frame = entry.frame or None
+            out.add(item, name=entry.name, level=entry.level, weight=entry.weight, relative_to=frame)
     return out
 
 

@@ -19,11 +19,19 @@ from wbc import validation
 from wbc.controller.controller import Controller, core_of
 from wbc.record.recording import FORMAT, RecordingError, Writer
 from wbc.stack.declaration import Declaration
+from wbc.stack.layout import Layout
 
 log = logging.getLogger("wbc")
 
 #: What a tick is a function of, besides the solver's memory of the last one; sensed inputs are in ``p``.
 INPUTS = ("q", "v_last", "v_in", "use_v", "cap", "dt", "p", "weight", "enabled", "bound_enabled")
+
+
+def recorded_inputs(layout: Layout) -> tuple[str, ...]:
+    """What is recorded of every tick of a layout: accelerations also have the wrenches that were kept."""
+    return INPUTS if layout.command == "velocity" else (*INPUTS, "kept")
+
+
 #: In place of a number of resets: what the solver remembers is not what was recorded
 UNKNOWN = -1
 #: The part ``reset`` of a tick
@@ -53,7 +61,7 @@ class Recorder:
         self.count = 0
         self._core = core = core_of(controller)
         self._tick = core.tick
-        views = {name: getattr(self._tick, name) for name in INPUTS}
+        views = {name: getattr(self._tick, name) for name in recorded_inputs(core.layout)}
         layout = core.layout
         sizes = {name: view.size for name, view in views.items()} | {"reset": 1, "v": layout.nv}
         if layout.variables > layout.nv:

@@ -15,7 +15,7 @@ from wbc.controller.policy import Policy
 from wbc.controller.stack import Stack
 from wbc.controller.step import Step
 from wbc.errors import ShapeError
-from wbc.record.recorder import INPUTS, about, declaration_key
+from wbc.record.recorder import about, declaration_key, recorded_inputs
 from wbc.record.recording import Recording, RecordingError
 from wbc.record.unpickle import load_stack
 from wbc.stack.declaration import Declaration
@@ -38,12 +38,12 @@ class ReplayedTick:
     @property
     def identical(self) -> bool:
         """Every bit of the command and the status are as recorded."""
-        return self.step.v.tobytes() == self.recorded.tobytes() and self.step.status == self.status
+        return self.step.command.tobytes() == self.recorded.tobytes() and self.step.status == self.status
 
     @property
     def difference(self) -> float:
         """Largest |v - v recorded| of any degree of freedom [rad/s, m/s]."""
-        return float(np.abs(self.step.v - self.recorded).max(initial=0.0))
+        return float(np.abs(self.step.command - self.recorded).max(initial=0.0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,8 +140,9 @@ def compiled(
     controller = stack.compile(solver=given["solver"], backend=chosen)
     conflict, chain = given["policy"]
     controller.policy = Policy(conflict, tuple(chain))
-    sizes = {name: getattr(core_of(controller).tick, name).size for name in INPUTS}
-    expected = {name: given["sizes"][name] for name in INPUTS}
+    names = recorded_inputs(core_of(controller).layout)
+    sizes = {name: getattr(core_of(controller).tick, name).size for name in names}
+    expected = {name: given["sizes"][name] for name in names}
     if sizes != expected:
         raise RecordingError("recording", expected, f"is of another layout, this version's is {sizes}")
     return controller
@@ -156,7 +157,7 @@ def replayed(recording: Recording, controller: Controller | None = None) -> Iter
     controller = compiled(recording) if controller is None else controller
     core, parts = core_of(controller), recording.parts
     tick = core.tick
-    buffers = [(getattr(tick, name), parts[name]) for name in INPUTS]
+    buffers = [(getattr(tick, name), parts[name]) for name in recorded_inputs(core.layout)]
     reset, v, flag = parts["reset"].start, parts["v"], parts["flag"].start
     number = 0
     for rows in recording.chunks():

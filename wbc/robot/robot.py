@@ -273,6 +273,17 @@ class Robot:
             model.addFrame(pin.Frame(name, above.parentJoint, index, above.placement * local, kind))
         return replace(self, model=model)
 
+    def seen_from(self, pose: pin.SE3) -> Robot:
+        """A copy whose world is the frame at ``pose``: every link is there as seen from that frame."""
+        model, away = pin.Model(self.model), pose.inverse()
+        for j in range(1, model.njoints):
+            if int(model.parents[j]) == 0:
+                model.jointPlacements[j] = away * model.jointPlacements[j]
+        for frame in model.frames:
+            if int(frame.parentJoint) == 0:
+                frame.placement = away * frame.placement
+        return replace(self, model=model)
+
     def with_limits(self, **changes: Any) -> Robot:
         """A copy with overridden limits.
 

@@ -85,5 +85,5 @@ def _virtual(stack: Declaration, layout: Layout, version: str) -> Artifact:
 
     folder, cached = cache.fetch(key(stack, version, "vm"), fill)
     saved = {path.stem: ca.Function.load(str(path)) for path in sorted(folder.glob("*.casadi"))}
-    functions = TickProgram(saved["rows"], saved.get("ahead"), saved.get("curvature"))
+    functions = TickProgram(saved["rows"], saved.get("ahead"), saved.get("curvature"), saved.get("torque"))
     return Artifact(layout, None, functions, cached)

@@ -10,7 +10,7 @@ import casadi as ca
 import numpy as np
 
 from wbc.shapes import FAR
-from wbc.stack.declaration import Declaration
+from wbc.stack.declaration import COMMANDS, Declaration
 from wbc.stack.layout import Layout
 from wbc.stack.memory import LEVEL_NUMBERS, structures
 from wbc.stack.program import TickProgram, sparsity_rows
@@ -24,6 +24,7 @@ from wbc.stack.tables import (
     rate_table,
     reported_slacks,
     stops,
+    torque_dofs,
 )
 from wbc.symbolic.kinematics import Kinematics
 
@@ -85,6 +86,7 @@ def _header(stack: Declaration, layout: Layout, program: TickProgram, functions:
                 "FAR": FAR,
                 "NNZK": upper.nnz(),
                 "CALM": int(stack.calm),
+                "COMMAND": COMMANDS.index(stack.command),
                 "UNITS": len(units),
                 "LAST_ORDER": max((o for o in orders if o < PRICED), default=0),
                 "LONGEST": max(1.0, *dofs, *scales),
@@ -136,6 +138,7 @@ def _soft(stack: Declaration, layout: Layout) -> list[str]:
         f"#define KEPT {int(max(kept_rows(layout), default=-1) >= 0)}",
         _table("int", "kept_of", kept_rows(layout)),
         _table("int", "price_at", layout.price_at),
+        _table("int", "torque_dof", torque_dofs(stack, layout)),
         _table("double", "slack_reported", reported_slacks(stack, layout)),
     ]
 

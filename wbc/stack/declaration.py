@@ -2,23 +2,41 @@
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, Self
+from typing import Any, Self, get_args
+
+import pinocchio as pin
 
 from wbc import pickling, validation
-from wbc.errors import DuplicateNameError, LevelError, PicklingError, RangeError, ShapeError, UnknownNameError
+from wbc.errors import (
+    CommandError,
+    DuplicateNameError,
+    LevelError,
+    PicklingError,
+    RangeError,
+    ShapeError,
+    UnknownNameError,
+)
 from wbc.robot import Robot
+from wbc.symbolic.kinematics import WORLD
 from wbc.tasks import inputs
+from wbc.tasks._contact import FORCE_WEIGHT, Contact, ContactForce, ContactWrench, Unactuated
 from wbc.tasks._direction import DIRECTION_PRICE, Direction
-from wbc.tasks.base import Constraint, Item, SacrificeOrder, Task
+from wbc.tasks.base import Command, Constraint, Item, SacrificeOrder, Task
+from wbc.tasks.damping import Damping
 from wbc.tasks.mechanism import Mechanism
+from wbc.tasks.moving_frame import MovingFrame
 
 #: Default cost of velocity against a task row of weight 1, per (rad/s)^2: keeps the optimum unique.
 #: It biases a posture task of weight w by the fraction damping / w.
 DAMPING = 1e-8
+
+#: Least of it
+LEAST_DAMPING = 1e-12
 
 #: Highest price of a soft constraint; beyond it a row is as good as hard
 HIGHEST_PRICE = 1e9
@@ -29,7 +47,11 @@ DT_FACTORS = (0.25, 2.0)
 
 @dataclass(frozen=True, eq=False)
 class Entry:
-    """One item of a stack, with the name, level and weight it was added with; ``price``: of a soft constraint."""
+    """One item of a stack, with the name, level and weight it was added with; ``price``: of a soft constraint.
+
+    ``frame``: name of the moving frame that it is stated in, whose world that is; "" for the world. ``added``: the item
+    as the user has it, where ``item`` is another.
+    """
 
     item: Item
     name: str
@@ -37,6 +59,8 @@ class Entry:
     weight: float
     hard: bool = True
     price: float | None = None
+    frame: str = ""
+    added: Item | None = None
 
     @property
     def order(self) -> SacrificeOrder:
@@ -50,8 +74,17 @@ class Entry:
         return isinstance(self.item, Task)
 
 
+COMMANDS: tuple[Command, ...] = get_args(Command)
+
+#: Of a stack of accelerations: joints that no task moves come to rest like exp(-4 REST t) [1/s]
+REST = 5.0
+
+
 class Declaration:
     """Items on a robot. See :class:`wbc.Stack`, which adds ``compile``."""
+
+    #: What it is compiled to command, see :meth:`commanding`
+    _command: Command = "velocity"
 
     def __init__(
         self,
@@ -66,7 +99,7 @@ class Declaration:
             raise ShapeError("robot", robot, "expected a wbc Robot, see wbc.robots.load")
         self._robot = robot
         self._dt = validation.scalar("dt", dt, low=0.0, open_low=True, unit="s")
-        self._damping = validation.scalar("damping", damping, low=1e-12, high=1.0)
+        self._damping = validation.scalar("damping", damping, low=LEAST_DAMPING, high=1.0)
         chosen = robot.characteristic_length if length is None else length
         self._length = validation.scalar("length", chosen, low=0.0, open_low=True, unit="m")
         self._calm = validation.flag("calm", calm)
@@ -106,7 +139,64 @@ class Declaration:
     @property
     def calm(self) -> bool:
         """Targets out of reach make no chatter, see docs/reach.md; False: the plain linear model."""
-        return self._calm
+        return self._calm and self._command == "velocity"
+
+    @property
+    def command(self) -> Command:
+        """What the stack commands: ``"velocity"``, ``"acceleration"`` or ``"torque"``."""
+        return self._command
+
+    def commanding(self, command: str) -> Self:
+        """This stack with what it needs to command accelerations or torques; itself where it commands that already.
+
+            rest                a task at the least weight that brings joints to rest that no other task moves
+            base                no motor drives a floating base (torques)
+            "<contact> wrench"  what the wrench of a contact may be (torques)
+            "<contact> force"   what it should be (torques)
+
+        Raises:
+            UnknownNameError: another command.
+            CommandError: an item has no meaning for it, and why; the stack commands something else already; the robot
+                has no mass.
+        """
+        validation.one_of("command", command, COMMANDS)
+        if command == self._command and command != "velocity":
+            return self
+        if self._command != "velocity":
+            reason = f"this stack is compiled for {self._command}; compile the one that it was made from"
+            raise CommandError("command", command, reason)
+        if command == "torque" and pin.computeTotalMass(self._robot.model) <= 0.0:
+            raise CommandError("command", command, f"the moving links of {self._robot.name!r} have no mass")
+        out = self if command == "velocity" else copy.copy(self)
+        out._command = next(known for known in COMMANDS if known == command)
+        for entry in self.entries:
+            if reason := entry.item.refusal(self._robot, out._command):
+                raise CommandError(f"{entry.name}", command, reason)
+        if command != "velocity":
+            out._command_entries()
+        return out
+
+    def _command_entries(self) -> None:
+        """Add what the command needs."""
+        last = max(self.levels)
+        rest = self._free_name("rest")
+        # After strict levels it is one of its own: it must not disturb them
+        cascade = len(self.levels) > 1 or any(e.level > 0 for e in self.entries)
+        weight = 1.0 if cascade else self._damping
+        if not cascade:
+            # The rest task keeps the optimum unique: what else does would slow it down
+            self._damping = max(LEAST_DAMPING, self._damping * 1e-3)
+        added = [Entry(Damping(gain=REST), rest, last + 1 if cascade else last, weight)]
+        if self._command == "torque":
+            if self._robot.base == "floating":
+                added.append(Entry(Unactuated(), self._free_name("base"), 0, 1.0))
+            for entry in self.entries:
+                if isinstance(entry.item, Contact):
+                    name = entry.name
+                    added.append(Entry(ContactWrench(name, entry.item), self._free_name(f"{name} wrench"), 0, 1.0))
+                    force = ContactForce(name, entry.item)
+                    added.append(Entry(force, self._free_name(f"{name} force"), last, FORCE_WEIGHT))
+        self._entries |= {entry.name: entry for entry in added}
 
     @property
     def entries(self) -> tuple[Entry, ...]:
@@ -140,6 +230,7 @@ class Declaration:
         hard: bool = True,
         soft: float | None = None,
         scaled: bool = False,
+        relative_to: str | None = None,
     ) -> Self:
         """Add an item; returns the stack, so that calls chain.
 
@@ -156,6 +247,8 @@ class Declaration:
                 task row of that weight that misses its rate by x. The first value of the input ``price``.
             scaled: of a task; it is slowed down and never turned aside: J v = lambda w with one lambda in [0, 1] for
                 the rates w that it asks for. Adds the item ``"<name> direction"``. docs/soft.md.
+            relative_to: name of a :class:`wbc.tasks.MovingFrame` of the stack that takes the place of the world for
+                this item; a field ``relative_to`` of the item says the same. docs/moving_frames.md.
 
         Raises:
             DuplicateNameError, LevelError, RangeError, ShapeError, UnknownNameError: bad input; the stack is unchanged.
@@ -169,6 +262,7 @@ class Declaration:
             raise LevelError("level", level, "expected an integer of 0 or more", ("0", "1", "2"))
         if level > 0 and isinstance(item, Constraint):
             _check_softened(level, item)
+        given, (item, frame) = item, self._framed(item, chosen, relative_to)
         number = validation.scalar("weight", weight, low=0.0)
         if isinstance(item, Constraint) and number != 1.0:
             raise RangeError("weight", weight, "a constraint is hard, soft at a price, or minimised at its level")
@@ -182,7 +276,7 @@ class Declaration:
             _require_soft(item, "soft", soft)
             if not hard:
                 raise RangeError("soft", soft, "hard=False is soft without a price; leave one of them out")
-        added = [Entry(item, chosen, level, number, bool(hard), price)]
+        added = [Entry(item, chosen, level, number, bool(hard), price, frame, None if item is given else given)]
         if validation.flag("scaled", scaled):
             if not isinstance(item, Task) or type(item).jacobian is not Task.jacobian:
                 raise RangeError("scaled", scaled, f"{type(item).__name__} asks for no velocity with a direction")
@@ -192,6 +286,29 @@ class Declaration:
         _check_values(item, self._robot)
         self._entries |= {entry.name: entry for entry in added}
         return self
+
+    def _framed(self, item: Item, name: str, frame: str | None) -> tuple[Item, str]:
+        """The item as it is in its own world, and the name of the moving frame that is this world.
+
+        Raises:
+            UnknownNameError: no such moving frame. RangeError: an item to which frames mean nothing.
+            DuplicateNameError: a moving frame that has the name of one of the robot's.
+        """
+        if isinstance(item, MovingFrame) and name in self._robot.frame_names:
+            raise DuplicateNameError("name", name, f"a frame of {self._robot.name!r} has this name")
+        known = [entry.name for entry in self.entries if isinstance(entry.item, MovingFrame)]
+        field = getattr(item, "relative_to", WORLD)
+        if isinstance(field, str) and field in known:
+            if frame not in (None, field):
+                raise RangeError("relative_to", frame, f"the item itself is stated relative to {field!r}")
+            own: dict[str, Any] = {"relative_to": WORLD}
+            item, frame = dataclasses.replace(item, **own), field
+        if frame is None:
+            return item, ""
+        validation.one_of("relative_to", frame, known)
+        if not item.stands_in_world:
+            raise RangeError("relative_to", frame, f"{type(item).__name__} depends on no frame outside the robot")
+        return item, frame
 
     def _free_name(self, name: object) -> str:
         if not isinstance(name, str) or not name:
@@ -235,8 +352,11 @@ class Declaration:
             "robot": self._robot.fingerprint,
             "length": self._length.hex(),
             "damping": self._damping.hex(),
-            "calm": self._calm,
-            "items": [[e.name, e.level, e.item.declaration(self._robot), *_softness(e)] for e in self.entries],
+            "calm": self.calm,
+            "command": self._command,
+            "items": [
+                [e.name, e.level, e.item.declaration(self._robot), *_softness(e), *_frame(e)] for e in self.entries
+            ],
         }
 
 
@@ -262,6 +382,11 @@ def soft_rows(entry: Entry, robot: Robot) -> int:
 def _softness(entry: Entry) -> list[str]:
     """What the compiled code knows of how soft an item is."""
     return ["priced"] if entry.price is not None else [] if entry.hard else ["soft"]
+
+
+def _frame(entry: Entry) -> list[dict[str, str]]:
+    """What the compiled code knows of the frame that an item is stated in."""
+    return [{"in": entry.frame}] if entry.frame else []
 
 
 def _require_soft(item: Item, field: str, value: object) -> None:

@@ -40,7 +40,8 @@ class Balls:
         for block in layout.of_form("margins"):
             assert isinstance(block.entry.item, Constraint)
             rows = block.entry.item.ball_rows(stack.robot)
-            if not rows or not _same_author(type(block.entry.item)):
+            # the loop knows balls in the world only
+            if not rows or block.entry.frame or not _same_author(type(block.entry.item)):
                 continue
             joints = [int(model.frames[frame_index(model, row.link)].parentJoint) for row in rows]
             moved = [[j for j in model.supports[joint] if j] for joint in joints]

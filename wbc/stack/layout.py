@@ -10,6 +10,7 @@ import numpy as np
 from wbc.errors import ShapeError
 from wbc.stack.declaration import HIGHEST_PRICE, Declaration, Entry, soft_rows
 from wbc.tasks import inputs
+from wbc.tasks._contact import Contact, ContactWrench, force_sizes
 from wbc.tasks._direction import Direction
 from wbc.tasks.base import Constraint, Form, Input, Row, Task
 
@@ -65,7 +66,9 @@ class Layout:
         leading: task rows of the first level, which come first.
         row_levels: index in ``levels`` of each general row that is minimised there, -1 for the others.
         price_at: offset in the parameters of the price of each general row that is soft, -1 for the others.
-        nv: degrees of freedom. variables: of the QP; what comes after the velocities are shares of scaled tasks.
+        command: what is commanded. nv: degrees of freedom. variables: of the QP; what comes after the velocities, or
+            accelerations, are shares of scaled tasks, or the wrenches of contacts.
+        forces: where the wrench of each contact is among the variables, by the contact's name.
         share_rows: task row -> the share of a scaled task; such a row counts for nothing, and its error is the speed
             that is asked for.
         nothing: an offset in the parameters that holds 0, where there are shares.
@@ -74,7 +77,15 @@ class Layout:
     def __init__(self, stack: Declaration) -> None:
         robot = stack.robot
         self.nq, self.nv = robot.nq, robot.nv
+        self.command = stack.command
         self.variables = self.nv
+        self.forces: dict[str, slice] = {}
+        if stack.command == "torque":
+            for entry in stack.constraints:
+                if isinstance(entry.item, Contact):
+                    count = entry.item.components
+                    self.forces[entry.name] = slice(self.variables, self.variables + count)
+                    self.variables += count
         self.parameters = 0
         self.task_rows = self.general_rows = self.bound_blocks = self.margin_rows = 0
         self.blocks: dict[str, Block] = {}
@@ -99,6 +110,11 @@ class Layout:
             self.nothing, self.parameters = self.parameters, self.parameters + 1
         self.leading = self.level_rows(0).stop
 
+    @cached_property
+    def shares(self) -> int:
+        """Variables that are shares of scaled tasks."""
+        return len(self.share_rows)
+
     def _add(self, stack: Declaration, entry: Entry, share: int = -1) -> None:
         robot, item = stack.robot, entry.item
         rows = item.rows(robot)
@@ -113,11 +129,15 @@ class Layout:
             count = item.sensed_rows(robot)
             if count:
                 declared += inputs.sensed(robot, count)
-            if form == "margins":
+            if form == "margins" or (form == "rows" and self.command != "velocity" and not _on_forces(item, rows)):
                 declared.append(Input("rate", unit="1/s", default=item.default_rate, low=0.0))
+            if self.command == "torque" and (isinstance(item, Contact) or item.is_load):
+                declared.append(Input(CLOSED, default=1.0, low=0.0, high=1.0, sensed=True))
         elif isinstance(item, Task) and not any(i.name == "gain" for i in declared):
             default = item.default_gain if item.gain is None else item.gain
-            declared.append(Input("gain", unit="1/s", default=default, low=0.0))
+            declared += _gains(default) if self.command != "velocity" else [_gain(default)]
+        if self.command != "velocity":
+            declared = inputs.with_accelerations(robot, declared)
         if entry.price is not None:
             high = np.inf if isinstance(item, Direction) else HIGHEST_PRICE
             declared.append(Input("price", default=entry.price, low=0.0, high=high))
@@ -165,6 +185,44 @@ class Layout:
         return scales
 
     def dof_scales(self, stack: Declaration) -> np.ndarray:
-        """Scale of each variable: the characteristic length for metres, 1 for radians and shares."""
+        """Scale of each variable: the characteristic length for metres, 1 for radians and shares; of wrenches see
+        :func:`wbc.tasks._contact.force_sizes`.
+        """
         own = [stack.length if u == "m" else 1.0 for u in stack.robot.dof_units]
-        return np.array(own + [1.0] * (self.variables - self.nv))
+        out = np.array(own + [1.0] * (self.variables - self.nv))
+        for name, span in self.forces.items():
+            item = self.blocks[name].entry.item
+            assert isinstance(item, Contact)
+            out[span] = force_sizes(stack.robot)[list(item.axes)]
+        return out
+
+
+#: Input of a contact or a load, 1 where it is enabled and 0 where it is not, so that it bears nothing
+CLOSED = "closed"
+
+
+def _gain(default: float) -> Input:
+    return Input("gain", unit="1/s", default=default, low=0.0)
+
+
+def _gains(gain: float) -> list[Input]:
+    """Stiffness and damping of a stack of accelerations: critically damped, with the same time integral of the error
+    from rest as exp(-gain t) has.
+    """
+    return [
+        Input("stiffness", unit="1/s^2", default=4.0 * gain * gain, low=0.0),
+        Input("damping", unit="1/s", default=4.0 * gain, low=0.0),
+    ]
+
+
+def _on_forces(item: Constraint, rows: tuple[Row, ...]) -> bool:
+    """Whether rows are on forces, which have no rate, or there are none."""
+    return not rows or isinstance(item, ContactWrench) or type(item).torque_rows is not Constraint.torque_rows
+
+
+def rate_unit(unit: str, command: str) -> str:
+    """Unit of what a row of the QP bounds or asks for, where the row's own unit is that of an error or of a rate."""
+    if unit in ("N", "N m"):
+        return unit
+    rate = unit if unit.endswith("/s") else f"{unit or '1'}/s"
+    return rate if command == "velocity" else f"{rate}^2"

@@ -87,6 +87,8 @@ LEVEL_REPORT = (
     Field("pushes", ("NV + MC",), "index of the level that a row pushes against first, -1: none", True),
     Field("levels", ("LEVELS + 1", "LEVEL_NUMBERS"), f"{', '.join(LEVEL_NUMBERS)}; last the least velocity"),
 )
+#: Of torques
+TORQUE_REPORT = (Field("torque", ("DOFS",), "torques of the joints [N m, N]"),)
 INPUTS = (
     Field("q", ("NQ",), "configuration", True),
     Field("v_last", ("NV",), "velocity that accelerations are counted from"),
@@ -99,6 +101,10 @@ INPUTS = (
     Field("enabled", ("MC",), "1 or 0 for each general row", True),
     Field("bound_enabled", ("NB * NV",), "the same for each entry of each bound block", True),
     Field("plain", (), "not 0: the linear model as it is, whatever CALM says"),
+)
+#: Of accelerations
+REST_INPUTS = (
+    Field("kept", ("NV",), "wrenches of the last tick with an answer, which one without keeps; 0 for joints"),
 )
 QP_FIELDS = (
     Field("H", ("NV", "WIDE"), "upper triangle, row by row"),
@@ -120,6 +126,7 @@ def sizes(layout: Layout) -> dict[str, int]:
     return {
         "NQ": layout.nq,
         "NV": layout.variables,
+        "DOFS": layout.nv,
         "NP": layout.parameters,
         "MT": layout.task_rows,
         "MC": layout.general_rows,
@@ -133,7 +140,12 @@ def sizes(layout: Layout) -> dict[str, int]:
 
 def report_fields(layout: Layout) -> tuple[Field, ...]:
     """What a tick reports."""
-    return REPORT + (LEVEL_REPORT if layout.cascade else ())
+    return REPORT + (LEVEL_REPORT if layout.cascade else ()) + (TORQUE_REPORT if layout.command == "torque" else ())
+
+
+def input_fields(layout: Layout) -> tuple[Field, ...]:
+    """What the caller writes."""
+    return INPUTS + (REST_INPUTS if layout.command != "velocity" else ())
 
 
 class Memory:
@@ -146,7 +158,8 @@ class Memory:
 
     def __init__(self, layout: Layout) -> None:
         known, reported = sizes(layout), report_fields(layout)
-        self.fields = (*reported, *INPUTS, *QP_FIELDS)
+        given = input_fields(layout)
+        self.fields = (*reported, *given, *QP_FIELDS)
         self._slices: dict[str, slice] = {}
         self._shapes: dict[str, tuple[int, ...]] = {}
         ends = {}
@@ -156,7 +169,7 @@ class Memory:
             self._shapes[field.name] = shape or (1,)
             self._slices[field.name] = slice(start, start + math.prod(shape))
             start = ends[field.name] = start + math.prod(shape) + field.spare
-        self.report, self.state, self.size = ends[reported[-1].name], ends[INPUTS[-1].name], start
+        self.report, self.state, self.size = ends[reported[-1].name], ends[given[-1].name], start
         #: place of the flag
         self.flag = int(self._slices["flag"].start)
 
@@ -189,7 +202,7 @@ class Memory:
 
 def structures(layout: Layout) -> str:
     """``memory.h``: the report's structure, and the fields that the tick begins with."""
-    reported = report_fields(layout)
+    reported, given = report_fields(layout), input_fields(layout)
     lines = ["/* Memory of a tick that its caller knows, from the table in memory.py; generated */"]
     lines += [
         "#ifndef WBC_MEMORY_H",
@@ -200,11 +213,11 @@ def structures(layout: Layout) -> str:
         "} wbc_report;",
         "",
     ]
-    buffers = ["    wbc_report report;", *_members((*INPUTS, *QP_FIELDS))]
+    buffers = ["    wbc_report report;", *_members((*given, *QP_FIELDS))]
     lines += ["/* The first fields of wbc_tick */", "#define WBC_BUFFERS \\", " \\\n".join(buffers), ""]
     lines += ["/* X(field) for each, in the order of memory */"]
     lines += [f"#define WBC_REPORT_FIELDS(X) {' '.join(f'X({field.c_name})' for field in reported)}"]
-    lines += [f"#define WBC_BUFFER_FIELDS(X) {' '.join(f'X({f.c_name})' for f in (*INPUTS, *QP_FIELDS))}"]
+    lines += [f"#define WBC_BUFFER_FIELDS(X) {' '.join(f'X({f.c_name})' for f in (*given, *QP_FIELDS))}"]
     return "\n".join([*lines, "", "#endif", ""])
 
 

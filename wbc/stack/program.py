@@ -20,6 +20,10 @@ inputs advanced by their rates. ``curvature(q, v, p, dt, force)`` is the upper t
 curvature of the errors of the first level's tasks for a weight ``force`` on each row, as far as it comes from the
 robot's links; see :mod:`wbc.symbolic.curvature`.
 
+Of a stack that commands accelerations or torques the variables are a, and the wrenches of contacts, in place of v: see
+:mod:`wbc.stack.second`. Then ``torque(q, v, p, dt, x)`` are the torques of the joints, and ``ahead`` takes the mean
+velocity until the next tick.
+
 For a compiled tick the rows of :meth:`Constraint.ball_rows` are left to the loop in ``native/balls.h``: here they have
 no entries, and ``low`` and ``margin`` are 0. Sensed rows have no entries either (``native/sensed.h``). Both need:
 
@@ -39,11 +43,12 @@ from wbc.errors import ShapeError
 from wbc.stack.declaration import Declaration
 from wbc.stack.distances import Balls, Sensed
 from wbc.stack.layout import Block, Layout, Slot
+from wbc.stack.second import SecondOrder
 from wbc.stack.shares import kept_direction, speeds, unlimited, widened
 from wbc.symbolic import rotations as rot
 from wbc.symbolic.curvature import AppliedForce, curvature
 from wbc.symbolic.kinematics import Kinematics, Pose
-from wbc.symbolic.tracer import Tracer
+from wbc.symbolic.tracer import Carrier, Tracer
 from wbc.tasks._direction import Direction
 from wbc.tasks.base import Bounds, Constraint, Rows, Task
 from wbc.tasks.inputs import as_value
@@ -66,24 +71,28 @@ ROWS_OUTPUTS = (
 @dataclass(frozen=True, eq=False)
 class TickProgram:
     """The compiled-to-be functions of a stack; ``ahead`` is None where there are no margins, ``curvature`` where no
-    task has any or the stack does not want it; ``balls`` and ``sensed`` are rows that are left to loops.
+    task has any or the stack does not want it; ``torque`` where none is commanded; ``balls`` and ``sensed`` are rows
+    that are left to loops.
     """
 
     rows: ca.Function
     ahead: ca.Function | None
     curvature: ca.Function | None
+    torque: ca.Function | None = None
     balls: Balls = field(default_factory=Balls)
     sensed: Sensed = field(default_factory=Sensed)
 
     @property
     def functions(self) -> dict[str, ca.Function]:
         """Those that exist, by name."""
-        every = {"rows": self.rows, "ahead": self.ahead, "curvature": self.curvature}
+        every = {"rows": self.rows, "ahead": self.ahead, "curvature": self.curvature, "torque": self.torque}
         return {name: function for name, function in every.items() if function is not None}
 
 
 class _Builder:
     def __init__(self, stack: Declaration, layout: Layout, loops: bool) -> None:
+        # Loops know first derivatives
+        loops = loops and stack.command == "velocity"
         self.stack, self.layout, self.loops = stack, layout, loops
         self.balls = Balls.of(stack, layout) if loops else Balls()
         self.kinematics = Kinematics(stack.robot.model)
@@ -92,6 +101,7 @@ class _Builder:
         self.force = ca.SX.sym("force", layout.task_rows)
         self.forces: list[AppliedForce] = []
         self.tasks: dict[str, tuple[ca.SX, ca.SX, ca.SX, ca.SX]] = {}
+        self.second = SecondOrder(self) if stack.command != "velocity" else None
 
     @cached_property
     def later(self) -> ca.SX:
@@ -102,11 +112,35 @@ class _Builder:
         """What the item's expressions receive for its inputs."""
         return {name: as_value(slot.input, self.p[slot.span]) for name, slot in block.slots.items()}
 
-    def rate(self, block: Block, slot: Slot) -> ca.SX | None:
-        """Time derivative of an input's numbers, or None for one that stands still."""
-        if slot.input.rate is None:
+    def carrier(self, block: Block) -> Carrier | None:
+        """The moving frame that the item is stated in."""
+        if not block.entry.frame:
             return None
-        speed = self.p[block.slots[slot.input.rate].span]
+        frame = self.layout.blocks[block.entry.frame]
+        pose = as_value(frame.slots["pose"].input, self.p[frame.slots["pose"].span])
+        assert isinstance(pose, Pose)
+        return Carrier(pose, self.speed(frame, frame.slots["pose"], mean=self.second is None))
+
+    def tracer(self, block: Block) -> Tracer:
+        """What the item sees of the robot."""
+        return Tracer(self.kinematics, self.carrier(block))
+
+    def moving(self, block: Block) -> list[tuple[Block, Slot]]:
+        """Inputs that have a rate, with their blocks: the item's, and those of the frame that it is stated in."""
+        blocks = [block, *([self.layout.blocks[block.entry.frame]] if block.entry.frame else [])]
+        return [(b, slot) for b in blocks for slot in b.slots.values() if slot.input.rate is not None]
+
+    def speed(self, block: Block, slot: Slot, mean: bool) -> ca.SX:
+        """Rate of an input, as the user gives it, now or its mean over the tick, where it has a rate of its own."""
+        rate = block.slots[slot.input.rate or ""]
+        own = self.p[rate.span]
+        if rate.input.rate is None or not mean:
+            return own
+        return own + 0.5 * self.dt * self.p[block.slots[rate.input.rate].span]
+
+    def rate(self, block: Block, slot: Slot) -> ca.SX:
+        """Time derivative of the numbers of an input that has a rate."""
+        speed = self.speed(block, slot, mean=self.second is None)
         part = self.p[slot.span]
         if slot.input.kind == "pose":
             return ca.vertcat(rot.rotation_rate(ca.reshape(part[:9], 3, 3)) @ speed[3:], speed[:3])
@@ -119,19 +153,15 @@ class _Builder:
     def drift(self, block: Block, expression: ca.SX) -> ca.SX:
         """Partial time derivative of an item's expression through its moving inputs."""
         total = ca.SX(expression.numel(), 1)
-        for slot in block.slots.values():
-            speed = self.rate(block, slot)
-            if speed is not None:
-                total = total + ca.jacobian(expression, self.p[slot.span]) @ speed
+        for owner, slot in self.moving(block):
+            total = total + ca.jacobian(expression, self.p[slot.span]) @ self.rate(owner, slot)
         return ca.sparsify(total)
 
     def advanced(self, block: Block) -> ca.SX:
         """The parameter vector with this block's moving inputs dt later."""
         out = ca.SX(self.p)
-        for slot in block.slots.values():
-            if slot.input.rate is None:
-                continue
-            speed = self.p[block.slots[slot.input.rate].span]
+        for owner, slot in self.moving(block):
+            speed = self.speed(owner, slot, mean=True)
             part = self.p[slot.span]
             if slot.input.kind in ("pose", "rotation"):
                 angular = speed[3:] if slot.input.kind == "pose" else speed
@@ -145,6 +175,10 @@ class _Builder:
                 moved = part + speed * self.dt
             out[slot.span] = moved
         return out
+
+    def columns(self, transposed: ca.SX) -> ca.SX:
+        """Rows of a task over all variables, as columns."""
+        return transposed if self.second is not None else widened(self.layout, transposed)
 
     def column(self, block: Block, what: str, expression: ca.SX) -> ca.SX:
         """The expression as a dense column of the declared number of rows."""
@@ -160,14 +194,17 @@ class _Builder:
         """error, desired, factor, J of a task."""
         item = block.entry.item
         assert isinstance(item, Task)
-        robot, tracer, inputs = self.stack.robot, Tracer(self.kinematics), self.values(block)
+        if self.second is not None:
+            return self.second.task(block)
+        robot, tracer, inputs = self.stack.robot, self.tracer(block), self.values(block)
         error = self.column(block, "error", item.error(robot, tracer, inputs))
         own = item.jacobian(robot, tracer, inputs)
         jacobian = tracer.jacobian(error) if own is None else tracer.expand(ca.SX(own))
+        jacobian, rest = jacobian[:, : robot.nv], jacobian[:, robot.nv :]
         if self.stack.calm and block.span.stop <= self.layout.leading:
             self.forces += tracer.forces(ca.dot(self.force[block.span], error))
         gain = self.p[block.slots["gain"].span]
-        desired = tracer.expand(-gain * error - self.drift(block, error))
+        desired = tracer.expand(-gain * error - self.drift(block, error)) - ca.sum2(rest)
         fade = item.row_factor(robot, tracer, inputs)
         factor = ca.SX.ones(len(block.rows)) if fade is None else self.column(block, "row_factor", fade)
         out = self.tasks[block.entry.name] = tracer.expand(error), desired, tracer.expand(factor), jacobian
@@ -178,6 +215,8 @@ class _Builder:
         item = block.entry.item
         if isinstance(item, Direction):
             rows, margin, factor = kept_direction(self.stack, self.layout, block, *self.tasks[item.of][1:]), None, None
+        elif self.second is not None:
+            rows, margin, factor = self.second.constraint(block)
         else:
             rows, margin, factor = self.constraint(block)
             rows = Rows(widened(self.layout, rows.matrix.T).T, rows.lower, rows.upper)
@@ -187,13 +226,15 @@ class _Builder:
         """Rows on v of a constraint, its margins and their factors."""
         item = block.entry.item
         assert isinstance(item, Constraint)
-        robot, tracer, inputs = self.stack.robot, Tracer(self.kinematics), self.values(block)
+        robot, tracer, inputs = self.stack.robot, self.tracer(block), self.values(block)
         count = len(block.rows)
         if block.form == "rows":
             rows = item.velocity_rows(robot, tracer, inputs, self.dt)
             assert rows is not None
             low, high = self.column(block, "lower", rows.lower), self.column(block, "upper", rows.upper)
-            return Rows(tracer.expand(ca.SX(rows.matrix)), tracer.expand(low), tracer.expand(high)), None, None
+            matrix = tracer.expand(ca.SX(rows.matrix))
+            matrix, rest = matrix[:, : robot.nv], ca.sum2(matrix[:, robot.nv :])
+            return Rows(matrix, tracer.expand(low) - rest, tracer.expand(high) - rest), None, None
         if block.entry.name in self.balls:
             return (
                 Rows(ca.SX(count, self.layout.nv), ca.SX(count, 1), ca.SX.inf(count)),
@@ -227,7 +268,7 @@ class _Builder:
         assert isinstance(item, Constraint)
         if block.entry.name in self.balls:
             return ca.SX(len(block.rows), 1)
-        tracer = Tracer(self.kinematics)
+        tracer = self.tracer(block)
         margins = item.margins(self.stack.robot, tracer, self.values(block))
         assert margins is not None
         here = ca.Function("h", [self.kinematics.q, self.p], [ca.densify(tracer.expand(margins))])
@@ -246,10 +287,10 @@ def build(stack: Declaration, layout: Layout, loops: bool = False) -> TickProgra
         ShapeError: an item's expression has another number of rows than it declares, or free symbols.
     """
     b = _Builder(stack, layout, loops)
-    balls, sensed = b.balls, Sensed.of(stack, layout) if loops else Sensed()
+    balls, sensed = b.balls, Sensed.of(stack, layout) if b.loops else Sensed()
     nv = layout.variables
     tasks = [(block.start, *b.task(block)) for block in layout.of_form("task")]
-    tasks = [(start, e, w, f, widened(layout, shared_pattern(J.T))) for start, e, w, f, J in tasks]
+    tasks = [(start, e, w, f, b.columns(shared_pattern(J.T))) for start, e, w, f, J in tasks]
     tasks = sorted([*tasks, *speeds(stack, layout, b.tasks)], key=lambda part: part[0])
     general = [b.general(block) for block in layout.of_form("margins", "rows")]
     bounds = []
@@ -257,7 +298,10 @@ def build(stack: Declaration, layout: Layout, loops: bool = False) -> TickProgra
         item = block.entry.item
         assert isinstance(item, Constraint)
         tracer = Tracer(b.kinematics)
-        got = item.bounds(stack.robot, tracer, b.values(block), b.dt)
+        if b.second is None:
+            got = item.bounds(stack.robot, tracer, b.values(block), b.dt)
+        else:
+            got = item.acceleration_bounds(stack.robot, tracer, b.values(block), b.dt, stack.dt_range[1])
         assert got is not None
         wide = unlimited(layout, Bounds(b.column(block, "lower", got.lower), b.column(block, "upper", got.upper)))
         bounds.append((wide.lower, wide.upper))
@@ -289,7 +333,12 @@ def build(stack: Declaration, layout: Layout, loops: bool = False) -> TickProgra
         upper = widened(layout, widened(layout, ca.triu(curvature(b.kinematics, b.forces))).T).T
     if upper.nnz():
         second = checked_function("curvature", [*inputs, b.force], [upper], ["curvature"])
-    return TickProgram(rows, ahead, second, balls, sensed)
+    torque = None
+    if b.second is not None and stack.command == "torque":
+        most = b.second.most(layout.of_form("margins", "rows"))
+        found = [ca.densify(b.second.torque), ca.densify(most)]
+        torque = checked_function("torque", [*inputs, b.second.x], found, ["torque", "most"])
+    return TickProgram(rows, ahead, second, torque, balls, sensed)
 
 
 def shared_pattern(transposed: ca.SX) -> ca.SX:
@@ -307,7 +356,7 @@ def sparsity_rows(transposed: ca.Sparsity) -> tuple[np.ndarray, np.ndarray]:
 
 
 def checked_function(name: str, inputs: list[ca.SX], outputs: list[ca.SX], labels: list[str]) -> ca.Function:
-    """A function of (q, v, p, dt, force), as many of them as there are inputs.
+    """A function of (q, v, p, dt, more), as many of them as there are inputs.
 
     Raises:
         ShapeError: symbols that are no inputs.
@@ -317,4 +366,4 @@ def checked_function(name: str, inputs: list[ca.SX], outputs: list[ca.SX], label
     stray = [s.name() for s in free if s.__hash__() not in known]
     if stray:
         raise ShapeError(f"stack.{name}", stray, "an item's expression contains symbols that are not its inputs")
-    return ca.Function(name, inputs, ca.cse(outputs), ["q", "v", "p", "dt", "force"][: len(inputs)], labels)
+    return ca.Function(name, inputs, ca.cse(outputs), ["q", "v", "p", "dt", "more"][: len(inputs)], labels)

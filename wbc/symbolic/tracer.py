@@ -14,7 +14,7 @@ moving obstacle) go through the same expression and give its partial derivative 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache, partial
 
 import casadi as ca
@@ -25,15 +25,33 @@ from wbc.symbolic.curvature import AppliedForce
 from wbc.symbolic.gaps import Gap, gap_jacobian
 from wbc.symbolic.kinematics import WORLD, Kinematics, Pose
 from wbc.symbolic.manipulability import manipulability, manipulability_curvature
+from wbc.symbolic.motion import Motion
 from wbc.symbolic.rotations import rotation_rate
+
+
+@dataclass(frozen=True, eq=False)
+class Carrier:
+    """A reference frame outside the robot as expressions of run-time values: its ``pose`` (R, p) in the world, and its
+    ``twist``, 6: velocity of its origin and angular velocity, world axes.
+    """
+
+    pose: Pose
+    twist: ca.SX
 
 
 @dataclass
 class Tracer:
-    """Placeholders of one item on one robot; ask, build an expression, then differentiate it."""
+    """Placeholders of one item on one robot; ask, build an expression, then differentiate it.
+
+    With a ``carrier`` the item sees the robot from that frame: it takes the place of the world in every pose, point,
+    direction and Jacobian, and ``"world"`` is its name. Placeholders stay those of the world, so that the chain rule,
+    and what other items share, are the same; what the carrier's motion adds is the derivative by its pose.
+    """
 
     kinematics: Kinematics
+    carrier: Carrier | None = None
     _poses: dict[str, Pose] = field(default_factory=dict)
+    _seen: dict[str, Pose] = field(default_factory=dict)
     _symbols: list[Placeholder] = field(default_factory=list)
     _com: ca.SX | None = None
 
@@ -53,6 +71,15 @@ class Tracer:
         Raises:
             UnknownNameError: no such frame.
         """
+        known = self._pose(frame)
+        if self.carrier is None or frame == WORLD:
+            return known
+        if frame not in self._seen:
+            self._seen[frame] = self.carrier.pose.inverse().times(known)
+        return self._seen[frame]
+
+    def _pose(self, frame: str) -> Pose:
+        """The same in the true world."""
         known = self._poses.get(frame)
         if known is not None:
             return known
@@ -87,9 +114,48 @@ class Tracer:
                     ca.SX.eye(3),
                     lambda: kinematics.center_of_mass_jacobian,
                     forces=lambda force: (AppliedForce("mass", WORLD, force),),
+                    twist=lambda motion: motion.center_of_mass,
                 )
             )
-        return self._com
+        return self._com if self.carrier is None else self.carrier.pose.inverse_point(self._com)
+
+    def joint_axis(self, joint: int) -> ca.SX:
+        """Axis of a one-dof joint, by number: the angular velocity that it gives, 3."""
+        axis = ca.densify(self.kinematics.joint_twist(joint)[1])
+        return axis if self.carrier is None else self.carrier.pose.rotation.T @ axis
+
+    def joint_position(self, joint: int) -> ca.SX:
+        """Origin of a joint's child side, by number [m]."""
+        position = self.kinematics.joint_pose(joint).position
+        return position if self.carrier is None else self.carrier.pose.inverse_point(position)
+
+    def frame_jacobian(self, frame: str) -> ca.SX:
+        """6 x nv Jacobian (linear at the origin; angular) of a named frame, see :meth:`point_jacobian`."""
+        return self._against_carrier(self.kinematics.jacobian(frame), self._pose(frame).position)
+
+    def point_jacobian(self, joint: int, point: ca.SX) -> ca.SX:
+        """6 x nv Jacobian of the point of body ``joint`` that is at ``point`` now.
+
+        Seen from a carrier it has one column more, the velocity that remains at v = 0. Rows of a constraint that are
+        linear in such Jacobians keep that column; it goes to their sides.
+        """
+        place = point if self.carrier is None else self.carrier.pose.point(point)
+        return self._against_carrier(self.kinematics.point_jacobian(joint, place), place)
+
+    def _against_carrier(self, jacobian: ca.SX, place: ca.SX) -> ca.SX:
+        """The Jacobian J of a point x as the carrier sees it: R_c' (J v - v_c - w_c x (x - p_c); J_w v - w_c)."""
+        if self.carrier is None:
+            return jacobian
+        pose, twist = self.carrier.pose, self.carrier.twist
+        carried = ca.vertcat(twist[:3] + ca.cross(twist[3:], place - pose.position), twist[3:])
+        both = ca.horzcat(jacobian, -carried)
+        return ca.vertcat(pose.rotation.T @ both[:3, :], pose.rotation.T @ both[3:, :])
+
+    def _swung(self) -> ca.SX:
+        """Zero, with the angular velocity of the carrier in its own axes as its rate, 3."""
+        assert self.carrier is not None
+        change = self.held(self.carrier.pose.rotation).T @ self.carrier.pose.rotation
+        return 0.5 * ca.vertcat(change[2, 1] - change[1, 2], change[0, 2] - change[2, 0], change[1, 0] - change[0, 1])
 
     def rotation_error(self, frame: str, base: str, target: ca.SX) -> ca.SX:
         """phi = log3(R_b' R R_t'): how far ``frame``, seen from ``base``, is turned past ``target`` [rad].
@@ -104,12 +170,12 @@ class Tracer:
         Raises:
             UnknownNameError: no such frame.
         """
-        relative = self.rotation(frame)
         phi = ca.SX.sym(f"phi_{frame}_{base}", 3)
-        motion = rot.left_jacobian_inverse(phi)
-        if base != WORLD:
-            relative = self.rotation(base).T @ relative
-            motion = motion @ self.rotation(base).T
+        inverse = motion = rot.left_jacobian_inverse(phi)
+        # Between two frames of the robot a carrier drops out
+        relative, axes = self._pose(frame).rotation, self._axes(base)
+        if axes is not None:
+            relative, motion = axes.T @ relative, motion @ axes.T
 
         value = rot.log3(relative @ target.T)
         self._symbols.append(
@@ -121,15 +187,17 @@ class Tracer:
                 partial(self._spin, frame, base),
                 inner=True,
                 forces=lambda torque: (AppliedForce("torque", frame, torque), AppliedForce("torque", base, -torque)),
+                twist=lambda motion: motion.spin(frame, base),
             )
         )
+        carried = phi if self.carrier is None or base != WORLD else phi - inverse @ self._swung()
         if not ca.symvar(target):
-            return phi
+            return carried
         # With the target held still ``turn`` is zero and only its derivative counts
         here = self.held(target)
         change = (target - here) @ here.T
         turn = 0.5 * ca.vertcat(change[2, 1] - change[1, 2], change[0, 2] - change[2, 0], change[1, 0] - change[0, 1])
-        return phi - rot.left_jacobian_inverse(-phi) @ turn
+        return carried - rot.left_jacobian_inverse(-phi) @ turn
 
     def across(self, frame: str, base: str, axes: ca.SX, turn: ca.SX) -> ca.SX:
         """Zero, with the angular velocity of ``frame`` across an axis of it as its rate: (b1, b2)' R_b' (w - w_b).
@@ -146,7 +214,8 @@ class Tracer:
         """
         symbol, spin = ca.SX.sym(f"across_{frame}_{base}", 2), partial(self._spin, frame, base)
         still = self.held(axes)
-        outer = still if base == WORLD else self.rotation(base) @ still
+        around = self._axes(base)
+        outer = still if around is None else around @ still
 
         def forces(torque: ca.SX) -> tuple[AppliedForce, ...]:
             curved = axis_curvature(spin(), self.expand(outer[:, 2]), torque, self.expand(outer[:, :2] @ turn))
@@ -158,10 +227,23 @@ class Tracer:
 
         zero = ca.SX.zeros(2)
         across = Placeholder(
-            f"across {frame} {base}", symbol, lambda: zero, outer[:, :2].T, spin, inner=True, forces=forces
+            f"across {frame} {base}",
+            symbol,
+            lambda: zero,
+            outer[:, :2].T,
+            spin,
+            inner=True,
+            forces=forces,
+            twist=lambda motion: motion.spin(frame, base),
         )
         self._symbols.append(across)
-        return symbol
+        return symbol if self.carrier is None or base != WORLD else symbol - still[:, :2].T @ self._swung()
+
+    def _axes(self, base: str) -> ca.SX | None:
+        """Axes in the true world of a frame, or of what takes the world's place; None: those of the world."""
+        if base != WORLD:
+            return self._pose(base).rotation
+        return None if self.carrier is None else self.carrier.pose.rotation
 
     def _spin(self, frame: str, base: str) -> ca.SX:
         """3 x nv: angular velocity of ``frame`` past ``base`` in world axes, by v."""
@@ -192,12 +274,24 @@ class Tracer:
         Inputs in the distances are held: what they move is for the caller to add.
         """
         count, kinematics = len(gaps), self.kinematics
+        carried = ca.vertcat(ca.SX(0, 1), *[self._carried_gap(gap) for gap in gaps])
+        if self.carrier is not None:
+            pose = self.carrier.pose
+            gaps = [replace(g, normal=pose.rotation @ g.normal, point=pose.point(g.point)) for g in gaps]
         symbol = ca.SX.sym("gap", count)
         value = ca.vertcat(ca.SX(0, 1), *[gap.distance for gap in gaps])
         motion = ca.SX(ca.DM.eye(count))
         slope = partial(gap_jacobian, kinematics, tuple(gaps))
         self._symbols.append(Placeholder("gaps", symbol, lambda: value, motion, slope, inner=True))
-        return symbol
+        return symbol + carried
+
+    def _carried_gap(self, gap: Gap) -> ca.SX:
+        """Zero, with the rate that the carrier's motion gives the distance of a link from what the carrier carries."""
+        if self.carrier is None or (gap.a == WORLD) == (gap.b == WORLD):
+            return ca.SX(1, 1)
+        pose = self.carrier.pose
+        place, normal = pose.point(self.held(gap.point)), self.held(pose.rotation @ gap.normal)
+        return (-1.0 if gap.a == WORLD else 1.0) * ca.dot(normal, place - self.held(place))
 
     def manipulability(self, frame: str, base: str, rows: tuple[int, ...], length: float) -> ca.SX:
         """Measure of how well a frame can be moved against a base, see :mod:`wbc.symbolic.manipulability`.
@@ -245,6 +339,70 @@ class Tracer:
             if change.nnz():
                 total = total + ca.sparsify(change @ known.motion) @ known.jacobian()
         return self.expand(ca.sparsify(total))
+
+    def second(
+        self,
+        expression: ca.SX,
+        motion: Motion,
+        own: ca.SX | None = None,
+        moving: Sequence[tuple[ca.SX, ca.SX]] = (),
+    ) -> tuple[ca.SX, ca.SX]:
+        """de/dt, and d2e/dt2 where v does not change, of an expression in this tracer's symbols at the velocity v.
+
+        The first derivative is one of a few placeholders, their twists w_k = J_k v, and q; in it the rates of all of
+        these go round once more, with dw_k/dt = (dJ_k/dt) v from the recursion that the dynamics use.
+
+        Args:
+            own: rows of de/dt along v where the expression does not have them, see ``Task.jacobian``.
+            moving: (symbols, rates) of what moves besides: inputs, and rates of inputs with their accelerations.
+        """
+        kinematics = self.kinematics
+        speed = kinematics.tangent_map @ kinematics.v
+        twists: list[tuple[ca.SX, ca.SX, ca.SX]] = []
+        rate = ca.SX(expression.shape[0], 1)
+        used: dict[int, ca.SX] = {}
+
+        def twist_of(known: Placeholder) -> ca.SX:
+            if known.twist is None:
+                # it may contain other placeholders, which go round with the rest
+                return known.jacobian() @ kinematics.v
+            symbol = used.get(id(known))
+            if symbol is None:
+                value, bias = known.twist(motion)
+                symbol = used[id(known)] = ca.SX.sym(f"w_{known.name}", value.shape[0])
+                twists.append((symbol, value, ca.densify(bias)))
+            return symbol
+
+        if own is None:
+            rate += ca.jtimes(expression, self.q, speed)
+            for known in self._symbols:
+                if known.motion.nnz():
+                    change = ca.jacobian(expression, known.symbol)
+                    if change.nnz():
+                        rate += ca.sparsify(change @ known.motion) @ twist_of(known)
+        else:
+            rate += along(own, kinematics.v)
+        for symbols, rates in moving:
+            rate += ca.jtimes(expression, symbols, rates)
+        rate = self._without_inner(ca.densify(rate))
+        variables, changes = [self.q], [speed]
+        for known in self._symbols:
+            if not known.inner and known.motion.nnz() and ca.jacobian_sparsity(rate, known.symbol).nnz():
+                variables.append(known.symbol)
+                changes.append(known.motion @ twist_of(known))
+        for symbol, _, bias in list(twists):
+            variables.append(symbol)
+            changes.append(bias)
+        for symbols, rates in moving:
+            variables.append(symbols)
+            changes.append(rates)
+        bias = ca.jtimes(rate, ca.vertcat(*variables), ca.densify(ca.vertcat(*changes)))
+        both = ca.vertcat(rate, bias)
+        if twists:
+            both = ca.substitute(both, ca.vertcat(*[t[0] for t in twists]), ca.vertcat(*[t[1] for t in twists]))
+        both = ca.densify(self.expand(both))
+        count = expression.shape[0]
+        return both[:count], both[count:]
 
     def forces(self, expression: ca.SX) -> list[AppliedForce]:
         """Forces and torques on the robot whose virtual work is the derivative of a scalar expression.
@@ -297,8 +455,9 @@ class Placeholder:
     The rate is kept as two factors because ``(partial @ motion) @ jacobian`` is much smaller than
     ``partial @ (motion @ jacobian)``. Kinematics are built when they are needed, so that an item can be traced
     (to count its rows, to make its cache key) without them. ``inner``: value and motion are in other placeholders.
-    ``turns``: it is the rotation of a frame, by which other forces turn. ``forces``: what a force along the rate, given
-    as a 3-vector in the axes of ``jacobian``, does to the robot.
+    ``turns``: it is the rotation of a frame, by which other forces turn. ``twist``: ``jacobian @ v``, and its rate
+    where v does not change, from a recursion over the bodies; None: from the Jacobian. ``forces``: what a force along
+    the rate, given as a 3-vector in the axes of ``jacobian``, does to the robot.
     """
 
     name: str
@@ -309,6 +468,12 @@ class Placeholder:
     inner: bool = False
     turns: bool = False
     forces: Callable[[ca.SX], tuple[AppliedForce, ...]] = lambda force: ()
+    twist: Callable[[Motion], tuple[ca.SX, ca.SX]] | None = None
+
+
+def along(matrix: ca.SX, v: ca.SX) -> ca.SX:
+    """Rows by v, with the column of what remains at v = 0, see :meth:`Tracer.point_jacobian`."""
+    return matrix[:, : v.numel()] @ v + ca.sum2(matrix[:, v.numel() :])
 
 
 def of_frame(kinematics: Kinematics, frame: str, pose: Pose) -> list[Placeholder]:
@@ -322,6 +487,7 @@ def of_frame(kinematics: Kinematics, frame: str, pose: Pose) -> list[Placeholder
         ca.SX.eye(3),
         lambda: kinematics.jacobian(frame)[:3, :],
         forces=lambda force: (AppliedForce("force", frame, force),),
+        twist=lambda motion: motion.part(frame, slice(0, 3)),
     )
     rotation = Placeholder(
         f"rotation {frame}",
@@ -331,6 +497,7 @@ def of_frame(kinematics: Kinematics, frame: str, pose: Pose) -> list[Placeholder
         lambda: kinematics.jacobian(frame)[3:, :],
         turns=True,
         forces=lambda torque: (AppliedForce("torque", frame, torque),),
+        twist=lambda motion: motion.part(frame, slice(3, 6)),
     )
     return [position, rotation]
 

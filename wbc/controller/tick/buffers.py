@@ -5,14 +5,17 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 
+import numpy as np
+
 from wbc.qp.problem import QP
+from wbc.tasks.base import Command
 from wbc.validation import Array
 
 #: Flags of a tick
 SOLVED, RELAXED, BRAKED, CAPPED = 0, 1, 2, 3
 #: In the report in place of these: the first of the links of a chain that may have given the answer; braked at its end;
-#: braked because the policy wants it
-RECOVERED, CHAIN_BRAKED, POLICY_BRAKED = 4, 8, 9
+#: braked because the policy wants it; moved out of a singular configuration because it wants that
+RECOVERED, CHAIN_BRAKED, POLICY_BRAKED, ESCAPED = 4, 8, 9, 10
 #: Added to what a tick returns, not to what it reports: the certificate fails, or a solver has found no answer
 UNSOUND = 4
 #: Refusals: nothing was changed
@@ -61,11 +64,14 @@ class Buffers:
     bound_enabled: Array
     report: Array
     state: Array
+    #: of accelerations, the wrenches that a tick without an answer keeps [variables]; empty for velocities
+    kept: Array = np.zeros(0)
 
     def share(self, other: Buffers) -> None:
         """Use the arrays of ``other``."""
         for name in Buffers.__annotations__:
             setattr(self, name, getattr(other, name))
+        self.kept = other.kept
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,6 +87,8 @@ class Assembly(Buffers, ABC):
     """Buffers and the QP at their values; ``plain``: not 0 for the linear model as it is, without curvature."""
 
     plain: Array
+    _command: Command
+    _dofs: int
 
     @abstractmethod
     def check(self) -> int:
@@ -124,6 +132,33 @@ class Assembly(Buffers, ABC):
         where it is not a pose or that cannot be done quicker here than in Python.
         """
         return False
+
+    def commanded(self, v: Array, sound: bool) -> None:
+        """What follows from a command in the report: torques, and the velocity that the next tick counts from.
+
+        Args:
+            sound: it is a certified answer, whose wrenches the next tick keeps if it has none.
+        """
+        if self._command == "velocity":
+            self.v_last[:] = v
+            return
+        nv = self._dofs
+        self._find_torques()
+        self.v_last[:nv] += float(self.dt[0]) * v[:nv]
+        if sound:
+            self.kept[nv:] = v[nv:]
+
+    def rest(self, lower: Array, upper: Array) -> Array:
+        """The command within simple bounds that is nearest to rest."""
+        nearest = np.zeros(lower.size)
+        if self._command != "velocity":
+            nv = self._dofs
+            nearest[:nv], nearest[nv:] = -self.v_last[:nv] / float(self.dt[0]), self.kept[nv:]
+        return np.minimum(np.maximum(nearest, lower), upper)
+
+    @abstractmethod
+    def _find_torques(self) -> None:
+        """Torques of the command into the report, where torques are commanded."""
 
     @abstractmethod
     def twin(self) -> Assembly:

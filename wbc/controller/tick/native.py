@@ -41,6 +41,9 @@ class NativeTick(Assembly):
         view = functools.partial(places.view, self._memory)
         self.q, self.p, self.dt, self.cap = view("q"), view("p"), view("dt"), view("cap")
         self.v_last, self.v_in, self.use_v = view("v_last"), view("v_in"), view("use_v")
+        self._command, self._dofs = layout.command, layout.nv
+        if layout.command != "velocity":
+            self.kept = view("kept")
         self.weight, self.enabled, self.bound_enabled = view("weight"), view("enabled"), view("bound_enabled")
         self.report, self.state = self._memory[: places.report], self._memory[: places.state]
         self._H, self._g, self._low, self._high = view("H"), view("g"), view("low"), view("high")
@@ -98,6 +101,10 @@ class NativeTick(Assembly):
     def check(self) -> int:
         """Only refuse bad inputs, and take over a measured velocity."""
         return int(self._library.wbc_tick_check(self.pointer))
+
+    def _find_torques(self) -> None:
+        if self._layout.command == "torque":
+            self._library.wbc_tick_torques(self.pointer)
 
     @property
     def usable(self) -> bool:

@@ -122,7 +122,7 @@ class SolvedTick(Buffers):
         report[memory["multipliers"]] = multipliers
         report[memory["slack"]] = slack
         self.assembly.look_ahead()
-        self.v_last[:] = v
+        self.assembly.commanded(v, answer is not None and self._sound(certificate))
         if answer is None:
             return BRAKED + UNSOUND if self.assembly.usable else BRAKED
         return flag if self._sound(certificate) else flag + UNSOUND
@@ -142,11 +142,11 @@ class SolvedTick(Buffers):
         report[memory["iterations"]] = 0.0
         report[memory["multipliers"]], report[memory["slack"]] = 0.0, 0.0
         self.assembly.look_ahead()
-        self.v_last[:] = v
+        self.assembly.commanded(v, False)
 
     def rest(self, qp: QP) -> Array:
-        """The velocity within the simple bounds that is nearest to rest."""
-        return np.minimum(np.maximum(0.0, qp.lower[: self._nv]), qp.upper[: self._nv])
+        """The command within the simple bounds that is nearest to rest."""
+        return self.assembly.rest(qp.lower[: self._nv], qp.upper[: self._nv])
 
     def _met(self, qp: QP, answer: Relaxed, v: Array) -> tuple[Array, Array]:
         """Bounds of the answer's problem without equality rows that v meets to rounding and that do not push.

@@ -16,6 +16,7 @@ from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Layout
 from wbc.stack.memory import Memory
 from wbc.stack.program import ROWS_OUTPUTS, TickProgram
+from wbc.stack.tables import torque_dofs
 from wbc.validation import Array
 
 
@@ -49,6 +50,9 @@ class VmAssembly(Assembly):
         view = functools.partial(memory.view, self.state)
         self.q, self.p, self.dt, self.cap, self.plain = (view(name) for name in ("q", "p", "dt", "cap", "plain"))
         self.v_last, self.v_in, self.use_v = view("v_last"), view("v_in"), view("use_v")
+        self._command, self._dofs = layout.command, layout.nv
+        if layout.command != "velocity":
+            self.kept = view("kept")
         self.weight, self.enabled, self.bound_enabled = view("weight"), view("enabled"), view("bound_enabled")
         # CasADi's buffers take no empty array: with the spare number
         self._q, self._v, self._p = self._wide("q"), self.v_last[: layout.nv], self._wide("p")
@@ -58,9 +62,14 @@ class VmAssembly(Assembly):
         arguments = [self._q, self._v, self._p, self.dt]
         self._rows = _Call(function, arguments, list(self._out.values()))
         self._ahead = None
-        self._later, self._command = _room(layout.margin_rows), _room(layout.nv)
+        self._later, self._mean = _room(layout.margin_rows), _room(layout.nv)
         if program.ahead is not None:
-            self._ahead = _Call(program.ahead, [self._q, self._command, self._p, self.dt], [self._later])
+            self._ahead = _Call(program.ahead, [self._q, self._mean, self._p, self.dt], [self._later])
+        self._torques: _Call | None = None
+        if program.torque is not None:
+            self._most, self._torque_dofs = _room(rows), np.array(torque_dofs(stack, layout), dtype=np.intp)
+            found = [self.report[memory["torque"]], self._most]
+            self._torques = _Call(program.torque, [*arguments, self.report[memory["v"]]], found)
         self._force = _room(tasks)
         self._reach = Reach(stack, layout, program, self._curvature_of(program, arguments)) if stack.calm else None
         jt, at = function.sparsity_out("jt"), function.sparsity_out("at")
@@ -227,10 +236,23 @@ class VmAssembly(Assembly):
     def look_ahead(self) -> None:
         """Margins at q (+) v dt, into the report."""
         if self._ahead is not None:
-            self._command[:] = self.report[self.memory["v"]][: self._layout.nv]
+            nv = self._layout.nv
+            self._mean[:] = self.report[self.memory["v"]][:nv]
+            if self._layout.command != "velocity":
+                # the mean velocity until the next tick
+                self._mean[:] = self.v_last[:nv] + 0.5 * self.dt[0] * self._mean
             self._ahead.run()
             later = self._later[: self._layout.margin_rows]
             self.report[self.memory["ahead"]] = np.where(np.isnan(later), -np.inf, later)
+
+    def _find_torques(self) -> None:
+        if self._torques is not None:
+            self._torques.run()
+            tau = self.report[self.memory["torque"]]
+            tau[~np.isfinite(tau)] = 0.0
+            limited = np.flatnonzero((self._torque_dofs >= 0) & (self.enabled != 0.0))
+            dofs, most = self._torque_dofs[limited], self._most[limited]
+            tau[dofs] = np.clip(tau[dofs], -most, most)
 
 
 def _unit_equalities(low: Array, high: Array, low_rows: Array, high_rows: Array, A: Array, dofs: Array) -> Array:

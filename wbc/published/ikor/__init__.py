@@ -7,9 +7,10 @@ Source: IKOR, inverse kinematics on redundant systems; ORNL/TM-13096. What its l
 from __future__ import annotations
 
 from wbc.published.ikor.cases import case, differences, printed
-from wbc.published.ikor.driver import Code, Driver, Run, Stop, line_to, straight
-from wbc.published.ikor.files import IkorFileError, Trajectory
+from wbc.published.ikor.driver import Code, Driver, Run, Stop
+from wbc.published.ikor.files import IkorFileError
 from wbc.published.ikor.legacy import legacy_hermies
+from wbc.published.ikor.lines import Trajectory, line_to, straight
 from wbc.published.ikor.machines import ArmMachine, airarm, hermies, machine_of, planar, without_platform
 from wbc.published.ikor.settings import Method, Settings
 

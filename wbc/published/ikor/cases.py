@@ -7,15 +7,16 @@ import functools
 import math
 import pathlib
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from wbc import validation
-from wbc.published.ikor.driver import Driver, Run, euler_angles, rotation_of, straight
-from wbc.published.ikor.files import Trajectory
+from wbc.published.ikor.driver import Driver, Run
 from wbc.published.ikor.legacy import QUARTER, legacy_hermies
+from wbc.published.ikor.lines import Trajectory, euler_angles, rotation_of, straight
 from wbc.published.ikor.machines import ArmMachine, hermies
-from wbc.published.ikor.settings import AXES, Method, Settings
+from wbc.published.ikor.settings import AXES, Settings
 from wbc.validation import Array
 
 FILE = pathlib.Path(__file__).with_name("norms.csv")
@@ -70,21 +71,22 @@ def route(machine: ArmMachine, trajectory: str) -> Trajectory:
     return straight(machine, way / steps, steps, start, turn / steps)
 
 
-def case(trajectory: str, config: str, *, legacy: bool = True, method: Method = Method.FSP) -> Run:
-    """A published run again: legacy with the two defects of the printed norms, else with consistent kinematics.
+def case(trajectory: str, config: str, *, legacy: bool = True, spheres: Any = (), **settings: Any) -> Run:
+    """A published run again: legacy with the two defects of the printed norms, else with consistent kinematics;
+    ``spheres`` and fields of :class:`Settings` beside those of the configuration, as it was not published.
 
     Raises:
-        UnknownNameError: a run that is not known.
+        UnknownNameError: a run that is not known. WbcError: settings that are none.
     """
-    validation.one_of("trajectory", trajectory, BETWEEN)
-    base = "none" if validation.one_of("config", config, CONFIGS).endswith("x7") else "holonomic"
+    validation.one_of("config", config, CONFIGS)
+    base = "none" if config.endswith("x7") else "holonomic"
     machine: ArmMachine = legacy_hermies(base)
     path = route(machine, trajectory)
     if not legacy:
         machine = hermies(base)
         assert path.euler is not None
         path = replace(path, euler=np.array([euler_angles(rotation_of(e) @ QUARTER.T) for e in path.euler]))
-    return Driver(machine, Settings(method, AXES[: int(config[0])], euler=legacy)).run(path)
+    return Driver(machine, Settings(rows=AXES[: int(config[0])], euler=legacy, **settings), spheres).run(path)
 
 
 def differences(run: Run, trajectory: str, config: str) -> Array:
@@ -97,18 +99,29 @@ def differences(run: Run, trajectory: str, config: str) -> Array:
 def unmatched(run: Run, trajectory: str, config: str) -> list[tuple[int, float, float, float, str]]:
     """Printed norms that are off by more than :data:`NEAR`: step, printed, measured, ln(measured / printed), and why.
 
-    ``misread``: both rows beside it match, which no motion would do, as feedback shows a step on. ``up and down``: of
-    consecutive rows each is off the other way than the one before, as if a target were off a little and the feedback
-    took it back; the report says nothing of it. ``unexplained``: all else.
+    ``misread``: both rows beside it match, which no motion would do, as feedback shows a step on. ``given back``: with
+    those beside them such rows add up to nothing, as if targets were off a little and the feedback took it back; the
+    report says nothing of it. ``numbered n on``: after n rows that are lost it matches n steps earlier.
+    ``unexplained``: all else.
     """
     found = printed()[trajectory, config]
-    off = np.log(run.norms[found.steps.astype(int) - 1] / found.fsp)
-    far = np.abs(off) > NEAR
-    out = []
+    steps = found.steps.astype(int)
+    off = np.log(run.norms[steps - 1] / found.fsp)
+    far, out = np.abs(off) > NEAR, list[tuple[int, float, float, float, str]]()
     for k in np.flatnonzero(far):
-        beside = [j for j in (k - 1, k + 1) if 0 <= j < len(off) and far[j]]
-        opposite = all(off[j] * off[k] < 0.0 for j in beside)
-        why = "misread" if not beside else "up and down" if opposite else "unexplained"
-        step = int(found.steps[k])
-        out.append((step, float(found.fsp[k]), float(run.norms[step - 1]), float(off[k]), why))
+        first, last = k, k
+        while first > 0 and far[first - 1]:
+            first -= 1
+        while last + 1 < len(far) and far[last + 1]:
+            last += 1
+        lost = int(steps[first] - steps[first - 1]) - 1 if first else 0
+        earlier = abs(math.log(run.norms[steps[k] - 1 - lost] / found.fsp[k]))
+        why = "unexplained"
+        if first == last:
+            why = "misread"
+        elif abs(np.nansum(off[max(first - 1, 0) : last + 2])) < NEAR:
+            why = "given back"
+        elif lost and earlier < NEAR:
+            why = f"numbered {lost} on"
+        out.append((int(steps[k]), float(found.fsp[k]), float(run.norms[steps[k] - 1]), float(off[k]), why))
     return out

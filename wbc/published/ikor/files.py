@@ -5,20 +5,26 @@ Angles in files are degrees, lengths metres, also of sliding joints; the report 
 
 from __future__ import annotations
 
+import math
 import pathlib
+import re
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from wbc import robots, validation
 from wbc.errors import WbcError
+from wbc.published.ikor.lines import Trajectory
 from wbc.published.ikor.machines import ArmMachine, airarm, hermies, machine_of, planar
 from wbc.validation import Array
 
 #: Points of a trajectory beyond these are dropped
 MAX_POINTS = 1000
+#: What numbers and counts look like: no other digits or separators, which Python would take
+NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?")
+WHOLE = re.compile(r"-?[0-9]{1,6}")
 
 
 class IkorFileError(WbcError):
@@ -55,16 +61,17 @@ class _Lines:
     def number(self, line: int, word: str, what: str) -> float:
         """A finite number of reasonable size."""
         try:
-            return validation.scalar(what, float(word))
-        except (ValueError, WbcError):
+            return validation.scalar(what, float(word) if NUMBER.fullmatch(word) else math.nan)
+        except WbcError:
             raise self.error(line, word, f"expected {what}: a finite number") from None
 
-    def count(self, what: str, low: int = 0) -> int:
-        """The next line, a whole number."""
-        line, (word,) = self.words(1, what)
-        if not word.lstrip("-").isdigit() or int(word) < low:
-            raise self.error(line, word, f"expected {what}: a whole number from {low}")
-        return int(word)
+    def counts(self, count: int, what: str, low: int = 0) -> list[int]:
+        """The next line, whole numbers of six digits at most."""
+        line, words = self.words(count, what)
+        for word in words:
+            if not WHOLE.fullmatch(word) or int(word) < low:
+                raise self.error(line, word, f"expected {what}: a whole number from {low}")
+        return [int(word) for word in words]
 
     def end(self) -> None:
         """Nothing may follow."""
@@ -75,21 +82,6 @@ class _Lines:
         return IkorFileError(f"{self.path.name}:{line}", value, reason)
 
 
-@dataclass(frozen=True, eq=False)
-class Trajectory:
-    """Where the tool goes.
-
-    Attributes:
-        start: columns of the machine at the start [M]. points: [n, 3] in m. euler: yaw, pitch, roll [n, 3] in rad.
-        dropped: points beyond :data:`MAX_POINTS`.
-    """
-
-    start: Array
-    points: Array
-    euler: Array | None = None
-    dropped: int = 0
-
-
 def read_trajectory(file: Any, machine: ArmMachine, angles: Any = None) -> Trajectory:
     """``TrajectoryPts``: initial joints, number of points, a point a line; ``EulerAngles``: yaw, pitch, roll a line.
 
@@ -98,7 +90,7 @@ def read_trajectory(file: Any, machine: ArmMachine, angles: Any = None) -> Traje
     """
     lines = _Lines(file)
     start = lines.numbers(machine.joints, "initial joints") / _units(machine)
-    count = lines.count("the number of points", -(2**31))
+    (count,) = lines.counts(1, "the number of points", -999_999)
     points = np.array([lines.numbers(3, f"point {k + 1}") for k in range(max(0, count))]).reshape(-1, 3)
     lines.end()
     euler = None
@@ -165,7 +157,7 @@ def read_jacobian(file: Any) -> tuple[Array, Array]:
         IkorFileError: a bad line.
     """
     lines = _Lines(file)
-    n, m = (int(k) for k in lines.numbers(2, "rows and joints"))
+    n, m = lines.counts(2, "rows and joints", 1)
     J = np.array([lines.numbers(m, f"row {k + 1} of J") for k in range(n)])
     x = np.array([lines.numbers(1, f"rate {k + 1}")[0] for k in range(n)])
     lines.end()
@@ -181,8 +173,9 @@ def read_robot(file: Any, base: str = "none") -> ArmMachine:
         IkorFileError: a bad line.
     """
     lines = _Lines(file)
-    links = lines.numbers(lines.count("the number of links", 1), "lengths of links")
-    joints = lines.count("the number of joints", 1)
+    (count,) = lines.counts(1, "the number of links", 1)
+    links = lines.numbers(count, "lengths of links")
+    (joints,) = lines.counts(1, "the number of joints", 1)
     rows, flags = [], []
     for k in range(joints):
         what = f"joint {k + 1}: most, least, prismatic, weight, home"

@@ -9,6 +9,7 @@ from typing import Any
 
 from wbc import validation
 from wbc.errors import RangeError
+from wbc.resolvers.fsp import Criterion
 
 #: Rows of a task, in their order
 AXES = ("x", "y", "z", "yaw", "pitch", "roll")
@@ -42,6 +43,7 @@ class Settings:
         loop_back: where a step would be longer than the limit, some steps are taken back and tried again with the
             joint held that moved most.
         feedback: the target less where the tool is; else less where it should have been.
+        criterion: of FSP's steps, in place of the least norm by the machine's weights.
     """
 
     method: Method = Method.FSP
@@ -56,6 +58,7 @@ class Settings:
     step_limit: float = math.inf
     loop_back: bool = False
     feedback: bool = True
+    criterion: Criterion | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "method", _method(self.method))
@@ -68,6 +71,8 @@ class Settings:
         validation.one_of("generator", self.generator, ("blocked", "orthogonal"))
         for name in ("margin", "damping"):
             validation.scalar(name, getattr(self, name), low=0.0)
+        if self.criterion is not None and (self.resolver != "fsp" or self.plain):
+            raise RangeError("criterion", self.resolver, "only FSP takes a criterion of its own")
         if not self.step_limit > 0.0:
             raise RangeError("step_limit", self.step_limit, "expected a length above 0")
 
@@ -75,6 +80,11 @@ class Settings:
     def limits(self) -> bool:
         """Whether joint limits act."""
         return self.method in (Method.LIMITS, Method.BOTH)
+
+    @property
+    def plain(self) -> bool:
+        """Whether the pseudo-inverse makes the steps."""
+        return self.resolver == "pseudo_inverse" or (self.resolver == "fsp" and self.method is Method.PSEUDO_INVERSE)
 
     @property
     def obstacles(self) -> bool:

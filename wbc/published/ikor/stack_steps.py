@@ -12,6 +12,7 @@ import pinocchio as pin
 from wbc import tasks
 from wbc.controller import Stack
 from wbc.errors import InfeasibleError, RangeError
+from wbc.published.ikor.legacy import LegacyHermies
 from wbc.published.ikor.machines import ArmMachine
 from wbc.published.ikor.settings import Settings
 from wbc.shapes import Capsule, PlacedShape, Sphere
@@ -52,6 +53,10 @@ class StackSteps:
         angles = [r for r in settings.rows if r in ("yaw", "pitch", "roll")]
         if len(angles) not in (0, 3) or not {"x", "y", "z"} <= set(settings.rows):
             raise RangeError("rows", settings.rows, "a stack takes x, y and z, and all three angles or none")
+        if isinstance(machine, LegacyHermies):
+            raise RangeError(
+                "resolver", "stack", "a stack has no defects of the printed norms; take consistent kinematics"
+            )
         if machine.base == "car":
             raise RangeError("base", machine.base, "a stack takes a holonomic or differential platform")
         if settings.loop_back:

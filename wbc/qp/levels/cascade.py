@@ -202,7 +202,11 @@ class LevelStep:
         """(what was achieved, the space that is left, multipliers)."""
         y, force, lam, solved = np.zeros(self.rank), self._none(), self._none(), True
         if self.rank:
-            y = np.asarray(np.linalg.solve(self.H, self.right))
+            try:
+                y = np.asarray(np.linalg.solve(self.H, self.right))
+            except np.linalg.LinAlgError:  # pivots of elimination may vanish where those of Cholesky do not
+                factor = np.linalg.inv(np.linalg.cholesky(self.H))
+                y = np.asarray(factor.T @ (factor @ self.right))
         x = self.x + self.Z @ y
         if not self._holds(x):
             x, y, force, solved = self._searched(place)

@@ -71,9 +71,7 @@ def blocked(
     A = J[:, active]
     rows = _independent(A)
     first, columns = _first_block(A[rows], x[rows])
-    start = np.zeros(J.shape[1])
-    start[active] = first
-    status, missed, reached = consistency(J, x, start, len(rows), project)
+    status, missed, reached = consistency(A, x, first, len(rows), project)
     finder = _Search(A[rows], reached[rows])
     if len(columns) < A.shape[1]:
         finder.exhaust() if search == "exhaustive" else finder.exchange()

@@ -147,7 +147,7 @@ def _orthogonal(J: Array, x: Array, held: tuple[int, ...], free: bool, project: 
     vectors = np.zeros((m - rank + 1, J.shape[1]))
     vectors[:, active] = Q[:, :rank] @ along
     vectors[1:, active] += Q[:, rank:].T
-    status, missed, reached = consistency(J, x, vectors[0], rank, project)
+    status, missed, reached = consistency(A, x, vectors[0, active], rank, project)
     if status is Consistency.INCONSISTENT:
         again = _orthogonal(J, reached, held, free, False)
         return SolutionSpace(J, reached, again.vectors, again.rows, idle, status, missed)
@@ -155,7 +155,7 @@ def _orthogonal(J: Array, x: Array, held: tuple[int, ...], free: bool, project: 
 
 
 def consistency(J: Array, x: Array, v: Array, rank: int, project: bool) -> tuple[Consistency, float, Array]:
-    """(status, what is missed, rates that can be had) of a task with a candidate solution.
+    """(status, what is missed, rates that can be had) of a task with a candidate solution; J: of joints that move.
 
     Raises:
         InfeasibleError: it is inconsistent and nothing shall be projected.

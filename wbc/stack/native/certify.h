@@ -175,7 +175,14 @@ EXPORT void wbc_tick_certify(wbc_tick *t) {
 
 EXPORT void wbc_tick_look_ahead(wbc_tick *t) {
 #if MH > 0
-    const double *arg[4] = {t->q, t->report.v, t->p, &t->dt};
+#if COMMAND == VELOCITY
+    const double *way = t->report.v;
+#else
+    /* The mean velocity until the next tick */
+    double way[NV];
+    for (int i = 0; i < NV; i++) way[i] = t->v_last[i] + 0.5 * t->dt * t->report.v[i];
+#endif
+    const double *arg[4] = {t->q, way, t->p, &t->dt};
     double *res[2] = {t->report.ahead, t->segment_ahead};
     ahead(arg, res, t->work_iw, t->work_w, 0);
 #if BALLS > 0

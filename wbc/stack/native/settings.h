@@ -17,6 +17,11 @@
 int rows(const double **arg, double **res, long long *iw, double *w, int mem);
 int ahead(const double **arg, double **res, long long *iw, double *w, int mem);
 int curvature(const double **arg, double **res, long long *iw, double *w, int mem);
+int torque(const double **arg, double **res, long long *iw, double *w, int mem);
+
+/* What is commanded */
+#define VELOCITY 0
+#define TORQUE 2
 
 #define EPS 1.1102230246251565e-16
 /* Two rows whose normals differ by an angle below sqrt(DEPENDENT) count as one */

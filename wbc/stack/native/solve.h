@@ -5,13 +5,23 @@
 #include "margins.h"
 #include "relax.h"
 
+/* The command that brings a joint to rest, and the wrench that a contact keeps */
+INLINE double rest(const wbc_tick *t, int i) {
+#if COMMAND == VELOCITY
+    (void)t, (void)i;
+    return 0.0;
+#else
+    return i < DOFS ? -t->v_last[i] / t->dt : t->kept[i];
+#endif
+}
+
 /* Come to rest as fast as the bounds let each joint */
 static void brake(wbc_tick *t) {
     /* A relaxation may have moved the bounds */
     form_bounds(t);
     for (int i = 0; i < NV; i++) {
         const double low = t->low[i], high = t->high[i];
-        t->x[i] = low <= high ? clamp(0.0, low, high) : 0.0;
+        t->x[i] = low <= high ? clamp(rest(t, i), low, high) : 0.0;
     }
     t->daqp.n_active = 0;
     t->warm = 0;

@@ -48,6 +48,36 @@ static void report_soft_rows(wbc_tick *t) {
     }
 }
 
+#if COMMAND == TORQUE
+/* Torques of the joints for the command, never beyond their limits: also not where a tick has no answer, nor by rounding */
+EXPORT void wbc_tick_torques(wbc_tick *t) {
+    double most[MC + 1];
+    const double *arg[5] = {t->q, t->v_last, t->p, &t->dt, t->report.v};
+    double *res[2] = {t->report.torque, most};
+    torque(arg, res, t->work_iw, t->work_w, 0);
+    for (int i = 0; i < DOFS; i++)
+        if (!isfinite(t->report.torque[i])) t->report.torque[i] = 0.0;
+    for (int k = 0; k < MC; k++) {
+        const int i = torque_dof[k];
+        if (i >= 0 && t->enabled[k] != 0.0) t->report.torque[i] = clamp(t->report.torque[i], -most[k], most[k]);
+    }
+}
+#endif
+
+/* What follows from the command: torques, and the velocity that the next tick counts from */
+static void commanded(wbc_tick *t, int sound) {
+#if COMMAND == VELOCITY
+    (void)sound;
+    memcpy(t->v_last, t->report.v, NV * sizeof(double));
+#else
+#if COMMAND == TORQUE
+    wbc_tick_torques(t);
+#endif
+    for (int i = 0; i < DOFS; i++) t->v_last[i] += t->dt * t->report.v[i];
+    for (int i = DOFS; sound && i < NV; i++) t->kept[i] = t->report.v[i];
+#endif
+}
+
 EXPORT int wbc_tick_step(wbc_tick *t) {
     const int bad = wbc_tick_check(t);
     if (bad) return bad;
@@ -64,8 +94,9 @@ EXPORT int wbc_tick_step(wbc_tick *t) {
 #endif
     if (PRICES) report_soft_rows(t);
     wbc_tick_look_ahead(t);
-    memcpy(t->v_last, t->report.v, NV * sizeof(double));
-    return unsound(t, flag) ? flag + WBC_UNSOUND : flag;
+    const int sound = !unsound(t, flag);
+    commanded(t, sound && flag != WBC_BRAKED);
+    return sound ? flag : flag + WBC_UNSOUND;
 }
 
 EXPORT long long wbc_tick_size(void) { return (long long)sizeof(wbc_tick); }
@@ -122,7 +153,7 @@ EXPORT int wbc_tick_safe_step(wbc_tick *t) {
     wbc_tick_certify(t);
     memset(t->report.slack, 0, sizeof t->report.slack);
     wbc_tick_look_ahead(t);
-    memcpy(t->v_last, t->report.v, NV * sizeof(double));
+    commanded(t, 0);
     return (int)(t->report.flag = WBC_UNCERTIFIED);
 }
 

@@ -8,6 +8,8 @@
  *   j_start j_col a_start a_end a_col   their positions, row by row
  *   damping     cost of each velocity
  *   CALM        0: the linear model as it is
+ *   COMMAND     0: velocities, 1: accelerations, 2: torques; of the last two the variables are accelerations and the
+ *               wrenches of contacts
  *   NNZK k_row k_col   entries of the curvature's upper triangle
  *   margin_at rate_at   margin of each general row (-1: none), and where its rate is in p
  *   gain_at     where the gain of each task row is in p
@@ -34,6 +36,7 @@
  *   task_scale  the unit of each task row
  *   LEVEL_NUMBERS LEVEL_MOST SOFT_MAX   numbers reported of each; rows and minimised general rows of one at most
  *   LEFT_FREE DAMPING   singular values below it are left to later levels; damping of one that is 0
+ *   torque_dof  the degree of freedom whose torque a general row limits (-1: none)
  *   stop_at stop_q stop_low stop_high   the same for position limits, with the coordinate that is limited
  */
 #ifndef WBC_TICK_H

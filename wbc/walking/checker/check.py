@@ -55,23 +55,26 @@ def check_walk(
 
     Raises:
         WalkLogError, StructureFileError, RobotFileError, UnsupportedJointError: a file that cannot be read.
-        UnknownNameError: a joint or hand that the URDF does not have. ShapeError: a log without the joints it needs.
+        UnknownNameError: a joint or hand that the URDF does not have, or a check in ``rules.observe``
+            that is none. ShapeError: a log without the joints it needs.
     """
     used = rules or Rules()
     if not isinstance(log, WalkLog):
         log = WalkLog.load(log)
     if structure is not None and not isinstance(structure, Structure):
         structure = read_structure(structure)
-    machine, tally = read_urdf(urdf), Tally()
+    machine, tally = read_urdf(urdf), Tally(used.observe)
     _check_names(log, machine)
     table = HoldTable.of(log)
     for declare in (table_of_holds.declare, clock_and_joints.declare, clearances.declare, swept.declare):
         declare(tally, used)
     grasps.declare(tally, used, log)
     _declare(tally, used)
+    tally.check_observed()
     table_of_holds.check_table(log, table, structure, tally)
     clock_and_joints.check_time(log, tally)
     clock_and_joints.check_rates(log, machine, tally)
+    clock_and_joints.check_accelerations(log, used, tally)
     clock_and_joints.check_twist(log, used, tally)
     clock_and_joints.check_jumps(log, tally)
     swept.check_swept(log, machine, urdf, structure, used, tally)

@@ -14,6 +14,7 @@ from wbc.walking.log.log import WalkLog
 
 #: A step of time below this [s] is none
 LEAST_STEP = 1e-12
+HARD = "joint acceleration / limit"
 JUMP, SPIN_JUMP = "jump of the body's velocity", "jump of the body's turn rate"
 
 
@@ -25,10 +26,11 @@ def declare(tally: Tally, rules: Rules) -> None:
     tally.declare("joint rate / limit", 1.0 + rules.rate)
     tally.declare("joint step rate / limit", 1.0 + rules.rate)
     tally.declare("joint step less rate x dt", rules.rounding, "rad")
+    tally.declare(HARD, 1.0 + rules.acceleration)
     tally.declare("twist speed", rules.twist_speed, "m/s")
     tally.declare("twist turn rate", rules.twist_rate, "rad/s")
-    tally.declare(JUMP, rules.jump_speed, "m/s", observed=True)
-    tally.declare(SPIN_JUMP, rules.jump_rate, "rad/s", observed=True)
+    tally.declare(JUMP, rules.jump_speed, "m/s")
+    tally.declare(SPIN_JUMP, rules.jump_rate, "rad/s")
 
 
 def check_time(log: WalkLog, tally: Tally) -> None:
@@ -52,6 +54,17 @@ def check_rates(log: WalkLog, urdf: Urdf, tally: Tally) -> None:
         ratios = np.where(steps == 0.0, 0.0, np.abs(steps) / np.maximum(gaps, 0.0)) / limits
     tally.add("joint step rate / limit", ratios, log.t, where)
     tally.add("joint step less rate x dt", np.abs(steps - log.v[:-1] * gaps), log.t, where)
+
+
+def check_accelerations(log: WalkLog, rules: Rules, tally: Tally) -> None:
+    """|v[k] - v[k - 1]| / dt within the limits of the rules, from rest on and to rest at the end."""
+    names = [name for name in log.joints if name in rules.accelerations]
+    if not names:
+        return
+    rates = log.v[:, [log.joints.index(name) for name in names]]
+    limits = np.array([rules.accelerations[name] for name in names])
+    changes = np.abs(np.diff(rates, axis=0, prepend=0.0 * rates[:1])) / log.dt
+    tally.add(HARD, changes / limits, log.t, lambda _, joint: names[joint])
 
 
 def check_positions(samples: Samples, log: WalkLog, urdf: Urdf, tally: Tally) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from math import inf, isfinite, nan
 from typing import Any
@@ -14,6 +14,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from wbc import validation
 from wbc.errors import UnknownNameError
 
 #: Unit -> (how it is shown, factor)
@@ -65,7 +66,7 @@ class Report:
         ticks, samples: how many were checked; duration [s].
         open_freedoms: samples at which the holding hands leave freedoms of the body open; there the body is compared in
             what they fix.
-        observed: checks that no walk is held to yet: what they find is shown and does not count.
+        observed: checks that :attr:`Rules.observe` names: what they find is shown and does not count.
     """
 
     findings: tuple[Finding, ...]
@@ -100,7 +101,7 @@ class Report:
         return self.table()
 
     def __str__(self) -> str:
-        console = Console(file=io.StringIO(), width=130, color_system=None)
+        console = Console(file=io.StringIO(), width=140, color_system=None)
         console.print(self.table())
         stream = console.file
         assert isinstance(stream, io.StringIO)
@@ -126,17 +127,28 @@ class Report:
 
 
 class Tally:
-    """Collects the values of checks; stores of each the worst and how many violate it."""
+    """Collects the values of checks; stores of each the worst and how many violate it.
 
-    def __init__(self) -> None:
+    Args:
+        observe: checks that do not count.
+    """
+
+    def __init__(self, observe: Sequence[str] = ()) -> None:
         self._findings: dict[str, Finding] = {}
-        self._observed: set[str] = set()
+        self._observed = tuple(observe)
 
-    def declare(self, kind: str, limit: float, unit: str = "", least: bool = False, observed: bool = False) -> None:
-        """A check: values of at most ``limit``, or at least, with ``least``; an observed one does not count."""
-        if observed:
-            self._observed.add(kind)
+    def declare(self, kind: str, limit: float, unit: str = "", least: bool = False) -> None:
+        """A check: values of at most ``limit``, or at least, with ``least``."""
         self._findings[kind] = Finding(kind, 0, nan, limit, unit, nan, "", least)
+
+    def check_observed(self) -> None:
+        """Once all checks are declared: whether those that do not count are some.
+
+        Raises:
+            UnknownNameError: one is none.
+        """
+        for kind in self._observed:
+            validation.one_of("Rules.observe", kind, list(self._findings))
 
     def worst(self, kind: str) -> float:
         """The worst value so far; NaN if there is none."""

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from math import radians
 
 from wbc import validation
@@ -25,11 +26,14 @@ class Rules:
         rounding: by which a joint's steps may miss its logged rate times dt [rad].
         drift_distance, drift_angle: by which the offset of a closed hand may grow again.
         twist_speed, twist_rate: of the logged twist against the body's motion, means over ``twist_window``.
-        jump_speed, jump_rate: by which the body's velocity may change from tick to tick; observed.
+        acceleration: of a joint beyond its limit, relative. accelerations: limits by joint, which no URDF has
+            [rad/s^2]; a joint without one is not checked.
+        jump_speed, jump_rate: by which the body's velocity may change from tick to tick.
         clearance, clearance_slack: least distance, and by how much it may be missed.
         exempt_distance: a hand this near to a hold may touch what the hold stands on.
-        exempt_depth: how deep it may be in that, beyond its roundness; observed.
+        exempt_depth: how deep it may be in that, beyond its roundness.
         latch_time: of closing and of opening, less a tick.
+        observe: checks (their names) that are shown and do not count.
 
     Raises:
         ShapeError, NotFiniteError, RangeError: a field that is no number or below 0.
@@ -51,6 +55,8 @@ class Rules:
     twist_speed: float = 0.01
     twist_rate: float = radians(1.0)
     twist_window: float = 0.1
+    acceleration: float = 0.01
+    accelerations: Mapping[str, float] = field(default_factory=dict)
     jump_speed: float = 0.02
     jump_rate: float = 0.02
     clearance: float = 1.0 * INCH
@@ -58,9 +64,18 @@ class Rules:
     exempt_distance: float = 3.0 * INCH
     exempt_depth: float = 0.005
     latch_time: float = 0.1
+    observe: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
+        limits = {
+            joint: validation.scalar(f"Rules.accelerations[{joint!r}]", value, low=0.0, open_low=True, unit="rad/s^2")
+            for joint, value in self.accelerations.items()
+        }
+        object.__setattr__(self, "accelerations", limits)
+        object.__setattr__(self, "observe", tuple(validation.items("Rules.observe", self.observe, "names of checks")))
         for name, value in self.__dict__.items():
+            if name in ("accelerations", "observe"):
+                continue
             if name in ("min_holds", "sub_samples"):
                 least = 1 if name == "sub_samples" else 0
                 if value is None and name == "min_holds":

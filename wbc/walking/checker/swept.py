@@ -32,7 +32,7 @@ MOUNTED, LEAVING = 0.005, 3.0
 def declare(tally: Tally, rules: Rules) -> None:
     """The checks of this module."""
     for kind in (LINKS, STRUCTURE):
-        tally.declare(kind, rules.clearance - rules.clearance_slack, "m", least=True, observed=True)
+        tally.declare(kind, rules.clearance - rules.clearance_slack, "m", least=True)
 
 
 def check_swept(

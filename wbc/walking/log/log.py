@@ -144,7 +144,9 @@ class WalkLog:
         """Whether holds (rows of the table) are there at times ``t`` [s]; False for -1. Arrays broadcast."""
         rows, times = np.broadcast_arrays(np.asarray(hold), np.asarray(t, dtype=float))
         out = np.zeros(rows.shape, dtype=bool)
-        for row, (start, end) in zip(self.presence_hold, self.presence_span, strict=True):
+        # Of hundreds of holds hands are at a few
+        asked = np.isin(self.presence_hold, np.unique(rows))
+        for row, (start, end) in zip(self.presence_hold[asked], self.presence_span[asked], strict=True):
             out |= (rows == row) & (times >= start) & (times < end)
         return out
 

@@ -96,14 +96,43 @@ def pose_numbers(pose: pin.SE3) -> Array:
     return out
 
 
-#: From rest to the commanded speed [s]; back, where hands would lose their holds, as of :class:`Stops`
-RAMP = 0.5
 #: Part of the pace from which a body that brakes steadily comes to rest in time
 PART = 0.9
+#: By which the body's velocity may change where its path has a corner [m/s, rad/s]: half of what a checker allows
+CORNER = 0.01
+
+
+class Corners:
+    """How fast a path may be followed: where its rate jumps by d from one sample to the next, the pace is at most
+    CORNER / d, and before it as much as can be braked in time.
+
+    Args:
+        brake: time in which the body comes to rest from full pace [s].
+    """
+
+    def __init__(self, path: BodyPath, brake: float) -> None:
+        self.path, self._gain = path, 2.0 * PART / brake
+        turns, places = path.poses[:, :3, :3], path.poses[:, :3, 3]
+        step = turns[1:] @ turns[:-1].transpose(0, 2, 1)
+        # Of small turns the skew part is the rotation vector
+        skew = 0.5 * np.stack(
+            [step[:, 2, 1] - step[:, 1, 2], step[:, 0, 2] - step[:, 2, 0], step[:, 1, 0] - step[:, 0, 1]]
+        )
+        rates = np.stack([np.diff(places, axis=0), skew.T], axis=1) / path.spacing
+        jumps = np.linalg.norm(np.diff(rates, axis=0), axis=2).max(axis=1)
+        most = np.ones(len(path.poses))
+        most[1:-1] = np.minimum(CORNER / np.maximum(jumps, CORNER), 1.0)
+        reach = most**2 + self._gain * path.spacing * np.arange(len(most))
+        self._reach: list[float] = np.minimum.accumulate(reach[::-1])[::-1].tolist()
+
+    def pace(self, u: float) -> float:
+        """The greatest at a path time [s]."""
+        row = min(int(u / self.path.spacing + 1.0 - 1e-9), len(self._reach) - 1)
+        return sqrt(max(self._reach[row] - self._gain * u, 0.0))
 
 
 class BodyMotion:
-    """The pace of the body, 1 the path's own, and its command.
+    """The pace of the body, 1 the path's own, and its command; how fast it changes says :class:`Stops`.
 
     Attributes:
         pace: now. wanted: that it should have. pose: where the body is to be as the tick ends: position [m] and
@@ -113,12 +142,21 @@ class BodyMotion:
     def __init__(self, dt: float, stops: Stops) -> None:
         self._dt, self._stops, self._command = dt, stops, BodyCommand(dt)
         self.pace, self.wanted = 0.0, 1.0
+        self._corners: Corners | None = None
 
     @property
     def pose(self) -> Array:
         return self._command.pose
 
-    def choose(self, margin: float, left: float, landing: tuple[float, float] | None, stands: bool) -> None:
+    def corners(self, path: BodyPath) -> Corners:
+        """Of a path, which are made once."""
+        if self._corners is None or self._corners.path is not path:
+            self._corners = Corners(path, self._stops.brake)
+        return self._corners
+
+    def choose(
+        self, margin: float, left: float, landing: tuple[float, float] | None, stands: bool, most: float = 1.0
+    ) -> None:
         """The pace of this tick: as fast as asked, as slow as the hands need. Braking from p in a time T takes
         p^2 T / 2 of path time.
 
@@ -126,13 +164,16 @@ class BodyMotion:
             margin: path time until a holding hand reaches the end of its grip [s]. left: until the end of the path or
                 of what is planned [s]. landing: path time that is left until the swinging hand has to hold, and the
                 time that it needs until then [s]; None: no hand is swinging. stands: the body is to come to rest.
+            most: that the path allows.
         """
         brake = self._stops.brake
-        wanted = min(1.0, sqrt(2.0 * margin / brake * PART), sqrt(2.0 * left / RAMP * PART))
+        wanted = min(1.0, most, sqrt(2.0 * margin / brake * PART), sqrt(2.0 * left / self._stops.ramp * PART))
         if landing is not None and landing[0] < landing[1]:
             wanted = min(wanted, landing[0] / landing[1])
         self.wanted = 0.0 if stands else wanted
-        self.pace = max(self.pace + min(max(self.wanted - self.pace, -self._dt / brake), self._dt / RAMP), 0.0)
+        self.pace = max(
+            self.pace + min(max(self.wanted - self.pace, -self._dt / brake), self._dt / self._stops.ramp), 0.0
+        )
 
     def go(self, path: BodyPath, begin: float) -> tuple[Array, float]:
         """A tick along a path from a path time on [s]: what the stack follows, as of :meth:`BodyCommand.go`, and the

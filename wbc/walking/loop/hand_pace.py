@@ -12,8 +12,13 @@ from wbc.validation import Array
 from wbc.walking.loop.stack import SWING_GAIN
 from wbc.walking.loop.state import Swinging
 
-#: A swing waits for a hand that is this far behind its aim [m]: full pace below half of it, least pace beyond
-BEHIND, LEAST_PACE = 0.02, 0.05
+#: The place that a hand is pulled to is no farther from it than this [m]
+BEHIND = 0.02
+#: A swing waits for a hand that is behind its aim or beside it: full pace up to the first [m], least pace beyond the
+#: second. As it comes to the distance at which it may be near to what its hold is mounted on, within :data:`OVER` of
+#: it [m], it is over the hold
+BESIDE, WAITS, LEAST_PACE = 0.0008, 0.005, 0.05
+OVER = (0.06, 0.16)
 #: A hand is near its hold from this part of the wrist's motion on; its joints are then this near to theirs [rad]
 LANDING, TURNED = 0.97, 0.5
 #: Part of the tolerances within which a hand closes: it is still moving a little as it does
@@ -26,12 +31,12 @@ HAND_RAMP = 0.2
 HAND_STOP = 0.3
 
 
-def hand_pace(swinging: Swinging, place: Array, turned: bool, early: float, pace: float) -> float:
+def hand_pace(swinging: Swinging, place: Array, turned: bool, early: float, pace: float, far: float) -> float:
     """Part of full speed at which the aim of a hand should go on.
 
     Args:
         place: of the hand [m]. turned: its wrist is on the branch that it lands with.
-        early: path time until the hold can be held [s]. pace: of the body.
+        early: path time until the hold can be held [s]. pace: of the body. far: the hand is from its hold [m].
     """
     aim = swinging.aim
     # In plain floats: three numbers are too few for numpy to be quick
@@ -40,7 +45,9 @@ def hand_pace(swinging: Swinging, place: Array, turned: bool, early: float, pace
     along = (x * u + y * v + z * w) / speed if speed > 1e-6 else 0.0
     across = sqrt(max(x * x + y * y + z * z - along * along, 0.0))
     # A hand that is ahead must not be stopped: it could not
-    wanted = min(max(1.5 - (max(along, 0.0) + across) / BEHIND, LEAST_PACE), 1.0)
+    off = max(along, 0.0) + across
+    least, most = (BESIDE, WAITS) if OVER[0] < far < OVER[1] else (0.5 * BEHIND, 1.5 * BEHIND)
+    wanted = min(max((most - off) / (most - least), LEAST_PACE), 1.0)
     wait = early - pace * (swinging.law.duration - swinging.clock)
     if wait > 0.0:
         wanted /= 1.0 + 4.0 * wait

@@ -12,7 +12,7 @@ import pinocchio as pin
 from wbc.errors import ShapeError
 from wbc.validation import Array
 from wbc.walking.loop.hand_command import UPRIGHT, HandCommand, HandLanding
-from wbc.walking.loop.hand_pace import HAND_RAMP, HAND_STOP, LANDING, at_rest, hand_pace, turned
+from wbc.walking.loop.hand_pace import HAND_RAMP, LANDING, at_rest, hand_pace, turned
 from wbc.walking.loop.machine import Machine
 from wbc.walking.loop.progress import PlanProgress
 from wbc.walking.loop.stack import WalkStack
@@ -21,6 +21,8 @@ from wbc.walking.loop.stopping import Stops
 from wbc.walking.planner.grips.rolls import ANY, frame_on
 from wbc.walking.planner.swings.law import SwingLaw
 
+#: Rate at which a hand that has arrived takes back what it is off its hold [1/s]
+SETTLING = 8.0
 #: A hold that could not be grasped so many times is taken as vanished
 TRIES = 3
 
@@ -30,10 +32,12 @@ class HandLeader(Protocol):
 
     Attributes:
         stops: how fast body and hand come to rest. one_motion: the hand moves because the body does, with its pace.
+        late: path time by which a hand that does not delay the body may land later than planned [s].
     """
 
     stops: Stops
     one_motion: bool
+    late: float
 
     def first(self) -> Array:
         """The configuration with which a plan begins: the body where its path begins, the arms on their grips."""
@@ -56,14 +60,14 @@ class ArmLeader:
         ShapeError: another machine.
     """
 
-    one_motion = False
+    one_motion, late = False, 0.05
 
     def __init__(self, machine: Machine, progress: PlanProgress, stack: WalkStack) -> None:
         if machine.walker.two_ended:
             raise ShapeError("plan", progress.plan, "expected a plan of a machine with WalkerData")
         self._machine, self._progress, self._stack, self._dt = machine, progress, stack, machine.dt
         self._hand, self._landing = HandCommand(machine.dt), HandLanding(machine.dt)
-        self.stops = Stops(machine.dt)
+        self.stops = Stops.of(machine.walker, machine.dt)
 
     def first(self) -> Array:
         """The body where the path begins, the arms on their grips."""
@@ -87,14 +91,21 @@ class ArmLeader:
         if swinging.state == "opening":
             swinging.open_on(self._dt)
         elif swinging.state == "open":
-            wanted = hand_pace(swinging, swinging.place, at_branch, early, pace)
-            wanted, change = (0.0, self._dt / HAND_STOP) if aborted else (wanted, self._dt / HAND_RAMP)
+            far = dist(swinging.place, machine.structure.positions[swinging.hold])
+            wanted = hand_pace(swinging, swinging.place, at_branch, early, pace, far)
+            stops = aborted or swinging.dropped
+            wanted, change = (0.0, self._dt / self.stops.hand) if stops else (wanted, self._dt / HAND_RAMP)
             swinging.pace += min(max(wanted - swinging.pace, -change), change)
             swinging.clock = min(swinging.clock + swinging.pace * self._dt, swinging.law.duration)
         grip = progress.grip[arm]
         followed = self._hand.go(swinging, swinging.place, progress.grips, grip, progress.sample)
+        if swinging.state == "open" and swinging.clock >= swinging.law.duration - 1e-9 and not swinging.dropped:
+            # What postures pull at a hand that has arrived is taken back, else it stays beside its hold
+            swinging.shift += SETTLING * self._dt * (swinging.aim.position - swinging.place)
+        followed[:3] += swinging.shift
         hold = machine.structure.positions[swinging.hold], machine.structure.axes[swinging.hold]
         near = swinging.aim.blend > LANDING and at_branch and dist(swinging.aim.position, hold[0]) < UPRIGHT
+        near = near and not swinging.dropped
         self._stack.swing(arm, followed, self._landing.go(swinging, hold, near))
 
 
@@ -144,34 +155,55 @@ class Hands:
         self.stack.hold(arm, hold, roll)
         return True
 
+    def settle_in_air(self, arm: int) -> None:
+        """A hand in the air that followed joints waits where it is."""
+        origin, axis, _ = self.machine.hand(arm)
+        self.stack.settle(arm, origin, axis, None)
+
     def stay(self, arm: int) -> None:
         """A hand in the air waits where it is."""
         origin, axis, _ = self.machine.hand(arm)
         self.stack.rest(arm, origin, axis)
 
     def drop(self) -> None:
-        """The swinging hand stays in the air, and goes nowhere any more."""
-        if self.swinging is not None:
-            self.stay(self.swinging.arm)
-            self.swinging = None
+        """The swinging hand does not go to its hold any more: it slows down along its law, and stays in the air."""
+        if self.swinging is None:
+            return
+        if self.swinging.state == "open" and self.swinging.pace > 0.0:
+            if not self.swinging.dropped:
+                self._leave(self.swinging)
+            self.swinging.dropped = True
+            return
+        if not self.swinging.dropped:
+            self._leave(self.swinging)
+        self.stay(self.swinging.arm)
+        self.swinging = None
+
+    def _leave(self, swinging: Swinging) -> None:
+        """The hand may still be near to what its hold is mounted on."""
+        places = self.machine.left.setdefault(swinging.arm, [])
+        places.append(self.machine.structure.positions[swinging.hold])
 
     def just_landed(self, arm: int) -> bool:
         """It has landed in this tick: a hand that goes on at once is closed for a tick."""
         return self._landed == (arm, self.machine.time)
 
-    def send(self, arm: int, grip: tuple[int, int, int], law: SwingLaw, **more: Any) -> Swinging:
-        """An open hand begins to go along a law.
+    def going(self, arm: int, grip: tuple[int, int, int], law: SwingLaw, **more: Any) -> Swinging:
+        """A hand that is to go along a law.
 
         Args:
             grip: its number, the row of its hold, and the number of its roll. more: of :class:`Swinging`.
         """
         number, hold, roll = grip
         x = None if roll == ANY else frame_on(self.machine.structure, hold, roll)[:3, 0]
-        self.swinging = Swinging(arm, hold, number, law, x=x, **more)
-        return self.swinging
+        return Swinging(arm, hold, number, law, x=x, **more)
 
     def settle(self, swinging: Swinging) -> bool:
         """Close a hand that has come to rest on its hold; whether the latch is through with this tick."""
+        if swinging.dropped:
+            if swinging.pace == 0.0:
+                self.drop()
+            return False
         if swinging.state == "open" and swinging.clock >= swinging.law.duration - 1e-9:
             before = swinging.place, swinging.axis, swinging.x_axis
             if self.rests(swinging.arm, swinging.hold, before, swinging.x):
@@ -208,7 +240,7 @@ class Hands:
         held = self.machine.held
         out = [held.get(arm, -1) for arm in self._arms]
         if self.swinging is not None:
-            out[self.swinging.arm] = self.swinging.hold
+            out[self.swinging.arm] = -1 if self.swinging.dropped else self.swinging.hold
         if self.manual is not None:
             out[self.manual.arm] = self.manual.hold
         return tuple(out)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from wbc.robots import Walker
 from wbc.simulation import Connection, Plant
 from wbc.validation import Array
+from wbc.walking.arms.fits import check_fits
 from wbc.walking.holds.structure import Structure
 from wbc.walking.loop.closed_chain import ClosedChain
 
@@ -25,14 +26,17 @@ class Machine:
         q: configuration, the body's pose in the structure. v: last command. rates: of the joints, means over the last
             period, and the body's velocity as the plant has it.
         time: [s]. held: row of the arm -> row of the hold.
+        left: row of the arm -> places of the holds that an open hand has left, or was to go to, last [m].
         fixed: fewer hands hold than the body needs, and have since the beginning: it is declared fixed.
         structure, chain: the holds that are there, and the hands on them.
 
     Raises:
-        what :class:`wbc.simulation.Connection` raises of a plant that does not fit.
+        RangeError: the walker's data are not those of its robot. What :class:`wbc.simulation.Connection` raises of a
+            plant that does not fit.
     """
 
     def __init__(self, walker: Walker, structure: Structure, dt: float, plant: Plant | None = None) -> None:
+        check_fits(walker)
         self.walker, self.structure, self.dt = walker, structure, dt
         self.chain = ClosedChain(walker, structure)
         self._connection = Connection(plant, walker.robot, dt)
@@ -40,14 +44,17 @@ class Machine:
         self.v = self.rates = np.zeros(walker.robot.nv)
         self.time, self.fixed = 0.0, False
         self.held: dict[int, int] = {}
+        self.left: dict[int, list[Array]] = {}
 
-    def begin(self, q: Array, held: Mapping[int, int], time: float = 0.0) -> None:
-        """At rest in a configuration, with some hands closed on holds.
+    def begin(self, q: Array, held: Mapping[int, int], time: float = 0.0, v: Array | None = None) -> None:
+        """In a configuration, with some hands closed on holds, and the rates of the last command; None: at rest.
 
         Raises:
             PlantError: the plant is not there, or has no valid reading. RangeError: as of :class:`ClosedChain`.
         """
         self.held, self.q = dict(held), q.copy()
+        if v is not None:
+            self.v = v.copy()
         self.fixed = len(self.held) < self.walker.min_holds
         self._place(q[7:])
         state = self._connection.reset(self.q, time)
@@ -83,7 +90,7 @@ class Machine:
 
     def open(self, arm: int) -> None:
         """A hand holds nothing."""
-        del self.held[arm]
+        self.left[arm] = [self.structure.positions[self.held.pop(arm)]]
 
     def hand(self, arm: int) -> tuple[Array, Array, Array]:
         """Origin [m], z axis and x axis of a hand in the structure."""

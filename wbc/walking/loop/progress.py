@@ -74,12 +74,15 @@ class PlanProgress:
         done = path.poses[: int(self.path_time / path.spacing) + 1]
         return np.concatenate([here, done[::-1], self.past[::-1][:TRAIL]])[:TRAIL]
 
-    def lift(self, arm: int) -> int:
-        """The next re-grasp begins; the grip that its hand goes to."""
+    def next_grip(self, arm: int) -> int:
+        """The grip that the hand of the next re-grasp goes to."""
+        return self.plan.chain[arm][self._used[arm] + 1]
+
+    def lift(self, arm: int) -> None:
+        """The next re-grasp begins."""
         step, before = self.plan.regrasps[self.next], len(self.past) * self.plan.path.spacing
         self._used[arm] += 1
         self.steps.append(replace(step, lift=step.lift + before, land=step.land + before, until=step.until + before))
-        return self.plan.chain[arm][self._used[arm]]
 
     def land(self, swinging: Swinging) -> None:
         """A hand holds what it went to."""

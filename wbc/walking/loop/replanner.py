@@ -8,6 +8,7 @@ import numpy as np
 
 from wbc import validation
 from wbc.walking.body_path import BodyPath, standing_path, straight_path
+from wbc.walking.loop.foresight import Foresight
 from wbc.walking.loop.machine import Machine
 from wbc.walking.loop.progress import PlanProgress
 from wbc.walking.planner.replanning import PlanSlices, plan_from_here, plan_from_stance, plan_rest
@@ -17,7 +18,13 @@ JOINING = 0.05
 
 
 class Replanner(Protocol):
-    """Plans, in slices, from where a machine stands."""
+    """Plans, in slices, from where a machine stands.
+
+    Attributes:
+        sight: what proves that a free hand may go to where a plan begins; None: nothing does.
+    """
+
+    sight: Foresight | None
 
     def go(self, goal: Any) -> None:
         """Plan to another goal from now on.
@@ -52,6 +59,7 @@ class BodyReplanner:
     def __init__(self, machine: Machine, progress: PlanProgress) -> None:
         self._machine, self._progress = machine, progress
         self._wanted: BodyPath | None = None
+        self.sight: Foresight | None = None
         self._quick = True
 
     def go(self, goal: Any) -> None:
@@ -81,7 +89,8 @@ class BodyReplanner:
             postures = {arm.name: machine.q[arm.q] for arm in walker.arms}
             return plan_from_stance(walker, machine.structure, whole, start, postures=postures)
         behind = progress.behind()
-        return plan_from_here(walker, machine.structure, whole, machine.held, machine.q, machine.chain, behind)
+        may = None if self.sight is None else self.sight.may_bring
+        return plan_from_here(walker, machine.structure, whole, machine.held, machine.q, machine.chain, behind, may)
 
     def without(self, kept: int) -> PlanSlices | None:
         """Along the same path."""

@@ -47,8 +47,10 @@ class Swinging:
         x: the x axis that the hand has on its hold; None if it may roll there.
         first_wrist: joints 4 to 6 of a hand that was in the air when it was sent [rad]; None: those of the grip that it
             leaves. wrist: joints 4 to 6 as they are to be now [rad].
+        shift: added to what the hand follows on its hold [m].
         counted: it is a move of the plan, not one of an earlier plan, or one that brings a free hand to it.
         waits: the body stands until the hand has landed.
+        dropped: it does not go to its hold any more, but comes to rest on its law.
     """
 
     arm: int
@@ -58,6 +60,7 @@ class Swinging:
     latch: float
     counted: bool = True
     waits: bool = False
+    dropped: bool = False
     clock: float = 0.0
     pace: float = 1.0
     state: Hand = "opening"
@@ -66,6 +69,7 @@ class Swinging:
     axis: Array = field(default_factory=lambda: np.zeros(3))
     x_axis: Array = field(default_factory=lambda: np.zeros(3))
     x: Array | None = None
+    shift: Array = field(default_factory=lambda: np.zeros(3))
     first_wrist: Wrist | None = None
     wrist: Wrist = (0.0, 0.0, 0.0)
     aim: Aim = field(init=False)
@@ -87,12 +91,14 @@ class State:
     Attributes:
         q: configuration. held: row of the arm -> row of the hold. time: [s].
         opening: row of an arm that opens, and of the hold that it leaves; None: none does.
+        v: velocity ``[nv]`` that everything has; a walk comes to rest from it first. None: at rest.
     """
 
     q: Array
     held: Mapping[int, int]
     time: float = 0.0
     opening: tuple[int, int] | None = None
+    v: Array | None = None
 
 
 @dataclass(eq=False, slots=True)

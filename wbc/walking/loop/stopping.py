@@ -6,14 +6,22 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from wbc.robots import Walker
 from wbc.validation import Array
 from wbc.walking.loop.hand_pace import BEHIND, HAND_STOP
 from wbc.walking.planner.plan import Plan
 
-#: A body comes to rest from full pace in [s]
-BRAKE = 0.25
+#: A body comes to rest from full pace in [s], and from rest to it in
+BRAKE, RAMP = 0.25, 0.5
 #: What a body may be off its path at the end of a stop [m]
 OFF = 0.002
+
+
+def slowness(walker: Walker) -> float:
+    """How many times longer than the shortest its joints need to their full rates: what all times above grow with."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        times = walker.robot.limits.velocity[6:] / walker.robot.limits.acceleration[6:]
+    return max(1.0, float(np.max(np.nan_to_num(times, nan=0.0, posinf=0.0))) / BRAKE)
 
 
 @dataclass(frozen=True)
@@ -21,12 +29,19 @@ class Stops:
     """Of a machine whose body comes to rest from full pace in T, and whose hand in T': 0 <= pace <= 1, in proportion.
 
     Attributes:
-        dt: control period [s]. brake, hand: T and T' [s].
+        dt: control period [s]. brake, hand: T and T' [s]. ramp: from rest to full pace [s].
     """
 
     dt: float
     brake: float = BRAKE
     hand: float = HAND_STOP
+    ramp: float = RAMP
+
+    @classmethod
+    def of(cls, walker: Walker, dt: float) -> Stops:
+        """Of a body with arms: longer where joints speed up more slowly than in :data:`BRAKE`."""
+        slower = slowness(walker)
+        return cls(dt, BRAKE * slower, HAND_STOP * slower, RAMP * slower)
 
     def of_body(self, places: Array, spacing: float, at: Array, pace: float, behind: float) -> Array:
         """How far a body's origin travels [m]: along its path while the pace p falls to 0, which is p^2 T / 2 of path

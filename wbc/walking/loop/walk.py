@@ -9,11 +9,15 @@ from typing import Any
 
 import numpy as np
 
+from wbc.clearance import Nearest
 from wbc.robots import Walker
 from wbc.simulation import Plant
 from wbc.validation import Array
 from wbc.walking.holds.structure import Structure
 from wbc.walking.loop.body_command import BodyMotion
+from wbc.walking.loop.caution import Caution, Course
+from wbc.walking.loop.coasting import Coasting
+from wbc.walking.loop.foresight import Foresight
 from wbc.walking.loop.hands import ArmLeader, HandLeader, Hands
 from wbc.walking.loop.machine import Machine
 from wbc.walking.loop.progress import PlanProgress
@@ -32,8 +36,8 @@ ARRIVED = 0.002
 PATIENCE, SLACK = 4.0, 20.0
 #: Slices of planning between two ticks
 SLICES = 3
-#: A hand may land so much path time later than planned [s]
-LATE = 0.2
+#: So often in a row what was planned may turn out to be too near to something, before the walk is given up
+REFUSALS = 3
 
 
 class Walk:
@@ -49,6 +53,7 @@ class Walk:
         plant: the robot that moves; default: a :class:`wbc.simulation.KinematicPlant`. Its inputs are the joint rates
             of the controller, see :class:`wbc.walking.loop.machine.Machine`.
         leader, replanner: what leads hands and what plans anew, of another kind of machine.
+        foresees: prove everything clear before it is begun (:class:`Caution`); the two-ended arm's plan is its proof.
 
     Attributes:
         machine, progress, body, hands, replanner, leader, stack: its parts, each one with a job of its own.
@@ -78,6 +83,7 @@ class Walk:
         plant: Plant | None = None,
         leader: Callable[[Machine, PlanProgress, WalkStack], HandLeader] = ArmLeader,
         replanner: Callable[[Machine, PlanProgress], Replanner] = BodyReplanner,
+        foresees: bool = True,
     ) -> None:
         self._planning: PlanSlices | None = None
         if not isinstance(plan, Plan):
@@ -101,9 +107,16 @@ class Walk:
             machine.held = {arm: int(grips.hold[grip]) for arm, grip in enumerate(mine)}
             machine.begin(self.leader.first(), machine.held)
         else:
-            machine.begin(state.q, state.held, state.time)
+            machine.begin(state.q, state.held, state.time, state.v)
         self.stack.begin(machine.q)
         self.hands.begin([int(grips.roll[grip]) for grip in mine])
+        self._caution: Caution | None = None
+        self._refusals, self._refused = 0, ""
+        if foresees and not self.leader.one_motion:
+            sight = Foresight(walker, structure)
+            self.replanner.sight, sight.left = sight, machine.left
+            self._caution = Caution(sight, machine, self.progress, self.leader.stops)
+        self._coasting = None if state is None else Coasting.of(walker, state, self.leader.stops.brake, self.dt)
 
     @property
     def q(self) -> Array:
@@ -154,6 +167,8 @@ class Walk:
     def still(self) -> bool:
         """Neither the body nor a hand is commanded to move."""
         swinging = None if self.leader.one_motion else self.swinging
+        if self._coasting is not None and not self._coasting.over:
+            return False
         return self.pace == 0.0 and (swinging is None or (swinging.state == "open" and swinging.pace == 0.0))
 
     @property
@@ -200,10 +215,19 @@ class Walk:
             self.body.pace = 0.0
             machine.rest()
             raise HoldLost("hands", len(machine.held), f"at least {self.walker.min_holds} must hold")
-        if hands.manual is None and not self.aborted:
-            self._think()
-            self._lift()
-        self._advance()
+        coasting = self._coasting
+        if coasting is not None and coasting.over:
+            for arm in coasting.free:
+                hands.settle_in_air(arm)
+            coasting = self._coasting = None
+        if coasting is not None:
+            coasting.go(self.stack)
+        else:
+            if hands.manual is None and not self.aborted:
+                self._think()
+                self._lift()
+                self._foresee()
+            self._advance()
         if hands.swinging is not None:
             early = self._due(hands.swinging) - self.path_time
             self.leader.lead(hands.swinging, early, self.body.wanted, self.aborted)
@@ -213,7 +237,7 @@ class Walk:
         slip, fixed = machine.move(step.v), machine.fixed
         if hands.swinging is not None:
             self._land(hands.swinging)
-        pose = self.body.pose
+        pose = self.body.pose if coasting is None else coasting.pose
         error = dist(machine.q[:3].tolist(), pose[:3].tolist())
         state = hands.states(), hands.holds(), pose, error, slip, step.status, cost, fixed
         return Tick(machine.time, self.path_time, machine.q, machine.v, machine.rates, *state)
@@ -326,6 +350,9 @@ class Walk:
         if self._changing and self._planning is None and self.pace == 0.0:
             self._give_up()
             if self.swinging is None:
+                if self._refusals > REFUSALS:
+                    self._say("refused", "", "")
+                    raise NoPlanError("walk", self.structure.name, self._refused)
                 self._planning = self.replanner.rest()
         if self._planning is None:
             return
@@ -375,12 +402,92 @@ class Walk:
         arm = self.progress.arm_of(step)
         if self.hands.just_landed(arm):
             return
-        law = self.plan.laws[self.progress.next]
-        grip = self.progress.lift(arm)
-        self.hands.open(arm)
-        swinging = self.hands.send(arm, self._grip(grip), law, latch=self.hands.data.latch_time)
+        law, grip = self.plan.laws[self.progress.next], self.progress.next_grip(arm)
+        swinging = self.hands.going(arm, self._grip(grip), law, latch=self.hands.data.latch_time)
         swinging.wrist = self.leader.wrist(arm)
+        if not self._may_swing(swinging, f"{step.arm} from {step.source} to {step.target}"):
+            return
+        self.progress.lift(arm)
+        self.hands.open(arm)
+        self.hands.swinging = swinging
         self._say("lift", step.arm, step.source)
+
+    def _foresee(self) -> None:
+        """Stop, and plan anew, where what is about to happen has changed and is not clear any more."""
+        caution, swinging = self._caution, self.swinging
+        if caution is None or (swinging is not None and (swinging.dropped or swinging.state == "closing")):
+            return
+        stands = self._stands()
+        if swinging is None:
+            if stands or len(self.held) < len(self.walker.arms):
+                return
+            lift = self._may_lift()
+            leaving = -1 if lift is None else self.progress.arm_of(lift)
+            found = caution.ahead(min([self._end(), *self._lasting(leaving)]), None if lift is None else lift.lift)
+            if found is not None:
+                self._refuse("the body's way", found)
+        elif caution.new(swinging, stands):
+            arm, hold = self.walker.arms[swinging.arm].name, self.structure.ids[swinging.hold]
+            if not self._may_swing(swinging, f"{arm} to {hold}"):
+                self.hands.drop()
+
+    def _may_swing(self, swinging: Swinging, what: str) -> bool:
+        """Whether a hand may go on to its hold: with the body as it is to move, else while that stands; if it may not,
+        it is planned anew.
+        """
+        caution = self._caution
+        if caution is None:
+            return True
+        course = self._course(swinging)
+        found = caution.swing(swinging, course)
+        if found is None:
+            return True
+        stop = self.path_time + 0.5 * self.leader.stops.brake * self.pace**2
+        if not course.stands and swinging.counted and self._soonest(swinging) <= stop:
+            swinging.waits = True
+            if caution.swing(swinging, course._replace(stands=True)) is None:
+                return True
+            swinging.waits = False
+        self._refuse(what, found)
+        return False
+
+    def _refuse(self, what: str, found: Nearest) -> None:
+        """The body stops, and the rest is planned from there; given up where that has led nowhere before."""
+        self._refusals += 1
+        self._refused = f"{what}: {found}"
+        here = None if self._caution is None or self.pace else self._caution.here()
+        if here is not None:
+            # No plan leads out of where it stands
+            raise NoPlanError("walk", self.structure.name, f"where it stands two bodies are too near: {here}")
+        self.replanner.from_stance(False)
+        self._stop()
+
+    def _course(self, swinging: Swinging) -> Course:
+        """How body and hand are about to go on."""
+        end, stands = self._end(), self._stands() or swinging.waits
+        soonest = min([end, *self._lasting(swinging.arm)])
+        if swinging.counted and not self._changing:
+            soonest = min(soonest, self._late())
+        corners = self.body.corners(self.plan.path)
+        return Course(self.pace, max(soonest, self.path_time), self._due(swinging), stands, corners.pace)
+
+    def _late(self) -> float:
+        """Path time that the body does not pass before the swinging hand holds [s]: where the body has to wait for it,
+        that at which it lands.
+        """
+        step = self.plan.regrasps[self.progress.next]
+        return step.land + (0.0 if step.delay else self.leader.late)
+
+    def _end(self) -> float:
+        """Path time that the body does not pass [s]."""
+        plan = self.plan
+        end = plan.path.duration if plan.complete else plan.reached
+        return end if self.limit is None else min(end, self.limit[0])
+
+    def _lasting(self, leaving: int) -> list[float]:
+        """Path times at which the grips of the holding hands end [s], but of an arm that is to leave."""
+        lasts = self.progress.grips.ends_at(self.plan.path.spacing)
+        return [lasts[self.progress.grip[arm]] for arm in self.held if arm != leaving]
 
     def _bring(self, arm: int) -> None:
         """A hand that is in the air goes to where the plan begins, while the body stands still."""
@@ -388,7 +495,10 @@ class Walk:
         _, _, _, a, b, c = machine.q[self.walker.arms[arm].q].tolist()
         law = way_to(self.walker, self.structure, self.plan, arm, machine.chain, machine.q)
         more: dict[str, Any] = {"counted": False, "waits": True, "state": "open", "first_wrist": (a, b, c)}
-        self.hands.send(arm, self._grip(self.progress.grip[arm]), law, latch=0.0, wrist=(a, b, c), **more)
+        grip = self._grip(self.progress.grip[arm])
+        swinging = self.hands.going(arm, grip, law, latch=0.0, wrist=(a, b, c), **more)
+        if self._may_swing(swinging, f"{self.walker.arms[arm].name} to {self.structure.ids[swinging.hold]}"):
+            self.hands.swinging = swinging
 
     def _grip(self, grip: int) -> tuple[int, int, int]:
         """A grip's number, the row of its hold and the number of its roll."""
@@ -405,24 +515,27 @@ class Walk:
 
     def _advance(self) -> None:
         """Move the body's command on: as fast as asked, as slow as the grips of the holding hands need."""
-        progress, swinging, limit = self.progress, self.swinging, self.limit
-        plan, path, u, step = self.plan, self.plan.path, self.path_time, self.progress.step
-        lifted, lasts = self._may_lift(), progress.grips.ends_at(path.spacing)
+        progress, swinging = self.progress, self.swinging
+        path, u, step = self.plan.path, self.path_time, self.progress.step
+        lifted = self._may_lift()
         leaving = -1 if lifted is None else progress.arm_of(lifted)
-        end = path.duration if plan.complete else plan.reached
-        end = end if limit is None else min(end, limit[0])
-        if self.approve is not None and swinging is None and step is not None:
-            end = min(end, step.lift)
-        soonest = min([end, *[lasts[progress.grip[arm]] for arm in self.held if arm != leaving]])
+        end = self._end()
+        if swinging is None:
+            if self.approve is not None and step is not None:
+                end = min(end, step.lift)
+            if self._caution is not None:
+                end = min(end, max(self._caution.until, u))
+        soonest = min([end, *self._lasting(leaving)])
         margin, landing = max(soonest - u, 0.0), None
         if swinging is not None:
             needed = swinging.law.duration - swinging.clock + self.hands.data.latch_time + SETTLE
             until = margin
             if swinging.counted and not self._changing:
                 # A hand that is late makes the body late too: the next ones then swing where they were planned to
-                until = min(until, max(plan.regrasps[progress.next].land + LATE - u, 0.0))
+                until = min(until, max(self._late() - u, 0.0))
             landing = until, needed
-        self.body.choose(margin, max(end - u, 0.0), landing, self._stands())
+        most = 1.0 if self.leader.one_motion else self.body.corners(path).pace(u)
+        self.body.choose(margin, max(end - u, 0.0), landing, self._stands(), most)
         aim, progress.path_time = self.body.go(path, u)
         self.stack.body(aim)
 
@@ -453,7 +566,7 @@ class Walk:
             return
         names = self.walker.arms[swinging.arm].name, self.structure.ids[swinging.hold]
         if self.hands.close(swinging.arm, swinging.hold, int(self.progress.grips.roll[swinging.grip])):
-            self.hands.swinging = None
+            self.hands.swinging, self._refusals = None, 0
             self.progress.land(swinging)
             self._say("land", *names)
             return
@@ -472,6 +585,8 @@ class Walk:
         rows = np.array([rest.index(name) if name in there else -1 for name in old.ids], dtype=np.int64)
         self.stack.structure = rest
         self.machine.renumber(rest, rows)
+        if self._caution is not None:
+            self._caution.sight.structure = rest
         if self.swinging is not None:
             self.swinging.hold = int(rows[self.swinging.hold])
         self.progress.renumber(rows, self.swinging)

@@ -11,14 +11,13 @@ import pinocchio as pin
 from wbc import validation
 from wbc.errors import WbcError
 from wbc.validation import Array
-from wbc.walking.loop.hand_pace import HAND_STOP
+from wbc.walking.loop.foresight import Foresight
 from wbc.walking.loop.state import Hand, Manual, Tick
 from wbc.walking.loop.stopping import OFF
 from wbc.walking.loop.walk import Walk
 from wbc.walking.modes.hand_motion import ArmRefused, Standing
 from wbc.walking.planner.grips.conflicts import LimbShapes
 from wbc.walking.planner.grips.rolls import ANY, frame_on
-from wbc.walking.planner.swings.clearance import SwingClearance
 
 #: Speeds of a hand unless others are asked for [m/s, rad/s]
 SPEED, TURN_RATE = 0.1, 0.5
@@ -37,7 +36,7 @@ class ArmMode:
 
     Args:
         walk: between its ticks; its body stands and no hand is swinging. arm: name. on_tick: what happens every tick.
-        stop: asked every tick of a motion: true ends it, within :data:`wbc.walking.loop.hand_pace.HAND_STOP` seconds,
+        stop: asked every tick of a motion: true ends it, within ``walk.leader.stops.hand`` seconds,
             and raises :class:`ArmStopped`.
 
     Attributes:
@@ -119,9 +118,12 @@ class ArmMode:
         number = min(frames, key=lambda k: float(np.linalg.norm(pin.log3(here.rotation.T @ frames[k].rotation))))
         on = frames[number]
         above = pin.SE3(on.rotation, on.translation - ABOVE * axis)
-        off = pin.SE3(here.rotation, here.translation - ABOVE * here.rotation[:, 2])
-        leaving = [off] if self.arm in walk.held else []
-        rows = self._standing().onto(leaving, [above, on], speed, turn_rate)
+        leaving = []
+        if self.arm in walk.held:
+            # Along the normal of the hold, as a hand that leans would come out beside it
+            normal = structure.axes[walk.held[self.arm]]
+            leaving = [pin.SE3(here.rotation, here.translation - ABOVE * normal)]
+        rows = self._standing().onto(leaving, [above, on], row, speed, turn_rate)
         self._release()
         self._follow(rows)
         self._close(row, number, on)
@@ -134,9 +136,10 @@ class ArmMode:
 
     def _standing(self) -> Standing:
         walk = self.walk
-        arms, clear = LimbShapes(walk.walker), SwingClearance(walk.walker, walk.structure)
+        sight = Foresight(walk.walker, walk.structure)
+        sight.left = walk.machine.left
         body = pin.SE3(pin.Quaternion(walk.q[3:7]).matrix(), walk.q[:3].copy())
-        return Standing(walk.walker, clear, arms, self.arm, body, walk.q.copy(), walk.dt)
+        return Standing(walk.walker, sight, dict(walk.held), self.arm, body, walk.q.copy(), walk.dt)
 
     def leave(self) -> None:
         """A hand in the air goes back to what the walk plans for it, with the next ticks of the walk."""
@@ -186,7 +189,8 @@ class ArmMode:
         gap = float(np.linalg.norm(_between(places, place) - hand))
         said = OFF, float(walk.leader.stops.of_hand(places, walk.dt, np.array(place * walk.dt), 1.0, gap))
         far = np.zeros(2)
-        for pace in (*np.arange(1.0 - walk.dt / HAND_STOP, 0.0, -walk.dt / HAND_STOP).tolist(), *[0.0] * STILL):
+        part = walk.dt / walk.leader.stops.hand
+        for pace in (*np.arange(1.0 - part, 0.0, -part).tolist(), *[0.0] * STILL):
             place = self._go(rows, place, pace)
             moved = walk.q[:3] - begin, walk.machine.chain.origins[self.arm] - hand
             far = np.maximum(far, [float(np.linalg.norm(path)) for path in moved])

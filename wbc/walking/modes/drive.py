@@ -67,6 +67,7 @@ class Drive:
         self._work: tuple[Course, Generator[Plan | None, None, Plan]] | None = None
         # Displacements of the paths that were planned last, sample by sample, and the last one that the body had
         self._displaced: list[tuple[BodyPath, Array]] = []
+        self._on = walk.plan.path
         self._last = np.zeros(PARTS)
         walk.halted = True
 
@@ -118,6 +119,10 @@ class Drive:
     def _plan(self) -> None:
         """Some slices of planning, begun anew where the command has changed or the horizon comes near."""
         walk = self.walk
+        if self._work is not None and walk.plan.path is not self._on:
+            # The walk has planned by itself meanwhile: what was begun leads on from another path
+            self._drop()
+            self._settled = False
         if (self.command != self._asked).any():
             self._order = list(range(len(ALTERNATIVES)))
             self._begin(LEAD, quick=True)
@@ -148,6 +153,7 @@ class Drive:
             else:
                 if plan is not None:
                     walk.go_over(plan, begun.begins, begun.since)
+                    self._on = walk.plan.path
                     walk.halted = False
                     self._work = Course(0.0, 0.0, 0, (), (), (), ()), slices
                     walk.limit = None
@@ -179,7 +185,7 @@ class Drive:
         kept = [pair for pair in self._displaced if pair[0] is path]
         self._displaced = [*kept, (other, np.concatenate([off, more]))]
         self._work = begun, course_slices(walk.walker, walk.structure, walk.plan, begun, other, quick)
-        self._asked, self._waited = self.command.copy(), wait > 0.0
+        self._asked, self._waited, self._on = self.command.copy(), wait > 0.0, path
         walk.limit = begun.splice, begun.since + len(begun.kept)
 
     def _displacement(self, path: BodyPath, u: float) -> Array:

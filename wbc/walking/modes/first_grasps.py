@@ -15,6 +15,7 @@ from wbc.validation import Array
 from wbc.walking.body_path import BodyPath
 from wbc.walking.holds.structure import Structure
 from wbc.walking.loop.closed_chain import ClosedChain
+from wbc.walking.loop.foresight import Foresight
 from wbc.walking.loop.state import State
 from wbc.walking.planner.plan import Plan
 from wbc.walking.planner.replanning import plan_from_here
@@ -48,4 +49,5 @@ def plan_from_state(walker: Walker, structure: Structure, path: BodyPath, state:
     chain = ClosedChain(walker, structure)
     chain.place(state.q)
     behind: Array = path.poses[:1]
-    return drained(plan_from_here(walker, structure, path, state.held, state.q, chain, behind))
+    may = Foresight(walker, structure).may_bring
+    return drained(plan_from_here(walker, structure, path, state.held, state.q, chain, behind, may))

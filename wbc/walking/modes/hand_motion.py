@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from math import ceil
@@ -14,15 +14,12 @@ from wbc.errors import WbcError
 from wbc.robots import Walker
 from wbc.validation import Array
 from wbc.walking.arms.puma import LIMIT_NAMES, ArmKinematics
-from wbc.walking.planner.grips.conflicts import LimbShapes
-from wbc.walking.planner.swings.clearance import SwingClearance
+from wbc.walking.loop.foresight import Foresight
 
 #: Parts of joint rates and accelerations that motions use, and margin to the other limits [rad]
 PART, MARGIN = 0.9, 0.01
 #: Motions that ask too much of a joint are made slower, by this factor and at most so often
 SLOWER, TRIES = 1.25, 12
-#: Width of the edge of that distance, and what the checker leaves of the clearance, less a half [m]
-EDGE, SLACK = 0.002, 5e-5
 #: A hand within this of a waypoint is there [m, rad]
 THERE = 1e-9
 
@@ -36,12 +33,13 @@ class Standing:
     """A body that stands, and what a hand of it must stay clear of.
 
     Attributes:
+        sight: proves motions. held: row of an arm -> row of the hold.
         arm: row of the arm that moves. body: pose of the body. q: configuration. dt: control period [s].
     """
 
     walker: Walker
-    clear: SwingClearance
-    arms: LimbShapes
+    sight: Foresight
+    held: Mapping[int, int]
     arm: int
     body: pin.SE3
     q: Array
@@ -57,13 +55,16 @@ class Standing:
             ArmRefused: a pose out of reach, a limit, the structure or another arm is too near.
         """
         out = self._through(self.q[self.walker.arms[self.arm].q][None], poses, speed, turn_rate)
-        self._check_clear(out)
+        self._check_clear(out, {})
         return out
 
-    def onto(self, off: Sequence[pin.SE3], on: Sequence[pin.SE3], speed: float, turn_rate: float) -> Array:
+    def onto(self, off: Sequence[pin.SE3], on: Sequence[pin.SE3], hold: int, speed: float, turn_rate: float) -> Array:
         """As :meth:`along` through ``off``, by joints to the first pose of ``on``, and straight through the others.
 
         The posture there is the one that is reached soonest of those that lead on.
+
+        Args:
+            hold: row of the one that the hand comes to.
 
         Raises:
             ArmRefused: none does; the reason is that of the last one.
@@ -82,7 +83,7 @@ class Standing:
             try:
                 across = self._timed(line, 0.5, "hold", on[0])
                 out = self._through(np.concatenate([rows, across[1:]]), on[1:], speed, turn_rate)
-                self._check_clear(out)
+                self._check_clear(out, {self.arm: hold})
             except ArmRefused as error:
                 why = error
                 continue
@@ -150,30 +151,22 @@ class Standing:
             raise ArmRefused(field, pose.translation.tolist(), f"the motion leads beyond the {name}")
         return out
 
-    def _check_clear(self, rows: Array) -> None:
-        """Refuse what comes too near to the structure or to another arm; the hold that the hand leaves is exempt."""
-        points = self.arms.points(self.arm, rows)
-        bodies = np.repeat(self.body.homogeneous[None, None], len(rows), axis=1)
-        hands = points[[0, -1], 5] @ self.body.rotation.T + self.body.translation
-        if not self.clear.structure(points[None], bodies, hands[None])[0] or not self._leaves(points, hands):
-            raise ArmRefused("poses", len(rows), "the arm would come too near to the structure")
-        for other, arm in enumerate(self.walker.arms):
-            if other == self.arm:
-                continue
-            held = np.repeat(self.arms.points(other, self.q[arm.q])[None], len(rows), axis=0)
-            if self.arms.near(points, held).any():
-                raise ArmRefused("poses", len(rows), f"the arm would come too near to {arm.name}")
+    def _check_clear(self, rows: Array, to: Mapping[int, int]) -> None:
+        """Refuse what comes too near to the structure or to the machine itself.
 
-    def _leaves(self, points: Array, ends: Array) -> bool:
-        """Whether the hand is clear of the structure where it comes out of the distance in which it may be near.
-
-        Swings are so by their shape, and :class:`SwingClearance` does not look there; this hand may go anywhere.
+        Args:
+            to: row of the arm -> row of the hold that its hand comes to.
         """
-        data, places = self._kinematics.data, points[:, 5] @ self.body.rotation.T + self.body.translation
-        far = np.linalg.norm(places[:, None] - ends, axis=2).min(axis=1) - data.exempt_distance
-        edge = (far > 0.0) & (far < EDGE)
-        margin = self.clear.height(places[edge]) - data.hand_radius - data.clearance
-        return bool((margin > -SLACK).all())
+        mine, held = self.walker.arms[self.arm], dict(self.held)
+        q = np.repeat(self.q[None], len(rows), axis=0)
+        q[:, mine.q] = rows
+        leaving, sight = {self.arm: held.pop(self.arm, -1)}, self.sight
+        at = [*sight.holds(to), *sight.holds(leaving)]
+        if min(leaving.values()) < 0:
+            at += sight.around(self.arm, (self._base * pin.SE3(self._kinematics.forward(rows[0]))).translation)
+        found = sight.nearest(np.arange(len(rows), dtype=np.float64) * self.dt, q, at, held)
+        if found is not None:
+            raise ArmRefused("poses", len(rows), f"the arm would come too near: {found}")
 
 
 def _line(begin: Array, change: Array, x: Array) -> Array:

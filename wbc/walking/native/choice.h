@@ -3,9 +3,44 @@
 #define WBC_WALKING_CHOICE_H
 
 #include "curve.h"
-#include "near.h"
-#include "surface.h"
 #include "tracks.h"
+
+/* Whether two arms are clear of each other between two instants, their points going straight from the one to the other. */
+static int pair_clear(const double (*one)[POINTS][3], const double (*other)[POINTS][3], const double *least)
+{
+    double middle[2][POINTS][3], way[2] = { 0.0, 0.0 };
+    for (int side = 0; side < 2; ++side) {
+        const double (*ends)[POINTS][3] = side ? other : one;
+        for (int p = 0; p < POINTS; ++p) {
+            double half[3];
+            for (int k = 0; k < 3; ++k) {
+                half[k] = 0.5 * (ends[1][p][k] - ends[0][p][k]);
+                middle[side][p][k] = ends[0][p][k] + half[k];
+            }
+            way[side] = larger(way[side], dot(half, half));
+        }
+    }
+    const double both = sqrt(way[0]) + sqrt(way[1]);
+    const double (*a)[3] = (const double (*)[3])middle[0], (*b)[3] = (const double (*)[3])middle[1];
+    if (!near(a, b, least, both))
+        return 1;
+    if (near(a, b, least, 0.0))
+        return 0;
+    if (both < FINELY)
+        return 1;
+    double halves[2][2][2][POINTS][3];
+    for (int side = 0; side < 2; ++side) {
+        const double (*ends)[POINTS][3] = side ? other : one;
+        memcpy(halves[0][side][0], ends[0], sizeof ends[0]);
+        memcpy(halves[0][side][1], middle[side], sizeof ends[0]);
+        memcpy(halves[1][side][0], middle[side], sizeof ends[0]);
+        memcpy(halves[1][side][1], ends[1], sizeof ends[0]);
+    }
+    for (int half = 0; half < 2; ++half)
+        if (!pair_clear((const double (*)[POINTS][3])halves[half][0], (const double (*)[POINTS][3])halves[half][1], least))
+            return 0;
+    return 1;
+}
 
 /* Whether m swinging arms, at n points each, stay clear of arms that hold `others`, with the bases (4 x 4). */
 void swings_clear(const Arm *arm, const Grips *grips, long m, long n, const double *points, const double *samples,
@@ -13,12 +48,16 @@ void swings_clear(const Arm *arm, const Grips *grips, long m, long n, const doub
 {
     for (long s = 0; s < m; ++s) {
         const Frame base = frame_of(bases + 16 * s);
+        double held[2][POINTS][3];
         out[s] = 1;
         for (long i = 0; i < n && out[s]; ++i) {
-            double posture[JOINTS], held[POINTS][3];
+            double posture[JOINTS];
+            const double (*here)[3] = (const double (*)[3])(points + 3 * POINTS * (s * n + i));
+            memcpy(held[0], held[1], sizeof held[0]);
             posture_at(grips, others[s], samples[s * n + i], 0, JOINTS, posture);
-            arm_points(arm, &base, posture, held);
-            if (near((const double (*)[3])(points + 3 * POINTS * (s * n + i)), (const double (*)[3])held, least))
+            arm_points(arm, &base, posture, held[1]);
+            if (near(here, (const double (*)[3])held[1], least, 0.0)
+                || (i && !pair_clear((const double (*)[POINTS][3])(here - POINTS), (const double (*)[POINTS][3])held, least)))
                 out[s] = 0;
         }
     }
@@ -29,21 +68,20 @@ void swings_clear(const Arm *arm, const Grips *grips, long m, long n, const doub
 
    Curves have n points: how far `across`, how far `raised`, and the part of the wrists' change, `blend`. The numbers of
    raise_curves: `span` at `spans` points, `look_across` and `look_raised` at `looks`, `steps` and `half` at `halves`.
-   `alternatives` says how much higher and what part of the arc each of `tried` curves is. Clear: `parts` of the links,
-   `some` of them, at which they are at least `above` the surface, unless a hand is within `touching` of a hold, and
-   `apart` of the links of two arms. The body is looked at `halfway` samples after the hand is lifted; a swing takes
+   `alternatives` says how much higher and what part of the arc each of `tried` curves is. Clear: of what stands around,
+   and `apart` of the links of two arms. The body is looked at `halfway` samples after the hand is lifted; a swing takes
    `extra` besides its law, of which the hand opens for `latch` [s]. */
 typedef struct {
     const Arm *arm;
     const Rules *rules;
-    const Surface *surface;
+    const World *world;
     Grips grips;
     const double *bases, *path, *places, *normals;
     const long *arms, *holds, *free;
     const double *across, *raised, *blend, *span, *look_across, *look_raised, *steps, *half;
-    const double *alternatives, *parts, *above, *apart;
-    long count, n, spans, looks, halves, tried, some, halfway, passes;
-    double spacing, height, aside, upright, touching, extra, latch;
+    const double *alternatives, *apart;
+    long count, n, spans, looks, halves, tried, halfway, passes;
+    double spacing, height, aside, upright, extra, latch;
 } Scene;
 
 /* A swing to be examined: row of the arm, grips, sample at which it is lifted, last sample of the body, sample at
@@ -72,7 +110,7 @@ static void curve_of(const Scene *scene, const Swing *swing, long which, double 
     const double *begin = scene->places + 3 * a, *end = scene->places + 3 * b;
     const double *leave = scene->normals + 3 * a, *arrive = scene->normals + 3 * b;
     double rise[2], lift;
-    raise_curves(scene->surface, 1, begin, end, leave, arrive, pivot, &turn, part, scene->height, scene->aside,
+    raise_curves(scene->world, 1, begin, end, leave, arrive, pivot, &turn, part, scene->height, scene->aside,
                  scene->upright, scene->spans, scene->span, scene->looks, scene->look_across, scene->look_raised,
                  scene->halves, scene->steps, scene->half, rise, &lift);
     lift += scene->alternatives[2 * which];
@@ -80,7 +118,7 @@ static void curve_of(const Scene *scene, const Swing *swing, long which, double 
               place);
 }
 
-/* Whether a swing along one curve is possible and clear of the surface and of `others`, so many grips; its law's
+/* Whether a swing along one curve is possible and clear of what stands around and of `others`, so many grips; its law's
    duration. */
 static int clear_along(const Scene *scene, const Swing *swing, long which, const long *others, long count,
                        double *duration)
@@ -90,7 +128,7 @@ static int clear_along(const Scene *scene, const Swing *swing, long which, const
     const double begin = (double)swing->lift + scene->latch / scene->spacing;
     const double least = (double)(swing->soonest - swing->lift) * scene->spacing - scene->extra;
     const double *base = scene->bases + 16 * swing->arm;
-    double place[3 * MOST], samples[MOST], points[3 * POINTS * MOST], bodies[16 * MOST], ends[2][3];
+    double place[3 * MOST], samples[MOST], points[3 * POINTS * MOST], bodies[16 * MOST];
     unsigned char fits = 0;
     curve_of(scene, swing, which, place);
     swing_tracks(scene->arm, scene->rules, &scene->grips, 1, n, guided, scene->passes, base, scene->path, scene->count,
@@ -102,18 +140,15 @@ static int clear_along(const Scene *scene, const Swing *swing, long which, const
         const Frame body = blended(scene->path, scene->count, samples[i]);
         memcpy(bodies + 16 * i, body.row, sizeof body.row);
     }
-    for (int end = 0; end < 2; ++end)
-        memcpy(ends[end], scene->places + 3 * hold[end], sizeof ends[end]);
-    stay_above(scene->surface, 1, n, points, bodies, &ends[0][0], scene->parts, scene->some, scene->above,
-               scene->touching, &fits);
+    swings_meet(scene->world, 1, n, &swing->arm, points, base, bodies, hold, &fits);
     for (long k = 0; k < count && fits; ++k)
         swings_clear(scene->arm, &scene->grips, 1, n, points, samples, scene->bases + 16 * scene->arms[others[k]],
                      others + k, scene->apart, &fits);
     return fits;
 }
 
-/* For m swings the first of the curves that is not `barred` (m x tried), possible, and clear of the surface and of the
-   grips `others`, `count` of each; -1 for none. `duration` is its law's. Returns 1 where n is too large. */
+/* For m swings the first of the curves that is not `barred` (m x tried), possible, and clear of what stands around and
+   of the grips `others`, `count` of each; -1 for none. `duration` is its law's. Returns 1 where n is too large. */
 int choose_swings(const Scene *scene, long m, const Swing *swings, long count, const long *others,
                const unsigned char *barred, long *chosen, double *duration)
 {

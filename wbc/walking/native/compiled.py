@@ -20,11 +20,20 @@ from wbc.errors import CompileError
 from wbc.native import toolchain
 from wbc.native.kernel import kernel
 from wbc.robots import BodyLimb, WalkerData
-from wbc.walking.holds.structure import Structure
-from wbc.walking.holds.surface import CylinderSurface
 
 _SOURCES = Path(__file__).parent
-_FILES = ("arm.h", "surface.h", "curve.h", "grips.h", "near.h", "speeds.h", "tracks.h", "choice.h", "planner.c")
+_FILES = (
+    "arm.h",
+    "surface.h",
+    "near.h",
+    "world.h",
+    "curve.h",
+    "grips.h",
+    "speeds.h",
+    "tracks.h",
+    "choice.h",
+    "planner.c",
+)
 
 
 class ArmNumbers(ctypes.Structure):
@@ -95,15 +104,3 @@ def arm_of(limb: BodyLimb) -> Any:
     """Pointer to the numbers of a limb that the compiled code knows."""
     assert limb.closed_form is not None
     return ctypes.byref(arm(limb.closed_form))
-
-
-def plain_surface(structure: Structure) -> Numbers | None:
-    """A point, a direction and a radius, 0 for a plane.
-
-    None where there is more than a surface, or none, or no compiler.
-    """
-    surface = structure.surface
-    if surface is None or structure.obstacles or library() is None:
-        return None
-    radius = surface.radius if isinstance(surface, CylinderSurface) else 0.0
-    return doubles([*surface.pose.translation, *surface.pose.rotation[:, 2], radius])

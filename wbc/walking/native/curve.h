@@ -2,8 +2,7 @@
 #ifndef WBC_WALKING_CURVE_H
 #define WBC_WALKING_CURVE_H
 
-#include "arm.h"
-#include "surface.h"
+#include "world.h"
 
 /* m curves between `begin` and `end` (m x 3), with the normals -leave and -arrive, `rise` m x 2 and `lift` m, about the
    z axes of `frames` (4 x 4), joint 1 turning by about `turn`; the part `part` from chord to arc. At n points: `across`
@@ -38,11 +37,11 @@ void curves_at(long m, long n, const double *begin, const double *end, const dou
     }
 }
 
-/* What lifts m flat curves over a surface: `rise` m x 2, with which hands are `height` up where they have come `aside`,
+/* What lifts m flat curves over what stands around: `rise` m x 2, with which hands are `height` up where they have come `aside`,
    and `lift` m, what is lacking then at places in between, `places` of them: how far across, and the part of the rise.
    `span`: the same of n places at which their length is measured; `half`: x over the first half of a curve, and `steps`
    the parts across there, `count` each. `upright`: the part of a curve that does not go across, at either end. */
-void raise_curves(const Surface *surface, long m, const double *begin, const double *end, const double *leave,
+void raise_curves(const World *world, long m, const double *begin, const double *end, const double *leave,
                   const double *arrive, const double *frames, const double *turn, double part, double height,
                   double aside, double upright, long n, const double *span, long places, const double *across,
                   const double *raised, long count, const double *steps, const double *half, double *rise, double *lift)
@@ -69,7 +68,7 @@ void raise_curves(const Surface *surface, long m, const double *begin, const dou
                   points);
         for (long i = 0; i < places; ++i) {
             const double y = across[i];
-            most = larger(most, (height - above(surface, points + 3 * i)) / (4.0 * y * (1.0 - y)));
+            most = larger(most, (height - clearance_at(world, points + 3 * i)) / (4.0 * y * (1.0 - y)));
         }
         lift[s] = most;
     }

@@ -2,7 +2,7 @@
 #ifndef WBC_WALKING_GRIPS_H
 #define WBC_WALKING_GRIPS_H
 
-#include "arm.h"
+#include "world.h"
 
 enum { BRANCHES = 2, LIMITS = 8, FREE = 5 };
 
@@ -142,12 +142,14 @@ static int wrist_on(const Arm *arm, const Keeping *keep, const double *spans, co
 }
 
 /* Grips of an arm on m holds along n frames of its base (4 x 4): `stretches`, and their postures of six angles, joint 6
-   at 0; both are long enough for all. `work`: 2 n x 6. Returns the number of stretches. */
-long grips_along(const Arm *arm, const Keeping *keep, long n, const double *frames, long m, const double *positions,
-                 const double *axes, const double *tilts, double *work, Stretch *stretches, double *rows)
+   at 0; both are long enough for all. They end where arm `row` meets something of the world, if there is one, of which
+   the holds are the rows `holds`, or the body does, `blocked` of each frame. `work`: 2 n x 6. Returns the number of stretches. */
+long grips_along(const Arm *arm, const Keeping *keep, const World *world, long row, long n, const double *frames,
+                 long m, const double *positions, const double *axes, const double *tilts, const long *holds, const long *blocked,
+                 double *work, Stretch *stretches, double *rows)
 {
     const double spans[2] = { span(arm, arm->elbow), span(arm, -arm->limits[2]) };
-    long found = 0, row = 0;
+    long found = 0, used = 0;
     for (long h = 0; h < m; ++h) {
         /* Samples at which the stretches that are going on began */
         long since[BRANCHES] = { -1, -1 };
@@ -160,15 +162,25 @@ long grips_along(const Arm *arm, const Keeping *keep, long n, const double *fram
             for (int b = 0; b < BRANCHES; ++b) {
                 double *mine = work + JOINTS * n * b, least = 0.0;
                 const int limit = there ? nearest_limit(arm, q[b], &least) : 0;
-                const int fits = solved && least > keep->angle_margin;
+                int fits = solved && least > keep->angle_margin;
+                long meets = fits && world ? blocked[i] : NOTHING;
+                fits &= meets == NOTHING;
+                if (fits && world) {
+                    const double posture[JOINTS] = { q[b][0], q[b][1], q[b][2], q[b][3], q[b][4] };
+                    const long own[2] = { holds[h], -1 };
+                    const Frame frame = frame_of(f);
+                    meets = posture_meets(world, arm, row, &frame, posture, own);
+                    fits = meets == NOTHING;
+                }
                 const int fast = there && since[b] >= 0 ? too_fast(keep->most, mine + JOINTS * (i - 1), q[b]) : -1;
                 if (since[b] >= 0 && (!fits || fast >= 0)) {
                     const long length = i - since[b], slow = fast >= 0 ? LIMITS + 1 + fast : limit;
-                    const long reason = i == n ? LIMITS + 7 : there ? slow : LIMITS;
+                    const long touched = meets == NOTHING ? slow : LIMITS + 8 + meets;
+                    const long reason = i == n ? LIMITS + 7 : there ? touched : LIMITS;
                     if ((double)length >= keep->shortest) {
-                        stretches[found++] = (Stretch){ h, b, since[b], i - 1, reason, row };
-                        memcpy(rows + JOINTS * row, mine + JOINTS * since[b], sizeof(double) * JOINTS * (size_t)length);
-                        row += length;
+                        stretches[found++] = (Stretch){ h, b, since[b], i - 1, reason, used };
+                        memcpy(rows + JOINTS * used, mine + JOINTS * since[b], sizeof(double) * JOINTS * (size_t)length);
+                        used += length;
                     }
                     since[b] = -1;
                 }

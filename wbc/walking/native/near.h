@@ -35,8 +35,8 @@ static double squared_distance(const double *a, const double *b, const double *c
     return dot(gap, gap);
 }
 
-/* `least`: of every pair of links but that of the two necks, row by row. */
-static int near(const double (*one)[3], const double (*other)[3], const double *least)
+/* `least`, and `more`: of every pair of links but that of the two necks, row by row. */
+static int near(const double (*one)[3], const double (*other)[3], const double *least, double more)
 {
     double middle[2][LINKS][3], half[2][LINKS];
     for (int side = 0; side < 2; ++side)
@@ -51,14 +51,14 @@ static int near(const double (*one)[3], const double (*other)[3], const double *
         }
     for (int k = 1; k < LINKS * LINKS; ++k) {
         const int i = k / LINKS, j = k % LINKS;
-        const double reach = half[0][i] + half[1][j] + least[k - 1];
+        const double reach = half[0][i] + half[1][j] + least[k - 1] + more;
         double gap[3];
         for (int x = 0; x < 3; ++x)
             gap[x] = middle[0][i][x] - middle[1][j][x];
         /* Capsules whose middles are far apart need no closer look */
         if (dot(gap, gap) >= reach * reach)
             continue;
-        if (sqrt(squared_distance(one[BEGINS[i]], one[ENDS[i]], other[BEGINS[j]], other[ENDS[j]])) < least[k - 1])
+        if (sqrt(squared_distance(one[BEGINS[i]], one[ENDS[i]], other[BEGINS[j]], other[ENDS[j]])) < least[k - 1] + more)
             return 1;
     }
     return 0;

@@ -15,7 +15,7 @@ void arms_near(long m, const double *one, const double *other, const double *lea
 {
     for (long i = 0; i < m; ++i) {
         const long at = 3 * POINTS * i;
-        out[i] = (unsigned char)near((const double (*)[3])(one + at), (const double (*)[3])(other + at), least);
+        out[i] = (unsigned char)near((const double (*)[3])(one + at), (const double (*)[3])(other + at), least, 0.0);
     }
 }
 
@@ -34,7 +34,7 @@ void grips_near(const Arm *arm, const Grips *grips, long m, const long *pairs, c
                 const long row = grips->offset[grip] + since;
                 arm_points(arm, base + side, grips->postures + JOINTS * row, points[side]);
             }
-            *out++ = (unsigned char)near((const double (*)[3])points[0], (const double (*)[3])points[1], least);
+            *out++ = (unsigned char)near((const double (*)[3])points[0], (const double (*)[3])points[1], least, 0.0);
         }
     }
 }

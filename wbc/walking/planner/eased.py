@@ -12,6 +12,7 @@ import numpy as np
 from wbc.trajectory.jerk.between_states import jerk_limited
 from wbc.trajectory.laws.law import Law
 from wbc.validation import Array
+from wbc.walking.planner.proof import Proof
 from wbc.walking.planner.slices import Slices
 from wbc.walking.planner.stances.body import BodySearch
 from wbc.walking.planner.stances.nodes import Found
@@ -80,13 +81,13 @@ def eased_law(swings: Swings, move: Move, others: Sequence[int]) -> SwingLaw | N
 
 
 def eased_slices(
-    search: BodySearch, found: Found, laws: Sequence[SwingLaw], sample: int
+    search: BodySearch, found: Found, laws: Sequence[SwingLaw], sample: int, proof: Proof
 ) -> Slices[tuple[Found, tuple[SwingLaw, ...]]]:
     """What was found, where hands that would wait for the next one to be lifted take this time for a jerk-limited law:
     they land as much later as they need.
 
     Args:
-        sample: of the path, since when the first stance holds.
+        sample: of the path, since when the first stance holds. proof: over the same path.
     """
     key, moves, out = list(found.start), list(found.moves), list(laws)
     spare = round(search.walker.margins.spare / search.path.spacing)
@@ -98,7 +99,7 @@ def eased_slices(
         if not move.delay and move.curve < len(ALTERNATIVES) and longest > EVEN * laws[k].fastest:
             yield None
             best = _eased_move(search, move, others, last)
-            if best is not None:
+            if best is not None and proof.of_swing(*best, key) is None:
                 moves[k], out[k] = best
         key[move.arm], sample = move.target, moves[k].land
     return replace(found, moves=tuple(moves)), tuple(out)
@@ -140,7 +141,7 @@ def _tried(swings: Swings, move: Move, others: Sequence[int]) -> tuple[SwingLaw 
     needed = _least_duration(swings, joints, places[0])
     if needed > duration:
         return None, needed
-    if not swings.clear_along(move, others, curve, joints.angles, samples):
+    if not swings.clear_along(move, others, joints.angles, samples):
         return None, 0.0
     rows = rows_over(duration)
     along = profile_at(rows / duration).position

@@ -73,7 +73,7 @@ class _Fewer(BodySearch):
 
     def starts(self, beginning: Beginning, sample: int) -> list[Key]:
         """Stances that the plan may begin with."""
-        choices = grips_at_first(self.walker, self.structure, self.grips, beginning)
+        choices = grips_at_first(self.walker, self.structure, self.path, self.grips, beginning)
         out, least, holds = list[Key](), self._least.tolist(), self.grips.hold.tolist()
         for key in product(*choices):
             if sum(least[g] for g in key) > self._most or len({holds[g] for g in key}) < len(key):

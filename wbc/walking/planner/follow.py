@@ -15,6 +15,7 @@ from wbc.walking.planner.eased import eased_law
 from wbc.walking.planner.grips.table import Grips, Ints, find_grips
 from wbc.walking.planner.plan import NoPlanError, Plan, Regrasp
 from wbc.walking.planner.planner import plan_found
+from wbc.walking.planner.proof import Proof
 from wbc.walking.planner.stances.body import BodySearch
 from wbc.walking.planner.stances.nodes import Found
 from wbc.walking.planner.swings.law import SwingLaw, law_of
@@ -25,7 +26,7 @@ def follow_plan(walker: Walker, structure: Structure, asked: Plan) -> Plan:
     """The re-grasps of a plan, with the grips and laws that a walk needs: nothing is searched for.
 
     Every re-grasp is looked at as the planner does: the grips last, the arms are clear of each other and of the
-    structure, and the swing takes no longer than the plan says.
+    structure, provably at every instant, and the swing takes no longer than the plan says.
 
     Args:
         asked: as of :func:`wbc.walking.planner.plan.read_plan`.
@@ -48,12 +49,19 @@ def follow_plan(walker: Walker, structure: Structure, asked: Plan) -> Plan:
     if len({int(grips.hold[g]) for g in key}) < len(key) or search.until(key, 0) <= 0:
         raise NoPlanError("plan.start", " ".join(asked.start), "the hands cannot hold them together")
     start, sample, moves, laws = tuple(key), 0, list[Move](), list[SwingLaw]()
+    proof = Proof(search.swings)
     for k, step in enumerate(asked.regrasps):
         move = _move(structure, search, step, k, names.index(step.arm), key)
-        laws.append(_law(structure, search, step, k, move, key, sample))
+        law = _law(structure, search, step, k, move, key, sample)
+        touched = proof.of_stance(key, sample, move.lift) or proof.of_swing(move, law, key)
+        if touched:
+            raise _refused(step, k, str(touched))
+        laws.append(law)
         moves.append(move)
         key[move.arm], sample = move.target, move.land
     found = search.shortened(Found(start, tuple(moves), False, 0, 0, ()), len(moves))
+    if touched := proof.of_stance(key, sample, found.reached):
+        raise NoPlanError("plan", structure.name, str(touched))
     plan = plan_found(walker, structure, path, grips, found, tuple(laws))
     if not plan.complete:
         raise NoPlanError("plan", structure.name, plan.reason, separating=plan.separating)

@@ -14,6 +14,7 @@ from wbc.validation import Array
 from wbc.walking.arms.puma import limb_of
 from wbc.walking.body_path import BodyPath
 from wbc.walking.holds.structure import Structure
+from wbc.walking.planner.around import NONE_MET, around
 from wbc.walking.planner.detours.route import find_routes
 from wbc.walking.planner.fewest import fewer_slices
 from wbc.walking.planner.grips.table import Grips, grip_slices
@@ -68,6 +69,7 @@ def plan_walk(
         NoPlanError: there is no plan, with where it ends, holds and limits.
     """
     beginning = start or {}, postures or {}, avoid or {}
+    _check_ends(walker, structure, path)
     deadline = None if time_budget is None else time.perf_counter() + time_budget
     search = functools.partial(
         plan_slices, walker, structure, width=width, deadline=deadline, thorough=time_budget is None
@@ -88,6 +90,15 @@ def plan_walk(
     if not plan.complete and not partial:
         raise NoPlanError("plan", structure.name, plan.reason, separating=plan.separating)
     return plan
+
+
+def _check_ends(walker: Walker, structure: Structure, path: BodyPath) -> None:
+    """Refuse a path whose first or last pose has the body, or what stands still on it, in something's way."""
+    there = around(walker, structure)
+    for where, met in zip(("beginning", "end"), there.bodies(path.poses[[0, -1]]).tolist(), strict=True):
+        if met != NONE_MET:
+            reason = f"at its {where} the body is nearer than {1e3 * there.of_body:.0f} mm to {there.names[met]}"
+            raise NoPlanError("path", structure.name, reason)
 
 
 def plan_slices(

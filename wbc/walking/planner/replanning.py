@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterator, Mapping
+from collections.abc import Callable, Generator, Iterator, Mapping
+from dataclasses import replace
 from itertools import product
 from typing import Protocol
 
@@ -14,9 +15,10 @@ from wbc.validation import Array
 from wbc.walking.arms.puma import limb_of
 from wbc.walking.body_path import BodyPath, straight_path
 from wbc.walking.holds.structure import Structure
-from wbc.walking.planner.grips.table import Grips, grip_slices
+from wbc.walking.planner.grips.table import Grips, Ints, grip_slices
 from wbc.walking.planner.plan import NoPlanError, Plan
 from wbc.walking.planner.planner import Objective, plan_slices
+from wbc.walking.planner.proof import EVERY, clear_scene
 from wbc.walking.planner.stances.body import BodySearch
 from wbc.walking.planner.starts import Beginning, stances
 from wbc.walking.planner.swings.curve import Pivots, between
@@ -26,10 +28,14 @@ from wbc.walking.planner.swings.swings import FINE
 
 #: Yields None or, first, a plan to begin with; returns the whole one
 PlanSlices = Generator[Plan | None, None, Plan]
+#: (plan, row of a free arm, law of its hand, row of an arm -> row of its hold, configuration) -> it touches nothing
+MayBring = Callable[[Plan, int, SwingLaw, Mapping[int, int], Array], bool]
 #: A new plan begins with a body that stands for so many samples
 STANDING = 10
 #: How far the body goes back to where a hand may be lifted [m]
 BACK = (0.05, 0.1, 0.2, 0.4)
+#: Part of what a hand in the air has left to its limits that its way to a hold leaves
+PART = 0.9
 #: How far it goes towards a hold instead, at the height that it has [m], and how fast [m/s]
 TOWARDS, ASIDE = (0.15, 0.3), 0.05
 
@@ -121,6 +127,7 @@ def plan_from_here(
     q: Array,
     hands: HandsThere,
     behind: Array,
+    may: MayBring | None = None,
 ) -> PlanSlices:
     """A plan along a path that begins where the body stands. If there is none, the body first goes back where it came
     from, by :data:`BACK`, or towards one of its holds, by :data:`TOWARDS`, and returns: a hand at the edge of its reach
@@ -129,6 +136,7 @@ def plan_from_here(
     Args:
         held: row of the arm -> row of the hold, of hands that hold. q: configuration. hands: where they are.
         behind: poses that the body had, the last ones first ``[n, 4, 4]``.
+        may: whether a free hand may go to where a plan begins; None: wherever it can.
 
     Raises:
         NoPlanError: there is none.
@@ -139,7 +147,7 @@ def plan_from_here(
         other = BodyPath(np.concatenate([here, there, there[::-1], path.poses]), path.spacing)
         sample = STANDING + len(there) if len(there) else 0
         try:
-            plan = yield from _from_here(walker, structure, other, held, q, hands, sample)
+            plan = yield from _from_here(walker, structure, other, held, q, hands, sample, may)
             return plan
         except NoPlanError as error:
             refused = refused or error
@@ -170,6 +178,7 @@ def _from_here(
     q: Array,
     hands: HandsThere,
     sample: int,
+    may: MayBring | None,
 ) -> PlanSlices:
     """Along one path, with free hands where they can be brought to."""
     arms, avoid = walker.arms, dict[str, set[str]]()
@@ -181,11 +190,19 @@ def _from_here(
         beginning: Beginning = start, postures, avoid
         asked = plan_slices(walker, structure, path, beginning, objective="destination", grips=grips, sample=sample)
         plan = _complete(structure, (yield from asked))
-        far = [arm for arm in free if not way_to(walker, structure, plan, arm, hands, q).possible]
+        far = list[int]()
+        for arm in free:
+            law = way_to(walker, structure, plan, arm, hands, q)
+            if not law.possible or (may is not None and not may(plan, arm, law, held, q)):
+                far.append(arm)
         if not far:
             return plan
         for arm in far:
             avoid.setdefault(arms[arm].name, set()).add(plan.start[arm])
+            there = grips.arm == arm
+            if {structure.ids[k] for k in np.unique(grips.hold[there & (grips.first == 0)])} <= avoid[arms[arm].name]:
+                reason = "the hand cannot be brought from where it is in the air to any hold that it reaches"
+                raise NoPlanError("plan", arms[arm].name, reason, separating=avoid[arms[arm].name])
 
 
 def way_to(walker: Walker, structure: Structure, plan: Plan, arm: int, hands: HandsThere, q: Array) -> SwingLaw:
@@ -204,7 +221,38 @@ def way_to(walker: Walker, structure: Structure, plan: Plan, arm: int, hands: Ha
     curve = between(walker, structure, places, axes, np.array([[True, False]]), pivots)
     first, last = np.array(mine[guided:]), grips.posture_at(grip, 0)[guided:]
     bent = first + blend(np.linspace(0.0, 1.0, FINE))[None, :, None] * (last - first)
-    return least_time_law(walker, arm, plan.path, curve, np.zeros(FINE), lambda _: bent, 1.0)
+    near = _from_where_it_is(walker, mine)
+    law = least_time_law(near, arm, plan.path, curve, np.zeros(FINE), lambda _: bent, 1.0)
+    if not law.possible:
+        return law
+    limb, base = limb_of(walker), plan.path.poses[0] @ walker.arms[arm].base.homogeneous
+    times = np.arange(0.0, law.duration + EVERY, EVERY)
+    way, part = law.along(times)
+    guide = first + part[:, None] * (last - first)
+    angles, _ = limb.follow(np.repeat(base[None, None], len(times), axis=1), way[None], guide[None], near.margins)
+    postures, holds = list[Array](), list[Ints]()
+    for k, other in enumerate(walker.arms):
+        # Hands that are free as well are brought there one after the other, from where they are
+        rows = angles[0] if k == arm else np.repeat(q[other.q][None], len(times), axis=0)
+        postures.append(rows)
+        holds.append(np.array([structure.index(plan.start[k])]))
+    # A hand that has just left a hold may be near to what that is mounted on, also where the hold is gone since
+    near_by = np.linalg.norm(structure.positions - hands.origins[arm], axis=1).argmin()
+    holds[arm] = np.append(holds[arm], near_by)
+    poses = np.repeat(plan.path.poses[:1], len(times), axis=0)
+    left = arm, np.array(hands.origins[arm])
+    law.possible = clear_scene(walker, structure).touched(times, poses, postures, holds, left) is None
+    return law
+
+
+def _from_where_it_is(walker: Walker, posture: Array) -> Walker:
+    """The walker with margins of swings that the posture of a hand in the air keeps: it may be nearer to a limit."""
+    left = PART * max(float(limb_of(walker).margins(posture[None])[0].min()), 0.0)
+    margins = walker.margins
+    if left >= max(margins.swing_elbow, margins.swing_angle):
+        return walker
+    angle, elbow = min(margins.swing_angle, left), min(margins.swing_elbow, left)
+    return replace(walker, margins=replace(margins, swing_angle=angle, swing_elbow=elbow, swing_reach=0.0))
 
 
 def _standing(path: BodyPath, grips: Grips, start: tuple[str, ...], stance: tuple[int, ...], sample: int) -> Plan:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from bisect import insort
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from itertools import combinations, product
 from typing import Any
 
@@ -12,7 +12,10 @@ import numpy as np
 from wbc import validation
 from wbc.robots import Walker
 from wbc.validation import Array
+from wbc.walking.body_path import BodyPath
 from wbc.walking.holds.structure import Structure
+from wbc.walking.planner.around import NONE_MET, around
+from wbc.walking.planner.grips.held import held, near_holds
 from wbc.walking.planner.grips.table import Grips
 from wbc.walking.planner.plan import NoPlanError
 from wbc.walking.planner.slices import Slices, drained
@@ -27,7 +30,9 @@ STARTS, ALL_STARTS = (10, 24), (24, 200)
 SAME_BRANCH = 0.3
 
 
-def grips_at_first(walker: Walker, structure: Structure, grips: Grips, beginning: Beginning) -> list[list[int]]:
+def grips_at_first(
+    walker: Walker, structure: Structure, path: BodyPath, grips: Grips, beginning: Beginning
+) -> list[list[int]]:
     """Of each arm the grips that it may begin with, those that last longest first.
 
     Raises:
@@ -58,11 +63,39 @@ def grips_at_first(walker: Walker, structure: Structure, grips: Grips, beginning
         mine = [g for g in mine if structure.ids[grips.hold[g]] not in avoid.get(name, ())]
         mine.sort(key=lambda g: (-int(grips.last[g]), int(grips.hold[g]), int(grips.branch[g])))
         if not mine:
-            raise NoPlanError(
-                "plan", name, "no hold is in reach at the beginning of the path", separating=_at_first(structure, grips)
-            )
+            reason = why_no_grip(walker, structure, path, k)
+            raise NoPlanError("plan", name, reason, separating=_at_first(structure, grips))
         choices.append(mine)
+    few = _too_few(structure, grips, names, choices)
+    if few:
+        raise NoPlanError("plan", structure.name, few, separating=_at_first(structure, grips))
     return choices
+
+
+def why_no_grip(walker: Walker, structure: Structure, path: BodyPath, arm: int) -> str:
+    """Why an arm has no grip at the beginning of a path."""
+    there, margins = around(walker, structure), walker.margins
+    frames = path.poses[:1] @ walker.arms[arm].base.homogeneous
+    near = near_holds(there.limb, structure, frames)
+    found = held(there.limb, structure, frames, near, reach=margins.held_reach, facing=margins.facing)
+    rows, branch = np.nonzero(found.within(margins.held_angle))
+    met = there.postures(arm, frames[found.pose[rows]], found.q[rows, branch], found.hold[rows])
+    if not len(met) or (met == NONE_MET).all():
+        return "no hold is in reach at the beginning of the path"
+    name = there.names[int(np.bincount(met[met != NONE_MET]).argmax())]
+    return f"{name} is in the way of every hold that it reaches at the beginning of the path"
+
+
+def _too_few(structure: Structure, grips: Grips, names: Sequence[str], choices: Sequence[Sequence[int]]) -> str:
+    """That some hands reach fewer holds than they are; "" where they do not."""
+    reached = [{int(grips.hold[g]) for g in mine} for mine in choices]
+    for count in range(2, len(names) + 1):
+        for some in combinations(range(len(names)), count):
+            union = set().union(*(reached[k] for k in some))
+            if len(union) < count:
+                holds, arms = ", ".join(structure.ids[k] for k in sorted(union)), ", ".join(names[k] for k in some)
+                return f"at the beginning of the path the hands of {arms} reach no more holds than {holds}"
+    return ""
 
 
 def stances(
@@ -90,7 +123,7 @@ def stance_slices(
     """
     grips, choices = (
         search.grips,
-        [mine[: most[0]] for mine in grips_at_first(walker, structure, search.grips, beginning)],
+        [mine[: most[0]] for mine in grips_at_first(walker, structure, search.path, search.grips, beginning)],
     )
     pairs = [(a, b) for one, other in combinations(choices, 2) for a, b in product(one, other)]
     for begin in range(0, len(pairs), PAIRS):
@@ -113,10 +146,30 @@ def stance_slices(
         raise NoPlanError(
             "plan",
             structure.name,
-            "no stance is possible at the beginning: the arms would collide",
+            _why_no_stance(walker, structure, search, every[0].tolist(), sample),
             separating=_at_first(structure, grips),
         )
     return [stance for _, _, stance in found[: most[1]]]
+
+
+def _why_no_stance(
+    walker: Walker, structure: Structure, search: StanceSearch[Any], stance: Sequence[int], sample: int
+) -> str:
+    """Why the stance that would last longest does not last to beyond a sample."""
+    grips, spacing = search.grips, search.path.spacing
+    names = [f"{arm.name} on {structure.ids[grips.hold[g]]}" for arm, g in zip(walker.arms, stance, strict=True)]
+    last = grips.last[list(stance)]
+    if last.min() <= sample:
+        k = int(last.argmin())
+        reason = grips.reasons[grips.ends[stance[k]]]
+        return f"no stance lasts long enough to begin with: {names[k]} until {last[k] * spacing:.2f} s ({reason})"
+    for (i, a), (j, b) in combinations(enumerate(stance), 2):
+        when = search.conflicts.first_conflict(a, b, 0)
+        if when <= sample:
+            return (
+                f"no stance is possible at the beginning: {names[i]} and {names[j]} would come too near to each other"
+            )
+    return "no stance is possible at the beginning"
 
 
 def _at_first(structure: Structure, grips: Grips) -> list[str]:

@@ -5,8 +5,11 @@ from __future__ import annotations
 import pathlib
 from collections.abc import Callable
 
+import numpy as np
+
 from wbc.robots import Walker
 from wbc.walking.checker import Report, Rules, check_run
+from wbc.walking.checker.clock_and_joints import JUMP, SPIN_JUMP
 from wbc.walking.holds.files import save_structure
 from wbc.walking.log.folder import BEGUN, PLAN, STRUCTURE, URDF, write_whole
 from wbc.walking.log.log import FILE
@@ -58,10 +61,14 @@ def save_run(run: WalkRun, folder: pathlib.Path, check: bool = True) -> tuple[li
 
 
 def rules_of(walker: Walker) -> Rules:
-    """What the checker goes by: tips of the two-ended arm are thicker than hands."""
+    """What the checker goes by: the accelerations of the joints; tips of the two-ended arm are thicker than hands."""
+    names = [joint for arm in walker.arms for joint in arm.joints]
+    limits = np.concatenate([walker.robot.limits.acceleration[arm.v] for arm in walker.arms])
+    found = dict(zip(names, limits.tolist(), strict=True))
     if walker.two_ended:
-        return Rules(exempt_distance=touching_distance(walker))
-    return Rules()
+        # Its body is its elbow, which goes as fast as the joints take it
+        return Rules(exempt_distance=touching_distance(walker), accelerations=found, observe=(JUMP, SPIN_JUMP))
+    return Rules(accelerations=found)
 
 
 def save_pictures(

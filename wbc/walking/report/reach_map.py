@@ -31,6 +31,8 @@ REASONS = {
     "elbow or shoulder limit": style.PURPLE,
     "faces away": "#b08900",
 }
+#: Holds are round about something where the approach of one has less than this along the mean approach
+ROUND = 0.5
 
 
 def why_unusable(walker: Walker, structure: Structure, path: BodyPath) -> tuple[NDArray[np.bool_], list[str]]:
@@ -109,6 +111,9 @@ def unrolled(structure: Structure, points: Array) -> tuple[Array, tuple[str, str
             "along the axis [m]",
             "round the surface [m]",
         )
+    mean = structure.axes.mean(axis=0)
+    if float((structure.axes @ mean).min()) < ROUND * float(np.linalg.norm(mean)):
+        return _unrolled_inside(structure, points)
     # The plane across the mean approach direction, x along the widest spread of holds
     centre = structure.positions.mean(axis=0)
     up = -structure.axes.mean(axis=0)
@@ -118,6 +123,28 @@ def unrolled(structure: Structure, points: Array) -> tuple[Array, tuple[str, str
     x = np.linalg.svd(off, full_matrices=False)[2][0]
     x = x * (1.0 if x[np.abs(x).argmax()] > 0 else -1.0)
     return np.stack([(points - centre) @ x, (points - centre) @ np.cross(up, x)], axis=1), ("along [m]", "across [m]")
+
+
+def _unrolled_inside(structure: Structure, points: Array) -> tuple[Array, tuple[str, str]]:
+    """The same of holds all round, as on the inside of a cylinder: its axis d is what their approach directions a are
+    across, its centre c the point that all of them point away from: min sum |(1 - a a') (p - c)|^2 across d.
+    """
+    axes, places = structure.axes, structure.positions
+    _, _, rows = np.linalg.svd(axes, full_matrices=False)
+    along = rows[2] * (1.0 if rows[2][np.abs(rows[2]).argmax()] > 0 else -1.0)
+    across = np.stack([rows[0], np.cross(along, rows[0])])
+    a, p = axes @ across.T, places @ across.T
+    a /= np.maximum(np.linalg.norm(a, axis=1, keepdims=True), 1e-9)
+    out = np.eye(2) - a[:, :, None] * a[:, None, :]
+    centre = np.linalg.lstsq(out.sum(axis=0), np.einsum("kij,kj->i", out, p), rcond=None)[0]
+    off = points @ across.T - centre
+    radius = float(np.linalg.norm(p - centre, axis=1).mean())
+    # Cut open where there is the widest gap between holds
+    angles = np.sort(np.arctan2(*(p - centre).T[::-1]))
+    gaps = np.diff(np.append(angles, angles[0] + 2.0 * np.pi))
+    cut = angles[int(gaps.argmax())] + 0.5 * float(gaps.max())
+    round_about = (np.arctan2(off[:, 1], off[:, 0]) - cut) % (2.0 * np.pi) - np.pi
+    return np.stack([points @ along, radius * round_about], axis=1), ("along the axis [m]", "round the surface [m]")
 
 
 def _window(usable: Array, places: Array, way: Array) -> tuple[Array, Array]:

@@ -25,8 +25,10 @@ from wbc.walking.log.body_paths import path_of
 from wbc.walking.log.folder import BEGUN, STRUCTURE, machine_made, read_begun, walked
 from wbc.walking.log.log import CLOSED, OPENING, WalkLog, WalkLogError
 from wbc.walking.log.ticks import TickColumns
-from wbc.walking.loop.stack import WalkStack
+from wbc.walking.loop.coasting import Coasting
+from wbc.walking.loop.stack import DT, WalkStack
 from wbc.walking.loop.state import Manual, State
+from wbc.walking.loop.stopping import Stops
 from wbc.walking.loop.walk import PATIENCE, SLACK, Walk
 from wbc.walking.modes.first_grasps import plan_from_state
 from wbc.walking.planner.plan import Plan
@@ -42,7 +44,7 @@ RESUME = "resume"
 
 
 def resumed_state(log: WalkLog, row: int, walker: Walker, structure: Structure) -> State:
-    """The state of a row of a log: a body at rest with the hands that hold there.
+    """The state of a row of a log, with the hands that hold there and the velocity that it came with.
 
     Args:
         structure: with the holds that are there.
@@ -59,7 +61,12 @@ def resumed_state(log: WalkLog, row: int, walker: Walker, structure: Structure) 
             opening = arm, structure.index(log.hold_id[hold])
     if len(held) < walker.min_holds and not log.body_fixed[row]:
         raise RangeError("resume.at", float(log.t[row]), f"{len(held)} hands hold there, {walker.min_holds} must")
-    return State(configuration(walker, log, row), held, float(log.t[row]), opening)
+    v = np.zeros(walker.robot.nv)
+    v[:6] = log.twist_body[row - 1]
+    column = {name: k for k, name in enumerate(log.joints)}
+    for limb in walker.arms:
+        v[limb.v] = log.v[row - 1, [column[joint] for joint in limb.joints]]
+    return State(configuration(walker, log, row), held, float(log.t[row]), opening, v)
 
 
 @dataclass(frozen=True)
@@ -174,11 +181,13 @@ class ResumeMode(Mode[PathRequest]):
         self._state = resumed_state(old, row, walker, self._there)
         asked = resume.points or "way" not in old.meta
         whole = request.path(walker.arm_data) if asked else path_of(old.meta["way"])
-        self.path = _rest(pin.XYZQUATToSE3(old.pose_body_in_structure[row]), whole, request)
+        coasting = Coasting.of(walker, self._state, Stops.of(walker, DT).brake, DT)
+        self._stands = self._state if coasting is None else coasting.state(self._state)
+        self.path = _rest(pin.XYZQUATToSE3(self._stands.q[:7]), whole, request)
 
     def plan(self) -> Plan:
-        """From the state of the log."""
-        return plan_from_state(self.walker, self._there, self.path, self._state)
+        """From where everything has come to rest after the state of the log."""
+        return plan_from_state(self.walker, self._there, self.path, self._stands)
 
     def compiled(self, backend: str) -> WalkStack:
         """For the holds that are there."""

@@ -63,7 +63,7 @@ def plan_two_ended(
     Raises:
         UnknownNameError: another arm, hold or gait. ShapeError: another machine, or a start without both hands.
         RangeError: a hold on which a hand may roll or lean: it does not say where the arm is.
-        NoPlanError: there is none.
+        NoPlanError: there is none, or the elbow comes nowhere near to a place.
     """
     validation.one_of("gait", gait, tuple(GAITS))
     rows = _start(structure, start)
@@ -117,7 +117,10 @@ def _goal(postures: PairPostures, to: str | Sequence[float]) -> tuple[Goal, Arra
             far[pair] = float(np.linalg.norm(elbow - place))
     if not far:
         raise NoPlanError("to", list(to), "the arm has no posture on any two holds")
-    least = min(far.values()) + SAME_PLACE
+    nearest = min(far.values())
+    if nearest > 2.0 * postures.kinematics.data.boom_length:
+        raise NoPlanError("to", list(to), f"no two holds bring the arm's elbow nearer to it than {nearest:.1f} m")
+    least = nearest + SAME_PLACE
     return (lambda near, other: far.get((near, other), np.inf) <= least), place
 
 

@@ -15,6 +15,7 @@ from wbc.simulation import Plant
 from wbc.validation import Array
 from wbc.walking.body_path import BodyPath
 from wbc.walking.holds.structure import Structure
+from wbc.walking.loop.foresight import Foresight
 from wbc.walking.loop.machine import Machine
 from wbc.walking.loop.progress import PlanProgress
 from wbc.walking.loop.stack import AXIS, DT, FREE_AXIS, FREE_WRIST, WalkStack
@@ -64,7 +65,7 @@ class TurnLeader:
         ShapeError: another machine.
     """
 
-    one_motion = True
+    one_motion, late = True, 0.2
 
     def __init__(self, machine: Machine, progress: PlanProgress, stack: TwoEndedStack) -> None:
         data, margins = machine.walker.two_ended_data, machine.walker.margins
@@ -113,6 +114,7 @@ class TurnReplanner:
 
     def __init__(self, machine: Machine, to: str | Sequence[float], gait: str) -> None:
         self._machine, self._to, self.gait = machine, to, gait
+        self.sight: Foresight | None = None
 
     def go(self, goal: Any) -> None:
         """To a hold, so that the elbow is near a point [m], or near the end of a body's path."""

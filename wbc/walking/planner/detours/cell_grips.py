@@ -11,6 +11,7 @@ from wbc.robots import Margins, Walker
 from wbc.validation import Array
 from wbc.walking.arms.puma import limb_of
 from wbc.walking.holds.structure import Structure
+from wbc.walking.planner.around import NONE_MET, around
 from wbc.walking.planner.detours.cells import Cells, Ints
 from wbc.walking.planner.grips.held import held, near_holds
 
@@ -43,13 +44,17 @@ class CellGrips:
 
 def cell_grips(walker: Walker, structure: Structure, cells: Cells) -> CellGrips:
     """Every arm on every hold at every cell."""
-    limb, margins = limb_of(walker), walker.margins
+    limb, margins, about = limb_of(walker), walker.margins, around(walker, structure)
+    free = about.bodies(cells.frames) == NONE_MET
     block = len(cells) // cells.shape[0]
     parts, found = list[Array](), list[tuple[Ints, Flags]]()
     for arm in range(len(walker.arms)):
         base = walker.arms[arm].base.homogeneous
         for begin in range(0, len(cells), block):
-            frames = cells.frames[begin : begin + block] @ base
+            here = begin + np.nonzero(free[begin : begin + block])[0]
+            if not len(here):
+                continue
+            frames = cells.frames[here] @ base
             there = held(
                 limb,
                 structure,
@@ -60,11 +65,19 @@ def cell_grips(walker: Walker, structure: Structure, cells: Cells) -> CellGrips:
             )
             good = there.within(margins.cell_angle) & (limb.wrist_bend(there.q) > margins.landing_wrist)
             rows, branch = np.nonzero(good)
+            q, poses = there.q[rows, branch], there.pose[rows]
+            clear = about.postures(arm, frames[poses], q, there.hold[rows]) == NONE_MET
+            rows, branch, q, poses = rows[clear], branch[clear], q[clear], poses[clear]
             lands = may_land(margins, there.reach, there.wrists)
             arms = np.full(len(rows), arm)
-            keys = np.column_stack([arms, begin + there.pose[rows], there.hold[rows], branch])
+            keys = np.column_stack([arms, here[poses], there.hold[rows], branch])
             found.append((keys, lands[rows]))
-            parts.append(there.q[rows, branch])
+            parts.append(q)
+    if not found:
+        found, parts = (
+            [(np.zeros((0, 4), dtype=np.int64), np.zeros(0, bool))],
+            [np.zeros((0, len(limb.position_limits)))],
+        )
     keys, lands = (np.concatenate(columns) for columns in zip(*found, strict=True))
     branches = 1 + int(keys[:, 3].max(initial=0))
     packed = (keys[:, 0] * len(structure) + keys[:, 2]) * branches + keys[:, 3]

@@ -154,13 +154,16 @@ class CellSearch:
                 mine = mine[grips.hold[mine] == start[arm]]
             # Grips that hold at many cells first
             choices.append(mine[np.argsort(-grips.fits[mine].sum(axis=1), kind="stable")][:START_GRIPS].tolist())
-        out = []
+        out: list[CellNode] = []
+        met: set[tuple[Grips, int]] = set()  # many stances share their grips
         for stance in product(*choices):
             if all(self.together(*pair)[cell] for pair in combinations(stance, 2)):
                 for some in combinations(range(self._arms), self._least):
                     held = tuple(stance[arm] for arm in some)
                     for left in (stance[arm] for arm in range(self._arms) if arm not in some):
-                        out += self._node(held, np.array([cell]), left, None, seen)
+                        if (held, left) not in met:
+                            met.add((held, left))
+                            out += self._node(held, np.array([cell]), left, None, seen)
         return out
 
     def _children(self, node: CellNode, grip: int, landed: Ints, seen: Seen) -> list[CellNode]:

@@ -14,10 +14,11 @@ from wbc.robots import Walker
 from wbc.validation import Array
 from wbc.walking.arms.puma import limb_of
 from wbc.walking.native import compiled
+from wbc.walking.planner.around import FINELY
 from wbc.walking.planner.grips.table import Grips, Ints
 
 #: Every so many samples of a path are looked at
-EVERY = 4
+EVERY = 2
 #: No conflict: a sample after every path
 NEVER = 1 << 40
 
@@ -74,9 +75,12 @@ class LimbShapes:
         out: Array = (segment_distances(*ends) - self.least).min(axis=1)
         return out
 
-    def near(self, one: Array, other: Array, less: float = 0.0) -> Flags:
-        """Whether arms given by their points are nearer than radii and clearance less ``less`` [m] allow: ``[m]``."""
-        least, library = self.least - less, compiled.library_for(self.limb)
+    def near(self, one: Array, other: Array, less: float | Array = 0.0) -> Flags:
+        """Whether arms given by their points are nearer than radii and clearance less ``less`` [m], for all or each,
+        allow: ``[m]``.
+        """
+        alike = isinstance(less, float)
+        least, library = self.least - np.reshape(less, (-1, 1)), compiled.library_for(self.limb) if alike else None
         out = np.zeros(len(one), dtype=np.bool_)
         if library is not None:
             given = [compiled.packed(points) for points in (one, other)]
@@ -90,7 +94,8 @@ class LimbShapes:
         reach = halves[0][:, self._one] + halves[1][:, self._other] + least
         row, pair = np.nonzero((gap * gap).sum(axis=2) < reach * reach)
         i, j = np.array(self._one)[pair], np.array(self._other)[pair]
-        close = segment_distances(a[row, i].T, b[row, i].T, c[row, j].T, d[row, j].T) < least[pair]
+        each = np.broadcast_to(least, reach.shape)[row, pair]
+        close = segment_distances(a[row, i].T, b[row, i].T, c[row, j].T, d[row, j].T) < each
         out[row[close]] = True
         return out
 
@@ -172,13 +177,34 @@ class ArmClearance:
         if library is None:
             there = shapes.points_of(grips.arm[others], grips.between(others[:, None], samples))
             one, other = (side.reshape(-1, *side.shape[2:]) for side in (points, there))
-            near = shapes.near(one, other, less)
-            return np.asarray(~near.reshape(samples.shape).any(axis=1))
+            near = shapes.near(one, other, less).reshape(samples.shape)
+            clear: Flags = np.asarray(np.logical_not(near.any(axis=1)))
+            self._between(points, there, less, clear)
+            return clear
         given = [compiled.packed(array) for array in (points, samples, shapes.bases[grips.arm[others]])]
         where = [compiled.at(array) for array in (*given, others, shapes.least - less, out)]
         sizes = (ctypes.c_long(size) for size in samples.shape)
         library.swings_clear(compiled.arm_of(shapes.limb), ctypes.byref(grips.table), *sizes, *where)
         return out
+
+    def _between(self, points: Array, there: Array, less: float, clear: Flags) -> None:
+        """Marks motions that are not clear between their instants, over which all points go straight: where the middle
+        is farther from the other arm than both go, all of it is.
+        """
+        who = np.repeat(np.arange(len(points)), points.shape[1] - 1)
+        spans = [np.stack([a[:, :-1], a[:, 1:]], axis=2).reshape(-1, 2, *a.shape[2:]) for a in (points, there)]
+        while len(who):
+            middle = [a.mean(axis=1) for a in spans]
+            both = sum(0.5 * np.linalg.norm(a[:, 1] - a[:, 0], axis=2).max(axis=1) for a in spans)
+            left = clear[who] & self.shapes.near(middle[0], middle[1], less - both)
+            who, spans, middle, both = who[left], [a[left] for a in spans], [a[left] for a in middle], both[left]
+            clear[who[self.shapes.near(middle[0], middle[1], np.full(len(who), less))]] = False
+            on = (both >= FINELY) & clear[who]
+            who, spans, middle = np.tile(who[on], 2), [a[on] for a in spans], [a[on] for a in middle]
+            spans = [
+                np.concatenate([np.stack([a[:, 0], m], axis=1), np.stack([m, a[:, 1]], axis=1)])
+                for a, m in zip(spans, middle, strict=True)
+            ]
 
 
 def _pair(one: int, other: int) -> tuple[int, int]:

@@ -8,12 +8,13 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from wbc.robots import BodyLimb, Margins, Walker
+from wbc.robots import Margins, Walker
 from wbc.validation import Array
 from wbc.walking.arms.puma import LIMIT_NAMES, limb_of
 from wbc.walking.body_path import BodyPath
 from wbc.walking.holds.structure import Structure
 from wbc.walking.native import compiled
+from wbc.walking.planner.around import NONE_MET, Around, around
 from wbc.walking.planner.grips.held import Held, held, near_holds
 from wbc.walking.planner.grips.rolls import ANY, turns
 from wbc.walking.planner.grips.stretches import stretches
@@ -29,9 +30,10 @@ ROWS = 12000
 SHORTEST = 3
 
 
-def reasons_of(limit_names: Sequence[str], joints: int) -> tuple[str, ...]:
-    """What may end a grip of a limb."""
-    return (*limit_names, "reach", *(f"joint {k} rate" for k in range(1, joints + 1)), END)
+def reasons_of(limit_names: Sequence[str], joints: int, met: Sequence[str] = ()) -> tuple[str, ...]:
+    """What may end a grip of a limb; ``met``: names of what may be in its way."""
+    ways = (f"{name} is in the way" for name in met)
+    return (*limit_names, "reach", *(f"joint {k} rate" for k in range(1, joints + 1)), END, *ways)
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,16 +145,17 @@ def grip_slices(walker: Walker, structure: Structure, path: BodyPath, only: Sequ
     Args:
         only: one row of a hold for each arm, where others do not matter.
     """
-    limb, margins = limb_of(walker), walker.margins
+    limb, margins, there = limb_of(walker), walker.margins, around(walker, structure)
+    blocked = there.bodies(path.poses)
     size, found = max(ROWS // len(path), 1), list[tuple[int, int, int, int, int, int, int, Array]]()
     for arm in range(len(walker.arms)):
         frames = path.poses @ walker.arms[arm].base.homogeneous
         holds = np.array(only[arm : arm + 1], dtype=np.int64) if only else near_holds(limb, structure, frames)
         for begin in range(0, len(holds), size):
             some = holds[begin : begin + size]
-            quick = stretches(limb, frames, structure, some, path.spacing, margins, SHORTEST)
+            quick = stretches(there, arm, frames, blocked, some, path.spacing, margins, SHORTEST)
             if quick is None:
-                found += _of_arm(limb, margins, arm, frames, structure, some, path.spacing)
+                found += _of_arm(there, margins, arm, frames, blocked, some, path.spacing)
             else:
                 found += [(arm, *stretch[:-1], ANY, stretch[-1]) for stretch in quick]
             yield None
@@ -163,14 +166,15 @@ def grip_slices(walker: Walker, structure: Structure, path: BodyPath, only: Sequ
     lengths = np.array([len(rows) for rows in columns[7]], dtype=int)
     offset = np.concatenate([[0], np.cumsum(lengths)[:-1]]) if found else np.zeros(0)
     arms, rows, branch, first, last, ends, rolls = (np.array(column, dtype=np.int64) for column in columns[:7])
-    reasons = reasons_of(limb.limit_names, joints)
+    reasons = reasons_of(limb.limit_names, joints, there.names)
     return Grips(arms, rows, branch, first, last, offset.astype(np.int64), postures, ends, rolls, reasons)
 
 
 def _of_arm(
-    limb: BodyLimb, margins: Margins, arm: int, frames: Array, structure: Structure, among: Ints, spacing: float
+    around_it: Around, margins: Margins, arm: int, frames: Array, blocked: Ints, among: Ints, spacing: float
 ) -> Iterator[tuple[int, int, int, int, int, int, int, Array]]:
     """(arm, hold, branch, first, last, reason of the end, roll, postures) of every grip of an arm on some holds."""
+    limb, structure = around_it.limb, around_it.structure
     lean_for = margins.lean_from * margins.held_reach
     there = held(limb, structure, frames, among, reach=margins.held_reach, facing=margins.facing, lean_for=lean_for)
     holds, samples, good, count = there.hold, there.pose, there.within(margins.held_angle), len(frames)
@@ -180,14 +184,18 @@ def _of_arm(
     free, names = len(most) - 1, len(limb.limit_names)
     neighbours = (holds[1:] == holds[:-1]) & (samples[1:] == samples[:-1] + 1)
     for branch in range(there.q.shape[1]):
-        q, fits = there.q[:, branch], good[:, branch]
+        q, fits = there.q[:, branch], good[:, branch].copy()
+        meets = np.where(fits, blocked[samples], NONE_MET)
+        some = np.nonzero(fits & (meets == NONE_MET))[0]
+        meets[some] = around_it.postures(arm, frames[samples[some]], q[some], holds[some])
+        fits &= meets == NONE_MET
         slow = [np.abs(q[1:, k] - q[:-1, k]) <= most[k] for k in range(free)]
         joined = np.logical_and.reduce([neighbours, fits[1:], fits[:-1], *slow])
         begins = np.nonzero(np.concatenate([[True], ~joined]))[0]
         ends = np.concatenate([begins[1:], [len(q)]]) - 1
         long = fits[begins] & (ends - begins + 1 >= SHORTEST)
         for begin, end in zip(begins[long].tolist(), ends[long].tolist(), strict=True):
-            reason = _reason(there, branch, most[:free], neighbours, end, count)
+            reason = _reason(there, branch, most[:free], neighbours, end, count, meets)
             first, last = int(samples[begin]), int(samples[end])
             hold, rows = int(holds[begin]), slice(begin, end + 1)
             if structure.free_rolls[hold]:
@@ -201,13 +209,17 @@ def _of_arm(
                 yield arm, hold, branch, first + one.first, first + one.last, why, one.roll, turned
 
 
-def _reason(there: Held, branch: int, most: Array, neighbours: NDArray[np.bool_], end: int, count: int) -> int:
+def _reason(
+    there: Held, branch: int, most: Array, neighbours: NDArray[np.bool_], end: int, count: int, meets: Ints
+) -> int:
     """Why a grip ends after row ``end``: an index into ``Grips.reasons``."""
     q, names = there.q[:, branch], int(there.margins.shape[-1])
     if there.pose[end] == count - 1:
         return names + len(q[0]) + 1
     if end + 1 == len(q) or not neighbours[end]:
         return names
+    if meets[end + 1] != NONE_MET:
+        return names + len(q[0]) + 2 + int(meets[end + 1])
     used = np.abs(q[end + 1, : len(most)] - q[end, : len(most)]) / most
     if (used > 1.0).any():
         return names + 1 + int(np.argmax(used))

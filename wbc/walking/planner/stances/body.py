@@ -10,6 +10,7 @@ from wbc.walking.holds.structure import Structure
 from wbc.walking.planner.grips.conflicts import ArmClearance
 from wbc.walking.planner.grips.table import Grips
 from wbc.walking.planner.stances.search import StanceSearch
+from wbc.walking.planner.swings.move import Move
 from wbc.walking.planner.swings.swings import Swings
 
 
@@ -34,3 +35,8 @@ class BodySearch(StanceSearch[Swings]):
         self.walker, self.structure = walker, structure
         swings = Swings(walker, structure, path, grips, ArmClearance(walker, grips)) if known is None else known.swings
         super().__init__(path, grips, swings.arms, swings, hover=walker.margins.hover, **more)
+
+    def exclude(self, move: Move) -> None:
+        """A move is not possible, along whichever curve."""
+        for curve in range(self.swings.curves):
+            self.correct(move._replace(curve=curve), move.duration, False)

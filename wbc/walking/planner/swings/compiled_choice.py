@@ -13,11 +13,10 @@ from wbc.validation import Array
 from wbc.walking.body_path import BodyPath
 from wbc.walking.holds.structure import Structure
 from wbc.walking.native import compiled
-from wbc.walking.native.compiled import plain_surface
+from wbc.walking.planner.around import World
 from wbc.walking.planner.grips.conflicts import LimbShapes
 from wbc.walking.planner.grips.rolls import ANY
 from wbc.walking.planner.grips.table import Grips
-from wbc.walking.planner.swings.clearance import ALONG, SwingClearance
 from wbc.walking.planner.swings.curve import RAISING, STEEP, UPRIGHT, alternatives, crossing_height, step
 from wbc.walking.planner.swings.joints import blend
 from wbc.walking.planner.swings.least_time import rules
@@ -27,16 +26,16 @@ from wbc.walking.planner.swings.tracks import PASSES
 Name = tuple[int, int, int, int, int, int]
 _POINTERS = ("bases", "path", "places", "normals", "arms", "holds", "free")
 _CURVES = ("across", "raised", "blend", "span", "look_across", "look_raised", "steps", "half")
-_CLEAR = ("alternatives", "parts", "above", "apart")
-_COUNTS = ("count", "n", "spans", "looks", "halves", "tried", "some", "halfway", "passes")
-_NUMBERS = ("spacing", "height", "aside", "upright", "touching", "extra", "latch")
+_CLEAR = ("alternatives", "apart")
+_COUNTS = ("count", "n", "spans", "looks", "halves", "tried", "halfway", "passes")
+_NUMBERS = ("spacing", "height", "aside", "upright", "extra", "latch")
 
 
 class _Scene(ctypes.Structure):
     """Scene of native/choice.h."""
 
     _fields_ = [
-        *((name, ctypes.c_void_p) for name in ("arm", "rules", "surface")),
+        *((name, ctypes.c_void_p) for name in ("arm", "rules", "world")),
         ("grips", compiled.Table),
         *((name, ctypes.c_void_p) for name in (*_POINTERS, *_CURVES, *_CLEAR)),
         *((name, ctypes.c_long) for name in _COUNTS),
@@ -45,15 +44,15 @@ class _Scene(ctypes.Structure):
 
 
 class CompiledChoice:
-    """Choice of curves for the swings of one plan over a plain surface.
+    """Choice of curves for the swings of one plan.
 
     Args:
-        shapes: of the arms. clear: of the structure. apart: distances of links of a swinging arm and one that holds
+        shapes: of the arms. world: what stands around. apart: distances of links of a swinging arm and one that holds
             ``[15]`` [m]. points: of a curve. halfway: samples after lifting at which the body is about where the swing
             is halfway. extra: latches and settling [s]. latch: how long a hand opens [s].
 
     Raises:
-        ValueError: nothing is compiled, or the structure is more than a plane or a cylinder, see :meth:`possible`.
+        ValueError: compiled code does not know the limb.
     """
 
     def __init__(
@@ -63,34 +62,33 @@ class CompiledChoice:
         path: BodyPath,
         grips: Grips,
         shapes: LimbShapes,
-        clear: SwingClearance,
+        world: World,
         apart: Array,
         points: int,
         halfway: int,
         extra: float,
         latch: float,
     ) -> None:
-        surface, data = plain_surface(structure), shapes.limb.closed_form
-        if surface is None or data is None:
-            raise ValueError("only over a plain surface, by compiled code")
+        data = shapes.limb.closed_form
+        if data is None:
+            raise ValueError("only by compiled code")
         x, tried = np.linspace(0.0, 1.0, points), alternatives(walker.margins)
         y = step((x - UPRIGHT) / (1 - 2 * UPRIGHT))
         of_grips = grips.arm, np.maximum(grips.hold, 0), (grips.roll == ANY).astype(np.int64)
         curves = y, 1.0 - (1.0 - 2.0 * x) ** STEEP, blend(x), *RAISING
-        distances = tried, ALONG, clear.least, apart
-        reals = [compiled.packed(a) for a in (shapes.bases, path.poses, structure.positions, structure.axes)]
+        distances = tried, apart
+        reals = [compiled.packed(a) for a in (shapes.bases, path.poses, structure.positions, world.approaches)]
         whole = [np.ascontiguousarray(a, dtype=np.int64) for a in of_grips]
         more = [compiled.packed(a) for a in (*curves, *distances)]
         arrays = dict(zip((*_POINTERS, *_CURVES, *_CLEAR), (*reals, *whole, *more), strict=True))
-        lengths = (
-            len(arrays[name]) for name in ("path", "across", "span", "look_across", "half", "alternatives", "parts")
-        )
-        numbers = path.spacing, crossing_height(walker), walker.margins.across, UPRIGHT, clear.touching, extra, latch
+        lengths = (len(arrays[name]) for name in ("path", "across", "span", "look_across", "half", "alternatives"))
+        numbers = path.spacing, crossing_height(walker), walker.margins.across, UPRIGHT, extra, latch
         arm, limits = compiled.arm(data), rules(walker.margins)
         # What the pointers are to
-        self._there = arrays, arm, limits, surface, grips
+        self._there = arrays, arm, limits, world, grips
         self._scene = _Scene(
-            *(ctypes.cast(ctypes.pointer(a), ctypes.c_void_p) for a in (arm, limits, surface)),
+            *(ctypes.cast(ctypes.pointer(a), ctypes.c_void_p) for a in (arm, limits)),
+            ctypes.cast(world.pointer, ctypes.c_void_p),
             grips.table,
             *(compiled.at(array) for array in arrays.values()),
             *lengths,
@@ -98,11 +96,6 @@ class CompiledChoice:
             PASSES,
             *numbers,
         )
-
-    @staticmethod
-    def possible(shapes: LimbShapes, structure: Structure) -> bool:
-        """Whether compiled code knows the limb, and the structure is a plane or a cylinder and nothing more."""
-        return compiled.library_for(shapes.limb) is not None and plain_surface(structure) is not None
 
     def choose(
         self, names: Sequence[Name], others: Sequence[tuple[int, ...]], barred: NDArray[np.bool_]

@@ -12,7 +12,7 @@ from wbc.validation import Array
 from wbc.walking.arms.puma import limb_of
 from wbc.walking.holds.structure import Structure
 from wbc.walking.native import compiled
-from wbc.walking.native.compiled import plain_surface
+from wbc.walking.planner.around import Around, World, around
 from wbc.walking.planner.grips.table import Ints
 
 #: Parts of the curve, at its beginning and its end, in which the hand does not go across
@@ -21,6 +21,8 @@ UPRIGHT = 0.1
 STEEP = 2
 #: Points at which the height above the structure is measured
 LOOKS = 9
+#: Way over which the direction away from all that stands around is measured [m]
+NEAR = 1e-3
 #: Curves that are tried, the first that is clear is taken: how much higher in the middle, in ``Margins.higher``, and
 #: what part of the arc. ``python -m bench.walk.fits`` prints how often each is the first
 ALTERNATIVES = ((0.0, 1.0), (0.0, 0.6), (0.0, 0.2), (1.0, 1.0), (1.0, 0.4), (0.0, 1.4))
@@ -131,13 +133,14 @@ def curves(
     more, part = alternatives(walker.margins)[alternative].tolist()
     a, b = structure.positions[begin], structure.positions[end]
     height, across = crossing_height(walker), walker.margins.across
-    none, surface = np.zeros((len(a), 2)), plain_surface(structure)
-    flat = Curves(a, b, structure.axes[begin], structure.axes[end], none, none[:, 0], pivots, part)
-    if surface is not None:
-        rise, lift = _raised(surface, flat, height, across)
+    none, there = np.zeros((len(a), 2)), around(walker, structure)
+    axes = there.approaches
+    flat = Curves(a, b, axes[begin], axes[end], none, none[:, 0], pivots, part)
+    if there.world is not None:
+        rise, lift = _raised(there.world, flat, height, across)
         return replace(flat, rise=rise, lift=lift + more)
     flat = replace(flat, rise=np.repeat(_rise(flat, height, across)[:, None], 2, axis=1))
-    return replace(flat, lift=_lift(structure, flat, height) + more)
+    return replace(flat, lift=_lift(there, flat, height) + more)
 
 
 def between(
@@ -156,21 +159,36 @@ def between(
     """
     height, flat = crossing_height(walker), Curves(*ends, *axes, np.zeros(free.shape), np.zeros(len(free)), pivots, 1.0)
     # From the air it need not rise more than it lacks, but must come down along the hold's normal
-    lack = np.stack([np.maximum(height - structure.clearance(end), 0.0) for end in ends], axis=1)
+    there = around(walker, structure)
+    lack = np.stack([np.maximum(height - there.height(end), 0.0) for end in ends], axis=1)
+    # However a hand in the air is turned, it goes straight away from what it is near to
+    leave, arrive = (
+        np.where(((free[:, side] > 0) & (lack[:, side] > 0.0))[:, None], -_upwards(there, ends[side]), axes[side])
+        for side in (0, 1)
+    )
+    flat = replace(flat, leave=leave, arrive=arrive)
     rise = _rise(flat, height, walker.margins.across)[:, None]
     flat = replace(flat, rise=np.where(free, rise * lack / height, rise))
-    return replace(flat, lift=_lift(structure, flat, height))
+    return replace(flat, lift=_lift(there, flat, height))
 
 
-def _raised(surface: compiled.Numbers, flat: Curves, height: float, aside: float) -> tuple[Array, Array]:
-    """Rise and lift of curves over a surface, by compiled code."""
+def _upwards(there: Around, points: Array) -> Array:
+    """The direction in which the distance from all that stands around grows ``[m, 3]``."""
+    steps = 0.5 * NEAR * np.eye(3)
+    slopes: Array = np.stack([there.height(points + way) - there.height(points - way) for way in steps], axis=1)
+    out: Array = slopes / np.maximum(np.linalg.norm(slopes, axis=1), 1e-9)[:, None]
+    return out
+
+
+def _raised(world: World, flat: Curves, height: float, aside: float) -> tuple[Array, Array]:
+    """Rise and lift of curves over what stands around, by compiled code."""
     library, count = compiled.library(), len(flat.begin)
     assert library is not None
     rise, lift = np.empty((count, 2)), np.empty(count)
     ends = flat.begin, flat.end, flat.leave, flat.arrive, flat.pivots.frames, flat.pivots.turn
     given = [compiled.packed(a) for a in ends]
     library.raise_curves(
-        surface,
+        world.pointer,
         ctypes.c_long(count),
         *map(compiled.at, given),
         *(ctypes.c_double(number) for number in (flat.part, height, aside, UPRIGHT)),
@@ -195,9 +213,9 @@ def _rise(flat: Curves, height: float, aside: float) -> Array:
     return out
 
 
-def _lift(structure: Structure, flat: Curves, height: float) -> Array:
+def _lift(there: Around, flat: Curves, height: float) -> Array:
     """What curves lack between their ends, the chord of a round surface and obstacles included."""
-    lack = (height - structure.clearance(flat.at(_LOOK))) / (4.0 * _ACROSS * (1.0 - _ACROSS))
+    lack = (height - there.height(flat.at(_LOOK))) / (4.0 * _ACROSS * (1.0 - _ACROSS))
     out: Array = np.maximum(lack.max(axis=1), 0.0)
     return out
 

@@ -91,6 +91,13 @@ class SwingLaw:
         row = rows[:7] + between * (rows[7:] - rows[:7])
         return Aim(row[:3], row[3:6], float(row[6]), part)
 
+    def along(self, times: Array) -> tuple[Array, Array]:
+        """Positions ``[k, 3]`` [m] and parts of the guided joints' change ``[k]`` at times ``[k]``, clipped."""
+        place = np.clip(times / self.duration, 0.0, 1.0) * (len(self._rows) - 1)
+        low = np.minimum(place.astype(np.int64), len(self._rows) - 2)
+        rows = self._rows[low] + (place - low)[:, None] * (self._rows[low + 1] - self._rows[low])
+        return rows[:, :3], rows[:, 6]
+
     def rows_at(self, time: float) -> tuple[Array, float, float]:
         """The rows before and after a time, clipped to the swing: position, velocity and part of the guided joints'
         change of each ``[14]``; how far it is between them, and the part of the whole time.

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,10 +15,10 @@ from wbc.robots import Walker
 from wbc.validation import Array
 from wbc.walking.body_path import BodyPath
 from wbc.walking.holds.structure import Structure
+from wbc.walking.planner.around import around
 from wbc.walking.planner.grips.conflicts import ArmClearance
 from wbc.walking.planner.grips.table import Grips, Ints
 from wbc.walking.planner.slices import Slices, drained
-from wbc.walking.planner.swings.clearance import SwingClearance
 from wbc.walking.planner.swings.compiled_choice import CompiledChoice, Name
 from wbc.walking.planner.swings.curve import ALTERNATIVES, Curves, Pivots, curves
 from wbc.walking.planner.swings.move import Chosen, Move, Swing
@@ -53,6 +54,13 @@ class _Track:
     samples: Array
 
 
+class HandLaw(Protocol):
+    """Where a swinging hand is when."""
+
+    def along(self, times: Array, /) -> tuple[Array, Array]:
+        """Positions [m] and parts of the guided joints' change at times since the hand is open [s]."""
+
+
 class Swings:
     """Swings of a body's arms between grips over one path; results are cached.
 
@@ -72,17 +80,22 @@ class Swings:
         # Hands that swing keep less of the others than hands that hold
         self._less = self.margins.held_clearance - self.margins.swing_clearance
         self._rates = np.array(self.limb.joint_rates)[:-1]
-        self._clear = SwingClearance(walker, structure)
+        self.around = around(walker, structure)
         self._quick: CompiledChoice | None = None
-        if CompiledChoice.possible(self.shapes, structure):
+        if self.around.world is not None:
             apart, times = self.shapes.least - self._less, (self.extra, self.latch)
             self._quick = CompiledChoice(
-                walker, structure, path, grips, self.shapes, self._clear, apart, COARSE, HALFWAY, *times
+                walker, structure, path, grips, self.shapes, self.around.world, apart, COARSE, HALFWAY, *times
             )
         self._tracks: dict[tuple[Name, int], _Track | None] = {}
         self._apart: dict[tuple[Name, int, int], bool] = {}
         self._chosen: dict[Swing, Chosen | None] = {}
         self._known: dict[tuple[int, int, int, int, int], float | None] = {}
+
+    @property
+    def curves(self) -> int:
+        """That are tried for a swing, those with a wait included."""
+        return len(ALTERNATIVES) + len(self.limb.waiting)
 
     def estimate(self, sources: Ints, targets: Ints, lift: Ints, land: Ints) -> Array:
         """About how long swings from grips take, lifted and landed at about these samples; latches included [s].
@@ -169,7 +182,7 @@ class Swings:
         name = _name(swing)
         return self._tracks[name, which] is not None and all(self._apart[name, which, g] for g in swing.others)
 
-    def clear_along(self, move: Move, others: Sequence[int], curve: Curves, angles: Array, samples: Array) -> bool:
+    def clear_along(self, move: Move, others: Sequence[int], angles: Array, samples: Array) -> bool:
         """Whether the arm of a move is clear as :meth:`clear` says, at joints ``[1, n, joints]`` [rad], the last of
         which may be left out, and samples of the path ``[1, n]``.
 
@@ -177,11 +190,24 @@ class Swings:
             others: grips of the other arms.
         """
         points = points_along(self.shapes, np.array([move.arm]), angles)
-        ends = np.stack([curve.begin, curve.end], axis=1)
-        if not self._clear.structure(points, self.path.blended(samples), ends)[0]:
+        ends = self.grips.hold[[[move.source, move.target]]]
+        if not self.around.swings(np.array([move.arm]), points, self.path.blended(samples), ends)[0]:
             return False
         points, samples = (np.repeat(array, len(others), axis=0) for array in (points, samples))
         return bool(self.arms.stay_clear(points, samples, np.array(others, dtype=np.int64), self._less).all())
+
+    def posture_along(self, move: Move, law: HandLaw, samples: Array, since: Array) -> Array:
+        """Joints of the arm of a move ``[k, joints]`` [rad], with the body at samples of the path, at times since the
+        hand is open ``[k]`` [s].
+        """
+        limb, grips = self.limb, self.grips
+        places, part = law.along(since)
+        frames = self.path.blended(samples) @ self.shapes.bases[move.arm]
+        first, last = (grips.between(np.array(grip), samples)[:, limb.guided :] for grip in (move.source, move.target))
+        guide = first + part[:, None] * (last - first)
+        angles, _ = limb.follow(frames[None], places[None], guide[None], self.margins)
+        out: Array = angles[0]
+        return out
 
     def correct(self, move: Move, duration: float, possible: bool) -> None:
         """A swing along the curve of a move takes another time [s], or is not possible after all."""
@@ -212,9 +238,9 @@ class Swings:
         else:
             whole = begin, begin + least / self.path.spacing
             found = Tracks.of(self.waiting((arms, source, target), whole, which, COARSE), arms, self.shapes)
-        ends = self.structure.positions[self.grips.hold[np.stack([source, target], axis=1)]]
+        ends = self.grips.hold[np.stack([source, target], axis=1)]
         bodies = self.path.blended(found.samples)
-        possible = found.possible & self._clear.structure(found.points, bodies, ends)
+        possible = found.possible & self.around.swings(arms, found.points, bodies, ends)
         for k, name in enumerate(names):
             duration = FINER * float(found.duration[k]) + self.extra
             track = _Track(duration, found.points[k], found.samples[k])

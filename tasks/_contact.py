@@ -1,0 +1,209 @@
+"""What contacts have in common: a frame that does not move, and what its wrench may be."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import casadi as ca
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from wbc import validation
+from wbc.errors import RangeError
+from wbc.symbolic.tracer import Tracer
+from wbc.tasks.base import Constraint, Input, Row, Rows, SacrificeOrder, Task, Torques, Values
+from wbc.tasks.frames import frame_pose, require_motion
+from wbc.tasks.hold import Hold
+
+if TYPE_CHECKING:
+    from wbc.robot import Robot
+
+#: Components of a wrench, of a force its first three
+LABELS = ("fx", "fy", "fz", "mx", "my", "mz")
+UNITS = ("N", "N", "N", "N m", "N m", "N m")
+#: Acceleration by which a robot's mass is a force, whatever gravity it is in [m/s^2]
+NOMINAL = 9.81
+#: First weight of a force against task rows of weight 1: a robot's own weight costs as much as 0.01 rad/s^2 missed
+FORCE_WEIGHT = 1e-4
+
+
+def force_sizes(robot: Robot) -> NDArray[np.float64]:
+    """How many N, 3, and N m, 3, count as much as 1 rad/s^2: the robot's weight on earth, and that by its length."""
+    mass = float(pin.computeTotalMass(robot.model))
+    force = max(mass, 1e-3) * NOMINAL
+    sizes: NDArray[np.float64] = np.repeat([force, force * robot.characteristic_length], 3)
+    return sizes
+
+
+@dataclass(frozen=True)
+class Cone:
+    """What a wrench w may be: lower <= matrix w <= upper, a label and a unit a row."""
+
+    matrix: ca.SX
+    lower: ca.SX
+    upper: ca.SX
+
+
+@dataclass(frozen=True)
+class Contact(Constraint):
+    """A frame that does not move, by a wrench that the surroundings exert on it.
+
+    The motion is that of ``Hold``. A stack that commands torques has the wrench as variables of its QP, in the axes
+    of the frame and about its origin, and the items ``"<name> wrench"``, the rows of :meth:`cone`, and
+    ``"<name> force"``, a task for the wrench.
+    """
+
+    abstract: ClassVar[bool] = True
+    order: ClassVar[SacrificeOrder] = SacrificeOrder.HOLD
+    equality: ClassVar[bool] = True
+    #: Components of the wrench that the contact can bear, in the axes of its frame: 0, 1, 2 force, 3, 4, 5 moment
+    axes: ClassVar[tuple[int, ...]] = (0, 1, 2, 3, 4, 5)
+
+    frame: str
+
+    @property
+    def components(self) -> int:
+        """How many numbers the wrench has."""
+        return len(self.axes)
+
+    def validate(self, robot: Robot) -> None:
+        """Check the frame.
+
+        Raises:
+            UnknownNameError: no such frame. RangeError: a frame that no joint moves.
+        """
+        field = f"{type(self).__name__}.frame"
+        robot.check_frame(field, self.frame)
+        require_motion(robot, field, self.frame)
+
+    def inputs(self, robot: Robot) -> tuple[Input, ...]:
+        """``target`` and ``gain`` of the motion, then :meth:`limits`."""
+        return (
+            Input("target", "pose", unit="m, rad"),
+            Input("gain", unit="1/s", default=10.0, low=0.0),
+            *self.limits(),
+        )
+
+    def initial(self, robot: Robot, q: NDArray[np.float64]) -> dict[str, Any]:
+        """The frame's pose at ``q``."""
+        return {"target": frame_pose(robot, self.frame, q)}
+
+    @property
+    def _hold(self) -> Hold:
+        return Hold(self.frame, kind="pose" if self.components == 6 else "position")
+
+    def rows(self, robot: Robot) -> tuple[Row, ...]:
+        """Those of the motion."""
+        return self._hold.rows(robot)
+
+    def velocity_rows(self, robot: Robot, kin: Tracer, inputs: Values, dt: ca.SX) -> Rows:
+        """Those of ``Hold``: J v = -gain e."""
+        return self._hold.velocity_rows(robot, kin, inputs, dt)
+
+    def still(self, inputs: Values, rotation: ca.SX, twist: ca.SX) -> ca.SX:
+        """What of a twist (linear; angular) in the axes of :meth:`velocity_rows` its rows are, linear in the twist.
+
+        Of J v it is the rows times v, and of (dJ/dt) v their rate where v does not change.
+        """
+        return twist[: self.components]
+
+    def unit_wrenches(self, inputs: Values, rotation: ca.SX, twist: ca.SX) -> ca.SX:
+        """components x 6: the wrench in the axes of the frame, about its origin, that each component is the size of."""
+        return ca.SX.eye(6)[list(self.axes), :]
+
+    def limits(self) -> tuple[Input, ...]:
+        """Run-time inputs of :meth:`cone`."""
+        raise TypeError(f"{type(self).__name__} declares no limits")
+
+    def cone_rows(self, robot: Robot) -> tuple[Row, ...]:
+        """Labels and units of the rows of :meth:`cone`."""
+        raise TypeError(f"{type(self).__name__} declares no cone")
+
+    def cone(self, inputs: Values) -> Cone:
+        """What the wrench may be; the units are N and N m."""
+        raise TypeError(f"{type(self).__name__} declares no cone")
+
+
+@dataclass(frozen=True)
+class ContactWrench(Constraint):
+    """What the wrench of a contact may be. Made by the stack, under the name ``"<contact> wrench"``."""
+
+    abstract: ClassVar[bool] = True
+    order: ClassVar[SacrificeOrder] = SacrificeOrder.MARGIN
+
+    of: str
+    contact: Contact
+
+    def rows(self, robot: Robot) -> tuple[Row, ...]:
+        """Those of the contact's cone."""
+        return self.contact.cone_rows(robot)
+
+    def velocity_rows(self, robot: Robot, kin: Tracer, inputs: Values, dt: ca.SX) -> Rows | None:
+        """None: its rows are on forces."""
+        return None
+
+
+@dataclass(frozen=True)
+class ContactForce(Task):
+    """The wrench of a contact follows a wrench: w = target [N; N m]. Made by the stack, as ``"<contact> force"``.
+
+    With the target 0 and a small weight, the first values, loads are shared so that the sum of the weighted squares
+    of all wrenches is least.
+    """
+
+    abstract: ClassVar[bool] = True
+
+    of: str
+    contact: Contact
+
+    def inputs(self, robot: Robot) -> tuple[Input, ...]:
+        """``target``, in the axes of the frame [N; N m]."""
+        count, moments = self.contact.components, max(self.contact.axes) >= 3
+        return (Input("target", unit="N, N m" if moments else "N", size=count, default=np.zeros(count)),)
+
+    def rows(self, robot: Robot) -> tuple[Row, ...]:
+        """The components of the wrench."""
+        sizes = force_sizes(robot)
+        return tuple(Row(LABELS[k], UNITS[k], float(sizes[k])) for k in self.contact.axes)
+
+
+@dataclass(frozen=True)
+class Unactuated(Constraint):
+    """No motor drives a floating base: its six rows of  M a + h = J'w  hold whatever gives way. Made by the stack."""
+
+    abstract: ClassVar[bool] = True
+    order: ClassVar[SacrificeOrder] = SacrificeOrder.ACTUATOR
+    equality: ClassVar[bool] = True
+
+    def rows(self, robot: Robot) -> tuple[Row, ...]:
+        """x, y, z [N] and rx, ry, rz [N m] along the base's own axes."""
+        sizes = force_sizes(robot)
+        return tuple(Row(robot.dof_names[k], UNITS[k], float(sizes[k])) for k in range(6))
+
+    def velocity_rows(self, robot: Robot, kin: Tracer, inputs: Values, dt: ca.SX) -> Rows | None:
+        """None: its rows are on generalised forces."""
+        return None
+
+    def torque_rows(self, robot: Robot, inputs: Values) -> Torques:
+        """None for the base."""
+        zero = ca.SX.zeros(6)
+        return Torques(tuple(range(6)), zero, zero)
+
+
+def force_row(robot: Robot, label: str, kind: str = "N") -> Row:
+    """A row of a force or a moment with the robot's own size."""
+    return Row(label, kind, float(force_sizes(robot)[0 if kind == "N" else 3]))
+
+
+def checked_positive(field: str, value: Any, unit: str = "", zero: bool = False) -> float:
+    """A number > 0, or >= 0; infinite for none.
+
+    Raises:
+        ShapeError, NotFiniteError, RangeError: it is not.
+    """
+    number = float(validation.real_array(field, value, (), finite=False))
+    if not (number >= 0.0 if zero else number > 0.0):
+        raise RangeError(field, value, f"expected a number {'>= 0' if zero else '> 0'} {unit}".rstrip())
+    return number

@@ -1,0 +1,59 @@
+"""A push, a payload, or what a force sensor measures."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import casadi as ca
+import numpy as np
+
+from wbc.symbolic.kinematics import Kinematics
+from wbc.tasks._load import Load
+from wbc.tasks.base import Input, Values
+from wbc.tasks.frames import require_motion
+
+if TYPE_CHECKING:
+    from wbc.robot import Robot
+
+
+@dataclass(frozen=True)
+class ExternalWrench(Load):
+    """A wrench w = (f; m) that is known to act on a frame of the robot, along the axes of the world and about the
+    frame's origin, is part of its dynamics:
+
+        M a + h = tau + J'w,        J = (J_lin; J_ang), 6 x nv
+
+    so that the torques bear it: a payload that the description does not have, a push that a force sensor measures,
+    what a tool is known to do. Only a stack that commands torques can have it.
+
+    Inputs:
+        wrench: on the robot, force and moment [N, N m]. Default 0.
+
+    Example:
+        >>> ExternalWrench("panda_hand_tcp")
+
+    What it cannot do: it does not estimate. A measured wrench is as old and as noisy as its sensor, and one that a
+    contact of the stack bears would be counted twice.
+
+    Attributes:
+        frame: name of the frame.
+
+    Raises:
+        UnknownNameError, RangeError: in :meth:`validate`: no such frame, or one that no joint moves.
+    """
+
+    frame: str
+
+    def validate(self, robot: Robot) -> None:
+        """Check the frame, see :meth:`Item.validate`."""
+        robot.check_frame("ExternalWrench.frame", self.frame)
+        require_motion(robot, "ExternalWrench.frame", self.frame)
+
+    def inputs(self, robot: Robot) -> tuple[Input, ...]:
+        """``wrench``."""
+        return (Input("wrench", unit="N, N m", size=6, default=np.zeros(6)),)
+
+    def load(self, robot: Robot, kin: Kinematics, inputs: Values) -> ca.SX:
+        """J'w."""
+        return kin.jacobian(self.frame).T @ inputs["wrench"]

@@ -1,0 +1,113 @@
+"""An edge that lies on a surface: toes, the rim of a gripper, a blade."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+import casadi as ca
+
+from wbc import validation
+from wbc.robot import Robot
+from wbc.symbolic.tracer import Tracer
+from wbc.tasks._contact import Cone, Contact, checked_positive, force_row
+from wbc.tasks._pointing import shortest_turn
+from wbc.tasks.base import Input, Row, Rows, Values
+
+
+@dataclass(frozen=True)
+class LineContact(Contact):
+    """A segment along the x axis of a frame, of length 2 X about its origin, does not move, but the frame may turn
+    about it; z is the normal of the surface, out of it and towards the robot:
+
+        J_lin v = -gain (p - p_target)                                                           [m/s]
+        (J_ang v)_y,z = -gain (theta n)_y,z         in the axes of the frame                     [rad/s]
+
+    theta n is the shortest turn of the x axis from that of the target. The wrench (f_x, f_y, f_z, m_y, m_z), in the
+    axes of the frame and about its origin, is that of forces at both ends within friction pyramids:
+
+        least <= f_z <= most,   |f_x| <= mu f_z,   |m_y| <= X f_z                                [N; N m]
+        |X f_y + m_z| <= mu (X f_z - m_y),   |X f_y - m_z| <= mu (X f_z + m_y)                   [N m]
+
+    mu = friction / sqrt(2), so that the pyramids are within Coulomb's cones.
+
+    Inputs:
+        target: pose in the world [m, rad]. Default: the pose at the first step.
+        gain: how fast drift decays [1/s]. Default 10.
+        friction: coefficient of friction [1].
+        least: least normal force [N].
+        most: largest normal force [N].
+
+    Example:
+        >>> LineContact("left_sole_link", half_length=0.05)
+
+    What it cannot do: the frame's z axis is taken for the normal, so the turn about the edge should stay small, or the
+    cone turns with the frame.
+
+    Attributes:
+        frame: name of the frame.
+        half_length: X [m].
+        friction: first value of the input.
+        least: first value of the input.
+        most: first value of the input; infinite for none.
+
+    Raises:
+        UnknownNameError, ShapeError, NotFiniteError, RangeError: on construction or in :meth:`validate`.
+    """
+
+    axes: ClassVar[tuple[int, ...]] = (0, 1, 2, 4, 5)
+
+    half_length: float
+    friction: float = 0.5
+    least: float = 0.0
+    most: float = math.inf
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "half_length", checked_positive("LineContact.half_length", self.half_length, "m"))
+        object.__setattr__(self, "friction", validation.scalar("LineContact.friction", self.friction, low=0.0))
+        object.__setattr__(self, "least", validation.scalar("LineContact.least", self.least, low=0.0, unit="N"))
+        object.__setattr__(self, "most", checked_positive("LineContact.most", self.most, "N", zero=True))
+
+    def rows(self, robot: Robot) -> tuple[Row, ...]:
+        """x, y, z of the world and ry, rz of the frame."""
+        return (*(Row(axis, "m/s") for axis in "xyz"), Row("ry", "rad/s"), Row("rz", "rad/s"))
+
+    def velocity_rows(self, robot: Robot, kin: Tracer, inputs: Values, dt: ca.SX) -> Rows:
+        """See the class."""
+        pose, target, jacobian = kin.pose(self.frame), inputs["target"], kin.frame_jacobian(self.frame)
+        # y, z, x in place of x, y, z: the turn is that of the third axis
+        seen = (pose.rotation.T @ target.rotation[:, 0])[[1, 2, 0]]
+        wanted = -inputs["gain"] * ca.vertcat(pose.position - target.position, shortest_turn(seen))
+        matrix = ca.vertcat(jacobian[:3, :], (pose.rotation.T @ jacobian[3:, :])[1:, :])
+        return Rows(matrix, wanted, wanted)
+
+    def still(self, inputs: Values, rotation: ca.SX, twist: ca.SX) -> ca.SX:
+        """The rate of R'w is R' dw/dt, so both are taken alike."""
+        return ca.vertcat(twist[:3], (rotation.T @ twist[3:])[1:])
+
+    def limits(self) -> tuple[Input, ...]:
+        """``friction``, ``least`` and ``most``."""
+        return (
+            Input("friction", unit="1", default=self.friction, low=0.0),
+            Input("least", unit="N", default=self.least, low=0.0),
+            Input("most", unit="N", default=self.most, low=0.0, infinite=math.inf),
+        )
+
+    def cone_rows(self, robot: Robot) -> tuple[Row, ...]:
+        """``normal``, ``friction +x`` and ``-x``, ``pressure -`` and ``+``, then ``end 1`` to ``end 4``."""
+        plain = [force_row(robot, name) for name in ("normal", "friction +x", "friction -x")]
+        moments = ["pressure -", "pressure +", *[f"end {k}" for k in range(1, 5)]]
+        return (*plain, *[force_row(robot, name, "N m") for name in moments])
+
+    def cone(self, inputs: Values) -> Cone:
+        """The rows of the class, each as a w >= 0 after the first."""
+        mu, X = inputs["friction"] / math.sqrt(2.0), self.half_length
+        rows = [ca.horzcat(0, 0, 1, 0, 0)]
+        rows += [ca.horzcat(-s, 0, mu, 0, 0) for s in (1, -1)]
+        rows += [ca.horzcat(0, 0, X, -s, 0) for s in (1, -1)]
+        for end in (1, -1):
+            # the end at end X bears f_y + end m_z / X and f_z - end m_y / X, times 2
+            rows += [ca.horzcat(0, -s * X, mu * X, -end * mu, -s * end) for s in (1, -1)]
+        lower = ca.vertcat(inputs["least"], ca.SX.zeros(8))
+        return Cone(ca.sparsify(ca.SX(ca.vertcat(*rows))), lower, ca.vertcat(inputs["most"], ca.SX.inf(8)))

@@ -1,0 +1,89 @@
+"""A point that presses on a surface without slipping."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+import casadi as ca
+
+from wbc import validation
+from wbc.errors import RangeError
+from wbc.robot import Robot
+from wbc.tasks._contact import Cone, Contact, checked_positive, force_row
+from wbc.tasks.base import Input, Row, Values
+
+
+@dataclass(frozen=True)
+class PointContact(Contact):
+    """The origin of a frame does not move, J v = -gain e as for ``Hold`` with ``kind="position"``, by a force f in the
+    axes of the frame, whose z axis is the normal of the surface, out of it and towards the robot:
+
+        least <= f_z <= most,      d_k' f <= cos(pi / edges) friction f_z,      k = 1 ... edges      [N]
+
+    d_k are unit vectors across z, evenly spread from x on. This is the largest pyramid with ``edges`` faces inside of
+    Coulomb's cone |(f_x, f_y)| <= friction f_z: what it allows is allowed, and it leaves out at most the share
+    1 - cos(pi / edges) of a tangential force, 29 % for 4 and 8 % for 8 edges.
+
+    Inputs:
+        target: pose in the world, of which the position counts [m]. Default: the pose at the first step.
+        gain: how fast drift decays [1/s]. Default 10.
+        friction: coefficient of friction [1].
+        least: least normal force [N].
+        most: largest normal force [N].
+
+    Example:
+        >>> PointContact("LF_FOOT", friction=0.7)
+
+    What it cannot do: it does not roll, and no torque acts at the point. Whether the surface is there is not its
+    concern.
+
+    Attributes:
+        frame: name of the frame; z is the normal, from the surface to the robot.
+        friction: first value of the input.
+        least: first value of the input.
+        most: first value of the input; infinite for none.
+        edges: faces of the pyramid, 4 or more.
+
+    Raises:
+        UnknownNameError, ShapeError, NotFiniteError, RangeError: on construction or in :meth:`validate`.
+    """
+
+    axes: ClassVar[tuple[int, ...]] = (0, 1, 2)
+
+    friction: float = 0.5
+    least: float = 0.0
+    most: float = math.inf
+    edges: int = 4
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "friction", validation.scalar("PointContact.friction", self.friction, low=0.0))
+        object.__setattr__(self, "least", validation.scalar("PointContact.least", self.least, low=0.0, unit="N"))
+        object.__setattr__(self, "most", checked_positive("PointContact.most", self.most, "N", zero=True))
+        if isinstance(self.edges, bool) or not isinstance(self.edges, int) or self.edges < 4:
+            raise RangeError("PointContact.edges", self.edges, "expected an integer >= 4")
+
+    def limits(self) -> tuple[Input, ...]:
+        """``friction``, ``least`` and ``most``."""
+        return (
+            Input("friction", unit="1", default=self.friction, low=0.0),
+            Input("least", unit="N", default=self.least, low=0.0),
+            Input("most", unit="N", default=self.most, low=0.0, infinite=math.inf),
+        )
+
+    def cone_rows(self, robot: Robot) -> tuple[Row, ...]:
+        """``normal``, then ``friction 1`` and so on."""
+        return (
+            force_row(robot, "normal"),
+            *[force_row(robot, f"friction {k}") for k in range(1, self.edges + 1)],
+        )
+
+    def cone(self, inputs: Values) -> Cone:
+        """The pyramid of the class."""
+        slope = math.cos(math.pi / self.edges) * inputs["friction"]
+        angles = [2.0 * math.pi * k / self.edges for k in range(self.edges)]
+        faces = [ca.horzcat(-math.cos(x), -math.sin(x), slope) for x in angles]
+        matrix = ca.vertcat(ca.SX([[0.0, 0.0, 1.0]]), *faces)
+        lower = ca.vertcat(inputs["least"], ca.SX.zeros(self.edges))
+        return Cone(ca.sparsify(matrix), lower, ca.vertcat(inputs["most"], ca.SX.inf(self.edges)))

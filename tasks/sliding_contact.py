@@ -1,0 +1,104 @@
+"""A point that slides on a surface: a hand that wipes, a tool that grinds."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+import casadi as ca
+
+from wbc import validation
+from wbc.robot import Robot
+from wbc.symbolic.tracer import Tracer
+from wbc.tasks._contact import Cone, Contact, checked_positive, force_row
+from wbc.tasks.base import Input, Row, Rows, Values
+
+
+@dataclass(frozen=True)
+class SlidingContact(Contact):
+    """The origin of a frame stays on a plane, by a force of known direction: along the normal n, the z axis of the
+    target, and against the velocity s with which it slides in the plane, by kinetic friction,
+
+        n'J_lin v = -gain n'(p - p_target)                                                       [m/s]
+        force on the robot = f (n - friction s / sqrt(|s|^2 + slow^2)),   least <= f <= most     [N]
+
+    The wrench has one number, f >= 0. Unlike the other contacts it leaves the motion in the plane free: tasks say
+    where the frame goes, and the task ``"<contact> force"`` with how many newtons it presses.
+
+    Inputs:
+        target: pose in the world, of which the plane counts: its origin, and z out of the surface [m, rad]. Default:
+            the pose of the frame at the first step.
+        gain: how fast the distance from the plane decays [1/s]. Default 10.
+        friction: coefficient of kinetic friction [1].
+        least: least normal force [N].
+        most: largest normal force [N].
+        slow: speed up to which friction grows with speed [m/s].
+
+    Example:
+        >>> SlidingContact("panda_hand_tcp", friction=0.3)
+
+    What it cannot do: s is the measured velocity; below ``slow`` friction is less than it may be, and stiction is
+    another contact.
+
+    Attributes:
+        frame: name of the frame.
+        friction: first value of the input.
+        least: first value of the input.
+        most: first value of the input; infinite for none.
+        slow: first value of the input.
+
+    Raises:
+        UnknownNameError, ShapeError, NotFiniteError, RangeError: on construction or in :meth:`validate`.
+    """
+
+    axes: ClassVar[tuple[int, ...]] = (2,)
+
+    friction: float = 0.5
+    least: float = 0.0
+    most: float = math.inf
+    slow: float = 0.01
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "friction", validation.scalar("SlidingContact.friction", self.friction, low=0.0))
+        object.__setattr__(self, "least", validation.scalar("SlidingContact.least", self.least, low=0.0, unit="N"))
+        object.__setattr__(self, "most", checked_positive("SlidingContact.most", self.most, "N", zero=True))
+        object.__setattr__(self, "slow", validation.scalar("SlidingContact.slow", self.slow, low=0.0, open_low=True))
+
+    def rows(self, robot: Robot) -> tuple[Row, ...]:
+        """``normal``."""
+        return (Row("normal", "m/s"),)
+
+    def velocity_rows(self, robot: Robot, kin: Tracer, inputs: Values, dt: ca.SX) -> Rows:
+        """See the class."""
+        target, normal = inputs["target"], inputs["target"].rotation[:, 2]
+        wanted = -inputs["gain"] * ca.dot(normal, kin.position(self.frame) - target.position)
+        return Rows(normal.T @ kin.frame_jacobian(self.frame)[:3, :], wanted, wanted)
+
+    def still(self, inputs: Values, rotation: ca.SX, twist: ca.SX) -> ca.SX:
+        """Along the normal."""
+        return ca.dot(inputs["target"].rotation[:, 2], twist[:3])
+
+    def unit_wrenches(self, inputs: Values, rotation: ca.SX, twist: ca.SX) -> ca.SX:
+        """The normal and what friction adds to it."""
+        normal = inputs["target"].rotation[:, 2]
+        slip = twist[:3] - normal * ca.dot(normal, twist[:3])
+        force = normal - inputs["friction"] * slip / ca.sqrt(ca.sumsqr(slip) + inputs["slow"] ** 2)
+        return ca.horzcat((rotation.T @ force).T, ca.SX(1, 3))
+
+    def limits(self) -> tuple[Input, ...]:
+        """``friction``, ``least``, ``most`` and ``slow``."""
+        return (
+            Input("friction", unit="1", default=self.friction, low=0.0),
+            Input("least", unit="N", default=self.least, low=0.0),
+            Input("most", unit="N", default=self.most, low=0.0, infinite=math.inf),
+            Input("slow", unit="m/s", default=self.slow, low=1e-6),
+        )
+
+    def cone_rows(self, robot: Robot) -> tuple[Row, ...]:
+        """``normal``."""
+        return (force_row(robot, "normal"),)
+
+    def cone(self, inputs: Values) -> Cone:
+        """The limits of the normal force."""
+        return Cone(ca.SX.ones(1, 1), inputs["least"], inputs["most"])

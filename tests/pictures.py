@@ -1,0 +1,28 @@
+"""Plots of the tests are small, and their labels may lie on each other: what is in them is the same."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+from matplotlib.layout_engine import ConstrainedLayoutEngine
+
+from wbc import style
+
+#: Labels are moved apart by drawing all of them twice
+_execute = ConstrainedLayoutEngine.execute
+
+
+@pytest.fixture(autouse=True, scope="session")
+def quick_pictures() -> Iterator[None]:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(ConstrainedLayoutEngine, "execute", lambda self, figure: None)
+        patch.setitem(style.SETTINGS, "savefig.dpi", 50)
+        yield
+
+
+@pytest.fixture
+def as_users_get_them(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Plots of a test that asks for this are drawn as always."""
+    monkeypatch.setattr(ConstrainedLayoutEngine, "execute", _execute)
+    monkeypatch.setitem(style.SETTINGS, "savefig.dpi", 140)

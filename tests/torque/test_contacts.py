@@ -1,0 +1,231 @@
+"""What contacts bear, how they open, and what a tick says where they cannot hold."""
+
+from __future__ import annotations
+
+import itertools
+
+import casadi as ca
+import numpy as np
+import pinocchio as pin
+import pytest
+from scipy.optimize import linprog
+
+from tests.torque.problems import DT, controller, robot
+from tests.torque.referee import Referee
+from wbc.controller import Stack
+from wbc.errors import BoundsError, CommandError, RangeError, ShapeError, UnknownNameError
+from wbc.tasks import EndEffector, PointContact, RigidGrasp, SurfaceContact, TorqueLimits
+
+
+def cone(item: SurfaceContact | PointContact) -> tuple[np.ndarray, np.ndarray]:
+    """Rows F w >= low of a contact's declaration, by CasADi."""
+    declared = {i.name: ca.SX(i.default) for i in item.limits()}
+    found = item.cone(declared)
+    function = ca.Function("cone", [], [ca.densify(found.matrix), found.lower])
+    matrix, low = function()["o0"], function()["o1"]
+    return np.array(matrix), np.array(low)[:, 0]
+
+
+def test_surface_wrenches_are_exactly_those_of_four_corners() -> None:
+    """Sums of forces within pyramids at the corners are allowed; others, found by linear programming, are not."""
+    X, Y, friction = 0.12, 0.05, 0.7
+    F, low = cone(SurfaceContact("any", half_lengths=(X, Y), friction=friction))
+    mu = friction / np.sqrt(2)
+    corners = [np.array([a * X, b * Y, 0.0]) for a, b in itertools.product((1, -1), repeat=2)]
+    rays = [np.array([a * mu, b * mu, 1.0]) for a, b in itertools.product((1, -1), repeat=2)]
+    generators = np.column_stack([np.r_[f, np.cross(p, f)] for p in corners for f in rays])
+    rng = np.random.default_rng(0)
+    inside = generators @ rng.exponential(1.0, (16, 200)) ** 3
+    assert (F @ inside >= low[:, None] - 1e-9).all()
+    scale = np.array([0.6, 0.6, 1.0, 0.06, 0.13, 0.08])
+    outside = 0
+    for w in rng.normal(size=(300, 6)) * scale + np.array([0, 0, 1.0, 0, 0, 0]):
+        allowed = bool((F @ w >= low - 1e-9).all())
+        possible = linprog(np.zeros(16), A_eq=generators, b_eq=w).status == 0
+        assert allowed == possible, w
+        outside += not possible
+    assert 30 < outside < 270
+
+
+@pytest.mark.parametrize("edges", [4, 5, 8])
+def test_a_pyramid_is_within_coulombs_cone_and_touches_it(edges: int) -> None:
+    friction = 0.6
+    F, low = cone(PointContact("any", friction=friction, edges=edges))
+    angles, sizes = np.linspace(0.0, 2 * np.pi, 720, endpoint=False), np.linspace(0, 1, 401)
+    around = np.array([np.cos(angles), np.sin(angles)])
+    # rows x angles x sizes
+    value = F[:, 2, None, None] + (F[:, :2] @ around)[:, :, None] * sizes
+    radius = sizes[(value >= low[:, None, None] - 1e-12).all(axis=0).sum(axis=1) - 1]
+    assert radius.max() <= friction + 1e-9
+    assert radius.max() >= friction - 0.003
+    assert radius.min() >= np.cos(np.pi / edges) * friction - 0.003
+
+
+def standing() -> tuple[object, np.ndarray, np.ndarray]:
+    bot = robot("talos")
+    return bot, bot.neutral.copy(), np.zeros(bot.nv)
+
+
+def test_feet_carry_the_weight_and_an_open_contact_bears_nothing() -> None:
+    bot, q, v = standing()
+    tick = controller("talos").clone()
+    tick.reset(q)
+    step = tick.step(q, v)
+    assert step.status == "solved"
+    tick["palm"].enabled = False
+    step = tick.step(q, v)
+    forces, weight = step.forces, pin.computeTotalMass(bot.model) * 9.81
+    assert not forces["palm"].any()
+    assert forces["left foot"][2] + forces["right foot"][2] == pytest.approx(weight, rel=1e-3)
+    for side in ("left foot", "right foot"):
+        tick[side].enabled = False
+    step = tick.step(q, v)
+    assert step.status == "solved"
+    assert not any(f.any() for f in step.forces.values())
+    # nothing bears the robot, so its centre of mass falls
+    data = bot.model.createData()
+    pin.centerOfMass(bot.model, data, q, v, step.a)
+    assert data.acom[0] == pytest.approx([0.0, 0.0, -9.81], abs=1e-6)
+    tick["left foot"].enabled = True
+    assert tick.step(q, v).forces["left foot"][2] > 0.5 * weight
+
+
+def test_a_hand_presses_with_the_force_that_is_asked_for() -> None:
+    _, q, v = standing()
+    tick = controller("talos").clone()
+    tick.reset(q)
+    tick.step(q, v)
+    tick["palm force"].set(target=np.array([0.0, 0.0, 10.0]))
+    tick["palm force"].weight = 10.0
+    step = tick.step(q, v)
+    assert step.forces["palm"] == pytest.approx([0.0, 0.0, 10.0], abs=0.05)
+
+
+def test_a_load_is_handed_over_by_a_ramp_without_a_jump_in_torque() -> None:
+    """The price of the right foot's wrench rises until it bears nothing; then it opens."""
+    _, q, v = standing()
+    tick = controller("talos").clone()
+    tick["palm"].enabled = False
+    tick.reset(q)
+    last = tick.step(q, v)
+    tick["right foot force"].ramp(1e8, 0.2)
+    jumps = []
+    for _ in range(100):
+        step = tick.step(q, v)
+        jumps.append(float(np.abs(step.torque - last.torque).max()))
+        last = step
+    assert last.forces["right foot"][2] < 0.01
+    tick["right foot"].enabled = False
+    opened = tick.step(q, v)
+    assert np.abs(opened.torque - last.torque).max() < 1.0
+    assert max(jumps) < 10.0
+
+
+def test_what_cannot_be_borne_gives_way_by_name_in_newtons() -> None:
+    _, q, v = standing()
+    tick = controller("talos").clone()
+    tick.reset(q)
+    tick["left foot"].least = 20_000.0
+    step = tick.step(q, v)
+    assert step.status == "relaxed"
+    slack = {str(s).split(" by ")[0]: s for s in step.relaxed}
+    assert slack["left foot wrench/normal"].unit == "N"
+    assert slack["left foot wrench/normal"].amount > 1000.0
+    assert (np.abs(step.torque) <= tick.stack.robot.limits.effort).all()
+    assert "left foot wrench/normal" in str(step.explain())
+
+
+def test_motors_that_are_too_weak_give_the_motion_of_contacts_up() -> None:
+    _, q, v = standing()
+    tick = controller("talos").clone()
+    tick.reset(q)
+    tick["torque_limits"].scale = 0.02
+    step = tick.step(q, v)
+    assert step.status == "relaxed"
+    assert {s.unit for s in step.relaxed} <= {"m/s^2", "rad/s^2", "N", "N m"}
+    assert (np.abs(step.torque) <= 0.02 * tick.stack.robot.limits.effort + 1e-12).all()
+
+
+def test_a_tick_without_an_answer_keeps_the_wrenches_and_brakes() -> None:
+    _, q, v = standing()
+    tick = controller("talos").clone()
+    tick.reset(q)
+    held = tick.step(q, v).forces
+    v = v + 0.01
+    tick["left foot"].target = pin.SE3(np.eye(3), np.array([1e300, 0.0, 0.0]))
+    step = tick.step(q, v)
+    assert step.status == "braked"
+    for name, force in step.forces.items():
+        assert force == pytest.approx(held[name], abs=1e-9)
+    # joints that their limits let come to rest by the next tick do so
+    assert (np.abs(step.v) < 1e-12).sum() >= len(v) - 4
+    assert (np.abs(step.a) <= tick.stack.robot.limits.acceleration).all()
+    assert np.isfinite(step.torque).all()
+    assert (np.abs(step.torque) <= tick.stack.robot.limits.effort).all()
+
+
+def test_squeezing_grips_share_a_load_within_their_ratings() -> None:
+    """The walker pulls its hand hard: no grip exceeds its rating, whatever is asked for."""
+    tick, bot = controller("walker").clone(), robot("walker")
+    q, v = bot.neutral.copy(), np.zeros(bot.nv)
+    tick.reset(q)
+    tick["hand"].target = tick["hand"].target + np.array([3.0, 0.0, 0.0])
+    tick["hand"].set(stiffness=400.0, damping=40.0)
+    most = 0.0
+    for _ in range(30):
+        step = tick.step(q, v)
+        for name in ("grip 1", "grip 2"):
+            load = np.abs(step.forces[name]) / np.array([300.0, 300.0, 300.0, 80.0, 90.0, 100.0])
+            most = max(most, float(load.max()))
+        q, v = pin.integrate(bot.model, q, 0.5 * (v + step.v) * DT), step.v
+    assert 0.99 < most <= 1.0 + 1e-9
+
+
+def test_velocity_and_acceleration_level_hold_the_frame() -> None:
+    bot = robot("walker")
+    stack = Stack(bot, dt=DT).add(EndEffector("arm3_hand", kind="position"), name="hand")
+    stack.add(RigidGrasp("arm1_hand", force=300.0), name="grip")
+    for command in ("velocity", "acceleration"):
+        tick = stack.compile(command=command, backend="vm")
+        tick.reset(bot.neutral)
+        tick["hand"].target = tick["hand"].target + 0.3
+        step = tick.step(bot.neutral, np.zeros(bot.nv))
+        J = Referee(tick, bot.neutral, np.zeros(bot.nv), DT).frame("arm1_hand")[1]
+        assert np.abs(J @ step.command).max() < 1e-9
+        assert np.abs(step.command).max() > 0.01
+        for name in ("torque", "forces"):
+            with pytest.raises(CommandError, match="commands"):
+                getattr(step, name)
+
+
+@pytest.mark.parametrize(
+    ("make", "error"),
+    [
+        (lambda: RigidGrasp("a", force=-1.0), BoundsError),
+        (lambda: RigidGrasp("a", torque=(1.0, 2.0)), ShapeError),
+        (lambda: PointContact("a", friction=-0.1), RangeError),
+        (lambda: PointContact("a", edges=3), RangeError),
+        (lambda: PointContact("a", most=-1.0), RangeError),
+        (lambda: SurfaceContact("a", half_lengths=(0.1,)), ShapeError),
+        (lambda: SurfaceContact("a", half_lengths=(0.1, 0.0)), RangeError),
+        (lambda: TorqueLimits(()), ShapeError),
+        (lambda: Stack(robot("talos"), dt=DT).add(PointContact("left_sole")), UnknownNameError),
+        (lambda: Stack(robot("talos"), dt=DT).add(TorqueLimits("no_joint")), UnknownNameError),
+        (lambda: Stack(robot("talos"), dt=DT).add(TorqueLimits()).compile(), CommandError),
+        (lambda: Stack(robot("talos"), dt=DT).compile(command="power"), UnknownNameError),
+    ],
+)
+def test_bad_declarations_are_refused(make: object, error: type[Exception]) -> None:
+    assert callable(make)
+    with pytest.raises(error):
+        make()
+
+
+def test_robots_without_mass_have_no_torques() -> None:
+    import wbc.robots
+
+    bare = wbc.robots.load("walker")
+    stack = Stack(bare, dt=DT).add(EndEffector("arm3_hand"), name="hand")
+    with pytest.raises(CommandError, match="no mass"):
+        stack.compile(command="torque")
+    assert stack.commanding("acceleration").command == "acceleration"

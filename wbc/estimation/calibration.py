@@ -1,0 +1,193 @@
+"""Frame, scale and delay of a measuring device from what it read while its target moved along known positions.
+
+A device reads y where the target is at x(t):
+
+    y(t) = M x(t - delay) + b + noise
+
+    rigid        M = R               a rotation: the device's axes
+    similarity   M = s R             and one scale
+    affine       M any 3 x 3         a scale and a tilt for each axis
+
+The parameters minimise the sum of squares (Gauss-Newton from the closed form for M and b at no delay); with x a cubic
+spline through the known positions, dx/dt is exact for it. Covariance: sigma^2 (J'J)^-1, sigma^2 from the residuals.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+import pinocchio as pin
+from scipy.interpolate import CubicSpline
+
+from wbc import validation
+from wbc.errors import RangeError, SolverError
+from wbc.validation import Array
+
+Kind = Literal["rigid", "similarity", "affine"]
+KINDS = ("rigid", "similarity", "affine")
+#: Least singular value of the Jacobian with columns of unit length, below which data do not tell parameters apart
+EXCITED = 1e-3
+#: Steps, and the relative change at which they end
+STEPS, SETTLED = 50, 1e-12
+
+
+@dataclass(frozen=True, eq=False)
+class Calibration:
+    """What was found.
+
+    Attributes:
+        matrix, offset: M and b. delay: [s], 0 where it was not asked for.
+        names: of the parameters, in the order of the covariance: turns [rad] about the axes of the readings, or the
+            entries of M; scale; offsets [m]; delay [s].
+        covariance: of the parameters. residual: root of the mean square of what is left, per axis [m].
+    """
+
+    matrix: Array
+    offset: Array
+    delay: float
+    names: tuple[str, ...]
+    covariance: Array
+    residual: Array
+
+    @property
+    def rotation(self) -> Array:
+        """The rotation nearest to M: the reference's axes as the device sees them."""
+        left, _, right = np.linalg.svd(self.matrix)
+        return np.array(left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right)
+
+    @property
+    def scales(self) -> Array:
+        """Length that the device reads for a metre along each reference axis."""
+        return np.array(np.linalg.norm(self.matrix, axis=0))
+
+    @property
+    def tilts(self) -> Array:
+        """Angle between each reference axis and what the device reads for it, with :attr:`rotation` not taken out
+        [rad].
+        """
+        return np.arccos(np.clip(np.diag(self.matrix) / self.scales, -1.0, 1.0))
+
+    def deviation(self, name: str) -> float:
+        """Standard deviation of a parameter.
+
+        Raises:
+            UnknownNameError: no such parameter.
+        """
+        k = self.names.index(validation.one_of("parameter", name, self.names))
+        return float(np.sqrt(self.covariance[k, k]))
+
+    def position(self, reading: Any) -> Array:
+        """Where the target was, from a reading [3] or many [n, 3]: M^-1 (y - b)."""
+        given = validation.real_array("reading", reading)
+        return np.array(np.linalg.solve(self.matrix, (given - self.offset).T).T)
+
+    def pose(self, reading: Any) -> pin.SE3:
+        """The same of a pose, whose axes are turned back by :attr:`rotation`."""
+        given = validation.pose("reading", reading)
+        return pin.SE3(self.rotation.T @ given.rotation, self.position(given.translation))
+
+
+def calibrate(times: Any, readings: Any, positions: Any, kind: Kind = "affine", delay: bool = True) -> Calibration:
+    """Calibrate a device, see the module.
+
+    Args:
+        times: increasing [s], count. readings, positions: the device's and the true ones [m], count x 3, at these.
+        kind: what M may be. delay: whether the device's delay is sought, too; without it no time enters.
+
+    Raises:
+        ShapeError, NotFiniteError, RangeError, UnknownNameError: bad input.
+        SolverError: motion that does not excite a parameter, which is named; or no convergence.
+    """
+    validation.one_of("kind", kind, KINDS)
+    x = validation.real_array("positions", positions)
+    x = validation.real_array("positions", x, (len(x) if x.ndim else 0, 3))
+    y = validation.real_array("readings", readings, x.shape)
+    t = validation.real_array("times", times, (len(x),))
+    seek = validation.flag("delay", delay)
+    names = _names(kind, seek)
+    if 3 * len(x) <= len(names):
+        raise RangeError("positions", len(x), f"{len(names)} parameters need more than {len(names) // 3} positions")
+    if seek and (np.diff(t) <= 0.0).any():
+        raise RangeError("times", times, "expected increasing times")
+    path = CubicSpline(t, x) if seek else None
+    matrix, offset, late = _start(kind, x, y)
+    for _ in range(STEPS):
+        residual, jacobian = _linearised(kind, path, t, x, y, matrix, offset, late)
+        step = _solved(jacobian, residual, names)
+        matrix, offset, late = _moved(kind, matrix, offset, late, step)
+        if np.abs(step * np.linalg.norm(jacobian, axis=0)).max() <= SETTLED * np.linalg.norm(y - y.mean(axis=0)):
+            break
+    else:
+        raise SolverError("calibrate", kind, f"no minimum in {STEPS} steps")
+    residual, jacobian = _linearised(kind, path, t, x, y, matrix, offset, late)
+    variance = float(residual @ residual) / (len(residual) - len(names))
+    covariance = np.array(variance * np.linalg.inv(jacobian.T @ jacobian), dtype=np.float64)
+    left = np.sqrt(np.mean(residual.reshape(-1, 3) ** 2, axis=0))
+    return Calibration(matrix, offset, late, names, covariance, left)
+
+
+def _names(kind: Kind, delay: bool) -> tuple[str, ...]:
+    turns = tuple(f"turn {axis}" for axis in "xyz")
+    entries = tuple(f"M {row}{column}" for column in "xyz" for row in "xyz")
+    own = {"rigid": turns, "similarity": (*turns, "scale"), "affine": entries}[kind]
+    return (*own, *(f"offset {axis}" for axis in "xyz"), *(("delay",) if delay else ()))
+
+
+def _start(kind: Kind, x: Array, y: Array) -> tuple[Array, Array, float]:
+    """M and b without delay: least squares, or the nearest rotation (Arun, Huang and Blostein 1987)."""
+    middle, centre = x.mean(axis=0), y.mean(axis=0)
+    if kind == "affine":
+        matrix = np.linalg.lstsq(x - middle, y - centre, rcond=None)[0].T
+    else:
+        left, _, right = np.linalg.svd((y - centre).T @ (x - middle))
+        matrix = left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right
+    return matrix, centre - matrix @ middle, 0.0
+
+
+def _linearised(
+    kind: Kind, path: CubicSpline | None, t: Array, x: Array, y: Array, matrix: Array, offset: Array, late: float
+) -> tuple[Array, Array]:
+    """Residuals y - M x - b, point by point, and the Jacobian of M x + b by the parameters."""
+    place = x if path is None else path(t - late)
+    seen = place @ matrix.T
+    count = len(x)
+    jacobian = np.zeros((count, 3, 0))
+    if kind == "affine":
+        jacobian = np.einsum("nc,rk->nrck", place, np.eye(3)).reshape(count, 3, 9)
+    else:
+        jacobian = np.array([-pin.skew(row) for row in seen])
+        if kind == "similarity":
+            jacobian = np.concatenate([jacobian, seen[:, :, None]], axis=2)
+    parts = [jacobian, np.tile(np.eye(3), (count, 1, 1))]
+    if path is not None:
+        parts.append(-(path(t - late, 1) @ matrix.T)[:, :, None])
+    return (y - seen - offset).ravel(), np.concatenate(parts, axis=2).reshape(3 * count, -1)
+
+
+def _solved(jacobian: Array, residual: Array, names: tuple[str, ...]) -> Array:
+    """The least-squares step, by columns of unit length.
+
+    Raises:
+        SolverError: columns that the data do not tell apart.
+    """
+    lengths = np.linalg.norm(jacobian, axis=0)
+    longest = lengths.max()
+    unit = jacobian / np.where(lengths > EXCITED**2 * longest, lengths, np.inf)
+    left, values, right = np.linalg.svd(unit, full_matrices=False)
+    if values[-1] < EXCITED:
+        blind = [names[k] for k in np.argsort(-np.abs(right[-1])) if abs(right[-1][k]) > 0.1]
+        reason = f"the motion does not tell {', '.join(blind)} apart (excitation {values[-1]:.1e} of {EXCITED:g})"
+        raise SolverError("calibrate", blind[0], reason)
+    return np.array((right.T @ ((left.T @ residual) / values)) / lengths)
+
+
+def _moved(kind: Kind, matrix: Array, offset: Array, late: float, step: Array) -> tuple[Array, Array, float]:
+    """The parameters after a step."""
+    if kind == "affine":
+        matrix, rest = matrix + step[:9].reshape(3, 3, order="F"), step[9:]
+    else:
+        scale = np.exp(step[3]) if kind == "similarity" else 1.0
+        matrix, rest = scale * pin.exp3(step[:3]) @ matrix, step[4 if kind == "similarity" else 3 :]
+    return matrix, offset + rest[:3], late + (float(rest[3]) if len(rest) > 3 else 0.0)

@@ -1,0 +1,85 @@
+"""What a step must not do: joints beyond their limits, links and the platform within spheres."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from wbc.published.ikor.machines import ArmMachine
+from wbc.published.ikor.settings import Settings
+from wbc.resolvers.fsp import EqualityRow, joint_row, point_row
+from wbc.validation import Array
+
+#: The platform among links
+PLATFORM = -1
+
+
+@dataclass(frozen=True, eq=False)
+class Gap:
+    """Between a sphere and a link: least distance, less than 0 within the sphere, nearest point of the link, and the
+    unit normal along which that gets away. The platform, link -1, is a disc on the ground.
+    """
+
+    size: float
+    link: int
+    point: Array
+    normal: Array
+    sphere: int
+
+    def row(self, machine: ArmMachine, q: Array) -> EqualityRow:
+        """The point goes clear along the normal in one step."""
+        name = "platform" if self.link == PLATFORM else f"link {self.link + 1}"
+        J = machine.point_jacobian(q, self.link, self.point) if self.link >= 0 else np.eye(3, len(q), len(q) - 3)
+        if self.link == PLATFORM:
+            J[2] = 0.0
+        return point_row(f"{name}, sphere {self.sphere + 1}", J, self.normal, -self.size)
+
+
+def gaps(machine: ArmMachine, q: Array, spheres: Array, margin: float = 0.0, whole: bool = True) -> list[Gap]:
+    """Of every sphere and link; ``whole``: of tool and platform, too, which the published driver left out."""
+    points, out = machine.points(q), list[Gap]()
+    links = len(points) - (1 if whole else 2)
+    ways = np.diff(points, axis=0)[:links]
+    lengths = np.maximum((ways * ways).sum(axis=1), 1e-300)
+    for number, (*centre, radius) in enumerate(spheres):
+        shares = np.clip(((centre - points[:links]) * ways).sum(axis=1) / lengths, 0.0, 1.0)
+        near = points[:links] + shares[:, None] * ways
+        for link in range(links):
+            size, normal = _away(near[link] - centre, ways[link])
+            out.append(Gap(size - radius - margin, link, near[link], normal, number))
+        across = (radius + margin) ** 2 - centre[2] ** 2
+        if whole and machine.base != "none" and across >= 0.0:
+            middle = np.array([q[-3], q[-2], centre[2]])
+            size, normal = _away(middle - centre, np.array([0.0, 0.0, 1.0]))
+            out.append(Gap(size - machine.plate - math.sqrt(across), PLATFORM, middle, normal, number))
+    return out
+
+
+def broken(machine: ArmMachine, settings: Settings, q: Array, v: Array, spheres: Array) -> list[EqualityRow]:
+    """Constraints that q + v breaks, the worst first: back by all of it in one step."""
+    out = list[tuple[float, EqualityRow]]()
+    if settings.limits:
+        low, high = machine.lower - q, machine.upper - q
+        for joint in np.flatnonzero((v > high + 1e-12) | (v < low - 1e-12)).tolist():
+            step = float(np.clip(v[joint], low[joint], high[joint]))
+            out.append((abs(step - v[joint]), joint_row(f"joint {joint + 1}", joint, len(q), step)))
+    if settings.obstacles:
+        # No point moves by more than ten times what all columns move together
+        reach = 10.0 * float(np.abs(v).sum())
+        for gap in gaps(machine, q, spheres, settings.margin, settings.ahead):
+            if gap.size < 0.0 or gap.size < reach:
+                row = gap.row(machine, q)
+                late = row.value - float(row.a @ v)
+                if late > 1e-12:
+                    out.append((late, row))
+    return [row for _, row in sorted(out, key=lambda one: -one[0])]
+
+
+def _away(off: Array, along: Array) -> tuple[float, Array]:
+    """(distance, unit vector); across the link where its point is the centre, which has no normal of its own."""
+    size = float(np.linalg.norm(off))
+    if size < 1e-9:
+        size, off = 0.0, np.cross(along, np.eye(3)[int(np.argmin(np.abs(along)))])
+    return size, off / np.linalg.norm(off)

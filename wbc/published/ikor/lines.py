@@ -1,0 +1,82 @@
+"""Trajectories as lines in equal steps, and yaw, pitch and roll of a rotation."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from wbc import validation
+from wbc.published.ikor.machines import ArmMachine
+from wbc.validation import Array
+
+#: Of a line that is created: [m], [rad], as the published program shows them
+INCREMENTS = 0.01, math.radians(1.0)
+#: Smallest cosine of the pitch at which yaw and roll are told apart
+GIMBAL = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectory:
+    """Where the tool goes.
+
+    Attributes:
+        start: columns of the machine at the start [M]. points: [n, 3] in m. euler: yaw, pitch, roll [n, 3] in rad.
+        dropped: points beyond the most that a file may have.
+    """
+
+    start: Array
+    points: Array
+    euler: Array | None = None
+    dropped: int = 0
+
+
+def straight(machine: ArmMachine, step: Any, count: int, start: Any = None, turn: Any = None) -> Trajectory:
+    """A line in equal steps from where the tool is; ``turn``: of yaw, pitch, roll a step [rad].
+
+    Raises:
+        ShapeError, NotFiniteError: no step, turn or start.
+    """
+    q = machine.home if start is None else machine.checked("start", start)
+    place, rotation = machine.place(q)
+    ways = np.arange(1, count + 1)[:, None]
+    turn = validation.ordinary_array("turn", np.zeros(3) if turn is None else turn, (3,))
+    return Trajectory(
+        q, place + ways * validation.ordinary_array("step", step, (3,)), euler_angles(rotation) + ways * turn
+    )
+
+
+def line_to(machine: ArmMachine, point: Any, euler: Any = None, start: Any = None) -> Trajectory:
+    """A line from where the tool is to a point [m], turning to yaw, pitch, roll [rad] on the way, in equal steps of at
+    most :data:`INCREMENTS`.
+
+    Raises:
+        ShapeError, NotFiniteError: no point or angles.
+    """
+    place, rotation = machine.place(machine.home if start is None else machine.checked("start", start))
+    way, turn = validation.ordinary_array("point", point, (3,)) - place, np.zeros(3)
+    if euler is not None:
+        turn = turned(validation.ordinary_array("euler", euler, (3,)) - euler_angles(rotation))
+    count = max(1, math.ceil(max(np.linalg.norm(way) / INCREMENTS[0], np.abs(turn).max() / INCREMENTS[1]) - 1e-9))
+    return straight(machine, way / count, count, start, turn / count)
+
+
+def euler_angles(rotation: Array) -> Array:
+    """Yaw, pitch, roll of Rz Ry Rx; yaw 0 where the pitch is a right angle, as published."""
+    roll, pitch, yaw = pin.rpy.matrixToRpy(rotation)
+    if math.cos(pitch) < GIMBAL:
+        yaw, roll = 0.0, math.copysign(1.0, pitch) * math.atan2(rotation[0, 1], rotation[1, 1])
+    return np.array([yaw, pitch, roll])
+
+
+def rotation_of(euler: Array) -> Array:
+    """Rz(yaw) Ry(pitch) Rx(roll)."""
+    return np.asarray(pin.rpy.rpyToMatrix(euler[::-1]))
+
+
+def turned(angles: Array) -> Array:
+    """The same angles within half a turn of zero."""
+    return np.asarray((angles + math.pi) % (2.0 * math.pi) - math.pi)

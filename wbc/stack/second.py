@@ -1,0 +1,255 @@
+"""Rows of a stack that commands accelerations or torques, on x = (a; w) with the wrenches w of its contacts.
+
+    tasks       J a + (dJ/dt) v + ... = -damping de/dt - stiffness e         derivatives of the item's e(q, inputs)
+    margins     d2h/dt2 >= -rate (2 dh/dt + rate h) / (1 + rate dt / 2)
+    rows        with r = A v - lower:  dr/dt >= -rate r, and the same for upper; equalities with both
+    contacts    their motion as rows above; cone w within its limits; w = target as a task
+    dynamics    M a + h - J'w = tau on the degrees of freedom whose tau is limited, or known to be 0
+
+Why margins stay positive: with psi = dh/dt + rate h the row says psi(t + dt) >= (1 - rate dt) psi(t) where the second
+derivative of h does not change within the tick, and then h(t + dt) (1 + rate dt / 2) >= h(t) (1 - rate dt / 2) by the
+trapezoidal rule, which is exact there; for every rate dt in (0, 1], however dt varies. docs/torque.md.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Protocol
+
+import casadi as ca
+import numpy as np
+
+from wbc.stack.declaration import Declaration
+from wbc.stack.layout import CLOSED, Block, Layout, Slot
+from wbc.symbolic.kinematics import Kinematics, Pose
+from wbc.symbolic.motion import Motion
+from wbc.symbolic.tracer import Tracer, along
+from wbc.tasks._contact import Contact, ContactForce, ContactWrench
+from wbc.tasks.base import Constraint, Rows, Task
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+
+class Builder(Protocol):
+    """What is needed of the builder of a program."""
+
+    @property
+    def stack(self) -> Declaration: ...
+    @property
+    def layout(self) -> Layout: ...
+    @property
+    def kinematics(self) -> Kinematics: ...
+    @property
+    def p(self) -> ca.SX: ...
+    @property
+    def dt(self) -> ca.SX: ...
+
+    def tracer(self, block: Block) -> Tracer:
+        """What an item sees of the robot."""
+
+    def moving(self, block: Block) -> list[tuple[Block, Slot]]:
+        """Inputs that have a rate, with their blocks: the item's, and those of the frame that it is stated in."""
+
+    def values(self, block: Block) -> dict[str, ca.SX | Pose]:
+        """Inputs of an item as its expressions receive them."""
+
+    def rate(self, block: Block, slot: Slot) -> ca.SX:
+        """Time derivative of the numbers of an input that has a rate."""
+
+    def column(self, block: Block, what: str, expression: ca.SX) -> ca.SX:
+        """A column of the declared number of rows."""
+
+
+class SecondOrder:
+    """Rows of one stack.
+
+    Attributes:
+        x: symbols of all variables, of which the torques are a function.
+    """
+
+    def __init__(self, builder: Builder) -> None:
+        self._b, self._layout, self._robot = builder, builder.layout, builder.stack.robot
+        self._kinematics = builder.kinematics
+        self._motion = Motion(builder.kinematics)
+        self.x = ca.SX.sym("x", builder.layout.variables)
+        self._forces: ca.SX | None = None
+
+    def task(self, block: Block) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
+        """error, desired acceleration, factor and rows over all variables of a task."""
+        item = block.entry.item
+        assert isinstance(item, Task)
+        b, robot, count = self._b, self._robot, len(block.rows)
+        if isinstance(item, ContactForce):
+            target = b.p[block.slots["target"].span]
+            rows = ca.SX(count, self._layout.variables)
+            rows[:, self._layout.forces[item.of]] = ca.SX.eye(count)
+            return -target, target, ca.SX.ones(count), rows
+        tracer, inputs = b.tracer(block), b.values(block)
+        error = b.column(block, "error", item.error(robot, tracer, inputs))
+        own = item.jacobian(robot, tracer, inputs)
+        rate, bias = tracer.second(error, self._motion, own, self._moving(block))
+        jacobian = tracer.jacobian(error) if own is None else tracer.expand(ca.SX(own))[:, : robot.nv]
+        stiffness, damping = (b.p[block.slots[name].span] for name in ("stiffness", "damping"))
+        value = tracer.expand(error)
+        desired = -stiffness * value - damping * rate - bias
+        fade = item.row_factor(robot, tracer, inputs)
+        factor = ca.SX.ones(count) if fade is None else b.column(block, "row_factor", fade)
+        return value, desired, tracer.expand(factor), self._wide(jacobian)
+
+    def constraint(self, block: Block) -> tuple[Rows, ca.SX | None, ca.SX | None]:
+        """Rows over all variables of a constraint, its margins and their factors."""
+        item = block.entry.item
+        assert isinstance(item, Constraint)
+        robot, tracer, inputs = self._robot, self._b.tracer(block), self._b.values(block)
+        if isinstance(item, ContactWrench):
+            cone = item.contact.cone(self._b.values(self._layout.blocks[item.of]))
+            wide = ca.SX(len(block.rows), self._layout.variables)
+            wide[:, self._layout.forces[item.of]] = cone.matrix
+            return Rows(wide, cone.lower, cone.upper), None, None
+        torques = item.torque_rows(robot, inputs)
+        if torques is not None:
+            dofs = list(torques.dofs)
+            still = self._still[dofs]
+            return Rows(self._dynamics[dofs, :], torques.lower - still, torques.upper - still), None, None
+        if not block.rows:
+            return Rows(ca.SX(0, self._layout.variables), ca.SX(0, 1), ca.SX(0, 1)), None, None
+        if block.form == "rows":
+            return self._rates(block, item, tracer), None, None
+        margins = item.margins(robot, tracer, inputs)
+        assert margins is not None
+        margin = self._b.column(block, "margins", margins)
+        first, bias = tracer.second(margin, self._motion, None, self._moving(block))
+        value, rate = tracer.expand(margin), self._b.p[block.slots["rate"].span]
+        low = -bias - rate * (2.0 * first + rate * value) / (1.0 + 0.5 * rate * self._b.dt)
+        fade = item.row_factor(robot, tracer, inputs)
+        factor = ca.SX.ones(len(block.rows)) if fade is None else self._b.column(block, "row_factor", fade)
+        rows = Rows(self._wide(tracer.jacobian(margin)), low, ca.SX.inf(len(block.rows)))
+        return rows, value, tracer.expand(factor)
+
+    def _rates(self, block: Block, item: Constraint, tracer: Tracer) -> Rows:
+        """Rows on velocities: what they are off decays at ``rate``."""
+        b = self._b
+        declared = item.velocity_rows(self._robot, tracer, b.values(block), b.dt)
+        assert declared is not None
+        matrix, (low, high) = (
+            tracer.expand(ca.SX(declared.matrix)),
+            (
+                tracer.expand(b.column(block, name, ends))
+                for name, ends in (("lower", declared.lower), ("upper", declared.upper))
+            ),
+        )
+        rate = b.p[block.slots["rate"].span]
+        if isinstance(item, Contact) and not block.entry.frame:
+            turn, inputs = self._kinematics.pose(item.frame).rotation, b.values(block)
+            speed, drift = (item.still(inputs, turn, part) for part in self._motion.frame(item.frame))
+        else:
+            speed = ca.densify(along(matrix, self._kinematics.v))
+            drift = self._along(speed, block)
+        ends = []
+        for end in (low, high):
+            ends.append(self._along(end, block) - drift - rate * (speed - end))
+        if item.equality:
+            ends[1] = ends[0]
+        return Rows(self._wide(matrix[:, : self._layout.nv]), ends[0], ends[1])
+
+    def _along(self, expression: ca.SX, block: Block) -> ca.SX:
+        """Time derivative of an expression in q, v and inputs where v does not change."""
+        kin = self._kinematics
+        total = ca.jtimes(expression, kin.q, kin.tangent_map @ kin.v)
+        for symbols, rates in self._moving(block):
+            total += ca.jtimes(expression, symbols, rates)
+        return ca.densify(total)
+
+    def _moving(self, block: Block) -> Sequence[tuple[ca.SX, ca.SX]]:
+        """(symbols, rates) of an item's inputs that move, their rates included."""
+        out = []
+        for owner, slot in self._b.moving(block):
+            rate, name = self._b.rate(owner, slot), slot.input.name
+            for other in owner.slots.values():
+                if other.input.direction and other.input.rate == name:
+                    # a direction stays at unit length
+                    rate -= ca.sumsqr(self._b.p[slot.span]) * self._b.p[other.span]
+            out.append((self._b.p[slot.span], ca.densify(rate)))
+        return out
+
+    def _wide(self, matrix: ca.SX) -> ca.SX:
+        """Columns of accelerations, with none for wrenches."""
+        return ca.horzcat(matrix, ca.SX(matrix.shape[0], self._layout.variables - self._layout.nv))
+
+    @property
+    def _driven(self) -> ca.SX:
+        """nv x nv: what motors have to give for generalised forces; the leader of a mimic joint has its follower's."""
+        matrix = np.eye(self._layout.nv)
+        for coupling in self._robot.couplings:
+            matrix[coupling.leader] += coupling.ratio * matrix[coupling.follower]
+            matrix[coupling.follower] = 0.0
+        return ca.SX(ca.sparsify(ca.DM(matrix)))
+
+    @property
+    def _still(self) -> ca.SX:
+        """Torques of the motors without acceleration and wrenches."""
+        return ca.densify(self._driven @ (self._motion.dynamics.nonlinear_effects - self._loads))
+
+    @property
+    def _loads(self) -> ca.SX:
+        """Generalised forces of all loads, as far as they are enabled."""
+        total = ca.SX(self._layout.nv, 1)
+        for block in self._layout.blocks.values():
+            item = block.entry.item
+            if isinstance(item, Constraint) and item.is_load:
+                load = item.load(self._robot, self._kinematics, self._b.values(block))
+                assert load is not None
+                total += self._b.p[block.slots[CLOSED].span] * load
+        return total
+
+    @property
+    def _dynamics(self) -> ca.SX:
+        """nv x variables: torques of the motors by accelerations and wrenches."""
+        if self._forces is None:
+            parts = [self._motion.dynamics.mass_matrix, *(-jacobian.T for jacobian in self._contacts())]
+            self._forces = ca.sparsify(self._driven @ ca.horzcat(*parts))
+        return self._forces
+
+    def _contacts(self) -> list[ca.SX]:
+        """What the transposed of takes each contact's wrench to generalised forces, components x nv, as far as it is
+        closed.
+        """
+        out = []
+        for name in self._layout.forces:
+            block = self._layout.blocks[name]
+            item = block.entry.item
+            assert isinstance(item, Contact)
+            closed = self._b.p[block.slots[CLOSED].span]
+            units = item.unit_wrenches(self._b.values(block), *self._seen(block, item.frame))
+            out.append(closed * (ca.sparsify(units) @ self._kinematics.jacobian(item.frame, "local")))
+        return out
+
+    def _seen(self, block: Block, frame: str) -> tuple[ca.SX, ca.SX]:
+        """Rotation and twist of a frame as the item sees them, from the world or from the frame it is stated in."""
+        tracer = self._b.tracer(block)
+        rotation = tracer.expand(ca.SX(tracer.rotation(frame)))
+        if tracer.carrier is None:
+            return rotation, self._motion.frame(frame)[0]
+        return rotation, tracer.expand(along(tracer.frame_jacobian(frame), self._kinematics.v))
+
+    def most(self, blocks: Sequence[Block]) -> ca.SX:
+        """The largest torque that each general row allows, infinite for rows on other things."""
+        parts = []
+        for block in blocks:
+            item = block.entry.item
+            limits = item.torque_rows(self._robot, self._b.values(block)) if isinstance(item, Constraint) else None
+            parts.append(ca.SX.inf(len(block.rows)) if limits is None else limits.upper)
+        return ca.vertcat(ca.SX(0, 1), *parts)
+
+    @property
+    def torque(self) -> ca.SX:
+        """Torques of the motors at the variables :attr:`x`, by one recursion: M a + h - J'w, 0 for a floating base."""
+        nv = self._layout.nv
+        dynamics = self._motion.dynamics
+        tau = ca.substitute(dynamics.inverse_dynamics, dynamics.a, self.x[:nv])
+        for jacobian, span in zip(self._contacts(), self._layout.forces.values(), strict=True):
+            tau -= jacobian.T @ self.x[span]
+        tau = self._driven @ (tau - self._loads)
+        if self._robot.base == "floating":
+            tau[:6] = 0.0
+        return tau

@@ -1,0 +1,132 @@
+"""Nothing is begun that is not proven clear: a swing before its hand is lifted, the body's way some tenths ahead."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import inf
+from typing import NamedTuple
+
+import numpy as np
+
+from wbc.clearance import Nearest
+from wbc.validation import Array
+from wbc.walking.loop.foresight import STEP, Foresight, Timing
+from wbc.walking.loop.hand_pace import HAND_RAMP
+from wbc.walking.loop.machine import Machine
+from wbc.walking.loop.progress import PlanProgress
+from wbc.walking.loop.state import Swinging
+from wbc.walking.loop.stopping import Stops
+from wbc.walking.planner.swings.swings import SETTLE
+
+#: Path time that the body's way is proven ahead, and what is left of it when it is looked at again [s]
+AHEAD, LEFT = 1.0, 0.4
+
+
+class Course(NamedTuple):
+    """How body and swinging hand are about to go on.
+
+    Attributes:
+        pace: of the body now. end: path time that it does not pass [s]. due: path time at which the hand is to be on
+            its hold [s]. stands: the body comes to rest. most: pace that the path allows at a path time [s].
+    """
+
+    pace: float
+    end: float
+    due: float
+    stands: bool
+    most: Callable[[float], float]
+
+
+class Caution:
+    """What of a walk is proven.
+
+    Attributes:
+        until: path time up to which the body may go with the hands that hold now [s].
+    """
+
+    def __init__(self, sight: Foresight, machine: Machine, progress: PlanProgress, stops: Stops) -> None:
+        self.sight, self._machine, self._progress, self._stops = sight, machine, progress, stops
+        self.until = 0.0
+        self._known: tuple[object, ...] = ()
+
+    def forget(self) -> None:
+        """Nothing is proven any more."""
+        self._known, self.until = (), self._progress.path_time
+
+    def new(self, swinging: Swinging | None, stands: bool) -> bool:
+        """Whether what body and hand do has changed since it was proven."""
+        return self._known != (self._progress.plan.path, swinging, stands)
+
+    def ahead(self, end: float, lift: float | None = None) -> Nearest | None:
+        """Prove the body's way on, all hands as they hold, if little of it is left; what is too near on it.
+
+        Args:
+            end: path time to which they can hold [s]. lift: where the next hand is lifted, whose swing is proven then;
+                None: none is.
+        """
+        progress = self._progress
+        path, u = progress.plan.path, progress.path_time
+        if self.new(None, False) or (lift is None and self.until == inf):
+            self._known, self.until = (path, None, False), u
+        if self.until - u > LEFT or self.until >= end - 1e-9:
+            return None
+        end = min(u + AHEAD, end)
+        lifts = lift is not None and lift <= end
+        end = end if lift is None else max(min(end, lift), u)
+        times = np.linspace(0.0, max(end - u, STEP), max(int((end - u) / STEP), 1) + 1)
+        when = Timing(times, np.minimum(u + times, end), times)
+        found = self._near(None, when)
+        if found is None:
+            self.until = inf if lifts else end
+        return found
+
+    def here(self) -> Nearest | None:
+        """What is too near where everything is now."""
+        times = np.array([0.0, STEP])
+        return self._near(None, Timing(times, np.full(2, self._progress.path_time), times))
+
+    def swing(self, swinging: Swinging, course: Course) -> Nearest | None:
+        """What is too near while a hand goes on to its hold and the body as its pace has it; None: proven clear."""
+        found = self._near(swinging, self.timing(swinging, course))
+        if found is None:
+            self._known = self._progress.plan.path, swinging, course.stands
+            self.until = self._progress.path_time
+        return found
+
+    def timing(self, swinging: Swinging, course: Course) -> Timing:
+        """Body and hand with the paces of the loop, until the hand holds."""
+        law, latch = swinging.law, swinging.latch if swinging.state == "opening" else 0.0
+        u, clock, pace, hand, t = self._progress.path_time, swinging.clock, course.pace, swinging.pace, 0.0
+        closing = self._machine.walker.tolerances.latch_time + SETTLE
+        rows = [(0.0, u, clock)]
+        while clock < law.duration - 1e-9 or latch > 1e-9 or (course.stands and pace > 0.0):
+            left = law.duration - clock
+            needed, until = latch + left + closing, max(course.end - u, 0.0)
+            wanted = 0.0 if course.stands else min(1.0, until / needed, course.most(u))
+            pace = max(pace + min(max(wanted - pace, -STEP / self._stops.brake), STEP / self._stops.ramp), 0.0)
+            wait = course.due - u - wanted * left
+            aim = 1.0 / (1.0 + 4.0 * wait) if wait > 0.0 else 1.0
+            u, t = min(u + pace * STEP, course.end), t + STEP
+            if latch > 1e-9:
+                latch -= STEP
+            else:
+                hand += min(max(aim - hand, -STEP / HAND_RAMP), STEP / HAND_RAMP)
+                clock = min(clock + hand * STEP, law.duration)
+            rows.append((t, u, clock))
+            if len(rows) > 4 * (law.duration + 2.0) / STEP:
+                break
+        rows.append((t + closing, u if course.stands else max(u, min(u + pace * closing, course.end)), clock))
+        return Timing(*np.array(rows).T)
+
+    def _near(self, swinging: Swinging | None, when: Timing) -> Nearest | None:
+        machine, progress = self._machine, self._progress
+        rows = self.sight.rows(machine, progress, swinging, when)
+        held = dict(machine.held)
+        at = list[tuple[int, Array]]()
+        for arm in set(range(len(machine.walker.arms))) - set(machine.held):
+            at += self.sight.around(arm, machine.hand(arm)[0])
+        if swinging is not None:
+            # It is on the hold that it is about to leave
+            leaving = {swinging.arm: held.pop(swinging.arm, -1)}
+            at += [*self.sight.holds({swinging.arm: swinging.hold}), *self.sight.holds(leaving)]
+        return self.sight.nearest(when.times, rows, at, held)

@@ -1,0 +1,205 @@
+"""What the loop is about to do is proven clear before it does it: the motion as its timing has it, delays included."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+import pinocchio as pin
+
+from wbc.clearance import (
+    EndlessCylinder,
+    Exemption,
+    Motion,
+    Nearest,
+    Pair,
+    Sweeper,
+    SweptBody,
+    SweptScene,
+    Tree,
+    bodies_of,
+    self_pairs,
+)
+from wbc.robots import Walker
+from wbc.shapes import HalfSpace
+from wbc.validation import Array
+from wbc.walking.arms.puma import limb_of
+from wbc.walking.holds.structure import Structure
+from wbc.walking.holds.surface import PlaneSurface
+from wbc.walking.loop.machine import Machine
+from wbc.walking.loop.progress import PlanProgress
+from wbc.walking.loop.state import Swinging
+from wbc.walking.planner.plan import Plan
+from wbc.walking.planner.swings.law import SwingLaw
+
+#: Time from knot to knot of a motion [s]: between them joints go straight
+STEP = 0.025
+#: A hold is mounted on what is this near to it, and its hand may be this deep in it, beyond its own roundness [m]
+MOUNTED, DEPTH = 0.005, 0.005
+#: The same of a hand that holds, whose posture is foreseen less well than its place [m]
+HELD_DEPTH = 0.03
+#: What clearances may lack: as much as the checker leaves; and what the proof may miss [m]
+SLACK, TOLERANCE = 1e-4, 5e-5
+
+
+@dataclass(frozen=True, eq=False)
+class Timing:
+    """k instants of a motion: times [s], path times of the body [s], and the clock of the swinging hand [s]."""
+
+    times: Array
+    path_times: Array
+    clock: Array
+
+
+class Foresight:
+    """Sweeps of a walker among what stands around it.
+
+    Args:
+        structure: its surface and obstacles; where holds are, for hands that may touch what these are mounted on.
+
+    Attributes:
+        left: row of an arm -> places of holds that it has left [m], see :class:`wbc.walking.loop.machine.Machine`.
+    """
+
+    def __init__(self, walker: Walker, structure: Structure) -> None:
+        self.walker, self.structure = walker, structure
+        tree, clearance = Tree.of_model(walker.robot.model), walker.tolerances.clearance - SLACK
+        self._hands = [self._grasping(tree, arm) for arm in range(len(walker.arms))]
+        hands = {body.name: body for body in self._hands}
+        bodies = [hands.get(body.name, body) for body in bodies_of(walker.robot)]
+        things = list(_things(structure))
+        pairs = self_pairs(walker.robot, clearance)
+        pairs += [Pair(body.name, thing.name, clearance) for body, thing in product(bodies, things)]
+        self._sweeper = Sweeper(SweptScene(tree, [*bodies, *things], pairs))
+        self._tree, self._mounts = tree, dict[bytes, tuple[str, ...]]()
+        self.left: Mapping[int, Sequence[Array]] = {}
+        column = {name: arm.q.start + k for arm in walker.arms for k, name in enumerate(arm.joints)}
+        self._columns = [column[name] for name in tree.coordinates]
+
+    def nearest(
+        self, times: Array, q: Array, at: Sequence[tuple[int, Array]], held: Mapping[int, int] | None = None
+    ) -> Nearest | None:
+        """The first instant found at which two bodies are too near in a motion ``[k, nq]``; None: proven clear.
+
+        Args:
+            times: of the rows [s]. at: (row of an arm, place of a hold [m]): its hand may touch what it is on.
+            held: row of an arm -> row of the hold, of hands that hold all the time.
+        """
+        motion = self.motion(times, q)
+        exempt = [one for arm, place in at for one in self._exemptions(arm, place, DEPTH)]
+        exempt += [one for arm, place in self.holds(held or {}) for one in self._exemptions(arm, place, HELD_DEPTH)]
+        return self._sweeper.sweep(motion, exemptions=exempt, tolerance=TOLERANCE).violation
+
+    def motion(self, times: Array, q: Array) -> Motion:
+        """Of configurations ``[k, nq]`` at times [s]; joints go straight between them."""
+        return Motion.linear(self._tree, times, q[:, self._columns], q[:, :7])
+
+    def rows(self, machine: Machine, progress: PlanProgress, swinging: Swinging | None, when: Timing) -> Array:
+        """Configurations ``[k, nq]`` that a plan has at instants; hands that hold keep their axes. Joint 6, which turns
+        a hand about its own axis, moves nothing and stays.
+        """
+        q, held, path = machine.q, machine.held, progress.plan.path
+        out = np.repeat(q[None], len(when.times), axis=0)
+        poses = [path.at(u)[0] for u in when.path_times.tolist()]
+        out[:, :7] = [pin.SE3ToXYZQUAT(pose) for pose in poses]
+        samples, grips, limb = when.path_times / path.spacing, progress.grips, limb_of(self.walker)
+        for k, arm in enumerate(self.walker.arms):
+            grip, frames = np.array(progress.grip[k]), np.array([(pose * arm.base).homogeneous for pose in poses])
+            if swinging is None or swinging.arm != k:
+                if k in held:
+                    place = self.structure.positions[held[k]]
+                    out[:, arm.q] = self._holding(frames, q[arm.q], place, machine.chain.axes[k])
+                continue
+            law = swinging.law
+            parts, places = np.interp(when.clock, law.times, law.parts), np.empty((len(samples), 3))
+            for axis in range(3):
+                places[:, axis] = np.interp(when.clock, law.times, law.places[:, axis])
+            last = grips.between(np.array(swinging.grip), samples)[:, limb.guided :]
+            first = np.array(swinging.first_wrist) if swinging.first_wrist is not None else None
+            first = grips.between(grip, samples)[:, limb.guided :] if first is None else first
+            guide = first + parts[:, None] * (last - first)
+            angles, _ = limb.follow(frames[None], places[None], guide[None], self.walker.margins)
+            out[:, arm.q] = angles[0]
+        return out
+
+    def _holding(self, frames: Array, now: Array, place: Array, axis: Array) -> Array:
+        """Joints of an arm whose hand stays at a place along its axis, from frames of its base ``[k, 4, 4]`` on; where
+        it is out of reach it goes with the body.
+
+        Args:
+            now: its joints, at the first frame.
+        """
+        limb, turns = limb_of(self.walker), frames[:, :3, :3]
+        points, axes = np.einsum("kji,kj->ki", turns, place - frames[:, :3, 3]), np.einsum("kji,j->ki", turns, axis)
+        found, solved = limb.held(points, axes)
+        branch = int(np.abs(found[0, :, :-1] - now[:-1]).max(axis=1).argmin())
+        out = np.unwrap(found[:, branch], axis=0)
+        out[:, -1] = now[-1]
+        out[~solved[:, branch]] = now
+        return out
+
+    def may_bring(self, plan: Plan, arm: int, law: SwingLaw, held: Mapping[int, int], q: Array) -> bool:
+        """Whether a free hand may go along a law to where a plan begins, while the body stands and other hands hold."""
+        count, grips, limb = max(int(law.duration / STEP), 1) + 1, plan.grips, limb_of(self.walker)
+        assert grips is not None
+        times = np.linspace(0.0, law.duration, count)
+        out = np.repeat(q[None], count, axis=0)
+        pose = pin.SE3(plan.path.poses[0])
+        out[:, :7] = pin.SE3ToXYZQUAT(pose)
+        there = {k: self.structure.index(plan.start[k]) for k in range(arm + 1) if k not in held}
+        for k in set(there) - {arm}:
+            # It has been brought before
+            out[:, self.walker.arms[k].q] = grips.posture_at(plan.chain[k][0], 0)
+        mine = self.walker.arms[arm]
+        first, last = q[mine.q][limb.guided :], grips.posture_at(plan.chain[arm][0], 0)[limb.guided :]
+        guide = first + np.interp(times, law.times, law.parts)[:, None] * (last - first)
+        places = np.stack([np.interp(times, law.times, column) for column in law.places.T], axis=1)
+        frames = np.repeat((pose * mine.base).homogeneous[None], count, axis=0)
+        angles, _ = limb.follow(frames[None], places[None], guide[None], self.walker.margins)
+        out[:, mine.q] = angles[0]
+        at = [*self.holds(there), *self.around(arm, places[0])]
+        return self.nearest(times, out, at, held) is None
+
+    def holds(self, held: Mapping[int, int]) -> list[tuple[int, Array]]:
+        """(arm, place) of hands on holds."""
+        return [(arm, self.structure.positions[hold]) for arm, hold in held.items() if hold >= 0]
+
+    def around(self, arm: int, place: Array) -> list[tuple[int, Array]]:
+        """(arm, place) of the holds that an open hand at a place [m] has left; none known: of those near to it."""
+        if arm in self.left:
+            return [(arm, left) for left in self.left[arm]]
+        off = np.linalg.norm(self.structure.positions - place, axis=1)
+        near = np.flatnonzero(off < self.walker.tolerances.exempt_distance)
+        return [(arm, self.structure.positions[hold]) for hold in near]
+
+    def _grasping(self, tree: Tree, arm: int) -> SweptBody:
+        """The hand of an arm, with its grasp point."""
+        mine = self.walker.arms[arm]
+        body = next(body for body in bodies_of(self.walker.robot) if body.link == mine.links[-1])
+        grasp = (tree.links[body.link][1].inverse() * tree.links[mine.hand][1]).translation
+        return SweptBody(body.name, body.shape, body.link, body.placement, grasp)
+
+    def _exemptions(self, arm: int, point: Array, deep: float) -> list[Exemption]:
+        name, hand = point.tobytes(), self._hands[arm]
+        if name not in self._mounts:
+            self._mounts[name] = tuple(_mounted(self.structure, point))
+        depth, radius = deep + float(getattr(hand.shape, "radius", 0.0)), self.walker.tolerances.exempt_distance
+        return [Exemption(hand.name, mount, point, radius, depth) for mount in self._mounts[name]]
+
+
+def _things(structure: Structure) -> list[SweptBody]:
+    out = [SweptBody(f"obstacle {one.id}", one.shape, placement=one.placement) for one in structure.obstacles]
+    surface = structure.surface
+    if surface is not None:
+        shape = HalfSpace() if isinstance(surface, PlaneSurface) else EndlessCylinder(surface.radius)
+        out.append(SweptBody("the surface", shape, placement=surface.pose))
+    return out
+
+
+def _mounted(structure: Structure, point: Array) -> list[str]:
+    off = {f"obstacle {one.id}": abs(float(one.distance(point))) for one in structure.obstacles}
+    if structure.surface is not None:
+        off["the surface"] = abs(float(structure.surface.height(point)))
+    return [name for name, distance in off.items() if distance <= MOUNTED]
