@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import mujoco
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -10,8 +11,6 @@ import wbc
 from tests.refusals import assert_refused
 from wbc.errors import RangeError, UnknownNameError
 from wbc.simulation import Command, CommandKind, MujocoPlant
-
-mujoco = pytest.importorskip("mujoco")
 
 ARM = """<mujoco><compiler angle="radian"/><option gravity="0 0 0" timestep="0.001"/>
 <default><joint damping="1"/></default>
@@ -88,3 +87,23 @@ def _file(folder: object, text: str) -> str:
     with open(path, "w") as file:
         file.write(text)
     return path
+
+
+GEOMS = """<mujoco><default><default class="drawn"><geom contype="0" conaffinity="0" density="300"/></default></default>
+<worldbody><body name="a"><joint name="one" axis="0 0 1"/><geom class="drawn" type="box" size=".1 .2 .1" pos=".1 0 0"/>
+<body name="b" pos="0 0 1"><joint name="two" axis="0 1 0"/><geom type="sphere" size=".1" mass="3"/>
+<geom type="capsule" size=".05" fromto="0 0 0 0 0 .3" mass="1.5" contype="0" conaffinity="0"/>
+<body name="c"><joint name="three" axis="1 0 0"/><inertial pos="0 .1 0" mass=".7" diaginertia=".01 .02 .03"/>
+<geom class="drawn" type="sphere" size=".3"/></body></body></body></worldbody></mujoco>"""
+
+
+def test_geoms_that_touch_nothing_weigh_what_mujoco_says(tmp_path: object) -> None:
+    robot, model = wbc.robots.load(_file(tmp_path, GEOMS)), mujoco.MjModel.from_xml_string(GEOMS)
+    assert [robot.model.inertias[k].mass for k in (1, 2, 3)] == pytest.approx(model.body_mass[1:])
+    q, data = np.array([0.3, -0.4, 0.5]), mujoco.MjData(model)
+    data.qpos[:] = q
+    mujoco.mj_forward(model, data)
+    full = np.zeros((3, 3))
+    mujoco.mj_fullM(model, data, full)
+    mass = pin.crba(robot.model, robot.model.createData(), q)
+    assert np.triu(mass) == pytest.approx(np.triu(full), rel=1e-6, abs=1e-9)

@@ -12,8 +12,8 @@ from wbc.validation import Array
 PER_DELAY = {CommandKind.POSITION: 2.5, CommandKind.VELOCITY: 1.5, CommandKind.TORQUE: 1.0}
 #: at least so many periods,
 PER_PERIOD = 10.0
-#: and where nobody told the response, at least so much [s]
-UNTOLD = {CommandKind.POSITION: 0.05, CommandKind.VELOCITY: 0.02, CommandKind.TORQUE: 0.01}
+#: and where the response is still to be found, at least so much [s]
+UNTOLD = {CommandKind.POSITION: 0.05, CommandKind.VELOCITY: 0.02}
 #: A velocity servo's error takes so many times its lag longer
 PER_LAG = 2.0
 
@@ -27,8 +27,8 @@ class Feedback:
 
     with z = int e dt. Of velocities and torques e and de/dt are those at t + D, when d takes hold: corrections that
     were sent within the last D are accounted for. Of positions the loop is w/s exp(-D s) without that, because the zero
-    of d cancels the lag. A velocity servo gets no de/dt: joints that move more lightly together than
-    one by one would answer it by more than itself.
+    of d cancels the lag. A velocity servo gets no de/dt: joints that move more lightly together than one by one would
+    answer it by more than itself.
 
     Args:
         kind: of servo. dt: period [s]. lag: T, nv numbers. late: D in periods. w: [1/s].
@@ -43,9 +43,8 @@ class Feedback:
             CommandKind.VELOCITY: (0.0 * lag, slow, 0.25 * slow * slow),
             CommandKind.TORQUE: (2.0 * w * wide, w * w * wide, w**3 / 3.0 * wide),
         }[kind]
-        left = np.arange(late, 0.0, -1.0)[
-            :, None
-        ]  # periods from the sending of each correction to t + D, the oldest first
+        # Periods from the sending of each correction to t + D, the oldest first
+        left = np.arange(late, 0.0, -1.0)[:, None]
         if kind is CommandKind.TORQUE:
             self._stay, self._reach = wide, late * dt * wide
             self._slows, self._moves = dt * (wide + 0.0 * left), dt * dt * (left - 0.5) * wide

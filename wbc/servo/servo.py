@@ -156,7 +156,8 @@ class Servo:
         q, nv = self._robot.configuration("q", validation.ordinary_array("q", q)), self._robot.nv
         self.controller.reset(q)
         self._identification = Identification(nv, self._dt, LONGEST_DELAY, MEMORY) if self._learns else None
-        self._q, self._v, self._a, self._wanted, self._sum = q, *np.zeros((4, nv))
+        self._q: Array = q
+        self._v, self._a, self._wanted, self._sum = np.zeros((4, nv))
         self._measured, self._command, self._moved, self._asked = q, q, *np.zeros((2, nv))
         self._stopped, self._ticks = False, 0
         #: The last references and corrections, the oldest first

@@ -1,7 +1,8 @@
 """Reading MJCF files: Pinocchio's parser for the model, the XML for joint ranges, keyframes and couplings.
 
 Pinocchio 4.1 scales the range of a slide joint as if it were an angle, applies ranges of joints that say
-``limited="false"``, and counts q from ``ref``; ranges are therefore taken from the XML here.
+``limited="false"``, and counts q from ``ref``; ranges are therefore taken from the XML here. It loses the mass of geoms
+that touch nothing, see :func:`wbc.robot.sources.mjcf_xml.with_weight`.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import pinocchio as pin
 from wbc.errors import RobotFileError
 from wbc.robot.sources.description import Description, Mimic, with_base
 from wbc.robot.sources.files import PARSER_ERRORS, captured_stderr
-from wbc.robot.sources.mjcf_xml import Element, MjcfJoint, joints, parser_file, read_tree
+from wbc.robot.sources.mjcf_xml import Element, MjcfJoint, joints, parser_file, read_tree, with_weight
 from wbc.validation import Array
 
 _KINDS = {"hinge": (1, 1), "slide": (1, 1), "ball": (4, 3), "free": (7, 6)}
@@ -28,7 +29,7 @@ def read_mjcf(path: pathlib.Path, base: str | None = None) -> Description:
     """
     tree = read_tree(path)
     try:
-        with captured_stderr() as noise, parser_file(tree) as file:
+        with captured_stderr() as noise, parser_file(with_weight(tree)) as file:
             model = pin.buildModelFromMJCF(file)
         listed = joints(tree)
     except PARSER_ERRORS as error:

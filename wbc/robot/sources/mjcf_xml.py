@@ -7,6 +7,7 @@ stands in a <frame>; none of this is reported. So the tree is put into a form th
 from __future__ import annotations
 
 import contextlib
+import copy
 import math
 import pathlib
 import tempfile
@@ -58,6 +59,20 @@ def read_tree(path: pathlib.Path) -> Element:
             if f"body{number}" not in names:
                 body.set("name", f"body{number}")
     return tree
+
+
+def with_weight(tree: Element) -> Element:
+    """The tree with the mass of every geom that MuJoCo weighs.
+
+    Pinocchio 4.1 takes geoms with contype and conaffinity 0 for pictures and leaves their mass out, where MuJoCo counts
+    all geoms of a body without <inertial>. Such geoms touch something here; shapes are read from the tree as it was.
+    """
+    out = copy.deepcopy(tree)
+    for body in out.iter("body"):
+        if body.find("inertial") is None:
+            for geom in body.findall("geom"):
+                geom.set("contype", "1")
+    return out
 
 
 @contextlib.contextmanager
