@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import functools
+import logging
 import warnings
+import weakref
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from wbc import validation
 from wbc.controller import hooks
@@ -12,13 +17,47 @@ from wbc.controller.controller import Controller, core_of
 from wbc.qp.solvers import available_solvers
 from wbc.stack.artifact import compile_stack
 from wbc.stack.declaration import Declaration
+from wbc.tasks import Fixed, FrameVelocityLimit, JointLimits
+from wbc.tasks.mechanism import Mechanism
 
 if TYPE_CHECKING:
     from wbc.ik import InverseKinematics, Solution
 
+log = logging.getLogger("wbc")
+
+#: Controllers that exist: what is added to their stacks later they do not have
+_COMPILED: weakref.WeakSet[Controller] = weakref.WeakSet()
+
 
 #: What :meth:`Stack.solve` hands on to :meth:`wbc.InverseKinematics.solve`
 OPTIONS = ("seed", "budget", "restarts", "tolerance")
+
+
+def base_is_free(stack: Declaration) -> bool:
+    """A base that moves, and no item says how fast: no limit of its velocity, and nothing that holds the robot."""
+    robot = stack.robot
+    limited = bool(np.isfinite(robot.limits.velocity[: robot.base_nv]).any())
+    for entry in stack.constraints:
+        item = entry.item
+        if isinstance(item, JointLimits) and item.velocity and limited:
+            return False
+        if isinstance(item, (FrameVelocityLimit, Fixed)):
+            return False
+        if getattr(item, "equality", False) and not isinstance(item, Mechanism):
+            return False
+    return robot.base_nv > 0
+
+
+@functools.cache
+def warn_free_base(robot: str, joint: str, numbers: str) -> None:
+    """Say once for each robot what limits its base."""
+    log.warning(
+        "%s: nothing limits how fast its base moves; with robot = robot.with_limits(velocity={%r: [%s]}) in m/s and "
+        "rad/s, stack.add(wbc.tasks.JointLimits()) does",
+        robot,
+        joint,
+        numbers,
+    )
 
 
 class Stack(Declaration):
@@ -41,6 +80,10 @@ class Stack(Declaration):
         ShapeError, RangeError, NotFiniteError: bad arguments.
     """
 
+    def _was_added(self, name: str) -> None:
+        if any(controller.stack is self for controller in list(_COMPILED)):
+            log.warning("%r was added after compile(): controllers that exist do not have it; compile again", name)
+
     def compile(self, solver: str = "daqp", backend: str = "auto", command: str | None = None) -> Controller:
         """A controller with its own memory; compiled code comes from the cache where it can.
 
@@ -59,6 +102,10 @@ class Stack(Declaration):
         declared = self.commanding(self.command if command is None else command)
         controller = Controller(declared, compile_stack(declared, backend, __version__), solver)
         core_of(controller).fallback.prepare()
+        _COMPILED.add(controller)
+        if base_is_free(self):
+            joint = self.robot.joint_names[0]
+            warn_free_base(self.robot.name, joint, ", ".join(["0.5"] * self.robot.base_nv))
         return controller
 
     def inverse_kinematics(self, goals: Iterable[str] | None = None, backend: str = "auto") -> InverseKinematics:

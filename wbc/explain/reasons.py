@@ -53,10 +53,10 @@ class _Finder:
         self.rates = self.here.J @ (v[: past.layout.nv] / past.layout.dof_scales(past.stack)[: past.layout.nv])
 
     def reason(self, binding: tuple[Bound, ...], losses: list[Loss]) -> Reason | None:
-        """The reason; None where the error is zero and the rates are not."""
+        """The reason; None where the error is zero and the task moves."""
         off, asks = float(np.abs(self.here.e).max(initial=0.0)), float(np.linalg.norm(self.asked))
         if off < MET and asks < _ASKS:
-            return self._say("done")
+            return self._say("done") if float(np.linalg.norm(self.served)) < _ASKS else None
         share = float(self.asked @ self.served) / asks**2 if asks > _ASKS else 1.0
         if off < MET:
             return None if share >= _SERVED else self._moving(share, binding, losses)

@@ -285,7 +285,11 @@ class Declaration:
         item.validate(self._robot)
         _check_values(item, self._robot)
         self._entries |= {entry.name: entry for entry in added}
+        self._was_added(chosen)
         return self
+
+    def _was_added(self, name: str) -> None:
+        """An item is in the stack."""
 
     def _framed(self, item: Item, name: str, frame: str | None) -> tuple[Item, str]:
         """The item as it is in its own world, and the name of the moving frame that is this world.

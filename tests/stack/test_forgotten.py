@@ -1,0 +1,38 @@
+"""What is easily forgotten is said once: an item after ``compile``, a base that nothing limits."""
+
+from __future__ import annotations
+
+import pytest
+
+import wbc.robots
+from wbc.controller import Stack
+from wbc.controller.stack import warn_free_base
+from wbc.tasks import Damping, FrameVelocityLimit, Hold, JointLimits, Posture
+
+
+def test_an_item_after_compile_is_said_while_a_controller_lives(caplog: pytest.LogCaptureFixture) -> None:
+    stack = Stack(wbc.robots.load("double_pendulum"), 0.01).add(Posture())
+    controller = stack.compile(backend="vm")
+    assert not caplog.messages
+    stack.add(Damping())
+    (said,) = caplog.messages
+    assert said == "'damping' was added after compile(): controllers that exist do not have it; compile again"
+    assert "damping" not in controller
+
+
+def test_a_base_that_nothing_limits_is_said_once_with_a_line_that_works(caplog: pytest.LogCaptureFixture) -> None:
+    warn_free_base.cache_clear()
+    robot = wbc.robots.load("quadruped")
+    for _ in range(2):
+        Stack(robot, 0.01).add(Posture()).add(JointLimits()).compile(backend="vm")
+    (said,) = caplog.messages
+    assert "quadruped: nothing limits how fast its base moves" in said
+    line = said.split("robot = robot.")[1].split(" in m/s")[0]
+    limited = eval(f"robot.{line}", {"robot": robot})
+    foot = robot.frames["front_left_foot"]
+    warn_free_base.cache_clear()
+    caplog.clear()
+    Stack(limited, 0.01).add(Posture()).add(JointLimits()).compile(backend="vm")
+    for item in (Hold(foot), FrameVelocityLimit(foot, linear=1.0)):
+        Stack(robot, 0.01).add(Posture()).add(item).compile(backend="vm")
+    assert not caplog.messages
