@@ -56,4 +56,4 @@ class ExternalWrench(Load):
 
     def load(self, robot: Robot, kin: Kinematics, inputs: Values) -> ca.SX:
         """J'w."""
-        return kin.jacobian(self.frame).T @ inputs["wrench"]
+        return ca.SX(kin.jacobian(self.frame).T @ inputs["wrench"])

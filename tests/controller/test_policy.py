@@ -47,7 +47,7 @@ def _fresh(tick: Controller) -> None:
 
 def contradict(tick: Controller) -> None:
     """The grip is to move faster than anything can."""
-    target = tick["grip"].target
+    target = tick["grip"].target.copy()
     target.translation[:] += [0.0, 3.0, 0.0]
     tick["grip"].target, tick["grip"].enabled = target, True
 
