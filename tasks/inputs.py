@@ -33,6 +33,7 @@ def with_accelerations(robot: Robot, declared: Sequence[Input]) -> list[Input]:
     it at unit length comes by itself.
     """
     rates = {i.rate for i in declared if i.rate is not None}
+    rates -= {i.rate for i in declared if i.name in rates}  # second derivatives that are declared
     out, more = [], []
     for i in declared:
         if i.name not in rates or i.rate is not None or i.sensed:

@@ -31,8 +31,8 @@ class Mutation:
 MUTATIONS = (
     Mutation(
         "wbc/stack/program.py",
-        "total = total + ca.jacobian(expression, self.p[slot.span]) @ speed",
-        "total = total - ca.jacobian(expression, self.p[slot.span]) @ speed",
+        "total = total + ca.jacobian(expression, self.p[slot.span]) @ self.rate(owner, slot)",
+        "total = total - ca.jacobian(expression, self.p[slot.span]) @ self.rate(owner, slot)",
         ("controller/test_qp_referee.py",),
     ),
     Mutation(

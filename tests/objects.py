@@ -3,6 +3,8 @@
 A stack is compiled again as soon as a line of the package changes that may have to do with it (wbc.stack.key); nearly
 always the C code stays the same, and so does its object file. What is not in the folder is compiled; rows that are not
 to be optimised are assembled (:mod:`tests.assembly`).
+
+Code that the compiler refuses fails the test: the package itself would go on, slowly, on the virtual machine.
 """
 
 from __future__ import annotations
@@ -16,6 +18,7 @@ import tempfile
 import casadi as ca
 
 from tests.assembly import assembled
+from wbc.errors import CompileError
 from wbc.native import toolchain
 
 _run, _compiler = toolchain._run, toolchain.compiler()
@@ -26,7 +29,16 @@ def keep(folder: pathlib.Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
 
     def run(command: list[str], place: pathlib.Path) -> None:
-        if command[0] != _compiler or "-c" not in command:
+        if command[0] != _compiler:
+            _run(command, place)
+            return
+        try:
+            compile_or_take(command, place)
+        except CompileError as error:
+            raise AssertionError(f"the package's C code does not compile: {error}") from error
+
+    def compile_or_take(command: list[str], place: pathlib.Path) -> None:
+        if "-c" not in command:
             _run(command, place)
             return
         made = place / command[command.index("-o") + 1]

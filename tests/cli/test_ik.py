@@ -97,6 +97,9 @@ def test_out_of_reach_is_exit_code_1_with_the_reason(tmp_path: Path) -> None:
     assert code == 1
     assert "unreachable" in out
     assert err.startswith("target 1: unreachable after 101 descents; off by 2.")
+    assert "out of reach of the robot itself by 2." in err
+    assert "no constraint is to blame" in err
+    assert "binding" not in err
     assert "rad" not in err
     rows = list(csv.DictReader(file.open()))
     assert [row["status"] for row in rows] == ["unreachable"] + ["solved"] * 8
@@ -108,6 +111,7 @@ def test_obstacles_take_part() -> None:
     assert code == 1
     assert "target 1: unreachable" in err
     assert "sphere1/" in err.split("binding: ")[1]
+    assert "within reach without sphere1;" in err
     code, _, err = run("ur5", "--target", DOWN, "--sphere", "0.4,0.6,0.5,0.1", "--floor", "1.5")
     assert code == 1
     assert "contradictory" in err

@@ -129,6 +129,12 @@ def test_late_and_lost_measurements() -> None:
     stream.push(3.0, there)
     assert np.allclose(stream.at(2.95).pose.homogeneous, there.homogeneous)
     assert stream.at(2.95).state is StreamState.TRACKED
+    # A clock that was set back: what is measured then counts for nothing until the stream is told
+    stream.push(-7.0, there)
+    assert stream.at(-7.0).state is StreamState.LOST
+    stream.reset()
+    stream.push(-7.0, there)
+    assert stream.at(-7.0).state is StreamState.TRACKED
     again = tracking(DropoutPolicy(0.1, 0.1))
     assert np.array_equal(again.at(1.0).pose.homogeneous, before.homogeneous)
 

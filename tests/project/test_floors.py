@@ -40,6 +40,7 @@ FLOORS = {
     "wbc.export": 7,
     "wbc.ik": 7,
     "wbc.record": 7,
+    "wbc.servo": 7,
     "wbc.trajectory": 8,
     "wbc.coordinates": 8,
     "wbc.explore": 9,

@@ -74,8 +74,9 @@ def moving_target(
     from wbc.cli.session import INTERRUPTED, Stopper
     from wbc.moving_target import folder as files
     from wbc.moving_target import pictures
+    from wbc.moving_target.knowledge import Knowledge, Measurement
     from wbc.moving_target.study import JOBS, MOTIONS, grasp, outcome, peg, trials
-    from wbc.moving_target.trial import Knowledge, Measurement, Trial
+    from wbc.moving_target.trial import Trial
 
     validation.one_of("job", job, JOBS)
     validation.one_of("motion", motion, MOTIONS)

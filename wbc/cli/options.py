@@ -55,7 +55,8 @@ Backend = Annotated[str, typer.Option(help="auto, native or vm.", rich_help_pane
 Gain = Annotated[float, typer.Option(help="Gain of the hand, in 1/s.", rich_help_panel=_CONTROL)]
 Margin = Annotated[float, typer.Option(help="Distance kept from obstacles, in m.", rich_help_panel=_CONTROL)]
 RunFolder = Annotated[
-    Path | None, typer.Option(help="Run folder. Default: runs/ROBOT-PATH-TIME.", rich_help_panel=_OUTPUT)
+    Path | None,
+    typer.Option("--out", "--output", help="Run folder. Default: runs/ROBOT-PATH-TIME.", rich_help_panel=_OUTPUT),
 ]
 Force = Annotated[bool, typer.Option(help="Write into a folder that has a run.", rich_help_panel=_OUTPUT)]
 LogFormat = Annotated[str, typer.Option(help="parquet or npz.", rich_help_panel=_OUTPUT)]

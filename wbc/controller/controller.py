@@ -118,7 +118,10 @@ class Controller(Handles):
 
         Raises:
             RecordingError: the file is there or cannot be written, or the controller records already.
+            SolverError: its policy has an escape.
         """
+        if self.policy.escape:
+            raise SolverError("record", self.policy, "a recording holds no escape; set a policy without it")
         recorder: Recorder = hooks.record(self, path, overwrite)
         return recorder
 
@@ -160,7 +163,8 @@ class Controller(Handles):
         """What happens where rows conflict or an answer cannot be certified, see :class:`wbc.Policy`.
 
         Raises:
-            ShapeError: no policy. SolverError: the controller records; a recording has one policy.
+            ShapeError: no policy. SolverError: the controller records; a recording has one policy; an escape in a
+                stack of strict levels.
         """
         return self._core.fallback.policy
 
@@ -170,7 +174,9 @@ class Controller(Handles):
             raise ShapeError("policy", policy, "expected a wbc.Policy")
         if self._core.recording is not None:
             raise SolverError("policy", policy, "cannot change while the controller records")
-        self._core.fallback.policy = policy
+        if policy.escape and self._core.layout.cascade:
+            raise SolverError("policy", policy, "only stacks of one level have an escape")
+        self._core.follow(policy)
 
     @property
     def iteration_cap(self) -> int | None:

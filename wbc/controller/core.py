@@ -11,9 +11,10 @@ import numpy as np
 import pinocchio as pin
 
 from wbc import validation
+from wbc.controller.escape import Escape
 from wbc.controller.handle import Directions, Handle
 from wbc.controller.handles import kind_of
-from wbc.controller.policy import Fallback
+from wbc.controller.policy import Fallback, Policy
 from wbc.controller.ramps import Ramps
 from wbc.controller.step import Context, Step
 from wbc.controller.tick.buffers import BAD_V, Assembly
@@ -89,6 +90,7 @@ class Core:
         self.call: Callable[[], int] = self.tick.step
         if isinstance(self.tick, NativeTick):
             self.call = functools.partial(self.tick.step_function, self.tick.pointer)
+        self._plain_call = self.call
         self.context = Context(stack, layout, self.assembly)
         # of all ways to copy some hundred numbers into something immutable, the fastest
         self.snapshot: Callable[[], bytes] = self.tick.state.data.cast("B").tobytes
@@ -121,11 +123,18 @@ class Core:
         if self.layout.command != "velocity":
             self.assembly.kept[:] = other.assembly.kept
         self.tick.check()
-        self.fallback.policy = other.fallback.policy
+        self.follow(other.fallback.policy)
         self.ramps.assume(other.ramps, self.handles)
         if other.fallback.prepared:
             self.fallback.prepare()
         self._first, self.waiting, self.waits = dict(other._first), dict(other.waiting), other.waits
+
+    def follow(self, policy: Policy) -> None:
+        """Another policy from now on."""
+        self.fallback.policy = policy
+        self.call = self._plain_call
+        if policy.escape:
+            self.call = Escape(self._plain_call, self.tick, self.fallback, self.context, self.snapshot)
 
     def again(self) -> Step:
         """A tick on the buffers as they are."""
@@ -152,6 +161,8 @@ class Core:
         if self.layout.command != "velocity":
             self.assembly.kept[:] = 0.0
         self.tick.reset()
+        if isinstance(self.call, Escape):
+            self.call.reset()
         for sensor, _ in self.sensors:
             sensor.reset()
         self.resets += 1

@@ -21,6 +21,8 @@ def _above(module: str, name: str) -> Callable[..., Any]:
 explain = _above("wbc.explain", "explain")
 #: For :meth:`wbc.Step.derivative`: (the same two, item, value) -> numbers [nv, k]
 derivative = _above("wbc.explain", "derivative")
+#: For ``Policy.escape``: (the same two, the way out so far or None) -> step of the joints [nv], or None
+escape = _above("wbc.explain", "escape")
 #: For :meth:`wbc.Controller.record`: (controller, file, overwrite) -> Recorder
 record = _above("wbc.record", "record")
 #: For :meth:`wbc.Stack.inverse_kinematics`: (stack, goals, back end) -> InverseKinematics

@@ -35,9 +35,9 @@ class Status(StrEnum):
 
 #: By the tick's flag
 STATUSES: tuple[Status, ...] = (Status.SOLVED, Status.RELAXED, Status.BRAKED, Status.CAPPED)
-STATUSES += (*[Status.RECOVERED] * len(CHAIN), Status.BRAKED, Status.BRAKED)
+STATUSES += (*[Status.RECOVERED] * len(CHAIN), Status.BRAKED, Status.BRAKED, Status.SOLVED)
 #: What gave the command, by the tick's flag
-ANSWERED = ("", "", "", "", *CHAIN, "braking", "policy")
+ANSWERED = ("", "", "", "", *CHAIN, "braking", "policy", "escape")
 
 
 @dataclass(frozen=True)

@@ -2,10 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+
+import numpy as np
 
 from wbc import validation
-from wbc.controller.tick.buffers import CHAIN, CHAIN_BRAKED, POLICY_BRAKED, RECOVERED, RELAXED, UNSOUND, Assembly
+from wbc.controller.tick.buffers import (
+    CHAIN,
+    CHAIN_BRAKED,
+    ESCAPED,
+    POLICY_BRAKED,
+    RECOVERED,
+    RELAXED,
+    SOLVED,
+    UNSOUND,
+    Assembly,
+)
 from wbc.controller.tick.elastic import ElasticTick
 from wbc.controller.tick.native import NativeTick
 from wbc.controller.tick.solved import SolvedTick
@@ -14,6 +26,7 @@ from wbc.qp.factor import load
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Layout
 from wbc.stack.memory import Memory
+from wbc.validation import Array
 
 #: What to do with rows that cannot all hold
 CONFLICTS = ("elastic", "brake")
@@ -38,9 +51,11 @@ class Policy:
 
     conflict: str = "elastic"
     chain: tuple[str, ...] = CHAIN
+    escape: bool = False
 
     def __post_init__(self) -> None:
         validation.one_of("Policy.conflict", self.conflict, CONFLICTS)
+        object.__setattr__(self, "escape", validation.flag("Policy.escape", self.escape))
         given: object = self.chain
         if not isinstance(given, (tuple, list)):
             raise ShapeError("Policy.chain", self.chain, "expected a sequence of names")
@@ -61,7 +76,7 @@ class Fallback:
     def __init__(self, tick: NativeTick | SolvedTick, assembly: Assembly, stack: Declaration, layout: Layout) -> None:
         self._policy, self.prepared = Policy(), False
         self._tick, self._given = tick, (assembly, stack, layout)
-        self._flag = Memory(layout).flag
+        self._flag, self._v = Memory(layout).flag, Memory(layout)["v"]
         self._links: dict[str, SolvedTick] = {}
 
     @property
@@ -121,6 +136,25 @@ class Fallback:
         solver.brake(solver.qp())
         self._tick.report[self._flag] = flag
         return flag
+
+    def lead(self, way: Array, speed: float) -> bool:
+        """Command the tick again, along ``way`` (radians and characteristic lengths, of length 1) at ``speed``;
+        whether that has a certified answer. Otherwise the report is that of the tick.
+        """
+        self._tick.v_last[:], before = self._tick.v_in, self._tick.report.copy()
+        solver, dofs = self._link("daqp"), self._given[2].dof_scales(self._given[1])
+        qp = solver.qp()
+        ahead = np.zeros(qp.n)
+        ahead[: len(way)] = way / dofs[: len(way)]
+        firm = float((np.diag(qp.H) * dofs**2).max())
+        solved = solver.finish(replace(qp, H=qp.H + firm * np.outer(ahead, ahead), g=qp.g - firm * speed * ahead))
+        self._tick.reset()
+        if solved == SOLVED:
+            self._tick.report[self._flag] = ESCAPED
+            return True
+        self._tick.report[:] = before
+        self._tick.v_last[:] = before[self._v]
+        return False
 
     def _link(self, name: str) -> SolvedTick:
         if name not in self._links:

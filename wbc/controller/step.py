@@ -249,7 +249,8 @@ class Step:
     @property
     def answered_by(self) -> str:
         """What gave the command in place of the first answer: a link of :attr:`wbc.Policy.chain`; ``braking``, where
-        none had a certified answer; ``policy``, where that brakes in conflicts. Empty for a first answer.
+        none had a certified answer; ``policy``, where that brakes in conflicts; ``escape``, where it leaves a singular
+        configuration. Empty for a first answer.
         """
         return ANSWERED[int(self._number("flag"))]
 

@@ -148,7 +148,10 @@ class PoseFilter:
             transition[:6, 6 * k : 6 * k + 6] = share * linear
             if k == 2:
                 transition[6:12, 12:18] = t * np.eye(6)
-        return transition @ self.covariance @ transition.T + np.kron(self._white(t), np.diag(self._process**2))
+        out: Array = transition @ self.covariance @ transition.T
+        blocks, diagonal = out.reshape(self._order, 6, self._order, 6), np.arange(6)
+        blocks[:, diagonal, :, diagonal] += self._process[:, None, None] ** 2 * self._white(t)
+        return out
 
     def _white(self, t: float) -> Array:
         """Q / s^2, order x order: integrals over s in [0, t] of the powers (t - s)^i/i! (t - s)^j/j!."""

@@ -117,14 +117,17 @@ class PoseStream:
         self._filter.update(taken, pose)
 
     def at(self, time: float) -> FrameEstimate:
-        """The frame at a time, not before the last measurement was taken, by the policy.
+        """The frame at a time, not before the last measurement was taken, by the policy; lost where the time is before
+        that by more than the policy's own, since a clock was set back: see :meth:`reset`.
 
         Raises:
             SolverError: there was no measurement.
         """
         if self._filter.time is None:
             raise SolverError("at", time, "there is no measurement yet")
-        age = max(validation.scalar("time", time, unit="s") - self._filter.time, 0.0)
+        age = validation.scalar("time", time, unit="s") - self._filter.time
+        # Far before the last measurement: a clock was set back, and what is measured now is left out as too old
+        age = abs(age) if age < -(self.policy.predict + self.policy.hold) else max(age, 0.0)
         s, pace, state = self.policy.ahead(age)
         motion: FrameMotion = self._filter.at(self._filter.time + s)
         braking = -1.0 / self.policy.hold if state is StreamState.HELD else 0.0

@@ -9,7 +9,7 @@ from wbc.controller.step import Context
 from wbc.explain.explanation import Explanation
 from wbc.validation import Array
 
-__all__ = ["Explanation", "derivative", "explain"]
+__all__ = ["Explanation", "derivative", "escape", "explain"]
 
 
 def explain(data: bytes, context: Context, status: str, answered_by: str) -> Explanation:
@@ -26,3 +26,11 @@ def derivative(data: bytes, context: Context, name: str, value: str | None) -> A
     from wbc.explain.past import past_of
 
     return sensitivity.derivative(past_of(data, context), name, value)
+
+
+def escape(data: bytes, context: Context, way: Array | None) -> Array | None:
+    """See :func:`wbc.explain.way_out.way_out`; ``data`` is a step's copy of its tick."""
+    from wbc.explain.past import past_of
+    from wbc.explain.way_out import way_out
+
+    return way_out(past_of(data, context), way)

@@ -9,6 +9,7 @@ from wbc.explain.explanation import Bound, Contradiction, Explanation, Give, Res
 from wbc.explain.losses import groups, losses, prices
 from wbc.explain.naming import Naming
 from wbc.explain.past import Past
+from wbc.explain.reasons import reasons
 from wbc.qp.conflict import Conflict, Infeasibility, diagnose
 from wbc.qp.problem import QP
 from wbc.stack.layout import Block, rate_unit
@@ -62,6 +63,7 @@ class Explainer:
                 for task, share in scales(past.layout, v, past.part("error")).items()
                 if share < 1.0 - 1e-6
             ),
+            reasons(past, v, tuple(binding.values()), missed),
         )
 
     def _infeasibility(self) -> Infeasibility:

@@ -6,17 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from wbc.explain.reason import Reason, amount
 from wbc.renamed import old_attribute
 
 RELATIONS = {"lower": "at least", "upper": "at most", "equal": "exactly"}
-
-
-def amount(value: float, unit: str) -> str:
-    """A number with its unit, lengths below a metre in millimetres or micrometres: ``31 mm/s``."""
-    prefix = ""
-    if (unit == "m" or unit.startswith("m/")) and np.isfinite(value) and 1e-7 <= abs(value) < 1.0:
-        value, prefix = (1e3 * value, "m") if abs(value) >= 1e-4 else (1e6 * value, "u")
-    return f"{value if abs(value) > 1e-13 else 0.0:.3g} {prefix}{unit}".rstrip()
 
 
 def listed(bounds: tuple[Bound, ...]) -> str:
@@ -147,8 +140,6 @@ class Loss:
         if self.to:
             parts = [f"{amount(share.amount, self.unit)} without {share.item}" for share in self.to]
             text += "; it would regain " + ", ".join(parts)
-        if 0.01 * self.lost < self.alone <= 1.01 * self.lost:
-            text += f"; {amount(self.alone, self.unit)} would be missing with nothing else in the stack"
         return text + "."
 
 
@@ -199,6 +190,7 @@ class Explanation:
         primal: largest violation of a row that did not give way. dual: largest velocity by which one degree of freedom
             alone would better the objective. complementarity: largest distance of an active row from its bound.
         scales: lambda of each scaled task that is slowed down; the rows that keep its direction are not in ``binding``.
+        reasons: why each task does or does not converge, see :class:`Reason`.
     """
 
     status: str
@@ -214,6 +206,7 @@ class Explanation:
     dual: Residue
     complementarity: Residue
     scales: tuple[tuple[str, float], ...] = ()
+    reasons: tuple[Reason, ...] = ()
 
     def __str__(self) -> str:
         lines = [f"{self.status} (by {self.answered_by})." if self.answered_by else f"{self.status}."]
@@ -227,6 +220,7 @@ class Explanation:
         if self.binding:
             lines.append(f"Binding: {listed(self.binding)}.")
         lines += [f"{task} keeps its direction at {share:.3g} of its rates." for task, share in self.scales]
+        lines += [str(reason) for reason in self.reasons]
         lines += [str(loss) for loss in self.losses]
         lines += [f"{price}." for price in self.prices]
         if np.isfinite(self.dual.amount):

@@ -11,6 +11,7 @@ import numpy as np
 from wbc.controller.step import Context
 from wbc.controller.tick.buffers import Assembly
 from wbc.controller.tick.solved import SolvedTick
+from wbc.controller.tick.vm import VmAssembly
 from wbc.errors import SolverError
 from wbc.qp.levels.hierarchy import Hierarchy, LevelsAnswer
 from wbc.qp.levels.sensitivity import FrozenLevels
@@ -143,37 +144,51 @@ class Past:
         return [b for b in self.layout.blocks.values() if b is not block and not isinstance(b.entry.item, Mechanism)]
 
     def task_rows(self, block: Block) -> tuple[Array, Array]:
-        """(J, w) of a task's rows that count, J v - w being what each misses; both up to the sign of a row.
+        """(J, w) of a task's rows that count, J v - w being what each misses; both up to the sign of a row."""
+        return rows_of(self, self.tick, block)
 
-        A row's part of the plain QP is H = J'J and g = -J'w, from which both come back.
-        """
-        if self.layout.cascade:
-            return self._level_rows(block)
-        tick, weight, factor = self.tick, self.tick.weight.copy(), self.part("factor")
-        damping = self.stack.damping / self.layout.dof_scales(self.stack) ** 2
-        rows, desired = np.zeros((len(block.rows), self.layout.variables)), np.zeros(len(block.rows))
-        tick.plain[0] = 1.0
-        for k in range(len(block.rows)):
-            share = factor[block.start + k]
-            if weight[block.start + k] == 0.0 or not share > 0.0:
-                continue
-            tick.weight[:] = 0.0
-            tick.weight[block.start + k] = 1.0
-            qp = tick.qp()
-            square = (qp.H - np.diag(damping)) / share
-            i = int(np.diag(square).argmax())
-            if square[i, i] > 0.0:
-                rows[k] = square[i] / np.sqrt(square[i, i])
-                desired[k] = -qp.g[i] / share / rows[k, i]
-        tick.weight[:], tick.plain[0] = weight, 0.0
-        return rows, desired
 
-    def _level_rows(self, block: Block) -> tuple[Array, Array]:
-        """The same from the rows that levels have."""
-        self.tick.qp()
-        tasks, span = self.tick.task_rows(), block.span
-        counts = (self.tick.weight[span] > 0.0) & (tasks.factor[span] > 0.0)
-        return np.where(counts[:, None], tasks.J[span], 0.0), np.where(counts, tasks.desired[span], 0.0)
+def rows_of(past: Past, tick: Assembly, block: Block) -> tuple[Array, Array]:
+    """:meth:`Past.task_rows` from the buffers of any tick of the same code.
+
+    A row's part of the plain QP is H = J'J and g = -J'w, from which both come back.
+    """
+    if keeps_rows(past, tick):
+        tick.qp()
+        return kept_rows(tick, block)
+    weight, before = tick.weight.copy(), float(tick.plain[0])
+    damping = past.stack.damping / past.layout.dof_scales(past.stack) ** 2
+    rows, desired = np.zeros((len(block.rows), past.layout.variables)), np.zeros(len(block.rows))
+    tick.plain[0] = 1.0
+    factor = tick.report[past.places["factor"]]
+    for k in range(len(block.rows)):
+        if weight[block.start + k] == 0.0:
+            continue
+        tick.weight[:] = 0.0
+        tick.weight[block.start + k] = 1.0
+        qp = tick.qp()
+        share = float(factor[block.start + k])
+        if not share > 0.0:
+            continue
+        square = (qp.H - np.diag(damping)) / share
+        i = int(np.diag(square).argmax())
+        if square[i, i] > 0.0:
+            rows[k] = square[i] / np.sqrt(square[i, i])
+            desired[k] = -qp.g[i] / share / rows[k, i]
+    tick.weight[:], tick.plain[0] = weight, before
+    return rows, desired
+
+
+def keeps_rows(past: Past, tick: Assembly) -> bool:
+    """Whether a tick keeps the rows of its last QP."""
+    return past.layout.cascade or isinstance(tick, VmAssembly)
+
+
+def kept_rows(tick: Assembly, block: Block) -> tuple[Array, Array]:
+    """:func:`rows_of` the last QP, where the tick keeps its rows."""
+    tasks, span = tick.task_rows(), block.span
+    counts = (tick.weight[span] > 0.0) & (tasks.factor[span] > 0.0)
+    return np.where(counts[:, None], tasks.J[span], 0.0), np.where(counts, tasks.desired[span], 0.0)
 
 
 def past_of(data: bytes, context: Context) -> Past:

@@ -12,8 +12,9 @@ from typing import Any
 
 import numpy as np
 
+from wbc.moving_target.knowledge import Knowledge
 from wbc.moving_target.study import Outcome, Study
-from wbc.moving_target.trial import Knowledge, Trial
+from wbc.moving_target.trial import Trial
 
 SUMMARY = "summary.json"
 
@@ -29,7 +30,7 @@ def save(
         "motion": study.motion,
         "severity": study.severity,
         "rate": s.rate,
-        "allowed": s.allowed,
+        "clearance": s.clearance,
         "measurement": dataclasses.asdict(s.measurement),
         "policy": dataclasses.asdict(s.policy),
         "outcomes": {str(kind): dataclasses.asdict(found) for kind, found in figures.items()},
@@ -38,11 +39,11 @@ def save(
     files[0].write_text(json.dumps(_plain(summary), indent=1) + "\n")
     with files[1].open("w", newline="") as stream:
         writer = csv.writer(stream)
-        writer.writerow(("knowledge", "trial", "success", "reason", "time", "aligned_at", "rms", "worst", "rate"))
+        writer.writerow(("knowledge", "trial", "success", "reason", "time", "began", "rms", "worst", "rate"))
         for kind, trials in done.items():
             for number, trial in enumerate(trials):
                 size = np.linalg.norm(trial.error[trial.working, :3], axis=1)
-                numbers = (trial.time, trial.aligned_at, np.sqrt(np.mean(size**2)), size.max(), trial.rates.max())
+                numbers = (trial.time, trial.began, np.sqrt(np.mean(size**2)), size.max(), trial.rates.max())
                 writer.writerow(
                     (
                         kind,

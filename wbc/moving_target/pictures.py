@@ -10,8 +10,9 @@ import pinocchio as pin
 from PIL import Image, ImageDraw
 
 from wbc import style
+from wbc.moving_target.knowledge import Knowledge
 from wbc.moving_target.study import Study
-from wbc.moving_target.trial import Knowledge, Trial
+from wbc.moving_target.trial import Trial
 from wbc.shapes import Box, Cylinder, PlacedShape
 from wbc.track import render
 from wbc.track.scene import link_meshes, simplified
@@ -41,9 +42,9 @@ def plot(study: Study, done: Mapping[Knowledge, list[Trial]], folder: pathlib.Pa
             for panel, part, scale in zip(panels, (slice(0, 3), slice(3, 6)), (1e3, 180.0 / np.pi), strict=True):
                 size = scale * np.linalg.norm(trial.error[:, part], axis=1)
                 panel.semilogy(trial.t, np.maximum(size, 1e-6), color=COLOURS[kind], label=LABELS[kind])
-            if np.isfinite(trial.aligned_at):
-                panels[0].axvline(trial.aligned_at, color=COLOURS[kind], lw=0.8, ls=":")
-        panels[0].axhline(1e3 * study.scenario.allowed[0], color=style.INK, lw=0.8, ls="--")
+            if np.isfinite(trial.began):
+                panels[0].axvline(trial.began, color=COLOURS[kind], lw=0.8, ls=":")
+        panels[0].axhline(1e3 * study.scenario.clearance, color=style.INK, lw=0.8, ls="--")
         panels[0].set(ylabel="mm", title="Error in the object's frame, first trial; dashed: allowed, dotted: goes in")
         panels[1].set(ylabel="degrees", xlabel="s")
         panels[0].legend(fontsize=9, loc="lower left")
@@ -83,7 +84,7 @@ def _trials(plt: object, study: Study, done: Mapping[Knowledge, list[Trial]], fi
             y = row + rng.uniform(-0.25, 0.25)
             face = COLOURS[kind] if trial.success else "none"
             panel.plot(worst, y, "o", ms=4, mec=COLOURS[kind], mfc=face, mew=0.8)
-    panel.axvline(1e3 * study.scenario.allowed[0], color=style.INK, lw=0.8, ls="--")
+    panel.axvline(1e3 * study.scenario.clearance, color=style.INK, lw=0.8, ls="--")
     names = [f"{LABELS[k]}\n{sum(t.success for t in ts)} of {len(ts)}" for k, ts in done.items()]
     panel.set(xscale="log", xlabel="largest error in the object's frame while working [mm]; filled: it was done")
     panel.set_yticks(range(len(names)), names)
@@ -100,7 +101,7 @@ def film(
     stop: Callable[[], bool] | None = None,
 ) -> pathlib.Path | None:
     """Trials side by side as an animated picture; None if ``stop`` ended it."""
-    robot, scale = study.scenario.robot, study.scenario.near + study.scenario.lead
+    robot, scale = study.scenario.robot, study.scenario.size
     links = [(name, simplified(mesh, 0.1 * scale)) for name, mesh in link_meshes(robot)]
     camera = _camera(study, scale)
     end = max(float(trial.t[-1]) for trial in pair.values())

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
+from itertools import chain, product
 
 import numpy as np
 import pinocchio as pin
 
 from wbc import validation
 from wbc.estimation import DropoutPolicy
+from wbc.moving_target.knowledge import Knowledge, Measurement
 from wbc.moving_target.motions import Motion, sea, swing, tumble
-from wbc.moving_target.trial import Bench, Knowledge, Measurement, Scenario, Trial
+from wbc.moving_target.trial import HAND, WORK, Bench, Scenario, Trial
+from wbc.program import Approach, Guard, Hold, Move, Pose, Program, Retreat
 from wbc.robot import Robot
 from wbc.simulation import Plant
 from wbc.validation import Array
@@ -21,6 +24,8 @@ MOTIONS, JOBS = ("sea", "tumble", "swing", "rest"), ("peg", "grasp")
 SIGNIFICANT, PERIOD = (0.04, 0.04, 0.06, 0.07, 0.07, 0.07), 6.0
 #: Of a tumble: rate [rad/s]
 RATE = float(np.radians(3.0))
+#: How long a tool has to be aligned before it goes in [s], and what ends every program
+STEADY, LOST = 0.25, Guard("lost", above=0.5)
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,25 +85,47 @@ class Outcome:
 
 
 def peg(robot: Robot, tip: str, motion: str, clearance: float, measurement: Measurement, **more: float) -> Study:
-    """A peg into a hole of 40 mm in a table below the tool: 25 mm of way before it, ``clearance`` all round [m]."""
+    """A peg into a hole of 40 mm in a table below the tool, from 25 mm before it and out again, ``clearance`` all round
+    [m].
+    """
     tool = pin.SE3(np.eye(3), np.array([0.0, 0.0, 0.05]))
     goal = pin.SE3(np.diag([1.0, -1.0, -1.0]), np.array([0.10, 0.05, -0.04]))
+    touches = (Guard("wall", below=0.0),)
+    program = Program(
+        (
+            Move(HAND, Pose((0, 0, -0.065), (0, 0, 0, 1)), speed=(0.06, 0.5), within=(5e-3, 0.02), timeout=8),
+            Hold((Guard("aside", below=0.75 * clearance, lasting=STEADY),), name="align", timeout=3),
+            Approach(HAND, (0, 0, 1), 0.03, (Guard("depth", above=0.038),), 0.07, name=WORK, unless=touches),
+            Hold((Guard("elapsed", above=0.5),), name="stay", unless=touches),
+            Retreat(HAND, (0, 0, -0.065), speed=(0.06, 0.5), within=(5e-3, 0.02), unless=touches, timeout=5),
+        ),
+        abort=(LOST,),
+    )
     scenario = Scenario(
-        robot, tip, tool, robot.neutral, goal, near=0.025, aligned=(0.75 * clearance, np.radians(1.0)),
-        allowed=(clearance, np.radians(3.0)), lead=0.04, timeout=9.0, measurement=measurement,
+        robot, tip, tool, robot.neutral, goal, program, lead=0.04, clearance=clearance, size=0.065, timeout=15.0,
+        measurement=measurement,
     )  # fmt: skip
     return _placed(scenario, motion, np.array([0.0, 0.0, 0.12]), (0.03, 0.1), 0.15, 0.005, **more)
 
 
 def grasp(robot: Robot, tip: str, motion: str, measurement: Measurement, **more: float) -> Study:
-    """A grapple fixture on a free body, a tenth of the arm's length before the tool: the tool comes within a fiftieth,
-    goes on to the fixture and holds, within 20 mm and 1 degree.
+    """A grapple fixture on a free body, a twentieth of the arm's length before the tool: the tool comes within a
+    fiftieth, goes on to the fixture and holds, within 20 mm and 1 degree.
     """
-    length = robot.characteristic_length
+    length, off = robot.characteristic_length, (Guard("off", above=0.02), Guard("tilt", above=np.radians(1.0)))
+    near = 0.02 * length
+    program = Program(
+        (
+            Move(HAND, Pose((0, 0, -near), (0, 0, 0, 1)), speed=(0.12, 0.03), within=(0.05, 0.02), timeout=20),
+            Hold((Guard("aside", below=0.01, lasting=STEADY),), name="align", timeout=10),
+            Approach(HAND, (0, 0, 1), 0.1, (Guard("depth", above=-0.005),), 1.05 * near, name=WORK, unless=off[1:]),
+            Hold((Guard("elapsed", above=1.0),), name="stay", unless=off),
+        ),
+        abort=(LOST,),
+    )
     scenario = Scenario(
-        robot, tip, pin.SE3.Identity(), _limber(robot, tip), pin.SE3.Identity(), near=0.02 * length,
-        aligned=(0.01, np.radians(0.5)), allowed=(0.02, np.radians(1.0)), lead=0.0, approach=6.0, insert=4.0,
-        stay=1.0, timeout=30.0, rate=25.0, gain=2.0, measurement=measurement, process=(1e-3, 1e-3),
+        robot, tip, pin.SE3.Identity(), nimble(robot, tip, 0.05 * length), pin.SE3.Identity(), program, lead=0.0,
+        clearance=0.02, size=near, timeout=40.0, rate=25.0, gain=2.0, measurement=measurement, process=(1e-3, 1e-3),
         policy=DropoutPolicy(1.0, 2.0),
     )  # fmt: skip
     return _placed(scenario, motion, np.array([0.0, 0.0, 0.05 * length]), (0.01 * length, 0.1), 1.0, 0.005, **more)
@@ -123,22 +150,46 @@ def _placed(
     return Study(scenario, motion, home, spread, lever, drift, **more)
 
 
-def _limber(robot: Robot, tip: str) -> Array:
-    """Of 300 configurations within half the joints' ranges, or 1.5 rad, that with the largest least singular value of
-    J, metres by the robot's length: from which the slowest motion of the tip is the fastest.
+def nimble(robot: Robot, tip: str, ahead: float, rate: float = RATE, seconds: float = 18.0) -> Array:
+    """Of 2000 configurations within half the joints' ranges, or 1.5 rad, that from which the tip can turn at ``rate``
+    about every one of 26 axes u with the smallest part of its joints' rate limits, while it goes ahead along its z axis
+    in the first five seconds: with least-norm velocities
+
+        dq/dt = J^+ (v; rate u),          the largest |dq/dt| / limit of all axes, joints and times.
+
+    Only the 150 that are best at the first moment are followed over the time.
     """
-    rng, data = np.random.default_rng(0), robot.model.createData()
+    rng, model, data = np.random.default_rng(0), robot.model, robot.model.createData()
     reach = np.minimum((robot.limits.position_upper - robot.limits.position_lower) / 4, 1.5)
-    frame, reference = robot.model.getFrameId(tip), pin.LOCAL_WORLD_ALIGNED
-    rows = np.repeat([robot.characteristic_length, 1.0], 3)[:, None]
-    best, found = -1.0, robot.neutral
-    for _ in range(300):
-        q = pin.integrate(robot.model, robot.neutral, reach * rng.uniform(-1.0, 1.0, robot.nv))
-        jacobian = pin.computeFrameJacobian(robot.model, data, q, frame, reference) / rows
-        least = float(np.linalg.svd(jacobian, compute_uv=False)[-1])
-        if least > best:
-            best, found = least, q
-    return np.array(found)
+    frame, fastest = model.getFrameId(tip), robot.limits.velocity
+    axes = np.array([u for u in product((-1.0, 0.0, 1.0), repeat=3) if any(u)])
+    axes *= rate / np.linalg.norm(axes, axis=1)[:, None]
+
+    def inverse(q: Array) -> Array:
+        return np.linalg.pinv(pin.computeFrameJacobian(model, data, q, frame, pin.LOCAL_WORLD_ALIGNED))
+
+    def at_first(q: Array) -> float:
+        return float((np.abs(inverse(q)[:, 3:] @ axes.T) / fastest[:, None]).max())
+
+    def followed(q: Array, spin: Array) -> Iterator[float]:
+        inverse(q)
+        way = pin.updateFramePlacement(model, data, frame).rotation[:, 2] * ahead / 5.0
+        for second in range(round(seconds)):
+            v = inverse(q) @ np.concatenate([way * (second < 5), spin])
+            yield float((np.abs(v) / fastest).max())
+            q = pin.integrate(model, q, v)
+
+    drawn = [pin.integrate(model, robot.neutral, reach * rng.uniform(-1.0, 1.0, robot.nv)) for _ in range(2000)]
+    best, least = drawn[0], np.inf
+    for q in sorted(drawn, key=at_first)[:150]:
+        worst = 0.0
+        for part in chain.from_iterable(followed(q, spin) for spin in axes):
+            worst = max(worst, part)
+            if worst >= least:
+                break
+        else:
+            best, least = q, worst
+    return np.array(best)
 
 
 def trials(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import importlib.util
 import logging
 import os
 import pathlib
@@ -41,11 +42,29 @@ COMMON_FLAGS = (
 
 @functools.cache
 def compiler() -> str | None:
-    """Path of the C compiler, or None: ``WBC_CC`` if set (empty: none), else gcc or cc on the PATH."""
+    """Path of the C compiler, or None: ``WBC_CC`` if set (empty: none), else gcc or cc on the PATH, else the zig of the
+    ``ziglang`` wheel, which is a clang with its own headers and linker.
+    """
     chosen = os.environ.get("WBC_CC")
     if chosen is not None:
         return shutil.which(chosen) if chosen else None
-    return shutil.which("gcc") or shutil.which("cc")
+    return shutil.which("gcc") or shutil.which("cc") or _wheel()
+
+
+def _wheel() -> str | None:
+    """Path of zig in the ``ziglang`` wheel."""
+    found = importlib.util.find_spec("ziglang")
+    folders = found.submodule_search_locations if found is not None else None
+    return shutil.which("zig", path=os.pathsep.join(folders)) if folders else None
+
+
+def _is_zig(cc: str) -> bool:
+    return pathlib.Path(cc).stem == "zig"
+
+
+def _command(cc: str) -> list[str]:
+    """What a command line of the compiler begins with; zig would trap undefined behaviour at -O0."""
+    return [cc, "cc", "-fno-sanitize=undefined"] if _is_zig(cc) else [cc]
 
 
 @functools.cache
@@ -54,7 +73,11 @@ def missing() -> tuple[str, ...]:
     out = []
     if compiler() is None:
         chosen = os.environ.get("WBC_CC")
-        why = "neither gcc nor cc is on the PATH" if chosen is None else f"WBC_CC is {chosen!r}"
+        why = (
+            "neither gcc nor cc is on the PATH; pip install wbc[compiler] brings one"
+            if chosen is None
+            else f"WBC_CC is {chosen!r}"
+        )
         out.append(f"no C compiler ({why})")
     if not (library().exists() and (headers() / "daqp" / "api.h").exists()):
         out.append("no static daqp library in the casadi package")
@@ -71,7 +94,7 @@ def available() -> bool:
 @functools.cache
 def fall_back(reason: str) -> None:
     """Say once for each reason that ticks are not native."""
-    log.warning("%s: ticks run on the CasADi virtual machine, some 10 times slower", reason)
+    log.warning("%s: ticks run on the CasADi virtual machine, 50 to 300 times slower", reason)
 
 
 def headers() -> pathlib.Path:
@@ -90,8 +113,9 @@ def identity() -> str:
     cc = compiler()
     if cc is None:
         return "none"
-    version = _output([cc, "--version"]).splitlines()[:1]
-    target = _output([cc, "-march=native", "-Q", "--help=target"])
+    version = _output([*_command(cc), "--version"]).splitlines()[:1]
+    asked = ("-dM", "-E", "-x", "c", os.devnull) if _is_zig(cc) else ("-Q", "--help=target")
+    target = _output([*_command(cc), "-march=native", *asked])
     return "\n".join([*version, target, *ROWS_FLAGS, *TICK_FLAGS, *COMMON_FLAGS])
 
 
@@ -105,7 +129,7 @@ def compile_tick(files: dict[str, str], output: pathlib.Path, search: bool = Fal
     """
     cc = compiler()
     if cc is None:
-        raise CompileError("compiler", None, "no C compiler found; install gcc or use backend='vm'")
+        raise CompileError("compiler", None, "no C compiler found; install gcc or wbc[compiler], or use backend='vm'")
     with tempfile.TemporaryDirectory(prefix="wbc-") as folder:
         place = pathlib.Path(folder)
         for name, text in files.items():
@@ -113,16 +137,26 @@ def compile_tick(files: dict[str, str], output: pathlib.Path, search: bool = Fal
         include = (f"-I{headers()}",)
         flags = ROWS_FLAGS if len(files["rows.c"]) <= LONG_ROWS else ("-O0",)
         parts = (
-            [cc, *COMMON_FLAGS, *flags, "-c", "rows.c", "-o", "rows.o"],
-            [cc, *COMMON_FLAGS, *TICK_FLAGS, *include, "-c", "converge.c" if search else "tick.c", "-o", "tick.o"],
+            [*_command(cc), *COMMON_FLAGS, *flags, "-c", "rows.c", "-o", "rows.o"],
+            [
+                *_command(cc),
+                *COMMON_FLAGS,
+                *TICK_FLAGS,
+                *include,
+                "-c",
+                "converge.c" if search else "tick.c",
+                "-o",
+                "tick.o",
+            ],
         )
         with ThreadPoolExecutor(len(parts)) as pool:
             list(pool.map(lambda part: _run(part, place), parts))
         _run(
             [
-                cc,
+                *_command(cc),
                 "-shared",
-                "-Wl,--exclude-libs,ALL",
+                # Of DAQP nothing is seen from outside; zig's linker knows no such option, and -Bsymbolic is enough
+                *(() if _is_zig(cc) else ("-Wl,--exclude-libs,ALL",)),
                 "-Wl,-Bsymbolic",
                 "rows.o",
                 "tick.o",
@@ -161,7 +195,7 @@ def compile_library(
             (place / name).write_text(text)
         # What it exports must be seen by who loads the library
         flags = [f for f in COMMON_FLAGS if not f.startswith(("-fvisibility", "-DCASADI_SYMBOL_EXPORT"))]
-        _run([cc, *flags, *optimisation, "-shared", main, "-lm", "-o", str(output)], place)
+        _run([*_command(cc), *flags, *optimisation, "-shared", main, "-lm", "-o", str(output)], place)
 
 
 def _output(command: list[str]) -> str:

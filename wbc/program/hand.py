@@ -11,6 +11,7 @@ from wbc import validation
 from wbc.controller import Controller
 from wbc.program.reference import HandReference
 from wbc.tasks import EndEffector
+from wbc.tasks.frames import frame_pose
 from wbc.validation import Array
 
 
@@ -32,14 +33,16 @@ class ProgramHand:
     """A hand of a program: its item, the pose that it is told to follow, and an operator's twist.
 
     Attributes:
-        order: last twist of an operator (linear; angular). ordered: when it came [s].
+        target: what the controller is told for this tick. order: last twist of an operator (linear; angular).
+        ordered: when it came [s].
     """
 
     def __init__(self, controller: Controller, name: str, dt: float) -> None:
         entry = controller.stack[name]
         item = validation.instance(f"hand {name!r}", entry.item, EndEffector, "an EndEffector")
         self._item, self._handle, self._robot, self._dt = item, controller[name], controller.stack.robot, dt
-        self.reference = HandReference(pin.SE3.Identity(), dt)
+        self._frame = controller[entry.frame] if entry.frame else None
+        self.reference, self.target = HandReference(pin.SE3.Identity(), dt), pin.SE3.Identity()
         self.order, self.ordered, self._q = np.zeros(6), -np.inf, np.zeros(0)
 
     def start(self, q: Array) -> None:
@@ -52,11 +55,17 @@ class ProgramHand:
         self._q = q
 
     def pose(self) -> pin.SE3:
-        """Of the hand in its reference frame, measured."""
-        here = self._item.initial(self._robot, self._q)["target"]
-        if self._item.kind == "pose":
-            return pin.SE3(here)
-        return pin.SE3(np.eye(3), here) if self._item.kind == "position" else pin.SE3(here, np.zeros(3))
+        """Of the hand in its reference frame, measured; a moving one stands where the controller was told last."""
+        item, base = self._item, frame_pose(self._robot, self._item.relative_to, self._q)
+        pose = base.actInv(frame_pose(self._robot, item.frame, self._q))
+        if self._frame is not None:
+            pose = pin.SE3(self._frame.pose).actInv(pose)
+        # What the item does not command stands still
+        if item.kind == "position":
+            pose.rotation = np.eye(3)
+        elif item.kind == "orientation":
+            pose.translation = np.zeros(3)
+        return pose
 
     def off(self, goal: pin.SE3) -> tuple[float, float]:
         """Distance [m] and angle [rad] from a pose, of what the item commands."""
@@ -66,9 +75,10 @@ class ProgramHand:
         return distance * (self._item.kind != "orientation"), angle * (self._item.kind != "position")
 
     def write(self) -> None:
-        """One tick of the reference, into the controller."""
+        """Where the hand is to be now, into the controller, and its mean twist over the tick that begins."""
+        pose, before = self.reference.pose, self.reference.twist
         self.reference.tick()
-        pose, twist = self.reference.pose, self.reference.twist
+        self.target, twist = pose, 0.5 * (before + self.reference.twist)
         if self._item.kind == "pose":
             self._handle.target, self._handle.feedforward = pose, twist
         elif self._item.kind == "position":

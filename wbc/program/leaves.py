@@ -150,7 +150,8 @@ class Motion(Leaf):
         self._asked = step
 
     def begin(self) -> None:
-        here = self.runner.hands[self._asked.hand].pose()
+        # From where it is commanded: what is measured late or with noise does not come into the program's path
+        here = self.runner.hands[self._asked.hand].reference.pose
         if isinstance(self._asked, steps.Move):
             self._goal = self._asked.to.from_here(here)
         else:

@@ -12,8 +12,9 @@ from wbc.validation import Array
 
 #: Accelerations [m/s^2, rad/s^2] and jerks [m/s^3, rad/s^3] along each axis
 ACCELERATION, JERK = (1.0, 5.0), (20.0, 100.0)
-#: An axis along which a straight motion does not lead has this share of the speed, for what is left of the last motion
-ACROSS = 1e-3
+#: An axis along which a straight motion does not lead has this share of the speed: from rest it is not used, and from a
+#: motion it takes the hand back to the line
+ACROSS, ACROSS_MOVING = 1e-3, 0.3
 #: A drift takes the orientation of the moment for R_0 after this angle [rad]; step of a difference along x [s]
 FARTHEST, _SMALL = 2.0, 1e-6
 
@@ -48,7 +49,8 @@ class HandReference:
     def aim(self, pose: pin.SE3, speed: tuple[float, float]) -> None:
         """Go straight to a pose; speed: along the line and about the axis [m/s, rad/s]."""
         change = np.append(pose.translation - self.pose.translation, pin.log3(self.pose.rotation.T @ pose.rotation))
-        self._begin(np.concatenate([_along(change[:3], speed[0]), _along(change[3:], speed[1])]))
+        least = ACROSS_MOVING if self.twist.any() else ACROSS
+        self._begin(np.concatenate([_along(change[:3], speed[0], least), _along(change[3:], speed[1], least)]))
         self._filter.target(np.append(pose.translation, change[3:]))
 
     def drift(self, twist: Any, speed: tuple[float, float]) -> None:
@@ -98,9 +100,9 @@ class HandReference:
         self._drift, self._fresh = None, True
 
 
-def _along(change: Array, speed: float) -> Array:
+def _along(change: Array, speed: float, least: float) -> Array:
     """Limits of the velocities along three axes that sum up to a speed along a line."""
     length = float(np.linalg.norm(change))
     if length == 0.0:
         return np.full(3, speed)
-    return np.maximum(np.abs(change) / length, ACROSS) * speed
+    return np.maximum(np.abs(change) / length, least) * speed

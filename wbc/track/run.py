@@ -30,6 +30,8 @@ from wbc.validation import Array
 
 VERSIONS = ("wbc", "casadi", "pin", "daqp", "osqp", "numpy")
 STATUSES = tuple(Status)
+#: A run is asked what stood in its way where the frame is farther from its target than this [m]
+MISSED = 1e-3
 POSE = ("x", "y", "z", "qx", "qy", "qz", "qw")
 
 
@@ -74,6 +76,10 @@ def track(
     meta = _meta(plan, controller, recorder, compile_time)
     if plant is not None:
         meta["integration"] = f"plant {type(plant).__name__}"
+    if recorder.worst is not None:
+        when, step = recorder.worst
+        said = [str(reason) for reason in step.explain().reasons if reason.task == "hand"]
+        meta["hindrance"] = {"t": when, "text": " ".join(said)}
     nearest = least_mesh_clearance(robot, recorder.q, obstacles, t, gaps)
     if nearest is not None:
         meta["mesh_clearance"] = dict(zip(("least", "link", "t"), nearest, strict=True))
@@ -188,6 +194,9 @@ class RunRecorder:
         self._binding: dict[str, Array] = {}
         self._relaxed: dict[str, Array] = {}
         self._relaxed_units: dict[str, str] = {}
+        #: time and step of the tick that was farthest from its target, None where all were near
+        self.worst: tuple[float, Step] | None = None
+        self._farthest = MISSED
 
     @property
     def q(self) -> Array:
@@ -206,6 +215,9 @@ class RunRecorder:
         pin.framesForwardKinematics(self._plan.robot.model, self._data, q)
         self._pose[k] = pin.SE3ToXYZQUAT(self._data.oMf[self._frame])
         self._target[k] = pin.SE3ToXYZQUAT(target)
+        off = float(np.linalg.norm(self._pose[k, :3] - self._target[k, :3]))
+        if off > self._farthest:
+            self._farthest, self.worst = off, (t, step)
         for name, residual in step.residuals.items():
             self._errors[name][k] = residual.values
         for name, margins in step.margins.items():

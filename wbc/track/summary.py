@@ -34,6 +34,9 @@ def summarise(log: Log) -> list[Figure]:
     if len(log) == 0:
         return out
     out += _tracking(log)
+    if hindrance := meta.get("hindrance"):
+        text = f"{hindrance['text']} ({hindrance['t']:.3g} s)"
+        out.append(Figure("hindrance", "what stood in the way", hindrance, text))
     out += _clearances(log)
     out += _limits(log)
     out += _solver(log)

@@ -13,6 +13,7 @@ from rich.table import Table
 from wbc import validation
 from wbc.cli.console import OutputError, err, out
 from wbc.ik import Solution
+from wbc.ik.hindrance import Hindrance
 from wbc.robot import Robot
 
 SUFFIXES = (".csv", ".npz")
@@ -26,6 +27,7 @@ class TargetAnswer:
     branch: int
     solution: Solution
     oriented: bool
+    why: Hindrance | None = None
 
     @property
     def solved(self) -> bool:
@@ -40,7 +42,9 @@ class TargetAnswer:
 
     @property
     def binding(self) -> str:
-        """Rows and bounds that push; not those of holds, which always do."""
+        """Rows and bounds that push; not those of holds, which always do, nor any where none is to blame."""
+        if self.why is not None and self.why.out_of_reach:
+            return ""
         return ", ".join(str(b) for b in self.solution.binding if b.bound != "equal")
 
     @property
@@ -49,8 +53,17 @@ class TargetAnswer:
         solution = self.solution
         text = f"{solution.status} after {solution.descents} descents; off by {self.off[0]:.3g} m"
         text += f", {self.off[1]:.3g} rad" if self.oriented else ""
+        if self.why is not None and self.why.nearest is not None:
+            nearest = self.why.nearest.residuals["hand"]
+            text += f"; out of reach of the robot itself by {nearest.norm('m'):.3g} m"
+            return (
+                text + (f" and {nearest.norm('rad'):.3g} rad" if self.oriented else "") + "; no constraint is to blame"
+            )
         broken = ", ".join(str(slack) for slack in solution.step.relaxed)
         text += f"; cannot be kept: {broken}" if broken else ""
+        if self.why is not None and (self.why.alone or self.why.together):
+            items = " or without ".join(self.why.alone) or "all constraints"
+            text += f"; within reach without {items}"
         return text + (f"; binding: {self.binding}" if self.binding else "; no row binds")
 
 

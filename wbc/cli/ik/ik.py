@@ -15,6 +15,7 @@ from wbc.cli.ik.targets import Target, given_targets
 from wbc.cli.planning import given_obstacles, planned
 from wbc.errors import InfeasibleError, RangeError
 from wbc.ik import InverseKinematics, Solution
+from wbc.ik.hindrance import hindrance
 from wbc.track.setup import MovingObstacle
 from wbc.validation import Array
 
@@ -105,7 +106,8 @@ def _answers(
         # Where the time ends before the first of all branches, there is the one answer
         with contextlib.suppress(InfeasibleError):
             found = solver.branches(first, **given).solutions
-    return [TargetAnswer(number, k, solution, target.oriented) for k, solution in enumerate(found, 1)]
+    why = None if found[0].solved else hindrance(solver, first, **given)
+    return [TargetAnswer(number, k, solution, target.oriented, why) for k, solution in enumerate(found, 1)]
 
 
 def _standing(obstacles: dict[str, MovingObstacle]) -> dict[str, MovingObstacle]:

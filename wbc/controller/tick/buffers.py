@@ -14,8 +14,8 @@ from wbc.validation import Array
 #: Flags of a tick
 SOLVED, RELAXED, BRAKED, CAPPED = 0, 1, 2, 3
 #: In the report in place of these: the first of the links of a chain that may have given the answer; braked at its end;
-#: braked because the policy wants it
-RECOVERED, CHAIN_BRAKED, POLICY_BRAKED = 4, 8, 9
+#: braked because the policy wants it; moved out of a singular configuration because it wants that
+RECOVERED, CHAIN_BRAKED, POLICY_BRAKED, ESCAPED = 4, 8, 9, 10
 #: Added to what a tick returns, not to what it reports: the certificate fails, or a solver has found no answer
 UNSOUND = 4
 #: Refusals: nothing was changed

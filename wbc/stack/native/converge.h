@@ -49,7 +49,7 @@ typedef struct {
     const double *settling;  /* MT: weights while secondary tasks are followed */
     double restarts;         /* rows of the table */
     double seconds;          /* until the search ends */
-    double room;             /* how far constraints may be off at the answer, in row units */
+    double accuracy;         /* how far constraints may be off at the answer, in row units */
     double secondary;        /* not 0: there are secondary tasks to follow once the goals are met */
 } wbc_search;
 
@@ -116,7 +116,7 @@ static int descend(wbc_tick *t, const wbc_search *s, wbc_found *out, double end)
         out->ticks += 1.0;
         const double cost = squares(t, s, 0, 1.0, &met);
         if (t->unusable != 0.0 || !(cost < HUGE_VAL)) return WBC_EXHAUSTED;
-        const int allowed = may_rest(t, s->room);
+        const int allowed = may_rest(t, s->accuracy);
         if (allowed && cost < out->cost) {
             out->cost = cost;
             memcpy(t->q_good, t->q, NQ * sizeof(double));
@@ -147,7 +147,7 @@ static double corrected(wbc_tick *t, const wbc_search *s, wbc_found *out, int fo
         out->ticks += 1.0;
         if (t->unusable != 0.0) return HUGE_VAL;
         cost = squares(t, s, 0, found ? CLOSELY : 1.0, &met);
-        if (may_rest(t, s->room) && (met || !found)) {
+        if (may_rest(t, s->accuracy) && (met || !found)) {
             if (met && !found) out->ending = WBC_FOUND;
             return found ? squares(t, s, 1, 1.0, &any) : cost;
         }

@@ -1,0 +1,187 @@
+"""How far a hand is off its path on servos in MuJoCo: what users write by hand, and wbc.servo.Servo."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+from time import perf_counter
+
+import numpy as np
+import pinocchio as pin
+
+import wbc
+from bench.pool import ROOT
+from bench.sheet import Sheet
+from wbc.controller import Controller
+from wbc.robot import Robot
+from wbc.servo import Response, Servo
+from wbc.simulation import Command, CommandKind, MujocoPlant
+
+ARM = ROOT / "bench" / "servo_arm.xml"
+HOME = np.array([0.0, 0.3, 0.0, -1.6, 0.0, 1.8, 0.0])
+DT, TICKS, SETTLED = 0.001, 4000, 500
+#: Servos drawn at random
+COUNT = 12
+KINDS = (CommandKind.POSITION, CommandKind.VELOCITY, CommandKind.TORQUE)
+
+
+@dataclass(frozen=True)
+class Hardware:
+    """Servos of an arm: stiffness [N m/rad] and lag [s] for positions, drive [N m s/rad] for velocities,
+    damping [N m s/rad], friction [N m], payload [kg], delay [ms].
+    """
+
+    stiffness: float = 2000.0
+    lag: float = 0.1
+    drive: float = 200.0
+    damping: float = 1.0
+    friction: float = 0.0
+    payload: float = 0.0
+    delay: int = 0
+
+    def plant(self, kind: CommandKind, robot: Robot) -> MujocoPlant:
+        """The arm on servos of a kind; those of velocities come with compensation of gravity, the payload's too."""
+        import mujoco
+
+        model = mujoco.MjModel.from_xml_path(str(ARM))
+        k, d = self.stiffness, self.drive
+        gains = {"position": (k, 0, -k, -k * self.lag), "velocity": (d, 0, 0, -d), "torque": (1, 0, 0, 0)}[kind]
+        model.actuator_gainprm[:, 0], model.actuator_biasprm[:, :3] = gains[0], gains[1:]
+        model.dof_damping[:], model.dof_frictionloss[:] = self.damping, self.friction
+        model.body_mass[model.body("flange").id] += self.payload
+        model.body_gravcomp[1:] = float(kind is CommandKind.VELOCITY)
+        return MujocoPlant(model, robot)
+
+
+def drawn(seed: int) -> Hardware:
+    """Servos at random."""
+    rng = np.random.default_rng(seed)
+    low, high = (10**2.9, 0.03, 50.0, 0.0, 0.0, 0.0), (10**3.9, 0.15, 400.0, 3.0, 2.0, 2.0)
+    numbers = rng.uniform((np.log10(low[0]), *low[1:]), (np.log10(high[0]), *high[1:]))
+    stiffness, lag, drive, damping, friction, payload = numbers.tolist()
+    return Hardware(10.0**stiffness, lag, drive, damping, friction, payload, int(rng.integers(0, 21)))
+
+
+def controller() -> Controller:
+    """A hand, a posture and limits."""
+    robot = wbc.robots.load(ARM, velocity=2.0, acceleration=10.0)
+    stack = wbc.Stack(robot, dt=DT)
+    stack.add(wbc.tasks.EndEffector("tool", gain=10.0), name="hand")
+    stack.add(wbc.tasks.Posture(), name="posture", weight=1e-3)
+    stack.add(wbc.tasks.JointLimits())
+    return stack.compile()
+
+
+class ByHand:
+    """What is written without a servo layer: the command from the tick at ``at``: "commanded", "q" or "q and v"."""
+
+    def __init__(self, controller: Controller, kind: CommandKind, at: str) -> None:
+        self.controller, self.kind, self.at = controller, kind, at
+        self.robot = controller.stack.robot
+        self.data = self.robot.model.createData()
+
+    def reset(self, q: np.ndarray) -> None:
+        """At rest."""
+        self.controller.reset(q)
+        self.q, self.v = q, np.zeros_like(q)
+
+    def step(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """The command's numbers."""
+        start, before = self.q if self.at == "commanded" else q, self.v
+        self.v = (self.controller.step(start, v) if self.at == "q and v" else self.controller.step(start)).v.copy()
+        self.q = start + self.v * DT
+        if self.kind is not CommandKind.TORQUE:
+            return self.q if self.kind is CommandKind.POSITION else self.v
+        back = 40.0 * (self.v - v) + 400.0 * (self.q - q) if self.at == "commanded" else 100.0 * (self.v - v)
+        return np.asarray(pin.rnea(self.robot.model, self.data, q, v, (self.v - before) / DT + back) + v)
+
+
+def error(follower: ByHand | Servo, kind: CommandKind, hardware: Hardware) -> float:
+    """Median distance of the hand from its path after half a second [mm]."""
+    control = follower.controller
+    robot = control.stack.robot
+    plant = hardware.plant(kind, robot)
+    plant.reset(HOME, 0.0)
+    follower.reset(HOME)
+    start, late = pin.SE3(control["hand"].target), deque[Command](maxlen=hardware.delay + 1)
+    off = []
+    for k in range(TICKS):
+        a = np.pi * k * DT
+        goal = start.translation + [0.0, 0.15 * np.sin(a), 0.08 * np.sin(2 * a)]
+        control["hand"].target = pin.SE3(start.rotation, goal)
+        control["hand"].feedforward = [0.0, 0.15 * np.pi * np.cos(a), 0.16 * np.pi * np.cos(2 * a), 0.0, 0.0, 0.0]
+        state = plant.read()
+        if not state.valid:
+            return np.inf
+        if isinstance(follower, Servo):
+            command = follower.step(state.q, state.v).command
+        else:
+            command = Command(kind, follower.step(state.q, state.v))
+        late.append(command)
+        plant.apply(late[0])
+        plant.advance(DT)
+        off.append(1e3 * float(np.linalg.norm(robot.pose(plant.read().q, "tool").translation - goal)))
+    return float(np.median(off[SETTLED:]))
+
+
+def parts() -> dict[str, Sheet | str]:
+    """The plain servos by who follows; random servos; what a step costs."""
+    control = controller()
+    return {"plain": plain(control), "random": random_servos(control), "cost": cost(control)}
+
+
+def plain(control: Controller) -> Sheet:
+    """Servos without friction, payload and delay."""
+    rows = []
+    for kind in KINDS:
+        cells = [f"{error(ByHand(control, kind, at), kind, Hardware()):.2g}" for at in ("commanded", "q", "q and v")]
+        untold = Servo(control, kind)
+        cells.append(f"{error(untold, kind, Hardware()):.2g}")
+        told = Servo(control, kind, response=untold.response)
+        cells.append(f"{error(told, kind, Hardware()):.2g}")
+        rows.append((str(kind), *cells))
+    columns = ("hand off its path, median [mm]", "ticks at what was commanded", "at measured q", "at measured q and v",
+               "`Servo`, told nothing", "`Servo`, told")  # fmt: skip
+    return Sheet("", columns, rows)
+
+
+def random_servos(control: Controller) -> Sheet:
+    """Each drawn servo, told nothing and told what was found."""
+    rows = []
+    for seed in range(COUNT):
+        hardware, cells = drawn(seed), []
+        for kind in KINDS:
+            if kind is CommandKind.TORQUE:
+                delay = Response(delay=hardware.delay * DT)
+                cells.append(f"{error(Servo(control, kind, response=delay), kind, hardware):.2g}")
+                continue
+            untold = Servo(control, kind)
+            first = error(untold, kind, hardware)
+            cells.append(f"{first:.2g} / {error(Servo(control, kind, response=untold.response), kind, hardware):.2g}")
+        h = hardware
+        drawn_as = (h.stiffness, 1e3 * h.lag, h.drive, h.friction, h.payload, h.delay)
+        rows.append(
+            (*(f"{number:.{digits}f}" for number, digits in zip(drawn_as, (0, 0, 0, 1, 1, 0), strict=True)), *cells)
+        )
+    columns = ("stiffness, N m/rad", "lag, ms", "drive, N m s/rad", "friction, N m", "payload, kg", "delay, ms",
+               "position, mm", "velocity, mm", "torque, mm")  # fmt: skip
+    return Sheet("", columns, rows)
+
+
+def cost(control: Controller) -> Sheet:
+    """Median of a step."""
+    rows: list[tuple[str, ...]] = [("tick alone", f"{_median_us(control):.1f}")]
+    for kind in KINDS:
+        servo = Servo(control, kind)
+        servo.reset(HOME)
+        rows.append((str(kind), f"{_median_us(servo):.1f}"))
+    return Sheet("", ("a step, median [us]", ""), rows)
+
+
+def _median_us(stepped: Controller | Servo) -> float:
+    spent = np.empty(4000)
+    for k in range(spent.size):
+        began = perf_counter()
+        stepped.step(HOME)
+        spent[k] = perf_counter() - began
+    return 1e6 * float(np.median(spent))

@@ -1,0 +1,90 @@
+"""MuJoCo as a plant: names on both sides, commands of each kind, quaternions and velocities of free joints."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import wbc
+from tests.refusals import assert_refused
+from wbc.errors import RangeError, UnknownNameError
+from wbc.simulation import Command, CommandKind, MujocoPlant
+
+mujoco = pytest.importorskip("mujoco")
+
+ARM = """<mujoco><compiler angle="radian"/><option gravity="0 0 0" timestep="0.001"/>
+<default><joint damping="1"/></default>
+<worldbody><body name="a"><joint name="one" axis="0 0 1"/><inertial pos=".1 0 0" mass="1" diaginertia=".1 .1 .1"/>
+<body name="b" pos=".3 0 0"><joint name="two" axis="0 1 0"/><inertial pos=".1 0 0" mass="1" diaginertia=".1 .1 .1"/>
+</body></body></worldbody><actuator>{}</actuator></mujoco>"""
+FREE = """<mujoco><compiler angle="radian"/><option gravity="0 0 -9.81" timestep="0.001"/><worldbody><body name="base">
+<freejoint name="base"/><inertial pos="0 0 0" mass="2" diaginertia=".1 .2 .3"/><body name="leg" pos="0 0 -.1">
+<joint name="hip" axis="0 1 0"/><inertial pos="0 0 -.1" mass=".5" diaginertia=".01 .01 .01"/></body></body></worldbody>
+<actuator><motor name="hip" joint="hip" gear="2"/></actuator></mujoco>"""
+DRIVES = {
+    "position": '<position name="b" joint="two" kp="50" kv="5"/><position name="a" joint="one" kp="50" kv="5"/>',
+    "velocity": '<velocity name="b" joint="two" kv="20"/><velocity name="a" joint="one" kv="20"/>',
+    "torque": '<motor name="b" joint="two" gear="4"/><motor name="a" joint="one"/>',
+}
+TWIN = '<worldbody><body name="ball"><freejoint name="ball"/><geom size=".1"/></body>'
+
+
+@pytest.mark.parametrize("kind", DRIVES)
+def test_commands_go_to_the_joints_of_their_names(kind: str, tmp_path: object) -> None:
+    robot = wbc.robots.load(_file(tmp_path, ARM.format(DRIVES[kind])))
+    # An object in front of the robot shifts all of qpos
+    plant = MujocoPlant(mujoco.MjModel.from_xml_string(ARM.format(DRIVES[kind]).replace("<worldbody>", TWIN)), robot)
+    assert list(plant.commands) == [kind]
+    plant.reset(np.array([0.1, -0.2]), 2.0)
+    plant.apply(Command(CommandKind(kind), np.array([0.3, -0.5])))
+    plant.advance(1.0)
+    state = plant.read()
+    assert state.time == pytest.approx(3.0)
+    if kind == "position":
+        assert state.q == pytest.approx([0.3, -0.5], abs=0.02)
+    elif kind == "velocity":
+        assert state.v == pytest.approx(np.array([0.3, -0.5]) * 20 / 21, abs=0.02)
+    else:
+        data = plant.data
+        forces = {data.joint(name).name: float(data.joint(name).qfrc_actuator[0]) for name in ("one", "two")}
+        assert forces == pytest.approx({"one": 0.3, "two": -0.5})
+
+
+def test_a_free_base_falls_as_pinocchio_says(tmp_path: object) -> None:
+    robot = wbc.robots.load(_file(tmp_path, FREE))
+    assert robot.base == "floating"
+    plant, rng = MujocoPlant(mujoco.MjModel.from_xml_string(FREE), robot), np.random.default_rng(0)
+    q, v, data = robot.random(1), rng.uniform(-1, 1, robot.nv), robot.model.createData()
+    plant.reset(q, 0.0)
+    assert plant.read().q == pytest.approx(q)
+    plant._write(q, v)
+    assert plant.read().v == pytest.approx(v)
+    torque = np.zeros(robot.nv)
+    torque[-1] = 0.4
+    plant.apply(Command(CommandKind.TORQUE, torque))
+    for _ in range(50):
+        plant.advance(0.001)
+        v = v + 0.001 * pin.aba(robot.model, data, q, v, torque)
+        q = pin.integrate(robot.model, q, 0.001 * v)
+    state = plant.read()
+    assert pin.difference(robot.model, q, state.q) == pytest.approx(np.zeros(robot.nv), abs=2e-3)
+    assert state.v == pytest.approx(v, abs=2e-2)
+
+
+def test_what_does_not_fit_is_refused(tmp_path: object) -> None:
+    robot = wbc.robots.load(_file(tmp_path, ARM.format("")))
+    model = mujoco.MjModel.from_xml_string(ARM.format(DRIVES["torque"]))
+    assert_refused(lambda: MujocoPlant(mujoco.MjModel.from_xml_string(ARM.format("")), robot), RangeError, "actuator")
+    assert_refused(lambda: MujocoPlant(model, wbc.robots.load("panda")), UnknownNameError, "joint")
+    plant = MujocoPlant(model, robot)
+    assert_refused(lambda: plant.apply(Command(CommandKind.POSITION, np.zeros(2))), UnknownNameError, "position")
+    plant.data.qvel[:] = np.nan
+    assert not plant.read().valid
+
+
+def _file(folder: object, text: str) -> str:
+    path = f"{folder}/robot.xml"
+    with open(path, "w") as file:
+        file.write(text)
+    return path

@@ -1,0 +1,39 @@
+"""The published simulator of arms by Newton and Euler, and its three controllers of a three-link arm.
+
+Source: a thesis on a simulator in PL/1 with a modified Stanford arm; title page and figures of the copy are lost. What
+its print has wrong is put right here and shown in tests/published/test_newton_euler_controllers.py.
+"""
+
+from __future__ import annotations
+
+from wbc.published.newton_euler.actuators import Drive, Motor, discretised
+from wbc.published.newton_euler.control import Adaptive, Estimator, Linearised, Nominal, OneStep, gain
+from wbc.published.newton_euler.decoupling import DecoupledArm, DecoupledTwo, Decoupling
+from wbc.published.newton_euler.links import Arm, Link
+from wbc.published.newton_euler.recursion import Equations, External, LinearModel, equations, linear_model
+from wbc.published.newton_euler.simulation import Run, rigid, simulate
+
+__all__ = [
+    "Adaptive",
+    "Arm",
+    "DecoupledArm",
+    "DecoupledTwo",
+    "Decoupling",
+    "Drive",
+    "Equations",
+    "Estimator",
+    "External",
+    "LinearModel",
+    "Linearised",
+    "Link",
+    "Motor",
+    "Nominal",
+    "OneStep",
+    "Run",
+    "discretised",
+    "equations",
+    "gain",
+    "linear_model",
+    "rigid",
+    "simulate",
+]

@@ -1,0 +1,166 @@
+"""How a servo responds: its lag and its delay, found from a recording or while it works."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from wbc import validation
+from wbc.errors import RangeError
+from wbc.validation import Array
+
+#: Both sides of the equation are smoothed over this time, which makes the derivative one of measured values [s]
+SMOOTHING = 0.02
+#: What is found for each joint
+PER_JOINT = ("lag", "compliance", "sag", "friction")
+#: These, and an offset
+TERMS = 5
+#: Integrals of squares of terms, about which their numbers are said to be half of what fits [rad^2/s, (N m)^2 s, s]
+LITTLE = (1e-4, 1.0, 1.0, 0.1, 1e-9)
+#: A delay is doubted as long as its squared residual is at most so many times the least one
+AS_GOOD = 1.5
+#: A joint that moves less than this between its extremes says nothing of its lag [rad or m, rad/s or m/s]
+LEAST_MOTION = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class Response:
+    """What a servo does with what it is sent, joint by joint, each one number or nv of them:
+
+        T dx/dt + x = u(t - D) - C (M(q) a + c(q, v)) - S g(q) - F sign(v) + offset
+
+    with x = q of a position servo and v of a velocity servo; M, c and g are inertia, Coriolis forces and gravity.
+
+    Attributes:
+        lag: T [s]. delay: D, of command and measurement together [s].
+        doubt: by how much the delay may be longer, at the cost of the lag; feedback is as slow as that asks for [s].
+        compliance, sag: C and S, of forces of motion and of gravity [rad/(N m), or rad/(N m s) of velocities].
+        friction: F [rad or rad/s].
+
+    Raises:
+        ShapeError, NotFiniteError, RangeError: no such numbers, or negative ones.
+    """
+
+    lag: Array | float = 0.0
+    delay: float = 0.0
+    doubt: float = 0.0
+    compliance: Array | float = 0.0
+    sag: Array | float = 0.0
+    friction: Array | float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in PER_JOINT:
+            found = validation.ordinary_array(f"response.{name}", getattr(self, name))
+            if found.ndim > 1 or (found < 0.0).any():
+                raise RangeError(
+                    f"response.{name}", getattr(self, name), "expected one number, or one a joint, of at least 0"
+                )
+        for name in ("delay", "doubt"):
+            validation.scalar(f"response.{name}", getattr(self, name), low=0.0, unit="s")
+
+    def towards(self, other: Response, part: float) -> Response:
+        """With the delay of another one, and a part of the way to its numbers of joints."""
+        lag, *others = (a + min(1.0, part) * (b - a) for a, b in zip(self.rows(), other.rows(), strict=True))
+        return Response(lag, other.delay, other.doubt, *others)
+
+    def rows(self, joints: int | None = None) -> list[Array]:
+        """T, C, S and F, each for so many joints."""
+        found = [np.asarray(getattr(self, name), dtype=float) for name in PER_JOINT]
+        return found if joints is None else [np.broadcast_to(one, (joints,)) for one in found]
+
+
+class Identification:
+    """Least squares over what has been sent and measured so far, for every delay up to a longest one:
+
+        min over D, offset and T, C, S, F >= 0 of  int f |u(t - D) - x - T dx/dt - C .. - S .. - F .. - offset|^2 dt
+
+    f forgets the past with a time constant. All is smoothed alike, which leaves the numbers as they are.
+
+    Args:
+        joints: how many. dt: between samples [s]. longest_delay, memory: of D and of f [s].
+    """
+
+    def __init__(self, joints: int, dt: float, longest_delay: float, memory: float = np.inf) -> None:
+        self._dt, self._keep = dt, np.exp(-dt / memory)
+        self._part = -np.expm1(-dt / SMOOTHING)
+        self._rows = round(longest_delay / dt) + 1
+        # Written twice, so that the last rows always lie in one piece, the oldest first
+        self._sent = np.zeros((2 * self._rows, joints))
+        #: Smoothed: u, x; dx/dt, the loads, and 1
+        self._u, self._x, self._terms = np.zeros(joints), np.zeros(joints), np.zeros((TERMS, joints))
+        self._terms[-1] = 1.0
+        self._squares = np.zeros((TERMS, TERMS, joints))
+        self._products = np.zeros((TERMS, self._rows, joints))
+        self._errors = np.zeros((self._rows, joints))
+        self._next = -1
+
+    def add(self, u: Array, x: Array, loads: Array | float = 0.0) -> None:
+        """What is sent now, what is measured now, and the terms of C, S and F now ``[3, joints]``."""
+        if self._next < 0:
+            self._u[:], self._x[:], self._sent[:], self._terms[1:-1] = u, x, u, loads
+        self._next = (self._next + 1) % self._rows
+        self._u += self._part * (u - self._u)
+        terms = self._terms
+        terms[0] = (self._part / self._dt) * (x - self._x)
+        self._x += self._dt * terms[0]
+        terms[1:-1] += self._part * (loads - terms[1:-1])
+        self._sent[self._next] = self._sent[self._next + self._rows] = self._u
+        error = self._sent[self._next + 1 : self._next + 1 + self._rows] - self._x
+        for sums in (self._squares, self._products, self._errors):
+            sums *= self._keep
+        self._squares += terms[:, None] * terms
+        self._products += terms[:, None] * error
+        self._errors += error * error
+
+    @property
+    def motion(self) -> float:
+        """How much there was to learn from: the sum of int (dx/dt)^2 dt about its mean [rad^2/s]."""
+        return float(self._dt * self._variance().sum())
+
+    def _variance(self) -> Array:
+        squares = self._squares
+        return np.asarray(np.maximum(squares[0, 0] - squares[0, -1] ** 2 / np.maximum(squares[-1, -1], 1.0), 0.0))
+
+    def response(self) -> Response:
+        """What fits best."""
+        squares, products = np.moveaxis(self._squares, -1, 0), np.moveaxis(self._products, -1, 0)
+        found = np.linalg.solve(squares + np.diag(np.array(LITTLE) / self._dt), products)
+        found[:, :-1] = np.maximum(found[:, :-1], 0.0)
+        # The offset that goes with what was cut off
+        rest = products[:, -1] - np.einsum("jt,jtd->jd", squares[:, -1, :-1], found[:, :-1])
+        found[:, -1] = rest / np.maximum(squares[:, -1, -1], 1.0)[:, None]
+        explained = np.einsum("jtd,jtd->jd", found, 2.0 * products - squares @ found)
+        left = ((self._errors.T - explained) / (self._variance() + LITTLE[0] / self._dt)[:, None]).sum(axis=0)
+        row = int(left.argmin())
+        # Row 0 is the longest delay
+        doubtful = row - int(np.argmax(left <= AS_GOOD * left[row]))
+        lag, compliance, sag, friction = found[:, :-1, row].T
+        return Response(lag, (self._rows - 1 - row) * self._dt, doubtful * self._dt, compliance, sag, friction)
+
+
+def identify(commands: Any, measured: Any, dt: float, longest_delay: float = 0.05) -> Response:
+    """Lag and delay of servos from what they were commanded and what they did: see :class:`Identification`.
+
+    Args:
+        commands: u ``[n, joints]``. measured: as each command was sent ``[n, joints]``, positions of a position servo
+            or velocities of a velocity servo. dt: between two rows [s]. longest_delay: no delay is longer [s].
+
+    Raises:
+        ShapeError, NotFiniteError: other arrays. RangeError: a joint that hardly moves, or too few samples.
+    """
+    u, x = (validation.ordinary_array(name, a) for name, a in (("commands", commands), ("measured", measured)))
+    dt = validation.scalar("dt", dt, low=0.0, open_low=True, unit="s")
+    longest = validation.scalar("longest_delay", longest_delay, low=0.0, high=1e4 * dt, unit="s")
+    least = 4 * round(longest / dt) + 20
+    if u.ndim != 2 or len(u) < least or u.shape[1] < 1:
+        raise RangeError("commands", u.shape, f"expected at least {least} samples of some joints")
+    validation.real_array("measured", x, u.shape)
+    moved = np.ptp(x, axis=0)
+    if moved.min() < LEAST_MOTION:
+        raise RangeError("measured", float(moved.min()), f"joint {int(moved.argmin())} hardly moves")
+    found = Identification(u.shape[1], dt, longest)
+    for sent, seen in zip(u, x, strict=True):
+        found.add(sent, seen)
+    return found.response()
