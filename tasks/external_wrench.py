@@ -56,5 +56,4 @@ class ExternalWrench(Load):
 
     def load(self, robot: Robot, kin: Kinematics, inputs: Values) -> ca.SX:
         """J'w."""
-        load: ca.SX = kin.jacobian(self.frame).T @ inputs["wrench"]
-        return load
+        return ca.SX(kin.jacobian(self.frame).T @ inputs["wrench"])

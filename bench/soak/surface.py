@@ -89,7 +89,9 @@ def _of_modules() -> Iterator[Callee]:
             k for k, v in vars(found).items() if getattr(v, "__module__", "") == module and not k.startswith("_")
         ]:
             value = getattr(found, name)
-            if callable(value) and name not in MADE and id(value) not in seen:
+            # a protocol is for type checkers: it has no objects
+            protocol = getattr(value, "_is_protocol", False)
+            if callable(value) and not protocol and name not in MADE and id(value) not in seen:
                 seen.add(id(value))
                 # "load" is the name of two functions
                 key = name if inspect.isclass(value) else f"{module.removeprefix('wbc.')}.{name}"

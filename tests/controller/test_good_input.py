@@ -83,7 +83,10 @@ def test_what_was_given_is_copied(backend: str) -> None:
         one["hand"].target, one["posture"].target, one["place"].target = pose, posture, place
     pose.translation, posture[:], place[:] = np.zeros(3), 0.0, 0.0
     read = controller["hand"].target
-    read.translation = np.ones(3)
+    with pytest.raises(AttributeError, match="translation"):
+        read.translation = np.ones(3)
+    with pytest.raises(ValueError, match="read-only"):
+        read.translation[:] = 1.0
     for item, key in (("posture", "target"), ("place", "target"), ("turn", "target"), ("hand", "mask")):
         value = getattr(controller[item], key)
         value[:] = 7.0

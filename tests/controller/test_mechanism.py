@@ -72,7 +72,7 @@ def test_a_platform_drives_round_its_sideways_direction() -> None:
     q = bot.neutral.copy()
     tick.reset(q)
     tick["posture"].enabled = False
-    goal = tick["hand"].target
+    goal = tick["hand"].target.copy()
     goal.translation = goal.translation + np.array([0.0, 0.6, 0.0])
     tick["hand"].target = goal
     data, frame = bot.model.createData(), bot.model.getFrameId(TIPS["tiago"])

@@ -144,8 +144,9 @@ def test_written_values_read_back() -> None:
             else:
                 assert np.array_equal(back, value)
                 assert isinstance(back, type(value))
-    # what is read is a copy
-    tick["hand"].target.translation[:] = 0.0
+    # what is read cannot be written into
+    with pytest.raises(ValueError, match="read-only"):
+        tick["hand"].target.translation[:] = 0.0
     tick["posture"].target[:] = 0.0
     tick["hand"].mask[:] = 0.0
     assert tick["hand"].target.isApprox(written["hand"]["target"], 1e-15)

@@ -28,8 +28,8 @@ from wbc.tasks import Constraint, EndEffector, Item, JointLimits, Posture
 DT = 0.01
 ROBOTS = ("panda", "talos")
 
-#: A robot's own couplings are no item that one switches
-CLASSES = sorted(name for name in FACTORIES if name != "Mechanism")
+#: A robot's own couplings are no item that one switches, and what is about torques is for stacks that command them
+CLASSES = sorted(FACTORIES.keys() - {"Mechanism", "TorqueLimits", "ExternalWrench", "JointFriction"})
 
 #: Violations that are switched on [m, rad], and how far from there the configurations are that have none
 SHALLOW, DEEP, REACH = 0.01, 0.2, 0.6

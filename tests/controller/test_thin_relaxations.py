@@ -25,7 +25,7 @@ def test_both_back_ends_find_the_optimum_of_a_thin_rest() -> None:
         answers = []
         for controller in (native, vm):
             controller.reset(home)
-            target = controller["hand"].target
+            target = controller["hand"].target.copy()
             target.translation += shift
             controller["hand"].target = target
             controller["hand"].gain = 5.0

@@ -274,8 +274,12 @@ class Robot:
         return replace(self, model=model)
 
     def seen_from(self, pose: pin.SE3) -> Robot:
-        """A copy whose world is the frame at ``pose``: every link is there as seen from that frame."""
-        model, away = pin.Model(self.model), pose.inverse()
+        """A copy whose world is the frame at ``pose``: every link is there as seen from that frame.
+
+        Raises:
+            ShapeError, NotFiniteError, RotationError: no pose.
+        """
+        model, away = pin.Model(self.model), validation.pose("pose", pose).inverse()
         for j in range(1, model.njoints):
             if int(model.parents[j]) == 0:
                 model.jointPlacements[j] = away * model.jointPlacements[j]
