@@ -1,5 +1,5 @@
-"""A peg goes into a hole of a table that heaves and turns: a program of steps (insert.yaml) relative to the hole, which a
-device measures 50 ms late and with noise.
+"""A peg goes into a hole of a table that moves: a program of steps (insert.yaml) relative to the hole, which is
+measured 50 ms late and with noise.
 """
 
 from pathlib import Path

@@ -98,6 +98,13 @@ def test_moving_obstacle_pushes_the_arm_away() -> None:
     assert number("at the end: solved, hand error # mm", text) < 0.1
 
 
+def test_a_peg_goes_in_where_the_hole_is_measured() -> None:
+    said = output("insert")
+    assert "measured: False  failed" in said
+    assert "measured: True   succeeded" in said
+    assert said.count("retreat") == 2
+
+
 def test_moving_table_is_followed() -> None:
     still, followed = (float(x) for x in re.findall(rf"table's frame {NUMBER} mm", output("moving_table")))
     assert followed < 1.0 < 50.0 < still
