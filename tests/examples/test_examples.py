@@ -98,6 +98,13 @@ def test_moving_obstacle_pushes_the_arm_away() -> None:
     assert number("at the end: solved, hand error # mm", text) < 0.1
 
 
+def test_a_peg_goes_in_where_the_hole_is_measured() -> None:
+    said = output("insert")
+    assert "measured: False  failed" in said
+    assert "measured: True   succeeded" in said
+    assert said.count("retreat") == 2
+
+
 def test_moving_table_is_followed() -> None:
     still, followed = (float(x) for x in re.findall(rf"table's frame {NUMBER} mm", output("moving_table")))
     assert followed < 1.0 < 50.0 < still
@@ -218,7 +225,7 @@ def test_examples_are_short_and_use_public_names(path: Path) -> None:
     modules = {a.name for n in ast.walk(tree) if isinstance(n, ast.Import) for a in n.names}
     modules |= {n.module or "" for n in ast.walk(tree) if isinstance(n, ast.ImportFrom)}
     ours = {"wbc", "wbc.tasks", "wbc.track", "wbc.shapes", "wbc.trajectory", "wbc.walking.run", "wbc.coordinates"}
-    ours |= {"wbc.estimation"}
+    ours |= {"wbc.estimation", "wbc.program"}
     assert modules <= {"itertools", "pathlib", "numpy", "pinocchio", "casadi"} | ours
     assert not [n.attr for n in ast.walk(tree) if isinstance(n, ast.Attribute) and n.attr.startswith("_")]
 

@@ -41,7 +41,7 @@ def plot(study: Study, done: Mapping[Knowledge, list[Trial]], folder: pathlib.Pa
         for kind, trial in first.items():
             for panel, part, scale in zip(panels, (slice(0, 3), slice(3, 6)), (1e3, 180.0 / np.pi), strict=True):
                 size = scale * np.linalg.norm(trial.error[:, part], axis=1)
-                panel.semilogy(trial.t, np.maximum(size, 1e-6), color=COLOURS[kind], label=LABELS[kind])
+                panel.semilogy(trial.t, np.maximum(size, 1e-4), color=COLOURS[kind], label=LABELS[kind])
             if np.isfinite(trial.began):
                 panels[0].axvline(trial.began, color=COLOURS[kind], lw=0.8, ls=":")
         panels[0].axhline(1e3 * study.scenario.clearance, color=style.INK, lw=0.8, ls="--")
@@ -50,14 +50,14 @@ def plot(study: Study, done: Mapping[Knowledge, list[Trial]], folder: pathlib.Pa
         panels[0].legend(fontsize=9, loc="lower left")
         figure.savefig(files[0])
         plt.close(figure)
-        _object(plt, study, files[1])
+        _object(plt, study, max(float(trial.t[-1]) for trial in first.values()), files[1])
         _trials(plt, study, done, files[2])
     return files
 
 
-def _object(plt: object, study: Study, file: pathlib.Path) -> None:
+def _object(plt: object, study: Study, end: float, file: pathlib.Path) -> None:
     """How the object of the first trial moves, from where it is at first."""
-    motion, times = study.moves(0), np.linspace(0.0, study.scenario.timeout, 400)
+    motion, times = study.moves(0), np.linspace(0.0, end, 400)
     first = motion.at(0.0).pose
     poses = [motion.at(float(t)).pose for t in times]
     place = 1e3 * np.array([pose.translation - first.translation for pose in poses])

@@ -25,7 +25,7 @@ SIGNIFICANT, PERIOD = (0.04, 0.04, 0.06, 0.07, 0.07, 0.07), 6.0
 #: Of a tumble: rate [rad/s]
 RATE = float(np.radians(3.0))
 #: How long a tool has to be aligned before it goes in [s], and what ends every program
-STEADY, LOST = 0.25, Guard("lost", above=0.5)
+STEADY, LOST = 0.25, Guard(signal="lost", above=0.5)
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,14 +90,16 @@ def peg(robot: Robot, tip: str, motion: str, clearance: float, measurement: Meas
     """
     tool = pin.SE3(np.eye(3), np.array([0.0, 0.0, 0.05]))
     goal = pin.SE3(np.diag([1.0, -1.0, -1.0]), np.array([0.10, 0.05, -0.04]))
-    touches = (Guard("wall", below=0.0),)
+    touches, before = (Guard(signal="wall", below=0.0),), Pose(position=(0, 0, -0.065), quaternion=(0, 0, 0, 1))
+    aligned = Guard(signal="aside", below=0.75 * clearance, lasting=STEADY)
+    slow, within = (0.06, 0.5), (5e-3, 0.02)
     program = Program(
-        (
-            Move(HAND, Pose((0, 0, -0.065), (0, 0, 0, 1)), speed=(0.06, 0.5), within=(5e-3, 0.02), timeout=8),
-            Hold((Guard("aside", below=0.75 * clearance, lasting=STEADY),), name="align", timeout=3),
-            Approach(HAND, (0, 0, 1), 0.03, (Guard("depth", above=0.038),), 0.07, name=WORK, unless=touches),
-            Hold((Guard("elapsed", above=0.5),), name="stay", unless=touches),
-            Retreat(HAND, (0, 0, -0.065), speed=(0.06, 0.5), within=(5e-3, 0.02), unless=touches, timeout=5),
+        steps=(
+            Move(hand=HAND, to=before, speed=slow, within=within, timeout=8),
+            Hold(until=(aligned,), name="align", timeout=3),
+            _approach(0.03, 0.038, 0.07, touches),
+            Hold(until=(Guard(signal="elapsed", above=0.5),), name="stay", unless=touches),
+            Retreat(hand=HAND, by=(0, 0, -0.065), speed=slow, within=within, unless=touches, timeout=5),
         ),
         abort=(LOST,),
     )
@@ -112,14 +114,16 @@ def grasp(robot: Robot, tip: str, motion: str, measurement: Measurement, **more:
     """A grapple fixture on a free body, a twentieth of the arm's length before the tool: the tool comes within a
     fiftieth, goes on to the fixture and holds, within 20 mm and 1 degree.
     """
-    length, off = robot.characteristic_length, (Guard("off", above=0.02), Guard("tilt", above=np.radians(1.0)))
-    near = 0.02 * length
+    length = robot.characteristic_length
+    near, turned = 0.02 * length, Guard(signal="tilt", above=float(np.radians(1.0)))
+    before = Pose(position=(0, 0, -near), quaternion=(0, 0, 0, 1))
+    aligned, off = Guard(signal="aside", below=0.01, lasting=STEADY), Guard(signal="off", above=0.02)
     program = Program(
-        (
-            Move(HAND, Pose((0, 0, -near), (0, 0, 0, 1)), speed=(0.12, 0.03), within=(0.05, 0.02), timeout=20),
-            Hold((Guard("aside", below=0.01, lasting=STEADY),), name="align", timeout=10),
-            Approach(HAND, (0, 0, 1), 0.1, (Guard("depth", above=-0.005),), 1.05 * near, name=WORK, unless=off[1:]),
-            Hold((Guard("elapsed", above=1.0),), name="stay", unless=off),
+        steps=(
+            Move(hand=HAND, to=before, speed=(0.12, 0.03), within=(0.05, 0.02), timeout=20),
+            Hold(until=(aligned,), name="align", timeout=10),
+            _approach(0.1, -0.005, 1.05 * near, (turned,)),
+            Hold(until=(Guard(signal="elapsed", above=1.0),), name="stay", unless=(off, turned)),
         ),
         abort=(LOST,),
     )
@@ -129,6 +133,12 @@ def grasp(robot: Robot, tip: str, motion: str, measurement: Measurement, **more:
         policy=DropoutPolicy(1.0, 2.0),
     )  # fmt: skip
     return _placed(scenario, motion, np.array([0.0, 0.0, 0.05 * length]), (0.01 * length, 0.1), 1.0, 0.005, **more)
+
+
+def _approach(speed: float, depth: float, at_most: float, unless: tuple[Guard, ...]) -> Approach:
+    """The step that goes in."""
+    deep = (Guard(signal="depth", above=depth),)
+    return Approach(hand=HAND, along=(0, 0, 1), speed=speed, until=deep, at_most=at_most, name=WORK, unless=unless)
 
 
 def _placed(

@@ -146,13 +146,13 @@ class Bench:
                 if report.state != "running":
                     break
                 state = connection.drive(step.v)
-        columns = [np.array(column) for column in zip(*rows, strict=True)]
+        t, q, command, off, known_off, rates, goals = (np.array(column) for column in zip(*rows, strict=True))
         began = next((e.time for e in runner.log if e.status == "begins" and e.step.endswith(WORK)), np.nan)
         success = report.state == "succeeded"
         # Without the figures, which differ from trial to trial
         told = re.split(r" \(|, ", report.reason)[0] or "not done in time"
         reason = "" if success else f"{report.step.partition(' ')[2]}: {told}"
-        return Trial(*columns, success=success, reason=reason, time=float(columns[0][-1]), began=began)
+        return Trial(t, q, command, off, known_off, rates, goals, success, reason, float(t[-1]), began)
 
     def _place(self, believed: FrameMotion) -> None:
         """The goal, which the object carries, is the moving frame."""
