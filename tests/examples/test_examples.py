@@ -212,7 +212,7 @@ def test_conflict_names_the_culprit() -> None:
     page = (FOLDER.parent / "docs" / "explanations.md").read_text()
     worked = page.split("## Three worked conflicts")[1].split("\n## ")[0]
     quoted = [line.strip() for line in worked.splitlines() if line[:4] == "    "]
-    assert len(quoted) == 10
+    assert len(quoted) == 11
     assert [line for line in quoted if line not in text.splitlines()] == []
 
 

@@ -100,8 +100,8 @@ def test_a_walk_on_servos_is_judged_by_the_checker(
         assert report.ok, str(report)
         assert len(walk.progress.steps) >= 1
         ends.append((walk.time, max(tick.slip for tick in ticks), max(tick.body_error for tick in ticks)))
-    # Hands on their holds slip and the body is late, within what the rules allow
-    assert ends[1][0] == pytest.approx(ends[0][0], abs=0.2)
+    # Hands on their holds slip and the body is late, within what the rules allow; hands that lag wait over their holds
+    assert ends[0][0] - 0.2 < ends[1][0] < ends[0][0] + 1.0
     assert ends[0][1] < 3e-5 < ends[1][1] < 3e-4
     assert ends[0][2] < 1e-4 < ends[1][2] < 2e-3
 

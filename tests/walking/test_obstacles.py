@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from wbc.robots import Walker
 from wbc.shapes import Box, Capsule
@@ -15,7 +16,7 @@ from wbc.walking.checker import Report, Rules, check_walk
 from wbc.walking.holds.built_in import grid_pose
 from wbc.walking.loop.stack import WalkStack
 from wbc.walking.loop.walk import Walk
-from wbc.walking.planner.plan import Plan
+from wbc.walking.planner.plan import NoPlanError, Plan
 from wbc.walking.planner.planner import plan_walk
 from wbc.walking.run.recording import WalkRecorder
 
@@ -23,9 +24,11 @@ INCH = 0.0254
 CLEARANCE = "clearance of the structure"
 
 
-def checked(machine: Walker, planned: Plan, on: Structure, stack: WalkStack, folder: Path) -> Report:
+def checked(
+    machine: Walker, planned: Plan, on: Structure, stack: WalkStack, folder: Path, foresees: bool = True
+) -> Report:
     """A walk, checked against a structure that need not be the one that it was planned for."""
-    walk = Walk(machine, on, planned, stack=stack)
+    walk = Walk(machine, on, planned, stack=stack, foresees=foresees)
     recorder = WalkRecorder(walk)
     assert walk.run(recorder.tick) == "arrived"
     return check_walk(recorder.log()[0], machine.urdf(folder / "robot.urdf"), on, Rules(sub_samples=1))
@@ -45,8 +48,10 @@ def test_swings_go_round_what_stands_in_their_way(
     file = save_structure(replace(structure, obstacles=tuple(obstacles)), tmp_path / "there.csv")
     there = replace(read_structure(file), name=structure.name)
     assert [obstacle.id for obstacle in there.obstacles] == [obstacle.id for obstacle in obstacles]
-    # Planned without them, a hand comes too near; planned with them, none
-    blind = checked(machine, plain, there, stack, tmp_path)
+    # Planned without them, a hand comes too near, or the walk refuses to begin; planned with them, none does
+    with pytest.raises(NoPlanError, match="obstacle"):
+        checked(machine, plain, there, stack, tmp_path)
+    blind = checked(machine, plain, there, stack, tmp_path, foresees=False)
     assert not blind[CLEARANCE].ok
     assert blind[CLEARANCE].where.endswith("'s")
     seen = plan_walk(machine, there, path)

@@ -159,7 +159,7 @@ def test_bad_questions_are_refused(quick: Walker, row: Structure) -> None:
         plan_two_ended(quick, row, {"arm1": "1", "arm2": "1"}, "6")
     with pytest.raises(NoPlanError, match="no posture between"):
         plan_two_ended(quick, row, {"arm1": "1", "arm2": "6"}, "6")
-    with pytest.raises(NoPlanError, match="the elbow comes no nearer"):
+    with pytest.raises(NoPlanError, match="no two holds bring the arm's elbow nearer"):
         plan_two_ended(quick, row, START, [1000.0, 0.0, 0.0])
     with pytest.raises(RangeError, match="one hand must fix the arm"):
         plan_two_ended(quick, cylinder(), {"arm1": "1,1", "arm2": "9,9"}, "5,5")

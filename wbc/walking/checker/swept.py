@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Sequence
 from itertools import combinations
+from math import inf
 
 import numpy as np
 import pinocchio as pin
@@ -24,9 +25,8 @@ from wbc.walking.holds.surface import PlaneSurface
 from wbc.walking.log.log import WalkLog
 
 LINKS, STRUCTURE = "swept clearance of links", "swept clearance of the structure"
-#: A hold is mounted on what is this near to it [m]; so long before and after the log has a hand there it may be near
-#: to it [s]
-MOUNTED, LEAVING = 0.005, 3.0
+#: A hold is mounted on what is this near to it [m]
+MOUNTED = 0.005
 
 
 def declare(tally: Tally, rules: Rules) -> None:
@@ -116,12 +116,14 @@ def _exemptions(
         mine = [body for body in bodies if body.link in urdf.carried_with(hand)]
         rows = log.hand_hold[:, arm]
         starts = np.flatnonzero(np.diff(rows, prepend=-2))
-        for start, end in zip(starts, np.append(starts[1:], len(rows)) - 1, strict=True):
+        ends = np.append(starts[1:], len(rows)) - 1
+        for k, start in enumerate(starts):
             if rows[start] < 0:
                 continue
             point = log.hold_pose[int(rows[start]), :3]
             mounts = _mounts(structure, point)
-            since, until = float(log.t[start]) - LEAVING, float(log.t[end]) + LEAVING
+            # While the hand comes and goes: from the hold before to the one after
+            since, until = float(log.t[ends[k - 1]]) if k else -inf, float(log.t[ends[min(k + 1, len(ends) - 1)]])
             for body in mine:
                 depth = rules.exempt_depth + float(getattr(body.shape, "radius", 0.0))
                 for mount in mounts:

@@ -67,10 +67,10 @@ class Foresight:
         self.walker, self.structure = walker, structure
         tree, clearance = Tree.of_model(walker.robot.model), walker.tolerances.clearance - SLACK
         self._hands = [self._grasping(tree, arm) for arm in range(len(walker.arms))]
-        hands = {body.name: body for body in self._hands}
+        hands = {body.name: body for mine in self._hands for body in mine}
         bodies = [hands.get(body.name, body) for body in bodies_of(walker.robot)]
         things = list(_things(structure))
-        pairs = self_pairs(walker.robot, clearance)
+        pairs = self_pairs(walker.robot, clearance) if walker.robot.self_pairs is not None else []
         pairs += [Pair(body.name, thing.name, clearance) for body, thing in product(bodies, things)]
         self._sweeper = Sweeper(SweptScene(tree, [*bodies, *things], pairs))
         self._tree, self._mounts = tree, dict[bytes, tuple[str, ...]]()
@@ -174,19 +174,25 @@ class Foresight:
         near = np.flatnonzero(off < self.walker.tolerances.exempt_distance)
         return [(arm, self.structure.positions[hold]) for hold in near]
 
-    def _grasping(self, tree: Tree, arm: int) -> SweptBody:
-        """The hand of an arm, with its grasp point."""
+    def _grasping(self, tree: Tree, arm: int) -> list[SweptBody]:
+        """The bodies that move with the hand of an arm, with its grasp point; none where the hand has no shape."""
         mine = self.walker.arms[arm]
-        body = next(body for body in bodies_of(self.walker.robot) if body.link == mine.links[-1])
-        grasp = (tree.links[body.link][1].inverse() * tree.links[mine.hand][1]).translation
-        return SweptBody(body.name, body.shape, body.link, body.placement, grasp)
+        carried = tree.links[mine.hand][0]
+        out = []
+        for body in bodies_of(self.walker.robot):
+            if tree.links[body.link][0] == carried:
+                grasp = (tree.links[body.link][1].inverse() * tree.links[mine.hand][1]).translation
+                out.append(SweptBody(body.name, body.shape, body.link, body.placement, grasp))
+        return out
 
     def _exemptions(self, arm: int, point: Array, deep: float) -> list[Exemption]:
-        name, hand = point.tobytes(), self._hands[arm]
+        name, distance = point.tobytes(), self.walker.tolerances.exempt_distance
         if name not in self._mounts:
             self._mounts[name] = tuple(_mounted(self.structure, point))
-        depth, radius = deep + float(getattr(hand.shape, "radius", 0.0)), self.walker.tolerances.exempt_distance
-        return [Exemption(hand.name, mount, point, radius, depth) for mount in self._mounts[name]]
+        return [
+            Exemption(hand.name, mount, point, distance, deep + float(getattr(hand.shape, "radius", 0.0)))
+            for hand, mount in product(self._hands[arm], self._mounts[name])
+        ]
 
 
 def _things(structure: Structure) -> list[SweptBody]:
