@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import degrees, isfinite
 from pathlib import Path
 from typing import Annotated
 
@@ -128,7 +129,8 @@ def moving_target(
         table.add_column(head, justify="left" if "object" in head else "right")
     for kind, found in figures.items():
         time = f"{found.time[0]:.2f}" if found.successes else "-"
-        cells = [f"{1e3 * found.rms:.3f}", f"{1e3 * found.worst:.3f}", f"{57.29578 * found.angle:.3f}"]
+        sizes = (1e3 * found.rms, 1e3 * found.worst, degrees(found.angle))
+        cells = [f"{size:.3f}" if isfinite(size) else "-" for size in sizes]
         last = [time, f"{found.rate:.2f}", f"{1e3 * found.knowledge_rms:.3f}"]
         table.add_row(pictures.LABELS[kind], f"{found.successes} of {found.done}", *cells, *last)
     console = out()
