@@ -9,7 +9,6 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Sequence
 from itertools import combinations
-from math import inf
 
 import numpy as np
 import pinocchio as pin
@@ -25,8 +24,9 @@ from wbc.walking.holds.surface import PlaneSurface
 from wbc.walking.log.log import WalkLog
 
 LINKS, STRUCTURE = "swept clearance of links", "swept clearance of the structure"
-#: A hold is mounted on what is this near to it [m]
-MOUNTED = 0.005
+#: A hold is mounted on what is this near to it [m]; so long before and after the log has a hand there it may be near
+#: to it [s]
+MOUNTED, LEAVING = 0.005, 3.0
 
 
 def declare(tally: Tally, rules: Rules) -> None:
@@ -122,8 +122,10 @@ def _exemptions(
                 continue
             point = log.hold_pose[int(rows[start]), :3]
             mounts = _mounts(structure, point)
-            # While the hand comes and goes: from the hold before to the one after
-            since, until = float(log.t[ends[k - 1]]) if k else -inf, float(log.t[ends[min(k + 1, len(ends) - 1)]])
+            # While the hand comes and goes, from the hold before to the one after, and LEAVING at the least
+            came, went = starts[max(k - 1, 0)], ends[min(k + 1, len(ends) - 1)]
+            since = float(min(log.t[came], log.t[start] - LEAVING))
+            until = float(max(log.t[went], log.t[ends[k]] + LEAVING))
             for body in mine:
                 depth = rules.exempt_depth + float(getattr(body.shape, "radius", 0.0))
                 for mount in mounts:
