@@ -107,7 +107,7 @@ def median(controller: Controller, states: list[np.ndarray], target: np.ndarray 
     controller.reset(controller.stack.robot.neutral)
     v, least = np.zeros(controller.stack.robot.nv), np.inf
     if target is not None:
-        goal = controller["hand"].target
+        goal = controller["hand"].target.copy()
         goal.translation += 0.05
         controller["hand"].target = goal
     for _ in range(TURNS):
