@@ -169,13 +169,14 @@ class Hands:
         """The swinging hand does not go to its hold any more: it slows down along its law, and stays in the air."""
         if self.swinging is None:
             return
-        if self.swinging.state == "open" and self.swinging.pace > 0.0:
-            if not self.swinging.dropped:
-                self._leave(self.swinging)
-            self.swinging.dropped = True
-            return
         if not self.swinging.dropped:
             self._leave(self.swinging)
+        if self.swinging.state == "opening":
+            self.swinging.dropped, self.swinging.pace = True, 0.0
+            return
+        if self.swinging.state == "open" and self.swinging.pace > 0.0:
+            self.swinging.dropped = True
+            return
         self.stay(self.swinging.arm)
         self.swinging = None
 
@@ -201,7 +202,7 @@ class Hands:
     def settle(self, swinging: Swinging) -> bool:
         """Close a hand that has come to rest on its hold; whether the latch is through with this tick."""
         if swinging.dropped:
-            if swinging.pace == 0.0:
+            if swinging.pace == 0.0 and swinging.state == "open":
                 self.drop()
             return False
         if swinging.state == "open" and swinging.clock >= swinging.law.duration - 1e-9:

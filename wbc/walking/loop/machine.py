@@ -14,6 +14,9 @@ from wbc.walking.arms.fits import check_fits
 from wbc.walking.holds.structure import Structure
 from wbc.walking.loop.closed_chain import ClosedChain
 
+#: What a body is off where the hands have it, when others hold than before, is taken back in [s]
+EASING = 0.2
+
 
 class Machine:
     """Where the joints are is what the plant reads; where the body is follows from the holds of the closed hands
@@ -38,7 +41,7 @@ class Machine:
     def __init__(self, walker: Walker, structure: Structure, dt: float, plant: Plant | None = None) -> None:
         check_fits(walker)
         self.walker, self.structure, self.dt = walker, structure, dt
-        self.chain = ClosedChain(walker, structure)
+        self.chain = ClosedChain(walker, structure, round(EASING / dt))
         self._connection = Connection(plant, walker.robot, dt)
         self.q = np.array(walker.robot.neutral)
         self.v = self.rates = np.zeros(walker.robot.nv)
