@@ -26,6 +26,7 @@ from wbc.stack.layout import Block, Layout
 from wbc.validation import Array
 
 if TYPE_CHECKING:
+    from wbc.batch import Batch
     from wbc.record.recorder import Recorder
 
 _Array = np.ndarray
@@ -133,6 +134,22 @@ class Controller(Handles):
         out = Controller(self.stack, self._artifact, self.solver, self._core.assembly.twin())
         out._core.assume(self._core)
         return out
+
+    def batch(self, count: int, *, threads: int | None = None) -> Batch:
+        """Many robots, or candidate states, of this compiled stack, which tick in one call; docs/batch.md.
+
+            batch = controller.batch(10_000)
+            batch.set(hand=poses)                   # [10_000, 4, 4]
+            v = batch.step(q).v                     # [10_000, nq] -> [10_000, nv]
+
+        Args:
+            count: how many. threads: that tick at a time; default: one a core.
+
+        Raises:
+            RangeError: not an integer >= 1. SolverError: the stack measures distances, or its policy has an escape.
+        """
+        batch: Batch = hooks.batch(self, count, threads)
+        return batch
 
     def __reduce_ex__(self, protocol: Any) -> Any:
         reason = "lives in the memory of its process; pickle controller.stack, and compile it there"

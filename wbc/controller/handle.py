@@ -280,6 +280,10 @@ class Handle:
             super().__setattr__(name, getattr(other, name))
         super().__setattr__("_mask", other._mask.copy())
 
+    def unit_weights(self) -> Array:
+        """What a weight of 1 puts on each row of a task, its switches counted."""
+        return self._mask * float(self._enabled) * self._row_weights * self._owner.row_costs[self._block.span]
+
     def apply(self) -> None:
         """Write weights or row switches to the buffers."""
         tick, block, form = self._owner.tick, self._block, self._block.form

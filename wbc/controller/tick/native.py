@@ -55,19 +55,22 @@ class NativeTick(Assembly):
         self.step_function = self._library.wbc_tick_step
         self._take_pose = functools.partial(self._library.wbc_tick_pose, self.pointer)
 
-    @functools.cached_property
-    def converge_function(self) -> Any:
-        """One search; of a library that was compiled with inverse kinematics."""
-        function = self._library.wbc_tick_converge
-        function.restype = None
+    def library_function(self, name: str, returns: Any, unlocked: bool = False) -> Any:
+        """Another function of the library; ``unlocked``: it works long enough to be worth releasing the lock for."""
+        library = ctypes.CDLL(self._library._name, handle=self._library._handle) if unlocked else self._library
+        function = getattr(library, name)
+        function.restype = returns
         return function
 
     @functools.cached_property
+    def converge_function(self) -> Any:
+        """One search; of a library that was compiled with inverse kinematics."""
+        return self.library_function("wbc_tick_converge", None)
+
+    @functools.cached_property
     def converge_many(self) -> Any:
-        """Thousands of searches in one call, which are worth releasing the lock for."""
-        function = ctypes.CDLL(self._library._name, handle=self._library._handle).wbc_tick_converge_many
-        function.restype = None
-        return function
+        """Thousands of searches in one call."""
+        return self.library_function("wbc_tick_converge_many", None, unlocked=True)
 
     def twin(self) -> NativeTick:
         return NativeTick(self._library, self._layout)
