@@ -15,6 +15,7 @@ from wbc.batch.engine import Clones, Compiled, Engine
 from wbc.controller import Controller, core_of
 from wbc.controller.handle import Handle, UnknownValueError
 from wbc.controller.tick.native import NativeTick
+from wbc.controller.together import main_input
 from wbc.errors import RangeError, ShapeError, SolverError
 from wbc.stack.codegen import unit_groups
 from wbc.stack.layout import Slot
@@ -204,19 +205,6 @@ class Batch:
     def __repr__(self) -> str:
         stack = self._core.stack
         return f"<Batch of {self.count} {stack.robot.name}: {', '.join(e.name for e in stack.entries)}>"
-
-
-def main_input(handle: Handle) -> str:
-    """The value that an item is about: its target, or the only one that it has.
-
-    Raises:
-        ShapeError: it has several, or none.
-    """
-    names = [name for name in handle.names if name not in ("weight", "enabled", "mask", "gain", "rate", "price")]
-    if "target" in names or len(names) == 1:
-        return "target" if "target" in names else names[0]
-    reason = f"has no target; say which of its values: a dictionary of {', '.join(map(repr, handle.names))}"
-    raise ShapeError(handle.item_name, None, reason)
 
 
 def _below(handle: Handle, name: str) -> str | None:

@@ -1,4 +1,5 @@
-/* What a process loads: the tick, and many ticks in one call */
+/* What a process loads: the tick, values from Python, and many ticks in one call */
 #include "tick.c"
 
+#include "builtins.h"
 #include "many.h"
