@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -124,6 +125,32 @@ class Contact(Constraint):
     def cone(self, inputs: Values) -> Cone:
         """What the wrench may be; the units are N and N m."""
         raise TypeError(f"{type(self).__name__} declares no cone")
+
+
+class Pressing:
+    """Ground of contacts that a surface only pushes: the fields ``friction``, ``least`` and ``most`` and their inputs.
+
+    Raises:
+        ShapeError, NotFiniteError, RangeError: on construction.
+    """
+
+    friction: float
+    least: float
+    most: float
+
+    def __post_init__(self) -> None:
+        owner = type(self).__name__
+        object.__setattr__(self, "friction", validation.scalar(f"{owner}.friction", self.friction, low=0.0))
+        object.__setattr__(self, "least", validation.scalar(f"{owner}.least", self.least, low=0.0, unit="N"))
+        object.__setattr__(self, "most", checked_positive(f"{owner}.most", self.most, "N", zero=True))
+
+    def limits(self) -> tuple[Input, ...]:
+        """``friction``, ``least`` and ``most``."""
+        return (
+            Input("friction", unit="1", default=self.friction, low=0.0),
+            Input("least", unit="N", default=self.least, low=0.0),
+            Input("most", unit="N", default=self.most, low=0.0, infinite=math.inf),
+        )
 
 
 @dataclass(frozen=True)
