@@ -34,6 +34,17 @@ static int unsound(const wbc_tick *t, int flag) {
     return !((optimal || t->report.error_bound <= KNOWN * LONGEST) && t->report.violation <= SOUND * LONGEST);
 }
 
+#if LEVELS == 0
+/* After a relaxation: from the point that its classes met at */
+static int primal_of_the_rest(wbc_tick *t, int flag) {
+    if (flag != WBC_RELAXED || LAST_ORDER == 0) return 0;
+    for (int i = 0; i < NV; i++) t->report.v[i] = clamp(t->met[i], t->low[i], t->high[i]);
+    if (!primal(t)) return 0;
+    report_slack(t, flag);
+    return 1;
+}
+#endif
+
 /* By how much soft rows are violated; the slack of those that give way by more than is worth a report */
 static void report_soft_rows(wbc_tick *t) {
     for (int k = 0; k < MC; k++) {
@@ -90,7 +101,8 @@ EXPORT int wbc_tick_step(wbc_tick *t) {
     flag = all_levels(t, flag);
 #else
     wbc_tick_certify(t);
-    if (t->cap == 0.0 && unsound(t, flag) && primal(t)) flag = (int)(t->report.flag = flag == WBC_RELAXED ? WBC_RELAXED : WBC_SOLVED);
+    if (t->cap == 0.0 && unsound(t, flag) && (primal(t) || primal_of_the_rest(t, flag)))
+        flag = (int)(t->report.flag = flag == WBC_RELAXED ? WBC_RELAXED : WBC_SOLVED);
 #endif
     if (PRICES) report_soft_rows(t);
     wbc_tick_look_ahead(t);

@@ -123,6 +123,8 @@ typedef struct {
     long long work_iw[WORK_IW + 1];
     int warm;                    /* the sense array holds the active set of the last tick */
     int spent;                   /* the cap has ended a search of this tick */
+    double met[NV];              /* where the classes of a relaxation met */
+    int brief;                   /* iterations of a search that may fail; 0: as many as it takes */
     int alone;                   /* no row binds: R^-1 is all that a refinement needs */
     int factored;                /* R inverse and M of the last tick are in the workspace */
     /* DAQP workspace on our own memory */
