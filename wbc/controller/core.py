@@ -158,8 +158,7 @@ class Core:
             self.initialise(self._first, configuration)
         self.waiting = {} if configuration is not None else dict(self._first)
         self.tick.v_last[: self.layout.nv] = velocity
-        if self.layout.command != "velocity":
-            self.assembly.kept[:] = 0.0
+        self.assembly.forget()
         self.tick.reset()
         if isinstance(self.call, Escape):
             self.call.reset()
