@@ -159,8 +159,7 @@ class Core:
             self.initialise(self.first, configuration)
         self.waiting = {} if configuration is not None else dict(self.first)
         self.tick.v_last[: self.layout.nv] = velocity
-        if self.layout.command != "velocity":
-            self.assembly.kept[:] = 0.0
+        self.assembly.forget()
         self.tick.reset()
         if isinstance(self.call, Escape):
             self.call.reset()

@@ -104,7 +104,7 @@ INPUTS = (
 )
 #: Of accelerations
 REST_INPUTS = (
-    Field("kept", ("NV",), "wrenches of the last tick with an answer, which one without keeps; 0 for joints"),
+    Field("kept", ("NV",), "torques of the last command, 1e30: unknown; wrenches of the last tick with an answer"),
 )
 QP_FIELDS = (
     Field("H", ("NV", "WIDE"), "upper triangle, row by row"),

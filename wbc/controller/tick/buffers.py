@@ -65,7 +65,8 @@ class Buffers:
     bound_enabled: Array
     report: Array
     state: Array
-    #: of accelerations, the wrenches that a tick without an answer keeps [variables]; empty for velocities
+    #: of accelerations, the torques of the last command and the wrenches that a tick without an answer keeps
+    #: [variables]; empty for velocities
     kept: Array = np.zeros(0)
 
     def share(self, other: Buffers) -> None:
@@ -90,6 +91,10 @@ class Assembly(Buffers, ABC):
     plain: Array
     _command: Command
     _dofs: int
+    #: place of the torques in the report
+    _torque: slice
+    #: places in ``p`` of torques that may change only so fast, and their degrees of freedom
+    _slewed: tuple[list[int], list[int]]
 
     @abstractmethod
     def check(self) -> int:
@@ -151,9 +156,21 @@ class Assembly(Buffers, ABC):
             return
         nv = self._dofs
         self._find_torques()
+        if self._command == "torque":
+            self.kept[:nv] = self.report[self._torque]
         self.v_last[:nv] += float(self.dt[0]) * v[:nv]
         if sound:
             self.kept[nv:] = v[nv:]
+
+    def forget(self) -> None:
+        """No wrenches are kept, and the last torques are not known."""
+        self.kept[:] = 0.0
+        self.kept[: self._dofs] = INFINITE
+
+    def rewind(self) -> None:
+        """Before the tick is done again: accelerations and torques count from where they did."""
+        self.v_last[:] = self.v_in
+        self.kept[self._slewed[1]] = self.p[self._slewed[0]]
 
     def rest(self, lower: Array, upper: Array) -> Array:
         """The command within simple bounds that is nearest to rest."""

@@ -44,6 +44,9 @@ class NativeTick(Assembly):
         self.q, self.p, self.dt, self.cap = view("q"), view("p"), view("dt"), view("cap")
         self.v_last, self.v_in, self.use_v = view("v_last"), view("v_in"), view("use_v")
         self._command, self._dofs = layout.command, layout.nv
+        self._slewed = layout.slewed
+        if layout.command == "torque":
+            self._torque = places["torque"]
         if layout.command != "velocity":
             self.kept = view("kept")
         self.weight, self.enabled, self.bound_enabled = view("weight"), view("enabled"), view("bound_enabled")
