@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from wbc import lazy
 
 if TYPE_CHECKING:
+    from wbc.robot.carried import carry
     from wbc.robot.geometry.convex_parts import ConvexParts
     from wbc.robot.geometry.link_shapes import convex_parts, fit_shapes
     from wbc.robot.mujoco_joints import MujocoJoints
@@ -38,6 +39,7 @@ __all__ = [
     "Walker",
     "WalkerArm",
     "WalkerData",
+    "carry",
     "convex_parts",
     "find_self_pairs",
     "fit_shapes",

@@ -8,6 +8,8 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
+import pinocchio as pin
+
 import wbc
 from bench.descriptions import write_urdf
 from bench.pool import ROOT
@@ -75,7 +77,10 @@ def arguments(program: Program, folder: Path) -> list[str]:
         return [str(EXAMPLES / program.robot)]
     robot, file = wbc.robots.load(program.robot, shapes="none"), folder / f"{program.robot}.urdf"
     folder.mkdir(parents=True, exist_ok=True)
-    write_urdf(Path(robot.source), file)
+    # What the table locks has no joint for the peer either; bases of wheels it builds itself
+    whole = pin.buildModelFromUrdf(robot.source)
+    locked = set(list(whole.names)[1:]) - set(robot.joint_names) if robot.base == "fixed" else ()
+    write_urdf(Path(robot.source), file, locked=locked)
     words = [str(file)]
     if robot.base != "fixed":
         for j in range(2, robot.model.njoints):
