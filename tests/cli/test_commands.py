@@ -116,7 +116,7 @@ def test_track_of_a_position_alone_lets_the_hand_turn(tmp_path: Path) -> None:
     assert run("track", "ur5", *options, "--output", tmp_path / "run")[0] == 0
     summary = json.loads((tmp_path / "run" / "summary.json").read_text())
     assert "rotation_error" not in summary
-    assert summary["position_error"]["max"] < 5e-3
+    assert summary["position_error"]["max"] < 0.05
 
 
 def test_track_solvers_agree(tmp_path: Path) -> None:
