@@ -104,6 +104,7 @@ _ALL = (
     Figure("levels", TICK, 0.5),
     Figure("pairs", (*TICK, "wbc/coordinates"), 0.5),
     Figure("policy", (*TICK, "wbc/record", "wbc/explain"), 0.5),
+    Figure("programs", ("examples", "bench/programs"), 4.0),
     Figure("reach", (*TICK, "tests/calm"), 0.5),
     Figure("relative_motion", ("wbc/published/relative_motion", "wbc/symbolic/taylor.py"), 0.2),
     Figure("resolvers", (*TICK, "wbc/resolvers", "wbc/coordinates", "bench/resolvers"), 1.0),
