@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from wbc.robots.pairs import find_self_pairs
     from wbc.robots.walker_arms import WalkerArm
     from wbc.robots.walker_data import TwoEndedData, WalkerData
+    from wbc.robots.walker_masses import HoldRating, hold_rating, with_masses
     from wbc.robots.walker_robot import Walker, walker
 else:
     __getattr__ = lazy.attach(__name__, __file__, {"Arm": "WalkerArm"})
@@ -27,6 +28,7 @@ __all__ = [
     "BodyLimb",
     "ConvexParts",
     "DHRow",
+    "HoldRating",
     "Limb",
     "LinkPair",
     "Margins",
@@ -40,6 +42,7 @@ __all__ = [
     "find_self_pairs",
     "fit_shapes",
     "from_dh",
+    "hold_rating",
     "load",
     "names",
     "operator_arm",
@@ -47,6 +50,7 @@ __all__ = [
     "save_self_pairs",
     "table",
     "walker",
+    "with_masses",
 ]
 
 
