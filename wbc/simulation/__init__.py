@@ -1,6 +1,7 @@
 """What a control loop commands: the plant's contract, a loop's connection to one, kinematic and dynamic plants."""
 
 from wbc.simulation.connection import Connection
+from wbc.simulation.dynamics import Grip
 from wbc.simulation.ground import Ground, level
 from wbc.simulation.kinematic import KinematicPlant
 from wbc.simulation.motors import Encoders, Motors
@@ -14,6 +15,7 @@ __all__ = [
     "CommandKind",
     "Connection",
     "Encoders",
+    "Grip",
     "GripKind",
     "GrippingPlant",
     "Ground",

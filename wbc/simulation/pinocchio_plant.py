@@ -43,6 +43,7 @@ class _State:
     reading: PlantState
     grips: dict[str, Grip] = field(default_factory=dict)
     slips: dict[str, tuple[Array, float]] = field(default_factory=dict)
+    broken: list[str] = field(default_factory=list)
     first: Array = field(default_factory=lambda: np.zeros(6))
     fallen: Array = field(default_factory=lambda: np.zeros(6))
 
@@ -221,7 +222,22 @@ class PinocchioPlant:
         self._state.slips.pop(frame, None)
         self._hold()
 
+    def lost(self) -> tuple[str, ...]:
+        """See :class:`wbc.simulation.GrippingPlant`."""
+        out = tuple(self._state.broken)
+        self._state.broken.clear()
+        return out
+
     # What breaks
+
+    def lose(self, frame: str) -> None:
+        """What holds a frame breaks off.
+
+        Raises:
+            UnknownNameError: nothing holds it.
+        """
+        self.release(frame)
+        self._state.broken.append(frame)
 
     def slip(self, frame: str, velocity: Any, duration: float) -> None:
         """A grip slips: what it holds the frame at moves with a velocity in the world [m/s] for some seconds.

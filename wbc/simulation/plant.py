@@ -121,6 +121,9 @@ class GrippingPlant(Protocol):
             UnknownNameError: it was not held.
         """
 
+    def lost(self) -> tuple[str, ...]:
+        """Frames that what held them has let go of, since this was last asked."""
+
 
 class PlantError(WbcError):
     """A plant that has no valid reading, or cannot do what it is to do; it was commanded to rest."""

@@ -44,6 +44,7 @@ class Machine:
         self.walker, self.structure, self.dt = walker, structure, dt
         self.chain = ClosedChain(walker, structure)
         self._connection = Connection(plant, walker.robot, dt)
+        self._broken: set[int] = set()
         self._grips: GrippingPlant | None = plant if isinstance(plant, GrippingPlant) else None
         self.q = np.array(walker.robot.neutral)
         self.v = self.rates = np.zeros(walker.robot.nv)
@@ -98,9 +99,19 @@ class Machine:
 
     def open(self, arm: int) -> None:
         """A hand holds nothing."""
-        if self._grips is not None:
+        if self._grips is not None and arm not in self._broken:
             self._grips.release(self.walker.arms[arm].hand)
+        self._broken.discard(arm)
         self.left[arm] = [self.structure.positions[self.held.pop(arm)]]
+
+    def lost(self) -> list[int]:
+        """Rows of holds that have broken off under a closed hand; the hand is to be opened."""
+        if self._grips is None:
+            return []
+        names = self._grips.lost()
+        arms = [arm for arm in self.held if self.walker.arms[arm].hand in names]
+        self._broken.update(arms)
+        return [self.held[arm] for arm in arms]
 
     def hand(self, arm: int) -> tuple[Array, Array, Array]:
         """Origin [m], z axis and x axis of a hand in the structure."""

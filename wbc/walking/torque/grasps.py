@@ -1,9 +1,9 @@
-"""Grasps of holds that leave a hand some freedom."""
+"""A grasp of a hold that leaves the hand its roll."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from typing import ClassVar
 
 import casadi as ca
 
@@ -16,28 +16,31 @@ from wbc.tasks.base import Row, Rows, Values
 
 
 @dataclass(frozen=True)
-class FreeingGrasp(RigidGrasp):
-    """A hand on a hold that leaves it some freedom: the motion of a :class:`wbc.tasks.Hold` of :attr:`held`, and the
-    part of the wrench that this can bear, within the box of ``RigidGrasp``.
+class AxisGrasp(RigidGrasp):
+    """A hand that may roll about its z axis: five rows as of ``Hold(kind="axis")``, and a wrench without m_z within the
+    box of ``RigidGrasp``.
     """
 
-    abstract: ClassVar[bool] = True
-    held: ClassVar[Literal["axis", "position"]] = "axis"
+    axes: ClassVar[tuple[int, ...]] = (0, 1, 2, 3, 4)
 
     @property
     def _hold(self) -> Hold:
-        return Hold(self.frame, kind=self.held)
+        return Hold(self.frame, kind="axis")
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
-        """Those of the hold."""
+        """x, y, z of the world and rx, ry of the frame."""
         return self._hold.rows(robot)
 
     def velocity_rows(self, robot: Robot, kin: Tracer, inputs: Values, dt: ca.SX) -> Rows:
         """Those of the hold."""
         return self._hold.velocity_rows(robot, kin, inputs, dt)
 
+    def still(self, inputs: Values, rotation: ca.SX, twist: ca.SX) -> ca.SX:
+        """The rate of R'w is R' dw/dt, so both are taken alike."""
+        return ca.vertcat(twist[:3], (rotation.T @ twist[3:])[:2])
+
     def cone(self, inputs: Values) -> Cone:
-        """The box, as far as the hold bears it."""
+        """The box, without m_z."""
         unlimited = ca.SX.inf(3)
         most = ca.vertcat(inputs.get("force", unlimited), inputs.get("torque", unlimited))[self._limited]
         return Cone(ca.SX.eye(6)[self._limited, list(self.axes)], -most, most)
@@ -48,30 +51,5 @@ class FreeingGrasp(RigidGrasp):
         return [k for k in limited if k in self.axes]
 
 
-@dataclass(frozen=True)
-class AxisGrasp(FreeingGrasp):
-    """A hand that may roll about its z axis: no m_z."""
-
-    abstract: ClassVar[bool] = False
-    axes: ClassVar[tuple[int, ...]] = (0, 1, 2, 3, 4)
-
-    def still(self, inputs: Values, rotation: ca.SX, twist: ca.SX) -> ca.SX:
-        """The rate of R'w is R' dw/dt, so both are taken alike."""
-        return ca.vertcat(twist[:3], (rotation.T @ twist[3:])[:2])
-
-
-@dataclass(frozen=True)
-class BallGrasp(FreeingGrasp):
-    """A hand that may turn about its origin: a force alone."""
-
-    abstract: ClassVar[bool] = False
-    axes: ClassVar[tuple[int, ...]] = (0, 1, 2)
-    held: ClassVar[Literal["axis", "position"]] = "position"
-
-
 #: By what a hold holds
-GRASPS: dict[GripKind, type[RigidGrasp]] = {
-    GripKind.POSE: RigidGrasp,
-    GripKind.AXIS: AxisGrasp,
-    GripKind.POSITION: BallGrasp,
-}
+GRASPS: dict[GripKind, type[RigidGrasp]] = {GripKind.POSE: RigidGrasp, GripKind.AXIS: AxisGrasp}

@@ -2,30 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 import pinocchio as pin
 
-from wbc import tasks, validation
-from wbc.controller.controller import Controller
-from wbc.controller.stack import Stack
-from wbc.errors import RangeError, ShapeError
-from wbc.robots import HoldRating, Walker, hold_rating
-from wbc.simulation import Command, CommandKind, GripKind, GrippingPlant, Plant, PlantState
+from wbc import validation
+from wbc.errors import ShapeError
+from wbc.simulation import Command, CommandKind, Grip, GripKind, GrippingPlant, Plant, PlantState
 from wbc.validation import Array
-from wbc.walking.torque.grasps import GRASPS
-
-#: Period of the torques [s]
-PERIOD = 0.001
-#: Weights: the body's pose counts most, as the walk's does
-BODY = 100.0
-#: How fast errors of the reference decay [1/s], twice; how fast the reference comes to where the robot is [1/s]
-BANDWIDTH, LEAK = 40.0, 2.0
-#: How fast the drift of closed hands decays [1/s]
-GRIP_GAIN = 20.0
+from wbc.walking.torque.faults import Fault
+from wbc.walking.torque.stack import TorqueStack
+from wbc.walking.torque.watch import Watch
 
 
 @dataclass(frozen=True)
@@ -38,64 +28,59 @@ class Gains:
         grip: how fast the drift of closed hands decays [1/s].
     """
 
-    bandwidth: float = BANDWIDTH
-    leak: float = LEAK
-    grip: float = GRIP_GAIN
+    bandwidth: float = 40.0
+    leak: float = 2.0
+    grip: float = 20.0
 
 
-class TorqueStack:
-    """The compiled stack: all coordinates follow a reference, closed hands bear wrenches within their rating.
+@runtime_checkable
+class Tested(GrippingPlant, Protocol):
+    """What a plant has besides that says how a walk does on it, and can be made to fail."""
 
-    Args:
-        walker: with masses, as :func:`wbc.robots.with_masses` gives it; its torque limits.
-        kinds: how holds may be held. rating: of every hold. backend: as of ``Stack.compile``.
+    @property
+    def grips(self) -> Mapping[str, Grip]:
+        """Frame -> how it is held."""
 
-    Raises:
-        RangeError: a robot without masses or limits of torque.
-    """
+    @property
+    def wrenches(self) -> Mapping[str, Array]:
+        """Frame -> what holds it exerts on the robot, in its axes and about its origin ``[6]`` [N, N m]."""
 
-    def __init__(
-        self,
-        walker: Walker,
-        kinds: Iterable[GripKind],
-        *,
-        rating: HoldRating | None = None,
-        period: float = PERIOD,
-        backend: str = "auto",
-    ) -> None:
-        robot, rating = walker.robot, rating or hold_rating()
-        if min(float(i.mass) for i in robot.model.inertias[1:]) <= 0.0:
-            raise RangeError("walker", robot.name, "torques need masses: wbc.robots.with_masses(walker)")
-        self.walker, self.kinds, self.rating = walker, tuple(dict.fromkeys(kinds)), rating
-        stack = Stack(robot, dt=period, calm=False)
-        weights = np.where(np.arange(robot.nv) < robot.base_nv, BODY, 1.0)
-        follow = tasks.Posture(joints=robot.joint_names, weights=tuple(weights.tolist()))
-        stack.add(follow, name="reference")
-        stack.add(tasks.JointLimits(), name="limits").add(tasks.TorqueLimits(), name="torques")
-        for arm in walker.arms:
-            for kind in self.kinds:
-                torque = None if kind is GripKind.POSITION else rating.torque
-                stack.add(GRASPS[kind](arm.hand, force=rating.force, torque=torque), name=f"{arm.hand} {kind}")
-        self.controller: Controller = stack.compile(command="torque", backend=backend)
+    @property
+    def given(self) -> Array:
+        """Momentum that it has given to its surroundings (linear; angular about the origin) [N s, N m s]."""
+
+    @property
+    def state(self) -> PlantState:
+        """The truth."""
+
+    def slip(self, frame: str, velocity: Any, duration: float) -> None:
+        """What holds a frame moves [m/s] for some seconds."""
+
+    def limp(self, joint: str, scale: float = 0.0) -> None:
+        """A motor gives this part of its torque."""
+
+    def lose(self, frame: str) -> None:
+        """What holds a frame breaks off."""
 
 
 class TorqueLoop:
     """A plant that takes the velocities of a walk, and drives one that takes torques.
 
-        plant = PinocchioPlant(walker.robot)                       # walker = wbc.robots.with_masses(wbc.robots.walker())
-        Walk(walker, structure, plan, plant=TorqueLoop(TorqueStack(walker, [GripKind.AXIS]), plant))
+        walker = wbc.robots.with_masses(wbc.robots.walker())
+        loop = TorqueLoop(TorqueStack(walker, [GripKind.AXIS]), PinocchioPlant(walker.robot))
+        Walk(walker, structure, plan, plant=loop)
 
     Within a period of the walk the reference goes from the last velocity to the new one in a straight line; q_ref is its
     integral. Every millisecond the stack finds torques for da_ref + 2 omega (v_ref - v) + omega^2 (q_ref - q) and for
-    what the closed hands bear. Nothing of the walk, its planner or its stack is changed.
+    what the closed hands bear. Torques that take hold late are found for the state that they will meet: what is read,
+    and the accelerations that were decided since. Nothing of the walk, its planner or its stack is changed.
 
     Args:
         stack: compiled. plant: takes torques, and grasps. gains: of the reference.
+        delay: of the torques, which the loop knows [s]. faults: that come in time.
 
     Attributes:
-        step: of the last torques.
-        slip: farthest that a closed hand has been from its hold [m]. peak: largest components of wrenches that the plant
-            had, as parts of the rating; of plants that have wrenches.
+        watch: what was seen of the plant.
 
     Raises:
         ShapeError: a plant that takes no torques, or grasps nothing.
@@ -103,20 +88,33 @@ class TorqueLoop:
 
     commands: Collection[CommandKind] = (CommandKind.VELOCITY,)
 
-    def __init__(self, stack: TorqueStack, plant: Plant, gains: Gains | None = None) -> None:
+    def __init__(
+        self,
+        stack: TorqueStack,
+        plant: Plant,
+        gains: Gains | None = None,
+        *,
+        delay: float = 0.0,
+        faults: Sequence[Fault] = (),
+    ) -> None:
         if CommandKind.TORQUE not in plant.commands:
             raise ShapeError("plant", type(plant).__name__, "expected a plant that takes torques")
-        if not isinstance(plant, GrippingPlant):
-            raise ShapeError("plant", type(plant).__name__, "expected a plant that can grasp")
-        self.stack, self.plant, self.grips = stack, plant, plant
+        if not isinstance(plant, Tested):
+            raise ShapeError("plant", type(plant).__name__, "expected a plant that can grasp, and fail")
+        self.stack, self.plant, self._tested = stack, plant, plant
         self.nq, self.nv = plant.nq, plant.nv
         self.time_step = stack.controller.stack.dt
         items: Any = stack.controller
+        arms = stack.walker.arms
         self._model, self._reference = stack.walker.robot.model, items["reference"]
-        self._items = {(arm.hand, kind): items[f"{arm.hand} {kind}"] for arm in stack.walker.arms for kind in stack.kinds}
-        self._gains = gains or Gains()
+        self._items = {(arm.hand, kind): items[f"{arm.hand} {kind}"] for arm in arms for kind in stack.kinds}
+        self._gains, self._faults = gains or Gains(), tuple(fault for fault in faults if fault.kind != "delay")
         self._command = Command(CommandKind.TORQUE, np.zeros(self.nv))
-        self._closed: dict[str, GripKind] = {}
+        ahead = round(validation.scalar("delay", delay, low=0.0, unit="s") / self.time_step)
+        # Accelerations on their way, the oldest first, and how long each lasts until the next torque takes hold
+        self._decided = np.zeros((ahead, self.nv))
+        self._lasts = (np.arange(ahead, 0, -1) - 0.5) * self.time_step**2
+        self.watch = Watch(stack.rating, [arm.hand for arm in arms])
 
     def reset(self, q: Array, time: float) -> None:
         """At rest, nothing grasped."""
@@ -126,7 +124,9 @@ class TorqueLoop:
         self._reference.set(stiffness=gains.bandwidth**2, damping=2.0 * gains.bandwidth)
         for item in self._items.values():
             item.enabled, item.gain = False, gains.grip
-        self._closed = {}
+        self._closed: dict[str, GripKind] = {}
+        self._coming = list(self._faults)
+        self._decided[:] = 0.0
         self._q = np.array(q)
         self._v, self._next = np.zeros((2, self.nv))
 
@@ -141,32 +141,59 @@ class TorqueLoop:
     def grasp(self, frame: str, pose: pin.SE3, kind: GripKind) -> None:
         """The plant's hand closes, and the stack counts on it."""
         kind = GripKind(validation.one_of("kind", str(kind), [str(k) for k in self.stack.kinds]))
-        self.grips.grasp(frame, pose, kind)
+        self._tested.grasp(frame, pose, kind)
         item = self._items[frame, kind]
         item.target, item.enabled = pose, True
         self._closed[frame] = kind
 
     def release(self, frame: str) -> None:
         """The plant's hand opens, and the stack does without it."""
-        self._items[frame, self._closed.pop(frame)].enabled = False
-        self.grips.release(frame)
+        self._tested.release(frame)
+        self._let_go(frame)
+
+    def lost(self) -> tuple[str, ...]:
+        """Hands whose holds have broken off; the stack has done without them since."""
+        return self._tested.lost()
 
     def advance(self, dt: float) -> None:
         """A period of the walk: as many of torques as go into it."""
         count = max(round(dt / self.time_step), 1)
-        ramp = (self._next - self._v) / count
-        acceleration = ramp / self.time_step
+        ramp, step = (self._next - self._v) / count, self.time_step
         plant, reference, command, controller = self.plant, self._reference, self._command, self.stack.controller
-        reference.acceleration = acceleration
+        reference.acceleration = ramp / step
         for _ in range(count):
             state = plant.read()
+            if self._coming:
+                self._fail(state.time)
+            q, v = (state.q, state.v) if not len(self._decided) else self._ahead(state)
             reference.target, reference.feedforward = self._q, self._v
-            self.step = controller.step(state.q, state.v)
+            self.step = controller.step(q, v)
             command.values[:] = self.step.torque
             plant.apply(command)
-            plant.advance(self.time_step)
-            ahead = self._v + 0.5 * ramp
-            self._q = pin.integrate(self._model, self._q, ahead * self.time_step)
+            plant.advance(step)
+            self._q = pin.integrate(self._model, self._q, (self._v + 0.5 * ramp) * step)
             self._v = self._v + ramp
+            if len(self._decided):
+                self._decided[:-1] = self._decided[1:]
+                self._decided[-1] = self.step.a
+            self.watch.see(self._tested, self._model, self.step.status)
         off = pin.difference(self._model, self._q, plant.read().q)
         self._q = pin.integrate(self._model, self._q, min(self._gains.leak * dt, 1.0) * off)
+
+    def _ahead(self, state: PlantState) -> tuple[Array, Array]:
+        """Where the torque of this tick will find the robot."""
+        moved = len(self._decided) * self.time_step * state.v + self._lasts @ self._decided
+        return pin.integrate(self._model, state.q, moved), state.v + self.time_step * self._decided.sum(axis=0)
+
+    def _fail(self, time: float) -> None:
+        """Faults whose time has come."""
+        for fault in [fault for fault in self._coming if fault.time <= time]:
+            if not fault.begin(self._tested):
+                continue
+            self._coming.remove(fault)
+            hand = f"{fault.what}_hand"
+            if fault.kind == "break":
+                self._let_go(hand)
+
+    def _let_go(self, frame: str) -> None:
+        self._items[frame, self._closed.pop(frame)].enabled = False
