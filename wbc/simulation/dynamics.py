@@ -86,9 +86,7 @@ class Dynamics:
             return v
         pin.crba(self.model, self.data, q)
         settings = pin.ProximalSettings(1e-12, PROXIMAL, ITERATIONS)
-        return np.array(
-            pin.impulseDynamics(self.model, self.data, q, v, self._models, self._datas, 0.0, settings)
-        )
+        return np.array(pin.impulseDynamics(self.model, self.data, q, v, self._models, self._datas, 0.0, settings))
 
     def wrenches(self) -> dict[str, Array]:
         """On the robot, in the axes of the frame and about its origin, of the last acceleration ``[6]`` [N, N m]."""

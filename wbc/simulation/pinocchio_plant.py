@@ -208,7 +208,8 @@ class PinocchioPlant:
         if kind is GripKind.AXIS:
             turn = float(np.arccos(np.clip(at.rotation[:, 2] @ pose.rotation[:, 2], -1.0, 1.0)))
         if off > REACH or (turn > TURN and kind is not GripKind.POSITION):
-            reason = f"an impossible contact: {frame} is {off:.3g} m and {turn:.3g} rad off, {REACH:g} and {TURN:g} are possible"
+            most = f"{REACH:g} and {TURN:g} are possible"
+            reason = f"an impossible contact: {frame} is {off:.3g} m and {turn:.3g} rad off, {most}"
             raise RangeError("pose", pose.translation.tolist(), reason)
         state.grips[frame] = Grip(pose, kind)
         self._hold()
@@ -272,8 +273,8 @@ class PinocchioPlant:
 
     @property
     def wrenches(self) -> Mapping[str, Array]:
-        """Frame -> what its grip exerts on the robot, in the frame's axes and about its origin, in the last acceleration
-        that was computed ``[6]`` [N, N m].
+        """Frame -> what its grip exerts on the robot, in the frame's axes and about its origin, in the last
+        acceleration that was computed ``[6]`` [N, N m].
         """
         return self._dynamics.wrenches()
 
@@ -286,8 +287,8 @@ class PinocchioPlant:
 
     @property
     def momentum(self) -> Array:
-        """Of the robot: (linear; angular about the world's origin) [N s, N m s]. Rotors of motors turn relative to their
-        joints; what they carry is in the joints' equations alone, as is usual.
+        """Of the robot: (linear; angular about the world's origin) [N s, N m s]. What the rotors of motors carry is in
+        the joints' equations alone, as is usual.
         """
         return self._momentum()
 
@@ -378,7 +379,9 @@ class PinocchioPlant:
         values, vectors = np.linalg.eigh(mass)
         if not values[0] > SINGULAR * values[-1]:
             dof = self.robot.dof_names[int(np.abs(vectors[:, 0]).argmax())]
-            raise RangeError("robot", self.robot.name, f"its mass matrix is singular: nothing that {dof} moves has inertia")
+            raise RangeError(
+                "robot", self.robot.name, f"its mass matrix is singular: nothing that {dof} moves has inertia"
+            )
 
     def _check_step(self, q: Array) -> None:
         model, data = self.model, self._dynamics.data
@@ -388,7 +391,9 @@ class PinocchioPlant:
             stiffness, damping = stiffness + more[0], damping + more[1]
         most = largest_step(pin.crba(model, data, q), stiffness, damping, self._rate, self._integrator)
         if self.time_step > most:
-            raise RangeError("time_step", self.time_step, f"too coarse for this plant: the largest that works is {most:.3g} s")
+            raise RangeError(
+                "time_step", self.time_step, f"too coarse for this plant: the largest that works is {most:.3g} s"
+            )
 
 
 def _check_inertias(model: pin.Model) -> None:

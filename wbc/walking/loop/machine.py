@@ -20,8 +20,8 @@ from wbc.walking.planner.grips.rolls import allowed_x
 
 class Machine:
     """Where the joints are is what the plant reads; where the body is follows from the holds of the closed hands
-    (:class:`ClosedChain`), as no sensor of the machine measures it. What a plant says of the body does not count. A plant
-    whose robot can grasp (:class:`wbc.simulation.GrippingPlant`) is told which hands close and open.
+    (:class:`ClosedChain`), as no sensor of the machine measures it. What a plant says of the body does not count.
+    A plant that can grasp (:class:`wbc.simulation.GrippingPlant`) is told which hands close and open.
 
     Args:
         dt: control period [s]. plant: what moves; None: a :class:`wbc.simulation.KinematicPlant`.

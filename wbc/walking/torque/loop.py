@@ -70,8 +70,8 @@ class TorqueLoop:
         loop = TorqueLoop(TorqueStack(walker, [GripKind.AXIS]), PinocchioPlant(walker.robot))
         Walk(walker, structure, plan, plant=loop)
 
-    Within a period of the walk the reference goes from the last velocity to the new one in a straight line; q_ref is its
-    integral. Every millisecond the stack finds torques for da_ref + 2 omega (v_ref - v) + omega^2 (q_ref - q) and for
+    Within a period of the walk the reference goes from the last velocity to the new one in a straight line; q_ref is
+    its integral. Every millisecond the stack finds torques for da_ref + 2 omega (v_ref - v) + omega^2 (q_ref - q) and for
     what the closed hands bear. Torques that take hold late are found for the state that they will meet: what is read,
     and the accelerations that were decided since. Nothing of the walk, its planner or its stack is changed.
 
@@ -80,7 +80,7 @@ class TorqueLoop:
         delay: of the torques, which the loop knows [s]. faults: that come in time.
 
     Attributes:
-        watch: what was seen of the plant.
+        watch: what was seen of the plant. about: plain data for a log, which say what it is.
 
     Raises:
         ShapeError: a plant that takes no torques, or grasps nothing.
@@ -96,6 +96,7 @@ class TorqueLoop:
         *,
         delay: float = 0.0,
         faults: Sequence[Fault] = (),
+        about: Mapping[str, Any] | None = None,
     ) -> None:
         if CommandKind.TORQUE not in plant.commands:
             raise ShapeError("plant", type(plant).__name__, "expected a plant that takes torques")
@@ -114,6 +115,7 @@ class TorqueLoop:
         # Accelerations on their way, the oldest first, and how long each lasts until the next torque takes hold
         self._decided = np.zeros((ahead, self.nv))
         self._lasts = (np.arange(ahead, 0, -1) - 0.5) * self.time_step**2
+        self.about = dict(about or {"name": type(plant).__name__})
         self.watch = Watch(stack.rating, [arm.hand for arm in arms])
 
     def reset(self, q: Array, time: float) -> None:

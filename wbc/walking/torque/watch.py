@@ -60,6 +60,11 @@ class Watch:
         return (
             Figure("grip_drift", "closed hand off its hold, in the plant", self.drift, f"{1e3 * self.drift:.2g} mm"),
             Figure("grip_wrench", "largest grip", {"force": self.force, "torque": self.moment}, text),
-            Figure("given", "momentum given to the structure", given, f"{given[0]:.1f} N s, {given[1]:.1f} N m s about the body"),
+            Figure(
+                "given",
+                "momentum given to the structure",
+                given,
+                f"{given[0]:.1f} N s, {given[1]:.1f} N m s about the body",
+            ),
             Figure("unsolved", "torques that gave way", self.unsolved, f"{self.unsolved} of {self.ticks} ticks"),
         )
