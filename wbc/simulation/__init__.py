@@ -5,6 +5,7 @@ from wbc.simulation.dynamics import Grip
 from wbc.simulation.ground import Ground, level
 from wbc.simulation.kinematic import KinematicPlant
 from wbc.simulation.motors import Encoders, Motors
+from wbc.simulation.mujoco_grips import GrippingMujocoPlant
 from wbc.simulation.mujoco_model import mujoco_model, mujoco_spec
 from wbc.simulation.mujoco_plant import MujocoPlant
 from wbc.simulation.pinocchio_plant import PinocchioPlant, SavedState
@@ -18,6 +19,7 @@ __all__ = [
     "Encoders",
     "Grip",
     "GripKind",
+    "GrippingMujocoPlant",
     "GrippingPlant",
     "Ground",
     "KinematicPlant",

@@ -16,6 +16,7 @@ from wbc.robot import Robot
 from wbc.robot.robot import checked_robot
 from wbc.simulation.dynamics import Dynamics, Grip, Integrator, step_midpoint, step_rk4
 from wbc.simulation.ground import Ground, Touch
+from wbc.simulation.momentum import Balance
 from wbc.simulation.motors import Drive, Encoders, Motors, MotorState
 from wbc.simulation.plant import Command, CommandKind, GripKind, PlantError, PlantState
 from wbc.simulation.stability import largest_step
@@ -119,8 +120,7 @@ class PinocchioPlant:
             model.gravity.linear = validation.real_array("gravity", gravity, (3,))
         self.model = model
         _check_inertias(model)
-        self._weight = pin.computeTotalMass(model) * np.array(model.gravity.linear)
-        self._falls = bool(self._weight.any())
+        self._balance = Balance(model)
         self._dynamics = Dynamics(model, self._rate)
         self._touch = None if ground is None else Touch(ground, robot, model)
         self._check_mass(robot.neutral)
@@ -147,7 +147,7 @@ class PinocchioPlant:
         self._state = _State(q, v, time, np.zeros(self.nv), self._drive.fresh(), self._drive.scale.copy(), anchors,
                              np.random.default_rng(self._seed), reading)  # fmt: skip
         self._hold()
-        self._state.first = self._momentum()
+        self._state.first = self._balance.momentum(q, v)
         self._sense()
 
     def read(self) -> PlantState:
@@ -169,7 +169,7 @@ class PinocchioPlant:
         Raises:
             PlantError: the simulation has blown up, which a state says with numbers that are none.
         """
-        state, h, drive = self._state, self.time_step, self._drive
+        state, h, drive, balance = self._state, self.time_step, self._drive, self._balance
         for _ in range(round(dt / h)):
             drive.scale = state.scale
             self._torque = drive.torque(state.motors, state.command, state.v, state.random)
@@ -179,8 +179,8 @@ class PinocchioPlant:
                 self._touch.force(state.q, state.v, state.anchors, settle=True)
             state.q, state.v = self._step(self._dynamics, state.q, state.v, self._forces, h)
             state.time += h
-            if self._falls:
-                self._fall(h)
+            if balance.falls:
+                state.fallen += balance.by_gravity(state.q, h)
         if not np.isfinite(state.q.dot(state.q) + state.v.dot(state.v)):
             raise PlantError("plant", state.time, "the simulation has blown up")
         self._sense()
@@ -203,14 +203,7 @@ class PinocchioPlant:
         data = self.model.createData()
         pin.framesForwardKinematics(self.model, data, state.q)
         at = data.oMf[self.model.getFrameId(frame)]
-        off = float(np.linalg.norm(at.translation - pose.translation))
-        turn = float(np.linalg.norm(pin.log3(at.rotation.T @ pose.rotation)))
-        if kind is GripKind.AXIS:
-            turn = float(np.arccos(np.clip(at.rotation[:, 2] @ pose.rotation[:, 2], -1.0, 1.0)))
-        if off > REACH or (turn > TURN and kind is not GripKind.POSITION):
-            most = f"{REACH:g} and {TURN:g} are possible"
-            reason = f"an impossible contact: {frame} is {off:.3g} m and {turn:.3g} rad off, {most}"
-            raise RangeError("pose", pose.translation.tolist(), reason)
+        check_reach(frame, at, pose, kind)
         state.grips[frame] = Grip(pose, kind)
         self._hold()
         state.v = self._dynamics.latched(state.q, state.v)
@@ -283,14 +276,12 @@ class PinocchioPlant:
         """Momentum that the robot has given to what it holds on to or stands on since the reset: what it has lost, and
         what gravity gave it, (linear; angular about the world's origin) [N s, N m s].
         """
-        return self._state.first + self._state.fallen - self._momentum()
+        return self._state.first + self._state.fallen - self.momentum
 
     @property
     def momentum(self) -> Array:
-        """Of the robot: (linear; angular about the world's origin) [N s, N m s]. What the rotors of motors carry is in
-        the joints' equations alone, as is usual.
-        """
-        return self._momentum()
+        """Of the robot, see :class:`Balance` ``[6]``."""
+        return self._balance.momentum(self._state.q, self._state.v)
 
     @property
     def energy(self) -> float:
@@ -344,18 +335,6 @@ class PinocchioPlant:
                 del state.slips[name]
         self._hold()
 
-    def _fall(self, h: float) -> None:
-        """What gravity gave in a step."""
-        place = pin.centerOfMass(self.model, self._dynamics.data, self._state.q)
-        force = self._weight
-        self._state.fallen += h * np.append(force, pin.skew(place) @ force)
-
-    def _momentum(self) -> Array:
-        data, state = self._dynamics.data, self._state
-        momentum = np.array(pin.computeCentroidalMomentum(self.model, data, state.q, state.v).vector)
-        momentum[3:] += np.cross(data.com[0], momentum[:3])
-        return momentum
-
     def _sense(self) -> None:
         state, encoders, base = self._state, self._encoders, self.robot.base_nv
         q, v = state.q, state.v
@@ -394,6 +373,22 @@ class PinocchioPlant:
             raise RangeError(
                 "time_step", self.time_step, f"too coarse for this plant: the largest that works is {most:.3g} s"
             )
+
+
+def check_reach(frame: str, at: pin.SE3, pose: pin.SE3, kind: GripKind) -> None:
+    """A frame is grasped where it is, as far as the kind holds it.
+
+    Raises:
+        RangeError: it is too far away.
+    """
+    off = float(np.linalg.norm(at.translation - pose.translation))
+    turn = float(np.linalg.norm(pin.log3(at.rotation.T @ pose.rotation)))
+    if kind is GripKind.AXIS:
+        turn = float(np.arccos(np.clip(at.rotation[:, 2] @ pose.rotation[:, 2], -1.0, 1.0)))
+    if off > REACH or (turn > TURN and kind is not GripKind.POSITION):
+        most = f"{REACH:g} and {TURN:g} are possible"
+        reason = f"an impossible contact: {frame} is {off:.3g} m and {turn:.3g} rad off, {most}"
+        raise RangeError("pose", pose.translation.tolist(), reason)
 
 
 def _check_inertias(model: pin.Model) -> None:

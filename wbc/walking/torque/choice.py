@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from wbc import validation
 from wbc.errors import RangeError
 from wbc.robots import Walker, with_masses
-from wbc.simulation import GripKind, Motors, PinocchioPlant
+from wbc.simulation import GripKind, GrippingMujocoPlant, Motors, PinocchioPlant
 from wbc.walking.holds.structure import Structure
 from wbc.walking.loop.stack import hold_kind
 from wbc.walking.torque.faults import Fault, delay_of
@@ -68,9 +68,8 @@ class PlantChoice:
         if self.name == "pinocchio":
             plant = PinocchioPlant(heavy.robot, stack.controller.stack.dt, integrator="midpoint", motors=motors)
         else:
-            from wbc.walking.torque.mujoco import gripping_plant
-
-            plant = gripping_plant(heavy, stack.controller.stack.dt, motors)
+            hands = [arm.hand for arm in heavy.arms]
+            plant = GrippingMujocoPlant(heavy.robot, hands, stack.controller.stack.dt, motors=motors)
         about = {"name": self.name, "gravity": list(self.gravity), "faults": list(self.faults)}
         return TorqueLoop(stack, plant, delay=delay, faults=faults, about=about)
 
