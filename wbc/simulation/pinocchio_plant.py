@@ -126,7 +126,7 @@ class PinocchioPlant:
         self._check_mass(robot.neutral)
         self._check_step(robot.neutral)
         self._torque = np.zeros(self.nv)
-        self.reset(robot.neutral, 0.0)
+        self._begin(robot.neutral, 0.0, np.zeros(self.nv))
 
     # What a loop does
 
@@ -142,6 +142,9 @@ class PinocchioPlant:
         self._check_step(q)
         if self._touch is not None:
             self._touch.check(q)
+        self._begin(q, time, v)
+
+    def _begin(self, q: Array, time: float, v: Array) -> None:
         anchors = np.zeros((0, 3)) if self._touch is None else self._touch.fresh()
         reading = PlantState(q, v, time)
         self._state = _State(q, v, time, np.zeros(self.nv), self._drive.fresh(), self._drive.scale.copy(), anchors,
@@ -299,7 +302,7 @@ class PinocchioPlant:
 
     def save(self) -> SavedState:
         """Everything that the next step depends on."""
-        return SavedState(self.robot.fingerprint(), copy.deepcopy(self._state))
+        return SavedState(self.robot.fingerprint, copy.deepcopy(self._state))
 
     def restore(self, saved: SavedState) -> None:
         """Go on from there, to the same bits.
@@ -307,7 +310,7 @@ class PinocchioPlant:
         Raises:
             RangeError: of another robot.
         """
-        if saved.robot != self.robot.fingerprint():
+        if saved.robot != self.robot.fingerprint:
             raise RangeError("saved", saved.robot, f"it is of another robot than {self.robot.name}")
         self._state = copy.deepcopy(saved._state)
         self._hold()
