@@ -2,11 +2,11 @@
 
     v_r = v_d + lambda e,  a_r = dv_r/dt,  s = v_r - v,  e = q_d (-) q
     tau = Y(q, v, v_r, a_r + k s) phi             = M (a_r + k s) + C(q, v) v_r + g with the estimate's inertias
-    dP/dt = gamma S (Y's + (b - Lambda phi) / k) S,   P > 0              of every learned body
+    dP/dt = gamma S (Y's + beta (b - Lambda phi) / k) S,   P > 0              of every learned body
     Lambda = int Y'M^-1 Y dt,  b = int Y'M^-1 tau dt                     Y at the measured state and acceleration
 
 With the true inertias e dies away with rates lambda and k; else V = s'M s / 2 + |P - P_true|^2 / (2 gamma) in the
-metric of S never grows, as M' - 2 C is skew: dV/dt = -k s'M s - |phi - phi_true|^2 in the metric of Lambda / k. P is a
+metric of S never grows, as M' - 2 C is skew: dV/dt = -k s'M s - |phi - phi_true|^2 in the metric of beta Lambda / k. P is a
 body's pseudo-inertia and S the size of what is not known of it; the bracket of 10 numbers stands for a symmetric 4 x 4
 matrix. An estimate that would leave the bodies is projected, which only lowers V. A floating base without
 motors has a reference velocity of its own, whose rate is the one that needs no force there.
@@ -44,6 +44,8 @@ LEAST = 1e-4
 SAMPLES, HORIZON = 20, 2.0
 #: Torques and accelerations are averaged over this time before they are compared, as velocities are noisy [s]
 WINDOW = 0.05
+#: How much the past counts beside the error of now, beta
+PAST = 100.0
 
 
 class AdaptiveControl:
@@ -224,9 +226,9 @@ class AdaptiveControl:
     def _adapt(self, slope: Array) -> None:
         """An implicit step of the estimates, in the coordinates of an orthonormal basis in the metric of S."""
         B, past = self._basis, self._past
-        pull = self.dt * self.gamma / self.damping
-        here = B.T @ (slope + (past.b - past.information @ self._learned()) / self.damping)
-        step = np.linalg.solve(np.eye(len(here)) + pull * B.T @ past.information @ B, self.dt * self.gamma * here)
+        weight = PAST / self.damping
+        here = B.T @ (slope + weight * (past.b - past.information @ self._learned()))
+        step = np.linalg.solve(np.eye(len(here)) + self.dt * self.gamma * weight * B.T @ past.information @ B, self.dt * self.gamma * here)
         change = (B @ step).reshape(-1, PER_BODY)
         for k, (S, own) in enumerate(zip(self._scales, change, strict=True)):
             self._pseudo[k] = nearest_body(self._pseudo[k] + pseudo_inertia(own), S, LEAST)
