@@ -33,7 +33,9 @@ def test_log_cholesky(seed: int) -> None:
     np.testing.assert_allclose(pseudo_inertia(phi), pin.PseudoInertia.FromDynamicParameters(phi).toMatrix(), atol=1e-10)
     np.testing.assert_allclose(parameters(pseudo_inertia(phi)), phi, atol=1e-12 * np.abs(phi).max())
     h = 1e-6
-    by_steps = [(from_log_cholesky(theta + h * u)[0] - from_log_cholesky(theta - h * u)[0]) / (2 * h) for u in np.eye(10)]
+    by_steps = [
+        (from_log_cholesky(theta + h * u)[0] - from_log_cholesky(theta - h * u)[0]) / (2 * h) for u in np.eye(10)
+    ]
     np.testing.assert_allclose(slope, np.array(by_steps).T, rtol=1e-5, atol=1e-6 * np.abs(phi).max())
 
 

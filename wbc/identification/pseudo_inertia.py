@@ -40,7 +40,7 @@ def _linear() -> Array:
 #: vec P = TO_PSEUDO phi
 TO_PSEUDO: Array = _linear()
 #: phi = FROM_PSEUDO vec P, for symmetric P
-FROM_PSEUDO: Array = np.linalg.pinv(TO_PSEUDO)
+FROM_PSEUDO: Array = np.asarray(np.linalg.pinv(TO_PSEUDO), dtype=np.float64)
 
 
 def pseudo_inertia(phi: Array) -> Array:

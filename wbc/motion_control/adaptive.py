@@ -176,6 +176,17 @@ class AdaptiveControl:
         at = self._places[self.learn.index(validation.one_of("joint", joint, self.learn))]
         return self._body(at) - self._known[at : at + PER_BODY]
 
+    def mass(self, joint: str) -> tuple[float, float]:
+        """(mass besides the model's, its least standard deviation by what the motion has shown) [kg].
+
+        Raises:
+            UnknownNameError: it is not learned.
+        """
+        k = self.learn.index(validation.one_of("joint", joint, self.learn))
+        weights = np.zeros(PER_BODY * len(self.learn))
+        weights[PER_BODY * k] = 1.0
+        return float(self.unknown(joint)[0]), self.information.deviation(weights)
+
     def _each(self) -> list[tuple[int, Array]]:
         return list(zip(self._places, self._scales, strict=True))
 
@@ -218,7 +229,9 @@ class AdaptiveControl:
         for time in np.linspace(0.0, HORIZON, SAMPLES):
             q, v, a = self.motion(float(time))
             Z = self._shown_at(q, v, a) @ self._basis
-            worst = max(worst, float(np.linalg.eigvalsh(Z.T @ np.linalg.solve(mass_matrix(self._model, data, q), Z))[-1]))
+            worst = max(
+                worst, float(np.linalg.eigvalsh(Z.T @ np.linalg.solve(mass_matrix(self._model, data, q), Z))[-1])
+            )
         if worst == 0.0:
             raise RangeError("learn", self.learn, "the motion needs no torque for these bodies: nothing can be learned")
         return self.damping**2 / 4.0 / worst
@@ -228,7 +241,9 @@ class AdaptiveControl:
         B, past = self._basis, self._past
         weight = PAST / self.damping
         here = B.T @ (slope + weight * (past.b - past.information @ self._learned()))
-        step = np.linalg.solve(np.eye(len(here)) + self.dt * self.gamma * weight * B.T @ past.information @ B, self.dt * self.gamma * here)
+        step = np.linalg.solve(
+            np.eye(len(here)) + self.dt * self.gamma * weight * B.T @ past.information @ B, self.dt * self.gamma * here
+        )
         change = (B @ step).reshape(-1, PER_BODY)
         for k, (S, own) in enumerate(zip(self._scales, change, strict=True)):
             self._pseudo[k] = nearest_body(self._pseudo[k] + pseudo_inertia(own), S, LEAST)

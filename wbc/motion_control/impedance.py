@@ -59,7 +59,11 @@ class Impedance:
         w = validation.scalar("frequency", frequency, low=0.0, open_low=True, unit="1/s")
         self.frequency, self.dt = w, checked_gains(w * w, 2.0 * w, dt)[2]
         self.frame = robot.check_frame("frame", frame or robot.frames.get("tip", robot.frame_names[-1]))
-        self._model, self._data, self._index = robot.model, robot.model.createData(), frame_index(robot.model, self.frame)
+        self._model, self._data, self._index = (
+            robot.model,
+            robot.model.createData(),
+            frame_index(robot.model, self.frame),
+        )
         # The motion's own kinematics
         self._wanted = robot.model.createData()
         self.stiffness: Array | None = None
