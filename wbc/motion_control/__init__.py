@@ -1,4 +1,4 @@
-"""Torques that follow a motion of the joints, by a model: computed torque, adaptive control, impedance, one step ahead."""
+"""Torques that follow a motion by a model: computed torque, adaptive control, impedance, one step ahead."""
 
 from __future__ import annotations
 

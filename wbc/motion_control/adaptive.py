@@ -6,13 +6,14 @@
     Lambda = int Y'M^-1 Y dt,  b = int Y'M^-1 tau dt                     Y at the measured state and acceleration
 
 With the true inertias e dies away with rates lambda and k; else V = s'M s / 2 + |P - P_true|^2 / (2 gamma) in the
-metric of S never grows, as M' - 2 C is skew: dV/dt = -k s'M s - |phi - phi_true|^2 in the metric of beta Lambda / k. P is a
-body's pseudo-inertia and S the size of what is not known of it; the bracket of 10 numbers stands for a symmetric 4 x 4
-matrix. An estimate that would leave the bodies is projected, which only lowers V. A floating base without
-motors has a reference velocity of its own, whose rate is the one that needs no force there.
+metric of S never grows, as M' - 2 C is skew: dV/dt = -k s'M s - |phi - phi_true|^2 in the metric of beta Lambda / k.
+P is a body's pseudo-inertia and S the size of what is not known of it; the bracket of 10 numbers stands for a symmetric
+4 x 4 matrix. An estimate that would leave the bodies is projected, which only lowers V. A floating base without motors
+has a reference velocity of its own, whose rate is the one that needs no force there.
 
 Source: Slotine and Li 1987; S and P: Lee, Kwon and Park 2018, A natural adaptive control law for robot manipulators
-(with a constant metric); Lambda: Chowdhary and Johnson 2010, Concurrent learning; moving bases: Niemeyer and Slotine 1991, Wang and Xie 2012.
+(with a constant metric); Lambda: Chowdhary and Johnson 2010, Concurrent learning; moving bases: Niemeyer and Slotine
+1991, Wang and Xie 2012.
 """
 
 from __future__ import annotations
@@ -158,7 +159,7 @@ class AdaptiveControl:
         missing = torque - self._law.output[: self._model.nv] + Y @ self._learned()
         self._past.add(Y, missing, self.dt)
         if self._past.time >= WINDOW:
-            self._past.close(np.linalg.inv(mass_matrix(self._model, self._data, q)))
+            self._past.close(np.asarray(np.linalg.inv(mass_matrix(self._model, self._data, q)), dtype=np.float64))
 
     def _learned(self) -> Array:
         return np.concatenate([self._body(at) for at in self._places])
@@ -238,13 +239,10 @@ class AdaptiveControl:
 
     def _adapt(self, slope: Array) -> None:
         """An implicit step of the estimates, in the coordinates of an orthonormal basis in the metric of S."""
-        B, past = self._basis, self._past
-        weight = PAST / self.damping
+        B, past, weight, pace = self._basis, self._past, PAST / self.damping, self.dt * self.gamma
         here = B.T @ (slope + weight * (past.b - past.information @ self._learned()))
-        step = np.linalg.solve(
-            np.eye(len(here)) + self.dt * self.gamma * weight * B.T @ past.information @ B, self.dt * self.gamma * here
-        )
-        change = (B @ step).reshape(-1, PER_BODY)
+        implicit = np.eye(len(here)) + pace * weight * B.T @ past.information @ B
+        change = (B @ np.linalg.solve(implicit, pace * here)).reshape(-1, PER_BODY)
         for k, (S, own) in enumerate(zip(self._scales, change, strict=True)):
             self._pseudo[k] = nearest_body(self._pseudo[k] + pseudo_inertia(own), S, LEAST)
         self._write()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -26,7 +26,7 @@ Maker = Callable[[Robot, Motion, float], TorqueController]
 FASTEST = 100.0
 #: Part of a robot's mass that its unknown payload has, how much heavier links are, and noise of encoders [rad, m]
 PAYLOAD, HEAVIER, NOISE = 0.1, 1.2, 1e-5
-#: Of :func:`swing`: parts of the ranges and of the limits of speed that it uses, and the range of unbounded joints [rad, m]
+#: Of :func:`swing`: parts of ranges and of limits of speed that it uses, and half the range of unbounded joints [rad, m]
 RANGE, SPEED, FREE = 0.35, 0.4, 1.0
 
 
@@ -213,8 +213,8 @@ def scenario_of(robot: Robot, seconds: float = 2.0) -> Scenario:
 
 def standard_conditions(payload: float) -> tuple[Condition, ...]:
     """As modelled, with a payload [kg], with heavier links, with noise; each at 100 Hz and at 1 kHz."""
-    kinds = ({}, {"payload": payload}, {"heavier": HEAVIER}, {"noise": NOISE})
-    return tuple(Condition(**kind, rate=rate) for kind in kinds for rate in (100.0, 1000.0))
+    kinds = Condition(), Condition(payload), Condition(heavier=HEAVIER), Condition(noise=NOISE)
+    return tuple(replace(kind, rate=rate) for kind in kinds for rate in (100.0, 1000.0))
 
 
 def save_plot(found: Sequence[Compared], title: str, path: Path) -> None:

@@ -1,7 +1,7 @@
 """Operational-space impedance: a frame yields to what pushes it as a spring and damper would, and the rest follows.
 
     tau = J'F + N'M (a_d + 2 w (v_d - v) + w^2 (q_d (-) q)) + h
-    F = Lambda (dx2_d - dJ/dt v) + D (dx_d - dx) + K (x_d (-) x),   Lambda = (J M^-1 J' + eps 1)^-1,  N = 1 - M^-1 J'Lambda J
+    F = Lambda (dx2_d - dJ/dt v) + D (dx_d - dx) + K (x_d (-) x),  Lambda = (J M^-1 J')^-1,  N = 1 - M^-1 J'Lambda J
 
 x_d is where the motion has the frame. An outer wrench f moves it as Lambda d2e/dt2 + D de/dt + K e = f, whatever the
 other joints do. D is critical: D = 2 sqrt(Lambda) sqrt(sqrt(Lambda)^-1 K sqrt(Lambda)^-1) sqrt(Lambda).
@@ -22,7 +22,7 @@ from wbc.robot import Robot
 from wbc.symbolic.kinematics import frame_index
 from wbc.validation import Array
 
-#: eps as a part of the largest eigenvalue of J M^-1 J': directions in which the frame cannot move get no force
+#: Part of the largest eigenvalue of J M^-1 J' below which a direction counts as none: the frame cannot move there
 DAMPED = 1e-9
 _AXES = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 

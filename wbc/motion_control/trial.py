@@ -155,7 +155,7 @@ def run_trial(
         places.append((q, error, distance))
         tick()
     return Trial(
-        dt * np.arange(len(places)),
+        np.asarray(dt * np.arange(len(places)), dtype=np.float64),
         np.array([place[0] for place in places]),
         np.array([place[1] for place in places]),
         np.array([row[0] for row in rows]).reshape(-1, model.nv),
