@@ -4,6 +4,7 @@ from wbc.simulation.connection import Connection
 from wbc.simulation.ground import Ground, level
 from wbc.simulation.kinematic import KinematicPlant
 from wbc.simulation.motors import Encoders, Motors
+from wbc.simulation.mujoco_model import mujoco_model, mujoco_spec
 from wbc.simulation.mujoco_plant import MujocoPlant
 from wbc.simulation.pinocchio_plant import PinocchioPlant, SavedState
 from wbc.simulation.plant import Command, CommandKind, GripKind, GrippingPlant, Plant, PlantError, PlantState
@@ -27,4 +28,6 @@ __all__ = [
     "RealTime",
     "SavedState",
     "level",
+    "mujoco_model",
+    "mujoco_spec",
 ]

@@ -92,11 +92,10 @@ class MujocoPlant:
         columns = {kind: np.array(rows).T for kind, rows in found.items()}
         return {kind: (a.astype(int), dof.astype(int), scale) for kind, (a, dof, scale) in columns.items()}
 
-    def reset(self, q: Array, time: float) -> None:
-        """At rest at a configuration; position actuators hold it."""
+    def reset(self, q: Array, time: float, v: Array | None = None) -> None:
+        """At a configuration, at rest or with a velocity; position actuators hold it."""
         self._clear(self._model, self.data)
-        rest = np.zeros(self.nv)
-        self._write(np.asarray(q, dtype=float), rest)
+        self._write(np.asarray(q, dtype=float), np.zeros(self.nv) if v is None else np.asarray(v, dtype=float))
         self.data.time = time
         if CommandKind.POSITION in self._actuators:
             self.apply(Command(CommandKind.POSITION, np.asarray(q, dtype=float)))
