@@ -45,6 +45,8 @@ FLOORS = {
     "wbc.trajectory": 8,
     "wbc.coordinates": 8,
     "wbc.explore": 9,
+    "wbc.identification": 9,
+    "wbc.motion_control": 9,
     "wbc.program": 9,
     "wbc.moving_target": 9,
     "wbc.teleop": 9,
