@@ -31,7 +31,7 @@ def away(controller: Controller, offset: list[float]) -> list[float]:
     return [float(x) for x in pin.SE3ToXYZQUAT(pin.SE3(pose.rotation, pose.translation + offset))]
 
 
-@settings(max_examples=8)
+@settings(max_examples=4)
 @given(st.tuples(*[st.floats(-0.3, 0.3)] * 3), st.integers(1, 25))
 def test_a_stop_brakes_within_the_limits_and_stays(offset: tuple[float, float, float], after: int) -> None:
     controller = fresh()

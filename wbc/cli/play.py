@@ -12,7 +12,7 @@ from wbc.cli.console import err
 from wbc.cli.options import Backend
 from wbc.viewer import run
 from wbc.viewer.presets import PRESETS, playground
-from wbc.viewer.show import require_viser
+from wbc.viewer.beside import require_viser
 
 
 def play(

@@ -19,7 +19,7 @@ from wbc.viewer.errors import ViewerError
 from wbc.viewer.presets import of_robot
 from wbc.viewer.runs import REPLAY, recording_in, save_page, states_of
 from wbc.viewer.session import Session
-from wbc.viewer.show import require_viser, token_for
+from wbc.viewer.beside import require_viser, token_for
 
 
 def view(

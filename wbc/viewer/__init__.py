@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from wbc.viewer.messages import MessageError
     from wbc.viewer.operation import Operation
     from wbc.viewer.paced import run
-    from wbc.viewer.show import Viewer, show
+    from wbc.viewer.beside import Viewer, show
 else:
     __getattr__ = lazy.attach(__name__, __file__)
 

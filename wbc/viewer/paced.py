@@ -7,7 +7,7 @@ from typing import Any
 
 from wbc.controller import Controller
 from wbc.simulation import Connection, Plant
-from wbc.viewer.show import show
+from wbc.viewer.beside import show
 
 
 def run(

@@ -15,7 +15,7 @@ from wbc.record.replaying import compiled
 from wbc.viewer.drawing import Drawing, look
 from wbc.viewer.errors import ViewerError
 from wbc.viewer.link import State
-from wbc.viewer.show import require_viser
+from wbc.viewer.beside import require_viser
 from wbc.viewer.tick import Tick
 
 #: The recording in a run's folder, and the page that a run exports

@@ -9,6 +9,7 @@ import http
 import io
 import itertools
 import pathlib
+import socket
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -93,6 +94,7 @@ class PageServer:
     ) -> None:
         import viser
 
+        _require_free(host, port)
         self._hello, self._obey = hello, obey
         self._gate = Gate(host in ("127.0.0.1", "localhost", "::1"), token)
         self._clients: dict[str, Client] = {}
@@ -102,9 +104,6 @@ class PageServer:
         with _guarded(self._look, self._handle), contextlib.redirect_stdout(io.StringIO()):
             self.server = viser.ViserServer(host=host, port=port, verbose=False)
             self._loop = self.server.get_event_loop()
-        if port and self.server.get_port() != port:
-            self.close()
-            raise ViewerError("port", port, "is taken")
         self.scene = self.server.scene
         # viser's own panel holds the tree of the scene alone here
         self.server.gui.main_panel.minimize()
@@ -254,6 +253,17 @@ class PageServer:
     def _tell_all(self, message: dict[str, Any]) -> None:
         for client in self._clients.values():
             client.tell(message)
+
+
+def _require_free(host: str, port: int) -> None:
+    """viser would look for another port without an end."""
+    try:
+        family, kind, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
+        with socket.socket(family, kind) as probe:
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            probe.bind(address)
+    except OSError as error:
+        raise ViewerError("viewer", f"{host}:{port}", f"cannot listen there: {error.strerror}") from error
 
 
 @contextlib.contextmanager
