@@ -45,11 +45,10 @@ def test_a_loop_is_driven_and_its_viewer_lost() -> None:
     assert np.abs(controller.step(q).v).max() < 1e-6
 
 
-def test_a_viewer_that_dies_while_somebody_operates_stops_the_robot(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("wbc.viewer.beside.SILENT", 0.3)
+def test_a_viewer_that_dies_while_somebody_operates_stops_the_robot() -> None:
     controller = arms.fresh()
     q = controller.stack.robot.neutral
-    with show(controller, open_browser=False) as viewer:
+    with show(controller, open_browser=False, silence=0.3) as viewer:
         viewer.operation.obey({"type": "operate"})
         viewer._process.kill()
         until = time.monotonic() + 10.0

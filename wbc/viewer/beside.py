@@ -24,7 +24,7 @@ from wbc.viewer.operation import Operation
 
 log = logging.getLogger("wbc")
 
-#: A loop that somebody operates stops where its viewer gave no sign of life for so long [s]
+#: A loop that somebody operates stops where viewer or page gave no sign of life for so long [s]
 SILENT = 1.0
 #: How long a viewer's process may take to end [s]
 LEAVING = 3.0
@@ -38,13 +38,13 @@ class Viewer:
         url: address of the page. operation: what was taken over from it, see :class:`Operation`.
     """
 
-    def __init__(self, controller: Controller, host: str, port: int, token: str | None) -> None:
+    def __init__(self, controller: Controller, host: str, port: int, token: str | None, silence: float) -> None:
         core = core_of(controller)
         self.operation = Operation(controller)
         self._dt, self._time = controller.stack.dt, 0.0
         size = 8 * core.context.memory.state
         self._link = LoopEnd(size)
-        self._said = ""
+        self._said, self._silence = "", silence
         order = {
             "stack": _pickled(controller),
             "solver": controller.solver,
@@ -54,6 +54,7 @@ class Viewer:
             "host": host,
             "port": port,
             "token": token,
+            "silence": silence,
         }
         command = [sys.executable, "-m", "wbc.viewer.process"]
         # Output of the process that is no answer goes where this one's errors go
@@ -96,7 +97,7 @@ class Viewer:
                     operation.obey(messages.read(content))
                 except WbcError as error:
                     log.warning("the viewer's message was refused: %s", error)
-        if operation.operated and not operation.stopped and self._link.silence > SILENT:
+        if operation.operated and not operation.stopped and self._link.silence > self._silence:
             operation.stop(UNHEARD_TEXT)
         if operation.moving:
             operation.advance(self._dt)
@@ -150,6 +151,7 @@ def show(
     port: int = 0,
     open_browser: bool = True,
     token: str | None = None,
+    silence: float = SILENT,
 ) -> Viewer:
     """Show a controller that a loop steps, and let it be driven from a browser.
 
@@ -168,13 +170,16 @@ def show(
         open_browser: open the page; False: ``viewer.url`` says where it is.
         token: what a client must know; made anew where ``host`` is not this machine alone and none is given.
 
+        silence: while somebody has control, the robot stops where their page, or the viewer, is silent for so long [s].
+
     Raises:
         ViewerError: viser is not installed, the stack cannot be pickled, or the process did not start.
     """
     validation.instance("controller", controller, Controller, "a wbc Controller")
     require_viser()
     name = validation.name("host", host)
-    viewer = Viewer(controller, name, validation.integer("port", port, 0, 65535), token or token_for(name))
+    longest = validation.scalar("silence", silence, low=0.1, unit="s")
+    viewer = Viewer(controller, name, validation.integer("port", port, 0, 65535), token or token_for(name), longest)
     if open_browser:
         webbrowser.open(viewer.url)
     return viewer

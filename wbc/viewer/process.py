@@ -34,7 +34,8 @@ def main() -> None:
         stack: Stack = pickle.loads(order["stack"])
         controller = stack.compile(solver=order["solver"], backend=order["backend"])
         link = ViewerEnd(order["file"], order["state"])
-        session = Session(controller, link, host=order["host"], port=order["port"], token=order["token"])
+        given = {name: order[name] for name in ("host", "port", "token", "silence")}
+        session = Session(controller, link, **given)
     except Exception as error:
         _say(answers, problem=f"{type(error).__name__}: {error}")
         raise

@@ -16,6 +16,7 @@ from wbc.viewer.drawing import Drawing, look
 from wbc.viewer.errors import ViewerError
 from wbc.viewer.link import State
 from wbc.viewer.beside import require_viser
+from wbc.viewer.reading import sentences
 from wbc.viewer.tick import Tick
 
 #: The recording in a run's folder, and the page that a run exports
@@ -46,6 +47,17 @@ def states_of(
     if not states:
         raise ViewerError("recording", str(recording.path), "holds no tick")
     return controller, states
+
+
+def sentences_of(recording: Recording, ticks: Sequence[int]) -> dict[int, str]:
+    """Number of a tick of a recording -> why its command was what it was."""
+    wanted, out = set(ticks), {}
+    for tick in record.replayed(recording, compiled(recording, backend="auto")):
+        if tick.number in wanted:
+            out[tick.number] = " ".join(sentences(tick.step.explain()))
+            if len(out) == len(wanted):
+                break
+    return out
 
 
 def recording_in(folder: pathlib.Path) -> pathlib.Path | None:

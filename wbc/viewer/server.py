@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from websockets.http11 import Request, Response
 
 #: An operator's page that was silent for so long is lost [s]; it gives a sign of life ten times a second
-SILENT = 1.0
+SILENT, BEAT = 1.0, 0.1
 FOLDER = pathlib.Path(__file__).parent / "page"
 KINDS = {".html": "text/html", ".js": "text/javascript", ".css": "text/css"}
 PAGE, SCENE, SOCKET = "", "scene", "wbc"
@@ -91,11 +91,12 @@ class PageServer:
         token: str | None,
         hello: dict[str, Any],
         obey: Callable[[dict[str, Any]], None],
+        silence: float = SILENT,
     ) -> None:
         import viser
 
         _require_free(host, port)
-        self._hello, self._obey = hello, obey
+        self._hello, self._obey, self._silence = hello, obey, silence
         self._gate = Gate(host in ("127.0.0.1", "localhost", "::1"), token)
         self._clients: dict[str, Client] = {}
         self._numbers = itertools.count(1)
@@ -241,9 +242,9 @@ class PageServer:
     async def _watch(self) -> None:
         """An operator that is silent is lost."""
         while True:
-            await asyncio.sleep(SILENT / 10)
+            await asyncio.sleep(BEAT)
             client = self._clients.get(self.operator)
-            if client is not None and time.monotonic() - client.heard > SILENT:
+            if client is not None and time.monotonic() - client.heard > self._silence:
                 self._operator_lost()
 
     def _show(self, text: str) -> None:

@@ -21,7 +21,7 @@ from wbc.viewer.errors import ViewerError
 from wbc.viewer.link import STOPPED, UNHEARD, UNHEARD_TEXT, State, ViewerEnd
 from wbc.viewer.operation import Operation
 from wbc.viewer.reading import declared, sentences, told
-from wbc.viewer.server import PageServer
+from wbc.viewer.server import SILENT, PageServer
 from wbc.viewer.tick import Tick
 from wbc.viewer.timeline import Timeline
 
@@ -88,6 +88,7 @@ class Session:
         host: str = "127.0.0.1",
         port: int = 0,
         token: str | None = None,
+        silence: float = SILENT,
     ) -> None:
         self._controller, self._link = controller, link
         self._checker = Operation(controller)
@@ -96,7 +97,8 @@ class Session:
         self.timeline = Timeline(states)
         self.ended = threading.Event()
         self._stopped = ""
-        self.server = PageServer(host, port, token, declared(controller) | {"live": link is not None}, self._obey)
+        told_first = declared(controller) | {"live": link is not None, "silence": silence}
+        self.server = PageServer(host, port, token, told_first, self._obey, silence)
         self.server.on_lost(self._operator_lost)
         # The scene after the address: a page that comes early waits for it
         self._drawing = Drawing(self.server.scene, controller, None if link is None else self._dragged)

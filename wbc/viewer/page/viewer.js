@@ -33,7 +33,7 @@ function draw() { requestAnimationFrame(draw); if (newest) { const message = new
 requestAnimationFrame(draw);
 
 function take(message) {
-  if (message.type === "hello") { hello = message; operator = message.operator; me = message.you; build(); }
+  if (message.type === "hello") { hello = message; link.postMessage({ patience: 2500 * hello.silence }); operator = message.operator; me = message.you; build(); }
   else if (message.type === "state") { state = message; seen.states += 1; show(); }
   else if (message.type === "operator") { operator = message.name; who(); }
   else if (message.type === "refused") notice(message.reason);
