@@ -11,8 +11,8 @@ from wbc.cli import viewing
 from wbc.cli.console import err
 from wbc.cli.options import Backend
 from wbc.viewer import run
-from wbc.viewer.presets import PRESETS, playground
 from wbc.viewer.beside import require_viser
+from wbc.viewer.presets import PRESETS, playground
 
 
 def play(

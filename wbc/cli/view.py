@@ -15,11 +15,11 @@ from wbc.cli import viewing
 from wbc.cli.console import err, out
 from wbc.record.recording import Recording
 from wbc.viewer import run
+from wbc.viewer.beside import require_viser, token_for
 from wbc.viewer.errors import ViewerError
 from wbc.viewer.presets import of_robot
 from wbc.viewer.runs import REPLAY, recording_in, save_page, states_of
 from wbc.viewer.session import Session
-from wbc.viewer.beside import require_viser, token_for
 
 
 def view(
@@ -41,7 +41,7 @@ def view(
     require_viser()
     path = pathlib.Path(what)
     recording = recording_in(path) if path.is_dir() or path.suffix == ".npz" else None
-    if recording is None and path.is_dir():
+    if path.is_dir() and recording is None:
         page = path / REPLAY
         if not page.is_file():
             raise ViewerError("run", what, f"holds neither a recording nor {REPLAY}")

@@ -21,7 +21,8 @@ LARGEST = 1 << 20
 STYLE = """
 body{font:15px/1.45 system-ui,"DejaVu Sans",sans-serif;color:#1d2733;max-width:920px;margin:24px auto;padding:0 16px}
 h1{font-size:24px;margin:0 0 4px}h2{font-size:17px;margin:30px 0 8px;border-bottom:1px solid #dde2e8;padding-bottom:3px}
-table{border-collapse:collapse}td,th{padding:3px 14px 3px 0;text-align:left;vertical-align:top}th{color:#66727f;font-weight:500}
+table{border-collapse:collapse}th{color:#66727f;font-weight:500}
+td,th{padding:3px 14px 3px 0;text-align:left;vertical-align:top}
 img{max-width:100%}svg text{font:11px system-ui,"DejaVu Sans",sans-serif;fill:#1d2733}.lead{color:#66727f}
 p.kept::before{content:"kept";background:#d8f0df}p.missed::before{content:"not kept";background:#f8d3cd}
 p.kept::before,p.missed::before{border-radius:8px;padding:1px 8px;margin-right:8px}
@@ -124,7 +125,8 @@ class RunPage:
                 begin, over = float(times[first]), float(times[min(last, len(times) - 1)])
                 width = max((over - begin) * scale, 1.0)
                 drawn.append(
-                    f'<rect x="{label + begin * scale:.1f}" y="{y}" width="{width:.1f}" height="{STRIP}" fill="#e07b18">'
+                    f'<rect x="{label + begin * scale:.1f}" y="{y}" width="{width:.1f}" height="{STRIP}" '
+                    'fill="#e07b18">'
                     f"<title>{_text(name)}: {begin:.3g} s to {over:.3g} s</title></rect>"
                 )
         y = min(len(chosen), STRIPS) * (STRIP + 4) + 12

@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING
 from wbc import lazy
 
 if TYPE_CHECKING:
+    from wbc.viewer.beside import Viewer, show
     from wbc.viewer.errors import ViewerError
     from wbc.viewer.messages import MessageError
     from wbc.viewer.operation import Operation
     from wbc.viewer.paced import run
-    from wbc.viewer.beside import Viewer, show
 else:
     __getattr__ = lazy.attach(__name__, __file__)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import io
 import pathlib
+import zipfile
 from collections.abc import Callable, Sequence
 
 from wbc import record, validation
@@ -12,10 +13,10 @@ from wbc.controller import Controller
 from wbc.controller.step import state_of
 from wbc.record.recording import Recording
 from wbc.record.replaying import compiled
+from wbc.viewer.beside import require_viser
 from wbc.viewer.drawing import Drawing, look
 from wbc.viewer.errors import ViewerError
 from wbc.viewer.link import State
-from wbc.viewer.beside import require_viser
 from wbc.viewer.reading import sentences
 from wbc.viewer.tick import Tick
 
@@ -60,10 +61,23 @@ def sentences_of(recording: Recording, ticks: Sequence[int]) -> dict[int, str]:
     return out
 
 
+def is_recording(file: pathlib.Path) -> bool:
+    """Whether a file is a recording, of whatever version."""
+    try:
+        with zipfile.ZipFile(file) as archive:
+            return "about.json" in archive.namelist()
+    except zipfile.BadZipFile:
+        # One whose writer was killed has no directory
+        return True
+    except OSError:
+        return False
+
+
 def recording_in(folder: pathlib.Path) -> pathlib.Path | None:
     """The recording of a run's folder, or the file itself; None where there is none."""
     found = folder / RECORDING if folder.is_dir() else folder
-    return found if found.is_file() else None
+    # A walk keeps other figures of its ticks under this name
+    return found if found.is_file() and is_recording(found) else None
 
 
 def save_page(controller: Controller, states: Sequence[State], file: pathlib.Path) -> pathlib.Path:
