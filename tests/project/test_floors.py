@@ -54,7 +54,8 @@ FLOORS = {
     "wbc.published": 9,
     "wbc.walking": 9,
     "wbc.pages": 9,
-    "wbc.cli": 10,
+    "wbc.viewer": 10,
+    "wbc.cli": 11,
 }
 #: Floors inside wbc.walking; a room imports only rooms on lower floors
 WALKING = {
