@@ -33,7 +33,12 @@ LONG = (
     "self_collision",
     "levels",
     "moving_obstacle",
+    "moving_table",
+    "insert",
     "custom_expression",
+    "humanoid",
+    "torque",
+    "walk",
 )
 
 
