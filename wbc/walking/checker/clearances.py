@@ -1,8 +1,8 @@
 """Checks of clearances: links against each other, and against the structure.
 
-Each pair is measured at every tick, where a bound does not say that it is far enough apart. Between ticks a point moves at most as far as the farther-moving end of its
-segment, so where the distance at the tick less this travel is above both the limit and the least that was found, no
-sample in between can matter; all others are measured as well.
+Each pair is measured at every tick, where a bound does not say that it is far enough apart. Between ticks a point moves
+at most as far as the farther-moving end of its segment, so where the distance at the tick less this travel is above
+both the limit and the least that was found, no sample in between can matter; all others are measured as well.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ def check_links(urdf: Urdf, placements: Placements, samples: Samples, rules: Rul
 
 @dataclass(frozen=True, eq=False)
 class Surroundings:
-    """What links must stay clear of: parts by name, each with a bound that is quicker, and the holds that stand on it."""
+    """What links must stay clear of: parts by name, each with a quicker bound, and the holds that stand on it."""
 
     parts: dict[str, Measure]
     bounds: dict[str, Measure]

@@ -59,7 +59,7 @@ def from_obstacle(obstacle: Obstacle, a: Array, b: Array) -> Array:
 
 
 def at_least(obstacle: Obstacle, a: Array, b: Array) -> Array:
-    """No more than :func:`from_obstacle` [s]: of parts of the segments, from the middle to the box about the obstacle."""
+    """No more than :func:`from_obstacle` [s]: from the middles of parts of a segment to the box about the obstacle."""
     place, shape = obstacle.placement, obstacle.shape
     middle, half = np.zeros(3), np.zeros(3)
     if isinstance(shape, TriangleMesh):
