@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import ceil, cos, pi, radians, sin
@@ -24,6 +25,9 @@ PITCH, HEIGHT = 0.235, 1.32
 FREE_OF = 0.12
 #: Tilt that the holds allow [rad]
 TILT = 0.05
+#: Body and necks, whichever way they are turned, are within this radius about the normal of the hold that they stand
+#: over, and between these heights; obstacles are ROOM from all points of it that are looked at [m]
+BODY, LOW, HIGH, ROOM = 0.41, 0.55, 1.43, 0.09
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +82,7 @@ def _on_plane(name: str, obstacles: list[Obstacle], rows: int = 15, columns: int
 
 
 def _ends(rng: np.random.Generator, structure: Structure, apart: float = 1.2, margin: float = 0.75) -> tuple[str, str]:
-    """Two holds at least ``apart``, and at least ``margin`` from the outline of all holds [m]."""
+    """Two holds over which a body has place, at least ``apart``, and ``margin`` from the outline of all holds [m]."""
     points = structure.positions
     low, high = points.min(axis=0), points.max(axis=0)
     flat = high - low <= 2 * margin
@@ -86,8 +90,18 @@ def _ends(rng: np.random.Generator, structure: Structure, apart: float = 1.2, ma
     rows = np.flatnonzero(inner)
     gaps = np.linalg.norm(points[rows, None] - points[rows], axis=2)
     first, last = np.nonzero((gaps >= apart) & (gaps <= apart + 0.8))
-    k = int(rng.integers(len(first)))
-    return structure.ids[rows[first[k]]], structure.ids[rows[last[k]]]
+    place = functools.cache(lambda row: has_place(structure, points[row]))
+    pairs = ((rows[first[k]], rows[last[k]]) for k in rng.permutation(len(first)))
+    begin, end = next(pair for pair in pairs if place(pair[0]) and place(pair[1]))
+    return structure.ids[begin], structure.ids[end]
+
+
+def has_place(structure: Structure, foot: Array) -> bool:
+    """Whether a body has place at its usual height over a point of the plane z = 0, whichever way it is turned."""
+    grid = np.meshgrid(np.linspace(0.0, BODY, 4), np.arange(16) * pi / 8, np.linspace(LOW, HIGH, 9))
+    radius, angle, height = (axis.ravel() for axis in grid)
+    body = foot + np.stack([radius * np.cos(angle), radius * np.sin(angle), height], axis=1)
+    return all(float(obstacle.distance(body).min()) >= ROOM for obstacle in structure.obstacles)
 
 
 def capsule_between(name: str, a: Array, b: Array, radius: float) -> Obstacle:
