@@ -109,7 +109,7 @@ def test_a_walk_on_servos_is_judged_by_the_checker(
 def test_slow_servos_walk_later_and_violate_nothing(
     machine: Walker, structure: Structure, stack: WalkStack, tmp_path: Path
 ) -> None:
-    """How late they are shows in their motion, and the gains are lower then; as they are, a hand would not come to rest."""
+    """How late they are shows in their motion, and gains are lower then; else a hand would not come to rest."""
     plan = plan_walk(machine, structure, grid_path([(13, 9), (13, 14)], 0.1016))
     walk = Walk(machine, structure, plan, stack=stack, plant=LaggingPlant(machine.robot, *SLOW))
     recorder = WalkRecorder(walk)
