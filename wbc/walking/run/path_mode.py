@@ -54,7 +54,7 @@ class PlannedMode(Mode[Asked]):
     ) -> Ending:
         """Until the walk is done, or takes too long."""
         duration, doing = walk.plan.path.duration, CarryingOut(walk, recorder, progress=report, stop=stop)
-        veto, late = None if self._ask is None else Veto(walk), PATIENCE * duration + SLACK
+        veto, late = None if self._ask is None else Veto(walk), walk.time + PATIENCE * duration + SLACK
         ending = Ending("arrived", "")
         while not walk.done:
             if veto is not None and self._ask is not None and veto.proposal is not None:

@@ -367,7 +367,7 @@ def read_request(
     if two_ended:
         for name, value in (("speed", speed), ("turn_rate", turn_rate)):
             validation.scalar(name, value, low=0.0, open_low=True)
-        return _two_ended(site, start, points, gait)
+        return two_ended_request(site, start, points, gait)
     objective: Objective = "velocity" if mode == "velocity" else "destination"
     route: dict[str, Any] = {"site": site, "start": start, "points": tuple(points)}
     route |= {"speed": speed, "turn_rate": turn_rate}
@@ -380,7 +380,7 @@ def read_request(
     return PathRequest(**route, objective=objective, free_start=free_start, plan=plan)
 
 
-def _two_ended(site: Site, start: str, points: Sequence[str], gait: str) -> TwoEndedRequest:
+def two_ended_request(site: Site, start: str, points: Sequence[str], gait: str) -> TwoEndedRequest:
     """A goal is a hold if there is such a one, else a place x,y,z."""
     ends = TWO_ENDED_ENDS if site.structure == GRAPPLES else ((), "")
     first, goals = tuple(start.split()) or ends[0], tuple(points) or (ends[1],)

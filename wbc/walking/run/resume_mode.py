@@ -37,7 +37,7 @@ from wbc.walking.run.carrying_out import CarryingOut, Progress
 from wbc.walking.run.mode import Ending, Mode, Result, compiled_stack, off_goal
 from wbc.walking.run.places import GridPlace, Place
 from wbc.walking.run.recording import Before, WalkRecorder, as_walked, configuration
-from wbc.walking.run.request import PathRequest, Request, TwoEndedRequest, request_of
+from wbc.walking.run.request import PathRequest, Request, TwoEndedRequest, request_of, two_ended_request
 
 #: Name of the mode in ``begun.json``
 RESUME = "resume"
@@ -67,6 +67,19 @@ def resumed_state(log: WalkLog, row: int, walker: Walker, structure: Structure) 
     for limb in walker.arms:
         v[limb.v] = log.v[row - 1, [column[joint] for joint in limb.joints]]
     return State(configuration(walker, log, row), held, float(log.t[row]), opening, v)
+
+
+def row_at(log: WalkLog, at: float | None) -> int:
+    """The row of a log at a time [s]; None: the last one.
+
+    Raises:
+        RangeError: it has no such time.
+    """
+    if at is None:
+        return len(log) - 1
+    if not log.t[1] - 1e-9 <= at <= log.t[-1] + 1e-9:  # nor is nan
+        raise RangeError("resume.at", at, f"expected a time from {log.t[1]:g} to {log.t[-1]:g} s")
+    return int(np.searchsorted(log.t, at + 1e-9, side="right")) - 1
 
 
 @dataclass(frozen=True)
@@ -121,6 +134,10 @@ def going_on(resume: ResumeRequest, seen: frozenset[pathlib.Path] = frozenset())
     begun = dict(read_begun(folder)["request"])
     if begun.get("kind") != RESUME:
         request = request_of(begun)
+        if resume.points and isinstance(request, TwoEndedRequest):
+            return two_ended_request(
+                request.site, " ".join(request.start), tuple(map(str, resume.points)), request.gait
+            )
         return _goal(request, resume.points) if resume.points else request
     try:
         at, points = begun["at"], tuple(_place(place) for place in begun["points"])
@@ -165,15 +182,13 @@ class ResumeMode(Mode[PathRequest]):
         super().__init__(walker)
         self._resume, self._folder = resume, pathlib.Path(resume.folder)
         self._old, self._ticks = WalkLog.load(self._folder), TickColumns.load(self._folder)
-        old, at = self._old, resume.at
+        old = self._old
         self.request = request = _goal(request_of(old.meta.get("request")), resume.points)
         if walker.two_ended or walker.data.digest != old.meta["robot_digest"]:
             raise RangeError("resume", old.meta["robot_digest"], "the run has another robot; use the same --set")
         if len(old.arms) != len(walker.arms):
             raise RangeError("resume", len(old.arms), f"the run has another number of arms than {len(walker.arms)}")
-        if at is not None and not old.t[1] - 1e-9 <= at <= old.t[-1] + 1e-9:  # nor is nan
-            raise RangeError("resume.at", at, f"expected a time from {old.t[1]:g} to {old.t[-1]:g} s")
-        row = len(old) - 1 if at is None else int(np.searchsorted(old.t, at + 1e-9, side="right")) - 1
+        row = row_at(old, resume.at)
         self._row, self.structure = row, read_structure(self._folder / STRUCTURE)
         here = old.present(np.arange(len(old.hold_id)), float(old.t[row]))
         gone = [name for name, there in zip(old.hold_id, here, strict=True) if not there]
@@ -259,7 +274,7 @@ def _goal(request: Request, points: tuple[Place, ...]) -> PathRequest:
         RangeError: it has no goal.
     """
     if isinstance(request, TwoEndedRequest):
-        raise RangeError("resume", "two-ended", "runs of the two-ended arm are not resumed")
+        raise RangeError("resume", "two-ended", "the run is of the two-ended arm")
     if not points and not request.goes:
         raise RangeError("to", points, "the run was driven and has no goal; say where to go")
     goes = points or request.points, request.speed, request.turn_rate

@@ -32,6 +32,7 @@ from wbc.walking.run.plausible import far_apart
 from wbc.walking.run.recording import WalkRecorder
 from wbc.walking.run.request import ArmRequest, DriveRequest, PathRequest, Request, TwoEndedRequest, record_of
 from wbc.walking.run.resume_mode import ResumeMode, ResumeRequest, going_on
+from wbc.walking.run.resume_two_ended import TwoEndedResumeMode
 from wbc.walking.torque.loop import TorqueLoop
 
 
@@ -147,7 +148,7 @@ def mode_of(
     if isinstance(request, TwoEndedRequest):
         return TwoEndedMode(request, walker)
     if isinstance(request, ResumeRequest):
-        return ResumeMode(request, walker)
+        return TwoEndedResumeMode(request, walker) if walker.two_ended else ResumeMode(request, walker)
     raise ShapeError("request", request, "expected a request of a walk by the planner 'free'")
 
 

@@ -147,3 +147,17 @@ class TurnLaw(SwingLaw):
         row = min(int(place), len(self._joints) - 2)
         out: Array = self._joints[row] + (place - row) * (self._joints[row + 1] - self._joints[row])
         return out
+
+    def found(self, q: Array, v: Array) -> tuple[float, float]:
+        """The time at which the joints are nearest to a posture ``[joints]`` [rad], and the pace from 0 to 1 that their
+        rates are of its own there [rad/s].
+        """
+        rows = self._joints
+        spans, offs = np.diff(rows, axis=0), q - rows[:-1]
+        squares = np.maximum((spans * spans).sum(axis=1), 1e-18)
+        parts = np.clip((offs * spans).sum(axis=1) / squares, 0.0, 1.0)
+        row = int(np.linalg.norm(offs - parts[:, None] * spans, axis=1).argmin())
+        spacing = self.duration / len(spans)
+        rates = spans[row] / spacing
+        pace = float(v @ rates / max(float(rates @ rates), 1e-12))
+        return (row + float(parts[row])) * spacing, min(max(pace, 0.0), 1.0)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -19,7 +20,7 @@ from wbc.walking.loop.foresight import Foresight
 from wbc.walking.loop.machine import Machine
 from wbc.walking.loop.progress import PlanProgress
 from wbc.walking.loop.stack import AXIS, DT, FREE_AXIS, FREE_WRIST, WalkStack
-from wbc.walking.loop.state import Swinging, Wrist
+from wbc.walking.loop.state import State, Swinging, Wrist
 from wbc.walking.loop.stopping import Stops
 from wbc.walking.loop.walk import Walk
 from wbc.walking.planner.plan import NoPlanError
@@ -156,7 +157,7 @@ class TwoEndedWalk(Walk):
 
     Args:
         walker, structure, plan: the two-ended arm, the holds, and a plan of :func:`plan_two_ended`.
-        dt, backend, stack, grasps, plant: as of :class:`wbc.walking.loop.walk.Walk`.
+        dt, backend, stack, grasps, plant, state: as of :class:`wbc.walking.loop.walk.Walk`.
 
     Raises:
         ShapeError: another machine, or a plan without its grips; of a plant as ``Walk``.
@@ -173,6 +174,7 @@ class TwoEndedWalk(Walk):
         stack: TwoEndedStack | None = None,
         grasps: Callable[[str, str], bool] | None = None,
         plant: Plant | None = None,
+        state: State | None = None,
     ) -> None:
         if not isinstance(plan, TwoEndedPlan):
             raise ShapeError("plan", plan, "expected a plan of plan_two_ended")
@@ -185,8 +187,34 @@ class TwoEndedWalk(Walk):
         def leader(machine: Machine, progress: PlanProgress, _: WalkStack) -> TurnLeader:
             return TurnLeader(machine, progress, stack)
 
-        more: dict[str, Any] = {"stack": stack, "grasps": grasps, "plant": plant}
+        if state is not None:
+            # It goes on with its velocity, see go_on
+            state = replace(state, v=None)
+        more: dict[str, Any] = {"stack": stack, "grasps": grasps, "plant": plant, "state": state}
         super().__init__(walker, structure, plan, leader=leader, replanner=replanner, **more)
+
+    def go_on(self, arm: int | None, state: State) -> None:
+        """Go on from the middle of the plan's first swing, as fast as it was going.
+
+        Args:
+            arm: row of the arm that swings; None: both hands hold, and nothing moves. state: with its velocity.
+        """
+        if arm is None:
+            return
+        step, law, joints = self.plan.regrasps[0], self.plan.laws[0], self.walker.arms[arm]
+        assert isinstance(law, TurnLaw)
+        v = np.zeros(len(state.q) - 1) if state.v is None else state.v
+        clock, pace = law.found(state.q[joints.q], v[joints.v])
+        opens, progress = state.opening is not None, self.progress
+        more: dict[str, Any] = {"clock": 0.0 if opens else clock, "state": "opening" if opens else "open"}
+        latch = self.hands.data.latch_time if opens else 0.0
+        swinging = self.hands.going(arm, self._grip(progress.next_grip(arm)), law, latch=latch, **more)
+        swinging.place, swinging.axis, swinging.x_axis = self.machine.hand(arm)
+        swinging.wrist = self.leader.wrist(arm)
+        progress.path_time = step.lift + swinging.clock
+        progress.lift(arm)
+        self.hands.swinging = swinging
+        self.body.pace, self.machine.v = (0.0, self.machine.v) if opens else (pace, v.copy())
 
     def go_to(self, to: str | Sequence[float], gait: str = "any") -> None:
         """Go somewhere else, from the stance that the arm comes to next: to a hold, or with the elbow to a point [m].

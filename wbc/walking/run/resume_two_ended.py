@@ -1,0 +1,127 @@
+"""Going on with a run of the two-ended arm from any state of its log."""
+
+from __future__ import annotations
+
+import pathlib
+from typing import Any
+
+import numpy as np
+
+from wbc.errors import RangeError, ShapeError
+from wbc.robots import Walker
+from wbc.simulation import Plant
+from wbc.track.summary import Figure
+from wbc.walking.holds.files import read_structure
+from wbc.walking.log.folder import STRUCTURE
+from wbc.walking.log.log import CLOSED, CLOSING, OPEN, WalkLog
+from wbc.walking.log.ticks import TickColumns
+from wbc.walking.loop.stack import WalkStack
+from wbc.walking.loop.walk import Walk
+from wbc.walking.planner.plan import NoPlanError, Plan
+from wbc.walking.run.mode import Result
+from wbc.walking.run.path_mode import TwoEndedMode
+from wbc.walking.run.recording import Before, as_walked
+from wbc.walking.run.request import TwoEndedRequest, request_of, two_ended_request
+from wbc.walking.run.resume_mode import RESUME, ResumeRequest, resumed_state, row_at
+from wbc.walking.two_ended import TwoEndedPlan, TwoEndedStack, TwoEndedWalk, plan_two_ended
+
+
+class TwoEndedResumeMode(TwoEndedMode):
+    """Reads a run's folder, and goes on with it as fast as it was going: a hand in the air on its way, and then to the
+    goal.
+
+    Raises:
+        WalkLogError: no log of a walk. RangeError: a time that it does not have, another robot, or a state that is not
+            legal.
+    """
+
+    def __init__(self, resume: ResumeRequest, walker: Walker) -> None:
+        self._resume, self._folder = resume, pathlib.Path(resume.folder)
+        self._old, self._ticks = WalkLog.load(self._folder), TickColumns.load(self._folder)
+        request = request_of(self._old.meta.get("request"))
+        if not isinstance(request, TwoEndedRequest) or not walker.two_ended:
+            raise RangeError("resume", str(self._folder), "the run is of another machine")
+        if walker.data.digest != self._old.meta["robot_digest"]:
+            raise RangeError("resume", self._old.meta["robot_digest"], "the run has another robot; use the same --set")
+        if resume.points:
+            request = two_ended_request(request.site, " ".join(request.start), tuple(map(str, resume.points)), "any")
+        super().__init__(request, walker)
+        self._whole = read_structure(self._folder / STRUCTURE)
+        self._row = row = row_at(self._old, resume.at)
+        here = self._old.present(np.arange(len(self._old.hold_id)), float(self._old.t[row]))
+        gone = [name for name, there in zip(self._old.hold_id, here, strict=True) if not there]
+        self.structure = self._whole.without(gone)
+        self._state = resumed_state(self._old, row, walker, self.structure)
+
+    def plan(self) -> TwoEndedPlan:
+        """From the stance that the arm had last, beginning with the swing that it is in."""
+        start, request = dict[str, str](), self.request
+        for arm, name in enumerate(self._old.arms):
+            closed = np.flatnonzero(self._old.hand_state[: self._row + 1, arm] == CLOSED)
+            start[name] = self._old.hold_id[self._old.hand_hold[closed[-1], arm]]
+        self._arm, target = self._swing()
+
+        def to(goal: Any, gait: str) -> TwoEndedPlan:
+            return plan_two_ended(self.walker, self.structure, start, goal, gait=gait)
+
+        plan = to(request.goal, request.gait)
+        if self._arm is None or _begins(plan, self._old.arms[self._arm], target):
+            return plan
+        if target:
+            # The way to the goal begins otherwise from here: first to where the hand is on its way
+            plan = to(target, "any")
+            if _begins(plan, self._old.arms[self._arm], target) and len(plan.regrasps) == 1:
+                return plan
+        name = self._old.arms[self._arm]
+        raise NoPlanError("resume", name, f"no plan goes on with its swing from {start[name]} to {target or 'a hold'}")
+
+    def _swing(self) -> tuple[int | None, str]:
+        """The arm whose hand is in the air or opens, None for none, and the hold that it goes to, "" where none is."""
+        states, holds = self._old.hand_state[self._row], self._old.hand_hold[self._row]
+        for arm, state in enumerate(states.tolist()):
+            if arm not in self._state.held:
+                there = state in (OPEN, CLOSING) and holds[arm] >= 0
+                return arm, self._old.hold_id[holds[arm]] if there else ""
+        return None, ""
+
+    def walk(self, plan: Plan, stack: WalkStack, plant: Plant | None) -> TwoEndedWalk:
+        """From the state of the log."""
+        if not isinstance(plan, TwoEndedPlan) or not isinstance(stack, TwoEndedStack):
+            raise ShapeError("stack", stack, "expected a TwoEndedStack")
+        walk = TwoEndedWalk(self.walker, self.structure, plan, stack=stack, plant=plant, state=self._state)
+        walk.go_on(self._arm, self._state)
+        goal = self.request.goal
+        if plan.to != goal:
+            walk.go_to(goal, self.request.gait)
+        return walk
+
+    def asked(self) -> dict[str, Any]:
+        """The run that goes on, by its whole path, and from when."""
+        resume = self._resume
+        folder = str(self._folder.resolve())
+        return {"kind": RESUME, "folder": folder, "at": resume.at, "points": list(resume.points)}
+
+    def before(self) -> Before:
+        """What was walked until it goes on."""
+        return Before(self._old, self._ticks, self._row, self._whole)
+
+    def meta(self, plan: Plan) -> dict[str, Any]:
+        """What the old log has, and when it was gone on with."""
+        old = self._old.meta
+        return {**old, "resumed": [*old.get("resumed", []), self._state.time]}
+
+    def figures(self, log: WalkLog | None) -> tuple[Figure, ...]:
+        """From where it went on, and how far things go after an abort."""
+        value = {"from": str(self._folder), "at": self._state.time}
+        resumed = Figure("resumed", "resumed", value, f"{self._folder} at {self._state.time:.2f} s")
+        return (resumed, *super().figures(log))
+
+    def result(self, walk: Walk, log: WalkLog, ticks: TickColumns) -> Result:
+        """The log of the run up to then and of the new walk; the plan is what was done."""
+        plan, ticks = as_walked(log, ticks, walk.progress.steps)
+        return Result(plan, log, ticks, self.figures(log))
+
+
+def _begins(plan: TwoEndedPlan, arm: str, target: str) -> bool:
+    """Whether a plan begins with a swing of an arm, to a hold; "": to any."""
+    return bool(plan.regrasps) and plan.regrasps[0].arm == arm and target in ("", plan.regrasps[0].target)
