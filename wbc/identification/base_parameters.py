@@ -92,6 +92,8 @@ def base_parameters(W: Array, tolerance: float = DEPENDENT) -> BaseParameters:
 def identifiable(regression: Regression, states: int = 200, seed: int = 0) -> BaseParameters:
     """The base parameters of a robot over random states: no motion shows more."""
     robot, random = regression.robot, np.random.default_rng(validation.integer("seed", seed))
-    q = np.array([robot.random(int(random.integers(2**31))) for _ in range(validation.integer("states", states, low=1))])
+    q = np.array(
+        [robot.random(int(random.integers(2**31))) for _ in range(validation.integer("states", states, low=1))]
+    )
     v, a = random.normal(size=(2, states, robot.nv))
     return base_parameters(regression.matrix(q, v, a))

@@ -105,7 +105,9 @@ def exciting_motion(
         else:
             step = max(0.02, step * SHRINK ** (1.0 / 4.0))
     if law is None:
-        raise InfeasibleError("robot.limits.effort", limits.effort, "no motion that was tried keeps the limits of torque")
+        raise InfeasibleError(
+            "robot.limits.effort", limits.effort, "no motion that was tried keeps the limits of torque"
+        )
     times = np.linspace(0.0, law.duration, 4 * INSTANTS)
     return ExcitingMotion(law, base_parameters(regression.matrix(*law.at(times))), score, first)
 
