@@ -56,7 +56,7 @@ def derivatives() -> Sheet:
     """Of the Panda's ticks, by the configuration and by the target of the hand, on one thread."""
     with tempfile.TemporaryDirectory() as folder:
         case = load(panda(Path(folder)))
-    ours, q = states(case)
+        ours, q = states(case)
     batch = ours.controller.batch(len(q), threads=1)
     batch.set(**{case.problem.frames[0]: case.poses[:, 0]})
     step, rows = batch.step(q), []
