@@ -93,7 +93,7 @@ class Derivatives:
             for name in ("H", "g", "A", "low", "high")
         )
         upper = np.triu(H.reshape(len(given), n, -1)[:, :, :n])
-        return upper + np.triu(upper, 1).transpose(0, 2, 1), g[:, :n], A.reshape(-1, m, n), low, high
+        return upper + np.triu(upper, 1).transpose(0, 2, 1), g[:, :n], A.reshape(len(given), m, n), low, high
 
     def _moves(self, name: str, value: str | None) -> tuple[Moves, int]:
         """What displaces the k-th entry of a value of all robots, and how many entries there are."""
