@@ -45,6 +45,8 @@ FLOORS = {
     "wbc.trajectory": 8,
     "wbc.coordinates": 8,
     "wbc.explore": 9,
+    "wbc.identification": 9,
+    "wbc.motion_control": 9,
     "wbc.program": 9,
     "wbc.moving_target": 9,
     "wbc.teleop": 9,
@@ -52,7 +54,8 @@ FLOORS = {
     "wbc.published": 9,
     "wbc.walking": 9,
     "wbc.pages": 9,
-    "wbc.cli": 10,
+    "wbc.viewer": 10,
+    "wbc.cli": 11,
 }
 #: Floors inside wbc.walking; a room imports only rooms on lower floors
 WALKING = {
