@@ -23,8 +23,9 @@ from wbc.walking.planner.plan import HoldLost
 from wbc.walking.planner.planner import plan_walk
 from wbc.walking.run.recording import WalkRecorder
 from wbc.walking.torque.faults import Fault, delay_of
-from wbc.walking.torque.loop import Tested, TorqueLoop
+from wbc.walking.torque.loop import TorqueLoop
 from wbc.walking.torque.stack import TorqueStack
+from wbc.walking.torque.tested import Tested
 
 MOON, EARTH = (0.0, -1.62, 0.0), (0.0, -9.81, 0.0)
 

@@ -11,8 +11,9 @@ from wbc.simulation import GripKind, GrippingMujocoPlant, Motors, PinocchioPlant
 from wbc.walking.holds.structure import Structure
 from wbc.walking.loop.stack import hold_kind
 from wbc.walking.torque.faults import Fault, delay_of
-from wbc.walking.torque.loop import Tested, TorqueLoop
+from wbc.walking.torque.loop import TorqueLoop
 from wbc.walking.torque.stack import TorqueStack
+from wbc.walking.torque.tested import Tested
 
 PLANTS = ("kinematic", "pinocchio", "mujoco")
 
