@@ -43,6 +43,7 @@ from wbc.tasks.rolling import Rolling, Wheel
 from wbc.tasks.rolling_contact import RollingContact
 from wbc.tasks.self_collision import SelfCollision
 from wbc.tasks.sliding_contact import SlidingContact
+from wbc.tasks.support_region import SupportRegion
 from wbc.tasks.surface_contact import SurfaceContact
 from wbc.tasks.torque_limits import TorqueLimits
 from wbc.tasks.workspace_box import WorkspaceBox
@@ -95,6 +96,7 @@ __all__ = [
     "SacrificeOrder",
     "SelfCollision",
     "SlidingContact",
+    "SupportRegion",
     "SurfaceContact",
     "Task",
     "TorqueLimits",

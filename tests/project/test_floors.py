@@ -38,6 +38,7 @@ FLOORS = {
     "wbc.controller": 6,
     "wbc.explain": 7,
     "wbc.export": 7,
+    "wbc.support": 7,
     "wbc.ik": 7,
     "wbc.record": 7,
     "wbc.servo": 7,
