@@ -116,7 +116,6 @@ QP_FIELDS = (
     Field("desired", ("MT",), "rate that each task row asks for", True),
     Field("free_low", ("MC",), "bounds of the general rows before relaxation", True),
     Field("free_high", ("MC",), "", True),
-    Field("given", ("4", "4"), "a pose to be written into p: a homogeneous matrix, row by row"),
     Field("give", ("MC",), "by how much a soft row gives way per multiplier; 0 for hard rows", True),
 )
 

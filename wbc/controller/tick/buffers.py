@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -132,11 +133,17 @@ class Assembly(Buffers, ABC):
     def look_ahead(self) -> None:
         """Margins after the step, into the report."""
 
-    def put_pose(self, start: int, matrix: Array) -> bool:
-        """Check a homogeneous matrix [4, 4] and write it to ``p`` from ``start`` on; False, nothing written,
-        where it is not a pose or that cannot be done quicker here than in Python.
+    #: whether :meth:`taker` is there
+    takes = False
+
+    def taker(self, staged: Array, plan: np.ndarray) -> Callable[[], int]:
+        """What checks values that wait in ``staged`` and writes them to ``p``, in native code; 0, and nothing written,
+        where one is refused.
+
+        Args:
+            plan: of each value what it is, where it goes in ``p``, how many numbers it has [count, 3].
         """
-        return False
+        raise NotImplementedError
 
     def commanded(self, v: Array, sound: bool) -> None:
         """What follows from a command in the report: torques, and the velocity that the next tick counts from.

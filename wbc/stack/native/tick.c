@@ -2,7 +2,6 @@
 #include "assemble.h"
 #include "levels.h"
 #include "primal.h"
-#include "pose.h"
 
 static int refused(const wbc_tick *t) {
     for (int i = 0; i < NQ; i++)
