@@ -47,7 +47,7 @@ def test_on_level_ground_it_is_the_hull_of_the_soles() -> None:
     assert offsets.max() < 1e-4
     center = pin.centerOfMass(robot("talos").model, robot("talos").model.createData(), robot("talos").neutral)
     here = -(wanted.equations @ np.r_[center[:2], 1.0]).max()
-    assert found.margin() == pytest.approx(here, abs=1e-5)
+    assert found.margin() == pytest.approx(here, abs=1e-4)
     assert found.margin(center + np.array([1.0, 0.0, 0.0])) == pytest.approx(here - 1.0, abs=0.1)
 
 
@@ -76,7 +76,9 @@ def test_planes_are_within_it() -> None:
 
 
 def test_the_capture_point_stays_within_where_the_rate_is_that_of_the_pendulum() -> None:
-    """The centre of mass is thrown at an edge, and told to leave; psi = dh/dt + rate h never falls below 0."""
+    """The centre of mass is told to leave: the distance of the capture point from the edge, (dh/dt + rate h) / rate,
+    shrinks no faster than exp(-rate t).
+    """
     bot, rate = robot("talos"), 3.5
     made = Stack(bot, dt=0.005).add(CenterOfMass(), name="com").add(Posture(), weight=1e-3)
     made.add(SupportRegion(planes=6), name="balance")
@@ -95,7 +97,7 @@ def test_the_capture_point_stays_within_where_the_rate_is_that_of_the_pendulum()
         q, v = pin.integrate(bot.model, q, 0.5 * (v + step.v) * 0.005), step.v
         pin.centerOfMass(bot.model, data, q, v)
         least = min(least, float((offsets - normals @ (data.com[0] + data.vcom[0] / rate)).min()))
-    assert -1e-5 < least < 1e-3
+    assert least == pytest.approx(plain().margin() * (1.0 - 0.005 * rate) ** 60, rel=0.02)
 
 
 def test_what_is_lacking_is_named_in_newtons() -> None:
