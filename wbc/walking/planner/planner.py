@@ -18,7 +18,7 @@ from wbc.walking.arms.puma import limb_of
 from wbc.walking.body_path import BodyPath
 from wbc.walking.holds.structure import Structure
 from wbc.walking.planner.around import NONE_MET, Around, around
-from wbc.walking.planner.detours.route import find_routes
+from wbc.walking.planner.detours.route import BodyRoute, Routes, find_routes
 from wbc.walking.planner.fewest import fewer_slices
 from wbc.walking.planner.grips.table import Grips, grip_slices
 from wbc.walking.planner.plan import NoPlanError, Plan, Regrasp
@@ -36,6 +36,8 @@ DELAYS = (0.0, 0.25, 0.5, 1.0, 2.0, float("inf"))
 SOON = (0.0, 0.25, float("inf"))
 #: Where all searches fail, the one with any delay is made again, so many times as wide
 WIDER = 5
+#: With more arms than this detours, along which all but one must hold, come after the wider search
+USUAL_ARMS = 3
 
 
 def plan_walk(
@@ -83,16 +85,40 @@ def plan_walk(
     if not plan.complete and detour:
         rows = {arm.name: k for k, arm in enumerate(walker.arms)}
         hands = {rows[name]: structure.index(hold) for name, hold in beginning[0].items()}
-        for route in find_routes(walker, structure, path, hands, deadline):
+        wide = [(DELAYS[-1], WIDER * width)] if width is not None else []
+        if len(walker.arms) > USUAL_ARMS:
+            plan = _further(plan, drained(search(path, beginning, objective="destination", tries=wide)))
+        routes, ended, known = find_routes(walker, structure, path, hands, deadline), None, path
+        while not plan.complete and (route := _next(routes, ended)) is not None:
             if route.path is None:
-                plan = replace(plan, reason=f"{plan.reason}; {route.text}", separating=route.separating)
+                plan, ended = replace(plan, reason=f"{plan.reason}; {route.text}", separating=route.separating), None
                 continue
-            changed = drained(search(route.path, beginning, objective="destination"))
+            tries = [*([] if route.path is known else [(DELAYS[-1], width)]), *(wide if route.last else ())]
+            known = route.path
+            if not tries:
+                continue
+            changed = drained(search(route.path, beginning, objective="destination", tries=tries))
             if changed.complete:
                 return changed
+            ended = round(changed.reached / path.spacing)
+        if not plan.complete and len(walker.arms) <= USUAL_ARMS:
+            plan = _further(plan, drained(search(path, beginning, objective="destination", tries=wide)))
     if not plan.complete and not partial:
         raise NoPlanError("plan", structure.name, plan.reason, separating=plan.separating)
     return plan
+
+
+def _next(routes: Routes, ended: int | None) -> BodyRoute | None:
+    """The next route after the one along which a plan ended at a sample; None: no other."""
+    try:
+        return next(routes) if ended is None else routes.send(ended)
+    except StopIteration:
+        return None
+
+
+def _further(plan: Plan, other: Plan) -> Plan:
+    """The one that leads to the end; the first one where none does."""
+    return other if other.complete else plan
 
 
 def _check_ends(walker: Walker, structure: Structure, path: BodyPath) -> None:
