@@ -50,14 +50,12 @@ class BodyRoute:
         complete: the search looked at all that it can reach, so there is none among its cells.
         separating: ids of the holds at which it ends; empty if there is one.
         text: how far the body goes off its path, or why there is none.
-        last: of its mesh; its path may be that of the one before.
     """
 
     path: BodyPath | None
     complete: bool
     separating: tuple[str, ...]
     text: str
-    last: bool = True
 
 
 #: Takes the sample at which a plan along the route ends, and yields another route
@@ -109,16 +107,11 @@ def _variations(
     start: Mapping[int, int] | None,
     deadline: float | None,
 ) -> Routes:
-    """Detours of one mesh: the quickest one, then such as keep away from where plans ended."""
+    """Detours of one mesh: the quickest one, then such as have room, and keep away from where plans ended."""
     cells = cells_about(path, structure, mesh)
     grips = cell_grips(walker, structure, cells)
     there, dear, closed = around(walker, structure), _dear(cells), set[tuple[int, int]]()
-    # Cells at which the body has place on its way to the next one, or else those at which it has just enough
-    roomy = there.bodies(cells.frames, ROOMY) == NONE_MET
-    roomy[[cells.start, cells.goal]] = True
-    outcome = CellSearch(walker, structure, cells, grips.only(roomy)).run(start, deadline)
-    if not roomy.all() and (not outcome.nodes or _clear(there, cells, outcome, path, dear, closed) is None):
-        outcome = CellSearch(walker, structure, cells, grips).run(start, deadline)
+    outcome = CellSearch(walker, structure, cells, grips).run(start, deadline)
     if not outcome.nodes:
         names = tuple(structure.ids[k] for k in sorted({int(grips.hold[g]) for g in outcome.reached}))
         number = f"{outcome.expanded} landings looked at{'' if outcome.complete else ', more are left'}"
@@ -126,23 +119,29 @@ def _variations(
         text = f"up to {mesh.beside * mesh.side:.2f} m beside the path there is no route {where} ({number})"
         yield BodyRoute(None, outcome.complete, names, text)
         return
-    known: tuple[list[int], BodyPath, Ints] | None = None
+    outcomes, known, seen = [outcome], list[list[int]](), 0
+    # Then through cells at which the body has more place than it needs
+    roomy = there.bodies(cells.frames, ROOMY) == NONE_MET
+    roomy[[cells.start, cells.goal]] = True
     for count in range(VARIATIONS):
-        found = _clear(there, cells, outcome, path, dear, closed)
-        if found is None:
-            text = f"up to {mesh.beside * mesh.side:.2f} m beside the path the body touches something on each route"
-            yield BodyRoute(None, False, (), text)
-            return
-        same = known is not None and found[0] == known[0]
-        chain, route, at = known = known if known is not None and same else found
+        if count == 1 and not roomy.all():
+            outcome = CellSearch(walker, structure, cells, grips.only(roomy)).run(start, deadline)
+            outcomes += [outcome] if outcome.nodes else []
+        found = _clear(there, cells, outcomes[count % len(outcomes)], path, dear, closed)
+        if found is None or found[0] in known:
+            continue
+        chain, route, at = found
+        known.append(chain)
         off = cells.offsets(np.array(chain))
         far = np.abs(off[:, 1]).max(), off[:, 2].max(), np.degrees(np.abs(off[:, 3]).max())
         text = f"up to {far[0]:.2f} m beside, {far[1]:.2f} m lower, turned by {far[2]:.0f} deg"
-        ended = yield BodyRoute(route, True, (), text, same or count == VARIATIONS - 1)
-        if same:
-            return
+        ended = yield BodyRoute(route, True, (), text)
+        seen += 1
         if ended is not None:
             dear[_near(cells, chain[min(int(np.searchsorted(at, ended)), len(chain) - 1)])] += STUCK
+    if not seen:
+        text = f"up to {mesh.beside * mesh.side:.2f} m beside the path the body touches something on each route"
+        yield BodyRoute(None, False, (), text)
 
 
 def _clear(
