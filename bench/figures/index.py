@@ -15,6 +15,7 @@ from bench.pool import ROOT
 from bench.sheet import Sheet
 from bench.walk import layout_tables, planning_tables
 from bench.walk import tables as walks
+from bench.walk.trial_parts import trial_sheet
 
 View = Callable[[Any], str]
 #: What a tick consists of
@@ -90,6 +91,12 @@ _ALL = (
             "patches": walk_view("patches", planning_tables.patch_sheet),
             "layouts": walk_view("layouts", layout_tables.layout_sheet),
         },
+    ),
+    Figure(
+        "trials", (*WALK, "bench/walk"), 600.0,
+        ("python", "-m", "bench.walk", "--parts", "structures", "--resume", "--output", "bench/data"),
+        "bench/data/trials.json",
+        {"structures": walk_view("structures", lambda records: trial_sheet("structures", records))},
     ),
     Figure("soak", (*TICK, "bench/soak"), 20.0),
     Figure("analysis", ("wbc/analysis",), 2.0),
