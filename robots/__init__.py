@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from wbc.robots.pairs import find_self_pairs
     from wbc.robots.walker_arms import WalkerArm
     from wbc.robots.walker_data import TwoEndedData, WalkerData
+    from wbc.robots.walker_masses import HoldRating, hold_rating, with_masses
     from wbc.robots.walker_robot import Walker, walker
 else:
     __getattr__ = lazy.attach(__name__, __file__, {"Arm": "WalkerArm"})
@@ -29,6 +30,7 @@ __all__ = [
     "BodyLimb",
     "ConvexParts",
     "DHRow",
+    "HoldRating",
     "Limb",
     "LinkPair",
     "Margins",
@@ -44,6 +46,7 @@ __all__ = [
     "find_self_pairs",
     "fit_shapes",
     "from_dh",
+    "hold_rating",
     "load",
     "names",
     "operator_arm",
@@ -51,6 +54,7 @@ __all__ = [
     "save_self_pairs",
     "table",
     "walker",
+    "with_masses",
 ]
 
 

@@ -93,6 +93,7 @@ _ALL = (
     ),
     Figure("soak", (*TICK, "bench/soak"), 20.0),
     Figure("analysis", ("wbc/analysis",), 2.0),
+    Figure("batch", (*TICK, "wbc/batch", "wbc/ik"), 3.0),
     Figure("bilateral", ("wbc/teleop/bilateral",), 1.5),
     Figure("clearance", ("wbc/clearance",), 1.0),
     Figure("demo", (*TICK, "wbc/track", "wbc/cli/demo.py"), 0.5),

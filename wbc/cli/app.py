@@ -48,6 +48,8 @@ COMMANDS = {
         "moving_target",
         "Work on an object that moves, with and without compensation, and leave figures, plots and a film.",
     ),
+    "play": Listed("play", "play", "Open a robot in the browser: drag it, and read what holds it back."),
+    "view": Listed("view", "view", "Show a robot, or a run, in the browser."),
     "walk": Listed(
         "walking.walk",
         "walk",

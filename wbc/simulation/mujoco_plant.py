@@ -77,10 +77,11 @@ class MujocoPlant:
         made = {kind: np.array(rows).T for kind, rows in found.items()}
         return {kind: (a.astype(int), dof.astype(int), scale) for kind, (a, dof, scale) in made.items()}
 
-    def reset(self, q: Array, time: float) -> None:
-        """At rest at a configuration; position actuators hold it."""
+    def reset(self, q: Array, time: float, v: Array | None = None) -> None:
+        """At a configuration, at rest or with a velocity; position actuators hold it."""
         self._clear(self._model, self.data)
         self._joints.put_q(self.data.qpos, q)
+        self._joints.put_v(self.data.qvel, q, np.zeros(self.nv) if v is None else v)
         self.data.time = time
         if CommandKind.POSITION in self._actuators:
             self.apply(Command(CommandKind.POSITION, np.asarray(q, dtype=float)))
