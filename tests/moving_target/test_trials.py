@@ -132,14 +132,14 @@ def test_outcomes_and_a_stop_between_trials() -> None:
 
 def test_the_command_leaves_a_folder(tmp_path: Path) -> None:
     asked = ["moving-target", "--motion", "swing", "--runs", "1", "--knowledge", "twist", "--no-film"]
-    done = RUN.invoke(app, [*asked, "--output", str(tmp_path)])
+    done = RUN.invoke(app, [*asked, "--out", str(tmp_path)])
     assert done.exit_code == 0, done.output
     assert "1 of 1" in done.output
     figures = json.loads((tmp_path / "summary.json").read_text())
     assert figures["outcomes"]["twist"]["rms"] < 1e-4
     for name in ("trials.csv", "first.npz", "error.png", "object.png", "trials.png"):
         assert (tmp_path / name).stat().st_size > 100
-    again = RUN.invoke(app, [*asked, "--output", str(tmp_path)])
+    again = RUN.invoke(app, [*asked, "--out", str(tmp_path)])
     assert again.exit_code == 2
     assert "--force" in again.output
     wrong = RUN.invoke(app, ["moving-target", "--motion", "see"])

@@ -38,6 +38,7 @@ FLOORS = {
     "wbc.controller": 6,
     "wbc.explain": 7,
     "wbc.export": 7,
+    "wbc.batch": 7,
     "wbc.ik": 7,
     "wbc.record": 7,
     "wbc.servo": 7,
@@ -79,7 +80,7 @@ NAMED = re.compile(r"wbc(\.[a-z_]+)+\.?")
 #: Modules in strings that are not imported by who names them: classes that a pickle may ask for
 LISTED = {("wbc.record.unpickle", "wbc.coordinates"), ("wbc.record.unpickle", "wbc.analysis")}
 #: What a controller and its steps offer and packages above do: these are imported when somebody asks for it
-LISTED |= {("wbc.controller.hooks", f"wbc.{package}") for package in ("explain", "export", "ik", "record")}
+LISTED |= {("wbc.controller.hooks", f"wbc.{package}") for package in ("batch", "explain", "export", "ik", "record")}
 #: The package's own __init__ collects names from every floor
 ROOF = "wbc"
 PACKAGE_FILES = sources("wbc", "tasks", "robots")

@@ -19,6 +19,7 @@ OTHERS = {
     "ik": "bench.ik",
     "walk": "bench.walk",
     "resolvers": "bench.resolvers",
+    "batch": "bench.figures --only batch",
     "fsp": "bench.figures --only fsp fsp_norms",
 }
 
@@ -39,6 +40,8 @@ def bench(context: typer.Context) -> None:
     wbc bench walk plans and walks courses, turns, trenches and layouts: wbc bench walk --quick
 
     wbc bench resolvers drives the Space Station arm by classical rate resolution and by pairs
+
+    wbc bench batch measures ticks of thousands of robots, and a map of a million poses
 
     wbc bench fsp measures solution spaces, printed norms, and paths resolved as a whole
     """

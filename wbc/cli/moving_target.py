@@ -36,7 +36,10 @@ Dropouts = Annotated[
 ]
 Film = Annotated[bool, typer.Option(help="Whether to draw the film.", rich_help_panel=_OUTPUT)]
 RunFolder = Annotated[
-    Path | None, typer.Option(help="Run folder. Default: runs/moving-JOB-MOTION-TIME.", rich_help_panel=_OUTPUT)
+    Path | None,
+    typer.Option(
+        "--out", "--output", help="Run folder. Default: runs/moving-JOB-MOTION-TIME.", rich_help_panel=_OUTPUT
+    ),
 ]
 
 
@@ -65,12 +68,12 @@ def moving_target(
     Example: [bold]wbc moving-target --motion tumble --runs 50[/bold]
     """
     import contextlib
-    import datetime
 
     from rich.table import Table
 
     from wbc import robots, validation
-    from wbc.cli.console import OutputError, err, out, progress_bar
+    from wbc.cli.console import err, out, progress_bar
+    from wbc.cli.folders import run_folder
     from wbc.cli.planning import tip_frame
     from wbc.cli.session import INTERRUPTED, Stopper
     from wbc.moving_target import folder as files
@@ -93,14 +96,7 @@ def moving_target(
         study = peg(machine, tip, motion, clearance, sensor, severity=severity)
     else:
         study = grasp(machine, tip, motion, sensor, severity=severity)
-    stamp = datetime.datetime.now().strftime("%Y%m%d-%H%M%S")
-    folder = output or Path("runs") / f"moving-{job}-{motion}-{stamp}"
-    if (folder / files.SUMMARY).exists() and not force:
-        raise OutputError("output", str(folder), "there is a run in this folder; choose another, or use --force")
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise OutputError("output", str(folder), f"cannot be written: {error.strerror}") from error
+    folder = run_folder(output, f"moving-{job}-{motion}", files.WRITTEN, force)
     stopper = Stopper()
     with progress_bar() as bar, contextlib.ExitStack() as stack:
         stage = bar.add_task("compiling", total=runs * len(kinds))

@@ -22,6 +22,7 @@ def track(
     rate: options.Rate = 200.0,
     solver: options.Solver = "daqp",
     backend: options.Backend = "auto",
+    kind: options.Kind = "pose",
     gain: options.Gain = 10.0,
     margin: options.Margin = 0.02,
     output: options.RunFolder = None,
@@ -45,6 +46,7 @@ def track(
         rate=rate,
         margin=margin,
         gain=gain,
+        kind=kind,
         solver=solver,
         backend=backend,
     )

@@ -17,6 +17,9 @@ from wbc.moving_target.study import Outcome, Study
 from wbc.moving_target.trial import Trial
 
 SUMMARY = "summary.json"
+"""What was asked and what came of it."""
+WRITTEN = (SUMMARY, "trials.csv", "first.npz", "error.png", "object.png", "trials.png", "film.gif")
+"""All files of a run, those of the plots and the film too."""
 
 
 def save(

@@ -1,9 +1,11 @@
 """What a control loop commands: the plant's contract, a loop's connection to one, kinematic and dynamic plants."""
 
 from wbc.simulation.connection import Connection
+from wbc.simulation.dynamics import Grip
 from wbc.simulation.ground import Ground, level
 from wbc.simulation.kinematic import KinematicPlant
 from wbc.simulation.motors import Encoders, Motors
+from wbc.simulation.mujoco_grips import GrippingMujocoPlant
 from wbc.simulation.mujoco_model import mujoco_model, mujoco_spec
 from wbc.simulation.mujoco_plant import MujocoPlant
 from wbc.simulation.pinocchio_plant import PinocchioPlant, SavedState
@@ -15,7 +17,9 @@ __all__ = [
     "CommandKind",
     "Connection",
     "Encoders",
+    "Grip",
     "GripKind",
+    "GrippingMujocoPlant",
     "GrippingPlant",
     "Ground",
     "KinematicPlant",

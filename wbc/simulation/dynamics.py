@@ -84,11 +84,9 @@ class Dynamics:
         """The velocity after the grips have closed on moving frames, without a bounce: J v = 0 ``[nv]``."""
         if not self._held:
             return v
-        pin.crba(self.model, self.data, q)
-        settings = pin.ProximalSettings(1e-12, PROXIMAL, ITERATIONS)
-        return np.array(
-            pin.impulseDynamics(self.model, self.data, q, v, self._models, self._datas, 0.0, settings)
-        )
+        for _ in range(ITERATIONS):
+            v = pin.impulseDynamics(self.model, self.data, q, v, self._models, self._datas, 0.0, self._settings)
+        return np.array(v)
 
     def wrenches(self) -> dict[str, Array]:
         """On the robot, in the axes of the frame and about its origin, of the last acceleration ``[6]`` [N, N m]."""

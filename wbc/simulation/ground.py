@@ -91,7 +91,8 @@ class Touch:
         depth = self._radii - self.ground.distance(self._places())
         if len(depth) and depth.max() > DEEPEST:
             k = int(depth.argmax())
-            raise RangeError("q", self._names[k], f"it is {depth[k]:.3g} m inside of what it touches, {DEEPEST:g} at most")
+            reason = f"an impossible contact: {depth[k]:.3g} m inside of what it touches, {DEEPEST:g} is possible"
+            raise RangeError("q", self._names[k], reason)
 
     def force(self, q: Array, v: Array, anchors: Array, settle: bool = False) -> Array:
         """Generalised force of all balls ``[nv]``; with ``settle`` the anchors move on to where they are now."""

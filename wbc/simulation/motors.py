@@ -100,7 +100,9 @@ class Drive:
         numbers = validation.real_array(field, np.broadcast_to(numbers, (count,)) if numbers.ndim == 0 else value,
                                         (count,), finite=name not in ("effort", "no_load_speed"))  # fmt: skip
         if np.isnan(numbers).any() or (numbers < low).any() or (name == "no_load_speed" and (numbers == 0.0).any()):
-            raise RangeError(field, value, "expected numbers of at least 0" + (" and not 0" * (name == "no_load_speed")))
+            raise RangeError(
+                field, value, "expected numbers of at least 0" + (" and not 0" * (name == "no_load_speed"))
+            )
         rest = np.inf if name in ("effort", "no_load_speed") else 0.0
         return np.concatenate([np.full(self._robot.base_nv, rest), numbers])
 

@@ -16,6 +16,7 @@ from wbc.robot import Robot
 from wbc.robot.robot import checked_robot
 from wbc.simulation.dynamics import Dynamics, Grip, Integrator, step_midpoint, step_rk4
 from wbc.simulation.ground import Ground, Touch
+from wbc.simulation.momentum import Balance
 from wbc.simulation.motors import Drive, Encoders, Motors, MotorState
 from wbc.simulation.plant import Command, CommandKind, GripKind, PlantError, PlantState
 from wbc.simulation.stability import largest_step
@@ -43,6 +44,7 @@ class _State:
     reading: PlantState
     grips: dict[str, Grip] = field(default_factory=dict)
     slips: dict[str, tuple[Array, float]] = field(default_factory=dict)
+    broken: list[str] = field(default_factory=list)
     first: Array = field(default_factory=lambda: np.zeros(6))
     fallen: Array = field(default_factory=lambda: np.zeros(6))
 
@@ -118,14 +120,13 @@ class PinocchioPlant:
             model.gravity.linear = validation.real_array("gravity", gravity, (3,))
         self.model = model
         _check_inertias(model)
-        self._weight = pin.computeTotalMass(model) * np.array(model.gravity.linear)
-        self._falls = bool(self._weight.any())
+        self._balance = Balance(model)
         self._dynamics = Dynamics(model, self._rate)
         self._touch = None if ground is None else Touch(ground, robot, model)
         self._check_mass(robot.neutral)
         self._check_step(robot.neutral)
         self._torque = np.zeros(self.nv)
-        self.reset(robot.neutral, 0.0)
+        self._begin(robot.neutral, 0.0, np.zeros(self.nv))
 
     # What a loop does
 
@@ -141,12 +142,15 @@ class PinocchioPlant:
         self._check_step(q)
         if self._touch is not None:
             self._touch.check(q)
+        self._begin(q, time, v)
+
+    def _begin(self, q: Array, time: float, v: Array) -> None:
         anchors = np.zeros((0, 3)) if self._touch is None else self._touch.fresh()
         reading = PlantState(q, v, time)
         self._state = _State(q, v, time, np.zeros(self.nv), self._drive.fresh(), self._drive.scale.copy(), anchors,
                              np.random.default_rng(self._seed), reading)  # fmt: skip
         self._hold()
-        self._state.first = self._momentum()
+        self._state.first = self._balance.momentum(q, v)
         self._sense()
 
     def read(self) -> PlantState:
@@ -168,7 +172,7 @@ class PinocchioPlant:
         Raises:
             PlantError: the simulation has blown up, which a state says with numbers that are none.
         """
-        state, h, drive = self._state, self.time_step, self._drive
+        state, h, drive, balance = self._state, self.time_step, self._drive, self._balance
         for _ in range(round(dt / h)):
             drive.scale = state.scale
             self._torque = drive.torque(state.motors, state.command, state.v, state.random)
@@ -178,8 +182,8 @@ class PinocchioPlant:
                 self._touch.force(state.q, state.v, state.anchors, settle=True)
             state.q, state.v = self._step(self._dynamics, state.q, state.v, self._forces, h)
             state.time += h
-            if self._falls:
-                self._fall(h)
+            if balance.falls:
+                state.fallen += balance.by_gravity(state.q, h)
         if not np.isfinite(state.q.dot(state.q) + state.v.dot(state.v)):
             raise PlantError("plant", state.time, "the simulation has blown up")
         self._sense()
@@ -202,13 +206,7 @@ class PinocchioPlant:
         data = self.model.createData()
         pin.framesForwardKinematics(self.model, data, state.q)
         at = data.oMf[self.model.getFrameId(frame)]
-        off = float(np.linalg.norm(at.translation - pose.translation))
-        turn = float(np.linalg.norm(pin.log3(at.rotation.T @ pose.rotation)))
-        if kind is GripKind.AXIS:
-            turn = float(np.arccos(np.clip(at.rotation[:, 2] @ pose.rotation[:, 2], -1.0, 1.0)))
-        if off > REACH or (turn > TURN and kind is not GripKind.POSITION):
-            reason = f"an impossible contact: {frame} is {off:.3g} m and {turn:.3g} rad off, {REACH:g} and {TURN:g} are possible"
-            raise RangeError("pose", pose.translation.tolist(), reason)
+        check_reach(frame, at, pose, kind)
         state.grips[frame] = Grip(pose, kind)
         self._hold()
         state.v = self._dynamics.latched(state.q, state.v)
@@ -221,7 +219,22 @@ class PinocchioPlant:
         self._state.slips.pop(frame, None)
         self._hold()
 
+    def lost(self) -> tuple[str, ...]:
+        """See :class:`wbc.simulation.GrippingPlant`."""
+        out = tuple(self._state.broken)
+        self._state.broken.clear()
+        return out
+
     # What breaks
+
+    def lose(self, frame: str) -> None:
+        """What holds a frame breaks off.
+
+        Raises:
+            UnknownNameError: nothing holds it.
+        """
+        self.release(frame)
+        self._state.broken.append(frame)
 
     def slip(self, frame: str, velocity: Any, duration: float) -> None:
         """A grip slips: what it holds the frame at moves with a velocity in the world [m/s] for some seconds.
@@ -256,8 +269,8 @@ class PinocchioPlant:
 
     @property
     def wrenches(self) -> Mapping[str, Array]:
-        """Frame -> what its grip exerts on the robot, in the frame's axes and about its origin, in the last acceleration
-        that was computed ``[6]`` [N, N m].
+        """Frame -> what its grip exerts on the robot, in the frame's axes and about its origin, in the last
+        acceleration that was computed ``[6]`` [N, N m].
         """
         return self._dynamics.wrenches()
 
@@ -266,14 +279,12 @@ class PinocchioPlant:
         """Momentum that the robot has given to what it holds on to or stands on since the reset: what it has lost, and
         what gravity gave it, (linear; angular about the world's origin) [N s, N m s].
         """
-        return self._state.first + self._state.fallen - self._momentum()
+        return self._state.first + self._state.fallen - self.momentum
 
     @property
     def momentum(self) -> Array:
-        """Of the robot: (linear; angular about the world's origin) [N s, N m s]. Rotors of motors turn relative to their
-        joints; what they carry is in the joints' equations alone, as is usual.
-        """
-        return self._momentum()
+        """Of the robot, see :class:`Balance` ``[6]``."""
+        return self._balance.momentum(self._state.q, self._state.v)
 
     @property
     def energy(self) -> float:
@@ -291,7 +302,7 @@ class PinocchioPlant:
 
     def save(self) -> SavedState:
         """Everything that the next step depends on."""
-        return SavedState(self.robot.fingerprint(), copy.deepcopy(self._state))
+        return SavedState(self.robot.fingerprint, copy.deepcopy(self._state))
 
     def restore(self, saved: SavedState) -> None:
         """Go on from there, to the same bits.
@@ -299,7 +310,7 @@ class PinocchioPlant:
         Raises:
             RangeError: of another robot.
         """
-        if saved.robot != self.robot.fingerprint():
+        if saved.robot != self.robot.fingerprint:
             raise RangeError("saved", saved.robot, f"it is of another robot than {self.robot.name}")
         self._state = copy.deepcopy(saved._state)
         self._hold()
@@ -327,18 +338,6 @@ class PinocchioPlant:
                 del state.slips[name]
         self._hold()
 
-    def _fall(self, h: float) -> None:
-        """What gravity gave in a step."""
-        place = pin.centerOfMass(self.model, self._dynamics.data, self._state.q)
-        force = self._weight
-        self._state.fallen += h * np.append(force, pin.skew(place) @ force)
-
-    def _momentum(self) -> Array:
-        data, state = self._dynamics.data, self._state
-        momentum = np.array(pin.computeCentroidalMomentum(self.model, data, state.q, state.v).vector)
-        momentum[3:] += np.cross(data.com[0], momentum[:3])
-        return momentum
-
     def _sense(self) -> None:
         state, encoders, base = self._state, self._encoders, self.robot.base_nv
         q, v = state.q, state.v
@@ -362,7 +361,9 @@ class PinocchioPlant:
         values, vectors = np.linalg.eigh(mass)
         if not values[0] > SINGULAR * values[-1]:
             dof = self.robot.dof_names[int(np.abs(vectors[:, 0]).argmax())]
-            raise RangeError("robot", self.robot.name, f"its mass matrix is singular: nothing that {dof} moves has inertia")
+            raise RangeError(
+                "robot", self.robot.name, f"its mass matrix is singular: nothing that {dof} moves has inertia"
+            )
 
     def _check_step(self, q: Array) -> None:
         model, data = self.model, self._dynamics.data
@@ -372,7 +373,25 @@ class PinocchioPlant:
             stiffness, damping = stiffness + more[0], damping + more[1]
         most = largest_step(pin.crba(model, data, q), stiffness, damping, self._rate, self._integrator)
         if self.time_step > most:
-            raise RangeError("time_step", self.time_step, f"too coarse for this plant: the largest that works is {most:.3g} s")
+            raise RangeError(
+                "time_step", self.time_step, f"too coarse for this plant: the largest that works is {most:.3g} s"
+            )
+
+
+def check_reach(frame: str, at: pin.SE3, pose: pin.SE3, kind: GripKind) -> None:
+    """A frame is grasped where it is, as far as the kind holds it.
+
+    Raises:
+        RangeError: it is too far away.
+    """
+    off = float(np.linalg.norm(at.translation - pose.translation))
+    turn = float(np.linalg.norm(pin.log3(at.rotation.T @ pose.rotation)))
+    if kind is GripKind.AXIS:
+        turn = float(np.arccos(np.clip(at.rotation[:, 2] @ pose.rotation[:, 2], -1.0, 1.0)))
+    if off > REACH or (turn > TURN and kind is not GripKind.POSITION):
+        most = f"{REACH:g} and {TURN:g} are possible"
+        reason = f"an impossible contact: {frame} is {off:.3g} m and {turn:.3g} rad off, {most}"
+        raise RangeError("pose", pose.translation.tolist(), reason)
 
 
 def _check_inertias(model: pin.Model) -> None:

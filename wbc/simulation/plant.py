@@ -26,8 +26,8 @@ class CommandKind(StrEnum):
 
 
 class GripKind(StrEnum):
-    """What of a frame a grip holds, as of ``wbc.tasks.Hold``: ``POSE`` all of it, ``AXIS`` its origin and its z axis (it
-    may roll), ``POSITION`` its origin.
+    """What of a frame a grip holds, as of ``wbc.tasks.Hold``: ``POSE`` all of it, ``AXIS`` its origin and its z axis,
+    about which it may roll, ``POSITION`` its origin.
     """
 
     POSE = "pose"
@@ -120,6 +120,9 @@ class GrippingPlant(Protocol):
         Raises:
             UnknownNameError: it was not held.
         """
+
+    def lost(self) -> tuple[str, ...]:
+        """Frames that what held them has let go of, since this was last asked."""
 
 
 class PlantError(WbcError):

@@ -15,14 +15,16 @@ SLOW = 1e-3
 
 
 def largest_step(mass: Array, stiffness: Array, damping: Array, rate: float, integrator: Integrator) -> float:
-    """The longest step [s] at which every mode of M a + D v + K x = 0, and the drift of grips, (s + rate)^2 = 0, decays:
+    """The longest step [s] at which every mode of M a + D v + K x = 0 and the drift of grips, exp(-rate t), decay:
     |R(h s)| <= 1 with R(z) = 1 + z + z^2/2 (midpoint) + z^3/6 + z^4/24 (rk4); infinite where nothing is stiff.
 
     Args:
         mass, stiffness, damping: M, K, D ``[nv, nv]``. rate: [1/s].
     """
     count = len(mass)
-    state = np.block([[np.zeros((count, count)), np.eye(count)], [-np.linalg.solve(mass, np.hstack([stiffness, damping]))]])
+    state = np.block(
+        [[np.zeros((count, count)), np.eye(count)], [-np.linalg.solve(mass, np.hstack([stiffness, damping]))]]
+    )
     modes = np.append(np.linalg.eigvals(state), -rate)
     # The others move freely, whatever the step
     fast = modes[np.abs(modes) > SLOW]

@@ -40,6 +40,9 @@ def walk(
     planner: options.PlannerName = "free",
     plan: options.PlanFile = "",
     change: options.Change = None,
+    plant: options.PlantName = "kinematic",
+    gravity: options.Gravity = "0,0,0",
+    fault: options.Faults = None,
     backend: options.Backend = "auto",
     output: options.RunFolder = None,
     force: options.Force = False,
@@ -54,7 +57,7 @@ def walk(
     early; what was done until then is written all the same, and so is what a kill leaves.
     """
     from wbc.cli.console import err
-    from wbc.cli.walking.modes import performance
+    from wbc.cli.walking.modes import performance, plant_choice
     from wbc.cli.walking.run import changed_machine, new_folder, walk_free, walk_published
     from wbc.errors import RangeError
     from wbc.walking.run.request import PublishedRequest, read_request
@@ -94,11 +97,15 @@ def walk(
     machine = changed_machine(change or [], robot == "two-ended", arms if "arms" in _given(context) else None)
     # Bad input shows before a folder is made
     if isinstance(request, PublishedRequest):
+        if plant != "kinematic":
+            raise RangeError(
+                "plant", plant, "the published walker moves joints exactly; plants are of the planner 'free'"
+            )
         if ask or least_time:
             raise RangeError("planner", planner, "asking and the least time are of the planner 'free'")
         walk_published(request, new_folder(request.site.structure, output, force))
         return
-    perform = performance(request, machine, ask, least_time)
+    perform = performance(request, machine, ask, least_time, plant_choice(plant, gravity, fault))
     folder = new_folder(request.site.structure, output, force)
     walk_free(perform, machine, folder, backend, check or strict, pictures)
 

@@ -211,6 +211,9 @@ class Walk:
                 reading.
         """
         machine, hands = self.machine, self.hands
+        broken = machine.lost()
+        if broken:
+            self.vanish([self.structure.ids[hold] for hold in broken])
         if len(machine.held) < self.walker.min_holds and not machine.fixed:
             self.body.pace = 0.0
             machine.rest()
