@@ -34,7 +34,7 @@ plant = MujocoPlant(model, robot)
 
 
 def simulate(seconds: float) -> dict[str, np.ndarray]:
-    """Samples of every tick: time, error of the hand, centre of mass off its place, slip of a foot, shares of torques."""
+    """Samples of every tick: time, error of the hand, centre of mass off its place, slip of a foot, torques."""
     controller = stack.compile(command="torque")
     plant.reset(q, 0.0)
     controller.reset(q)

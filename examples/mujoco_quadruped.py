@@ -78,7 +78,9 @@ if __name__ == "__main__":
     late = run["time"] > RAISED + 0.5
     print(f"on three feet: the fourth {1e3 * run['height'][late].min():.1f} mm above the floor,", end=" ")
     print(f"{1e3 * run['foot'][late].max():.2f} mm from its target")
-    print(f"centre of mass {1e3 * run['balance'][late].max():.2f} mm off; the other feet moved {1e3 * run['slip'].max():.2f} mm")
+    print(
+        f"centre of mass {1e3 * run['balance'][late].max():.2f} mm off; the other feet moved {1e3 * run['slip'].max():.2f} mm"
+    )
     print(f"largest torque {100 * run['share'].max():.0f} % of its limit; {(~run['solved']).sum()} ticks relaxed")
     scene = Scene(robot)
     scene.add_robot(run["q"][-1])
