@@ -89,8 +89,9 @@ COMMANDS = {
     "compare-controllers": Listed(
         "compare_controllers",
         "compare_controllers",
-        "Run three published controllers of a three-link arm and two of today on the same line of 0.58 m in 1 s.",
+        "Controllers of torques beside each other, on the published arm or on any robot.",
     ),
+    "identify": Listed("identify", "identify", "Find the inertias of a simulated robot from a motion that shows much."),
     "explore": Listed(
         "explore",
         "explore",
