@@ -20,6 +20,9 @@ def play(
     host: viewing.Host = "127.0.0.1",
     port: viewing.Port = 0,
     browser: viewing.Browser = True,
+    zeromq: Annotated[
+        str, typer.Option(help="Take messages over ZeroMQ as well, at an address such as tcp://127.0.0.1:5555.")
+    ] = "",
     seconds: viewing.Seconds = None,
     backend: Backend = "auto",
 ) -> None:
@@ -36,5 +39,6 @@ def play(
             host=host,
             port=port,
             open_browser=browser,
+            zeromq=zeromq,
             announce=viewing.announce,
         )

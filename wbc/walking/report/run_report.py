@@ -34,7 +34,7 @@ def save_report(run: WalkRun, folder: pathlib.Path, report: Report | None) -> pa
     if run.log is not None and run.ticks is not None and len(run.ticks.cost):
         page.section("Ticks whose constraints did not all hold")
         times = run.log.t[: len(run.ticks.solved)]
-        page.strips(times, {"not all rows held": ~run.ticks.solved})
+        page.strips(times, {"not all rows held": 1.0 - run.ticks.solved})
         page.section("Time of a tick")
         page.histogram(1e6 * run.ticks.cost, "us")
     page.section("Pictures")
