@@ -16,6 +16,7 @@ seconds = float(sys.argv[2]) if len(sys.argv) > 2 else 8.0
 
 
 def send(**message: object) -> None:
+    """One message of format 1."""
     socket.send_string(json.dumps({"wbc": 1, **message}))
 
 

@@ -15,16 +15,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from websockets.exceptions import InvalidStatus
+from websockets.sync.client import ClientConnection, connect
 
 from tests.viewer import arms
 from wbc.viewer.link import LoopEnd, ViewerEnd
 from wbc.viewer.messages import read
-
-pytest.importorskip("viser")
-
-from websockets.exceptions import InvalidStatus
-from websockets.sync.client import ClientConnection, connect
-
 from wbc.viewer.session import Session
 
 
@@ -143,6 +139,7 @@ def test_a_lost_operator_is_a_stop(served: tuple[Session, Loop]) -> None:
         send(one, type="operate")
         loop.take("operate")
         assert "lost" in loop.take("stop")["reason"]
+        loop.take("release")
 
 
 def test_the_past_is_shown_and_not_changed(served: tuple[Session, Loop]) -> None:

@@ -6,6 +6,7 @@ import json
 import time
 
 import pytest
+import zmq
 
 from tests.viewer import arms
 from wbc.viewer import ViewerError, show
@@ -19,8 +20,6 @@ def test_addresses_of_other_machines_are_refused(address: str) -> None:
 
 
 def test_a_peer_operates_and_is_lost_when_it_is_silent(tmp_path: object) -> None:
-    pytest.importorskip("viser")
-    zmq = pytest.importorskip("zmq")
     controller = arms.fresh()
     q, address = controller.stack.robot.neutral, f"ipc://{tmp_path}/socket"
     with (
