@@ -53,7 +53,7 @@ def film(browser: Chromium, name: str) -> Path:
             if frame == 0:
                 page.wait("wbc.state", 60.0)
                 page.wait("!!document.getElementById('scene').contentDocument.querySelector('canvas')", 60.0)
-                time.sleep(6.0)
+                undisturbed(page)
             page.wait(f"wbc.state.number >= {frame + 1}", 60.0)
             time.sleep(0.6)
             pictures.append(Image.open(io.BytesIO(page.picture())).convert("RGB"))
@@ -75,10 +75,18 @@ def held_back(browser: Chromium) -> Path:
             viewer.update(step)
             q = chosen.stack.robot.integrate(q, step.v, chosen.stack.dt)
             time.sleep(chosen.stack.dt)
-        # With nothing to be drawn meanwhile
-        time.sleep(5.0)
+        undisturbed(page)
         (FOLDER / "viewer.png").write_bytes(page.picture())
     return FOLDER / "viewer.png"
+
+
+def undisturbed(page: Page) -> None:
+    """Nothing is drawn any more, and viser has said what it says of software that draws."""
+    page.evaluate(
+        "document.getElementById('scene').contentDocument"
+        ".querySelectorAll('.mantine-Notification-closeButton').forEach((b) => b.click())"
+    )
+    time.sleep(12.0)
 
 
 def explained(page: Page) -> bool:

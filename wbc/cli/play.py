@@ -12,6 +12,7 @@ from wbc.cli.console import err
 from wbc.cli.options import Backend
 from wbc.viewer import run
 from wbc.viewer.beside import require_viser
+from wbc.viewer.local import require_local
 from wbc.viewer.presets import PRESETS, playground
 
 
@@ -28,6 +29,8 @@ def play(
 ) -> None:
     """Open a robot in the browser: drag its targets and the obstacles, and read what holds it back."""
     require_viser()
+    if zeromq:
+        require_local(zeromq)
     chosen = playground(preset)
     err().print(f"{escape(chosen.about)} Space stops it, Ctrl-C ends.", soft_wrap=True)
     controller = viewing.compiled(chosen.stack, backend)
