@@ -86,7 +86,15 @@ def undisturbed(page: Page) -> None:
         "document.getElementById('scene').contentDocument"
         ".querySelectorAll('.mantine-Notification-closeButton').forEach((b) => b.click())"
     )
-    time.sleep(12.0)
+    # A page fades in, which takes a minute where software draws on a busy machine
+    before, until = 256.0, time.monotonic() + 150.0
+    while time.monotonic() < until:
+        time.sleep(4.0)
+        shown = np.asarray(Image.open(io.BytesIO(page.picture())).convert("L"), dtype=float)
+        scene = shown[: int(0.8 * shown.shape[0]), : int(0.6 * shown.shape[1])]
+        if np.percentile(scene, 2) < 170.0 and abs(scene.mean() - before) < 0.2:
+            return
+        before = float(scene.mean())
 
 
 def explained(page: Page) -> bool:

@@ -38,12 +38,15 @@ FLOORS = {
     "wbc.controller": 6,
     "wbc.explain": 7,
     "wbc.export": 7,
+    "wbc.batch": 7,
     "wbc.ik": 7,
     "wbc.record": 7,
     "wbc.servo": 7,
     "wbc.trajectory": 8,
     "wbc.coordinates": 8,
     "wbc.explore": 9,
+    "wbc.identification": 9,
+    "wbc.motion_control": 9,
     "wbc.program": 9,
     "wbc.moving_target": 9,
     "wbc.teleop": 9,
@@ -66,6 +69,7 @@ WALKING = {
     "loop": 4,
     "modes": 5,
     "two_ended": 5,
+    "torque": 5,
     "run": 6,
     "report": 7,
 }
@@ -78,7 +82,7 @@ NAMED = re.compile(r"wbc(\.[a-z_]+)+\.?")
 #: Modules in strings that are not imported by who names them: classes that a pickle may ask for
 LISTED = {("wbc.record.unpickle", "wbc.coordinates"), ("wbc.record.unpickle", "wbc.analysis")}
 #: What a controller and its steps offer and packages above do: these are imported when somebody asks for it
-LISTED |= {("wbc.controller.hooks", f"wbc.{package}") for package in ("explain", "export", "ik", "record")}
+LISTED |= {("wbc.controller.hooks", f"wbc.{package}") for package in ("batch", "explain", "export", "ik", "record")}
 #: The package's own __init__ collects names from every floor
 ROOF = "wbc"
 PACKAGE_FILES = sources("wbc", "tasks", "robots")

@@ -20,6 +20,7 @@ OTHERS = {
     "walk": "bench.walk",
     "resolvers": "bench.resolvers",
     "viewer": "bench.figures --only viewer",
+    "batch": "bench.figures --only batch",
     "fsp": "bench.figures --only fsp fsp_norms",
 }
 
@@ -42,6 +43,8 @@ def bench(context: typer.Context) -> None:
     wbc bench resolvers drives the Space Station arm by classical rate resolution and by pairs
 
     wbc bench viewer measures what the viewer costs a loop, and how long a drag takes
+
+    wbc bench batch measures ticks of thousands of robots, and a map of a million poses
 
     wbc bench fsp measures solution spaces, printed norms, and paths resolved as a whole
     """

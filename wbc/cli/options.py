@@ -51,8 +51,17 @@ Holds = Annotated[
 ]
 Rate = Annotated[float, typer.Option(help="Ticks a second, in Hz.", rich_help_panel=_CONTROL)]
 Solver = Annotated[str, typer.Option(help="QP solver.", rich_help_panel=_CONTROL)]
+PlantName = Annotated[
+    str,
+    typer.Option(
+        "--plant",
+        help="kinematic, or a robot on a fixed base with drives that give torques: pinocchio or mujoco.",
+        rich_help_panel=_CONTROL,
+    ),
+]
 Backend = Annotated[str, typer.Option(help="auto, native or vm.", rich_help_panel=_CONTROL)]
 Gain = Annotated[float, typer.Option(help="Gain of the hand, in 1/s.", rich_help_panel=_CONTROL)]
+Kind = Annotated[str, typer.Option(help="What follows the path: pose or position.", rich_help_panel=_CONTROL)]
 Margin = Annotated[float, typer.Option(help="Distance kept from obstacles, in m.", rich_help_panel=_CONTROL)]
 RunFolder = Annotated[
     Path | None,

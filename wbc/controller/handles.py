@@ -24,6 +24,8 @@ from wbc.tasks import (
     CenterOfMass,
     Damping,
     Distance,
+    DivergentComponent,
+    DriveTorqueLimits,
     Elbow,
     EndEffector,
     ExternalWrench,
@@ -48,13 +50,16 @@ from wbc.tasks import (
     RelativePose,
     RigidGrasp,
     Rolling,
+    RollingContact,
     SelfCollision,
     SlidingContact,
     SurfaceContact,
     TorqueLimits,
     WorkspaceBox,
     WorkspacePolyhedron,
+    WrenchSum,
 )
+from wbc.tasks._contact import ContactForce
 from wbc.tasks.base import Item
 
 
@@ -65,6 +70,22 @@ class TaskHandle(Handle):
     gain: float
     stiffness: float
     damping: float
+
+
+class ContactForceHandle(TaskHandle):
+    """Of the task for the wrench of a contact."""
+
+    target: Any
+    measured: Any
+    feedback: float
+
+
+class DivergentComponentHandle(TaskHandle):
+    """Of :class:`DivergentComponent`."""
+
+    target: Any
+    feedforward: Any
+    omega: float
 
 
 class FollowerHandle(TaskHandle):
@@ -138,6 +159,22 @@ class TorqueLimitsHandle(ConstraintHandle):
     """Of :class:`TorqueLimits`."""
 
     scale: float
+    slew: Any
+    last: Any
+
+
+class DriveTorqueLimitsHandle(ConstraintHandle):
+    """Of :class:`DriveTorqueLimits`."""
+
+    scale: float
+    torque: Any
+
+
+class WrenchSumHandle(ConstraintHandle):
+    """Of :class:`WrenchSum`."""
+
+    target: Any
+    point: Any
 
 
 class RollingHandle(ConstraintHandle):
@@ -250,6 +287,10 @@ if TYPE_CHECKING:
         ExternalWrenchHandle,
         JointFrictionHandle,
         TorqueLimitsHandle,
+        DriveTorqueLimitsHandle,
+        WrenchSumHandle,
+        DivergentComponentHandle,
+        ContactForceHandle,
     ):
         """Of an item that is known by its name only: all values that items of this package have."""
 
@@ -265,6 +306,7 @@ KINDS: dict[type[Item], type[Handle]] = {
     RelativePose: RelativePoseHandle,
     Momentum: MomentumHandle,
     Damping: TaskHandle,
+    ContactForce: ContactForceHandle,
     Hold: HoldHandle,
     Mechanism: HoldHandle,
     RigidGrasp: ContactHandle,
@@ -272,6 +314,10 @@ KINDS: dict[type[Item], type[Handle]] = {
     SurfaceContact: ContactHandle,
     LineContact: ContactHandle,
     SlidingContact: ContactHandle,
+    RollingContact: ContactHandle,
+    WrenchSum: WrenchSumHandle,
+    DriveTorqueLimits: DriveTorqueLimitsHandle,
+    DivergentComponent: DivergentComponentHandle,
     ExternalWrench: ExternalWrenchHandle,
     JointFriction: JointFrictionHandle,
     TorqueLimits: TorqueLimitsHandle,
@@ -320,14 +366,22 @@ class Handles:
     def __getitem__(self, item: Hold | Mechanism) -> HoldHandle: ...
     @overload
     def __getitem__(
-        self, item: RigidGrasp | PointContact | SurfaceContact | LineContact | SlidingContact
+        self, item: RigidGrasp | PointContact | SurfaceContact | LineContact | SlidingContact | RollingContact
     ) -> ContactHandle: ...
+    @overload
+    def __getitem__(self, item: WrenchSum) -> WrenchSumHandle: ...
+    @overload
+    def __getitem__(self, item: DivergentComponent) -> DivergentComponentHandle: ...
     @overload
     def __getitem__(self, item: ExternalWrench) -> ExternalWrenchHandle: ...
     @overload
     def __getitem__(self, item: JointFriction) -> JointFrictionHandle: ...
     @overload
     def __getitem__(self, item: TorqueLimits) -> TorqueLimitsHandle: ...
+    @overload
+    def __getitem__(self, item: DriveTorqueLimits) -> DriveTorqueLimitsHandle: ...
+    @overload
+    def __getitem__(self, item: ContactForce) -> ContactForceHandle: ...
     @overload
     def __getitem__(self, item: Rolling) -> RollingHandle: ...
     @overload

@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Protocol
+from typing import Protocol, runtime_checkable
+
+import pinocchio as pin
 
 from wbc.errors import WbcError
 from wbc.validation import Array
@@ -21,6 +23,16 @@ class CommandKind(StrEnum):
     VELOCITY = "velocity"
     POSITION = "position"
     TORQUE = "torque"
+
+
+class GripKind(StrEnum):
+    """What of a frame a grip holds, as of ``wbc.tasks.Hold``: ``POSE`` all of it, ``AXIS`` its origin and its z axis,
+    about which it may roll, ``POSITION`` its origin.
+    """
+
+    POSE = "pose"
+    AXIS = "axis"
+    POSITION = "position"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -89,6 +101,28 @@ class Plant(Protocol):
 
     def advance(self, dt: float) -> None:
         """Let ``dt`` [s] go by under the last command. A driver waits until they have."""
+
+
+@runtime_checkable
+class GrippingPlant(Protocol):
+    """What a plant has besides where its robot can grasp things that do not move."""
+
+    def grasp(self, frame: str, pose: pin.SE3, kind: GripKind) -> None:
+        """A frame is held at a pose of the world from now on.
+
+        Raises:
+            RangeError: it is not there. UnknownNameError: no such frame.
+        """
+
+    def release(self, frame: str) -> None:
+        """It is free again.
+
+        Raises:
+            UnknownNameError: it was not held.
+        """
+
+    def lost(self) -> tuple[str, ...]:
+        """Frames that what held them has let go of, since this was last asked."""
 
 
 class PlantError(WbcError):

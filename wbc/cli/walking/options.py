@@ -70,6 +70,27 @@ Change = Annotated[
     typer.Option("--set", help="NAME=VALUE of the walker's data, in SI; may be repeated.", rich_help_panel=_HOW),
 ]
 Backend = Annotated[str, typer.Option(help="auto, native or vm.", rich_help_panel=_HOW)]
+PlantName = Annotated[
+    str,
+    typer.Option(
+        "--plant",
+        help="kinematic, or under torques: pinocchio (rigid grips), mujoco (soft ones); these need holds that fix the "
+        "tilt of a hand, --rigid.",
+        rich_help_panel=_HOW,
+    ),
+]
+Gravity = Annotated[
+    str, typer.Option(help="x,y,z in m/s^2 along the structure's axes; of plants with torques.", rich_help_panel=_HOW)
+]
+Faults = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--fault",
+        help="'slip ARM METRES at SECONDS', 'limp JOINT at SECONDS', 'break ARM at SECONDS' or 'delay SECONDS'; may be "
+        "repeated.",
+        rich_help_panel=_HOW,
+    ),
+]
 LeastTime = Annotated[
     bool,
     typer.Option("--least-time", help="Least time of the plan's joint path, by toppra.", rich_help_panel=_OUTPUT),

@@ -40,6 +40,9 @@ def walk(
     planner: options.PlannerName = "free",
     plan: options.PlanFile = "",
     change: options.Change = None,
+    plant: options.PlantName = "kinematic",
+    gravity: options.Gravity = "0,0,0",
+    fault: options.Faults = None,
     backend: options.Backend = "auto",
     output: options.RunFolder = None,
     force: options.Force = False,
@@ -54,7 +57,7 @@ def walk(
     early; what was done until then is written all the same, and so is what a kill leaves.
     """
     from wbc.cli.console import err
-    from wbc.cli.walking.modes import performance
+    from wbc.cli.walking.modes import performance, plant_choice
     from wbc.cli.walking.run import changed_machine, new_folder, walk_free, walk_published
     from wbc.errors import RangeError
     from wbc.walking.run.request import PublishedRequest, read_request
@@ -94,11 +97,15 @@ def walk(
     machine = changed_machine(change or [], robot == "two-ended", arms if "arms" in _given(context) else None)
     # Bad input shows before a folder is made
     if isinstance(request, PublishedRequest):
+        if plant != "kinematic":
+            raise RangeError(
+                "plant", plant, "the published walker moves joints exactly; plants are of the planner 'free'"
+            )
         if ask or least_time:
             raise RangeError("planner", planner, "asking and the least time are of the planner 'free'")
         walk_published(request, new_folder(request.site.structure, output, force))
         return
-    perform = performance(request, machine, ask, least_time)
+    perform = performance(request, machine, ask, least_time, plant_choice(plant, gravity, fault))
     folder = new_folder(request.site.structure, output, force)
     walk_free(perform, machine, folder, backend, check or strict, pictures)
 
@@ -119,7 +126,9 @@ def _resumed(
     from wbc.cli.walking.modes import performance
     from wbc.cli.walking.run import changed_machine, new_folder, walk_free
     from wbc.errors import RangeError
+    from wbc.walking.log.folder import read_begun
     from wbc.walking.run.resume_mode import going_on, machine_walked, read_resume
+    from wbc.walking.torque.choice import PlantChoice
 
     given, of = context.params, read_resume(resume, points)
     output = given["output"]
@@ -132,7 +141,8 @@ def _resumed(
         raise RangeError("arms", given["arms"], f"the run has {len(machine.arms)} arms")
     if "change" in named:
         machine = changed_machine(given["change"], machine.two_ended, len(machine.arms))
-    perform = performance(request, machine, ask, least_time)
+    begun = read_begun(Path(of.folder))["plant"] if request is not of else {}
+    perform = performance(request, machine, ask, least_time, PlantChoice.of_run(begun))
     folder = new_folder("resumed", output, given["force"])
     walk_free(perform, machine, folder, given["backend"], check, given["pictures"])
 

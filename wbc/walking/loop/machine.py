@@ -5,19 +5,29 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
+import pinocchio as pin
 from numpy.typing import NDArray
 
 from wbc.robots import Walker
-from wbc.simulation import Connection, Plant
+from wbc.simulation import Connection, GripKind, GrippingPlant, Plant
 from wbc.validation import Array
 from wbc.walking.arms.fits import check_fits
 from wbc.walking.holds.structure import Structure
 from wbc.walking.loop.closed_chain import ClosedChain
+from wbc.walking.loop.stack import hold_kind
+from wbc.walking.planner.grips.rolls import allowed_x
+
+#: What a body is off where the hands have it, when others hold than before, is taken back in [s]
+EASING = 0.2
+#: A lag is taken of about the last [s], and where the squares of the joints' commanded accelerations add up to more
+#: than this [rad^2/s^4]
+REMEMBERED, SEEN = 2.0, 10.0
 
 
 class Machine:
     """Where the joints are is what the plant reads; where the body is follows from the holds of the closed hands
     (:class:`ClosedChain`), as no sensor of the machine measures it. What a plant says of the body does not count.
+    A plant that can grasp (:class:`wbc.simulation.GrippingPlant`) is told which hands close and open.
 
     Args:
         dt: control period [s]. plant: what moves; None: a :class:`wbc.simulation.KinematicPlant`.
@@ -27,6 +37,7 @@ class Machine:
             period, and the body's velocity as the plant has it.
         time: [s]. held: row of the arm -> row of the hold.
         left: row of the arm -> places of the holds that an open hand has left, or was to go to, last [m].
+        lag: by how much the joints are later than what they are commanded, as far as that shows [s].
         fixed: fewer hands hold than the body needs, and have since the beginning: it is declared fixed.
         structure, chain: the holds that are there, and the hands on them.
 
@@ -38,11 +49,14 @@ class Machine:
     def __init__(self, walker: Walker, structure: Structure, dt: float, plant: Plant | None = None) -> None:
         check_fits(walker)
         self.walker, self.structure, self.dt = walker, structure, dt
-        self.chain = ClosedChain(walker, structure)
+        self.chain = ClosedChain(walker, structure, round(EASING / dt))
         self._connection = Connection(plant, walker.robot, dt)
+        self._broken: set[int] = set()
+        self._grips: GrippingPlant | None = plant if isinstance(plant, GrippingPlant) else None
         self.q = np.array(walker.robot.neutral)
         self.v = self.rates = np.zeros(walker.robot.nv)
         self.time, self.fixed = 0.0, False
+        self.lag, self._late = 0.0, np.zeros(2)
         self.held: dict[int, int] = {}
         self.left: dict[int, list[Array]] = {}
 
@@ -61,6 +75,8 @@ class Machine:
         self.time = state.time
         if (state.q[7:] != self.q[7:]).any():
             self._place(state.q[7:])
+        for arm in self.held:
+            self._grasp(arm)
 
     def move(self, v: Array) -> float:
         """One period with desired rates ``[nv]``; the worst slip of a held hand after it [m].
@@ -68,7 +84,7 @@ class Machine:
         Raises:
             PlantError: the plant has no valid reading; it was commanded to rest.
         """
-        self.v = v.copy()
+        before, self.v = self.v, v.copy()
         if self.fixed:
             self.v[:6] = 0.0
         state = self._connection.drive(self.v)
@@ -76,7 +92,16 @@ class Machine:
         if state.v.tobytes() != self.v.tobytes():
             # It did something else than was commanded: what lasts for a period is its mean
             self.rates[6:] = (state.q[7:] - self.q[7:]) / self.dt
+            self._watch(before)
         return self._place(state.q[7:])
+
+    def _watch(self, before: Array) -> None:
+        """Of commands u and rates v of all joints the lag is sum (u - v) du / dt over sum (du / dt)^2, of late."""
+        change = (self.v[6:] - before[6:]) / self.dt
+        self._late *= 1.0 - self.dt / REMEMBERED
+        self._late += (self.v[6:] - self.rates[6:]) @ change, change @ change
+        if self._late[1] > SEEN:
+            self.lag = max(float(self._late[0] / self._late[1]), 0.0)
 
     def rest(self) -> None:
         """Command rest; time does not go on."""
@@ -86,11 +111,24 @@ class Machine:
     def close(self, arm: int, hold: int) -> None:
         """A hand holds a hold (its row)."""
         self.held[arm] = hold
+        self._grasp(arm)
         self.fixed = self.fixed and len(self.held) < self.walker.min_holds
 
     def open(self, arm: int) -> None:
         """A hand holds nothing."""
+        if self._grips is not None and arm not in self._broken:
+            self._grips.release(self.walker.arms[arm].hand)
+        self._broken.discard(arm)
         self.left[arm] = [self.structure.positions[self.held.pop(arm)]]
+
+    def lost(self) -> list[int]:
+        """Rows of holds that have broken off under a closed hand; the hand is to be opened."""
+        if self._grips is None:
+            return []
+        names = self._grips.lost()
+        arms = [arm for arm in self.held if self.walker.arms[arm].hand in names]
+        self._broken.update(arms)
+        return [self.held[arm] for arm in arms]
 
     def hand(self, arm: int) -> tuple[Array, Array, Array]:
         """Origin [m], z axis and x axis of a hand in the structure."""
@@ -104,6 +142,19 @@ class Machine:
         """
         self.structure, self.chain = rest, self.chain.on(rest)
         self.held = {arm: int(rows[hold]) for arm, hold in self.held.items()}
+
+    def _grasp(self, arm: int) -> None:
+        """Say to the plant what a hand holds, and at which of the allowed rolls."""
+        if self._grips is None:
+            return
+        structure, hold, (_, axis, x) = self.structure, self.held[arm], self.hand(arm)
+        z = structure.axes[hold]
+        if not structure.free_rolls[hold]:
+            x = allowed_x(structure, hold, x, axis)
+        x = x - (x @ z) * z
+        x = x / np.linalg.norm(x)
+        pose = pin.SE3(np.column_stack([x, np.cross(z, x), z]), structure.positions[hold])
+        self._grips.grasp(self.walker.arms[arm].hand, pose, GripKind(hold_kind(structure, hold)))
 
     def _place(self, joints: Array) -> float:
         """The joints are there; the body where the hands have it, or where it was if it is fixed."""

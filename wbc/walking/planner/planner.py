@@ -8,13 +8,16 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import Literal
 
+import numpy as np
+import pinocchio as pin
+
 from wbc import validation
 from wbc.robots import Walker
 from wbc.validation import Array
 from wbc.walking.arms.puma import limb_of
 from wbc.walking.body_path import BodyPath
 from wbc.walking.holds.structure import Structure
-from wbc.walking.planner.around import NONE_MET, around
+from wbc.walking.planner.around import NONE_MET, Around, around
 from wbc.walking.planner.detours.route import find_routes
 from wbc.walking.planner.fewest import fewer_slices
 from wbc.walking.planner.grips.table import Grips, grip_slices
@@ -94,11 +97,29 @@ def plan_walk(
 
 def _check_ends(walker: Walker, structure: Structure, path: BodyPath) -> None:
     """Refuse a path whose first or last pose has the body, or what stands still on it, in something's way."""
-    there = around(walker, structure)
-    for where, met in zip(("beginning", "end"), there.bodies(path.poses[[0, -1]]).tolist(), strict=True):
+    there, ends = around(walker, structure), path.poses[[0, -1]]
+    for where, pose, met in zip(("beginning", "end"), ends, there.bodies(ends).tolist(), strict=True):
         if met != NONE_MET:
             reason = f"at its {where} the body is nearer than {1e3 * there.of_body:.0f} mm to {there.names[met]}"
-            raise NoPlanError("path", structure.name, reason)
+            hold = _clear_over(there, pose)
+            raise NoPlanError("path", structure.name, f"{reason}; {hold}" if hold else reason)
+
+
+def _clear_over(there: Around, pose: Array) -> str:
+    """Over which hold the body would be clear, the nearest one in the same attitude and height; "" for none."""
+    places, axes = there.structure.positions, there.structure.axes
+    order = np.argsort(np.linalg.norm(places - pose[:3, 3], axis=1), kind="stable")
+    height = float((places[order[0]] - pose[:3, 3]) @ pose[:3, 2])
+    poses = np.repeat(pose[None], len(order), axis=0)
+    poses[:, :3, 3] = places[order] - height * axes[order]
+    for k, axis in enumerate(axes[order]):
+        poses[k, :3, :3] = pin.Quaternion.FromTwoVectors(pose[:3, 2], axis).toRotationMatrix() @ pose[:3, :3]
+    clear = np.flatnonzero(there.bodies(poses) == NONE_MET)
+    if not len(clear):
+        return ""
+    k = int(clear[np.argmin(np.linalg.norm(poses[clear, :3, 3] - pose[:3, 3], axis=1))])
+    far = float(np.linalg.norm(poses[k, :3, 3] - pose[:3, 3]))
+    return f"over {there.structure.ids[order[k]]}, {far:.2f} m from there, it is clear"
 
 
 def plan_slices(

@@ -32,6 +32,7 @@ from wbc.walking.run.plausible import far_apart
 from wbc.walking.run.recording import WalkRecorder
 from wbc.walking.run.request import ArmRequest, DriveRequest, PathRequest, Request, TwoEndedRequest, record_of
 from wbc.walking.run.resume_mode import ResumeMode, ResumeRequest, going_on
+from wbc.walking.torque.loop import TorqueLoop
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,7 +163,8 @@ def perform(
 ) -> WalkRun:
     """Plans, compiles, walks and records. Arguments as of :func:`perform_walk`."""
     if folder is not None:
-        begin_folder(folder, mode.asked(), mode.walker, mode.structure)
+        about = plant.about if isinstance(plant, TorqueLoop) else None
+        begin_folder(folder, mode.asked(), mode.walker, mode.structure, about)
     report, clock = progress or (lambda what, part: None), time.perf_counter
     run = WalkRun(mode.request, mode.walker, mode.structure, mode.path, None, "refused", "")
     report("planning", None)
@@ -184,6 +186,8 @@ def perform(
     run, begin = replace(run, compile_time=clock() - begin), clock()
     walk = mode.walk(plan, stack, plant)
     meta = {"machine": machine_of(mode.walker), **mode.meta(plan), "request": record_of(mode.request)}
+    if isinstance(plant, TorqueLoop):
+        meta["plant"] = plant.about
     recorder = WalkRecorder(walk, mode.request.site.seed, meta, folder=folder, before=mode.before())
     try:
         ending = mode.carry_out(walk, recorder, report, stop)
@@ -195,6 +199,8 @@ def perform(
     if not len(recorder):
         return replace(run, more=(*run.more, *mode.figures(None)))
     result = mode.result(walk, *recorder.log())
+    if isinstance(plant, TorqueLoop):
+        run = replace(run, more=(*run.more, *plant.watch.figures()))
     run = replace(run, log=result.log, ticks=result.ticks, more=(*run.more, *result.figures))
     if result.plan is not None:
         run = replace(run, path=result.plan.path, plan=result.plan)

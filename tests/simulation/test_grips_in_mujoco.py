@@ -1,0 +1,85 @@
+"""Grips in MuJoCo, and MuJoCo beside Pinocchio."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from tests.refusals import assert_refused
+from tests.simulation.machines import HANDS, heavy, random_torque
+from wbc.errors import RangeError, UnknownNameError
+from wbc.simulation import Command, CommandKind, GripKind, GrippingMujocoPlant, Motors, MujocoPlant, PinocchioPlant
+
+ROBOT = heavy().robot
+
+
+@pytest.fixture(scope="module")
+def plant() -> GrippingMujocoPlant:
+    return GrippingMujocoPlant(ROBOT, HANDS)
+
+
+def test_free_motion_is_that_of_pinocchio(plant: GrippingMujocoPlant) -> None:
+    other, rng = PinocchioPlant(ROBOT), np.random.default_rng(0)
+    for k in range(10):
+        q, v, tau = ROBOT.random(k), rng.normal(size=ROBOT.nv), random_torque(ROBOT, 3.0, k)
+        plant.reset(q, 0.0, v)
+        other.reset(q, 0.0, v)
+        MujocoPlant.apply(plant, Command(CommandKind.TORQUE, tau))
+        mujoco.mj_forward(plant._model, plant.data)
+        theirs, ours = np.array(plant.data.qacc), other.acceleration(tau)
+        # The free joint's linear velocity is along the world's axes there
+        theirs[:3] = pin.Quaternion(q[3:7]).matrix().T @ theirs[:3] - np.cross(v[3:6], v[:3])
+        assert theirs == pytest.approx(ours, abs=1e-9 * np.abs(ours).max())
+
+
+@pytest.mark.parametrize("kind", [GripKind.POSE, GripKind.POSITION])
+def test_grips_hold_and_bear_what_rigid_ones_do(plant: GrippingMujocoPlant, kind: GripKind) -> None:
+    other, tau = PinocchioPlant(ROBOT), random_torque(ROBOT, 1.0, 5)
+    for one in (plant, other):
+        one.reset(ROBOT.neutral, 0.0)
+        for hand in HANDS:
+            one.grasp(hand, ROBOT.pose(ROBOT.neutral, hand), kind)
+        one.apply(Command(CommandKind.TORQUE, tau))
+        one.advance(0.2)
+    gaps = [ROBOT.pose(plant.read().q, hand).translation - plant.grips[hand].pose.translation for hand in HANDS]
+    assert np.abs(gaps).max() < 1e-5
+    assert plant.given == pytest.approx(other.given, abs=0.02)
+    for hand in HANDS:
+        assert plant.wrenches[hand] == pytest.approx(other.wrenches[hand], abs=0.5)
+
+
+def test_faults_and_delay() -> None:
+    plant = GrippingMujocoPlant(ROBOT, HANDS, motors=Motors(delay=0.01))
+    plant.reset(ROBOT.neutral, 0.0)
+    for hand in HANDS[:2]:
+        plant.grasp(hand, ROBOT.pose(ROBOT.neutral, hand), GripKind.AXIS)
+    plant.apply(Command(CommandKind.TORQUE, random_torque(ROBOT, 3.0)))
+    plant.advance(0.009)
+    assert np.abs(plant.read().v).max() < 1e-9
+    plant.advance(0.01)
+    assert np.abs(plant.read().v).max() > 1e-3
+    plant.slip(HANDS[0], (0.0, 0.01, 0.0), 0.01)
+    before = plant.grips[HANDS[0]].pose.translation.copy()
+    plant.advance(0.02)
+    assert plant.grips[HANDS[0]].pose.translation - before == pytest.approx([0.0, 1e-4, 0.0])
+    plant.lose(HANDS[1])
+    assert plant.lost() == (HANDS[1],)
+    assert list(plant.wrenches) == [HANDS[0]]
+    plant.reset(ROBOT.neutral, 0.0)
+    plant.limp("arm3_joint1")
+    torque = np.zeros(ROBOT.nv)
+    torque[ROBOT.dofs("arm3_joint1")] = 30.0
+    plant.apply(Command(CommandKind.TORQUE, torque))
+    plant.advance(0.05)
+    assert not plant.read().v.any()
+
+
+def test_what_cannot_be_grasped_is_refused(plant: GrippingMujocoPlant) -> None:
+    plant.reset(ROBOT.neutral, 0.0)
+    far = pin.SE3(np.eye(3), np.ones(3))
+    assert_refused(lambda: plant.grasp(HANDS[0], far), RangeError, "impossible contact")
+    assert_refused(lambda: plant.grasp("body", far), UnknownNameError, "arm1_hand")
+    assert_refused(lambda: plant.release(HANDS[0]), UnknownNameError, "frame")
+    assert_refused(lambda: GrippingMujocoPlant(ROBOT, HANDS, time_constant=1e-3), RangeError, "time_constant")

@@ -1,0 +1,101 @@
+"""The loop of torques under a walk: it follows rates, opens and closes hands, and meets faults."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+import wbc.robots
+from tests.refusals import assert_refused
+from tests.simulation.machines import HANDS, heavy
+from wbc.errors import RangeError, ShapeError, UnknownNameError
+from wbc.simulation import Command, CommandKind, GripKind, KinematicPlant, Motors, PinocchioPlant
+from wbc.walking import cylinder
+from wbc.walking.torque.choice import PlantChoice
+from wbc.walking.torque.faults import Fault
+from wbc.walking.torque.loop import TorqueLoop
+from wbc.walking.torque.stack import TorqueStack
+
+ROBOT = heavy().robot
+
+
+@cache
+def stack() -> TorqueStack:
+    return TorqueStack(heavy(), [GripKind.AXIS], backend="vm")
+
+
+def begun(loop: TorqueLoop, hands: tuple[str, ...] = HANDS) -> TorqueLoop:
+    loop.reset(ROBOT.neutral, 0.0)
+    for hand in hands:
+        loop.grasp(hand, ROBOT.pose(ROBOT.neutral, hand), GripKind.AXIS)
+    return loop
+
+
+def rates(size: float) -> np.ndarray:
+    """Rates at which three closed hands stay: the body sinks, the joints follow from the hands' Jacobians."""
+    down = np.array([0.0, 0.0, size, 0.0, 0.0, 0.0])
+    rows = np.vstack([ROBOT.jacobian(ROBOT.neutral, hand) for hand in HANDS])
+    joints = -np.linalg.lstsq(rows[:, 6:], rows[:, :6] @ down)[0]
+    return np.concatenate([down, joints])
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.005])
+def test_it_follows_the_rates_of_a_walk(delay: float) -> None:
+    loop = begun(TorqueLoop(stack(), PinocchioPlant(ROBOT, motors=Motors(delay=delay)), delay=delay))
+    v = rates(0.02)
+    for part in (0.5, 1.0, 1.0, 1.0):
+        loop.apply(Command(CommandKind.VELOCITY, part * v))
+        loop.advance(0.01)
+    assert loop.read().v == pytest.approx(v, abs=0.25 * np.abs(v).max() if delay else 0.02 * np.abs(v).max())
+    assert loop.watch.unsolved == 0
+    assert loop.watch.drift < 1e-6
+    assert 0.0 < loop.watch.force < loop.stack.rating.force
+    assert loop.watch.figures()[0].value == loop.watch.drift
+
+
+def test_an_opened_hand_moves_alone() -> None:
+    loop = begun(TorqueLoop(stack(), PinocchioPlant(ROBOT)))
+    loop.release(HANDS[2])
+    v = np.zeros(ROBOT.nv)
+    v[ROBOT.dofs("arm3_joint1")] = 0.1
+    for _ in range(4):
+        loop.apply(Command(CommandKind.VELOCITY, v))
+        loop.advance(0.01)
+    assert loop.read().v == pytest.approx(v, abs=0.01)
+    assert set(loop.plant.grips) == set(HANDS[:2])  # type: ignore[attr-defined]
+    assert loop.watch.drift < 1e-6
+
+
+def test_faults_come_in_time_and_a_broken_hold_is_lost() -> None:
+    faults = [Fault.read("break arm1 at 0.01"), Fault.read("slip arm2 0.001 at 0"), Fault.read("limp arm3_joint1 at 0")]
+    loop = begun(TorqueLoop(stack(), PinocchioPlant(ROBOT), faults=faults))
+    loop.advance(0.01)
+    assert loop.lost() == ()
+    loop.advance(0.01)
+    assert loop.lost() == (HANDS[0],)
+    assert set(loop.plant.grips) == set(HANDS[1:])  # type: ignore[attr-defined]
+    assert not loop.plant._state.scale[ROBOT.dofs("arm3_joint1")].any()  # type: ignore[attr-defined]
+    assert loop.plant._state.slips  # type: ignore[attr-defined]
+
+
+def test_texts_of_faults() -> None:
+    assert Fault.read("slip arm2 0.005 at 4") == Fault("slip", "arm2", 0.005, 4.0)
+    assert Fault.read("limp arm3_joint2 at 2.5") == Fault("limp", "arm3_joint2", 0.0, 2.5)
+    assert Fault.read("delay 0.02") == Fault("delay", "", 0.02)
+    for text in ("slip arm2 at 4", "limp arm3_joint2 0.1 at 2", "break arm1 4", "delay", "delay x"):
+        assert_refused(lambda text=text: Fault.read(text), ShapeError, "expected")
+    assert_refused(lambda: Fault.read("burn arm1 at 2"), UnknownNameError, "break")
+
+
+def test_what_cannot_walk_under_torques_is_refused() -> None:
+    assert_refused(lambda: TorqueStack(wbc.robots.walker(), [GripKind.AXIS]), RangeError, "masses")
+    assert_refused(lambda: TorqueStack(heavy(), [GripKind.POSITION]), RangeError, "turning about the line")
+    assert_refused(lambda: TorqueLoop(stack(), KinematicPlant(ROBOT)), ShapeError, "torques")
+    assert_refused(lambda: wbc.robots.with_masses(wbc.robots.walker(two_ended=True)), ShapeError, "bodies with arms")
+    assert_refused(lambda: PlantChoice("pinochio"), UnknownNameError, "pinocchio")
+    assert_refused(lambda: PlantChoice(faults=("delay 0.02",)), RangeError, "kinematic")
+    assert_refused(lambda: PlantChoice("pinocchio", faults=("delay 0.02", "delay 0.01")), RangeError, "one delay")
+    choice, walker = PlantChoice("pinocchio", faults=("break arm9 at 1",)), wbc.robots.walker()
+    assert_refused(lambda: choice.build(walker, cylinder(rigid=True)), UnknownNameError, "arm1")

@@ -1,0 +1,1 @@
+"""Inertias from motion and torques."""

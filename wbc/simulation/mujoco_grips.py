@@ -1,0 +1,203 @@
+"""A robot in MuJoCo of which frames may be held."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from wbc import validation
+from wbc.errors import RangeError, UnknownNameError
+from wbc.robot import Robot
+from wbc.simulation.dynamics import AXIS, Grip
+from wbc.simulation.momentum import Balance
+from wbc.simulation.motors import Drive, Motors
+from wbc.simulation.mujoco_model import mujoco_spec
+from wbc.simulation.mujoco_plant import MujocoPlant
+from wbc.simulation.pinocchio_plant import check_reach
+from wbc.simulation.plant import Command, CommandKind, GripKind, PlantState
+from wbc.validation import Array
+
+#: Points of a frame that its grip holds, as many as the kind needs [m]
+POINTS = AXIS * np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
+HELD = {GripKind.POSITION: 1, GripKind.AXIS: 2, GripKind.POSE: 3}
+#: Time constant of a grip, in time steps of MuJoCo: fewer do not hold; and how hard it is, of 1
+SOFT, HARD = 2.0, 0.9999
+
+
+class GrippingMujocoPlant(MujocoPlant):
+    """A robot of ours in MuJoCo (:func:`mujoco_model`) that takes torques, and can grasp.
+
+    A grip is a ``connect`` of one, two or three points of the frame. MuJoCo's constraints are springs: a grip gives way
+    under load, the less the shorter the time constant. It goes with its mass, and is not one number [m/N].
+
+    Args:
+        frames: that can be held. time_step: [s].
+        time_constant: of the grips [s]; None: two time steps, the least that MuJoCo takes.
+        motors: default: torques as commanded within the limits of effort. seed: of their noise.
+
+    Raises:
+        UnknownNameError: no such frame. What :func:`mujoco_model` raises.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        frames: Sequence[str],
+        time_step: float = 0.001,
+        *,
+        time_constant: float | None = None,
+        motors: Motors | None = None,
+        seed: int = 0,
+    ) -> None:
+        import mujoco
+
+        spec = mujoco_spec(robot, time_step=time_step, actuators="torque", drawn=False)
+        soft = SOFT * time_step if time_constant is None else time_constant
+        soft = validation.scalar("time_constant", soft, low=SOFT * time_step, unit="s")
+        for name in frames:
+            frame = robot.model.frames[robot.model.getFrameId(robot.check_frame("frames", name))]
+            body = spec.joint(str(robot.model.names[frame.parentJoint])).parent
+            for k in range(len(POINTS)):
+                held = spec.add_equality(type=mujoco.mjtEq.mjEQ_CONNECT, objtype=mujoco.mjtObj.mjOBJ_BODY)
+                held.name, held.name1, held.active = f"{name} {k}", body.name, False
+                held.solref, held.solimp = [soft, 1.0], [HARD, HARD, 0.001, 0.5, 2.0]
+        model = spec.compile()
+        self._equality = int(mujoco.mjtConstraint.mjCNSTR_EQUALITY)
+        self._rows = {name: [int(model.equality(f"{name} {k}").id) for k in range(len(POINTS))] for name in frames}
+        self._drive = Drive(motors or Motors(), robot, time_step)
+        self._balance, self._placed, self._seed = Balance(robot.model), robot.model.createData(), seed
+        self._grips: dict[str, Grip] = {}
+        super().__init__(model, robot)
+        self.commands: Collection[CommandKind] = (CommandKind.TORQUE,)
+
+    def reset(self, q: Array, time: float, v: Array | None = None) -> None:
+        """At a configuration, at rest or with a velocity, and nothing grasped."""
+        self._grips, self._slips, self._broken = {}, dict[str, tuple[Array, float]](), list[str]()
+        super().reset(q, time, v)
+        self._torque, self._motors = np.zeros(self.nv), self._drive.fresh()
+        self._drive.scale[self._robot.base_nv :] = 1.0
+        self._random, self._fallen = np.random.default_rng(self._seed), np.zeros(6)
+        state = self.read()
+        self._first = self._balance.momentum(state.q, state.v)
+
+    def apply(self, command: Command) -> None:
+        """Take torques ``[nv]``.
+
+        Raises:
+            UnknownNameError: another kind of command.
+        """
+        validation.one_of("command.kind", str(command.kind), [str(CommandKind.TORQUE)])
+        self._torque = np.array(command.values)
+
+    def advance(self, dt: float) -> None:
+        """Whole time steps."""
+        h, drive = self.time_step, self._drive
+        for _ in range(round(dt / h)):
+            state = self.read()
+            torque = drive.torque(self._motors, self._torque, state.v, self._random)
+            if drive.rubs:
+                torque = torque - drive.friction(state.v)
+            super().apply(Command(CommandKind.TORQUE, torque))
+            for name in list(self._slips):
+                self._slide(name, h)
+            super().advance(h)
+            if self._balance.falls:
+                self._fallen += self._balance.by_gravity(state.q, h)
+
+    def grasp(self, frame: str, pose: pin.SE3, kind: GripKind = GripKind.POSE) -> None:
+        """A frame is held at a pose of the world.
+
+        Raises:
+            UnknownNameError: no such frame or kind. RangeError: held already, or out of reach, as of
+                :meth:`PinocchioPlant.grasp`.
+        """
+        validation.one_of("frame", frame, self._rows)
+        kind = GripKind(validation.one_of("kind", str(kind), [str(k) for k in GripKind]))
+        if frame in self._grips:
+            raise RangeError("frame", frame, "it is held already")
+        model = self._robot.model
+        pin.framesForwardKinematics(model, self._placed, self.read().q)
+        number = model.getFrameId(frame)
+        check_reach(frame, self._placed.oMf[number], pose, kind)
+        self._grips[frame] = Grip(pose, kind)
+        place = model.frames[number].placement
+        for row, point in zip(self._rows[frame][: HELD[kind]], POINTS, strict=False):
+            self._model.eq_data[row, :3], self._model.eq_data[row, 3:6] = place.act(point), pose.act(point)
+            self.data.eq_active[row] = 1
+
+    def release(self, frame: str) -> None:
+        """It is free again.
+
+        Raises:
+            UnknownNameError: it was not held.
+        """
+        if frame not in self._grips:
+            raise UnknownNameError("frame", frame, self._grips)
+        del self._grips[frame]
+        self._slips.pop(frame, None)
+        for row in self._rows[frame]:
+            self.data.eq_active[row] = 0
+
+    def lost(self) -> tuple[str, ...]:
+        """Frames that what held them has let go of, since this was last asked."""
+        out = tuple(self._broken)
+        self._broken.clear()
+        return out
+
+    def lose(self, frame: str) -> None:
+        """As :meth:`PinocchioPlant.lose`."""
+        self.release(frame)
+        self._broken.append(frame)
+
+    def slip(self, frame: str, velocity: Any, duration: float) -> None:
+        """As :meth:`PinocchioPlant.slip`."""
+        validation.one_of("frame", frame, self._grips)
+        rate = validation.real_array("velocity", velocity, (3,))
+        self._slips[frame] = rate, validation.scalar("duration", duration, low=0.0, unit="s")
+
+    def limp(self, joint: str, scale: float = 0.0) -> None:
+        """As :meth:`PinocchioPlant.limp`."""
+        self._drive.scale[self._robot.dofs(joint)] = validation.scalar("scale", scale, low=0.0, high=1.0)
+
+    @property
+    def grips(self) -> Mapping[str, Grip]:
+        """Frame -> how it is held."""
+        return self._grips
+
+    @property
+    def state(self) -> PlantState:
+        """The truth, which is what is read."""
+        return self.read()
+
+    @property
+    def given(self) -> Array:
+        """As of :attr:`PinocchioPlant.given`."""
+        state = self.read()
+        return self._first + self._fallen - self._balance.momentum(state.q, state.v)
+
+    @property
+    def wrenches(self) -> dict[str, Array]:
+        """As of :attr:`PinocchioPlant.wrenches`."""
+        data, out = self.data, dict[str, Array]()
+        ours = np.asarray(data.efc_type[: data.nefc]) == self._equality
+        numbers, forces = np.asarray(data.efc_id[: data.nefc]), np.asarray(data.efc_force[: data.nefc])
+        for name, grip in self._grips.items():
+            total = np.zeros(6)
+            for row, point in zip(self._rows[name][: HELD[grip.kind]], POINTS, strict=False):
+                force = grip.pose.rotation.T @ forces[ours & (numbers == row)]
+                total += np.append(force, pin.skew(point) @ force)
+            out[name] = total
+        return out
+
+    def _slide(self, name: str, h: float) -> None:
+        """A grip that slips, a step on."""
+        rate, left = self._slips[name]
+        grip, moved = self._grips[name], rate * min(h, left)
+        self._grips[name] = Grip(pin.SE3(grip.pose.rotation, grip.pose.translation + moved), grip.kind)
+        self._model.eq_data[self._rows[name], 3:6] += moved
+        self._slips[name] = rate, left - h
+        if left <= h:
+            del self._slips[name]

@@ -1,0 +1,242 @@
+"""A MuJoCo model made from a robot: the same joints, masses, limits and shapes under the same names."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pinocchio as pin
+
+from wbc import validation
+from wbc.errors import RangeError, UnsupportedJointError
+from wbc.robot import Robot
+from wbc.robot.robot import checked_robot
+from wbc.shapes import Box, Capsule, Convex, Cylinder, PlacedShape, Sphere
+from wbc.simulation.plant import CommandKind
+from wbc.symbolic.joints import motion_at
+from wbc.symbolic.kinematics import frame_index
+from wbc.validation import Array
+
+if TYPE_CHECKING:
+    import mujoco
+
+#: Mass and moments of a body that has none, which MuJoCo does not take [kg, kg m^2]
+NOTHING = 1e-12
+#: Bits of what touches what: shapes of the robot touch the ground and objects, not each other
+_TOUCHED, _TOUCHING = 1, 2
+
+
+def mujoco_spec(
+    robot: Robot,
+    *,
+    time_step: float = 0.001,
+    actuators: str = "torque",
+    frequency: float = 50.0,
+    contacts: Mapping[str, Sequence[PlacedShape]] | None = None,
+    ground: float | None = None,
+    friction: float = 0.8,
+    drawn: bool = True,
+) -> mujoco.MjSpec:
+    """What :func:`mujoco_model` compiles, to be added to before it is: objects, welds, cameras.
+
+    Raises:
+        As of :func:`mujoco_model`.
+    """
+    import mujoco
+
+    robot = checked_robot(robot)
+    spec = mujoco.MjSpec()
+    spec.modelname = robot.name or "robot"
+    spec.option.timestep = validation.scalar("time_step", time_step, low=0.0, open_low=True, unit="s")
+    spec.option.gravity = np.array(robot.model.gravity.linear)
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    spec.compiler.degree = False
+    spec.compiler.inertiafromgeom = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_FALSE
+    bodies = _add_bodies(spec, robot)
+    _add_shapes(spec, robot, bodies, robot.shapes if drawn else {}, touching=False, friction=friction)
+    validation.scalar("friction", friction, low=0.0)
+    _add_shapes(spec, robot, bodies, contacts or {}, touching=True, friction=friction)
+    if ground is not None:
+        plane = spec.worldbody.add_geom(name="ground", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0.0, 0.0, 1.0])
+        plane.pos = [0.0, 0.0, validation.scalar("ground", ground, unit="m")]
+        plane.contype, plane.conaffinity, plane.friction[0] = _TOUCHED, _TOUCHING, friction
+        plane.rgba = [0.85, 0.87, 0.9, 1.0]
+    _add_couplings(spec, robot)
+    _add_actuators(spec, robot, actuators, frequency)
+    return spec
+
+
+def mujoco_model(
+    robot: Robot,
+    *,
+    time_step: float = 0.001,
+    actuators: str = "torque",
+    frequency: float = 50.0,
+    contacts: Mapping[str, Sequence[PlacedShape]] | None = None,
+    ground: float | None = None,
+    friction: float = 0.8,
+    drawn: bool = True,
+) -> mujoco.MjModel:
+    """The robot in MuJoCo, for ``MujocoPlant(model, robot)``.
+
+        feet = {"left_sole": [PlacedShape(Box((0.2, 0.13, 0.02)), pin.SE3.Identity())]}
+        plant = MujocoPlant(mujoco_model(robot, contacts=feet, ground=0.0), robot)
+
+    Joints and actuators have the names of the robot's joints, each body that of its first link. Without contacts its
+    motion is Pinocchio's: armatures and gravity are the model's, damping and friction of joints are 0.
+
+    Args:
+        robot: on a base that is fixed or floats. time_step: [s].
+        actuators: of every joint with one degree of freedom: ``"torque"`` within the limits of effort, ``"position"``
+            or ``"velocity"`` with gains from the inertia at the robot's neutral configuration and a frequency [1/s].
+        contacts: frame -> shapes fixed to it that touch the ground and objects; nothing else of the robot touches.
+        ground: height of a floor [m]; None: none. friction: coefficient, of the floor and of the contacts.
+        drawn: whether the robot's own shapes are in it, to be seen; they weigh and touch nothing.
+
+    Raises:
+        ModuleNotFoundError: ``pip install wbc[mujoco]`` is to be done.
+        UnsupportedJointError: a joint that MuJoCo has none for: planar and helical ones, and composites.
+        RangeError: inertias that MuJoCo refuses, and why; a time step or a friction out of range.
+        UnknownNameError: no such kind of actuator, or frame.
+    """
+    spec = mujoco_spec(
+        robot, time_step=time_step, actuators=actuators, frequency=frequency, contacts=contacts, ground=ground,
+        friction=friction, drawn=drawn,
+    )  # fmt: skip
+    try:
+        return spec.compile()
+    except ValueError as error:
+        raise RangeError("robot", robot.name, f"MuJoCo does not take it: {error}") from error
+
+
+def _add_bodies(spec: mujoco.MjSpec, robot: Robot) -> list[mujoco.MjsBody]:
+    """A body a joint, the world's first."""
+    import mujoco
+
+    model, limits, bodies = robot.model, robot.limits, [spec.worldbody]
+    links: dict[int, str] = {}
+    for frame in model.frames:
+        if frame.type == pin.FrameType.BODY:
+            links.setdefault(int(frame.parentJoint), str(frame.name))
+    taken: set[str] = set()
+    for j in range(1, model.njoints):
+        name, place, inertia = str(model.names[j]), model.jointPlacements[j], model.inertias[j]
+        body = bodies[int(model.parents[j])].add_body(pos=place.translation, quat=_quaternion(place.rotation))
+        body.name = links[j] if j in links and links[j] not in taken else name
+        taken.add(body.name)
+        bodies.append(body)
+        moments = np.array(inertia.inertia)
+        if not np.trace(moments) > NOTHING:
+            moments = moments + NOTHING * np.eye(3)
+        body.explicitinertial, body.mass, body.ipos = True, max(inertia.mass, NOTHING), np.array(inertia.lever)
+        body.fullinertia = moments[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
+        start, kind = int(model.idx_vs[j]), model.joints[j].shortname().removeprefix("JointModel")
+        if kind == "FreeFlyer":
+            if int(model.parents[j]) or not place.isIdentity():
+                raise UnsupportedJointError("robot", name, "MuJoCo has free joints at the origin of the world alone")
+            body.add_joint(name=name, type=mujoco.mjtJoint.mjJNT_FREE)
+            continue
+        if kind == "Spherical":
+            body.add_joint(name=name, type=mujoco.mjtJoint.mjJNT_BALL, armature=float(model.armature[start]))
+            continue
+        linear, angular = _axes(model.joints[j], int(model.nvs[j]), int(model.nqs[j]), name, kind)
+        turns = bool(angular.any())
+        joint = body.add_joint(
+            name=name,
+            type=mujoco.mjtJoint.mjJNT_HINGE if turns else mujoco.mjtJoint.mjJNT_SLIDE,
+            axis=angular if turns else linear,
+            armature=float(model.armature[start]),
+        )
+        low, high = float(limits.position_lower[start]), float(limits.position_upper[start])
+        if low < high and np.isfinite([low, high]).all():
+            joint.limited, joint.range = mujoco.mjtLimited.mjLIMITED_TRUE, [low, high]
+    return bodies
+
+
+def _axes(joint: pin.JointModel, nv: int, nq: int, name: str, kind: str) -> tuple[Array, Array]:
+    """(linear, angular) motion of a joint of one degree of freedom, one of them zero."""
+    if nv != 1 or kind == "Mimic":
+        raise UnsupportedJointError("robot", name, f"MuJoCo has no joint like {kind}")
+    twist = motion_at(joint, np.array([0.0]) if nq == 1 else np.array([1.0, 0.0]))[0]
+    if twist[:3].any() and twist[3:].any():
+        raise UnsupportedJointError("robot", name, "MuJoCo has no helical joint")
+    return twist[:3], twist[3:]
+
+
+def _add_shapes(
+    spec: mujoco.MjSpec,
+    robot: Robot,
+    bodies: Sequence[mujoco.MjsBody],
+    shapes: Mapping[str, Sequence[PlacedShape]],
+    *,
+    touching: bool,
+    friction: float,
+) -> None:
+    """Geoms without mass on the bodies of their frames."""
+    import mujoco
+
+    kinds = mujoco.mjtGeom
+    for name, placed in shapes.items():
+        frame = robot.model.frames[frame_index(robot.model, robot.check_frame("contacts", name))]
+        for k, one in enumerate(placed):
+            validation.instance(f"contacts[{name!r}]", one, PlacedShape, "a PlacedShape")
+            place, shape = frame.placement * one.placement, one.shape
+            geom = bodies[int(frame.parentJoint)].add_geom(
+                pos=place.translation, quat=_quaternion(place.rotation), mass=0.0, group=1 if touching else 2
+            )
+            if isinstance(shape, Sphere) or (isinstance(shape, Capsule) and shape.length == 0.0):
+                geom.type, geom.size = kinds.mjGEOM_SPHERE, [shape.radius, 0.0, 0.0]
+            elif isinstance(shape, Capsule):
+                geom.type, geom.size = kinds.mjGEOM_CAPSULE, [shape.radius, shape.length / 2.0, 0.0]
+            elif isinstance(shape, Cylinder):
+                geom.type, geom.size = kinds.mjGEOM_CYLINDER, [shape.radius, shape.length / 2.0, 0.0]
+            elif isinstance(shape, Box):
+                geom.type, geom.size = kinds.mjGEOM_BOX, np.array(shape.size) / 2.0
+            elif isinstance(shape, Convex):
+                mesh = spec.add_mesh(name=f"{name} {k} {'touching' if touching else 'drawn'}")
+                mesh.uservert = shape.points.ravel()
+                geom.type, geom.meshname = kinds.mjGEOM_MESH, mesh.name
+            geom.contype, geom.conaffinity = (_TOUCHING, _TOUCHED) if touching else (0, 0)
+            if touching:
+                geom.name, geom.friction[0], geom.condim = f"{name} {k}", friction, 4
+            geom.rgba = [0.35, 0.55, 0.8, 1.0] if touching else [0.65, 0.68, 0.72, 1.0]
+
+
+def _add_couplings(spec: mujoco.MjSpec, robot: Robot) -> None:
+    import mujoco
+
+    for coupling in robot.couplings:
+        names = [robot.dof_names[dof] for dof in (coupling.follower, coupling.leader)]
+        equality = spec.add_equality(type=mujoco.mjtEq.mjEQ_JOINT, objtype=mujoco.mjtObj.mjOBJ_JOINT)
+        equality.name1, equality.name2 = names
+        equality.data[:5] = [coupling.offset, coupling.ratio, 0.0, 0.0, 0.0]
+
+
+def _add_actuators(spec: mujoco.MjSpec, robot: Robot, kind: str, frequency: float) -> None:
+    import mujoco
+
+    kind = validation.one_of("actuators", kind, [str(one) for one in CommandKind])
+    frequency = validation.scalar("frequency", frequency, low=0.0, open_low=True, unit="1/s")
+    inertia = np.diag(pin.crba(robot.model, robot.model.createData(), robot.neutral))
+    followers = {coupling.follower for coupling in robot.couplings}
+    for j in range(1, robot.model.njoints):
+        start = int(robot.model.idx_vs[j])
+        if int(robot.model.nvs[j]) != 1 or start in followers:
+            continue
+        name, effort = str(robot.model.names[j]), float(robot.limits.effort[start])
+        actuator = spec.add_actuator(name=name, target=name, trntype=mujoco.mjtTrn.mjTRN_JOINT)
+        if kind == CommandKind.TORQUE:
+            actuator.set_to_motor()
+        elif kind == CommandKind.POSITION:
+            actuator.set_to_position(kp=frequency**2 * inertia[start], kv=2.0 * frequency * inertia[start])
+        else:
+            actuator.set_to_velocity(kv=frequency * inertia[start])
+        if np.isfinite(effort) and effort > 0.0:
+            actuator.forcelimited, actuator.forcerange = mujoco.mjtLimited.mjLIMITED_TRUE, [-effort, effort]
+
+
+def _quaternion(rotation: Array) -> Array:
+    """w, x, y, z."""
+    x, y, z, w = pin.Quaternion(rotation).coeffs()
+    return np.array([w, x, y, z])

@@ -1,0 +1,172 @@
+"""A walk's rates, followed by torques on a robot with masses."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from wbc import validation
+from wbc.errors import ShapeError
+from wbc.simulation import Command, CommandKind, GripKind, Plant, PlantState
+from wbc.validation import Array
+from wbc.walking.torque.faults import Fault
+from wbc.walking.torque.stack import TorqueStack
+from wbc.walking.torque.tested import Tested
+from wbc.walking.torque.watch import Watch
+
+
+@dataclass(frozen=True)
+class Gains:
+    """Of the loop.
+
+    Attributes:
+        bandwidth: omega of  a = dv_ref/dt + 2 omega (v_ref - v) + omega^2 (q_ref - q)  [1/s].
+        leak: how fast q_ref comes to q, so that it does not wander where closed chains let nothing move [1/s].
+        grip: how fast the drift of closed hands decays [1/s].
+    """
+
+    bandwidth: float = 40.0
+    leak: float = 2.0
+    grip: float = 20.0
+
+
+class TorqueLoop:
+    """A plant that takes the velocities of a walk, and drives one that takes torques.
+
+        walker = wbc.robots.with_masses(wbc.robots.walker())
+        loop = TorqueLoop(TorqueStack(walker, [GripKind.AXIS]), PinocchioPlant(walker.robot))
+        Walk(walker, structure, plan, plant=loop)
+
+    Within a period of the walk the reference goes from the last velocity to the new one in a straight line; q_ref is
+    its integral. Every millisecond the stack finds torques for dv_ref/dt + 2 omega (v_ref - v) + omega^2 (q_ref - q),
+    and for what the closed hands bear. Torques that take hold late are found for the state that they will meet: what is
+    read, and the accelerations that were decided since. Nothing of the walk, its planner or its stack is changed.
+
+    Args:
+        stack: compiled. plant: takes torques, and grasps. gains: of the reference.
+        delay: of the torques, which the loop knows [s]. faults: that come in time.
+
+    Attributes:
+        watch: what was seen of the plant. about: plain data for a log, which say what it is.
+
+    Raises:
+        ShapeError: a plant that takes no torques, or grasps nothing.
+    """
+
+    commands: Collection[CommandKind] = (CommandKind.VELOCITY,)
+
+    def __init__(
+        self,
+        stack: TorqueStack,
+        plant: Plant,
+        gains: Gains | None = None,
+        *,
+        delay: float = 0.0,
+        faults: Sequence[Fault] = (),
+        about: Mapping[str, Any] | None = None,
+    ) -> None:
+        if CommandKind.TORQUE not in plant.commands:
+            raise ShapeError("plant", type(plant).__name__, "expected a plant that takes torques")
+        if not isinstance(plant, Tested):
+            raise ShapeError("plant", type(plant).__name__, "expected a plant that can grasp, and fail")
+        self.stack, self.plant, self._tested = stack, plant, plant
+        self.nq, self.nv = plant.nq, plant.nv
+        self.time_step = stack.controller.stack.dt
+        items: Any = stack.controller
+        arms = stack.walker.arms
+        self._model, self._reference = stack.walker.robot.model, items["reference"]
+        self._items = {(arm.hand, kind): items[f"{arm.hand} {kind}"] for arm in arms for kind in stack.kinds}
+        self._gains, self._faults = gains or Gains(), tuple(fault for fault in faults if fault.kind != "delay")
+        self._command = Command(CommandKind.TORQUE, np.zeros(self.nv))
+        ahead = round(validation.scalar("delay", delay, low=0.0, unit="s") / self.time_step)
+        # Accelerations on their way, the oldest first, and how long each lasts until the next torque takes hold
+        self._decided = np.zeros((ahead, self.nv))
+        self._lasts = (np.arange(ahead, 0, -1) - 0.5) * self.time_step**2
+        self.about = dict(about or {"name": type(plant).__name__})
+        self.watch = Watch(stack.rating, [arm.hand for arm in arms])
+
+    def reset(self, q: Array, time: float) -> None:
+        """At rest, nothing grasped."""
+        self.plant.reset(q, time)
+        gains, controller = self._gains, self.stack.controller
+        controller.reset(q)
+        self._reference.set(stiffness=gains.bandwidth**2, damping=2.0 * gains.bandwidth)
+        for item in self._items.values():
+            item.enabled, item.gain = False, gains.grip
+        self._closed: dict[str, GripKind] = {}
+        self._coming = list(self._faults)
+        self._decided[:] = 0.0
+        self._q = np.array(q)
+        self._v, self._next = np.zeros((2, self.nv))
+
+    def read(self) -> PlantState:
+        """The plant's."""
+        return self.plant.read()
+
+    def apply(self, command: Command) -> None:
+        """Take velocities, for the next period."""
+        self._next = validation.real_array("command.values", command.values, (self.nv,))
+
+    def grasp(self, frame: str, pose: pin.SE3, kind: GripKind) -> None:
+        """The plant's hand closes, and the stack counts on it."""
+        kind = GripKind(validation.one_of("kind", str(kind), [str(k) for k in self.stack.kinds]))
+        self._tested.grasp(frame, pose, kind)
+        item = self._items[frame, kind]
+        item.target, item.enabled = pose, True
+        self._closed[frame] = kind
+
+    def release(self, frame: str) -> None:
+        """The plant's hand opens, and the stack does without it."""
+        self._tested.release(frame)
+        self._let_go(frame)
+
+    def lost(self) -> tuple[str, ...]:
+        """Hands whose holds have broken off; the stack has done without them since."""
+        return self._tested.lost()
+
+    def advance(self, dt: float) -> None:
+        """A period of the walk: as many of torques as go into it."""
+        count = max(round(dt / self.time_step), 1)
+        ramp, step = (self._next - self._v) / count, self.time_step
+        plant, reference, command, controller = self.plant, self._reference, self._command, self.stack.controller
+        reference.acceleration = ramp / step
+        for _ in range(count):
+            state = plant.read()
+            if self._coming:
+                self._fail(state.time)
+            q, v = (state.q, state.v) if not len(self._decided) else self._ahead(state)
+            reference.target, reference.feedforward = self._q, self._v
+            self.step = controller.step(q, v)
+            command.values[:] = self.step.torque
+            plant.apply(command)
+            plant.advance(step)
+            self._q = pin.integrate(self._model, self._q, (self._v + 0.5 * ramp) * step)
+            self._v = self._v + ramp
+            if len(self._decided):
+                self._decided[:-1] = self._decided[1:]
+                self._decided[-1] = self.step.a
+            self.watch.see(self._tested, self._model, self.step.status)
+        off = pin.difference(self._model, self._q, plant.read().q)
+        self._q = pin.integrate(self._model, self._q, min(self._gains.leak * dt, 1.0) * off)
+
+    def _ahead(self, state: PlantState) -> tuple[Array, Array]:
+        """Where the torque of this tick will find the robot."""
+        moved = len(self._decided) * self.time_step * state.v + self._lasts @ self._decided
+        return pin.integrate(self._model, state.q, moved), state.v + self.time_step * self._decided.sum(axis=0)
+
+    def _fail(self, time: float) -> None:
+        """Faults whose time has come."""
+        for fault in [fault for fault in self._coming if fault.time <= time]:
+            if not fault.begin(self._tested):
+                continue
+            self._coming.remove(fault)
+            hand = f"{fault.what}_hand"
+            if fault.kind == "break":
+                self._let_go(hand)
+
+    def _let_go(self, frame: str) -> None:
+        self._items[frame, self._closed.pop(frame)].enabled = False

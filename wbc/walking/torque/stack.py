@@ -1,0 +1,59 @@
+"""The stack of torques under a walk."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from wbc import tasks
+from wbc.controller.controller import Controller
+from wbc.controller.stack import Stack
+from wbc.errors import RangeError
+from wbc.robots import HoldRating, Walker, hold_rating
+from wbc.simulation import GripKind
+from wbc.walking.torque.grasps import GRASPS
+
+#: Period of the torques [s]
+PERIOD = 0.001
+#: Weight of the body's pose, beside 1 of every joint
+BODY = 100.0
+
+
+class TorqueStack:
+    """The compiled stack: all coordinates follow a reference, closed hands bear wrenches within their rating.
+
+    Args:
+        walker: with masses, as :func:`wbc.robots.with_masses` gives it; its torque limits.
+        kinds: how holds may be held. rating: of every hold. backend: as of ``Stack.compile``.
+
+    Raises:
+        RangeError: a robot without masses, or holds that let hands tilt.
+    """
+
+    def __init__(
+        self,
+        walker: Walker,
+        kinds: Iterable[GripKind],
+        *,
+        rating: HoldRating | None = None,
+        period: float = PERIOD,
+        backend: str = "auto",
+    ) -> None:
+        robot, rating = walker.robot, rating or hold_rating()
+        if min(float(i.mass) for i in robot.model.inertias[1:]) <= 0.0:
+            raise RangeError("walker", robot.name, "torques need masses: wbc.robots.with_masses(walker)")
+        self.walker, self.kinds, self.rating = walker, tuple(dict.fromkeys(kinds)), rating
+        if not set(self.kinds) <= set(GRASPS):
+            why = "two hands that may tilt on their holds do not keep a body from turning about the line through them"
+            raise RangeError("kinds", [str(kind) for kind in self.kinds], f"holds that fix the tilt of a hand: {why}")
+        stack = Stack(robot, dt=period, calm=False)
+        weights = np.where(np.arange(robot.nv) < robot.base_nv, BODY, 1.0)
+        follow = tasks.Posture(joints=robot.joint_names, weights=tuple(weights.tolist()))
+        stack.add(follow, name="reference")
+        stack.add(tasks.JointLimits(), name="limits").add(tasks.TorqueLimits(), name="torques")
+        for arm in walker.arms:
+            for kind in self.kinds:
+                grasp = GRASPS[kind](arm.hand, force=rating.force, torque=rating.torque)
+                stack.add(grasp, name=f"{arm.hand} {kind}")
+        self.controller: Controller = stack.compile(command="torque", backend=backend)

@@ -1,0 +1,67 @@
+"""What is seen of a plant while a walk goes over it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pinocchio as pin
+
+from wbc.robots import HoldRating
+from wbc.track.summary import Figure
+from wbc.validation import Array
+from wbc.walking.torque.tested import Tested
+
+
+class Watch:
+    """The worst of every tick of torques.
+
+    Attributes:
+        drift: farthest that a held frame was from where its grip holds it [m]. force, moment: largest components of a
+            grip's wrench [N], [N m]. given: largest components of the momentum given to the structure, linear [N s] and
+            angular about the body's origin [N m s]. unsolved: ticks of torques that gave way or had no answer.
+    """
+
+    def __init__(self, rating: HoldRating, hands: Sequence[str]) -> None:
+        self.rating, self._hands = rating, tuple(hands)
+        self.drift = self.force = self.moment = 0.0
+        self.given = np.zeros(2)
+        self.ticks = self.unsolved = 0
+        self._data: pin.Data | None = None
+
+    def see(self, plant: Tested, model: pin.Model, status: str) -> None:
+        """After a tick."""
+        if self._data is None:
+            self._data = model.createData()
+        data, q, grips = self._data, plant.state.q, plant.grips
+        self.ticks += 1
+        self.unsolved += status != "solved"
+        for wrench in plant.wrenches.values():
+            sizes = np.abs(wrench)
+            self.force, self.moment = max(self.force, sizes[:3].max()), max(self.moment, sizes[3:].max())
+        pin.framesForwardKinematics(model, data, q)
+        for name, grip in grips.items():
+            off = data.oMf[model.getFrameId(name)].translation - grip.pose.translation
+            self.drift = max(self.drift, float(np.sqrt(off @ off)))
+        given: Array = plant.given
+        x, y, z = q[:3]
+        a, b, c = given[:3]
+        turning = given[3:] - (y * c - z * b, z * a - x * c, x * b - y * a)
+        self.given = np.maximum(self.given, (np.abs(given[:3]).max(), np.abs(turning).max()))
+
+    def figures(self) -> tuple[Figure, ...]:
+        """For the summary."""
+        rating, given = self.rating, self.given.tolist()
+        parts = self.force / rating.force, self.moment / rating.torque
+        text = f"{self.force:.0f} N and {self.moment:.0f} N m, {parts[0]:.0%} and {parts[1]:.0%} of what a hold bears"
+        return (
+            Figure("grip_drift", "closed hand off its hold, in the plant", self.drift, f"{1e3 * self.drift:.2g} mm"),
+            Figure("grip_wrench", "largest grip", {"force": self.force, "torque": self.moment}, text),
+            Figure(
+                "given",
+                "momentum given to the structure",
+                given,
+                f"{given[0]:.1f} N s, {given[1]:.1f} N m s about the body",
+            ),
+            Figure("unsolved", "torques that gave way", self.unsolved, f"{self.unsolved} of {self.ticks} ticks"),
+        )
