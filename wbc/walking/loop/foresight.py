@@ -43,7 +43,7 @@ HELD_DEPTH = 0.03
 #: A swinging arm that is off its way comes back to it within some of these [s]
 FADES = 0.15
 #: What clearances may lack, and what the proof may miss, together less than the checker leaves [m]
-SLACK, TOLERANCE = 4e-5, 4e-5
+SLACK, TOLERANCE = 8e-5, 1.5e-5
 
 
 @dataclass(frozen=True, eq=False)
