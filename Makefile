@@ -19,7 +19,7 @@ TYPES := build/types
 SOURCES := wbc tasks robots tests bench examples
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test check slow lint format types docs site figures bench bench-ik bench-time-laws soak lock clean
+.PHONY: help setup demo test check slow lint format types docs site check-export figures bench bench-ik bench-time-laws soak lock clean
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 18
@@ -60,6 +60,9 @@ site: $(SITE_READY)  ## the pages as a site with a reference of all public names
 	@rm -rf $(TYPES) && mkdir -p $(TYPES)/wbc
 	@ln -sf $(CURDIR)/wbc/* $(CURDIR)/tasks $(CURDIR)/robots $(TYPES)/wbc/
 	NO_MKDOCS_2_WARNING=1 $(SITE_VENV)/bin/mkdocs build --quiet
+
+check-export: $(READY)  ## exported C built for aarch64 by zig and run at 1000 states under qemu; says what is not installed
+	$(BIN)/python -m bench.export_machines
 
 figures: $(READY)  ## measure again what pages say, where it takes at most 5 minutes and is older than its code
 	$(BIN)/python -m bench.figures --stale
