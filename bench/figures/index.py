@@ -95,7 +95,8 @@ _ALL = (
     Figure(
         "trials", (*WALK, "bench/walk"), 600.0,
         ("python", "-m", "bench.walk", "--parts", "structures", "--resume", "--output", "bench/data"),
-        "bench/data/trials.json", {"structures": walk_view("structures", lambda records: trial_sheet("structures", records))},
+        "bench/data/trials.json",
+        {"structures": walk_view("structures", lambda records: trial_sheet("structures", records))},
     ),
     Figure("soak", (*TICK, "bench/soak"), 20.0),
     Figure("analysis", ("wbc/analysis",), 2.0),
