@@ -39,6 +39,7 @@ FLOORS = {
     "wbc.explain": 7,
     "wbc.export": 7,
     "wbc.batch": 7,
+    "wbc.support": 7,
     "wbc.ik": 7,
     "wbc.record": 7,
     "wbc.servo": 7,
@@ -69,6 +70,7 @@ WALKING = {
     "loop": 4,
     "modes": 5,
     "two_ended": 5,
+    "torque": 5,
     "run": 6,
     "report": 7,
 }
