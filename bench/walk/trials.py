@@ -65,7 +65,8 @@ def structures(name: str, walker: Walker, folder: Path) -> Record:
     request = PathRequest(Site(str(file)), trial.start, (trial.goal,), speed, 0.1, objective)
     spent = Spent()
     run = perform_walk(request, walker, progress=spent)
-    out = {**kept(run, folder), **spent.times(run.plan is not None)}
+    times = spent.times(run.plan is not None)
+    out = {**kept(run, folder), **times}
     if run.log is None:
         path = request.path(walker.data)
         found = passage(walker, request.site.build(), path.poses[0], path.poses[-1])
@@ -87,7 +88,9 @@ class Spent:
     def times(self, planned: bool) -> Record:
         """Of the plan, and of walking with its log."""
         begun, stages = [*self._begun.values()], [*self._begun]
-        if not planned or len(begun) < 3:
+        if not planned:
+            return {"plan_s": time.process_time() - begun[0]}
+        if len(begun) < 3:
             return {}
         return {"plan_s": begun[1] - begun[0], "walking_s": self._ended - begun[stages.index(stages[2])]}
 

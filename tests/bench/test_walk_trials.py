@@ -144,15 +144,16 @@ def test_costs_of_proofs_are_tabulated(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_tables_count_what_came_out() -> None:
     records = [
-        {"trial": "posts 0", "outcome": "arrived", "reason": "", "plan_s": 1.0, "violations": [], "second": []},
+        {"trial": "posts 0", "outcome": "arrived", "reason": "", "plan_s": 1.0, "walking_s": 1.0, "walk_s": 8.0,
+         "violations": [], "second": []},
         {"trial": "posts 1", "outcome": "arrived", "reason": "", "plan_s": 3.0, "violations": ["a: 1"],
          "second": ["clearance: 2"]},
-        {"trial": "bars 0", "outcome": "refused", "reason": "reach", "plan_s": 2.0},
+        {"trial": "bars 0", "outcome": "refused", "reason": "reach", "plan_s": 2.0, "reference": "impossible"},
         {"trial": "bars 1", "outcome": "crash", "reason": "ValueError"},
     ]  # fmt: skip
     sheet = trial_sheet("structures", records)
-    assert sheet.rows[0] == ("posts", "2", "2", "1", "1", "1", "0", "0", "3.0, 3.0", "")
-    assert sheet.rows[1] == ("bars", "2", "0", "0", "0", "0", "1", "1", "2.0, 2.0", "")
+    assert sheet.rows[0] == ("posts", "2", "2", "1", "1", "1", "0", "0", "0", "3.0, 3.0", "4.0, 4.0", "")
+    assert sheet.rows[1] == ("bars", "2", "0", "0", "0", "0", "1", "1", "1", "2.0, 2.0", "-", "")
     assert [row[0] for row in sheet.rows[2:]] == ["structures posts 1", "structures bars 0", "structures bars 1"]
-    assert [goal.value for goal in trial_goals("structures", records)] == [1, 1]
+    assert [goal.value for goal in trial_goals("structures", records)] == [1, 1, pytest.approx(1 / 3), 3.0, 0.25]
     assert json.dumps(records)
