@@ -47,5 +47,4 @@ for rated in (False, True):
 scene = Scene(robot, dark=[f"arm{k}_hand" for k in (1, 2, 3)], floor=False)
 scene.add_robot(path[0], pale=True)
 scene.add_robot(path[-1])
-scene.add_path(np.array([robot.pose(q, "body").translation for q in path[::20]]), "body")
 print(scene.save("runs/grips.png", size=(700, 560)))
