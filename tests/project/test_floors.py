@@ -70,6 +70,7 @@ WALKING = {
     "loop": 4,
     "modes": 5,
     "two_ended": 5,
+    "torque": 5,
     "run": 6,
     "report": 7,
 }

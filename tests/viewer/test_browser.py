@@ -16,10 +16,7 @@ from PIL import Image
 
 from tests.viewer import arms
 from wbc.viewer import Viewer, show
-from wbc.viewer.chromium import Chromium, Page, program
-
-pytest.importorskip("viser")
-needs_browser = pytest.mark.skipif(program() is None, reason="no chromium is installed (apt-get install chromium)")
+from wbc.viewer.chromium import Chromium, Page
 
 PICTURES = Path(__file__).parents[2] / "build" / "viewer"
 SIZE = (940, 560)
@@ -95,7 +92,6 @@ def drag_arrow(page: Page, at: np.ndarray, arrow: np.ndarray, by: float) -> None
     page.drag(pixel(page, begin), pixel(page, end), steps=14, pause=0.06)
 
 
-@needs_browser
 def test_the_hand_is_dragged_stopped_and_looked_back_at(loop: Loop) -> None:
     robot = loop.controller.stack.robot
     with Chromium(SIZE) as browser:

@@ -5,24 +5,22 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import runpy
 import threading
 import time
 import urllib.error
 import urllib.request
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
+from websockets.exceptions import InvalidStatus
+from websockets.sync.client import ClientConnection, connect
 
 from tests.viewer import arms
 from wbc.viewer.link import LoopEnd, ViewerEnd
 from wbc.viewer.messages import read
-
-pytest.importorskip("viser")
-
-from websockets.exceptions import InvalidStatus
-from websockets.sync.client import ClientConnection, connect
-
 from wbc.viewer.session import Session
 
 
@@ -141,6 +139,7 @@ def test_a_lost_operator_is_a_stop(served: tuple[Session, Loop]) -> None:
         send(one, type="operate")
         loop.take("operate")
         assert "lost" in loop.take("stop")["reason"]
+        loop.take("release")
 
 
 def test_the_past_is_shown_and_not_changed(served: tuple[Session, Loop]) -> None:
@@ -181,3 +180,16 @@ def test_a_drag_of_who_does_not_operate_does_nothing(served: tuple[Session, Loop
     for number in (None, 0, 12345):
         session._dragged("hand", "target", pose, "update", number)
     assert list(loop.end.take()) == []
+
+
+def test_a_script_drives_by_rates(
+    served: tuple[Session, Loop], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    session, loop = served
+    script = Path(__file__).parents[2] / "examples" / "remote" / "over_websocket.py"
+    monkeypatch.setattr("sys.argv", [script.name, session.url.replace("http", "ws") + "wbc", "0.7"])
+    runpy.run_path(str(script), run_name="__main__")
+    assert [loop.take(kind)["type"] for kind in ("operate", "rate", "release")] == ["operate", "rate", "release"]
+    assert "panda: driving hand\nsolved, hand " in capsys.readouterr().out
+    assert not [message for message in loop.told if message["type"] == "stop"]
+    loop.told.clear()

@@ -12,6 +12,7 @@ from wbc.cli.console import err
 from wbc.cli.options import Backend
 from wbc.viewer import run
 from wbc.viewer.beside import require_viser
+from wbc.viewer.local import require_local
 from wbc.viewer.presets import PRESETS, playground
 
 
@@ -20,11 +21,16 @@ def play(
     host: viewing.Host = "127.0.0.1",
     port: viewing.Port = 0,
     browser: viewing.Browser = True,
+    zeromq: Annotated[
+        str, typer.Option(help="Take messages over ZeroMQ as well, at an address such as tcp://127.0.0.1:5555.")
+    ] = "",
     seconds: viewing.Seconds = None,
     backend: Backend = "auto",
 ) -> None:
     """Open a robot in the browser: drag its targets and the obstacles, and read what holds it back."""
     require_viser()
+    if zeromq:
+        require_local(zeromq)
     chosen = playground(preset)
     err().print(f"{escape(chosen.about)} Space stops it, Ctrl-C ends.", soft_wrap=True)
     controller = viewing.compiled(chosen.stack, backend)
@@ -36,5 +42,6 @@ def play(
             host=host,
             port=port,
             open_browser=browser,
+            zeromq=zeromq,
             announce=viewing.announce,
         )

@@ -19,6 +19,7 @@ from wbc.cli.folders import run_folder
 from wbc.controller import Controller
 from wbc.interrupts import interrupts
 from wbc.record.recording import Recording, RecordingError
+from wbc.simulation import Plant
 from wbc.track.log import FORMATS, Log, save
 from wbc.track.plots import save_picture, save_plots
 from wbc.track.report import conflicts, save_report
@@ -67,8 +68,8 @@ class Stopper:
             yield
 
 
-def perform(plan: PathRun, output: Output) -> None:
-    """Do a plan, write its folder and print its summary; exit code 130 if Ctrl-C ended it early.
+def perform(plan: PathRun, output: Output, plant: Plant | None = None) -> None:
+    """Do a plan on a plant, write its folder and print its summary; exit code 130 if Ctrl-C ended it early.
 
     Raises:
         WbcError: bad input; nothing is written then but an empty folder.
@@ -80,7 +81,8 @@ def perform(plan: PathRun, output: Output) -> None:
     stopper, console = Stopper(), err()
     with progress_bar() as bar:
         stage = bar.add_task("compiling", total=None)
-        log = _tracked(plan, bar, stage, stopper, folder / RECORDING if output.record else None)
+        recording = folder / RECORDING if output.record else None
+        log = _tracked(plan, bar, stage, stopper, recording, plant)
         with stopper.listening():
             figures = summarise(log)
             files = [save(log, folder, output.log), save_summary(figures, folder)]
@@ -96,7 +98,9 @@ def perform(plan: PathRun, output: Output) -> None:
         raise typer.Exit(INTERRUPTED)
 
 
-def _tracked(plan: PathRun, bar: Progress, stage: Any, stopper: Stopper, recording: Path | None) -> Log:
+def _tracked(
+    plan: PathRun, bar: Progress, stage: Any, stopper: Stopper, recording: Path | None, plant: Plant | None
+) -> Log:
     with contextlib.ExitStack() as stack:
 
         def compiled(controller: Controller) -> None:
@@ -113,7 +117,7 @@ def _tracked(plan: PathRun, bar: Progress, stage: Any, stopper: Stopper, recordi
             if ticks % STRIDE == 0 or ticks == plan.ticks:
                 bar.update(stage, completed=ticks)
 
-        return track(plan, progress, stopper, compiled)
+        return track(plan, progress, stopper, compiled, plant=plant)
 
 
 def _drawn(plan: PathRun, log: Log, folder: Path, bar: Progress, stage: Any) -> list[Path]:

@@ -20,6 +20,8 @@ from wbc.validation import Array
 
 #: A column that adds less than this part of its own length depends on the others
 DEPENDENT = 1e-8
+#: A column below this part of the largest is what rounding left of zero
+NOTHING = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +56,7 @@ class BaseParameters:
         """A line for each base parameter, as the sum that it is."""
         out = []
         for row in self.combination:
-            parts = [(float(x), name) for x, name in zip(row, names, strict=True) if abs(x) > 1e-6]
+            parts = [(float(x), name) for x, name in zip(row, names, strict=True) if abs(float(x)) > 1e-6]
             parts.sort(key=lambda part: -abs(part[0]))
             more = f" + {len(parts) - largest} more" if len(parts) > largest else ""
             out.append(" ".join(f"{x:+.4g} {name}" for x, name in parts[:largest]) + more)
@@ -72,7 +74,8 @@ def base_parameters(W: Array, tolerance: float = DEPENDENT) -> BaseParameters:
         raise ShapeError("W", W.shape, "expected a regressor that is not zero")
     # Columns of one length: kilograms and kg m^2 do not decide what counts as small
     sizes = np.linalg.norm(W, axis=0)
-    scale = np.where(sizes > 0.0, sizes, 1.0)
+    zero = sizes <= NOTHING * sizes.max()
+    W, scale = np.where(zero, 0.0, W), np.where(zero, 1.0, sizes)
     R, order = qr(W / scale, mode="r", pivoting=True)
     diagonal = np.abs(np.diag(R))
     rank = int((diagonal > tolerance * diagonal[0]).sum())
@@ -92,6 +95,8 @@ def base_parameters(W: Array, tolerance: float = DEPENDENT) -> BaseParameters:
 def identifiable(regression: Regression, states: int = 200, seed: int = 0) -> BaseParameters:
     """The base parameters of a robot over random states: no motion shows more."""
     robot, random = regression.robot, np.random.default_rng(validation.integer("seed", seed))
-    q = np.array([robot.random(int(random.integers(2**31))) for _ in range(validation.integer("states", states, low=1))])
+    q = np.array(
+        [robot.random(int(random.integers(2**31))) for _ in range(validation.integer("states", states, low=1))]
+    )
     v, a = random.normal(size=(2, states, robot.nv))
     return base_parameters(regression.matrix(q, v, a))

@@ -20,6 +20,7 @@ from wbc.errors import WbcError
 from wbc.viewer import messages
 from wbc.viewer.errors import ViewerError
 from wbc.viewer.link import STOPPED, UNHEARD, UNHEARD_TEXT, LoopEnd
+from wbc.viewer.local import LOOPBACK, require_local
 from wbc.viewer.operation import Operation
 
 log = logging.getLogger("wbc")
@@ -28,7 +29,6 @@ log = logging.getLogger("wbc")
 SILENT = 1.0
 #: How long a viewer's process may take to end [s]
 LEAVING = 3.0
-LOOPBACK = ("127.0.0.1", "localhost", "::1")
 
 
 class Viewer:
@@ -38,7 +38,9 @@ class Viewer:
         url: address of the page. operation: what was taken over from it, see :class:`Operation`.
     """
 
-    def __init__(self, controller: Controller, host: str, port: int, token: str | None, silence: float) -> None:
+    def __init__(
+        self, controller: Controller, host: str, port: int, token: str | None, silence: float, zeromq: str
+    ) -> None:
         core = core_of(controller)
         self.operation = Operation(controller)
         self._dt, self._time = controller.stack.dt, 0.0
@@ -55,6 +57,7 @@ class Viewer:
             "port": port,
             "token": token,
             "silence": silence,
+            "zeromq": zeromq,
         }
         command = [sys.executable, "-m", "wbc.viewer.process"]
         # Output of the process that is no answer goes where this one's errors go
@@ -152,6 +155,7 @@ def show(
     open_browser: bool = True,
     token: str | None = None,
     silence: float = SILENT,
+    zeromq: str = "",
 ) -> Viewer:
     """Show a controller that a loop steps, and let it be driven from a browser.
 
@@ -170,6 +174,7 @@ def show(
         open_browser: open the page; False: ``viewer.url`` says where it is.
         token: what a client must know; made anew where ``host`` is not this machine alone and none is given.
 
+        zeromq: address to take the same messages at, such as ``tcp://127.0.0.1:5555``; "" for none.
         silence: while somebody has control, the robot stops where their page, or the viewer, is silent for so long [s].
 
     Raises:
@@ -179,7 +184,10 @@ def show(
     require_viser()
     name = validation.name("host", host)
     longest = validation.scalar("silence", silence, low=0.1, unit="s")
-    viewer = Viewer(controller, name, validation.integer("port", port, 0, 65535), token or token_for(name), longest)
+    number = validation.integer("port", port, 0, 65535)
+    if zeromq:
+        require_local(zeromq)
+    viewer = Viewer(controller, name, number, token or token_for(name), longest, zeromq)
     if open_browser:
         webbrowser.open(viewer.url)
     return viewer

@@ -20,6 +20,7 @@ def run(
     port: int = 0,
     open_browser: bool = True,
     token: str | None = None,
+    zeromq: str = "",
     announce: Any = None,
 ) -> None:
     """Step a controller every ``stack.dt`` seconds and let it be driven from a browser, until the page's process or the
@@ -29,7 +30,7 @@ def run(
         q: configuration to begin at. seconds: None: without end.
         plant: what moves; default: a :class:`wbc.simulation.KinematicPlant`.
         announce: called with the :class:`wbc.viewer.Viewer` before the first tick.
-        host, port, open_browser, token: as of :func:`wbc.viewer.show`.
+        host, port, open_browser, token, zeromq: as of :func:`wbc.viewer.show`.
 
     Raises:
         ViewerError: as of :func:`wbc.viewer.show`. PlantError: as of :class:`wbc.simulation.Connection`.
@@ -37,7 +38,10 @@ def run(
     dt = controller.stack.dt
     connection = Connection(plant, controller.stack.robot, dt)
     controller.reset(q)
-    with show(controller, host=host, port=port, open_browser=open_browser, token=token) as viewer, connection:
+    with (
+        show(controller, host=host, port=port, open_browser=open_browser, token=token, zeromq=zeromq) as viewer,
+        connection,
+    ):
         if announce is not None:
             announce(viewer)
         state = connection.reset(controller.stack.robot.configuration("q", q))

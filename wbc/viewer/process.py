@@ -17,6 +17,7 @@ import threading
 from wbc.controller import Stack
 from wbc.viewer.link import ViewerEnd
 from wbc.viewer.session import Session
+from wbc.viewer.zeromq import ZeroMqEnd
 
 #: Below the loop where cores are few
 NICE = 2
@@ -39,6 +40,12 @@ def main() -> None:
     except Exception as error:
         _say(answers, problem=f"{type(error).__name__}: {error}")
         raise
+    if order["zeromq"]:
+        try:
+            ZeroMqEnd(order["zeromq"], session.url, order["silence"])
+        except Exception as error:
+            _say(answers, problem=str(error))
+            raise
     threading.Thread(target=_wait, args=(session,), daemon=True).start()
     _say(answers, url=session.url)
     session.run()

@@ -20,6 +20,7 @@ from wbc.errors import WbcError
 from wbc.viewer import messages
 from wbc.viewer.errors import ViewerError
 from wbc.viewer.gate import Gate, answer
+from wbc.viewer.local import LOOPBACK
 
 if TYPE_CHECKING:
     from websockets.asyncio.server import ServerConnection
@@ -97,7 +98,7 @@ class PageServer:
 
         _require_free(host, port)
         self._hello, self._obey, self._silence = hello, obey, silence
-        self._gate = Gate(host in ("127.0.0.1", "localhost", "::1"), token)
+        self._gate = Gate(host in LOOPBACK, token)
         self._clients: dict[str, Client] = {}
         self._numbers = itertools.count(1)
         self.operator = ""

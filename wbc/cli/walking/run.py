@@ -96,8 +96,9 @@ def walk_free(perform: Perform, machine: Walker, folder: Path, backend: str, che
                 missing = list[str]()
                 if pictures and not stopper():
                     shown, missing = save_pictures(run, folder, report_progress, stopper)
+                    files += shown
                     # Again, with the pictures in it
-                    files += [*shown, save_report(run, folder, report)]
+                    save_report(run, folder, report)
         except OSError as error:
             raise OutputError("out", str(folder), f"cannot be written: {error.strerror}") from error
     _report(f"{machine.robot.name} on {run.structure.name}", figures_of(run, report), folder, files)

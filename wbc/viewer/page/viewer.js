@@ -135,7 +135,7 @@ function show() {
   $("binding").replaceChildren(...[...state.binding, ...state.relaxed.map((r) => `gave way: ${r}`)].slice(0, 14).map((text) => make("li", {}, text)));
   if (state.sentences && state.sentences.join("\n") !== told) {
     told = state.sentences.join("\n");
-    $("why").replaceChildren(...state.sentences.slice(0, 4).map((text, k) => make("p", { className: k ? "" : "first" }, text)));
+    $("why").replaceChildren(...state.sentences.slice(0, 2).map((text, k) => make("p", { className: k ? "" : "first" }, text)));
   }
   const line = state.timeline;
   if (line) {

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import pathlib
 
+import numpy as np
+
 from wbc.track.page import RunPage
 from wbc.walking.checker import Report
 from wbc.walking.report.figures import figures_of
@@ -34,7 +36,7 @@ def save_report(run: WalkRun, folder: pathlib.Path, report: Report | None) -> pa
     if run.log is not None and run.ticks is not None and len(run.ticks.cost):
         page.section("Ticks whose constraints did not all hold")
         times = run.log.t[: len(run.ticks.solved)]
-        page.strips(times, {"not all rows held": ~run.ticks.solved})
+        page.strips(times, {"not all rows held": np.where(run.ticks.solved, 0.0, 1.0)})
         page.section("Time of a tick")
         page.histogram(1e6 * run.ticks.cost, "us")
     page.section("Pictures")
