@@ -78,13 +78,13 @@ def braking(robot: Robot, *, share: float = 0.95, samples: int = 2000, seed: int
         M = pin.crba(model, data, q)
         M = np.triu(M) + np.triu(M, 1).T
         left = part * limits.effort - np.abs(pin.nonLinearEffects(model, data, q, v))
-        joint = int(np.argmin(left / (np.abs(M) @ limits.acceleration)))
-        if left[joint] <= 0.0:
+        motor = int(np.argmin(left / (np.abs(M) @ limits.acceleration)))
+        if left[motor] <= 0.0:
             reason = (
-                f"{robot.dof_names[joint]!r} lacks {-left[joint]:.3g} to carry the robot at {np.round(q, 3).tolist()}"
+                f"{robot.dof_names[motor]!r} lacks {-left[motor]:.3g} to carry the robot at {np.round(q, 3).tolist()}"
             )
-            raise RangeError("robot.limits.effort", float(limits.effort[joint]), reason)
-        scale = float(left[joint] / (np.abs(M[joint]) @ limits.acceleration))
+            raise RangeError("robot.limits.effort", float(limits.effort[motor]), reason)
+        scale = float(left[motor] / (np.abs(M[motor]) @ limits.acceleration))
         if scale < least:
-            least, found = scale, (robot.dof_names[joint], q, v)
+            least, found = scale, (robot.dof_names[motor], q, v)
     return Braking(least * limits.acceleration, least, *found, count)
