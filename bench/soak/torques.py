@@ -12,9 +12,10 @@ from bench.soak.episodes import LENGTH, label
 from bench.soak.judge import Judge, Outside
 from bench.soak.machines import configuration, machine
 from bench.soak.stacks import DT, pose, weight
-from wbc.controller import Controller, Status, Step
+from wbc.controller import Controller, Status, Step, core_of
 from wbc.robot import Robot
 from wbc.shapes import HalfSpace, Sphere
+from wbc.stack.codegen import row_units
 from wbc.tasks import (
     EndEffector,
     ExternalWrench,
@@ -124,6 +125,13 @@ class TorqueJudge(Judge):
     """
 
     scale = 1.0
+
+    def __init__(self, controller: Controller) -> None:
+        super().__init__(controller)
+        # as LONGEST of a tick: rows on forces count in their sizes
+        core = core_of(controller)
+        rows = row_units(controller.stack, core.layout)
+        self.longest = max(1.0, *rows, *core.layout.dof_scales(controller.stack))
 
     def step(self, step: Step, before: Array, dt: float) -> str:
         """Numbers, limits of accelerations, velocities and torques, and the certificate."""

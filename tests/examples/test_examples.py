@@ -292,3 +292,23 @@ def test_torque_wipes_with_ten_newtons() -> None:
     assert number("from # to", text) > 9.5
     assert number("error along the table # mm", text) < 1.0
     assert number("largest torque # %", text) < 100.0
+
+
+def test_grips_bear_no_more_than_their_rating() -> None:
+    text = output("grips")
+    shares = [float(x) for x in re.findall(rf"bears at most {NUMBER} %", text)]
+    assert shares[0] > 300.0
+    assert shares[1] <= 100.0 + 1e-6
+    assert text.count("solved") == 2
+    assert max(float(x) for x in re.findall(rf"body {NUMBER} mm", text)) < 1.0
+    assert max(float(x) for x in re.findall(rf"at most {NUMBER} um", text)) < 10.0
+    check_picture(text)
+
+
+def test_hands_squeeze_a_box_no_harder_than_it_takes() -> None:
+    text = output("squeeze")
+    assert "solved: each hand presses" in text
+    assert number("presses with # to", text) > 30.0
+    assert abs(number("at most # N more", text)) < 0.3
+    assert number("hand at most # mm", text) < 0.5
+    check_picture(text)

@@ -10,9 +10,10 @@ from wbc.controller.stack import warn_free_base
 from wbc.tasks import Damping, FrameVelocityLimit, Hold, JointLimits, Posture
 
 
-def test_an_item_after_compile_is_said_while_a_controller_lives(caplog: pytest.LogCaptureFixture) -> None:
+@pytest.mark.parametrize("command", ["velocity", "torque"])
+def test_an_item_after_compile_is_said_while_a_controller_lives(command: str, caplog: pytest.LogCaptureFixture) -> None:
     stack = Stack(wbc.robots.load("double_pendulum"), 0.01).add(Posture())
-    controller = stack.compile(backend="vm")
+    controller = stack.compile(backend="vm", command=command)
     assert not caplog.messages
     stack.add(Damping())
     (said,) = caplog.messages

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 log = logging.getLogger("wbc")
 
 #: Controllers that exist: what is added to their stacks later they do not have
-_COMPILED: weakref.WeakSet[Controller] = weakref.WeakSet()
+_COMPILED: weakref.WeakKeyDictionary[Controller, weakref.ref[Stack]] = weakref.WeakKeyDictionary()
 
 
 #: What :meth:`Stack.solve` hands on to :meth:`wbc.InverseKinematics.solve`
@@ -81,7 +81,7 @@ class Stack(Declaration):
     """
 
     def _was_added(self, name: str) -> None:
-        if any(controller.stack is self for controller in list(_COMPILED)):
+        if any(compiled() is self for compiled in list(_COMPILED.values())):
             log.warning("%r was added after compile(): controllers that exist do not have it; compile again", name)
 
     def compile(self, solver: str = "daqp", backend: str = "auto", command: str | None = None) -> Controller:
@@ -102,7 +102,8 @@ class Stack(Declaration):
         declared = self.commanding(self.command if command is None else command)
         controller = Controller(declared, compile_stack(declared, backend, __version__), solver)
         core_of(controller).fallback.prepare()
-        _COMPILED.add(controller)
+        # Of accelerations and torques the controller's own stack is a copy with more in it
+        _COMPILED[controller] = weakref.ref(self)
         if base_is_free(self):
             joint = self.robot.joint_names[0]
             warn_free_base(self.robot.name, joint, ", ".join(["0.5"] * self.robot.base_nv))

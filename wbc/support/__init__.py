@@ -1,8 +1,11 @@
-"""What contacts and motors can hold at rest: what is lacking, and over which region the centre of mass may be."""
+"""What contacts and motors can hold at rest: what is lacking, over which region the centre of mass may be, and
+braking.
+"""
 
 from __future__ import annotations
 
+from wbc.support.braking import Braking, braking
 from wbc.support.region import Region, region
 from wbc.support.statics import Lacking, lacking
 
-__all__ = ["Lacking", "Region", "lacking", "region"]
+__all__ = ["Braking", "Lacking", "Region", "braking", "lacking", "region"]
