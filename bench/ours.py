@@ -61,22 +61,25 @@ class Ours(Contender):
         self.controller["posture"].target = self.case.q0
         for name in [*(f"ball{k}" for k in range(len(problem.obstacles))), *clear]:
             self.controller[name].rate = problem.rate
-        self.targets = [self.controller[f] for f in problem.frames]
-        self.com = self.controller["com"] if problem.com else None
+        self.hand = self.controller[problem.frames[0]] if len(problem.frames) == 1 and not problem.com else None
         self.referee = Referee(case)
         self.reset()
 
     def reset(self) -> None:
         self.q = np.array(self.case.q0)
         self.controller.reset(self.q)
+        self.velocity: Array | None = None
         self.tick = 0
 
     def aim(self, tick: int) -> None:
         self.tick = tick
-        for target, pose in zip(self.targets, self.case.poses[tick], strict=True):
-            target.target = pose
-        if self.com is not None:
-            self.com.target = self.case.com[tick]
+        if self.hand is not None:
+            self.hand.target = self.case.poses[tick][0]
+            return
+        targets: dict[str, Any] = dict(zip(self.problem.frames, self.case.poses[tick], strict=True))
+        if self.problem.com:
+            targets["com"] = self.case.com[tick]
+        self.controller.set(**targets)
 
     def call(self) -> None:
         self.velocity = self.controller.step(self.q).v
@@ -106,8 +109,9 @@ class Ours(Contender):
         return True
 
     def settle(self) -> None:
-        # The last command is the velocity of the step, also after a native call that made no Step
-        velocity = self.controller.last_command
+        # After a native call there is no step
+        velocity = self.controller.last_command if self.velocity is None else self.velocity
+        self.velocity = None
         if self.problem.floating:
             self.q = pin.integrate(self.robot.model, self.q, velocity * self.problem.dt)
         else:

@@ -7,8 +7,10 @@ from typing import TYPE_CHECKING
 from wbc import lazy
 
 if TYPE_CHECKING:
+    from wbc.robot.carried import carry
     from wbc.robot.geometry.convex_parts import ConvexParts
     from wbc.robot.geometry.link_shapes import convex_parts, fit_shapes
+    from wbc.robot.mujoco_joints import MujocoJoints
     from wbc.robot.pairs.collision_pairs import LinkPair, SelfPairs
     from wbc.robot.pairs.pairs_file import read_self_pairs, save_self_pairs
     from wbc.robot.sources.dh import DHRow
@@ -32,12 +34,14 @@ __all__ = [
     "Limb",
     "LinkPair",
     "Margins",
+    "MujocoJoints",
     "OperatorArm",
     "SelfPairs",
     "TwoEndedData",
     "Walker",
     "WalkerArm",
     "WalkerData",
+    "carry",
     "convex_parts",
     "find_self_pairs",
     "fit_shapes",

@@ -7,7 +7,7 @@ import os
 import pathlib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pinocchio as pin
 
@@ -17,9 +17,13 @@ from wbc.robot.recipe import Recipe, lock_mapping
 from wbc.robot.robot import Robot
 from wbc.robot.sources.dh import DHRow, read_dh
 from wbc.robot.sources.files import example_data_folder
+from wbc.robot.sources.mjmodel import is_mjmodel, model_name
 from wbc.robot.sources.table import read_table
 from wbc.robots.operator_arms import OPERATOR_ARMS, operator_recipe
 from wbc.robots.walker_robot import MADE, as_made, made_here, recipe_of
+
+if TYPE_CHECKING:
+    from mujoco import MjModel
 
 _FOLDER = pathlib.Path(__file__).parent
 
@@ -40,7 +44,7 @@ def names() -> tuple[str, ...]:
 
 
 def load(
-    robot: str | os.PathLike[str] | pin.Model | Sequence[DHRow],
+    robot: str | os.PathLike[str] | pin.Model | MjModel | Sequence[DHRow],
     *,
     base: str | None = None,
     lock: Any = None,
@@ -58,7 +62,8 @@ def load(
 
     Args:
         robot: a name of the table (:func:`names`), ``walker`` or ``two_ended_arm`` (see :func:`~wbc.robots.walker`), a
-            name of :func:`~wbc.robots.operator_arm`, a path of a URDF or MJCF file, a ``pin.Model``, or DH rows.
+            name of :func:`~wbc.robots.operator_arm`, a path of a URDF or MJCF file, a ``pin.Model``, a
+            ``mujoco.MjModel``, or DH rows.
         base: ``fixed``, ``floating`` (free flyer: q has position and quaternion x, y, z, w), ``planar`` (x, y,
             cos, sin; any direction) or ``differential`` (planar, sideways velocity must stay 0, see
             ``Robot.locked_dofs``). Default: the table's, or the one that the model or MJCF file brings, or fixed.
@@ -147,4 +152,6 @@ def _find(robot: Any) -> tuple[Recipe, Any]:
             raise unknown(robot, (*_by_name(), *MADE, *OPERATOR_ARMS))
     if isinstance(robot, (str, os.PathLike)):
         return Recipe(validation.file_path("robot", robot).stem), robot
+    if is_mjmodel(robot):
+        return Recipe(model_name(robot)), robot
     return Recipe(str(robot.name) if isinstance(robot, pin.Model) else "dh"), robot

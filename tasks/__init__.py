@@ -12,6 +12,8 @@ from wbc.tasks.base import Bounds, Constraint, Form, Input, Item, Row, Rows, Sac
 from wbc.tasks.center_of_mass import CenterOfMass
 from wbc.tasks.damping import Damping
 from wbc.tasks.distance import Distance
+from wbc.tasks.divergent_component import DivergentComponent
+from wbc.tasks.drive_torque_limits import DriveTorqueLimits
 from wbc.tasks.elbow import Elbow
 from wbc.tasks.end_effector import EndEffector
 from wbc.tasks.expression import Expression
@@ -38,12 +40,16 @@ from wbc.tasks.posture import Posture
 from wbc.tasks.relative_pose import RelativePose
 from wbc.tasks.rigid_grasp import RigidGrasp
 from wbc.tasks.rolling import Rolling, Wheel
+from wbc.tasks.rolling_contact import RollingContact
 from wbc.tasks.self_collision import SelfCollision
 from wbc.tasks.sliding_contact import SlidingContact
+from wbc.tasks.support_polygon import support_planes, support_polygon
+from wbc.tasks.support_region import SupportRegion
 from wbc.tasks.surface_contact import SurfaceContact
 from wbc.tasks.torque_limits import TorqueLimits
 from wbc.tasks.workspace_box import WorkspaceBox
 from wbc.tasks.workspace_polyhedron import WorkspacePolyhedron
+from wbc.tasks.wrench_sum import WrenchSum
 
 __all__ = [
     "AxisAlign",
@@ -53,6 +59,8 @@ __all__ = [
     "Constraint",
     "Damping",
     "Distance",
+    "DivergentComponent",
+    "DriveTorqueLimits",
     "Elbow",
     "EndEffector",
     "Expression",
@@ -83,11 +91,13 @@ __all__ = [
     "RelativePose",
     "RigidGrasp",
     "Rolling",
+    "RollingContact",
     "Row",
     "Rows",
     "SacrificeOrder",
     "SelfCollision",
     "SlidingContact",
+    "SupportRegion",
     "SurfaceContact",
     "Task",
     "TorqueLimits",
@@ -95,7 +105,10 @@ __all__ = [
     "Wheel",
     "WorkspaceBox",
     "WorkspacePolyhedron",
+    "WrenchSum",
     "registry",
+    "support_planes",
+    "support_polygon",
 ]
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -102,10 +103,11 @@ class Contact(Constraint):
         """Those of ``Hold``: J v = -gain e."""
         return self._hold.velocity_rows(robot, kin, inputs, dt)
 
-    def still(self, inputs: Values, rotation: ca.SX, twist: ca.SX) -> ca.SX:
+    def still(self, inputs: Values, rotation: ca.SX, twist: ca.SX) -> ca.SX | None:
         """What of a twist (linear; angular) in the axes of :meth:`velocity_rows` its rows are, linear in the twist.
 
-        Of J v it is the rows times v, and of (dJ/dt) v their rate where v does not change.
+        Of J v it is the rows times v, and of (dJ/dt) v their rate where v does not change. None: these are
+        differentiated.
         """
         return twist[: self.components]
 
@@ -124,6 +126,32 @@ class Contact(Constraint):
     def cone(self, inputs: Values) -> Cone:
         """What the wrench may be; the units are N and N m."""
         raise TypeError(f"{type(self).__name__} declares no cone")
+
+
+class Pressing:
+    """Ground of contacts that a surface only pushes: the fields ``friction``, ``least`` and ``most`` and their inputs.
+
+    Raises:
+        ShapeError, NotFiniteError, RangeError: on construction.
+    """
+
+    friction: float
+    least: float
+    most: float
+
+    def __post_init__(self) -> None:
+        owner = type(self).__name__
+        object.__setattr__(self, "friction", validation.scalar(f"{owner}.friction", self.friction, low=0.0))
+        object.__setattr__(self, "least", validation.scalar(f"{owner}.least", self.least, low=0.0, unit="N"))
+        object.__setattr__(self, "most", checked_positive(f"{owner}.most", self.most, "N", zero=True))
+
+    def limits(self) -> tuple[Input, ...]:
+        """``friction``, ``least`` and ``most``."""
+        return (
+            Input("friction", unit="1", default=self.friction, low=0.0),
+            Input("least", unit="N", default=self.least, low=0.0),
+            Input("most", unit="N", default=self.most, low=0.0, infinite=math.inf),
+        )
 
 
 @dataclass(frozen=True)
@@ -147,7 +175,12 @@ class ContactWrench(Constraint):
 
 @dataclass(frozen=True)
 class ContactForce(Task):
-    """The wrench of a contact follows a wrench: w = target [N; N m]. Made by the stack, as ``"<contact> force"``.
+    """The wrench of a contact follows a wrench [N; N m]. Made by the stack, as ``"<contact> force"``.
+
+        w = target + feedback (target - measured)
+
+    What a sensor measures is w + d where the model is off by d; with feedback k the measured wrench misses its target
+    by d / (1 + k).
 
     With the target 0 and a small weight, the first values, loads are shared so that the sum of the weighted squares
     of all wrenches is least.
@@ -159,9 +192,13 @@ class ContactForce(Task):
     contact: Contact
 
     def inputs(self, robot: Robot) -> tuple[Input, ...]:
-        """``target``, in the axes of the frame [N; N m]."""
-        count, moments = self.contact.components, max(self.contact.axes) >= 3
-        return (Input("target", unit="N, N m" if moments else "N", size=count, default=np.zeros(count)),)
+        """``target`` and ``measured``, in the axes of the frame [N; N m], and ``feedback`` [1]."""
+        count, unit = self.contact.components, "N, N m" if max(self.contact.axes) >= 3 else "N"
+        return (
+            Input("target", unit=unit, size=count, default=np.zeros(count)),
+            Input("measured", unit=unit, size=count, default=np.zeros(count)),
+            Input("feedback", default=0.0, low=0.0),
+        )
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
         """The components of the wrench."""
@@ -186,7 +223,7 @@ class Unactuated(Constraint):
         """None: its rows are on generalised forces."""
         return None
 
-    def torque_rows(self, robot: Robot, inputs: Values) -> Torques:
+    def torque_rows(self, robot: Robot, inputs: Values, dt: ca.SX) -> Torques:
         """None for the base."""
         zero = ca.SX.zeros(6)
         return Torques(tuple(range(6)), zero, zero)

@@ -248,6 +248,12 @@ class Task(Item):
         """
         return None
 
+    def acceleration(self, inputs: Values, error: ca.SX, rate: ca.SX) -> ca.SX | None:
+        """None, or the second derivative of e that the rows ask for of a stack of accelerations, in place of
+        -stiffness e - damping de/dt; then ``gain`` is an input of its own.
+        """
+        return None
+
     def row_factor(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX | None:
         """None, or one smooth factor in [0, 1] a row by which the row's weight is multiplied: a task that
         fades where its error is singular.
@@ -277,11 +283,16 @@ class Bounds:
 
 @dataclass(frozen=True)
 class Torques:
-    """Limits lower <= tau <= upper of the generalised forces of some degrees of freedom [N m, N]."""
+    """Limits lower <= tau <= upper of the generalised forces of some degrees of freedom [N m, N].
+
+    Attributes:
+        drives: None, or the square matrix B of drives that move these joints together: then lower <= B tau <= upper.
+    """
 
     dofs: tuple[int, ...]
     lower: ca.SX
     upper: ca.SX
+    drives: NDArray[np.float64] | None = None
 
 
 @dataclass(frozen=True)
@@ -379,7 +390,7 @@ class Constraint(Item):
         own = self.bounds(robot, kin, inputs, dt)
         return None if own is None else Bounds((own.lower - kin.v) / dt, (own.upper - kin.v) / dt)
 
-    def torque_rows(self, robot: Robot, inputs: Values) -> Torques | None:
+    def torque_rows(self, robot: Robot, inputs: Values, dt: ca.SX) -> Torques | None:
         """Rows on generalised forces of a stack that commands torques, or None."""
         return None
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, ClassVar
 
 import casadi as ca
@@ -128,38 +130,24 @@ class JointLimits(Constraint):
 
     def bounds(self, robot: Robot, kin: Tracer, inputs: Values, dt: ca.SX) -> Bounds:
         """See the class."""
-        limits, count = robot.limits, robot.nv
-        lower, upper = -ca.SX.inf(count), ca.SX.inf(count)
-        for i in joint_dofs(robot, "JointLimits.joints", self.joints):
-            k = int(robot.position_index[i])
-            here = self.position and k >= 0
-            lower[i], upper[i] = allowed_interval(
-                kin.q[k] if here else ca.SX(0),
-                kin.v[i],
-                dt,
-                position=(
-                    float(limits.position_lower[i]) + self.margin if here else -np.inf,
-                    float(limits.position_upper[i]) - self.margin if here else np.inf,
-                ),
-                velocity=float(limits.velocity[i]) if self.velocity else np.inf,
-                acceleration=float(limits.acceleration[i]) if self.acceleration else np.inf,
-                velocity_scale=inputs["velocity_scale"],
-                return_rate=inputs["return_rate"],
-                shortest_dt=self.shortest_dt,
-            )
-        return Bounds(lower, upper)
+        return self._intervals(robot, kin, inputs, partial(allowed_interval, dt=dt, shortest_dt=self.shortest_dt))
 
     def acceleration_bounds(self, robot: Robot, kin: Tracer, inputs: Values, dt: ca.SX, longest: float) -> Bounds:
         """See :func:`wbc.tasks.stopping.allowed_accelerations`."""
+        return self._intervals(robot, kin, inputs, partial(allowed_accelerations, dt=dt, longest=longest))
+
+    def _intervals(
+        self, robot: Robot, kin: Tracer, inputs: Values, interval: Callable[..., tuple[ca.SX, ca.SX]]
+    ) -> Bounds:
+        """What ``interval`` allows each chosen degree of freedom."""
         limits, count = robot.limits, robot.nv
         lower, upper = -ca.SX.inf(count), ca.SX.inf(count)
         for i in joint_dofs(robot, "JointLimits.joints", self.joints):
             k = int(robot.position_index[i])
             here = self.position and k >= 0
-            lower[i], upper[i] = allowed_accelerations(
+            lower[i], upper[i] = interval(
                 kin.q[k] if here else ca.SX(0),
                 kin.v[i],
-                dt,
                 position=(
                     float(limits.position_lower[i]) + self.margin if here else -np.inf,
                     float(limits.position_upper[i]) - self.margin if here else np.inf,
@@ -168,7 +156,6 @@ class JointLimits(Constraint):
                 acceleration=float(limits.acceleration[i]) if self.acceleration else np.inf,
                 velocity_scale=inputs["velocity_scale"],
                 return_rate=inputs["return_rate"],
-                longest=longest,
             )
         return Bounds(lower, upper)
 

@@ -8,16 +8,15 @@ from typing import ClassVar
 
 import casadi as ca
 
-from wbc import validation
 from wbc.robot import Robot
 from wbc.symbolic.tracer import Tracer
-from wbc.tasks._contact import Cone, Contact, checked_positive, force_row
+from wbc.tasks._contact import Cone, Contact, Pressing, checked_positive, force_row
 from wbc.tasks._pointing import shortest_turn
-from wbc.tasks.base import Input, Row, Rows, Values
+from wbc.tasks.base import Row, Rows, Values
 
 
 @dataclass(frozen=True)
-class LineContact(Contact):
+class LineContact(Pressing, Contact):
     """A segment along the x axis of a frame, of length 2 X about its origin, does not move, but the frame may turn
     about it; z is the normal of the surface, out of it and towards the robot:
 
@@ -65,9 +64,7 @@ class LineContact(Contact):
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "half_length", checked_positive("LineContact.half_length", self.half_length, "m"))
-        object.__setattr__(self, "friction", validation.scalar("LineContact.friction", self.friction, low=0.0))
-        object.__setattr__(self, "least", validation.scalar("LineContact.least", self.least, low=0.0, unit="N"))
-        object.__setattr__(self, "most", checked_positive("LineContact.most", self.most, "N", zero=True))
+        super().__post_init__()
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
         """x, y, z of the world and ry, rz of the frame."""
@@ -85,14 +82,6 @@ class LineContact(Contact):
     def still(self, inputs: Values, rotation: ca.SX, twist: ca.SX) -> ca.SX:
         """The rate of R'w is R' dw/dt, so both are taken alike."""
         return ca.vertcat(twist[:3], (rotation.T @ twist[3:])[1:])
-
-    def limits(self) -> tuple[Input, ...]:
-        """``friction``, ``least`` and ``most``."""
-        return (
-            Input("friction", unit="1", default=self.friction, low=0.0),
-            Input("least", unit="N", default=self.least, low=0.0),
-            Input("most", unit="N", default=self.most, low=0.0, infinite=math.inf),
-        )
 
     def cone_rows(self, robot: Robot) -> tuple[Row, ...]:
         """``normal``, ``friction +x`` and ``-x``, ``pressure -`` and ``+``, then ``end 1`` to ``end 4``."""

@@ -8,15 +8,14 @@ from typing import ClassVar
 
 import casadi as ca
 
-from wbc import validation
 from wbc.errors import RangeError
 from wbc.robot import Robot
-from wbc.tasks._contact import Cone, Contact, checked_positive, force_row
-from wbc.tasks.base import Input, Row, Values
+from wbc.tasks._contact import Cone, Contact, Pressing, force_row
+from wbc.tasks.base import Row, Values
 
 
 @dataclass(frozen=True)
-class PointContact(Contact):
+class PointContact(Pressing, Contact):
     """The origin of a frame does not move, J v = -gain e as for ``Hold`` with ``kind="position"``, by a force f in the
     axes of the frame, whose z axis is the normal of the surface, out of it and towards the robot:
 
@@ -58,19 +57,9 @@ class PointContact(Contact):
     edges: int = 4
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "friction", validation.scalar("PointContact.friction", self.friction, low=0.0))
-        object.__setattr__(self, "least", validation.scalar("PointContact.least", self.least, low=0.0, unit="N"))
-        object.__setattr__(self, "most", checked_positive("PointContact.most", self.most, "N", zero=True))
+        super().__post_init__()
         if isinstance(self.edges, bool) or not isinstance(self.edges, int) or self.edges < 4:
             raise RangeError("PointContact.edges", self.edges, "expected an integer >= 4")
-
-    def limits(self) -> tuple[Input, ...]:
-        """``friction``, ``least`` and ``most``."""
-        return (
-            Input("friction", unit="1", default=self.friction, low=0.0),
-            Input("least", unit="N", default=self.least, low=0.0),
-            Input("most", unit="N", default=self.most, low=0.0, infinite=math.inf),
-        )
 
     def cone_rows(self, robot: Robot) -> tuple[Row, ...]:
         """``normal``, then ``friction 1`` and so on."""

@@ -11,12 +11,12 @@ import casadi as ca
 from wbc import validation
 from wbc.robot import Robot
 from wbc.symbolic.tracer import Tracer
-from wbc.tasks._contact import Cone, Contact, checked_positive, force_row
+from wbc.tasks._contact import Cone, Contact, Pressing, force_row
 from wbc.tasks.base import Input, Row, Rows, Values
 
 
 @dataclass(frozen=True)
-class SlidingContact(Contact):
+class SlidingContact(Pressing, Contact):
     """The origin of a frame stays on a plane, by a force of known direction: along the normal n, the z axis of the
     target, and against the velocity s with which it slides in the plane, by kinetic friction,
 
@@ -60,9 +60,7 @@ class SlidingContact(Contact):
     slow: float = 0.01
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "friction", validation.scalar("SlidingContact.friction", self.friction, low=0.0))
-        object.__setattr__(self, "least", validation.scalar("SlidingContact.least", self.least, low=0.0, unit="N"))
-        object.__setattr__(self, "most", checked_positive("SlidingContact.most", self.most, "N", zero=True))
+        super().__post_init__()
         object.__setattr__(self, "slow", validation.scalar("SlidingContact.slow", self.slow, low=0.0, open_low=True))
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
@@ -88,12 +86,7 @@ class SlidingContact(Contact):
 
     def limits(self) -> tuple[Input, ...]:
         """``friction``, ``least``, ``most`` and ``slow``."""
-        return (
-            Input("friction", unit="1", default=self.friction, low=0.0),
-            Input("least", unit="N", default=self.least, low=0.0),
-            Input("most", unit="N", default=self.most, low=0.0, infinite=math.inf),
-            Input("slow", unit="m/s", default=self.slow, low=1e-6),
-        )
+        return (*super().limits(), Input("slow", unit="m/s", default=self.slow, low=1e-6))
 
     def cone_rows(self, robot: Robot) -> tuple[Row, ...]:
         """``normal``."""

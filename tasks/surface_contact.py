@@ -9,12 +9,12 @@ import casadi as ca
 
 from wbc import validation
 from wbc.robot import Robot
-from wbc.tasks._contact import Cone, Contact, checked_positive, force_row
-from wbc.tasks.base import Input, Row, Values
+from wbc.tasks._contact import Cone, Contact, Pressing, checked_positive, force_row
+from wbc.tasks.base import Row, Values
 
 
 @dataclass(frozen=True)
-class SurfaceContact(Contact):
+class SurfaceContact(Pressing, Contact):
     """A frame does not move, J v = -gain e as for ``Hold`` with ``kind="pose"``, by the wrench w = (f; m) of a
     rectangle of half lengths X and Y about the frame's origin, in the axes of the frame, whose z axis is the normal of
     the surface, out of it and towards the robot:
@@ -63,17 +63,7 @@ class SurfaceContact(Contact):
         lengths = validation.real_array("SurfaceContact.half_lengths", self.half_lengths, (2,))
         checked = tuple(checked_positive(f"SurfaceContact.half_lengths[{k}]", lengths[k], "m") for k in range(2))
         object.__setattr__(self, "half_lengths", checked)
-        object.__setattr__(self, "friction", validation.scalar("SurfaceContact.friction", self.friction, low=0.0))
-        object.__setattr__(self, "least", validation.scalar("SurfaceContact.least", self.least, low=0.0, unit="N"))
-        object.__setattr__(self, "most", checked_positive("SurfaceContact.most", self.most, "N", zero=True))
-
-    def limits(self) -> tuple[Input, ...]:
-        """``friction``, ``least`` and ``most``."""
-        return (
-            Input("friction", unit="1", default=self.friction, low=0.0),
-            Input("least", unit="N", default=self.least, low=0.0),
-            Input("most", unit="N", default=self.most, low=0.0, infinite=math.inf),
-        )
+        super().__post_init__()
 
     def cone_rows(self, robot: Robot) -> tuple[Row, ...]:
         """``normal``, ``friction``, ``pressure`` (centre of pressure) and ``yaw`` rows."""

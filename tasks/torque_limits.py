@@ -8,12 +8,18 @@ from typing import TYPE_CHECKING, ClassVar
 import casadi as ca
 import numpy as np
 
+from wbc import validation
 from wbc.symbolic.tracer import Tracer
+from wbc.tasks._limits import checked_limits
 from wbc.tasks._selection import joint_dofs, selection
 from wbc.tasks.base import Command, Constraint, Input, Row, Rows, SacrificeOrder, Torques, Values
+from wbc.tasks.braking import clip
 
 if TYPE_CHECKING:
     from wbc.robot import Robot
+
+#: In place of a torque that is not known
+NOT_KNOWN = 1e30
 
 
 @dataclass(frozen=True)
@@ -23,10 +29,19 @@ class TorqueLimits(Constraint):
         -scale T <= M a + h - J'w <= scale T      [N m; N for sliding joints]
 
     with the mass matrix M, the inertia of the motors included, h of Coriolis forces and gravity, and the wrenches w of
-    the contacts. They never give way. Only a stack that commands torques can have them.
+    the contacts. They never give way. Only a stack that commands torques can have them. With ``slew`` they also change
+    no faster than that from the last command tau0:
+
+        tau0 - slew dt <= tau <= tau0 + slew dt,      as far as that is within the limits above
+
+    Where no command within both keeps the joints' limits as well, the tick brakes (status ``braked``) with torques that
+    are within both, and says how many N m are missing. After a reset the last torque is not known: the first tick is
+    free.
 
     Inputs:
         scale: shrinks the limits, from 0 to 1.
+        slew: with ``slew``, one number a row [N m/s, N/s].
+        last: with ``slew``, tau0, read-only; 1e30: not known [N m, N].
 
     Example:
         >>> TorqueLimits()
@@ -35,31 +50,44 @@ class TorqueLimits(Constraint):
 
     Attributes:
         joints: names of the joints to limit; None: all whose limit is finite.
+        slew: first value of the input, one number or one a row; None: torques may change at once.
 
     Raises:
-        UnknownNameError, DuplicateNameError: an unknown joint, or one twice.
+        UnknownNameError, DuplicateNameError: an unknown joint, or one twice. ShapeError, NotFiniteError, RangeError,
+            BoundsError: ``slew``.
     """
 
     order: ClassVar[SacrificeOrder] = SacrificeOrder.ACTUATOR
     stands_in_world: ClassVar[bool] = False
 
     joints: tuple[str, ...] | None = None
+    slew: float | tuple[float, ...] | None = None
 
     def __post_init__(self) -> None:
+        if self.slew is not None:
+            validation.real_array("TorqueLimits.slew", self.slew)
+            object.__setattr__(self, "slew", checked_limits("TorqueLimits.slew", 0.0, self.slew)[1])
         if self.joints is not None:
             object.__setattr__(self, "joints", selection("TorqueLimits.joints", self.joints))
 
     def validate(self, robot: Robot) -> None:
-        """Check the joint names, see :meth:`Item.validate`."""
+        """Check the joint names and that there is one slew rate a row, see :meth:`Item.validate`."""
         joint_dofs(robot, "TorqueLimits.joints", self.joints)
+        if isinstance(self.slew, tuple):
+            validation.real_array("TorqueLimits.slew", self.slew, (len(self.dofs(robot)),))
 
     def refusal(self, robot: Robot, command: Command) -> str:
         """Only a stack of torques has torques."""
         return "" if command == "torque" else 'limits torques: compile with command="torque"'
 
     def inputs(self, robot: Robot) -> tuple[Input, ...]:
-        """``scale``."""
-        return (Input("scale", default=1.0, low=0.0, high=1.0),)
+        """``scale``; ``slew`` and ``last`` with slew rates."""
+        scale, count = Input("scale", default=1.0, low=0.0, high=1.0), len(self.dofs(robot))
+        if self.slew is None or not count:
+            return (scale,)
+        rates = np.broadcast_to(np.array(self.slew, dtype=float), count).copy()
+        last = Input("last", unit="N m, N", size=count, default=np.full(count, NOT_KNOWN), sensed=True)
+        return (scale, Input("slew", unit="N m/s, N/s", size=count, default=rates, low=0.0), last)
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
         """One row a degree of freedom with a limit."""
@@ -73,11 +101,16 @@ class TorqueLimits(Constraint):
         """None: its rows are on torques."""
         return None
 
-    def torque_rows(self, robot: Robot, inputs: Values) -> Torques:
+    def torque_rows(self, robot: Robot, inputs: Values, dt: ca.SX) -> Torques:
         """See the class."""
         dofs = self.dofs(robot)
         most = inputs["scale"] * ca.SX(ca.DM(robot.limits.effort[list(dofs)]))
-        return Torques(dofs, -most, most)
+        if "last" not in inputs:
+            return Torques(dofs, -most, most)
+        change, last = inputs["slew"] * dt, inputs["last"]
+        ends = (clip(last + sign * change, -most, most) for sign in (-1.0, 1.0))
+        low, high = (ca.if_else(last < NOT_KNOWN, end, s * most) for end, s in zip(ends, (-1.0, 1.0), strict=True))
+        return Torques(dofs, low, high)
 
     def dofs(self, robot: Robot) -> tuple[int, ...]:
         """Degrees of freedom with a limit, in the order of the rows."""

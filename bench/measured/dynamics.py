@@ -9,6 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from bench.sheet import Sheet
+from wbc.motion_control.comparison import Condition, compare
 from wbc.published.newton_euler import (
     Adaptive,
     DecoupledArm,
@@ -21,14 +22,11 @@ from wbc.published.newton_euler import (
     rigid,
     simulate,
 )
-from wbc.published.newton_euler.comparison import LAWS, compare
+from wbc.published.newton_euler.comparison import published_scenario
 from wbc.published.newton_euler.control import Controller
 from wbc.published.newton_euler.counts import operations
 from wbc.published.newton_euler.simulation import PLANTS
 from wbc.published.newton_euler.three_link import MOTOR, arm, task, tip
-
-#: Half the mass of the last link [kg]
-PAYLOAD = 2.125
 
 
 def parts() -> dict[str, Sheet | str]:
@@ -44,9 +42,11 @@ def _tracking() -> Sheet:
         "2 decoupled": lambda: DecoupledTwo(motion, 0.01),
         "2 on all joints": lambda: DecoupledArm(rigid(chosen.model), motion, 0.01),
         "3 adaptive": lambda: Adaptive(chosen, motion, 0.01),
-        "1 with stiff weights": lambda: LAWS["1 with stiff weights"](0.01),
-        "computed torque": lambda: LAWS["computed torque"](0.01),
     }
+    scenario = published_scenario()
+    for name in ("1 with stiff weights", "computed torque", "adaptive, last link", "one-step optimum", "torque stack"):
+        maker = scenario.controllers[name]
+        laws[name] = lambda maker=maker: maker(scenario.robot, motion, 0.01)
     for name, make in laws.items():
         cells = [name]
         for plant in PLANTS:
@@ -64,14 +64,15 @@ def _tracking() -> Sheet:
 
 
 def _payload() -> Sheet:
-    rows = []
-    slow, fast = (list(compare(PAYLOAD, dt)) for dt in (0.01, 0.001))
+    rows, scenario = [], published_scenario()
+    slow, fast = (list(compare(scenario, Condition(scenario.payload, rate=rate))) for rate in (100.0, 1000.0))
     for one, other in zip(slow, fast, strict=True):
         cells = [one.name]
         for found in (one, other):
-            cells += [f"{1e3 * off:.3g}" for off in (found.tip.max(), found.tip[-1])] if found.run else ["ran away", ""]
-        cells += [f"{other.microseconds:.0f}", "" if other.mass is None else f"{other.mass:.3f}"]
-        rows.append(tuple(cells))
+            off = (found.largest, found.residual)
+            cells += ["ran away", ""] if found.trial.away else [f"{1e3 * distance:.3g}" for distance in off]
+        mass = "" if other.mass is None else f"{other.mass[0]:.3f} +- {other.mass[1]:.3f}"
+        rows.append((*cells, f"{other.microseconds:.0f}", mass))
     heads = ("controller", "100 Hz [mm]", "at the end [mm]", "1 kHz [mm]", "at the end [mm]", "a command [us]",
              "payload learned [kg]")  # fmt: skip
     return Sheet("", heads, rows)
@@ -79,13 +80,13 @@ def _payload() -> Sheet:
 
 def _faults() -> Sheet:
     """Largest distance of the tip [mm]; no payload."""
-    columns = []
-    for heavier, noise in ((1.0, 1e-5), (1.2, 0.0)):
-        for dt in (0.01, 0.001):
-            found = compare(0.0, dt, heavier=heavier, noise=noise)
-            columns.append([f"{1e3 * one.tip.max():.3g}" if one.run else "ran away" for one in found])
+    columns, scenario = [], published_scenario()
+    for fault in ({"noise": 1e-5}, {"heavier": 1.2}):
+        for rate in (100.0, 1000.0):
+            found = compare(scenario, Condition(**fault, rate=rate))
+            columns.append(["ran away" if one.trial.away else f"{1e3 * one.largest:.3g}" for one in found])
     heads = ("controller", "noise, 100 Hz [mm]", "noise, 1 kHz [mm]", "heavier, 100 Hz [mm]", "heavier, 1 kHz [mm]")
-    return Sheet("", heads, list(zip(LAWS, *columns, strict=True)))
+    return Sheet("", heads, list(zip(scenario.names(), *columns, strict=True)))
 
 
 def _cost() -> Sheet:

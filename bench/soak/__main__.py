@@ -22,11 +22,13 @@ from wbc.interrupts import obey_kill
 
 #: Stacks and ticks a stack on the virtual machine; the same compiled; stacks with known problems and problems of each;
 #: stacks for the faults; stacks with strict levels on either back end, and ticks of each (ten times as many compiled);
-#: stacks, and as many with levels, on both back ends at once; runs of random calls of the public surface, and calls of
-#: every callable in each
+#: stacks, and as many with levels, on both back ends at once; stacks that command torques on either back end, and ticks
+#: of each (two hundred times as many compiled); runs of random calls of the public surface, and calls of every callable
+#: in each
 FULL = {
     "vm": 200, "vm ticks": 240, "native": 20, "native ticks": 47_600, "known": 40, "problems": 25, "faults": 10,
-    "levels": 10, "levels ticks": 200, "both": 10, "both ticks": 200, "calls": 10, "call rounds": 20,
+    "levels": 10, "levels ticks": 200, "both": 10, "both ticks": 200, "torque": 25, "torque ticks": 200,
+    "calls": 10, "call rounds": 20,
 }  # fmt: skip
 
 STATUSES = ("solved", "relaxed", "recovered", "braked", "capped")
@@ -99,7 +101,8 @@ def sizes_of(scale: float, most: int | None) -> dict[str, int]:
     sizes = {name: max(20, int(n * scale)) if "ticks" in name else n for name, n in FULL.items()}
     if most is not None:
         sizes |= {
-            name: min(sizes[name], most) for name in ("vm", "native", "known", "faults", "levels", "both", "calls")
+            name: min(sizes[name], most)
+            for name in ("vm", "native", "known", "faults", "levels", "both", "torque", "calls")
         }
     return sizes
 

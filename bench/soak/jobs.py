@@ -22,6 +22,7 @@ from bench.soak.episodes import stack
 from bench.soak.faults import lost_library, one_iteration, plants
 from bench.soak.known import problems
 from bench.soak.surface import calls
+from bench.soak.torques import torques
 
 #: Names of runs with their counts
 Found = list[tuple[str, Counter[str]]]
@@ -49,6 +50,9 @@ def parts_of(seed: int, sizes: dict[str, int], native: bool) -> dict[str, list[J
         out[f"both {seed}"] = [
             partial(both, seed, k, n["both ticks"], levels=levels) for levels in (False, True) for k in range(n["both"])
         ]
+    for b in backends:
+        ticks = n["torque ticks"] * (200 if b == "native" else 1)
+        out[f"torque {b} {seed}"] = [partial(torques, seed, k, b, ticks) for k in range(n["torque"])]
     out[f"calls {seed}"] = [partial(calls, seed, k, n["call rounds"]) for k in range(n["calls"])]
     return out
 

@@ -19,6 +19,7 @@ from bench.soak.judge import Judge, Outside
 from bench.soak.known import problems
 from bench.soak.machines import machine
 from bench.soak.stacks import random_stack
+from bench.soak.torques import torques
 from wbc.controller import Controller
 
 
@@ -35,6 +36,14 @@ def test_random_stacks_give_safe_certified_commands() -> None:
     assert sum(n for key, n in total.items() if not key.startswith(("gave way", "loose", "compared"))) == 3 * 40
     assert total["solved"] >= 20
     assert total["relaxed"] > 20
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+def test_random_stacks_give_torques_within_their_limits() -> None:
+    counts = sum((c for k in (0, 2, 32) for _, c in torques(11, k, "vm", 20)), Counter[str]())
+    assert wrong(counts) == {}
+    assert counts["solved"] > 5
+    assert counts["relaxed"] > 5
 
 
 def test_known_problems_are_solved_as_the_referee_does() -> None:
@@ -70,13 +79,15 @@ def test_a_run_goes_on_from_the_jobs_that_are_kept(tmp_path: Path, monkeypatch: 
         "faults": 0,
         "levels": 1,
         "levels ticks": 20,
+        "torque": 0,
+        "torque ticks": 20,
         "calls": 0,
     }
     sizes["call rounds"] = 0
     path = tmp_path / "soak.jsonl"
     first, interrupted = measure(parts_of(2, sizes, False), Kept(path), 1, Progress(disable=True))
     assert interrupted is None
-    assert list(first) == ["known 2", "faults 2", "vm 2", "levels vm 2", "calls 2"]
+    assert list(first) == ["known 2", "faults 2", "vm 2", "levels vm 2", "torque vm 2", "calls 2"]
     monkeypatch.setattr("bench.soak.jobs._run", lambda jobs, pool: iter([(job, 1 / 0) for job in jobs]))
     again, _ = measure(parts_of(2, sizes, False), Kept(path), 1, Progress(disable=True))
     assert again == first

@@ -111,6 +111,14 @@ def test_an_obstacle_in_the_arm_at_the_start_is_said(tmp_path: Path) -> None:
     assert "warning: at the start panda_hand is -" in err
 
 
+def test_track_of_a_position_alone_lets_the_hand_turn(tmp_path: Path) -> None:
+    options = ["--kind", "position", "--path", "line", "--plane", "off", *FAST]
+    assert run("track", "ur5", *options, "--output", tmp_path / "run")[0] == 0
+    summary = json.loads((tmp_path / "run" / "summary.json").read_text())
+    assert "rotation_error" not in summary
+    assert summary["position_error"]["max"] < 0.05
+
+
 def test_track_solvers_agree(tmp_path: Path) -> None:
     logs = []
     for solver in ("daqp", "qpoases"):

@@ -9,16 +9,22 @@ import numpy as np
 import pinocchio as pin
 
 from wbc.robot import Robot
+from wbc.robot.transmission import Transmission
 from wbc.tasks import (
+    DivergentComponent,
+    DriveTorqueLimits,
     ExternalWrench,
     Item,
     JointFriction,
     LineContact,
     PointContact,
     RigidGrasp,
+    RollingContact,
     SlidingContact,
+    SupportRegion,
     SurfaceContact,
     TorqueLimits,
+    WrenchSum,
 )
 
 #: A plane like any other, for what slides
@@ -73,7 +79,54 @@ def _friction(robot: Robot) -> list[Declared]:
 
 
 def _torques(robot: Robot) -> list[Declared]:
-    return [(TorqueLimits(), {}), (TorqueLimits(robot.joint_names[-1]), {})]
+    return [(TorqueLimits(), {}), (TorqueLimits(robot.joint_names[-1], slew=100.0), {})]
+
+
+def wheel(robot: Robot) -> tuple[str, tuple[float, ...]]:
+    """A frame with its origin on the axis of the last revolute joint that has one, and the axis; like a wheel's."""
+    model = robot.model
+    for frame in reversed(list(model.frames)):
+        joint = frame.parentJoint
+        if joint == 0 or model.nvs[joint] != 1 or not model.joints[joint].shortname().startswith("JointModelR"):
+            continue
+        index = model.getFrameId(frame.name)
+        jacobian = pin.computeFrameJacobian(model, model.createData(), robot.neutral, index, pin.LOCAL)
+        screw = np.array(jacobian[:, model.idx_vs[joint]])
+        if np.linalg.norm(screw[:3]) < 1e-9:
+            return str(frame.name), tuple(screw[3:].tolist())
+    raise AssertionError(robot.name)
+
+
+def _rolling(robot: Robot) -> list[Declared]:
+    given = {"gain": 3.0, "friction": 0.5, "least": 1.0, "most": 200.0, "target": TILTED}
+    frame, axis = wheel(robot)
+    return [(RollingContact(frame, radius=0.2, axis=axis), given)]
+
+
+def _sum(robot: Robot) -> list[Declared]:
+    return [(WrenchSum("contact"), {})]
+
+
+def _support(robot: Robot) -> list[Declared]:
+    return [(SupportRegion(planes=4), {})]
+
+
+def _divergent(robot: Robot) -> list[Declared]:
+    return [(DivergentComponent(omega=3.5), {"omega": 2.0, "gain": 4.0})]
+
+
+def _drives(robot: Robot) -> list[Declared]:
+    followers = {robot.dof_names[c.follower] for c in robot.couplings}
+    single = [str(n) for j, n in enumerate(robot.model.names) if j > 0 and int(robot.model.nvs[j]) == 1]
+    a, b = [name for name in single if name not in followers][:2]
+    wrist = Transmission((a, b), {"left": {a: 1.0, b: 1.0}, "right": {a: 1.0, b: -1.0}})
+    return [(DriveTorqueLimits(wrist, torque=(5.0, np.inf)), {})]
+
+
+#: Classes that have no meaning for a stack that commands velocities
+NO_VELOCITIES = frozenset(
+    ("TorqueLimits", "DriveTorqueLimits", "ExternalWrench", "JointFriction", "WrenchSum", "DivergentComponent")
+)
 
 
 FACTORIES: dict[str, Callable[[Robot], list[Declared]]] = {
@@ -85,4 +138,9 @@ FACTORIES: dict[str, Callable[[Robot], list[Declared]]] = {
     "ExternalWrench": _wrench,
     "JointFriction": _friction,
     "TorqueLimits": _torques,
+    "RollingContact": _rolling,
+    "WrenchSum": _sum,
+    "DivergentComponent": _divergent,
+    "SupportRegion": _support,
+    "DriveTorqueLimits": _drives,
 }

@@ -7,6 +7,7 @@ from functools import cache
 import numpy as np
 import pytest
 
+from tests.constraints.items_forces import NO_VELOCITIES
 from tests.tasks.items import FACTORIES
 from tests.tasks.robots import random_configuration, robot
 from wbc import Controller, Stack
@@ -18,7 +19,7 @@ from wbc.tasks import JointLimits, Posture
 DT = 0.005
 #: Held to be all of the registry by the walk over derivatives. A mechanism is in every stack of a robot that needs one.
 #: Limits of torques are no part of a stack that commands velocities: tests/torque
-SHIPPED = sorted(FACTORIES.keys() - {"Mechanism", "TorqueLimits", "ExternalWrench", "JointFriction"})
+SHIPPED = sorted(FACTORIES.keys() - {"Mechanism"} - NO_VELOCITIES)
 STATES = 3
 
 

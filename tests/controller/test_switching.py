@@ -17,6 +17,7 @@ import pytest
 
 import wbc
 from tests.closed_loop.machines import anywhere, near
+from tests.constraints.items_forces import NO_VELOCITIES
 from tests.evaluation import numbers, sample
 from tests.repeats import covering
 from tests.tasks.items import FACTORIES
@@ -29,7 +30,7 @@ DT = 0.01
 ROBOTS = ("panda", "talos")
 
 #: A robot's own couplings are no item that one switches, and what is about torques is for stacks that command them
-CLASSES = sorted(FACTORIES.keys() - {"Mechanism", "TorqueLimits", "ExternalWrench", "JointFriction"})
+CLASSES = sorted(FACTORIES.keys() - {"Mechanism"} - NO_VELOCITIES)
 
 #: Violations that are switched on [m, rad], and how far from there the configurations are that have none
 SHALLOW, DEEP, REACH = 0.01, 0.2, 0.6

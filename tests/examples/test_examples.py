@@ -33,7 +33,18 @@ LONG = (
     "self_collision",
     "levels",
     "moving_obstacle",
+    "moving_table",
+    "insert",
     "custom_expression",
+    "humanoid",
+    "torque",
+    "walk",
+    "mujoco_servo",
+    "retarget",
+    "own_urdf",
+    "own_mjcf",
+    "dual_arm",
+    "mujoco_quadruped",
 )
 
 
@@ -86,15 +97,17 @@ def test_quick_start_follows() -> None:
 
 
 def test_custom_expression_looks_at_the_point() -> None:
-    errors = [float(x) for x in re.findall(rf"solved.*look {NUMBER} m", output("custom_expression"))]
+    text = output("custom_expression")
+    errors = [float(x) for x in re.findall(rf"solved: look {NUMBER} mm", text)]
     assert len(errors) == 2
-    assert max(errors) < 5e-3
+    assert max(errors) < 5.0
+    assert min(float(x) for x in re.findall(rf"at least {NUMBER} m high", text)) > 0.549
 
 
-def test_moving_obstacle_pushes_the_arm_away() -> None:
+def test_a_target_is_followed_past_a_moving_obstacle() -> None:
     text = output("moving_obstacle")
     assert number("beyond the margin # mm", text) > -0.5
-    assert number("hand pushed # mm", text) > 5.0
+    assert number("hand pushed # mm", text) > 20.0
     assert number("at the end: solved, hand error # mm", text) < 0.1
 
 
@@ -113,25 +126,63 @@ def test_moving_table_is_followed() -> None:
 def test_humanoid_reaches_on_held_feet() -> None:
     text = output("humanoid")
     assert number("solved: hand # mm", text) < 1.0
-    assert number("centre of mass # mm", text) < 5.0
+    # Its margin is 20 mm, and binds
+    assert number("centre of mass at least # mm", text) == pytest.approx(20.0, abs=0.2)
     assert number("left foot moved # um", text) < 1.0
 
 
-def test_dual_arm_carries_the_tray() -> None:
+def test_dual_arm_carries_the_box() -> None:
     text = output("dual_arm")
-    assert number("solved: tray at most # mm", text) < 0.5
+    assert number("solved: box at most # mm", text) < 0.5
     assert number("at most # mm apart", text) < 0.25
+
+
+def test_own_files_load_and_arrive() -> None:
+    assert max(float(x) for x in re.findall(rf"solved: {NUMBER} mm", output("own_urdf"))) < 0.1
+    assert number("MuJoCo has the tool # mm", output("own_mjcf")) < 0.2
+
+
+def test_servos_of_mujoco_follow() -> None:
+    text = output("mujoco_servo")
+    assert number("tool # mm .median", text) < 1.0
+    assert number("median., # mm", text) < 3.0
+
+
+def test_a_quadruped_stands_on_three_feet() -> None:
+    text = output("mujoco_quadruped")
+    assert number("the fourth # mm above", text) > 140.0
+    assert number("# mm from its target", text) < 3.0
+    assert number("centre of mass # mm off", text) < 5.0
+    assert "; 0 ticks relaxed" in text
     check_picture(text)
+
+
+def test_a_humanoid_stands_in_mujoco() -> None:
+    """A quarter of a second, on the virtual machine; the whole of it is measured for docs/motion_control.md."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(toolchain, "missing", lambda: ("no C compiler",))
+        example = runpy.run_path(str(FOLDER / "mujoco_humanoid.py"), run_name="example")
+    run = example["simulate"](0.1)
+    assert run["solved"].all()
+    assert run["slip"].max() < 1e-3
+    assert run["hand"].max() < 2e-3
+    assert run["balance"].max() < 1e-3
+
+
+def test_a_person_drives_a_humanoid() -> None:
+    assert number("hands at most # mm", output("retarget")) < 5.0
+
+
+def test_a_browser_shows_an_arm(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "argv", ["drag.py", "--ticks", "20"])
+    assert number("hand # mm", output("drag")) < 1e-3
 
 
 def test_mobile_base_rolls_along_with_the_hand() -> None:
     text = output("mobile_base")
     assert number("solved: hand at most # mm", text) < 2.0
-    assert number("within # m by", text) < 0.1
-    assert number("the arm raised it by # m", text) > 0.25
     assert number("wheels rolled # m", text) > 7.0
     assert number("slip at most # mm/s", text) < 1e-3
-    check_picture(text)
 
 
 def test_clutter_is_not_touched() -> None:
@@ -225,8 +276,8 @@ def test_examples_are_short_and_use_public_names(path: Path) -> None:
     modules = {a.name for n in ast.walk(tree) if isinstance(n, ast.Import) for a in n.names}
     modules |= {n.module or "" for n in ast.walk(tree) if isinstance(n, ast.ImportFrom)}
     ours = {"wbc", "wbc.tasks", "wbc.track", "wbc.shapes", "wbc.trajectory", "wbc.walking.run", "wbc.coordinates"}
-    ours |= {"wbc.estimation", "wbc.program"}
-    assert modules <= {"itertools", "pathlib", "numpy", "pinocchio", "casadi"} | ours
+    ours |= {"wbc.estimation", "wbc.program", "wbc.servo", "wbc.simulation"}
+    assert modules <= {"itertools", "pathlib", "sys", "numpy", "pinocchio", "casadi", "mujoco"} | ours
     assert not [n.attr for n in ast.walk(tree) if isinstance(n, ast.Attribute) and n.attr.startswith("_")]
 
 

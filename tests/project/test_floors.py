@@ -38,12 +38,16 @@ FLOORS = {
     "wbc.controller": 6,
     "wbc.explain": 7,
     "wbc.export": 7,
+    "wbc.batch": 7,
+    "wbc.support": 7,
     "wbc.ik": 7,
     "wbc.record": 7,
     "wbc.servo": 7,
     "wbc.trajectory": 8,
     "wbc.coordinates": 8,
     "wbc.explore": 9,
+    "wbc.identification": 9,
+    "wbc.motion_control": 9,
     "wbc.program": 9,
     "wbc.moving_target": 9,
     "wbc.teleop": 9,
@@ -51,7 +55,8 @@ FLOORS = {
     "wbc.published": 9,
     "wbc.walking": 9,
     "wbc.pages": 9,
-    "wbc.cli": 10,
+    "wbc.viewer": 10,
+    "wbc.cli": 11,
 }
 #: Floors inside wbc.walking; a room imports only rooms on lower floors
 WALKING = {
@@ -78,7 +83,7 @@ NAMED = re.compile(r"wbc(\.[a-z_]+)+\.?")
 #: Modules in strings that are not imported by who names them: classes that a pickle may ask for
 LISTED = {("wbc.record.unpickle", "wbc.coordinates"), ("wbc.record.unpickle", "wbc.analysis")}
 #: What a controller and its steps offer and packages above do: these are imported when somebody asks for it
-LISTED |= {("wbc.controller.hooks", f"wbc.{package}") for package in ("explain", "export", "ik", "record")}
+LISTED |= {("wbc.controller.hooks", f"wbc.{package}") for package in ("batch", "explain", "export", "ik", "record")}
 #: The package's own __init__ collects names from every floor
 ROOF = "wbc"
 PACKAGE_FILES = sources("wbc", "tasks", "robots")

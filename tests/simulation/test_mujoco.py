@@ -57,7 +57,7 @@ def test_a_free_base_falls_as_pinocchio_says(tmp_path: object) -> None:
     q, v, data = robot.random(1), rng.uniform(-1, 1, robot.nv), robot.model.createData()
     plant.reset(q, 0.0)
     assert plant.read().q == pytest.approx(q)
-    plant._write(q, v)
+    plant._joints.put_v(plant.data.qvel, q, v)
     assert plant.read().v == pytest.approx(v)
     torque = np.zeros(robot.nv)
     torque[-1] = 0.4

@@ -13,7 +13,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from tests.constraints.items_forces import TILTED
+from tests.constraints.items_forces import NO_VELOCITIES, TILTED
 from tests.evaluation import Numbers, later, numbers, sample, slope
 from tests.tasks.items import FACTORIES
 from tests.tasks.items_coordination import RATES as COORDINATION
@@ -30,11 +30,13 @@ from wbc.tasks import (
     PitchPlane,
     PointContact,
     RigidGrasp,
+    RollingContact,
     SlidingContact,
     SurfaceContact,
     Task,
     registry,
 )
+from wbc.tasks.rolling import FLAT
 
 STATES = 2
 DIRECTIONS = 2
@@ -103,6 +105,19 @@ def sliding(item: SlidingContact, robot: Robot, q: np.ndarray, v: np.ndarray) ->
     return np.array([TILTED.rotation[:, 2] @ velocity(robot, item.frame, q, v)[:3]])
 
 
+def rolling(item: RollingContact, robot: Robot, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """Velocity of the wheel's material at the point of its rim that is nearest to the ground's plane, downwards."""
+    pose, twist, normal = placement(robot, item.frame, q), velocity(robot, item.frame, q, v), TILTED.rotation[:, 2]
+    axis = pose.rotation @ np.array(item.axis)
+    ends = np.linalg.svd(axis[None])[2][1:]
+    angle = np.arctan2(ends[1] @ normal, ends[0] @ normal)
+    length = np.hypot(ends[0] @ normal, ends[1] @ normal)
+    up = (np.cos(angle) * ends[0] + np.sin(angle) * ends[1]) * length / np.hypot(length, FLAT)
+    slip = twist[:3] + np.cross(twist[3:], -item.radius * up)
+    along = np.cross(axis, up)
+    return np.array([along @ slip, np.cross(normal, along) @ slip, normal @ slip])
+
+
 def contact(item: RigidGrasp, robot: Robot, q: np.ndarray, v: np.ndarray) -> np.ndarray:
     return velocity(robot, item.frame, q, v)[: item.components]
 
@@ -140,6 +155,7 @@ RATES = {
     PointContact: contact,
     LineContact: line,
     SlidingContact: sliding,
+    RollingContact: rolling,
     SurfaceContact: contact,
     Mechanism: mechanism,
     PitchPlane: plane_rate,
@@ -168,7 +184,7 @@ def test_rows_are_what_the_class_says(class_name: str, robot_name: str) -> None:
     for item, given in FACTORIES[class_name](machine):
         if item.refusal(machine, "velocity"):
             # torques and forces have no rows on velocities: tests/torque
-            assert class_name in ("TorqueLimits", "ExternalWrench", "JointFriction")
+            assert class_name in NO_VELOCITIES
             continue
         found = numbers(item, machine)
         for _ in range(STATES):

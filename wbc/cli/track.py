@@ -26,6 +26,7 @@ def track(
     plant: options.PlantName = "kinematic",
     solver: options.Solver = "daqp",
     backend: options.Backend = "auto",
+    kind: options.Kind = "pose",
     gain: options.Gain = 10.0,
     margin: options.Margin = 0.02,
     output: options.RunFolder = None,
@@ -51,6 +52,7 @@ def track(
         rate=rate,
         margin=margin,
         gain=gain,
+        kind=kind,
         solver=solver,
         backend=backend,
     )

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import pinocchio as pin
 
 from wbc import validation
 from wbc.controller import hooks
@@ -26,10 +27,12 @@ from wbc.stack.layout import Block, Layout
 from wbc.validation import Array
 
 if TYPE_CHECKING:
+    from wbc.batch import Batch
     from wbc.record.recorder import Recorder
 
 _Array = np.ndarray
 _FLOAT = np.dtype(np.float64)
+_SE3 = pin.SE3
 
 
 class Controller(Handles):
@@ -51,9 +54,12 @@ class Controller(Handles):
         self._core = core = Core(stack, artifact, solver, assembly)
         super().__init__(core.handles, stack)
         # What every step needs
-        self._q, self._v_in, self._use_v = core.tick.q, core.tick.v_in[: core.layout.nv], core.tick.use_v
+        # A memoryview takes bytes in half the time in which an array takes an array
+        self._q = core.tick.q.data.cast("B")
+        self._v_in, self._use_v = core.tick.v_in[: core.layout.nv], core.tick.use_v
         self._q_shape, self._v_shape = (core.layout.nq,), (core.layout.nv,)
         self._snapshot, self._context, self._sensed = core.snapshot, core.context, bool(core.sensors)
+        self._plans = core.together.plans
         self._busy = False
 
     def step(self, q: Any, v: Any = None, dt: Any = None) -> Step:
@@ -89,7 +95,7 @@ class Controller(Handles):
             if v is not None:
                 self._v_in[:] = v
                 self._use_v[0] = 1.0
-            self._q[:] = q
+            self._q[:] = q.tobytes()
             if waits:
                 core.advance(dt)
             if (flag := core.call()) and core.finish(flag) < 0:
@@ -97,6 +103,39 @@ class Controller(Handles):
             return Step(self._snapshot(), self._context)
         finally:
             self._busy = False
+
+    def set(self, **values: Any) -> None:
+        """Set the targets of several items in one call: all are checked before any is written.
+
+            controller.set(hand=pose, posture=q)                      # items by name: their targets
+            controller.set(ball={"pose": pose, "velocity": twist})    # other values of an item
+
+        Targets that follow each other in every tick cost a third of what setting them one by one does.
+
+        Args:
+            values: of each item its target, or where it has none its only value; or a dictionary of its values.
+
+        Raises:
+            UnknownNameError: no such item, or no such value. ShapeError: an item without a target; no value of it.
+            NotFiniteError, RotationError, RangeError: no value of it. Nothing is changed.
+        """
+        plan = self._plans.get(tuple(values))
+        if plan is None:
+            plan = self._core.together.plan(values)
+        if plan is not None:
+            for value, place, shape in zip(values.values(), plan.places, plan.shapes):  # noqa: B905 (as many of each)
+                if type(value) is _SE3:
+                    place[:] = value.homogeneous.tobytes()
+                elif type(value) is _Array and value.dtype is _FLOAT and value.shape == shape:
+                    place[:] = value.tobytes()
+                else:
+                    break
+            else:
+                if plan.take():
+                    if self._core.first:
+                        self._core.let_go(plan.slots)
+                    return
+        self._core.together.carefully(values)
 
     def reset(self, q: Any = None, v: Any = None) -> None:
         """Start anew: the last command becomes ``v`` (default zero) and the solver forgets its active set.
@@ -133,6 +172,22 @@ class Controller(Handles):
         out = Controller(self.stack, self._artifact, self.solver, self._core.assembly.twin())
         out._core.assume(self._core)
         return out
+
+    def batch(self, count: int, *, threads: int | None = None) -> Batch:
+        """Many robots, or candidate states, of this compiled stack, which tick in one call; docs/batch.md.
+
+            batch = controller.batch(10_000)
+            batch.set(hand=poses)                   # [10_000, 4, 4]
+            v = batch.step(q).v                     # [10_000, nq] -> [10_000, nv]
+
+        Args:
+            count: how many. threads: that tick at a time; default: one a core.
+
+        Raises:
+            RangeError: not an integer >= 1. SolverError: the stack measures distances, or its policy has an escape.
+        """
+        batch: Batch = hooks.batch(self, count, threads)
+        return batch
 
     def __reduce_ex__(self, protocol: Any) -> Any:
         reason = "lives in the memory of its process; pickle controller.stack, and compile it there"

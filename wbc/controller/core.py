@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import functools
 import pathlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -12,7 +11,7 @@ import pinocchio as pin
 
 from wbc import validation
 from wbc.controller.escape import Escape
-from wbc.controller.handle import Directions, Handle
+from wbc.controller.handle import POSE, Directions, Handle
 from wbc.controller.handles import kind_of
 from wbc.controller.policy import Fallback, Policy
 from wbc.controller.ramps import Ramps
@@ -21,6 +20,7 @@ from wbc.controller.tick.buffers import BAD_V, Assembly
 from wbc.controller.tick.native import NativeTick
 from wbc.controller.tick.solved import SolvedTick
 from wbc.controller.tick.vm import VmAssembly
+from wbc.controller.together import Plan, Together
 from wbc.errors import SolverError
 from wbc.robot import Robot
 from wbc.stack.artifact import Artifact
@@ -73,7 +73,7 @@ class Core:
         stack, layout: the declaration and its buffers. assembly: rows and QP. tick: the whole cycle on its buffers.
         fallback: what follows a tick without a certified answer. context: what all steps share.
         handles: run-time values of the items by name. row_costs: of each task row at weight 1.
-        directions, ramps: of scaled tasks, and of weights that change.
+        directions, ramps: of scaled tasks, and of weights that change. together: sets values of several items.
         call: one tick on the buffers as they are, returns its flag; a recorder puts its own in place.
         resets: how many there were. recording: the file that ticks are recorded into, or None.
         waits: the next step has more to do than to copy q: defaults to take from it, ramps, or dt to set back.
@@ -87,9 +87,7 @@ class Core:
         native = self.assembly if isinstance(self.assembly, NativeTick) and solver == "daqp" else None
         self.tick: NativeTick | SolvedTick = native or SolvedTick(self.assembly, stack, layout, solver)
         self.fallback = Fallback(self.tick, self.assembly, stack, layout)
-        self.call: Callable[[], int] = self.tick.step
-        if isinstance(self.tick, NativeTick):
-            self.call = functools.partial(self.tick.step_function, self.tick.pointer)
+        self.call: Callable[[], int] = self.tick.call if isinstance(self.tick, NativeTick) else self.tick.step
         self._plain_call = self.call
         self.context = Context(stack, layout, self.assembly)
         # of all ways to copy some hundred numbers into something immutable, the fastest
@@ -97,9 +95,12 @@ class Core:
         self.resets, self.ramps = 0, Ramps()
         self.recording: pathlib.Path | None = None
         #: inputs that follow the first configuration, with their items, and those of them that it still has to fill
-        self._first: dict[Slot, str] = {}
+        self.first: dict[Slot, str] = {}
         self.waiting: dict[Slot, str] = {}
         self.handles = {name: kind_of(block.entry.item)(self, block) for name, block in layout.blocks.items()}
+        self.together = Together(self.handles, self.assembly)
+        #: where a pose waits to be taken, and what takes it
+        self._poses: dict[Slot, tuple[memoryview, Callable[[], int]]] = {}
         self.directions = Directions(layout, self.tick, self.handles)
         #: what sensors measure that stands in a moving frame, by the name of the item
         self._carried: dict[str, Carried] = {}
@@ -127,7 +128,7 @@ class Core:
         self.ramps.assume(other.ramps, self.handles)
         if other.fallback.prepared:
             self.fallback.prepare()
-        self._first, self.waiting, self.waits = dict(other._first), dict(other.waiting), other.waits
+        self.first, self.waiting, self.waits = dict(other.first), dict(other.waiting), other.waits
 
     def follow(self, policy: Policy) -> None:
         """Another policy from now on."""
@@ -155,11 +156,10 @@ class Core:
     def begin(self, configuration: Array | None, velocity: Array) -> None:
         """A reset with checked values."""
         if configuration is not None:
-            self.initialise(self._first, configuration)
-        self.waiting = {} if configuration is not None else dict(self._first)
+            self.initialise(self.first, configuration)
+        self.waiting = {} if configuration is not None else dict(self.first)
         self.tick.v_last[: self.layout.nv] = velocity
-        if self.layout.command != "velocity":
-            self.assembly.kept[:] = 0.0
+        self.assembly.forget()
         self.tick.reset()
         if isinstance(self.call, Escape):
             self.call.reset()
@@ -180,20 +180,35 @@ class Core:
     def write(self, slot: Slot, numbers: Array) -> None:
         """Write validated numbers of an input; it no longer follows the first configuration."""
         self.tick.p[slot.span] = numbers
-        if slot in self._first:
+        if slot in self.first:
             self._let_go(slot)
 
     def write_pose(self, slot: Slot, matrix: Array) -> bool:
         """Write a pose from its homogeneous matrix [4, 4]; False, and nothing written, where :meth:`write` has to."""
-        if not self.assembly.put_pose(slot.start, matrix):
+        if not self.assembly.takes:
             return False
-        if slot in self._first:
+        place, plan = self._poses.get(slot) or self._add_pose(slot)
+        place[:] = matrix.tobytes()
+        if not plan():
+            return False
+        if slot in self.first:
             self._let_go(slot)
         return True
 
+    def _add_pose(self, slot: Slot) -> tuple[memoryview, Callable[[], int]]:
+        plan = Plan(self.assembly, [slot], [POSE])
+        self._poses[slot] = plan.places[0], plan.take
+        return self._poses[slot]
+
+    def let_go(self, slots: Iterable[Slot]) -> None:
+        """Inputs were set, so they no longer follow the first configuration."""
+        for slot in slots:
+            if slot in self.first:
+                self._let_go(slot)
+
     def _let_go(self, slot: Slot) -> None:
         """An input was set, so it no longer follows the first configuration."""
-        del self._first[slot]
+        del self.first[slot]
         self.waiting.pop(slot, None)
 
     def start_ramp(self, handle: Handle, weight: float, seconds: float) -> None:
@@ -214,7 +229,7 @@ class Core:
     def _set_default(self, name: str, slot: Slot) -> None:
         value = slot.input.default
         if value is None:
-            self.waiting[slot] = self._first[slot] = name
+            self.waiting[slot] = self.first[slot] = name
             return
         if slot.input.name == "rate":
             value = min(float(value), 1.0 / self.stack.dt_range[1])

@@ -22,6 +22,8 @@ from wbc.validation import LARGEST, Array
 
 _ARRAY, _FLOAT = np.ndarray, np.dtype(np.float64)
 _MATRIX, _SE3 = (4, 4), pin.SE3
+#: What a value is that native code can check, as in ``native/values.h``
+NUMBERS, POSE, CONFIGURATION = 0, 1, 2
 
 
 class Owner(Protocol):
@@ -120,6 +122,15 @@ class Handle:
         put("_row_weights", np.asarray(block.entry.item.row_weights(self._robot), dtype=np.float64))
 
     @property
+    def quick(self) -> Mapping[str, int]:
+        """Inputs that native code can check, and what they are."""
+        slots = self._block.slots.items()
+        whole = {n for n, s in slots if s.input.kind == "configuration" and s.input.joints is None}
+        return (
+            dict.fromkeys(self._plain, NUMBERS) | dict.fromkeys(self._poses, POSE) | dict.fromkeys(whole, CONFIGURATION)
+        )
+
+    @property
     def names(self) -> tuple[str, ...]:
         """Names of all run-time values that can be set; sensed ones can also be read."""
         own = ("weight",) if self._block.form == "task" else ()
@@ -127,7 +138,7 @@ class Handle:
         return (*given, *own, "enabled", "mask")
 
     def __dir__(self) -> list[str]:
-        return [*self.names, "get", "names", "ramp", "set"]
+        return [*self.names, "get", "names", "ramp", "set", "switch"]
 
     def _get(self, name: str) -> Any:
         """Not an attribute that is there: a run-time value."""
@@ -225,14 +236,30 @@ class Handle:
         Raises:
             WbcError: as for one of them; nothing is changed.
         """
+        self.write_together(self.checked_together(values))
+
+    def checked_together(self, values: Mapping[str, Any]) -> dict[str, Array]:
+        """Numbers of several inputs, validated, bounds against each other too.
+
+        Raises:
+            WbcError: as of :meth:`set`.
+        """
         settable = [name for name, slot in self._block.slots.items() if not slot.input.sensed]
         for name in values:
             if name not in settable:
                 raise UnknownValueError(self._field(name), name, settable)
         numbers = {name: self.checked(name, value) for name, value in values.items()}
         self._check_order(numbers)
+        return numbers
+
+    def write_together(self, numbers: Mapping[str, Array]) -> None:
+        """Write numbers of :meth:`checked_together`."""
         for name, given in numbers.items():
             self._write(self.slot(name), given)
+
+    def switch(self, on: Any) -> None:
+        """Set ``enabled``, for those who know only that it is a handle."""
+        self._set("enabled", on)
 
     def _write(self, slot: Slot, numbers: Array) -> None:
         if slot is self._ramped:
@@ -279,6 +306,10 @@ class Handle:
         for name in ("_enabled", "_weight"):
             super().__setattr__(name, getattr(other, name))
         super().__setattr__("_mask", other._mask.copy())
+
+    def unit_weights(self) -> Array:
+        """What a weight of 1 puts on each row of a task, its switches counted."""
+        return self._mask * float(self._enabled) * self._row_weights * self._owner.row_costs[self._block.span]
 
     def apply(self) -> None:
         """Write weights or row switches to the buffers."""

@@ -24,6 +24,8 @@ from wbc.tasks import (
     CenterOfMass,
     Damping,
     Distance,
+    DivergentComponent,
+    DriveTorqueLimits,
     Elbow,
     EndEffector,
     ExternalWrench,
@@ -48,13 +50,17 @@ from wbc.tasks import (
     RelativePose,
     RigidGrasp,
     Rolling,
+    RollingContact,
     SelfCollision,
     SlidingContact,
+    SupportRegion,
     SurfaceContact,
     TorqueLimits,
     WorkspaceBox,
     WorkspacePolyhedron,
+    WrenchSum,
 )
+from wbc.tasks._contact import ContactForce
 from wbc.tasks.base import Item
 
 
@@ -65,6 +71,22 @@ class TaskHandle(Handle):
     gain: float
     stiffness: float
     damping: float
+
+
+class ContactForceHandle(TaskHandle):
+    """Of the task for the wrench of a contact."""
+
+    target: Any
+    measured: Any
+    feedback: float
+
+
+class DivergentComponentHandle(TaskHandle):
+    """Of :class:`DivergentComponent`."""
+
+    target: Any
+    feedforward: Any
+    omega: float
 
 
 class FollowerHandle(TaskHandle):
@@ -138,6 +160,22 @@ class TorqueLimitsHandle(ConstraintHandle):
     """Of :class:`TorqueLimits`."""
 
     scale: float
+    slew: Any
+    last: Any
+
+
+class DriveTorqueLimitsHandle(ConstraintHandle):
+    """Of :class:`DriveTorqueLimits`."""
+
+    scale: float
+    torque: Any
+
+
+class WrenchSumHandle(ConstraintHandle):
+    """Of :class:`WrenchSum`."""
+
+    target: Any
+    point: Any
 
 
 class RollingHandle(ConstraintHandle):
@@ -165,6 +203,13 @@ class MarginHandle(ConstraintHandle):
     """Of constraints with margins."""
 
     rate: float
+
+
+class SupportRegionHandle(MarginHandle):
+    """Of :class:`SupportRegion`."""
+
+    normals: Any
+    offsets: Any
 
 
 class ConeHandle(MarginHandle):
@@ -250,6 +295,11 @@ if TYPE_CHECKING:
         ExternalWrenchHandle,
         JointFrictionHandle,
         TorqueLimitsHandle,
+        DriveTorqueLimitsHandle,
+        WrenchSumHandle,
+        SupportRegionHandle,
+        DivergentComponentHandle,
+        ContactForceHandle,
     ):
         """Of an item that is known by its name only: all values that items of this package have."""
 
@@ -265,6 +315,7 @@ KINDS: dict[type[Item], type[Handle]] = {
     RelativePose: RelativePoseHandle,
     Momentum: MomentumHandle,
     Damping: TaskHandle,
+    ContactForce: ContactForceHandle,
     Hold: HoldHandle,
     Mechanism: HoldHandle,
     RigidGrasp: ContactHandle,
@@ -272,6 +323,11 @@ KINDS: dict[type[Item], type[Handle]] = {
     SurfaceContact: ContactHandle,
     LineContact: ContactHandle,
     SlidingContact: ContactHandle,
+    RollingContact: ContactHandle,
+    WrenchSum: WrenchSumHandle,
+    SupportRegion: SupportRegionHandle,
+    DriveTorqueLimits: DriveTorqueLimitsHandle,
+    DivergentComponent: DivergentComponentHandle,
     ExternalWrench: ExternalWrenchHandle,
     JointFriction: JointFrictionHandle,
     TorqueLimits: TorqueLimitsHandle,
@@ -320,14 +376,24 @@ class Handles:
     def __getitem__(self, item: Hold | Mechanism) -> HoldHandle: ...
     @overload
     def __getitem__(
-        self, item: RigidGrasp | PointContact | SurfaceContact | LineContact | SlidingContact
+        self, item: RigidGrasp | PointContact | SurfaceContact | LineContact | SlidingContact | RollingContact
     ) -> ContactHandle: ...
+    @overload
+    def __getitem__(self, item: WrenchSum) -> WrenchSumHandle: ...
+    @overload
+    def __getitem__(self, item: SupportRegion) -> SupportRegionHandle: ...
+    @overload
+    def __getitem__(self, item: DivergentComponent) -> DivergentComponentHandle: ...
     @overload
     def __getitem__(self, item: ExternalWrench) -> ExternalWrenchHandle: ...
     @overload
     def __getitem__(self, item: JointFriction) -> JointFrictionHandle: ...
     @overload
     def __getitem__(self, item: TorqueLimits) -> TorqueLimitsHandle: ...
+    @overload
+    def __getitem__(self, item: DriveTorqueLimits) -> DriveTorqueLimitsHandle: ...
+    @overload
+    def __getitem__(self, item: ContactForce) -> ContactForceHandle: ...
     @overload
     def __getitem__(self, item: Rolling) -> RollingHandle: ...
     @overload

@@ -27,6 +27,8 @@ escape = _above("wbc.explain", "escape")
 record = _above("wbc.record", "record")
 #: For :meth:`wbc.Stack.inverse_kinematics`: (stack, goals, back end) -> InverseKinematics
 inverse_kinematics = _above("wbc.ik", "InverseKinematics")
+#: For :meth:`wbc.Controller.batch`: (controller, count, threads) -> Batch
+batch = _above("wbc.batch", "Batch")
 #: For :meth:`wbc.Controller.export`: (controller, and its arguments) -> folder
 export = _above("wbc.export", "export")
 

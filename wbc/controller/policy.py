@@ -127,7 +127,7 @@ class Fallback:
 
     def _again(self) -> None:
         """Count accelerations from where the tick did."""
-        self._tick.v_last[:] = self._tick.v_in
+        self._given[0].rewind()
 
     def _brake(self, flag: int) -> int:
         self._again()
@@ -141,7 +141,8 @@ class Fallback:
         """Command the tick again, along ``way`` (radians and characteristic lengths, of length 1) at ``speed``;
         whether that has a certified answer. Otherwise the report is that of the tick.
         """
-        self._tick.v_last[:], before = self._tick.v_in, self._tick.report.copy()
+        before = self._tick.report.copy()
+        self._again()
         solver, dofs = self._link("daqp"), self._given[2].dof_scales(self._given[1])
         qp = solver.qp()
         ahead = np.zeros(qp.n)

@@ -86,8 +86,10 @@ class Step:
         """Velocities [rad/s, m/s], nv, read-only: the command, or where the command is an acceleration the velocity
         that it leads to until the next tick.
         """
-        if self._context.command == "velocity":
-            return self.command
+        context = self._context
+        if context.command == "velocity":
+            # As in `command`: every loop asks for this in every tick
+            return np.frombuffer(self._data, _FLOAT, context.nv)
         later = self._part("v_in")[: self._context.nv] + self._number("dt") * self.command
         later.flags.writeable = False
         return later
@@ -292,3 +294,10 @@ class Step:
         if self.relaxed:
             text += ", relaxed: " + ", ".join(str(s) for s in self.relaxed)
         return text + ")"
+
+
+def state_of(step: Step) -> bytes:
+    """A step's copy of its tick: report and inputs, laid out as :class:`wbc.stack.memory.Memory` says. With the
+    controller's :class:`Context` it is the step again, also in another process.
+    """
+    return step._data

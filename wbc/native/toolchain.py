@@ -144,7 +144,7 @@ def compile_tick(files: dict[str, str], output: pathlib.Path, search: bool = Fal
                 *TICK_FLAGS,
                 *include,
                 "-c",
-                "converge.c" if search else "tick.c",
+                "converge.c" if search else "library.c",
                 "-o",
                 "tick.o",
             ],

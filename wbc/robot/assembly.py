@@ -131,7 +131,10 @@ def neutral_configuration(
     """
     values: dict[str, Array] = {}
     where = "zero"
-    if recipe.state:
+    if not recipe.state:
+        # A base stands where the file draws it
+        values |= {k: v for k, v in states.get("qpos0", {}).items() if len(v) > 1 and _fits(model, k, v)}
+    else:
         validation.one_of("state", recipe.state, tuple(states))
         state = states[recipe.state]
         values |= {k: v for k, v in state.items() if _fits(model, k, v)}

@@ -23,6 +23,7 @@ from wbc.robot.sources.description import Description, with_base
 from wbc.robot.sources.dh import DHRow, read_dh
 from wbc.robot.sources.files import example_data_folder, read_xml
 from wbc.robot.sources.mjcf import read_mjcf
+from wbc.robot.sources.mjmodel import compiled, is_mjmodel, read_mjmodel
 from wbc.robot.sources.srdf import read_states
 from wbc.robot.sources.urdf import read_urdf
 
@@ -33,11 +34,13 @@ _FITTED = {"fit": "capsule", "spheres": "spheres", "convex": "convex"}
 
 
 def read(source: Any, base: str | None, recipe: Recipe) -> Description:
-    """The description in a URDF or MJCF file, a ``pin.Model``, or a sequence of :class:`DHRow`.
+    """The description in a URDF or MJCF file, a ``pin.Model``, a ``mujoco.MjModel`` or a sequence of :class:`DHRow`.
 
     Raises:
         RobotFileError: a file that is missing, unreadable or neither; ShapeError: something else altogether.
     """
+    if is_mjmodel(source):
+        return read_mjmodel(source, base)
     if isinstance(source, pin.Model):
         model, kind = with_base(pin.Model(source), base)
         return Description(model, kind)
@@ -51,7 +54,8 @@ def read(source: Any, base: str | None, recipe: Recipe) -> Description:
         raise RobotFileError("robot", str(path), f"neither URDF nor MJCF: the root element is <{tree.tag}>")
     if isinstance(source, Sequence) and source and all(isinstance(row, DHRow) for row in source):
         return read_dh(source, base)
-    raise ShapeError("robot", source, "expected a name, a path, a pin.Model or a sequence of DHRow")
+    expected = "expected a name, a path, a pin.Model, a mujoco.MjModel or a sequence of DHRow"
+    raise ShapeError("robot", source, expected)
 
 
 def build(
@@ -68,27 +72,40 @@ def build(
         WbcError: see ``wbc.robots.load``.
     """
     validation.one_of("shapes", shapes, SHAPES)
-    description = read(source, base, recipe)
-    return finish(description, recipe, shapes, package_dirs, limits or {})
+    try:
+        description, geometry = read(source, base, recipe), source if is_mjmodel(source) else None
+    except RobotFileError:
+        geometry = compiled(source)
+        if geometry is None:
+            raise
+        description = read_mjmodel(geometry, base)
+    return finish(description, recipe, shapes, package_dirs, limits or {}, geometry)
 
 
 def finish(
-    description: Description, recipe: Recipe, shapes: str, package_dirs: Iterable[Any], limits: Mapping[str, Any]
+    description: Description,
+    recipe: Recipe,
+    shapes: str,
+    package_dirs: Iterable[Any],
+    limits: Mapping[str, Any],
+    geometry: Any = None,
 ) -> Robot:
-    """The robot of a description: states, joints, limits, shapes."""
+    """The robot of a description: states, joints, limits, shapes (of a compiled model where there is no file)."""
     states = dict(description.states)
     if recipe.state:
         states |= read_states(example_data_folder() / recipe.srdf)
     if not recipe.state and "home" in states:
         recipe = replace(recipe, state="home")
     robot = override_limits(assemble(description, recipe, states), limits)
-    if shapes == "none" or not (robot.source or recipe.shapes):
+    if shapes == "none" or not (robot.source or recipe.shapes or geometry is not None):
         return robot
     if shapes in _FITTED:
-        return _with_pairs(fit_shapes(robot, kind=_FITTED[shapes], package_dirs=package_dirs), recipe)
+        fitted = fit_shapes(robot, kind=_FITTED[shapes], package_dirs=package_dirs, geometry=geometry)
+        return _with_pairs(fitted, recipe)
     if shapes == "auto" and recipe.shapes:
         return _with_pairs(_table_shapes(robot, recipe), recipe, recipe.pairs)
-    return _with_pairs(description_shapes(robot, package_dirs, exact=shapes == "exact"), recipe)
+    described = description_shapes(robot, package_dirs, exact=shapes == "exact", geometry=geometry)
+    return _with_pairs(described, recipe)
 
 
 def _table_shapes(robot: Robot, recipe: Recipe) -> Robot:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
@@ -17,6 +18,11 @@ from wbc.robot.limits import Limits
 from wbc.shapes import PlacedShape
 from wbc.symbolic.kinematics import WORLD, frame_index
 from wbc.validation import Array
+
+log = logging.getLogger("wbc")
+
+#: How MuJoCo writes an upright base: as x, y, z, w half a turn about x
+MUJOCO_UPRIGHT = (1.0, 0.0, 0.0, 0.0)
 
 BASES = ("fixed", "floating", "planar", "differential")
 
@@ -191,6 +197,8 @@ class Robot:
         out = validation.real_array(field_name, q, (self.nq,))
         if not pin.isNormalized(self.model, out, validation.ROTATION_TOLERANCE):
             raise RotationError(field_name, q, "a quaternion or (cos, sin) pair is not of unit length")
+        if self.base == "floating" and np.array_equal(out[3:7], MUJOCO_UPRIGHT):
+            log.warning("%s: the base is upside down; quaternions are x, y, z, w, MuJoCo's w, x, y, z", field_name)
         return out
 
     def pose(self, q: Any, frame: str, relative_to: str = WORLD) -> pin.SE3:

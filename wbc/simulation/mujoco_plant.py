@@ -8,19 +8,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pinocchio as pin
 
-from wbc.errors import RangeError, UnsupportedJointError
+from wbc.errors import RangeError
 from wbc.robot import Robot
+from wbc.robot.mujoco_joints import MujocoJoints
 from wbc.robot.robot import checked_robot
+from wbc.robot.sources.mjmodel import BALL, FREE, TO_JOINT
 from wbc.simulation.plant import Command, CommandKind, PlantState
 from wbc.validation import Array, one_of
 
 if TYPE_CHECKING:
     import mujoco
-
-#: Numbers of a joint in qpos and in qvel, by MuJoCo's type: free, ball, slide, hinge
-SIZES = {0: (7, 6), 1: (4, 3), 2: (1, 1), 3: (1, 1)}
-#: A quaternion w, x, y, z from one x, y, z, w, and the reverse
-TO_MUJOCO, TO_PINOCCHIO = [3, 0, 1, 2], [1, 2, 3, 0]
 
 
 class MujocoPlant:
@@ -45,7 +42,7 @@ class MujocoPlant:
 
     Raises:
         ModuleNotFoundError: ``pip install wbc[mujoco]`` is to be done.
-        UnknownNameError: a joint that the model does not have. UnsupportedJointError: it has it with other numbers.
+        WbcError: as of :class:`wbc.robots.MujocoJoints`.
         RangeError: no actuator that drives a joint of the robot.
     """
 
@@ -56,31 +53,19 @@ class MujocoPlant:
         self._model, self._robot = model, checked_robot(robot)
         self.data = mujoco.MjData(model)
         self.nq, self.nv, self.time_step = robot.nq, robot.nv, float(model.opt.timestep)
-        names = {model.joint(j).name: j for j in range(model.njnt)}
-        #: For each joint: where its numbers begin, in qpos, qvel, q and v, and how many these are there
-        self._places: list[tuple[int, int, int, int, int, int]] = []
-        for k, name in enumerate(robot.joint_names, start=1):
-            j = names[one_of("robot.joint_names", name, names)]
-            pins = int(robot.model.nqs[k]), int(robot.model.nvs[k])
-            if pins not in (SIZES[int(model.jnt_type[j])], (2, 1)):
-                raise UnsupportedJointError(
-                    "model", name, f"it has {SIZES[int(model.jnt_type[j])]} numbers, the robot's joint {pins}"
-                )
-            starts = int(robot.model.idx_qs[k]), int(robot.model.idx_vs[k])
-            self._places.append((int(model.jnt_qposadr[j]), int(model.jnt_dofadr[j]), *starts, *pins))
-        self._actuators = self._driven(names)
+        self._joints = MujocoJoints(model, robot)
+        self._actuators = self._driven()
         if not self._actuators:
             raise RangeError("model", int(model.nu), "no actuator of the model drives a joint of the robot")
         self.commands: Collection[CommandKind] = tuple(self._actuators)
         self.reset(robot.neutral, 0.0)
 
-    def _driven(self, names: dict[str, int]) -> dict[CommandKind, tuple[Array, Array, Array]]:
+    def _driven(self) -> dict[CommandKind, tuple[Array, Array, Array]]:
         """For each kind of command: actuators, velocity coordinates, and ctrl for 1 there."""
-        m, robot, found = self._model, self._robot, dict[CommandKind, list[tuple[int, int, float]]]()
-        joints = {names[name]: k for k, name in enumerate(robot.joint_names, start=1)}
+        m, found, columns = self._model, dict[CommandKind, list[tuple[int, int, float]]](), self._joints.columns
         for a in range(m.nu):
-            k = joints.get(int(m.actuator_trnid[a, 0]), 0) if int(m.actuator_trntype[a]) in (0, 1) else 0
-            if k == 0 or int(robot.model.nvs[k]) != 1:
+            joint = int(m.actuator_trnid[a, 0])
+            if int(m.actuator_trntype[a]) not in TO_JOINT or joint not in columns or m.jnt_type[joint] in (FREE, BALL):
                 continue
             gain, (_, on_q, on_v) = float(m.actuator_gainprm[a, 0]), m.actuator_biasprm[a, :3]
             kind = CommandKind.TORQUE
@@ -88,14 +73,15 @@ class MujocoPlant:
                 kind = CommandKind.POSITION if on_q != 0.0 else CommandKind.VELOCITY
             gear = float(m.actuator_gear[a, 0])
             scale = 1.0 / (gear * gain) if kind is CommandKind.TORQUE else gear
-            found.setdefault(kind, []).append((a, int(robot.model.idx_vs[k]), scale))
-        columns = {kind: np.array(rows).T for kind, rows in found.items()}
-        return {kind: (a.astype(int), dof.astype(int), scale) for kind, (a, dof, scale) in columns.items()}
+            found.setdefault(kind, []).append((a, columns[joint], scale))
+        made = {kind: np.array(rows).T for kind, rows in found.items()}
+        return {kind: (a.astype(int), dof.astype(int), scale) for kind, (a, dof, scale) in made.items()}
 
     def reset(self, q: Array, time: float, v: Array | None = None) -> None:
         """At a configuration, at rest or with a velocity; position actuators hold it."""
         self._clear(self._model, self.data)
-        self._write(np.asarray(q, dtype=float), np.zeros(self.nv) if v is None else np.asarray(v, dtype=float))
+        self._joints.put_q(self.data.qpos, q)
+        self._joints.put_v(self.data.qvel, q, np.zeros(self.nv) if v is None else v)
         self.data.time = time
         if CommandKind.POSITION in self._actuators:
             self.apply(Command(CommandKind.POSITION, np.asarray(q, dtype=float)))
@@ -103,33 +89,9 @@ class MujocoPlant:
 
     def read(self) -> PlantState:
         """Where the joints are; not valid where the simulation has blown up."""
-        q, v, data = np.empty(self.nq), np.empty(self.nv), self.data
-        for at, dof, start, column, nq, nv in self._places:
-            here, rate = data.qpos[at : at + max(nq, 1)], data.qvel[dof : dof + nv]
-            if nq == 2:
-                q[start : start + 2] = np.cos(here[0]), np.sin(here[0])
-            elif nq == 7:
-                q[start : start + 3], q[start + 3 : start + 7] = here[:3], here[3:][TO_PINOCCHIO]
-                v[column : column + 3] = _rotation(q[start + 3 : start + 7]).T @ rate[:3]
-                v[column + 3 : column + 6] = rate[3:]
-                continue
-            else:
-                q[start : start + nq] = here[TO_PINOCCHIO] if nq == 4 else here
-            v[column : column + nv] = rate
-        return PlantState(q, v, float(data.time), valid=bool(np.isfinite(q).all() and np.isfinite(v).all()))
-
-    def _write(self, q: Array, v: Array) -> None:
         data = self.data
-        for at, dof, start, column, nq, nv in self._places:
-            here, rate = q[start : start + nq], v[column : column + nv].copy()
-            if nq == 2:
-                data.qpos[at] = np.arctan2(here[1], here[0])
-            elif nq == 7:
-                data.qpos[at : at + 7] = [*here[:3], *here[3:][TO_MUJOCO]]
-                rate[:3] = _rotation(here[3:]) @ rate[:3]
-            else:
-                data.qpos[at : at + nq] = here[TO_MUJOCO] if nq == 4 else here
-            data.qvel[dof : dof + nv] = rate
+        q, v = self._joints.q(data.qpos), self._joints.v(data.qpos, data.qvel)
+        return PlantState(q, v, float(data.time), valid=bool(np.isfinite(q).all() and np.isfinite(v).all()))
 
     def apply(self, command: Command) -> None:
         """Write a command to the actuators of its kind.
@@ -148,7 +110,3 @@ class MujocoPlant:
         """Let whole time steps of the model go by [s]."""
         for _ in range(round(dt / self.time_step)):
             self._step(self._model, self.data)
-
-
-def _rotation(quaternion: Array) -> Array:
-    return np.asarray(pin.Quaternion(quaternion).toRotationMatrix())

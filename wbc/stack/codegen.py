@@ -24,7 +24,6 @@ from wbc.stack.tables import (
     rate_table,
     reported_slacks,
     stops,
-    torque_dofs,
 )
 from wbc.symbolic.kinematics import Kinematics
 
@@ -138,7 +137,8 @@ def _soft(stack: Declaration, layout: Layout) -> list[str]:
         f"#define KEPT {int(max(kept_rows(layout), default=-1) >= 0)}",
         _table("int", "kept_of", kept_rows(layout)),
         _table("int", "price_at", layout.price_at),
-        _table("int", "torque_dof", torque_dofs(stack, layout)),
+        f"#define SLEWED {len(layout.slewed[0])}",
+        *(_table("int", name, each) for name, each in zip(("slewed_at", "slewed_dof"), layout.slewed, strict=True)),
         _table("double", "slack_reported", reported_slacks(stack, layout)),
     ]
 

@@ -30,6 +30,7 @@ from wbc.tasks.base import Command, Constraint, Item, SacrificeOrder, Task
 from wbc.tasks.damping import Damping
 from wbc.tasks.mechanism import Mechanism
 from wbc.tasks.moving_frame import MovingFrame
+from wbc.tasks.wrench_sum import WrenchSum
 
 #: Default cost of velocity against a task row of weight 1, per (rad/s)^2: keeps the optimum unique.
 #: It biases a posture task of weight w by the fraction damping / w.
@@ -188,9 +189,13 @@ class Declaration:
             self._damping = max(LEAST_DAMPING, self._damping * 1e-3)
         added = [Entry(Damping(gain=REST), rest, last + 1 if cascade else last, weight)]
         if self._command == "torque":
+            contacts = [entry.name for entry in self.entries if isinstance(entry.item, Contact)]
             if self._robot.base == "floating":
                 added.append(Entry(Unactuated(), self._free_name("base"), 0, 1.0))
             for entry in self.entries:
+                if isinstance(entry.item, WrenchSum):
+                    for name in entry.item.contacts:
+                        validation.one_of(f"{entry.name}.contacts", name, contacts)
                 if isinstance(entry.item, Contact):
                     name = entry.name
                     added.append(Entry(ContactWrench(name, entry.item), self._free_name(f"{name} wrench"), 0, 1.0))

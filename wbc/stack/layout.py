@@ -13,6 +13,8 @@ from wbc.tasks import inputs
 from wbc.tasks._contact import Contact, ContactWrench, force_sizes
 from wbc.tasks._direction import Direction
 from wbc.tasks.base import Constraint, Form, Input, Row, Task
+from wbc.tasks.torque_limits import TorqueLimits
+from wbc.tasks.wrench_sum import WrenchSum
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,6 +74,8 @@ class Layout:
         share_rows: task row -> the share of a scaled task; such a row counts for nothing, and its error is the speed
             that is asked for.
         nothing: an offset in the parameters that holds 0, where there are shares.
+        slewed: places in the parameters of torques of the last command that may change only so fast, and their degrees
+            of freedom.
     """
 
     def __init__(self, stack: Declaration) -> None:
@@ -93,6 +97,7 @@ class Layout:
         self.row_levels: list[int] = []
         self.price_at: list[int] = []
         self.share_rows: dict[int, int] = {}
+        self.slewed: tuple[list[int], list[int]] = ([], [])
         self._ends: list[int] = []
         self.cascade = len(self.levels) > 1 or any(e.level > 0 and e.price is None for e in stack.constraints)
         shares: dict[str, int] = {}
@@ -147,6 +152,10 @@ class Layout:
             size = inputs.size(robot, declared_input)
             slots[declared_input.name] = Slot(declared_input, self.parameters, size)
             self.parameters += size
+        if isinstance(item, TorqueLimits) and item.slew is not None:
+            last = slots["last"]
+            self.slewed[0].extend(range(last.start, last.start + last.size))
+            self.slewed[1].extend(item.dofs(robot))
         margin = -1
         if form == "task":
             start, self.task_rows = self.task_rows, self.task_rows + len(rows)
@@ -217,7 +226,9 @@ def _gains(gain: float) -> list[Input]:
 
 def _on_forces(item: Constraint, rows: tuple[Row, ...]) -> bool:
     """Whether rows are on forces, which have no rate, or there are none."""
-    return not rows or isinstance(item, ContactWrench) or type(item).torque_rows is not Constraint.torque_rows
+    return (
+        not rows or isinstance(item, (ContactWrench, WrenchSum)) or type(item).torque_rows is not Constraint.torque_rows
+    )
 
 
 def rate_unit(unit: str, command: str) -> str:

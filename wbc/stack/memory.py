@@ -104,7 +104,7 @@ INPUTS = (
 )
 #: Of accelerations
 REST_INPUTS = (
-    Field("kept", ("NV",), "wrenches of the last tick with an answer, which one without keeps; 0 for joints"),
+    Field("kept", ("NV",), "torques of the last command, 1e30: unknown; wrenches of the last tick with an answer"),
 )
 QP_FIELDS = (
     Field("H", ("NV", "WIDE"), "upper triangle, row by row"),
@@ -116,7 +116,6 @@ QP_FIELDS = (
     Field("desired", ("MT",), "rate that each task row asks for", True),
     Field("free_low", ("MC",), "bounds of the general rows before relaxation", True),
     Field("free_high", ("MC",), "", True),
-    Field("given", ("4", "4"), "a pose to be written into p: a homogeneous matrix, row by row"),
     Field("give", ("MC",), "by how much a soft row gives way per multiplier; 0 for hard rows", True),
 )
 

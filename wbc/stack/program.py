@@ -21,8 +21,8 @@ curvature of the errors of the first level's tasks for a weight ``force`` on eac
 robot's links; see :mod:`wbc.symbolic.curvature`.
 
 Of a stack that commands accelerations or torques the variables are a, and the wrenches of contacts, in place of v: see
-:mod:`wbc.stack.second`. Then ``torque(q, v, p, dt, x)`` are the torques of the joints, and ``ahead`` takes the mean
-velocity until the next tick.
+:mod:`wbc.stack.second`. Then ``torque(q, v, p, dt, x, enabled)`` are the torques of the joints, and ``ahead`` takes the
+mean velocity until the next tick.
 
 For a compiled tick the rows of :meth:`Constraint.ball_rows` are left to the loop in ``native/balls.h``: here they have
 no entries, and ``low`` and ``margin`` are 0. Sensed rows have no entries either (``native/sensed.h``). Both need:
@@ -335,9 +335,9 @@ def build(stack: Declaration, layout: Layout, loops: bool = False) -> TickProgra
         second = checked_function("curvature", [*inputs, b.force], [upper], ["curvature"])
     torque = None
     if b.second is not None and stack.command == "torque":
-        most = b.second.most(layout.of_form("margins", "rows"))
-        found = [ca.densify(b.second.torque), ca.densify(most)]
-        torque = checked_function("torque", [*inputs, b.second.x], found, ["torque", "most"])
+        enabled = ca.SX.sym("enabled", layout.general_rows)
+        found = [ca.densify(b.second.torque(enabled))]
+        torque = checked_function("torque", [*inputs, b.second.x, enabled], found, ["torque"])
     return TickProgram(rows, ahead, second, torque, balls, sensed)
 
 
@@ -356,7 +356,7 @@ def sparsity_rows(transposed: ca.Sparsity) -> tuple[np.ndarray, np.ndarray]:
 
 
 def checked_function(name: str, inputs: list[ca.SX], outputs: list[ca.SX], labels: list[str]) -> ca.Function:
-    """A function of (q, v, p, dt, more), as many of them as there are inputs.
+    """A function of (q, v, p, dt, more, enabled), as many of them as there are inputs.
 
     Raises:
         ShapeError: symbols that are no inputs.
@@ -366,4 +366,4 @@ def checked_function(name: str, inputs: list[ca.SX], outputs: list[ca.SX], label
     stray = [s.name() for s in free if s.__hash__() not in known]
     if stray:
         raise ShapeError(f"stack.{name}", stray, "an item's expression contains symbols that are not its inputs")
-    return ca.Function(name, inputs, ca.cse(outputs), ["q", "v", "p", "dt", "more"][: len(inputs)], labels)
+    return ca.Function(name, inputs, ca.cse(outputs), ["q", "v", "p", "dt", "more", "enabled"][: len(inputs)], labels)

@@ -23,11 +23,16 @@ from wbc.stack.layout import CLOSED, Block, Layout, Slot
 from wbc.symbolic.kinematics import Kinematics, Pose
 from wbc.symbolic.motion import Motion
 from wbc.symbolic.tracer import Tracer, along
-from wbc.tasks._contact import Contact, ContactForce, ContactWrench
+from wbc.tasks._contact import Contact, ContactForce, ContactWrench, Unactuated
 from wbc.tasks.base import Constraint, Rows, Task
+from wbc.tasks.wrench_sum import WrenchSum
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+
+
+#: Torque of a motor without a limit [N m]; a number, as zero times infinity is none
+UNLIMITED = 1e300
 
 
 class Builder(Protocol):
@@ -80,18 +85,22 @@ class SecondOrder:
         assert isinstance(item, Task)
         b, robot, count = self._b, self._robot, len(block.rows)
         if isinstance(item, ContactForce):
-            target = b.p[block.slots["target"].span]
+            target, measured, feedback = (b.p[block.slots[name].span] for name in ("target", "measured", "feedback"))
+            wanted = target + feedback * (target - measured)
             rows = ca.SX(count, self._layout.variables)
             rows[:, self._layout.forces[item.of]] = ca.SX.eye(count)
-            return -target, target, ca.SX.ones(count), rows
+            return -wanted, wanted, ca.SX.ones(count), rows
         tracer, inputs = b.tracer(block), b.values(block)
         error = b.column(block, "error", item.error(robot, tracer, inputs))
         own = item.jacobian(robot, tracer, inputs)
         rate, bias = tracer.second(error, self._motion, own, self._moving(block))
         jacobian = tracer.jacobian(error) if own is None else tracer.expand(ca.SX(own))[:, : robot.nv]
-        stiffness, damping = (b.p[block.slots[name].span] for name in ("stiffness", "damping"))
         value = tracer.expand(error)
-        desired = -stiffness * value - damping * rate - bias
+        asked = item.acceleration(inputs, value, rate)
+        if asked is None:
+            stiffness, damping = (b.p[block.slots[name].span] for name in ("stiffness", "damping"))
+            asked = -stiffness * value - damping * rate
+        desired = asked - bias
         fade = item.row_factor(robot, tracer, inputs)
         factor = ca.SX.ones(count) if fade is None else b.column(block, "row_factor", fade)
         return value, desired, tracer.expand(factor), self._wide(jacobian)
@@ -106,11 +115,16 @@ class SecondOrder:
             wide = ca.SX(len(block.rows), self._layout.variables)
             wide[:, self._layout.forces[item.of]] = cone.matrix
             return Rows(wide, cone.lower, cone.upper), None, None
-        torques = item.torque_rows(robot, inputs)
+        torques = item.torque_rows(robot, inputs, self._b.dt)
         if torques is not None:
-            dofs = list(torques.dofs)
-            still = self._still[dofs]
-            return Rows(self._dynamics[dofs, :], torques.lower - still, torques.upper - still), None, None
+            still, moving = self._still[list(torques.dofs)], self._dynamics[list(torques.dofs), :]
+            if torques.drives is not None:
+                drives = ca.SX(ca.DM(torques.drives))
+                still, moving = drives @ still, drives @ moving
+            return Rows(moving, torques.lower - still, torques.upper - still), None, None
+        if isinstance(item, WrenchSum):
+            target = self._b.p[block.slots["target"].span]
+            return Rows(self._sum(item, block), target, target), None, None
         if not block.rows:
             return Rows(ca.SX(0, self._layout.variables), ca.SX(0, 1), ca.SX(0, 1)), None, None
         if block.form == "rows":
@@ -139,10 +153,11 @@ class SecondOrder:
             ),
         )
         rate = b.p[block.slots["rate"].span]
+        speed = drift = None
         if isinstance(item, Contact) and not block.entry.frame:
             turn, inputs = self._kinematics.pose(item.frame).rotation, b.values(block)
             speed, drift = (item.still(inputs, turn, part) for part in self._motion.frame(item.frame))
-        else:
+        if speed is None or drift is None:
             speed = ca.densify(along(matrix, self._kinematics.v))
             drift = self._along(speed, block)
         ends = []
@@ -224,6 +239,20 @@ class SecondOrder:
             out.append(closed * (ca.sparsify(units) @ self._kinematics.jacobian(item.frame, "local")))
         return out
 
+    def _sum(self, item: WrenchSum, block: Block) -> ca.SX:
+        """6 x variables: what the wrenches of some contacts add up to, in the world's axes about a point."""
+        out, point = ca.SX(6, self._layout.variables), self._b.p[block.slots["point"].span]
+        for name in item.contacts:
+            contact = self._layout.blocks[name]
+            own = contact.entry.item
+            assert isinstance(own, Contact)
+            units = own.unit_wrenches(self._b.values(contact), *self._seen(contact, own.frame)).T
+            pose = self._kinematics.pose(own.frame)
+            force, moment = pose.rotation @ units[:3, :], pose.rotation @ units[3:, :]
+            moment += ca.skew(pose.position - point) @ force
+            out[:, self._layout.forces[name]] = self._b.p[contact.slots[CLOSED].span] * ca.vertcat(force, moment)
+        return ca.sparsify(out)
+
     def _seen(self, block: Block, frame: str) -> tuple[ca.SX, ca.SX]:
         """Rotation and twist of a frame as the item sees them, from the world or from the frame it is stated in."""
         tracer = self._b.tracer(block)
@@ -232,24 +261,35 @@ class SecondOrder:
             return rotation, self._motion.frame(frame)[0]
         return rotation, tracer.expand(along(tracer.frame_jacobian(frame), self._kinematics.v))
 
-    def most(self, blocks: Sequence[Block]) -> ca.SX:
-        """The largest torque that each general row allows, infinite for rows on other things."""
-        parts = []
-        for block in blocks:
-            item = block.entry.item
-            limits = item.torque_rows(self._robot, self._b.values(block)) if isinstance(item, Constraint) else None
-            parts.append(ca.SX.inf(len(block.rows)) if limits is None else limits.upper)
-        return ca.vertcat(ca.SX(0, 1), *parts)
+    def torque(self, enabled: ca.SX) -> ca.SX:
+        """Torques of the motors at the variables :attr:`x`, by one recursion: M a + h - J'w, 0 for a floating base;
+        within their limits also where a tick has no answer, and not beyond them by rounding.
 
-    @property
-    def torque(self) -> ca.SX:
-        """Torques of the motors at the variables :attr:`x`, by one recursion: M a + h - J'w, 0 for a floating base."""
+        Args:
+            enabled: 1 or 0 for each general row.
+        """
         nv = self._layout.nv
         dynamics = self._motion.dynamics
         tau = ca.substitute(dynamics.inverse_dynamics, dynamics.a, self.x[:nv])
         for jacobian, span in zip(self._contacts(), self._layout.forces.values(), strict=True):
             tau -= jacobian.T @ self.x[span]
         tau = self._driven @ (tau - self._loads)
+        for block in self._layout.of_form("margins", "rows"):
+            item = block.entry.item
+            limits = (
+                item.torque_rows(self._robot, self._b.values(block), self._b.dt)
+                if isinstance(item, Constraint)
+                else None
+            )
+            if limits is None or isinstance(item, Unactuated):
+                continue
+            dofs, on = list(limits.dofs), enabled[block.span]
+            low, high = (ca.if_else(on, end, s * UNLIMITED) for end, s in ((limits.lower, -1.0), (limits.upper, 1.0)))
+            if limits.drives is None:
+                tau[dofs] = ca.fmin(ca.fmax(tau[dofs], low), high)
+            else:
+                own = ca.SX(ca.DM(limits.drives)) @ tau[dofs]
+                tau[dofs] = ca.SX(ca.DM(np.linalg.inv(limits.drives))) @ ca.fmin(ca.fmax(own, low), high)
         if self._robot.base == "floating":
             tau[:6] = 0.0
         return tau

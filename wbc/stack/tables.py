@@ -9,7 +9,6 @@ from wbc.stack.layout import Layout
 from wbc.stack.program import TickProgram
 from wbc.tasks._direction import Direction
 from wbc.tasks.base import Constraint, Row
-from wbc.tasks.torque_limits import TorqueLimits
 
 #: What a direction that a level leaves to later ones may cost its rows at full joint speed, in their unit per second
 DISTURBANCE = 1e-6
@@ -31,7 +30,7 @@ def gain_table(layout: Layout) -> list[int]:
     """Where the gain of each task row is in the parameters."""
     slots = [layout.nothing] * layout.task_rows
     for block in layout.of_form("task"):
-        gain = block.slots["gain" if layout.command == "velocity" else "stiffness"]
+        gain = block.slots.get("stiffness") or block.slots["gain"]
         slots[block.span] = [gain.start] * len(block.rows)
     return slots
 
@@ -115,13 +114,3 @@ def stops(stack: Declaration, layout: Layout) -> tuple[list[int], np.ndarray, np
         lower[: layout.nv] = np.maximum(lower[: layout.nv], below)
         upper[: layout.nv] = np.minimum(upper[: layout.nv], above)
     return slots, lower, upper
-
-
-def torque_dofs(stack: Declaration, layout: Layout) -> list[int]:
-    """The degree of freedom whose torque each general row limits, -1 for other rows."""
-    out = [-1] * layout.general_rows
-    for block in layout.of_form("rows"):
-        item = block.entry.item
-        if isinstance(item, TorqueLimits) and layout.command == "torque":
-            out[block.span] = item.dofs(stack.robot)
-    return out

@@ -3,6 +3,7 @@
 from wbc.symbolic.dynamics import Centroidal, Dynamics
 from wbc.symbolic.kinematics import WORLD, Kinematics, Pose
 from wbc.symbolic.tracer import Tracer
+from wbc.symbolic.two_velocities import TwoVelocityDynamics
 from wbc.symbolic.velocity import Velocities
 
-__all__ = ["WORLD", "Centroidal", "Dynamics", "Kinematics", "Pose", "Tracer", "Velocities"]
+__all__ = ["WORLD", "Centroidal", "Dynamics", "Kinematics", "Pose", "Tracer", "TwoVelocityDynamics", "Velocities"]

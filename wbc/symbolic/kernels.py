@@ -161,3 +161,46 @@ def point_columns(columns: int) -> Step:
     i, j = [1, 2, 0], [2, 0, 1]
     moved = linear - arms[i, :] * angular[j, :] + arms[j, :] * angular[i, :]
     return ca.Function("point_columns", [point, origins, linear, angular], [moved])
+
+
+def _motion_cross(u: tuple[ca.SX, ca.SX], m: tuple[ca.SX, ca.SX]) -> tuple[ca.SX, ca.SX]:
+    """u x m of twists (angular, linear)."""
+    return ca.cross(u[0], m[0]), ca.cross(u[0], m[1]) + ca.cross(u[1], m[0])
+
+
+@cache
+def reference_step() -> Step:
+    """(R, p, alpha, a, wc, vc, s, u, sd, ud) -> rates of the components of a twist that moves with the bodies.
+
+    d/dt of w' = R'w + .., v' = R'(v + w x p) + ..: alpha, a: the parent's rates; wc, vc: the parent's twist in child
+    axes; s, u: the joint's true twist, which turns them; sd, ud: rates of the joint's own part.
+    """
+    (r,), (p, alpha, a, wc, vc, s, u, sd, ud) = _inputs(("R", 3, 3)), _vectors("p alpha a wc vc s u sd ud")
+    turned, shifted = _motion_cross((wc, vc), (s, u))
+    outputs = [r.T @ alpha + turned + sd, r.T @ (a + ca.cross(alpha, p)) + shifted + ud]
+    return ca.Function("reference_step", [r, p, alpha, a, wc, vc, s, u, sd, ud], outputs)
+
+
+@cache
+def two_velocity_wrench() -> Step:
+    """(phi, alpha, a, w, v, wr, vr) -> force, moment: I A + (V x* I Vr + Vr x* I V + I (V x Vr)) / 2.
+
+    A = (alpha, a): rates of the components of Vr = (wr, vr); V = (w, v): the true twist; phi: mass, first moment and
+    inertia about the origin (xx, xy, yy, xz, yz, zz). The second part is skew in Vr, whatever V and phi.
+    """
+    phi, (alpha, a, w, v, wr, vr) = ca.SX.sym("phi", 10), _vectors("alpha a w v wr vr")
+    m, h = phi[0], phi[1:4]
+    xx, xy, yy, xz, yz, zz = (phi[k] for k in range(4, 10))
+    inertia = ca.vertcat(ca.horzcat(xx, xy, xz), ca.horzcat(xy, yy, yz), ca.horzcat(xz, yz, zz))
+
+    def momentum(twist: tuple[ca.SX, ca.SX]) -> tuple[ca.SX, ca.SX]:
+        return m * twist[1] + ca.cross(twist[0], h), inertia @ twist[0] + ca.cross(h, twist[1])
+
+    def turned(twist: tuple[ca.SX, ca.SX], carried: tuple[ca.SX, ca.SX]) -> tuple[ca.SX, ca.SX]:
+        force, moment = momentum(carried)
+        return ca.cross(twist[0], force), ca.cross(twist[1], force) + ca.cross(twist[0], moment)
+
+    true, reference = (w, v), (wr, vr)
+    pairs = zip(turned(true, reference), turned(reference, true), momentum(_motion_cross(true, reference)), strict=True)
+    outputs = [own + 0.5 * sum(some) for own, some in zip(momentum((alpha, a)), pairs, strict=True)]
+    return ca.Function("two_velocity_wrench", [phi, alpha, a, w, v, wr, vr], outputs)

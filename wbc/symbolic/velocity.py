@@ -55,7 +55,7 @@ class AccelerationField:
         if known is None:
             kin = self._motion.kinematics
             columns = kin.joint_columns(joint)
-            rate = kin.symbolic(joint).bias(kin.joint_q(joint), kin.v[columns])
+            rate = kin.symbolic(joint).bias(kin.joint_q(joint), self._motion.rates[columns])
             angular, linear = _pair(rate)
             if self._given is not None:
                 step = kernels.joint_velocity(columns.stop - columns.start)
@@ -102,10 +102,15 @@ class AccelerationField:
 
 
 class Velocities:
-    """Velocities and bias accelerations of one :class:`Kinematics`, as expressions in its q and v."""
+    """Velocities and bias accelerations of one :class:`Kinematics`, as expressions in its q and v.
 
-    def __init__(self, kinematics: Kinematics) -> None:
+    Args:
+        rates: joint velocities in place of its v, nv numbers.
+    """
+
+    def __init__(self, kinematics: Kinematics, rates: ca.SX | None = None) -> None:
         self.kinematics = kinematics
+        self.rates = kinematics.v if rates is None else rates
         self._joint: dict[int, tuple[ca.SX, ca.SX]] = {}
         self._bodies: dict[int, tuple[ca.SX, ca.SX]] = {0: (_ZERO, _ZERO)}
         #: Accelerations at zero joint acceleration, without gravity.
@@ -117,7 +122,7 @@ class Velocities:
         if known is None:
             columns = self.kinematics.joint_columns(joint)
             step = kernels.joint_velocity(columns.stop - columns.start)
-            known = step(*self.kinematics.joint_subspace(joint), self.kinematics.v[columns])
+            known = step(*self.kinematics.joint_subspace(joint), self.rates[columns])
             self._joint[joint] = known
         return known
 

@@ -100,16 +100,15 @@ def _shade(panel: Any, values: Array, low: float, high: float) -> None:
 
 def _errors(plt: Any, log: Log) -> Any:
     """Position and rotation error of the frame, and of the elbow plane where there is one."""
-    curves = [
-        ("position error [mm]", 1e3 * position_errors(log), style.BLUE),
-        ("rotation error [deg]", np.degrees(rotation_angles(log)), style.PURPLE),
-    ]
+    curves = [("position error [mm]", 1e3 * position_errors(log), style.BLUE)]
+    if log.meta.get("kind") != "position":
+        curves.append(("rotation error [deg]", np.degrees(rotation_angles(log)), style.PURPLE))
     if "plane.command" in log:
         curves.append(("elbow plane error [deg]", np.degrees(log["error.plane.plane"]), style.ORANGE))
     figure, axes = plt.subplots(
-        len(curves), 1, figsize=(9.2, 1.9 * len(curves) + 0.8), sharex=True, layout="constrained"
+        len(curves), 1, figsize=(9.2, 1.9 * len(curves) + 0.8), sharex=True, layout="constrained", squeeze=False
     )
-    for panel, (label, values, colour) in zip(axes, curves, strict=True):
+    for panel, (label, values, colour) in zip(axes[:, 0], curves, strict=True):
         panel.plot(log["t"], values, color=colour)
         panel.set_ylabel(label)
         panel.margins(x=0.01)

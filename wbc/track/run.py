@@ -106,8 +106,10 @@ def _loop(
             break
         t = k * dt
         target, middle = plan.path.sample(t).pose, plan.path.sample(t + dt / 2).twist
-        controller["hand"].target = target
-        controller["hand"].feedforward = middle
+        if plan.kind == "position":
+            controller["hand"].set(target=target.translation, feedforward=middle[:3])
+        else:
+            controller["hand"].set(target=target, feedforward=middle)
         angle = math.nan
         if plan.plane is not None:
             angle = rest + plan.plane.at(t, duration)[0]
@@ -137,6 +139,7 @@ def _meta(plan: PathRun, controller: Controller, recorder: RunRecorder, compile_
         "robot": robot.name,
         "source": robot.source,
         "frame": plan.frame,
+        "kind": plan.kind,
         "path": plan.label,
         "duration": plan.path.duration,
         "ticks": recorder.count,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import warnings
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pinocchio as pin
@@ -21,6 +21,8 @@ from wbc.validation import Array
 #: Angle 0 of the elbow plane is "elbow up" for an arm that reaches forward: the plane is vertical, the elbow above.
 REFERENCE = tasks.PlaneReference(pole=(1.0, 0.0, 0.0), direction=(0.0, 0.0, 1.0))
 
+#: What of the hand follows a path
+KINDS = ("pose", "position")
 #: Weights of the tasks: the plane costs far less than the hand and the posture far less than the plane, so that
 #: what cannot all be had is lost in that order.
 WEIGHTS = {"hand": 1.0, "plane": 1e-4, "posture": 1e-6}
@@ -86,7 +88,7 @@ class PathRun:
         approach: rate of the obstacles' rows [1/s]; a lower one brakes earlier. Cut to what ``dt`` allows.
         plane: command of the elbow plane, or None for none.
         holds: frames that must not move (the feet of a humanoid).
-        gain: of the hand [1/s].
+        gain: of the hand [1/s]. kind: "pose", or "position" for a hand that may turn as it likes.
         solver, backend: see :meth:`wbc.Stack.compile`.
     """
 
@@ -102,6 +104,7 @@ class PathRun:
     plane: ElbowSwing | None = None
     holds: tuple[str, ...] = ()
     gain: float = 10.0
+    kind: Literal["pose", "position"] = "pose"
     solver: str = "daqp"
     backend: str = "auto"
 
@@ -116,6 +119,7 @@ class PathRun:
         for frame in validation.items("holds", self.holds, "frames"):
             self.robot.check_frame("holds", frame)
         object.__setattr__(self, "label", validation.name("label", self.label))
+        validation.one_of("kind", self.kind, KINDS)
         validation.scalar("dt", self.dt, low=0.0, open_low=True, unit="s")
         validation.scalar("margin", self.margin, low=0.0, unit="m")
         validation.scalar("approach", self.approach, low=0.0, open_low=True, unit="1/s")
@@ -134,7 +138,8 @@ class PathRun:
         """
         robot = self.robot
         stack = Stack(robot, dt=self.dt)
-        stack.add(tasks.EndEffector(self.frame, gain=self.gain), name="hand", weight=WEIGHTS["hand"])
+        hand = tasks.EndEffector(self.frame, kind=self.kind, gain=self.gain)
+        stack.add(hand, name="hand", weight=WEIGHTS["hand"])
         if self.plane is not None:
             stack.add(plane_task(robot), name="plane", weight=WEIGHTS["plane"])
         stack.add(tasks.Posture(), name="posture", weight=WEIGHTS["posture"])

@@ -85,6 +85,8 @@ def _tracking(log: Log) -> list[Figure]:
         ("position_error", "position error", position, 1e3, "mm"),
         ("rotation_error", "rotation error", np.degrees(angle), 1.0, "deg"),
     ):
+        if key == "rotation_error" and log.meta.get("kind") == "position":
+            continue
         text = f"max {factor * values.max():.3g} {unit}, rms {factor * _rms(values):.3g} {unit}"
         stored = values if unit == "mm" else np.radians(values)
         out.append(Figure(key, label, {"max": float(stored.max()), "rms": _rms(stored)}, text))

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
+from wbc.errors import SolverError
 from wbc.qp.problem import QP
 from wbc.tasks.base import Command
 from wbc.validation import Array
@@ -64,7 +66,8 @@ class Buffers:
     bound_enabled: Array
     report: Array
     state: Array
-    #: of accelerations, the wrenches that a tick without an answer keeps [variables]; empty for velocities
+    #: of accelerations, the torques of the last command and the wrenches that a tick without an answer keeps
+    #: [variables]; empty for velocities
     kept: Array = np.zeros(0)
 
     def share(self, other: Buffers) -> None:
@@ -89,6 +92,10 @@ class Assembly(Buffers, ABC):
     plain: Array
     _command: Command
     _dofs: int
+    #: place of the torques in the report
+    _torque: slice
+    #: places in ``p`` of torques that may change only so fast, and their degrees of freedom
+    _slewed: tuple[list[int], list[int]]
 
     @abstractmethod
     def check(self) -> int:
@@ -127,11 +134,20 @@ class Assembly(Buffers, ABC):
     def look_ahead(self) -> None:
         """Margins after the step, into the report."""
 
-    def put_pose(self, start: int, matrix: Array) -> bool:
-        """Check a homogeneous matrix [4, 4] and write it to ``p`` from ``start`` on; False, nothing written,
-        where it is not a pose or that cannot be done quicker here than in Python.
+    #: whether :meth:`taker` is there
+    takes = False
+
+    def taker(self, staged: Array, plan: np.ndarray) -> Callable[[], int]:
+        """What checks values that wait in ``staged`` and writes them to ``p``, in native code; 0, and nothing written,
+        where one is refused.
+
+        Args:
+            plan: of each value what it is, where it goes in ``p``, how many numbers it has [count, 3].
+
+        Raises:
+            SolverError: not where :attr:`takes` is false.
         """
-        return False
+        raise SolverError("taker", type(self).__name__, "values are checked in Python here")
 
     def commanded(self, v: Array, sound: bool) -> None:
         """What follows from a command in the report: torques, and the velocity that the next tick counts from.
@@ -144,9 +160,21 @@ class Assembly(Buffers, ABC):
             return
         nv = self._dofs
         self._find_torques()
+        if self._command == "torque":
+            self.kept[:nv] = self.report[self._torque]
         self.v_last[:nv] += float(self.dt[0]) * v[:nv]
         if sound:
             self.kept[nv:] = v[nv:]
+
+    def forget(self) -> None:
+        """No wrenches are kept, and the last torques are not known."""
+        self.kept[:] = 0.0
+        self.kept[: self._dofs] = INFINITE
+
+    def rewind(self) -> None:
+        """Before the tick is done again: accelerations and torques count from where they did."""
+        self.v_last[:] = self.v_in
+        self.kept[self._slewed[1]] = self.p[self._slewed[0]]
 
     def rest(self, lower: Array, upper: Array) -> Array:
         """The command within simple bounds that is nearest to rest."""

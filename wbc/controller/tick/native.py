@@ -5,12 +5,14 @@ from __future__ import annotations
 import ctypes
 import functools
 import pathlib
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from wbc.controller.tick.buffers import INFINITE, Assembly, TaskRows
 from wbc.errors import SolverError
+from wbc.native.builtin import builtin
 from wbc.native.library import load_library
 from wbc.qp.problem import QP
 from wbc.stack.layout import Layout
@@ -42,6 +44,9 @@ class NativeTick(Assembly):
         self.q, self.p, self.dt, self.cap = view("q"), view("p"), view("dt"), view("cap")
         self.v_last, self.v_in, self.use_v = view("v_last"), view("v_in"), view("use_v")
         self._command, self._dofs = layout.command, layout.nv
+        self._slewed = layout.slewed
+        if layout.command == "torque":
+            self._torque = places["torque"]
         if layout.command != "velocity":
             self.kept = view("kept")
         self.weight, self.enabled, self.bound_enabled = view("weight"), view("enabled"), view("bound_enabled")
@@ -51,33 +56,43 @@ class NativeTick(Assembly):
         self._unusable, self.plain = view("unusable"), view("plain")
         self._desired, self._factor = view("desired"), view("factor")
         self._sides = view("free_low"), view("free_high")
-        self._given, self._give = view("given"), view("give")
+        self._give = view("give")
         self.step_function = self._library.wbc_tick_step
-        self._take_pose = functools.partial(self._library.wbc_tick_pose, self.pointer)
+        #: one tick; returns its flag
+        self.call = builtin(self._library.wbc_python_step, self.pointer.value or 0)
+        #: arrays that native code has the addresses of
+        self._kept: list[np.ndarray] = []
+
+    def library_function(self, name: str, returns: Any, unlocked: bool = False) -> Any:
+        """Another function of the library; ``unlocked``: it works long enough to be worth releasing the lock for."""
+        library = ctypes.CDLL(self._library._name, handle=self._library._handle) if unlocked else self._library
+        function = getattr(library, name)
+        function.restype = returns
+        return function
 
     @functools.cached_property
     def converge_function(self) -> Any:
         """One search; of a library that was compiled with inverse kinematics."""
-        function = self._library.wbc_tick_converge
-        function.restype = None
-        return function
+        return self.library_function("wbc_tick_converge", None)
 
     @functools.cached_property
     def converge_many(self) -> Any:
-        """Thousands of searches in one call, which are worth releasing the lock for."""
-        function = ctypes.CDLL(self._library._name, handle=self._library._handle).wbc_tick_converge_many
-        function.restype = None
-        return function
+        """Thousands of searches in one call."""
+        return self.library_function("wbc_tick_converge_many", None, unlocked=True)
 
     def twin(self) -> NativeTick:
         return NativeTick(self._library, self._layout)
 
     def step(self) -> int:
-        return int(self.step_function(self.pointer))
+        return self.call()
 
-    def put_pose(self, start: int, matrix: Array) -> bool:
-        self._given[:] = matrix
-        return bool(self._take_pose(start))
+    takes = True
+
+    def taker(self, staged: Array, plan: np.ndarray) -> Callable[[], int]:
+        table = np.ascontiguousarray(plan, np.intc)
+        request = np.array([self.pointer.value, staged.ctypes.data, table.ctypes.data, len(table)], np.int64)
+        self._kept += [staged, table, request]
+        return builtin(self._library.wbc_python_take, request.ctypes.data)
 
     def reset(self) -> None:
         self._library.wbc_tick_reset(self.pointer)

@@ -52,6 +52,7 @@ class SolvedTick(Buffers):
         self._memory = Memory(layout)
         self._solver = make_solver(solver, layout.with_slacks, layout.general_rows)
         self._relaxation = Relaxation(layout.with_slacks, layout.general_rows, self._solver)
+        self._torques = layout.command == "torque"
         self._orders = np.array(row_orders(layout), dtype=np.int_)
         self._units = np.array(row_units(stack, layout), dtype=np.float64)
         scales = layout.dof_scales(stack)
@@ -91,6 +92,7 @@ class SolvedTick(Buffers):
         if self.levels is not None:
             slack = self.levels.with_soft(qp, v, slack)
         slack = self._soft.reported(qp, v, self.assembly.row_bounds(), slack) if answer is not None else slack
+        slack = self.lacking(qp, v) if answer is None else slack
         slack = np.where(slack > 2.0 * TOLERANCE * self._units, slack, 0.0)
         if flag == RELAXED and not slack[self._hard].any():
             flag = SOLVED  # the rows contradict each other by rounding only
@@ -140,13 +142,20 @@ class SolvedTick(Buffers):
             report[memory[name]] = INFINITE
         report[memory["v"]], report[memory["flag"]] = v, BRAKED
         report[memory["iterations"]] = 0.0
-        report[memory["multipliers"]], report[memory["slack"]] = 0.0, 0.0
+        report[memory["multipliers"]], report[memory["slack"]] = 0.0, self.lacking(qp, v)
         self.assembly.look_ahead()
         self.assembly.commanded(v, False)
 
     def rest(self, qp: QP) -> Array:
         """The command within the simple bounds that is nearest to rest."""
         return self.assembly.rest(qp.lower[: self._nv], qp.upper[: self._nv])
+
+    def lacking(self, qp: QP, v: Array) -> Array:
+        """By how much a tick of torques that brakes misses what no motion may cost: torques, and forces on a base."""
+        if not self._torques:
+            return np.zeros(self._units.size)
+        missed = np.where(self._orders == 0, qp.violation(v)[qp.n :], 0.0)
+        return np.where(missed > 2.0 * TOLERANCE * self._units, missed, 0.0)
 
     def _met(self, qp: QP, answer: Relaxed, v: Array) -> tuple[Array, Array]:
         """Bounds of the answer's problem without equality rows that v meets to rounding and that do not push.

@@ -16,7 +16,6 @@ from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Layout
 from wbc.stack.memory import Memory
 from wbc.stack.program import ROWS_OUTPUTS, TickProgram
-from wbc.stack.tables import torque_dofs
 from wbc.validation import Array
 
 
@@ -51,8 +50,12 @@ class VmAssembly(Assembly):
         self.q, self.p, self.dt, self.cap, self.plain = (view(name) for name in ("q", "p", "dt", "cap", "plain"))
         self.v_last, self.v_in, self.use_v = view("v_last"), view("v_in"), view("use_v")
         self._command, self._dofs = layout.command, layout.nv
+        self._slewed = layout.slewed
+        if layout.command == "torque":
+            self._torque = memory["torque"]
         if layout.command != "velocity":
             self.kept = view("kept")
+            self.forget()
         self.weight, self.enabled, self.bound_enabled = view("weight"), view("enabled"), view("bound_enabled")
         # CasADi's buffers take no empty array: with the spare number
         self._q, self._v, self._p = self._wide("q"), self.v_last[: layout.nv], self._wide("p")
@@ -67,9 +70,8 @@ class VmAssembly(Assembly):
             self._ahead = _Call(program.ahead, [self._q, self._mean, self._p, self.dt], [self._later])
         self._torques: _Call | None = None
         if program.torque is not None:
-            self._most, self._torque_dofs = _room(rows), np.array(torque_dofs(stack, layout), dtype=np.intp)
-            found = [self.report[memory["torque"]], self._most]
-            self._torques = _Call(program.torque, [*arguments, self.report[memory["v"]]], found)
+            given = [*arguments, self.report[memory["v"]], self._wide("enabled")]
+            self._torques = _Call(program.torque, given, [self.report[memory["torque"]]])
         self._force = _room(tasks)
         self._reach = Reach(stack, layout, program, self._curvature_of(program, arguments)) if stack.calm else None
         jt, at = function.sparsity_out("jt"), function.sparsity_out("at")
@@ -136,6 +138,8 @@ class VmAssembly(Assembly):
             bad = BAD_V
         if not bad and self.use_v[0]:
             self.v_last[:] = self.v_in
+        if not bad:
+            self.p[self._slewed[0]] = self.kept[self._slewed[1]]
         self.use_v[0] = 0.0
         if bad:
             self.q[:] = self._q_good
@@ -250,9 +254,6 @@ class VmAssembly(Assembly):
             self._torques.run()
             tau = self.report[self.memory["torque"]]
             tau[~np.isfinite(tau)] = 0.0
-            limited = np.flatnonzero((self._torque_dofs >= 0) & (self.enabled != 0.0))
-            dofs, most = self._torque_dofs[limited], self._most[limited]
-            tau[dofs] = np.clip(tau[dofs], -most, most)
 
 
 def _unit_equalities(low: Array, high: Array, low_rows: Array, high_rows: Array, A: Array, dofs: Array) -> Array:

@@ -19,6 +19,7 @@ from wbc.robot.geometry.meshes import Mesh, hull_mesh, mesh_of, read_mesh
 from wbc.robot.robot import Robot
 from wbc.robot.sources.files import read_xml
 from wbc.robot.sources.mjcf import read_mjcf_geometry
+from wbc.robot.sources.mjmodel import body_name, is_mjmodel, pose_of, trees_of
 from wbc.shapes import Capsule, Sphere
 from wbc.validation import Array
 
@@ -65,14 +66,14 @@ class CollisionBody:
     read: Callable[[], Raw]
 
 
-def bodies_of(
-    robot: Robot, package_dirs: Iterable[Any] = (), geometry: pin.GeometryModel | None = None
-) -> list[CollisionBody]:
-    """The collision bodies of the file that a robot was read from, or of a Pinocchio collision model.
+def bodies_of(robot: Robot, package_dirs: Iterable[Any] = (), geometry: Any = None) -> list[CollisionBody]:
+    """The collision bodies of the file that a robot was read from, of a ``pin.GeometryModel`` or a ``mujoco.MjModel``.
 
     Raises:
         RobotFileError: no file and no ``geometry``, or the file cannot be read any more.
     """
+    if is_mjmodel(geometry):
+        return _mujoco_bodies(robot, geometry)
     if geometry is not None:
         return _geometry_bodies(robot.model, geometry)
     if not robot.source:
@@ -159,6 +160,48 @@ def _geometry_bodies(model: pin.Model, geometry: pin.GeometryModel) -> list[Coll
         mesh = isinstance(item.geometry, (coal.BVHModelBase, coal.ConvexBase))
         bodies.append(CollisionBody(str(frame.name), mesh, local, partial(_from_coal, item.geometry)))
     return bodies
+
+
+def _mujoco_bodies(robot: Robot, model: Any) -> list[CollisionBody]:
+    """Geoms of a compiled model that can touch something, on links of the robot that move or do not."""
+    bodies, own = [], set(trees_of(model).robot)
+    for g in range(model.ngeom):
+        body = int(model.geom_bodyid[g])
+        if body not in own or not (model.geom_contype[g] or model.geom_conaffinity[g]):
+            continue
+        link = body_name(model, body)
+        if robot.model.existFrame(link):
+            placement, mesh = pose_of(model.geom_pos[g], model.geom_quat[g]), int(model.geom_type[g]) == _MESH
+            bodies.append(CollisionBody(link, mesh, placement, partial(_from_geom, model, g)))
+    return bodies
+
+
+def _from_geom(model: Any, g: int) -> Raw:
+    """The body of a geom, in its own frame.
+
+    Raises:
+        RobotFileError: a plane, a height field or a signed distance field.
+    """
+    kind, size = int(model.geom_type[g]), np.array(model.geom_size[g])
+    if kind == _MESH:
+        mesh = int(model.geom_dataid[g])
+        vertices = slice(int(model.mesh_vertadr[mesh]), int(model.mesh_vertadr[mesh] + model.mesh_vertnum[mesh]))
+        faces = slice(int(model.mesh_faceadr[mesh]), int(model.mesh_faceadr[mesh] + model.mesh_facenum[mesh]))
+        return Mesh(np.array(model.mesh_vert[vertices], dtype=float), np.array(model.mesh_face[faces], dtype=np.intp))
+    if kind not in _GEOMS:
+        raise RobotFileError("geom", model.geom(g).name, "no shape is fitted to planes and fields")
+    return _GEOMS[kind](size)
+
+
+#: MuJoCo's numbers of kinds of geoms, and what they are from their sizes
+_MESH = 7
+_GEOMS: dict[int, Callable[[Array], Raw]] = {
+    2: lambda size: Sphere(float(size[0])),
+    3: lambda size: Capsule(float(size[0]), 2.0 * float(size[1])),
+    4: RawEllipsoid,
+    5: lambda size: RawCylinder(float(size[0]), float(size[1])),
+    6: RawBox,
+}
 
 
 def _from_coal(geometry: Any) -> Raw:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pinocchio as pin
@@ -16,10 +16,16 @@ from wbc.robot.geometry.convex_parts import ConvexParts, parts_of
 from wbc.robot.geometry.meshes import Mesh, read_mesh
 from wbc.robot.geometry.styles import Style
 from wbc.robot.robot import Robot
+from wbc.robot.sources.mjmodel import is_mjmodel
 from wbc.shapes import PlacedShape
 
+if TYPE_CHECKING:
+    from mujoco import MjModel
 
-def description_shapes(robot: Robot, package_dirs: Iterable[Any] = (), *, exact: bool = False) -> Robot:
+
+def description_shapes(
+    robot: Robot, package_dirs: Iterable[Any] = (), *, exact: bool = False, geometry: Any = None
+) -> Robot:
     """A copy whose shapes are those of the description's primitives; links with meshes are named in the notes.
 
     A sphere stays a sphere and a capsule a capsule. A cylinder, box or ellipsoid becomes the least capsule on its
@@ -30,7 +36,7 @@ def description_shapes(robot: Robot, package_dirs: Iterable[Any] = (), *, exact:
         RobotFileError: the robot was not read from a file, or the file cannot be read any more.
         RangeError: a box or cylinder of size 0, which has no exact shape.
     """
-    bodies = bodies_of(robot, package_dirs)
+    bodies = bodies_of(robot, package_dirs, geometry)
     meshes = [b.link for b in bodies if b.mesh]
     shapes, problems = _collect([b for b in bodies if not b.mesh], Style("convex" if exact else "capsule"))
     parts = [_counted(shapes, "from the description")]
@@ -47,7 +53,7 @@ def fit_shapes(
     count: int | None = None,
     tolerance: float = 0.0,
     package_dirs: Iterable[Any] = (),
-    geometry: pin.GeometryModel | None = None,
+    geometry: pin.GeometryModel | MjModel | None = None,
 ) -> Robot:
     """A copy whose links carry shapes that contain the description's collision bodies.
 
@@ -72,7 +78,7 @@ def fit_shapes(
             4 spheres. More are taken only where they stand out less.
         tolerance: fewer do where they stand out by at most this [m].
         package_dirs: folders to look for ``package://NAME/...`` in, besides the folders above the file.
-        geometry: a collision model of the same links to use instead of the file's.
+        geometry: a collision model of the same links, or a ``mujoco.MjModel``, to use instead of the file's.
 
     Raises:
         UnknownNameError: a link or kind that does not exist.
@@ -88,8 +94,8 @@ def fit_shapes(
         links = validation.strings("links", links)
         for link in links:
             robot.check_frame("links", link)
-    if geometry is not None:
-        validation.instance("geometry", geometry, pin.GeometryModel, "a pin.GeometryModel")
+    if geometry is not None and not is_mjmodel(geometry):
+        validation.instance("geometry", geometry, pin.GeometryModel, "a pin.GeometryModel or a mujoco.MjModel")
     style = Style(kind, count, tolerance)
     bodies = bodies_of(robot, package_dirs, geometry)
     shapes, problems = _collect([b for b in bodies if links is None or b.link in links], style)

@@ -1,8 +1,9 @@
 """Reading MJCF files: Pinocchio's parser for the model, the XML for joint ranges, keyframes and couplings.
 
 Pinocchio 4.1 scales the range of a slide joint as if it were an angle, applies ranges of joints that say
-``limited="false"``, and counts q from ``ref``; ranges are therefore taken from the XML here. It loses the mass of geoms
-that touch nothing, see :func:`wbc.robot.sources.mjcf_xml.with_weight`.
+``limited="false"``, and counts q from ``ref``; ranges are therefore taken from the XML here, and joints are turned so
+that q counts as the file does. It loses the mass of geoms that touch nothing, see
+:func:`wbc.robot.sources.mjcf_xml.with_weight`.
 """
 
 from __future__ import annotations
@@ -39,12 +40,10 @@ def read_mjcf(path: pathlib.Path, base: str | None = None) -> Description:
         found = ", ".join(str(name) for name in list(model.names)[1:])
         raise RobotFileError("robot", str(path), f"the MJCF parser read other joints than the file has: {found}")
     notes = {"parser": noise.reason} if noise.reason else {}
-    offsets = _set_ranges(model, listed)
-    moved = [joint.name for joint in listed if joint.ref]
-    if moved:
-        notes["position"] = f"q is counted from the file's ref for {', '.join(moved)}"
-    states = _states(model, offsets)
-    mimics, coupling_note = _couplings(tree)
+    _set_ranges(model, listed)
+    _count_from_zero(model, listed, path)
+    states = _states(model)
+    mimics, coupling_note = _couplings(tree, {joint.name: joint.ref for joint in listed})
     if coupling_note:
         notes["mimic"] = coupling_note
     drawn = np.concatenate([np.zeros(0), *states["qpos0"].values()]) if "qpos0" in states else None
@@ -94,32 +93,47 @@ def _same_order(model: pin.Model, listed: list[MjcfJoint]) -> bool:
     return True
 
 
-def _set_ranges(model: pin.Model, listed: list[MjcfJoint]) -> Array:
-    """Writes the file's ranges into the model; returns what to take off the file's qpos, nq numbers."""
+def _set_ranges(model: pin.Model, listed: list[MjcfJoint]) -> None:
+    """Writes the file's ranges into the model."""
     lower, upper = np.array(model.lowerPositionLimit), np.array(model.upperPositionLimit)
-    offsets = np.zeros(model.nq)
     index = 0
     for joint in listed:
         width = _KINDS[joint.kind][0]
         lower[index : index + width], upper[index : index + width] = joint.lower, joint.upper
-        offsets[index : index + width] = joint.ref
         index += width
     model.lowerPositionLimit, model.upperPositionLimit = lower, upper
-    return offsets
 
 
-def _states(model: pin.Model, offsets: Array) -> dict[str, dict[str, Array]]:
+def _count_from_zero(model: pin.Model, listed: list[MjcfJoint], path: pathlib.Path) -> None:
+    """Turns or moves joints back by ``ref``, where the file draws them, so that q is the file's qpos.
+
+    Raises:
+        RobotFileError: a joint with ``ref`` among several of one body, which Pinocchio makes one joint of.
+    """
+    for joint in listed:
+        if not joint.ref:
+            continue
+        if not model.existJointName(joint.name):
+            reason = f"ref of {joint.name or 'a joint'!r}, one of several joints of a body: pip install wbc[mujoco]"
+            raise RobotFileError("robot", str(path), reason)
+        j = model.getJointId(joint.name)
+        part = model.joints[j].createData()
+        model.joints[j].calc(part, np.concatenate([np.zeros(model.idx_qs[j]), [-joint.ref], np.zeros(model.nq)]))
+        model.jointPlacements[j] = model.jointPlacements[j] * part.M
+
+
+def _states(model: pin.Model) -> dict[str, dict[str, Array]]:
     """The keyframes, by joint; ``qpos0`` is the pose that the file is drawn in."""
     states = {}
     for entry in model.referenceConfigurations:
-        q = np.array(entry.data()) - offsets
+        q = np.array(entry.data())
         states[str(entry.key())] = {
             str(model.names[j]): q[model.idx_qs[j] : model.idx_qs[j] + model.nqs[j]] for j in range(1, model.njoints)
         }
     return states
 
 
-def _couplings(tree: Element) -> tuple[tuple[Mimic, ...], str]:
+def _couplings(tree: Element, refs: dict[str, float]) -> tuple[tuple[Mimic, ...], str]:
     """Linear joint equalities, and a sentence about the equalities that are none."""
     mimics, lost = [], []
     for equality in tree.findall("equality"):
@@ -127,7 +141,11 @@ def _couplings(tree: Element) -> tuple[tuple[Mimic, ...], str]:
             terms = [float(x) for x in element.get("polycoef", "0 1 0 0 0").split()]
             if element.tag == "joint" and element.get("joint2") and not any(terms[2:]):
                 offset, ratio = (terms + [0.0, 0.0])[:2]
-                mimics.append(Mimic(element.get("joint1", ""), element.get("joint2", ""), ratio, offset))
+                first, second = element.get("joint1", ""), element.get("joint2", "")
+                # y - y0 = a + b (x - x0)
+                mimics.append(
+                    Mimic(first, second, ratio, offset + refs.get(first, 0.0) - ratio * refs.get(second, 0.0))
+                )
             else:
                 lost.append(f"<{element.tag} {element.get('name', '')}>".replace(" >", ">"))
     return tuple(mimics), f"equalities that are not represented: {', '.join(lost)}" if lost else ""

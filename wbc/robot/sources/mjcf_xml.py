@@ -27,7 +27,7 @@ _FOLDERS = ("meshdir", "texturedir", "assetdir")
 
 @dataclass(frozen=True)
 class MjcfJoint:
-    """A joint element with its defaults applied; ranges in radians or metres, counted from ``ref``."""
+    """A joint element with its defaults applied; ranges and ``ref`` in radians or metres."""
 
     name: str
     kind: str
@@ -48,9 +48,11 @@ def read_tree(path: pathlib.Path) -> Element:
     tree = _include(tree, path.parent, 0)
     for element in tree.iter():
         if element.tag in _REFUSED:
-            raise RobotFileError("robot", str(path), f"<{element.tag}> is not supported: write out what it stands for")
+            reason = f"<{element.tag}> is not supported: write out what it stands for, or pip install wbc[mujoco]"
+            raise RobotFileError("robot", str(path), reason)
     _merge_compilers(tree, path.parent)
-    _one_root(tree)
+    _without_mocap(tree)
+    _one_root(tree, path)
     names = {body.get("name") for body in tree.iter("body")}
     number = 0
     for body in tree.iter("body"):
@@ -110,12 +112,28 @@ def _merge_compilers(tree: Element, folder: pathlib.Path) -> None:
     tree.insert(0, ElementTree.Element("compiler", merged))
 
 
-def _one_root(tree: Element) -> None:
-    """Puts several bodies of the world under one that is welded to it."""
+def _without_mocap(tree: Element) -> None:
+    """Takes out bodies that a program moves, such as targets: they are no part of a robot."""
+    for world in tree.findall("worldbody"):
+        for body in world.findall("body"):
+            if body.get("mocap") == "true":
+                world.remove(body)
+
+
+def _one_root(tree: Element, path: pathlib.Path) -> None:
+    """Puts several bodies of the world under one that is welded to it.
+
+    Raises:
+        RobotFileError: one of them moves freely, which Pinocchio reads only at the root.
+    """
     worlds = tree.findall("worldbody")
     bodies = [(world, body) for world in worlds for body in world.findall("body")]
     if len(bodies) < 2:
         return
+    for _, body in bodies:
+        if body.find("freejoint") is not None or body.find("joint[@type='free']") is not None:
+            what = f"body {body.get('name', '')!r} moves freely beside others: pip install wbc[mujoco]"
+            raise RobotFileError("robot", str(path), what)
     root = ElementTree.Element("body", {"name": "world_bodies"})
     for world, body in bodies:
         world.remove(body)
@@ -167,5 +185,5 @@ def _joint(attributes: dict[str, str], compiler: dict[str, str]) -> MjcfJoint:
         limited = "true" if automatic and "range" in attributes else "false"
     lower, upper = -math.inf, math.inf
     if limited == "true" and kind in ("hinge", "slide"):
-        lower, upper = (float(x) * unit - ref for x in attributes.get("range", "0 0").split())
+        lower, upper = (float(x) * unit for x in attributes.get("range", "0 0").split())
     return MjcfJoint(attributes.get("name", ""), kind, lower, upper, ref)

@@ -57,7 +57,7 @@ static int activate(DAQPWorkspace *work, int i, int lower) {
 
 /* What DAQP is given as its limit, one more than the iterations it may make; 0 where the cap leaves none */
 static int granted(wbc_tick *t) {
-    const int limit = 100 + 10 * M_ALL;
+    const int limit = t->brief ? t->brief : 100 + 10 * M_ALL;
     if (!(t->cap > 0.0)) return limit;
     const double left = t->cap - t->report.iterations;
     if (left >= limit) return limit;
@@ -72,7 +72,7 @@ static int search(wbc_tick *t, DAQPWorkspace *work, int limit) {
     /* Where the cap ends the search before its first iterate, the optimum without rows stands for it */
     if (t->cap > 0.0) memset(work->u, 0, work->n * sizeof(double));
     const int flag = daqp_ldp(work);
-    t->spent = t->cap > 0.0 && flag == EXIT_ITERLIMIT;
+    t->spent = t->cap > 0.0 && flag == EXIT_ITERLIMIT && limit != t->brief;
     t->report.iterations += work->iterations - t->spent;
     return flag;
 }

@@ -1,4 +1,4 @@
 /* The tick together with inverse kinematics, which needs a clock */
-#include "tick.c"
+#include "library.c"
 
 #include "converge.h"

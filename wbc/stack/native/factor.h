@@ -79,8 +79,18 @@ static void right_side(wbc_tick *t) {
             t->y[a_col[e]] += t->strength[k] * t->at[e] * met_side(t, k);
 }
 
-/* Eight rows of R from the rows above them. `from` is a constant after unrolling: the row stays in registers. */
-INLINE int factor_group(wbc_tick *t, const int from) {
+/* A pivot of the modified factorisation of Gill and Murray: no less than `least`, and such that no entry of the factor
+ * is larger than those of a definite matrix may be; `row`: the row from its pivot on */
+INLINE double amended(const double *row, int k, int from, double least, double bound) {
+    double part[8] = {0}, aside = 0.0;
+    for (int j = from; j < WIDE; j++) part[j & 7] = larger(part[j & 7], j > k ? fabs(row[j]) : 0.0);
+    for (int j = 0; j < 8; j++) aside = larger(aside, part[j]);
+    return larger(larger(fabs(row[k]), aside * aside / bound), least);
+}
+
+/* Eight rows of R from the rows above them. `from` is a constant after unrolling: the row stays in registers. `more`:
+ * what is added to the diagonal by the modified factorisation, or NULL for the plain one. */
+INLINE int factor_group(wbc_tick *t, const int from, double least, double bound, double *more) {
     const int to = from + 8 < NV ? from + 8 : NV;
     int ok = 1;
     for (int k = from; k < to; k++) {
@@ -90,7 +100,12 @@ INLINE int factor_group(wbc_tick *t, const int from) {
             const double *above = t->R + i * WIDE, f = above[k];
             for (int j = from; j < WIDE; j++) row[j] -= f * above[j];
         }
-        const double pivot = row[k];
+        double pivot = row[k];
+        if (more != NULL) {
+            pivot = amended(row, k, from, least, bound);
+            more[k] = pivot - row[k];
+            row[k] = pivot;
+        }
         ok &= pivot > 0.0;
         const double scale = t->inverse_diagonal[k] = 1.0 / sqrt(pivot);
         for (int j = from; j < WIDE; j++) t->R[k * WIDE + j] = row[j] * scale;
@@ -133,8 +148,37 @@ static void load(wbc_tick *t) {
 static int decompose(wbc_tick *t) {
     int ok = 1;
 #pragma GCC unroll 64
-    for (int group = 0; group < WIDE / 8; group++) ok &= factor_group(t, 8 * group);
+    for (int group = 0; group < WIDE / 8; group++) ok &= factor_group(t, 8 * group, 0.0, 0.0, NULL);
     return ok;
+}
+
+/* H += a diagonal that makes it positive definite, with pivots of v / dof_scale of `least` or more, where it is not (Gill and
+ * Murray); where it is, its plain factor. H = R'R afterwards, equality rows left out. */
+static void decompose_amended(wbc_tick *t, double least) {
+    double more[NV], scale[WIDE] = {0}, unit[WIDE] = {0}, part[8] = {0}, diagonal = 0.0, other = 0.0;
+    for (int i = 0; i < NV; i++) {
+        scale[i] = dof_scale[i];
+        unit[i] = 1.0 / dof_scale[i];
+    }
+    for (int i = 0; i < NV; i++) {
+        double *row = t->R + i * WIDE;
+        const double *from = t->H + i * WIDE, f = scale[i];
+        for (int j = 0; j < WIDE; j++) row[j] = from[j] * f * scale[j];
+        diagonal = larger(diagonal, fabs(row[i]));
+        for (int b = i / 8; b < WIDE / 8; b++)
+            for (int k = 0; k < 8; k++) part[k] = larger(part[k], 8 * b + k > i ? fabs(row[8 * b + k]) : 0.0);
+    }
+    for (int k = 0; k < 8; k++) other = larger(other, part[k]);
+    const double bound = larger(diagonal, other / sqrt(larger((double)NV * NV - 1.0, 1.0)));
+#pragma GCC unroll 64
+    for (int group = 0; group < WIDE / 8; group++) factor_group(t, 8 * group, least, bound, more);
+    for (int i = 0; i < NV; i++) {
+        double *row = t->R + i * WIDE;
+        for (int b = i / 8; b < WIDE / 8; b++)
+            for (int j = 8 * b; j < 8 * b + 8; j++) row[j] *= unit[j];
+        t->inverse_diagonal[i] *= dof_scale[i];
+        t->H[i * WIDE + i] += more[i] / (dof_scale[i] * dof_scale[i]);
+    }
 }
 
 /* H = R'R, upper triangle of H only; leaves -g in y */

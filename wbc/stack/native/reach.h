@@ -165,27 +165,6 @@ static int left_over(wbc_tick *t, const double *free, const double *error, const
     return !changed || cut_off(t, free, 0.0);
 }
 
-/* What makes a symmetric matrix positive definite, a diagonal: the modified factorisation of Gill and Murray */
-static void definite(const double *matrix, double least, double *more) {
-    double a[NV * NV], diagonal = 0.0, other = 0.0;
-    memcpy(a, matrix, sizeof a);
-    for (int i = 0; i < NV; i++) {
-        diagonal = larger(diagonal, fabs(a[i * NV + i]));
-        for (int j = i + 1; j < NV; j++) other = larger(other, fabs(a[i * NV + j]));
-    }
-    const double bound = larger(diagonal, other / sqrt(larger((double)NV * NV - 1.0, 1.0)));
-    for (int k = 0; k < NV; k++) {
-        double *row = a + k * NV, aside = 0.0;
-        for (int j = k + 1; j < NV; j++) aside = larger(aside, fabs(row[j]));
-        const double pivot = larger(larger(fabs(row[k]), aside * aside / bound), least);
-        more[k] = pivot - row[k];
-        for (int i = k + 1; i < NV; i++) {
-            const double f = row[i] / pivot;
-            for (int j = i; j < NV; j++) a[i * NV + j] -= f * row[j];
-        }
-    }
-}
-
 static double least_pivot(const wbc_tick *t) {
     double least = WBC_INF;
     for (int i = 0; i < NV; i++) {
@@ -228,19 +207,14 @@ static double curve_errors(wbc_tick *t, const double *free, const double *error,
 
 /* Curvature into H and what makes it positive definite again; leaves the factor. 1 where there is any to count. */
 static int add_curvature(wbc_tick *t, const double *free, const double *error, const double *force) {
-    double scaled[NV * NV], more[NV], least = least_pivot(t);
+    double least = least_pivot(t);
     const double largest = curve_errors(t, free, error, force, least);
     if (largest == 0.0) return 0;
-    least = larger(LEAST_PIVOT * largest, least);
-    /* Where no pivot is too small the modified factorisation is the plain one; but equality rows are not in H */
+    decompose_amended(t, larger(LEAST_PIVOT * largest, least));
+    /* The factor that is used has equality rows in it, and they are not in H */
     int equalities = 0;
     for (int i = 0; i < M_ALL; i++) equalities |= t->low[i] == t->high[i];
-    if (!equalities && factor(t) && least_pivot(t) >= least) return 1;
-    for (int i = 0; i < NV; i++)
-        for (int j = i; j < NV; j++) scaled[i * NV + j] = t->H[i * WIDE + j] * dof_scale[i] * dof_scale[j];
-    definite(scaled, least, more);
-    for (int i = 0; i < NV; i++) t->H[i * WIDE + i] += more[i] / (dof_scale[i] * dof_scale[i]);
-    t->prepared = factor(t);
+    t->prepared = equalities ? factor(t) : 1;
     return 1;
 }
 

@@ -70,7 +70,7 @@ static int least_slack(wbc_tick *t, int order, const double *base, int warm) {
         t->dlower[NV + k] = (t->low[NV + k] - value) * scale;
         t->sense[NV + k] = row_order[k] == order ? SOFT : 0;
     }
-    if (!(warm && active_set(t, 1, order, LOOSE, base) >= 0) && active_set(t, 0, order, LOOSE, base) < 0) return 0;
+    if (!(warm && active_set(t, 1, order, LOOSE, base) >= 0) && (t->brief || active_set(t, 0, order, LOOSE, base) < 0)) return 0;
     memcpy(t->keep, t->sense, sizeof t->keep);
     for (int i = 0; i < NV; i++) t->x[i] = clamp(t->x[i], t->low[i], t->high[i]);
     return 1;
@@ -93,11 +93,32 @@ static void find_pushing(const wbc_tick *t, int order, char *pushing) {
     }
 }
 
+/* The next proximal step at a price of slack that is ten times as high, if the search follows within BRIEF iterations; else
+ * at the last price */
+static int dearer_slack(wbc_tick *t, int order, const double *base) {
+    const double rho = t->settings.rho_soft;
+    t->settings.rho_soft = larger(0.1 * rho, RHO);
+    t->brief = rho > RHO ? BRIEF : 0;
+    const int found = least_slack(t, order, base, 1);
+    t->brief = 0;
+    if (found || rho <= RHO || t->spent) return found;
+    t->settings.rho_soft = rho;
+    return least_slack(t, order, base, 1);
+}
+
+/* The first proximal step. The price of slack may be too high for the search, which then calls rows infeasible that are
+ * not: it rises from 1 step by step. */
+static int first_slack(wbc_tick *t, int order, const double *base) {
+    t->settings.rho_soft = RHO;
+    if (least_slack(t, order, base, 0)) return 1;
+    t->settings.rho_soft = 1.0;
+    return !t->spent && least_slack(t, order, base, 0);
+}
+
 /* The least sum of squared slack of one class, with the bounds and the classes before it as they stand; then they are
- * frozen there. The proximal steps take the share of |v| out of the multipliers. */
-static int relax_class(wbc_tick *t, int order) {
+ * frozen there. The proximal steps take the share of |v| out of the multipliers. `base`: where the classes before met. */
+static int relax_class(wbc_tick *t, int order, double *base) {
     DAQPWorkspace *work = &t->daqp;
-    double base[WIDE] = {0};
     char pushing[M_ALL];
     int found = 0;
     t->factored = 0;
@@ -105,29 +126,32 @@ static int relax_class(wbc_tick *t, int order) {
     work->Rinv = NULL;
     work->RinvD = (double *)dof_scale;
     work->v = NULL;
-    for (int step = 0; step < PROXIMAL_STEPS && least_slack(t, order, base, step > 0); step++) {
+    for (int step = 0; step < PROXIMAL_STEPS; step++) {
         double moved = 0.0;
+        if (!(step ? dearer_slack(t, order, base) : first_slack(t, order, base))) break;
         for (int k = 0; k < MC; k++)
             if (row_order[k] == order) moved = fmax(moved, fabs(row_at(t, k, t->x) - row_at(t, k, base)) / row_scale[k]);
-        memcpy(base, t->x, sizeof base);
+        memcpy(base, t->x, WIDE * sizeof(double));
         find_pushing(t, order, pushing);
         found = 1;
-        if (moved <= SETTLED) break;
+        if (moved <= SETTLED && t->settings.rho_soft <= RHO) break;
     }
+    t->settings.rho_soft = RHO;
     work->Rinv = t->Rinv;
     work->RinvD = NULL;
     work->v = t->ldp_v;
     if (!found) return 0;
-    memcpy(t->x, base, sizeof base);
+    memcpy(t->x, base, sizeof t->x);
     freeze(t, order, pushing);
+    memcpy(base, t->x, sizeof t->x);
     return 1;
 }
 
 /* The optimum over what the classes left. The set may be so thin that rounding makes it empty: then its bounds get
  * rounding, then the joints of frozen rows are fixed, and at last the point that the classes met at is the answer. */
 static int optimum_of_the_rest(wbc_tick *t) {
-    double met[WIDE], low[NV], high[NV];
-    memcpy(met, t->x, sizeof met);
+    double low[NV], high[NV];
+    memcpy(t->met, t->x, sizeof t->met);
     memcpy(low, t->low, sizeof low);
     memcpy(high, t->high, sizeof high);
     /* The bounds have moved, and with them what the equality rows contribute */
@@ -147,13 +171,13 @@ static int optimum_of_the_rest(wbc_tick *t) {
     /* Joints that frozen rows speak of stay where the classes met; the others still serve the tasks */
     for (int k = 0; k < MC; k++)
         for (int e = a_start[k]; t->low[NV + k] == t->high[NV + k] && e < a_end[k]; e++)
-            if (t->at[e] != 0.0) t->low[a_col[e]] = t->high[a_col[e]] = met[a_col[e]];
+            if (t->at[e] != 0.0) t->low[a_col[e]] = t->high[a_col[e]] = t->met[a_col[e]];
     t->prepared = 0;
     flag = optimum(t, LOOSE);
     if (flag >= 0 || t->spent) return flag;
     memcpy(t->low, low, sizeof low);
     memcpy(t->high, high, sizeof high);
-    memcpy(t->x, met, sizeof met);
+    memcpy(t->x, t->met, sizeof t->met);
     t->daqp.n_active = 0;
     /* Not an optimum, so nothing for the certificate to refine */
     t->factored = 0;
@@ -161,12 +185,13 @@ static int optimum_of_the_rest(wbc_tick *t) {
 }
 
 static int relaxed(wbc_tick *t) {
+    double base[WIDE] = {0};
     t->warm = 0;
     memset(t->idle, 0, sizeof t->idle);
     /* Rows of class 0 never give way */
     if (LAST_ORDER == 0) return -1;
     for (int order = 1; order <= LAST_ORDER; order++)
-        if (!relax_class(t, order)) return -1;
+        if (!relax_class(t, order, base)) return -1;
     return optimum_of_the_rest(t);
 }
 

@@ -34,6 +34,8 @@ int torque(const double **arg, double **res, long long *iw, double *w, int mem);
 #define DEAD 1e-20
 /* Weight of the proximal term |v - base|^2 against slack^2 in the relaxation */
 #define RHO 1e-6
+/* Iterations of a search with a higher price at most, see first_slack */
+#define BRIEF 30
 /* How much more than other equality rows those that keep a direction count while curvature is looked for */
 #define FIRM 1e4
 /* Soft rows that are held are part of H where they count at most this often as much as it; of the price of others, as

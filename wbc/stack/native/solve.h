@@ -90,6 +90,18 @@ static void own_sides(wbc_tick *t) {
     uncross(t);
 }
 
+/* By how much rows give way at the command; whether any does */
+static int report_slack(wbc_tick *t, int flag) {
+    int gave_way = 0;
+    for (int k = 0; (flag == WBC_RELAXED || flag == WBC_CAPPED) && k < MC; k++) {
+        const double value = row_at(t, k, t->report.v);
+        const double slack = MINIMISED(k) || price_at[k] >= 0 ? 0.0 : fmax(t->free_low[k] - value, value - t->free_high[k]);
+        t->report.slack[k] = slack > 2.0 * TOLERANCE * row_scale[k] ? slack : 0.0;
+        gave_way |= t->report.slack[k] > 0.0;
+    }
+    return gave_way;
+}
+
 EXPORT int wbc_tick_solve(wbc_tick *t) {
     int flag = uncross(t) ? WBC_RELAXED : WBC_SOLVED;
     t->report.iterations = 0.0;
@@ -124,13 +136,7 @@ EXPORT int wbc_tick_solve(wbc_tick *t) {
         flag = WBC_BRAKED;
     }
     command(t);
-    int gave_way = 0;
-    for (int k = 0; (flag == WBC_RELAXED || flag == WBC_CAPPED) && k < MC; k++) {
-        const double value = row_at(t, k, t->report.v);
-        const double slack = MINIMISED(k) || price_at[k] >= 0 ? 0.0 : fmax(t->free_low[k] - value, value - t->free_high[k]);
-        t->report.slack[k] = slack > 2.0 * TOLERANCE * row_scale[k] ? slack : 0.0;
-        gave_way |= t->report.slack[k] > 0.0;
-    }
+    const int gave_way = report_slack(t, flag);
     /* Rows that contradict each other by rounding only: what is certified are their own bounds */
     if (flag == WBC_RELAXED && !gave_way) {
         flag = WBC_SOLVED;

@@ -2,7 +2,6 @@
 #include "assemble.h"
 #include "levels.h"
 #include "primal.h"
-#include "pose.h"
 
 static int refused(const wbc_tick *t) {
     for (int i = 0; i < NQ; i++)
@@ -22,6 +21,9 @@ static int refused(const wbc_tick *t) {
 EXPORT int wbc_tick_check(wbc_tick *t) {
     const int bad = refused(t);
     if (!bad && t->use_v != 0.0) memcpy(t->v_last, t->v_in, sizeof t->v_in);
+#if SLEWED > 0
+    for (int k = 0; !bad && k < SLEWED; k++) t->p[slewed_at[k]] = t->kept[slewed_dof[k]];
+#endif
     t->use_v = 0.0;
     memcpy(bad ? t->q : t->q_good, bad ? t->q_good : t->q, NQ * sizeof(double));
     return bad;
@@ -33,6 +35,17 @@ static int unsound(const wbc_tick *t, int flag) {
     const int optimal = t->report.stationarity <= OPTIMAL && t->report.complementarity <= OPTIMAL;
     return !((optimal || t->report.error_bound <= KNOWN * LONGEST) && t->report.violation <= SOUND * LONGEST);
 }
+
+#if LEVELS == 0
+/* After a relaxation: from the point that its classes met at */
+static int primal_of_the_rest(wbc_tick *t, int flag) {
+    if (flag != WBC_RELAXED || LAST_ORDER == 0) return 0;
+    for (int i = 0; i < NV; i++) t->report.v[i] = clamp(t->met[i], t->low[i], t->high[i]);
+    if (!primal(t)) return 0;
+    report_slack(t, flag);
+    return 1;
+}
+#endif
 
 /* By how much soft rows are violated; the slack of those that give way by more than is worth a report */
 static void report_soft_rows(wbc_tick *t) {
@@ -49,17 +62,14 @@ static void report_soft_rows(wbc_tick *t) {
 }
 
 #if COMMAND == TORQUE
-/* Torques of the joints for the command, never beyond their limits: also not where a tick has no answer, nor by rounding */
+/* Torques of the joints for the command, within their limits */
 EXPORT void wbc_tick_torques(wbc_tick *t) {
-    double most[MC + 1];
-    const double *arg[5] = {t->q, t->v_last, t->p, &t->dt, t->report.v};
-    double *res[2] = {t->report.torque, most};
+    const double *arg[6] = {t->q, t->v_last, t->p, &t->dt, t->report.v, t->enabled};
+    double *res[1] = {t->report.torque};
     torque(arg, res, t->work_iw, t->work_w, 0);
-    for (int i = 0; i < DOFS; i++)
+    for (int i = 0; i < DOFS; i++) {
         if (!isfinite(t->report.torque[i])) t->report.torque[i] = 0.0;
-    for (int k = 0; k < MC; k++) {
-        const int i = torque_dof[k];
-        if (i >= 0 && t->enabled[k] != 0.0) t->report.torque[i] = clamp(t->report.torque[i], -most[k], most[k]);
+        t->kept[i] = t->report.torque[i];
     }
 }
 #endif
@@ -71,10 +81,23 @@ static void commanded(wbc_tick *t, int sound) {
     memcpy(t->v_last, t->report.v, NV * sizeof(double));
 #else
 #if COMMAND == TORQUE
+    /* What no motion may cost, and the command of a tick without an answer lacks */
+    for (int k = 0; t->report.flag == WBC_BRAKED && k < MC; k++) {
+        const double value = row_at(t, k, t->report.v), missed = fmax(t->free_low[k] - value, value - t->free_high[k]);
+        t->report.slack[k] = row_order[k] == 0 && missed > 2.0 * TOLERANCE * row_scale[k] ? missed : 0.0;
+    }
     wbc_tick_torques(t);
 #endif
     for (int i = 0; i < DOFS; i++) t->v_last[i] += t->dt * t->report.v[i];
     for (int i = DOFS; sound && i < NV; i++) t->kept[i] = t->report.v[i];
+#endif
+}
+
+/* The tick again: accelerations and torques count from where they did */
+static void rewind_tick(wbc_tick *t) {
+    memcpy(t->v_last, t->v_in, sizeof t->v_in);
+#if SLEWED > 0
+    for (int k = 0; k < SLEWED; k++) t->kept[slewed_dof[k]] = t->p[slewed_at[k]];
 #endif
 }
 
@@ -90,7 +113,8 @@ EXPORT int wbc_tick_step(wbc_tick *t) {
     flag = all_levels(t, flag);
 #else
     wbc_tick_certify(t);
-    if (t->cap == 0.0 && unsound(t, flag) && primal(t)) flag = (int)(t->report.flag = flag == WBC_RELAXED ? WBC_RELAXED : WBC_SOLVED);
+    if (t->cap == 0.0 && unsound(t, flag) && (primal(t) || primal_of_the_rest(t, flag)))
+        flag = (int)(t->report.flag = flag == WBC_RELAXED ? WBC_RELAXED : WBC_SOLVED);
 #endif
     if (PRICES) report_soft_rows(t);
     wbc_tick_look_ahead(t);
@@ -140,11 +164,11 @@ EXPORT void wbc_tick_reset(wbc_tick *t) {
 EXPORT int wbc_tick_safe_step(wbc_tick *t) {
     int flag = wbc_tick_step(t);
     if (flag < 0 || !(flag & WBC_UNSOUND)) return flag;
-    memcpy(t->v_last, t->v_in, sizeof t->v_in);
+    rewind_tick(t);
     wbc_tick_reset(t);
     flag = wbc_tick_step(t);
     if (!(flag & WBC_UNSOUND)) return (int)(t->report.flag = WBC_RECOVERED);
-    memcpy(t->v_last, t->v_in, sizeof t->v_in);
+    rewind_tick(t);
     wbc_tick_reset(t);
     assemble(t, 1);
     brake(t);
@@ -193,4 +217,7 @@ EXPORT void wbc_tick_init(wbc_tick *t) {
     for (int i = 0; i < MT; i++) t->weight[i] = 1.0;
     for (int k = 0; k < MC; k++) t->enabled[k] = 1.0;
     for (int i = 0; i < NB * NV; i++) t->bound_enabled[i] = 1.0;
+#if COMMAND == TORQUE
+    for (int i = 0; i < DOFS; i++) t->kept[i] = WBC_INF;
+#endif
 }

@@ -36,7 +36,7 @@
  *   task_scale  the unit of each task row
  *   LEVEL_NUMBERS LEVEL_MOST SOFT_MAX   numbers reported of each; rows and minimised general rows of one at most
  *   LEFT_FREE DAMPING   singular values below it are left to later levels; damping of one that is 0
- *   torque_dof  the degree of freedom whose torque a general row limits (-1: none)
+ *   SLEWED slewed_at slewed_dof   torques that may change only so fast: where p has the last one, degree of freedom
  *   stop_at stop_q stop_low stop_high   the same for position limits, with the coordinate that is limited
  */
 #ifndef WBC_TICK_H
@@ -123,6 +123,8 @@ typedef struct {
     long long work_iw[WORK_IW + 1];
     int warm;                    /* the sense array holds the active set of the last tick */
     int spent;                   /* the cap has ended a search of this tick */
+    double met[NV];              /* where the classes of a relaxation met */
+    int brief;                   /* iterations of a search that may fail; 0: as many as it takes */
     int alone;                   /* no row binds: R^-1 is all that a refinement needs */
     int factored;                /* R inverse and M of the last tick are in the workspace */
     /* DAQP workspace on our own memory */

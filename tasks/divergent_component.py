@@ -1,0 +1,106 @@
+"""The divergent component of motion, and with it the capture point, follows a position."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from wbc import validation
+from wbc.symbolic.tracer import Tracer
+from wbc.tasks.base import Command, Input, Row, Task, Values
+from wbc.tasks.center_of_mass import CenterOfMass
+from wbc.tasks.frames import checked_weights, point_rows, weights_of_rows
+
+if TYPE_CHECKING:
+    from wbc.robot import Robot
+
+
+@dataclass(frozen=True)
+class DivergentComponent(Task):
+    """The divergent component of motion xi of the centre of mass c follows a position in the world,
+
+        xi = c + (dc/dt) / omega,   d xi/dt = feedforward - gain (xi - target),   omega = sqrt(g / height)     [m, m/s]
+
+    (Takenaka, Matsumoto and Yoshiike, IROS 2009; Englsberger, Ott and Albu-Schaeffer, IEEE T-RO 31(2), 2015). c itself
+    converges to xi, by dc/dt = -omega (c - xi), so only xi has to be kept over the feet. Its projection on level ground
+    is the capture point (Pratt, Carff, Drakunov and Goswami, Humanoids 2006): where a pendulum of this height comes to
+    rest above. The rows ask for the acceleration of c that this takes,
+
+        d2c/dt2 = omega (feedforward - gain (xi - target) - dc/dt),
+
+    and the error that a step reports is e = c - target. Only a stack that commands accelerations or torques can have
+    it: for velocities a row of ``CenterOfMass`` with gain omega puts xi on its target at once.
+
+    Inputs:
+        target: 3 numbers in the world [m]. Default: where the centre of mass is at the first step.
+        feedforward: velocity of the target [m/s]. Default 0.
+        gain: how fast xi reaches its target [1/s]. Default 3.
+        omega: of the pendulum [1/s].
+
+    Example:
+        >>> DivergentComponent(omega=3.5)                  # x and y: the capture point
+
+    What it cannot do: it is no balance criterion: whether the contacts can make the acceleration is for their cones to
+    say.
+
+    Attributes:
+        omega: first value of the input: sqrt(g / height), for 0.8 m on earth 3.5/s.
+        weights: three numbers >= 0, by default x and y alike and the height free.
+
+    Raises:
+        ShapeError, NotFiniteError, RangeError: on construction; a robot without mass in :meth:`validate`.
+    """
+
+    initial_only: ClassVar[tuple[str, ...]] = ("omega",)
+
+    omega: float
+    weights: tuple[float, ...] | None = (1.0, 1.0, 0.0)
+
+    def __post_init__(self) -> None:
+        number = validation.scalar("DivergentComponent.omega", self.omega, low=0.0, open_low=True, unit="1/s")
+        object.__setattr__(self, "omega", number)
+        object.__setattr__(self, "weights", checked_weights("DivergentComponent.weights", self.weights, 3))
+
+    def validate(self, robot: Robot) -> None:
+        """Check that the robot has mass, see :meth:`Item.validate`."""
+        CenterOfMass().validate(robot)
+
+    def refusal(self, robot: Robot, command: Command) -> str:
+        """It has the velocity of the centre of mass in it."""
+        return (
+            'needs command="acceleration" or "torque"; for velocities use CenterOfMass' if command == "velocity" else ""
+        )
+
+    def inputs(self, robot: Robot) -> tuple[Input, ...]:
+        """``target``, ``feedforward``, ``gain`` and ``omega``, see the class."""
+        return (
+            Input("target", unit="m", size=3),
+            Input("feedforward", unit="m/s", size=3, default=np.zeros(3)),
+            Input("gain", unit="1/s", default=3.0 if self.gain is None else self.gain, low=0.0),
+            Input("omega", unit="1/s", default=self.omega, low=1e-6),
+        )
+
+    def rows(self, robot: Robot) -> tuple[Row, ...]:
+        """x, y, z [m]."""
+        return point_rows()
+
+    def row_weights(self, robot: Robot) -> NDArray[np.float64]:
+        """The declared weights."""
+        return weights_of_rows(self.weights, 3)
+
+    def initial(self, robot: Robot, q: NDArray[np.float64]) -> dict[str, Any]:
+        """The target where the centre of mass is at ``q``."""
+        return CenterOfMass().initial(robot, q)
+
+    def error(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
+        """c - target."""
+        return ca.SX(kin.center_of_mass() - inputs["target"])
+
+    def acceleration(self, inputs: Values, error: ca.SX, rate: ca.SX) -> ca.SX:
+        """See the class; the rate is dc/dt, as the target has none of its own."""
+        omega, gain = inputs["omega"], inputs["gain"]
+        return ca.SX(omega * (inputs["feedforward"] - gain * (error + rate / omega) - rate))

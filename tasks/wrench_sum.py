@@ -1,0 +1,75 @@
+"""What the wrenches of several contacts add up to."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
+
+import casadi as ca
+import numpy as np
+
+from wbc.symbolic.tracer import Tracer
+from wbc.tasks._contact import LABELS, UNITS, force_row
+from wbc.tasks._selection import selection
+from wbc.tasks.base import Command, Constraint, Input, Row, Rows, SacrificeOrder, Values
+
+if TYPE_CHECKING:
+    from wbc.robot import Robot
+
+
+@dataclass(frozen=True)
+class WrenchSum(Constraint):
+    """The wrenches of some contacts on the robot, in the axes of the world and about one point, add up to a wrench:
+
+        sum_i (f_i; m_i + (p_i - point) x f_i) = target        [N; N m]
+
+    p_i is the origin of the frame of contact i. Of all contacts it is the contact wrench sum, which is the rate of the
+    robot's momentum about the point less the moment of its weight. Of two hands it is what they carry together: a box
+    of mass m that accelerates at a asks for the force m (g - a), and within their friction the hands squeeze it no
+    harder than that takes, as the tasks of their forces ask for the least sum of squares. With ``soft=`` it is a task
+    with a price. Only a stack that commands torques can have it.
+
+    Inputs:
+        target: force and moment on the robot [N, N m]. Default 0.
+        point: about which moments are taken, in the world [m]. Default: the origin.
+
+    Example:
+        >>> WrenchSum(("left palm", "right palm"))
+
+    What it cannot do: it knows nothing of the body that the contacts are with; its weight, and what accelerates it, are
+    in ``target``. A contact that is not enabled counts as 0.
+
+    Attributes:
+        contacts: names of contacts of the stack.
+
+    Raises:
+        ShapeError, DuplicateNameError: on construction. UnknownNameError: no such contact, when the stack is compiled.
+    """
+
+    order: ClassVar[SacrificeOrder] = SacrificeOrder.HOLD
+    stands_in_world: ClassVar[bool] = False
+    equality: ClassVar[bool] = True
+
+    contacts: tuple[str, ...]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "contacts", selection("WrenchSum.contacts", self.contacts))
+
+    def refusal(self, robot: Robot, command: Command) -> str:
+        """Only a stack of torques has forces."""
+        return "" if command == "torque" else 'is about forces: compile with command="torque"'
+
+    def inputs(self, robot: Robot) -> tuple[Input, ...]:
+        """``target`` and ``point``."""
+        return (
+            Input("target", unit="N, N m", size=6, default=np.zeros(6)),
+            Input("point", unit="m", size=3, default=np.zeros(3)),
+        )
+
+    def rows(self, robot: Robot) -> tuple[Row, ...]:
+        """fx, fy, fz [N] and mx, my, mz [N m]."""
+        return tuple(force_row(robot, label, unit) for label, unit in zip(LABELS, UNITS, strict=True))
+
+    def velocity_rows(self, robot: Robot, kin: Tracer, inputs: Values, dt: ca.SX) -> Rows | None:
+        """None: its rows are on forces."""
+        return None
