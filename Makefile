@@ -71,6 +71,7 @@ bench: $(READY) $(PEERS_READY)  ## compare with pink, mink and placo on the same
 	$(BIN)/python -m bench --peers-python $(PEERS_VENV)/bin/python
 	$(BIN)/python -m bench.ik --full --peers-python $(PEERS_VENV)/bin/python
 	$(BIN)/python -m bench.time_laws
+	$(BIN)/python -m bench.figures --only plant_steps
 
 bench-ik: $(READY) $(PEERS_READY)  ## inverse kinematics on TRAC-IK's protocol, 10 000 poses a chain; Ctrl-C keeps what it has
 	$(BIN)/python -m bench.ik --full --peers-python $(PEERS_VENV)/bin/python

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import sys
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field, replace
+from multiprocessing import get_context
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -33,8 +35,8 @@ from wbc.walking.torque.tested import Tested
 
 #: Along -y, towards the holds [m/s^2]
 CERES, PLUTO, MOON = (0.0, -0.28, 0.0), (0.0, -0.62, 0.0), (0.0, -1.62, 0.0)
-#: Of the walks that were made
-LOGS: list[WalkLog] = []
+#: Walks at once
+WORKERS = 4
 #: A body that is farther from its command has fallen [m]
 FALLEN = 0.3
 #: Rows of a log from one stance that is looked at to the next
@@ -43,7 +45,8 @@ STRIDE = 20
 
 def parts() -> dict[str, Sheet | str]:
     """A row for each trial."""
-    return {"walks": torques(), "bearable": bearable()}
+    walks, log = torques()
+    return {"walks": walks, "bearable": bearable(log)}
 
 
 @dataclass(frozen=True)
@@ -61,14 +64,13 @@ class Trial:
 
 TRIALS = (
     Trial("Pinocchio, no gravity"),
+    Trial("a joint goes limp in the air", faults=("limp arm3_joint2 at 4",)),
     Trial("MuJoCo, no gravity", "mujoco"),
     Trial("Pinocchio, on Ceres, 0.28 m/s^2", gravity=CERES),
-    Trial("MuJoCo, on Ceres", "mujoco", CERES),
     Trial("Pinocchio, on Pluto, 0.62 m/s^2", gravity=PLUTO),
     Trial("Pinocchio, on the Moon, 1.62 m/s^2", gravity=MOON),
     Trial("20 kg on the body that the loop does not know", payload=20.0),
     Trial("friction that it does not know, 2 N m and 2 N m s", motors=Motors(coulomb=2.0, viscous=2.0)),
-    Trial("encoders with noise, 1e-6 rad and 1e-4 rad/s", encoders=Encoders(position=1e-6, velocity=1e-4)),
     Trial("encoders with noise, 1e-5 rad and 1e-3 rad/s", encoders=Encoders(position=1e-5, velocity=1e-3)),
     Trial("20 ms of delay, known", faults=("delay 0.02",)),
     Trial("the same, MuJoCo", "mujoco", faults=("delay 0.02",)),
@@ -76,45 +78,47 @@ TRIALS = (
     Trial("a grip slips by 5 mm", faults=("slip arm2 0.005 at 2",)),
     Trial("a hold breaks off, three hold", faults=("break arm1 at 0.5",)),
     Trial("a hold breaks off, two hold", faults=("break arm1 at 3",)),
-    Trial("a joint goes limp in the air", faults=("limp arm3_joint2 at 4",)),
 )
 
 
-def torques() -> Sheet:
-    """A row for each trial."""
-    bare, structure = wbc.robots.walker(), cylinder(rigid=True)
-    plan, walking = (
-        plan_walk(bare, structure, grid_path([(13, 9), (13, 14)], 0.1016)),
-        WalkStack(bare, structure, collisions=False),
-    )
-    rows, stacks = [], dict[tuple[float, float, float], TorqueStack]()
-    for trial in TRIALS:
-        heavy = wbc.robots.with_masses(bare, trial.gravity)
-        stack = stacks.setdefault(trial.gravity, TorqueStack(heavy, [GripKind.AXIS]))
-        faults = tuple(map(Fault.read, trial.faults))
-        motors = replace(trial.motors, delay=delay_of(faults))
-        payloads = {"body": pin.Inertia.FromSphere(trial.payload, 0.2)} if trial.payload else None
-        plant: Tested
-        if trial.plant == "mujoco":
-            plant = GrippingMujocoPlant(heavy.robot, HANDS, motors=motors)
-        else:
-            plant = PinocchioPlant(heavy.robot, integrator="midpoint", motors=motors, encoders=trial.encoders,
-                                   payloads=payloads)  # fmt: skip
-        loop = TorqueLoop(stack, plant, delay=motors.delay, faults=faults)
-        end, walk, kinds, slip = _walked(Walk(bare, structure, plan, stack=walking, plant=loop), bare, structure)
-        watch = loop.watch
-        print(f"{trial.name}: {end}", file=sys.stderr)
-        rows.append((trial.name, f"{end} after {walk.time:.1f} s", slip, f"{1e3 * watch.drift:.2g} mm",
-                     f"{watch.force:.0f} N, {watch.moment:.0f} N m", f"{watch.given[0]:.0f} N s", kinds))  # fmt: skip
+def torques() -> tuple[Sheet, WalkLog]:
+    """A row for each trial, and the log of the first; each in a process of its own."""
+    # Forked processes would share locks of what is loaded here
+    with ProcessPoolExecutor(WORKERS, get_context("spawn")) as pool:
+        found = list(pool.map(tried, TRIALS))
     columns = ("walk", "end", "hold slip", "grip off its hold", "largest grip", "momentum given", "external checker")
-    return Sheet("", columns, rows)
+    return Sheet("", columns, [row for row, _ in found]), found[0][1]
+
+
+def tried(trial: Trial) -> tuple[tuple[str, ...], WalkLog]:
+    """The row of a trial, and its log."""
+    bare, structure = wbc.robots.walker(), cylinder(rigid=True)
+    plan = plan_walk(bare, structure, grid_path([(13, 9), (13, 14)], 0.1016))
+    heavy, faults = wbc.robots.with_masses(bare, trial.gravity), tuple(map(Fault.read, trial.faults))
+    motors = replace(trial.motors, delay=delay_of(faults))
+    payloads = {"body": pin.Inertia.FromSphere(trial.payload, 0.2)} if trial.payload else None
+    plant: Tested
+    if trial.plant == "mujoco":
+        plant = GrippingMujocoPlant(heavy.robot, HANDS, motors=motors)
+    else:
+        plant = PinocchioPlant(
+            heavy.robot, integrator="midpoint", motors=motors, encoders=trial.encoders, payloads=payloads
+        )
+    loop = TorqueLoop(TorqueStack(heavy, [GripKind.AXIS]), plant, delay=motors.delay, faults=faults)
+    walk = Walk(bare, structure, plan, stack=WalkStack(bare, structure, collisions=False), plant=loop)
+    end, log, kinds, slip = _walked(walk, bare, structure)
+    watch = loop.watch
+    print(f"{trial.name}: {end}", file=sys.stderr)
+    grip, given = f"{watch.force:.0f} N, {watch.moment:.0f} N m", f"{watch.given[0]:.0f} N s"
+    row = (trial.name, f"{end} after {walk.time:.1f} s", slip, f"{1e3 * watch.drift:.2g} mm", grip, given, kinds)
+    return row, log
 
 
 class FallenError(WbcError):
     """The body is far from its command."""
 
 
-def _walked(walk: Walk, machine: Walker, structure: Structure) -> tuple[str, Walk, str, str]:
+def _walked(walk: Walk, machine: Walker, structure: Structure) -> tuple[str, WalkLog, str, str]:
     """How it ended, and what the checker says of its log."""
     recorder, slip = WalkRecorder(walk), 0.0
 
@@ -131,18 +135,18 @@ def _walked(walk: Walk, machine: Walker, structure: Structure) -> tuple[str, Wal
         end = "hold lost"
     except FallenError:
         end = "fell"
-    LOGS.append(recorder.log()[0])
+    log = recorder.log()[0]
     with TemporaryDirectory() as folder:
-        report = check_walk(LOGS[-1], machine.urdf(Path(folder) / "robot.urdf"), structure)
+        report = check_walk(log, machine.urdf(Path(folder) / "robot.urdf"), structure)
     kinds = ", ".join(finding.kind for finding in report.violations)
-    return end, walk, kinds or "clean", f"{1e3 * slip:.2g} mm"
+    return end, log, kinds or "clean", f"{1e3 * slip:.2g} mm"
 
 
-def bearable() -> str:
-    """The largest gravity along y in which every posture of the first walk can be held still: at each, the linear
+def bearable(log: WalkLog) -> str:
+    """The largest gravity along y in which every posture of a walk can be held still: at each, the linear
     programme of wrenches within the rating, torques within their limits, and a base in balance.
     """
-    log, robot, rating = LOGS[0], wbc.robots.with_masses(wbc.robots.walker()).robot, wbc.robots.hold_rating()
+    robot, rating = wbc.robots.with_masses(wbc.robots.walker()).robot, wbc.robots.hold_rating()
     model, limits = robot.model.copy(), robot.limits.effort[6:]
     model.gravity.linear = np.array([0.0, -1.0, 0.0])
     data, box = model.createData(), [rating.force] * 3 + [rating.torque] * 2

@@ -42,15 +42,23 @@ class AxisGrasp(RigidGrasp):
 
     def cone(self, inputs: Values) -> Cone:
         """The box, without m_z."""
-        unlimited = ca.SX.inf(3)
-        most = ca.vertcat(inputs.get("force", unlimited), inputs.get("torque", unlimited))[self._limited]
-        matrix = ca.SX(ca.DM(np.eye(6)[np.ix_(self._limited, self.axes)]))
-        return Cone(ca.sparsify(matrix), -most, most)
+        numbers = ca.vertcat(*[inputs[i.name] for i in self.limits()])
+        places = [k for k, axis in enumerate(self._given) if axis in self.axes]
+        most = _chosen(places, len(self._given)) @ numbers
+        return Cone(_chosen(self._limited, 6)[:, list(self.axes)], -most, most)
+
+    @property
+    def _given(self) -> list[int]:
+        return [*range(3)] * (self.force is not None) + [*range(3, 6)] * (self.torque is not None)
 
     @property
     def _limited(self) -> list[int]:
-        limited = [*range(3)] * (self.force is not None) + [*range(3, 6)] * (self.torque is not None)
-        return [k for k in limited if k in self.axes]
+        return [axis for axis in self._given if axis in self.axes]
+
+
+def _chosen(rows: list[int], count: int) -> ca.SX:
+    """Some rows of the unit matrix."""
+    return ca.sparsify(ca.SX(ca.DM(np.eye(count)[rows])))
 
 
 #: By what a hold holds
