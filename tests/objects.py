@@ -2,17 +2,20 @@
 
 A stack is compiled again as soon as a line of the package changes that may have to do with it (wbc.stack.key); nearly
 always the C code stays the same, and so does its object file. What is not in the folder is compiled; rows that are not
-to be optimised are assembled (:mod:`tests.assembly`).
+to be optimised are assembled (:mod:`tests.assembly`), and what then belongs together is linked without asking the
+compiler to ask the linker, which takes as long again.
 
 Code that the compiler refuses fails the test: the package itself would go on, slowly, on the virtual machine.
 """
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import os
 import pathlib
 import shutil
+import subprocess
 import tempfile
 
 import casadi as ca
@@ -22,6 +25,8 @@ from wbc.errors import CompileError
 from wbc.native import toolchain
 
 _run, _compiler = toolchain._run, toolchain.compiler()
+#: Empty file beside a tick that is not optimised
+_PLAIN = "plain"
 
 
 def keep(folder: pathlib.Path) -> None:
@@ -39,8 +44,10 @@ def keep(folder: pathlib.Path) -> None:
 
     def compile_or_take(command: list[str], place: pathlib.Path) -> None:
         if "-c" not in command:
-            _run(command, place)
+            _run(_linked(command) if (place / _PLAIN).exists() else command, place)
             return
+        if "tick.o" in command and "-O0" in command:
+            (place / _PLAIN).touch()
         made = place / command[command.index("-o") + 1]
         kept = folder / _name(command, place)
         if kept.exists():
@@ -62,9 +69,22 @@ def _made(command: list[str], place: pathlib.Path) -> None:
         text = assembled(rows.read_text())
         if text is not None:
             (place / "rows.s").write_text(text)
-            _run([command[0], "-c", "rows.s", "-o", command[command.index("-o") + 1]], place)
+            _run([_tool("as"), "rows.s", "-o", command[command.index("-o") + 1]], place)
             return
     _run(command, place)
+
+
+def _linked(command: list[str]) -> list[str]:
+    """The linker's command that the compiler's stands for, without the start-up code that a tick does not have."""
+    return [_tool("ld"), *(flag for word in command[1:] for flag in word.removeprefix("-Wl,").split(","))]
+
+
+@functools.cache
+def _tool(name: str) -> str:
+    """The assembler or the linker that the compiler calls."""
+    assert _compiler is not None
+    done = subprocess.run([_compiler, f"-print-prog-name={name}"], capture_output=True, text=True, check=True)
+    return done.stdout.strip()
 
 
 def _name(command: list[str], place: pathlib.Path) -> str:

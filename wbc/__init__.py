@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 from wbc import lazy
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 if TYPE_CHECKING:
     from wbc import analysis as analysis
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from wbc import teleop as teleop
     from wbc import track as track
     from wbc import trajectory as trajectory
+    from wbc import viewer as viewer
     from wbc import walking as walking
     from wbc.controller import Certificate, Controller, Policy, Stack, Status, Step
     from wbc.errors import WbcError
@@ -64,6 +65,7 @@ __all__ = [
     "teleop",
     "track",
     "trajectory",
+    "viewer",
     "walking",
 ]
 

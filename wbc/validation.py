@@ -42,7 +42,8 @@ def real_array(field: str, value: Any, shape: tuple[int, ...] | None = None, *, 
         raise ShapeError(field, value, "expected real numbers") from error
     if shape is not None and out.shape != shape:
         raise ShapeError(field, value, f"expected shape {shape}, not {out.shape}")
-    if finite and not np.isfinite(out).all():
+    # A byte of 0 is a False; every value that a user sets comes through here, and all() takes four times as long
+    if finite and b"\0" in np.isfinite(out).tobytes():
         raise NotFiniteError(field, value, "expected finite numbers")
     return out
 

@@ -15,6 +15,7 @@ from bench.pool import ROOT
 from bench.sheet import Sheet
 from bench.walk import layout_tables, planning_tables
 from bench.walk import tables as walks
+from bench.walk.trial_parts import trial_sheet
 
 View = Callable[[Any], str]
 #: What a tick consists of
@@ -91,6 +92,12 @@ _ALL = (
             "layouts": walk_view("layouts", layout_tables.layout_sheet),
         },
     ),
+    Figure(
+        "trials", (*WALK, "bench/walk"), 600.0,
+        ("python", "-m", "bench.walk", "--parts", "structures", "--resume", "--output", "bench/data"),
+        "bench/data/trials.json",
+        {"structures": walk_view("structures", lambda records: trial_sheet("structures", records))},
+    ),
     Figure("soak", (*TICK, "bench/soak"), 20.0),
     Figure("analysis", ("wbc/analysis",), 2.0),
     Figure("batch", (*TICK, "wbc/batch", "wbc/ik"), 3.0),
@@ -112,12 +119,14 @@ _ALL = (
     Figure("relative_motion", ("wbc/published/relative_motion", "wbc/symbolic/taylor.py"), 0.2),
     Figure("resolvers", (*TICK, "wbc/resolvers", "wbc/coordinates", "bench/resolvers"), 1.0),
     Figure("sensing", ("wbc/proximity",), 1.0),
+    Figure("viewer", ("wbc/viewer",), 3.0),
     Figure("servos", (*TICK, "wbc/servo", "wbc/simulation/mujoco_plant.py", "bench/servo_arm.xml"), 2.0),
     Figure("shapes", ("wbc/robot",), 0.5),
     Figure("soft", TICK, 1.0),
     Figure("solvers", (*TICK, "bench/conditioning.py"), 2.0),
     Figure("symbolic", ("wbc/symbolic",), 0.2),
-    Figure("plants", (*WALK, "wbc/simulation", "tests/simulation/lagging.py"), 1.0),
+    Figure("plants", (*WALK, "wbc/simulation", "tests/simulation/lagging.py"), 2.0),
+    Figure("torque_walks", (*WALK, "wbc/simulation"), 8.0),
     Figure("moving", (*TICK, "wbc/moving_target", "wbc/estimation", "wbc/simulation"), 6.0),
     Figure("torques", (*TICK, "bench/torque_peer.py"), 1.5),
     Figure("two_ended", WALK, 0.5),

@@ -25,8 +25,6 @@ from wbc.walking import PlaneSurface, Structure
 CLEARANCE, SLACK = 0.0254, 1e-4
 #: A hand this near to its hold may be near to what that is mounted on, which is this near to the hold, so deep [m]
 NEAR, MOUNTED, DEPTH = 0.0762, 0.005, 0.005
-#: So long before and after the log has a hand at a hold it may come to it and leave it [s]
-LEAVING = 3.0
 #: Of hands at their holds [m, rad], and of joints' accelerations, in parts of their limits
 OFF, TURNED, HARDER = 0.002, np.radians(0.5), 1.01
 #: By which the velocity of the body may change from tick to tick: ten times the ramp to 0.1 m/s in 0.5 s [m/s, rad/s]
@@ -142,7 +140,7 @@ def _neighbours(model: pin.Model, shaped: set[str]) -> set[frozenset[str]]:
 
 def _exemptions(log: Columns, model: pin.Model, parts: list[SweptBody], structure: Structure) -> Iterator[Exemption]:
     """Hands at the holds that the log has them at, against what these are mounted on."""
-    mounts: dict[int, list[str]] = {}
+    mounts, places = dict[int, list[str]](), np.array([[at.translation for at in row] for row in _hands(log, model)])
     for arm, hand in enumerate(log["hands"]):
         joint = model.frames[model.getFrameId(str(hand))].parentJoint
         mine = [p for p in parts if model.frames[model.getFrameId(p.link)].parentJoint == joint]
@@ -154,11 +152,17 @@ def _exemptions(log: Columns, model: pin.Model, parts: list[SweptBody], structur
                 continue
             if row not in mounts:
                 mounts[row] = list(_mounts(structure, log["hold_pose"][row, :3]))
-            since, until = float(log["t"][start]) - LEAVING, float(log["t"][end]) + LEAVING
+            # As long as the hand is near the hold without a break
+            point, k, last = log["hold_pose"][row, :3], int(start), int(end)
+            near = np.linalg.norm(places[:, arm] - point, axis=1) <= NEAR
+            while k > 0 and near[k]:
+                k -= 1
+            while last < len(near) - 1 and near[last]:
+                last += 1
+            since, until = float(log["t"][k]), float(log["t"][last])
             for part in mine:
                 depth = DEPTH + float(getattr(part.shape, "radius", 0.0))
                 for mount in mounts[row]:
-                    point = log["hold_pose"][row, :3]
                     yield Exemption(part.name, mount, point, NEAR, depth, since, until)
 
 
@@ -172,19 +176,13 @@ def _mounts(structure: Structure, point: Array) -> Iterator[str]:
 
 def _loose(log: Columns, model: pin.Model) -> Iterator[str]:
     """Closed hands off their holds."""
-    data = model.createData()
-    index = [model.joints[model.getJointId(str(name))].idx_q for name in log["joints"]]
-    hands = [model.getFrameId(str(hand)) for hand in log["hands"]]
-    worst, q = dict[str, tuple[float, float, str]](), pin.neutral(model)
-    for k, t in enumerate(log["t"]):
-        q[index] = log["q"][k]
-        pin.framesForwardKinematics(model, data, q)
-        body = pin.XYZQUATToSE3(log["pose_body_in_structure"][k])
-        for arm, frame in enumerate(hands):
+    worst = dict[str, tuple[float, float, str]]()
+    for k, (t, there) in enumerate(zip(log["t"], _hands(log, model), strict=True)):
+        for arm, at in enumerate(there):
             row = int(log["hand_hold"][k, arm])
             if log["hand_state"][k, arm] != CLOSED or row < 0:
                 continue
-            off = pin.XYZQUATToSE3(log["hold_pose"][row]).actInv(body * data.oMf[frame])
+            off = pin.XYZQUATToSE3(log["hold_pose"][row]).actInv(at)
             tilt = float(np.arccos(np.clip(off.rotation[2, 2], -1.0, 1.0))) - float(log["hold_max_tilt"][row])
             for kind, value in (
                 ("hand off its hold [m]", float(np.linalg.norm(off.translation))),
@@ -196,6 +194,17 @@ def _loose(log: Columns, model: pin.Model) -> Iterator[str]:
         value, time, arm_name = worst.get(kind, (0.0, 0.0, ""))
         if value > limit:
             yield f"{kind}: {value:.4g} at {time:.3f} s, {arm_name}"
+
+
+def _hands(log: Columns, model: pin.Model) -> Iterator[list[pin.SE3]]:
+    """Where the hands are at every tick, the body as logged."""
+    data, q = model.createData(), pin.neutral(model)
+    index = [model.joints[model.getJointId(str(name))].idx_q for name in log["joints"]]
+    hands = [model.getFrameId(str(hand)) for hand in log["hands"]]
+    for joints, pose in zip(log["q"], log["pose_body_in_structure"], strict=True):
+        q[index] = joints
+        pin.framesForwardKinematics(model, data, q)
+        yield [pin.XYZQUATToSE3(pose) * data.oMf[frame] for frame in hands]
 
 
 def _jumps(log: Columns) -> Iterator[str]:

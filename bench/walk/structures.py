@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import ceil, cos, pi, radians, sin
@@ -24,6 +25,13 @@ PITCH, HEIGHT = 0.235, 1.32
 FREE_OF = 0.12
 #: Tilt that the holds allow [rad]
 TILT = 0.05
+#: Body and necks, whichever way they are turned, are within this radius about the normal of the hold that they stand
+#: over, and between these heights; obstacles are ROOM from all points of it that are looked at [m]
+BODY, LOW, HIGH, ROOM = 0.41, 0.55, 1.43, 0.09
+#: Beginning and end are so far apart at least, and so far from the outline of all holds [m]
+APART, MARGIN = 1.2, 0.75
+#: Ids of the holds over which a walk begins and ends; None: they are drawn
+Ends = tuple[str, str] | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,16 +55,19 @@ class Trial:
         return save_structure(self.structure, folder / f"{self.family}-{self.seed}.csv")
 
 
-def random_structure(family: str, seed: int) -> Trial:
+def random_structure(family: str, seed: int, body: float = BODY) -> Trial:
     """The structure of a seed.
+
+    Args:
+        body: radius about the body's z axis within which it is with its necks [m].
 
     Raises:
         UnknownNameError: no such family.
     """
     make = FAMILIES[validation.one_of("family", family, tuple(FAMILIES))]
     rng = np.random.default_rng([list(FAMILIES).index(family), seed])
-    structure, start, goal = make(rng, f"{family}-{seed}")
-    return Trial(family, seed, structure, start, goal)
+    structure, ends = make(rng, f"{family}-{seed}")
+    return Trial(family, seed, structure, *(ends or _ends(rng, structure, body)))
 
 
 def _lattice(rows: int, columns: int) -> dict[str, Array]:
@@ -77,17 +88,27 @@ def _on_plane(name: str, obstacles: list[Obstacle], rows: int = 15, columns: int
     return Structure(name, tuple(holds), tuple(obstacles), PlaneSurface(pin.SE3.Identity()))
 
 
-def _ends(rng: np.random.Generator, structure: Structure, apart: float = 1.2, margin: float = 0.75) -> tuple[str, str]:
-    """Two holds at least ``apart``, and at least ``margin`` from the outline of all holds [m]."""
+def _ends(rng: np.random.Generator, structure: Structure, body: float) -> tuple[str, str]:
+    """Two holds over which a body has place, at least APART, and MARGIN from the outline of all holds [m]."""
     points = structure.positions
     low, high = points.min(axis=0), points.max(axis=0)
-    flat = high - low <= 2 * margin
-    inner = np.all(((points >= low + margin) & (points <= high - margin)) | flat, axis=1)
+    flat = high - low <= 2 * MARGIN
+    inner = np.all(((points >= low + MARGIN) & (points <= high - MARGIN)) | flat, axis=1)
     rows = np.flatnonzero(inner)
     gaps = np.linalg.norm(points[rows, None] - points[rows], axis=2)
-    first, last = np.nonzero((gaps >= apart) & (gaps <= apart + 0.8))
-    k = int(rng.integers(len(first)))
-    return structure.ids[rows[first[k]]], structure.ids[rows[last[k]]]
+    first, last = np.nonzero((gaps >= APART) & (gaps <= APART + 0.8))
+    place = functools.cache(lambda row: has_place(structure, points[row], body))
+    pairs = ((rows[first[k]], rows[last[k]]) for k in rng.permutation(len(first)))
+    begin, end = next(pair for pair in pairs if place(pair[0]) and place(pair[1]))
+    return structure.ids[begin], structure.ids[end]
+
+
+def has_place(structure: Structure, foot: Array, within: float) -> bool:
+    """Whether a body has place at its usual height over a point of the plane z = 0, whichever way it is turned."""
+    grid = np.meshgrid(np.linspace(0.0, within, 4), np.arange(16) * pi / 8, np.linspace(LOW, HIGH, 9))
+    radius, angle, height = (axis.ravel() for axis in grid)
+    body = foot + np.stack([radius * np.cos(angle), radius * np.sin(angle), height], axis=1)
+    return all(float(obstacle.distance(body).min()) >= ROOM for obstacle in structure.obstacles)
 
 
 def capsule_between(name: str, a: Array, b: Array, radius: float) -> Obstacle:
@@ -97,29 +118,27 @@ def capsule_between(name: str, a: Array, b: Array, radius: float) -> Obstacle:
     return Obstacle(name, Capsule(radius, length), pin.SE3(turn, (a + b) / 2))
 
 
-def _posts(rng: np.random.Generator, name: str) -> tuple[Structure, str, str]:
+def _posts(rng: np.random.Generator, name: str) -> tuple[Structure, Ends]:
     """Posts of any height that stand among the holds."""
     posts = []
     for k in range(int(rng.integers(3, 9))):
         foot = np.append(rng.uniform([0.3, 0.3], [3.7, 3.0]), 0.0)
         top = foot + [0.0, 0.0, rng.uniform(0.3, 1.7)]
         posts.append(capsule_between(f"post {k}", foot, top, float(rng.uniform(0.02, 0.06))))
-    structure = _on_plane(name, posts)
-    return structure, *_ends(rng, structure)
+    return _on_plane(name, posts), None
 
 
-def _bars(rng: np.random.Generator, name: str) -> tuple[Structure, str, str]:
+def _bars(rng: np.random.Generator, name: str) -> tuple[Structure, Ends]:
     """Bars at any height that cross the holds."""
     bars = []
     for k in range(int(rng.integers(2, 6))):
         angle, middle = rng.uniform(0, pi), np.append(rng.uniform([0.5, 0.5], [3.5, 2.8]), rng.uniform(0.15, 1.5))
         along = np.array([cos(angle), sin(angle), rng.uniform(-0.2, 0.2)]) * rng.uniform(0.3, 1.2)
         bars.append(capsule_between(f"bar {k}", middle - along, middle + along, float(rng.uniform(0.02, 0.05))))
-    structure = _on_plane(name, bars)
-    return structure, *_ends(rng, structure)
+    return _on_plane(name, bars), None
 
 
-def _ladder(rng: np.random.Generator, name: str) -> tuple[Structure, str, str]:
+def _ladder(rng: np.random.Generator, name: str) -> tuple[Structure, Ends]:
     """A ladder that leans or lies among the holds: two rails and their rungs."""
     foot, angle, lean = (
         np.append(rng.uniform([0.8, 0.8], [3.2, 2.5]), 0.08),
@@ -136,11 +155,10 @@ def _ladder(rng: np.random.Generator, name: str) -> tuple[Structure, str, str]:
     ]
     for k, at in enumerate(np.arange(0.15, length, 0.3)):
         parts.append(capsule_between(f"rung {k}", *(foot + at * up + s * half * across for s in (-1, 1)), 0.018))
-    structure = _on_plane(name, parts)
-    return structure, *_ends(rng, structure)
+    return _on_plane(name, parts), None
 
 
-def _corner(rng: np.random.Generator, name: str) -> tuple[Structure, str, str]:
+def _corner(rng: np.random.Generator, name: str) -> tuple[Structure, Ends]:
     """Two planes that meet in a corner or an edge; the body goes from the one to the other."""
     angle = float(rng.choice([-1.0, 1.0]) * rng.uniform(radians(15), radians(75)))  # > 0: a corner
     rows, columns, thick, holds, slabs = 11, 8, 0.1, [], []
@@ -158,10 +176,10 @@ def _corner(rng: np.random.Generator, name: str) -> tuple[Structure, str, str]:
         slabs.append(Obstacle("slab a" if side < 0 else "slab c", Box(sizes), pin.SE3(rotation, middle)))
     structure = Structure(name, tuple(holds), tuple(slabs))
     row = int(rng.integers(4, 7))
-    return structure, f"a{row},{int(rng.integers(3, 5))}", f"c{int(rng.integers(4, 7))},{int(rng.integers(3, 5))}"
+    return structure, (f"a{row},{int(rng.integers(3, 5))}", f"c{int(rng.integers(4, 7))},{int(rng.integers(3, 5))}")
 
 
-def _inside(rng: np.random.Generator, name: str) -> tuple[Structure, str, str]:
+def _inside(rng: np.random.Generator, name: str) -> tuple[Structure, Ends]:
     """The inside of a cylinder about x, of staves; holds on the wall."""
     radius, length, half = float(rng.uniform(2.4, 4.0)), 18 * PITCH, radians(75)
     count = ceil(2 * half * radius / PITCH)
@@ -181,10 +199,10 @@ def _inside(rng: np.random.Generator, name: str) -> tuple[Structure, str, str]:
     structure = Structure(name, tuple(holds), tuple(staves))
     t = sorted(rng.integers(count // 3, count - count // 3, 2).tolist())
     a = (int(rng.integers(4, 6)), int(rng.integers(10, 13)))
-    return structure, f"{t[0]},{a[0]}", f"{t[1]},{a[1]}"
+    return structure, (f"{t[0]},{a[0]}", f"{t[1]},{a[1]}")
 
 
-def _tilted(rng: np.random.Generator, name: str) -> tuple[Structure, str, str]:
+def _tilted(rng: np.random.Generator, name: str) -> tuple[Structure, Ends]:
     """A lattice on a plane in any attitude, jittered, with holds of every kind that lean a little."""
     attitude = pin.SE3(pin.Quaternion(*_unit(rng.normal(size=4))).matrix(), rng.uniform(-2, 2, 3))
     jitter, lean = rng.uniform(0.0, 0.06), rng.uniform(0.0, radians(12))
@@ -195,8 +213,7 @@ def _tilted(rng: np.random.Generator, name: str) -> tuple[Structure, str, str]:
         place = at + np.append(rng.uniform(-jitter, jitter, 2), 0.0)
         holds.append(Hold(key, frame_of("hold", place, axis, (1, 0, 0)), roll, float(rng.choice([0.0, TILT]))))
     flat = Structure(name, tuple(holds), (), PlaneSurface(pin.SE3.Identity()))
-    start, goal = _ends(rng, flat)
-    return flat.moved(attitude), start, goal
+    return flat.moved(attitude), _ends(rng, flat, BODY)
 
 
 def rock(rng: np.random.Generator, size: float) -> Array:
@@ -214,15 +231,14 @@ def surface_of(points: Array) -> Array:
     return corners
 
 
-def _mesh(rng: np.random.Generator, name: str) -> tuple[Structure, str, str]:
+def _mesh(rng: np.random.Generator, name: str) -> tuple[Structure, Ends]:
     """Rocks as meshes, on the plane and above it."""
     rocks = []
     for k in range(int(rng.integers(2, 6))):
         place = rng.uniform([0.5, 0.5, 0.0], [3.5, 2.8, 1.0])
         shape = TriangleMesh(surface_of(rock(rng, float(rng.uniform(0.1, 0.3)))), solid=True)
         rocks.append(Obstacle(f"rock {k}", shape, pin.SE3(np.eye(3), place)))
-    structure = _on_plane(name, rocks)
-    return structure, *_ends(rng, structure)
+    return _on_plane(name, rocks), None
 
 
 def _unit(vector: Array) -> Array:
@@ -230,8 +246,8 @@ def _unit(vector: Array) -> Array:
     return out
 
 
-#: Family -> (generator, name) -> structure, and the holds over which a walk begins and ends
-FAMILIES: dict[str, Callable[[np.random.Generator, str], tuple[Structure, str, str]]] = {
+#: Family -> (generator, name) -> structure, and the holds over which a walk begins and ends; None: such as have place
+FAMILIES: dict[str, Callable[[np.random.Generator, str], tuple[Structure, Ends]]] = {
     "posts": _posts,
     "bars": _bars,
     "ladder": _ladder,

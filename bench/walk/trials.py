@@ -11,12 +11,14 @@ import sys
 import time
 import traceback
 from collections.abc import Callable
+from math import pi, sin
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 import wbc
+from bench.walk.reference.passage import passage
 from bench.walk.second_checker import second_check
 from bench.walk.structures import FAMILIES, random_structure
 from wbc.errors import RangeError, WbcError
@@ -46,6 +48,8 @@ GROUNDS = (
 )
 #: Arms of the walkers on random structures, seed by seed in turn
 ARMS = (3, 3, 3, 4, 3, 3, 6, 3, 5, 3)
+#: Body and necks are within this beyond the shoulders [m]
+NECK = 0.105
 #: Commanded rates of velocity trials: largest [m/s, m/s, rad/s], how many and how long each [s]
 RATES, LEGS, LEG = np.array([0.12, 0.12, 0.1]), 4, 3.0
 
@@ -53,13 +57,39 @@ RATES, LEGS, LEG = np.array([0.12, 0.12, 0.1]), 4, 3.0
 def structures(name: str, walker: Walker, folder: Path) -> Record:
     """A walk on ``FAMILY SEED``."""
     family, seed = name.split()
-    trial = random_structure(family, int(seed))
+    trial = random_structure(family, int(seed), walker.arm_data.shoulder_radius + NECK)
     file = trial.save(folder)
     rng = np.random.default_rng(int(seed))
     speed = float(rng.uniform(0.05, 0.15))
     objective: Objective = "velocity" if rng.random() < 0.5 else "destination"
     request = PathRequest(Site(str(file)), trial.start, (trial.goal,), speed, 0.1, objective)
-    return kept(perform_walk(request, walker), folder)
+    spent = Spent()
+    run = perform_walk(request, walker, progress=spent)
+    out = {**kept(run, folder), **spent.times(run.plan is not None)}
+    if run.log is None:
+        path = request.path(walker.data)
+        found = passage(walker, request.site.build(), path.poses[0], path.poses[-1])
+        out |= {"reference": found.kind, "around": found.around}
+    return out
+
+
+class Spent:
+    """Processor time of a walk's stages, as it reports them [s]."""
+
+    def __init__(self) -> None:
+        self._begun: dict[str, float] = {}
+        self._ended = 0.0
+
+    def __call__(self, what: str, part: float | None) -> None:
+        self._ended = time.process_time()
+        self._begun.setdefault(what, self._ended)
+
+    def times(self, planned: bool) -> Record:
+        """Of the plan, and of walking with its log."""
+        begun, stages = [*self._begun.values()], [*self._begun]
+        if not planned or len(begun) < 3:
+            return {}
+        return {"plan_s": begun[1] - begun[0], "walking_s": self._ended - begun[stages.index(stages[2])]}
 
 
 class RandomRates:
@@ -172,6 +202,14 @@ def names(part: str, count: int) -> list[str]:
     return [f"{families[k % 7]} {k // 7}" if part == "structures" else str(k) for k in seeds]
 
 
+def walker_of(arms: int) -> Walker:
+    """A walker whose arms are as far from each other as three of them, as ``wbc walk --arms`` has it."""
+    three = wbc.robots.walker()
+    if arms <= 3:
+        return wbc.robots.walker(arms)
+    return wbc.robots.walker(arms, three.data.shoulder_radius * sin(pi / 3) / sin(pi / arms))
+
+
 def tried(part: str, name: str, folder: Path) -> Record:
     """The record of one trial; an error of the package is its outcome."""
     folder.mkdir(parents=True, exist_ok=True)
@@ -179,7 +217,7 @@ def tried(part: str, name: str, folder: Path) -> Record:
     try:
         arms = ARMS[int(name.split()[1]) % len(ARMS)] if part == "structures" else 3
         out["arms"] = arms
-        out |= PARTS[part](name, wbc.robots.walker(arms=arms), folder)
+        out |= PARTS[part](name, walker_of(arms), folder)
     except WbcError as error:
         out |= {"outcome": "error", "reason": f"{type(error).__name__}: {error}"}
     except Exception as error:  # noqa: BLE001 (an error of a trial is what the benchmark looks for)

@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from tests.controller.stacks import aim, controller, near_limits, robot
+from tests.controller.stacks import aim, controller, inside, near_limits, robot
 from tests.levels import arms
 from tests.torque import problems
 from wbc import Controller, Policy, Stack, Status
@@ -41,7 +41,13 @@ def soft(backend: str) -> Controller:
     return stack.compile(backend=backend)
 
 
+def bare(backend: str) -> Controller:
+    """Without general rows."""
+    return controller("arm", "panda", 1e-3, False, backend=backend)
+
+
 MADE: dict[str, Made] = {
+    "bare": bare,
     "arm": lambda backend: controller("arm", "panda", backend=backend),
     "conflicts": lambda backend: controller("conflicts", backend=backend),
     "humanoid": lambda backend: controller("humanoid", backend=backend),
@@ -138,6 +144,46 @@ def compare(one: Controller, count: int, threads: int, ticks: int = 5) -> set[St
         seen |= set(found.statuses)
         q = np.stack([pin.integrate(bot.model, now, 0.005 * v) for now, v in zip(q, found.v, strict=True)])
     return seen
+
+
+@pytest.mark.parametrize("name", ["bare", "arm", "humanoid", "torque", "levels"])
+def test_derivatives_are_those_of_single_steps(name: str) -> None:
+    """By q, by the velocity that accelerations count from, and by targets; with and without rows that bind."""
+    one, rng = MADE[name]("native"), np.random.default_rng(3)
+    bot = one.stack.robot
+    batch = one.batch(3)
+    q = np.stack([inside(bot, rng) for _ in range(3)])
+    batch.reset(q)
+    singles = [one.clone() for _ in range(3)]
+    for k, single in enumerate(singles):
+        single.reset(q[k])
+        aim(single, rng)
+    give(batch, [values(single) for single in singles])
+    step = batch.step(q)
+    while not step.solved.all():
+        q[~step.solved] = np.stack([inside(bot, rng) for _ in range(int((~step.solved).sum()))])
+        step = batch.step(q)
+    assert name in ("bare", "torque") or any(step[k].binding for k in range(3))
+    of = next(entry.name for entry in one.stack.tasks if "target" in one[entry.name].names)
+    for asked in (("q", None), ("v", None), (of, "target"), (of, "weight")):
+        found = step.derivative(*asked)
+        wanted = np.stack([step[k].derivative(*asked) for k in range(3)])
+        np.testing.assert_allclose(found, wanted, rtol=1e-4, atol=1e-5 * max(1.0, np.abs(wanted).max()))
+
+
+def test_a_robot_whose_rows_gave_way_has_no_derivative() -> None:
+    one = controller("conflicts", backend="native")
+    batch = one.batch(2)
+    batch.reset(robot("panda").neutral)
+    batch.set(hold={"target": [pin.SE3.Identity(), one_pose()]})
+    step = batch.step(robot("panda").neutral)
+    assert not step.solved.all()
+    with pytest.raises(SolverError, match="robot 0 is relaxed"):
+        step.derivative("q")
+
+
+def one_pose() -> pin.SE3:
+    return robot("panda").pose(robot("panda").neutral, "panda_hand_tcp")
 
 
 @pytest.fixture(scope="module")

@@ -33,7 +33,12 @@ LONG = (
     "self_collision",
     "levels",
     "moving_obstacle",
+    "moving_table",
+    "insert",
     "custom_expression",
+    "humanoid",
+    "torque",
+    "walk",
     "mujoco_servo",
     "retarget",
     "own_urdf",
@@ -165,6 +170,11 @@ def test_a_humanoid_is_pushed() -> None:
 
 def test_a_person_drives_a_humanoid() -> None:
     assert number("hands at most # mm", output("retarget")) < 5.0
+
+
+def test_a_browser_shows_an_arm(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "argv", ["drag.py", "--ticks", "20"])
+    assert number("hand # mm", output("drag")) < 1e-3
 
 
 def test_mobile_base_rolls_along_with_the_hand() -> None:

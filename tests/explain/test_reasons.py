@@ -9,6 +9,7 @@ import pytest
 
 import wbc.robots
 from tests.constraints.robots import robot as limited_robot
+from tests.repeats import ALL, MORE
 from wbc.controller import Controller, Policy, Stack, Step
 from wbc.explain.reason import Reason
 from wbc.robot import Robot
@@ -205,13 +206,17 @@ def test_speed_limits_are_named() -> None:
 
 @pytest.mark.parametrize("name", ARMS)
 def test_an_escape_leaves_a_singular_start_and_arrives(name: str) -> None:
-    """Without it a stretched arm stays; with it the target on its own line is reached, the same way each time."""
+    """Without it a stretched arm stays; with it the target on its own line is reached, the same way each time.
+
+    The second time on one arm, and with ``REPEATS=3`` on all.
+    """
     robot, tip, tick = arm(name)
     along = np.array([0.3, -0.4, 0.5]) / np.sqrt(0.5)
     start = farthest(robot, tip, along, 2)
     goal = robot.pose(start, tip).translation - 0.1 * along
     ends = []
-    for policy in (Policy(), Policy(escape=True), Policy(escape=True)):
+    again = name == ARMS[0] or MORE >= ALL
+    for policy in (Policy(), *[Policy(escape=True)] * (2 if again else 1)):
         tick.policy, q = policy, start
         tick.reset(q)
         tick["hand"].target, tick["hand"].gain = goal, 10.0
@@ -225,4 +230,4 @@ def test_an_escape_leaves_a_singular_start_and_arrives(name: str) -> None:
         assert answered == ({"", "escape"} if policy.escape else {""})
         assert off < 5e-3 if policy.escape else off > 0.09
     tick.policy, tick["hand"].gain = Policy(), 2.0
-    np.testing.assert_array_equal(ends[1], ends[2])
+    np.testing.assert_array_equal(ends[1], ends[-1])

@@ -39,6 +39,7 @@ FLOORS = {
     "wbc.explain": 7,
     "wbc.export": 7,
     "wbc.batch": 7,
+    "wbc.support": 7,
     "wbc.ik": 7,
     "wbc.record": 7,
     "wbc.servo": 7,
@@ -54,7 +55,8 @@ FLOORS = {
     "wbc.published": 9,
     "wbc.walking": 9,
     "wbc.pages": 9,
-    "wbc.cli": 10,
+    "wbc.viewer": 10,
+    "wbc.cli": 11,
 }
 #: Floors inside wbc.walking; a room imports only rooms on lower floors
 WALKING = {
@@ -68,6 +70,7 @@ WALKING = {
     "loop": 4,
     "modes": 5,
     "two_ended": 5,
+    "torque": 5,
     "run": 6,
     "report": 7,
 }

@@ -18,7 +18,7 @@ NAMES = {
     *("Controller", "Policy", "Stack", "Status", "Step", "Certificate", "Explanation", "Recording", "replay"),
     *("InverseKinematics", "Solution", "WbcError", "__version__"),
     *("analysis", "coordinates", "errors", "proximity", "resolvers", "robots", "shapes", "tasks"),
-    *("teleop", "track", "trajectory", "walking"),
+    *("teleop", "track", "trajectory", "viewer", "walking"),
 }
 
 

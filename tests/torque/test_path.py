@@ -26,6 +26,7 @@ def controller(command: str) -> Controller:
     return stack.compile(command=command, backend="vm")
 
 
+@cache
 def drawn(command: str) -> tuple[np.ndarray, float]:
     """Path of the hand to a pose [ticks, 3], and the time integral of the distance [m s]."""
     tick, bot = controller(command), robot("panda")

@@ -10,6 +10,7 @@ import pinocchio as pin
 import pytest
 
 from tests.walking.honest import MACHINE, honest
+from wbc.clearance import TriangleMesh
 from wbc.robots import walker
 from wbc.shapes import Box, Capsule, Cylinder, Sphere
 from wbc.walking import CylinderSurface, Obstacle, PlaneSurface
@@ -95,9 +96,15 @@ def test_distances_are_those_of_many_points() -> None:
     assert (found <= grid + 1e-12).all()
     np.testing.assert_allclose(found, grid, atol=0.03)
     place = pin.SE3.Random()
-    for shape in (Box((0.5, 1.0, 0.3)), Capsule(0.2, 0.9), Sphere(0.4), Cylinder(0.3, 0.8)):
+    corners = np.vstack([np.zeros(3), np.eye(3)])
+    rock = TriangleMesh(corners[[[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]]], solid=True)
+    for shape in (Box((0.5, 1.0, 0.3)), Capsule(0.2, 0.9), Sphere(0.4), Cylinder(0.3, 0.8), rock):
         obstacle = Obstacle("o", shape, place)
         exact = distances.from_obstacle(obstacle, a, b)
+        bound = distances.at_least(obstacle, a, b)
+        assert (bound <= exact + 1e-9).all()
+        if isinstance(shape, Box):
+            assert (bound >= exact - np.linalg.norm(b - a, axis=1) / (2 * distances.PARTS) - 1e-9).all()
         grid = obstacle.distance(brute(a, b)).min(axis=1)
         assert (exact <= grid + 1e-9).all()
         np.testing.assert_allclose(exact, grid, atol=0.01)

@@ -18,6 +18,8 @@ from wbc.walking.body_path import BodyPath, grid_path
 from wbc.walking.holds.built_in import grid_pose
 from wbc.walking.native import compiled
 from wbc.walking.planner.around import around
+from wbc.walking.planner.detours.cell_grips import CellGrips, cell_grips
+from wbc.walking.planner.detours.cells import CellSpacing, cells_about
 from wbc.walking.planner.grips.conflicts import ArmClearance
 from wbc.walking.planner.grips.table import Grips, find_grips
 from wbc.walking.planner.plan import Plan
@@ -180,6 +182,19 @@ def test_plans_are_the_same(machine: Walker, structure: Structure, both: Both) -
     one, other = both(lambda: plan_walk(machine, structure, way))
     assert (one.start, one.regrasps) == (other.start, other.regrasps)
     assert one.regrasps
+
+
+def test_postures_in_cells_are_the_same(machine: Walker, structure: Structure, path: BodyPath, both: Both) -> None:
+    there = replace(structure, obstacles=SHAPES)
+    cells = cells_about(path, there, CellSpacing(0.2, 0.3, 1, (0.0, 0.1), 5))
+    one: CellGrips
+    other: CellGrips
+    one, other = both(lambda: cell_grips(machine, there, cells))
+    for name in ("arm", "hold", "branch", "fits", "lands"):
+        assert getattr(one, name).tolist() == getattr(other, name).tolist()
+    fits = one.fits
+    np.testing.assert_allclose(one.postures[one.row[fits]], other.postures[other.row[fits]], rtol=0.0, atol=1e-10)
+    assert 0 < one.lands.sum() < fits.sum()
 
 
 @pytest.mark.parametrize("rigid", [True, False])

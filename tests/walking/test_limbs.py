@@ -203,13 +203,15 @@ def path() -> BodyPath:
 
 
 @pytest.fixture(scope="module")
-def grips(numeric: Walker, floor: Structure, path: BodyPath) -> Grips:
-    return find_grips(numeric, floor, path)
+def plan(numeric: Walker, floor: Structure, path: BodyPath) -> Plan:
+    return plan_walk(numeric, floor, path)
 
 
 @pytest.fixture(scope="module")
-def plan(numeric: Walker, floor: Structure, path: BodyPath) -> Plan:
-    return plan_walk(numeric, floor, path)
+def grips(plan: Plan) -> Grips:
+    """All that the planner chose from."""
+    assert plan.grips is not None
+    return plan.grips
 
 
 def test_grips_are_postures_on_their_holds(numeric: Walker, floor: Structure, path: BodyPath, grips: Grips) -> None:

@@ -32,8 +32,13 @@ def test_a_body_in_somethings_way_is_refused_with_its_name(
     machine: Walker, structure: Structure, at: float, where: str
 ) -> None:
     there = with_obstacle(structure, Box((0.3, 0.3, 0.3)), grid_pose(13, at, 152 * INCH))
-    with pytest.raises(NoPlanError, match=f"at its {where} the body is nearer than 31 mm to obstacle crate"):
+    with pytest.raises(
+        NoPlanError, match=f"at its {where} the body is nearer than 31 mm to obstacle crate; over "
+    ) as no:
         plan_walk(machine, there, grid_path([(13, 9), (13, 13)], 0.1))
+    # Over the hold that it names it is clear
+    t, a = map(float, str(no.value).split("; over ")[1].split(" m from")[0].rsplit(",", 1)[0].split(","))
+    assert (around(machine, there).bodies(grid_path([(t, a), (13, 11)], 0.1).poses[:1]) == NONE_MET).all()
 
 
 def test_what_is_in_the_way_of_a_body_ends_grips(machine: Walker, structure: Structure) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ import numpy as np
 from wbc import validation
 from wbc.batch import numbers
 from wbc.batch.batch_step import BatchStep
+from wbc.batch.derivatives import Derivatives
 from wbc.batch.engine import Clones, Compiled, Engine
 from wbc.controller import Controller, core_of
 from wbc.controller.handle import Handle, UnknownValueError
@@ -198,6 +200,17 @@ class Batch:
         for span in spans:
             self._view("p")[:, span] = found[:, span]
         self._waiting = {}
+
+    @cached_property
+    def derivatives(self) -> Derivatives | None:
+        """What differentiates all ticks at once; None where each is done alone."""
+        layout, tick = self._layout, self._core.tick
+        soft = any(at >= 0 for at in layout.price_at)
+        return (
+            Derivatives(tick, self._core.context)
+            if isinstance(tick, NativeTick) and not (soft or layout.cascade)
+            else None
+        )
 
     def __len__(self) -> int:
         return self.count

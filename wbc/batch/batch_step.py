@@ -8,6 +8,7 @@ from typing import Protocol
 import numpy as np
 
 from wbc import validation
+from wbc.batch.derivatives import Derivatives
 from wbc.controller.outcome import STATUSES, Status
 from wbc.controller.step import Context, Step
 from wbc.errors import CommandError, SolverError
@@ -23,6 +24,10 @@ class Owner(Protocol):
 
     inputs: Array
     changes: int
+
+    @property
+    def derivatives(self) -> Derivatives | None:
+        """What differentiates all ticks at once; None where each is done alone."""
 
 
 class BatchStep:
@@ -133,6 +138,27 @@ class BatchStep:
         number = int(validation.scalar("robot", robot, low=-len(self), high=len(self) - 1))
         self._given("q")
         return Step(self._reports[number].tobytes() + self._owner.inputs[number].tobytes(), self._context)
+
+    def derivative(self, name: str, value: str | None = None) -> Array:
+        """dv/dx [n, nv, k] of every robot, as of :meth:`wbc.Step.derivative`.
+
+            step.derivative("q")                  # [n, nv, nv]
+            step.derivative("hand", "target")     # [n, nv, 6]
+
+        All at once where the stack has one level without soft rows and is compiled; else one after the other.
+
+        Raises:
+            UnknownNameError: no such item or value.
+            SolverError: the batch has gone on since, or a robot's rows do not all hold; see :attr:`solved`.
+        """
+        self._given("q")
+        if not self.solved.all():
+            number = int(np.flatnonzero(~self.solved)[0])
+            reason = f"robot {number} is {self.statuses[number]}: only a command for which every row holds has one"
+            raise SolverError("derivative", name, reason)
+        if (together := self._owner.derivatives) is not None:
+            return together.find(name, value, self._reports, self._owner.inputs)
+        return np.stack([self[k].derivative(name, value) for k in range(len(self))])
 
     def __repr__(self) -> str:
         codes, names = self.status_codes, list(Status)

@@ -34,7 +34,9 @@ def rows(field: str, value: Any, count: int, width: int) -> Array:
         raise ShapeError(field, value, f"expected shape ({width},) or ({count}, {width}), is {numbers.shape}")
     if not np.isfinite(numbers).all():
         each = numbers.reshape(-1, width)
-        _refuse_first(~np.isfinite(each).all(axis=1), lambda k: validation.real_array(f"{field}[{k}]", each[k]))
+        _refuse_first(
+            np.atleast_1d(~np.isfinite(each).all(axis=1)), lambda k: validation.real_array(f"{field}[{k}]", each[k])
+        )
     return np.broadcast_to(numbers, (count, width))
 
 

@@ -19,6 +19,7 @@ OTHERS = {
     "ik": "bench.ik",
     "walk": "bench.walk",
     "resolvers": "bench.resolvers",
+    "viewer": "bench.figures --only viewer",
     "batch": "bench.figures --only batch",
     "fsp": "bench.figures --only fsp fsp_norms",
 }
@@ -40,6 +41,8 @@ def bench(context: typer.Context) -> None:
     wbc bench walk plans and walks courses, turns, trenches and layouts: wbc bench walk --quick
 
     wbc bench resolvers drives the Space Station arm by classical rate resolution and by pairs
+
+    wbc bench viewer measures what the viewer costs a loop, and how long a drag takes
 
     wbc bench batch measures ticks of thousands of robots, and a map of a million poses
 

@@ -7,11 +7,14 @@ from typing import Annotated
 
 import typer
 
+from wbc.cli import completion
 from wbc.track.presets import PRESETS
 
 _SCENE, _CONTROL, _OUTPUT = "What it does", "How it is controlled", "What it writes"
 
-RobotName = Annotated[str, typer.Argument(help="A name of `wbc robots`, or a URDF or MJCF file.")]
+RobotName = Annotated[
+    str, typer.Argument(help="A name of `wbc robots`, or a URDF or MJCF file.", autocompletion=completion.robots)
+]
 PathName = Annotated[
     str,
     typer.Option(
@@ -19,7 +22,12 @@ PathName = Annotated[
     ),
 ]
 FrameName = Annotated[
-    str | None, typer.Option(help="Frame that follows the path. Default: the robot's tip.", rich_help_panel=_SCENE)
+    str | None,
+    typer.Option(
+        help="Frame that follows the path. Default: the robot's tip.",
+        rich_help_panel=_SCENE,
+        autocompletion=completion.frames,
+    ),
 ]
 Duration = Annotated[
     float | None,
@@ -51,6 +59,14 @@ Holds = Annotated[
 ]
 Rate = Annotated[float, typer.Option(help="Ticks a second, in Hz.", rich_help_panel=_CONTROL)]
 Solver = Annotated[str, typer.Option(help="QP solver.", rich_help_panel=_CONTROL)]
+PlantName = Annotated[
+    str,
+    typer.Option(
+        "--plant",
+        help="kinematic, or a robot on a fixed base with drives that give torques: pinocchio or mujoco.",
+        rich_help_panel=_CONTROL,
+    ),
+]
 Backend = Annotated[str, typer.Option(help="auto, native or vm.", rich_help_panel=_CONTROL)]
 Gain = Annotated[float, typer.Option(help="Gain of the hand, in 1/s.", rich_help_panel=_CONTROL)]
 Kind = Annotated[str, typer.Option(help="What follows the path: pose or position.", rich_help_panel=_CONTROL)]
@@ -64,4 +80,5 @@ LogFormat = Annotated[str, typer.Option(help="parquet or npz.", rich_help_panel=
 Record = Annotated[
     bool, typer.Option(help="Record the inputs of every tick, for `wbc replay`.", rich_help_panel=_OUTPUT)
 ]
+AsJson = Annotated[bool, typer.Option("--json", help="Print the results as JSON.", rich_help_panel=_OUTPUT)]
 Plots = Annotated[bool, typer.Option(help="Draw the plots and the picture.", rich_help_panel=_OUTPUT)]

@@ -18,9 +18,11 @@ from wbc.cli.console import err, out, progress_bar
 from wbc.cli.folders import run_folder
 from wbc.controller import Controller
 from wbc.interrupts import interrupts
-from wbc.record.recording import RecordingError
+from wbc.record.recording import Recording, RecordingError
+from wbc.simulation import Plant
 from wbc.track.log import FORMATS, Log, save
 from wbc.track.plots import save_picture, save_plots
+from wbc.track.report import conflicts, save_report
 from wbc.track.run import track
 from wbc.track.setup import PathRun
 from wbc.track.summary import Figure, save_summary, summarise
@@ -66,20 +68,21 @@ class Stopper:
             yield
 
 
-def perform(plan: PathRun, output: Output) -> None:
-    """Do a plan, write its folder and print its summary; exit code 130 if Ctrl-C ended it early.
+def perform(plan: PathRun, output: Output, plant: Plant | None = None) -> None:
+    """Do a plan on a plant, write its folder and print its summary; exit code 130 if Ctrl-C ended it early.
 
     Raises:
         WbcError: bad input; nothing is written then but an empty folder.
     """
     validation.one_of("log", output.log, FORMATS)
-    written = (*(f"log.{kind}" for kind in FORMATS), RECORDING, "summary.json")
+    written = (*(f"log.{kind}" for kind in FORMATS), RECORDING, "summary.json", "report.html", "replay.html")
     name = f"{plan.robot.name}-{plan.label}"
     folder = run_folder(output.folder, name, written, output.force, field="output")
     stopper, console = Stopper(), err()
     with progress_bar() as bar:
         stage = bar.add_task("compiling", total=None)
-        log = _tracked(plan, bar, stage, stopper, folder / RECORDING if output.record else None)
+        recording = folder / RECORDING if output.record else None
+        log = _tracked(plan, bar, stage, stopper, recording, plant)
         with stopper.listening():
             figures = summarise(log)
             files = [save(log, folder, output.log), save_summary(figures, folder)]
@@ -87,6 +90,7 @@ def perform(plan: PathRun, output: Output) -> None:
                 files.append(folder / RECORDING)
             if output.plots:
                 files += _drawn(plan, log, folder, bar, stage)
+            files += _pages(log, figures, folder, output.record, bar, stage)
     report(plan, log, figures, folder, files)
     for warning in start_warnings(log):
         console.print(f"[yellow]warning[/yellow]: {escape(warning)}", soft_wrap=True)
@@ -94,7 +98,9 @@ def perform(plan: PathRun, output: Output) -> None:
         raise typer.Exit(INTERRUPTED)
 
 
-def _tracked(plan: PathRun, bar: Progress, stage: Any, stopper: Stopper, recording: Path | None) -> Log:
+def _tracked(
+    plan: PathRun, bar: Progress, stage: Any, stopper: Stopper, recording: Path | None, plant: Plant | None
+) -> Log:
     with contextlib.ExitStack() as stack:
 
         def compiled(controller: Controller) -> None:
@@ -111,7 +117,7 @@ def _tracked(plan: PathRun, bar: Progress, stage: Any, stopper: Stopper, recordi
             if ticks % STRIDE == 0 or ticks == plan.ticks:
                 bar.update(stage, completed=ticks)
 
-        return track(plan, progress, stopper, compiled)
+        return track(plan, progress, stopper, compiled, plant=plant)
 
 
 def _drawn(plan: PathRun, log: Log, folder: Path, bar: Progress, stage: Any) -> list[Path]:
@@ -120,6 +126,25 @@ def _drawn(plan: PathRun, log: Log, folder: Path, bar: Progress, stage: Any) -> 
     bar.update(stage, description="picture")
     picture = save_picture(log, plan.robot, folder / "overview.png")
     return files if picture is None else [*files, picture]
+
+
+def _pages(log: Log, figures: list[Figure], folder: Path, recorded: bool, bar: Progress, stage: Any) -> list[Path]:
+    """The report; with a recording also why there were conflicts, and the page that plays the run."""
+    bar.update(stage, description="report")
+    out: list[Path] = []
+    said: dict[int, str] = {}
+    if recorded and len(log):
+        from wbc.viewer.errors import ViewerError
+        from wbc.viewer.runs import PAGE_RATE, REPLAY, save_page, sentences_of, states_of
+
+        recording = Recording(folder / RECORDING)
+        if wanted := conflicts(log):
+            said = sentences_of(recording, wanted)
+        # A run is worth keeping where what draws the page is not installed
+        with contextlib.suppress(ViewerError):
+            bar.update(stage, description="replay page")
+            out.append(save_page(*states_of(recording, rate=PAGE_RATE), folder / REPLAY))
+    return [*out, save_report(log, figures, folder, said)]
 
 
 def start_warnings(log: Log) -> list[str]:

@@ -6,6 +6,9 @@ from wbc.cli import options
 from wbc.cli.planning import given_obstacles, planned
 from wbc.cli.session import Output, perform
 
+#: Period of torques, about [s]
+TORQUES = 0.001
+
 
 def track(
     robot: options.RobotName = "panda",
@@ -20,6 +23,7 @@ def track(
     swing: options.SwingAmplitude = 0.5,
     hold: options.Holds = None,
     rate: options.Rate = 200.0,
+    plant: options.PlantName = "kinematic",
     solver: options.Solver = "daqp",
     backend: options.Backend = "auto",
     kind: options.Kind = "pose",
@@ -35,6 +39,8 @@ def track(
 
     Ctrl-C ends the run early; what was done until then is written all the same.
     """
+    from wbc.simulation import driven
+
     plan = planned(
         robot,
         frame,
@@ -50,4 +56,5 @@ def track(
         solver=solver,
         backend=backend,
     )
-    perform(plan, Output(output, force, log, plots, record))
+    period = plan.dt / max(round(plan.dt / TORQUES), 1)
+    perform(plan, Output(output, force, log, plots, record), driven(plant, plan.robot, period))

@@ -55,7 +55,7 @@ class Controller(Handles):
         super().__init__(core.handles, stack)
         # What every step needs
         # A memoryview takes bytes in half the time in which an array takes an array
-        self._q = memoryview(core.tick.q).cast("B")
+        self._q = core.tick.q.data.cast("B")
         self._v_in, self._use_v = core.tick.v_in[: core.layout.nv], core.tick.use_v
         self._q_shape, self._v_shape = (core.layout.nq,), (core.layout.nv,)
         self._snapshot, self._context, self._sensed = core.snapshot, core.context, bool(core.sensors)

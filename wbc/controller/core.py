@@ -98,7 +98,7 @@ class Core:
         self.first: dict[Slot, str] = {}
         self.waiting: dict[Slot, str] = {}
         self.handles = {name: kind_of(block.entry.item)(self, block) for name, block in layout.blocks.items()}
-        self.together = Together(self)
+        self.together = Together(self.handles, self.assembly)
         #: where a pose waits to be taken, and what takes it
         self._poses: dict[Slot, tuple[memoryview, Callable[[], int]]] = {}
         self.directions = Directions(layout, self.tick, self.handles)

@@ -138,7 +138,7 @@ class Handle:
         return (*given, *own, "enabled", "mask")
 
     def __dir__(self) -> list[str]:
-        return [*self.names, "get", "names", "ramp", "set"]
+        return [*self.names, "get", "names", "ramp", "set", "switch"]
 
     def _get(self, name: str) -> Any:
         """Not an attribute that is there: a run-time value."""
@@ -256,6 +256,10 @@ class Handle:
         """Write numbers of :meth:`checked_together`."""
         for name, given in numbers.items():
             self._write(self.slot(name), given)
+
+    def switch(self, on: Any) -> None:
+        """Set ``enabled``, for those who know only that it is a handle."""
+        self._set("enabled", on)
 
     def _write(self, slot: Slot, numbers: Array) -> None:
         if slot is self._ramped:

@@ -294,3 +294,10 @@ class Step:
         if self.relaxed:
             text += ", relaxed: " + ", ".join(str(s) for s in self.relaxed)
         return text + ")"
+
+
+def state_of(step: Step) -> bytes:
+    """A step's copy of its tick: report and inputs, laid out as :class:`wbc.stack.memory.Memory` says. With the
+    controller's :class:`Context` it is the step again, also in another process.
+    """
+    return step._data

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -12,9 +12,6 @@ from wbc.controller.handle import POSE, Handle
 from wbc.controller.tick.buffers import Assembly
 from wbc.errors import ShapeError
 from wbc.stack.layout import Slot
-
-if TYPE_CHECKING:
-    from wbc.controller.core import Core
 
 _POSE_SHAPE = (4, 4)
 
@@ -37,7 +34,7 @@ class Plan:
         )
         # A memoryview takes bytes in half the time in which an array takes an array
         ends = 8 * np.cumsum(sizes)
-        whole = memoryview(staged).cast("B")
+        whole = staged.data.cast("B")
         self.places = [whole[end - 8 * size : end] for end, size in zip(ends.tolist(), sizes, strict=True)]
         self.take = assembly.taker(staged, table)
 
@@ -45,8 +42,8 @@ class Plan:
 class Together:
     """Sets values of several items: quickly where one native call can check them, else one by one."""
 
-    def __init__(self, core: Core) -> None:
-        self._core = core
+    def __init__(self, handles: Mapping[str, Handle], assembly: Assembly) -> None:
+        self._handles, self._assembly = handles, assembly
         #: of names that were given together and can be taken quickly
         self.plans: dict[tuple[str, ...], Plan] = {}
 
@@ -56,15 +53,15 @@ class Together:
         Raises:
             UnknownNameError: no such item. ShapeError: an item without a target.
         """
-        if not (values and self._core.assembly.takes) or any(isinstance(value, Mapping) for value in values.values()):
+        if not (values and self._assembly.takes) or any(isinstance(value, Mapping) for value in values.values()):
             return None
-        handles = [self._core.handles[validation.one_of("set", name, self._core.handles)] for name in values]
+        handles = [self._handles[validation.one_of("set", name, self._handles)] for name in values]
         slots = [handle.slot(main_input(handle)) for handle in handles]
         kinds = [handle.quick.get(slot.input.name) for handle, slot in zip(handles, slots, strict=True)]
         known = [kind for kind in kinds if kind is not None]
         if len(known) < len(kinds):
             return None
-        plan = self.plans[tuple(values)] = Plan(self._core.assembly, slots, known)
+        plan = self.plans[tuple(values)] = Plan(self._assembly, slots, known)
         return plan
 
     def carefully(self, values: Mapping[str, Any]) -> None:
@@ -75,7 +72,7 @@ class Together:
         """
         found: list[tuple[Handle, dict[str, Any]]] = []
         for name, given in values.items():
-            handle = self._core.handles[validation.one_of("set", name, self._core.handles)]
+            handle = self._handles[validation.one_of("set", name, self._handles)]
             own = given if isinstance(given, Mapping) else {main_input(handle): given}
             found.append((handle, handle.checked_together(own)))
         for handle, numbers in found:

@@ -76,6 +76,9 @@ def independent(qp: QP, threshold: float = THRESHOLD, order: NDArray[np.int_] | 
     fixed = qp.lower[:n] == qp.upper[:n]
     constant = np.where(fixed, qp.lower[:n], 0.0)
     rows = np.flatnonzero(qp.lower[n:] == qp.upper[n:])
+    if not rows.size:
+        nothing = np.zeros(0)
+        return Equalities(rows, rows, nothing, nothing > 0.0, np.zeros((0, n)), nothing, np.zeros((0, 0)))
     free = np.where(fixed, 0.0, qp.A[rows])
     right = qp.lower[n + rows] - qp.A[rows] @ constant
     length = np.sqrt(np.einsum("ij,ij->i", free, free))
@@ -121,7 +124,9 @@ def _finish(
     constant: Array,
 ) -> Equalities:
     kept = np.array(chosen, dtype=np.intp)
-    left = np.setdiff1d(np.arange(rows.size), kept)
+    rest = np.ones(rows.size, dtype=np.bool_)
+    rest[kept] = False
+    left = np.flatnonzero(rest)
     triangle = np.ascontiguousarray(coordinates[kept])
     target = np.zeros(kept.size)
     for k in range(kept.size):

@@ -140,12 +140,12 @@ def definite(matrix: Array) -> Array:
     out = matrix
     for _ in range(8):
         try:
-            pivots = np.diag(np.linalg.cholesky(out)) ** 2
+            pivots = np.linalg.cholesky(out).diagonal() ** 2
         except np.linalg.LinAlgError:
             pivots = np.zeros(len(matrix))
-        if (pivots > rounding * np.diag(matrix)).all():
+        if (pivots > rounding * matrix.diagonal()).all():
             break
-        out = out + np.diag(more * np.diag(matrix) + more * 1e-3 * np.abs(matrix).max(initial=0.0))
+        out = out + np.diag(more * matrix.diagonal() + more * 1e-3 * np.abs(matrix).max(initial=0.0))
         more *= 10.0
     return out
 

@@ -1,6 +1,7 @@
 """What a control loop commands: the plant's contract, a loop's connection to one, kinematic and dynamic plants."""
 
 from wbc.simulation.connection import Connection
+from wbc.simulation.drives import VelocityDrive, driven
 from wbc.simulation.dynamics import Grip
 from wbc.simulation.ground import Ground, level
 from wbc.simulation.kinematic import KinematicPlant
@@ -31,6 +32,8 @@ __all__ = [
     "PlantState",
     "RealTime",
     "SavedState",
+    "VelocityDrive",
+    "driven",
     "level",
     "mujoco_model",
     "mujoco_spec",

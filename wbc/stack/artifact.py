@@ -78,12 +78,14 @@ def _native(stack: Declaration, layout: Layout, version: str, search: bool) -> A
 
 def _virtual(stack: Declaration, layout: Layout, version: str) -> Artifact:
     """The functions for the virtual machine, built or from the cache."""
+    made: dict[str, ca.Function] = {}
 
     def fill(folder: pathlib.Path) -> None:
-        for name, function in build(stack, layout).functions.items():
+        made.update(build(stack, layout).functions)
+        for name, function in made.items():
             function.save(str(folder / f"{name}.casadi"))
 
     folder, cached = cache.fetch(key(stack, version, "vm"), fill)
-    saved = {path.stem: ca.Function.load(str(path)) for path in sorted(folder.glob("*.casadi"))}
+    saved = made or {path.stem: ca.Function.load(str(path)) for path in sorted(folder.glob("*.casadi"))}
     functions = TickProgram(saved["rows"], saved.get("ahead"), saved.get("curvature"), saved.get("torque"))
     return Artifact(layout, None, functions, cached)

@@ -44,10 +44,13 @@ def skew(w: ca.SX) -> ca.SX:
 
 def rotation_rate(rotation: ca.SX) -> ca.SX:
     """9x3 map from an angular velocity in the outer axes to d vec(R)/dt = vec([w]x R), columns first."""
-    out = []
-    for axis in _EYE:
-        out.append(ca.vec(ca.skew(ca.SX(ca.sparsify(ca.DM(axis)))) @ rotation))
-    return ca.horzcat(*out)
+    return ca.horzcat(*(ca.vec(turn @ rotation) for turn in _unit_turns()))
+
+
+@lru_cache(maxsize=1)
+def _unit_turns() -> tuple[ca.SX, ...]:
+    """[w]x of w along x, y and z."""
+    return tuple(ca.skew(ca.SX(ca.sparsify(ca.DM(axis)))) for axis in _EYE)
 
 
 def from_axis_angle(axis: ArrayLike, cos: ca.SX, sin: ca.SX) -> ca.SX:

@@ -38,7 +38,7 @@ class BodyPath:
 
     poses: Array
     spacing: float = SPACING
-    _steps: dict[int, tuple[pin.SE3, pin.SE3, Array]] = field(default_factory=dict, init=False, repr=False)
+    _steps: dict[int, Array] = field(default_factory=dict, init=False, repr=False)
 
     def __post_init__(self) -> None:
         poses = validation.real_array("BodyPath.poses", self.poses)
@@ -64,31 +64,40 @@ class BodyPath:
     def at(self, u: float) -> tuple[pin.SE3, Array]:
         """Pose, and its derivative along u: (linear; angular) in the structure's axes [m/s, rad/s].
 
-        Between samples the pose moves with constant twist. u is clipped to the path.
+        With the part s of the way from the middle before sample k to the middle behind it, where poses are P,
+
+            P_k exp(s^2 / 2 log(P_k^-1 P_k+1) + (1 - s)^2 / 2 log(P_k^-1 P_k-1))
+
+        so that the rate changes evenly from middle to middle and jumps nowhere; at the ends the path goes straight.
+        A sample at which the rate changes by d is passed at d spacing / 8 from it. u is clipped to the path.
         """
         k, part = self.place(u)
-        first, last, twist = self._step(k)
-        pose = pin.SE3.Interpolate(first, last, part)
-        return pose, (twist @ pose.rotation.T).ravel()
+        before, after = self.step(k - 1), self.step(k)
+        bend = pin.Motion(0.5 * part**2 * after - 0.5 * (1.0 - part) ** 2 * before)
+        pose = pin.SE3(self.poses[k]) * pin.exp6(bend)
+        twist = pin.Jexp6(bend) @ (part * after + (1.0 - part) * before) / self.spacing
+        return pose, (twist.reshape(2, 3) @ pose.rotation.T).ravel()
 
     def place(self, u: float) -> tuple[int, float]:
-        """The sample before u, clipped to the path, and the part of the step to the next one."""
+        """The sample nearest to u, clipped to the path, and the part of the way from the middle before it to that
+        behind it.
+        """
         place = min(max(u / self.spacing, 0.0), len(self.poses) - 1.0)
-        k = min(int(place), len(self.poses) - 2)
-        return k, place - k
+        k = min(int(place + 0.5), len(self.poses) - 1)
+        return k, place - k + 0.5
+
+    def step(self, k: int) -> Array:
+        """log(P_k^-1 P_k+1), (linear; angular); before the path its first one, behind it its last ``[6]``."""
+        k = min(max(k, 0), len(self.poses) - 2)
+        if k not in self._steps:
+            first, last = self.poses[k], self.poses[k + 1]
+            self._steps[k] = np.array(pin.log6(pin.SE3(first).actInv(pin.SE3(last))).vector)
+        return self._steps[k]
 
     @functools.cached_property
     def numbers(self) -> Array:
         """Samples as rotation by columns and position ``[samples, 12]`` [m]."""
         return np.ascontiguousarray(self.poses[:, :3].transpose(0, 2, 1).reshape(-1, 12))
-
-    def _step(self, k: int) -> tuple[pin.SE3, pin.SE3, Array]:
-        """Sample k, the next one, and the rate (linear; angular) between them ``[2, 3]`` [m/s, rad/s]."""
-        if k not in self._steps:
-            first, last = pin.SE3(self.poses[k]), pin.SE3(self.poses[k + 1])
-            step = pin.log6(first.actInv(last))
-            self._steps[k] = first, last, np.array([step.linear, step.angular]) / self.spacing
-        return self._steps[k]
 
     def blended(self, samples: Array) -> Array:
         """Matrices at fractional samples, by straight lines between entries: for estimates; ``[..., 4, 4]``."""

@@ -26,6 +26,7 @@ from wbc.walking.log.folder import machine_made
 from wbc.walking.log.log import FILE, WalkLog, WalkLogError
 from wbc.walking.report.figures import figures_of, save_figures
 from wbc.walking.report.folder import WRITTEN, rules_of, save_pictures, save_run
+from wbc.walking.report.run_report import save_report
 from wbc.walking.run import WalkRun
 from wbc.walking.run.mode import keep
 from wbc.walking.run.request import PublishedRequest
@@ -96,6 +97,8 @@ def walk_free(perform: Perform, machine: Walker, folder: Path, backend: str, che
                 if pictures and not stopper():
                     shown, missing = save_pictures(run, folder, report_progress, stopper)
                     files += shown
+                    # Again, with the pictures in it
+                    save_report(run, folder, report)
         except OSError as error:
             raise OutputError("out", str(folder), f"cannot be written: {error.strerror}") from error
     _report(f"{machine.robot.name} on {run.structure.name}", figures_of(run, report), folder, files)

@@ -145,7 +145,7 @@ class Reach:
         # what blocked joints are asked for is not asked of the others
         slope = free * slope
         rows, kept, parts = keepers
-        stiffness = FIRM * float((np.diag(H) * self._dofs**2).max(initial=0.0))
+        stiffness = FIRM * float((H.diagonal() * self._dofs**2).max(initial=0.0))
         firm = metric + _cut_off((stiffness - stiffness / FIRM) * rows.T @ rows, free)
         squares = [
             (J, weight),
@@ -161,18 +161,18 @@ class Reach:
         force = weight * (error - J @ step)
         force[kept] -= parts * stiffness * (rows @ step)
         size, whole = (float((np.abs(x) * self._force_scale).sum()) for x in (force, weight * error))
-        pivots = np.diag(np.linalg.cholesky(metric)) * self._dofs
+        pivots = np.linalg.cholesky(metric).diagonal() * self._dofs
         least = float((pivots**2).min())
         share = float(np.clip(size / (NEGLIGIBLE * least) - 1.0, 0.0, 1.0))
         share *= float(np.clip(size / (REMOVED * whole + np.finfo(float).tiny) - 1.0, 0.0, 1.0))
         if not share > 0.0:
             return None
-        curvature = share * np.outer(free, free) * self._curve(force)
+        curvature = share * (free[:, None] * free) * self._curve(force)
         if not np.isfinite(curvature).all():
             return None
         self.curvature = curvature
         mixed = share * _cut_off(H, free) + (1.0 - share) * H + curvature
-        scale = np.outer(self._dofs, self._dofs)
+        scale = self._dofs[:, None] * self._dofs
         least = max(LEAST_PIVOT * float(np.abs(curvature * scale).max()), least)
         more_pivot = definite(mixed * scale, least)
         return np.asarray(mixed + np.diag(more_pivot / self._dofs**2))
@@ -184,7 +184,7 @@ class Reach:
             squares: rows and what each counts, whose sum is the metric but for damping, ``more`` and what is cut off.
         """
         x = np.linalg.solve(metric, b)
-        pivots = (np.diag(np.linalg.cholesky(metric)) * self._dofs) ** 2
+        pivots = (np.linalg.cholesky(metric).diagonal() * self._dofs) ** 2
         if pivots.max() <= APART * pivots.min():
             return np.asarray(x)
         diagonal = (self._damping + more / self._dofs**2).astype(np.longdouble)
@@ -213,7 +213,7 @@ class Reach:
 
     def _strengthened(self, H: Array, equal: Array) -> Array:
         """H with the equality rows in it, see ``native/factor.h``."""
-        stiffness = float((np.diag(H) * self._dofs**2).max(initial=0.0))
+        stiffness = float((H.diagonal() * self._dofs**2).max(initial=0.0))
         return np.asarray(H + stiffness * equal.T @ equal)
 
     def _limited(self, bound_enabled: Array) -> NDArray[np.bool_]:
@@ -258,21 +258,23 @@ def definite(matrix: Array, least: float) -> Array:
     """
     a, n = matrix.copy(), len(matrix)
     more = np.zeros(n)
-    largest = float(np.abs(np.diag(a)).max())
-    other = float(np.abs(a - np.diag(np.diag(a))).max())
+    sizes = np.abs(a)
+    largest = float(sizes.diagonal().max())
+    np.fill_diagonal(sizes, 0.0)
+    other = float(sizes.max())
     bound = max(largest, other / np.sqrt(max(n * n - 1.0, 1.0)))
     for k in range(n):
         row = a[k, k + 1 :].copy()
         aside = float(np.abs(row).max(initial=0.0))
         pivot = max(abs(a[k, k]), aside * aside / bound, least)
         more[k] = pivot - a[k, k]
-        a[k + 1 :, k + 1 :] -= np.outer(row, row) / pivot
+        a[k + 1 :, k + 1 :] -= row[:, None] * row / pivot
     return more
 
 
 def _cut_off(H: Array, free: Array) -> Array:
     """H with blocked joints cut off from the others."""
-    shares = np.outer(free, free)
+    shares = free[:, None] * free
     np.fill_diagonal(shares, 1.0)
     return np.asarray(shares * H)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import importlib
 
 from wbc import validation
@@ -13,12 +14,18 @@ _SUPPORTED = {"daqp": ("wbc.qp.solvers.daqp", "Daqp"), "osqp": ("wbc.qp.solvers.
 
 def available_solvers(experimental: bool = False) -> tuple[str, ...]:
     """Names that :func:`make_solver` takes on this machine; with ``experimental`` also the unproven ones."""
-    import casadi as ca
-
     from wbc.qp.solvers.conic import EXPERIMENTAL
 
     names = [*_SUPPORTED, "qpoases", *(EXPERIMENTAL if experimental else ())]
-    return tuple(name for name in names if name in _SUPPORTED or ca.has_conic(name))
+    return tuple(name for name in names if name in _SUPPORTED or _has_conic(name))
+
+
+@functools.cache
+def _has_conic(name: str) -> bool:
+    """CasADi has the plugin; for those that are missing it searches the disk, and every compilation asks."""
+    import casadi as ca
+
+    return bool(ca.has_conic(name))
 
 
 def make_solver(name: str, n: int, m: int, prepared: bool = True) -> Backend:

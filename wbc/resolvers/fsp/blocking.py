@@ -74,7 +74,7 @@ def blocked(
     status, missed, reached = consistency(A, x, first, len(rows), project)
     finder = _Search(A[rows], reached[rows])
     if len(columns) < A.shape[1]:
-        finder.exhaust() if search == "exhaustive" else finder.exchange()
+        finder.exhaust() if search == "exhaustive" else finder.exchange(columns)
     else:
         finder.take(columns)
     completed = finder.complete()
@@ -113,7 +113,12 @@ class _Search:
         v = np.zeros(self.m)
         v[columns] = x
         if self._new(v):
-            self.blocks.append(tuple(np.setdiff1d(np.arange(self.m), columns).tolist()))
+            self.blocks.append(tuple(self._still(columns)))
+
+    def _still(self, columns: Array) -> list[int]:
+        """All other columns, by number."""
+        moving = set(columns.tolist())
+        return [k for k in range(self.m) if k not in moving]
 
     def exhaust(self) -> None:
         """Pattern after pattern, the first columns blocked first."""
@@ -125,9 +130,8 @@ class _Search:
             if self.enough():
                 return
 
-    def exchange(self) -> None:
+    def exchange(self, basis: Array) -> None:
         """From the best block on, breadth first: every blocked column in turn takes the place of one that moves."""
-        _, basis = _first_block(self.A, self.b)
         self.take(basis)
         queue, seen = deque([basis]), {tuple(sorted(basis.tolist()))}
         while queue and not self.enough() and len(seen) < LOOKS * (self.m - self.n + 1):
@@ -147,7 +151,7 @@ class _Search:
             return
         inverse = lapack.dgetri(factors, pivoted)[0]
         moving, table = np.abs(inverse @ self.b) * self.size[basis], inverse @ self.A
-        for j in np.setdiff1d(np.arange(self.m), basis):
+        for j in self._still(basis):
             pivots = np.abs(table[:, j]) * self.size[basis]
             if pivots.max() <= RANK * self.size[j] or not np.isfinite(pivots).all():
                 continue
@@ -171,7 +175,7 @@ class _Search:
             missing -= 1
         table = np.linalg.inv(self.A[:, basis]) @ self.A
         length = float(np.abs(start * self.size).max()) or 1.0
-        for j in np.setdiff1d(np.arange(self.m), basis):
+        for j in self._still(basis):
             if self.enough():
                 break
             turn = np.zeros(self.m)

@@ -8,6 +8,7 @@
 #define REPORT_SIZE sizeof(wbc_report)
 /* Of what the caller writes, which stands between the report and H */
 #define INPUT_SIZE (offsetof(wbc_tick, H) - offsetof(wbc_tick, q))
+#define PROBLEM_SIZE (offsetof(wbc_tick, unusable) - offsetof(wbc_tick, H))
 
 /* What one tick leaves to the next beside its inputs: the active sets of its searches */
 typedef struct {
@@ -63,6 +64,15 @@ EXPORT void wbc_tick_many(wbc_tick *t, long long count, double *inputs, double *
         memcpy((char *)reports + k * (long long)REPORT_SIZE, &t->report, REPORT_SIZE);
         memcpy(input, t->q, INPUT_SIZE);
         wbc_tick_suspend(t, carried + k);
+    }
+}
+
+/* H, g, A and the bounds of the QP of each robot at its inputs, as they stand in memory */
+EXPORT void wbc_tick_qp_many(wbc_tick *t, long long count, const double *inputs, double *problems) {
+    for (long long k = 0; k < count; k++) {
+        memcpy(t->q, (const char *)inputs + k * (long long)INPUT_SIZE, INPUT_SIZE);
+        wbc_tick_assemble(t);
+        memcpy((char *)problems + k * (long long)PROBLEM_SIZE, t->H, PROBLEM_SIZE);
     }
 }
 

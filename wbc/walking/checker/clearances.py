@@ -1,8 +1,8 @@
 """Checks of clearances: links against each other, and against the structure.
 
-Each pair is measured at every tick. Between ticks a point moves at most as far as the farther-moving end of its
-segment, so where the distance at the tick less this travel is above both the limit and the least that was found, no
-sample in between can matter; all others are measured as well.
+Each pair is measured at every tick, where a bound does not say that it is far enough apart. Between ticks a point moves
+at most as far as the farther-moving end of its segment, so where the distance at the tick less this travel is above
+both the limit and the least that was found, no sample in between can matter; all others are measured as well.
 """
 
 from __future__ import annotations
@@ -72,20 +72,22 @@ def check_links(urdf: Urdf, placements: Placements, samples: Samples, rules: Rul
 
 @dataclass(frozen=True, eq=False)
 class Surroundings:
-    """What links must stay clear of: parts by name, each with the holds that stand on it."""
+    """What links must stay clear of: parts by name, each with a quicker bound, and the holds that stand on it."""
 
     parts: dict[str, Measure]
+    bounds: dict[str, Measure]
     holds: dict[str, Array]
 
     @classmethod
     def of(cls, structure: Structure | None, table: HoldTable, rules: Rules) -> Surroundings:
         """Surface and obstacles; with neither, the planes through the holds across their axes."""
-        parts: dict[str, Measure] = {}
+        parts, bounds = dict[str, Measure](), dict[str, Measure]()
         surface = None if structure is None else structure.surface
         if surface is not None:
             parts["surface"] = lambda a, b: distances.from_surface(surface, a, b)
         for obstacle in () if structure is None else structure.obstacles:
             parts[obstacle.id] = partial(distances.from_obstacle, obstacle)
+            bounds[obstacle.id] = partial(distances.at_least, obstacle)
         if not parts:
             axes = table.rotation[:, :, 2]
             parts["plane of a hold"] = lambda a, b: distances.from_tangents(table.position, axes, a, b)
@@ -93,7 +95,7 @@ class Surroundings:
         for name, measure in parts.items():
             stands = np.abs(measure(table.position, table.position)) <= rules.exempt_distance
             holds[name] = table.position[stands]
-        return cls(parts, holds)
+        return cls(parts, bounds, holds)
 
 
 def check_structure(
@@ -119,12 +121,14 @@ def check_structure(
             def measure(rows: Rows, x: Moving = moving, of: Measure = part, r: float = radius) -> Array:
                 return of(x.a[rows], x.b[rows]) - r
 
+            bound = partial(measure, of=around.bounds.get(name, part))
+
             def touches(rows: Rows, at: Array | None = hand, holds: Array = around.holds[name]) -> NDArray[np.bool_]:
                 if at is None or not len(holds):
                     return np.zeros(len(rows), dtype=bool)
                 return distances.nearest(holds, at[rows])[1] <= rules.exempt_distance
 
-            _add(tally, STRUCTURE, measure, moving.travel, samples, rules, f"{link} and {name}", touches)
+            _add(tally, STRUCTURE, measure, moving.travel, samples, rules, f"{link} and {name}", touches, bound)
 
 
 def _moving(urdf: Urdf, placements: Placements, samples: Samples) -> list[Moving]:
@@ -144,20 +148,32 @@ def _add(
     rules: Rules,
     what: str,
     exempt: Callable[[Rows], NDArray[np.bool_]] = _never,
+    at_least: Callable[[Rows], Array] | None = None,
 ) -> None:
-    """Measures a pair at ticks, and between them where it can matter: at the limit, or at the least so far."""
+    """Measures a pair at ticks, and between them where it can matter: at the limit, or at the least so far.
+
+    Args:
+        at_least: no more than ``measure`` says, and quicker.
+    """
     known, ticks = tally.worst(kind), samples.starts
-    at_ticks = measure(ticks)
     bound = max(rules.clearance, np.inf if np.isnan(known) else known)
+    at_ticks = (at_least or measure)(ticks)
     counts = at_ticks <= bound
     counts[counts] = ~exempt(ticks[counts])
+    if at_least is not None and counts.any():
+        at_ticks[counts] = measure(ticks[counts])
+        counts &= at_ticks <= bound
     if counts.any():
         bound = max(rules.clearance, float(at_ticks[counts].min()))
         tally.add(kind, at_ticks[counts], samples.t[ticks[counts]], lambda _: what)
     inside = np.ones(len(samples), dtype=bool)
     inside[ticks] = False
     rows = np.flatnonzero(inside & (at_ticks - travel <= bound)[samples.anchor])
+    rows = rows[~exempt(rows)]
+    if at_least is not None:
+        rows = rows[at_least(rows) <= bound]
+    if not len(rows):
+        return
     found = measure(rows)
-    rows, found = rows[found <= bound], found[found <= bound]
-    bare = ~exempt(rows)
-    tally.add(kind, found[bare], samples.t[rows[bare]], lambda _: what)
+    near = found <= bound
+    tally.add(kind, found[near], samples.t[rows[near]], lambda _: what)

@@ -8,13 +8,15 @@ import numpy as np
 
 from wbc.clearance import TriangleMesh
 from wbc.errors import UnknownNameError
-from wbc.shapes import Capsule, Cylinder, Sphere
+from wbc.shapes import Box, Capsule, Cylinder, Sphere
 from wbc.validation import Array
 from wbc.walking.holds.obstacle import Obstacle
 from wbc.walking.holds.surface import CylinderSurface, PlaneSurface, Surface
 
 #: Thirds taken of an interval in which a convex function is least: (2/3)^60 = 3e-11
 THIRDS = 60
+#: Parts of a segment that a bound looks at
+PARTS = 4
 
 
 def between_segments(a: Array, b: Array, c: Array, d: Array) -> Array:
@@ -51,10 +53,28 @@ def from_obstacle(obstacle: Obstacle, a: Array, b: Array) -> Array:
     def distance(x: Array) -> Array:
         if isinstance(shape, Cylinder):
             x = np.stack([np.hypot(x[:, 0], x[:, 1]), x[:, 2]], axis=1)
-        beyond = np.abs(x) - size
-        return np.asarray(np.linalg.norm(np.maximum(beyond, 0.0), axis=1) + np.minimum(beyond.max(axis=1), 0.0))
+        return _from_box(x, size)
 
     return _least_on(distance, *local)
+
+
+def at_least(obstacle: Obstacle, a: Array, b: Array) -> Array:
+    """No more than :func:`from_obstacle` [s]: from the middles of parts of a segment to the box about the obstacle."""
+    place, shape = obstacle.placement, obstacle.shape
+    middle, half = np.zeros(3), np.zeros(3)
+    if isinstance(shape, TriangleMesh):
+        low, high = shape.corners.min(axis=(0, 1)), shape.corners.max(axis=(0, 1))
+        middle, half = (low + high) / 2.0, (high - low) / 2.0
+    elif isinstance(shape, Box):
+        half = np.array(shape.size) / 2.0
+    else:
+        high = 0.0 if isinstance(shape, Sphere) else shape.length / 2.0
+        round_ends = 0.0 if isinstance(shape, Cylinder) else shape.radius
+        half = np.array([shape.radius, shape.radius, high + round_ends])
+    first, last = ((end - place.translation) @ place.rotation - middle for end in (a, b))
+    parts = ((k + 0.5) / PARTS for k in range(PARTS))
+    near = np.min([_from_box(first + part * (last - first), half) for part in parts], axis=0)
+    return np.asarray(near - np.sqrt(_dot(b - a, b - a)) / (2.0 * PARTS))
 
 
 def from_surface(surface: Surface, a: Array, b: Array) -> Array:
@@ -89,6 +109,13 @@ def nearest(points: Array, of: Array) -> tuple[np.ndarray, Array]:
     square = (points**2).sum(axis=1) - 2.0 * (of @ points.T)
     row = np.argmin(square, axis=1)
     return row, np.linalg.norm(of - points[row], axis=1)
+
+
+def _from_box(x: Array, half: Array) -> Array:
+    """Signed distance of points [s, n] from the box from -half to half [n]."""
+    beyond = np.abs(x) - half
+    outside = np.maximum(beyond, 0.0)
+    return np.asarray(np.sqrt(_dot(outside, outside)) + np.minimum(beyond.max(axis=1), 0.0))
 
 
 def _least_on(function: Callable[[Array], Array], a: Array, b: Array) -> Array:

@@ -1,7 +1,7 @@
 """Clearances as a proof: bodies over the whole motion between ticks, by :mod:`wbc.clearance`.
 
-A hand may be nearer than the clearance to what a hold is mounted on while it comes to that hold, holds it
-or leaves it, and no deeper in it than a stated depth beyond its own roundness.
+A hand may be nearer than the clearance to what a hold is mounted on from where it comes near to that hold, on which the
+log has it then, to where it is no longer near, and no deeper in it than a stated depth beyond its own roundness.
 """
 
 from __future__ import annotations
@@ -18,15 +18,15 @@ from wbc.shapes import Capsule, HalfSpace
 from wbc.validation import Array
 from wbc.walking.checker.report import Tally
 from wbc.walking.checker.rules import Rules
-from wbc.walking.checker.urdf import CapsuleOfLink, Urdf
+from wbc.walking.checker.samples import blocks
+from wbc.walking.checker.urdf import CapsuleOfLink, Urdf, forward
 from wbc.walking.holds.structure import Structure
 from wbc.walking.holds.surface import PlaneSurface
 from wbc.walking.log.log import WalkLog
 
 LINKS, STRUCTURE = "swept clearance of links", "swept clearance of the structure"
-#: A hold is mounted on what is this near to it [m]; so long before and after the log has a hand there it may be near
-#: to it [s]
-MOUNTED, LEAVING = 0.005, 3.0
+#: A hold is mounted on what is this near to it [m]
+MOUNTED = 0.005
 
 
 def declare(tally: Tally, rules: Rules) -> None:
@@ -112,24 +112,36 @@ def _things(structure: Structure) -> list[SweptBody]:
 def _exemptions(
     log: WalkLog, urdf: Urdf, bodies: Sequence[SweptBody], structure: Structure, rules: Rules
 ) -> Iterator[Exemption]:
+    places = _places(log, urdf)
     for arm, hand in enumerate(log.hands):
         mine = [body for body in bodies if body.link in urdf.carried_with(hand)]
         rows = log.hand_hold[:, arm]
         starts = np.flatnonzero(np.diff(rows, prepend=-2))
         ends = np.append(starts[1:], len(rows)) - 1
-        for k, start in enumerate(starts):
+        for start, end in zip(starts, ends, strict=True):
             if rows[start] < 0:
                 continue
             point = log.hold_pose[int(rows[start]), :3]
+            # From where the hand came near to where it is no longer
+            far = np.flatnonzero(np.linalg.norm(places[:, arm] - point, axis=1) > rules.exempt_distance)
+            came, went = far[far < start], far[far > end]
+            since = float(log.t[came[-1]] if len(came) else log.t[0])
+            until = float(log.t[went[0]] if len(went) else log.t[-1])
             mounts = _mounts(structure, point)
-            # While the hand comes and goes, from the hold before to the one after, and LEAVING at the least
-            came, went = starts[max(k - 1, 0)], ends[min(k + 1, len(ends) - 1)]
-            since = float(min(log.t[came], log.t[start] - LEAVING))
-            until = float(max(log.t[went], log.t[ends[k]] + LEAVING))
             for body in mine:
                 depth = rules.exempt_depth + float(getattr(body.shape, "radius", 0.0))
                 for mount in mounts:
                     yield Exemption(body.name, mount, point, rules.exempt_distance, depth, since, until)
+
+
+def _places(log: WalkLog, urdf: Urdf) -> Array:
+    """Where the hands are at ticks, the body as logged ``[n, a, 3]`` [m]."""
+    out = np.empty((len(log), len(log.hands), 3))
+    for block in blocks(log, 0):
+        found = forward(urdf, log.joints, block.q)
+        for arm, hand in enumerate(log.hands):
+            out[block.tick, arm] = np.einsum("nij,nj->ni", block.rotation, found.position[hand]) + block.position
+    return out
 
 
 def _mounts(structure: Structure, point: Array) -> list[str]:

@@ -20,16 +20,23 @@ BEGUN = "begun.json"
 PLAN, STRUCTURE, URDF = "plan.json", "structure.csv", "robot.urdf"
 
 
-def begin_folder(folder: pathlib.Path, asked: Mapping[str, Any], machine: Walker, structure: Structure) -> None:
+def begin_folder(
+    folder: pathlib.Path,
+    asked: Mapping[str, Any],
+    machine: Walker,
+    structure: Structure,
+    plant: Mapping[str, Any] | None = None,
+) -> None:
     """Writes what a run needs to be begun again, gone on with and checked, whenever it ends.
 
     Args:
-        asked: the run's request as plain data.
+        asked: the run's request as plain data. plant: what moves, as plain data; None: the kinematic one.
 
     Raises:
         WalkLogError, StructureFileError, RobotFileError: a file cannot be written.
     """
-    text = json.dumps({"request": asked, "machine": machine_of(machine)}, indent=1) + "\n"
+    begun = {"request": asked, "machine": machine_of(machine), **({} if plant is None else {"plant": plant})}
+    text = json.dumps(begun, indent=1) + "\n"
     write_whole(folder / BEGUN, lambda file: file.write_text(text))
     save_structure(structure, folder / STRUCTURE)
     write_whole(folder / URDF, machine.urdf)
@@ -71,14 +78,16 @@ def write_whole(file: pathlib.Path, write: Callable[[pathlib.Path], Any]) -> pat
 
 
 def read_begun(folder: pathlib.Path) -> dict[str, Any]:
-    """What a run was asked to do, and its machine, as plain data: ``request`` and ``machine`` of ``begun.json``.
+    """What a run was asked to do, and its machine, as plain data: ``request`` and ``machine`` of ``begun.json``, and
+    ``plant``, empty for the kinematic one.
 
     Raises:
         WalkLogError: no such file, or another one.
     """
     try:
         found = json.loads((folder / BEGUN).read_text())
-        return {"request": dict(found["request"]), "machine": dict(found["machine"])}
+        plant = dict(found.get("plant", {}))
+        return {"request": dict(found["request"]), "machine": dict(found["machine"]), "plant": plant}
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise WalkLogError("run", str(folder), f"there is no run in this folder: {error}") from error
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from math import sqrt
+from math import inf, sqrt
 
 import casadi as ca
 import numpy as np
@@ -11,7 +11,7 @@ import pinocchio as pin
 
 from wbc.native.compiled_function import compiled
 from wbc.stack.evaluation import SingleState
-from wbc.symbolic.rotations import exp3, from_quaternion, left_jacobian, left_jacobian_inverse, log3, to_quaternion
+from wbc.symbolic.rotations import exp3, from_quaternion, left_jacobian, log3, to_quaternion
 from wbc.validation import Array
 from wbc.walking.body_path import BodyPath
 from wbc.walking.loop.stopping import Stops
@@ -23,27 +23,25 @@ TARGET, AFTER, POSE = slice(0, 18), slice(18, 30), slice(30, 37)
 
 @functools.cache
 def pose_function() -> ca.Function:
-    """f(now, first, last, part, rate), poses as 12 numbers: the rotation by columns, the position.
+    """f(now, sample, bend, rate), poses as 12 numbers: the rotation by columns, the position.
 
-    The body is at M exp(s log(M' N)) when it has come the part s from M to N; its rate from where it is now
-    on is (p' - p, R log(R' R')) / dt in the structure's axes.
+    At the end of the tick the body is at M exp(bend), see :meth:`wbc.walking.body_path.BodyPath.at`; its rate from
+    where it is now on is (p' - p, R log(R' R')) / dt in the structure's axes.
 
     Args:
-        now: at the beginning of the tick. first, last: M and N. part: s at the end of the tick. rate: 1 / dt [1/s].
+        now: at the beginning of the tick. sample: M. bend: (linear; angular) ``[6]``. rate: 1 / dt [1/s].
 
     Returns:
         now, its rate ``[6]``, the pose afterwards ``[12]``, and its position and quaternion x, y, z, w ``[7]``.
     """
-    sizes = {"now": 12, "first": 12, "last": 12, "part": 1, "rate": 1}
-    now, first, last, part, rate = (ca.SX.sym(name, size) for name, size in sizes.items())
-    turns, places = zip(*((ca.reshape(pose[:9], 3, 3), pose[9:]) for pose in (now, first, last)), strict=True)
-    angular = log3(turns[1].T @ turns[2])
-    linear = left_jacobian_inverse(angular) @ (turns[1].T @ (places[2] - places[1]))
-    turned = turns[1] @ from_quaternion(exp3(part * angular))
-    moved = places[1] + turns[1] @ (left_jacobian(part * angular) @ (part * linear))
+    sizes = {"now": 12, "sample": 12, "bend": 6, "rate": 1}
+    now, sample, bend, rate = (ca.SX.sym(name, size) for name, size in sizes.items())
+    turns, places = zip(*((ca.reshape(pose[:9], 3, 3), pose[9:]) for pose in (now, sample)), strict=True)
+    turned = turns[1] @ from_quaternion(exp3(bend[3:]))
+    moved = places[1] + turns[1] @ (left_jacobian(bend[3:]) @ bend[:3])
     speed = ca.vertcat(moved - places[0], turns[0] @ log3(turns[0].T @ turned)) * rate
     out = ca.vertcat(now, speed, ca.vec(turned), moved, moved, to_quaternion(turned))
-    return compiled(ca.Function("pose", [now, first, last, part, rate], [out]))
+    return compiled(ca.Function("pose", [now, sample, bend, rate], [out]))
 
 
 class BodyCommand:
@@ -58,10 +56,11 @@ class BodyCommand:
 
     def __init__(self, dt: float) -> None:
         self._step = SingleState(pose_function())
-        self._now, self._first, self._last, self._part, rate = self._step.inputs
+        self._now, self._sample, self._bend, rate = self._step.inputs
         rate[0] = 1.0 / dt
         self._path: BodyPath | None = None
         self._place, self._row = np.nan, -1
+        self._around = np.zeros(6), np.zeros(6)
         self.pose: Array = np.zeros(7)
 
     def go(self, path: BodyPath, begin: float, end: float) -> Array:
@@ -80,10 +79,11 @@ class BodyCommand:
         else:
             self._now[:] = out[AFTER]
         row, part = path.place(end)
-        self._part[0] = part
         if row != self._row:
-            self._first[:], self._last[:] = path.numbers[row : row + 2]
-            self._row = row
+            self._sample[:], self._row = path.numbers[row], row
+            self._around = path.step(row - 1), path.step(row)
+        before, after = self._around
+        self._bend[:] = 0.5 * part**2 * after - 0.5 * (1.0 - part) ** 2 * before
         self._step.run()
         self._place = end
         self.pose = out[POSE].copy()
@@ -98,13 +98,13 @@ def pose_numbers(pose: pin.SE3) -> Array:
 
 #: Part of the pace from which a body that brakes steadily comes to rest in time
 PART = 0.9
-#: By which the body's velocity may change where its path has a corner [m/s, rad/s]: half of what a checker allows
-CORNER = 0.01
+#: Accelerations of the body where its path bends [m/s^2, rad/s^2]: a quarter of the jumps that a checker allows a tick
+BENDING = 0.5
 
 
 class Corners:
-    """How fast a path may be followed: where its rate jumps by d from one sample to the next, the pace is at most
-    CORNER / d, and before it as much as can be braked in time.
+    """How fast a path may be followed: where its rate changes by d around a sample, over one spacing, at the pace p by
+    p^2 d / spacing, which is at most :data:`BENDING`; and before it as fast as can be braked in time.
 
     Args:
         brake: time in which the body comes to rest from full pace [s].
@@ -120,15 +120,17 @@ class Corners:
         )
         rates = np.stack([np.diff(places, axis=0), skew.T], axis=1) / path.spacing
         jumps = np.linalg.norm(np.diff(rates, axis=0), axis=2).max(axis=1)
-        most = np.ones(len(path.poses))
-        most[1:-1] = np.minimum(CORNER / np.maximum(jumps, CORNER), 1.0)
-        reach = most**2 + self._gain * path.spacing * np.arange(len(most))
-        self._reach: list[float] = np.minimum.accumulate(reach[::-1])[::-1].tolist()
+        squares = np.ones(len(path.poses))
+        squares[1:-1] = np.minimum(BENDING * path.spacing / np.maximum(jumps, BENDING * path.spacing), 1.0)
+        # From half a spacing before a sample on
+        reach = squares + self._gain * path.spacing * (np.arange(len(squares)) - 0.5)
+        self._here: list[float] = squares.tolist()
+        self._reach: list[float] = [*np.minimum.accumulate(reach[::-1])[::-1].tolist(), inf]
 
     def pace(self, u: float) -> float:
         """The greatest at a path time [s]."""
-        row = min(int(u / self.path.spacing + 1.0 - 1e-9), len(self._reach) - 1)
-        return sqrt(max(self._reach[row] - self._gain * u, 0.0))
+        row = min(int(u / self.path.spacing + 0.5), len(self._here) - 1)
+        return sqrt(max(min(self._here[row], self._reach[row + 1] - self._gain * u), 0.0))
 
 
 class BodyMotion:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import inf
+from math import dist, inf
 from typing import NamedTuple
 
 import numpy as np
@@ -18,6 +18,9 @@ from wbc.walking.loop.state import Swinging
 from wbc.walking.loop.stopping import Stops
 from wbc.walking.planner.swings.swings import SETTLE
 
+#: A swing is proven again where body and hand are farther than this from where they were foreseen [m], which is looked
+#: at every so many ticks; a turn of the body counts as if it were about a point this far away [m]
+STRAY, EVERY, ARM = 0.002, 10, 1.3
 #: Path time that the body's way is proven ahead, and what is left of it when it is looked at again [s]
 AHEAD, LEFT = 1.0, 0.4
 
@@ -48,6 +51,9 @@ class Caution:
         self.sight, self._machine, self._progress, self._stops = sight, machine, progress, stops
         self.until = 0.0
         self._known: tuple[object, ...] = ()
+        # When the swing was proven, times since then, and where the body and the hand are then
+        self._foreseen: tuple[float, Array, Array] | None = None
+        self._clock: Array = np.zeros(0)
 
     def forget(self) -> None:
         """Nothing is proven any more."""
@@ -87,11 +93,34 @@ class Caution:
 
     def swing(self, swinging: Swinging, course: Course) -> Nearest | None:
         """What is too near while a hand goes on to its hold and the body as its pace has it; None: proven clear."""
-        found = self._near(swinging, self.timing(swinging, course))
+        when = self.timing(swinging, course)
+        found = self._near(swinging, when)
         if found is None:
             self._known = self._progress.plan.path, swinging, course.stands
             self.until = self._progress.path_time
+            self._clock = when.clock
+            places = np.concatenate([self._rows[:, :7], self.sight.hand(swinging.arm, self._rows)], axis=1)
+            self._foreseen = self._machine.time, when.times, places
         return found
+
+    def strays(self, swinging: Swinging) -> bool:
+        """Whether body and hand are elsewhere than they were foreseen, as far as that is looked at now."""
+        if self._foreseen is None:
+            return False
+        machine, (begin, times, places) = self._machine, self._foreseen
+        since = machine.time - begin
+        if round(since / machine.dt) % EVERY:
+            return False
+        if swinging.state == "open":
+            # A hand that waits is where it was to be a little ago, and the body with it
+            since = float(np.interp(swinging.clock, self._clock, times))
+        row = min(int(np.searchsorted(times, since, side="right")) - 1, len(times) - 2)
+        part = min((since - times[row]) / (times[row + 1] - times[row]), 1.0)
+        there = places[row] + part * (places[row + 1] - places[row])
+        body, hand = machine.q[:7], machine.chain.origins[swinging.arm]
+        # The sine of half the angle between two unit quaternions
+        turned = dist(body[3:], there[3:7]) if body[3:].dot(there[3:7]) > 0.0 else dist(body[3:], -there[3:7])
+        return dist(body[:3], there[:3]) + 2.0 * ARM * turned + dist(hand, there[7:]) > STRAY
 
     def timing(self, swinging: Swinging, course: Course) -> Timing:
         """Body and hand with the paces of the loop, until the hand holds."""
@@ -120,7 +149,7 @@ class Caution:
 
     def _near(self, swinging: Swinging | None, when: Timing) -> Nearest | None:
         machine, progress = self._machine, self._progress
-        rows = self.sight.rows(machine, progress, swinging, when)
+        rows = self._rows = self.sight.rows(machine, progress, swinging, when)
         held = dict(machine.held)
         at = list[tuple[int, Array]]()
         for arm in set(range(len(machine.walker.arms))) - set(machine.held):

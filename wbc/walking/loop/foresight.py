@@ -40,8 +40,10 @@ STEP = 0.025
 MOUNTED, DEPTH = 0.005, 0.005
 #: The same of a hand that holds, whose posture is foreseen less well than its place [m]
 HELD_DEPTH = 0.03
-#: What clearances may lack: as much as the checker leaves; and what the proof may miss [m]
-SLACK, TOLERANCE = 1e-4, 5e-5
+#: A swinging arm that is off its way comes back to it within some of these [s]
+FADES = 0.15
+#: What clearances may lack, and what the proof may miss, together less than the checker leaves [m]
+SLACK, TOLERANCE = 4e-5, 4e-5
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,7 +123,18 @@ class Foresight:
             first = grips.between(grip, samples)[:, limb.guided :] if first is None else first
             guide = first + parts[:, None] * (last - first)
             angles, _ = limb.follow(frames[None], places[None], guide[None], self.walker.margins)
-            out[:, arm.q] = angles[0]
+            # What the arm is off now it takes back in a while
+            fades = np.exp(-when.times / FADES)[:, None]
+            out[:, arm.q] = angles[0] + fades * (q[arm.q] - angles[0, 0])
+        return out
+
+    def hand(self, arm: int, q: Array) -> Array:
+        """Where the hand of an arm is in configurations ``[k, nq]``, in the structure ``[k, 3]`` [m]."""
+        mine = self.walker.arms[arm]
+        local = np.asarray(limb_of(self.walker).points(q[:, mine.q]))[:, -1]
+        in_body = local @ mine.base.rotation.T + mine.base.translation
+        turns = np.array([pin.Quaternion(row).matrix() for row in q[:, 3:7]])
+        out: Array = np.einsum("kij,kj->ki", turns, in_body) + q[:, :3]
         return out
 
     def _holding(self, frames: Array, now: Array, place: Array, axis: Array) -> Array:

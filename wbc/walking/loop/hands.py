@@ -21,8 +21,10 @@ from wbc.walking.loop.stopping import Stops
 from wbc.walking.planner.grips.rolls import ANY, frame_on
 from wbc.walking.planner.swings.law import SwingLaw
 
-#: Rate at which a hand that has arrived takes back what it is off its hold [1/s]
+#: Rate at which a hand that has arrived takes back what it is off its hold [1/s],
 SETTLING = 8.0
+#: and at most this part of the gain with which it follows
+PART = 0.33
 #: A hold that could not be grasped so many times is taken as vanished
 TRIES = 3
 
@@ -93,7 +95,7 @@ class ArmLeader:
         elif swinging.state == "open":
             far = dist(swinging.place, machine.structure.positions[swinging.hold])
             wanted = hand_pace(swinging, swinging.place, at_branch, early, pace, far)
-            stops = aborted or swinging.dropped
+            stops = aborted or swinging.dropped or swinging.pauses
             wanted, change = (0.0, self._dt / self.stops.hand) if stops else (wanted, self._dt / HAND_RAMP)
             swinging.pace += min(max(wanted - swinging.pace, -change), change)
             swinging.clock = min(swinging.clock + swinging.pace * self._dt, swinging.law.duration)
@@ -101,8 +103,13 @@ class ArmLeader:
         followed = self._hand.go(swinging, swinging.place, progress.grips, grip, progress.sample)
         if swinging.state == "open" and swinging.clock >= swinging.law.duration - 1e-9 and not swinging.dropped:
             # What postures pull at a hand that has arrived is taken back, else it stays beside its hold
-            swinging.shift += SETTLING * self._dt * (swinging.aim.position - swinging.place)
+            settling = min(SETTLING, PART * self._stack.swing_gain)
+            swinging.shift += settling * self._dt * (swinging.aim.position - swinging.place)
         followed[:3] += swinging.shift
+        if machine.lag > 0.0 and swinging.state == "open":
+            # Joints that lag are told now how fast the hand is to be when they follow
+            soon = swinging.law.at(swinging.clock + machine.lag * swinging.pace).velocity
+            followed[3:6] += swinging.pace * (soon - swinging.aim.velocity)
         hold = machine.structure.positions[swinging.hold], machine.structure.axes[swinging.hold]
         near = swinging.aim.blend > LANDING and at_branch and dist(swinging.aim.position, hold[0]) < UPRIGHT
         near = near and not swinging.dropped
@@ -169,13 +176,14 @@ class Hands:
         """The swinging hand does not go to its hold any more: it slows down along its law, and stays in the air."""
         if self.swinging is None:
             return
-        if self.swinging.state == "open" and self.swinging.pace > 0.0:
-            if not self.swinging.dropped:
-                self._leave(self.swinging)
-            self.swinging.dropped = True
-            return
         if not self.swinging.dropped:
             self._leave(self.swinging)
+        if self.swinging.state == "opening":
+            self.swinging.dropped, self.swinging.pace = True, 0.0
+            return
+        if self.swinging.state == "open" and self.swinging.pace > 0.0:
+            self.swinging.dropped = True
+            return
         self.stay(self.swinging.arm)
         self.swinging = None
 
@@ -201,7 +209,7 @@ class Hands:
     def settle(self, swinging: Swinging) -> bool:
         """Close a hand that has come to rest on its hold; whether the latch is through with this tick."""
         if swinging.dropped:
-            if swinging.pace == 0.0:
+            if swinging.pace == 0.0 and swinging.state == "open":
                 self.drop()
             return False
         if swinging.state == "open" and swinging.clock >= swinging.law.duration - 1e-9:

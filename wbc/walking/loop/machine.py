@@ -17,6 +17,12 @@ from wbc.walking.loop.closed_chain import ClosedChain
 from wbc.walking.loop.stack import hold_kind
 from wbc.walking.planner.grips.rolls import allowed_x
 
+#: What a body is off where the hands have it, when others hold than before, is taken back in [s]
+EASING = 0.2
+#: A lag is taken of about the last [s], and where the squares of the joints' commanded accelerations add up to more
+#: than this [rad^2/s^4]
+REMEMBERED, SEEN = 2.0, 10.0
+
 
 class Machine:
     """Where the joints are is what the plant reads; where the body is follows from the holds of the closed hands
@@ -31,6 +37,7 @@ class Machine:
             period, and the body's velocity as the plant has it.
         time: [s]. held: row of the arm -> row of the hold.
         left: row of the arm -> places of the holds that an open hand has left, or was to go to, last [m].
+        lag: by how much the joints are later than what they are commanded, as far as that shows [s].
         fixed: fewer hands hold than the body needs, and have since the beginning: it is declared fixed.
         structure, chain: the holds that are there, and the hands on them.
 
@@ -42,13 +49,14 @@ class Machine:
     def __init__(self, walker: Walker, structure: Structure, dt: float, plant: Plant | None = None) -> None:
         check_fits(walker)
         self.walker, self.structure, self.dt = walker, structure, dt
-        self.chain = ClosedChain(walker, structure)
+        self.chain = ClosedChain(walker, structure, round(EASING / dt))
         self._connection = Connection(plant, walker.robot, dt)
         self._broken: set[int] = set()
         self._grips: GrippingPlant | None = plant if isinstance(plant, GrippingPlant) else None
         self.q = np.array(walker.robot.neutral)
         self.v = self.rates = np.zeros(walker.robot.nv)
         self.time, self.fixed = 0.0, False
+        self.lag, self._late = 0.0, np.zeros(2)
         self.held: dict[int, int] = {}
         self.left: dict[int, list[Array]] = {}
 
@@ -76,7 +84,7 @@ class Machine:
         Raises:
             PlantError: the plant has no valid reading; it was commanded to rest.
         """
-        self.v = v.copy()
+        before, self.v = self.v, v.copy()
         if self.fixed:
             self.v[:6] = 0.0
         state = self._connection.drive(self.v)
@@ -84,7 +92,16 @@ class Machine:
         if state.v.tobytes() != self.v.tobytes():
             # It did something else than was commanded: what lasts for a period is its mean
             self.rates[6:] = (state.q[7:] - self.q[7:]) / self.dt
+            self._watch(before)
         return self._place(state.q[7:])
+
+    def _watch(self, before: Array) -> None:
+        """Of commands u and rates v of all joints the lag is sum (u - v) du / dt over sum (du / dt)^2, of late."""
+        change = (self.v[6:] - before[6:]) / self.dt
+        self._late *= 1.0 - self.dt / REMEMBERED
+        self._late += (self.v[6:] - self.rates[6:]) @ change, change @ change
+        if self._late[1] > SEEN:
+            self.lag = max(float(self._late[0] / self._late[1]), 0.0)
 
     def rest(self) -> None:
         """Command rest; time does not go on."""

@@ -47,13 +47,13 @@ class HoldItems:
     """
 
     def __init__(self, stack: Stack, walker: Walker, structure: Structure, dt: float) -> None:
-        self._names = [arm.name for arm in walker.arms]
+        self._names, self._gain = [arm.name for arm in walker.arms], 1.0 / (HOLD_TICKS * dt)
         self.kinds = sorted({hold_kind(structure, k) for k in range(len(structure))})
         self._tilts = bool({"position", "roll"} & set(self.kinds))
         self._rolls = bool({"pose", "roll"} & set(self.kinds))
         for arm in walker.arms:
             for kind in self.kinds:
-                item = tasks.Hold(arm.hand, kind=kind, gain=1.0 / (HOLD_TICKS * dt))
+                item = tasks.Hold(arm.hand, kind=kind, gain=self._gain)
                 stack.add(item, name=f"{arm.name} hold {kind}")
             if self._tilts:
                 stack.add(tasks.AxisCone(arm.hand, half_angle=1.0), name=f"{arm.name} tilt")
@@ -66,8 +66,8 @@ class HoldItems:
         self._holds = [{kind: items[f"{name} hold {kind}"] for kind in self.kinds} for name in self._names]
         self._cones = [items[f"{name} tilt"] for name in self._names] if self._tilts else []
         self._turned = [items[f"{name} x axis"] for name in self._names] if self._rolls else []
-        for turned in self._turned:
-            turned.gain = ROLL_GAIN
+        self.gains = [(turned, ROLL_GAIN) for turned in self._turned]
+        self.gains += [(hold, self._gain) for kinds in self._holds for hold in kinds.values()]
         for arm in range(len(self._names)):
             self.release(arm)
 
@@ -116,6 +116,9 @@ DT = 0.01
 BODY, SWING, AXIS, WRIST, UPRIGHT = 1e4, 10.0, 3.0, 1e-3, 100.0
 #: Gains [1/s] of body, swinging hand, its axis and the wrists
 BODY_GAIN, SWING_GAIN, AXIS_GAIN, WRIST_GAIN = 12.0, 25.0, 20.0, 12.0
+#: On joints that lag by T no gain is greater than this over T: an error then falls with hardly any overshoot, as from
+#: 1/4 on it begins to swing
+CRITICAL = 0.4
 #: Until then the wrist follows its postures; near the next hold its axis counts
 FREE_AXIS, FREE_WRIST, RESTING = 1e-6, 40.0, 0.1
 
@@ -153,16 +156,28 @@ class WalkStack:
         self._rest = items["posture"]
         self._holds.of(self.controller)
         self._swings, self._axes = ([items[f"{arm.name} {kind}"] for arm in walker.arms] for kind in ("swing", "axis"))
-        items["body"].gain, self._rest.gain = BODY_GAIN, WRIST_GAIN
+        self._gains: list[tuple[Any, float]] = [(items["body"], BODY_GAIN), (self._rest, WRIST_GAIN)]
         self._hands = [self._hand(arm) for arm in walker.arms]
-        for swing, axis in zip(self._swings, self._axes, strict=True):
-            swing.gain, axis.gain = SWING_GAIN, AXIS_GAIN
+        self._gains += [(swing, SWING_GAIN) for swing in self._swings] + [(axis, AXIS_GAIN) for axis in self._axes]
+        self._gains += self._holds.gains
+        self._lag, self.swing_gain = -1.0, SWING_GAIN
+        self.follow(0.0)
+
+    def follow(self, lag: float) -> None:
+        """Gains for joints that follow their commands by so much later [s]."""
+        if abs(lag - self._lag) <= 0.1 * self._lag + 1e-3:
+            return
+        self._lag, most = lag, CRITICAL / max(lag, 1e-9)
+        self.swing_gain = min(SWING_GAIN, most)
+        for item, gain in self._gains:
+            item.gain = min(gain, most)
 
     def begin(self, q: Array) -> None:
         """A walk begins at ``q`` ``[nq]``, at rest: nothing is left of the walk that was on this stack before."""
         self.controller.reset(q)
         self._posture[:], self._turning[:], self._mask[:] = self.walker.robot.neutral, 0.0, RESTING
         self._near = (-1, False)
+        self.follow(0.0)
         self._rest.target, self._rest.feedforward, self._rest.mask = q, self._turning, self._mask
 
     def hold(self, arm: int, hold: int, roll: int = ANY) -> None:

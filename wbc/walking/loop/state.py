@@ -50,6 +50,7 @@ class Swinging:
         shift: added to what the hand follows on its hold [m].
         counted: it is a move of the plan, not one of an earlier plan, or one that brings a free hand to it.
         waits: the body stands until the hand has landed.
+        pauses: hand and body come to rest where they are, and then it goes on. paused: how often they have.
         dropped: it does not go to its hold any more, but comes to rest on its law.
     """
 
@@ -60,6 +61,8 @@ class Swinging:
     latch: float
     counted: bool = True
     waits: bool = False
+    pauses: bool = False
+    paused: int = 0
     dropped: bool = False
     clock: float = 0.0
     pace: float = 1.0

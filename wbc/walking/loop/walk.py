@@ -36,6 +36,8 @@ ARRIVED = 0.002
 PATIENCE, SLACK = 4.0, 20.0
 #: Slices of planning between two ticks
 SLICES = 3
+#: So often a swing is stopped on its way because it is not where it was foreseen
+PAUSES = 3
 #: So often in a row what was planned may turn out to be too near to something, before the walk is given up
 REFUSALS = 3
 
@@ -238,6 +240,7 @@ class Walk:
         step = self.stack.controller.step(machine.q, machine.v)
         cost = time.perf_counter() - begin
         slip, fixed = machine.move(step.v), machine.fixed
+        self.stack.follow(machine.lag)
         if hands.swinging is not None:
             self._land(hands.swinging)
         pose = self.body.pose if coasting is None else coasting.pose
@@ -429,10 +432,24 @@ class Walk:
             found = caution.ahead(min([self._end(), *self._lasting(leaving)]), None if lift is None else lift.lift)
             if found is not None:
                 self._refuse("the body's way", found)
+        elif swinging.pauses:
+            if self.pace == 0.0 and (swinging.state == "opening" or swinging.pace == 0.0):
+                swinging.pauses = False
+                self._go_on(swinging)
         elif caution.new(swinging, stands):
-            arm, hold = self.walker.arms[swinging.arm].name, self.structure.ids[swinging.hold]
-            if not self._may_swing(swinging, f"{arm} to {hold}"):
-                self.hands.drop()
+            self._go_on(swinging)
+        elif caution.strays(swinging) and caution.swing(swinging, self._course(swinging)) is not None:
+            # At rest it is where it is to be, and can go on from there
+            swinging.pauses, swinging.paused = swinging.paused < PAUSES, swinging.paused + 1
+            if not swinging.pauses:
+                self._go_on(swinging)
+
+    def _go_on(self, swinging: Swinging) -> None:
+        """A hand goes on to its hold, or not."""
+        if not self._may_swing(
+            swinging, f"{self.walker.arms[swinging.arm].name} to {self.structure.ids[swinging.hold]}"
+        ):
+            self.hands.drop()
 
     def _may_swing(self, swinging: Swinging, what: str) -> bool:
         """Whether a hand may go on to its hold: with the body as it is to move, else while that stands; if it may not,
@@ -549,7 +566,7 @@ class Walk:
         if self.leader.one_motion:
             # A swinging hand goes on to its hold with the body
             return self._changing and self.swinging is None
-        return self._changing or (self.swinging is not None and self.swinging.waits)
+        return self._changing or (self.swinging is not None and (self.swinging.waits or self.swinging.pauses))
 
     def _soonest(self, swinging: Swinging) -> float:
         """Path time from which on the hold of a swinging hand is in reach [s]."""

@@ -168,7 +168,14 @@ class Drive:
         path = walk.plan.path
         begun, spacing = course(walk, lead, not quick), path.spacing
         times = np.arange(begun.begins, begun.splice + spacing / 2, spacing)
-        tail, off = [path.at(u)[0].homogeneous for u in times], [self._displacement(path, u) for u in times]
+        waits = wait > 0.0
+        if walk.pace:
+            tail = list(path.poses[np.rint(times / spacing).astype(int)])
+            off = [self._displacement(path, u) for u in times]
+        else:
+            # It stands between samples of its path, and begins from there
+            tail = [path.at(walk.path_time)[0].homogeneous] * len(times)
+            off, wait = [self._displacement(path, walk.path_time)] * len(times), max(wait, spacing)
         bare = [undisplaced(*pair) for pair in zip(tail, off, strict=True)]
         rates = steering.rates(bare[-2], bare[-1], spacing) if walk.pace and len(bare) > 1 else np.zeros(4)
         part, much = ALTERNATIVES[self._order[0]]
@@ -178,15 +185,16 @@ class Drive:
         direction = (bare[-1][:3, :3].T @ (led[-1] - led[len(rest)])[:3, 3])[:2]
         shift, tilt = walk.hands.data.body_shift, walk.hands.data.body_tilt
         wanted = displacement(direction, *(m * most for m, most in zip(much, (shift, shift, tilt, tilt), strict=True)))
-        still = np.repeat(off[-1][None], len(rest), axis=0)
-        more = np.concatenate([still, towards(off[-1], wanted, len(ahead), spacing)])
+        shifting = (off[-1] - off[-2]) / spacing if len(off) > 1 else np.zeros(PARTS)
+        aims = np.repeat([off[-1], wanted], [len(rest), len(ahead)], axis=0)
+        more = towards(off[-1], shifting, aims, spacing)
         poses = [displaced(*pair) for pair in zip(led, more, strict=True)]
         other = BodyPath(np.concatenate([tail, poses]), spacing)
         kept = [pair for pair in self._displaced if pair[0] is path]
         self._displaced = [*kept, (other, np.concatenate([off, more]))]
         self._work = begun, course_slices(walk.walker, walk.structure, walk.plan, begun, other, quick)
-        self._asked, self._waited, self._on = self.command.copy(), wait > 0.0, path
-        walk.limit = begun.splice, begun.since + len(begun.kept)
+        self._asked, self._waited, self._on = self.command.copy(), waits, path
+        walk.limit = max(begun.splice - 0.5 * spacing, walk.path_time), begun.since + len(begun.kept)
 
     def _displacement(self, path: BodyPath, u: float) -> Array:
         """Of the body at a path time, from where its command has it; on a path of another origin it stays."""

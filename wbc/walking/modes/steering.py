@@ -14,6 +14,8 @@ from wbc.walking.holds.surface import CylinderSurface, PlaneSurface
 
 #: A displacement changes as fast as this [m/s, rad/s]
 SPEEDS = np.array([0.05, 0.05, 0.05, 0.05, 0.05])
+#: and its rate by this [m/s^2, rad/s^2]
+EASILY = 0.2
 #: Parts of a displacement: across and along the body's x and y axes and its z axis [m], and turns about x and y [rad]
 PARTS = len(SPEEDS)
 #: Columns of rates: speed of the body's origin round and along [m/s], spin about z into the structure [rad/s], and how
@@ -48,10 +50,19 @@ def undisplaced(pose: Array, by: Array) -> Array:
     return out
 
 
-def towards(begin: Array, wanted: Array, count: int, spacing: float) -> Array:
-    """Displacements ``[count, 5]`` after each of some steps, from one to another as fast as :data:`SPEEDS`."""
-    steps = np.arange(1, count + 1)[:, None] * SPEEDS * spacing
-    out: Array = begin + np.clip(wanted - begin, -steps, steps)
+def towards(begin: Array, rate: Array, wanted: Array, spacing: float) -> Array:
+    """Displacements ``[n, 5]`` after each of n steps, from one that changes at a rate [m/s, rad/s] to those that are
+    wanted ``[n, 5]``, as fast as :data:`SPEEDS` and by accelerations of :data:`EASILY`.
+    """
+    out, here, now, change = np.empty((len(wanted), PARTS)), begin.copy(), rate.copy(), EASILY * spacing
+    for k, aim in enumerate(wanted):
+        left = aim - here
+        # From so fast it comes to rest in whole steps
+        most = np.sqrt((0.5 * change) ** 2 + 2.0 * EASILY * np.abs(left)) - 0.5 * change
+        fit = np.sign(left) * np.minimum(most, SPEEDS)
+        now += np.clip(fit - now, -change, change)
+        here = here + now * spacing
+        out[k] = here
     return out
 
 

@@ -112,10 +112,10 @@ static int too_fast(const double *most, const double *q, const double *p)
     return out;
 }
 
-/* Where the wrist of a hand on a hold is in the frame of the arm's base, and the hand's axis; whether it is in reach.
-   `spans`: the shoulder's largest and least distance from the wrist. */
+/* Where the wrist of a hand on a hold is in the frame of the arm's base, the hand's axis, and how much reach is left;
+   whether it is in reach. `spans`: the shoulder's largest and least distance from the wrist. */
 static int wrist_on(const Arm *arm, const Keeping *keep, const double *spans, const double *frame, const double *place,
-                    const double *normal, double tilt, double *w, double *axis)
+                    const double *normal, double tilt, double *w, double *axis, double *left)
 {
     const double whole = arm->offset + arm->upper + arm->fore + arm->hand, *f = frame;
     double p[3];
@@ -138,6 +138,7 @@ static int wrist_on(const Arm *arm, const Keeping *keep, const double *spans, co
             w[k] = p[k] - arm->hand * axis[k];
         reach = wrist_margin(arm, w, spans[0], spans[1]);
     }
+    *left = reach;
     return reach > keep->reach_margin;
 }
 
@@ -154,10 +155,10 @@ long grips_along(const Arm *arm, const Keeping *keep, const World *world, long r
         /* Samples at which the stretches that are going on began */
         long since[BRANCHES] = { -1, -1 };
         for (long i = 0; i <= n; ++i) {
-            double axis[3], w[3], q[BRANCHES][FREE];
+            double axis[3], w[3], left, q[BRANCHES][FREE];
             const double *f = frames + 16 * i;
             const double *place = positions + 3 * h, *normal = axes + 3 * h;
-            const int there = i < n && wrist_on(arm, keep, spans, f, place, normal, tilts[h], w, axis);
+            const int there = i < n && wrist_on(arm, keep, spans, f, place, normal, tilts[h], w, axis, &left);
             const int solved = there && postures(arm, keep, w, axis, q);
             for (int b = 0; b < BRANCHES; ++b) {
                 double *mine = work + JOINTS * n * b, least = 0.0;
@@ -190,6 +191,41 @@ long grips_along(const Arm *arm, const Keeping *keep, const World *world, long r
                     memcpy(mine + JOINTS * i, q[b], sizeof q[b]);
                     mine[JOINTS * i + FREE] = 0.0;
                 }
+            }
+        }
+    }
+    return found;
+}
+
+/* Postures of an arm on m holds at n frames of its base (4 x 4), straight along the holds' axes and clear of the world:
+   `table`, four numbers each: frame, hold, branch, and whether a hand may land there, for which |sin theta5|, the
+   reach that is left, and the wrist's distance from the base's z axis are larger than the three of `landing`, the first
+   in any case; and their six angles, joint 6 at 0. Both are long enough for all. Returns how many there are. */
+long grips_at(const Arm *arm, const Keeping *keep, const double *landing, const World *world, long row, long n,
+              const double *frames, long m, const double *positions, const double *axes, const long *holds, long *table,
+              double *rows)
+{
+    const double spans[2] = { span(arm, arm->elbow), span(arm, -arm->limits[2]) };
+    long found = 0;
+    for (long i = 0; i < n; ++i) {
+        const Frame frame = frame_of(frames + 16 * i);
+        for (long h = 0; h < m; ++h) {
+            double axis[3], w[3], left, q[BRANCHES][FREE], least;
+            if (!wrist_on(arm, keep, spans, frames + 16 * i, positions + 3 * h, axes + 3 * h, 0.0, w, axis, &left)
+                || !postures(arm, keep, w, axis, q))
+                continue;
+            const long own[2] = { holds[h], -1 }, lands = left > landing[1] && hypot(w[0], w[1]) > landing[2];
+            for (int b = 0; b < BRANCHES; ++b) {
+                double *mine = rows + JOINTS * found;
+                nearest_limit(arm, q[b], &least);
+                if (!(least > keep->angle_margin && fabs(sin(q[b][4])) > landing[0]))
+                    continue;
+                memcpy(mine, q[b], sizeof q[b]);
+                mine[FREE] = 0.0;
+                if (posture_meets(world, arm, row, &frame, mine, own) != NOTHING)
+                    continue;
+                const long where[4] = { i, h, b, lands };
+                memcpy(table + 4 * found++, where, sizeof where);
             }
         }
     }

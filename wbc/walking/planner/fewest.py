@@ -8,7 +8,6 @@ after d re-grasps only those with d + h <= k can lead to the end with k. They ar
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import product
 
 import numpy as np
 
@@ -18,6 +17,7 @@ from wbc.walking.planner.sound import sound_slices
 from wbc.walking.planner.stances.body import BodySearch
 from wbc.walking.planner.stances.candidates import Fan
 from wbc.walking.planner.stances.nodes import Found, Node
+from wbc.walking.planner.stances.together import together
 from wbc.walking.planner.starts import Beginning, grips_at_first
 from wbc.walking.planner.swings.law import SwingLaw
 from wbc.walking.planner.swings.move import Key
@@ -75,11 +75,15 @@ class _Fewer(BodySearch):
         """Stances that the plan may begin with."""
         choices = grips_at_first(self.walker, self.structure, self.path, self.grips, beginning)
         out, least, holds = list[Key](), self._least.tolist(), self.grips.hold.tolist()
-        for key in product(*choices):
-            if sum(least[g] for g in key) > self._most or len({holds[g] for g in key}) < len(key):
-                continue
-            if self.until(key, 0) > sample:
+        # What all other arms need at least leaves so much to an arm
+        fewest = [min(least[g] for g in mine) for mine in choices]
+        spare = self._most - sum(fewest)
+        choices = [[g for g in mine if least[g] - few <= spare] for mine, few in zip(choices, fewest, strict=True)]
+        for key in together(choices, lambda one, other: holds[one] != holds[other]):
+            if sum(least[g] for g in key) <= self._most and self.until(key, 0) > sample:
                 out.append(key)
+                if len(out) > MOST:
+                    break
         return out
 
     def _moves(self, level: Sequence[tuple[Key, Node]], rows: range) -> list[Fan]:

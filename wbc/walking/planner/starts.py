@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from bisect import insort
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from itertools import combinations, product
 from typing import Any
 
@@ -20,12 +20,15 @@ from wbc.walking.planner.grips.table import Grips
 from wbc.walking.planner.plan import NoPlanError
 from wbc.walking.planner.slices import Slices, drained
 from wbc.walking.planner.stances.search import PAIRS, StanceSearch
+from wbc.walking.planner.stances.together import together
 
 #: Holds that hands begin on, postures that they have, and holds that they must not begin on, by arm
 Beginning = tuple[Mapping[str, str], Mapping[str, Array], Mapping[str, Collection[str]]]
 NOTHING: Beginning = ({}, {}, {})
 #: Grips of an arm that a start may have, and stances that a search begins with; the same of a thorough one
 STARTS, ALL_STARTS = (10, 24), (24, 200)
+#: Of more arms than this the best grips are tried with each other, and more of them until there are so many stances
+FEW_ARMS, ENOUGH = 3, 1000
 #: Joints of one branch differ by less than this from where they are [rad]; other branches by more
 SAME_BRANCH = 0.3
 
@@ -121,23 +124,16 @@ def stance_slices(
     Raises:
         UnknownNameError: another arm or hold. NoPlanError: there are none.
     """
-    grips, choices = (
-        search.grips,
-        [mine[: most[0]] for mine in grips_at_first(walker, structure, search.path, search.grips, beginning)],
-    )
+    grips = search.grips
+    choices = [mine[: most[0]] for mine in grips_at_first(walker, structure, search.path, grips, beginning)]
     pairs = [(a, b) for one, other in combinations(choices, 2) for a, b in product(one, other)]
     for begin in range(0, len(pairs), PAIRS):
         search.conflicts.prepare(pairs[begin : begin + PAIRS])
         yield None
-    every = np.array(list(product(*choices)), dtype=np.int64)
-    holds, bounds = np.sort(grips.hold[every], axis=1), grips.last[every].min(axis=1)
-    every = every[np.argsort(np.where((np.diff(holds, axis=1) > 0).all(axis=1), -bounds, 1), kind="stable")]
     found = list[tuple[int, tuple[tuple[int, int], ...], tuple[int, ...]]]()
-    for stance in map(tuple, every.tolist()):
+    for stance in _candidates(grips, search, choices, sample):
         # No stance lasts longer than its grips
-        if len({int(grips.hold[g]) for g in stance}) < len(stance) or (
-            len(found) >= most[1] and min(int(grips.last[g]) for g in stance) < -found[most[1] - 1][0]
-        ):
+        if len(found) >= most[1] and min(int(grips.last[g]) for g in stance) < -found[most[1] - 1][0]:
             break
         until = search.until(stance, 0)
         if until > sample:
@@ -146,10 +142,31 @@ def stance_slices(
         raise NoPlanError(
             "plan",
             structure.name,
-            _why_no_stance(walker, structure, search, every[0].tolist(), sample),
+            _why_no_stance(walker, structure, search, [mine[0] for mine in choices], sample),
             separating=_at_first(structure, grips),
         )
     return [stance for _, _, stance in found[: most[1]]]
+
+
+def _candidates(
+    grips: Grips, search: StanceSearch[Any], choices: Sequence[Sequence[int]], sample: int
+) -> Iterator[tuple[int, ...]]:
+    """Stances on holds of their own, those whose grips last longest first; see :data:`FEW_ARMS`."""
+
+    def fit(one: int, other: int) -> bool:
+        return bool(grips.hold[one] != grips.hold[other])
+
+    def lasting(one: int, other: int) -> bool:
+        return fit(one, other) and search.conflicts.first_conflict(one, other, 0) > sample + 1
+
+    found = list[tuple[int, ...]]()
+    if len(choices) <= FEW_ARMS:
+        found += together(choices, fit)
+    for count in range(2, max(map(len, choices)) + 1) if len(choices) > FEW_ARMS else ():
+        found = list(together([mine[:count] for mine in choices], lasting))
+        if len(found) >= ENOUGH:
+            break
+    yield from sorted(found, key=lambda stance: -min(int(grips.last[g]) for g in stance))
 
 
 def _why_no_stance(

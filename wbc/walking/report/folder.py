@@ -8,6 +8,7 @@ from collections.abc import Callable
 import numpy as np
 
 from wbc.robots import Walker
+from wbc.track.page import FILE as REPORT
 from wbc.walking.checker import Report, Rules, check_run
 from wbc.walking.checker.clock_and_joints import JUMP, SPIN_JUMP
 from wbc.walking.holds.files import save_structure
@@ -20,6 +21,7 @@ from wbc.walking.report.figures import figures_of, save_figures
 from wbc.walking.report.plots import save_plots
 from wbc.walking.report.reach_map import save_reach_map
 from wbc.walking.report.replay_page import ReplayPageError, save_replay_page
+from wbc.walking.report.run_report import save_report
 from wbc.walking.report.stills import save_stills
 from wbc.walking.run.carrying_out import Progress
 from wbc.walking.run.session import WalkRun
@@ -31,7 +33,7 @@ WRITTEN = (
     *(BEGUN, FILE, PART, TICKS, "published.npz", PLAN, STRUCTURE, f"{pathlib.Path(STRUCTURE).stem}-*.stl", URDF),
     *(CHECK, "summary.json", "summary.txt"),
     *(f"{name}.png" for name in ("holds", "margins", "joints", "rates", "drift", "wrists", "speed", "tick_time")),
-    *("reach_map.png", "walk.png", "still_*.png", "walk.gif", "replay.html"),
+    *("reach_map.png", "walk.png", "still_*.png", "walk.gif", "replay.html", REPORT),
 )
 
 
@@ -57,7 +59,7 @@ def save_run(run: WalkRun, folder: pathlib.Path, check: bool = True) -> tuple[li
         if report is not None:
             text = f"{report}\n"
             files.append(write_whole(folder / CHECK, lambda file: file.write_text(text)))
-    return [*files, *save_figures(figures_of(run, report), folder)], report
+    return [*files, *save_figures(figures_of(run, report), folder), save_report(run, folder, report)], report
 
 
 def rules_of(walker: Walker) -> Rules:

@@ -51,7 +51,7 @@ def save_replay_page(
     try:
         viser: Any = importlib.import_module("viser")
     except ImportError as error:
-        raise ReplayPageError("replay", FILE, "needs viser: pip install 'wbc[replay]'") from error
+        raise ReplayPageError("replay", FILE, "needs viser: pip install 'wbc[viewer]'") from error
     # What is recorded is what a server would send; nobody is asked to connect, so its address is not printed
     with contextlib.redirect_stdout(io.StringIO()):
         server = viser.ViserServer(host="127.0.0.1", verbose=False)

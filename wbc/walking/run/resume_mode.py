@@ -158,7 +158,7 @@ class ResumeMode(Mode[PathRequest]):
 
     Raises:
         WalkLogError: no log of a walk. RangeError: a time that it does not have, another robot, a state that is not
-            legal, or a run that has no goal.
+            legal, a run that has no goal, or one under torques.
     """
 
     def __init__(self, resume: ResumeRequest, walker: Walker) -> None:
@@ -169,6 +169,10 @@ class ResumeMode(Mode[PathRequest]):
         self.request = request = _goal(request_of(old.meta.get("request")), resume.points)
         if walker.two_ended or walker.data.digest != old.meta["robot_digest"]:
             raise RangeError("resume", old.meta["robot_digest"], "the run has another robot; use the same --set")
+        if "plant" in old.meta:
+            name = old.meta["plant"]["name"]
+            why = f"it ran under torques in {name}, whose state is not in the log: run it again from its beginning"
+            raise RangeError("resume", str(self._folder), why)
         if len(old.arms) != len(walker.arms):
             raise RangeError("resume", len(old.arms), f"the run has another number of arms than {len(walker.arms)}")
         if at is not None and not old.t[1] - 1e-9 <= at <= old.t[-1] + 1e-9:  # nor is nan

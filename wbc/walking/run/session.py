@@ -163,7 +163,8 @@ def perform(
 ) -> WalkRun:
     """Plans, compiles, walks and records. Arguments as of :func:`perform_walk`."""
     if folder is not None:
-        begin_folder(folder, mode.asked(), mode.walker, mode.structure)
+        about = plant.about if isinstance(plant, TorqueLoop) else None
+        begin_folder(folder, mode.asked(), mode.walker, mode.structure, about)
     report, clock = progress or (lambda what, part: None), time.perf_counter
     run = WalkRun(mode.request, mode.walker, mode.structure, mode.path, None, "refused", "")
     report("planning", None)

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from wbc import validation
-from wbc.errors import RangeError
+from wbc.errors import RangeError, WbcError
 from wbc.robots import Walker, with_masses
 from wbc.simulation import GripKind, GrippingMujocoPlant, Motors, PinocchioPlant
 from wbc.walking.holds.structure import Structure
+from wbc.walking.log.part import WalkLogError
 from wbc.walking.loop.stack import hold_kind
 from wbc.walking.torque.faults import Fault, delay_of
-from wbc.walking.torque.loop import Tested, TorqueLoop
+from wbc.walking.torque.loop import TorqueLoop
 from wbc.walking.torque.stack import TorqueStack
+from wbc.walking.torque.tested import Tested
 
 PLANTS = ("kinematic", "pinocchio", "mujoco")
 
@@ -42,6 +46,24 @@ class PlantChoice:
             raise RangeError("plant", self.name, "it has no masses, so no gravity and no faults")
         delay_of(tuple(map(Fault.read, self.faults)))
 
+    @classmethod
+    def of_run(cls, about: Mapping[str, Any]) -> PlantChoice:
+        """That of a run which was begun: plain data of :meth:`about`, empty for the kinematic one.
+
+        Raises:
+            WalkLogError: it is none.
+        """
+        try:
+            x, y, z = about.get("gravity", (0.0, 0.0, 0.0))
+            return cls(about.get("name", "kinematic"), (x, y, z), tuple(about.get("faults", ())))
+        except (TypeError, ValueError, WbcError) as error:
+            raise WalkLogError("plant", str(about), f"the run does not say what moved: {error}") from error
+
+    @property
+    def about(self) -> dict[str, Any]:
+        """As plain data."""
+        return {"name": self.name, "gravity": list(self.gravity), "faults": list(self.faults)}
+
     @property
     def dynamic(self) -> bool:
         """It has masses and takes torques."""
@@ -70,8 +92,7 @@ class PlantChoice:
         else:
             hands = [arm.hand for arm in heavy.arms]
             plant = GrippingMujocoPlant(heavy.robot, hands, stack.controller.stack.dt, motors=motors)
-        about = {"name": self.name, "gravity": list(self.gravity), "faults": list(self.faults)}
-        return TorqueLoop(stack, plant, delay=delay, faults=faults, about=about)
+        return TorqueLoop(stack, plant, delay=delay, faults=faults, about=self.about)
 
 
 def hold_kind_of(structure: Structure, hold: int) -> str:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import casadi as ca
+import numpy as np
 
 from wbc.robot import Robot
 from wbc.simulation import GripKind
@@ -43,7 +44,8 @@ class AxisGrasp(RigidGrasp):
         """The box, without m_z."""
         unlimited = ca.SX.inf(3)
         most = ca.vertcat(inputs.get("force", unlimited), inputs.get("torque", unlimited))[self._limited]
-        return Cone(ca.SX.eye(6)[self._limited, list(self.axes)], -most, most)
+        matrix = ca.SX(ca.DM(np.eye(6)[np.ix_(self._limited, self.axes)]))
+        return Cone(ca.sparsify(matrix), -most, most)
 
     @property
     def _limited(self) -> list[int]:

@@ -4,17 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol, runtime_checkable
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
 from wbc import validation
 from wbc.errors import ShapeError
-from wbc.simulation import Command, CommandKind, Grip, GripKind, GrippingPlant, Plant, PlantState
+from wbc.simulation import Command, CommandKind, GripKind, Plant, PlantState
 from wbc.validation import Array
 from wbc.walking.torque.faults import Fault
 from wbc.walking.torque.stack import TorqueStack
+from wbc.walking.torque.tested import Tested
 from wbc.walking.torque.watch import Watch
 
 
@@ -23,7 +24,7 @@ class Gains:
     """Of the loop.
 
     Attributes:
-        bandwidth: omega of  a = da_ref + 2 omega (v_ref - v) + omega^2 (q_ref - q)  [1/s].
+        bandwidth: omega of  a = dv_ref/dt + 2 omega (v_ref - v) + omega^2 (q_ref - q)  [1/s].
         leak: how fast q_ref comes to q, so that it does not wander where closed chains let nothing move [1/s].
         grip: how fast the drift of closed hands decays [1/s].
     """
@@ -31,36 +32,6 @@ class Gains:
     bandwidth: float = 40.0
     leak: float = 2.0
     grip: float = 20.0
-
-
-@runtime_checkable
-class Tested(GrippingPlant, Protocol):
-    """What a plant has besides that says how a walk does on it, and can be made to fail."""
-
-    @property
-    def grips(self) -> Mapping[str, Grip]:
-        """Frame -> how it is held."""
-
-    @property
-    def wrenches(self) -> Mapping[str, Array]:
-        """Frame -> what holds it exerts on the robot, in its axes and about its origin ``[6]`` [N, N m]."""
-
-    @property
-    def given(self) -> Array:
-        """Momentum that it has given to its surroundings (linear; angular about the origin) [N s, N m s]."""
-
-    @property
-    def state(self) -> PlantState:
-        """The truth."""
-
-    def slip(self, frame: str, velocity: Any, duration: float) -> None:
-        """What holds a frame moves [m/s] for some seconds."""
-
-    def limp(self, joint: str, scale: float = 0.0) -> None:
-        """A motor gives this part of its torque."""
-
-    def lose(self, frame: str) -> None:
-        """What holds a frame breaks off."""
 
 
 class TorqueLoop:
@@ -71,9 +42,9 @@ class TorqueLoop:
         Walk(walker, structure, plan, plant=loop)
 
     Within a period of the walk the reference goes from the last velocity to the new one in a straight line; q_ref is
-    its integral. Every millisecond the stack finds torques for da_ref + 2 omega (v_ref - v) + omega^2 (q_ref - q) and for
-    what the closed hands bear. Torques that take hold late are found for the state that they will meet: what is read,
-    and the accelerations that were decided since. Nothing of the walk, its planner or its stack is changed.
+    its integral. Every millisecond the stack finds torques for dv_ref/dt + 2 omega (v_ref - v) + omega^2 (q_ref - q),
+    and for what the closed hands bear. Torques that take hold late are found for the state that they will meet: what is
+    read, and the accelerations that were decided since. Nothing of the walk, its planner or its stack is changed.
 
     Args:
         stack: compiled. plant: takes torques, and grasps. gains: of the reference.

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pinocchio as pin
@@ -11,9 +10,7 @@ import pinocchio as pin
 from wbc.robots import HoldRating
 from wbc.track.summary import Figure
 from wbc.validation import Array
-
-if TYPE_CHECKING:
-    from wbc.walking.torque.loop import Tested
+from wbc.walking.torque.tested import Tested
 
 
 class Watch:

@@ -11,9 +11,10 @@ from wbc.robots import Margins, Walker
 from wbc.validation import Array
 from wbc.walking.arms.puma import limb_of
 from wbc.walking.holds.structure import Structure
-from wbc.walking.planner.around import NONE_MET, around
+from wbc.walking.planner.around import NONE_MET, Around, around
 from wbc.walking.planner.detours.cells import Cells, Ints
 from wbc.walking.planner.grips.held import held, near_holds
+from wbc.walking.planner.grips.stretches import postures_at
 
 Flags = NDArray[np.bool_]
 
@@ -37,6 +38,12 @@ class CellGrips:
     row: NDArray[np.int32]
     postures: Array
 
+    def only(self, cells: Flags) -> CellGrips:
+        """The same at some cells ``[cells]`` alone."""
+        left = (self.fits & cells).any(axis=1)
+        fits, lands, row = self.fits[left] & cells, self.lands[left] & cells, np.where(cells, self.row[left], -1)
+        return CellGrips(self.arm[left], self.hold[left], self.branch[left], fits, lands, row, self.postures)
+
     def of_arm(self, arm: int) -> Ints:
         """Grips of an arm."""
         return np.nonzero(self.arm == arm)[0]
@@ -55,23 +62,12 @@ def cell_grips(walker: Walker, structure: Structure, cells: Cells) -> CellGrips:
             if not len(here):
                 continue
             frames = cells.frames[here] @ base
-            there = held(
-                limb,
-                structure,
-                frames,
-                near_holds(limb, structure, frames),
-                reach=margins.cell_reach,
-                facing=margins.facing,
+            among = near_holds(limb, structure, frames)
+            quick = postures_at(about, arm, frames, among, margins)
+            (poses, holds, branch, lands), q = (
+                _postures(about, margins, arm, frames, among) if quick is None else (quick[0].T, quick[1])
             )
-            good = there.within(margins.cell_angle) & (limb.wrist_bend(there.q) > margins.landing_wrist)
-            rows, branch = np.nonzero(good)
-            q, poses = there.q[rows, branch], there.pose[rows]
-            clear = about.postures(arm, frames[poses], q, there.hold[rows]) == NONE_MET
-            rows, branch, q, poses = rows[clear], branch[clear], q[clear], poses[clear]
-            lands = may_land(margins, there.reach, there.wrists)
-            arms = np.full(len(rows), arm)
-            keys = np.column_stack([arms, here[poses], there.hold[rows], branch])
-            found.append((keys, lands[rows]))
+            found.append((np.column_stack([np.full(len(q), arm), here[poses], holds, branch]), lands.astype(bool)))
             parts.append(q)
     if not found:
         found, parts = (
@@ -90,6 +86,21 @@ def cell_grips(walker: Walker, structure: Structure, cells: Cells) -> CellGrips:
     rest, branch = np.divmod(names, branches)
     arms, holds = np.divmod(rest, len(structure))
     return CellGrips(arms, holds, branch, row >= 0, landing, row, np.concatenate(parts))
+
+
+def _postures(
+    about: Around, margins: Margins, arm: int, frames: Array, among: Ints
+) -> tuple[tuple[Ints, Ints, Ints, Ints], Array]:
+    """Of an arm on some holds from frames of its base: frame, hold, branch, whether it may land there; and joints."""
+    limb = about.limb
+    there = held(limb, about.structure, frames, among, reach=margins.cell_reach, facing=margins.facing)
+    good = there.within(margins.cell_angle) & (limb.wrist_bend(there.q) > margins.landing_wrist)
+    rows, branch = np.nonzero(good)
+    q, poses = there.q[rows, branch], there.pose[rows]
+    clear = about.postures(arm, frames[poses], q, there.hold[rows]) == NONE_MET
+    rows, branch, q, poses = rows[clear], branch[clear], q[clear], poses[clear]
+    lands = may_land(margins, there.reach, there.wrists)[rows].astype(np.int64)
+    return (poses, there.hold[rows], branch, lands), q
 
 
 def may_land(margins: Margins, reach: Array, wrists: Array) -> Flags:

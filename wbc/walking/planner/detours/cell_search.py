@@ -1,8 +1,7 @@
-"""The search for a detour: as many hands as must hold do while the body goes from cell to cell and another hand changes
-its hold.
+"""The search for a detour: all hands but one hold while the body goes from cell to cell and that one changes its hold.
 
-A node is the grips of the hands that hold, two or, of a body with two arms, one, and a connected set of cells at which
-they hold together. Where another hand can land at one of these cells, each of them can be the next to lift. Nodes
+A node is the grips of the hands that hold, and a connected set of cells at which they hold together. Where another hand
+can land at one of these cells, each of them can be the next to lift. Nodes
 nearer to the goal, and with fewer re-grasps, come first.
 """
 
@@ -12,7 +11,7 @@ import heapq
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
-from itertools import combinations, product
+from itertools import combinations, islice
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,13 +24,14 @@ from wbc.walking.planner.detours.cell_grips import CellGrips, Flags
 from wbc.walking.planner.detours.cell_swings import CellSwings
 from wbc.walking.planner.detours.cells import Cells, Ints
 from wbc.walking.planner.grips.conflicts import LimbShapes
+from wbc.walking.planner.stances.together import together
 
 #: A re-grasp counts as so many stations; nodes that are looked at before the search gives up
 STRIDE, LIMIT = 0.1, 2_000
 #: Landings at fewer cells than WIDE come later, by so many stations
 WIDE, NARROW = 4, 4.0
-#: Grips of an arm that a start may have; nodes that differ only in the hold that the free hand left
-START_GRIPS, LEFTS = 6, 2
+#: Grips of an arm that a start may have, and starts; nodes that differ only in the hold that the free hand left
+START_GRIPS, START_STANCES, LEFTS = 12, 2000, 2
 
 Grips = tuple[int, ...]
 #: Grips that hold and a number of a connected set -> grips that free hands left
@@ -80,7 +80,7 @@ class CellSearch:
         self.cells, self.grips, self._structure = cells, grips, structure
         self._shapes, self._order = LimbShapes(walker), walker.margins.cell_order
         self._swings = CellSwings(walker, structure, cells, grips)
-        self._arms, self._least = len(walker.arms), walker.min_holds
+        self._arms, self._least = len(walker.arms), len(walker.arms) - 1
         self._by_arm = [grips.of_arm(arm) for arm in range(self._arms)]
         self._together: dict[tuple[int, int], Flags] = {}
         self._named: dict[int, Array] = {}
@@ -156,14 +156,13 @@ class CellSearch:
             choices.append(mine[np.argsort(-grips.fits[mine].sum(axis=1), kind="stable")][:START_GRIPS].tolist())
         out: list[CellNode] = []
         met: set[tuple[Grips, int]] = set()  # many stances share their grips
-        for stance in product(*choices):
-            if all(self.together(*pair)[cell] for pair in combinations(stance, 2)):
-                for some in combinations(range(self._arms), self._least):
-                    held = tuple(stance[arm] for arm in some)
-                    for left in (stance[arm] for arm in range(self._arms) if arm not in some):
-                        if (held, left) not in met:
-                            met.add((held, left))
-                            out += self._node(held, np.array([cell]), left, None, seen)
+        stances = islice(together(choices, lambda one, other: bool(self.together(one, other)[cell])), START_STANCES)
+        for stance in stances:
+            for left in stance:
+                held = tuple(g for g in stance if g != left)
+                if (held, left) not in met:
+                    met.add((held, left))
+                    out += self._node(held, np.array([cell]), left, None, seen)
         return out
 
     def _children(self, node: CellNode, grip: int, landed: Ints, seen: Seen) -> list[CellNode]:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import ctypes
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from wbc.robots import Margins
+from wbc.robots import Margins, WalkerData
 from wbc.validation import Array
 from wbc.walking.arms.angles import ALIGNED
 from wbc.walking.arms.puma import ROUNDING
@@ -31,20 +32,19 @@ def stretches(
 ) -> list[Stretch] | None:
     """Stretches of an arm (its row), whose base has the frames ``[n, 4, 4]``, on some holds (their rows).
 
-    None where there is no compiler, the limb has no closed form, or the roll of a hold is not free.
+    None where there is no compiler, the limb has no closed form, or the roll of one of the holds is not free.
 
     Args:
         there: what stands around. blocked: what the body meets at the frames ``[n]``, see :class:`Around`.
         shortest: samples of a stretch at least.
     """
-    structure, limb, world = there.structure, there.limb, there.world
-    library, data = compiled.library(), limb.closed_form
-    if library is None or data is None or not all(structure.free_rolls[hold] for hold in among.tolist()):
+    structure, world = there.structure, there.world
+    library, data = _for(there, among)
+    if library is None or data is None:
         return None
     count = len(frames)
     most = [margins.held_rate * spacing * rate for rate in data.joint_rates[:5]]
-    numbers = [margins.held_reach, margins.held_angle, *most, margins.facing, shortest]
-    numbers.append(margins.lean_from * margins.held_reach)
+    leans = margins.lean_from * margins.held_reach
     given = [
         compiled.packed(a)
         for a in (
@@ -62,7 +62,7 @@ def stretches(
     library.grips_along.restype = ctypes.c_long
     found = library.grips_along(
         ctypes.byref(compiled.arm(data)),
-        compiled.doubles([*numbers, TILT_PART, LEAST_TILT, ROUNDING, ALIGNED]),
+        _keeping(margins.held_reach, margins.held_angle, most, margins.facing, shortest, leans),
         None if world is None else world.pointer,
         ctypes.c_long(arm),
         ctypes.c_long(count),
@@ -77,3 +77,52 @@ def stretches(
         (int(among[hold]), branch, first, last, reason, rows[row : row + last - first + 1].copy())
         for hold, branch, first, last, reason, row in table[:found].tolist()
     ]
+
+
+def postures_at(
+    there: Around, arm: int, frames: Array, among: NDArray[np.int64], margins: Margins
+) -> tuple[NDArray[np.int64], Array] | None:
+    """Postures of an arm (its row) on some holds (their rows) from frames of its base ``[n, 4, 4]``, in a cell of a
+    detour: row of the frame, of the hold, branch, and whether a hand may land there ``[k, 4]``; and ``[k, 6]`` [rad].
+
+    None as of :func:`stretches`, and where nothing stands around.
+    """
+    structure, world = there.structure, there.world
+    library, data = _for(there, among)
+    if library is None or data is None or world is None:
+        return None
+    most = 2 * len(frames) * len(among)
+    table, rows = np.empty((most, 4), dtype=np.int64), np.empty((most, 6))
+    given = [compiled.packed(a) for a in (frames, structure.positions[among], structure.axes[among])]
+    where, holds = [compiled.at(a) for a in given], np.ascontiguousarray(among, dtype=np.int64)
+    library.grips_at.restype = ctypes.c_long
+    found = library.grips_at(
+        ctypes.byref(compiled.arm(data)),
+        _keeping(margins.cell_reach, margins.cell_angle, [np.inf] * 5, margins.facing, 1, 0.0),
+        compiled.doubles([margins.landing_wrist, margins.cell_landing_reach, margins.cell_landing_axis]),
+        world.pointer,
+        ctypes.c_long(arm),
+        ctypes.c_long(len(frames)),
+        where[0],
+        ctypes.c_long(len(among)),
+        *where[1:],
+        *(compiled.at(a) for a in (holds, table, rows)),
+    )
+    out = table[:found]
+    out[:, 1] = among[out[:, 1]]
+    return out, rows[:found]
+
+
+def _for(there: Around, among: NDArray[np.int64]) -> tuple[ctypes.PyDLL | None, WalkerData | None]:
+    """The compiled code and the arm's numbers; None where some holds do not let a hand roll."""
+    if not all(there.structure.free_rolls[hold] for hold in among.tolist()):
+        return None, None
+    return compiled.library(), there.limb.closed_form
+
+
+def _keeping(
+    reach: float, angle: float, most: Sequence[float], facing: float, shortest: int, lean_for: float
+) -> compiled.Numbers:
+    """Keeping of native/grips.h."""
+    numbers = (reach, angle, *most, facing, shortest, lean_for)
+    return compiled.doubles([*numbers, TILT_PART, LEAST_TILT, ROUNDING, ALIGNED])

@@ -1,0 +1,157 @@
+"""What the viewer costs a control loop, and how long a drag takes to the loop and back."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+
+import numpy as np
+from websockets.sync.client import connect
+
+from bench.pool import ROOT
+from bench.sheet import Sheet, us
+from wbc.controller import Controller
+from wbc.viewer import Viewer, show
+from wbc.viewer.presets import playground
+
+#: Ticks of a block at the preset's rate, and blocks of each kind, taken in turn
+TICKS, BLOCKS = 1000, 6
+#: Messages that are timed
+SENT = 150
+WATCHERS = 10
+
+
+def parts() -> dict[str, Sheet | str]:
+    """Blocks without a viewer, with one that nobody watches, with one page's worth of clients, and with ten."""
+    chosen = playground("panda")
+    controller = chosen.stack.compile()
+    dt, q = chosen.stack.dt, chosen.start
+    controller.reset(q)
+    found: dict[str, list[np.ndarray]] = {}
+    began = time.perf_counter()
+    with show(controller, open_browser=False) as viewer:
+        ready = time.perf_counter() - began
+        for _ in range(BLOCKS):
+            for name, count in (("no viewer", -1), ("viewer", 0), ("one client", 1), ("ten clients", WATCHERS)):
+                with watched(viewer, count):
+                    found.setdefault(name, []).append(block(controller, q, dt, None if count < 0 else viewer))
+        there, back, rate, explained = delays(controller, q, dt, viewer)
+    rows = []
+    for name, blocks in found.items():
+        took, late = np.concatenate(blocks, axis=1)
+        figures = [np.percentile(x, p) for x in (took, late) for p in (50, 99)]
+        rows.append((name, *(us(1e6 * float(x)) for x in figures)))
+    base, one = (np.concatenate(found[name], axis=1)[1] for name in ("no viewer", "one client"))
+    change = float(np.percentile(one, 99) / np.percentile(base, 99)) - 1.0
+    columns = ("loop", "tick, median", "tick, p99", "late, median", "late, p99")
+    text = (
+        f"The 99th percentile of how late a tick begins is {100 * abs(change):.0f} % "
+        f"{'more' if change > 0 else 'less'} with a viewer and one client than without. The address is there after "
+        f"{ready:.1f} s, with compiled code cached."
+    )
+    delay = Sheet(
+        "",
+        ("a target that is sent", "median", "p95"),
+        [
+            ("is in the controller after", *(f"{1e3 * np.percentile(there, p):.1f} ms" for p in (50, 95))),
+            ("is back in a state after", *(f"{1e3 * np.percentile(back, p):.1f} ms" for p in (50, 95))),
+        ],
+    )
+    rates = f"A client gets {rate:.0f} states a second, and {explained:.0f} explanations a second while a row binds."
+    return {"jitter": Sheet("", columns, rows), "cost": text, "delay": delay, "rates": rates}
+
+
+def block(controller: Controller, q: np.ndarray, dt: float, viewer: Viewer | None) -> np.ndarray:
+    """Two rows: how long each tick took with its update, and how late it began [s]."""
+    took, late = np.zeros(TICKS), np.zeros(TICKS)
+    integrate = controller.stack.robot.integrate
+    due = time.perf_counter() + dt
+    for k in range(TICKS):
+        wait = due - time.perf_counter()
+        if wait > 0.0:
+            time.sleep(wait)
+        start = time.perf_counter()
+        step = controller.step(q)
+        if viewer is not None:
+            viewer.update(step)
+        took[k], late[k] = time.perf_counter() - start, start - due
+        q = integrate(q, step.v, dt)
+        due = max(due + dt, start)
+    return np.array([took, late])
+
+
+@contextlib.contextmanager
+def watched(viewer: Viewer, count: int) -> Iterator[None]:
+    """With clients in a process of their own."""
+    if count < 1:
+        yield
+        return
+    address = viewer.url.replace("http", "ws") + "wbc"
+    clients = subprocess.Popen([sys.executable, "-m", "bench.watchers", address, str(count)], cwd=ROOT)
+    time.sleep(2.0)
+    yield
+    clients.terminate()
+    clients.wait()
+
+
+def delays(
+    controller: Controller, q: np.ndarray, dt: float, viewer: Viewer
+) -> tuple[list[float], list[float], float, float]:
+    """Times from a message to the controller and back in a state [s]; states and explanations a second."""
+    over = threading.Event()
+    seen: dict[float, float] = {}
+
+    def loop() -> None:
+        here, last = q, 0.0
+        while not over.is_set():
+            step = controller.step(here)
+            viewer.update(step)
+            weight = float(controller["posture"].weight)
+            if weight != last:
+                seen[weight] = time.perf_counter()
+                last = weight
+            here = controller.stack.robot.integrate(here, step.v, dt)
+            time.sleep(dt)
+
+    thread = threading.Thread(target=loop)
+    thread.start()
+    there, back = [], []
+    with connect(viewer.url.replace("http", "ws") + "wbc", max_size=None) as socket:
+        pose = json.loads(socket.recv()) and None
+        socket.send('{"type": "operate"}')
+        while pose is None:
+            message = json.loads(socket.recv())
+            pose = message["items"]["hand"]["values"]["target"] if message["type"] == "state" else None
+        # Into the ball, so that a row binds
+        pose[1] += 0.5
+        socket.send(json.dumps({"type": "set", "item": "hand", "values": {"target": pose}}))
+        for k in range(SENT):
+            weight = 1e-6 * (1.0 + 0.001 * (k + 1))
+            sent = time.perf_counter()
+            socket.send(json.dumps({"type": "set", "item": "posture", "values": {"weight": weight}}))
+            while True:
+                message = json.loads(socket.recv())
+                if (
+                    message["type"] == "state"
+                    and abs(message["items"]["posture"]["values"]["weight"] / weight - 1) < 1e-5
+                ):
+                    break
+            back.append(time.perf_counter() - sent)
+            there.append(min(seen.values(), key=lambda when: abs(when - sent) if when >= sent else np.inf) - sent)
+            time.sleep(0.01)
+        begun, states, explained, last = time.perf_counter(), 0, 0, -1
+        while time.perf_counter() - begun < 4.0:
+            message = json.loads(socket.recv())
+            if message["type"] == "state":
+                states += 1
+                explained += message["explained"] != last
+                last = message["explained"]
+                socket.send('{"type": "alive"}')
+    over.set()
+    thread.join()
+    return there, back, states / 4.0, explained / 4.0

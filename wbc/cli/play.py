@@ -1,0 +1,47 @@
+"""``wbc play``: a robot to be dragged in the browser."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+from rich.markup import escape
+
+from wbc.cli import viewing
+from wbc.cli.console import err
+from wbc.cli.options import Backend
+from wbc.viewer import run
+from wbc.viewer.beside import require_viser
+from wbc.viewer.local import require_local
+from wbc.viewer.presets import PRESETS, playground
+
+
+def play(
+    preset: Annotated[str, typer.Argument(help=f"{', '.join(PRESETS)}.")] = "panda",
+    host: viewing.Host = "127.0.0.1",
+    port: viewing.Port = 0,
+    browser: viewing.Browser = True,
+    zeromq: Annotated[
+        str, typer.Option(help="Take messages over ZeroMQ as well, at an address such as tcp://127.0.0.1:5555.")
+    ] = "",
+    seconds: viewing.Seconds = None,
+    backend: Backend = "auto",
+) -> None:
+    """Open a robot in the browser: drag its targets and the obstacles, and read what holds it back."""
+    require_viser()
+    if zeromq:
+        require_local(zeromq)
+    chosen = playground(preset)
+    err().print(f"{escape(chosen.about)} Space stops it, Ctrl-C ends.", soft_wrap=True)
+    controller = viewing.compiled(chosen.stack, backend)
+    with viewing.until_interrupted():
+        run(
+            controller,
+            chosen.start,
+            seconds,
+            host=host,
+            port=port,
+            open_browser=browser,
+            zeromq=zeromq,
+            announce=viewing.announce,
+        )

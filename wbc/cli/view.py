@@ -1,0 +1,75 @@
+"""``wbc view``: a robot, or a run, in the browser."""
+
+from __future__ import annotations
+
+import pathlib
+import threading
+import webbrowser
+from typing import Annotated
+
+import typer
+from rich.markup import escape
+
+from wbc import robots
+from wbc.cli import viewing
+from wbc.cli.console import err, out
+from wbc.record.recording import Recording
+from wbc.viewer import run
+from wbc.viewer.beside import require_viser, token_for
+from wbc.viewer.errors import ViewerError
+from wbc.viewer.presets import of_robot
+from wbc.viewer.runs import REPLAY, recording_in, save_page, states_of
+from wbc.viewer.session import Session
+
+
+def view(
+    what: Annotated[
+        str, typer.Argument(help="A name of `wbc robots`, a URDF or MJCF file, a run folder, or a recording.")
+    ],
+    export: Annotated[
+        pathlib.Path | None, typer.Option(help="Of a run: write one HTML file that plays offline, and end.")
+    ] = None,
+    trust: Annotated[
+        bool, typer.Option("--trust", help="Run code from the recording: items and functions that are not wbc's.")
+    ] = False,
+    host: viewing.Host = "127.0.0.1",
+    port: viewing.Port = 0,
+    browser: viewing.Browser = True,
+    seconds: viewing.Seconds = None,
+) -> None:
+    """Show a robot with its joints on sliders, or a run with its time on one."""
+    require_viser()
+    path = pathlib.Path(what)
+    recording = recording_in(path) if path.is_dir() or path.suffix == ".npz" else None
+    if path.is_dir() and recording is None:
+        page = path / REPLAY
+        if not page.is_file():
+            raise ViewerError("run", what, f"holds neither a recording nor {REPLAY}")
+        viewing.say(page.resolve().as_uri())
+        if browser:
+            webbrowser.open(page.resolve().as_uri())
+        return
+    if recording is None:
+        if export is not None:
+            raise ViewerError("export", what, "only runs are exported; this is a robot")
+        chosen = of_robot(robots.load(what))
+        err().print(escape(chosen.about), soft_wrap=True)
+        with viewing.until_interrupted():
+            controller = chosen.stack.compile(backend="vm")
+            run(
+                controller, chosen.start, seconds, host=host, port=port, open_browser=browser, announce=viewing.announce
+            )
+        return
+    with err().status("doing the ticks of the recording again"):
+        controller, states = states_of(Recording(recording), trust=trust)
+    if export is not None:
+        out().print(str(save_page(controller, states, export)), soft_wrap=True, markup=False)
+        return
+    session = Session(controller, None, states, host=host, port=port, token=token_for(host))
+    viewing.say(session.url)
+    if browser:
+        webbrowser.open(session.url)
+    if seconds is not None:
+        threading.Timer(seconds, session.ended.set).start()
+    with viewing.until_interrupted():
+        session.run()

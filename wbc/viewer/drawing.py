@@ -1,0 +1,301 @@
+"""The scene: robot, targets that can be dragged, obstacles, and lines that say how near things are."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING, Any
+
+import coal
+import numpy as np
+import pinocchio as pin
+
+from wbc.controller import Controller, core_of
+from wbc.robot.geometry.coal_shapes import geometry_of
+from wbc.tasks import CenterOfMass, EndEffector, Hold, Obstacle, PitchPlane, PitchPlaneLimit
+from wbc.tasks.base import Input, Task
+from wbc.validation import Array
+from wbc.viewer.bodies import DETAIL, Colour, Mesh, robot_meshes, shape_mesh, wxyz
+from wbc.viewer.tick import Tick
+
+if TYPE_CHECKING:
+    import viser
+
+#: A pose that moved less than this is not sent again [m, and as entries of a quaternion]
+STILL = 1e-5
+#: Clearances up to this are drawn [m]; below the other the line is red
+NEAR, TIGHT = 0.25, 0.03
+#: Points of the path of a hand, and how far apart they are [m]
+TRAIL, APART = 300, 0.004
+GREEN, AMBER, RED, BLUE = (64, 160, 90), (230, 150, 30), (215, 50, 40), (40, 110, 200)
+#: In place of a quaternion for what has none
+EMPTY = np.zeros(0)
+#: What is told of a drag: item, value, pose in the world, phase, number of viser's client
+Dragged = Callable[[str, str, pin.SE3, str, int | None], None]
+
+
+class Drawing:
+    """Draws ticks of a controller into a scene of viser.
+
+    Args:
+        dragged: told of every drag; None: nothing can be dragged, as in a page that is played back.
+        detail: of meshes, see :data:`wbc.viewer.bodies.DETAIL`.
+    """
+
+    def __init__(
+        self, scene: viser.SceneApi, controller: Controller, dragged: Dragged | None = None, detail: float = DETAIL
+    ) -> None:
+        self._scene, self._dragged = scene, dragged
+        self._controller, self._stack = controller, controller.stack
+        self._robot = robot = controller.stack.robot
+        self._size = float(np.clip(robot.characteristic_length, 0.1, 30.0))
+        self._placed: dict[str, tuple[Array, Array]] = {}
+        self._nodes: dict[str, Any] = {}
+        self._held: set[str] = set()
+        self._trails: dict[str, list[Array]] = {}
+        scene.set_up_direction("+z")
+        scene.configure_default_lights(cast_shadow=False)
+        self._links = robot_meshes(robot, detail)
+        for link, mesh in self._links.items():
+            self._add_mesh(f"/robot/{link}", mesh)
+        self._obstacles: dict[str, Obstacle] = {}
+        self._targets: dict[str, str] = {}
+        blocks = core_of(controller).layout.blocks
+        for name, block in blocks.items():
+            item = block.entry.item
+            if isinstance(item, Obstacle):
+                self._obstacles[name] = item
+                self._add_mesh(f"/obstacles/{name}", shape_mesh(item.parts), flat=True)
+            if isinstance(item, Task) and "target" in block.slots and is_place(block.slots["target"].input):
+                self._targets[name] = "target"
+        self._pairs = {name: list(self._shaped(item)) for name, item in self._obstacles.items()}
+        self._add_gizmos()
+        wide = self._size
+        ground = (0.0, 0.0, self._lowest())
+        scene.add_grid("/floor", 6 * wide, 6 * wide, cell_size=wide / 4, section_size=wide, position=ground)
+
+    def show(self, tick: Tick) -> None:
+        """Draw a tick."""
+        for link in self._links:
+            self._place(f"/robot/{link}", tick.pose(link))
+        for name in self._obstacles:
+            pose = tick.world_pose(name, "pose")
+            if pose is not None:
+                self._place(f"/obstacles/{name}", pose)
+                self._follow(name, pose)
+        for name, value in self._targets.items():
+            pose = tick.world_pose(name, value)
+            if pose is not None:
+                self._follow(name, pose)
+        self._lines("/lines/clearance", *self._clearances(tick))
+        self._lines("/lines/tasks", *self._task_lines(tick))
+        self._trail(tick)
+        self._planes(tick)
+        self._balance(tick)
+
+    # What can be dragged
+
+    def _add_gizmos(self) -> None:
+        if self._dragged is None:
+            return
+        for name in (*self._targets, *self._obstacles):
+            slot = core_of(self._controller).layout.blocks[name].slots
+            value = "pose" if name in self._obstacles else "target"
+            turns = slot[value].input.kind == "pose"
+            node = f"/gizmos/{name}"
+            scale = 0.32 * self._size if name in self._targets else 0.24 * self._size
+            gizmo = self._scene.add_transform_controls(
+                node,
+                scale=scale,
+                disable_rotations=not turns or name in self._obstacles,
+                depth_test=False,
+                line_width=3.0,
+            )
+            self._nodes[node] = gizmo
+            gizmo.on_update(self._listener(name, value, node))
+
+    def _listener(self, name: str, value: str, node: str) -> Callable[[Any], Any]:
+        async def listen(event: Any) -> None:
+            if event.phase == "start":
+                self._held.add(node)
+            elif event.phase == "end":
+                self._held.discard(node)
+            gizmo = event.target
+            turn = pin.Quaternion(*(float(x) for x in gizmo.wxyz)).normalized().matrix()
+            assert self._dragged is not None
+            self._placed.pop(node, None)
+            self._dragged(
+                name, value, pin.SE3(turn, np.array(gizmo.position, dtype=float)), event.phase, event.client_id
+            )
+
+        return listen
+
+    def _follow(self, name: str, pose: pin.SE3) -> None:
+        """A gizmo that nobody holds is where the controller has its value."""
+        node = f"/gizmos/{name}"
+        if node in self._nodes and node not in self._held:
+            self._place(node, pose)
+
+    def let_go(self) -> None:
+        """Nobody holds a gizmo any more, as who did is gone."""
+        self._held.clear()
+        self._placed.clear()
+
+    # Lines
+
+    def _shaped(self, item: Obstacle) -> Iterator[tuple[str, pin.SE3, Any]]:
+        """(link, place in it, geometry) of the shapes that keep clear."""
+        for link, shapes in self._robot.shapes.items():
+            if item.links is None or link in item.links:
+                joint = int(self._robot.model.frames[self._robot.model.getFrameId(link)].parentJoint)
+                for placed in shapes if joint else ():
+                    made = geometry_of(placed.shape)
+                    yield link, placed.placement * made.offset, made.geometry
+
+    def _clearances(self, tick: Tick) -> tuple[list[Array], list[Colour]]:
+        """The shortest line from each link that is near to each obstacle."""
+        lines, colours = [], []
+        request, result = coal.DistanceRequest(), coal.DistanceResult()
+        request.enable_signed_distance = True
+        for name, item in self._obstacles.items():
+            pose = tick.world_pose(name, "pose")
+            margin = tick.numbers(name, "margin")
+            if pose is None or not tick.is_on(core_of(self._controller).layout.blocks[name]):
+                continue
+            nearest: dict[str, tuple[float, Array]] = {}
+            for part in item.parts:
+                made = geometry_of(part)
+                place = pose * made.offset
+                for link, local, geometry in self._pairs[name]:
+                    result.clear()
+                    gap = coal.distance(geometry, tick.pose(link) * local, made.geometry, place, request, result)
+                    if gap < min(NEAR, nearest.get(link, (np.inf, None))[0]):
+                        nearest[link] = gap, np.array([result.getNearestPoint1(), result.getNearestPoint2()])
+            kept = 0.0 if margin is None else float(margin[0])
+            for gap, line in sorted(nearest.values(), key=lambda pair: pair[0])[:4]:
+                lines.append(line)
+                colours.append(RED if gap - kept < TIGHT / 10 else AMBER if gap - kept < TIGHT else GREEN)
+        return lines, colours
+
+    def _task_lines(self, tick: Tick) -> tuple[list[Array], list[Colour]]:
+        """From each frame to its target where it is not there."""
+        lines: list[Array] = []
+        for name in self._targets:
+            item = self._stack[name].item
+            if isinstance(item, EndEffector):
+                here, there = tick.pose(item.frame).translation, tick.world_pose(name, "target")
+                if there is not None and np.linalg.norm(there.translation - here) > 1e-3:
+                    lines.append(np.array([here, there.translation]))
+        return lines, [RED] * len(lines)
+
+    def _trail(self, tick: Tick) -> None:
+        """The way that each hand came."""
+        for name in self._targets:
+            item = self._stack[name].item
+            if not isinstance(item, EndEffector):
+                continue
+            here, trail = tick.pose(item.frame).translation, self._trails.setdefault(name, [])
+            if not trail or np.linalg.norm(trail[-1] - here) > APART * self._size:
+                trail.append(np.array(here))
+                del trail[:-TRAIL]
+                points = np.array(trail)
+                pieces = np.stack([points[:-1], points[1:]], axis=1)
+                self._lines(f"/lines/way of {name}", pieces, [BLUE] * len(pieces))
+
+    def _lines(self, node: str, lines: Array | list[Array], colours: list[Colour]) -> None:
+        """Line segments, sent anew where they changed."""
+        points = np.array(lines, dtype=np.float32).reshape(-1, 2, 3)
+        before = self._placed.get(node)
+        if before is not None and before[0].shape == points.shape and np.allclose(before[0], points, atol=STILL):
+            return
+        self._placed[node] = np.asarray(points, dtype=np.float64), EMPTY
+        shown = self._nodes.get(node)
+        if not len(points):
+            if shown is not None:
+                shown.visible = False
+            return
+        shades = np.repeat(np.array(colours, dtype=np.uint8)[:, None], 2, axis=1)
+        if shown is None:
+            self._nodes[node] = self._scene.add_line_segments(
+                node, points, shades, thickness=3.0, thickness_units="screen"
+            )
+            return
+        shown.visible = True
+        shown.points, shown.colors = points, shades
+
+    def _planes(self, tick: Tick) -> None:
+        """The plane of shoulder, elbow and wrist as a triangle."""
+        for entry in self._stack.entries:
+            item = entry.item
+            if not isinstance(item, PitchPlane | PitchPlaneLimit):
+                continue
+            corners = np.array([tick.pose(f).translation for f in (item.shoulder, item.elbow, item.wrist)])
+            node = f"/planes/{entry.name}"
+            if node not in self._nodes:
+                self._nodes[node] = self._scene.add_mesh_simple(
+                    node, corners, np.array([[0, 1, 2]]), color=BLUE, opacity=0.35, side="double", cast_shadow=False
+                )
+            elif node not in self._placed or not np.allclose(self._placed[node][0], corners, atol=STILL):
+                self._nodes[node].vertices = corners
+            self._placed[node] = corners, EMPTY
+
+    def _balance(self, tick: Tick) -> None:
+        """Centre of mass, the point below it, and the polygon of what the robot stands on."""
+        items = [entry.item for entry in self._stack.entries]
+        if not any(isinstance(item, CenterOfMass) for item in items):
+            return
+        center = tick.center_of_mass()
+        feet = [tick.pose(item.frame).translation for item in items if isinstance(item, Hold)]
+        low = min((float(foot[2]) for foot in feet), default=self._lowest())
+        below = np.array([center[0], center[1], low])
+        if "/com" not in self._nodes:
+            self._nodes["/com"] = self._scene.add_icosphere("/com", 0.03 * self._size, color=AMBER)
+        self._place("/com", pin.SE3(np.eye(3), center))
+        ring = [*feet, feet[0]] if len(feet) > 2 else feet
+        edges = [np.array(pair) for pair in itertools.pairwise(ring)]
+        self._lines("/lines/balance", [np.array([center, below]), *edges], [AMBER] + [GREEN] * len(edges))
+
+    # Nodes
+
+    def _add_mesh(self, node: str, mesh: Mesh, flat: bool = False) -> None:
+        self._nodes[node] = self._scene.add_mesh_simple(
+            node, mesh.corners, mesh.triangles, color=mesh.colour, flat_shading=flat, side="double"
+        )
+
+    def _place(self, node: str, pose: pin.SE3) -> None:
+        """Where a node is; nothing is sent where it did not move."""
+        at, turn = np.array(pose.translation), wxyz(pose.rotation)
+        before = self._placed.get(node)
+        if before is not None:
+            same = min(np.abs(turn - before[1]).max(), np.abs(turn + before[1]).max()) < STILL
+            if same and np.abs(at - before[0]).max() < STILL:
+                return
+        self._placed[node] = at, turn
+        handle = self._nodes[node]
+        handle.position, handle.wxyz = at, turn
+
+    def _lowest(self) -> float:
+        """Height of the floor: under everything at the neutral configuration [m]."""
+        if self._robot.base_nv == 0:
+            return 0.0
+        data = self._robot.model.createData()
+        pin.framesForwardKinematics(self._robot.model, data, self._robot.neutral)
+        return min(float(frame.translation[2]) for frame in data.oMf)
+
+
+def is_place(declared: Input) -> bool:
+    """A pose, or a point in metres: what a gizmo can stand for."""
+    return declared.kind == "pose" or (declared.kind == "vector" and declared.size == 3 and declared.unit == "m")
+
+
+def look(server: viser.ViserServer, controller: Controller) -> None:
+    """Where a page's camera begins: the robot fills the view."""
+    robot = controller.stack.robot
+    data = robot.model.createData()
+    pin.framesForwardKinematics(robot.model, data, robot.neutral)
+    points = np.array([frame.translation for frame in data.oMf])
+    low, high = points.min(axis=0), points.max(axis=0)
+    reach = max(float((high - low).max()), 0.3)
+    camera = server.initial_camera
+    camera.position = (low + high) / 2 + reach * np.array([1.35, -1.1, 0.7])
+    camera.look_at = (low + high) / 2

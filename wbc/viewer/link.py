@@ -1,0 +1,157 @@
+"""The memory that a control loop and its viewer share: states of ticks one way, messages the other.
+
+The loop never waits: it copies a tick's state (2 kB of an arm, 30 kB of a humanoid) into the next of some slots and
+then counts it. The viewer copies the newest slot and keeps the copy only if the loop has not come round meanwhile.
+Messages of the viewer (:mod:`wbc.viewer.messages`) lie in a ring behind two counters, one that each side writes.
+
+    words    0 states written   1 bytes of messages written   2 bytes of messages read   3 flags of the loop
+    numbers  4 the viewer's last sign of life   5 the loop's    [s of the machine's monotonic clock]
+    ring     RING bytes of messages: a length of 4 bytes, then JSON
+    slots    SLOTS times: number of the state, its time [s], the number again, then the state
+
+All of it is anonymous memory of Linux (``memfd_create``), which goes when the last process that has it does.
+"""
+
+from __future__ import annotations
+
+import mmap
+import os
+import struct
+import time
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+HEAD, RING, SLOTS = 64, 1 << 16, 4
+#: Words of the head, and of a slot's
+STATES, SENT, TAKEN, FLAGS, VIEWER_ALIVE, LOOP_ALIVE = range(6)
+SLOT_HEAD = 24
+#: Flags of the loop: it brakes on a stop; it does so because the viewer was silent
+STOPPED, UNHEARD = 1, 2
+UNHEARD_TEXT = "the viewer gave no sign of life"
+_LENGTH = struct.Struct("<I")
+#: Number of a state, and its time
+_STAMP = struct.Struct("<qd")
+
+
+class State(NamedTuple):
+    """A tick: its number from 1, its time on the loop's clock [s], its memory."""
+
+    number: int
+    time: float
+    data: bytes
+
+
+def size_for(state: int) -> int:
+    """Bytes of the memory for states of so many bytes."""
+    return HEAD + RING + SLOTS * (SLOT_HEAD + state)
+
+
+class _Shared:
+    def __init__(self, file: int, state: int) -> None:
+        self.file, self.state = file, state
+        self._map = mmap.mmap(file, size_for(state))
+        self._bytes = memoryview(self._map)
+        self._words = self._bytes[:HEAD].cast("q")
+        self._numbers = self._bytes[:HEAD].cast("d")
+        self._ring = self._bytes[HEAD : HEAD + RING]
+        first, step = HEAD + RING, SLOT_HEAD + state
+        self._slots = [self._bytes[first + k * step : first + (k + 1) * step] for k in range(SLOTS)]
+
+    def close(self) -> None:
+        """Let the memory go; more calls do nothing."""
+        if self.file >= 0:
+            views: list[memoryview[Any]] = [*self._slots, self._ring, self._numbers, self._words, self._bytes]
+            for view in views:
+                view.release()
+            self._map.close()
+            os.close(self.file)
+            self.file = -1
+
+
+class LoopEnd(_Shared):
+    """The control loop's end; makes the memory.
+
+    Args:
+        state: bytes of a tick's state.
+    """
+
+    def __init__(self, state: int) -> None:
+        file = os.memfd_create("wbc-viewer")
+        os.ftruncate(file, size_for(state))
+        super().__init__(file, state)
+        self._count = 0
+
+    def write(self, data: bytes, when: float) -> None:
+        """The state of a tick."""
+        number = self._count = self._count + 1
+        slot = self._slots[number % SLOTS]
+        _STAMP.pack_into(slot, 0, number, when)
+        slot[SLOT_HEAD:] = data
+        slot[16:SLOT_HEAD] = slot[:8]
+        self._words[STATES] = number
+
+    @property
+    def waiting(self) -> bool:
+        """Messages have come."""
+        return self._words[SENT] != self._words[TAKEN]
+
+    def take(self) -> Iterator[bytes]:
+        """The messages that have come, oldest first."""
+        while (taken := self._words[TAKEN]) != self._words[SENT]:
+            (length,) = _LENGTH.unpack(self._part(taken, _LENGTH.size))
+            content = self._part(taken + _LENGTH.size, length)
+            self._words[TAKEN] = taken + _LENGTH.size + length
+            yield content
+
+    def _part(self, start: int, length: int) -> bytes:
+        start %= RING
+        first = bytes(self._ring[start : start + length])
+        return first + bytes(self._ring[: length - len(first)])
+
+    @property
+    def silence(self) -> float:
+        """Since the viewer's last sign of life [s]."""
+        return time.monotonic() - float(self._numbers[VIEWER_ALIVE])
+
+    def put_flags(self, flags: int) -> None:
+        """What the viewer is to know of the loop."""
+        self._words[FLAGS] = flags
+
+
+class ViewerEnd(_Shared):
+    """The viewer's end, from the number of the file that it inherits. One thread may send, one may read."""
+
+    def send(self, message: bytes) -> bool:
+        """A message for the loop; False where the loop has not taken the last ones and there is no place for it."""
+        sent, needed = self._words[SENT], _LENGTH.size + len(message)
+        if sent - self._words[TAKEN] + needed > RING:
+            return False
+        for k, part in ((sent, _LENGTH.pack(len(message))), (sent + _LENGTH.size, message)):
+            start = k % RING
+            room = min(len(part), RING - start)
+            self._ring[start : start + room] = part[:room]
+            self._ring[: len(part) - room] = part[room:]
+        self._words[SENT] = sent + needed
+        return True
+
+    def read(self, after: int = 0) -> State | None:
+        """The newest state, None where it is not newer than number ``after``."""
+        for _ in range(8):
+            number = self._words[STATES]
+            if number <= after:
+                return None
+            slot = bytes(self._slots[number % SLOTS])
+            begun, when = _STAMP.unpack_from(slot)
+            # The loop may have come round while this was copied
+            if begun == number and slot[16:SLOT_HEAD] == slot[:8] and self._words[STATES] < number + SLOTS - 1:
+                return State(number, when, slot[SLOT_HEAD:])
+        return None
+
+    def live(self) -> None:
+        """Give a sign of life."""
+        self._numbers[VIEWER_ALIVE] = time.monotonic()
+
+    @property
+    def flags(self) -> int:
+        """What the loop says of itself."""
+        return int(self._words[FLAGS])

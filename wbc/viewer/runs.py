@@ -1,0 +1,119 @@
+"""Runs that were recorded: their ticks again, as states to look at and to export."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import pathlib
+import zipfile
+from collections.abc import Callable, Sequence
+
+from wbc import record, validation
+from wbc.controller import Controller
+from wbc.controller.step import state_of
+from wbc.record.recording import Recording
+from wbc.record.replaying import compiled
+from wbc.viewer.beside import require_viser
+from wbc.viewer.drawing import Drawing, look
+from wbc.viewer.errors import ViewerError
+from wbc.viewer.link import State
+from wbc.viewer.reading import sentences
+from wbc.viewer.tick import Tick
+
+#: The recording in a run's folder, and the page that a run exports
+RECORDING, REPLAY = "ticks.npz", "replay.html"
+#: States of a recording that are kept a second, and of a page; a page has this many at most
+RATE, PAGE_RATE, MOST = 40.0, 20.0, 1200
+#: Corners of a page's meshes closer than this part of the robot's characteristic length are one
+DETAIL = 0.02
+
+
+def states_of(
+    recording: Recording, *, trust: bool = False, rate: float = RATE, progress: Callable[[int], None] | None = None
+) -> tuple[Controller, list[State]]:
+    """The ticks of a recording done again: a controller of their stack, and ``rate`` states a second.
+
+    Raises:
+        RecordingError, PicklingError, CompileError: as of :func:`wbc.replay`.
+    """
+    controller = compiled(recording, backend="auto", trust=trust)
+    dt, states, due = float(recording.about["dt"]), [], 0.0
+    for tick in record.replayed(recording, controller):
+        time = tick.number * dt
+        if time >= due - 1e-9:
+            states.append(State(tick.number + 1, time, state_of(tick.step)))
+            due = time + 1.0 / rate
+        if progress is not None:
+            progress(tick.number)
+    if not states:
+        raise ViewerError("recording", str(recording.path), "holds no tick")
+    return controller, states
+
+
+def sentences_of(recording: Recording, ticks: Sequence[int]) -> dict[int, str]:
+    """Number of a tick of a recording -> why its command was what it was."""
+    wanted, out = set(ticks), {}
+    for tick in record.replayed(recording, compiled(recording, backend="auto")):
+        if tick.number in wanted:
+            out[tick.number] = " ".join(sentences(tick.step.explain()))
+            if len(out) == len(wanted):
+                break
+    return out
+
+
+def is_recording(file: pathlib.Path) -> bool:
+    """Whether a file is a recording, of whatever version."""
+    try:
+        with zipfile.ZipFile(file) as archive:
+            return "about.json" in archive.namelist()
+    except zipfile.BadZipFile:
+        # One whose writer was killed has no directory
+        return True
+    except OSError:
+        return False
+
+
+def recording_in(folder: pathlib.Path) -> pathlib.Path | None:
+    """The recording of a run's folder, or the file itself; None where there is none."""
+    found = folder / RECORDING if folder.is_dir() else folder
+    # A walk keeps other figures of its ticks under this name
+    return found if found.is_file() and is_recording(found) else None
+
+
+def save_page(controller: Controller, states: Sequence[State], file: pathlib.Path) -> pathlib.Path:
+    """Write states as one HTML file that plays in a browser, without a network or this package.
+
+    Raises:
+        ViewerError: viser is not installed, there is nothing to write, or the file cannot be written.
+    """
+    require_viser()
+    import viser
+
+    if not states:
+        raise ViewerError("states", 0, "there is nothing to show")
+    validation.instance("controller", controller, Controller, "a wbc Controller")
+    length = states[-1].time - states[0].time
+    step = max(1.0 / PAGE_RATE, length / MOST)
+    # What is recorded is what a server would send; nobody is asked to connect, so its address is not printed
+    with contextlib.redirect_stdout(io.StringIO()):
+        server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+        try:
+            drawing = Drawing(server.scene, controller, detail=DETAIL)
+            look(server, controller)
+            drawing.show(Tick(controller, states[0]))
+            serializer = server.get_scene_serializer()
+            before = states[0].time
+            for state in states[1:]:
+                if state.time - before < step - 1e-9 and state is not states[-1]:
+                    continue
+                serializer.insert_sleep(state.time - before)
+                drawing.show(Tick(controller, state))
+                before = state.time
+            text = str(serializer.as_html())
+        finally:
+            server.stop()
+    try:
+        file.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise ViewerError("file", str(file), f"cannot be written: {error.strerror}") from error
+    return file

@@ -1,0 +1,234 @@
+"""What a viewer does: states in, scene and messages out, drags back to the loop."""
+
+from __future__ import annotations
+
+import contextlib
+import sys
+import threading
+import time
+from collections.abc import Sequence
+from typing import Any
+
+import pinocchio as pin
+
+from wbc import validation
+from wbc.controller import Controller, core_of
+from wbc.errors import WbcError
+from wbc.tasks.base import Constraint
+from wbc.viewer import messages
+from wbc.viewer.drawing import Drawing, look
+from wbc.viewer.errors import ViewerError
+from wbc.viewer.link import STOPPED, UNHEARD, UNHEARD_TEXT, State, ViewerEnd
+from wbc.viewer.operation import Operation
+from wbc.viewer.reading import declared, sentences, told
+from wbc.viewer.server import SILENT, PageServer
+from wbc.viewer.tick import Tick
+from wbc.viewer.timeline import Timeline
+
+#: States that are drawn and told a second, and explanations, at most
+RATE, EXPLAINED = 40.0, 25.0
+#: Between two signs of life for the loop [s]
+BEAT = 0.05
+
+
+class Explainer(threading.Thread):
+    """Explains the newest tick that it is given, one after the other."""
+
+    def __init__(self) -> None:
+        super().__init__(name="explainer", daemon=True)
+        self._wanted: Tick | None = None
+        self._wake, self.count = threading.Event(), 0
+        #: number of the tick that was explained last, and what was said
+        self.said: tuple[int, list[str]] = (0, [])
+
+    def ask(self, tick: Tick) -> None:
+        """Explain this next, if nothing newer comes before."""
+        self._wanted = tick
+        self._wake.set()
+
+    def run(self) -> None:
+        last = b""
+        while True:
+            self._wake.wait()
+            self._wake.clear()
+            tick, began = self._wanted, time.monotonic()
+            if tick is None:
+                return
+            if tick.state.data != last:
+                try:
+                    self.said = tick.number, sentences(tick.step.explain())
+                except WbcError as error:
+                    self.said = tick.number, [str(error)]
+                last = tick.state.data
+            self.count += 1
+            took = time.monotonic() - began
+            # The rest of the process has two thirds of its core at the least
+            time.sleep(max(1.0 / EXPLAINED - took, 0.5 * took))
+
+    def end(self) -> None:
+        """Stop after the explanation that is under way."""
+        self._wanted = None
+        self._wake.set()
+
+
+class Session:
+    """One viewer: a server, its scene, and where states come from.
+
+    Args:
+        controller: compiled from the same stack as the loop's; only its names, layout and code are used.
+        link: to the loop; None: ``states`` of a recording.
+    """
+
+    def __init__(
+        self,
+        controller: Controller,
+        link: ViewerEnd | None,
+        states: Sequence[State] = (),
+        *,
+        host: str = "127.0.0.1",
+        port: int = 0,
+        token: str | None = None,
+        silence: float = SILENT,
+    ) -> None:
+        self._controller, self._link = controller, link
+        self._checker = Operation(controller)
+        self._tick: Tick | None = None
+        self._sending = threading.Lock()
+        self.timeline = Timeline(states)
+        self.ended = threading.Event()
+        self._stopped = ""
+        told_first = declared(controller) | {"live": link is not None, "silence": silence}
+        self.server = PageServer(host, port, token, told_first, self._obey, silence)
+        self.server.on_lost(self._operator_lost)
+        # The scene after the address: a page that comes early waits for it
+        self._drawing = Drawing(self.server.scene, controller, None if link is None else self._dragged)
+        look(self.server.server, controller)
+        self._explainer = Explainer()
+
+    @property
+    def url(self) -> str:
+        """Address of the page."""
+        return self.server.url
+
+    def run(self) -> None:
+        """Until :attr:`ended` is set."""
+        sys.setswitchinterval(0.001)
+        threading.Thread(target=self._beat, name="signs of life", daemon=True).start()
+        self._explainer.start()
+        before, shown, counted = time.monotonic(), b"", (time.monotonic(), 0)
+        sentence_rate, quiet = 0.0, 0.0
+        while not self.ended.is_set():
+            now = time.monotonic()
+            self.timeline.advance(now - before)
+            before = now
+            if self._link is not None and (state := self._link.read(self._newest())) is not None:
+                self._last = state
+                self.timeline.add(state)
+            current = self._current()
+            if now - counted[0] > 1.0:
+                sentence_rate = (self._explainer.count - counted[1]) / (now - counted[0])
+                counted = now, self._explainer.count
+            # What did not change is told twice a second, for who comes late
+            fresh = current is not None and (current.data != shown or now - quiet > 0.5)
+            if current is not None and fresh:
+                shown, quiet = current.data, now
+                self._show(current, sentence_rate)
+            time.sleep(max(0.002, 1.0 / RATE - (time.monotonic() - now)))
+        self._explainer.end()
+        self.server.tell_all({"type": "ended", "reason": "The loop has ended."})
+        time.sleep(0.2)
+        self.server.close()
+
+    _last: State | None = None
+
+    def _newest(self) -> int:
+        return 0 if self._last is None else self._last.number
+
+    def _current(self) -> State | None:
+        return self._last if self.timeline.live else self.timeline.state()
+
+    def _show(self, state: State, sentence_rate: float) -> None:
+        tick = Tick(self._controller, state)
+        self._tick = tick
+        with self.server.server.atomic():
+            self._drawing.show(tick)
+        # Not in a window of up to a sixtieth of a second
+        self.server.server.flush()
+        if not self.server.watched:
+            return
+        self._explainer.ask(tick)
+        stopped = ""
+        if self._link is not None and self._link.flags & STOPPED:
+            stopped = UNHEARD_TEXT if self._link.flags & UNHEARD else self._stopped or "by the loop"
+        number, text = self._explainer.said
+        extra = {
+            "stopped": stopped,
+            "sentences": text,
+            "explained": number,
+            "sentence_rate": sentence_rate,
+            "timeline": self.timeline.told(),
+        }
+        self.server.publish(told(self._controller, tick) | extra)
+
+    def _beat(self) -> None:
+        """Say that messages are passed on: the server's own thread has to answer in between."""
+        while not self.ended.is_set():
+            if self._link is not None and self.server.answers():
+                self._link.live()
+            time.sleep(BEAT)
+
+    # From pages
+
+    def _obey(self, message: dict[str, Any]) -> None:
+        kind = message["type"]
+        if kind == "seek":
+            self.timeline.seek(validation.scalar("seek.time", message["time"], unit="s"))
+        elif kind == "play":
+            self.timeline.play(validation.scalar("play.speed", message["speed"], low=0.0, high=100.0))
+        elif kind == "live":
+            self.timeline.back()
+        else:
+            if kind == "stop":
+                self._stopped = str(message.get("reason", "by hand"))
+            self._send(message)
+
+    def _send(self, message: dict[str, Any]) -> None:
+        """On to the loop.
+
+        Raises:
+            WbcError: what it would refuse.
+        """
+        if self._link is None:
+            raise ViewerError(message["type"], "recording", "a recording obeys nobody")
+        self._checker.check(message)
+        if message["type"] in ("set", "rate") and self._link.flags & STOPPED:
+            block = core_of(self._controller).layout.blocks[message["item"]]
+            if not isinstance(block.entry.item, Constraint):
+                raise ViewerError("message", message["item"], "the robot is stopped; resume first")
+        if message["type"] in ("set", "rate") and not self.timeline.live:
+            raise ViewerError("message", message["item"], "the past cannot be changed; go back to live")
+        with self._sending:
+            if not self._link.send(messages.write(message).encode()):
+                raise ViewerError("message", message["type"], "the loop takes no messages; is it still running?")
+
+    def _dragged(self, item: str, value: str, pose: pin.SE3, phase: str, client: int | None) -> None:
+        """A gizmo was moved in the scene by one of viser's clients."""
+        tick = self._tick
+        if tick is None or phase == "start" or not self.server.operates(client):
+            return
+        local = tick.reference(item).actInv(pose)
+        slot = core_of(self._controller).layout.blocks[item].slots[value]
+        sent: list[float] = [float(x) for x in pin.SE3ToXYZQUAT(local)]
+        sent = sent if slot.input.kind == "pose" else sent[:3]
+        try:
+            self._send({"type": "set", "item": item, "values": {value: sent}})
+        except WbcError as error:
+            if phase == "end":
+                self.server.tell_all({"type": "refused", "reason": str(error)})
+
+    def _operator_lost(self) -> None:
+        self._drawing.let_go()
+        self._stopped = "the operator's page was lost"
+        for kind in ({"type": "stop", "reason": self._stopped}, {"type": "release"}):
+            with contextlib.suppress(WbcError):
+                self._send(kind)
