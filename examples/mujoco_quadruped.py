@@ -6,12 +6,11 @@ import pinocchio as pin
 import wbc
 from wbc.shapes import PlacedShape, Sphere
 from wbc.simulation import Command, CommandKind, MujocoPlant, mujoco_model
-from wbc.track.scene import Scene
+from wbc.track import Scene
 
-DT, SECONDS = 0.002, 6.0
-FEET, LIFTED = ("LF_FOOT", "RF_FOOT", "LH_FOOT", "RH_FOOT"), "LF_FOOT"
-SHIFTED, UNLOADED, RAISED = 2.0, 2.5, 4.0  # s
-RADIUS, HEIGHT = 0.03, 0.15  # of a foot, and of the lifted one, m
+DT, FEET, LIFTED = 0.002, ("LF_FOOT", "RF_FOOT", "LH_FOOT", "RH_FOOT"), "LF_FOOT"
+SHIFTED, UNLOADED, RAISED, SECONDS = 1.5, 2.0, 3.0, 4.0
+RADIUS, HEIGHT = 0.03, np.array([0.0, 0.0, 0.15])  # of a foot, and of the lifted one, m
 
 robot = wbc.robots.load("anymal_c")
 q = robot.neutral
@@ -27,10 +26,10 @@ stack.add(wbc.tasks.JointLimits()).add(wbc.tasks.TorqueLimits())
 for foot in FEET:
     stack.add(wbc.tasks.PointContact(f"{foot} contact", friction=0.5), name=foot)
 
+places = np.array([robot.pose(q, foot).translation for foot in FEET])
+floor = float(places[:, 2].mean()) - RADIUS
 ball = {foot: [PlacedShape(Sphere(RADIUS), pin.SE3.Identity())] for foot in FEET}
-floor = float(np.mean([robot.pose(q, foot).translation[2] for foot in FEET])) - RADIUS
 model = mujoco_model(robot, time_step=DT / 2, contacts=ball, ground=floor, friction=0.8, drawn=False)
-plant = MujocoPlant(model, robot)
 
 
 def eased(t: float, begin: float, end: float) -> float:
@@ -39,49 +38,34 @@ def eased(t: float, begin: float, end: float) -> float:
     return s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
 
 
-def simulate(seconds: float) -> dict[str, np.ndarray]:
-    """Samples of every tick: errors of foot and balance, slip of the others, force on the lifted foot, torques."""
-    controller = stack.compile(command="torque")
-    plant.reset(q, 0.0)
-    controller.reset(q)
-    balance, goal = controller["balance"].target.copy(), controller["foot"].target.copy()
-    places = {foot: robot.pose(q, foot).translation for foot in FEET}
-    others = [foot for foot in FEET if foot != LIFTED]
-    # Over the middle of the three that stay
-    over = np.append(np.mean([places[foot][:2] for foot in others], axis=0), balance[2])
-    data, out = robot.model.createData(), []
-    for k in range(round(seconds / DT)):
-        state, t = plant.read(), k * DT
-        controller["balance"].target = balance + eased(t, 0.0, SHIFTED) * (over - balance)
-        controller["foot"].target = goal + np.array([0.0, 0.0, HEIGHT * eased(t, UNLOADED, RAISED)])
-        if t == SHIFTED:
-            # Its load goes to the others before it opens
-            controller[f"{LIFTED} force"].ramp(1e4, UNLOADED - SHIFTED)
-        controller[LIFTED].enabled = t < UNLOADED
-        step = controller.step(state.q, state.v)
-        plant.apply(Command(CommandKind.TORQUE, step.torque))
-        plant.advance(DT)
-        pin.framesForwardKinematics(robot.model, data, state.q)
-        pin.centerOfMass(robot.model, data, state.q)
-        at = {foot: data.oMf[robot.model.getFrameId(foot)].translation for foot in FEET}
-        slip = max(float(np.linalg.norm((at[foot] - places[foot])[:2])) for foot in others)
-        error = float(np.linalg.norm(at[LIFTED] - controller["foot"].target))
-        off = float(np.linalg.norm(data.com[0] - controller["balance"].target))
-        share = float(np.max(np.abs(step.torque[6:]) / robot.limits.effort[6:]))
-        out.append((t, error, off, slip, at[LIFTED][2] - RADIUS - floor, share, step.status == "solved", state.q))
-    names = ("time", "foot", "balance", "slip", "height", "share", "solved", "q")
-    return {name: np.array(column) for name, column in zip(names, zip(*out, strict=True), strict=True)}
-
-
-if __name__ == "__main__":
-    run = simulate(SECONDS)
-    late = run["time"] > RAISED + 0.5
-    print(f"on three feet: the fourth {1e3 * run['height'][late].min():.1f} mm above the floor,", end=" ")
-    print(f"{1e3 * run['foot'][late].max():.2f} mm from its target")
-    print(
-        f"centre of mass {1e3 * run['balance'][late].max():.2f} mm off; the other feet moved {1e3 * run['slip'].max():.2f} mm"
-    )
-    print(f"largest torque {100 * run['share'].max():.0f} % of its limit; {(~run['solved']).sum()} ticks relaxed")
-    scene = Scene(robot)
-    scene.add_robot(run["q"][-1])
-    print(scene.save("runs/mujoco_quadruped.png", size=(800, 600), azimuth=0.9))
+controller, plant = stack.compile(command="torque"), MujocoPlant(model, robot)
+plant.reset(q, 0.0)
+controller.reset(q)
+balance, goal, others = controller["balance"].target.copy(), controller["foot"].target.copy(), slice(1, 4)
+over = np.append(places[others, :2].mean(axis=0), balance[2])  # the middle of the three that stay
+rows, relaxed = [], 0
+for k in range(round(SECONDS / DT)):
+    t, state = k * DT, plant.read()
+    controller["balance"].target = balance + eased(t, 0.0, SHIFTED) * (over - balance)
+    controller["foot"].target = goal + HEIGHT * eased(t, UNLOADED, RAISED)
+    if t == SHIFTED:
+        controller[f"{LIFTED} force"].ramp(1e4, UNLOADED - SHIFTED)  # the others take its load
+    controller[LIFTED].enabled = t < UNLOADED
+    step = controller.step(state.q, state.v)
+    relaxed += step.status != "solved"
+    plant.apply(Command(CommandKind.TORQUE, step.torque))
+    plant.advance(DT)
+    if t > RAISED + 0.3:
+        now = np.array([robot.pose(state.q, foot).translation for foot in FEET])
+        center = pin.centerOfMass(robot.model, robot.model.createData(), state.q)
+        rolled = np.linalg.norm((now - places)[others, :2], axis=1).max()
+        share = np.max(np.abs(step.torque[6:]) / robot.limits.effort[6:])
+        rows.append((now[0, 2] - RADIUS - floor, np.linalg.norm(now[0] - goal - HEIGHT), np.linalg.norm(center - over),
+                     rolled, share))  # fmt: skip
+lowest, (_, foot_off, center_off, rolled, share) = np.min(rows, axis=0)[0], np.max(rows, axis=0)
+print(f"on three feet: the fourth {1e3 * lowest:.1f} mm above the floor, {1e3 * foot_off:.2f} mm from its target;")
+print(f"centre of mass {1e3 * center_off:.2f} mm off, the other feet rolled by {1e3 * rolled:.2f} mm;")
+print(f"largest torque then {100 * share:.0f} % of its limit; {relaxed} ticks relaxed")
+scene = Scene(robot)
+scene.add_robot(state.q)
+print(scene.save("runs/mujoco_quadruped.png", size=(800, 600), azimuth=0.9))

@@ -8,14 +8,14 @@ from bench.sheet import Sheet
 from wbc.identification.experiment import experiment
 from wbc.robots import load
 
-ROBOTS = ("ur5", "panda", "xarm7")
+ROBOTS = ("ur5", "panda")
 
 
 def parts() -> dict[str, Sheet | str]:
     """What can be known, what the motion shows, and torques that are not explained."""
     rows = []
     for name in ROBOTS:
-        done = experiment(load(name), tries=150)
+        done = experiment(load(name), tries=60)
         found, motion = done.found, done.motion
         share = done.check[0] / done.check[1]
         errors = float(np.sqrt((done.errors**2).mean()))

@@ -45,7 +45,7 @@ def compare_controllers(
     out: Out = None,
     force: Force = False,
 ) -> None:
-    """Let controllers of torques follow one motion, under what none of them knows of.
+    """Controllers of torques beside each other, on the published arm or on any robot.
 
     Without a robot: the published three-link arm on its line of 0.58 m in 1 s, with the three published controllers.
     With one: all its joints swing for 2 s. Without --payload, --heavier, --noise and --rate: as modelled, with half the

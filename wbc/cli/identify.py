@@ -25,7 +25,7 @@ def identify(
     out: Out = None,
     force: Force = False,
 ) -> None:
-    """Find masses, inertias and friction of a simulated robot that is not the model's, and check them.
+    """Find the inertias of a simulated robot from a motion that shows much.
 
     See docs/identification.md.
 

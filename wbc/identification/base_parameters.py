@@ -50,7 +50,7 @@ class BaseParameters:
         """
         w = validation.ordinary_array("weights", weights, (self.combination.shape[1],))
         rest = w - self.combination.T @ w[list(self.columns)]
-        return bool(np.linalg.norm(rest) <= 1e-6 * max(np.linalg.norm(w), 1e-300))
+        return float(np.linalg.norm(rest)) <= 1e-6 * max(float(np.linalg.norm(w)), 1e-300)
 
     def text(self, names: Sequence[str], largest: int = 6) -> list[str]:
         """A line for each base parameter, as the sum that it is."""

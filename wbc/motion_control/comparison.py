@@ -220,23 +220,22 @@ def standard_conditions(payload: float) -> tuple[Condition, ...]:
 def save_plot(found: Sequence[Compared], title: str, path: Path) -> None:
     """Distances of the tip, and torques of the three joints that need the largest, over time."""
     runs = [one for one in found if len(one.trial.torques)]
-    sizes = np.max([np.abs(one.trial.torques).max(axis=0) for one in runs if not one.trial.away] or [[0.0]], axis=0)
+    largest = np.array([np.abs(one.trial.torques).max(axis=0) for one in runs])
+    # A controller that chatters is not to hide the others
+    sizes = np.median(largest, axis=0)
     joints = np.sort(np.argsort(sizes)[-3:])
     with style.pyplot() as plt:
-        figure, axes = plt.subplots(
-            1 + len(joints), 1, figsize=(9, 4 + 2 * len(joints)), sharex=True, layout="constrained"
-        )
-        for one, colour in zip(runs, style.CYCLE, strict=False):
-            trial = one.trial
-            away = " (ran away)" if trial.away else ""
-            axes[0].semilogy(
-                trial.times[1:], 1e3 * np.maximum(trial.tip[1:], 1e-9), color=colour, label=one.name + away
-            )
+        size = (9, 4 + 2 * len(joints))
+        figure, axes = plt.subplots(1 + len(joints), 1, figsize=size, sharex=True, layout="constrained")
+        for k, one in enumerate(runs):
+            trial, away = one.trial, " (ran away)" if one.trial.away else ""
+            look = {"color": style.CYCLE[k % len(style.CYCLE)], "linestyle": "-" if k < len(style.CYCLE) else "--"}
+            axes[0].semilogy(trial.times[1:], 1e3 * np.maximum(trial.tip[1:], 1e-9), label=one.name + away, **look)
             for axis, joint in zip(axes[1:], joints, strict=True):
-                axis.step(trial.times[: len(trial.torques)], trial.torques[:, joint], where="post", color=colour)
+                axis.step(trial.times[: len(trial.torques)], trial.torques[:, joint], where="post", **look)
         axes[0].set(title=title, ylabel="tip off [mm]", ylim=(1e-4, None))
         for axis, joint in zip(axes[1:], joints, strict=True):
-            most = 1.3 * max(float(sizes[joint]), 1e-3)
+            most = 2.0 * max(float(sizes[joint]), 1e-3)
             axis.set(ylabel=f"tau {joint + 1} [N m or N]", ylim=(-most, most))
         axes[-1].set(xlabel="time [s]")
         figure.legend(loc="outside lower center", ncols=3)
