@@ -59,7 +59,8 @@ def film(browser: Chromium, name: str) -> Path:
             page.wait(f"wbc.state.number >= {frame + 1}", 60.0)
             time.sleep(0.6)
             pictures.append(Image.open(io.BytesIO(page.picture())).convert("RGB"))
-    return save([picture.crop(CUT).resize(SIZE) for picture in pictures[1:]], FOLDER / f"play_{name.replace('-', '_')}.gif")
+    file = FOLDER / f"play_{name.replace('-', '_')}.gif"
+    return save([picture.crop(CUT).resize(SIZE) for picture in pictures[1:]], file)
 
 
 def held_back(browser: Chromium) -> Path:
