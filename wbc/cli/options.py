@@ -72,4 +72,6 @@ LogFormat = Annotated[str, typer.Option(help="parquet or npz.", rich_help_panel=
 Record = Annotated[
     bool, typer.Option(help="Record the inputs of every tick, for `wbc replay`.", rich_help_panel=_OUTPUT)
 ]
-Plots = Annotated[bool, typer.Option(help="Draw the plots, the picture, and the page that plays the run.", rich_help_panel=_OUTPUT)]
+Plots = Annotated[
+    bool, typer.Option(help="Draw the plots, the picture and the page that plays the run.", rich_help_panel=_OUTPUT)
+]
