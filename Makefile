@@ -13,11 +13,13 @@ REPEATS ?= 1
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 PEERS_READY := $(PEERS_VENV)/.ready
+SITE_VENV ?= .venv-site
+SITE_READY := $(SITE_VENV)/.ready
 TYPES := build/types
 SOURCES := wbc tasks robots tests bench examples
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test check slow lint format types docs figures bench bench-ik bench-time-laws soak lock clean
+.PHONY: help setup demo test check slow lint format types docs site figures bench bench-ik bench-time-laws soak lock clean
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 18
@@ -54,6 +56,11 @@ types: $(READY)  ## mypy --strict on the package
 docs: $(READY)  ## write what the code declares into the pages of tasks and constraints
 	$(BIN)/wbc docs
 
+site: $(SITE_READY)  ## the pages as a site with a reference of all public names, into build/site; warnings are errors
+	@rm -rf $(TYPES) && mkdir -p $(TYPES)/wbc
+	@ln -sf $(CURDIR)/wbc/* $(CURDIR)/tasks $(CURDIR)/robots $(TYPES)/wbc/
+	NO_MKDOCS_2_WARNING=1 $(SITE_VENV)/bin/mkdocs build --quiet
+
 figures: $(READY)  ## measure again what pages say, where it takes at most 5 minutes and is older than its code
 	$(BIN)/python -m bench.figures --stale
 
@@ -76,7 +83,7 @@ lock: $(READY)  ## write the versions in .venv to requirements/lock.txt
 	mv requirements/lock.txt.new requirements/lock.txt
 
 clean:  ## remove environments, builds and caches
-	rm -rf $(VENV) $(PEERS_VENV) build dist runs *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis
+	rm -rf $(VENV) $(PEERS_VENV) $(SITE_VENV) build dist runs *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 # An environment is ready when everything in it is installed; a change of the pins makes it again in place.
@@ -91,6 +98,11 @@ $(READY): requirements/lock.txt pyproject.toml
 $(PEERS_READY): requirements/peers.txt
 	$(call make_venv,$(PEERS_VENV))
 	$(PEERS_VENV)/bin/python -m pip install --quiet --no-deps --requirement requirements/peers.txt
+	@touch $@
+
+$(SITE_READY): requirements/site.txt
+	$(call make_venv,$(SITE_VENV))
+	$(SITE_VENV)/bin/python -m pip install --quiet --no-deps --requirement requirements/site.txt
 	@touch $@
 
 # Debian splits ensurepip off from Python; then pip is brought in by the pip outside.

@@ -35,6 +35,10 @@ class Kept:
         first, *lines = path.read_text().splitlines()
         if first != head:
             raise ValueError(f"{path} holds jobs of other sources; give another file")
+        # A run that was killed may have left half a line
+        if lines and not path.read_text().endswith("\n"):
+            lines.pop()
+            path.write_text("\n".join([first, *lines, ""]))
         self._done = {done["job"]: done["found"] for done in map(json.loads, lines)}
 
     def get(self, job: str) -> Any:

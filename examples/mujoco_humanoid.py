@@ -19,7 +19,7 @@ stack = wbc.Stack(robot, dt=DT)
 stack.add(wbc.tasks.CenterOfMass(gain=4.0), name="balance", weight=10.0)
 stack.add(wbc.tasks.EndEffector(CHEST, kind="orientation", gain=5.0), name="chest")
 stack.add(wbc.tasks.EndEffector(HAND, kind="position", gain=5.0), name="hand")
-stack.add(wbc.tasks.Posture(gain=5.0), name="posture", weight=1e-4)
+stack.add(wbc.tasks.Posture(gain=5.0), name="posture", weight=1e-3)
 stack.add(wbc.tasks.JointLimits()).add(wbc.tasks.TorqueLimits())
 for sole in SOLES:
     stack.add(wbc.tasks.SurfaceContact(sole, half_lengths=HALF, friction=0.6), name=sole)
@@ -34,7 +34,7 @@ plant = MujocoPlant(model, robot)
 
 
 def simulate(seconds: float) -> dict[str, np.ndarray]:
-    """Samples of every tick: time, error of the hand, centre of mass off its place, slip of a foot, shares of torques."""
+    """Samples of every tick: time, error of the hand, centre of mass off its place, slip of a foot, torques."""
     controller = stack.compile(command="torque")
     plant.reset(q, 0.0)
     controller.reset(q)

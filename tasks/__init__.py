@@ -44,6 +44,7 @@ from wbc.tasks.rolling_contact import RollingContact
 from wbc.tasks.self_collision import SelfCollision
 from wbc.tasks.sliding_contact import SlidingContact
 from wbc.tasks.support_polygon import support_planes, support_polygon
+from wbc.tasks.support_region import SupportRegion
 from wbc.tasks.surface_contact import SurfaceContact
 from wbc.tasks.torque_limits import TorqueLimits
 from wbc.tasks.workspace_box import WorkspaceBox
@@ -96,6 +97,7 @@ __all__ = [
     "SacrificeOrder",
     "SelfCollision",
     "SlidingContact",
+    "SupportRegion",
     "SurfaceContact",
     "Task",
     "TorqueLimits",

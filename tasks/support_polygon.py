@@ -116,4 +116,5 @@ def _edges(points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np
 
 def _distances(kin: Tracer, p: Values) -> ca.SX:
     count = p["offsets"].numel()
-    return ca.reshape(p["normals"], 2, count).T @ kin.center_of_mass()[:2] - p["offsets"]
+    out: ca.SX = ca.reshape(p["normals"], 2, count).T @ kin.center_of_mass()[:2] - p["offsets"]
+    return out

@@ -15,7 +15,7 @@ ROOT = Path(__file__).parent.parent
 
 #: Pages whose Python runs as one program
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
-RUN = [ROOT / "README.md", *(ROOT / "docs" / f"{name}.md" for name in ("cookbook",))]
+RUN = [ROOT / "README.md", *(ROOT / "docs" / f"{name}.md" for name in ("cookbook", "tutorial", "porting"))]
 
 
 @pytest.mark.parametrize("page", RUN, ids=lambda page: page.stem)

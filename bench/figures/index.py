@@ -15,6 +15,7 @@ from bench.pool import ROOT
 from bench.sheet import Sheet
 from bench.walk import layout_tables, planning_tables
 from bench.walk import tables as walks
+from bench.walk.trial_parts import trial_sheet
 
 View = Callable[[Any], str]
 #: What a tick consists of
@@ -91,13 +92,22 @@ _ALL = (
             "layouts": walk_view("layouts", layout_tables.layout_sheet),
         },
     ),
+    Figure(
+        "trials", (*WALK, "bench/walk"), 600.0,
+        ("python", "-m", "bench.walk", "--parts", "structures", "--resume", "--output", "bench/data"),
+        "bench/data/trials.json",
+        {"structures": walk_view("structures", lambda records: trial_sheet("structures", records))},
+    ),
     Figure("soak", (*TICK, "bench/soak"), 20.0),
     Figure("analysis", ("wbc/analysis",), 2.0),
     Figure("batch", (*TICK, "wbc/batch", "wbc/ik"), 3.0),
     Figure("bilateral", ("wbc/teleop/bilateral",), 1.5),
     Figure("clearance", ("wbc/clearance",), 1.0),
     Figure("demo", (*TICK, "wbc/track", "wbc/cli/demo.py"), 0.5),
-    Figure("dynamics", ("wbc/published/newton_euler",), 0.5),
+    Figure("dynamics", ("wbc/published/newton_euler", "wbc/motion_control"), 3.0),
+    Figure("identification", ("wbc/identification",), 2.0),
+    Figure("motion_control", (*TICK, "wbc/motion_control", "wbc/identification", "examples/mujoco_humanoid.py",
+                              "examples/mujoco_quadruped.py"), 3.0),
     Figure("examples", (*TICK, "wbc/proximity", "examples"), 1.0),
     Figure("fsp", ("wbc/resolvers", "wbc/explore", "wbc/published/ikor"), 4.0),
     Figure("fsp_norms", ("wbc/resolvers/fsp", "wbc/published/ikor"), 0.5),

@@ -1,4 +1,4 @@
-"""The programs of examples/ as they are written with pink or mink: their lengths and what they print."""
+"""The ten programs of examples/ as they are written with pink or mink: their lengths and what they print."""
 
 from __future__ import annotations
 
@@ -55,6 +55,7 @@ PROGRAMS = (
     Program("custom_expression", "pink", "panda", "a task and a constraint of one's own"),
     Program("mujoco_servo", "mink", "arm.xml", "MuJoCo at 1 kHz"),
     Program("retarget", "mink", "g1", "key points of a person on a G1"),
+    Program("drag", "mink", "arm.xml", "drag the hand with the mouse", display=True),
 )
 
 

@@ -1,4 +1,5 @@
-"""``python -m bench.walk``: plan and walk, print, write walk.md and walk.json.
+"""``python -m bench.walk``: plan and walk, print, write walk.md and walk.json, and of trials from seeds trials.md and
+trials.json.
 
 Ctrl-C ends the measuring; what was measured until then is printed and written, and the same command with --resume goes
 on from there.
@@ -9,6 +10,7 @@ from __future__ import annotations
 import argparse
 import json
 from pathlib import Path
+from typing import Any
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
@@ -22,11 +24,14 @@ from bench.records import Parts, measure
 from bench.report import goal_sheet
 from bench.walk.machine import Machine
 from bench.walk.parts import QUICK, Sizes, goals, others, parts_of, records, sheets
+from bench.walk.trials import PARTS
 from wbc.errors import RangeError
 from wbc.interrupts import obey_kill
 from wbc.robots import WalkerData
 from wbc.robots.walker_data import WALKER_DIGEST
 
+#: Records of the walker's parts, and of trials from seeds: each is resumed, measured anew and written by itself
+FILES = ("walk", "trials")
 #: What decides what a run measures
 SOURCES = ("wbc", "tasks", "robots", "bench/walk")
 
@@ -79,11 +84,15 @@ def main(given: list[str] | None = None) -> None:
     data = WalkerData.read()
     if data.digest != WALKER_DIGEST:
         raise RangeError("walker.toml", data.digest, f"figures are reported for the data {WALKER_DIGEST} only")
-    path = chosen.output / "walk.jsonl"
-    if not chosen.resume:
-        path.unlink(missing_ok=True)
     version = {"sources": sources(SOURCES), "data": data.digest, "collisions": chosen.collisions}
-    kept, about, begun = Kept(path, version), host(), stamp()
+    kept, about, begun = dict[str, Kept](), host(), stamp()
+    for file in FILES:
+        path = chosen.output / f"{file}.jsonl"
+        asked = any(file_of(name) == file for name in chosen.parts)
+        if asked and not chosen.resume:
+            path.unlink(missing_ok=True)
+        if asked or path.exists():
+            kept[file] = _kept(path, version, asked)
     it = Machine(wbc.robots.walker(), collisions=chosen.collisions)
     console, errors = Console(), Console(stderr=True)
     if not console.is_terminal:
@@ -91,9 +100,13 @@ def main(given: list[str] | None = None) -> None:
     bars = (TextColumn("{task.description:10}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
     with Progress(*bars, TimeRemainingColumn(), console=errors) as progress:
         jobs = {name: part.jobs(it) for name, part in parts_of(chosen.sizes).items() if name in chosen.parts}
-        work = {name: (len(mine), records(name, mine, kept, chosen.parallel)) for name, mine in jobs.items() if mine}
+        work = {
+            name: (len(mine), records(name, mine, kept[file_of(name)], chosen.parallel))
+            for name, mine in jobs.items()
+            if mine
+        }
         parts, interrupted = measure(work, progress)
-    parts = others([*work], kept) | parts
+    parts = {name: found for one in kept.values() for name, found in others([*work], one).items()} | parts
     lines = [
         f"{about['processor']}, Python {about['python']}; load {about['load']}.",
         f"Robot data {data.digest}; self-collision rows {'on' if chosen.collisions else 'off'}.",
@@ -108,16 +121,34 @@ def main(given: list[str] | None = None) -> None:
         console.print()
     for text in lines:
         console.print(text, markup=False, highlight=False)
-    write(chosen.output, parts, chosen.sizes, lines, begun)
-    console.print(f"Written to {chosen.output / 'walk.md'}", markup=False, highlight=False)
+    for file in FILES:
+        mine = {name: found for name, found in parts.items() if file_of(name) == file}
+        if any(file_of(name) == file for name in chosen.parts) and mine:
+            write(chosen.output / file, mine, chosen.sizes, lines, begun)
+            console.print(f"Written to {chosen.output / file}.md", markup=False, highlight=False)
 
 
-def write(folder: Path, parts: Parts, sizes: Sizes, lines: list[str], begun: dict[str, str]) -> None:
-    """walk.md and walk.json."""
-    folder.mkdir(parents=True, exist_ok=True)
+def file_of(part: str) -> str:
+    """Which of :data:`FILES` a part is in."""
+    return FILES[part in PARTS]
+
+
+def _kept(path: Path, version: dict[str, Any], asked: bool) -> Kept:
+    """What is kept in a file; nothing of a file of other sources that is not asked for."""
+    try:
+        return Kept(path, version)
+    except ValueError:
+        if asked:
+            raise
+        return Kept(None, version)
+
+
+def write(file: Path, parts: Parts, sizes: Sizes, lines: list[str], begun: dict[str, str]) -> None:
+    """A file with the tables and one with the records: ``.md`` and ``.json``."""
+    file.parent.mkdir(parents=True, exist_ok=True)
     tables = [sheet.markdown() for sheet in (*sheets(parts, sizes), goal_sheet(goals(parts, sizes)))]
-    (folder / "walk.md").write_text("\n\n".join([*tables, *lines]) + "\n")
-    (folder / "walk.json").write_text(json.dumps({"stamp": begun, "about": lines, "parts": parts}, indent=1) + "\n")
+    file.with_suffix(".md").write_text("\n\n".join([*tables, *lines]) + "\n")
+    file.with_suffix(".json").write_text(json.dumps({"stamp": begun, "about": lines, "parts": parts}, indent=1) + "\n")
 
 
 if __name__ == "__main__":

@@ -21,6 +21,7 @@ from bench.walk.trials import PARTS, names
 LONGEST = 900.0
 #: Ends of a walk that did what it was to do, and of one that was refused with a reason
 WELL, REFUSED = ("arrived", "time"), ("refused", "hold lost", "HoldLost", "NoPlanError", "late")
+CRASHED = ("crash", "error")
 
 
 def trial_jobs(it: Machine, part: str, count: int, folder: Path) -> list[Job]:
@@ -64,40 +65,80 @@ def trial_sheet(part: str, records: list[Record]) -> Sheet:
     rows = []
     for family in dict.fromkeys(group(r) for r in records):
         mine = [r for r in records if group(r) == family]
-        well = [r for r in mine if r["outcome"] in WELL]
+        well, refused = ([r for r in mine if r["outcome"] in some] for some in (WELL, REFUSED))
         bad = [r for r in well if r.get("violations")]
         other = [r for r in well if r.get("second")]
-        times = sorted(r["plan_s"] for r in mine if "plan_s" in r)
         counts = (len(mine), len(well), len(bad), len(other), sum(touching(r, "second") for r in well))
-        refused, crashed = (
-            sum(r["outcome"] in REFUSED for r in mine),
-            sum(r["outcome"] in ("crash", "error") for r in mine),
+        refusals = len(refused), sum(impossible(r) for r in refused), sum(r["outcome"] in CRASHED for r in mine)
+        spent = ranged(sorted(r["plan_s"] for r in mine if "plan_s" in r), -1)
+        rows.append(
+            (
+                family or part,
+                *map(str, (*counts, *refusals)),
+                spent,
+                ranged(sorted(filter(None, map(pace, mine))), 0),
+                "",
+            )
         )
-        spent = f"{times[len(times) // 2]:.1f}, {times[-1]:.1f}" if times else "-"
-        rows.append((f"{family or part}", *(str(n) for n in counts), str(refused), str(crashed), spent, ""))
     for r in records:
         wrong = [*r.get("violations", ())[:1], *r.get("second", ())[:1]]
         if r["outcome"] not in WELL:
             wrong.append(f"{r['outcome']}: {r['reason']}")
         if wrong:
             spent = f"{r['plan_s']:.1f}" if "plan_s" in r else "-"
-            rows.append((f"{part} {r['trial']}", *[""] * 7, spent, "; ".join(wrong)))
+            rows.append((f"{part} {r['trial']}", *[""] * 8, spent, "", "; ".join(wrong)))
     columns = (
-        *("", "trials", "arrived", "violate", "violate, 2nd checker", "touch, 2nd", "refused", "crashed"),
-        *("plan: median, most, s", "what"),
+        *("", "trials", "arrived", "violate", "violate, 2nd checker", "touch, 2nd", "refused", "no passage", "crashed"),
+        *("plan: median, most, s", "real time with planning: median, least", "what"),
     )
     return Sheet(f"Trials from seeds: {part}", columns, rows)
 
 
+def impossible(record: Record) -> bool:
+    """Whether no body passes, proven by the reference."""
+    return bool(record.get("reference") == "impossible")
+
+
+def pace(record: Record) -> float | None:
+    """Real time factor of a walk with its planning; None of one that was not walked."""
+    spent = record.get("plan_s", 0.0) + record.get("walking_s", 0.0)
+    return record["walk_s"] / spent if record.get("walking_s") and record["outcome"] in WELL else None
+
+
+def ranged(numbers: list[float], end: int) -> str:
+    """Median and one end of sorted numbers."""
+    return f"{numbers[len(numbers) // 2]:.1f}, {numbers[end]:.1f}" if numbers else "-"
+
+
 def trial_goals(part: str, records: list[Record]) -> list[Goal]:
-    """Nothing that arrived violates, by either checker, and nothing crashes."""
+    """Nothing that arrived violates, by either checker, and nothing crashes; of structures nearly all are walked that
+    the reference does not prove impossible, and plans are made in time.
+    """
     well = [r for r in records if r["outcome"] in WELL]
     bad = sum(bool(r.get("violations") or r.get("second")) for r in well)
-    crashed = sum(r["outcome"] in ("crash", "error") for r in records)
-    return [
+    crashed = sum(r["outcome"] in CRASHED for r in records)
+    out = [
         Goal(f"{part}: walks of {len(well)} that arrived and violate", bad, 0, ""),
         Goal(f"{part}: trials of {len(records)} that crash", crashed, 0, ""),
     ]
+    open_ = [r for r in records if not impossible(r)]
+    if part == "structures" and open_:
+        paces = sorted(filter(None, map(pace, well)))
+        longest = max((r["plan_s"] for r in records if "plan_s" in r), default=0.0)
+        out += [
+            Goal("structures that may be possible and are not walked", 1.0 - len(well) / len(open_), 0.05, ""),
+            Goal("structures: longest plan or refusal", longest, 15.0, "s"),
+        ]
+        if paces:
+            out.append(
+                Goal(
+                    "structures: time for a second of walk, with planning, median",
+                    1.0 / paces[len(paces) // 2],
+                    0.2,
+                    "s",
+                )
+            )
+    return out
 
 
 __all__ = ["PARTS", "trial_goals", "trial_jobs", "trial_sheet"]

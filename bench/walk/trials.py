@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 import wbc
+from bench.walk.reference.passage import passage
 from bench.walk.second_checker import second_check
 from bench.walk.structures import FAMILIES, random_structure
 from wbc.errors import RangeError, WbcError
@@ -62,7 +63,33 @@ def structures(name: str, walker: Walker, folder: Path) -> Record:
     speed = float(rng.uniform(0.05, 0.15))
     objective: Objective = "velocity" if rng.random() < 0.5 else "destination"
     request = PathRequest(Site(str(file)), trial.start, (trial.goal,), speed, 0.1, objective)
-    return kept(perform_walk(request, walker), folder)
+    spent = Spent()
+    run = perform_walk(request, walker, progress=spent)
+    out = {**kept(run, folder), **spent.times(run.plan is not None)}
+    if run.log is None:
+        path = request.path(walker.data)
+        found = passage(walker, request.site.build(), path.poses[0], path.poses[-1])
+        out |= {"reference": found.kind, "around": found.around}
+    return out
+
+
+class Spent:
+    """Processor time of a walk's stages, as it reports them [s]."""
+
+    def __init__(self) -> None:
+        self._begun: dict[str, float] = {}
+        self._ended = 0.0
+
+    def __call__(self, what: str, part: float | None) -> None:
+        self._ended = time.process_time()
+        self._begun.setdefault(what, self._ended)
+
+    def times(self, planned: bool) -> Record:
+        """Of the plan, and of walking with its log."""
+        begun, stages = [*self._begun.values()], [*self._begun]
+        if not planned or len(begun) < 3:
+            return {}
+        return {"plan_s": begun[1] - begun[0], "walking_s": self._ended - begun[stages.index(stages[2])]}
 
 
 class RandomRates:

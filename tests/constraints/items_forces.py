@@ -11,6 +11,7 @@ import pinocchio as pin
 from wbc.robot import Robot
 from wbc.robot.transmission import Transmission
 from wbc.tasks import (
+    DivergentComponent,
     DriveTorqueLimits,
     ExternalWrench,
     Item,
@@ -20,6 +21,7 @@ from wbc.tasks import (
     RigidGrasp,
     RollingContact,
     SlidingContact,
+    SupportRegion,
     SurfaceContact,
     TorqueLimits,
     WrenchSum,
@@ -105,6 +107,14 @@ def _sum(robot: Robot) -> list[Declared]:
     return [(WrenchSum("contact"), {})]
 
 
+def _support(robot: Robot) -> list[Declared]:
+    return [(SupportRegion(planes=4), {})]
+
+
+def _divergent(robot: Robot) -> list[Declared]:
+    return [(DivergentComponent(omega=3.5), {"omega": 2.0, "gain": 4.0})]
+
+
 def _drives(robot: Robot) -> list[Declared]:
     followers = {robot.dof_names[c.follower] for c in robot.couplings}
     single = [str(n) for j, n in enumerate(robot.model.names) if j > 0 and int(robot.model.nvs[j]) == 1]
@@ -130,5 +140,7 @@ FACTORIES: dict[str, Callable[[Robot], list[Declared]]] = {
     "TorqueLimits": _torques,
     "RollingContact": _rolling,
     "WrenchSum": _sum,
+    "DivergentComponent": _divergent,
+    "SupportRegion": _support,
     "DriveTorqueLimits": _drives,
 }

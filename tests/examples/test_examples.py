@@ -44,6 +44,7 @@ LONG = (
     "own_urdf",
     "own_mjcf",
     "dual_arm",
+    "mujoco_quadruped",
 )
 
 
@@ -147,8 +148,34 @@ def test_servos_of_mujoco_follow() -> None:
     assert number("median., # mm", text) < 3.0
 
 
+def test_a_quadruped_stands_on_three_feet() -> None:
+    text = output("mujoco_quadruped")
+    assert number("the fourth # mm above", text) > 140.0
+    assert number("# mm from its target", text) < 3.0
+    assert number("centre of mass # mm off", text) < 5.0
+    assert "; 0 ticks relaxed" in text
+    check_picture(text)
+
+
+def test_a_humanoid_stands_in_mujoco() -> None:
+    """A quarter of a second, on the virtual machine; the whole of it is measured for docs/motion_control.md."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(toolchain, "missing", lambda: ("no C compiler",))
+        example = runpy.run_path(str(FOLDER / "mujoco_humanoid.py"), run_name="example")
+    run = example["simulate"](0.1)
+    assert run["solved"].all()
+    assert run["slip"].max() < 1e-3
+    assert run["hand"].max() < 2e-3
+    assert run["balance"].max() < 1e-3
+
+
 def test_a_person_drives_a_humanoid() -> None:
     assert number("hands at most # mm", output("retarget")) < 5.0
+
+
+def test_a_browser_shows_an_arm(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "argv", ["drag.py", "--ticks", "20"])
+    assert number("hand # mm", output("drag")) < 1e-3
 
 
 def test_mobile_base_rolls_along_with_the_hand() -> None:

@@ -39,6 +39,7 @@ FLOORS = {
     "wbc.explain": 7,
     "wbc.export": 7,
     "wbc.batch": 7,
+    "wbc.support": 7,
     "wbc.ik": 7,
     "wbc.record": 7,
     "wbc.servo": 7,

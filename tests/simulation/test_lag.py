@@ -24,7 +24,7 @@ from wbc.walking.modes.drive import Drive, standing_plan
 from wbc.walking.planner.planner import plan_walk
 from wbc.walking.run.recording import WalkRecorder
 
-#: Lag of a servo [s], delay in milliseconds, and noise of an encoder [rad]: slow, quick, and too slow for a walk
+#: Lag of a servo [s], delay in milliseconds, and noise of an encoder [rad]: slow, quick, and very slow
 SERVO, QUICK, SLOW = (0.02, 5, 2e-5), (0.01, 2, 1e-6), (0.05, 10, 0.0)
 
 
@@ -106,18 +106,18 @@ def test_a_walk_on_servos_is_judged_by_the_checker(
     assert ends[0][2] < 1e-4 < ends[1][2] < 2e-3
 
 
-def test_the_checker_sees_what_slow_servos_do(
+def test_slow_servos_walk_later_and_violate_nothing(
     machine: Walker, structure: Structure, stack: WalkStack, tmp_path: Path
 ) -> None:
-    """The gains of the stack are too high for them: the swinging hand does not come to rest on its hold."""
+    """How late they are shows in their motion, and gains are lower then; else a hand would not come to rest."""
     plan = plan_walk(machine, structure, grid_path([(13, 9), (13, 14)], 0.1016))
     walk = Walk(machine, structure, plan, stack=stack, plant=LaggingPlant(machine.robot, *SLOW))
     recorder = WalkRecorder(walk)
-    while walk.time < 12.0:
-        recorder.tick(walk.tick())
+    assert walk.run(recorder.tick) == "arrived"
+    assert walk.machine.lag == pytest.approx(SLOW[0] + SLOW[1] * 1e-3, rel=0.2)
     report = check_walk(recorder.log()[0], machine.urdf(tmp_path / "robot.urdf"), structure)
-    assert "joint beyond its limit" in {finding.kind for finding in report.violations}
-    assert not walk.done
+    assert report.ok, str(report)
+    assert walk.time < 1.5 * plan.path.duration
 
 
 def test_a_driven_body_on_servos(machine: Walker, structure: Structure, stack: WalkStack) -> None:

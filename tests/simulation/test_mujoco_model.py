@@ -1,4 +1,4 @@
-"""MuJoCo models made from robots: they move as Pinocchio says, stand on what touches, and take every kind of command."""
+"""MuJoCo models made from robots: they move as Pinocchio says, touch the ground, and take every kind of command."""
 
 from __future__ import annotations
 

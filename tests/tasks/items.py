@@ -17,7 +17,6 @@ from wbc.robot import Robot
 from wbc.tasks import (
     CenterOfMass,
     Damping,
-    DivergentComponent,
     Elbow,
     EndEffector,
     Expression,
@@ -118,7 +117,6 @@ FACTORIES: dict[str, Callable[[Robot], list[Declared]]] = {
     "Posture": _posture,
     "Damping": _damping,
     "CenterOfMass": _center_of_mass,
-    "DivergentComponent": lambda robot: [(DivergentComponent(omega=3.5), {"omega": 2.0, "gain": 4.0})],
     "Expression": _expression,
     "PitchPlane": _pitch_plane,
     "PitchPlaneLimit": _pitch_plane_limit,

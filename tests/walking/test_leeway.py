@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from wbc.walking.modes.steering import SPEEDS, displaced, displacement, towards, undisplaced
+from wbc.walking.modes.steering import EASILY, SPEEDS, displaced, displacement, towards, undisplaced
 
 INCH = 0.0254
 
@@ -31,10 +31,12 @@ def test_a_displacement_is_in_the_axes_of_the_body_and_its_way() -> None:
     assert undisplaced(displaced(pose.homogeneous, by), by) == pytest.approx(pose.homogeneous)
 
 
-def test_it_comes_and_goes_no_faster_than_it_may() -> None:
-    begin, wanted = np.array([0.05, 0.0, 0.0, 0.0, -0.05]), np.array([0.0, -0.05, 0.02, 0.0, 0.0])
-    rows = towards(begin, wanted, 30, 0.05)
-    steps = np.abs(np.diff(np.concatenate([begin[None], rows]), axis=0))
-    assert (steps <= SPEEDS * 0.05 + 1e-12).all()
-    assert rows[-1] == pytest.approx(wanted)
-    assert (rows[-2] == rows[-1]).all()
+def test_it_comes_and_goes_as_fast_and_as_gently_as_it_may() -> None:
+    begin, rate = np.array([0.05, 0.0, 0.0, 0.0, -0.05]), np.array([0.05, 0.0, -0.03, 0.0, 0.0])
+    wanted, spacing = np.array([0.0, -0.05, 0.02, 0.0, 0.0]), 0.05
+    rows = towards(begin, rate, np.repeat(wanted[None], 60, axis=0), spacing)
+    rates = np.diff(np.concatenate([(begin - rate * spacing)[None], begin[None], rows]), axis=0) / spacing
+    assert (np.abs(rates) <= SPEEDS + 1e-12).all()
+    assert (np.abs(np.diff(rates, axis=0)) <= EASILY * spacing + 1e-12).all()
+    assert rows[-1] == pytest.approx(wanted, abs=1e-5)
+    assert rates[-1] == pytest.approx(np.zeros(5), abs=1e-4)

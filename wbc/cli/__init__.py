@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
+#: Exit code where Ctrl-C came before any command
+INTERRUPTED_EARLY = 130
+
 
 def main() -> None:
     """Entry point of the command ``wbc``."""
-    # Imported here, so that importing the package for its documentation costs nothing
-    from wbc.cli.app import app
-    from wbc.interrupts import obey_kill
+    try:
+        # Imported here, so that importing the package for its documentation costs nothing
+        from wbc.cli.app import app
+        from wbc.interrupts import obey_kill
 
-    obey_kill()
-    app()
+        obey_kill()
+        app()
+    except KeyboardInterrupt:
+        # While the interpreter still imports: nothing has begun, and nothing is to be said
+        raise SystemExit(INTERRUPTED_EARLY) from None

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import functools
 import importlib
+import pathlib
 from typing import Annotated, Any, NamedTuple
 
 import typer
@@ -20,12 +21,15 @@ BAD_INPUT, INTERRUPTED = 2, 130
 
 
 class Listed(NamedTuple):
-    """A command: module of this package and function, its line in the list of commands, settings of its parser."""
+    """A command: module of this package and function, its line in the list of commands, settings of its parser, and
+    whether it works in a clone of the repository alone.
+    """
 
     module: str
     function: str
     line: str
     settings: dict[str, bool] | None = None
+    in_clone: bool = False
 
 
 COMMANDS = {
@@ -87,8 +91,9 @@ COMMANDS = {
     "compare-controllers": Listed(
         "compare_controllers",
         "compare_controllers",
-        "Run three published controllers of a three-link arm and two of today on the same line of 0.58 m in 1 s.",
+        "Controllers of torques beside each other, on the published arm or on any robot.",
     ),
+    "identify": Listed("identify", "identify", "Find the inertias of a simulated robot from a motion that shows much."),
     "explore": Listed(
         "explore",
         "explore",
@@ -120,9 +125,13 @@ COMMANDS = {
         "bench",
         "Compare with pink, mink and placo on the same problems (needs the repository).",
         {"allow_extra_args": True, "ignore_unknown_options": True},
+        in_clone=True,
     ),
     "docs": Listed(
-        "docs", "docs", "Write what the code declares into the pages of tasks and constraints (needs the repository)."
+        "docs",
+        "docs",
+        "Write what the code declares into the pages of tasks and constraints (needs the repository).",
+        in_clone=True,
     ),
 }
 
@@ -142,8 +151,10 @@ class CommandGroup(TyperGroup):
 
     def __init__(self, **settings: Any) -> None:
         super().__init__(**settings)
+        clone = (pathlib.Path(__file__).resolve().parents[2] / "bench" / "__main__.py").is_file()
         for name, entry in COMMANDS.items():
-            self.add_command(TyperCommand(name, help=entry.line, rich_markup_mode="rich"))
+            hidden = entry.in_clone and not clone
+            self.add_command(TyperCommand(name, help=entry.line, rich_markup_mode="rich", hidden=hidden))
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """The command that was asked for, imported."""
@@ -159,6 +170,9 @@ class CommandGroup(TyperGroup):
 
             complain(error)
             raise typer.Exit(BAD_INPUT) from error
+        except KeyboardInterrupt:
+            # While the command starts: one that has begun says what is left of its run
+            raise typer.Exit(INTERRUPTED) from None
 
 
 app = typer.Typer(

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import json
+import math
+import sys
+
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.text import Text
@@ -21,6 +25,21 @@ def out() -> Console:
 def err() -> Console:
     """For progress and errors."""
     return Console(stderr=True, highlight=False)
+
+
+def print_json(data: object) -> None:
+    """Results as one JSON document on standard output, numbers that are not finite as null."""
+    sys.stdout.write(json.dumps(_finite(data), indent=1) + "\n")
+
+
+def _finite(data: object) -> object:
+    if isinstance(data, dict):
+        return {str(key): _finite(value) for key, value in data.items()}
+    if isinstance(data, (list, tuple)):
+        return [_finite(value) for value in data]
+    if isinstance(data, float):
+        return data if math.isfinite(data) else None
+    return data
 
 
 def complain(error: WbcError) -> None:

@@ -10,11 +10,14 @@ import numpy as np
 import typer
 from rich.markup import escape
 
+from wbc.cli import completion
 from wbc.cli.analysis.advise import configuration_of
 from wbc.cli.console import err, out
 from wbc.cli.options import Backend
 from wbc.coordinates import Condition, parts
-from wbc.errors import RangeError
+from wbc.errors import RangeError, UnknownNameError
+from wbc.robot import Robot
+from wbc.robots import load
 from wbc.teleop import Keyboard, RateFile, Seen, SessionLog, Teleoperation, run_session
 from wbc.teleop.keyboard import HELP
 from wbc.teleop.session import NOTHING
@@ -23,10 +26,17 @@ from wbc.teleop.session import NOTHING
 STEPS, INTERRUPTED = (NOTHING, 0.01, 0.1, 0.5), 130
 #: While only the loss changes, a line after so long [s]
 PAUSE = 0.5
+#: The live line is written anew after so long [s]
+LIVE = 0.1
 
 
 def drive(
-    robot: Annotated[str, typer.Argument(help="A name of `wbc modes` or `wbc robots`, or a URDF or MJCF file.")],
+    robot: Annotated[
+        str,
+        typer.Argument(
+            help="A name of `wbc modes` or `wbc robots`, or a URDF or MJCF file.", autocompletion=completion.robots
+        ),
+    ],
     rates: Annotated[Path | None, typer.Option(help="CSV file of orders: time, pair, r1 ... r6.")] = None,
     keys: Annotated[bool, typer.Option("--keys", help="Orders from the keyboard, at 50 Hz.")] = False,
     mode: Annotated[
@@ -46,9 +56,11 @@ def drive(
     """
     if keys == (rates is not None):
         raise RangeError("rates", rates, "give either --rates FILE or --keys")
-    given = configuration_of(parts(robot).robot, at) if at else None
+    machine = _standing(robot)
+    given = configuration_of(parts(machine).robot, at) if at else None
     source = RateFile(rates) if rates is not None else None
-    session = Teleoperation(robot, mode or None, automatic=automatic, backend=backend)
+    err().print(f"starting {escape(robot)} ...", soft_wrap=True)
+    session = Teleoperation(machine, mode or None, automatic=automatic, backend=backend)
     q = session.start() if given is None else given
     if given is None:
         err().print(f"from --at={','.join(f'{x:.4f}' for x in q)}", soft_wrap=True, markup=False)
@@ -59,12 +71,64 @@ def drive(
             run_session(session, source, q, realtime=realtime, progress=progress, log=found)
         else:
             err().print(HELP, soft_wrap=True)
-            with Keyboard().terminal() as keyboard:
-                run_session(session, keyboard, q, realtime=True, progress=progress, log=found)
+            with Keyboard().terminal() as keyboard, _Line(session, found, progress) as line:
+                run_session(session, keyboard, q, realtime=True, progress=line, log=found)
     finally:
         _report(found, session, log)
     if found.interrupted:
         raise typer.Exit(INTERRUPTED)
+
+
+def _standing(name: str) -> str | Robot:
+    """What is driven: a robot that floats, such as a humanoid, with its base held."""
+    try:
+        base = load(name, shapes="none").base
+    except UnknownNameError:
+        return name
+    if base != "floating":
+        return name
+    err().print(f"{escape(name)} floats: its base is held where it is", soft_wrap=True)
+    return load(name, base="fixed")
+
+
+class _Line:
+    """The last line of a terminal, while keys are pressed: pose of what is commanded, its rate, and what binds."""
+
+    def __init__(self, session: Teleoperation, found: SessionLog, tell: _Teller) -> None:
+        self._session, self._found, self._tell, self._console = session, found, tell, err()
+        self._after = -LIVE
+
+    def __enter__(self) -> _Line:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._clear()
+
+    def _clear(self) -> None:
+        if self._console.is_terminal:
+            self._console.file.write("\r\x1b[K")
+            self._console.file.flush()
+
+    def __call__(self, time: float, seen: Seen) -> None:
+        if self._tell.has_news(time, seen):
+            self._clear()
+            self._tell(time, seen)
+        if self._console.is_terminal and time >= self._after + LIVE:
+            self._after = time
+            self._clear()
+            self._console.file.write(self.text(time, seen)[: self._console.width - 1])
+            self._console.file.flush()
+
+    def text(self, time: float, seen: Seen) -> str:
+        """The line, without regard to the terminal's width."""
+        parts = [f"{time:7.1f} s"]
+        frame = getattr(self._session.control.pair.task, "frame", "")
+        if frame in self._session.robot.frame_names:
+            place = self._session.robot.pose(self._found.q[-1], frame).translation
+            parts.append(f"{frame} at ({', '.join(f'{x:.3f}' for x in place)}) m")
+        parts.append(f"rate {_rates(seen.met)}")
+        binding = ", ".join(str(one) for one in seen.step.binding[:2])
+        return "  ".join([*parts, f"binds: {binding}" if binding else "nothing binds"])
 
 
 class _Teller:
@@ -74,12 +138,21 @@ class _Teller:
         self._last: tuple[object, ...] = ()
         self._loss, self._time = -1, -PAUSE
 
-    def __call__(self, time: float, seen: Seen) -> None:
+    def has_news(self, time: float, seen: Seen) -> bool:
+        """Whether there is something to say that was not said."""
+        state, loss = self._state(seen)
+        return state != self._last or (loss != self._loss and time >= self._time + PAUSE)
+
+    @staticmethod
+    def _state(seen: Seen) -> tuple[tuple[object, ...], int]:
         state = seen.active, seen.blending, seen.step.status, seen.advised
-        loss = sum(seen.lost > step for step in STEPS)
-        if state == self._last and (loss == self._loss or time < self._time + PAUSE):
+        return state, sum(seen.lost > step for step in STEPS)
+
+    def __call__(self, time: float, seen: Seen) -> None:
+        if not self.has_news(time, seen):
             return
-        self._last, self._loss, self._time = state, loss, time
+        self._last, self._loss = self._state(seen)
+        self._time = time
         text = f"{seen.active}{' (changing)' if seen.blending else ''}, {seen.step.status}, sigma {seen.sigma:.2g}"
         text += f" ({seen.kept:.2f} of the task's)"
         if seen.advised != seen.active:

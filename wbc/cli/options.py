@@ -7,11 +7,14 @@ from typing import Annotated
 
 import typer
 
+from wbc.cli import completion
 from wbc.track.presets import PRESETS
 
 _SCENE, _CONTROL, _OUTPUT = "What it does", "How it is controlled", "What it writes"
 
-RobotName = Annotated[str, typer.Argument(help="A name of `wbc robots`, or a URDF or MJCF file.")]
+RobotName = Annotated[
+    str, typer.Argument(help="A name of `wbc robots`, or a URDF or MJCF file.", autocompletion=completion.robots)
+]
 PathName = Annotated[
     str,
     typer.Option(
@@ -19,7 +22,12 @@ PathName = Annotated[
     ),
 ]
 FrameName = Annotated[
-    str | None, typer.Option(help="Frame that follows the path. Default: the robot's tip.", rich_help_panel=_SCENE)
+    str | None,
+    typer.Option(
+        help="Frame that follows the path. Default: the robot's tip.",
+        rich_help_panel=_SCENE,
+        autocompletion=completion.frames,
+    ),
 ]
 Duration = Annotated[
     float | None,
@@ -72,6 +80,7 @@ LogFormat = Annotated[str, typer.Option(help="parquet or npz.", rich_help_panel=
 Record = Annotated[
     bool, typer.Option(help="Record the inputs of every tick, for `wbc replay`.", rich_help_panel=_OUTPUT)
 ]
+AsJson = Annotated[bool, typer.Option("--json", help="Print the results as JSON.", rich_help_panel=_OUTPUT)]
 Plots = Annotated[
     bool, typer.Option(help="Draw the plots, the picture and the page that plays the run.", rich_help_panel=_OUTPUT)
 ]

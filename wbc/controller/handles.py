@@ -53,6 +53,7 @@ from wbc.tasks import (
     RollingContact,
     SelfCollision,
     SlidingContact,
+    SupportRegion,
     SurfaceContact,
     TorqueLimits,
     WorkspaceBox,
@@ -204,6 +205,13 @@ class MarginHandle(ConstraintHandle):
     rate: float
 
 
+class SupportRegionHandle(MarginHandle):
+    """Of :class:`SupportRegion`."""
+
+    normals: Any
+    offsets: Any
+
+
 class ConeHandle(MarginHandle):
     """Of :class:`AxisCone` and :class:`GazeCone`."""
 
@@ -289,6 +297,7 @@ if TYPE_CHECKING:
         TorqueLimitsHandle,
         DriveTorqueLimitsHandle,
         WrenchSumHandle,
+        SupportRegionHandle,
         DivergentComponentHandle,
         ContactForceHandle,
     ):
@@ -316,6 +325,7 @@ KINDS: dict[type[Item], type[Handle]] = {
     SlidingContact: ContactHandle,
     RollingContact: ContactHandle,
     WrenchSum: WrenchSumHandle,
+    SupportRegion: SupportRegionHandle,
     DriveTorqueLimits: DriveTorqueLimitsHandle,
     DivergentComponent: DivergentComponentHandle,
     ExternalWrench: ExternalWrenchHandle,
@@ -370,6 +380,8 @@ class Handles:
     ) -> ContactHandle: ...
     @overload
     def __getitem__(self, item: WrenchSum) -> WrenchSumHandle: ...
+    @overload
+    def __getitem__(self, item: SupportRegion) -> SupportRegionHandle: ...
     @overload
     def __getitem__(self, item: DivergentComponent) -> DivergentComponentHandle: ...
     @overload

@@ -20,6 +20,8 @@ from wbc.validation import Array
 
 #: A column that adds less than this part of its own length depends on the others
 DEPENDENT = 1e-8
+#: A column below this part of the largest is what rounding left of zero
+NOTHING = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +56,7 @@ class BaseParameters:
         """A line for each base parameter, as the sum that it is."""
         out = []
         for row in self.combination:
-            parts = [(float(x), name) for x, name in zip(row, names, strict=True) if abs(x) > 1e-6]
+            parts = [(float(x), name) for x, name in zip(row, names, strict=True) if abs(float(x)) > 1e-6]
             parts.sort(key=lambda part: -abs(part[0]))
             more = f" + {len(parts) - largest} more" if len(parts) > largest else ""
             out.append(" ".join(f"{x:+.4g} {name}" for x, name in parts[:largest]) + more)
@@ -72,7 +74,8 @@ def base_parameters(W: Array, tolerance: float = DEPENDENT) -> BaseParameters:
         raise ShapeError("W", W.shape, "expected a regressor that is not zero")
     # Columns of one length: kilograms and kg m^2 do not decide what counts as small
     sizes = np.linalg.norm(W, axis=0)
-    scale = np.where(sizes > 0.0, sizes, 1.0)
+    zero = sizes <= NOTHING * sizes.max()
+    W, scale = np.where(zero, 0.0, W), np.where(zero, 1.0, sizes)
     R, order = qr(W / scale, mode="r", pivoting=True)
     diagonal = np.abs(np.diag(R))
     rank = int((diagonal > tolerance * diagonal[0]).sum())

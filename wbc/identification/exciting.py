@@ -77,7 +77,7 @@ def exciting_motion(
     sigma = np.broadcast_to(validation.ordinary_array("noise", noise), (robot.nv,))
     random = np.random.default_rng(validation.integer("seed", seed))
     limits = robot.limits
-    known = np.isfinite(limits.position_upper - limits.position_lower)
+    known = np.isfinite(limits.position_upper - limits.position_lower) & (limits.position_upper > limits.position_lower)
     middle = np.where(known, (limits.position_lower + limits.position_upper) / 2.0, robot.neutral)
     half = np.where(known, (limits.position_upper - limits.position_lower) / 2.0, FREE)
     half = SHARE * np.minimum(half, np.pi)
@@ -105,9 +105,8 @@ def exciting_motion(
         else:
             step = max(0.02, step * SHRINK ** (1.0 / 4.0))
     if law is None:
-        raise InfeasibleError(
-            "robot.limits.effort", limits.effort, "no motion that was tried keeps the limits of torque"
-        )
+        said = "no motion that was tried keeps the limits of torque"
+        raise InfeasibleError("robot.limits.effort", limits.effort, said)
     times = np.linspace(0.0, law.duration, 4 * INSTANTS)
     return ExcitingMotion(law, base_parameters(regression.matrix(*law.at(times))), score, first)
 
@@ -118,13 +117,16 @@ class _Search:
     def __init__(self, regression: Regression, base: BaseParameters, sigma: Array) -> None:
         self.regression, self.base, self.sigma = regression, base, sigma
         limits, robot = regression.robot.limits, regression.robot
+        bounded = limits.position_upper > limits.position_lower
         self.limits = MotionLimits(
-            np.where(np.isfinite(limits.position_lower), limits.position_lower, -1e3),
-            np.where(np.isfinite(limits.position_upper), limits.position_upper, 1e3),
-            np.where(np.isfinite(limits.velocity), SHARE * limits.velocity, 1e3),
+            np.where(bounded & np.isfinite(limits.position_lower), limits.position_lower, -1e3),
+            np.where(bounded & np.isfinite(limits.position_upper), limits.position_upper, 1e3),
+            np.where(np.isfinite(limits.velocity) & (limits.velocity > 0.0), SHARE * limits.velocity, 1e3),
             np.where(np.isfinite(limits.acceleration), SHARE * limits.acceleration, ACCELERATION),
         )
-        self.effort, self.data = SHARE * limits.effort, robot.model.createData()
+        # An effort of 0 is one that the description does not state
+        self.effort = np.where(limits.effort > 0.0, SHARE * limits.effort, np.inf)
+        self.data = robot.model.createData()
 
     def score(self, waypoints: Array) -> tuple[float, Law | None]:
         """log det, and the law; none where a limit cannot be kept."""

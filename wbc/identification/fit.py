@@ -2,9 +2,9 @@
 
     minimise  |(W phi - y) / noise|^2 + weight |theta - theta_0|^2,   phi = phi(theta)
 
-theta: log-Cholesky coordinates of every body, so that each estimate is that of a body, whatever the noise; friction stands
-beside them as it is, and is at least 0. What the motion does not show stays near the model's, theta_0. W is reduced to
-its triangle by QR first, so that the samples cost nothing in the search (Levenberg and Marquardt).
+theta: log-Cholesky coordinates of every body, so that each estimate is that of a body, whatever the noise; friction
+stands beside them as it is, and is at least 0. What the motion does not show stays near the model's, theta_0. W is
+reduced to its triangle by QR first, so that the samples cost nothing in the search.
 Source: Rucker and Wensing 2022, Smooth parameterization of rigid-body inertia.
 """
 
@@ -20,9 +20,15 @@ from scipy.optimize import least_squares
 from wbc import validation
 from wbc.errors import InfeasibleError, RangeError
 from wbc.identification.base_parameters import BaseParameters, base_parameters
-from wbc.identification.pseudo_inertia import from_log_cholesky, is_body, log_cholesky, model_parameters, nearest_body
+from wbc.identification.pseudo_inertia import (
+    from_log_cholesky,
+    is_body,
+    log_cholesky,
+    model_parameters,
+    nearest_body,
+    pseudo_inertia,
+)
 from wbc.identification.pseudo_inertia import parameters as of_pseudo
-from wbc.identification.pseudo_inertia import pseudo_inertia
 from wbc.identification.regression import Regression, Samples
 from wbc.robot import Robot
 from wbc.symbolic.two_velocities import PER_BODY
@@ -69,8 +75,8 @@ def identify(regression: Regression, samples: Samples, *, noise: Array | float |
             of torques, one or one each [N m or N]; None: from a first fit.
 
     Raises:
-        ShapeError, NotFiniteError: other shapes, or numbers that are none. RangeError: noise not above 0; the model has a
-            body of negative mass or of impossible moments. InfeasibleError: the motion shows nothing.
+        ShapeError, NotFiniteError: other shapes, or numbers that are none. RangeError: noise not above 0; the model has
+            a body of negative mass or of impossible moments. InfeasibleError: the motion shows nothing.
     """
     robot, bodies = regression.robot, len(regression.robot.joint_names)
     W, y = regression.stacked(samples)

@@ -2,8 +2,8 @@
 
     tau - armature a = Y(q, v, a) phi + diag(v) f_v + diag(sign v) f_c
 
-phi has ten numbers a joint (:mod:`wbc.identification.pseudo_inertia`), f_v and f_c viscous and Coulomb friction, one each
-for a degree of freedom of a joint.
+phi has ten numbers a joint (:mod:`wbc.identification.pseudo_inertia`), f_v and f_c viscous and Coulomb friction, one
+each for a degree of freedom of a joint.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from wbc.symbolic.two_velocities import PER_BODY
 from wbc.validation import Array
 
 #: Coulomb's friction grows from 0 to its size over speeds of this order [rad/s, m/s]
-SLOW = 1e-3
+SLOW = 0.05
 
 
 class Samples(NamedTuple):

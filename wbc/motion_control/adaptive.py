@@ -45,8 +45,8 @@ LEAST = 1e-4
 SAMPLES, HORIZON = 20, 2.0
 #: Torques and accelerations are averaged over this time before they are compared, as velocities are noisy [s]
 WINDOW = 0.05
-#: How much the past counts beside the error of now, beta
-PAST = 100.0
+#: How much the past counts beside the error of now, beta: what noise of encoders of 1e-5 bears
+PAST = 1e4
 
 
 class AdaptiveControl:

@@ -26,7 +26,7 @@ Maker = Callable[[Robot, Motion, float], TorqueController]
 FASTEST = 100.0
 #: Part of a robot's mass that its unknown payload has, how much heavier links are, and noise of encoders [rad, m]
 PAYLOAD, HEAVIER, NOISE = 0.1, 1.2, 1e-5
-#: Of :func:`swing`: parts of ranges and of limits of speed that it uses, and half the range of unbounded joints [rad, m]
+#: Of :func:`swing`: parts of ranges and of limits of speed that it uses; half the range of unbounded joints [rad, m]
 RANGE, SPEED, FREE = 0.35, 0.4, 1.0
 
 

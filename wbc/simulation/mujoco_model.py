@@ -88,8 +88,8 @@ def mujoco_model(
 
     Args:
         robot: on a base that is fixed or floats. time_step: [s].
-        actuators: of every joint with one degree of freedom: ``"torque"`` within the limits of effort, ``"position"``
-            or ``"velocity"`` with gains from the inertia at the robot's neutral configuration and a frequency [1/s].
+        actuators: of every joint with one degree of freedom: ``"torque"`` within limits of effort, ``"position"`` or
+            ``"velocity"`` with gains from the inertia at the robot's neutral configuration and a frequency [1/s].
         contacts: frame -> shapes fixed to it that touch the ground and objects; nothing else of the robot touches.
         ground: height of a floor [m]; None: none. friction: coefficient, of the floor and of the contacts.
         drawn: whether the robot's own shapes are in it, to be seen; they weigh and touch nothing.

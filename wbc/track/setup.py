@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import warnings
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pinocchio as pin
@@ -104,7 +104,7 @@ class PathRun:
     plane: ElbowSwing | None = None
     holds: tuple[str, ...] = ()
     gain: float = 10.0
-    kind: str = "pose"
+    kind: Literal["pose", "position"] = "pose"
     solver: str = "daqp"
     backend: str = "auto"
 

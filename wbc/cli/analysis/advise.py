@@ -8,6 +8,7 @@ import typer
 from rich.markup import escape
 from rich.table import Table
 
+from wbc.cli import completion
 from wbc.cli.analysis.modes import SHORT_NAMES
 from wbc.cli.console import err, out
 from wbc.coordinates import Adviser, advice_time, mode_pairs, parts, restriction_table, survey_pairs
@@ -21,7 +22,12 @@ TIMED, GOAL_TIME = 5, 100
 
 
 def advise(
-    robot: Annotated[str, typer.Argument(help="A name of `wbc modes` or `wbc robots`, or a URDF or MJCF file.")],
+    robot: Annotated[
+        str,
+        typer.Argument(
+            help="A name of `wbc modes` or `wbc robots`, or a URDF or MJCF file.", autocompletion=completion.robots
+        ),
+    ],
     at: Annotated[str, typer.Option(help="Joint coordinates with commas [rad, m]. Default: neutral.")] = "",
     mode: Annotated[str, typer.Option(help=f"Pairs of this mode: {', '.join(SHORT_NAMES)}.")] = "M1",
     current: Annotated[str | None, typer.Option(help="The pair in use: stay where none is much better.")] = None,

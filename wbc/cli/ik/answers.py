@@ -66,6 +66,20 @@ class TargetAnswer:
             text += f"; within reach without {items}"
         return text + (f"; binding: {self.binding}" if self.binding else "; no row binds")
 
+    def data(self) -> dict[str, object]:
+        """For programs, in SI units; ``reason`` where the target is not reached."""
+        return {
+            "target": self.target,
+            "branch": self.branch,
+            "solved": self.solved,
+            "status": str(self.solution.status),
+            "position_error": self.off[0],
+            "rotation_error": self.off[1],
+            "binding": self.binding,
+            "q": self.solution.q.tolist(),
+            **({} if self.solved else {"reason": self.reason}),
+        }
+
 
 def check_output(file: Path | None, force: bool) -> None:
     """Whether results can be written.

@@ -9,7 +9,8 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
-from wbc.cli import options
+from wbc.cli import completion, options
+from wbc.cli.console import print_json
 from wbc.cli.ik.answers import TargetAnswer, check_output, report, save
 from wbc.cli.ik.targets import Target, given_targets
 from wbc.cli.planning import given_obstacles, planned
@@ -32,7 +33,10 @@ TargetFile = Annotated[
     Path | None,
     typer.Option(help="CSV file with columns x,y,z[,qx,qy,qz,qw], or npz file with poses.", rich_help_panel=_WHAT),
 ]
-FrameName = Annotated[str | None, typer.Option(help="Frame. Default: the robot's tip.", rich_help_panel=_WHAT)]
+FrameName = Annotated[
+    str | None,
+    typer.Option(help="Frame. Default: the robot's tip.", rich_help_panel=_WHAT, autocompletion=completion.frames),
+]
 Start = Annotated[
     str | None,
     typer.Option(help="Where the search begins, numbers with commas. Default: neutral.", rich_help_panel=_WHAT),
@@ -69,6 +73,7 @@ def ik(
     backend: options.Backend = "auto",
     out: Out = None,
     force: Force = False,
+    as_json: options.AsJson = False,
 ) -> None:
     """Find joint positions that put a frame at a pose or a position, clear of obstacles and within the limits.
 
@@ -87,7 +92,10 @@ def ik(
     answers = []
     for number, one in enumerate(wanted, 1):
         answers += _answers(solver, plan.start, number, one, branches, given)
-    report(plan.robot, plan.frame, answers)
+    if as_json:
+        print_json([answer.data() for answer in answers])
+    else:
+        report(plan.robot, plan.frame, answers)
     if out is not None:
         save(out, plan.robot, answers)
     if not all(answer.solved for answer in answers):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import fields
 from pathlib import Path
 from typing import Annotated
 
@@ -11,7 +12,8 @@ from rich.markup import escape
 from rich.table import Table
 
 from wbc import robots
-from wbc.cli.console import err, out
+from wbc.cli import completion
+from wbc.cli.console import err, out, print_json
 from wbc.cli.robot.collisions import SAMPLES, Collisions
 from wbc.cli.robot.collisions import show as show_collisions
 from wbc.robot import Robot
@@ -23,6 +25,7 @@ _PAIRS = "With --collisions, which --samples, --srdf, --pairs and --save imply"
 def table(
     match: Annotated[str, typer.Argument(help="Only names that contain this text.")] = "",
     all_: Annotated[bool, typer.Option("--all", help="Also the files that cannot be loaded, and why.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the results as JSON.")] = False,
 ) -> None:
     """List the robots that load by name."""
     rows = Table(title="Robots", title_justify="left", header_style="bold", box=None, pad_edge=False)
@@ -30,15 +33,20 @@ def table(
     rows.add_column("base")
     rows.add_column("tip frame", no_wrap=True)
     rows.add_column("about")
-    count = 0
+    count, data = 0, []
     for recipe in robots.table():
         if match.lower() not in recipe.name.lower() or (recipe.problem and not all_):
             continue
         about = f"[red]does not load: {escape(recipe.problem)}[/red]" if recipe.problem else escape(recipe.about)
         rows.add_row(recipe.name, recipe.base, recipe.frames.get("tip", "-"), about)
+        shown = {key: getattr(recipe, key) for key in ("name", "base", "about", "problem")}
+        data.append({**shown, "frames": dict(recipe.frames)})
         count += 1
     if count == 0:
         robots.load(match)  # not in the table: raises with the nearest names, unless it is a file
+    if as_json:
+        print_json(data)
+        return
     out().print(rows)
     err().print(
         f"{count} robots; [bold]wbc robot NAME[/bold] shows one. A URDF or MJCF file works in the place of a name."
@@ -46,7 +54,14 @@ def table(
 
 
 def show(
-    name: Annotated[str, typer.Argument(help="A name of `wbc robots`, or a URDF or MJCF file.", show_default=False)],
+    name: Annotated[
+        str,
+        typer.Argument(
+            help="A name of `wbc robots`, or a URDF or MJCF file.",
+            show_default=False,
+            autocompletion=completion.robots,
+        ),
+    ],
     base: Annotated[str | None, typer.Option(help="fixed, floating, planar or differential.")] = None,
     frames: Annotated[bool, typer.Option("--frames/--no-frames", help="List the frames.")] = True,
     shapes: Annotated[str, typer.Option(help="Shapes of the links: " + ", ".join(SHAPES) + ".")] = "auto",
@@ -69,6 +84,7 @@ def show(
         Path | None, typer.Option(help="Write the pairs to this file, to be edited.", rich_help_panel=_PAIRS)
     ] = None,
     force: Annotated[bool, typer.Option(help="Write over a file that is there.", rich_help_panel=_PAIRS)] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the results as JSON.")] = False,
 ) -> None:
     """Show a robot: joints, limits, frames, shapes and where the numbers come from.
 
@@ -77,6 +93,9 @@ def show(
     robot = robots.load(name, base=base, shapes=shapes)
     if collisions or samples is not None or any((srdf, pairs, save)):
         show_collisions(robot, Collisions(samples, seed, clearance, srdf, pairs, save, force))
+        return
+    if as_json:
+        print_json(_data(robot))
         return
     console = out()
     console.print(
@@ -99,6 +118,26 @@ def show(
         console.print(f"[bold]{key}[/bold]: {escape(note)}", soft_wrap=True)
     if frames:
         console.print(f"[bold]frames[/bold]   {', '.join(robot.frame_names)}")
+
+
+def _data(robot: Robot) -> dict[str, object]:
+    """What there is to know of a robot, limits by degree of freedom."""
+    limits = {field.name: getattr(robot.limits, field.name).tolist() for field in fields(robot.limits)}
+    return {
+        "name": robot.name,
+        "base": robot.base,
+        "source": robot.source,
+        "nq": robot.nq,
+        "nv": robot.nv,
+        "dofs": list(robot.dof_names),
+        "units": list(robot.dof_units),
+        "limits": limits,
+        "neutral": robot.neutral.tolist(),
+        "roles": dict(robot.frames),
+        "frames": list(robot.frame_names),
+        "shapes": {link: len(group) for link, group in robot.shapes.items()},
+        "notes": dict(robot.notes),
+    }
 
 
 def _joints(robot: Robot) -> Table:

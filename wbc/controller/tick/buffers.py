@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from wbc.errors import SolverError
 from wbc.qp.problem import QP
 from wbc.tasks.base import Command
 from wbc.validation import Array
@@ -142,8 +143,11 @@ class Assembly(Buffers, ABC):
 
         Args:
             plan: of each value what it is, where it goes in ``p``, how many numbers it has [count, 3].
+
+        Raises:
+            SolverError: not where :attr:`takes` is false.
         """
-        raise NotImplementedError
+        raise SolverError("taker", type(self).__name__, "values are checked in Python here")
 
     def commanded(self, v: Array, sound: bool) -> None:
         """What follows from a command in the report: torques, and the velocity that the next tick counts from.

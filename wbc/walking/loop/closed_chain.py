@@ -44,8 +44,8 @@ def chain_function(walker: Walker) -> ca.Function:
     body is off the place that fits, along and about the structure's axes [m, rad].
 
     Returns:
-        q with the body where the holds have it, and off that, its quaternion with the sign nearest to the one given; the slip [m];
-        and the 3 n rows in the structure ``[9 n]``.
+        q with the body where the holds have it, and off that, its quaternion with the sign nearest to the one given;
+        the slip [m]; and the 3 n rows in the structure ``[9 n]``.
     """
     known = _KNOWN.get(walker.robot)
     if known is None:

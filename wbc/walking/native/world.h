@@ -232,11 +232,12 @@ static double clearance_at(const World *world, const double *p)
     return out;
 }
 
-/* The first thing that the body at a pose is too near to, `things` for the surface; NOTHING for none. */
-static long body_meets(const World *world, const Frame *pose)
+/* The first thing that the body at a pose is nearer to than it may be, and `more`, `things` for the surface; NOTHING for
+   none. */
+static long body_meets(const World *world, const Frame *pose, double more)
 {
     for (long s = 0; s < world->bodies; ++s) {
-        const double *segment = world->body + 7 * s, least = segment[6] + world->of_body;
+        const double *segment = world->body + 7 * s, least = segment[6] + world->of_body + more;
         double ends[2][3];
         for (int e = 0; e < 2; ++e)
             for (int k = 0; k < 3; ++k)
@@ -353,12 +354,12 @@ static int between_clear(const World *world, long row, const Place *one, const P
            || (between_clear(world, row, one, &middle, holds) && between_clear(world, row, &middle, other, holds));
 }
 
-/* What the body meets at n poses (4 x 4): `things` for the surface, NOTHING for none. */
-void bodies_meet(const World *world, long n, const double *poses, long *out)
+/* What the body is nearer to at n poses (4 x 4) than it may be, and `more`: `things` for the surface, NOTHING for none. */
+void bodies_meet(const World *world, double more, long n, const double *poses, long *out)
 {
     for (long i = 0; i < n; ++i) {
         const Frame pose = frame_of(poses + 16 * i);
-        out[i] = body_meets(world, &pose);
+        out[i] = body_meets(world, &pose, more);
     }
 }
 

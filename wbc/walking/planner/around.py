@@ -100,21 +100,26 @@ class Around:
             out[slants] = straight[slants]
         return out
 
-    def bodies(self, poses: Array) -> Ints:
-        """What the body meets at poses ``[n, 4, 4]``: an index of :attr:`names`, :data:`NONE_MET` for nothing."""
+    def bodies(self, poses: Array, more: float = 0.0) -> Ints:
+        """What the body meets at poses ``[n, 4, 4]``: an index of :attr:`names`, :data:`NONE_MET` for nothing.
+
+        Args:
+            more: that it keeps beyond what it must [m].
+        """
         out = np.full(len(poses), NONE_MET, dtype=np.int64)
         world = self.world
         if world is not None:
             library, given = compiled.library(), compiled.packed(poses)
             assert library is not None
-            library.bodies_meet(world.pointer, ctypes.c_long(len(poses)), compiled.at(given), compiled.at(out))
+            sizes = ctypes.c_double(more), ctypes.c_long(len(poses))
+            library.bodies_meet(world.pointer, *sizes, compiled.at(given), compiled.at(out))
             return out
         if self.plain:
             return out
         turn, origin = poses[:, None, :3, :3], poses[:, None, :3, 3]
         a, b = ((turn @ self.body[:, part, None])[..., 0] + origin for part in (slice(0, 3), slice(3, 6)))
         for k in range(len(self.names) - 2, -1, -1):
-            near = (self._gap(k, a, b) < self.body[:, 6] + self.of_body).any(axis=1)
+            near = (self._gap(k, a, b) < self.body[:, 6] + self.of_body + more).any(axis=1)
             out[near] = k
         return out
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import time
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import Literal
 
@@ -18,7 +18,7 @@ from wbc.walking.arms.puma import limb_of
 from wbc.walking.body_path import BodyPath
 from wbc.walking.holds.structure import Structure
 from wbc.walking.planner.around import NONE_MET, Around, around
-from wbc.walking.planner.detours.route import find_routes
+from wbc.walking.planner.detours.route import BodyRoute, Routes, find_routes
 from wbc.walking.planner.fewest import fewer_slices
 from wbc.walking.planner.grips.table import Grips, grip_slices
 from wbc.walking.planner.plan import NoPlanError, Plan, Regrasp
@@ -36,6 +36,12 @@ DELAYS = (0.0, 0.25, 0.5, 1.0, 2.0, float("inf"))
 SOON = (0.0, 0.25, float("inf"))
 #: Where all searches fail, the one with any delay is made again, so many times as wide
 WIDER = 5
+#: So many of the path and its detours are searched that widely, those first on which plans came furthest
+WIDELY = 3
+#: Where so little is left of a detour, it is searched widely at once [s]
+NEARLY = 2.5
+#: With more arms than this detours, along which all but one must hold, come after the wider search
+USUAL_ARMS = 3
 
 
 def plan_walk(
@@ -81,18 +87,66 @@ def plan_walk(
     narrow = [(delay, width) for delay in (DELAYS if objective == "velocity" else DELAYS[-1:])] if detour else ()
     plan = drained(search(path, beginning, objective=objective, tries=narrow))
     if not plan.complete and detour:
-        rows = {arm.name: k for k, arm in enumerate(walker.arms)}
-        hands = {rows[name]: structure.index(hold) for name, hold in beginning[0].items()}
-        for route in find_routes(walker, structure, path, hands, deadline):
-            if route.path is None:
-                plan = replace(plan, reason=f"{plan.reason}; {route.text}", separating=route.separating)
-                continue
-            changed = drained(search(route.path, beginning, objective="destination"))
-            if changed.complete:
-                return changed
+        plan = _beside(walker, structure, path, beginning, plan, search, deadline, width)
     if not plan.complete and not partial:
         raise NoPlanError("plan", structure.name, plan.reason, separating=plan.separating)
     return plan
+
+
+def _beside(
+    walker: Walker,
+    structure: Structure,
+    path: BodyPath,
+    beginning: Beginning,
+    plan: Plan,
+    search: Callable[..., Slices[Plan]],
+    deadline: float | None,
+    width: int | None,
+) -> Plan:
+    """A plan along a detour, or by a wider search, in place of one that does not lead to the end; else that one.
+
+    Args:
+        search: as of :func:`plan_slices`, without path and beginning.
+    """
+    rows = {arm.name: k for k, arm in enumerate(walker.arms)}
+    hands = {rows[name]: structure.index(hold) for name, hold in beginning[0].items()}
+    wide = [(DELAYS[-1], WIDER * width)] if width is not None else []
+    tried = [(plan.path.duration - plan.reached, path, "")]
+    if wide and len(walker.arms) > USUAL_ARMS:
+        found = drained(search(path, beginning, objective="destination", tries=wide))
+        if found.complete:
+            return found
+        tried.clear()
+    routes, ended = find_routes(walker, structure, path, hands, deadline), None
+    while (route := _next(routes, ended)) is not None:
+        if route.path is None:
+            plan, ended = replace(plan, reason=f"{plan.reason}; {route.text}", separating=route.separating), None
+            continue
+        found = drained(search(route.path, beginning, objective="destination", tries=[(DELAYS[-1], width)]))
+        if found.complete:
+            return found
+        ended, left = round(found.reached / path.spacing), route.path.duration - found.reached
+        if wide and left <= NEARLY:
+            found = drained(search(route.path, beginning, objective="destination", tries=wide))
+            if found.complete:
+                return found
+        else:
+            tried.append((left, route.path, f"on a detour {route.text} {found.reason}"))
+    tried.sort(key=lambda one: one[0])
+    for _, way, _ in tried[:WIDELY] if wide else ():
+        found = drained(search(way, beginning, objective="destination", tries=wide))
+        if found.complete:
+            return found
+    best = next((text for *_, text in tried if text), "")
+    return replace(plan, reason=f"{plan.reason}; {best}") if best else plan
+
+
+def _next(routes: Routes, ended: int | None) -> BodyRoute | None:
+    """The next route after the one along which a plan ended at a sample; None: no other."""
+    try:
+        return next(routes) if ended is None else routes.send(ended)
+    except StopIteration:
+        return None
 
 
 def _check_ends(walker: Walker, structure: Structure, path: BodyPath) -> None:

@@ -26,7 +26,7 @@ from wbc.walking.modes.hand_motion import ArmRefused
 from wbc.walking.planner.plan import HoldLost, Plan
 from wbc.walking.run.carrying_out import CarryingOut, Outcome, Progress, farthest, travelled
 from wbc.walking.run.mode import Ending, Mode, Result, loose_hands
-from wbc.walking.run.plausible import check_holds
+from wbc.walking.run.plausible import ground
 from wbc.walking.run.recording import WalkRecorder, as_walked
 from wbc.walking.run.request import ArmRequest, ArmTask
 
@@ -61,8 +61,7 @@ class ArmTasksMode(Mode[ArmRequest]):
     def __init__(self, request: ArmRequest, walker: Walker) -> None:
         super().__init__(walker)
         data = walker.arm_data
-        self.request, self.structure = request, request.site.build()
-        check_holds(self.structure, walker)
+        self.request, self.structure = request, ground(request.site, walker)
         for task in request.tasks:
             if task.kind == "hold":
                 self.structure.index(task.hold)

@@ -20,7 +20,7 @@ from wbc.walking.modes.drive import Drive, standing_plan
 from wbc.walking.planner.plan import Plan
 from wbc.walking.run.carrying_out import CarryingOut, Progress
 from wbc.walking.run.mode import Ending, Mode, Result
-from wbc.walking.run.plausible import check_holds
+from wbc.walking.run.plausible import ground
 from wbc.walking.run.recording import WalkRecorder, as_walked
 from wbc.walking.run.request import DriveRequest
 
@@ -43,8 +43,7 @@ class DriveMode(Mode[DriveRequest]):
     def __init__(self, request: DriveRequest, walker: Walker, commands: Commands | None = None) -> None:
         super().__init__(walker)
         data = walker.arm_data
-        self.request, self.structure = request, request.site.build()
-        check_holds(self.structure, walker)
+        self.request, self.structure = request, ground(request.site, walker)
         self._pose = request.beginning(data)
         self.path = standing_path(self._pose)
         self._commands = read_commands(request.commands) if commands is None else commands

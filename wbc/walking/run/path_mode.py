@@ -26,7 +26,7 @@ from wbc.walking.planner.plan import NoPlanError, Plan, Regrasp, read_plan
 from wbc.walking.planner.planner import plan_walk
 from wbc.walking.run.carrying_out import CarryingOut, Progress
 from wbc.walking.run.mode import Asked, Ending, Mode, off_goal
-from wbc.walking.run.plausible import check_holds
+from wbc.walking.run.plausible import ground
 from wbc.walking.run.recording import WalkRecorder
 from wbc.walking.run.request import PathRequest, TwoEndedRequest
 from wbc.walking.two_ended import TwoEndedPlan, TwoEndedStack, TwoEndedWalk, plan_two_ended
@@ -89,8 +89,7 @@ class PathMode(PlannedMode[PathRequest]):
     def __init__(self, request: PathRequest, walker: Walker, ask: Ask | None = None) -> None:
         super().__init__(walker, ask)
         data = walker.arm_data
-        self.request, self.structure = request, request.site.build()
-        check_holds(self.structure, walker)
+        self.request, self.structure = request, ground(request.site, walker)
         self._given = read_plan(request.plan) if request.plan else None
         for step in () if self._given is None else self._given.regrasps:
             self.structure.index(step.target)
@@ -146,8 +145,7 @@ class TwoEndedMode(PlannedMode[TwoEndedRequest]):
     def __init__(self, request: TwoEndedRequest, walker: Walker) -> None:
         super().__init__(walker)
         _ = walker.two_ended_data
-        self.request, self.structure = request, request.site.build()
-        check_holds(self.structure, walker)
+        self.request, self.structure = request, ground(request.site, walker)
         first = [self.structure.index(name) for name in request.start]
         if isinstance(request.goal, str):
             self.structure.index(request.goal)

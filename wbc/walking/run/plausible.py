@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from wbc.errors import RangeError
 from wbc.robots import TwoEndedData, Walker
+from wbc.walking.holds.built_in import BUILT_IN
 from wbc.walking.holds.structure import Structure
+from wbc.walking.run.request import Site
 
 #: Units that files of holds are written in by mistake, and what they are in metres
 UNITS = {"inches": 0.0254, "feet": 0.3048, "centimetres": 0.01, "millimetres": 0.001}
 
+#: Rolls of a built-in hold for a body with two arms
+FOLD = 8
 #: Least and largest usual distance of neighbouring holds, over what two hands can be apart
 SMALL = 0.02, 0.25
 
@@ -23,6 +29,27 @@ def hands_apart(walker: Walker) -> float:
         return 2.0 * (data.boom_length + offsets)
     arm = data.upper_arm_length + data.forearm_length + data.hand_length
     return 2.0 * (float(np.hypot(data.shoulder_radius + data.shoulder_offset, data.neck_length)) + arm)
+
+
+def ground(site: Site, walker: Walker) -> Structure:
+    """The holds of a site for a machine. Two arms walk on one hand at a time, which has to say where the body is: holds
+    that are built in then fix tilt and roll, every 360 / :data:`FOLD` degrees.
+
+    Raises:
+        RangeError: as of :func:`check_holds`; two arms on holds of a file on which hands may roll or lean. What the
+            site raises.
+    """
+    structure = site.build()
+    if len(walker.arms) == 2 and not walker.two_ended:
+        if site.structure in BUILT_IN:
+            holds = tuple(replace(hold, roll=FOLD, max_tilt=0.0) for hold in structure.holds)
+            structure = replace(structure, holds=holds)
+        for hold in structure.holds:
+            if not hold.rolls or hold.max_tilt > 0.0:
+                reason = "one of two hands alone does not fix the body where it may roll or lean (roll, max_tilt)"
+                raise RangeError("arms", len(walker.arms), f"{reason}, as on hold {hold.id}")
+    check_holds(structure, walker)
+    return structure
 
 
 def check_holds(structure: Structure, walker: Walker) -> None:

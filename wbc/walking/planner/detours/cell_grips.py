@@ -38,6 +38,12 @@ class CellGrips:
     row: NDArray[np.int32]
     postures: Array
 
+    def only(self, cells: Flags) -> CellGrips:
+        """The same at some cells ``[cells]`` alone."""
+        left = (self.fits & cells).any(axis=1)
+        fits, lands, row = self.fits[left] & cells, self.lands[left] & cells, np.where(cells, self.row[left], -1)
+        return CellGrips(self.arm[left], self.hold[left], self.branch[left], fits, lands, row, self.postures)
+
     def of_arm(self, arm: int) -> Ints:
         """Grips of an arm."""
         return np.nonzero(self.arm == arm)[0]

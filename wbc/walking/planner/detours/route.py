@@ -5,7 +5,7 @@ from __future__ import annotations
 import heapq
 import itertools
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Generator, Mapping
 from dataclasses import dataclass
 from math import ceil, pi
 
@@ -17,8 +17,9 @@ from wbc.validation import Array
 from wbc.walking.arms.puma import limb_of
 from wbc.walking.body_path import BodyPath
 from wbc.walking.holds.structure import Structure
+from wbc.walking.planner.around import NONE_MET, Around, around
 from wbc.walking.planner.detours.cell_grips import cell_grips
-from wbc.walking.planner.detours.cell_search import CellNode, CellSearch
+from wbc.walking.planner.detours.cell_search import CellNode, CellSearch, Outcome
 from wbc.walking.planner.detours.cells import ALONG, WIDE, Cells, CellSpacing, Ints, cells_about
 
 #: How fast the body goes down [m/s] and turns [rad/s]
@@ -31,6 +32,11 @@ SLOW = 0.01
 DEAR = np.array([0.1, 0.2, 0.1])
 
 
+#: How many detours of a mesh are tried, each away from where plans along those before ended: cells next to that cost so
+#: much more
+VARIATIONS, STUCK = 4, 3.0
+#: Room that the body has beyond its clearance at the cells that are looked at first [m]
+ROOMY = 0.06
 #: Cells that are looked at, in the order of trying: higher, lower and turned, then beside the path too
 MESHES = (ALONG, WIDE)
 
@@ -52,6 +58,10 @@ class BodyRoute:
     text: str
 
 
+#: Takes the sample at which a plan along the route ends, and yields another route
+Routes = Generator[BodyRoute, int | None, None]
+
+
 def find_route(
     walker: Walker,
     structure: Structure,
@@ -67,20 +77,7 @@ def find_route(
         mesh: how far beside the path, how low, and how closely it is looked.
         start: arm -> hold (rows) of hands that hold at the beginning. deadline: of ``time.perf_counter``.
     """
-    cells = cells_about(path, structure, mesh)
-    grips = cell_grips(walker, structure, cells)
-    outcome = CellSearch(walker, structure, cells, grips).run(start, deadline)
-    if not outcome.nodes:
-        names = tuple(structure.ids[k] for k in sorted({int(grips.hold[g]) for g in outcome.reached}))
-        number = f"{outcome.expanded} landings looked at{'' if outcome.complete else ', more are left'}"
-        where = f"beyond {', '.join(names)}" if names else "from the start"
-        text = f"up to {mesh.beside * mesh.side:.2f} m beside the path there is no route {where} ({number})"
-        return BodyRoute(None, outcome.complete, names, text)
-    chain = shortest(cells, outcome.nodes, outcome.final)
-    off = cells.offsets(np.array(chain))
-    far = np.abs(off[:, 1]).max(), off[:, 2].max(), np.degrees(np.abs(off[:, 3]).max())
-    text = f"up to {far[0]:.2f} m beside, {far[1]:.2f} m lower, turned by {far[2]:.0f} deg"
-    return BodyRoute(as_path(cells, chain, path), True, (), text)
+    return next(_variations(walker, structure, path, mesh, start, deadline))
 
 
 def find_routes(
@@ -89,8 +86,8 @@ def find_routes(
     path: BodyPath,
     start: Mapping[int, int] | None = None,
     deadline: float | None = None,
-) -> Iterator[BodyRoute]:
-    """Detours, those near the path first; the next one is looked for on demand.
+) -> Routes:
+    """Detours, those near the path first, each with :data:`VARIATIONS`; the next one is looked for on demand.
 
     Args:
         start, deadline: of :func:`find_route`.
@@ -99,14 +96,88 @@ def find_routes(
     for mesh in MESHES:
         if deadline is not None and time.perf_counter() > deadline:
             return
-        yield find_route(walker, structure, path, mesh=mesh.of(limb), start=start, deadline=deadline)
+        yield from _variations(walker, structure, path, mesh.of(limb), start, deadline)
 
 
-def shortest(cells: Cells, nodes: tuple[CellNode, ...], final: Ints) -> list[int]:
-    """The quickest chain of cells through the sets of nodes, each left where the next hand lands."""
+def _variations(
+    walker: Walker,
+    structure: Structure,
+    path: BodyPath,
+    mesh: CellSpacing,
+    start: Mapping[int, int] | None,
+    deadline: float | None,
+) -> Routes:
+    """Detours of one mesh: the quickest one, then such as have room, and keep away from where plans ended."""
+    cells = cells_about(path, structure, mesh)
+    grips = cell_grips(walker, structure, cells)
+    there, dear, closed = around(walker, structure), _dear(cells), set[tuple[int, int]]()
+    outcome = CellSearch(walker, structure, cells, grips).run(start, deadline)
+    if not outcome.nodes:
+        names = tuple(structure.ids[k] for k in sorted({int(grips.hold[g]) for g in outcome.reached}))
+        number = f"{outcome.expanded} landings looked at{'' if outcome.complete else ', more are left'}"
+        where = f"beyond {', '.join(names)}" if names else "from the start"
+        text = f"up to {mesh.beside * mesh.side:.2f} m beside the path there is no route {where} ({number})"
+        yield BodyRoute(None, outcome.complete, names, text)
+        return
+    outcomes, known, seen = [outcome], list[list[int]](), 0
+    # Then through cells at which the body has more place than it needs
+    roomy = there.bodies(cells.frames, ROOMY) == NONE_MET
+    roomy[[cells.start, cells.goal]] = True
+    for count in range(VARIATIONS):
+        if count == 1 and not roomy.all():
+            outcome = CellSearch(walker, structure, cells, grips.only(roomy)).run(start, deadline)
+            outcomes += [outcome] if outcome.nodes else []
+        found = _clear(there, cells, outcomes[count % len(outcomes)], path, dear, closed)
+        if found is None or found[0] in known:
+            continue
+        chain, route, at = found
+        known.append(chain)
+        off = cells.offsets(np.array(chain))
+        far = np.abs(off[:, 1]).max(), off[:, 2].max(), np.degrees(np.abs(off[:, 3]).max())
+        text = f"up to {far[0]:.2f} m beside, {far[1]:.2f} m lower, turned by {far[2]:.0f} deg"
+        ended = yield BodyRoute(route, True, (), text)
+        seen += 1
+        if ended is not None:
+            dear[_near(cells, chain[min(int(np.searchsorted(at, ended)), len(chain) - 1)])] += STUCK
+    if not seen:
+        text = f"up to {mesh.beside * mesh.side:.2f} m beside the path the body touches something on each route"
+        yield BodyRoute(None, False, (), text)
+
+
+def _clear(
+    there: Around, cells: Cells, outcome: Outcome, path: BodyPath, dear: Array, closed: set[tuple[int, int]]
+) -> tuple[list[int], BodyPath, Ints] | None:
+    """The quickest chain of cells along which the body touches nothing on its way from cell to cell either, as a path,
+    and the samples of its cells; steps at which it would are added to ``closed``. None if there is none.
+    """
+    while True:
+        chain = shortest(cells, outcome.nodes, outcome.final, dear, closed)
+        if chain is None:
+            return None
+        route, at = as_path(cells, chain, path)
+        met = np.flatnonzero(there.bodies(route.poses) != NONE_MET)
+        if not len(met):
+            return chain, route, at
+        for k in np.unique(np.clip(np.searchsorted(at, met), 1, max(len(chain) - 1, 1))).tolist():
+            if k >= len(chain):
+                return None
+            closed |= {(chain[k - 1], chain[k]), (chain[k], chain[k - 1])}
+
+
+def shortest(
+    cells: Cells,
+    nodes: tuple[CellNode, ...],
+    final: Ints,
+    off: Array,
+    closed: Collection[tuple[int, int]] = (),
+) -> list[int] | None:
+    """The quickest chain of cells through the sets of nodes, each left where the next hand lands; None: there is none.
+
+    Args:
+        off: what each cell costs more ``[cells]``. closed: steps from cell to cell that are not made.
+    """
     sets = [set(node.cells.tolist()) for node in nodes]
     doors = [*(set(node.landed.tolist()) for node in nodes[1:]), set(final.tolist())]
-    off = _dear(cells)
     begin = (0, cells.start)
     cost: dict[tuple[int, int], float] = {begin: 0.0}
     came: dict[tuple[int, int], tuple[int, int] | None] = {begin: None}
@@ -120,6 +191,7 @@ def shortest(cells: Cells, nodes: tuple[CellNode, ...], final: Ints) -> list[int
         if layer == len(nodes):
             return _chain(came, here)
         steps = [((layer, there), price) for there, price in _neighbours(cells, cell) if there in sets[layer]]
+        steps = [(there, price) for there, price in steps if (cell, there[1]) not in closed]
         if cell in doors[layer]:
             steps.append(((layer + 1, cell), 0.0))
         for there, price in steps:
@@ -127,11 +199,11 @@ def shortest(cells: Cells, nodes: tuple[CellNode, ...], final: Ints) -> list[int
             if total < cost.get(there, np.inf):
                 cost[there], came[there] = total, here
                 heapq.heappush(queue, (total, there))
-    raise AssertionError("sets of nodes are connected")
+    return None
 
 
-def as_path(cells: Cells, chain: list[int], path: BodyPath) -> BodyPath:
-    """The path over a chain of cells, as fast as the given one along it."""
+def as_path(cells: Cells, chain: list[int], path: BodyPath) -> tuple[BodyPath, Ints]:
+    """The path over a chain of cells, as fast as the given one along it, and its samples at the cells."""
     off = cells.offsets(np.array(chain))
     poses = [pin.SE3(cells.frames[cell]) for cell in chain]
     out = [poses[0].homogeneous[None]]
@@ -141,7 +213,8 @@ def as_path(cells: Cells, chain: list[int], path: BodyPath) -> BodyPath:
         count = max(ceil(seconds / path.spacing - 1e-9), 1)
         step = pin.log6(first.actInv(last))
         out.append(np.array([(first * pin.exp6(step * (k / count))).homogeneous for k in range(1, count + 1)]))
-    return BodyPath(_rounded(np.concatenate(out), round(CORNER / path.spacing)), path.spacing)
+    whole = BodyPath(_rounded(np.concatenate(out), round(CORNER / path.spacing)), path.spacing)
+    return whole, np.cumsum([len(part) for part in out]) - 1
 
 
 def _rounded(poses: Array, most: int) -> Array:
@@ -186,6 +259,11 @@ def _neighbours(cells: Cells, cell: int) -> list[tuple[int, float]]:
     there, price = there[inside], price[inside]
     numbers = np.ravel_multi_index(tuple(there.T), cells.shape)
     return list(zip(numbers.tolist(), price.tolist(), strict=True))
+
+
+def _near(cells: Cells, cell: int) -> Ints:
+    """A cell and those next to it."""
+    return np.array([cell, *(there for there, _ in _neighbours(cells, cell))], dtype=np.int64)
 
 
 def _chain(came: dict[tuple[int, int], tuple[int, int] | None], end: tuple[int, int]) -> list[int]:

@@ -1,0 +1,76 @@
+"""The centre of mass stays where the contacts can hold the robot."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
+
+import casadi as ca
+import numpy as np
+
+from wbc import validation
+from wbc.symbolic.tracer import Tracer
+from wbc.tasks.base import Constraint, Input, Row, Values
+from wbc.tasks.center_of_mass import CenterOfMass
+
+if TYPE_CHECKING:
+    from wbc.robot import Robot
+
+#: Distance of a plane that is none [m]
+FAR = 1e3
+
+
+@dataclass(frozen=True)
+class SupportRegion(Constraint):
+    """The centre of mass c stays on the allowed side of planes along gravity, the edges of the region over which its
+    contacts can hold the robot at rest:
+
+        h_i = offset_i - n_i' c >= 0        [m]
+
+    ``wbc.support.region`` computes planes for the contacts of a stack, with their friction and, if wished, the torque
+    limits. In a stack that commands accelerations or torques the rows keep dh/dt + rate h at or above 0: with ``rate``
+    = omega of the pendulum, n_i'(c + (dc/dt) / omega) <= offset_i, so the capture point stays within as well.
+
+    Inputs:
+        normals: unit vectors n_i in the world, outwards, one after the other; zero: no plane.
+        offsets: how far each plane is from the origin of the world along its normal [m].
+
+    Example:
+        >>> SupportRegion(planes=12)
+
+    What it cannot do: the region is that of the contacts when it was computed, and with torque limits that of the
+    configuration. It is about rest; what accelerates the centre of mass is for the cones of the contacts to bear.
+
+    Attributes:
+        planes: how many at most, 3 or more.
+
+    Raises:
+        RangeError: fewer planes; in :meth:`validate`: a robot without mass.
+    """
+
+    stands_in_world: ClassVar[bool] = False
+
+    planes: int = 12
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "planes", validation.integer("SupportRegion.planes", self.planes, 3))
+
+    def validate(self, robot: Robot) -> None:
+        """Check that the robot has mass, see :meth:`Item.validate`."""
+        CenterOfMass().validate(robot)
+
+    def inputs(self, robot: Robot) -> tuple[Input, ...]:
+        """``normals`` and ``offsets``."""
+        return (
+            Input("normals", size=3 * self.planes, default=np.zeros(3 * self.planes)),
+            Input("offsets", unit="m", size=self.planes, default=np.full(self.planes, FAR)),
+        )
+
+    def rows(self, robot: Robot) -> tuple[Row, ...]:
+        """``edge 1`` and so on [m]."""
+        return tuple(Row(f"edge {k}", "m") for k in range(1, self.planes + 1))
+
+    def margins(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
+        """The formula of the class."""
+        normals = ca.reshape(inputs["normals"], 3, self.planes)
+        return ca.SX(inputs["offsets"] - normals.T @ kin.center_of_mass())

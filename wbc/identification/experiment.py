@@ -1,0 +1,149 @@
+"""A whole identification on a simulated robot: a motion that shows much, torques with noise, a fit, and a check.
+
+The simulated robot is not the one that is believed: its bodies are heavier or lighter and their inertias elsewhere, and
+its joints rub. It follows the motion under computed torque with the believed model and encoders that are noisy.
+Velocities and accelerations are differences of what the encoders say behind a low-pass filter without delay; torques
+pass the same filter. The check is the same on another motion, which the fit has not seen.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pinocchio as pin
+from scipy.signal import butter, filtfilt
+
+from wbc import validation
+from wbc.errors import RangeError
+from wbc.identification.exciting import ExcitingMotion, exciting_motion
+from wbc.identification.fit import Identified, identify
+from wbc.identification.pseudo_inertia import from_log_cholesky, is_body, log_cholesky, model_parameters
+from wbc.identification.regression import SLOW, Regression, Samples
+from wbc.robot import Robot
+from wbc.simulation import Command, CommandKind, Motors, PinocchioPlant
+from wbc.trajectory import Law
+from wbc.validation import Array
+
+#: Rate of the encoders [1/s], cut-off of the filter [Hz], rate of samples whose noise is independent behind it [1/s],
+#: and what its ends spoil [s]
+RATE, CUT, KEPT, EDGE = 250.0, 8.0, 16.0, 0.3
+#: Poles of the computed torque that follows the motion [1/s]
+POLE = 20.0
+#: Viscous and Coulomb friction and noise of the torques, each by the inertia that a joint moves [1/s, 1/s^2, 1/s^2]
+RUBBING = (1.0, 0.5, 1.0)
+#: How far the true bodies are from those believed: standard deviation of the logarithms of masses and moments
+FAR = 0.2
+
+
+@dataclass(frozen=True, eq=False)
+class Experiment:
+    """What was done and found.
+
+    Attributes:
+        true: robot that moved. motion: that it was to follow. found: by the fit. check: root of the mean square of the
+            torques of another motion that the found parameters do not explain, and that the believed ones do not, of
+            each degree of freedom [N m or N], ``[2, nv]``. errors: of the base parameters, in standard deviations.
+    """
+
+    true: Robot
+    motion: ExcitingMotion
+    found: Identified
+    check: Array
+    errors: Array
+
+
+def changed(robot: Robot, far: float = FAR, seed: int = 0) -> Robot:
+    """A robot whose bodies are others: log-Cholesky coordinates that are moved at random, each body still a body."""
+    random, model = np.random.default_rng(validation.integer("seed", seed)), robot.model.copy()
+    far = validation.scalar("far", far, low=0.0, high=2.0)
+    spread = far * np.array([0.5, 1, 1, 1, 0.1, 0.1, 0.1, 0.1, 0.1, 0.1])
+    for j in range(1, model.njoints):
+        phi = np.array(model.inertias[j].toDynamicParameters())
+        if is_body(phi):
+            phi = from_log_cholesky(log_cholesky(phi) + spread * random.normal(size=10))[0]
+            model.inertias[j] = pin.Inertia.FromDynamicParameters(phi)
+    return replace(robot, model=model)
+
+
+def record(plant: PinocchioPlant, believed: Robot, law: Law, noise: float = 0.0, seed: int = 0) -> Samples:
+    """What encoders and motors say of a motion that is followed, filtered.
+
+    Args:
+        plant: of the true robot. believed: whose model computes the torques. noise: of encoders, a standard deviation
+            [rad, m].
+
+    Raises:
+        RangeError: the motion is too short. PlantError: the simulation has blown up.
+    """
+    model, data, dt = believed.model, believed.model.createData(), 1.0 / RATE
+    random = np.random.default_rng(validation.integer("seed", seed))
+    steps = int(law.duration * RATE)
+    if steps * dt < 4.0 * EDGE:
+        raise RangeError("law.duration", law.duration, f"expected at least {4.0 * EDGE:g} s")
+    course = law.at(dt * np.arange(steps))
+    last = course.position[0]
+    plant.reset(last, 0.0)
+    q, torques = np.empty((steps, believed.nq)), np.empty((steps, believed.nv))
+    for k in range(steps):
+        q[k] = plant.read().q + noise * random.normal(size=believed.nq)
+        rate, last = (q[k] - last) / dt if k else np.zeros(believed.nv), q[k]
+        wanted, speed, change = (part[k] for part in course)
+        a = change + 2.0 * POLE * (speed - rate) + POLE**2 * (wanted - q[k])
+        torques[k] = np.clip(pin.rnea(model, data, q[k], rate, a), -believed.limits.effort, believed.limits.effort)
+        plant.apply(Command(CommandKind.TORQUE, torques[k]))
+        plant.advance(dt)
+    return filtered(q, torques, dt)
+
+
+def filtered(q: Array, torque: Array, dt: float) -> Samples:
+    """Samples without the ends: q, its differences and torques behind one low-pass filter, forwards and backwards."""
+    b, a = butter(4, CUT * 2.0 * dt)
+    smooth, load = filtfilt(b, a, q, axis=0), filtfilt(b, a, torque, axis=0)
+    v = np.gradient(smooth, dt, axis=0)
+    keep = slice(round(EDGE / dt), len(q) - round(EDGE / dt), round(1.0 / (KEPT * dt)))
+    return Samples(smooth[keep], v[keep], np.gradient(v, dt, axis=0)[keep], load[keep])
+
+
+def experiment(
+    robot: Robot,
+    *,
+    far: float = FAR,
+    noise: float = 1e-5,
+    tries: int = 200,
+    waypoints: int = 8,
+    seed: int = 0,
+    tick: Callable[[], None] = lambda: None,
+) -> Experiment:
+    """Identify a simulated robot whose bodies are not the model's and whose joints rub.
+
+    Args:
+        robot: that is believed, on a fixed base. far: how far the true bodies are. noise: of encoders [rad, m].
+            tries: motions that are looked at, of so many waypoints; tick: called after each.
+
+    Raises:
+        UnsupportedJointError: a base that moves, coupled joints, or joints with coordinates of another number.
+        InfeasibleError: no motion keeps the limits of torque. RangeError: numbers out of range.
+    """
+    noise = validation.scalar("noise", noise, low=0.0, high=0.01)
+    regression = Regression(robot, friction=True)
+    true = changed(robot, far, seed)
+    motion = exciting_motion(regression, waypoints=waypoints, tries=tries, seed=seed, tick=tick)
+    other = exciting_motion(regression, waypoints=waypoints, tries=1, seed=seed + 1)
+    size = np.diag(pin.crba(robot.model, robot.model.createData(), robot.neutral))
+    motors = Motors(viscous=RUBBING[0] * size, coulomb=RUBBING[1] * size, noise=RUBBING[2] * size, slip_speed=SLOW)
+    plant = PinocchioPlant(true, 0.5 / RATE, motors=motors, seed=seed)
+    samples, unseen = (record(plant, robot, one.law, noise, seed + k) for k, one in enumerate((motion, other)))
+    found = identify(regression, samples)
+    W, y = regression.stacked(unseen)
+    start = np.concatenate([model_parameters(robot.model), np.zeros(2 * robot.nv)])
+    truth = np.concatenate([model_parameters(true.model), motors_of(motors)])
+    check = [np.sqrt(((y - W @ phi).reshape(-1, robot.nv) ** 2).mean(axis=0)) for phi in (found.parameters, start)]
+    errors = (found.values - found.base.combination @ truth) / found.deviations
+    return Experiment(true, motion, found, np.array(check), np.asarray(errors))
+
+
+def motors_of(motors: Motors) -> Array:
+    """Viscous and Coulomb friction of motors with a number for each joint."""
+    return np.concatenate([np.asarray(motors.viscous), np.asarray(motors.coulomb)])

@@ -1,0 +1,141 @@
+"""Static equilibrium as linear rows in the wrenches of contacts, from the QP of a tick of torques at rest.
+
+At zero velocity and acceleration the rows of that QP on a floating base, torques and cones are
+
+    h - J'w = 0 (base),    -T <= h - J'w <= T,    F w >= b,    sum of wrenches = target
+
+in the wrenches w alone: with the loads, limits, masks and switches that the controller has at present.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import linprog
+
+from wbc.controller import Controller, core_of
+from wbc.controller.tick.buffers import INFINITE
+from wbc.errors import CommandError, SolverError
+from wbc.tasks._contact import ContactWrench, Unactuated
+from wbc.tasks.base import Constraint
+from wbc.tasks.wrench_sum import WrenchSum
+from wbc.validation import Array
+
+#: What is lacking counts from this share of a row's size on
+COUNTS = 1e-7
+#: How much dearer it is to lack a force on the base than one of the contacts and motors
+BASE_PRICE = 1e3
+
+
+@dataclass(frozen=True)
+class Lacking:
+    """A row that no wrenches of the contacts keep at rest, and by how much [N, N m]."""
+
+    item: str
+    row: str
+    amount: float
+    unit: str
+
+    def __str__(self) -> str:
+        return f"{self.item}/{self.row} by {self.amount:.3g} {self.unit}"
+
+
+@dataclass(frozen=True, eq=False)
+class Statics:
+    """Rows lower <= A w <= upper of a controller at rest.
+
+    Attributes:
+        A: rows x wrench components. lower, upper: [rows]. sizes: what counts as much as 1 rad, row by row.
+        base: which rows are those of the floating base. torques: of motors.
+        names: item, row and unit of each. scale: the same for the components.
+    """
+
+    A: Array
+    lower: Array
+    upper: Array
+    sizes: Array
+    base: NDArray[np.bool_]
+    torques: NDArray[np.bool_]
+    names: tuple[tuple[str, str, str], ...]
+    scale: Array
+
+
+def statics(controller: Controller, q: Any) -> Statics:
+    """The rows at a configuration.
+
+    Raises:
+        CommandError: the controller does not command torques. ShapeError, NotFiniteError: q.
+        SolverError: numbers that are not finite, such as values of inputs that nobody has set.
+    """
+    core = core_of(controller)
+    if core.layout.command != "torque":
+        reason = f'this controller commands {core.layout.command}; compile the stack with command="torque"'
+        raise CommandError("controller", core.layout.command, reason)
+    layout, stack, robot = core.layout, core.stack, core.stack.robot
+    configuration = robot.configuration("q", q)
+    if core.waiting:
+        core.take_first(configuration)
+    tick = core.assembly.twin()
+    tick.state[:] = core.assembly.state
+    tick.forget()
+    tick.q[:], tick.v_in[:], tick.use_v[0] = configuration, 0.0, 1.0
+    tick.check()
+    with np.errstate(all="ignore"):
+        qp = tick.qp()
+    place, names, base, torques, sizes = [], [], [], [], []
+    for block in layout.of_form("margins", "rows"):
+        item = block.entry.item
+        assert isinstance(item, Constraint)
+        motors = type(item).torque_rows is not Constraint.torque_rows and not isinstance(item, Unactuated)
+        if not (motors or isinstance(item, (ContactWrench, WrenchSum, Unactuated))):
+            continue
+        for k, row in enumerate(block.rows):
+            place.append(block.start + k)
+            names.append((block.entry.name, row.label, row.unit))
+            base.append(isinstance(item, Unactuated))
+            torques.append(motors)
+            sizes.append(row.scale(stack.length))
+    nv, rows = layout.nv, np.array(place, dtype=np.intp)
+    A, lower, upper = qp.A[rows, nv:], qp.lower[qp.n + rows], qp.upper[qp.n + rows]
+    if not np.isfinite(A).all() or np.isnan(lower).any() or np.isnan(upper).any():
+        raise SolverError("q", q, "the rows of this configuration are not finite")
+    scale = layout.dof_scales(stack)[nv : nv + A.shape[1]]
+    lower, upper = (np.where(np.abs(side) >= INFINITE, np.copysign(np.inf, side), side) for side in (lower, upper))
+    return Statics(A, lower, upper, np.array(sizes), np.array(base, bool), np.array(torques, bool), tuple(names), scale)
+
+
+def lacking(controller: Controller, q: Any) -> tuple[Lacking, ...]:
+    """What contacts and motors lack to hold the robot at rest at a configuration, the worst first; empty where they
+    can.
+
+        minimise  sum s_i / size_i     over w and s >= 0 with  lower - s <= A w <= upper + s
+
+    so that few rows are named: a foot that cannot bear the load by the newtons that it is short of, a motor by its
+    newton metres, and the base where contacts that only push have no wrench against its weight at all.
+
+    Args:
+        controller: of a stack that commands torques, with the values of its inputs as they are. q: configuration [nq].
+
+    Raises:
+        CommandError, ShapeError, NotFiniteError, SolverError: see :func:`statics`.
+    """
+    found = statics(controller, q)
+    count, rows = found.A.shape[1], len(found.lower)
+    wide = found.A * found.scale / found.sizes[:, None]
+    price = np.concatenate([np.zeros(count), np.where(found.base, BASE_PRICE, 1.0)])
+    sides, limits = [], []
+    for sign, end in ((1.0, found.upper), (-1.0, -found.lower)):
+        on = np.isfinite(end)
+        sides.append(np.hstack([sign * wide, -np.eye(rows)])[on])
+        limits.append((end / found.sizes)[on])
+    bounds = [(None, None)] * count + [(0.0, None)] * rows
+    answer = linprog(price, A_ub=np.vstack(sides), b_ub=np.concatenate(limits), bounds=bounds, method="highs")
+    if answer.x is None:
+        raise SolverError("q", q, f"no answer from the linear program: {answer.message}")
+    short = answer.x[count:]
+    order = np.argsort(-short)
+    named = ((found.names[k], short[k] * found.sizes[k]) for k in order if short[k] > COUNTS)
+    return tuple(Lacking(item, row, float(amount), unit) for (item, row, unit), amount in named)
