@@ -22,9 +22,11 @@ from wbc.viewer.chromium import Chromium, Page
 from wbc.viewer.presets import PRESETS, playground
 
 FOLDER = ROOT / "docs" / "images"
-SIZE, PAGE = (480, 360), (1040, 620)
+SIZE, PAGE, WINDOW = (480, 360), (1040, 620), (960, 810)
 #: Pictures of a loop, its seconds, and colours
 FRAMES, SECONDS, COLOURS = 16, 6.0, 128
+#: Part of a page without viser's own bar [pixels]
+CUT = (0, 30, 960, 720)
 #: Radii of the loop [m], where they are not those of an arm
 RADII = {"ssrms": 2.0, "walker": 0.15, "mobile": 0.5}
 
@@ -57,7 +59,8 @@ def film(browser: Chromium, name: str) -> Path:
             page.wait(f"wbc.state.number >= {frame + 1}", 60.0)
             time.sleep(0.6)
             pictures.append(Image.open(io.BytesIO(page.picture())).convert("RGB"))
-    return save([picture.resize(SIZE) for picture in pictures[1:]], FOLDER / f"play_{name.replace('-', '_')}.gif")
+    file = FOLDER / f"play_{name.replace('-', '_')}.gif"
+    return save([picture.crop(CUT).resize(SIZE) for picture in pictures[1:]], file)
 
 
 def held_back(browser: Chromium) -> Path:
@@ -115,7 +118,7 @@ def main() -> None:
     """Those that are named, or all."""
     wanted = sys.argv[1:] or ["page", *PRESETS]
     for name in wanted:
-        with Chromium(PAGE if name == "page" else (SIZE[0], SIZE[1] + 90)) as browser:
+        with Chromium(PAGE if name == "page" else WINDOW) as browser:
             print(held_back(browser) if name == "page" else film(browser, name), flush=True)
 
 

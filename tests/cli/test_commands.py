@@ -95,7 +95,7 @@ def test_track_leaves_a_run_folder(kind: str, tmp_path: Path) -> None:
     ball = ["--sphere", "0.5,0.3,0.5,0.1,0,-0.1,0", "--floor", "-0.5", "--plane", "swing", "--swing", "0.2"]
     code, out, err = run("track", "panda", *FAST, *ball, "--log", kind, "--output", folder)
     assert (code, err) == (0, "")
-    assert {p.name for p in folder.iterdir()} == {f"log.{kind}", "summary.json", "ticks.npz"}
+    assert {p.name for p in folder.iterdir()} == {f"log.{kind}", "summary.json", "ticks.npz", "report.html"}
     log = track.load(folder)
     assert len(log) == 25
     assert set(log.meta["obstacles"]) == {"sphere1", "floor"}
@@ -202,7 +202,7 @@ def test_a_run_is_not_written_over_by_accident(tmp_path: Path) -> None:
     assert "use --force" in err
     assert (tmp_path / "log.parquet").stat().st_mtime_ns == before
     assert run("track", *FAST, "--log", "npz", "--output", tmp_path, "--force")[0] == 0
-    assert {p.name for p in tmp_path.iterdir()} == {"log.npz", "summary.json", "ticks.npz"}
+    assert {p.name for p in tmp_path.iterdir()} == {"log.npz", "summary.json", "ticks.npz", "report.html"}
 
 
 def test_a_folder_that_cannot_be_made(tmp_path: Path) -> None:

@@ -79,7 +79,7 @@ def test_a_run_that_ends_early_or_is_killed(folder: Path, tmp_path: Path, monkey
 
 def test_a_run_without_a_recording(tmp_path: Path) -> None:
     assert run("track", *FAST, "--no-record", "--output", tmp_path)[0] == 0
-    assert {p.name for p in tmp_path.iterdir()} == {"log.parquet", "summary.json"}
+    assert {p.name for p in tmp_path.iterdir()} == {"log.parquet", "summary.json", "report.html"}
     code, out, err = run("replay", tmp_path)
     assert (code, out) == (2, "")
     assert err.startswith("error: recording: cannot be read: No such file")

@@ -19,6 +19,7 @@ from websockets.exceptions import InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
 from tests.viewer import arms
+from wbc.viewer import ViewerError, server
 from wbc.viewer.link import LoopEnd, ViewerEnd
 from wbc.viewer.messages import read
 from wbc.viewer.session import Session
@@ -193,3 +194,10 @@ def test_a_script_drives_by_rates(
     assert "panda: driving hand\nsolved, hand " in capsys.readouterr().out
     assert not [message for message in loop.told if message["type"] == "stop"]
     loop.told.clear()
+
+
+def test_a_viser_that_cannot_be_guarded_is_not_served(monkeypatch: pytest.MonkeyPatch) -> None:
+    # As where a version makes its sockets in another way
+    monkeypatch.setattr(server, "_guarded", lambda *_: contextlib.nullcontext([]))
+    with pytest.raises(ViewerError, match="foreign pages"):
+        server.PageServer("127.0.0.1", 0, None, {}, lambda message: None)

@@ -48,8 +48,10 @@ COMMANDS = {
         "moving_target",
         "Work on an object that moves, with and without compensation, and leave figures, plots and a film.",
     ),
-    "play": Listed("play", "play", "Open a robot in the browser: drag it, and read what holds it back."),
-    "view": Listed("view", "view", "Show a robot, or a run, in the browser."),
+    "play": Listed(
+        "play", "play", "Open a robot in the browser: drag its targets and the obstacles, and read what holds it back."
+    ),
+    "view": Listed("view", "view", "Show a robot with its joints on sliders, or a run with its time on one."),
     "walk": Listed(
         "walking.walk",
         "walk",

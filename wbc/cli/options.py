@@ -81,4 +81,6 @@ Record = Annotated[
     bool, typer.Option(help="Record the inputs of every tick, for `wbc replay`.", rich_help_panel=_OUTPUT)
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="Print the results as JSON.", rich_help_panel=_OUTPUT)]
-Plots = Annotated[bool, typer.Option(help="Draw the plots and the picture.", rich_help_panel=_OUTPUT)]
+Plots = Annotated[
+    bool, typer.Option(help="Draw the plots, the picture and the page that plays the run.", rich_help_panel=_OUTPUT)
+]

@@ -90,7 +90,7 @@ def perform(plan: PathRun, output: Output, plant: Plant | None = None) -> None:
                 files.append(folder / RECORDING)
             if output.plots:
                 files += _drawn(plan, log, folder, bar, stage)
-            files += _pages(log, figures, folder, output.record, bar, stage)
+            files += _pages(log, figures, folder, output, bar, stage)
     report(plan, log, figures, folder, files)
     for warning in start_warnings(log):
         console.print(f"[yellow]warning[/yellow]: {escape(warning)}", soft_wrap=True)
@@ -128,22 +128,23 @@ def _drawn(plan: PathRun, log: Log, folder: Path, bar: Progress, stage: Any) -> 
     return files if picture is None else [*files, picture]
 
 
-def _pages(log: Log, figures: list[Figure], folder: Path, recorded: bool, bar: Progress, stage: Any) -> list[Path]:
+def _pages(log: Log, figures: list[Figure], folder: Path, output: Output, bar: Progress, stage: Any) -> list[Path]:
     """The report; with a recording also why there were conflicts, and the page that plays the run."""
     bar.update(stage, description="report")
     out: list[Path] = []
     said: dict[int, str] = {}
-    if recorded and len(log):
+    if output.record and len(log):
         from wbc.viewer.errors import ViewerError
         from wbc.viewer.runs import PAGE_RATE, REPLAY, save_page, sentences_of, states_of
 
         recording = Recording(folder / RECORDING)
         if wanted := conflicts(log):
             said = sentences_of(recording, wanted)
-        # A run is worth keeping where what draws the page is not installed
-        with contextlib.suppress(ViewerError):
+        if output.plots:
             bar.update(stage, description="replay page")
-            out.append(save_page(*states_of(recording, rate=PAGE_RATE), folder / REPLAY))
+            # A run is worth keeping where what draws the page is not installed
+            with contextlib.suppress(ViewerError):
+                out.append(save_page(*states_of(recording, rate=PAGE_RATE), folder / REPLAY))
     return [*out, save_report(log, figures, folder, said)]
 
 

@@ -103,9 +103,12 @@ class PageServer:
         self._numbers = itertools.count(1)
         self.operator = ""
         self._lost: Callable[[], None] = lambda: None
-        with _guarded(self._look, self._handle), contextlib.redirect_stdout(io.StringIO()):
+        with _guarded(self._look, self._handle) as guarded, contextlib.redirect_stdout(io.StringIO()):
             self.server = viser.ViserServer(host=host, port=port, verbose=False)
             self._loop = self.server.get_event_loop()
+        if not guarded:
+            self.server.stop()
+            raise ViewerError("viewer", viser.__version__, "this viser cannot be kept from foreign pages; use 1.1")
         self.scene = self.server.scene
         # viser's own panel holds the tree of the scene alone here
         self.server.gui.main_panel.minimize()
@@ -157,6 +160,8 @@ class PageServer:
         """End it."""
         with contextlib.suppress(RuntimeError, AttributeError):
             self._watching.cancel()
+            # The first turn of the loop cancels it, the second ends it
+            self.answers()
             self.answers()
         with contextlib.redirect_stdout(io.StringIO()):
             self.server.stop()
@@ -269,11 +274,13 @@ def _require_free(host: str, port: int) -> None:
 
 
 @contextlib.contextmanager
-def _guarded(look: Callable[[Request, Callable[[], Any]], Any], handle: Callable[[Any, Any], Any]) -> Iterator[None]:
-    """viser's server, made inside, asks us first: it has no setting for who may connect."""
+def _guarded(
+    look: Callable[[Request, Callable[[], Any]], Any], handle: Callable[[Any, Any], Any]
+) -> Iterator[list[bool]]:
+    """viser's server, made inside, asks us first: it has no setting for who may connect. Gives whether it does."""
     from websockets.asyncio import server
 
-    original = server.serve
+    original, used = server.serve, list[bool]()
 
     @functools.wraps(original)
     def serve(handler: Any, *arguments: Any, process_request: Any = None, **settings: Any) -> Any:
@@ -283,10 +290,11 @@ def _guarded(look: Callable[[Request, Callable[[], Any]], Any], handle: Callable
         async def handled(connection: Any) -> None:
             await handle(connection, handler)
 
+        used.append(True)
         return original(handled, *arguments, process_request=process, **settings)
 
     server.serve = serve  # type: ignore[assignment,misc]
     try:
-        yield
+        yield used
     finally:
         server.serve = original  # type: ignore[misc]
