@@ -41,7 +41,7 @@ def with_masses(walker: Walker, gravity: Any = (0.0, 0.0, 0.0)) -> Walker:
     Raises:
         ShapeError: the two-ended arm, which has no such data, or gravity that is not three numbers.
     """
-    if walker.two_ended:
+    if validation.instance("walker", walker, Walker, "a walker").two_ended:
         raise ShapeError("walker", walker.robot.name, "only bodies with arms have masses")
     published, assumed = _data()["published"], _data()["assumed"]
     robot, model = walker.robot, walker.robot.model.copy()

@@ -79,12 +79,12 @@ from wbc.cli import session
 
 track = session.track
 
-def signalled(plan, progress, stop, compiled):
+def signalled(plan, progress, stop, compiled, **given):
     def at(ticks):
         progress(ticks)
         if ticks in (9, 20):
             os.kill(os.getpid(), signal.SIGINT if ticks == 9 else signal.SIGTERM)
-    return track(plan, at, stop, compiled)
+    return track(plan, at, stop, compiled, **given)
 
 session.track = signalled
 sys.argv[0] = "wbc"

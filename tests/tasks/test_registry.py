@@ -40,7 +40,7 @@ from wbc.tasks.rolling import FLAT
 
 STATES = 2
 DIRECTIONS = 2
-SHIPPED = sorted(name for name, cls in registry().items() if cls.__module__.startswith("wbc."))
+SHIPPED = sorted(name for name, cls in registry().items() if cls.__module__.startswith("wbc.tasks."))
 
 
 def close(found: np.ndarray, wanted: np.ndarray, tolerance: float = 1e-7) -> None:

@@ -34,7 +34,7 @@ def test_a_displacement_is_in_the_axes_of_the_body_and_its_way() -> None:
 def test_it_comes_and_goes_as_fast_and_as_gently_as_it_may() -> None:
     begin, rate = np.array([0.05, 0.0, 0.0, 0.0, -0.05]), np.array([0.05, 0.0, -0.03, 0.0, 0.0])
     wanted, spacing = np.array([0.0, -0.05, 0.02, 0.0, 0.0]), 0.05
-    rows = towards(begin, rate, np.repeat(wanted[None], 60, axis=0), spacing)
+    rows = towards(begin, rate, np.repeat(wanted[None], 80, axis=0), spacing)
     rates = np.diff(np.concatenate([(begin - rate * spacing)[None], begin[None], rows]), axis=0) / spacing
     assert (np.abs(rates) <= SPEEDS + 1e-12).all()
     assert (np.abs(np.diff(rates, axis=0)) <= EASILY * spacing + 1e-12).all()

@@ -21,8 +21,8 @@ list; a test fails where it is stale. [Your own tasks](expression.md) have the s
 
 
 def shipped() -> dict[str, type[Item]]:
-    """The classes of this package by name; the user's own are in the registry, too, but have no page here."""
-    return {name: cls for name, cls in sorted(registry().items()) if cls.__module__.startswith("wbc.")}
+    """The classes of this package by name; others, a user's too, are in the registry but have no page here."""
+    return {name: cls for name, cls in sorted(registry().items()) if cls.__module__.startswith("wbc.tasks.")}
 
 
 def page_name(cls: type[Item]) -> str:
